@@ -1,0 +1,1 @@
+//! Geometry, circuit and limits of a coil.

@@ -1,0 +1,5 @@
+//! The input documents: types, validation, messages. Lengths are metres inside.
+
+pub mod model;
+
+pub use model::*;

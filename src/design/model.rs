@@ -1,0 +1,201 @@
+//! What a design file says, validated, in SI units.
+
+use std::path::PathBuf;
+
+use crate::numerics::axis::Axis;
+
+/// A validated design.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Design {
+    /// `[A-Za-z0-9._-]+`; names the output folder.
+    pub name: String,
+    /// The coil's winding; may be absent for `optimize` and `sweep` only.
+    pub coil: Option<Coil>,
+    /// The wire it is wound of.
+    pub wire: Wire,
+    /// The steel core; `None` for an air coil.
+    pub core: Option<Core>,
+    /// Where the coils stand.
+    pub array: Array,
+    /// The finger's magnet.
+    pub magnet: Magnet,
+    /// Current and voltage limits.
+    pub supply: Supply,
+    /// Limits that `evaluate` and `optimize` check.
+    pub limits: Limits,
+    /// Height of the magnet's centre above the winding's top face at the target, m.
+    pub target_height_m: f64,
+    /// Grid on which maps are tabulated.
+    pub workspace: Workspace,
+}
+
+/// The winding: uniform current density over `[inner, outer] x [-length, 0]`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coil {
+    /// Inner diameter, m.
+    pub inner_diameter_m: f64,
+    /// Outer diameter, m.
+    pub outer_diameter_m: f64,
+    /// Length along z, m.
+    pub length_m: f64,
+    /// Number of turns; `None` means as many as fit, not rounded.
+    pub turns: Option<f64>,
+}
+
+/// The wire.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Wire {
+    /// Diameter over the insulation, m: decides how many turns fit.
+    pub diameter_m: f64,
+    /// Diameter of the metal, m: decides the resistance.
+    pub conductor_diameter_m: f64,
+    /// Resistivity at 20 C, ohm m.
+    pub resistivity_ohm_m: f64,
+    /// Temperature, C.
+    pub temperature_c: f64,
+    /// Insulated diameters that `optimize` may choose among, m.
+    pub choices_m: Vec<f64>,
+}
+
+/// How the core's steel is described.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Steel {
+    /// Linear, homogeneous: mu_r.
+    Linear(f64),
+    /// A B-H table, path resolved against the design file's folder.
+    Curve(PathBuf),
+}
+
+/// The steel core: a cylinder on the coil's axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Core {
+    /// Gap between core and winding, m: core radius = inner diameter / 2 - clearance.
+    pub clearance_m: f64,
+    /// The core's top is at z = +above, m.
+    pub above_m: f64,
+    /// The core's bottom is at z = -(length + below), m.
+    pub below_m: f64,
+    /// Material.
+    pub steel: Steel,
+    /// Flux density above which a warning is due, T.
+    pub knee_t: f64,
+    /// Conductivity, S/m, for the transient estimate.
+    pub conductivity_s_per_m: f64,
+}
+
+/// How the neighbours' cores are treated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Coupling {
+    /// All cores respond to each driven coil.
+    Full,
+    /// Superposition of single coils.
+    None,
+}
+
+/// The array of identical coils, axes parallel to z, top faces at z = 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Array {
+    /// Axes' positions, m, in coil order.
+    pub positions_m: Vec<[f64; 2]>,
+    /// Rows, columns and pitch (m) where the positions come from a grid.
+    pub grid: Option<ArrayGrid>,
+    /// Coupling between cores.
+    pub coupling: Coupling,
+    /// Measured scale of each coil's map; one entry a coil.
+    pub gain: Vec<f64>,
+}
+
+/// A rectangular arrangement: index = row * columns + column.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ArrayGrid {
+    /// Rows; y grows with the row.
+    pub rows: usize,
+    /// Columns; x grows with the column.
+    pub columns: usize,
+    /// Distance between neighbours, m.
+    pub pitch_m: f64,
+}
+
+/// Which way a positive current pushes the magnet on the coil's axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Polarity {
+    /// Up: the moment points down, m_z < 0.
+    Repel,
+    /// Down: m_z > 0.
+    Attract,
+}
+
+/// How the magnet's force is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MagnetModel {
+    /// A point dipole at the magnet's centre (eq. 5).
+    Dipole,
+    /// The surface charges of the cylinder.
+    Cylinder,
+}
+
+/// The finger's magnet.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Magnet {
+    /// Diameter, m.
+    pub diameter_m: f64,
+    /// Length, m.
+    pub length_m: f64,
+    /// Axial magnetisation, A/m, positive.
+    pub magnetization_a_per_m: f64,
+    /// Direction of the moment.
+    pub polarity: Polarity,
+    /// Dipole or cylinder.
+    pub model: MagnetModel,
+    /// Moment tilted about x, then y, degrees.
+    pub tilt_deg: [f64; 2],
+    /// Whether the unpowered steel's pull is added.
+    pub passive_force: bool,
+}
+
+/// Current and voltage limits of the drivers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Supply {
+    /// Upper current limit of each coil, A (>= 0); one entry a coil.
+    pub current_max_a: Vec<f64>,
+    /// Lower current limit of each coil, A (<= 0); one entry a coil.
+    pub current_min_a: Vec<f64>,
+    /// Limit of the sum of the currents, A.
+    pub total_current_max_a: Option<f64>,
+    /// Supply voltage, V.
+    pub voltage_v: Option<f64>,
+}
+
+/// Limits; `None` where the design names none.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Limits {
+    /// Resistance at the wire's temperature, ohm.
+    pub resistance_max_ohm: Option<f64>,
+    /// Five time constants, s.
+    pub settling_max_s: Option<f64>,
+    /// Outer diameter, m.
+    pub outer_diameter_max_m: Option<f64>,
+    /// Inner diameter (a lower limit), m.
+    pub inner_diameter_min_m: Option<f64>,
+    /// Length, m.
+    pub length_max_m: Option<f64>,
+    /// Heat at the rated current, W.
+    pub power_max_w: Option<f64>,
+    /// Mass of wire and core, kg.
+    pub mass_max_kg: Option<f64>,
+    /// Length of wire, m.
+    pub wire_length_max_m: Option<f64>,
+    /// Flux density in the core, T.
+    pub core_field_max_t: Option<f64>,
+}
+
+/// The workspace grid, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Workspace {
+    /// x axis, m.
+    pub x_m: Axis,
+    /// y axis, m.
+    pub y_m: Axis,
+    /// z axis, m; from the windings' top face up.
+    pub z_m: Axis,
+}

@@ -1,0 +1,1 @@
+//! The force constant: the path of e*(lambda) and its criteria.

@@ -1,0 +1,7 @@
+//! The binary: calls the command line, returns its exit code.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    fluxform::cli::main(std::env::args_os())
+}

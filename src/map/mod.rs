@@ -1,0 +1,1 @@
+//! Tabulation over the workspace and its error.

@@ -1,0 +1,60 @@
+//! Equally spaced grid axes whose two ends are exact.
+
+/// An axis from `from` to `to` with `samples` equally spaced nodes, both ends included exactly.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Axis {
+    /// First node.
+    pub from: f64,
+    /// Last node.
+    pub to: f64,
+    /// Number of nodes, at least 1; with 1 the node is `from`.
+    pub samples: usize,
+}
+
+impl Axis {
+    /// The node `index`. Mirrored axes (`from == -to`) have exactly mirrored nodes.
+    #[must_use]
+    pub fn node(&self, index: usize) -> f64 {
+        let last = self.samples.saturating_sub(1);
+        if last == 0 {
+            return self.from;
+        }
+        // Weights from the two ends: exact at both, and symmetric under reversal.
+        let (a, b) = ((last - index) as f64, index as f64);
+        (a * self.from + b * self.to) / last as f64
+    }
+
+    /// All nodes in order.
+    #[must_use]
+    pub fn nodes(&self) -> Vec<f64> {
+        (0..self.samples).map(|i| self.node(i)).collect()
+    }
+
+    /// Distance between neighbouring nodes; 0 for a single node.
+    #[must_use]
+    pub fn step(&self) -> f64 {
+        if self.samples < 2 {
+            0.0
+        } else {
+            (self.to - self.from) / (self.samples - 1) as f64
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Axis;
+
+    #[test]
+    fn ends_are_exact_and_nodes_mirror() {
+        let axis = Axis { from: -0.05, to: 0.05, samples: 61 };
+        let nodes = axis.nodes();
+        assert_eq!(nodes[0], -0.05);
+        assert_eq!(nodes[60], 0.05);
+        for i in 0..61 {
+            assert_eq!(nodes[i], -nodes[60 - i]);
+        }
+        let skew = Axis { from: 0.013, to: 0.071, samples: 30 };
+        assert_eq!((skew.node(0), skew.node(29)), (0.013, 0.071));
+    }
+}

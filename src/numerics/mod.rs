@@ -1,0 +1,3 @@
+//! Quadrature, ordered sums, small dense algebra, interpolation: no physics.
+
+pub mod axis;

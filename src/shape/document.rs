@@ -1,0 +1,97 @@
+//! What a shape file says, validated, in SI units.
+
+use std::path::PathBuf;
+
+use crate::numerics::axis::Axis;
+
+/// A validated shape document, or a raw surface with its flags.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShapeDocument {
+    /// Names the bundle's folder.
+    pub name: String,
+    /// Where the surface comes from.
+    pub source: SurfaceSource,
+    /// Applied to the surface after its unit: rotation about x, then y, then z, then translation.
+    pub placement: Placement,
+    /// Grid of constraint points; `None`: 61 x 61 over the surface's own extent.
+    pub grid: GridRequest,
+}
+
+/// Where a surface comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SurfaceSource {
+    /// A file, path resolved against the shape file's folder, and metres per file unit
+    /// (`None` where the format itself carries the unit).
+    File {
+        /// Path to read.
+        path: PathBuf,
+        /// Metres per unit of the file's coordinates.
+        unit_m: Option<f64>,
+    },
+    /// One of the seed's shapes.
+    Primitive(Primitive),
+}
+
+/// The seed's shapes, exact (physics.md 8).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Primitive {
+    /// A horizontal square.
+    Flat {
+        /// Side, m.
+        side_m: f64,
+        /// Height, m.
+        height_m: f64,
+    },
+    /// The upper half of a sphere.
+    HalfSphere {
+        /// Radius, m.
+        radius_m: f64,
+        /// Height of its base, m.
+        base_m: f64,
+    },
+    /// The upper half of a cylinder whose axis is y.
+    HalfCylinder {
+        /// Radius, m.
+        radius_m: f64,
+        /// Length along y, m.
+        length_m: f64,
+        /// Height of its base, m.
+        base_m: f64,
+    },
+    /// A plane that rises with x.
+    Wedge {
+        /// Side of its square footprint, m.
+        side_m: f64,
+        /// Height at the low side, m.
+        low_m: f64,
+        /// Height at the high side, m.
+        high_m: f64,
+    },
+}
+
+/// Rigid placement: rotate about x, then y, then z, then translate.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Placement {
+    /// Translation, m.
+    pub translate_m: [f64; 3],
+    /// Rotation angles, degrees.
+    pub rotate_deg: [f64; 3],
+}
+
+/// Which grid of points is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GridRequest {
+    /// Extent and samples along x; `None` extent: the surface's own.
+    pub x: AxisRequest,
+    /// The same along y.
+    pub y: AxisRequest,
+}
+
+/// One axis of the requested grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum AxisRequest {
+    /// A given axis, m.
+    Given(Axis),
+    /// This many samples over the surface's own extent.
+    Extent(usize),
+}

@@ -1,0 +1,3 @@
+//! Surfaces: mesh readers, primitives, the height map and the constraint points.
+
+pub mod document;

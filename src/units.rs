@@ -1,0 +1,27 @@
+//! Physical constants with their sources, and the millimetre border.
+
+use std::f64::consts::PI;
+
+/// Vacuum permeability, T m/A: 4 pi 1e-7 exactly (CODATA 2022 lies 1.3e-10 lower, relatively).
+pub const MU_0_T_M_PER_A: f64 = 4.0e-7 * PI;
+
+/// Temperature coefficient of copper's resistivity at 20 C, 1/K (IEC 60028).
+pub const COPPER_TEMPERATURE_COEFFICIENT_PER_K: f64 = 3.93e-3;
+
+/// Temperature at which a design file states the resistivity, C.
+pub const REFERENCE_TEMPERATURE_C: f64 = 20.0;
+
+/// Density of annealed copper at 20 C, kg/m^3 (IEC 60028).
+pub const COPPER_DENSITY_KG_PER_M3: f64 = 8890.0;
+
+/// Smallest force a finger feels, N (Burdea 1999).
+pub const DETECTION_THRESHOLD_N: f64 = 0.8e-3;
+
+/// Just-noticeable relative difference of finger force (Pang, Tan and Durlach 1991).
+pub const FORCE_JND: f64 = 0.07;
+
+/// Millimetres to metres. The quotient is correctly rounded: 38 mm is the double nearest 0.038.
+#[must_use]
+pub fn m_from_mm(length_mm: f64) -> f64 {
+    length_mm / 1000.0
+}
