@@ -1,5 +1,17 @@
 //! The input documents: types, validation, messages. Lengths are metres inside.
 
+pub mod array;
+mod checks;
+pub mod diagnostics;
 pub mod model;
+pub mod parse;
+pub mod reader;
+pub mod rule;
+pub(crate) mod sections;
+pub mod source;
+pub mod values;
+pub mod words;
 
+pub use diagnostics::{Fault, Faults, InvalidDocument, Severity};
 pub use model::*;
+pub use parse::Need;

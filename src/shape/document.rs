@@ -1,8 +1,15 @@
 //! What a shape file says, validated, in SI units.
 
+mod format;
+mod raw;
+mod read;
+
 use std::path::PathBuf;
 
 use crate::numerics::axis::Axis;
+
+pub use format::{SurfaceFormat, parse_unit};
+pub use raw::{RawSurface, RawSurfaceError};
 
 /// A validated shape document, or a raw surface with its flags.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,7 +20,8 @@ pub struct ShapeDocument {
     pub source: SurfaceSource,
     /// Applied to the surface after its unit: rotation about x, then y, then z, then translation.
     pub placement: Placement,
-    /// Grid of constraint points; `None`: 61 x 61 over the surface's own extent.
+    /// Grid of constraint points: of a document 61 x 61 over [-50, 50] mm unless it says
+    /// otherwise, of a raw surface 61 x 61 over its own extent.
     pub grid: GridRequest,
 }
 

@@ -1,0 +1,238 @@
+//! Reading a design file: text to a validated [`Design`], or every fault in it.
+
+use std::path::Path;
+
+use super::checks;
+use super::diagnostics::{Faults, InvalidDocument};
+use super::model::{
+    Array, Coil, Core, Coupling, Design, Limits, Magnet, Steel, Supply, Wire, Workspace,
+};
+use super::reader::{Located, Section, Sink, read_document};
+use super::sections::{self, ArrayDraft, CoilDraft, CoreDraft, Layout, MagnetDraft};
+use super::sections::{SupplyDraft, WireDraft, WorkspaceDraft, axis_m};
+use super::source;
+use super::values::OneOrMany;
+use crate::units::m_from_mm;
+
+/// What a command needs of a design. What it does not place may overlap: then that is a warning.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Need {
+    /// The coil as given: `[coil]` is required.
+    pub coil: bool,
+    /// The coils beside each other: they must not overlap.
+    pub array: bool,
+    /// The magnet at the target height: it must not overlap winding or core.
+    pub target: bool,
+    /// The workspace grid: it must lie above the windings and the cores.
+    pub workspace: bool,
+}
+
+impl Need {
+    /// `evaluate`.
+    pub const EVALUATE: Self = Self {
+        coil: true,
+        array: true,
+        target: true,
+        workspace: false,
+    };
+    /// `probe`.
+    pub const PROBE: Self = Self {
+        coil: true,
+        array: true,
+        target: false,
+        workspace: false,
+    };
+    /// `map`.
+    pub const MAP: Self = Self {
+        coil: true,
+        array: true,
+        target: false,
+        workspace: true,
+    };
+    /// `lambda`.
+    pub const LAMBDA: Self = Self::PROBE;
+    /// `calibrate`.
+    pub const CALIBRATE: Self = Self::MAP;
+    /// `optimize`.
+    pub const OPTIMIZE: Self = Self {
+        coil: false,
+        array: false,
+        target: true,
+        workspace: false,
+    };
+    /// `sweep plan`: each design of the sweep is checked when it runs.
+    pub const SWEEP: Self = Self {
+        coil: false,
+        array: false,
+        target: false,
+        workspace: false,
+    };
+}
+
+impl Design {
+    /// The design that `text` describes, and the warnings about it. `path` names it in messages
+    /// and its folder is where a relative `bh_curve` is looked for.
+    ///
+    /// # Errors
+    /// Every fault found.
+    pub fn from_toml(
+        text: &str,
+        path: &Path,
+        need: Need,
+    ) -> Result<(Self, Faults), InvalidDocument> {
+        read_document(text, path, |root, sink| {
+            let draft = Draft::read(root, need);
+            checks::check(&draft, need, sink);
+            draft.design(path, sink)
+        })
+    }
+
+    /// The design in the file `path`, as [`Design::from_toml`].
+    ///
+    /// # Errors
+    /// Every fault found, or why the file cannot be read.
+    pub fn read(path: &Path, need: Need) -> Result<(Self, Faults), InvalidDocument> {
+        Self::from_toml(&source::text_of(path)?, path, need)
+    }
+}
+
+/// The sections as read, in the file's units.
+#[derive(Debug)]
+pub(super) struct Draft {
+    name: Option<String>,
+    pub(super) coil: Option<CoilDraft>,
+    pub(super) wire: WireDraft,
+    pub(super) core: Option<CoreDraft>,
+    pub(super) array: ArrayDraft,
+    pub(super) magnet: MagnetDraft,
+    pub(super) supply: SupplyDraft,
+    limits: Limits,
+    pub(super) target_height: Located<f64>,
+    pub(super) workspace: WorkspaceDraft,
+}
+
+impl Draft {
+    fn read(root: &mut Section<'_>, need: Need) -> Self {
+        if need.coil && !root.has("coil") {
+            root.missing(
+                "coil",
+                "add [coil] with inner_diameter_mm, outer_diameter_mm, length_mm",
+            );
+        }
+        Self {
+            name: root.name(),
+            coil: sections::coil(root.section("coil")),
+            wire: sections::wire(root.section("wire")),
+            core: sections::core(root.section("core")),
+            array: sections::array(root.section("array")),
+            magnet: sections::magnet(root.section("magnet")),
+            supply: sections::supply(root.section("supply")),
+            limits: sections::limits(root.section("limits")),
+            target_height: sections::target_height_mm(root.section("target")),
+            workspace: sections::workspace(root.section("workspace")),
+        }
+    }
+
+    /// The design in SI; `None` where an error stands in the way.
+    fn design(self, path: &Path, sink: &Sink) -> Option<Design> {
+        if sink.has_errors() {
+            return None;
+        }
+        let positions_m = self.array.layout.positions_m();
+        let coils = positions_m.len();
+        let coupling = match self.core {
+            Some(_) => Coupling::Full,
+            None => Coupling::None,
+        };
+        Some(Design {
+            name: self.name?,
+            coil: self.coil.map(coil_m),
+            wire: wire_m(self.wire),
+            core: self.core.map(|core| core_m(core, path)),
+            array: Array {
+                positions_m,
+                grid: match self.array.layout {
+                    Layout::Grid(grid, _) => Some(grid),
+                    _ => None,
+                },
+                coupling: self.array.coupling.unwrap_or(coupling),
+                gain: self
+                    .array
+                    .gain
+                    .map_or_else(|| vec![1.0; coils], |gain| gain.value),
+            },
+            magnet: magnet_m(&self.magnet),
+            supply: supply_of(self.supply, coils),
+            limits: self.limits,
+            target_height_m: m_from_mm(self.target_height.value),
+            workspace: workspace_m(&self.workspace)?,
+        })
+    }
+}
+
+fn coil_m(draft: CoilDraft) -> Coil {
+    Coil {
+        inner_diameter_m: m_from_mm(draft.inner.value),
+        outer_diameter_m: m_from_mm(draft.outer.value),
+        length_m: m_from_mm(draft.length.value),
+        turns: draft.turns.map(|turns| turns.value),
+    }
+}
+
+fn wire_m(draft: WireDraft) -> Wire {
+    Wire {
+        diameter_m: m_from_mm(draft.diameter.value),
+        conductor_diameter_m: m_from_mm(draft.conductor.value),
+        resistivity_ohm_m: draft.resistivity_ohm_m.value,
+        temperature_c: draft.temperature_c.value,
+        choices_m: draft.choices.into_iter().map(m_from_mm).collect(),
+    }
+}
+
+fn core_m(draft: CoreDraft, path: &Path) -> Core {
+    let beside = |file: String| path.parent().unwrap_or(Path::new("")).join(file);
+    Core {
+        clearance_m: m_from_mm(draft.clearance.value),
+        above_m: m_from_mm(draft.above.value),
+        below_m: m_from_mm(draft.below.value),
+        steel: match draft.bh_curve {
+            Some(file) => Steel::Curve(beside(file)),
+            None => Steel::Linear(draft.relative_permeability),
+        },
+        knee_t: draft.knee_t,
+        conductivity_s_per_m: draft.conductivity_s_per_m,
+    }
+}
+
+fn magnet_m(draft: &MagnetDraft) -> Magnet {
+    Magnet {
+        diameter_m: m_from_mm(draft.diameter),
+        length_m: m_from_mm(draft.length),
+        magnetization_a_per_m: draft.magnetization_a_per_m,
+        polarity: draft.polarity,
+        model: draft.model,
+        tilt_deg: draft.tilt_deg,
+        passive_force: draft.passive_force,
+    }
+}
+
+fn supply_of(draft: SupplyDraft, coils: usize) -> Supply {
+    let each = |current: OneOrMany| match current {
+        OneOrMany::One(current) => vec![current; coils],
+        OneOrMany::Many(currents) => currents,
+    };
+    Supply {
+        current_max_a: each(draft.current_max_a.value),
+        current_min_a: each(draft.current_min_a.value),
+        total_current_max_a: draft.total_current_max_a,
+        voltage_v: draft.voltage_v,
+    }
+}
+
+fn workspace_m(draft: &WorkspaceDraft) -> Option<Workspace> {
+    Some(Workspace {
+        x_m: axis_m(draft.x.as_ref()?.value),
+        y_m: axis_m(draft.y.as_ref()?.value),
+        z_m: axis_m(draft.z.as_ref()?.value),
+    })
+}

@@ -1,0 +1,216 @@
+//! Typed reading of a TOML document that collects every fault instead of stopping at the first.
+//!
+//! A section knows the keys it was asked for; [`Section::finish`] refuses all others. So a key
+//! is declared where it is read, on one line, and nowhere else.
+//!
+//! A number at fault is reported once and then reads as NaN, which satisfies no comparison: the
+//! checks that follow stay silent about it. Such a number never leaves the room, because a
+//! document with an error yields no value.
+
+use std::cell::RefCell;
+use std::ops::Range;
+use std::path::Path;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::diagnostics::{Fault, Faults, InvalidDocument, Severity};
+use super::words::{QUOTED_MAX, escaped, nearest, quoted};
+
+/// A value and the bytes it stands at (those of its section where it is a default).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Located<T> {
+    /// The value.
+    pub value: T,
+    /// Bytes of the source text.
+    pub span: Range<usize>,
+}
+
+/// The faults found so far.
+#[derive(Debug, Default)]
+pub struct Sink(RefCell<Vec<Fault>>);
+
+impl Sink {
+    /// Adds a fault.
+    pub fn add(&self, fault: Fault) {
+        self.0.borrow_mut().push(fault);
+    }
+
+    /// True when one of the faults is an error.
+    #[must_use]
+    pub fn has_errors(&self) -> bool {
+        self.0
+            .borrow()
+            .iter()
+            .any(|f| f.severity == Severity::Error)
+    }
+}
+
+/// Reads the document `text` with `read`, which takes the root section and the sink.
+///
+/// Returns the value and the warnings.
+///
+/// # Errors
+/// Every fault of the document when one of them is an error; the syntax errors alone where the
+/// text is not TOML, because what can be read of such a text misleads.
+pub fn read_document<T>(
+    text: &str,
+    path: &Path,
+    read: impl FnOnce(&mut Section<'_>, &Sink) -> Option<T>,
+) -> Result<(T, Faults), InvalidDocument> {
+    let (table, errors) = DeTable::parse_recoverable(text);
+    let sink = Sink::default();
+    errors
+        .iter()
+        .for_each(|error| sink.add(syntax_fault(error)));
+    let mut value = None;
+    if !sink.has_errors() {
+        let mut root = Section::root(table.get_ref(), &sink);
+        value = read(&mut root, &sink);
+        root.finish();
+    }
+    let refused = sink.has_errors();
+    let faults = Faults::new(path, text, sink.0.into_inner());
+    match value {
+        Some(value) if !refused => Ok((value, faults)),
+        _ => Err(InvalidDocument { faults }),
+    }
+}
+
+fn syntax_fault(error: &toml::de::Error) -> Fault {
+    let message = format!("not valid TOML: {}", escaped(error.message().trim(), 200));
+    Fault::error("", message).at(&error.span().unwrap_or(0..0))
+}
+
+/// One table of the document.
+#[derive(Debug)]
+pub struct Section<'a> {
+    pub(super) sink: &'a Sink,
+    pub(super) path: String,
+    span: Range<usize>,
+    table: Option<&'a DeTable<'a>>,
+    known: Vec<&'static str>,
+}
+
+/// A value of the document and where it stands.
+pub(super) type Found<'a> = &'a Spanned<DeValue<'a>>;
+
+impl<'a> Section<'a> {
+    fn root(table: &'a DeTable<'a>, sink: &'a Sink) -> Self {
+        Self {
+            sink,
+            path: String::new(),
+            span: 0..0,
+            table: Some(table),
+            known: Vec::new(),
+        }
+    }
+
+    /// The table `name` of this one; absent tables read as empty ones.
+    pub fn section(&mut self, name: &'static str) -> Section<'a> {
+        let found = self.found(name);
+        let table = found.and_then(|value| match value.get_ref() {
+            DeValue::Table(table) => Some(table),
+            _ => {
+                self.add_wrong_type(&self.path_of(name), value, &format!("a section [{name}]"));
+                None
+            }
+        });
+        Section {
+            sink: self.sink,
+            path: self.path_of(name),
+            span: found.map_or(self.span.clone(), Spanned::span),
+            table,
+            known: Vec::new(),
+        }
+    }
+
+    /// True when the document has this table.
+    #[must_use]
+    pub fn is_present(&self) -> bool {
+        self.table.is_some()
+    }
+
+    /// True when the document has `key` here, whatever its value.
+    #[must_use]
+    pub fn has(&self, key: &str) -> bool {
+        self.table.is_some_and(|table| table.contains_key(key))
+    }
+
+    /// Where this table begins.
+    #[must_use]
+    pub fn span(&self) -> Range<usize> {
+        self.span.clone()
+    }
+
+    /// The dotted path of `key`.
+    #[must_use]
+    pub fn path_of(&self, key: &str) -> String {
+        if self.path.is_empty() {
+            key.to_owned()
+        } else {
+            format!("{}.{key}", self.path)
+        }
+    }
+
+    /// The bytes of `key`'s value, or of the section where it is absent.
+    #[must_use]
+    pub fn span_of(&self, key: &str) -> Range<usize> {
+        let found = self.table.and_then(|table| table.get(key));
+        found.map_or(self.span.clone(), Spanned::span)
+    }
+
+    /// Adds a fault at `key`.
+    pub fn fault(&self, key: &str, message: impl Into<String>, help: &str) {
+        self.sink.add(
+            Fault::error(self.path_of(key), message)
+                .at(&self.span_of(key))
+                .help(help),
+        );
+    }
+
+    /// Reports that the required `key` is absent.
+    pub fn missing(&self, key: &str, help: &str) {
+        let fault = Fault::error(self.path_of(key), "this key is required and missing");
+        self.sink.add(fault.at(&self.span).help(help));
+    }
+
+    /// Accepts `keys` without reading them.
+    pub fn ignore(&mut self, keys: &[&'static str]) {
+        self.known.extend(keys);
+    }
+
+    /// Refuses the keys that were never asked for.
+    pub fn finish(self) {
+        let Some(table) = self.table else { return };
+        for key in table.keys() {
+            let name: &str = key.get_ref();
+            if !self.known.contains(&name) {
+                self.sink.add(self.unknown(name).at(&key.span()));
+            }
+        }
+    }
+
+    fn unknown(&self, name: &str) -> Fault {
+        let place = if self.path.is_empty() {
+            "the top level".to_owned()
+        } else {
+            format!("[{}]", self.path)
+        };
+        let fault = Fault::error(
+            self.path_of(&escaped(name, QUOTED_MAX)),
+            format!("unknown key {} in {place}", quoted(name)),
+        );
+        fault.help(match nearest(name, &self.known) {
+            Some(near) => format!("did you mean {near}?"),
+            None => format!("known here: {}", self.known.join(", ")),
+        })
+    }
+
+    pub(super) fn found(&mut self, key: &'static str) -> Option<Found<'a>> {
+        if !self.known.contains(&key) {
+            self.known.push(key);
+        }
+        self.table?.get(key)
+    }
+}

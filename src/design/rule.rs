@@ -1,0 +1,149 @@
+//! What a number in a document may be: its unit, its range, and values that betray another unit.
+
+use std::ops::Range;
+
+use super::diagnostics::Fault;
+use super::words::{number, quantity, twelve_digits};
+
+/// The values a key accepts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Bound {
+    /// Any finite number.
+    Any,
+    /// Greater than 0.
+    Positive,
+    /// 0 or greater.
+    NotNegative,
+    /// 0 or less.
+    NotPositive,
+    /// At least this.
+    AtLeast(f64),
+    /// From the first to the second, both included.
+    Within(f64, f64),
+}
+
+impl Bound {
+    fn admits(self, value: f64) -> bool {
+        match self {
+            Self::Any => true,
+            Self::Positive => value > 0.0,
+            Self::NotNegative => value >= 0.0,
+            Self::NotPositive => value <= 0.0,
+            Self::AtLeast(least) => value >= least,
+            Self::Within(least, most) => (least..=most).contains(&value),
+        }
+    }
+
+    fn words(self, unit: &str) -> String {
+        match self {
+            Self::Any => format!("any number{}", spaced(unit)),
+            Self::Positive => "a number greater than 0".to_owned(),
+            Self::NotNegative => "0 or more".to_owned(),
+            Self::NotPositive => "0 or less".to_owned(),
+            Self::AtLeast(least) => format!("at least {}", quantity(least, unit)),
+            Self::Within(least, most) => {
+                format!(
+                    "between {} and {}",
+                    quantity(least, ""),
+                    quantity(most, unit)
+                )
+            }
+        }
+    }
+}
+
+/// Values that look as if another unit was meant: `from < |value| < to`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slip {
+    /// Lower end, excluded.
+    pub from: f64,
+    /// Upper end, excluded.
+    pub to: f64,
+    /// The unit that is probably meant.
+    pub unit: &'static str,
+    /// Times this it is in the key's unit.
+    pub times: f64,
+}
+
+/// A number's unit, range and likely slips.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rule {
+    /// Unit for the messages; empty for a pure number.
+    pub unit: &'static str,
+    /// Values that are accepted.
+    pub bound: Bound,
+    /// Values that are warned about.
+    pub slips: &'static [Slip],
+}
+
+impl Rule {
+    /// Any finite number of `unit`.
+    #[must_use]
+    pub const fn any(unit: &'static str) -> Self {
+        Self {
+            unit,
+            bound: Bound::Any,
+            slips: &[],
+        }
+    }
+
+    /// The same with these slips.
+    #[must_use]
+    pub const fn slips(self, slips: &'static [Slip]) -> Self {
+        Self { slips, ..self }
+    }
+
+    /// The same within `bound`.
+    #[must_use]
+    pub const fn bound(self, bound: Bound) -> Self {
+        Self { bound, ..self }
+    }
+
+    /// The same, greater than 0.
+    #[must_use]
+    pub const fn positive(self) -> Self {
+        self.bound(Bound::Positive)
+    }
+
+    /// The error where `value` is not finite or out of bounds.
+    #[must_use]
+    pub fn error(&self, key: &str, value: f64, span: &Range<usize>) -> Option<Fault> {
+        if value.is_finite() && self.bound.admits(value) {
+            return None;
+        }
+        let message = if value.is_finite() {
+            let wanted = self.bound.words(self.unit);
+            format!("expected {wanted}, found {}", quantity(value, self.unit))
+        } else {
+            format!(
+                "expected a finite number{}, found {value}",
+                spaced(self.unit)
+            )
+        };
+        Some(Fault::error(key, message).at(span))
+    }
+
+    /// The warning where `value` looks like one in another unit.
+    #[must_use]
+    pub fn warning(&self, key: &str, value: f64, span: &Range<usize>) -> Option<Fault> {
+        let size = value.abs();
+        let slip = self.slips.iter().find(|s| s.from < size && size < s.to)?;
+        let found = quantity(value, self.unit);
+        let message = format!("{found} looks like {}", slip.unit);
+        let help = format!(
+            "write {} if {} {} is meant",
+            number(twelve_digits(value * slip.times)),
+            number(value),
+            slip.unit
+        );
+        Some(Fault::warning(key, message).at(span).help(help))
+    }
+}
+
+fn spaced(unit: &str) -> String {
+    if unit.is_empty() {
+        String::new()
+    } else {
+        format!(" of {unit}")
+    }
+}

@@ -1,0 +1,380 @@
+//! The design file's keys: one line each, with its rule and its default.
+//!
+//! What is read here is a draft in the file's own units, with the place of every value that a
+//! check may speak of.
+
+use super::array::{COILS_MAX, grid_positions_m};
+use super::model::{ArrayGrid, Coupling, Limits, MagnetModel, Polarity};
+use super::reader::{Located, Section};
+use super::rule::{Bound, Rule, Slip};
+use super::values::OneOrMany;
+use crate::numerics::axis::Axis;
+use crate::units::{MU_0_T_M_PER_A, REFERENCE_TEMPERATURE_C, m_from_mm};
+
+/// Absolute zero, C.
+const ABSOLUTE_ZERO_C: f64 = -273.15;
+
+/// Resistivity of copper at 20 C, ohm m.
+const COPPER_RESISTIVITY_OHM_M: f64 = 1.68e-8;
+
+const fn slip(from: f64, to: f64, unit: &'static str, times: f64) -> Slip {
+    Slip {
+        from,
+        to,
+        unit,
+        times,
+    }
+}
+
+/// A millimetre key whose value is metres below this size.
+const fn metres_below(size: f64) -> Slip {
+    slip(0.0, size, "metres", 1000.0)
+}
+
+/// Sizes of coils, arrays and workspaces, mm: half a metre is 0.5.
+pub const BODY_MM: Rule = Rule::any("mm").slips(&[metres_below(0.5)]);
+/// Sizes of magnets, mm.
+const MAGNET_MM: Rule = Rule::any("mm").slips(&[metres_below(0.1)]);
+/// Gaps and overhangs, mm.
+const OFFSET_MM: Rule = Rule::any("mm").slips(&[metres_below(0.02)]);
+/// Wire diameters, mm: 8 mm is 0.008.
+const WIRE_MM: Rule = Rule::any("mm").slips(&[metres_below(0.008)]);
+const SETTLING_MS: Rule = Rule::any("ms").slips(&[slip(0.0, 0.5, "seconds", 1000.0)]);
+/// Metals lie between 1e-8 and 2e-6.
+const RESISTIVITY_OHM_M: Rule = Rule::any("ohm m").slips(&[
+    slip(0.0, 1e-9, "a slip of the exponent", 1.0),
+    slip(1e-4, 0.5, "ohm mm^2/m", 1e-6),
+    slip(0.5, 10.0, "microohm cm", 1e-8),
+    slip(10.0, 1e4, "nanoohm m", 1e-9),
+]);
+const MAGNETIZATION_A_PER_M: Rule = Rule::any("A/m").slips(&[
+    slip(0.0, 3.0, "tesla", 1.0 / MU_0_T_M_PER_A),
+    slip(3.0, 5000.0, "kA/m", 1000.0),
+]);
+const CONDUCTIVITY_S_PER_M: Rule = Rule::any("S/m")
+    .bound(Bound::NotNegative)
+    .slips(&[slip(0.0, 1000.0, "MS/m", 1e6)]);
+const AMPERE: Rule = Rule::any("A");
+
+/// `[coil]`, mm.
+#[derive(Debug)]
+pub struct CoilDraft {
+    pub inner: Located<f64>,
+    pub outer: Located<f64>,
+    pub length: Located<f64>,
+    pub turns: Option<Located<f64>>,
+}
+
+pub fn coil(mut s: Section<'_>) -> Option<CoilDraft> {
+    let draft = s.is_present().then(|| CoilDraft {
+        inner: s.required("inner_diameter_mm", &BODY_MM.positive()),
+        outer: s.required("outer_diameter_mm", &BODY_MM.positive()),
+        length: s.required("length_mm", &BODY_MM.positive()),
+        turns: s.number("turns", &Rule::any("").positive()),
+    });
+    s.finish();
+    draft
+}
+
+/// `[wire]`, mm.
+#[derive(Debug)]
+pub struct WireDraft {
+    pub diameter: Located<f64>,
+    pub conductor: Located<f64>,
+    pub resistivity_ohm_m: Located<f64>,
+    pub temperature_c: Located<f64>,
+    pub choices: Vec<f64>,
+}
+
+pub fn wire(mut s: Section<'_>) -> WireDraft {
+    let temperature = Rule::any("C").bound(Bound::AtLeast(ABSOLUTE_ZERO_C));
+    let diameter = s.required("diameter_mm", &WIRE_MM.positive());
+    let conductor = s.number("conductor_diameter_mm", &WIRE_MM.positive());
+    let draft = WireDraft {
+        conductor: conductor.unwrap_or_else(|| diameter.clone()),
+        diameter,
+        resistivity_ohm_m: s.number_or(
+            "resistivity_ohm_m",
+            &RESISTIVITY_OHM_M.positive(),
+            COPPER_RESISTIVITY_OHM_M,
+        ),
+        temperature_c: s.number_or("temperature_c", &temperature, REFERENCE_TEMPERATURE_C),
+        choices: s
+            .numbers("choices_mm", &WIRE_MM.positive())
+            .map_or_else(Vec::new, |c| c.value),
+    };
+    s.finish();
+    draft
+}
+
+/// `[core]`, mm.
+#[derive(Debug)]
+pub struct CoreDraft {
+    pub clearance: Located<f64>,
+    pub above: Located<f64>,
+    pub below: Located<f64>,
+    pub relative_permeability: f64,
+    pub bh_curve: Option<String>,
+    pub knee_t: f64,
+    pub conductivity_s_per_m: f64,
+}
+
+pub fn core(mut s: Section<'_>) -> Option<CoreDraft> {
+    let draft = s.is_present().then(|| CoreDraft {
+        clearance: s.number_or("clearance_mm", &OFFSET_MM, 0.0),
+        above: s.number_or("above_mm", &OFFSET_MM, 0.0),
+        below: s.number_or("below_mm", &OFFSET_MM, 10.0),
+        relative_permeability: s
+            .number_or(
+                "relative_permeability",
+                &Rule::any("").bound(Bound::AtLeast(1.0)),
+                1000.0,
+            )
+            .value,
+        bh_curve: s.text("bh_curve").map(|text| text.value),
+        knee_t: s.number_or("knee_t", &Rule::any("T").positive(), 1.5).value,
+        conductivity_s_per_m: s
+            .number_or("conductivity_s_per_m", &CONDUCTIVITY_S_PER_M, 5.8e6)
+            .value,
+    });
+    if s.has("relative_permeability") && s.has("bh_curve") {
+        let message = "relative_permeability and bh_curve exclude each other";
+        s.fault("bh_curve", message, "keep the one that describes the steel");
+    }
+    if draft
+        .as_ref()
+        .is_some_and(|core| core.bh_curve.as_deref() == Some(""))
+    {
+        s.fault(
+            "bh_curve",
+            "expected the path of a B-H table, found an empty text",
+            "name a CSV file",
+        );
+    }
+    s.finish();
+    draft
+}
+
+/// How the axes of the array are given.
+#[derive(Debug)]
+pub enum Layout {
+    /// One coil at the origin.
+    Single,
+    /// A grid, and where its pitch stands.
+    Grid(ArrayGrid, Located<f64>),
+    /// A list, mm.
+    Listed(Vec<Located<[f64; 2]>>),
+    /// What the file says of it is at fault.
+    Unknown,
+}
+
+impl Layout {
+    /// Positions in coil order, m; empty where at fault.
+    pub fn positions_m(&self) -> Vec<[f64; 2]> {
+        match self {
+            Self::Single => vec![[0.0, 0.0]],
+            Self::Grid(grid, pitch) => grid_positions_m(grid.rows, grid.columns, pitch.value),
+            Self::Listed(list) => list.iter().map(|p| p.value.map(m_from_mm)).collect(),
+            Self::Unknown => Vec::new(),
+        }
+    }
+}
+
+/// `[array]`.
+#[derive(Debug)]
+pub struct ArrayDraft {
+    pub layout: Layout,
+    pub coupling: Option<Coupling>,
+    pub gain: Option<Located<Vec<f64>>>,
+}
+
+pub fn array(mut s: Section<'_>) -> ArrayDraft {
+    let listed = s.pairs("positions_mm", &BODY_MM, COILS_MAX);
+    let rows = s.count_or("rows", 3);
+    let columns = s.count_or("columns", 3);
+    let pitch = s.number_or("pitch_mm", &BODY_MM.positive(), 50.0);
+    let coupling = s.choice(
+        "coupling",
+        &[("full", Coupling::Full), ("none", Coupling::None)],
+    );
+    let gain = s.numbers("gain", &Rule::any(""));
+    for key in ["rows", "columns", "pitch_mm"] {
+        if listed.is_some() && s.has(key) {
+            let message = format!("{key} and positions_mm exclude each other");
+            s.fault(key, message, "give a grid, or give the positions");
+        }
+    }
+    let layout = match (listed, rows, columns) {
+        _ if !s.is_present() => Layout::Single,
+        (Some(list), ..) if list.is_empty() => Layout::Unknown,
+        (Some(list), ..) => Layout::Listed(list),
+        (None, Some(rows), Some(columns)) => grid(&s, rows, columns, pitch),
+        _ => Layout::Unknown,
+    };
+    s.finish();
+    ArrayDraft {
+        layout,
+        coupling,
+        gain,
+    }
+}
+
+fn grid(s: &Section<'_>, rows: usize, columns: usize, pitch: Located<f64>) -> Layout {
+    if rows
+        .checked_mul(columns)
+        .is_none_or(|coils| coils > COILS_MAX)
+    {
+        let message = format!("{rows} x {columns} coils are more than {COILS_MAX}");
+        s.fault(
+            if s.has("rows") { "rows" } else { "columns" },
+            message,
+            "lower rows or columns",
+        );
+        return Layout::Unknown;
+    }
+    let pitch_m = m_from_mm(pitch.value);
+    Layout::Grid(
+        ArrayGrid {
+            rows,
+            columns,
+            pitch_m,
+        },
+        pitch,
+    )
+}
+
+/// `[magnet]`, mm.
+#[derive(Debug)]
+pub struct MagnetDraft {
+    pub diameter: f64,
+    pub length: f64,
+    pub magnetization_a_per_m: f64,
+    pub polarity: Polarity,
+    pub model: MagnetModel,
+    pub tilt_deg: [f64; 2],
+    pub passive_force: bool,
+}
+
+pub fn magnet(mut s: Section<'_>) -> MagnetDraft {
+    let polarities = [("repel", Polarity::Repel), ("attract", Polarity::Attract)];
+    let models = [
+        ("dipole", MagnetModel::Dipole),
+        ("cylinder", MagnetModel::Cylinder),
+    ];
+    let tilt = Rule::any("degrees").bound(Bound::Within(-180.0, 180.0));
+    let draft = MagnetDraft {
+        diameter: s
+            .number_or("diameter_mm", &MAGNET_MM.positive(), 10.0)
+            .value,
+        length: s.number_or("length_mm", &MAGNET_MM.positive(), 10.0).value,
+        magnetization_a_per_m: s
+            .number_or(
+                "magnetization_a_per_m",
+                &MAGNETIZATION_A_PER_M.positive(),
+                1.1579e6,
+            )
+            .value,
+        polarity: s.choice("polarity", &polarities).unwrap_or(Polarity::Repel),
+        model: s.choice("model", &models).unwrap_or(MagnetModel::Dipole),
+        tilt_deg: s.tuple("tilt_deg", &tilt).map_or([0.0; 2], |t| t.value),
+        passive_force: s.flag_or("passive_force", false),
+    };
+    s.finish();
+    draft
+}
+
+/// `[supply]`.
+#[derive(Debug)]
+pub struct SupplyDraft {
+    pub current_max_a: Located<OneOrMany>,
+    pub current_min_a: Located<OneOrMany>,
+    pub total_current_max_a: Option<f64>,
+    pub voltage_v: Option<f64>,
+}
+
+pub fn supply(mut s: Section<'_>) -> SupplyDraft {
+    let or = |given: Option<Located<OneOrMany>>, default, span| {
+        given.unwrap_or(Located {
+            value: OneOrMany::One(default),
+            span,
+        })
+    };
+    let most = s.one_or_many("current_max_a", &AMPERE.bound(Bound::NotNegative));
+    let least = s.one_or_many("current_min_a", &AMPERE.bound(Bound::NotPositive));
+    let draft = SupplyDraft {
+        current_max_a: or(most, 2.0, s.span()),
+        current_min_a: or(least, 0.0, s.span()),
+        total_current_max_a: s
+            .number("total_current_max_a", &AMPERE.bound(Bound::NotNegative))
+            .map(|i| i.value),
+        voltage_v: s
+            .number("voltage_v", &Rule::any("V").positive())
+            .map(|v| v.value),
+    };
+    s.finish();
+    draft
+}
+
+pub fn limits(mut s: Section<'_>) -> Limits {
+    let mut limit = |key, rule: Rule| s.number(key, &rule.positive()).map(|l| l.value);
+    let limits = Limits {
+        resistance_max_ohm: limit("resistance_max_ohm", Rule::any("ohm")),
+        settling_max_s: limit("settling_max_ms", SETTLING_MS).map(|ms| ms / 1000.0),
+        outer_diameter_max_m: limit("outer_diameter_max_mm", BODY_MM).map(m_from_mm),
+        inner_diameter_min_m: limit("inner_diameter_min_mm", BODY_MM).map(m_from_mm),
+        length_max_m: limit("length_max_mm", BODY_MM).map(m_from_mm),
+        power_max_w: limit("power_max_w", Rule::any("W")),
+        mass_max_kg: limit("mass_max_kg", Rule::any("kg")),
+        wire_length_max_m: limit("wire_length_max_m", Rule::any("m")),
+        core_field_max_t: limit("core_field_max_t", Rule::any("T")),
+    };
+    s.finish();
+    limits
+}
+
+/// Height of the magnet's centre, mm.
+pub fn target_height_mm(mut s: Section<'_>) -> Located<f64> {
+    let height = s.number_or("height_mm", &BODY_MM, 30.0);
+    s.finish();
+    height
+}
+
+/// `[workspace]`, mm; `None` where an axis is at fault.
+#[derive(Debug)]
+pub struct WorkspaceDraft {
+    pub x: Option<Located<Axis>>,
+    pub y: Option<Located<Axis>>,
+    pub z: Option<Located<Axis>>,
+}
+
+/// The seed's grid along x and y, mm.
+pub const SEED_SIDE_MM: Axis = Axis {
+    from: -50.0,
+    to: 50.0,
+    samples: 61,
+};
+
+pub fn workspace(mut s: Section<'_>) -> WorkspaceDraft {
+    let heights = Axis {
+        from: 10.0,
+        to: 80.0,
+        samples: 29,
+    };
+    let draft = WorkspaceDraft {
+        x: s.axis_or("x_mm", &BODY_MM, SEED_SIDE_MM),
+        y: s.axis_or("y_mm", &BODY_MM, SEED_SIDE_MM),
+        z: s.axis_or("z_mm", &BODY_MM, heights),
+    };
+    s.finish();
+    draft
+}
+
+/// An axis in metres.
+#[must_use]
+pub fn axis_m(axis: Axis) -> Axis {
+    Axis {
+        from: m_from_mm(axis.from),
+        to: m_from_mm(axis.to),
+        samples: axis.samples,
+    }
+}

@@ -1,0 +1,117 @@
+//! Reading a document's text from a file or a stream, bounded in size.
+
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::Path;
+
+use super::diagnostics::{Fault, InvalidDocument, place_of};
+
+/// Largest document that is read, bytes (16 MiB).
+pub const DOCUMENT_MAX_BYTES: u64 = 16 << 20;
+
+/// The text of the document at `path`.
+///
+/// # Errors
+/// A missing file, a directory, a file over 16 MiB or not in UTF-8, or what the system says.
+pub fn text_of(path: &Path) -> Result<String, InvalidDocument> {
+    let refuse = |fault| Err(InvalidDocument::unreadable(path, fault));
+    match fs::metadata(path) {
+        Err(error) => return refuse(cannot_read(&error)),
+        Ok(found) if found.is_dir() => {
+            let fault = Fault::error("", "expected a TOML file, found a directory");
+            return refuse(fault.help("name the file inside it"));
+        }
+        Ok(_) => {}
+    }
+    match File::open(path) {
+        Ok(file) => text_from(file, path),
+        Err(error) => refuse(cannot_read(&error)),
+    }
+}
+
+/// The text of the document that `stream` yields; messages call it `path` (`-` for stdin).
+///
+/// # Errors
+/// A document over 16 MiB or not in UTF-8, or what the system says.
+pub fn text_from(stream: impl Read, path: &Path) -> Result<String, InvalidDocument> {
+    let mut bytes = Vec::new();
+    let result = stream.take(DOCUMENT_MAX_BYTES + 1).read_to_end(&mut bytes);
+    text_of_bytes(result.map(|_| bytes)).map_err(|fault| InvalidDocument::unreadable(path, fault))
+}
+
+fn text_of_bytes(bytes: io::Result<Vec<u8>>) -> Result<String, Fault> {
+    let bytes = bytes.map_err(|error| cannot_read(&error))?;
+    if bytes.len() as u64 > DOCUMENT_MAX_BYTES {
+        let message = format!("the file is larger than {DOCUMENT_MAX_BYTES} bytes");
+        return Err(
+            Fault::error("", message).help("is this the TOML document, or the surface itself?")
+        );
+    }
+    String::from_utf8(bytes).map_err(|error| not_utf8(&error))
+}
+
+fn cannot_read(error: &io::Error) -> Fault {
+    let fault = Fault::error("", format!("cannot read the file: {error}"));
+    match error.kind() {
+        io::ErrorKind::NotFound => fault.help("check the path"),
+        io::ErrorKind::PermissionDenied => fault.help("allow reading it"),
+        _ => fault,
+    }
+}
+
+fn not_utf8(error: &std::string::FromUtf8Error) -> Fault {
+    let good = error.utf8_error().valid_up_to();
+    let text = String::from_utf8_lossy(&error.as_bytes()[..good]);
+    let place = place_of(&text, good);
+    let byte = error.as_bytes()[good];
+    let message = format!(
+        "the text is not UTF-8: byte 0x{byte:02x} at line {}, column {}",
+        place.line, place.column
+    );
+    Fault::error("", message)
+        .help("save the file as UTF-8; a surface needs its own ending (.stl, .obj, ...)")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(bytes: &[u8]) -> String {
+        text_from(bytes, Path::new("-")).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn bytes_that_are_no_text_are_placed() {
+        let said = refusal(b"name = \"a\"\nb = \"\xc3\xa9\xff\"\n");
+        assert!(
+            said.starts_with("-: error: the text is not UTF-8: byte 0xff at line 2, column 7"),
+            "{said}"
+        );
+    }
+
+    #[test]
+    fn an_endless_stream_is_cut_off() {
+        let said = text_from(io::repeat(b'#'), Path::new("-"))
+            .unwrap_err()
+            .to_string();
+        assert!(said.contains("larger than 16777216 bytes"), "{said}");
+    }
+
+    #[test]
+    fn a_directory_and_a_missing_file_are_named() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+        assert!(
+            text_of(folder)
+                .unwrap_err()
+                .to_string()
+                .contains("found a directory")
+        );
+        let missing = folder.join("no_such_design.toml");
+        let said = text_of(&missing).unwrap_err().to_string();
+        assert!(
+            said.contains("no_such_design.toml: error: cannot read the file"),
+            "{said}"
+        );
+        assert!(said.ends_with("(check the path)"), "{said}");
+    }
+}

@@ -1,0 +1,390 @@
+//! The typed values of a section: numbers, lists, axes, texts, choices.
+
+use toml::Spanned;
+use toml::de::DeValue;
+
+use super::diagnostics::Fault;
+use super::reader::{Found, Located, Section};
+use super::rule::{Bound, Rule};
+use super::words::{axis_fault, nearest, number, quoted};
+use crate::numerics::axis::Axis;
+
+/// Longest name of a document, bytes.
+const NAME_MAX: usize = 100;
+
+/// Most values in one list.
+const LIST_MAX: usize = 1_000_000;
+
+/// One number for all, or one for each.
+#[derive(Debug, Clone, PartialEq)]
+pub enum OneOrMany {
+    /// The same for all.
+    One(f64),
+    /// One for each.
+    Many(Vec<f64>),
+}
+
+impl<'a> Section<'a> {
+    /// A number; `None` where absent, NaN where at fault.
+    pub fn number(&mut self, key: &'static str, rule: &Rule) -> Option<Located<f64>> {
+        let found = self.found(key)?;
+        let value = self.checked(&self.path_of(key), found, rule);
+        self.warn_of_slip(key, &[value], rule, found);
+        Some(located(value, found))
+    }
+
+    /// A number with a default.
+    pub fn number_or(&mut self, key: &'static str, rule: &Rule, default: f64) -> Located<f64> {
+        let span = self.span();
+        self.number(key, rule).unwrap_or(Located {
+            value: default,
+            span,
+        })
+    }
+
+    /// A number that must be given.
+    pub fn required(&mut self, key: &'static str, rule: &Rule) -> Located<f64> {
+        self.number(key, rule).unwrap_or_else(|| {
+            let unit = if rule.unit.is_empty() {
+                "a number"
+            } else {
+                rule.unit
+            };
+            self.missing(key, &format!("add {key} = ... ({unit}) to [{}]", self.path));
+            Located {
+                value: f64::NAN,
+                span: self.span(),
+            }
+        })
+    }
+
+    /// A list of numbers, at least one; `None` where absent, empty where at fault.
+    pub fn numbers(&mut self, key: &'static str, rule: &Rule) -> Option<Located<Vec<f64>>> {
+        let found = self.found(key)?;
+        let items = self.items(key, found, "a list of numbers");
+        let values = self.checked_items(key, items, rule);
+        self.warn_of_slip(key, &values, rule, found);
+        Some(located(values, found))
+    }
+
+    /// One number, or a list of numbers; `None` where absent, an empty list where at fault.
+    pub fn one_or_many(&mut self, key: &'static str, rule: &Rule) -> Option<Located<OneOrMany>> {
+        let found = self.found(key)?;
+        let value = match found.get_ref() {
+            DeValue::Array(_) => OneOrMany::Many(self.numbers(key, rule)?.value),
+            _ => OneOrMany::One(self.number(key, rule)?.value),
+        };
+        Some(located(value, found))
+    }
+
+    /// Exactly `N` numbers; NaN where at fault.
+    pub fn tuple<const N: usize>(
+        &mut self,
+        key: &'static str,
+        rule: &Rule,
+    ) -> Option<Located<[f64; N]>> {
+        let found = self.found(key)?;
+        let mut values = [f64::NAN; N];
+        let wanted = format!("a list of {N} numbers");
+        let items = self.items(key, found, &wanted);
+        if items.len() == N {
+            values.copy_from_slice(&self.checked_items(key, items, rule));
+            self.warn_of_slip(key, &values, rule, found);
+        } else if !items.is_empty() {
+            let message = format!("expected {wanted}, found {}", items.len());
+            self.fault(key, message, "write them in square brackets, with commas");
+        }
+        Some(located(values, found))
+    }
+
+    /// A list of at most `most` pairs `[a, b]`, each with its place; empty where at fault.
+    pub fn pairs(
+        &mut self,
+        key: &'static str,
+        rule: &Rule,
+        most: usize,
+    ) -> Option<Vec<Located<[f64; 2]>>> {
+        let found = self.found(key)?;
+        let items = self.items(key, found, "a list of pairs [x, y]");
+        if items.len() > most {
+            let message = format!("{} pairs are more than {most}", items.len());
+            self.fault(key, message, "shorten the list");
+            return Some(Vec::new());
+        }
+        let pairs: Option<Vec<_>> = (0..)
+            .zip(items)
+            .map(|(i, item)| self.pair(key, i, item, rule))
+            .collect();
+        let pairs = pairs.unwrap_or_default();
+        let values: Vec<f64> = pairs.iter().flat_map(|pair| pair.value).collect();
+        self.warn_of_slip(key, &values, rule, found);
+        Some(pairs)
+    }
+
+    fn pair(
+        &self,
+        key: &str,
+        index: usize,
+        item: Found<'a>,
+        rule: &Rule,
+    ) -> Option<Located<[f64; 2]>> {
+        let path = format!("{}[{index}]", self.path_of(key));
+        let DeValue::Array(pair) = item.get_ref() else {
+            self.add_wrong_type(&path, item, "a pair [x, y]");
+            return None;
+        };
+        let [a, b] = &pair[..] else {
+            let message = format!("expected a pair [x, y], found {} values", pair.len());
+            self.sink.add(Fault::error(path, message).at(&item.span()));
+            return None;
+        };
+        let values = [self.checked(&path, a, rule), self.checked(&path, b, rule)];
+        values
+            .iter()
+            .all(|v| v.is_finite())
+            .then(|| located(values, item))
+    }
+
+    /// A whole number of at least 1 with a default; `None` where at fault.
+    pub fn count_or(&mut self, key: &'static str, default: usize) -> Option<usize> {
+        match self.found(key) {
+            Some(found) => self.whole(&self.path_of(key), found),
+            None => Some(default),
+        }
+    }
+
+    /// An axis `[from, to, samples]` with a default; `None` where at fault.
+    pub fn axis_or(
+        &mut self,
+        key: &'static str,
+        rule: &Rule,
+        default: Axis,
+    ) -> Option<Located<Axis>> {
+        match self.found(key) {
+            Some(found) => self.axis_in(key, found, rule),
+            None => Some(Located {
+                value: default,
+                span: self.span(),
+            }),
+        }
+    }
+
+    fn axis_in(&self, key: &str, found: Found<'a>, rule: &Rule) -> Option<Located<Axis>> {
+        let items = self.items(key, found, "[from, to, samples]");
+        let [from, to, samples] = items else {
+            if !items.is_empty() {
+                let message = format!("expected [from, to, samples], found {} values", items.len());
+                self.fault(key, message, "for example [-50.0, 50.0, 61]");
+            }
+            return None;
+        };
+        let path = self.path_of(key);
+        let ends = [
+            self.checked(&path, from, rule),
+            self.checked(&path, to, rule),
+        ];
+        let samples = self.whole(&format!("{path} (samples)"), samples)?;
+        let axis = Axis {
+            from: ends[0],
+            to: ends[1],
+            samples,
+        };
+        if ends.iter().any(|end| end.is_nan()) {
+            return None;
+        }
+        if let Some((message, help)) = axis_fault(&axis, rule.unit) {
+            self.fault(key, message, help);
+            return None;
+        }
+        self.warn_of_slip(key, &ends, rule, found);
+        Some(located(axis, found))
+    }
+
+    /// A text; `None` where absent or at fault.
+    pub fn text(&mut self, key: &'static str) -> Option<Located<String>> {
+        let found = self.found(key)?;
+        match found.get_ref() {
+            DeValue::String(text) => Some(located(text.to_string(), found)),
+            _ => {
+                self.add_wrong_type(&self.path_of(key), found, "a text in quotes");
+                None
+            }
+        }
+    }
+
+    /// A required text; `None` where absent or at fault.
+    pub fn required_text(&mut self, key: &'static str, help: &str) -> Option<Located<String>> {
+        if !self.has(key) {
+            self.missing(key, help);
+        }
+        self.text(key)
+    }
+
+    /// The document's required `name`: `[A-Za-z0-9._-]+`, because it names a folder.
+    pub fn name(&mut self) -> Option<String> {
+        let name = self
+            .required_text("name", "add name = \"...\"; it names the output folder")?
+            .value;
+        let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '_' | '-');
+        if (1..=NAME_MAX).contains(&name.len())
+            && name.chars().all(plain)
+            && name != "."
+            && name != ".."
+        {
+            return Some(name);
+        }
+        let message = format!(
+            "expected 1 to {NAME_MAX} of A-Z a-z 0-9 . _ -, found {}",
+            quoted(&name)
+        );
+        self.fault("name", message, "it names the output folder");
+        None
+    }
+
+    /// One of `options` by name; `None` where absent or at fault.
+    pub fn choice<T: Copy>(
+        &mut self,
+        key: &'static str,
+        options: &[(&'static str, T)],
+    ) -> Option<T> {
+        let text = self.text(key)?;
+        if let Some((_, value)) = options.iter().find(|(name, _)| *name == text.value) {
+            return Some(*value);
+        }
+        let names: Vec<&str> = options.iter().map(|(name, _)| *name).collect();
+        let listed: Vec<String> = names.iter().map(|name| format!("{name:?}")).collect();
+        let message = format!(
+            "expected {}, found {}",
+            listed.join(" or "),
+            quoted(&text.value)
+        );
+        let help = nearest(&text.value, &names).map(|name| format!("did you mean {name:?}?"));
+        self.fault(
+            key,
+            message,
+            help.as_deref().unwrap_or("choose one of them"),
+        );
+        None
+    }
+
+    /// True or false; the default where absent or at fault.
+    pub fn flag_or(&mut self, key: &'static str, default: bool) -> bool {
+        match self.found(key).map(|found| (found, found.get_ref())) {
+            None => default,
+            Some((_, DeValue::Boolean(value))) => *value,
+            Some((found, _)) => {
+                self.add_wrong_type(&self.path_of(key), found, "true or false");
+                default
+            }
+        }
+    }
+
+    fn items(&self, key: &str, found: Found<'a>, wanted: &str) -> &'a [Spanned<DeValue<'a>>] {
+        match found.get_ref() {
+            DeValue::Array(items) if items.is_empty() => {
+                self.fault(
+                    key,
+                    format!("expected {wanted}, found an empty list"),
+                    "leave the key out for its default",
+                );
+            }
+            DeValue::Array(items) if items.len() > LIST_MAX => {
+                self.fault(
+                    key,
+                    format!("{} values are more than {LIST_MAX}", items.len()),
+                    "shorten the list",
+                );
+            }
+            DeValue::Array(items) => return items,
+            _ => self.add_wrong_type(&self.path_of(key), found, wanted),
+        }
+        &[]
+    }
+
+    fn checked_items(&self, key: &str, items: &'a [Spanned<DeValue<'a>>], rule: &Rule) -> Vec<f64> {
+        let path = self.path_of(key);
+        let value = |(i, item)| self.checked(&format!("{path}[{i}]"), item, rule);
+        items.iter().enumerate().map(value).collect()
+    }
+
+    /// The number, or NaN and a fault.
+    fn checked(&self, path: &str, found: Found<'a>, rule: &Rule) -> f64 {
+        let Some(value) = float(found.get_ref()) else {
+            self.add_wrong_type(path, found, "a number");
+            return f64::NAN;
+        };
+        match rule.error(path, value, &found.span()) {
+            None => value,
+            Some(fault) => {
+                self.sink.add(fault);
+                f64::NAN
+            }
+        }
+    }
+
+    fn whole(&self, path: &str, found: Found<'a>) -> Option<usize> {
+        let rule = Rule::any("").bound(Bound::AtLeast(1.0));
+        let value = self.checked(path, found, &rule);
+        // Beyond 2^53 a double no longer counts.
+        if value.fract() == 0.0 && value <= 9.0e15 {
+            return Some(value as usize);
+        }
+        if value.is_finite() {
+            let message = format!("expected a whole number, found {}", number(value));
+            self.sink.add(Fault::error(path, message).at(&found.span()));
+        }
+        None
+    }
+
+    /// Warns of the largest of `values`: a list in another unit is one slip.
+    fn warn_of_slip(&self, key: &str, values: &[f64], rule: &Rule, found: Found<'a>) {
+        let largest = values
+            .iter()
+            .copied()
+            .fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+        if let Some(fault) = rule.warning(&self.path_of(key), largest, &found.span()) {
+            self.sink.add(fault);
+        }
+    }
+
+    pub(super) fn add_wrong_type(&self, path: &str, found: Found<'a>, wanted: &str) {
+        let message = format!("expected {wanted}, found {}", described(found.get_ref()));
+        self.sink.add(Fault::error(path, message).at(&found.span()));
+    }
+}
+
+fn located<T>(value: T, found: Found<'_>) -> Located<T> {
+    Located {
+        value,
+        span: found.span(),
+    }
+}
+
+fn float(value: &DeValue<'_>) -> Option<f64> {
+    match value {
+        DeValue::Float(float) => float.as_str().parse().ok(),
+        DeValue::Integer(integer) if integer.radix() == 10 => integer.as_str().parse().ok(),
+        DeValue::Integer(integer) => {
+            let value = i128::from_str_radix(integer.as_str(), integer.radix());
+            // Only a hexadecimal, octal or binary number of over 127 bits fails.
+            Some(value.map_or(f64::INFINITY, |v| v as f64))
+        }
+        _ => None,
+    }
+}
+
+fn described(value: &DeValue<'_>) -> String {
+    match value {
+        DeValue::String(text) => format!("the text {}", quoted(text)),
+        DeValue::Integer(_) | DeValue::Float(_) => {
+            format!(
+                "the number {}",
+                float(value).map_or_else(String::new, number)
+            )
+        }
+        DeValue::Boolean(value) => format!("{value}"),
+        DeValue::Datetime(_) => "a date or time".to_owned(),
+        DeValue::Array(items) => format!("a list of {}", items.len()),
+        DeValue::Table(_) => "a section".to_owned(),
+    }
+}

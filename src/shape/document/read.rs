@@ -1,0 +1,222 @@
+//! Reading a shape file: text to a validated [`ShapeDocument`], or every fault in it.
+
+use std::path::Path;
+
+use super::format::{SurfaceFormat, parse_unit, unit_names};
+use super::{AxisRequest, GridRequest, Placement, Primitive, ShapeDocument, SurfaceSource};
+use crate::design::diagnostics::{Fault, Faults, InvalidDocument};
+use crate::design::reader::{Section, Sink, read_document};
+use crate::design::rule::Rule;
+use crate::design::sections::{BODY_MM, SEED_SIDE_MM, axis_m};
+use crate::design::source;
+use crate::design::words::{nearest, quoted};
+use crate::units::m_from_mm;
+
+/// Most grid points of one shape.
+pub const POINTS_MAX: usize = 100_000_000;
+
+const SIZES: [&str; 7] = [
+    "side_mm",
+    "height_mm",
+    "radius_mm",
+    "length_mm",
+    "base_mm",
+    "low_mm",
+    "high_mm",
+];
+
+#[derive(Clone, Copy)]
+enum Kind {
+    Flat,
+    HalfSphere,
+    HalfCylinder,
+    Wedge,
+}
+
+const KINDS: [(&str, Kind); 4] = [
+    ("flat", Kind::Flat),
+    ("half-sphere", Kind::HalfSphere),
+    ("half-cylinder", Kind::HalfCylinder),
+    ("wedge", Kind::Wedge),
+];
+
+impl ShapeDocument {
+    /// The shape that `text` describes, and the warnings about it. `path` names it in messages,
+    /// and its folder is where a relative `surface` is looked for.
+    ///
+    /// # Errors
+    /// Every fault found. Whether the surface exists is for the reader of surfaces to say.
+    pub fn from_toml(text: &str, path: &Path) -> Result<(Self, Faults), InvalidDocument> {
+        read_document(text, path, |root, sink| document(root, path, sink))
+    }
+
+    /// The shape in the file `path`, as [`ShapeDocument::from_toml`].
+    ///
+    /// # Errors
+    /// Every fault found, or why the file cannot be read.
+    pub fn read(path: &Path) -> Result<(Self, Faults), InvalidDocument> {
+        Self::from_toml(&source::text_of(path)?, path)
+    }
+}
+
+fn document(root: &mut Section<'_>, path: &Path, sink: &Sink) -> Option<ShapeDocument> {
+    let name = root.name();
+    let source = match (root.has("surface"), root.has("primitive")) {
+        (true, false) => surface(root, path, sink),
+        (false, true) => primitive(root),
+        (given, _) => neither_or_both(root, given),
+    };
+    let placement = Placement {
+        translate_m: root
+            .tuple("translate_mm", &BODY_MM)
+            .map_or([0.0; 3], |t| t.value.map(m_from_mm)),
+        rotate_deg: root
+            .tuple("rotate_deg", &Rule::any("degrees"))
+            .map_or([0.0; 3], |r| r.value),
+    };
+    let grid = points(root.section("points"));
+    Some(ShapeDocument {
+        name: name?,
+        source: source?,
+        placement,
+        grid: grid?,
+    })
+}
+
+fn neither_or_both(root: &mut Section<'_>, both: bool) -> Option<SurfaceSource> {
+    root.ignore(&["surface", "primitive", "unit"]);
+    root.ignore(&SIZES);
+    let help = "write surface = \"part.stl\" with its unit, or primitive = \"flat\"";
+    if both {
+        root.fault(
+            "primitive",
+            "surface and primitive exclude each other",
+            help,
+        );
+    } else {
+        root.missing("surface", help);
+    }
+    None
+}
+
+fn surface(root: &mut Section<'_>, path: &Path, sink: &Sink) -> Option<SurfaceSource> {
+    root.ignore(&["primitive"]);
+    let file = root.text("surface").map(|text| text.value);
+    let unit = root.text("unit");
+    let unit_m = unit.as_ref().and_then(|unit| unit_of(root, &unit.value));
+    let file = file?;
+    let Some(format) = SurfaceFormat::of(Path::new(&file)) else {
+        let message = format!(
+            "expected a file ending in {}, found {}",
+            SurfaceFormat::endings(),
+            quoted(&file)
+        );
+        root.fault("surface", message, "convert the surface to one of these");
+        return None;
+    };
+    if format.carries_unit() {
+        if let Some(unit) = unit {
+            let message = "this format carries its own unit, which is used instead of this one";
+            sink.add(
+                Fault::warning("unit", message)
+                    .at(&unit.span)
+                    .help("leave the key out"),
+            );
+        }
+    } else if !root.has("unit") {
+        let help = format!(
+            "add unit = \"mm\" or what it was drawn in ({})",
+            unit_names().join(", ")
+        );
+        root.missing("unit", &help);
+    }
+    Some(SurfaceSource::File {
+        path: path.parent().unwrap_or(Path::new("")).join(file),
+        unit_m: unit_m.filter(|_| !format.carries_unit()),
+    })
+}
+
+fn unit_of(root: &Section<'_>, unit: &str) -> Option<f64> {
+    let metres = parse_unit(unit);
+    if metres.is_none() {
+        let names = unit_names();
+        let message = format!("expected {}, found {}", names.join(", "), quoted(unit));
+        let help = nearest(unit, &names).map(|near| format!("did you mean {near:?}?"));
+        root.fault(
+            "unit",
+            message,
+            help.as_deref()
+                .unwrap_or("name the unit of the file's coordinates"),
+        );
+    }
+    metres
+}
+
+fn primitive(root: &mut Section<'_>) -> Option<SurfaceSource> {
+    root.ignore(&["surface"]);
+    if root.has("unit") {
+        root.fault(
+            "unit",
+            "a primitive has no unit: its sizes are in mm",
+            "leave the key out",
+        );
+    }
+    root.ignore(&["unit"]);
+    let Some(kind) = root.choice("primitive", &KINDS) else {
+        root.ignore(&SIZES);
+        return None;
+    };
+
+    let primitive = match kind {
+        Kind::Flat => Primitive::Flat {
+            side_m: size(root, "side_mm", 100.0),
+            height_m: level(root, "height_mm", 50.0),
+        },
+        Kind::HalfSphere => Primitive::HalfSphere {
+            radius_m: size(root, "radius_mm", 50.0),
+            base_m: level(root, "base_mm", 30.0),
+        },
+        Kind::HalfCylinder => Primitive::HalfCylinder {
+            radius_m: size(root, "radius_mm", 50.0),
+            length_m: size(root, "length_mm", 100.0),
+            base_m: level(root, "base_mm", 30.0),
+        },
+        Kind::Wedge => Primitive::Wedge {
+            side_m: size(root, "side_mm", 100.0),
+            low_m: level(root, "low_mm", 30.0),
+            high_m: level(root, "high_mm", 80.0),
+        },
+    };
+    Some(SurfaceSource::Primitive(primitive))
+}
+
+/// A size, m.
+fn size(root: &mut Section<'_>, key: &'static str, default_mm: f64) -> f64 {
+    m_from_mm(root.number_or(key, &BODY_MM.positive(), default_mm).value)
+}
+
+/// A height, m; a surface may start anywhere, the placement lifts it.
+fn level(root: &mut Section<'_>, key: &'static str, default_mm: f64) -> f64 {
+    m_from_mm(root.number_or(key, &BODY_MM, default_mm).value)
+}
+
+fn points(mut s: Section<'_>) -> Option<GridRequest> {
+    let x = s.axis_or("x_mm", &BODY_MM, SEED_SIDE_MM);
+    let y = s.axis_or("y_mm", &BODY_MM, SEED_SIDE_MM);
+    s.choice("outside", &[("skip", ())]);
+    let grid = x.zip(y).map(|(x, y)| [x.value, y.value]);
+    if let Some([x, y]) = &grid
+        && x.samples
+            .checked_mul(y.samples)
+            .is_none_or(|n| n > POINTS_MAX)
+    {
+        let message = format!(
+            "{} x {} points are more than {POINTS_MAX}",
+            x.samples, y.samples
+        );
+        s.fault("x_mm", message, "ask for fewer samples");
+    }
+    s.finish();
+    let [x, y] = grid?.map(|axis| AxisRequest::Given(axis_m(axis)));
+    Some(GridRequest { x, y })
+}
