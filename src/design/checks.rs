@@ -213,11 +213,11 @@ fn array_overlap(draft: &Draft, need: Need, sink: &Sink) {
         placed(sink, need.array, key, span, message, help);
     };
     match &draft.array.layout {
-        Layout::Grid(grid, pitch) if grid.rows * grid.columns > 1 => {
-            if exceeds(outer, pitch.value) {
-                // One column: the next coil stands in the next row.
-                report("array.pitch_mm", &pitch.span, [0, 1], pitch.value);
-            }
+        // The next coil stands in the next column, or in the next row of a single column.
+        Layout::Grid(grid, pitch)
+            if grid.rows * grid.columns > 1 && exceeds(outer, pitch.value) =>
+        {
+            report("array.pitch_mm", &pitch.span, [0, 1], pitch.value);
         }
         Layout::Listed(list) if outer.is_finite() => {
             let positions: Vec<[f64; 2]> = list.iter().map(|place| place.value).collect();
@@ -276,13 +276,16 @@ fn target(draft: &Draft, need: Need, sink: &Sink) {
     let half = draft.magnet.length / 2.0;
     let (bottom, top) = (height.value - half, height.value + half);
     let coil = draft.coil.as_ref().filter(|_| need.coil);
-    let coil_bottom = coil.map_or(f64::NEG_INFINITY, |coil| -coil.length.value);
-    let meets = |from: f64, to: f64| exceeds(to, bottom) && exceeds(top, from);
+    // Spans from `to` down to `below` under the winding, or without end.
+    let meets = |below: f64, to: f64| {
+        let from = coil.map(|coil| -coil.length.value - below);
+        exceeds(to, bottom) && from.is_none_or(|from| exceeds(top, from))
+    };
     let in_core = draft
         .core
         .as_ref()
-        .filter(|core| meets(coil_bottom - core.below.value, core.above.value));
-    let in_winding = meets(coil_bottom, 0.0);
+        .filter(|core| meets(core.below.value, core.above.value));
+    let in_winding = meets(0.0, 0.0);
     let fits_bore = coil.is_some_and(|coil| !exceeds(draft.magnet.diameter, coil.inner.value));
     let (name, face) = match in_core {
         Some(core) => ("core", core.above.value),

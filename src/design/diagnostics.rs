@@ -4,7 +4,10 @@ use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, NamedSource};
+use miette::{
+    Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteError,
+    MietteSpanContents, SourceCode, SourceSpan, SpanContents,
+};
 
 /// Faults beyond this many are counted, not shown.
 const SHOWN_MAX: usize = 100;
@@ -304,11 +307,39 @@ impl InvalidDocument {
     }
 }
 
+/// The quoted text. Unlike miette's own named source its columns are characters, as in
+/// [`Faults::plain`].
+#[derive(Debug)]
+struct QuotedSource<'a> {
+    name: String,
+    text: &'a str,
+}
+
+impl SourceCode for QuotedSource<'_> {
+    fn read_span<'a>(
+        &'a self,
+        span: &SourceSpan,
+        lines_before: usize,
+        lines_after: usize,
+    ) -> Result<Box<dyn SpanContents<'a> + 'a>, MietteError> {
+        let inner = self.text.read_span(span, lines_before, lines_after)?;
+        let column = match lines_before {
+            0 => place_of(self.text, span.offset()).column - 1,
+            _ => inner.column(),
+        };
+        let name = self.name.clone();
+        let (data, line, lines) = (inner.data(), inner.line(), inner.line_count());
+        let contents =
+            MietteSpanContents::new_named(name, data, *inner.span(), line, column, lines);
+        Ok(Box::new(contents))
+    }
+}
+
 /// What miette renders: a headline, then each fault against the named source.
 #[derive(Debug)]
 pub struct Report<'a> {
     faults: &'a Faults,
-    source: NamedSource<String>,
+    source: QuotedSource<'a>,
     headline: String,
 }
 
@@ -318,7 +349,10 @@ impl<'a> Report<'a> {
     pub fn new(faults: &'a Faults) -> Self {
         Self {
             faults,
-            source: NamedSource::new(faults.path.display().to_string(), faults.source.clone()),
+            source: QuotedSource {
+                name: faults.path.display().to_string(),
+                text: &faults.source,
+            },
             headline: faults.headline(),
         }
     }
@@ -346,7 +380,7 @@ impl Diagnostic for Report<'_> {
         Some(Box::new(rest))
     }
 
-    fn source_code(&self) -> Option<&dyn miette::SourceCode> {
+    fn source_code(&self) -> Option<&dyn SourceCode> {
         Some(&self.source)
     }
 

@@ -58,6 +58,8 @@ pub fn read_document<T>(
     path: &Path,
     read: impl FnOnce(&mut Section<'_>, &Sink) -> Option<T>,
 ) -> Result<(T, Faults), InvalidDocument> {
+    // A byte order mark would count as a column.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let (table, errors) = DeTable::parse_recoverable(text);
     let sink = Sink::default();
     errors

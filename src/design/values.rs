@@ -12,6 +12,9 @@ use crate::numerics::axis::Axis;
 /// Longest name of a document, bytes.
 const NAME_MAX: usize = 100;
 
+/// Largest count, far above what any bound on a product of counts admits.
+const COUNT_MAX: f64 = 1e9;
+
 /// Most values in one list.
 const LIST_MAX: usize = 1_000_000;
 
@@ -325,12 +328,13 @@ impl<'a> Section<'a> {
     fn whole(&self, path: &str, found: Found<'a>) -> Option<usize> {
         let rule = Rule::any("").bound(Bound::AtLeast(1.0));
         let value = self.checked(path, found, &rule);
-        // Beyond 2^53 a double no longer counts.
-        if value.fract() == 0.0 && value <= 9.0e15 {
+        if value.fract() == 0.0 && value <= COUNT_MAX {
             return Some(value as usize);
         }
         if value.is_finite() {
-            let message = format!("expected a whole number, found {}", number(value));
+            let found_value = number(value);
+            let message =
+                format!("expected a whole number up to {COUNT_MAX:e}, found {found_value}");
             self.sink.add(Fault::error(path, message).at(&found.span()));
         }
         None
