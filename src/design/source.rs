@@ -6,13 +6,13 @@ use std::path::Path;
 
 use super::diagnostics::{Fault, InvalidDocument, place_of};
 
-/// Largest document that is read, bytes (16 MiB).
-pub const DOCUMENT_MAX_BYTES: u64 = 16 << 20;
+/// Largest document that is read, bytes (4 MiB): several times what ten thousand coils need.
+pub const DOCUMENT_MAX_BYTES: u64 = 4 << 20;
 
 /// The text of the document at `path`.
 ///
 /// # Errors
-/// A missing file, a directory, a file over 16 MiB or not in UTF-8, or what the system says.
+/// A missing file, a directory, a file over 4 MiB or not in UTF-8, or what the system says.
 pub fn text_of(path: &Path) -> Result<String, InvalidDocument> {
     let refuse = |fault| Err(InvalidDocument::unreadable(path, fault));
     match fs::metadata(path) {
@@ -32,7 +32,7 @@ pub fn text_of(path: &Path) -> Result<String, InvalidDocument> {
 /// The text of the document that `stream` yields; messages call it `path` (`-` for stdin).
 ///
 /// # Errors
-/// A document over 16 MiB or not in UTF-8, or what the system says.
+/// A document over 4 MiB or not in UTF-8, or what the system says.
 pub fn text_from(stream: impl Read, path: &Path) -> Result<String, InvalidDocument> {
     let mut bytes = Vec::new();
     let result = stream.take(DOCUMENT_MAX_BYTES + 1).read_to_end(&mut bytes);
@@ -94,7 +94,7 @@ mod tests {
         let said = text_from(io::repeat(b'#'), Path::new("-"))
             .unwrap_err()
             .to_string();
-        assert!(said.contains("larger than 16777216 bytes"), "{said}");
+        assert!(said.contains("larger than 4194304 bytes"), "{said}");
     }
 
     #[test]
