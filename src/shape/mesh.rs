@@ -67,33 +67,32 @@ impl Mesh {
         let count = triangles.len();
         let mut min_m = [f64::INFINITY; 3];
         let mut max_m = [f64::NEG_INFINITY; 3];
+        let mut number = 0;
+        let mut too_far = None;
         // Area is judged on the file's own numbers, where equal vertices are equal.
         triangles.retain_mut(|triangle| {
-            let keep = has_area(triangle);
-            if keep {
-                for vertex in triangle.iter_mut() {
-                    *vertex = transform.apply(*vertex);
-                    for k in 0..3 {
-                        min_m[k] = min_m[k].min(vertex[k]);
-                        max_m[k] = max_m[k].max(vertex[k]);
+            number += 1;
+            if !has_area(triangle) {
+                return false;
+            }
+            for vertex in triangle.iter_mut() {
+                *vertex = transform.apply(*vertex);
+                for k in 0..3 {
+                    min_m[k] = min_m[k].min(vertex[k]);
+                    max_m[k] = max_m[k].max(vertex[k]);
+                    // `contains` is false for a not-a-number that overflow made.
+                    if !(-FARTHEST_M..=FARTHEST_M).contains(&vertex[k]) && too_far.is_none() {
+                        too_far = Some((number, vertex[k]));
                     }
                 }
             }
-            keep
+            true
         });
         if triangles.is_empty() {
             return Err(ShapeError::NoArea { triangles: count });
         }
-        for (index, triangle) in triangles.iter().enumerate() {
-            let farthest = triangle.as_flattened().iter().fold(0.0, |m: f64, c| m.max(c.abs()));
-            // Also true for a not-a-number that overflow made.
-            if !(farthest <= FARTHEST_M) {
-                return Err(ShapeError::TooFar {
-                    triangle: index + 1,
-                    coordinate_m: farthest,
-                    limit_m: FARTHEST_M,
-                });
-            }
+        if let Some((triangle, coordinate_m)) = too_far {
+            return Err(ShapeError::TooFar { triangle, coordinate_m, limit_m: FARTHEST_M });
         }
         let facts = MeshFacts {
             triangles: count,
