@@ -3,7 +3,8 @@
 
     python3 scripts/make_shapes.py [FOLDER]        # default: shapes/
 
-The bodies are closed and rest on z = 0, as a CAD program exports them; vertices of curved
+The bodies are closed, as a CAD program exports them; they rest on z = 0, but for the plate,
+whose top is z = 0. Vertices of curved
 surfaces lie on the surface, so the facets lie inside it. The largest distance between facets
 and the true surface is printed. Nothing but Python 3 is needed; the same bytes every time.
 """
@@ -42,7 +43,7 @@ def prism(outline, y0, y1):
 
 
 def flat():
-    return prism([(-HALF, 0.0), (HALF, 0.0), (HALF, PLATE), (-HALF, PLATE)], -HALF, HALF), 0.0
+    return prism([(-HALF, -PLATE), (HALF, -PLATE), (HALF, 0.0), (-HALF, 0.0)], -HALF, HALF), 0.0
 
 
 def wedge():
@@ -162,7 +163,7 @@ outside = "skip"
 
 # name, file, body, height of z = 0 of the body (mm), what the shape is, the exact shape's keys
 SHAPES = [
-    ("flat", "flat", flat, 45.0, "A plate whose top lies at 50 mm.",
+    ("flat", "flat", flat, 50.0, "A plate whose top lies at 50 mm.",
      "side_mm = 100.0\nheight_mm = 50.0\n"),
     ("half-sphere", "half_sphere", half_sphere, 30.0, "Radius 50 mm on a base at 30 mm.",
      "radius_mm = 50.0\nbase_mm = 30.0\n"),

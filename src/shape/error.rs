@@ -127,5 +127,9 @@ fn extent_mm(extent: &[[f64; 2]; 2]) -> String {
 fn mm(length_m: f64) -> f64 {
     let length_mm = length_m * 1000.0;
     let rounded = (length_mm * 1e6).round() / 1e6;
-    if rounded.is_finite() { rounded } else { length_mm }
+    if rounded.is_finite() {
+        rounded
+    } else {
+        length_mm
+    }
 }

@@ -29,7 +29,9 @@ impl Format {
     /// # Errors
     /// [`ShapeError::Format`] for any other ending.
     pub fn of(path: &Path) -> Result<Self, ShapeError> {
-        let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        let ending = path
+            .extension()
+            .map(|e| e.to_string_lossy().to_ascii_lowercase());
         match ending.as_deref() {
             Some("stl") => Ok(Self::Stl),
             Some("obj") => Ok(Self::Obj),
@@ -65,8 +67,10 @@ impl Format {
     /// [`ShapeError::Stl`] with the place; [`ShapeError::Format`] where no reader is built.
     pub fn read(self, path: &Path, bytes: &[u8]) -> Result<FileMesh, ShapeError> {
         match self {
-            Self::Stl => stl::read(bytes)
-                .map_err(|source| ShapeError::Stl { path: path.into(), source }),
+            Self::Stl => stl::read(bytes).map_err(|source| ShapeError::Stl {
+                path: path.into(),
+                source,
+            }),
             _ => Err(self.not_built(path)),
         }
     }
@@ -76,7 +80,11 @@ impl Format {
     /// # Errors
     /// [`ShapeError::Format`] with what to export instead.
     pub fn check(self, path: &Path) -> Result<(), ShapeError> {
-        if self == Self::Stl { Ok(()) } else { Err(self.not_built(path)) }
+        if self == Self::Stl {
+            Ok(())
+        } else {
+            Err(self.not_built(path))
+        }
     }
 
     fn not_built(self, path: &Path) -> ShapeError {

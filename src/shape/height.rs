@@ -13,11 +13,11 @@ use rayon::prelude::*;
 use crate::numerics::axis::Axis;
 use crate::progress::{Interrupted, Progress};
 use crate::shape::mesh::{Mesh, Triangle};
-use crate::shape::seen::{Contact, Seen, upward_normal};
+use crate::shape::seen::{Contact, Seen, WALL_NORMAL_Z, upward_normal};
 
-/// How many coordinate roundings a point may lie off an edge: two for the edge's ends, twice
-/// for programs that round on the way (metres to millimetres, say).
-const REACH_ROUNDINGS: f64 = 4.0;
+/// How many coordinate roundings a point may lie off an edge: x and y of its ends are rounded
+/// (1.4), by some programs twice (metres to millimetres, say).
+const REACH_ROUNDINGS: f64 = 3.0;
 /// Doubles are rounded on the way too: unit, rotation, translation, grid nodes.
 const REACH_EPSILONS: f64 = 8.0;
 /// Triangles between two looks at the progress.
@@ -75,7 +75,11 @@ pub fn reach_m(mesh: &Mesh, grid: &Grid) -> f64 {
         return 0.0;
     }
     let plan = [facts.bounds.plan(), grid.plan()];
-    let largest = plan.as_flattened().as_flattened().iter().fold(0.0, |m: f64, c| m.max(c.abs()));
+    let largest = plan
+        .as_flattened()
+        .as_flattened()
+        .iter()
+        .fold(0.0, |m: f64, c| m.max(c.abs()));
     REACH_ROUNDINGS * facts.coordinate_rounding_m + REACH_EPSILONS * f64::EPSILON * largest
 }
 
@@ -89,7 +93,10 @@ pub fn heights(
     progress: &dyn Progress,
 ) -> Result<Vec<Option<Sample>>, Interrupted> {
     let triangles = mesh.triangles();
-    let nodes = Nodes { x: Line::new(&grid.x_m), y: Line::new(&grid.y_m) };
+    let nodes = Nodes {
+        x: Line::new(&grid.x_m),
+        y: Line::new(&grid.y_m),
+    };
     let reach = reach_m(mesh, grid);
     let workers = rayon::current_num_threads()
         .min(MOST_WORKERS)
@@ -130,7 +137,11 @@ impl Line {
     fn new(axis: &Axis) -> Self {
         let step = axis.step();
         let per_step = if step > 0.0 { 1.0 / step } else { 0.0 };
-        Self { nodes: axis.nodes(), from: axis.from, per_step }
+        Self {
+            nodes: axis.nodes(),
+            from: axis.from,
+            per_step,
+        }
     }
 
     /// Index of the first node that is not below `value`.
@@ -165,7 +176,10 @@ struct Hit {
     triangle: u32,
 }
 
-const NOTHING: Hit = Hit { height: f64::NEG_INFINITY, triangle: u32::MAX };
+const NOTHING: Hit = Hit {
+    height: f64::NEG_INFINITY,
+    triangle: u32::MAX,
+};
 
 /// What touches a point without covering it.
 #[derive(Clone, Copy)]
@@ -183,7 +197,11 @@ struct Layer<'a> {
 
 impl<'a> Layer<'a> {
     fn new(triangles: &'a [Triangle], points: usize) -> Self {
-        Self { triangles, covering: vec![NOTHING; points], touching: BTreeMap::new() }
+        Self {
+            triangles,
+            covering: vec![NOTHING; points],
+            touching: BTreeMap::new(),
+        }
     }
 
     fn add(&mut self, triangle: u32, nodes: &Nodes, reach: f64) {
@@ -218,10 +236,22 @@ impl<'a> Layer<'a> {
                         self.covering[point] = higher(self.triangles, best, hit(height));
                     }
                     Contact::Near(height) => {
-                        self.touch(point, Touch { hit: hit(height), wall: false });
+                        self.touch(
+                            point,
+                            Touch {
+                                hit: hit(height),
+                                wall: false,
+                            },
+                        );
                     }
                     Contact::Wall(height) => {
-                        self.touch(point, Touch { hit: hit(height), wall: true });
+                        self.touch(
+                            point,
+                            Touch {
+                                hit: hit(height),
+                                wall: true,
+                            },
+                        );
                     }
                 }
             }
@@ -272,15 +302,19 @@ impl<'a> Layer<'a> {
     }
 }
 
-/// The higher hit; at equal heights the one that looks up more, then the larger normal. Equal
-/// normals give the same sample either way.
+/// The higher hit. At equal heights the face seen from above is wanted: any face before a wall,
+/// one that rises from there before one that does not (a dome before its base), of two that rise
+/// the steeper, of two that do not the flatter; then the larger normal. Equal keys give the same
+/// sample either way, so the order of the triangles does not matter.
 fn higher(triangles: &[Triangle], a: Hit, b: Hit) -> Hit {
     if a.height != b.height || a.triangle == u32::MAX || b.triangle == u32::MAX {
         return if b.height > a.height { b } else { a };
     }
     let key = |hit: Hit| {
-        let [x, y, z] = upward_normal(&triangles[hit.triangle as usize]);
-        [z, x, y]
+        let triangle = &triangles[hit.triangle as usize];
+        let [x, y, z] = upward_normal(triangle);
+        let rises = triangle.iter().any(|vertex| vertex[2] > hit.height);
+        (z > WALL_NORMAL_Z, rises, [if rises { -z } else { z }, x, y])
     };
     match key(a).partial_cmp(&key(b)) {
         Some(Ordering::Less) => b,

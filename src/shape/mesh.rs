@@ -92,7 +92,11 @@ impl Mesh {
             return Err(ShapeError::NoArea { triangles: count });
         }
         if let Some((triangle, coordinate_m)) = too_far {
-            return Err(ShapeError::TooFar { triangle, coordinate_m, limit_m: FARTHEST_M });
+            return Err(ShapeError::TooFar {
+                triangle,
+                coordinate_m,
+                limit_m: FARTHEST_M,
+            });
         }
         let facts = MeshFacts {
             triangles: count,
@@ -129,5 +133,9 @@ pub(super) fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 /// a x b.
 #[must_use]
 pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
 }

@@ -18,8 +18,11 @@ impl Transform {
     pub fn new(unit_m: f64, placement: &Placement) -> Self {
         // Dividing by 1000 rounds correctly (38 mm is the double nearest 0.038), times 0.001 not.
         let per_metre = (1.0 / unit_m).round();
-        let unit =
-            if per_metre > 1.0 && 1.0 / per_metre == unit_m { [1.0, per_metre] } else { [unit_m, 1.0] };
+        let unit = if per_metre > 1.0 && 1.0 / per_metre == unit_m {
+            [1.0, per_metre]
+        } else {
+            [unit_m, 1.0]
+        };
         let rotation = rotation(placement.rotate_deg);
         let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         Self {
@@ -75,7 +78,13 @@ mod tests {
     use crate::shape::document::Placement;
 
     fn turned(rotate_deg: [f64; 3]) -> Transform {
-        Transform::new(1.0, &Placement { translate_m: [0.0; 3], rotate_deg })
+        Transform::new(
+            1.0,
+            &Placement {
+                translate_m: [0.0; 3],
+                rotate_deg,
+            },
+        )
     }
 
     #[test]
@@ -97,7 +106,10 @@ mod tests {
         assert_eq!(turned([0.0, 0.0, -270.0]).apply(p), [-1.3, 0.7, -2.9]);
         assert_eq!(turned([720.0, -360.0, 360.0]), turned([0.0; 3]));
         // x first: y -> z; then z: the new z stays.
-        assert_eq!(turned([90.0, 0.0, 90.0]).apply([0.0, 1.3, 0.0]), [0.0, 0.0, 1.3]);
+        assert_eq!(
+            turned([90.0, 0.0, 90.0]).apply([0.0, 1.3, 0.0]),
+            [0.0, 0.0, 1.3]
+        );
     }
 
     #[test]
@@ -107,13 +119,18 @@ mod tests {
             .apply(turned([0.0, -23.0, 0.0]).apply(turned([37.0, 0.0, 0.0]).apply(p)));
         let at_once = turned([37.0, -23.0, 71.0]).apply(p);
         for k in 0..3 {
-            assert!((by_steps[k] - at_once[k]).abs() < 1e-15, "{by_steps:?} {at_once:?}");
+            assert!(
+                (by_steps[k] - at_once[k]).abs() < 1e-15,
+                "{by_steps:?} {at_once:?}"
+            );
         }
     }
 
     #[test]
     fn sines_are_sines() {
-        for angle in [-400.3, -91.0, -44.9, 0.3, 44.9, 45.1, 133.0, 200.0, 300.7, 1e4] {
+        for angle in [
+            -400.3, -91.0, -44.9, 0.3, 44.9, 45.1, 133.0, 200.0, 300.7, 1e4,
+        ] {
             let (sin, cos) = sin_cos_deg(angle);
             let radians = angle.to_radians();
             assert!((sin - radians.sin()).abs() < 1e-13 && (cos - radians.cos()).abs() < 1e-13);

@@ -72,11 +72,20 @@ impl ConstraintPoints {
     /// Counts and heights.
     #[must_use]
     pub fn facts(&self) -> PointFacts {
-        let fold = |start, pick: fn(f64, f64) -> f64| self.height_m.iter().copied().fold(start, pick);
+        let fold =
+            |start, pick: fn(f64, f64) -> f64| self.height_m.iter().copied().fold(start, pick);
         let max_height_m = fold(f64::NEG_INFINITY, f64::max);
         // In one order on any number of threads; scaled, so that no square underflows.
-        let scale = if max_height_m > 0.0 { max_height_m } else { 1.0 };
-        let squares: f64 = self.height_m.iter().map(|h| (h / scale) * (h / scale)).sum();
+        let scale = if max_height_m > 0.0 {
+            max_height_m
+        } else {
+            1.0
+        };
+        let squares: f64 = self
+            .height_m
+            .iter()
+            .map(|h| (h / scale) * (h / scale))
+            .sum();
         PointFacts {
             points: self.len(),
             outside: self.outside,
@@ -137,28 +146,47 @@ pub fn discretize(
         ),
         Surface::Primitive(_) => (None, "a-priori: a closed formula in double precision"),
     };
-    let accuracy =
-        StageAccuracy { estimate: rounding_m, relative_to: "1 m".into(), method: method.into() };
-    Ok(Discretized { points, bounds, mesh, accuracy, warnings })
+    let accuracy = StageAccuracy {
+        estimate: rounding_m,
+        relative_to: "1 m".into(),
+        method: method.into(),
+    };
+    Ok(Discretized {
+        points,
+        bounds,
+        mesh,
+        accuracy,
+        warnings,
+    })
 }
 
 /// The requested axis; its nodes ascend.
 fn axis(name: &str, request: AxisRequest, extent: [f64; 2]) -> Result<Axis, ShapeError> {
     let axis = match request {
         AxisRequest::Given(axis) => axis,
-        AxisRequest::Extent(samples) => Axis { from: extent[0], to: extent[1], samples },
+        AxisRequest::Extent(samples) => Axis {
+            from: extent[0],
+            to: extent[1],
+            samples,
+        },
     };
-    let fault = |what: String| Err(ShapeError::Document(format!("the grid's {name} axis {what}")));
+    let fault = |what: String| {
+        Err(ShapeError::Document(format!(
+            "the grid's {name} axis {what}"
+        )))
+    };
     let Axis { from, to, samples } = axis;
     if samples == 0 {
         return fault("has no sample; give at least 1".into());
     }
     if !from.is_finite() || !to.is_finite() {
-        return fault(format!("runs from {from} to {to} m; both ends must be finite"));
+        return fault(format!(
+            "runs from {from} to {to} m; both ends must be finite"
+        ));
     }
     if samples > 1 && samples <= MOST_POINTS {
         let finest = 4.0 * f64::EPSILON * from.abs().max(to.abs());
-        if !(axis.step() > finest) {
+        if axis.step() <= finest {
             let advice = match request {
                 AxisRequest::Given(_) => "the first end must be the smaller one",
                 AxisRequest::Extent(_) => {
@@ -186,9 +214,16 @@ fn collect(
         let (surface, plan) = (bounds.plan(), grid.plan());
         let apart = (0..2).any(|k| surface[k][1] < plan[k][0] || surface[k][0] > plan[k][1]);
         return Err(if apart {
-            ShapeError::OutsideGrid { surface, grid: plan }
+            ShapeError::OutsideGrid {
+                surface,
+                grid: plan,
+            }
         } else {
-            ShapeError::NoPoint { grid_points: grid.len(), surface, grid: plan }
+            ShapeError::NoPoint {
+                grid_points: grid.len(),
+                surface,
+                grid: plan,
+            }
         });
     }
     let mut points = ConstraintPoints {
@@ -216,7 +251,11 @@ fn collect(
         points.grid_index.push(index);
     }
     if below > 0 {
-        return Err(ShapeError::BelowZero { below, points: found, lowest_m });
+        return Err(ShapeError::BelowZero {
+            below,
+            points: found,
+            lowest_m,
+        });
     }
     Ok(points)
 }

@@ -30,7 +30,9 @@ impl PlacedPrimitive {
                 vec![("side_mm", side_m)]
             }
             Primitive::HalfSphere { radius_m, .. } => vec![("radius_mm", radius_m)],
-            Primitive::HalfCylinder { radius_m, length_m, .. } => {
+            Primitive::HalfCylinder {
+                radius_m, length_m, ..
+            } => {
                 vec![("radius_mm", radius_m), ("length_mm", length_m)]
             }
         };
@@ -50,7 +52,11 @@ impl PlacedPrimitive {
             )));
         }
         let (sin, cos) = sin_cos_deg(about_z);
-        Ok(Self { primitive, translate_m: placement.translate_m, turn: [sin, cos] })
+        Ok(Self {
+            primitive,
+            translate_m: placement.translate_m,
+            turn: [sin, cos],
+        })
     }
 
     /// The box around it, m.
@@ -62,12 +68,16 @@ impl PlacedPrimitive {
             Primitive::HalfSphere { radius_m, base_m } => {
                 ([radius_m; 2], base_m, base_m + radius_m)
             }
-            Primitive::HalfCylinder { radius_m, length_m, base_m } => {
-                ([radius_m, length_m / 2.0], base_m, base_m + radius_m)
-            }
-            Primitive::Wedge { side_m, low_m, high_m } => {
-                ([side_m / 2.0; 2], low_m.min(high_m), low_m.max(high_m))
-            }
+            Primitive::HalfCylinder {
+                radius_m,
+                length_m,
+                base_m,
+            } => ([radius_m, length_m / 2.0], base_m, base_m + radius_m),
+            Primitive::Wedge {
+                side_m,
+                low_m,
+                high_m,
+            } => ([side_m / 2.0; 2], low_m.min(high_m), low_m.max(high_m)),
         };
         let turned = match self.primitive {
             Primitive::HalfSphere { .. } => half,
@@ -104,17 +114,27 @@ impl PlacedPrimitive {
                 let normal = [u, v, rise].map(|c| c / radius_m);
                 (base_m + rise, normal)
             }
-            Primitive::HalfCylinder { radius_m, length_m, base_m } => {
+            Primitive::HalfCylinder {
+                radius_m,
+                length_m,
+                base_m,
+            } => {
                 (inside(u, radius_m) && inside(v, length_m / 2.0)).then_some(())?;
                 let rise = circle(radius_m, u);
                 let normal = [u / radius_m, 0.0, rise / radius_m];
                 (base_m + rise, normal)
             }
-            Primitive::Wedge { side_m, low_m, high_m } => {
+            Primitive::Wedge {
+                side_m,
+                low_m,
+                high_m,
+            } => {
                 let half = side_m / 2.0;
                 (inside(u, half) && inside(v, half)).then_some(())?;
-                let (from_low, from_high) =
-                    (((u + half) / side_m).max(0.0), ((half - u) / side_m).max(0.0));
+                let (from_low, from_high) = (
+                    ((u + half) / side_m).max(0.0),
+                    ((half - u) / side_m).max(0.0),
+                );
                 let rise = high_m - low_m;
                 let height = if from_low <= from_high {
                     low_m + from_low * rise
@@ -146,24 +166,48 @@ mod tests {
     use crate::numerics::axis::Axis;
     use crate::shape::document::{Placement, Primitive};
 
-    const HALF_SPHERE: Primitive = Primitive::HalfSphere { radius_m: 0.05, base_m: 0.03 };
-    const HALF_CYLINDER: Primitive =
-        Primitive::HalfCylinder { radius_m: 0.05, length_m: 0.1, base_m: 0.03 };
-    const WEDGE: Primitive = Primitive::Wedge { side_m: 0.1, low_m: 0.03, high_m: 0.08 };
-    const FLAT: Primitive = Primitive::Flat { side_m: 0.1, height_m: 0.05 };
+    const HALF_SPHERE: Primitive = Primitive::HalfSphere {
+        radius_m: 0.05,
+        base_m: 0.03,
+    };
+    const HALF_CYLINDER: Primitive = Primitive::HalfCylinder {
+        radius_m: 0.05,
+        length_m: 0.1,
+        base_m: 0.03,
+    };
+    const WEDGE: Primitive = Primitive::Wedge {
+        side_m: 0.1,
+        low_m: 0.03,
+        high_m: 0.08,
+    };
+    const FLAT: Primitive = Primitive::Flat {
+        side_m: 0.1,
+        height_m: 0.05,
+    };
 
     fn placed(primitive: Primitive, translate_m: [f64; 3], about_z: f64) -> PlacedPrimitive {
-        let placement = Placement { translate_m, rotate_deg: [0.0, 0.0, about_z] };
+        let placement = Placement {
+            translate_m,
+            rotate_deg: [0.0, 0.0, about_z],
+        };
         PlacedPrimitive::new(primitive, &placement).unwrap()
     }
 
     /// Points of the seed's 61 x 61 grid, moved with the shape, that have surface.
     fn covered(primitive: Primitive, at: [f64; 3], turn: f64) -> usize {
         let shape = placed(primitive, at, turn);
-        let axis = |c: f64| Axis { from: c - 0.05, to: c + 0.05, samples: 61 };
+        let axis = |c: f64| Axis {
+            from: c - 0.05,
+            to: c + 0.05,
+            samples: 61,
+        };
         let y = axis(at[1]).nodes();
-        axis(at[0]).nodes().iter().flat_map(|x| y.iter().map(move |y| (*x, *y)))
-            .filter(|(x, y)| shape.sample(*x, *y).is_some()).count()
+        axis(at[0])
+            .nodes()
+            .iter()
+            .flat_map(|x| y.iter().map(move |y| (*x, *y)))
+            .filter(|(x, y)| shape.sample(*x, *y).is_some())
+            .count()
     }
 
     #[test]
@@ -199,11 +243,20 @@ mod tests {
                 let shape = placed(primitive, [0.003, -0.004, 0.01], turn);
                 let h = |x: f64, y: f64| shape.sample(x, y).unwrap().height_m;
                 let (x, y, d) = (0.017, -0.011, 1e-6);
-                let slope = [(h(x + d, y) - h(x - d, y)) / (2.0 * d), (h(x, y + d) - h(x, y - d)) / (2.0 * d)];
+                let slope = [
+                    (h(x + d, y) - h(x - d, y)) / (2.0 * d),
+                    (h(x, y + d) - h(x, y - d)) / (2.0 * d),
+                ];
                 let n = shape.sample(x, y).unwrap().normal;
                 assert!((n[0] * n[0] + n[1] * n[1] + n[2] * n[2] - 1.0).abs() < 1e-14);
-                assert!((n[0] + slope[0] * n[2]).abs() < 1e-8, "{primitive:?} {turn}");
-                assert!((n[1] + slope[1] * n[2]).abs() < 1e-8, "{primitive:?} {turn}");
+                assert!(
+                    (n[0] + slope[0] * n[2]).abs() < 1e-8,
+                    "{primitive:?} {turn}"
+                );
+                assert!(
+                    (n[1] + slope[1] * n[2]).abs() < 1e-8,
+                    "{primitive:?} {turn}"
+                );
             }
         }
     }
@@ -224,11 +277,22 @@ mod tests {
 
     #[test]
     fn other_turns_and_sizes_are_refused() {
-        let tilt = Placement { translate_m: [0.0; 3], rotate_deg: [30.0, 0.0, 0.0] };
+        let tilt = Placement {
+            translate_m: [0.0; 3],
+            rotate_deg: [30.0, 0.0, 0.0],
+        };
         let message = PlacedPrimitive::new(FLAT, &tilt).unwrap_err().to_string();
-        assert!(message.contains("about z only") && message.contains("STL"), "{message}");
-        let flat = Primitive::Flat { side_m: -0.1, height_m: 0.05 };
-        let message = PlacedPrimitive::new(flat, &Placement::default()).unwrap_err().to_string();
+        assert!(
+            message.contains("about z only") && message.contains("STL"),
+            "{message}"
+        );
+        let flat = Primitive::Flat {
+            side_m: -0.1,
+            height_m: 0.05,
+        };
+        let message = PlacedPrimitive::new(flat, &Placement::default())
+            .unwrap_err()
+            .to_string();
         assert!(message.contains("side_mm is -100"), "{message}");
     }
 }

@@ -9,7 +9,7 @@ use twofloat::TwoFloat;
 use crate::shape::mesh::{Triangle, cross, minus};
 
 /// |n_z| below which a sliver in plan is taken as a vertical wall.
-const WALL_NORMAL_Z: f64 = 1e-4;
+pub(super) const WALL_NORMAL_Z: f64 = 1e-4;
 /// Cancellation in the weights beyond which they are computed in double-double.
 const CANCELLATION: f64 = 16.0;
 
@@ -49,9 +49,14 @@ impl Seen {
         let longest = longest[0].max(longest[1]).max(longest[2]);
         // As wide in plan as the file's rounding can make a wall that was vertical.
         let wall = orientation == 0.0
-            || (orientation.abs() <= 0.5 * reach * longest
+            || (orientation.abs() <= reach * longest
                 && upward_normal(triangle)[2] <= WALL_NORMAL_Z);
-        Self { vertices, orientation, wall, reach }
+        Self {
+            vertices,
+            orientation,
+            wall,
+            reach,
+        }
     }
 
     /// A range of x that holds every point of row `y` that this triangle touches.
@@ -74,38 +79,58 @@ impl Seen {
             }
         }
         // The cut's rounding is a few units of the largest x.
-        let slack = self.reach
-            + 16.0 * f64::EPSILON * a[0].abs().max(b[0].abs()).max(c[0].abs());
+        let slack = self.reach + 16.0 * f64::EPSILON * a[0].abs().max(b[0].abs()).max(c[0].abs());
         [range[0] - slack, range[1] + slack]
     }
 
     /// How the vertical line through `p` meets the triangle.
     pub(super) fn contact(&self, p: Point) -> Contact {
         if self.wall {
-            return self.edges(p, 2.0 * self.reach).map_or(Contact::None, Contact::Wall);
+            return match self.near(p) {
+                Some(_) => Contact::Wall(self.wall_top(p)),
+                None => Contact::None,
+            };
         }
         let [a, b, c] = self.vertices;
         let sign = self.orientation.signum();
-        let weights = [side(b, c, p) * sign, side(c, a, p) * sign, side(a, b, p) * sign];
+        let weights = [
+            side(b, c, p) * sign,
+            side(c, a, p) * sign,
+            side(a, b, p) * sign,
+        ];
         if weights.iter().all(|w| *w >= 0.0) {
             return Contact::Covers(self.inside(weights, p));
         }
-        self.edges(p, self.reach).map_or(Contact::None, Contact::Near)
+        self.near(p).map_or(Contact::None, Contact::Near)
     }
 
-    /// The highest of the edges' points within the reach of `p`, if any; `above` widens the
-    /// search once one edge is touched, so that a wall's top is found from its foot.
-    fn edges(&self, p: Point, above: f64) -> Option<f64> {
+    fn edges(&self) -> [(Vertex, Vertex); 3] {
         let [a, b, c] = self.vertices;
-        let mut touched = false;
-        let mut top = f64::NEG_INFINITY;
-        for (a, b) in [(a, b), (b, c), (a, c)] {
-            if let Some((distance, height)) = edge_contact(a, b, p, above) {
-                touched |= distance <= self.reach;
-                top = top.max(height);
-            }
-        }
-        touched.then_some(top)
+        [(a, b), (b, c), (a, c)]
+    }
+
+    /// The highest of the edges' points nearest to `p`, of the edges within reach.
+    fn near(&self, p: Point) -> Option<f64> {
+        let heights = self.edges().into_iter();
+        heights
+            .filter_map(|(a, b)| edge_contact(a, b, p, self.reach))
+            .reduce(f64::max)
+    }
+
+    /// Height of a wall's top beside `p`, measured along the wall.
+    fn wall_top(&self, p: Point) -> f64 {
+        let [a, b, c] = self.vertices;
+        let low = [0, 1].map(|k| a[k].min(b[k]).min(c[k]));
+        let high = [0, 1].map(|k| a[k].max(b[k]).max(c[k]));
+        let k = usize::from(high[1] - low[1] > high[0] - low[0]);
+        let at = p[k].clamp(low[k], high[k]);
+        let spanning = self
+            .edges()
+            .into_iter()
+            .filter(|(a, b)| a[k].min(b[k]) <= at && at <= a[k].max(b[k]));
+        spanning.fold(f64::NEG_INFINITY, |top, (a, b)| {
+            top.max(edge_height_at(a, b, k, at))
+        })
     }
 
     /// Height at a covered point; the vertices' own heights are met exactly.
@@ -195,42 +220,49 @@ fn precise_side(a: Vertex, b: Vertex, p: Point) -> f64 {
 
 /// Height of the edge at its point beside `p`; depends on the two ends alone.
 fn edge_height(a: Vertex, b: Vertex, p: Point) -> f64 {
-    let span = [b[0] - a[0], b[1] - a[1]];
-    let k = usize::from(span[1].abs() > span[0].abs());
-    if span[k] == 0.0 {
+    let k = usize::from((b[1] - a[1]).abs() > (b[0] - a[0]).abs());
+    edge_height_at(a, b, k, p[k])
+}
+
+/// Height of the edge where its coordinate `k` is `at`; the top of an edge that stands upright.
+fn edge_height_at(a: Vertex, b: Vertex, k: usize, at: f64) -> f64 {
+    let span = b[k] - a[k];
+    if span == 0.0 {
         return a[2].max(b[2]);
     }
-    let (from_a, from_b) = ((p[k] - a[k]) / span[k], (b[k] - p[k]) / span[k]);
+    let (from_a, from_b) = ((at - a[k]) / span, (b[k] - at) / span);
     let rise = b[2] - a[2];
-    let height = if from_a <= from_b { a[2] + from_a * rise } else { b[2] - from_b * rise };
+    let height = if from_a <= from_b {
+        a[2] + from_a * rise
+    } else {
+        b[2] - from_b * rise
+    };
     height.clamp(a[2].min(b[2]), a[2].max(b[2]))
 }
 
-/// Distance in plan and height of the edge's point nearest to `p`, if within `reach`.
-fn edge_contact(a: Vertex, b: Vertex, p: Point, reach: f64) -> Option<(f64, f64)> {
-    let within = |k: usize| {
-        p[k] >= a[k].min(b[k]) - reach && p[k] <= a[k].max(b[k]) + reach
-    };
-    if !within(0) || !within(1) {
+/// Height of the edge's point nearest to `p` in plan, if within `reach`.
+fn edge_contact(a: Vertex, b: Vertex, p: Point, reach: f64) -> Option<f64> {
+    let within =
+        |slack: f64, k: usize| p[k] >= a[k].min(b[k]) - slack && p[k] <= a[k].max(b[k]) + slack;
+    if !within(reach, 0) || !within(reach, 1) {
         return None;
     }
     let span = [b[0] - a[0], b[1] - a[1]];
-    let across = side(a, b, p);
     let square = span[0] * span[0] + span[1] * span[1];
-    if square == 0.0 {
-        let distance = (p[0] - a[0]).hypot(p[1] - a[1]);
-        return (distance <= reach).then(|| (distance, a[2].max(b[2])));
-    }
-    let between = |k: usize| p[k] >= a[k].min(b[k]) && p[k] <= a[k].max(b[k]);
-    if across == 0.0 && between(0) && between(1) {
-        return Some((0.0, edge_height(a, b, p)));
-    }
-    if across.abs() > reach * square.sqrt() {
-        return None;
-    }
-    let along = ((p[0] - a[0]) * span[0] + (p[1] - a[1]) * span[1]) / square;
-    let along = along.clamp(0.0, 1.0);
-    let foot = [a[0] + along * span[0], a[1] + along * span[1]];
-    let distance = (p[0] - foot[0]).hypot(p[1] - foot[1]);
-    (distance <= reach).then(|| (distance, edge_height(a, b, foot)))
+    let foot = if square == 0.0 {
+        [a[0], a[1]]
+    } else {
+        let across = side(a, b, p);
+        if across == 0.0 && within(0.0, 0) && within(0.0, 1) {
+            return Some(edge_height(a, b, p));
+        }
+        if across.abs() > reach * square.sqrt() {
+            return None;
+        }
+        let along = ((p[0] - a[0]) * span[0] + (p[1] - a[1]) * span[1]) / square;
+        let along = along.clamp(0.0, 1.0);
+        [a[0] + along * span[0], a[1] + along * span[1]]
+    };
+    let near = (p[0] - foot[0]).hypot(p[1] - foot[1]) <= reach;
+    near.then(|| edge_height(a, b, foot))
 }

@@ -39,7 +39,10 @@ impl Surface {
         let format = Format::of(path)?;
         format.check(path)?;
         let Some(unit_m) = *unit_m else {
-            return Err(ShapeError::UnitMissing { path: path.clone(), format: format.name() });
+            return Err(ShapeError::UnitMissing {
+                path: path.clone(),
+                format: format.name(),
+            });
         };
         if !(unit_m > 0.0 && unit_m.is_finite()) {
             return Err(ShapeError::Document(format!(
@@ -49,7 +52,11 @@ impl Surface {
         let mut file = format.read(path, &read_file(path)?)?;
         let mut warnings = std::mem::take(&mut file.warnings);
         let mesh = Mesh::place(file, &Transform::new(unit_m, &document.placement))?;
-        let MeshFacts { triangles, degenerate, .. } = *mesh.facts();
+        let MeshFacts {
+            triangles,
+            degenerate,
+            ..
+        } = *mesh.facts();
         if degenerate > 0 {
             warnings.push(format!(
                 "{degenerate} of {triangles} triangles have no area and are left out"
@@ -74,8 +81,10 @@ impl Surface {
             Self::Mesh(mesh) => mesh.facts().coordinate_rounding_m,
             Self::Primitive(primitive) => {
                 let Bounds { min_m, max_m } = primitive.bounds();
-                let largest =
-                    min_m.iter().chain(&max_m).fold(0.0, |m: f64, c| m.max(c.abs()));
+                let largest = min_m
+                    .iter()
+                    .chain(&max_m)
+                    .fold(0.0, |m: f64, c| m.max(c.abs()));
                 largest * f64::EPSILON
             }
         }
@@ -95,17 +104,24 @@ impl Surface {
             Self::Primitive(primitive) => {
                 let (x, y) = (grid.x_m.nodes(), grid.y_m.nodes());
                 let points = (0..grid.len()).into_par_iter();
-                Ok(points.map(|k| primitive.sample(x[k % x.len()], y[k / x.len()])).collect())
+                Ok(points
+                    .map(|k| primitive.sample(x[k % x.len()], y[k / x.len()]))
+                    .collect())
             }
         }
     }
 }
 
 fn check_placement(placement: &Placement) -> Result<(), ShapeError> {
-    let keys = [("translate_mm", placement.translate_m), ("rotate_deg", placement.rotate_deg)];
+    let keys = [
+        ("translate_mm", placement.translate_m),
+        ("rotate_deg", placement.rotate_deg),
+    ];
     for (key, values) in keys {
         if values.iter().any(|v| !v.is_finite()) {
-            return Err(ShapeError::Document(format!("{key} holds a number that is not finite")));
+            return Err(ShapeError::Document(format!(
+                "{key} holds a number that is not finite"
+            )));
         }
     }
     Ok(())
@@ -113,7 +129,10 @@ fn check_placement(placement: &Placement) -> Result<(), ShapeError> {
 
 /// A regular file's bytes.
 fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
-    let unreadable = |what: String| ShapeError::Unreadable { path: path.into(), what };
+    let unreadable = |what: String| ShapeError::Unreadable {
+        path: path.into(),
+        what,
+    };
     let failed = |error: std::io::Error| {
         unreadable(match error.kind() {
             std::io::ErrorKind::NotFound => {
@@ -126,10 +145,14 @@ fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
     };
     let kind = std::fs::metadata(path).map_err(failed)?;
     if kind.is_dir() {
-        return Err(unreadable("this is a folder; name the surface file in it".into()));
+        return Err(unreadable(
+            "this is a folder; name the surface file in it".into(),
+        ));
     }
     if !kind.is_file() {
-        return Err(unreadable("this is no regular file (a device, a pipe or a socket)".into()));
+        return Err(unreadable(
+            "this is no regular file (a device, a pipe or a socket)".into(),
+        ));
     }
     std::fs::read(path).map_err(failed)
 }

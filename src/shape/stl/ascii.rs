@@ -5,6 +5,8 @@ use crate::shape::stl::StlError;
 
 /// A text whose numbers all have fewer digits than a printed float wrote them exactly.
 const PRINTED_DIGITS: usize = 6;
+/// A number with more digits may show that it never was a single-precision float.
+const FLOAT_DIGITS: usize = 9;
 
 /// The bytes after a UTF-8 byte-order mark.
 pub(super) fn after_mark(bytes: &[u8]) -> &[u8] {
@@ -35,7 +37,13 @@ fn is_text(bytes: &[u8]) -> bool {
 
 /// Reads the whole text.
 pub(super) fn read(bytes: &[u8]) -> Result<FileMesh, StlError> {
-    let mut reader = Reader { words: Words::new(bytes), triangle: 0, digits: 0, largest: 0.0 };
+    let mut reader = Reader {
+        words: Words::new(bytes),
+        triangle: 0,
+        digits: 0,
+        largest: 0.0,
+        finer_than_float: false,
+    };
     let mut triangles: Vec<Triangle> = Vec::new();
     let mut warnings = Vec::new();
     let mut solids = 0;
@@ -67,9 +75,15 @@ pub(super) fn read(bytes: &[u8]) -> Result<FileMesh, StlError> {
         }
     }
     if solids > 1 {
-        warnings.push(format!("the file holds {solids} solids; they are taken as one surface"));
+        warnings.push(format!(
+            "the file holds {solids} solids; they are taken as one surface"
+        ));
     }
-    Ok(FileMesh { triangles, coordinate_rounding: reader.rounding(), warnings })
+    Ok(FileMesh {
+        triangles,
+        coordinate_rounding: reader.rounding(),
+        warnings,
+    })
 }
 
 struct Reader<'a> {
@@ -79,6 +93,8 @@ struct Reader<'a> {
     /// Most significant digits of any coordinate.
     digits: usize,
     largest: f64,
+    /// A coordinate lies between two floats by more than its digits leave open.
+    finer_than_float: bool,
 }
 
 impl Reader<'_> {
@@ -121,16 +137,26 @@ impl Reader<'_> {
 
     fn expect(&mut self, wanted: &str) -> Result<(), StlError> {
         let word = self.words.next();
-        if is(word, wanted) { Ok(()) } else { Err(self.unexpected(&format!("`{wanted}`"), word)) }
+        if is(word, wanted) {
+            Ok(())
+        } else {
+            Err(self.unexpected(&format!("`{wanted}`"), word))
+        }
     }
 
     fn number(&mut self) -> Result<f64, StlError> {
         let word = self.words.next();
-        let value: Option<f64> =
-            word.and_then(|w| std::str::from_utf8(w).ok()).and_then(|w| w.parse().ok());
+        let value: Option<f64> = word
+            .and_then(|w| std::str::from_utf8(w).ok())
+            .and_then(|w| w.parse().ok());
         match (word, value) {
             (Some(word), Some(value)) if value.is_finite() => {
-                self.digits = self.digits.max(significant_digits(word));
+                let digits = significant_digits(word);
+                self.digits = self.digits.max(digits);
+                if digits > FLOAT_DIGITS && !self.finer_than_float {
+                    let off = (value - f64::from(value as f32)).abs();
+                    self.finer_than_float = off > value.abs() * 5.0 * 10f64.powf(-(digits as f64));
+                }
                 self.largest = self.largest.max(value.abs());
                 Ok(value)
             }
@@ -149,15 +175,20 @@ impl Reader<'_> {
         }
     }
 
-    /// Half a unit of the last printed digit at the largest coordinate, at least f32's rounding
-    /// (most programs print floats).
+    /// Half a unit of the last printed digit at the largest coordinate, and f32's rounding unless
+    /// the digits show something finer: most programs print floats.
     fn rounding(&self) -> f64 {
-        let float = self.largest * super::F32_ROUNDING;
+        let epsilon = if self.finer_than_float {
+            f64::EPSILON
+        } else {
+            super::F32_ROUNDING
+        };
+        let stored = self.largest * epsilon;
         if self.digits < PRINTED_DIGITS || self.largest == 0.0 {
-            return float;
+            return stored;
         }
         let decade = self.largest.log10().floor() + 1.0 - self.digits as f64;
-        float.max(0.5 * 10f64.powf(decade))
+        stored.max(0.5 * 10f64.powf(decade))
     }
 
     fn unexpected(&self, wanted: &str, found: Option<&[u8]>) -> StlError {
@@ -168,7 +199,11 @@ impl Reader<'_> {
     }
 
     fn fault(&self, what: String) -> StlError {
-        StlError::Text { line: self.words.line(), triangle: self.triangle, what }
+        StlError::Text {
+            line: self.words.line(),
+            triangle: self.triangle,
+            what,
+        }
     }
 }
 
@@ -202,7 +237,11 @@ struct Words<'a> {
 impl<'a> Words<'a> {
     fn new(bytes: &'a [u8]) -> Self {
         let at = bytes.len() - after_mark(bytes).len();
-        Self { bytes, at, word_at: at }
+        Self {
+            bytes,
+            at,
+            word_at: at,
+        }
     }
 
     fn next(&mut self) -> Option<&'a [u8]> {
@@ -218,7 +257,10 @@ impl<'a> Words<'a> {
     /// Skips a name: everything up to the end of the line.
     fn skip_line(&mut self) {
         let rest = &self.bytes[self.at..];
-        self.at += rest.iter().position(|b| matches!(b, b'\n' | b'\r')).unwrap_or(rest.len());
+        self.at += rest
+            .iter()
+            .position(|b| matches!(b, b'\n' | b'\r'))
+            .unwrap_or(rest.len());
     }
 
     /// Line of the last word, from 1; counted only when a message needs it.

@@ -50,7 +50,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<FileMesh, StlError> {
 
 /// Names the first coordinate that is not finite.
 fn not_finite(triangles: &[Triangle]) -> StlError {
-    let position = triangles.as_flattened().as_flattened().iter().position(|c| !c.is_finite());
+    let position = triangles
+        .as_flattened()
+        .as_flattened()
+        .iter()
+        .position(|c| !c.is_finite());
     let index = position.expect("the caller found one");
     let (triangle, within) = (index / 9, index % 9);
     StlError::NotFinite {
@@ -82,5 +86,9 @@ pub(super) fn fault(bytes: &[u8]) -> StlError {
         };
     }
     let end = HEADER + RECORD * claimed as usize;
-    StlError::Trailing { claimed, end, extra: length - end }
+    StlError::Trailing {
+        claimed,
+        end,
+        extra: length - end,
+    }
 }

@@ -126,7 +126,11 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, StlError> {
     } else {
         return Err(binary::fault(bytes));
     };
-    if mesh.triangles.is_empty() { Err(StlError::NoTriangle) } else { Ok(mesh) }
+    if mesh.triangles.is_empty() {
+        Err(StlError::NoTriangle)
+    } else {
+        Ok(mesh)
+    }
 }
 
 /// What a file that is no STL looks like.
@@ -136,24 +140,44 @@ fn something_else(bytes: &[u8]) -> Option<&'static str> {
             b"version https://git-lfs",
             "a git-LFS pointer to one: run `git lfs pull` in its repository, or download the file itself",
         ),
-        (b"<!doctype", "a web page: the download went wrong; fetch the raw file"),
-        (b"<html", "a web page: the download went wrong; fetch the raw file"),
-        (b"<?xml", "XML (AMF, COLLADA or a web page); export it as STL"),
-        (b"pk\x03\x04", "a ZIP archive (a 3MF file is one); unpack it, or export it as STL"),
+        (
+            b"<!doctype",
+            "a web page: the download went wrong; fetch the raw file",
+        ),
+        (
+            b"<html",
+            "a web page: the download went wrong; fetch the raw file",
+        ),
+        (
+            b"<?xml",
+            "XML (AMF, COLLADA or a web page); export it as STL",
+        ),
+        (
+            b"pk\x03\x04",
+            "a ZIP archive (a 3MF file is one); unpack it, or export it as STL",
+        ),
         (b"\x1f\x8b", "compressed with gzip; unpack it"),
-        (b"iso-10303-21", "a STEP file; save the body as STL in the CAD program"),
-        (b"\xd0\xcf\x11\xe0", "an OLE document (a SOLIDWORKS part up to 2014 is one); save it as STL"),
+        (
+            b"iso-10303-21",
+            "a STEP file; save the body as STL in the CAD program",
+        ),
+        (
+            b"\xd0\xcf\x11\xe0",
+            "an OLE document (a SOLIDWORKS part up to 2014 is one); save it as STL",
+        ),
         (b"ply", "a PLY file; export it as STL"),
         (b"glTF", "a glTF file; export it as STL"),
         (b"\xff\xfe", "text in UTF-16; save it as plain ASCII"),
         (b"\xfe\xff", "text in UTF-16; save it as plain ASCII"),
     ];
     let body = ascii::after_mark(bytes).trim_ascii_start();
-    let begins = |sign: &[u8]| {
-        body.len() >= sign.len() && body[..sign.len()].eq_ignore_ascii_case(sign)
-    };
+    let begins =
+        |sign: &[u8]| body.len() >= sign.len() && body[..sign.len()].eq_ignore_ascii_case(sign);
     if body.is_empty() {
         return Some("blank; the export failed");
     }
-    SIGNS.iter().find(|(sign, _)| begins(sign)).map(|(_, what)| *what)
+    SIGNS
+        .iter()
+        .find(|(sign, _)| begins(sign))
+        .map(|(_, what)| *what)
 }
