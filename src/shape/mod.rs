@@ -1,3 +1,21 @@
 //! Surfaces: mesh readers, primitives, the height map and the constraint points.
+//!
+//! A surface file passes `format` (which reader) and `stl` (file units), becomes a placed
+//! [`mesh::Mesh`] in metres, and `height` looks at it from above. `points` is the entry.
 
 pub mod document;
+pub mod error;
+pub mod format;
+pub mod height;
+pub mod mesh;
+pub mod placement;
+pub mod points;
+pub mod primitive;
+pub mod stl;
+pub mod surface;
+
+mod seen;
+
+pub use error::ShapeError;
+pub use points::{ConstraintPoints, Discretized, discretize};
+pub use surface::Surface;

@@ -1,0 +1,135 @@
+//! What can go wrong between a shape document and its points, and what to do about it.
+
+use std::path::PathBuf;
+
+use crate::progress::Interrupted;
+use crate::shape::stl::StlError;
+
+/// A shape that gives no constraint points. Lengths are metres inside, millimetres in messages.
+#[derive(Debug, thiserror::Error)]
+pub enum ShapeError {
+    /// The surface's path cannot be read as a file.
+    #[error("{}: {what}", path.display())]
+    Unreadable {
+        /// Path as given.
+        path: PathBuf,
+        /// What was found and what to do.
+        what: String,
+    },
+    /// The name's ending belongs to no surface format that can be read.
+    #[error("{}: {what}", path.display())]
+    Format {
+        /// Path as given.
+        path: PathBuf,
+        /// What was found and what to do.
+        what: String,
+    },
+    /// The format carries no unit and none was given.
+    #[error(
+        "{}: {format} files carry no unit; state it (`unit = \"mm\"` in the shape file, \
+         `--unit mm` on the command line)",
+        path.display()
+    )]
+    UnitMissing {
+        /// Path as given.
+        path: PathBuf,
+        /// The format's name.
+        format: &'static str,
+    },
+    /// The STL file is damaged or is none.
+    #[error("{}: {source}", path.display())]
+    Stl {
+        /// Path as given.
+        path: PathBuf,
+        /// The fault, with its byte or line.
+        source: StlError,
+    },
+    /// Every triangle is a line or a point.
+    #[error(
+        "the surface's {triangles} triangles all have zero area: there is no surface; \
+         export the body again"
+    )]
+    NoArea {
+        /// Triangles in the file.
+        triangles: usize,
+    },
+    /// A coordinate that is no length of this world.
+    #[error(
+        "triangle {triangle} of the surface reaches {coordinate_m:e} m from the origin (limit \
+         {limit_m:e} m): the file is damaged or its unit is wrong"
+    )]
+    TooFar {
+        /// Number of the triangle, from 1.
+        triangle: usize,
+        /// The coordinate, m.
+        coordinate_m: f64,
+        /// The limit, m.
+        limit_m: f64,
+    },
+    /// A number of the document is not usable here.
+    #[error("{0}")]
+    Document(String),
+    /// Surface and grid do not overlap.
+    #[error(
+        "the surface lies wholly outside the grid: the surface covers {}, the grid {}; \
+         change the translation, the unit or the grid",
+        extent_mm(surface),
+        extent_mm(grid)
+    )]
+    OutsideGrid {
+        /// x and y range of the surface, m.
+        surface: [[f64; 2]; 2],
+        /// x and y range of the grid, m.
+        grid: [[f64; 2]; 2],
+    },
+    /// They overlap, but no grid point has surface above or below it.
+    #[error(
+        "none of the {grid_points} grid points lies on the surface, which covers {} of the grid \
+         {}; take more samples or a smaller grid",
+        extent_mm(surface),
+        extent_mm(grid)
+    )]
+    NoPoint {
+        /// Points of the grid.
+        grid_points: usize,
+        /// x and y range of the surface, m.
+        surface: [[f64; 2]; 2],
+        /// x and y range of the grid, m.
+        grid: [[f64; 2]; 2],
+    },
+    /// Heights are measured upwards from the windings' top face.
+    #[error(
+        "{below} of {points} points lie below z = 0, the windings' top face (lowest {:.6} mm); \
+         a translation of z by at least {:.6} mm more lifts them",
+        lowest_m * 1000.0,
+        -lowest_m * 1000.0
+    )]
+    BelowZero {
+        /// Points with a negative height.
+        below: usize,
+        /// All points.
+        points: usize,
+        /// The lowest height, m.
+        lowest_m: f64,
+    },
+    /// The user asked to stop.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+}
+
+/// `x -50 to 50 mm, y 0 to 20 mm`.
+fn extent_mm(extent: &[[f64; 2]; 2]) -> String {
+    let [x, y] = extent.map(|[from, to]| format!("{} to {} mm", mm(from), mm(to)));
+    format!("x {x}, y {y}")
+}
+
+/// Millimetres to at most six decimals, for messages.
+fn mm(length_m: f64) -> f64 {
+    let length_mm = length_m * 1000.0;
+    let rounded = (length_mm * 1e6).round() / 1e6;
+    if rounded.is_finite() {
+        rounded
+    } else {
+        length_mm
+    }
+}

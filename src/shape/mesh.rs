@@ -1,0 +1,141 @@
+//! A triangle soup in metres and the facts about it.
+
+use crate::shape::error::ShapeError;
+use crate::shape::placement::Transform;
+
+/// Three vertices, x, y, z each.
+pub type Triangle = [[f64; 3]; 3];
+
+/// Coordinates beyond this are no length of a haptic surface, m; below it no predicate overflows.
+const FARTHEST_M: f64 = 1e9;
+
+/// Triangles as a file gives them, in the file's own unit.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FileMesh {
+    /// Every triangle of the file, finite coordinates, in file order.
+    pub triangles: Vec<Triangle>,
+    /// How far a coordinate may lie from what was meant, because of the file's number format.
+    pub coordinate_rounding: f64,
+    /// What a careful reader would mention.
+    pub warnings: Vec<String>,
+}
+
+/// Axis-aligned box, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    /// Smallest x, y, z.
+    pub min_m: [f64; 3],
+    /// Largest x, y, z.
+    pub max_m: [f64; 3],
+}
+
+impl Bounds {
+    /// Range of x and of y.
+    #[must_use]
+    pub fn plan(&self) -> [[f64; 2]; 2] {
+        [0, 1].map(|k| [self.min_m[k], self.max_m[k]])
+    }
+}
+
+/// What a mesh file holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeshFacts {
+    /// Triangles in the file.
+    pub triangles: usize,
+    /// Of these, lines and points: they are left out.
+    pub degenerate: usize,
+    /// Box of the placed triangles that have an area.
+    pub bounds: Bounds,
+    /// How far a coordinate may lie from what was meant, because of the file's number format, m.
+    pub coordinate_rounding_m: f64,
+}
+
+/// A placed triangle soup, m. No order, orientation or connectivity is assumed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mesh {
+    triangles: Vec<Triangle>,
+    facts: MeshFacts,
+}
+
+impl Mesh {
+    /// Scales and places a file's triangles; those without area are counted and dropped.
+    ///
+    /// # Errors
+    /// [`ShapeError::NoArea`] when nothing is left, [`ShapeError::TooFar`] beyond 1e9 m.
+    pub fn place(file: FileMesh, transform: &Transform) -> Result<Self, ShapeError> {
+        let mut triangles = file.triangles;
+        let count = triangles.len();
+        let mut min_m = [f64::INFINITY; 3];
+        let mut max_m = [f64::NEG_INFINITY; 3];
+        let mut number = 0;
+        let mut too_far = None;
+        // Area is judged on the file's own numbers, where equal vertices are equal.
+        triangles.retain_mut(|triangle| {
+            number += 1;
+            if !has_area(triangle) {
+                return false;
+            }
+            for vertex in triangle.iter_mut() {
+                *vertex = transform.apply(*vertex);
+                for k in 0..3 {
+                    min_m[k] = min_m[k].min(vertex[k]);
+                    max_m[k] = max_m[k].max(vertex[k]);
+                    // `contains` is false for a not-a-number that overflow made.
+                    if !(-FARTHEST_M..=FARTHEST_M).contains(&vertex[k]) && too_far.is_none() {
+                        too_far = Some((number, vertex[k]));
+                    }
+                }
+            }
+            true
+        });
+        if triangles.is_empty() {
+            return Err(ShapeError::NoArea { triangles: count });
+        }
+        if let Some((triangle, coordinate_m)) = too_far {
+            return Err(ShapeError::TooFar {
+                triangle,
+                coordinate_m,
+                limit_m: FARTHEST_M,
+            });
+        }
+        let facts = MeshFacts {
+            triangles: count,
+            degenerate: count - triangles.len(),
+            bounds: Bounds { min_m, max_m },
+            coordinate_rounding_m: transform.length_m(file.coordinate_rounding),
+        };
+        Ok(Self { triangles, facts })
+    }
+
+    /// The placed triangles that have an area, m.
+    #[must_use]
+    pub fn triangles(&self) -> &[Triangle] {
+        &self.triangles
+    }
+
+    /// What the file holds.
+    #[must_use]
+    pub fn facts(&self) -> &MeshFacts {
+        &self.facts
+    }
+}
+
+fn has_area(&[a, b, c]: &Triangle) -> bool {
+    cross(minus(b, a), minus(c, a)) != [0.0; 3]
+}
+
+/// a - b.
+#[must_use]
+pub(super) fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// a x b.
+#[must_use]
+pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}

@@ -1,0 +1,139 @@
+//! From a file's coordinates to metres: unit, rotation about x, then y, then z, translation.
+
+use crate::shape::document::Placement;
+
+/// Unit and placement as one map of points; right angles rotate exactly.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Transform {
+    /// A coordinate is multiplied by the first, divided by the second; one of them is 1.
+    unit: [f64; 2],
+    /// Rows of the rotation; `None` for the identity.
+    rotation: Option<[[f64; 3]; 3]>,
+    translate_m: [f64; 3],
+}
+
+impl Transform {
+    /// `unit_m`: metres per unit of the file's coordinates.
+    #[must_use]
+    pub fn new(unit_m: f64, placement: &Placement) -> Self {
+        // Dividing by 1000 rounds correctly (38 mm is the double nearest 0.038), times 0.001 not.
+        let per_metre = (1.0 / unit_m).round();
+        let unit = if per_metre > 1.0 && 1.0 / per_metre == unit_m {
+            [1.0, per_metre]
+        } else {
+            [unit_m, 1.0]
+        };
+        let rotation = rotation(placement.rotate_deg);
+        let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        Self {
+            unit,
+            rotation: (rotation != identity).then_some(rotation),
+            translate_m: placement.translate_m,
+        }
+    }
+
+    /// The placed point, m.
+    #[must_use]
+    pub fn apply(&self, point: [f64; 3]) -> [f64; 3] {
+        let mut p = point.map(|c| self.length_m(c));
+        if let Some(rows) = &self.rotation {
+            p = rows.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2]);
+        }
+        [0, 1, 2].map(|k| p[k] + self.translate_m[k])
+    }
+
+    /// A length of the file, m.
+    #[must_use]
+    pub fn length_m(&self, length: f64) -> f64 {
+        length * self.unit[0] / self.unit[1]
+    }
+}
+
+/// Sine and cosine of an angle in degrees, exact at multiples of 90.
+#[must_use]
+pub fn sin_cos_deg(angle_deg: f64) -> (f64, f64) {
+    let quarter = (angle_deg / 90.0).round();
+    let (sin, cos) = (angle_deg - quarter * 90.0).to_radians().sin_cos();
+    match quarter.rem_euclid(4.0) as u8 {
+        0 => (sin, cos),
+        1 => (cos, -sin),
+        2 => (-sin, -cos),
+        _ => (-cos, sin),
+    }
+}
+
+/// Rz Ry Rx: the fixed axes, x first.
+fn rotation(rotate_deg: [f64; 3]) -> [[f64; 3]; 3] {
+    let [(sx, cx), (sy, cy), (sz, cz)] = rotate_deg.map(sin_cos_deg);
+    [
+        [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
+        [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
+        [-sy, cy * sx, cy * cx],
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Transform, sin_cos_deg};
+    use crate::shape::document::Placement;
+
+    fn turned(rotate_deg: [f64; 3]) -> Transform {
+        Transform::new(
+            1.0,
+            &Placement {
+                translate_m: [0.0; 3],
+                rotate_deg,
+            },
+        )
+    }
+
+    #[test]
+    fn millimetres_are_divided_and_inches_multiplied() {
+        let mm = Transform::new(0.001, &Placement::default());
+        let inch = Transform::new(0.0254, &Placement::default());
+        for value in [38.0, 0.7, 61.3, 1e6 + 0.3] {
+            assert_eq!(mm.apply([value; 3]), [value / 1000.0; 3]);
+            assert_eq!(inch.apply([value; 3]), [value * 0.0254; 3]);
+        }
+    }
+
+    #[test]
+    fn quarter_turns_are_exact_and_in_order() {
+        let p = [0.7, 1.3, -2.9];
+        assert_eq!(turned([90.0, 0.0, 0.0]).apply(p), [0.7, 2.9, 1.3]);
+        assert_eq!(turned([0.0, 90.0, 0.0]).apply(p), [-2.9, 1.3, -0.7]);
+        assert_eq!(turned([0.0, 0.0, 90.0]).apply(p), [-1.3, 0.7, -2.9]);
+        assert_eq!(turned([0.0, 0.0, -270.0]).apply(p), [-1.3, 0.7, -2.9]);
+        assert_eq!(turned([720.0, -360.0, 360.0]), turned([0.0; 3]));
+        // x first: y -> z; then z: the new z stays.
+        assert_eq!(
+            turned([90.0, 0.0, 90.0]).apply([0.0, 1.3, 0.0]),
+            [0.0, 0.0, 1.3]
+        );
+    }
+
+    #[test]
+    fn any_rotation_keeps_lengths_and_composes() {
+        let p = [0.7, 1.3, -2.9];
+        let by_steps = turned([0.0, 0.0, 71.0])
+            .apply(turned([0.0, -23.0, 0.0]).apply(turned([37.0, 0.0, 0.0]).apply(p)));
+        let at_once = turned([37.0, -23.0, 71.0]).apply(p);
+        for k in 0..3 {
+            assert!(
+                (by_steps[k] - at_once[k]).abs() < 1e-15,
+                "{by_steps:?} {at_once:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn sines_are_sines() {
+        for angle in [
+            -400.3, -91.0, -44.9, 0.3, 44.9, 45.1, 133.0, 200.0, 300.7, 1e4,
+        ] {
+            let (sin, cos) = sin_cos_deg(angle);
+            let radians = angle.to_radians();
+            assert!((sin - radians.sin()).abs() < 1e-13 && (cos - radians.cos()).abs() < 1e-13);
+        }
+    }
+}

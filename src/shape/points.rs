@@ -1,0 +1,261 @@
+//! From a shape document to its constraint points (eq. 6): (x_j, y_j, h_j), x fastest, then y.
+
+use crate::accuracy::StageAccuracy;
+use crate::numerics::axis::Axis;
+use crate::progress::Progress;
+use crate::shape::document::{AxisRequest, ShapeDocument};
+use crate::shape::error::ShapeError;
+use crate::shape::height::{Grid, Sample};
+use crate::shape::mesh::{Bounds, MeshFacts};
+use crate::shape::surface::Surface;
+
+/// More grid points than this are refused: their files and matrices fit no computer.
+const MOST_POINTS: usize = 100_000_000;
+
+/// The points of a grid that lie on the surface, m; columns of equal length.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ConstraintPoints {
+    /// The grid they were taken from.
+    pub grid: Grid,
+    /// x of each point.
+    pub x_m: Vec<f64>,
+    /// y of each point.
+    pub y_m: Vec<f64>,
+    /// Height of each point above z = 0, never negative.
+    pub height_m: Vec<f64>,
+    /// Unit normal of each point, n_z >= 0.
+    pub normal: Vec<[f64; 3]>,
+    /// Each point's place in the grid: row * columns + column; ascending.
+    pub grid_index: Vec<usize>,
+    /// Grid points without surface, skipped.
+    pub outside: usize,
+}
+
+/// Figures that sum the points up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointFacts {
+    /// Number of points.
+    pub points: usize,
+    /// Grid points without surface.
+    pub outside: usize,
+    /// Lowest height, m.
+    pub min_height_m: f64,
+    /// Highest height, m.
+    pub max_height_m: f64,
+    /// Root mean square of the heights, m.
+    pub rms_height_m: f64,
+}
+
+impl ConstraintPoints {
+    /// Number of points, at least 1 when made by [`discretize`].
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.height_m.len()
+    }
+
+    /// True without points.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.height_m.is_empty()
+    }
+
+    /// For every grid point, x fastest, its row among the points.
+    #[must_use]
+    pub fn row_of_grid_point(&self) -> Vec<Option<usize>> {
+        let mut rows = vec![None; self.grid.len()];
+        for (row, index) in self.grid_index.iter().enumerate() {
+            rows[*index] = Some(row);
+        }
+        rows
+    }
+
+    /// Counts and heights.
+    #[must_use]
+    pub fn facts(&self) -> PointFacts {
+        let fold =
+            |start, pick: fn(f64, f64) -> f64| self.height_m.iter().copied().fold(start, pick);
+        let max_height_m = fold(f64::NEG_INFINITY, f64::max);
+        // In one order on any number of threads; scaled, so that no square underflows.
+        let scale = if max_height_m > 0.0 {
+            max_height_m
+        } else {
+            1.0
+        };
+        let squares: f64 = self
+            .height_m
+            .iter()
+            .map(|h| (h / scale) * (h / scale))
+            .sum();
+        PointFacts {
+            points: self.len(),
+            outside: self.outside,
+            min_height_m: fold(f64::INFINITY, f64::min),
+            max_height_m,
+            rms_height_m: scale * (squares / self.len() as f64).sqrt(),
+        }
+    }
+}
+
+/// What discretising a document gives.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Discretized {
+    /// The constraint points.
+    pub points: ConstraintPoints,
+    /// The surface's own box, placed, m.
+    pub bounds: Bounds,
+    /// What the mesh file holds; `None` for a primitive.
+    pub mesh: Option<MeshFacts>,
+    /// The stage's error, absolute, m.
+    pub accuracy: StageAccuracy,
+    /// What the user should know though it stops nothing.
+    pub warnings: Vec<String>,
+}
+
+/// Opens the document's surface, places it and samples it over the requested grid.
+///
+/// # Errors
+/// [`ShapeError`]: an unreadable or damaged file, no unit, a grid that does not ascend, a surface
+/// outside the grid, no point at all, points below z = 0, an interruption.
+pub fn discretize(
+    document: &ShapeDocument,
+    progress: &dyn Progress,
+) -> Result<Discretized, ShapeError> {
+    let (surface, warnings) = Surface::open(document)?;
+    progress.check()?;
+    let bounds = surface.extent();
+    let [x, y] = bounds.plan();
+    let grid = Grid {
+        x_m: axis("x", document.grid.x, x)?,
+        y_m: axis("y", document.grid.y, y)?,
+    };
+    let count = grid.x_m.samples.saturating_mul(grid.y_m.samples);
+    if count > MOST_POINTS {
+        return Err(ShapeError::Document(format!(
+            "a grid of {} x {} samples has {count} points; at most {MOST_POINTS} are possible",
+            grid.x_m.samples, grid.y_m.samples
+        )));
+    }
+    let samples = surface.heights(&grid, progress)?;
+    let rounding_m = surface.coordinate_rounding_m();
+    let points = collect(&grid, &samples, rounding_m, &bounds)?;
+    let (mesh, method) = match &surface {
+        Surface::Mesh(mesh) => (
+            Some(*mesh.facts()),
+            "a-priori: the file's coordinate rounding (exact heights of its triangles; a slope \
+             multiplies it; the tessellation's own deviation is not in the file)",
+        ),
+        Surface::Primitive(_) => (None, "a-priori: a closed formula in double precision"),
+    };
+    let accuracy = StageAccuracy {
+        estimate: rounding_m,
+        relative_to: "1 m".into(),
+        method: method.into(),
+    };
+    Ok(Discretized {
+        points,
+        bounds,
+        mesh,
+        accuracy,
+        warnings,
+    })
+}
+
+/// The requested axis; its nodes ascend.
+fn axis(name: &str, request: AxisRequest, extent: [f64; 2]) -> Result<Axis, ShapeError> {
+    let axis = match request {
+        AxisRequest::Given(axis) => axis,
+        AxisRequest::Extent(samples) => Axis {
+            from: extent[0],
+            to: extent[1],
+            samples,
+        },
+    };
+    let fault = |what: String| {
+        Err(ShapeError::Document(format!(
+            "the grid's {name} axis {what}"
+        )))
+    };
+    let Axis { from, to, samples } = axis;
+    if samples == 0 {
+        return fault("has no sample; give at least 1".into());
+    }
+    if !from.is_finite() || !to.is_finite() {
+        return fault(format!(
+            "runs from {from} to {to} m; both ends must be finite"
+        ));
+    }
+    if samples > 1 && samples <= MOST_POINTS {
+        let finest = 4.0 * f64::EPSILON * from.abs().max(to.abs());
+        if axis.step() <= finest {
+            let advice = match request {
+                AxisRequest::Given(_) => "the first end must be the smaller one",
+                AxisRequest::Extent(_) => {
+                    "the surface has no extent along it; give the axis, or one sample"
+                }
+            };
+            let (from_mm, to_mm) = (from * 1000.0, to * 1000.0);
+            return fault(format!(
+                "runs from {from_mm} to {to_mm} mm in {samples} samples; {advice}"
+            ));
+        }
+    }
+    Ok(axis)
+}
+
+/// Picks the grid points that lie on the surface.
+fn collect(
+    grid: &Grid,
+    samples: &[Option<Sample>],
+    rounding_m: f64,
+    bounds: &Bounds,
+) -> Result<ConstraintPoints, ShapeError> {
+    let found = samples.iter().flatten().count();
+    if found == 0 {
+        let (surface, plan) = (bounds.plan(), grid.plan());
+        let apart = (0..2).any(|k| surface[k][1] < plan[k][0] || surface[k][0] > plan[k][1]);
+        return Err(if apart {
+            ShapeError::OutsideGrid {
+                surface,
+                grid: plan,
+            }
+        } else {
+            ShapeError::NoPoint {
+                grid_points: grid.len(),
+                surface,
+                grid: plan,
+            }
+        });
+    }
+    let mut points = ConstraintPoints {
+        grid: *grid,
+        x_m: Vec::with_capacity(found),
+        y_m: Vec::with_capacity(found),
+        height_m: Vec::with_capacity(found),
+        normal: Vec::with_capacity(found),
+        grid_index: Vec::with_capacity(found),
+        outside: samples.len() - found,
+    };
+    let (x, y) = (grid.x_m.nodes(), grid.y_m.nodes());
+    let (mut below, mut lowest_m) = (0, 0.0f64);
+    for (index, sample) in samples.iter().enumerate() {
+        let Some(sample) = sample else { continue };
+        if sample.height_m < -rounding_m {
+            below += 1;
+            lowest_m = lowest_m.min(sample.height_m);
+        }
+        points.x_m.push(x[index % x.len()]);
+        points.y_m.push(y[index / x.len()]);
+        // A surface that rests on z = 0 may be rounded below it.
+        points.height_m.push(sample.height_m.max(0.0));
+        points.normal.push(sample.normal);
+        points.grid_index.push(index);
+    }
+    if below > 0 {
+        return Err(ShapeError::BelowZero {
+            below,
+            points: found,
+            lowest_m,
+        });
+    }
+    Ok(points)
+}

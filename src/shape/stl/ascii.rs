@@ -1,0 +1,276 @@
+//! ASCII STL: one pass over the words, whatever separates the lines.
+
+use crate::shape::mesh::{FileMesh, Triangle};
+use crate::shape::stl::StlError;
+
+/// A text whose numbers all have fewer digits than a printed float wrote them exactly.
+const PRINTED_DIGITS: usize = 6;
+/// A number with more digits may show that it never was a single-precision float.
+const FLOAT_DIGITS: usize = 9;
+
+/// The bytes after a UTF-8 byte-order mark.
+pub(super) fn after_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
+}
+
+/// True for a text that begins with `solid`. Binary headers often do too: those show control
+/// bytes at once, and no `facet` after the first line.
+pub(super) fn looks_like(bytes: &[u8]) -> bool {
+    let mut words = Words::new(bytes);
+    let first = words.next();
+    if !is(first, "solid") {
+        // Some text editors' leftovers aside, only a text has no control byte.
+        return is_text(bytes);
+    }
+    if is_text(bytes) {
+        return true;
+    }
+    words.skip_line();
+    let next = words.next();
+    is(next, "facet") || is(next, "endsolid")
+}
+
+/// True when the beginning holds no byte that texts never hold.
+fn is_text(bytes: &[u8]) -> bool {
+    bytes[..bytes.len().min(1024)].iter().all(|b| *b >= 0x09)
+}
+
+/// Reads the whole text.
+pub(super) fn read(bytes: &[u8]) -> Result<FileMesh, StlError> {
+    let mut reader = Reader {
+        words: Words::new(bytes),
+        triangle: 0,
+        digits: 0,
+        largest: 0.0,
+        finer_than_float: false,
+    };
+    let mut triangles: Vec<Triangle> = Vec::new();
+    let mut warnings = Vec::new();
+    let mut solids = 0;
+    while let Some(word) = reader.words.next() {
+        reader.triangle = 0;
+        if !is(Some(word), "solid") {
+            return Err(reader.unexpected("`solid`", Some(word)));
+        }
+        solids += 1;
+        reader.words.skip_line();
+        loop {
+            reader.triangle = 0;
+            let word = reader.words.next();
+            if is(word, "facet") {
+                reader.triangle = triangles.len() + 1;
+                triangles.push(reader.facet()?);
+            } else if is(word, "endsolid") {
+                reader.words.skip_line();
+                break;
+            } else if word.is_none() && !triangles.is_empty() {
+                warnings.push(format!(
+                    "the file ends after triangle {} without `endsolid`: it may have been cut short",
+                    triangles.len()
+                ));
+                break;
+            } else {
+                return Err(reader.unexpected("`facet` or `endsolid`", word));
+            }
+        }
+    }
+    if solids > 1 {
+        warnings.push(format!(
+            "the file holds {solids} solids; they are taken as one surface"
+        ));
+    }
+    Ok(FileMesh {
+        triangles,
+        coordinate_rounding: reader.rounding(),
+        warnings,
+    })
+}
+
+struct Reader<'a> {
+    words: Words<'a>,
+    /// Number of the triangle being read, 0 outside one.
+    triangle: usize,
+    /// Most significant digits of any coordinate.
+    digits: usize,
+    largest: f64,
+    /// A coordinate lies between two floats by more than its digits leave open.
+    finer_than_float: bool,
+}
+
+impl Reader<'_> {
+    /// What follows `facet`. The normal is not trusted and not even parsed.
+    fn facet(&mut self) -> Result<Triangle, StlError> {
+        let mut word = self.words.next();
+        if is(word, "normal") {
+            for _ in 0..3 {
+                word = self.words.next();
+                if is(word, "outer") {
+                    return Err(self.unexpected("three numbers after `normal`", word));
+                }
+            }
+            word = self.words.next();
+        }
+        if !is(word, "outer") {
+            return Err(self.unexpected("`outer loop`", word));
+        }
+        self.expect("loop")?;
+        let mut triangle = [[0.0; 3]; 3];
+        for vertex in &mut triangle {
+            self.expect("vertex")?;
+            for coordinate in vertex {
+                *coordinate = self.number()?;
+            }
+        }
+        let word = self.words.next();
+        if is(word, "vertex") {
+            return Err(self.fault(
+                "a fourth `vertex`: STL holds triangles only; export the surface again as triangles"
+                    .into(),
+            ));
+        }
+        if !is(word, "endloop") {
+            return Err(self.unexpected("`endloop`", word));
+        }
+        self.expect("endfacet")?;
+        Ok(triangle)
+    }
+
+    fn expect(&mut self, wanted: &str) -> Result<(), StlError> {
+        let word = self.words.next();
+        if is(word, wanted) {
+            Ok(())
+        } else {
+            Err(self.unexpected(&format!("`{wanted}`"), word))
+        }
+    }
+
+    fn number(&mut self) -> Result<f64, StlError> {
+        let word = self.words.next();
+        let value: Option<f64> = word
+            .and_then(|w| std::str::from_utf8(w).ok())
+            .and_then(|w| w.parse().ok());
+        match (word, value) {
+            (Some(word), Some(value)) if value.is_finite() => {
+                let digits = significant_digits(word);
+                self.digits = self.digits.max(digits);
+                if digits > FLOAT_DIGITS && !self.finer_than_float {
+                    let off = (value - f64::from(value as f32)).abs();
+                    self.finer_than_float = off > value.abs() * 5.0 * 10f64.powf(-(digits as f64));
+                }
+                self.largest = self.largest.max(value.abs());
+                Ok(value)
+            }
+            (Some(word), Some(_)) if word.iter().any(u8::is_ascii_digit) => {
+                Err(self.fault(format!("the coordinate `{}` is too large", shown(word))))
+            }
+            (Some(word), Some(_)) => Err(self.fault(format!(
+                "a coordinate is `{}`, not a finite number; repair the body and export it again",
+                shown(word)
+            ))),
+            (Some(word), None) if word.contains(&b',') => Err(self.fault(format!(
+                "expected a number, found `{}`; numbers are written with a decimal point",
+                shown(word)
+            ))),
+            _ => Err(self.unexpected("a number", word)),
+        }
+    }
+
+    /// Half a unit of the last printed digit at the largest coordinate, and f32's rounding unless
+    /// the digits show something finer: most programs print floats.
+    fn rounding(&self) -> f64 {
+        let epsilon = if self.finer_than_float {
+            f64::EPSILON
+        } else {
+            super::F32_ROUNDING
+        };
+        let stored = self.largest * epsilon;
+        if self.digits < PRINTED_DIGITS || self.largest == 0.0 {
+            return stored;
+        }
+        let decade = self.largest.log10().floor() + 1.0 - self.digits as f64;
+        stored.max(0.5 * 10f64.powf(decade))
+    }
+
+    fn unexpected(&self, wanted: &str, found: Option<&[u8]>) -> StlError {
+        self.fault(match found {
+            Some(word) => format!("expected {wanted}, found `{}`", shown(word)),
+            None => format!("expected {wanted}, but the file ends here: it was cut short"),
+        })
+    }
+
+    fn fault(&self, what: String) -> StlError {
+        StlError::Text {
+            line: self.words.line(),
+            triangle: self.triangle,
+            what,
+        }
+    }
+}
+
+/// Digits from the first that is not 0 to the end of the mantissa.
+fn significant_digits(word: &[u8]) -> usize {
+    word.iter()
+        .take_while(|b| !b.eq_ignore_ascii_case(&b'e'))
+        .filter(|b| b.is_ascii_digit())
+        .skip_while(|b| **b == b'0')
+        .count()
+}
+
+/// A word for a message, at most 40 bytes of it.
+fn shown(word: &[u8]) -> String {
+    word[..word.len().min(40)].escape_ascii().to_string()
+}
+
+fn is(word: Option<&[u8]>, wanted: &str) -> bool {
+    word.is_some_and(|w| w.eq_ignore_ascii_case(wanted.as_bytes()))
+}
+
+/// Words between white space, and where they stand.
+struct Words<'a> {
+    bytes: &'a [u8],
+    /// First byte not yet looked at.
+    at: usize,
+    /// Where the last word began.
+    word_at: usize,
+}
+
+impl<'a> Words<'a> {
+    fn new(bytes: &'a [u8]) -> Self {
+        let at = bytes.len() - after_mark(bytes).len();
+        Self {
+            bytes,
+            at,
+            word_at: at,
+        }
+    }
+
+    fn next(&mut self) -> Option<&'a [u8]> {
+        let rest = &self.bytes[self.at..];
+        let blank = rest.iter().position(|b| *b > b' ').unwrap_or(rest.len());
+        let word = &rest[blank..];
+        let length = word.iter().position(|b| *b <= b' ').unwrap_or(word.len());
+        self.word_at = self.at + blank;
+        self.at = self.word_at + length;
+        (length > 0).then_some(&word[..length])
+    }
+
+    /// Skips a name: everything up to the end of the line.
+    fn skip_line(&mut self) {
+        let rest = &self.bytes[self.at..];
+        self.at += rest
+            .iter()
+            .position(|b| matches!(b, b'\n' | b'\r'))
+            .unwrap_or(rest.len());
+    }
+
+    /// Line of the last word, from 1; counted only when a message needs it.
+    fn line(&self) -> usize {
+        let before = &self.bytes[..self.word_at.min(self.bytes.len())];
+        let breaks = before.iter().enumerate().filter(|(i, b)| match b {
+            b'\n' => true,
+            b'\r' => self.bytes.get(i + 1) != Some(&b'\n'),
+            _ => false,
+        });
+        breaks.count() + 1
+    }
+}

@@ -1,0 +1,183 @@
+//! STL files: binary or ASCII is decided by the length, never by the word `solid` alone.
+//!
+//! Binary: 80 bytes of header, a little-endian u32 count n, n records of 50 bytes (normal and
+//! three vertices as f32, two attribute bytes). Normals and attributes are not used.
+
+mod ascii;
+mod binary;
+
+use crate::shape::mesh::FileMesh;
+
+/// Relative rounding of a coordinate stored as f32.
+const F32_ROUNDING: f64 = 1.0 / 16_777_216.0;
+
+/// Why bytes are no STL mesh, and where.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum StlError {
+    /// No byte at all.
+    #[error("the file is empty (0 bytes): the export or the download failed")]
+    Empty,
+    /// Well formed, but without a triangle.
+    #[error("the STL file holds no triangle: export a body or a surface")]
+    NoTriangle,
+    /// Something else than STL.
+    #[error("this is not an STL file but {what}")]
+    Other {
+        /// What it looks like, and what to do.
+        what: &'static str,
+    },
+    /// Too short for a header and a count.
+    #[error(
+        "binary STL cut short: {length} bytes, where header and triangle count alone take 84; \
+         export or copy it again"
+    )]
+    NoHeader {
+        /// Bytes in the file.
+        length: usize,
+    },
+    /// The file ends before its last triangle.
+    #[error(
+        "binary STL whose header claims {claimed} triangles ({wanted} bytes), but the file has \
+         {length} bytes: {whole} whole triangles{}; it was cut short or the count \
+         (bytes 80 to 83) is wrong; export or copy it again",
+        if *rest == 0 { String::new() } else { format!(" and {rest} bytes of another") }
+    )]
+    CutShort {
+        /// The header's count.
+        claimed: u32,
+        /// Bytes that such a file has.
+        wanted: u64,
+        /// Bytes in the file.
+        length: usize,
+        /// Whole triangles that are there.
+        whole: usize,
+        /// Bytes after the last whole one.
+        rest: usize,
+    },
+    /// The file goes on after its last triangle.
+    #[error(
+        "binary STL whose header claims {claimed} triangles, which end at byte {end}, but \
+         {extra} bytes follow{}; the count (bytes 80 to 83) is wrong or something was appended; \
+         export it again",
+        if extra % 50 == 0 { format!(" (room for {} more triangles)", extra / 50) } else { String::new() }
+    )]
+    Trailing {
+        /// The header's count.
+        claimed: u32,
+        /// Offset of the first byte after the triangles.
+        end: usize,
+        /// Bytes from there on.
+        extra: usize,
+    },
+    /// The count fits the length only when read the other way round.
+    #[error(
+        "binary STL in big-endian byte order ({count} triangles by its length); STL is \
+         little-endian; export it again on another program"
+    )]
+    BigEndian {
+        /// The count, read as big-endian.
+        count: u32,
+    },
+    /// A vertex of a binary file is NaN or infinite.
+    #[error(
+        "vertex {vertex} of triangle {triangle} (byte {byte}) has a coordinate that is {found}, \
+         not a finite number; repair the body in the CAD program and export it again"
+    )]
+    NotFinite {
+        /// Number of the triangle, from 1.
+        triangle: usize,
+        /// Number of the vertex in it, 1 to 3.
+        vertex: usize,
+        /// Offset of the coordinate.
+        byte: usize,
+        /// NaN, inf or -inf.
+        found: String,
+    },
+    /// A fault in an ASCII file.
+    #[error("line {line}{}: {what}", if *triangle == 0 { String::new() } else { format!(", triangle {triangle}") })]
+    Text {
+        /// Line, from 1.
+        line: usize,
+        /// Number of the triangle, from 1; 0 outside one.
+        triangle: usize,
+        /// What was expected and what was found.
+        what: String,
+    },
+}
+
+/// Reads an STL file's bytes. Nothing is allocated on the header's word.
+///
+/// `84 + 50 n` bytes are binary before anything else. Otherwise a text that begins with `solid`
+/// is ASCII: several solids are one surface; CR, LF, CRLF, a byte-order mark, capitals and any
+/// bytes in names are accepted, and a missing `endsolid` after a whole facet is a warning.
+///
+/// # Errors
+/// [`StlError`] with the byte or the line.
+pub fn read(bytes: &[u8]) -> Result<FileMesh, StlError> {
+    if bytes.is_empty() {
+        return Err(StlError::Empty);
+    }
+    let mesh = if binary::length_fits(bytes) {
+        binary::read(bytes)?
+    } else if let Some(what) = something_else(bytes) {
+        return Err(StlError::Other { what });
+    } else if ascii::looks_like(bytes) {
+        ascii::read(bytes)?
+    } else {
+        return Err(binary::fault(bytes));
+    };
+    if mesh.triangles.is_empty() {
+        Err(StlError::NoTriangle)
+    } else {
+        Ok(mesh)
+    }
+}
+
+/// What a file that is no STL looks like.
+fn something_else(bytes: &[u8]) -> Option<&'static str> {
+    const SIGNS: [(&[u8], &str); 12] = [
+        (
+            b"version https://git-lfs",
+            "a git-LFS pointer to one: run `git lfs pull` in its repository, or download the file itself",
+        ),
+        (
+            b"<!doctype",
+            "a web page: the download went wrong; fetch the raw file",
+        ),
+        (
+            b"<html",
+            "a web page: the download went wrong; fetch the raw file",
+        ),
+        (
+            b"<?xml",
+            "XML (AMF, COLLADA or a web page); export it as STL",
+        ),
+        (
+            b"pk\x03\x04",
+            "a ZIP archive (a 3MF file is one); unpack it, or export it as STL",
+        ),
+        (b"\x1f\x8b", "compressed with gzip; unpack it"),
+        (
+            b"iso-10303-21",
+            "a STEP file; save the body as STL in the CAD program",
+        ),
+        (
+            b"\xd0\xcf\x11\xe0",
+            "an OLE document (a SOLIDWORKS part up to 2014 is one); save it as STL",
+        ),
+        (b"ply", "a PLY file; export it as STL"),
+        (b"glTF", "a glTF file; export it as STL"),
+        (b"\xff\xfe", "text in UTF-16; save it as plain ASCII"),
+        (b"\xfe\xff", "text in UTF-16; save it as plain ASCII"),
+    ];
+    let body = ascii::after_mark(bytes).trim_ascii_start();
+    let begins =
+        |sign: &[u8]| body.len() >= sign.len() && body[..sign.len()].eq_ignore_ascii_case(sign);
+    if body.is_empty() {
+        return Some("blank; the export failed");
+    }
+    SIGNS
+        .iter()
+        .find(|(sign, _)| begins(sign))
+        .map(|(_, what)| *what)
+}

@@ -1,0 +1,158 @@
+//! A surface in metres, whether it is a mesh or a formula.
+
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use crate::progress::Progress;
+use crate::shape::document::{Placement, ShapeDocument, SurfaceSource};
+use crate::shape::error::ShapeError;
+use crate::shape::format::Format;
+use crate::shape::height::{self, Grid, Sample};
+use crate::shape::mesh::{Bounds, Mesh, MeshFacts};
+use crate::shape::placement::Transform;
+use crate::shape::primitive::PlacedPrimitive;
+
+/// A placed surface, m.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Surface {
+    /// Triangles.
+    Mesh(Mesh),
+    /// One of the seed's shapes.
+    Primitive(PlacedPrimitive),
+}
+
+impl Surface {
+    /// Opens, reads and places what a document names; the second value holds warnings.
+    ///
+    /// # Errors
+    /// [`ShapeError`] with the path and the place.
+    pub fn open(document: &ShapeDocument) -> Result<(Self, Vec<String>), ShapeError> {
+        check_placement(&document.placement)?;
+        let (path, unit_m) = match &document.source {
+            SurfaceSource::Primitive(primitive) => {
+                let placed = PlacedPrimitive::new(*primitive, &document.placement)?;
+                return Ok((Self::Primitive(placed), Vec::new()));
+            }
+            SurfaceSource::File { path, unit_m } => (path, unit_m),
+        };
+        let format = Format::of(path)?;
+        format.check(path)?;
+        let Some(unit_m) = *unit_m else {
+            return Err(ShapeError::UnitMissing {
+                path: path.clone(),
+                format: format.name(),
+            });
+        };
+        if !(unit_m > 0.0 && unit_m.is_finite()) {
+            return Err(ShapeError::Document(format!(
+                "the unit is {unit_m} m; it must be positive"
+            )));
+        }
+        let mut file = format.read(path, &read_file(path)?)?;
+        let mut warnings = std::mem::take(&mut file.warnings);
+        let mesh = Mesh::place(file, &Transform::new(unit_m, &document.placement))?;
+        let MeshFacts {
+            triangles,
+            degenerate,
+            ..
+        } = *mesh.facts();
+        if degenerate > 0 {
+            warnings.push(format!(
+                "{degenerate} of {triangles} triangles have no area and are left out"
+            ));
+        }
+        Ok((Self::Mesh(mesh), warnings))
+    }
+
+    /// The box around the surface, m.
+    #[must_use]
+    pub fn extent(&self) -> Bounds {
+        match self {
+            Self::Mesh(mesh) => mesh.facts().bounds,
+            Self::Primitive(primitive) => primitive.bounds(),
+        }
+    }
+
+    /// How far a coordinate of the surface may lie from what was meant, by its number format, m.
+    #[must_use]
+    pub fn coordinate_rounding_m(&self) -> f64 {
+        match self {
+            Self::Mesh(mesh) => mesh.facts().coordinate_rounding_m,
+            Self::Primitive(primitive) => {
+                let Bounds { min_m, max_m } = primitive.bounds();
+                let largest = min_m
+                    .iter()
+                    .chain(&max_m)
+                    .fold(0.0, |m: f64, c| m.max(c.abs()));
+                largest * f64::EPSILON
+            }
+        }
+    }
+
+    /// The surface over every point of an ascending grid, x fastest; `None` where there is none.
+    ///
+    /// # Errors
+    /// [`ShapeError::Interrupted`] when the user asked to stop.
+    pub fn heights(
+        &self,
+        grid: &Grid,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Option<Sample>>, ShapeError> {
+        match self {
+            Self::Mesh(mesh) => Ok(height::heights(mesh, grid, progress)?),
+            Self::Primitive(primitive) => {
+                let (x, y) = (grid.x_m.nodes(), grid.y_m.nodes());
+                let points = (0..grid.len()).into_par_iter();
+                Ok(points
+                    .map(|k| primitive.sample(x[k % x.len()], y[k / x.len()]))
+                    .collect())
+            }
+        }
+    }
+}
+
+fn check_placement(placement: &Placement) -> Result<(), ShapeError> {
+    let keys = [
+        ("translate_mm", placement.translate_m),
+        ("rotate_deg", placement.rotate_deg),
+    ];
+    for (key, values) in keys {
+        if values.iter().any(|v| !v.is_finite()) {
+            return Err(ShapeError::Document(format!(
+                "{key} holds a number that is not finite"
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// A regular file's bytes.
+fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
+    let unreadable = |what: String| ShapeError::Unreadable {
+        path: path.into(),
+        what,
+    };
+    let failed = |error: std::io::Error| {
+        unreadable(match error.kind() {
+            std::io::ErrorKind::NotFound => {
+                "no such file; check the path (in a shape file it counts from that file's folder)"
+                    .into()
+            }
+            std::io::ErrorKind::PermissionDenied => "it may not be read (permission denied)".into(),
+            _ => format!("it cannot be read: {error}"),
+        })
+    };
+    let kind = std::fs::metadata(path).map_err(failed)?;
+    if kind.is_dir() {
+        return Err(unreadable(
+            "this is a folder; name the surface file in it".into(),
+        ));
+    }
+    if !kind.is_file() {
+        return Err(unreadable(
+            "this is no regular file (a device, a pipe or a socket)".into(),
+        ));
+    }
+    std::fs::read(path).map_err(failed)
+}

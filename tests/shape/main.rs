@@ -1,0 +1,8 @@
+//! Surfaces: STL readers, exact heights, primitives, constraint points.
+#![allow(missing_docs)]
+
+mod fuzz;
+mod heights;
+mod points;
+mod stl;
+mod support;

@@ -1,0 +1,411 @@
+//! The STL readers: real files, damaged files, and the messages.
+
+use fluxform::shape::document::{AxisRequest, GridRequest, Placement};
+use fluxform::shape::mesh::Mesh;
+use fluxform::shape::placement::Transform;
+use fluxform::shape::stl::{StlError, read};
+
+use crate::support::{binary, corpus};
+
+const ONE: [[f32; 3]; 3] = [[0.7, -1.3, 2.9], [10.1, 0.3, 3.1], [-4.7, 8.3, 2.3]];
+
+fn ascii(vertices: &str) -> String {
+    format!("solid s\nfacet normal 0 0 1\nouter loop\n{vertices}\nendloop\nendfacet\nendsolid s\n")
+}
+
+#[test]
+fn good_files_have_the_indexs_facts() {
+    let Some(folder) = corpus() else { return };
+    let index = std::fs::read_to_string(folder.join("index.tsv")).unwrap();
+    let mut read_files = 0;
+    for line in index.lines().skip(1) {
+        let cells: Vec<&str> = line.split('\t').collect();
+        let (name, format, expected) = (cells[0], cells[1], cells[9]);
+        if format != "stl" {
+            continue;
+        }
+        let bytes = std::fs::read(folder.join(name)).unwrap();
+        if expected.starts_with("error") {
+            assert_eq!(read(&bytes), Err(StlError::NoTriangle), "{name}");
+            continue;
+        }
+        let file = read(&bytes).unwrap();
+        assert_eq!(
+            file.triangles.len(),
+            cells[10].parse::<usize>().unwrap(),
+            "{name}"
+        );
+        let volume: f64 = file
+            .triangles
+            .iter()
+            .map(|[a, b, c]| {
+                (a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
+                    + a[2] * (b[0] * c[1] - b[1] * c[0]))
+                    / 6.0
+            })
+            .sum();
+        let wanted: f64 = cells[15].parse().unwrap();
+        // The index gives six digits; open bodies have no volume to compare.
+        if cells[13] == "True" {
+            assert!(
+                (volume - wanted).abs() <= 1e-5 * wanted.abs(),
+                "{name}: {volume} {wanted}"
+            );
+        }
+        let mesh = Mesh::place(file, &Transform::new(1.0, &Placement::default())).unwrap();
+        let facts = mesh.facts();
+        assert_eq!(
+            facts.degenerate,
+            cells[14].parse::<usize>().unwrap(),
+            "{name}"
+        );
+        let bounds: Vec<f64> = cells[11].split(' ').map(|c| c.parse().unwrap()).collect();
+        let size = bounds.iter().fold(0.0, |m: f64, b| m.max(b.abs()));
+        for k in 0..3 {
+            assert!(
+                (facts.bounds.min_m[k] - bounds[k]).abs() <= 1e-5 * size,
+                "{name}"
+            );
+            assert!(
+                (facts.bounds.max_m[k] - bounds[k + 3]).abs() <= 1e-5 * size,
+                "{name}"
+            );
+        }
+        read_files += 1;
+    }
+    assert_eq!(read_files, 9);
+}
+
+#[test]
+fn damaged_files_get_a_message_that_says_where() {
+    let Some(folder) = corpus() else { return };
+    let cases: [(&str, Result<usize, &[&str]>); 19] = [
+        ("00_ok_solid_header_binary", Ok(12)),
+        (
+            "02_truncated_half",
+            Err(&["claims 12 triangles (684 bytes)", "384 bytes", "6 whole"]),
+        ),
+        (
+            "04_count_too_small",
+            Err(&["claims 8 triangles", "byte 484", "200 bytes", "4 more"]),
+        ),
+        (
+            "06_count_4e9",
+            Err(&["claims 4294967280", "684 bytes", "12 whole"]),
+        ),
+        (
+            "08_nan_vertex",
+            Err(&["vertex 1 of triangle 1 (byte 96)", "NaN"]),
+        ),
+        (
+            "10_trailing_bytes",
+            Err(&["claims 12 triangles", "byte 684", "37 bytes follow"]),
+        ),
+        ("12_83_bytes", Err(&["83 bytes", "84"])),
+        ("14_all_bigendian", Err(&["big-endian", "12 triangles"])),
+        ("20_ascii_ok", Ok(12)),
+        ("22_ascii_uppercase", Ok(12)),
+        ("24_ascii_no_endsolid", Ok(12)),
+        ("26_ascii_nan", Err(&["line 4, triangle 1", "`nan`"])),
+        (
+            "28_ascii_1e999",
+            Err(&["line 4, triangle 1", "`1e999` is too large"]),
+        ),
+        ("30_ascii_two_solids", Ok(24)),
+        ("32_ascii_bom", Ok(12)),
+        ("34_ascii_cr_only", Ok(12)),
+        (
+            "36_ascii_garbage_number",
+            Err(&["line 4, triangle 1", "a number", "`abc`"]),
+        ),
+        (
+            "38_gitlfs_pointer",
+            Err(&["git-LFS pointer", "git lfs pull"]),
+        ),
+        ("40_degenerate_point_tri", Ok(12)),
+    ];
+    for (name, expected) in cases {
+        let bytes = std::fs::read(folder.join(format!("bad_stl/{name}.stl"))).unwrap();
+        match (read(&bytes), expected) {
+            (Ok(mesh), Ok(count)) => {
+                assert_eq!(mesh.triangles.len(), count, "{name}");
+                let said = mesh.warnings.join(" ");
+                assert_eq!(
+                    said.contains("without `endsolid`"),
+                    name.contains("no_endsolid")
+                );
+                assert_eq!(said.contains("2 solids"), name.contains("two_solids"));
+            }
+            (Err(error), Err(parts)) => {
+                let message = error.to_string();
+                assert!(
+                    parts.iter().all(|p| message.contains(p)),
+                    "{name}: {message}"
+                );
+            }
+            (got, _) => panic!("{name}: {got:?}"),
+        }
+    }
+}
+
+#[test]
+fn length_decides_before_the_word_solid() {
+    let mut bytes = binary(&[ONE, ONE]);
+    for header in [
+        &b"solid part\nfacet normal 0 0 1"[..],
+        b"ISO-10303-21",
+        b"<html",
+        b"version https://git-lfs",
+    ] {
+        bytes[..header.len()].copy_from_slice(header);
+        assert_eq!(read(&bytes).unwrap().triangles.len(), 2);
+    }
+    assert_eq!(
+        read(&bytes).unwrap().triangles[1],
+        ONE.map(|v| v.map(f64::from))
+    );
+}
+
+#[test]
+fn a_binary_file_with_every_length_is_read_or_refused() {
+    let whole = binary(&[ONE; 5]);
+    for length in 0..whole.len() {
+        let error = read(&whole[..length]).unwrap_err();
+        let message = error.to_string();
+        match length {
+            0 => assert_eq!(error, StlError::Empty),
+            1..=80 => assert!(message.contains("blank"), "{length}: {message}"),
+            81..=83 => assert!(message.contains(&format!("{length} bytes")), "{message}"),
+            _ => assert!(
+                message.contains("claims 5") && message.contains(&format!("{length} bytes"))
+            ),
+        }
+    }
+}
+
+#[test]
+fn a_lying_count_reserves_nothing() {
+    // 4e9 triangles would be 288 GB: were they reserved, this would abort or swap.
+    for claimed in [1u32, 3, 1000, 0x7fff_ffff, u32::MAX] {
+        let mut bytes = binary(&[ONE, ONE]);
+        bytes[80..84].copy_from_slice(&claimed.to_le_bytes());
+        let message = read(&bytes).unwrap_err().to_string();
+        assert!(
+            message.contains(&format!("claims {claimed} triangles")),
+            "{message}"
+        );
+    }
+    assert_eq!(read(&binary(&[])), Err(StlError::NoTriangle));
+}
+
+#[test]
+fn not_finite_vertices_are_named_and_denormal_ones_are_numbers() {
+    for (value, found) in [
+        (f32::NAN, "NaN"),
+        (f32::INFINITY, "inf"),
+        (f32::NEG_INFINITY, "-inf"),
+    ] {
+        let mut triangles = [ONE; 4];
+        triangles[2][1][2] = value;
+        let message = read(&binary(&triangles)).unwrap_err().to_string();
+        let byte = 84 + 2 * 50 + 12 + 5 * 4;
+        let place = format!("vertex 2 of triangle 3 (byte {byte})");
+        assert!(
+            message.contains(&place) && message.contains(found),
+            "{message}"
+        );
+    }
+    let mut small = ONE;
+    small[1][2] = 1e-41;
+    assert_eq!(
+        read(&binary(&[small])).unwrap().triangles[0][1][2],
+        f64::from(1e-41f32)
+    );
+    // Stored normals are not trusted, so they may be anything.
+    let mut bytes = binary(&[ONE]);
+    bytes[84..88].copy_from_slice(&f32::NAN.to_le_bytes());
+    assert!(read(&bytes).is_ok());
+}
+
+#[test]
+fn text_is_read_however_it_is_written() {
+    let plain = ascii("vertex 0.7 -1.3 2.9\nvertex 10.1 .3 3.1\nvertex -4.7 +8.3 23.e-1");
+    let expected = [[0.7, -1.3, 2.9], [10.1, 0.3, 3.1], [-4.7, 8.3, 2.3]];
+    let variants = [
+        plain.clone().into_bytes(),
+        plain.replace('\n', "\r\n").into_bytes(),
+        plain.replace('\n', "\r").into_bytes(),
+        plain.to_uppercase().into_bytes(),
+        format!("\u{feff}{plain}").into_bytes(),
+        format!("\n\n   {plain}\n\n").into_bytes(),
+        plain
+            .replace('\n', "\n\t  ")
+            .replace(' ', "   ")
+            .into_bytes(),
+        plain
+            .replace("2.9", "2.9e+000")
+            .replace("8.3", "830.0E-002")
+            .into_bytes(),
+        plain.replace("0 0 1", "nan -nan(ind) 1.#QNAN").into_bytes(),
+        plain.replace(" normal 0 0 1", "").into_bytes(),
+        [
+            b"solid t\xeate facet vertex\n",
+            plain.split_once('\n').unwrap().1.as_bytes(),
+        ]
+        .concat(),
+        [
+            b"solid \0\x01\x02\n",
+            plain.split_once('\n').unwrap().1.as_bytes(),
+        ]
+        .concat(),
+    ];
+    for text in variants {
+        let mesh = read(&text).unwrap();
+        assert_eq!(
+            mesh.triangles,
+            [expected],
+            "{}",
+            String::from_utf8_lossy(&text)
+        );
+        assert!(mesh.warnings.is_empty());
+    }
+}
+
+#[test]
+fn faults_in_a_text_have_their_line() {
+    let good = "vertex 0.7 1.3 2.9\nvertex 3 1 4\nvertex 5 9 2";
+    let cases = [
+        (
+            ascii(good).replace("3 1 4", "3 1,5 4"),
+            "line 5, triangle 1",
+            "decimal point",
+        ),
+        (
+            ascii(good).replace("3 1 4", "3 1"),
+            "line 6, triangle 1",
+            "`vertex`",
+        ),
+        (
+            ascii(good).replace("3 1 4", "3 1 -1e400"),
+            "line 5, triangle 1",
+            "too large",
+        ),
+        (
+            ascii(good).replace("3 1 4", "3 infinity 4"),
+            "line 5, triangle 1",
+            "not a finite",
+        ),
+        (
+            ascii(&format!("{good}\nvertex 1 2 3")),
+            "line 7, triangle 1",
+            "triangles only",
+        ),
+        (
+            ascii("vertex 0.7 1.3 2.9\nvertex 3 1 4"),
+            "line 6, triangle 1",
+            "expected `vertex`",
+        ),
+        (
+            ascii(good).replace("outer", "inner"),
+            "line 3, triangle 1",
+            "`outer loop`",
+        ),
+        (
+            ascii(good).replace("endsolid s", "vertex"),
+            "line 9",
+            "`facet` or `endsolid`",
+        ),
+        (
+            ascii(good).replace("endsolid s", "endsolid s\nrubbish"),
+            "line 10",
+            "expected `solid`",
+        ),
+        (ascii(good)[..70].to_string(), "triangle 1", "cut short"),
+        (
+            "solid waste report\n\nof 1998".into(),
+            "line 3",
+            "found `of`",
+        ),
+        (
+            "some other text".into(),
+            "line 1",
+            "expected `solid`, found `some`",
+        ),
+        ("solid".into(), "line 1", "cut short"),
+    ];
+    for (text, place, what) in cases {
+        for text in [
+            text.clone(),
+            text.replace('\n', "\r\n"),
+            text.replace('\n', "\r"),
+        ] {
+            let message = read(text.as_bytes()).unwrap_err().to_string();
+            assert!(
+                message.contains(place) && message.contains(what),
+                "{text:?}: {message}"
+            );
+        }
+    }
+}
+
+#[test]
+fn what_is_no_stl_is_called_by_its_name() {
+    let cases: [(&[u8], &str); 9] = [
+        (b"<!DOCTYPE html>\n<html>", "web page"),
+        (b"\r\n <HTML lang=en>", "web page"),
+        (b"PK\x03\x04\x14\x00\x00\x00", "ZIP"),
+        (b"\x1f\x8b\x08\x00\x00", "gzip"),
+        (b"ISO-10303-21;\nHEADER;", "STEP"),
+        (b"\xd0\xcf\x11\xe0\xa1\xb1", "SOLIDWORKS part up to 2014"),
+        (b"\xff\xfes\0o\0l\0i\0d\0", "UTF-16"),
+        (b"ply\nformat ascii 1.0\n", "PLY"),
+        (b"  \n\t ", "blank"),
+    ];
+    for (bytes, what) in cases {
+        let message = read(bytes).unwrap_err().to_string();
+        assert!(message.contains(what), "{message}");
+    }
+}
+
+#[test]
+fn the_rounding_is_that_of_the_number_format() {
+    let float = read(&binary(&[ONE])).unwrap().coordinate_rounding;
+    assert!((float / f64::from(10.1f32) - 2f64.powi(-24)).abs() < 1e-12);
+    let text = |largest: &str| {
+        let vertices = format!("vertex 0 0 0\nvertex {largest} 0 0\nvertex 0 3 0");
+        read(ascii(&vertices).as_bytes())
+            .unwrap()
+            .coordinate_rounding
+    };
+    // Seven printed digits of 355.6: the last is a 1e-4.
+    assert!((text("3.556000e+002") - 0.5e-4).abs() < 1e-18);
+    assert!((text("10.12345") - 0.5e-5).abs() < 1e-18);
+    // Short numbers are what they say; many digits still come from floats as a rule,
+    assert!((text("100") - 100.0 * 2f64.powi(-24)).abs() < 1e-18);
+    let float = f64::from(100.123_45f32);
+    assert!((text(&float.to_string()) - float * 2f64.powi(-24)).abs() < 1e-18);
+    // unless they show that they do not.
+    assert!((text("100.12345678901") - 0.5e-11).abs() < 1e-20);
+}
+
+#[test]
+fn the_degenerate_triangle_is_left_out_and_said() {
+    let Some(folder) = corpus() else { return };
+    let path = folder.join("bad_stl/40_degenerate_point_tri.stl");
+    let grid = GridRequest {
+        x: AxisRequest::Extent(7),
+        y: AxisRequest::Extent(7),
+    };
+    let placement = crate::support::lifted(1.3);
+    let document = crate::support::file(&path, 1.0, placement, grid);
+    let result = fluxform::shape::discretize(&document, &fluxform::progress::Silent).unwrap();
+    let facts = result.mesh.unwrap();
+    assert_eq!((facts.triangles, facts.degenerate), (12, 1));
+    assert!(
+        result
+            .warnings
+            .iter()
+            .any(|w| w.contains("1 of 12 triangles have no area"))
+    );
+    assert_eq!(result.points.len(), 49);
+}

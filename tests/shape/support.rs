@@ -1,0 +1,116 @@
+//! What the tests of surfaces share.
+
+use std::path::{Path, PathBuf};
+
+use fluxform::numerics::axis::Axis;
+use fluxform::progress::Silent;
+use fluxform::shape::document::{
+    AxisRequest, GridRequest, Placement, ShapeDocument, SurfaceSource,
+};
+use fluxform::shape::height::{Grid, Sample, heights};
+use fluxform::shape::mesh::{FileMesh, Mesh, Triangle};
+use fluxform::shape::placement::Transform;
+
+/// A repeatable stream of numbers (splitmix64).
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        let unit = (self.bits() >> 11) as f64 / (1u64 << 53) as f64;
+        low + (high - low) * unit
+    }
+
+    pub fn below(&mut self, n: usize) -> usize {
+        (self.bits() % n as u64) as usize
+    }
+}
+
+pub fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The folder of real surface files, or `None` with a printed reason.
+#[allow(clippy::print_stderr)]
+pub fn corpus() -> Option<PathBuf> {
+    let folder = root().join("../shared/corpus");
+    if folder.is_dir() {
+        Some(folder)
+    } else {
+        eprintln!(
+            "skipped: no folder of real surface files at {}",
+            folder.display()
+        );
+        None
+    }
+}
+
+pub fn binary(triangles: &[[[f32; 3]; 3]]) -> Vec<u8> {
+    let mut bytes = vec![b' '; 80];
+    bytes.extend((triangles.len() as u32).to_le_bytes());
+    for triangle in triangles {
+        bytes.extend([0; 12]);
+        for c in triangle.as_flattened() {
+            bytes.extend(c.to_le_bytes());
+        }
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
+/// A mesh in metres whose numbers are exact.
+pub fn exact(triangles: Vec<Triangle>) -> Mesh {
+    let file = FileMesh {
+        triangles,
+        coordinate_rounding: 0.0,
+        warnings: Vec::new(),
+    };
+    Mesh::place(file, &Transform::new(1.0, &Placement::default())).unwrap()
+}
+
+pub fn grid(x: (f64, f64, usize), y: (f64, f64, usize)) -> Grid {
+    let axis = |(from, to, samples)| Axis { from, to, samples };
+    Grid {
+        x_m: axis(x),
+        y_m: axis(y),
+    }
+}
+
+pub fn sample(mesh: &Mesh, grid: &Grid) -> Vec<Option<Sample>> {
+    heights(mesh, grid, &Silent).unwrap()
+}
+
+pub fn seed_grid() -> GridRequest {
+    let axis = AxisRequest::Given(Axis {
+        from: -0.05,
+        to: 0.05,
+        samples: 61,
+    });
+    GridRequest { x: axis, y: axis }
+}
+
+pub fn file(path: &Path, unit_m: f64, placement: Placement, grid: GridRequest) -> ShapeDocument {
+    ShapeDocument {
+        name: "test".into(),
+        source: SurfaceSource::File {
+            path: path.into(),
+            unit_m: Some(unit_m),
+        },
+        placement,
+        grid,
+    }
+}
+
+pub fn lifted(z_m: f64) -> Placement {
+    Placement {
+        translate_m: [0.0, 0.0, z_m],
+        rotate_deg: [0.0; 3],
+    }
+}
