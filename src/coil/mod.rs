@@ -1,1 +1,6 @@
-//! Geometry, circuit and limits of a coil.
+//! A coil's geometry, circuit and limits.
+
+pub mod circuit;
+pub mod inductance;
+pub mod limits;
+pub mod mutual;

@@ -1,1 +1,7 @@
-//! Sources to field and gradient.
+//! Sources to field and gradient: the loop, the winding, the dipole magnet.
+
+pub mod batch;
+pub mod dipole;
+pub mod frame;
+pub mod ring;
+pub mod winding;

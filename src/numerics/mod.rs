@@ -1,3 +1,7 @@
-//! Quadrature, ordered sums, small dense algebra, interpolation: no physics.
+//! Quadrature, vector dispatch, differentiation, grid axes: no physics.
 
 pub mod axis;
+pub mod chebyshev;
+pub mod dispatch;
+pub mod dual;
+pub mod gauss;

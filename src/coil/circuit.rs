@@ -1,0 +1,159 @@
+//! Turns, wire, resistance, time constant, heat and mass of a coil.
+
+use std::f64::consts::PI;
+
+use super::inductance::self_inductance_h;
+use crate::design::{Coil, Wire};
+use crate::field::winding::Winding;
+use crate::units::{
+    COPPER_DENSITY_KG_PER_M3, COPPER_TEMPERATURE_COEFFICIENT_PER_K, REFERENCE_TEMPERATURE_C,
+};
+
+/// Time constants after which a current counts as settled.
+pub const SETTLING_TIME_CONSTANTS: f64 = 5.0;
+
+/// Turns that fit, layers stacked squarely: (OD - ID)/2/d x L/d, not rounded.
+#[must_use]
+pub fn turns_that_fit(coil: &Coil, wire: &Wire) -> f64 {
+    let depth_m = 0.5 * (coil.outer_diameter_m - coil.inner_diameter_m);
+    (depth_m / wire.diameter_m) * (coil.length_m / wire.diameter_m)
+}
+
+/// The winding as a field source; turns default to what fits.
+#[must_use]
+pub fn winding(coil: &Coil, wire: &Wire) -> Winding {
+    Winding {
+        inner_radius_m: 0.5 * coil.inner_diameter_m,
+        outer_radius_m: 0.5 * coil.outer_diameter_m,
+        length_m: coil.length_m,
+        turns: coil.turns.unwrap_or_else(|| turns_that_fit(coil, wire)),
+    }
+}
+
+/// What a coil is to its driver.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Circuit {
+    /// Number of turns N.
+    pub turns: f64,
+    /// Resistance at the wire's temperature, ohm.
+    pub resistance_ohm: f64,
+    /// Self inductance, H.
+    pub inductance_h: f64,
+    /// Length of wire, m: N times the mean turn.
+    pub wire_length_m: f64,
+    /// Mass of the wire's metal, kg.
+    pub wire_mass_kg: f64,
+}
+
+impl Circuit {
+    /// The circuit of an air coil.
+    ///
+    /// R = rho(T) N pi (a1 + a2) / (pi d^2 / 4), rho(T) = rho (1 + alpha (T - 20 C)).
+    #[must_use]
+    pub fn of_air_coil(coil: &Coil, wire: &Wire) -> Self {
+        let winding = winding(coil, wire);
+        let wire_length_m = winding.turns * PI * (winding.inner_radius_m + winding.outer_radius_m);
+        let section_m2 = 0.25 * PI * wire.conductor_diameter_m * wire.conductor_diameter_m;
+        let warmth = 1.0
+            + COPPER_TEMPERATURE_COEFFICIENT_PER_K * (wire.temperature_c - REFERENCE_TEMPERATURE_C);
+        Self {
+            turns: winding.turns,
+            resistance_ohm: wire.resistivity_ohm_m * warmth * wire_length_m / section_m2,
+            inductance_h: self_inductance_h(&winding),
+            wire_length_m,
+            wire_mass_kg: wire_length_m * section_m2 * COPPER_DENSITY_KG_PER_M3,
+        }
+    }
+
+    /// tau = L / R, s.
+    #[must_use]
+    pub fn time_constant_s(&self) -> f64 {
+        self.inductance_h / self.resistance_ohm
+    }
+
+    /// Five time constants, s.
+    #[must_use]
+    pub fn settling_s(&self) -> f64 {
+        SETTLING_TIME_CONSTANTS * self.time_constant_s()
+    }
+
+    /// Heat at a steady current, W.
+    #[must_use]
+    pub fn power_w(&self, current_a: f64) -> f64 {
+        self.resistance_ohm * current_a * current_a
+    }
+
+    /// The current that `limit_a` and the supply's voltage over the resistance allow, A.
+    #[must_use]
+    pub fn rated_current_a(&self, limit_a: f64, voltage_v: Option<f64>) -> f64 {
+        voltage_v.map_or(limit_a, |voltage_v| {
+            limit_a.min(voltage_v / self.resistance_ohm)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seed() -> (Coil, Wire) {
+        (
+            Coil {
+                inner_diameter_m: 0.024,
+                outer_diameter_m: 0.038,
+                length_m: 0.1,
+                turns: Some(1429.0),
+            },
+            Wire {
+                diameter_m: 0.0007,
+                conductor_diameter_m: 0.0007,
+                resistivity_ohm_m: 1.68e-8,
+                temperature_c: 20.0,
+                choices_m: vec![],
+            },
+        )
+    }
+
+    #[test]
+    fn the_seed_coil() {
+        let (coil, wire) = seed();
+        assert!((turns_that_fit(&coil, &wire) - 1_428.571_428_571).abs() < 1e-9);
+        let circuit = Circuit::of_air_coil(&coil, &wire);
+        assert!(
+            (circuit.resistance_ohm - 6.0753).abs() < 5e-5,
+            "{}",
+            circuit.resistance_ohm
+        );
+        // 28 digits from the reference: 0.0145019260634521282419059281
+        let error = circuit.inductance_h / 0.014_501_926_063_452_128 - 1.0;
+        assert!(error.abs() < 1e-12, "{error:e}");
+    }
+
+    #[test]
+    fn a_warm_coil_resists_more_and_the_voltage_can_bind() {
+        let (coil, mut wire) = seed();
+        let cold = Circuit::of_air_coil(&coil, &wire);
+        wire.temperature_c = 83.0;
+        let warm = Circuit::of_air_coil(&coil, &wire);
+        let expected = 1.0 + 3.93e-3 * 63.0;
+        assert!((warm.resistance_ohm / cold.resistance_ohm - expected).abs() < 1e-14);
+        assert_eq!(cold.rated_current_a(2.0, Some(36.0)), 2.0);
+        assert_eq!(
+            cold.rated_current_a(2.0, Some(6.0)),
+            6.0 / cold.resistance_ohm
+        );
+    }
+
+    #[test]
+    fn a_thinner_conductor_changes_the_resistance_only() {
+        let (coil, mut wire) = seed();
+        let full = Circuit::of_air_coil(&coil, &wire);
+        wire.conductor_diameter_m = 0.00065;
+        let thin = Circuit::of_air_coil(&coil, &wire);
+        assert!(
+            (thin.resistance_ohm / full.resistance_ohm - (0.7_f64 / 0.65).powi(2)).abs() < 1e-14
+        );
+        assert_eq!(thin.inductance_h, full.inductance_h);
+        assert_eq!(thin.wire_length_m, full.wire_length_m);
+    }
+}

@@ -1,0 +1,185 @@
+//! Mutual inductance of two equal air coils with parallel axes and level faces.
+//!
+//! The flux of the first through the second's turns, with the loops' exact vector potential:
+//! with D the axes' distance, a' and theta a point of the second winding and
+//! rho^2 = D^2 + a'^2 + 2 D a' cos theta its distance from the first axis,
+//!
+//! ```text
+//! M = mu_0 J^2 int da' int dtheta a' (a' + D cos theta) int da int_0^l 2 (l - u) [A/r](a; rho, u) du.
+//! ```
+
+use std::f64::consts::PI;
+
+use crate::field::ring::{RingPoint, ring_field};
+use crate::field::winding::Winding;
+use crate::numerics::gauss;
+use crate::units::MU_0_T_M_PER_A;
+
+/// Relative error of [`mutual_inductance_h`] for gaps of at least a tenth of the outer radius.
+pub const RELATIVE_ERROR: f64 = 1e-6;
+/// Relative error where the windings touch.
+pub const RELATIVE_ERROR_TOUCHING: f64 = 1e-3;
+const TOLERANCE: f64 = 1e-7;
+/// Singularities closer than this multiple of the outer radius are treated as being there: what
+/// they leave of the integral is a logarithm of small weight.
+const NEAREST: f64 = 0.05;
+/// Most radial nodes.
+const MOST_NODES: usize = 10;
+
+/// Mutual inductance of two equal windings whose axes are `distance_m` apart, H; negative, as
+/// the flux returns outside. Domain: the windings do not overlap.
+#[must_use]
+pub fn mutual_inductance_h(winding: &Winding, distance_m: f64) -> f64 {
+    let (a1, a2) = (winding.inner_radius_m, winding.outer_radius_m);
+    let length = winding.length_m;
+    let floor = NEAREST * a2;
+    let (centre, half) = (0.5 * (a1 + a2), 0.5 * (a2 - a1));
+    let along_axis = |a: f64, rho: f64| {
+        let mut sum = 0.0;
+        gauss::graded(0.0, length, (rho - a).max(floor), TOLERANCE, |u, weight| {
+            let at = RingPoint {
+                radius_m: a,
+                r_m: rho,
+                offset_m: a - rho,
+                u_m: u,
+            };
+            sum += weight * 2.0 * (length - u) * ring_field(at).a_phi_over_r;
+        });
+        sum
+    };
+    // Either radius is singular where the other winding's nearest filament would be met.
+    let nearest = (distance_m - a2).max(a2 + floor);
+    let radius = gauss::bernstein_radius(a1, a2, nearest, 0.0);
+    let order = gauss::order_for(radius, 4.0 * PI, TOLERANCE).unwrap_or(MOST_NODES);
+    let rule = gauss::rule((order + 1).min(MOST_NODES));
+    let mut total = 0.0;
+    for (x, weight_b) in rule.nodes.iter().zip(&rule.weights) {
+        let b = centre + half * x;
+        let gap2 = ((distance_m - b).powi(2) - a2 * a2).max(0.0);
+        let near = (gap2 / (distance_m * b)).sqrt().max(NEAREST);
+        // phi = pi - theta is zero at the closest approach. The midpoint rule over a period
+        // converges like exp(-n near), exactly for the harmonics that cancel far away.
+        let steps = ((distance_m / (b * TOLERANCE)).ln() / (2.0 * near)).ceil() + 2.0;
+        for step in 0..steps as usize {
+            let phi = PI * (step as f64 + 0.5) / steps;
+            let sine = (0.5 * phi).sin();
+            let rho = ((distance_m - b).powi(2) + 4.0 * distance_m * b * sine * sine).sqrt();
+            let projection = 2.0 * b * (b - distance_m * phi.cos());
+            for (x, weight_a) in rule.nodes.iter().zip(&rule.weights) {
+                let weight = weight_b * weight_a * half * half * projection * PI / steps;
+                total += weight * along_axis(centre + half * x, rho);
+            }
+        }
+    }
+    let density = winding.current_density_per_m2();
+    MU_0_T_M_PER_A * density * density * total
+}
+
+/// The inductance matrix of equal windings at `axes_m`, H, row by row; equal distances are
+/// computed once.
+#[must_use]
+pub fn inductance_matrix_h(winding: &Winding, self_h: f64, axes_m: &[[f64; 2]]) -> Vec<Vec<f64>> {
+    // Distances that differ by rounding only share a key.
+    const SAME: f64 = 1e-9;
+    let mut known: Vec<(f64, f64)> = Vec::new();
+    let mut between = |distance: f64| {
+        let same = |d: f64| (d - distance).abs() <= SAME * distance;
+        if let Some((_, value)) = known.iter().find(|(d, _)| same(*d)) {
+            return *value;
+        }
+        let value = mutual_inductance_h(winding, distance);
+        known.push((distance, value));
+        value
+    };
+    let mut matrix = vec![vec![self_h; axes_m.len()]; axes_m.len()];
+    for (i, [xi, yi]) in axes_m.iter().enumerate() {
+        for (j, [xj, yj]) in axes_m.iter().enumerate().skip(i + 1) {
+            let value = between((xi - xj).hypot(yi - yj));
+            matrix[i][j] = value;
+            matrix[j][i] = value;
+        }
+    }
+    matrix
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn far_apart_the_coils_are_dipoles() {
+        let winding = Winding {
+            inner_radius_m: 0.012,
+            outer_radius_m: 0.019,
+            length_m: 0.1,
+            turns: 1429.0,
+        };
+        // Mean turn area of a uniform current density; two vertical dipoles side by side.
+        let area = PI * (0.012_f64.powi(2) + 0.012 * 0.019 + 0.019_f64.powi(2)) / 3.0;
+        let dipole = |d: f64| -MU_0_T_M_PER_A * (1429.0 * area).powi(2) / (4.0 * PI * d.powi(3));
+        for distance in [3.1, 6.2] {
+            let ratio = mutual_inductance_h(&winding, distance) / dipole(distance);
+            // The next multipoles enter with (size / distance)^2.
+            assert!(
+                (ratio - 1.0).abs() < 2.0 * (0.1_f64 / distance).powi(2),
+                "{ratio}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_direct_sum_agrees() {
+        // Flux of the first coil's B_z through the second's turns, by midpoints.
+        let winding = Winding {
+            inner_radius_m: 0.012,
+            outer_radius_m: 0.019,
+            length_m: 0.1,
+            turns: 1429.0,
+        };
+        let distance = 0.05;
+        // The first coil's B_z, summed over discs bounded by the second's turns.
+        let (turns, radial, axial) = (gauss::rule(3), gauss::rule(6), gauss::rule(16));
+        let steps = 24;
+        let mut flux = 0.0;
+        for (xb, wb) in turns.nodes.iter().zip(&turns.weights) {
+            let b = 0.0155 + 0.0035 * xb;
+            for (xr, wr) in radial.nodes.iter().zip(&radial.weights) {
+                let rho = 0.5 * b * (1.0 + xr);
+                for step in 0..steps {
+                    let angle = 2.0 * PI * (f64::from(step) + 0.5) / f64::from(steps);
+                    let r = (distance * distance + rho * rho + 2.0 * distance * rho * angle.cos())
+                        .sqrt();
+                    for (xz, wz) in axial.nodes.iter().zip(&axial.weights) {
+                        let b_z = winding.field(r, -0.05 + 0.05 * xz).expect("outside").b_z;
+                        let area = 0.5 * b * wr * rho * 2.0 * PI / f64::from(steps);
+                        flux += b_z * area * 0.5 * wz * 0.5 * wb;
+                    }
+                }
+            }
+        }
+        let direct = 1429.0 * flux;
+        let value = mutual_inductance_h(&winding, distance);
+        assert!((value / direct - 1.0).abs() < 1e-5, "{value:e} {direct:e}");
+    }
+
+    #[test]
+    fn touching_coils_are_finite_and_the_matrix_is_symmetric() {
+        let winding = Winding {
+            inner_radius_m: 0.012,
+            outer_radius_m: 0.019,
+            length_m: 0.1,
+            turns: 1429.0,
+        };
+        let touching = mutual_inductance_h(&winding, 0.038);
+        let apart = mutual_inductance_h(&winding, 0.0385);
+        assert!(
+            touching < apart && apart < 0.0 && touching > 1.1 * apart,
+            "{touching} {apart}"
+        );
+        let axes = [[-0.05, 0.0], [0.0, 0.0], [0.05, 0.0]];
+        let matrix = inductance_matrix_h(&winding, 0.0145, &axes);
+        assert_eq!(matrix[0][1], matrix[2][1]);
+        assert_eq!(matrix[1][1], 0.0145);
+        assert!(matrix[0][2] > matrix[0][1]);
+    }
+}

@@ -1,0 +1,180 @@
+//! Piecewise Chebyshev tables of a function of one variable.
+
+use std::f64::consts::PI;
+
+use super::dispatch::{Kernel, LANES, Lanes};
+
+/// Equal panels over an interval, each with one Chebyshev series of the same degree.
+#[derive(Debug, Clone)]
+pub struct Table {
+    from: f64,
+    width: f64,
+    terms: usize,
+    /// [panel][term]
+    coefficients: Vec<f64>,
+}
+
+/// Where a table's function must be known: the Chebyshev points of every panel.
+#[derive(Debug, Clone)]
+pub struct Layout {
+    from: f64,
+    width: f64,
+    panels: usize,
+    terms: usize,
+}
+
+impl Layout {
+    /// Panels over `from..to` for a function whose singularities keep a distance of at least
+    /// `distance` from every real point, with interpolation error below `tolerance` times the
+    /// function's size. `None` when that would take more than `most` nodes.
+    ///
+    /// With panels of half-width h the singularities lie outside the ellipse of Bernstein
+    /// radius rho = d/h + sqrt(1 + (d/h)^2), and n terms leave an error below 16 rho^(-n)
+    /// (Trefethen, Approximation Theory and Approximation Practice, theorem 8.2).
+    #[must_use]
+    pub fn new(from: f64, to: f64, distance: f64, tolerance: f64, most: usize) -> Option<Self> {
+        const PANEL_SHARE: f64 = 3.0;
+        let panels = ((to - from) * PANEL_SHARE / (2.0 * distance))
+            .ceil()
+            .max(1.0);
+        if !(distance > 0.0 && panels < most as f64) {
+            return None;
+        }
+        let width = (to - from) / panels;
+        let ratio = 2.0 * distance / width.max(f64::MIN_POSITIVE);
+        let radius = ratio + ratio.hypot(1.0);
+        let terms = ((16.0 / tolerance).ln() / radius.ln()).ceil().max(1.0) as usize + 1;
+        let layout = Self {
+            from,
+            width,
+            panels: panels as usize,
+            terms,
+        };
+        (layout.panels * layout.terms <= most).then_some(layout)
+    }
+
+    /// The nodes, panel by panel.
+    #[must_use]
+    pub fn nodes(&self) -> Vec<f64> {
+        let n = self.terms as f64;
+        (0..self.panels)
+            .flat_map(|panel| {
+                (0..self.terms).map(move |k| {
+                    let x = (PI * (k as f64 + 0.5) / n).cos();
+                    self.from + self.width * (panel as f64 + 0.5 + 0.5 * x)
+                })
+            })
+            .collect()
+    }
+
+    /// The table from the function's values at [`Layout::nodes`].
+    #[must_use]
+    pub fn table(&self, values: &[f64]) -> Table {
+        let n = self.terms;
+        let mut coefficients = Vec::with_capacity(values.len());
+        for panel in values.chunks_exact(n) {
+            for j in 0..n {
+                let sum: f64 = panel
+                    .iter()
+                    .enumerate()
+                    .map(|(k, f)| f * (PI * j as f64 * (k as f64 + 0.5) / n as f64).cos())
+                    .sum();
+                coefficients.push(sum * if j == 0 { 1.0 } else { 2.0 } / n as f64);
+            }
+        }
+        Table {
+            from: self.from,
+            width: self.width,
+            terms: n,
+            coefficients,
+        }
+    }
+}
+
+/// Evaluates a [`Table`] at ascending points.
+pub struct Evaluation<'a> {
+    /// The table.
+    pub table: &'a Table,
+    /// Points, ascending, within the table's interval.
+    pub points: &'a [f64],
+    /// Values, one a point.
+    pub out: &'a mut [f64],
+}
+
+impl Kernel for Evaluation<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<const FMA: bool>(self) {
+        let Self { table, points, out } = self;
+        let panels = table.coefficients.len() / table.terms;
+        let mut start = 0;
+        for panel in 0..panels {
+            let upper = table.from + table.width * (panel + 1) as f64;
+            let count = if panel + 1 == panels {
+                points.len() - start
+            } else {
+                points[start..].partition_point(|x| *x < upper)
+            };
+            let series = &table.coefficients[panel * table.terms..(panel + 1) * table.terms];
+            let middle = table.from + table.width * (panel as f64 + 0.5);
+            let end = start + count;
+            for first in (start..end).step_by(LANES) {
+                let last = (first + LANES).min(end);
+                let x = (Lanes::load(&points[first..last]) - middle) * (2.0 / table.width);
+                clenshaw::<FMA>(series, x).store(&mut out[first..last]);
+            }
+            start = end;
+        }
+    }
+}
+
+/// Sum of c_k T_k(x) by Clenshaw's recurrence.
+#[inline(always)]
+fn clenshaw<const FMA: bool>(series: &[f64], x: Lanes) -> Lanes {
+    let twice = x * 2.0;
+    let (mut newer, mut older) = (Lanes::splat(0.0), Lanes::splat(0.0));
+    for c in series[1..].iter().rev() {
+        let next = twice.mul_add::<FMA>(newer, Lanes::splat(*c) - older);
+        (newer, older) = (next, newer);
+    }
+    x.mul_add::<FMA>(newer, Lanes::splat(series[0]) - older)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::dispatch;
+
+    #[test]
+    fn the_error_stays_below_the_tolerance() {
+        // Singular at 0.4 +- 0.3 i.
+        let f = |x: f64| 1.0 / ((x - 0.4).powi(2) + 0.09);
+        for tolerance in [1e-4, 1e-8, 1e-12] {
+            let layout = Layout::new(-1.3, 2.7, 0.3, tolerance, 4000).expect("fits");
+            let values: Vec<f64> = layout.nodes().into_iter().map(f).collect();
+            let table = layout.table(&values);
+            let points: Vec<f64> = (0..997)
+                .map(|i| -1.3 + 4.0 * f64::from(i) / 996.0)
+                .collect();
+            let mut out = vec![0.0; points.len()];
+            dispatch::run(Evaluation {
+                table: &table,
+                points: &points,
+                out: &mut out,
+            });
+            let worst = points
+                .iter()
+                .zip(&out)
+                .map(|(x, y)| (f(*x) - y).abs() * 0.09)
+                .fold(0.0, f64::max);
+            assert!(worst < tolerance, "{tolerance:e}: {worst:e}");
+        }
+    }
+
+    #[test]
+    fn too_many_nodes_or_no_distance_is_none() {
+        assert!(Layout::new(0.0, 1.0, 1e-6, 1e-9, 5000).is_none());
+        assert!(Layout::new(0.0, 1.0, 0.0, 1e-9, 5000).is_none());
+    }
+}

@@ -1,0 +1,144 @@
+//! Forward differentiation in one variable.
+
+use std::ops::{Add, Div, Mul, Sub};
+
+/// What the generic kernels need of a number.
+pub trait Number:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Mul<f64, Output = Self>
+    + Add<f64, Output = Self>
+{
+    /// Square root.
+    #[must_use]
+    fn sqrt(self) -> Self;
+    /// The value without derivatives.
+    fn value(self) -> f64;
+    /// A constant.
+    fn constant(value: f64) -> Self;
+}
+
+impl Number for f64 {
+    fn sqrt(self) -> Self {
+        f64::sqrt(self)
+    }
+    fn value(self) -> f64 {
+        self
+    }
+    fn constant(value: f64) -> Self {
+        value
+    }
+}
+
+/// A value and its derivative.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dual {
+    /// Value.
+    pub re: f64,
+    /// Derivative.
+    pub du: f64,
+}
+
+impl Dual {
+    /// The independent variable.
+    #[must_use]
+    pub fn variable(value: f64) -> Self {
+        Self { re: value, du: 1.0 }
+    }
+}
+
+impl Add for Dual {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self {
+            re: self.re + other.re,
+            du: self.du + other.du,
+        }
+    }
+}
+
+impl Sub for Dual {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        Self {
+            re: self.re - other.re,
+            du: self.du - other.du,
+        }
+    }
+}
+
+impl Mul for Dual {
+    type Output = Self;
+    fn mul(self, other: Self) -> Self {
+        Self {
+            re: self.re * other.re,
+            du: self.du * other.re + self.re * other.du,
+        }
+    }
+}
+
+impl Div for Dual {
+    type Output = Self;
+    fn div(self, other: Self) -> Self {
+        let re = self.re / other.re;
+        Self {
+            re,
+            du: (self.du - re * other.du) / other.re,
+        }
+    }
+}
+
+impl Mul<f64> for Dual {
+    type Output = Self;
+    fn mul(self, factor: f64) -> Self {
+        Self {
+            re: self.re * factor,
+            du: self.du * factor,
+        }
+    }
+}
+
+impl Add<f64> for Dual {
+    type Output = Self;
+    fn add(self, term: f64) -> Self {
+        Self {
+            re: self.re + term,
+            du: self.du,
+        }
+    }
+}
+
+impl Number for Dual {
+    fn sqrt(self) -> Self {
+        let re = self.re.sqrt();
+        Self {
+            re,
+            du: 0.5 * self.du / re,
+        }
+    }
+    fn value(self) -> f64 {
+        self.re
+    }
+    fn constant(value: f64) -> Self {
+        Self { re: value, du: 0.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn differentiates_a_composite() {
+        // f = sqrt(1.3 x + x^2) / (x - 0.2); f' in closed form
+        let x = Dual::variable(0.7);
+        let f = (x * 1.3 + x * x).sqrt() / (x + -0.2);
+        let root = (1.3_f64 * 0.7 + 0.49).sqrt();
+        let slope = (1.3 + 1.4) / (2.0 * root) / 0.5 - root / 0.25;
+        assert!((f.re - root / 0.5).abs() < 1e-15);
+        assert!((f.du - slope).abs() < 1e-14);
+    }
+}
