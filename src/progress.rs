@@ -13,12 +13,19 @@ pub trait Progress: Sync {
         false
     }
     /// `Err` when the user asked to stop.
+    ///
+    /// # Errors
+    /// [`Interrupted`].
     fn check(&self) -> Result<(), Interrupted> {
         if self.interrupted() {
             Err(Interrupted)
         } else {
             Ok(())
         }
+    }
+    /// Seconds spent in each stage since the last call, in order; empty where nobody measures.
+    fn take_seconds(&self) -> Vec<(String, f64)> {
+        Vec::new()
     }
 }
 

@@ -1,1 +1,73 @@
-//! What a command does, from documents to results.
+//! What a command does, from documents to results and artefacts. No screens, no clocks.
+
+pub mod calibrate;
+pub mod discretize;
+pub mod evaluate;
+pub mod lambda;
+pub mod map;
+pub mod probe;
+pub mod scene;
+pub mod verify;
+
+use crate::bundle::atomic::WriteError;
+use crate::bundle::load::BundleError;
+use crate::field::winding::OnEdge;
+use crate::lambda::ProblemError;
+use crate::map::tabulate::MapError;
+use crate::progress::Interrupted;
+use crate::shape::ShapeError;
+
+/// Relative error of the air coil's exact kernel, held by tests against 40-digit values.
+pub const KERNEL_ERROR: f64 = 1e-12;
+
+/// Why a job gave no result. Messages say what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum JobError {
+    /// The design asks for physics that this version does not model.
+    #[error("{0}")]
+    NotModelled(String),
+    /// Inputs that contradict each other.
+    #[error("{0}")]
+    Input(String),
+    /// A point on a winding's edge.
+    #[error(transparent)]
+    OnEdge(#[from] OnEdge),
+    /// The shape gives no points.
+    #[error(transparent)]
+    Shape(#[from] ShapeError),
+    /// The force problem cannot be stated.
+    #[error(transparent)]
+    Problem(#[from] ProblemError),
+    /// An artefact was not written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// A bundle cannot be used.
+    #[error(transparent)]
+    Bundle(#[from] BundleError),
+    /// The user asked to stop.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+}
+
+impl From<MapError> for JobError {
+    fn from(error: MapError) -> Self {
+        match error {
+            MapError::OnEdge(on_edge) => on_edge.into(),
+            MapError::Interrupted(interrupted) => interrupted.into(),
+        }
+    }
+}
+
+impl JobError {
+    /// The process's exit code: 3 a bad input, 4 an output that is not ours or cannot be
+    /// written, 5 a bundle that fails its checks, 130 interrupted.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Interrupted(_) | Self::Shape(ShapeError::Interrupted(_)) => 130,
+            Self::Write(_) => 4,
+            Self::Bundle(error) if error.is_damage() => 5,
+            _ => 3,
+        }
+    }
+}
