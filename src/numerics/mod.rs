@@ -1,3 +1,4 @@
 //! Quadrature, ordered sums, small dense algebra, interpolation: no physics.
 
 pub mod axis;
+pub mod lagrange;
