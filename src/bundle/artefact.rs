@@ -58,3 +58,37 @@ pub fn parse_version(version: &str) -> Option<[u32; 3]> {
     let numbers = [parts.next()??, parts.next()??, parts.next()??];
     parts.next().is_none().then_some(numbers)
 }
+
+/// Whether this program reads artefacts of that schema version.
+///
+/// # Errors
+/// The end of a sentence that begins with what holds the version.
+pub fn check_version(version: &str) -> Result<(), String> {
+    let ours = parse_version(SCHEMA_VERSION).unwrap_or_default()[0];
+    match parse_version(version) {
+        None => Err(format!("{version:?} is not of the form major.minor.patch")),
+        Some([major, ..]) if major == ours => Ok(()),
+        Some([major, ..]) if major > ours => Err(format!(
+            "{version} is newer than this program, which reads {ours}.x; update fluxform"
+        )),
+        Some(_) => Err(format!(
+            "{version} is older than this program, which reads {ours}.x; make the artefact anew"
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{check_version, parse_version};
+
+    #[test]
+    fn another_major_is_refused_another_minor_is_read() {
+        assert_eq!(parse_version("1.20.3"), Some([1, 20, 3]));
+        for bad in ["", "1", "1.2", "1.2.3.4", "1.x.0", "-1.0.0"] {
+            assert_eq!(parse_version(bad), None, "{bad}");
+        }
+        assert_eq!(check_version("1.7.3"), Ok(()));
+        assert!(check_version("2.0.0").unwrap_err().contains("newer"));
+        assert!(check_version("0.9.0").unwrap_err().contains("older"));
+    }
+}

@@ -141,7 +141,8 @@ impl ser::SerializeMap for Parts<'_> {
     type Error = JsonError;
 
     fn serialize_key<T: Serialize + ?Sized>(&mut self, key: &T) -> Result<(), JsonError> {
-        let name = serde_json::to_value(key).map_err(|error| JsonError::Other(error.to_string()))?;
+        let name =
+            serde_json::to_value(key).map_err(|error| JsonError::Other(error.to_string()))?;
         self.enter(name.as_str().unwrap_or("?"));
         Ok(())
     }
@@ -199,11 +200,20 @@ impl<'a> Serializer for Finite<'a> {
         Ok(())
     }
 
-    fn serialize_unit_variant(self, _: &'static str, _: u32, _: &'static str) -> Result<(), JsonError> {
+    fn serialize_unit_variant(
+        self,
+        _: &'static str,
+        _: u32,
+        _: &'static str,
+    ) -> Result<(), JsonError> {
         Ok(())
     }
 
-    fn serialize_newtype_struct<T: Serialize + ?Sized>(self, _: &'static str, value: &T) -> Result<(), JsonError> {
+    fn serialize_newtype_struct<T: Serialize + ?Sized>(
+        self,
+        _: &'static str,
+        value: &T,
+    ) -> Result<(), JsonError> {
         value.serialize(self)
     }
 
@@ -231,7 +241,13 @@ impl<'a> Serializer for Finite<'a> {
         Ok(self.parts())
     }
 
-    fn serialize_tuple_variant(self, _: &'static str, _: u32, _: &'static str, _: usize) -> Result<Parts<'a>, JsonError> {
+    fn serialize_tuple_variant(
+        self,
+        _: &'static str,
+        _: u32,
+        _: &'static str,
+        _: usize,
+    ) -> Result<Parts<'a>, JsonError> {
         Ok(self.parts())
     }
 
@@ -243,7 +259,13 @@ impl<'a> Serializer for Finite<'a> {
         Ok(self.parts())
     }
 
-    fn serialize_struct_variant(self, _: &'static str, _: u32, _: &'static str, _: usize) -> Result<Parts<'a>, JsonError> {
+    fn serialize_struct_variant(
+        self,
+        _: &'static str,
+        _: u32,
+        _: &'static str,
+        _: usize,
+    ) -> Result<Parts<'a>, JsonError> {
         Ok(self.parts())
     }
 }
@@ -263,20 +285,35 @@ mod tests {
     #[test]
     fn names_the_key_that_is_not_finite() {
         let mut path = BTreeMap::new();
-        path.insert("steps", vec![
-            Step { lambda_n_per_m: None, currents_a: vec![0.7, 1.3] },
-            Step { lambda_n_per_m: Some(5.9), currents_a: vec![0.7, f64::NAN] },
-        ]);
+        path.insert(
+            "steps",
+            vec![
+                Step {
+                    lambda_n_per_m: None,
+                    currents_a: vec![0.7, 1.3],
+                },
+                Step {
+                    lambda_n_per_m: Some(5.9),
+                    currents_a: vec![0.7, f64::NAN],
+                },
+            ],
+        );
         let key = "steps[1].currents_a[1]".to_owned();
         assert_eq!(to_json(&path), Err(JsonError::NotFinite { key }));
-        let step = Step { lambda_n_per_m: Some(f64::INFINITY), currents_a: vec![] };
+        let step = Step {
+            lambda_n_per_m: Some(f64::INFINITY),
+            currents_a: vec![],
+        };
         let key = "lambda_n_per_m".to_owned();
         assert_eq!(to_json(&step), Err(JsonError::NotFinite { key }));
     }
 
     #[test]
     fn writes_shortest_round_trip_numbers_and_null() {
-        let step = Step { lambda_n_per_m: None, currents_a: vec![0.1 + 0.2] };
+        let step = Step {
+            lambda_n_per_m: None,
+            currents_a: vec![0.1 + 0.2],
+        };
         let text = String::from_utf8(to_json(&step).unwrap()).unwrap();
         assert_eq!(
             text,

@@ -5,4 +5,12 @@ pub mod artefact;
 #[allow(clippy::disallowed_methods)] // the one place that writes files
 pub mod atomic;
 pub mod json;
+pub mod lambda_file;
+pub mod manifest;
+mod npy;
+pub mod npz;
 pub mod number;
+pub mod read_table;
+pub mod schema;
+pub mod table;
+pub mod vtk;

@@ -60,13 +60,22 @@ mod tests {
     fn text_reads_back_to_the_same_bits() {
         let mut bits = 0x9e37_79b9_7f4a_7c15u64;
         for _ in 0..200_000 {
-            bits = bits.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            bits = bits
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             let value = f64::from_bits(bits);
             if value.is_finite() {
                 let text = text(value);
-                assert_eq!(text.parse::<f64>().unwrap().to_bits(), value.to_bits(), "{text}");
+                assert_eq!(
+                    text.parse::<f64>().unwrap().to_bits(),
+                    value.to_bits(),
+                    "{text}"
+                );
                 let size = value.abs();
-                assert!(!(1e-5..=1e15).contains(&size) || !text.contains('e'), "{text}");
+                assert!(
+                    !(1e-5..=1e15).contains(&size) || !text.contains('e'),
+                    "{text}"
+                );
             }
         }
     }

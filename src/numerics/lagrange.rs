@@ -97,7 +97,8 @@ impl Cell {
         for (k, wz) in self.z.weights.iter().enumerate().take(self.z.count) {
             let mut plane = 0.0;
             for (j, wy) in self.y.weights.iter().enumerate().take(self.y.count) {
-                let node = ((self.z.start + k) * self.rows + self.y.start + j) * self.row + self.x.start;
+                let node =
+                    ((self.z.start + k) * self.rows + self.y.start + j) * self.row + self.x.start;
                 let line = &values[node * components + index..];
                 let mut row = 0.0;
                 for (i, wx) in self.x.weights.iter().enumerate().take(self.x.count) {
@@ -142,7 +143,15 @@ mod tests {
     #[test]
     fn the_stencil_is_the_nearest_four_and_stays_inside() {
         let nodes: Vec<f64> = (0..7).map(|i| 0.3 * f64::from(i)).collect();
-        for (x, start) in [(0.0, 0), (0.29, 0), (0.31, 0), (0.7, 1), (1.0, 2), (1.3, 3), (1.75, 3)] {
+        for (x, start) in [
+            (0.0, 0),
+            (0.29, 0),
+            (0.31, 0),
+            (0.7, 1),
+            (1.0, 2),
+            (1.3, 3),
+            (1.75, 3),
+        ] {
             assert_eq!(stencil(&nodes, x).unwrap().start, start, "{x}");
         }
         for outside in [-1e-9, 1.800_000_1, f64::NAN, f64::INFINITY] {
@@ -191,7 +200,9 @@ mod tests {
     #[test]
     fn components_are_picked_out_of_the_last_axis() {
         let axes: [&[f64]; 3] = [&[0.0, 0.4, 1.1], &[0.2, 0.9], &[0.5]];
-        let values: Vec<f64> = (0..6).flat_map(|n| [f64::from(n), 10.0 * f64::from(n * n)]).collect();
+        let values: Vec<f64> = (0..6)
+            .flat_map(|n| [f64::from(n), 10.0 * f64::from(n * n)])
+            .collect();
         let second: Vec<f64> = values.chunks(2).map(|pair| pair[1]).collect();
         let cell = locate(axes, [0.7, 0.3, 0.5]).unwrap();
         assert_eq!(cell.component(&values, 2, 1), cell.value(&second));

@@ -148,7 +148,9 @@ pub(super) fn fill(
     let outcome = content(&mut buffered);
     // On failure the buffer's rest is dropped unwritten.
     let hashing = match outcome {
-        Ok(()) => buffered.into_inner().map_err(io::IntoInnerError::into_error)?,
+        Ok(()) => buffered
+            .into_inner()
+            .map_err(io::IntoInnerError::into_error)?,
         Err(error) => {
             let _ = buffered.into_parts();
             return Err(error);

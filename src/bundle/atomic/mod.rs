@@ -16,10 +16,10 @@ mod overwrite;
 use std::io;
 use std::path::{Path, PathBuf};
 
-pub use file::{FileSet, write};
 pub(crate) use file::hex;
-pub(crate) use folder::check_name;
+pub use file::{FileSet, write};
 pub use folder::FolderDraft;
+pub(crate) use folder::check_name;
 pub use leftovers::clean_leftovers;
 pub use overwrite::{Overwrite, Record};
 

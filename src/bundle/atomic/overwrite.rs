@@ -58,12 +58,10 @@ impl Overwrite {
             Err(error) => return Err(WriteError::from_io("look at", target, error)),
             Ok(_) => {}
         }
-        record
-            .confirm()
-            .map_err(|reason| WriteError::OutputExists {
-                path: target.to_path_buf(),
-                reason,
-            })
+        record.confirm().map_err(|reason| WriteError::OutputExists {
+            path: target.to_path_buf(),
+            reason,
+        })
     }
 }
 
@@ -77,10 +75,8 @@ impl Record {
             .map_err(|_| format!("and no {name} tells what it was made from"))?;
         let value: Value = serde_json::from_slice(&text)
             .map_err(|_| format!("and {name} does not tell what it was made from"))?;
-        let found: Option<Vec<&str>> = value
-            .get("inputs")
-            .and_then(Value::as_array)
-            .map(|inputs| {
+        let found: Option<Vec<&str>> =
+            value.get("inputs").and_then(Value::as_array).map(|inputs| {
                 inputs
                     .iter()
                     .map(|input| input.get("sha256").and_then(Value::as_str).unwrap_or(""))
