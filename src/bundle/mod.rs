@@ -4,8 +4,10 @@
 pub mod artefact;
 #[allow(clippy::disallowed_methods)] // the one place that writes files
 pub mod atomic;
+mod consistent;
 pub mod json;
 pub mod lambda_file;
+pub mod load;
 pub mod manifest;
 mod npy;
 pub mod npz;
@@ -14,3 +16,4 @@ pub mod read_table;
 pub mod schema;
 pub mod table;
 pub mod vtk;
+pub mod write;

@@ -200,7 +200,7 @@ fn absorb(old: &Path, new: &Path) -> io::Result<()> {
     let listed = listed_files(&old.join(MANIFEST));
     absorb_folder(old, old, new, &listed)?;
     match fs::remove_file(old.join(MANIFEST)) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
         _ => fs::remove_dir(old),
     }
 }
