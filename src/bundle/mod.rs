@@ -1,1 +1,19 @@
-//! The only writer and reader of artefacts.
+//! The only writer and reader of artefacts. It takes plain data and knows nothing of how the
+//! numbers were made.
+
+pub mod artefact;
+#[allow(clippy::disallowed_methods)] // the one place that writes files
+pub mod atomic;
+mod consistent;
+pub mod json;
+pub mod lambda_file;
+pub mod load;
+pub mod manifest;
+mod npy;
+pub mod npz;
+pub mod number;
+pub mod read_table;
+pub mod schema;
+pub mod table;
+pub mod vtk;
+pub mod write;

@@ -1,7 +1,8 @@
-//! Quadrature, vector dispatch, differentiation, grid axes: no physics.
+//! Quadrature, dense algebra, interpolation, vector dispatch, grid axes: no physics.
 
 pub mod axis;
 pub mod chebyshev;
 pub mod dispatch;
 pub mod dual;
 pub mod gauss;
+pub mod lagrange;

@@ -1,0 +1,94 @@
+//! What every artefact says about itself: versions, inputs, files.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Version of the artefacts' layout, `major.minor.patch`. A reader refuses another major; a new
+/// minor only adds keys, arrays or files.
+pub const SCHEMA_VERSION: &str = "1.0.0";
+
+/// Version of the program that wrote an artefact.
+pub const FLUXFORM_VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// The sentence on units that every artefact carries.
+pub const UNITS: &str = "SI throughout; the unit of every number stands in its key, column or array name (m, A, T, N, ohm)";
+
+/// A file that went into an artefact.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Input {
+    /// As given on the command line.
+    pub path: String,
+    /// SHA-256 of its bytes, 64 lower-case hexadecimal digits.
+    pub sha256: String,
+}
+
+impl Input {
+    /// An input of these bytes.
+    #[must_use]
+    pub fn of_bytes(path: impl Into<String>, bytes: &[u8]) -> Self {
+        Self {
+            path: path.into(),
+            sha256: sha256_hex(bytes),
+        }
+    }
+}
+
+/// A file that belongs to an artefact.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct FileEntry {
+    /// Relative to the folder of the file that lists it, `/` between folders.
+    pub path: String,
+    /// Size.
+    pub bytes: u64,
+    /// SHA-256 of its bytes, 64 lower-case hexadecimal digits.
+    pub sha256: String,
+}
+
+/// SHA-256 of `bytes`, 64 lower-case hexadecimal digits.
+#[must_use]
+pub fn sha256_hex(bytes: &[u8]) -> String {
+    use sha2::{Digest, Sha256};
+    super::atomic::hex(&Sha256::digest(bytes))
+}
+
+/// The three numbers of a schema version; `None` when it is not `major.minor.patch`.
+#[must_use]
+pub fn parse_version(version: &str) -> Option<[u32; 3]> {
+    let mut parts = version.split('.').map(|part| part.parse().ok());
+    let numbers = [parts.next()??, parts.next()??, parts.next()??];
+    parts.next().is_none().then_some(numbers)
+}
+
+/// Whether this program reads artefacts of that schema version.
+///
+/// # Errors
+/// The end of a sentence that begins with what holds the version.
+pub fn check_version(version: &str) -> Result<(), String> {
+    let ours = parse_version(SCHEMA_VERSION).unwrap_or_default()[0];
+    match parse_version(version) {
+        None => Err(format!("{version:?} is not of the form major.minor.patch")),
+        Some([major, ..]) if major == ours => Ok(()),
+        Some([major, ..]) if major > ours => Err(format!(
+            "{version} is newer than this program, which reads {ours}.x; update fluxform"
+        )),
+        Some(_) => Err(format!(
+            "{version} is older than this program, which reads {ours}.x; make the artefact anew"
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{check_version, parse_version};
+
+    #[test]
+    fn another_major_is_refused_another_minor_is_read() {
+        assert_eq!(parse_version("1.20.3"), Some([1, 20, 3]));
+        for bad in ["", "1", "1.2", "1.2.3.4", "1.x.0", "-1.0.0"] {
+            assert_eq!(parse_version(bad), None, "{bad}");
+        }
+        assert_eq!(check_version("1.7.3"), Ok(()));
+        assert!(check_version("2.0.0").unwrap_err().contains("newer"));
+        assert!(check_version("0.9.0").unwrap_err().contains("older"));
+    }
+}

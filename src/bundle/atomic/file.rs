@@ -1,0 +1,219 @@
+//! Single files: written beside the target, then renamed.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+use tempfile::NamedTempFile;
+
+use super::leftovers::{clean_leftovers, temporary_file};
+use super::{Overwrite, WriteError, Written};
+
+/// Writes of at least this size pass through unbuffered.
+const BUFFER_BYTES: usize = 1 << 20;
+
+/// Writes one file whole or not at all and returns its size and digest. Missing folders are made.
+/// `content` writes the bytes; an error of its own of kind `InvalidData` is reported as such.
+///
+/// A target that is a device or a pipe is written to directly.
+///
+/// # Errors
+/// [`WriteError`]; the target is then as it was.
+pub fn write(
+    path: &Path,
+    overwrite: &Overwrite,
+    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<Written, WriteError> {
+    if let Ok(metadata) = path.metadata()
+        && !metadata.is_file()
+        && !metadata.is_dir()
+    {
+        return File::options()
+            .write(true)
+            .open(path)
+            .and_then(|mut device| fill(&mut device, content))
+            .map_err(|error| WriteError::from_io("write", path, error));
+    }
+    let name = path.file_name().ok_or_else(|| WriteError::IsFolder {
+        path: path.to_path_buf(),
+    })?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut set = FileSet::begin(folder, overwrite.clone())?;
+    let written = set.write_path(folder.join(name), content)?;
+    set.commit()?;
+    Ok(written)
+}
+
+/// Files that belong together, such as an array file and its sidecar.
+///
+/// All are written first, then renamed in reverse order: the sidecar, staged last because it lists
+/// the digests of the others, is in place first. After a kill between two renames the sidecar
+/// therefore tells that what lies there is ours, and the same command replaces it.
+#[derive(Debug)]
+pub struct FileSet {
+    folder: PathBuf,
+    overwrite: Overwrite,
+    staged: Vec<(NamedTempFile, PathBuf)>,
+}
+
+impl FileSet {
+    /// Makes the folder where needed and removes the leftovers of killed runs in it.
+    ///
+    /// # Errors
+    /// [`WriteError`] when the folder cannot be made.
+    pub fn begin(folder: &Path, overwrite: Overwrite) -> Result<Self, WriteError> {
+        let folder = if folder.as_os_str().is_empty() {
+            Path::new(".")
+        } else {
+            folder
+        };
+        make_folder(folder)?;
+        clean_leftovers(folder);
+        Ok(Self {
+            folder: folder.to_path_buf(),
+            overwrite,
+            staged: Vec::new(),
+        })
+    }
+
+    /// Stages a file of the given plain name.
+    ///
+    /// # Errors
+    /// [`WriteError`]; nothing is left of it.
+    pub fn write(
+        &mut self,
+        name: &str,
+        content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<Written, WriteError> {
+        super::folder::check_name(name)?;
+        self.write_path(self.folder.join(name), content)
+    }
+
+    fn write_path(
+        &mut self,
+        target: PathBuf,
+        content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<Written, WriteError> {
+        if target.is_dir() {
+            return Err(WriteError::IsFolder { path: target });
+        }
+        self.overwrite.check(&target)?;
+        // A link is followed: the file it leads to is replaced, not the link.
+        let target = target.canonicalize().unwrap_or(target);
+        let beside = target.parent().unwrap_or(&self.folder);
+        let fail = |error| WriteError::from_io("write", &target, error);
+        let mut file = temporary_file(beside).map_err(fail)?;
+        let written = fill(file.as_file_mut(), content)
+            .and_then(|written| file.as_file().sync_all().map(|()| written))
+            .map_err(fail)?;
+        self.staged.push((file, target));
+        Ok(written)
+    }
+
+    /// Puts all staged files in place.
+    ///
+    /// # Errors
+    /// [`WriteError`]; files not yet in place are removed.
+    pub fn commit(self) -> Result<(), WriteError> {
+        let mut folders = Vec::new();
+        for (file, target) in self.staged.into_iter().rev() {
+            file.persist(&target)
+                .map_err(|error| WriteError::from_io("write", &target, error.error))?;
+            let folder = target.parent().unwrap_or(&self.folder).to_path_buf();
+            if !folders.contains(&folder) {
+                folders.push(folder);
+            }
+        }
+        for folder in folders {
+            sync_folder(&folder).map_err(|error| WriteError::from_io("write", &folder, error))?;
+        }
+        Ok(())
+    }
+}
+
+/// Runs `content` into `file` through a buffer, hashing on the way.
+pub(super) fn fill(
+    file: &mut File,
+    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<Written> {
+    let mut buffered = BufWriter::with_capacity(
+        BUFFER_BYTES,
+        Hashing {
+            file,
+            sha256: Sha256::new(),
+            bytes: 0,
+        },
+    );
+    let outcome = content(&mut buffered);
+    // On failure the buffer's rest is dropped unwritten.
+    let hashing = match outcome {
+        Ok(()) => buffered
+            .into_inner()
+            .map_err(io::IntoInnerError::into_error)?,
+        Err(error) => {
+            let _ = buffered.into_parts();
+            return Err(error);
+        }
+    };
+    Ok(Written {
+        bytes: hashing.bytes,
+        sha256: hex(&hashing.sha256.finalize()),
+    })
+}
+
+/// Lower-case hexadecimal digits.
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    const DIGITS: &[u8; 16] = b"0123456789abcdef";
+    bytes
+        .iter()
+        .flat_map(|b| [b >> 4, b & 15])
+        .map(|nibble| char::from(DIGITS[usize::from(nibble)]))
+        .collect()
+}
+
+struct Hashing<'a> {
+    file: &'a mut File,
+    sha256: Sha256,
+    bytes: u64,
+}
+
+impl Write for Hashing<'_> {
+    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
+        let count = self.file.write(buffer)?;
+        self.sha256.update(&buffer[..count]);
+        self.bytes += count as u64;
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+/// Makes a folder and its parents; the error names the path that stands in the way.
+pub(super) fn make_folder(folder: &Path) -> Result<(), WriteError> {
+    if folder.is_dir() {
+        return Ok(());
+    }
+    for part in folder.ancestors() {
+        if part.is_file() {
+            return Err(WriteError::NotFolder {
+                path: part.to_path_buf(),
+            });
+        }
+    }
+    std::fs::create_dir_all(folder)
+        .map_err(|error| WriteError::from_io("make the folder", folder, error))
+}
+
+/// Makes renames in `folder` durable, where the system knows how.
+pub(super) fn sync_folder(folder: &Path) -> io::Result<()> {
+    if cfg!(unix) {
+        match File::open(folder)?.sync_all() {
+            Err(error) if error.kind() == io::ErrorKind::InvalidInput => {} // some network disks
+            outcome => return outcome,
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,268 @@
+//! Whole folders: a bundle is whole or absent.
+//!
+//! 1. All files are written and fsynced in a temporary folder beside the target.
+//! 2. Under a lock on the parent folder: an existing target is renamed to `.<name>.fluxform-old`,
+//!    the temporary folder is renamed to the target, the parent is fsynced.
+//! 3. What the user had added to the old folder (files its manifest does not list) is moved into
+//!    the new one; the rest of the old folder is removed.
+//!
+//! POSIX has no portable exchange of two folders, so between the two renames of step 2 the name is
+//! absent for some microseconds. A run killed there leaves the whole old folder under its other
+//! name; the next [`FolderDraft::begin`] puts it back. A run killed in step 3 leaves the new
+//! bundle whole; the next one finishes the step.
+
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Component, Path, PathBuf};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use super::file::{fill, make_folder, sync_folder};
+use super::leftovers::{clean_leftovers, temporary_folder};
+use super::{Overwrite, WriteError};
+use crate::bundle::artefact::FileEntry;
+
+/// The file whose presence makes a folder a bundle.
+const MANIFEST: &str = "manifest.json";
+
+/// A folder in the making; dropped without [`FolderDraft::commit`] it leaves nothing.
+#[derive(Debug)]
+pub struct FolderDraft {
+    target: PathBuf,
+    overwrite: Overwrite,
+    draft: TempDir,
+    lock: Option<File>,
+}
+
+impl FolderDraft {
+    /// Begins a folder that will stand at `target`. Finishes what a killed run left half done.
+    ///
+    /// # Errors
+    /// [`WriteError`] when the target is not ours to replace or the place cannot be written to.
+    pub fn begin(target: &Path, overwrite: Overwrite) -> Result<Self, WriteError> {
+        // A link is followed: the folder it leads to is replaced, not the link.
+        let target = if target.is_symlink() {
+            target.canonicalize().unwrap_or(target.to_path_buf())
+        } else {
+            target.to_path_buf()
+        };
+        let parent = parent_of(&target);
+        make_folder(parent)?;
+        clean_leftovers(parent);
+        {
+            let _lock = lock_parent(parent);
+            recover(&target).map_err(|error| WriteError::from_io("recover", &target, error))?;
+        }
+        check_target(&target, &overwrite)?;
+        let (draft, lock) = temporary_folder(parent)
+            .map_err(|error| WriteError::from_io("write", &target, error))?;
+        Ok(Self {
+            target,
+            overwrite,
+            draft,
+            lock,
+        })
+    }
+
+    /// Writes one file; `name` is relative, with `/` between folders.
+    ///
+    /// # Errors
+    /// [`WriteError`].
+    pub fn write(
+        &mut self,
+        name: &str,
+        content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<FileEntry, WriteError> {
+        check_name(name)?;
+        let path = self.draft.path().join(name);
+        let shown = self.target.join(name);
+        let write = || -> io::Result<_> {
+            fs::create_dir_all(parent_of(&path))?;
+            let mut file = File::create_new(&path)?;
+            let written = fill(&mut file, content)?;
+            file.sync_all()?;
+            Ok(written)
+        };
+        let written = write().map_err(|error| WriteError::from_io("write", &shown, error))?;
+        Ok(FileEntry {
+            path: name.to_owned(),
+            bytes: written.bytes,
+            sha256: written.sha256,
+        })
+    }
+
+    /// Puts the folder in place.
+    ///
+    /// # Errors
+    /// [`WriteError`]; the target is then as it was.
+    pub fn commit(self) -> Result<(), WriteError> {
+        let target = &self.target;
+        let parent = parent_of(target);
+        let fail = |error| WriteError::from_io("write", target, error);
+        sync_tree(self.draft.path()).map_err(fail)?;
+        let _lock = lock_parent(parent);
+        recover(target).map_err(fail)?;
+        // Another run may have been faster.
+        check_target(target, &self.overwrite)?;
+        let old = old_name(target);
+        let replaced = target.exists();
+        if replaced {
+            fs::rename(target, &old).map_err(fail)?;
+        }
+        // From here on the temporary name is no more; dropping the guard must not remove anything.
+        let draft = self.draft.keep();
+        if let Err(error) = fs::rename(&draft, target) {
+            if replaced {
+                let _ = fs::rename(&old, target);
+            }
+            let _ = fs::remove_dir_all(&draft);
+            return Err(fail(error));
+        }
+        drop(self.lock);
+        sync_folder(parent).map_err(fail)?;
+        if replaced {
+            absorb(&old, target).map_err(fail)?;
+        }
+        Ok(())
+    }
+}
+
+/// A name inside a bundle: relative, `/`-separated plain names, none of them `.` or `..`.
+pub(crate) fn check_name(name: &str) -> Result<(), WriteError> {
+    let plain = Path::new(name)
+        .components()
+        .all(|part| matches!(part, Component::Normal(_)));
+    let odd = |c: char| c == '\\' || c == ':' || c.is_control();
+    // `components` folds "a//b", "a/./b" and "a/": their number tells.
+    let parts = Path::new(name).components().count();
+    if name.is_empty() || !plain || name.contains(odd) || parts != name.split('/').count() {
+        return Err(WriteError::BadName {
+            name: name.to_owned(),
+        });
+    }
+    Ok(())
+}
+
+fn parent_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
+fn old_name(target: &Path) -> PathBuf {
+    let name = target.file_name().unwrap_or_default().to_string_lossy();
+    target.with_file_name(format!(".{name}.fluxform-old"))
+}
+
+/// Serialises the renames of runs that write into the same parent. Where folders cannot be locked
+/// the renames go ahead without.
+fn lock_parent(parent: &Path) -> Option<File> {
+    let handle = File::open(parent).ok()?;
+    handle.lock().ok()?;
+    Some(handle)
+}
+
+fn check_target(target: &Path, overwrite: &Overwrite) -> Result<(), WriteError> {
+    let Some(_) = target.file_name() else {
+        return Err(WriteError::BadName {
+            name: target.display().to_string(),
+        });
+    };
+    match fs::read_dir(target) {
+        Ok(mut entries) => match entries.next() {
+            None => Ok(()),
+            Some(_) => overwrite.check(target),
+        },
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(WriteError::from_io("write", target, error)),
+    }
+}
+
+/// Finishes or undoes a swap that was cut short.
+fn recover(target: &Path) -> io::Result<()> {
+    let old = old_name(target);
+    if !old.is_dir() {
+        return Ok(());
+    }
+    if target.exists() {
+        absorb(&old, target)
+    } else {
+        fs::rename(&old, target)
+    }
+}
+
+/// Moves what is not ours from the old folder into the new one and removes the rest. May be cut
+/// short anywhere and begun again: the old manifest, which tells what is ours, goes last.
+fn absorb(old: &Path, new: &Path) -> io::Result<()> {
+    let listed = listed_files(&old.join(MANIFEST));
+    absorb_folder(old, old, new, &listed)?;
+    match fs::remove_file(old.join(MANIFEST)) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => fs::remove_dir(old),
+    }
+}
+
+fn absorb_folder(
+    root: &Path,
+    folder: &Path,
+    new: &Path,
+    listed: &BTreeSet<PathBuf>,
+) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        let relative = path.strip_prefix(root).unwrap_or(&path);
+        if relative == Path::new(MANIFEST) {
+            continue;
+        }
+        let destination = new.join(relative);
+        let link_or_file = !path.symlink_metadata()?.is_dir();
+        if link_or_file {
+            let timing = relative
+                .to_str()
+                .is_some_and(|name| name.starts_with("timing"));
+            if timing || listed.contains(relative) || destination.exists() {
+                fs::remove_file(&path)?;
+            } else {
+                fs::rename(&path, &destination)?;
+            }
+        } else if destination.is_dir() || listed.iter().any(|file| file.starts_with(relative)) {
+            fs::create_dir_all(&destination)?;
+            absorb_folder(root, &path, new, listed)?;
+            fs::remove_dir(&path)?;
+            let _ = fs::remove_dir(&destination); // goes only when nothing was kept in it
+        } else if destination.exists() {
+            fs::remove_dir_all(&path)?; // a folder where the new bundle has a file
+        } else {
+            fs::rename(&path, &destination)?;
+        }
+    }
+    Ok(())
+}
+
+fn listed_files(manifest: &Path) -> BTreeSet<PathBuf> {
+    let value: Value = fs::read(manifest)
+        .ok()
+        .and_then(|text| serde_json::from_slice(&text).ok())
+        .unwrap_or_default();
+    let files = value.get("files").and_then(Value::as_array);
+    files
+        .into_iter()
+        .flatten()
+        .filter_map(|file| file.get("path")?.as_str())
+        .map(PathBuf::from)
+        .collect()
+}
+
+/// Makes the names in a folder and its subfolders durable (their files are already).
+fn sync_tree(folder: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        if entry.file_type()?.is_dir() {
+            sync_tree(&entry.path())?;
+        }
+    }
+    sync_folder(folder)
+}

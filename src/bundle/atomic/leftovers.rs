@@ -1,0 +1,89 @@
+//! Temporary names, their locks, and what killed runs left behind.
+
+use std::fs::{File, TryLockError};
+use std::io;
+use std::path::Path;
+
+use tempfile::{Builder, NamedTempFile, TempDir};
+
+const PREFIX: &str = ".fluxform-";
+const SUFFIX: &str = ".tmp";
+
+/// A new locked file under a temporary name; removed when dropped.
+pub(super) fn temporary_file(folder: &Path) -> io::Result<NamedTempFile> {
+    loop {
+        let file = builder(0o666).tempfile_in(folder)?;
+        if claim(file.as_file(), file.path()) {
+            return Ok(file);
+        }
+    }
+}
+
+/// A new locked folder under a temporary name; removed when dropped. The file is the lock's handle.
+pub(super) fn temporary_folder(folder: &Path) -> io::Result<(TempDir, Option<File>)> {
+    loop {
+        let draft = builder(0o777).tempdir_in(folder)?;
+        // Folders cannot be opened, hence not locked, on every system.
+        let Ok(handle) = File::open(draft.path()) else {
+            return Ok((draft, None));
+        };
+        if claim(&handle, draft.path()) {
+            return Ok((draft, Some(handle)));
+        }
+    }
+}
+
+/// Removes temporary files and folders in `folder` that no living run holds. Best effort: where
+/// locks do not work, nothing is removed.
+pub fn clean_leftovers(folder: &Path) {
+    let Ok(entries) = folder.read_dir() else {
+        return;
+    };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let Some(name) = name.to_str() else { continue };
+        if !(name.starts_with(PREFIX) && name.ends_with(SUFFIX)) {
+            continue;
+        }
+        let path = entry.path();
+        let Ok(kind) = entry.file_type() else {
+            continue;
+        };
+        if kind.is_symlink() {
+            continue;
+        }
+        let Ok(handle) = File::open(&path) else {
+            continue;
+        };
+        if handle.try_lock().is_ok() {
+            let _ = if kind.is_dir() {
+                std::fs::remove_dir_all(&path)
+            } else {
+                std::fs::remove_file(&path)
+            };
+        }
+    }
+}
+
+/// Locks what was just made. False when a cleaner came between: then it is gone or going.
+fn claim(handle: &File, path: &Path) -> bool {
+    match handle.try_lock() {
+        Ok(()) => path.exists(),
+        Err(TryLockError::WouldBlock) => false,
+        Err(TryLockError::Error(_)) => true, // no locks here: then nobody cleans either
+    }
+}
+
+/// Names, and whom the files let in: the umask decides, as for any new file.
+fn builder(mode: u32) -> Builder<'static, 'static> {
+    let mut builder = Builder::new();
+    builder.prefix(PREFIX).suffix(SUFFIX);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(mode));
+    }
+    #[cfg(not(unix))]
+    let _ = mode;
+    builder
+}

@@ -1,0 +1,118 @@
+//! The one place that writes files.
+//!
+//! A file is written beside its target under a temporary name, fsynced, renamed into place, and
+//! its folder fsynced: it is whole or absent whenever the program ends. [`FileSet`] does that for
+//! a file and its sidecar, [`FolderDraft`] for a whole folder (see there for the scheme).
+//! Temporary names are `.fluxform-*.tmp`; their writer holds a lock on them, so that the next run
+//! can tell a killed run's leftovers ([`clean_leftovers`]) from another run's work.
+//!
+//! The digest of a file is computed while it is written: no second pass.
+
+mod file;
+mod folder;
+mod leftovers;
+mod overwrite;
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+pub(crate) use file::hex;
+pub use file::{FileSet, write};
+pub use folder::FolderDraft;
+pub(crate) use folder::check_name;
+pub use leftovers::clean_leftovers;
+pub use overwrite::{Overwrite, Record};
+
+/// What was written: size and digest of the bytes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Written {
+    /// Number of bytes.
+    pub bytes: u64,
+    /// SHA-256 of the bytes, 64 lower-case hexadecimal digits.
+    pub sha256: String,
+}
+
+/// Why an output was not written. Nothing is left half written.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// The target exists and is not known to come from the same inputs.
+    #[error("{path} exists {reason}; use --force to replace it, or choose another --out")]
+    OutputExists {
+        /// The target.
+        path: PathBuf,
+        /// Why it is not ours to replace.
+        reason: String,
+    },
+    /// A file was to be written where a folder is.
+    #[error("{path} is a folder, expected a file name")]
+    IsFolder {
+        /// The target.
+        path: PathBuf,
+    },
+    /// A folder was to be made where (or below where) a file is.
+    #[error("{path} is not a folder; choose another --out")]
+    NotFolder {
+        /// The path that is a file.
+        path: PathBuf,
+    },
+    /// The folder may not be written to.
+    #[error("cannot write {path}: the folder is read-only or belongs to someone else")]
+    ReadOnly {
+        /// The target.
+        path: PathBuf,
+    },
+    /// No space left on the device, or the quota is used up.
+    #[error("cannot write {path}: the disk is full; free some space or choose another --out")]
+    DiskFull {
+        /// The target.
+        path: PathBuf,
+    },
+    /// The content itself could not be made.
+    #[error("cannot write {path}: {message}")]
+    Content {
+        /// The target.
+        path: PathBuf,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// A name that may not stand inside a bundle.
+    #[error("{name:?} is not a plain file name inside the output folder")]
+    BadName {
+        /// The name.
+        name: String,
+    },
+    /// Anything else the operating system said.
+    #[error("cannot {action} {path}: {source}")]
+    Io {
+        /// What was being done.
+        action: &'static str,
+        /// The target.
+        path: PathBuf,
+        /// The system's error.
+        source: io::Error,
+    },
+}
+
+impl WriteError {
+    /// Sorts an I/O error by what the user can do about it.
+    pub(crate) fn from_io(action: &'static str, path: &Path, source: io::Error) -> Self {
+        let path = path.to_path_buf();
+        match source.kind() {
+            io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+                Self::ReadOnly { path }
+            }
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Self::DiskFull { path },
+            io::ErrorKind::NotADirectory => Self::NotFolder { path },
+            io::ErrorKind::IsADirectory => Self::IsFolder { path },
+            io::ErrorKind::InvalidData => Self::Content {
+                path,
+                message: source.to_string(),
+            },
+            _ => Self::Io {
+                action,
+                path,
+                source,
+            },
+        }
+    }
+}

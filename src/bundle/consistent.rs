@@ -1,0 +1,161 @@
+//! A bundle says some things twice: for people, for C programs, for spreadsheets. They must agree.
+
+use super::lambda_file::LambdaFile;
+use super::manifest::{AxisSummary, INTERPOLATION, Manifest};
+use super::npz::MapArrays;
+use super::table::{CurrentRow, PointRow};
+
+/// Points may lie this far from their grid nodes, relative to the larger side of the grid.
+const ON_GRID: f64 = 1e-9;
+
+/// Checks a bundle's parts against each other.
+///
+/// # Errors
+/// The first contradiction, as a sentence.
+pub(super) fn check(
+    manifest: &Manifest,
+    map: &MapArrays,
+    points: &[PointRow],
+    currents: &[CurrentRow],
+    lambda: &LambdaFile,
+) -> Result<(), String> {
+    check_coils(manifest, map)?;
+    check_map(manifest, map)?;
+    check_points(manifest, points)?;
+    let coils = manifest.array.positions_m.len();
+    same(
+        "currents.csv has as many rows as there are coils",
+        currents.len(),
+        coils,
+    )?;
+    for (row, position) in currents.iter().zip(&manifest.array.positions_m) {
+        same(
+            "currents.csv and the array agree on the coils' positions",
+            [row.x_m, row.y_m],
+            *position,
+        )?;
+    }
+    same(
+        "lambda.json and the manifest agree on lambda",
+        lambda.lambda_n_per_m,
+        manifest.lambda.lambda_n_per_m,
+    )?;
+    if let Some(want) = &lambda.currents_a {
+        let found: Vec<f64> = currents.iter().map(|row| row.current_a).collect();
+        same("currents.csv and lambda.json agree", &found, want)?;
+    }
+    Ok(())
+}
+
+fn check_coils(manifest: &Manifest, map: &MapArrays) -> Result<(), String> {
+    let coils = manifest.array.positions_m.len();
+    let limits = &manifest.limits;
+    let runtime = &map.runtime;
+    same("there is one gain a coil", manifest.array.gain.len(), coils)?;
+    same(
+        "there is one upper limit a coil",
+        limits.current_max_a.len(),
+        coils,
+    )?;
+    same(
+        "map.npz and the manifest agree on current_max_a",
+        &runtime.current_max_a,
+        &limits.current_max_a,
+    )?;
+    same(
+        "map.npz and the manifest agree on current_min_a",
+        &runtime.current_min_a,
+        &limits.current_min_a,
+    )?;
+    same(
+        "map.npz and the manifest agree on total_current_max_a",
+        runtime.total_current_max_a,
+        limits.total_current_max_a,
+    )?;
+    same(
+        "map.npz and the manifest agree on resistance_ohm",
+        &runtime.resistance_ohm,
+        &manifest.resistance_ohm,
+    )?;
+    same(
+        "map.npz and the manifest agree on moment_a_m2",
+        runtime.moment_a_m2,
+        manifest.magnet.moment_a_m2,
+    )?;
+    same(
+        "map.npz and the manifest agree on lambda",
+        runtime.lambda_n_per_m,
+        manifest.lambda.lambda_n_per_m,
+    )?;
+    let tilted = runtime.moment_a_m2[..2].iter().any(|&part| part != 0.0);
+    if tilted && map.gradient_t_per_m_per_a.is_none() {
+        return Err("a tilted magnet needs gradient_t_per_m_per_a in map.npz".to_owned());
+    }
+    Ok(())
+}
+
+fn check_map(manifest: &Manifest, map: &MapArrays) -> Result<(), String> {
+    let told = &manifest.map;
+    same(
+        "map.npz and the manifest agree on x_m",
+        AxisSummary::of_nodes(&map.x_m),
+        told.x_m,
+    )?;
+    same(
+        "map.npz and the manifest agree on y_m",
+        AxisSummary::of_nodes(&map.y_m),
+        told.y_m,
+    )?;
+    same(
+        "map.npz and the manifest agree on z_m",
+        AxisSummary::of_nodes(&map.z_m),
+        told.z_m,
+    )?;
+    same(
+        "map.npz and the manifest agree on coil",
+        &*map.coil,
+        told.coil.as_slice(),
+    )?;
+    same(
+        "the interpolation is known",
+        told.interpolation.name.as_str(),
+        INTERPOLATION,
+    )
+}
+
+fn check_points(manifest: &Manifest, points: &[PointRow]) -> Result<(), String> {
+    let grid = &manifest.points;
+    let flags = grid
+        .flags()
+        .ok_or("points.present does not fit points.x_m, y_m and count")?;
+    same(
+        "points.csv has as many rows as points.count",
+        points.len(),
+        grid.count,
+    )?;
+    let (x, y) = (grid.x_m.axis(), grid.y_m.axis());
+    let near = ON_GRID * (x.to - x.from).abs().max((y.to - y.from).abs());
+    let present = flags.iter().enumerate().filter(|(_, flag)| **flag);
+    for (row, (point, (node, _))) in points.iter().zip(present).enumerate() {
+        let want = [x.node(node % x.samples), y.node(node / x.samples)];
+        if (point.x_m - want[0]).abs() > near || (point.y_m - want[1]).abs() > near {
+            let found = [point.x_m, point.y_m];
+            return Err(format!(
+                "row {row} of points.csv is at {found:?}, its grid node at {want:?}"
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn same<T: PartialEq + std::fmt::Debug>(rule: &str, found: T, want: T) -> Result<(), String> {
+    if found == want {
+        return Ok(());
+    }
+    let short = |value: &T| format!("{value:?}").chars().take(120).collect::<String>();
+    Err(format!(
+        "expected that {rule}; found {} and {}",
+        short(&found),
+        short(&want)
+    ))
+}

@@ -1,0 +1,84 @@
+//! `lambda.json`, and what `fluxform lambda` prints.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::artefact::Input;
+use crate::accuracy::StageAccuracy;
+
+/// The path of e*(lambda) and the constants read off it. `null` where a limit never binds or
+/// nothing can be rendered.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LambdaFile {
+    /// Layout, `major.minor.patch`.
+    pub schema_version: String,
+    /// Program that wrote it.
+    pub fluxform_version: String,
+    /// Name of the design.
+    pub design: String,
+    /// Name of the shape.
+    pub shape: String,
+    /// What went in, paths as given on the command line.
+    pub inputs: Vec<Input>,
+    /// Where the first limit binds, N/m.
+    pub lambda_linear_n_per_m: Option<f64>,
+    /// The largest lambda at which saturation adds less than a just-noticeable difference, N/m.
+    pub lambda_jnd_n_per_m: Option<f64>,
+    /// The last breakpoint, N/m.
+    pub lambda_saturation_n_per_m: Option<f64>,
+    /// Below it the weakest point is not felt, N/m; null for a surface that touches z = 0.
+    pub lambda_floor_n_per_m: Option<f64>,
+    /// The one chosen, N/m.
+    pub lambda_n_per_m: Option<f64>,
+    /// How it was chosen: `jnd`, `linear` or `saturation`.
+    pub criterion: String,
+    /// The relative error that `jnd` allows to be added.
+    pub jnd: f64,
+    /// Static currents at the chosen lambda, A, one a coil of the array.
+    pub currents_a: Option<Vec<f64>>,
+    /// Root mean square of the force error at the chosen lambda, N.
+    pub rms_error_n: Option<f64>,
+    /// Largest force error at the chosen lambda, N.
+    pub worst_error_n: Option<f64>,
+    /// RMS error over lambda times the RMS height.
+    pub relative_rms_error: Option<f64>,
+    /// Bound on the error of the mean squared force error, N^2.
+    pub duality_gap_n2: Option<f64>,
+    /// Rank of the force matrix.
+    pub rank: usize,
+    /// Number of constraint points.
+    pub points: usize,
+    /// Breakpoints, lambda ascending; between them the currents are linear in lambda.
+    pub path: Vec<PathStep>,
+    /// Currents and errors at the lambda asked for with `--at`; absent when none was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at: Option<AtLambda>,
+    /// Each stage's estimated error.
+    pub accuracy: BTreeMap<String, StageAccuracy>,
+}
+
+/// A breakpoint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PathStep {
+    /// N/m.
+    pub lambda_n_per_m: f64,
+    /// A, one a coil of the array.
+    pub currents_a: Vec<f64>,
+    /// What happens here, such as "coil 4 meets its upper limit".
+    pub event: String,
+}
+
+/// Currents and errors at a given lambda.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct AtLambda {
+    /// N/m.
+    pub lambda_n_per_m: f64,
+    /// A, one a coil of the array.
+    pub currents_a: Vec<f64>,
+    /// N.
+    pub rms_error_n: f64,
+    /// N.
+    pub worst_error_n: f64,
+}

@@ -1,0 +1,322 @@
+//! Reading a bundle back: the library's own loader.
+//!
+//! A bundle is untrusted. The manifest is read first; every file it lists must be a plain file
+//! inside the folder with the listed size and digest, and is read once: what is parsed is what was
+//! hashed. Memory is bounded by the size of the files.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::artefact::{check_version, sha256_hex};
+use super::atomic::check_name;
+use super::consistent;
+use super::lambda_file::LambdaFile;
+use super::manifest::Manifest;
+use super::npz::{MapArrays, from_npz};
+use super::read_table::{read_currents, read_points};
+use super::table::{CurrentRow, PointRow};
+use crate::numerics::lagrange::{Cell, locate};
+
+/// Manifests larger than this are refused unread.
+const MANIFEST_MAX_BYTES: u64 = 64 << 20;
+
+/// Why a bundle cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum BundleError {
+    /// There is no manifest: not a bundle.
+    #[error("{path} is not a bundle: it has no manifest.json")]
+    NoBundle {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A file cannot be read.
+    #[error("cannot read {path}: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's error.
+        source: io::Error,
+    },
+    /// Written by a program with another layout.
+    #[error("{path}: schema_version {message}")]
+    Schema {
+        /// The manifest.
+        path: PathBuf,
+        /// What was found and expected.
+        message: String,
+    },
+    /// The manifest lists a file that it must not.
+    #[error("{path} lists {name:?}, which {message}")]
+    Listed {
+        /// The manifest.
+        path: PathBuf,
+        /// The listed name.
+        name: String,
+        /// Why it is refused.
+        message: String,
+    },
+    /// A file is not the one that was written.
+    #[error("{path} was changed or damaged: {message}; make the bundle anew")]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// How it differs.
+        message: String,
+    },
+    /// A file's content is not as it must be.
+    #[error("{path}: {message}")]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What was expected and found.
+        message: String,
+    },
+}
+
+/// A bundle in memory.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bundle {
+    /// Where it was read from.
+    pub folder: PathBuf,
+    /// `manifest.json`.
+    pub manifest: Manifest,
+    /// `map.npz`.
+    pub map: MapArrays<'static>,
+    /// `points.csv`.
+    pub points: Vec<PointRow>,
+    /// `currents.csv`.
+    pub currents: Vec<CurrentRow>,
+    /// `lambda.json`.
+    pub lambda: LambdaFile,
+}
+
+impl Bundle {
+    /// Reads and checks the bundle in a folder (or the one whose `manifest.json` is given).
+    ///
+    /// # Errors
+    /// [`BundleError`] for the first thing that is not as it must be.
+    pub fn open(path: &Path) -> Result<Self, BundleError> {
+        let folder = match path.file_name() {
+            Some(name) if name == "manifest.json" => path.parent().unwrap_or(Path::new("")),
+            _ => path,
+        };
+        let manifest_path = folder.join("manifest.json");
+        let manifest = read_manifest(folder, &manifest_path)?;
+        let mut files = Vec::new();
+        for entry in &manifest.files {
+            let listed = |message: &str| BundleError::Listed {
+                path: manifest_path.clone(),
+                name: entry.path.clone(),
+                message: message.to_owned(),
+            };
+            if check_name(&entry.path).is_err() || entry.path == "manifest.json" {
+                return Err(listed("is not the name of a file inside the bundle"));
+            }
+            if files.iter().any(|(name, _)| *name == entry.path) {
+                return Err(listed("stands there twice"));
+            }
+            let bytes = read_listed(folder, &entry.path, entry.bytes, &entry.sha256, &listed)?;
+            let kept = REQUIRED.contains(&entry.path.as_str());
+            files.push((entry.path.clone(), if kept { bytes } else { Vec::new() }));
+        }
+        let part = |name: &str| {
+            let found = files.iter().find(|(listed, _)| listed == name);
+            found
+                .map(|(_, bytes)| bytes.as_slice())
+                .ok_or_else(|| BundleError::Content {
+                    path: manifest_path.clone(),
+                    message: format!("files does not list {name}, which every bundle has"),
+                })
+        };
+        let content = |name: &str, message: String| BundleError::Content {
+            path: folder.join(name),
+            message,
+        };
+        let [map, points, currents, lambda] = REQUIRED;
+        let bundle = Self {
+            folder: folder.to_path_buf(),
+            map: from_npz(part(map)?).map_err(|error| content(map, error.to_string()))?,
+            points: read_points(points, part(points)?)
+                .map_err(|error| content(points, error.to_string()))?,
+            currents: read_currents(currents, part(currents)?)
+                .map_err(|error| content(currents, error.to_string()))?,
+            lambda: serde_json::from_slice(part(lambda)?)
+                .map_err(|error| content(lambda, error.to_string()))?,
+            manifest,
+        };
+        consistent::check(
+            &bundle.manifest,
+            &bundle.map,
+            &bundle.points,
+            &bundle.currents,
+            &bundle.lambda,
+        )
+        .map_err(|message| content("manifest.json", message))?;
+        Ok(bundle)
+    }
+
+    /// Number of coils of the array, those left out of the map included.
+    #[must_use]
+    pub fn coil_count(&self) -> usize {
+        self.map.runtime.current_max_a.len()
+    }
+
+    /// dB_z/dz per ampere of every coil of the array at (x, y, z) m, T/m/A, interpolated; zero for
+    /// coils left out of the map. Outside the map: all zero, and false.
+    ///
+    /// # Panics
+    /// When `gz_t_per_m_per_a` is shorter than the array.
+    pub fn gz_per_ampere(&self, position_m: [f64; 3], gz_t_per_m_per_a: &mut [f64]) -> bool {
+        let nodes = self.nodes();
+        let gz = &self.map.gz_t_per_m_per_a;
+        self.each_coil(position_m, gz_t_per_m_per_a, |cell, place| {
+            cell.value(&gz[place * nodes..(place + 1) * nodes])
+        })
+    }
+
+    /// Upward force per ampere of every coil of the array on the magnet's centre at (x, y, z) m,
+    /// N/A: sum over i of m_i dB_i/dz, interpolated. Outside the map: all zero, and false.
+    ///
+    /// # Panics
+    /// When `force_n_per_a` is shorter than the array.
+    pub fn force_per_ampere(&self, position_m: [f64; 3], force_n_per_a: &mut [f64]) -> bool {
+        let [m_x, m_y, m_z] = self.map.runtime.moment_a_m2;
+        let nodes = self.nodes();
+        match &self.map.gradient_t_per_m_per_a {
+            Some(gradient) if m_x != 0.0 || m_y != 0.0 => {
+                self.each_coil(position_m, force_n_per_a, |cell, place| {
+                    let block = &gradient[9 * place * nodes..9 * (place + 1) * nodes];
+                    m_x * cell.component(block, 9, 2)
+                        + m_y * cell.component(block, 9, 5)
+                        + m_z * cell.component(block, 9, 8)
+                })
+            }
+            _ => {
+                let inside = self.gz_per_ampere(position_m, force_n_per_a);
+                force_n_per_a.iter_mut().for_each(|force| *force *= m_z);
+                inside
+            }
+        }
+    }
+
+    fn nodes(&self) -> usize {
+        self.map.x_m.len() * self.map.y_m.len() * self.map.z_m.len()
+    }
+
+    fn each_coil(
+        &self,
+        position_m: [f64; 3],
+        values: &mut [f64],
+        value: impl Fn(&Cell, usize) -> f64,
+    ) -> bool {
+        let values = &mut values[..self.coil_count()];
+        values.fill(0.0);
+        let Some(cell) = locate([&self.map.x_m, &self.map.y_m, &self.map.z_m], position_m) else {
+            return false;
+        };
+        for (place, &coil) in self.map.coil.iter().enumerate() {
+            values[coil as usize] = value(&cell, place);
+        }
+        true
+    }
+}
+
+/// What every bundle has.
+const REQUIRED: [&str; 4] = ["map.npz", "points.csv", "currents.csv", "lambda.json"];
+
+fn read_manifest(folder: &Path, path: &Path) -> Result<Manifest, BundleError> {
+    /// Of a newer manifest only this is understood.
+    #[derive(Deserialize)]
+    struct Version {
+        schema_version: String,
+    }
+    let text = match read_bounded(path, MANIFEST_MAX_BYTES) {
+        Err(error)
+            if matches!(
+                error.kind(),
+                io::ErrorKind::NotFound | io::ErrorKind::NotADirectory
+            ) =>
+        {
+            return Err(BundleError::NoBundle {
+                path: folder.to_path_buf(),
+            });
+        }
+        Err(source) => {
+            return Err(BundleError::Read {
+                path: path.to_path_buf(),
+                source,
+            });
+        }
+        Ok(text) => text,
+    };
+    let content = |error: serde_json::Error| BundleError::Content {
+        path: path.to_path_buf(),
+        message: error.to_string(),
+    };
+    let version: Version = serde_json::from_slice(&text).map_err(content)?;
+    check_version(&version.schema_version).map_err(|message| BundleError::Schema {
+        path: path.to_path_buf(),
+        message,
+    })?;
+    serde_json::from_slice(&text).map_err(content)
+}
+
+/// The bytes of a listed file, after checking place, size and digest.
+fn read_listed(
+    folder: &Path,
+    name: &str,
+    bytes: u64,
+    sha256: &str,
+    listed: &dyn Fn(&str) -> BundleError,
+) -> Result<Vec<u8>, BundleError> {
+    let path = folder.join(name);
+    let read = |source| BundleError::Read {
+        path: path.clone(),
+        source,
+    };
+    let damaged = |message| BundleError::Damaged {
+        path: path.clone(),
+        message,
+    };
+    let root = folder.canonicalize().map_err(read)?;
+    let real = match path.canonicalize() {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            return Err(damaged("it is missing".to_owned()));
+        }
+        other => other.map_err(read)?,
+    };
+    if !real.starts_with(&root) {
+        return Err(listed("leads out of the bundle"));
+    }
+    let metadata = real.metadata().map_err(read)?;
+    if !metadata.is_file() {
+        return Err(listed("is not a plain file"));
+    }
+    if metadata.len() != bytes {
+        let found = metadata.len();
+        return Err(damaged(format!("{found} bytes, the manifest says {bytes}")));
+    }
+    let content = read_bounded(&real, bytes).map_err(read)?;
+    let found = sha256_hex(&content);
+    if found != sha256 {
+        return Err(damaged(format!(
+            "its SHA-256 is {found}, the manifest says {sha256}"
+        )));
+    }
+    Ok(content)
+}
+
+fn read_bounded(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
+    // Asked before opening: opening a pipe would wait for its other end.
+    let metadata = path.metadata()?;
+    if !metadata.is_file() || metadata.len() > max_bytes {
+        let message = format!("expected a plain file of at most {max_bytes} bytes");
+        return Err(io::Error::new(io::ErrorKind::InvalidData, message));
+    }
+    let mut content = Vec::with_capacity(metadata.len() as usize);
+    File::open(path)?.take(max_bytes).read_to_end(&mut content)?;
+    Ok(content)
+}

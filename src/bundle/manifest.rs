@@ -1,0 +1,316 @@
+//! `manifest.json` of a bundle and `map.json` beside a map.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::artefact::{FileEntry, Input};
+use crate::accuracy::StageAccuracy;
+use crate::numerics::axis::Axis;
+
+/// The interpolation between nodes that every loader implements.
+pub const INTERPOLATION: &str = "tricubic-lagrange";
+
+/// What a runtime reads first.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Manifest {
+    /// Layout, `major.minor.patch`.
+    pub schema_version: String,
+    /// Program that wrote the bundle.
+    pub fluxform_version: String,
+    /// Name of the design.
+    pub design: String,
+    /// Name of the shape.
+    pub shape: String,
+    /// What went in, paths as given on the command line.
+    pub inputs: Vec<Input>,
+    /// A sentence on units.
+    pub units: String,
+    /// Where the coils stand.
+    pub array: ArrayGeometry,
+    /// Limits of the currents.
+    pub limits: CurrentLimits,
+    /// Resistance of every coil, ohm: the weights of least power.
+    pub resistance_ohm: Vec<f64>,
+    /// The magnet.
+    pub magnet: MagnetSummary,
+    /// The force constant.
+    pub lambda: LambdaSummary,
+    /// The grid the constraint points lie on.
+    pub points: PointsGrid,
+    /// The map's grid, coils and interpolation.
+    pub map: MapSummary,
+    /// What was left out because the object does not need it.
+    pub left_out: Vec<LeftOut>,
+    /// Each stage's estimated error.
+    pub accuracy: BTreeMap<String, StageAccuracy>,
+    /// Every other file of the bundle but `timing*`.
+    pub files: Vec<FileEntry>,
+}
+
+/// What lies in the `map.npz` beside it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MapSidecar {
+    /// Layout, `major.minor.patch`.
+    pub schema_version: String,
+    /// Program that wrote the map.
+    pub fluxform_version: String,
+    /// Name of the design.
+    pub design: String,
+    /// What went in, paths as given on the command line.
+    pub inputs: Vec<Input>,
+    /// A sentence on units.
+    pub units: String,
+    /// Where the coils stand.
+    pub array: ArrayGeometry,
+    /// The magnet.
+    pub magnet: MagnetSummary,
+    /// The map's grid, coils and interpolation.
+    pub map: MapSummary,
+    /// Each stage's estimated error.
+    pub accuracy: BTreeMap<String, StageAccuracy>,
+    /// The map's files.
+    pub files: Vec<FileEntry>,
+}
+
+/// Where the coils stand; index = row * columns + column for a rectangular array.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ArrayGeometry {
+    /// The axes' x and y, m, in coil order.
+    pub positions_m: Vec<[f64; 2]>,
+    /// `full` or `none`.
+    pub coupling: String,
+    /// Measured scale of each coil's map; already in the maps.
+    pub gain: Vec<f64>,
+}
+
+/// Limits of the currents, one entry a coil.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CurrentLimits {
+    /// A.
+    pub current_min_a: Vec<f64>,
+    /// A.
+    pub current_max_a: Vec<f64>,
+    /// A; null without such a limit.
+    pub total_current_max_a: Option<f64>,
+}
+
+/// The magnet.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MagnetSummary {
+    /// Its moment, A m^2.
+    pub moment_a_m2: [f64; 3],
+    /// `dipole` or `cylinder`.
+    pub model: String,
+    /// `repel` or `attract`.
+    pub polarity: String,
+    /// m.
+    pub diameter_m: f64,
+    /// m.
+    pub length_m: f64,
+}
+
+/// The force constant.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LambdaSummary {
+    /// N/m; null when there is none.
+    pub lambda_n_per_m: Option<f64>,
+    /// How it was chosen: `jnd`, `linear`, `saturation` or `maxmin`.
+    pub criterion: String,
+}
+
+/// Equally spaced nodes: node i is ((n - 1 - i) from + i to) / (n - 1), n the samples.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct AxisSummary {
+    /// First node, m.
+    pub from_m: f64,
+    /// Last node, m.
+    pub to_m: f64,
+    /// Number of nodes.
+    pub samples: usize,
+}
+
+impl From<Axis> for AxisSummary {
+    fn from(axis: Axis) -> Self {
+        Self {
+            from_m: axis.from,
+            to_m: axis.to,
+            samples: axis.samples,
+        }
+    }
+}
+
+impl AxisSummary {
+    /// The axis in memory.
+    #[must_use]
+    pub fn axis(&self) -> Axis {
+        Axis {
+            from: self.from_m,
+            to: self.to_m,
+            samples: self.samples,
+        }
+    }
+
+    /// An axis of given nodes; their ends and number.
+    #[must_use]
+    pub fn of_nodes(nodes: &[f64]) -> Self {
+        Self {
+            from_m: nodes.first().copied().unwrap_or(0.0),
+            to_m: nodes.last().copied().unwrap_or(0.0),
+            samples: nodes.len(),
+        }
+    }
+}
+
+/// The grid on which `points.csv` lies.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PointsGrid {
+    /// Along x.
+    pub x_m: AxisSummary,
+    /// Along y.
+    pub y_m: AxisSummary,
+    /// How many points there are.
+    pub count: usize,
+    /// One string a grid row, y ascending; one character a node, x ascending: `1` where there is a
+    /// surface. The rows of `points.csv` are the ones in reading order.
+    pub present: Vec<String>,
+}
+
+impl PointsGrid {
+    /// The grid, from one flag a node, x fastest.
+    ///
+    /// # Panics
+    /// When the flags are not as many as the nodes.
+    #[must_use]
+    pub fn new(x_m: Axis, y_m: Axis, present: &[bool]) -> Self {
+        assert_eq!(
+            present.len(),
+            x_m.samples * y_m.samples,
+            "one flag a grid node"
+        );
+        let row = |flags: &[bool]| {
+            flags
+                .iter()
+                .map(|&flag| if flag { '1' } else { '0' })
+                .collect()
+        };
+        Self {
+            count: present.iter().filter(|&&flag| flag).count(),
+            present: present.chunks(x_m.samples.max(1)).map(row).collect(),
+            x_m: x_m.into(),
+            y_m: y_m.into(),
+        }
+    }
+
+    /// One flag a node, x fastest; `None` when the strings do not fit the axes or the count.
+    #[must_use]
+    pub fn flags(&self) -> Option<Vec<bool>> {
+        let mut flags = Vec::new();
+        for row in &self.present {
+            if row.len() != self.x_m.samples {
+                return None;
+            }
+            for c in row.bytes() {
+                flags.push(match c {
+                    b'1' => true,
+                    b'0' => false,
+                    _ => return None,
+                });
+            }
+        }
+        let count = flags.iter().filter(|&&flag| flag).count();
+        (self.present.len() == self.y_m.samples && count == self.count).then_some(flags)
+    }
+}
+
+/// The map's grid, coils and interpolation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MapSummary {
+    /// Along x; `map.npz` holds the nodes themselves.
+    pub x_m: AxisSummary,
+    /// Along y.
+    pub y_m: AxisSummary,
+    /// Along z.
+    pub z_m: AxisSummary,
+    /// Indices of the coils whose maps were kept.
+    pub coil: Vec<i64>,
+    /// `gz`, `gradient` or `all`.
+    pub components: String,
+    /// Between the nodes.
+    pub interpolation: Interpolation,
+}
+
+/// How values between nodes are found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Interpolation {
+    /// `tricubic-lagrange`.
+    pub name: String,
+    /// Degree along each axis that has nodes enough.
+    pub order: u32,
+    /// What happens at and beyond the borders.
+    pub borders: String,
+    /// Its largest error.
+    pub largest_error: f64,
+    /// What the largest error is relative to and how it was found.
+    pub largest_error_definition: String,
+}
+
+impl Interpolation {
+    /// The interpolation of this version, with its error on a given map.
+    #[must_use]
+    pub fn tricubic(largest_error: f64, definition: impl Into<String>) -> Self {
+        Self {
+            name: INTERPOLATION.to_owned(),
+            order: 3,
+            borders: "the four nearest nodes of each axis, moved inward at the borders; axes of \
+                      three or two nodes: quadratic, linear; an axis of one node: that node alone; \
+                      outside the grid the force is zero"
+                .to_owned(),
+            largest_error,
+            largest_error_definition: definition.into(),
+        }
+    }
+}
+
+/// Something the object does not need.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LeftOut {
+    /// What: coils, workspace, components.
+    pub what: String,
+    /// Why it is not needed.
+    pub why: String,
+    /// The error this costs, relative to the largest force per ampere at the points unless `why`
+    /// says otherwise; 0 where it costs none.
+    pub error_cost: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::PointsGrid;
+    use crate::numerics::axis::Axis;
+
+    #[test]
+    fn grid_rows_read_back() {
+        let x = Axis {
+            from: -0.05,
+            to: 0.05,
+            samples: 3,
+        };
+        let y = Axis {
+            from: 0.01,
+            to: 0.07,
+            samples: 2,
+        };
+        let flags = [true, false, true, false, false, true];
+        let mut grid = PointsGrid::new(x, y, &flags);
+        assert_eq!(grid.present, ["101", "001"]);
+        assert_eq!((grid.count, grid.x_m.axis()), (3, x));
+        assert_eq!(grid.flags().as_deref(), Some(&flags[..]));
+        grid.count = 4;
+        assert_eq!(grid.flags(), None);
+        grid.count = 3;
+        grid.present[1] = "00é".into();
+        assert_eq!(grid.flags(), None);
+    }
+}

@@ -1,0 +1,488 @@
+//! `map.npz`: axes, coil indices, maps per ampere, and what a runtime needs besides.
+//!
+//! A stored zip of NPY 1.0 arrays with fixed time stamps: the same numbers give the same bytes.
+//! Besides the contract's arrays it holds the few numbers a runtime needs, so that C and MATLAB
+//! programs need not read JSON: `schema_version` (i64, 3), `moment_a_m2` (3), and one entry a coil
+//! of the array: `current_min_a`, `current_max_a`, `resistance_ohm`; where there are such,
+//! `total_current_max_a` and `lambda_n_per_m` (no dimension). `coil` holds the indices of the
+//! coils whose maps were kept; the others give no force.
+
+use std::borrow::Cow;
+use std::io::{self, Cursor, Read, Write};
+
+use zip::result::ZipError;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
+
+use super::artefact::{SCHEMA_VERSION, check_version, parse_version};
+use super::npy;
+
+#[cfg(target_endian = "big")]
+compile_error!("arrays are written as they lie in memory, which must be little-endian");
+
+/// The arrays of `map.npz`. All lengths in metres, fields and gradients per ampere.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MapArrays<'a> {
+    /// Nodes along x, m, strictly increasing.
+    pub x_m: Cow<'a, [f64]>,
+    /// Nodes along y, m, strictly increasing.
+    pub y_m: Cow<'a, [f64]>,
+    /// Nodes along z, m, strictly increasing.
+    pub z_m: Cow<'a, [f64]>,
+    /// Indices of the coils whose maps follow, strictly increasing.
+    pub coil: Cow<'a, [i64]>,
+    /// dB_z/dz, `[coil, z, y, x]`, T/m/A.
+    pub gz_t_per_m_per_a: Cow<'a, [f64]>,
+    /// dB_i/dx_j, `[coil, z, y, x, i, j]`, T/m/A.
+    pub gradient_t_per_m_per_a: Option<Cow<'a, [f64]>>,
+    /// B, `[coil, z, y, x, 3]`, T/A.
+    pub field_t_per_a: Option<Cow<'a, [f64]>>,
+    /// What a runtime needs besides the maps.
+    pub runtime: Runtime,
+}
+
+/// Magnet, limits and force constant, as a runtime needs them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Runtime {
+    /// The magnet's moment, A m^2.
+    pub moment_a_m2: [f64; 3],
+    /// Lower current limit of every coil of the array, A.
+    pub current_min_a: Vec<f64>,
+    /// Upper current limit of every coil of the array, A.
+    pub current_max_a: Vec<f64>,
+    /// Resistance of every coil of the array, ohm.
+    pub resistance_ohm: Vec<f64>,
+    /// Limit of the sum of the currents, A.
+    pub total_current_max_a: Option<f64>,
+    /// The chosen force constant, N/m.
+    pub lambda_n_per_m: Option<f64>,
+}
+
+/// What is wrong with a `map.npz`.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NpzError {
+    /// Not a zip archive, or cut short.
+    #[error("not a readable NPZ archive ({0})")]
+    Archive(String),
+    /// An array that must be there is not.
+    #[error("array {0} is missing")]
+    Missing(&'static str),
+    /// An array that is not as it must be.
+    #[error("array {name} {message}")]
+    Array {
+        /// Its name.
+        name: &'static str,
+        /// What was expected and found.
+        message: String,
+    },
+}
+
+fn bad(name: &'static str, message: impl Into<String>) -> NpzError {
+    NpzError::Array {
+        name,
+        message: message.into(),
+    }
+}
+
+const X: &str = "x_m";
+const Y: &str = "y_m";
+const Z: &str = "z_m";
+const COIL: &str = "coil";
+const GZ: &str = "gz_t_per_m_per_a";
+const GRADIENT: &str = "gradient_t_per_m_per_a";
+const FIELD: &str = "field_t_per_a";
+const VERSION: &str = "schema_version";
+const MOMENT: &str = "moment_a_m2";
+const CURRENT_MIN: &str = "current_min_a";
+const CURRENT_MAX: &str = "current_max_a";
+const RESISTANCE: &str = "resistance_ohm";
+const TOTAL: &str = "total_current_max_a";
+const LAMBDA: &str = "lambda_n_per_m";
+
+impl MapArrays<'_> {
+    /// `[coil, z, y, x]`.
+    #[must_use]
+    pub fn shape(&self) -> [usize; 4] {
+        [
+            self.coil.len(),
+            self.z_m.len(),
+            self.y_m.len(),
+            self.x_m.len(),
+        ]
+    }
+
+    /// Checks lengths, order of the axes, coil indices, and that every number is finite.
+    ///
+    /// # Errors
+    /// The first array that is not as it must be.
+    pub fn validate(&self) -> Result<(), NpzError> {
+        for (name, nodes) in [(X, &self.x_m), (Y, &self.y_m), (Z, &self.z_m)] {
+            if nodes.is_empty() || !nodes.is_sorted_by(|a, b| a < b) {
+                return Err(bad(name, "must increase from node to node"));
+            }
+        }
+        let coils = self.runtime.current_max_a.len();
+        let ordered = self.coil.is_sorted_by(|a, b| a < b);
+        let known = |&index: &i64| usize::try_from(index).is_ok_and(|index| index < coils);
+        if !ordered || !self.coil.iter().all(known) {
+            let message =
+                format!("must hold increasing indices below {coils}, the number of coils");
+            return Err(bad(COIL, message));
+        }
+        let nodes = self
+            .shape()
+            .iter()
+            .try_fold(1usize, |n, &size| n.checked_mul(size));
+        let nodes = nodes.ok_or_else(|| bad(GZ, "is too large"))?;
+        let runtime = &self.runtime;
+        let total = runtime.total_current_max_a.as_slice();
+        let lambda = runtime.lambda_n_per_m.as_slice();
+        let gradient = self.gradient_t_per_m_per_a.as_deref();
+        let field = self.field_t_per_a.as_deref();
+        for (name, values, count) in [
+            (X, &*self.x_m, self.x_m.len()),
+            (Y, &*self.y_m, self.y_m.len()),
+            (Z, &*self.z_m, self.z_m.len()),
+            (GZ, &*self.gz_t_per_m_per_a, nodes),
+            (
+                GRADIENT,
+                gradient.unwrap_or_default(),
+                gradient.map_or(0, |_| nodes.saturating_mul(9)),
+            ),
+            (
+                FIELD,
+                field.unwrap_or_default(),
+                field.map_or(0, |_| nodes.saturating_mul(3)),
+            ),
+            (MOMENT, &runtime.moment_a_m2, 3),
+            (CURRENT_MIN, &runtime.current_min_a, coils),
+            (CURRENT_MAX, &runtime.current_max_a, coils),
+            (RESISTANCE, &runtime.resistance_ohm, coils),
+            (TOTAL, total, total.len()),
+            (LAMBDA, lambda, lambda.len()),
+        ] {
+            if values.len() != count {
+                let message = format!("must hold {count} numbers, holds {}", values.len());
+                return Err(bad(name, message));
+            }
+            if !all_finite(values) {
+                return Err(bad(name, "holds a number that is not finite"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether all numbers are finite; in blocks, so that it runs at memory speed.
+fn all_finite(values: &[f64]) -> bool {
+    values.chunks(1024).all(|block| {
+        block
+            .iter()
+            .fold(true, |all, value| all & value.is_finite())
+    })
+}
+
+/// The bytes of `map.npz`.
+///
+/// # Errors
+/// As [`MapArrays::validate`].
+pub fn to_npz(map: &MapArrays) -> Result<Vec<u8>, NpzError> {
+    map.validate()?;
+    let numbers = map.gz_t_per_m_per_a.len()
+        + map.gradient_t_per_m_per_a.as_ref().map_or(0, |a| a.len())
+        + map.field_t_per_a.as_ref().map_or(0, |a| a.len());
+    let room = numbers * npy::ELEMENT_BYTES + (64 << 10);
+    let mut archive = Archive(ZipWriter::new(Cursor::new(Vec::with_capacity(room))));
+    archive
+        .put_all(map)
+        .and_then(|()| archive.0.finish().map_err(io::Error::other))
+        .map(Cursor::into_inner)
+        .map_err(|error| NpzError::Archive(error.to_string()))
+}
+
+struct Archive(ZipWriter<Cursor<Vec<u8>>>);
+
+impl Archive {
+    fn put_all(&mut self, map: &MapArrays) -> io::Result<()> {
+        let version: Vec<i64> = parse_version(SCHEMA_VERSION)
+            .unwrap_or_default()
+            .map(i64::from)
+            .to_vec();
+        let [coils, nz, ny, nx] = map.shape();
+        let runtime = &map.runtime;
+        self.put_i64(VERSION, &version)?;
+        self.put(X, &[nx], &map.x_m)?;
+        self.put(Y, &[ny], &map.y_m)?;
+        self.put(Z, &[nz], &map.z_m)?;
+        self.put_i64(COIL, &map.coil)?;
+        self.put(GZ, &[coils, nz, ny, nx], &map.gz_t_per_m_per_a)?;
+        if let Some(values) = &map.gradient_t_per_m_per_a {
+            self.put(GRADIENT, &[coils, nz, ny, nx, 3, 3], values)?;
+        }
+        if let Some(values) = &map.field_t_per_a {
+            self.put(FIELD, &[coils, nz, ny, nx, 3], values)?;
+        }
+        self.put(MOMENT, &[3], &runtime.moment_a_m2)?;
+        for (name, values) in [
+            (CURRENT_MIN, &runtime.current_min_a),
+            (CURRENT_MAX, &runtime.current_max_a),
+            (RESISTANCE, &runtime.resistance_ohm),
+        ] {
+            self.put(name, &[values.len()], values)?;
+        }
+        for (name, value) in [
+            (TOTAL, runtime.total_current_max_a),
+            (LAMBDA, runtime.lambda_n_per_m),
+        ] {
+            if let Some(value) = value {
+                self.put(name, &[], &[value])?;
+            }
+        }
+        Ok(())
+    }
+
+    fn put(&mut self, name: &str, shape: &[usize], values: &[f64]) -> io::Result<()> {
+        self.put_bytes(
+            name,
+            &npy::header("<f8", shape),
+            bytemuck::cast_slice(values),
+        )
+    }
+
+    fn put_i64(&mut self, name: &str, values: &[i64]) -> io::Result<()> {
+        self.put_bytes(
+            name,
+            &npy::header("<i8", &[values.len()]),
+            bytemuck::cast_slice(values),
+        )
+    }
+
+    fn put_bytes(&mut self, name: &str, header: &[u8], data: &[u8]) -> io::Result<()> {
+        let options = SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Stored)
+            .last_modified_time(DateTime::DEFAULT)
+            .unix_permissions(0o644)
+            .large_file(data.len() as u64 > u64::from(u32::MAX) - 4096);
+        self.0
+            .start_file(format!("{name}.npy"), options)
+            .map_err(io::Error::other)?;
+        self.0.write_all(header)?;
+        self.0.write_all(data)
+    }
+}
+
+/// The arrays of an untrusted `map.npz`. Nothing is allocated before its size was checked against
+/// the file's; unknown arrays are passed over.
+///
+/// # Errors
+/// [`NpzError`]: what is wrong, and with which array.
+pub fn from_npz(bytes: &[u8]) -> Result<MapArrays<'static>, NpzError> {
+    let archive = ZipArchive::new(Cursor::new(bytes));
+    let mut arrays = Arrays {
+        archive: archive.map_err(|error| NpzError::Archive(error.to_string()))?,
+        file_bytes: bytes.len() as u64,
+    };
+    let version: Vec<i64> = arrays.need(VERSION, &[Some(3)])?;
+    let version: Vec<String> = version.iter().map(i64::to_string).collect();
+    check_version(&version.join(".")).map_err(|message| bad(VERSION, message))?;
+    let x_m: Vec<f64> = arrays.need(X, &[None])?;
+    let y_m: Vec<f64> = arrays.need(Y, &[None])?;
+    let z_m: Vec<f64> = arrays.need(Z, &[None])?;
+    let coil: Vec<i64> = arrays.need(COIL, &[None])?;
+    let [c, z, y, x] = [coil.len(), z_m.len(), y_m.len(), x_m.len()].map(Some);
+    let moment: Vec<f64> = arrays.need(MOMENT, &[Some(3)])?;
+    let current_max_a: Vec<f64> = arrays.need(CURRENT_MAX, &[None])?;
+    let coils = Some(current_max_a.len());
+    let gz: Vec<f64> = arrays.need(GZ, &[c, z, y, x])?;
+    let gradient: Option<Vec<f64>> = arrays.get(GRADIENT, &[c, z, y, x, Some(3), Some(3)])?;
+    let field: Option<Vec<f64>> = arrays.get(FIELD, &[c, z, y, x, Some(3)])?;
+    let map = MapArrays {
+        x_m: x_m.into(),
+        y_m: y_m.into(),
+        z_m: z_m.into(),
+        coil: coil.into(),
+        gz_t_per_m_per_a: gz.into(),
+        gradient_t_per_m_per_a: gradient.map(Cow::Owned),
+        field_t_per_a: field.map(Cow::Owned),
+        runtime: Runtime {
+            moment_a_m2: [moment[0], moment[1], moment[2]],
+            current_min_a: arrays.need(CURRENT_MIN, &[coils])?,
+            resistance_ohm: arrays.need(RESISTANCE, &[coils])?,
+            current_max_a,
+            total_current_max_a: arrays.scalar(TOTAL)?,
+            lambda_n_per_m: arrays.scalar(LAMBDA)?,
+        },
+    };
+    map.validate()?;
+    Ok(map)
+}
+
+struct Arrays<'a> {
+    archive: ZipArchive<Cursor<&'a [u8]>>,
+    file_bytes: u64,
+}
+
+/// Element types of arrays and what NPY calls them.
+trait Element: bytemuck::Pod {
+    const KIND: &'static str;
+}
+
+impl Element for f64 {
+    const KIND: &'static str = "<f8";
+}
+
+impl Element for i64 {
+    const KIND: &'static str = "<i8";
+}
+
+impl Arrays<'_> {
+    fn need<T: Element>(
+        &mut self,
+        name: &'static str,
+        shape: &[Option<usize>],
+    ) -> Result<Vec<T>, NpzError> {
+        self.get(name, shape)?.ok_or(NpzError::Missing(name))
+    }
+
+    fn scalar(&mut self, name: &'static str) -> Result<Option<f64>, NpzError> {
+        Ok(self.get(name, &[])?.map(|values: Vec<f64>| values[0]))
+    }
+
+    /// The array of that shape (`None`: any length); `None` when there is no such array.
+    fn get<T: Element>(
+        &mut self,
+        name: &'static str,
+        shape: &[Option<usize>],
+    ) -> Result<Option<Vec<T>>, NpzError> {
+        let mut entry = match self.archive.by_name(&format!("{name}.npy")) {
+            Ok(entry) => entry,
+            Err(ZipError::FileNotFound) => return Ok(None),
+            Err(error) => return Err(bad(name, format!("cannot be read ({error})"))),
+        };
+        if entry.compression() != CompressionMethod::Stored || entry.encrypted() {
+            return Err(bad(
+                name,
+                "is compressed or encrypted, expected stored as it is",
+            ));
+        }
+        let size = entry.size();
+        if size > self.file_bytes {
+            let message = format!("claims {size} bytes, the file has {}", self.file_bytes);
+            return Err(bad(name, message));
+        }
+        let cut = |error: io::Error| bad(name, format!("cannot be read ({error})"));
+        let mut head = vec![0; 10];
+        entry.read_exact(&mut head).map_err(cut)?;
+        head.resize(10 + usize::from(u16::from_le_bytes([head[8], head[9]])), 0);
+        entry.read_exact(&mut head[10..]).map_err(cut)?;
+        let found = npy::parse(&head, size, T::KIND).map_err(|message| bad(name, message))?;
+        let fits = |(want, size): (&Option<usize>, &usize)| want.is_none_or(|want| want == *size);
+        if found.len() != shape.len() || !shape.iter().zip(&found).all(fits) {
+            let want: Vec<String> = shape
+                .iter()
+                .map(|size| size.map_or("any".to_owned(), |size| size.to_string()))
+                .collect();
+            let message = format!("must have shape [{}], has {found:?}", want.join(", "));
+            return Err(bad(name, message));
+        }
+        let mut values = vec![T::zeroed(); found.iter().product()];
+        entry
+            .read_exact(bytemuck::cast_slice_mut(&mut values))
+            .map_err(cut)?;
+        // Reading to the end is what checks the CRC.
+        entry.read(&mut [0]).map_err(cut)?;
+        Ok(Some(values))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    pub(super) fn sample() -> MapArrays<'static> {
+        let values = |n: usize, p: f64| (0..n).map(|i| (i as f64 * p).sin()).collect::<Vec<_>>();
+        MapArrays {
+            x_m: vec![-0.03, 0.01, 0.07].into(),
+            y_m: vec![-0.02, 0.05].into(),
+            z_m: vec![0.01, 0.02, 0.04, 0.09].into(),
+            coil: vec![0, 2].into(),
+            gz_t_per_m_per_a: values(48, 0.7).into(),
+            gradient_t_per_m_per_a: Some(values(48 * 9, 1.3).into()),
+            field_t_per_a: Some(values(48 * 3, 2.1).into()),
+            runtime: Runtime {
+                moment_a_m2: [0.0, 0.0, -0.909],
+                current_min_a: vec![0.0, -0.7, 0.0],
+                current_max_a: vec![2.0, 1.3, 0.7],
+                resistance_ohm: vec![6.07, 6.08, 6.09],
+                total_current_max_a: Some(3.1),
+                lambda_n_per_m: None,
+            },
+        }
+    }
+
+    #[test]
+    fn round_trip_and_same_bytes() {
+        let map = sample();
+        let bytes = to_npz(&map).unwrap();
+        assert_eq!(bytes, to_npz(&map).unwrap());
+        assert_eq!(from_npz(&bytes).unwrap(), map);
+    }
+
+    #[test]
+    fn every_truncation_is_an_error() {
+        let bytes = to_npz(&sample()).unwrap();
+        for cut in 0..bytes.len() {
+            assert!(from_npz(&bytes[..cut]).is_err(), "cut at {cut}");
+        }
+    }
+
+    #[test]
+    fn a_changed_bit_is_an_error_or_changes_nothing() {
+        let bytes = to_npz(&sample()).unwrap();
+        for at in 0..bytes.len() {
+            let mut edited = bytes.clone();
+            edited[at] ^= 0x10;
+            // Bits that only a permission or a time stamp holds may change; numbers may not.
+            if let Ok(map) = from_npz(&edited) {
+                assert!(map == sample() || optional_lost(&map), "byte {at}");
+            }
+        }
+    }
+
+    /// A damaged name hides an optional array; the bundle's checksums see that.
+    fn optional_lost(map: &MapArrays) -> bool {
+        map.gradient_t_per_m_per_a.is_none()
+            || map.field_t_per_a.is_none()
+            || map.runtime.total_current_max_a.is_none()
+    }
+
+    #[test]
+    fn wrong_content_is_named() {
+        let refuse = |edit: fn(&mut MapArrays), words: &str| {
+            let mut map = sample();
+            edit(&mut map);
+            let message = to_npz(&map).unwrap_err().to_string();
+            assert!(message.contains(words), "{message}");
+        };
+        refuse(
+            |m| m.gz_t_per_m_per_a.to_mut()[7] = f64::NAN,
+            "gz_t_per_m_per_a holds a number that is not finite",
+        );
+        refuse(|m| m.x_m.to_mut()[2] = 0.01, "x_m must increase");
+        refuse(|m| m.z_m.to_mut()[3] = f64::INFINITY, "z_m holds");
+        refuse(|m| m.coil.to_mut()[1] = 3, "below 3");
+        refuse(|m| m.coil.to_mut()[1] = 0, "increasing");
+        refuse(
+            |m| {
+                m.gz_t_per_m_per_a.to_mut().pop();
+            },
+            "must hold 48 numbers, holds 47",
+        );
+        refuse(
+            |m| {
+                m.runtime.resistance_ohm.pop();
+            },
+            "resistance_ohm must hold 3",
+        );
+    }
+}

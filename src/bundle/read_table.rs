@@ -1,0 +1,240 @@
+//! Reading CSV tables: columns by name, every fault told with its line and column.
+
+use std::io::Read;
+
+use csv::{ByteRecord, ReaderBuilder, Trim};
+
+use super::table::{CURRENT_COLUMNS, CurrentRow, POINT_COLUMNS, PointRow};
+
+/// No more faults than this are told.
+const MAX_FAULTS: usize = 20;
+
+/// What is wrong with a table.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{}", .faults.join("\n"))]
+pub struct TableError {
+    /// One sentence a fault, each beginning with the file and line; never empty.
+    pub faults: Vec<String>,
+}
+
+impl TableError {
+    fn one(fault: String) -> Self {
+        Self {
+            faults: vec![fault],
+        }
+    }
+}
+
+/// Reads the wanted columns of a CSV file, in the wanted order; other columns are passed over.
+/// A byte order mark, CRLF and blanks around cells are tolerated.
+///
+/// # Errors
+/// Every missing or doubled column, or every cell that is not a finite number (the first twenty).
+pub fn read_columns(
+    name: &str,
+    source: impl Read,
+    wanted: &[&str],
+) -> Result<Vec<Vec<f64>>, TableError> {
+    let mut reader = ReaderBuilder::new()
+        .trim(Trim::All)
+        .flexible(true)
+        .from_reader(source);
+    let header: Vec<String> = reader
+        .byte_headers()
+        .map_err(|error| TableError::one(format!("{name}: cannot be read: {error}")))?
+        .iter()
+        .map(|cell| String::from_utf8_lossy(cell).into_owned())
+        .collect();
+    let places = find_columns(name, &header, wanted)?;
+    let mut columns = vec![Vec::new(); wanted.len()];
+    let mut faults = Vec::new();
+    let mut more = 0usize;
+    let mut record = ByteRecord::new();
+    loop {
+        match reader.read_byte_record(&mut record) {
+            Ok(false) => break,
+            Ok(true) => {}
+            Err(error) => {
+                faults.push(format!("{name}: cannot be read: {error}"));
+                break;
+            }
+        }
+        let line = record.position().map_or(0, csv::Position::line);
+        let mut fault = |message: String| {
+            if faults.len() < MAX_FAULTS {
+                faults.push(format!("{name}:{line}: {message}"));
+            } else {
+                more += 1;
+            }
+        };
+        if record.len() != header.len() {
+            fault(format!(
+                "{} cells, expected {} as in the header",
+                record.len(),
+                header.len()
+            ));
+            continue;
+        }
+        for ((column, &place), wanted) in columns.iter_mut().zip(&places).zip(wanted) {
+            let cell = std::str::from_utf8(&record[place]).unwrap_or("(not UTF-8)");
+            match cell.parse::<f64>() {
+                Ok(value) if value.is_finite() => column.push(value),
+                _ => {
+                    let shown: String = cell.chars().take(40).collect();
+                    fault(format!(
+                        "column {wanted}: expected a finite number, found {shown:?}"
+                    ));
+                }
+            }
+        }
+    }
+    if more > 0 {
+        faults.push(format!("{name}: and {more} faults more"));
+    }
+    if faults.is_empty() {
+        Ok(columns)
+    } else {
+        Err(TableError { faults })
+    }
+}
+
+fn find_columns(name: &str, header: &[String], wanted: &[&str]) -> Result<Vec<usize>, TableError> {
+    let mut places = Vec::new();
+    let mut faults = Vec::new();
+    for column in wanted {
+        let mut found = header.iter().enumerate().filter(|(_, cell)| cell == column);
+        match (found.next(), found.next()) {
+            (Some((place, _)), None) => places.push(place),
+            (Some(_), Some(_)) => faults.push(format!("{name}:1: column {column} stands twice")),
+            (None, _) => {
+                let shown: String = header.join(",").chars().take(120).collect();
+                faults.push(format!(
+                    "{name}:1: column {column} is missing; expected a header line with {}, found {shown:?}",
+                    wanted.join(",")
+                ));
+            }
+        }
+    }
+    if faults.is_empty() {
+        Ok(places)
+    } else {
+        Err(TableError { faults })
+    }
+}
+
+/// Reads positions: columns `x_m,y_m,z_m`.
+///
+/// # Errors
+/// As [`read_columns`].
+pub fn read_positions(name: &str, source: impl Read) -> Result<Vec<[f64; 3]>, TableError> {
+    let columns = read_columns(name, source, &["x_m", "y_m", "z_m"])?;
+    Ok((0..columns[0].len())
+        .map(|row| [columns[0][row], columns[1][row], columns[2][row]])
+        .collect())
+}
+
+/// Reads `points.csv`.
+///
+/// # Errors
+/// As [`read_columns`].
+pub fn read_points(name: &str, source: impl Read) -> Result<Vec<PointRow>, TableError> {
+    let columns = read_columns(name, source, &POINT_COLUMNS)?;
+    Ok((0..columns[0].len())
+        .map(|row| PointRow {
+            x_m: columns[0][row],
+            y_m: columns[1][row],
+            height_m: columns[2][row],
+            normal: [columns[3][row], columns[4][row], columns[5][row]],
+        })
+        .collect())
+}
+
+/// Reads `currents.csv`; its rows must be the coils 0, 1, 2, ...
+///
+/// # Errors
+/// As [`read_columns`].
+pub fn read_currents(name: &str, source: impl Read) -> Result<Vec<CurrentRow>, TableError> {
+    let columns = read_columns(name, source, &CURRENT_COLUMNS)?;
+    (0..columns[0].len())
+        .map(|row| {
+            if columns[0][row] != row as f64 {
+                let (line, found) = (row + 2, columns[0][row]);
+                let fault = format!("{name}:{line}: column coil: expected {row}, found {found}");
+                return Err(TableError::one(fault));
+            }
+            Ok(CurrentRow {
+                coil: row,
+                x_m: columns[1][row],
+                y_m: columns[2][row],
+                current_a: columns[3][row],
+            })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bundle::table::{write_currents, write_points};
+
+    #[test]
+    fn what_was_written_is_read_back() {
+        let points: Vec<PointRow> = (0..40)
+            .map(|i| PointRow {
+                x_m: 0.1 / (f64::from(i) + 0.7),
+                y_m: -1e-7 * f64::from(i),
+                height_m: 0.05,
+                normal: [0.6, 0.0, 0.8],
+            })
+            .collect();
+        let mut text = Vec::new();
+        write_points(&mut text, &points).unwrap();
+        assert_eq!(read_points("p", text.as_slice()).unwrap(), points);
+        let currents: Vec<CurrentRow> = (0..9)
+            .map(|coil| CurrentRow {
+                coil,
+                x_m: 0.05,
+                y_m: -0.05,
+                current_a: 0.7 * coil as f64,
+            })
+            .collect();
+        let mut text = Vec::new();
+        write_currents(&mut text, &currents).unwrap();
+        assert_eq!(read_currents("c", text.as_slice()).unwrap(), currents);
+        let text = String::from_utf8(text).unwrap().replace("\n3,", "\n4,");
+        let error = read_currents("c", text.as_bytes()).unwrap_err();
+        assert_eq!(error.to_string(), "c:5: column coil: expected 3, found 4");
+    }
+
+    #[test]
+    fn tolerates_what_spreadsheets_do() {
+        let text = "\u{feff}label, z_m ,x_m,y_m\r\n\"a, b\", 0.03 ,0.01,-0.02\r\n";
+        assert_eq!(
+            read_positions("p", text.as_bytes()).unwrap(),
+            [[0.01, -0.02, 0.03]]
+        );
+    }
+
+    #[test]
+    fn every_fault_has_its_line_and_column() {
+        let text = "x_m,y_m,z_m\n0.1,0.2,0.3\n0.1,nan,0.3\n0.1,0.2\n1e999,0.2,three\n";
+        let error = read_positions("p.csv", text.as_bytes()).unwrap_err();
+        assert_eq!(
+            error.faults,
+            [
+                "p.csv:3: column y_m: expected a finite number, found \"nan\"",
+                "p.csv:4: 2 cells, expected 3 as in the header",
+                "p.csv:5: column x_m: expected a finite number, found \"1e999\"",
+                "p.csv:5: column z_m: expected a finite number, found \"three\"",
+            ]
+        );
+        let error = read_positions("p.csv", "x_m,x_m,z\n".as_bytes()).unwrap_err();
+        assert_eq!(error.faults.len(), 3);
+        let many = format!("x_m,y_m,z_m\n{}", "a,b,c\n".repeat(50));
+        let error = read_positions("p.csv", many.as_bytes()).unwrap_err();
+        assert_eq!(error.faults.len(), 21);
+        assert_eq!(error.faults[20], "p.csv: and 130 faults more");
+        assert!(read_positions("p.csv", "".as_bytes()).is_err());
+        assert!(read_positions("p.csv", &b"\xff\xfe\x00,1\n"[..]).is_err());
+    }
+}

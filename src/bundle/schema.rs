@@ -1,0 +1,59 @@
+//! The JSON Schemas of the artefacts, generated from the structs and committed in `schema/`.
+
+use schemars::{JsonSchema, schema_for};
+
+use super::lambda_file::LambdaFile;
+use super::manifest::{Manifest, MapSidecar};
+
+/// The committed schemas: file name and text.
+pub const SCHEMAS: [(&str, &str); 3] = [
+    (
+        "manifest.schema.json",
+        include_str!("schema/manifest.schema.json"),
+    ),
+    ("map.schema.json", include_str!("schema/map.schema.json")),
+    (
+        "lambda.schema.json",
+        include_str!("schema/lambda.schema.json"),
+    ),
+];
+
+/// The schemas as the structs have them now, in the order of [`SCHEMAS`].
+#[must_use]
+pub fn generated() -> [String; 3] {
+    [
+        text::<Manifest>(),
+        text::<MapSidecar>(),
+        text::<LambdaFile>(),
+    ]
+}
+
+fn text<T: JsonSchema>() -> String {
+    format!("{:#}\n", schema_for!(T).as_value())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{SCHEMAS, generated};
+
+    #[test]
+    fn the_committed_schemas_are_the_generated_ones() {
+        for ((name, committed), generated) in SCHEMAS.iter().zip(generated()) {
+            assert!(
+                *committed == generated,
+                "src/bundle/schema/{name} is out of date: raise SCHEMA_VERSION where the layout \
+                 changed and run `cargo test --lib -- --ignored regenerate_schemas`"
+            );
+        }
+    }
+
+    #[test]
+    #[ignore = "writes src/bundle/schema"]
+    #[allow(clippy::disallowed_methods)]
+    fn regenerate_schemas() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/bundle/schema");
+        for ((name, _), generated) in SCHEMAS.iter().zip(generated()) {
+            std::fs::write(folder.join(name), generated).unwrap();
+        }
+    }
+}

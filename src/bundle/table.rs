@@ -1,0 +1,354 @@
+//! CSV tables: one header line, LF, decimal point, shortest round-trip numbers, no comments.
+
+use std::io::{self, Write};
+
+use super::npz::MapArrays;
+use super::number::{push_index, push_number};
+
+/// Rows are gathered to blocks of about this size.
+const BLOCK_BYTES: usize = 64 << 10;
+
+/// Columns of field components, T/A.
+pub const FIELD_COLUMNS: [&str; 3] = ["bx_t_per_a", "by_t_per_a", "bz_t_per_a"];
+
+/// Columns of gradient components, T/m/A: field component, then direction.
+pub const GRADIENT_COLUMNS: [&str; 9] = [
+    "dbx_dx_t_per_m_per_a",
+    "dbx_dy_t_per_m_per_a",
+    "dbx_dz_t_per_m_per_a",
+    "dby_dx_t_per_m_per_a",
+    "dby_dy_t_per_m_per_a",
+    "dby_dz_t_per_m_per_a",
+    "dbz_dx_t_per_m_per_a",
+    "dbz_dy_t_per_m_per_a",
+    "dbz_dz_t_per_m_per_a",
+];
+
+/// Columns of `points.csv`.
+pub const POINT_COLUMNS: [&str; 6] = ["x_m", "y_m", "height_m", "normal_x", "normal_y", "normal_z"];
+
+/// Columns of `currents.csv`.
+pub const CURRENT_COLUMNS: [&str; 4] = ["coil", "x_m", "y_m", "current_a"];
+
+/// A constraint point: a row of `points.csv`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointRow {
+    /// m.
+    pub x_m: f64,
+    /// m.
+    pub y_m: f64,
+    /// Height of the surface above the windings' top face, m.
+    pub height_m: f64,
+    /// Unit normal, its z component not negative.
+    pub normal: [f64; 3],
+}
+
+/// A coil's static current: a row of `currents.csv`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CurrentRow {
+    /// Index of the coil in the array.
+    pub coil: usize,
+    /// Position of its axis, m.
+    pub x_m: f64,
+    /// Position of its axis, m.
+    pub y_m: f64,
+    /// A.
+    pub current_a: f64,
+}
+
+/// A column of a table.
+#[derive(Debug, Clone, Copy)]
+pub enum Column<'a> {
+    /// Real numbers.
+    Number(&'a [f64]),
+    /// Whole numbers.
+    Index(&'a [i64]),
+}
+
+impl Column<'_> {
+    fn len(&self) -> usize {
+        match self {
+            Self::Number(values) => values.len(),
+            Self::Index(values) => values.len(),
+        }
+    }
+}
+
+/// Writes named columns of equal length.
+///
+/// # Errors
+/// The writer's; `InvalidData` for columns of different lengths and for numbers that are not finite.
+pub fn write_columns(out: &mut dyn Write, columns: &[(&str, Column)]) -> io::Result<()> {
+    let rows = columns.first().map_or(0, |(_, column)| column.len());
+    if let Some((name, column)) = columns.iter().find(|(_, column)| column.len() != rows) {
+        let message = format!("column {name} has {} rows, expected {rows}", column.len());
+        return Err(invalid(message));
+    }
+    let mut lines = Lines::begin(out, columns.iter().map(|(name, _)| *name))?;
+    for row in 0..rows {
+        for (_, column) in columns {
+            match column {
+                Column::Number(values) => lines.number(values[row])?,
+                Column::Index(values) => lines.index(values[row]),
+            }
+        }
+        lines.end_row()?;
+    }
+    lines.finish()
+}
+
+/// Writes `points.csv`; the rows' order is kept (x fastest, then y).
+///
+/// # Errors
+/// As [`write_columns`].
+pub fn write_points(out: &mut dyn Write, points: &[PointRow]) -> io::Result<()> {
+    let mut lines = Lines::begin(out, POINT_COLUMNS)?;
+    for point in points {
+        for value in [point.x_m, point.y_m, point.height_m]
+            .iter()
+            .chain(&point.normal)
+        {
+            lines.number(*value)?;
+        }
+        lines.end_row()?;
+    }
+    lines.finish()
+}
+
+/// Writes `currents.csv`.
+///
+/// # Errors
+/// As [`write_columns`].
+pub fn write_currents(out: &mut dyn Write, currents: &[CurrentRow]) -> io::Result<()> {
+    let mut lines = Lines::begin(out, CURRENT_COLUMNS)?;
+    for row in currents {
+        lines.index(row.coil as i64);
+        for value in [row.x_m, row.y_m, row.current_a] {
+            lines.number(value)?;
+        }
+        lines.end_row()?;
+    }
+    lines.finish()
+}
+
+/// Writes samples of every coil at every point: rows in the points' order, coil by coil within a
+/// point. `values` gives the numbers of (position in `points`, position in `coils`).
+///
+/// # Errors
+/// As [`write_columns`].
+pub fn write_samples<V: AsRef<[f64]>>(
+    out: &mut dyn Write,
+    columns: &[&str],
+    points: impl Iterator<Item = [f64; 3]>,
+    coils: &[i64],
+    mut values: impl FnMut(usize, usize) -> V,
+) -> io::Result<()> {
+    let names = ["x_m", "y_m", "z_m", "coil"];
+    let mut lines = Lines::begin(out, names.iter().chain(columns).copied())?;
+    for (index, point) in points.enumerate() {
+        let start = lines.block.len();
+        for value in point {
+            lines.number(value)?;
+        }
+        // The position is formatted once for all coils.
+        let position = lines.block.split_off(start);
+        for (place, &coil) in coils.iter().enumerate() {
+            lines.block.extend_from_slice(&position);
+            lines.index(coil);
+            for &value in values(index, place).as_ref() {
+                lines.number(value)?;
+            }
+            lines.end_row()?;
+        }
+    }
+    lines.finish()
+}
+
+/// Writes a map as `probe` would at its nodes: x fastest, then y, then z; field and gradient where
+/// the map has them, else dB_z/dz alone.
+///
+/// # Errors
+/// As [`write_columns`].
+pub fn write_map(out: &mut dyn Write, map: &MapArrays) -> io::Result<()> {
+    let [_, nz, ny, nx] = map.shape();
+    let nodes = nz * ny * nx;
+    let points = (0..nodes).map(|n| {
+        let (x, y, z) = (n % nx, n / nx % ny, n / nx / ny);
+        [map.x_m[x], map.y_m[y], map.z_m[z]]
+    });
+    let field = map.field_t_per_a.as_deref();
+    let gradient = map.gradient_t_per_m_per_a.as_deref();
+    let mut columns = Vec::new();
+    if field.is_some() {
+        columns.extend(FIELD_COLUMNS);
+    }
+    match gradient {
+        Some(_) => columns.extend(GRADIENT_COLUMNS),
+        None => columns.push(GRADIENT_COLUMNS[8]),
+    }
+    write_samples(out, &columns, points, &map.coil, |node, coil| {
+        let at = coil * nodes + node;
+        let mut row = Row::default();
+        row.extend(field.map_or(&[], |values| &values[3 * at..3 * at + 3]));
+        row.extend(match gradient {
+            Some(values) => &values[9 * at..9 * at + 9],
+            None => &map.gz_t_per_m_per_a[at..=at],
+        });
+        row
+    })
+}
+
+/// Up to twelve numbers without a heap.
+#[derive(Default)]
+struct Row {
+    values: [f64; 12],
+    count: usize,
+}
+
+impl Row {
+    fn extend(&mut self, values: &[f64]) {
+        self.values[self.count..self.count + values.len()].copy_from_slice(values);
+        self.count += values.len();
+    }
+}
+
+impl AsRef<[f64]> for Row {
+    fn as_ref(&self) -> &[f64] {
+        &self.values[..self.count]
+    }
+}
+
+/// Lines in the making; every cell ends with a comma until its row ends.
+struct Lines<'a> {
+    out: &'a mut dyn Write,
+    block: Vec<u8>,
+}
+
+impl<'a> Lines<'a> {
+    fn begin<'n>(
+        out: &'a mut dyn Write,
+        names: impl IntoIterator<Item = &'n str>,
+    ) -> io::Result<Self> {
+        let mut block = Vec::with_capacity(BLOCK_BYTES + 4096);
+        for name in names {
+            block.extend_from_slice(name.as_bytes());
+            block.push(b',');
+        }
+        let mut lines = Self { out, block };
+        lines.end_row()?;
+        Ok(lines)
+    }
+
+    fn number(&mut self, value: f64) -> io::Result<()> {
+        if !value.is_finite() {
+            return Err(invalid("a number is not finite"));
+        }
+        push_number(&mut self.block, value);
+        self.block.push(b',');
+        Ok(())
+    }
+
+    fn index(&mut self, value: i64) {
+        push_index(&mut self.block, value);
+        self.block.push(b',');
+    }
+
+    fn end_row(&mut self) -> io::Result<()> {
+        if let Some(last) = self.block.last_mut() {
+            *last = b'\n';
+        }
+        if self.block.len() >= BLOCK_BYTES {
+            self.out.write_all(&self.block)?;
+            self.block.clear();
+        }
+        Ok(())
+    }
+
+    fn finish(self) -> io::Result<()> {
+        self.out.write_all(&self.block)
+    }
+}
+
+fn invalid(message: impl Into<String>) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, message.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bundle::npz::Runtime;
+
+    #[test]
+    fn points_currents_and_columns() {
+        let mut text = Vec::new();
+        let point = PointRow {
+            x_m: -0.05,
+            y_m: 1e-6,
+            height_m: 0.05,
+            normal: [0.0, 0.6, 0.8],
+        };
+        write_points(&mut text, &[point]).unwrap();
+        let mut row = CurrentRow {
+            coil: 7,
+            x_m: 0.05,
+            y_m: 0.0,
+            current_a: 1.3,
+        };
+        write_currents(&mut text, &[row]).unwrap();
+        write_columns(
+            &mut text,
+            &[
+                ("t_s", Column::Number(&[0.7, 30.0])),
+                ("coil", Column::Index(&[3, -1])),
+            ],
+        )
+        .unwrap();
+        assert_eq!(
+            String::from_utf8(text).unwrap(),
+            "x_m,y_m,height_m,normal_x,normal_y,normal_z\n-0.05,1e-6,0.05,0,0.6,0.8\n\
+             coil,x_m,y_m,current_a\n7,0.05,0,1.3\nt_s,coil\n0.7,3\n30,-1\n"
+        );
+        row.current_a = f64::NAN;
+        let error = write_currents(&mut Vec::new(), &[row]).unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::InvalidData);
+        let uneven = [("a", Column::Number(&[0.7])), ("b", Column::Index(&[]))];
+        assert!(write_columns(&mut Vec::new(), &uneven).is_err());
+    }
+
+    #[test]
+    fn a_map_is_written_coil_by_coil_within_a_point() {
+        let mut map = MapArrays {
+            x_m: vec![0.1, 0.2].into(),
+            y_m: vec![0.3].into(),
+            z_m: vec![0.01].into(),
+            coil: vec![1, 4].into(),
+            gz_t_per_m_per_a: vec![0.5, 0.6, 0.7, 0.8].into(),
+            gradient_t_per_m_per_a: None,
+            field_t_per_a: None,
+            runtime: Runtime {
+                moment_a_m2: [0.0, 0.0, 1.0],
+                current_min_a: vec![],
+                current_max_a: vec![],
+                resistance_ohm: vec![],
+                total_current_max_a: None,
+                lambda_n_per_m: None,
+            },
+        };
+        let mut text = Vec::new();
+        write_map(&mut text, &map).unwrap();
+        assert_eq!(
+            String::from_utf8(text).unwrap(),
+            "x_m,y_m,z_m,coil,dbz_dz_t_per_m_per_a\n0.1,0.3,0.01,1,0.5\n0.1,0.3,0.01,4,0.7\n\
+             0.2,0.3,0.01,1,0.6\n0.2,0.3,0.01,4,0.8\n"
+        );
+        map.field_t_per_a = Some((0..12).map(f64::from).collect());
+        map.gradient_t_per_m_per_a = Some((100..136).map(f64::from).collect());
+        let mut text = Vec::new();
+        write_map(&mut text, &map).unwrap();
+        let text = String::from_utf8(text).unwrap();
+        assert!(
+            text.ends_with("0.2,0.3,0.01,4,9,10,11,127,128,129,130,131,132,133,134,135\n"),
+            "{text}"
+        );
+    }
+}

@@ -1,0 +1,162 @@
+//! Whole artefacts: a bundle, a map with its sidecar, a JSON result.
+
+use std::io;
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::artefact::FileEntry;
+use super::atomic::{FileSet, FolderDraft, Overwrite, WriteError, Written, write};
+use super::consistent;
+use super::json::to_json;
+use super::lambda_file::LambdaFile;
+use super::manifest::{Manifest, MapSidecar};
+use super::npz::{MapArrays, to_npz};
+use super::table::{CurrentRow, PointRow, write_currents, write_map, write_points};
+use super::vtk::write_vti;
+
+/// Everything a bundle holds but its timing.
+#[derive(Debug, Clone)]
+pub struct BundleContent<'a> {
+    /// Its `files` are filled in while writing.
+    pub manifest: Manifest,
+    /// `map.npz`.
+    pub map: &'a MapArrays<'a>,
+    /// `points.csv`.
+    pub points: &'a [PointRow],
+    /// `currents.csv`, one row a coil of the array.
+    pub currents: &'a [CurrentRow],
+    /// `lambda.json`.
+    pub lambda: &'a LambdaFile,
+}
+
+/// Refuses early, before a long computation, when the bundle at `target` must not be replaced.
+///
+/// # Errors
+/// [`WriteError`].
+pub fn check_bundle_target(
+    target: &Path,
+    force: bool,
+    manifest: &Manifest,
+) -> Result<(), WriteError> {
+    FolderDraft::begin(target, overwrite_bundle(target, force, manifest)).map(drop)
+}
+
+/// Writes a bundle whole or not at all; `timing` becomes `timing.json`, which no manifest lists.
+/// Returns the manifest as written.
+///
+/// # Errors
+/// [`WriteError`]; also when the parts contradict each other.
+pub fn write_bundle<T: Serialize + ?Sized>(
+    target: &Path,
+    force: bool,
+    content: &BundleContent,
+    timing: &T,
+) -> Result<Manifest, WriteError> {
+    let mut manifest = content.manifest.clone();
+    consistent::check(
+        &manifest,
+        content.map,
+        content.points,
+        content.currents,
+        content.lambda,
+    )
+    .map_err(|message| WriteError::Content {
+        path: target.to_path_buf(),
+        message,
+    })?;
+    let mut draft = FolderDraft::begin(target, overwrite_bundle(target, force, &manifest))?;
+    manifest.files = vec![
+        draft.write("map.npz", |out| {
+            out.write_all(&to_npz(content.map).map_err(invalid)?)
+        })?,
+        draft.write("points.csv", |out| write_points(out, content.points))?,
+        draft.write("currents.csv", |out| write_currents(out, content.currents))?,
+        draft.write("lambda.json", |out| {
+            out.write_all(&to_json(content.lambda).map_err(invalid)?)
+        })?,
+    ];
+    draft.write("timing.json", |out| {
+        out.write_all(&to_json(timing).map_err(invalid)?)
+    })?;
+    draft.write("manifest.json", |out| {
+        out.write_all(&to_json(&manifest).map_err(invalid)?)
+    })?;
+    draft.commit()?;
+    Ok(manifest)
+}
+
+fn overwrite_bundle(target: &Path, force: bool, manifest: &Manifest) -> Overwrite {
+    Overwrite::new(force, target.join("manifest.json"), &manifest.inputs)
+}
+
+/// Which formats of a map are wanted beside `map.npz`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct MapFormats {
+    /// `map.csv`.
+    pub csv: bool,
+    /// `map.vti`.
+    pub vtk: bool,
+}
+
+/// Writes `map.npz`, the other formats wanted, and `map.json` into `folder`. Returns the sidecar as
+/// written, its `files` filled in.
+///
+/// # Errors
+/// [`WriteError`].
+pub fn write_map_files(
+    folder: &Path,
+    force: bool,
+    sidecar: &MapSidecar,
+    map: &MapArrays,
+    formats: MapFormats,
+) -> Result<MapSidecar, WriteError> {
+    let mut sidecar = sidecar.clone();
+    let overwrite = Overwrite::new(force, folder.join("map.json"), &sidecar.inputs);
+    let mut set = FileSet::begin(folder, overwrite)?;
+    let mut put =
+        |set: &mut FileSet, name: &str, content: &dyn Fn(&mut dyn io::Write) -> io::Result<()>| {
+            set.write(name, content)
+                .map(|written| sidecar.files.push(entry(name, written)))
+        };
+    put(&mut set, "map.npz", &|out| {
+        out.write_all(&to_npz(map).map_err(invalid)?)
+    })?;
+    if formats.csv {
+        put(&mut set, "map.csv", &|out| write_map(out, map))?;
+    }
+    if formats.vtk {
+        put(&mut set, "map.vti", &|out| write_vti(out, map))?;
+    }
+    set.write("map.json", |out| {
+        out.write_all(&to_json(&sidecar).map_err(invalid)?)
+    })?;
+    set.commit()?;
+    Ok(sidecar)
+}
+
+/// Writes a JSON result that tells its own `inputs`.
+///
+/// # Errors
+/// [`WriteError`].
+pub fn write_json<T: Serialize + ?Sized>(
+    path: &Path,
+    overwrite: &Overwrite,
+    value: &T,
+) -> Result<Written, WriteError> {
+    write(path, overwrite, |out| {
+        out.write_all(&to_json(value).map_err(invalid)?)
+    })
+}
+
+fn entry(name: &str, written: Written) -> FileEntry {
+    FileEntry {
+        path: name.to_owned(),
+        bytes: written.bytes,
+        sha256: written.sha256,
+    }
+}
+
+fn invalid(error: impl std::error::Error + Send + Sync + 'static) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, error)
+}
