@@ -47,14 +47,22 @@ mod tests {
 
     #[test]
     fn ends_are_exact_and_nodes_mirror() {
-        let axis = Axis { from: -0.05, to: 0.05, samples: 61 };
+        let axis = Axis {
+            from: -0.05,
+            to: 0.05,
+            samples: 61,
+        };
         let nodes = axis.nodes();
         assert_eq!(nodes[0], -0.05);
         assert_eq!(nodes[60], 0.05);
         for i in 0..61 {
             assert_eq!(nodes[i], -nodes[60 - i]);
         }
-        let skew = Axis { from: 0.013, to: 0.071, samples: 30 };
+        let skew = Axis {
+            from: 0.013,
+            to: 0.071,
+            samples: 30,
+        };
         assert_eq!((skew.node(0), skew.node(29)), (0.013, 0.071));
     }
 }
