@@ -3,6 +3,9 @@
 pub mod axis;
 pub mod chebyshev;
 pub mod dispatch;
+pub mod double_double;
 pub mod dual;
 pub mod gauss;
 pub mod lagrange;
+pub mod qr;
+pub mod real;

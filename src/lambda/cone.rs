@@ -1,0 +1,267 @@
+//! Least squares over a cone: the direction in which the minimiser leaves a breakpoint.
+//!
+//! Lawson and Hanson's active-set method for non-negative least squares, with
+//! two-sided variables, either sign of one-sided ones, and one equality.
+
+use crate::numerics::real::Real;
+
+use super::model::{Factor, Model};
+
+/// How a variable may move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Role {
+    /// Not at all.
+    Fixed,
+    /// Both ways.
+    Free,
+    /// Both ways, but it gives way where columns depend on each other.
+    Held,
+    /// Upwards only.
+    Rising,
+    /// Downwards only.
+    Falling,
+}
+
+/// The minimiser of `|target - A d|` over the cone with `w'd = 0`.
+pub(super) struct Direction<T> {
+    /// d.
+    pub rate: Vec<T>,
+    /// `target - A d`.
+    pub residual: Vec<T>,
+    /// Reduced gradients `A'(residual) - nu w`.
+    pub gradient: Vec<T>,
+    /// Factor of the variables that move.
+    pub factor: Factor<T>,
+    /// One-sided variables that rounding alone would let in.
+    pub blocked: Vec<bool>,
+    /// False when the iteration limit was met: the direction is not the minimiser.
+    pub converged: bool,
+}
+
+/// Minimises `|target - A d|`.
+pub(super) fn solve<T: Real>(model: &Model<T>, roles: &[Role], target: &[T]) -> Direction<T> {
+    let count = model.count();
+    let target_norm = T::dot(target, target).sqrt();
+    let with_role = |role: Role| (0..count).filter(move |&i| roles[i] == role);
+    let mut basis: Vec<usize> = with_role(Role::Free).chain(with_role(Role::Held)).collect();
+    if basis.is_empty() && model.weight.is_some() {
+        basis.extend(first_of_the_sum(model, roles, target));
+    }
+    let mut factor = Factor::new(model, &basis);
+    let mut rate = vec![T::ZERO; count];
+    let mut blocked = vec![false; count];
+    // The variable that has just entered, and is not yet known to move the right way.
+    let mut entered = None;
+    let limit = 30 * (count + 3);
+    for _ in 0..limit {
+        let candidate = factor.solve(model, target, T::ZERO);
+        if let Some(violators) = step(roles, &basis, &mut rate, &candidate.x) {
+            match entered {
+                // In exact arithmetic a variable enters in the direction of its gradient.
+                Some(i) if violators.contains(&i) => {
+                    blocked[i] = true;
+                    basis.retain(|&j| j != i);
+                }
+                _ => basis.retain(|j| !violators.contains(j)),
+            }
+            entered = None;
+            factor = Factor::new(model, &basis);
+            continue;
+        }
+        if entered.take().is_some() {
+            blocked.fill(false);
+        }
+        let gradient = factor.gradient(model, &candidate.residual);
+        loop {
+            let best = most_wanted(
+                model,
+                roles,
+                &basis,
+                &blocked,
+                &gradient,
+                &factor,
+                target_norm,
+            );
+            let Some(i) = best else {
+                return Direction {
+                    rate,
+                    residual: candidate.residual,
+                    gradient,
+                    factor,
+                    blocked,
+                    converged: true,
+                };
+            };
+            if let Some(grown) = factor.with(model, &basis, i) {
+                factor = grown;
+                basis.push(i);
+                entered = Some(i);
+                break;
+            }
+            blocked[i] = true;
+        }
+    }
+    let last = factor.solve(model, target, T::ZERO);
+    let gradient = factor.gradient(model, &last.residual);
+    Direction {
+        rate: last.x,
+        residual: last.residual,
+        gradient,
+        factor,
+        blocked,
+        converged: false,
+    }
+}
+
+/// Where nothing two-sided carries the equality: the variable whose multiplier leaves
+/// every rising one satisfied (or, without rising ones, every falling one).
+fn first_of_the_sum<T: Real>(model: &Model<T>, roles: &[Role], target: &[T]) -> Option<usize> {
+    let pressure = |i: usize| T::dot(model.column(i), target) / model.weight_of(i);
+    let with_role = |role: Role| (0..roles.len()).filter(move |&i| roles[i] == role);
+    with_role(Role::Rising)
+        .reduce(|p, i| if pressure(i) > pressure(p) { i } else { p })
+        .or_else(|| {
+            with_role(Role::Falling).reduce(|p, i| if pressure(i) < pressure(p) { i } else { p })
+        })
+}
+
+fn moves_wrongly<T: Real>(role: Role, rate: T) -> bool {
+    match role {
+        Role::Rising => rate < T::ZERO,
+        Role::Falling => rate > T::ZERO,
+        _ => false,
+    }
+}
+
+/// Moves `rate` to `goal`, or as far as the signs allow; then the variables that stopped it.
+fn step<T: Real>(
+    roles: &[Role],
+    basis: &[usize],
+    rate: &mut Vec<T>,
+    goal: &[T],
+) -> Option<Vec<usize>> {
+    let mut share: Option<T> = None;
+    for &i in basis.iter().filter(|&&i| moves_wrongly(roles[i], goal[i])) {
+        let reach = rate[i] / (rate[i] - goal[i]);
+        share = Some(share.map_or(reach, |s| s.smaller(reach)));
+    }
+    let Some(share) = share else {
+        rate.clear();
+        rate.extend_from_slice(goal);
+        return None;
+    };
+    let mut stopped = Vec::new();
+    for &i in basis {
+        if moves_wrongly(roles[i], goal[i]) && rate[i] / (rate[i] - goal[i]) <= share {
+            stopped.push(i);
+        }
+    }
+    for (r, &g) in rate.iter_mut().zip(goal) {
+        *r += share * (g - *r);
+    }
+    for &i in &stopped {
+        rate[i] = T::ZERO;
+    }
+    Some(stopped)
+}
+
+/// The one-sided variable outside the basis with the largest relative gain.
+fn most_wanted<T: Real>(
+    model: &Model<T>,
+    roles: &[Role],
+    basis: &[usize],
+    blocked: &[bool],
+    gradient: &[T],
+    factor: &Factor<T>,
+    target_norm: T,
+) -> Option<usize> {
+    let noise = T::of(factor.noise()) * target_norm;
+    let mut best: Option<(usize, T)> = None;
+    for i in (0..roles.len()).filter(|&i| !blocked[i]) {
+        let gain = match roles[i] {
+            Role::Rising => gradient[i],
+            Role::Falling => -gradient[i],
+            _ => continue,
+        };
+        let scale = factor.gradient_scale(model, i);
+        if gain <= noise * scale || basis.contains(&i) {
+            continue;
+        }
+        let relative = gain / scale;
+        if best.is_none_or(|(_, most)| relative > most) {
+            best = Some((i, relative));
+        }
+    }
+    best.map(|(i, _)| i)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Columns in R^3 with generic entries; the last is the slack of a sum.
+    fn model(weight: Option<Vec<f64>>) -> Model<f64> {
+        let columns = vec![1.3, 0.2, -0.4, 0.7, 1.1, 0.3, -0.6, 0.9, 1.7, 0.0, 0.0, 0.0];
+        Model::new(3, columns, weight)
+    }
+
+    /// The gradient must vanish for what moves and point outwards for what does not.
+    fn assert_optimal(model: &Model<f64>, roles: &[Role], target: &[f64]) {
+        let d = solve(model, roles, target);
+        assert!(d.converged);
+        let mut residual = target.to_vec();
+        for i in 0..4 {
+            f64::add_scaled(&mut residual, -d.rate[i], model.column(i));
+        }
+        let sum: f64 = (0..4).map(|i| model.weight_of(i) * d.rate[i]).sum();
+        assert!(sum.abs() < 1e-14);
+        for i in 0..4 {
+            assert!((residual[i.min(2)] - d.residual[i.min(2)]).abs() < 1e-14);
+            assert!(!moves_wrongly(roles[i], d.rate[i]));
+            let g = d.gradient[i];
+            match roles[i] {
+                Role::Rising => assert!(g < 1e-13 && (g * d.rate[i]).abs() < 1e-13),
+                Role::Falling => assert!(g > -1e-13 && (g * d.rate[i]).abs() < 1e-13),
+                Role::Free | Role::Held => assert!(g.abs() < 1e-13),
+                Role::Fixed => assert_eq!(d.rate[i], 0.0),
+            }
+        }
+    }
+
+    #[test]
+    fn every_combination_of_roles_is_solved_to_its_optimality_conditions() {
+        use Role::{Falling, Fixed, Free, Held, Rising};
+        let all = [Fixed, Free, Held, Rising, Falling];
+        let targets = [
+            [0.7, -1.3, 0.4],
+            [-0.9, 0.1, 1.6],
+            [0.3, 0.8, 0.5],
+            [-1.1, -0.6, -0.2],
+        ];
+        for weight in [None, Some(vec![0.7, 1.3, 0.4, 1.0])] {
+            let model = model(weight);
+            for code in 0..625 {
+                let roles = [
+                    all[code % 5],
+                    all[code / 5 % 5],
+                    all[code / 25 % 5],
+                    all[code / 125],
+                ];
+                if roles == [Fixed; 4] {
+                    continue;
+                }
+                for target in &targets {
+                    assert_optimal(&model, &roles, target);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_copied_column_is_held_still() {
+        let model = Model::new(2, vec![0.7, 1.3, 0.7, 1.3], None);
+        let d = solve(&model, &[Role::Free, Role::Held], &[1.1, 0.4]);
+        assert!(d.factor.contains(0) && !d.factor.contains(1));
+        assert_eq!(d.rate[1], 0.0);
+    }
+}

@@ -1,0 +1,214 @@
+//! The force constants on a followed path (eq. 10), in scaled units.
+
+use crate::numerics::real::Real;
+
+use super::follow::{Bounds, Piece, Trace};
+use super::model::Model;
+
+/// e* and the error e_0 without upper limits, both as functions of lambda.
+pub(super) struct Comparison<'a, T> {
+    /// The path under all limits.
+    pub limited: &'a Trace<T>,
+    /// The path without upper limits and without a limit on the sum.
+    pub unlimited: &'a Trace<T>,
+    /// Mean of h^2, scaled.
+    pub mean_square: T,
+}
+
+/// On one stretch between breakpoints of either path.
+struct Stretch<'a, T> {
+    start: T,
+    end: Option<T>,
+    limited: &'a Piece<T>,
+    unlimited: &'a Piece<T>,
+}
+
+fn square<T: Real>(v: &[T]) -> T {
+    T::dot(v, v)
+}
+
+impl<T: Real> Stretch<'_, T> {
+    /// `e* - e_0` at `start + step` as coefficients of 1, step, step^2.
+    fn excess(&self) -> [T; 3] {
+        let (r, s) = (
+            self.limited.residual_at(self.start),
+            self.unlimited.residual_at(self.start),
+        );
+        let (dr, ds) = (&self.limited.residual_rate, &self.unlimited.residual_rate);
+        let two = T::of(2.0);
+        [
+            square(&r) - square(&s),
+            two * (T::dot(&r, dr) - T::dot(&s, ds)),
+            square(dr) - square(ds),
+        ]
+    }
+}
+
+impl<'a, T: Real> Comparison<'a, T> {
+    fn stretches(&self) -> Vec<Stretch<'a, T>> {
+        let (mut i, mut k) = (0, 0);
+        let (a, b) = (&self.limited.pieces, &self.unlimited.pieces);
+        let mut start = T::ZERO;
+        let mut all = Vec::new();
+        loop {
+            let (next_a, next_b) = (a.get(i + 1).map(|p| p.start), b.get(k + 1).map(|p| p.start));
+            let end = match (next_a, next_b) {
+                (Some(x), Some(y)) => Some(x.smaller(y)),
+                (x, y) => x.or(y),
+            };
+            all.push(Stretch {
+                start,
+                end,
+                limited: &a[i],
+                unlimited: &b[k],
+            });
+            let Some(end) = end else {
+                return all;
+            };
+            i += usize::from(next_a == Some(end));
+            k += usize::from(next_b == Some(end));
+            start = end;
+        }
+    }
+
+    /// Where the first limit binds, if the unlimited currents are unique: the first lambda at
+    /// which they leave the bounds (slack last in the model, its weights among `limited`'s).
+    pub fn linear(&self, model: &Model<T>, bounds: &Bounds<T>) -> Option<T> {
+        let slope = self.mean_square.sqrt();
+        let pieces = &self.unlimited.pieces;
+        let coils = pieces[0].x.len();
+        let mut first: Option<T> = None;
+        for (k, piece) in pieces.iter().enumerate() {
+            let floor = T::of(piece.noise) * slope;
+            let mut meet = |distance: T, rate: T, floor: T| {
+                let lambda = if distance < T::ZERO {
+                    piece.start
+                } else if rate > floor {
+                    piece.start + distance / rate
+                } else {
+                    return;
+                };
+                let within = pieces.get(k + 1).is_none_or(|next| lambda <= next.start);
+                if within && first.is_none_or(|least| lambda < least) {
+                    first = Some(lambda);
+                }
+            };
+            // Of the sum: its value, its rate, and the rate that rounding may make up.
+            let mut sums = [T::ZERO; 3];
+            for i in 0..coils {
+                let (x, rate, weight) = (piece.x[i], piece.x_rate[i], model.weight_of(i));
+                let blur = floor + T::of(piece.noise) * rate.abs();
+                for (sum, term) in sums.iter_mut().zip([x, rate, blur]) {
+                    *sum += weight * term;
+                }
+                if let Some(upper) = bounds.upper[i] {
+                    meet(beyond_rounding(upper - x, floor * piece.start), rate, floor);
+                }
+            }
+            if model.weight.is_some() {
+                meet(
+                    beyond_rounding(bounds.total - sums[0], sums[2] * piece.start),
+                    sums[1],
+                    sums[2],
+                );
+            }
+            if first.is_some() {
+                return first;
+            }
+        }
+        None
+    }
+
+    /// The same from the errors alone: the start of the first stretch on which e* leaves e_0.
+    pub fn linear_by_error(&self) -> Option<T> {
+        let visible = T::of(T::EPSILON.powf(0.75)) * self.mean_square;
+        self.stretches().iter().find_map(|stretch| {
+            let length = match stretch.end {
+                Some(end) => end - stretch.start,
+                None => stretch.start + T::ONE,
+            };
+            let lambda = stretch.start + length;
+            let [c, b, a] = stretch.excess();
+            let excess = c + length * (b + length * a);
+            (excess > visible * lambda * lambda).then_some(stretch.start)
+        })
+    }
+
+    /// The largest lambda with `e* - e_0 <= weight^2 lambda^2 mean(h^2)`; `None`: all of them.
+    pub fn jnd(&self, weight: f64) -> Option<T> {
+        let share = T::of(weight) * T::of(weight) * self.mean_square;
+        for stretch in self.stretches().iter().rev() {
+            let start = stretch.start;
+            let [c, b, a] = stretch.excess();
+            let c = c - share * start * start;
+            let b = b - T::of(2.0) * share * start;
+            let a = a - share;
+            if stretch.end.is_none() && a <= T::ZERO {
+                return None;
+            }
+            let crossing = upward_crossing(a, b, c);
+            if c <= T::ZERO {
+                // The signs at both ends decide; the root may miss an end by rounding.
+                let lambda = crossing.map(|step| start + step);
+                return lambda.map_or(stretch.end, |l| {
+                    Some(stretch.end.map_or(l, |end| l.smaller(end)))
+                });
+            }
+            if let Some(step) = crossing
+                && stretch.end.is_none_or(|end| start + step < end)
+            {
+                return Some(start + step);
+            }
+        }
+        Some(T::ZERO)
+    }
+}
+
+/// A distance that rounding may have made negative is zero.
+fn beyond_rounding<T: Real>(distance: T, rounding: T) -> T {
+    if distance.abs() <= rounding {
+        T::ZERO
+    } else {
+        distance
+    }
+}
+
+/// The step >= 0 at which `c + b step + a step^2` crosses zero upwards.
+fn upward_crossing<T: Real>(a: T, b: T, c: T) -> Option<T> {
+    let four = T::of(4.0);
+    let discriminant = b * b - four * a * c;
+    if discriminant < T::ZERO {
+        return None;
+    }
+    let root = discriminant.sqrt();
+    let two = T::of(2.0);
+    let step = if b > T::ZERO {
+        -(two * c) / (b + root)
+    } else if a == T::ZERO {
+        return None;
+    } else {
+        (root - b) / (two * a)
+    };
+    (step >= T::ZERO).then_some(step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::upward_crossing;
+
+    #[test]
+    fn upward_crossings_are_found_on_either_side_of_a_parabola() {
+        // (s - 0.3)(s - 0.7): upwards at 0.7; its negative: upwards at 0.3.
+        let close = |a: Option<f64>, b: f64| a.is_some_and(|a| (a - b).abs() < 1e-15);
+        assert!(close(upward_crossing(1.0, -1.0, 0.21), 0.7));
+        assert!(close(upward_crossing(-1.0, 1.0, -0.21), 0.3));
+        assert!(close(upward_crossing(0.0, 1.3, -0.26), 0.2));
+        assert_eq!(upward_crossing(1.3, 0.7, 0.4), None);
+        assert_eq!(upward_crossing(0.0, -1.3, 0.26), None);
+        // A tiny root of a nearly straight line is not lost to cancellation.
+        assert!(close(
+            upward_crossing(1e-17, 1.3, -1.3e-9).map(|s| s / 1e-9),
+            1.0
+        ));
+    }
+}

@@ -1,0 +1,311 @@
+//! Least squares over scaled currents: columns, their factorisation, an optional sum row.
+
+use crate::numerics::real::Real;
+
+/// Columns `a_i` of one least-squares problem and the weights of its equality
+/// `sum w_i x_i = total` (a limit on the sum enters as an equality with a slack
+/// variable, whose column is zero).
+#[derive(Debug, Clone)]
+pub(super) struct Model<T> {
+    /// Length of a column.
+    pub rows: usize,
+    columns: Vec<T>,
+    /// Euclidean norms of the columns.
+    pub norm: Vec<T>,
+    /// Positive weights of the equality, if there is one.
+    pub weight: Option<Vec<T>>,
+}
+
+/// A column whose part outside the span of the others is below this share depends on them.
+pub(super) fn dependence<T: Real>() -> f64 {
+    T::EPSILON.powf(0.8)
+}
+
+impl<T: Real> Model<T> {
+    /// Columns stored one after another, `rows` entries each.
+    pub fn new(rows: usize, columns: Vec<T>, weight: Option<Vec<T>>) -> Self {
+        let norm = columns
+            .chunks_exact(rows)
+            .map(|c| T::dot(c, c).sqrt())
+            .collect();
+        Self {
+            rows,
+            columns,
+            norm,
+            weight,
+        }
+    }
+
+    /// Number of variables.
+    pub fn count(&self) -> usize {
+        self.norm.len()
+    }
+
+    /// Column `i`.
+    pub fn column(&self, i: usize) -> &[T] {
+        &self.columns[i * self.rows..(i + 1) * self.rows]
+    }
+
+    /// Weight of variable `i` in the equality, 0 without one.
+    pub fn weight_of(&self, i: usize) -> T {
+        self.weight.as_ref().map_or(T::ZERO, |w| w[i])
+    }
+
+    /// `target - sum a_i x_i` over the listed variables, and what they leave of `total`.
+    pub fn remainder(
+        &self,
+        target: &[T],
+        total: T,
+        fixed: impl Iterator<Item = (usize, T)>,
+    ) -> (Vec<T>, T) {
+        let (mut rest, mut left) = (target.to_vec(), total);
+        for (i, x) in fixed {
+            if x != T::ZERO {
+                T::add_scaled(&mut rest, -x, self.column(i));
+                left -= self.weight_of(i) * x;
+            }
+        }
+        (rest, left)
+    }
+}
+
+/// Householder factorisation of chosen columns with the equality eliminated: the pivot
+/// is the chosen variable of the smallest column per weight, so that the reduced columns
+/// `a_j - (w_j / w_p) a_p` never grow beyond twice the originals.
+#[derive(Debug, Clone)]
+pub(super) struct Factor<T> {
+    rows: usize,
+    pivot: Option<usize>,
+    /// Variables in the order of their columns, the pivot not among them.
+    members: Vec<usize>,
+    /// Householder vectors, `rows` entries each.
+    reflectors: Vec<T>,
+    scales: Vec<T>,
+    /// Columns of the triangle, `rows` entries each.
+    triangle: Vec<T>,
+    /// Smallest share of a member's column that lies outside the span of those before it.
+    independence: f64,
+}
+
+/// The minimiser over the members of a factor.
+pub(super) struct Minimiser<T> {
+    /// One entry a variable; zero where not a member.
+    pub x: Vec<T>,
+    /// Target minus fit.
+    pub residual: Vec<T>,
+}
+
+impl<T: Real> Factor<T> {
+    /// Factorises the listed variables in order, leaving out those that depend on earlier ones.
+    pub fn new(model: &Model<T>, variables: &[usize]) -> Self {
+        let pivot = model.weight.as_ref().and_then(|w| {
+            let per_weight = |i: usize| model.norm[i] / w[i];
+            variables
+                .iter()
+                .copied()
+                .reduce(|p, i| if per_weight(i) < per_weight(p) { i } else { p })
+        });
+        let mut factor = Self {
+            rows: model.rows,
+            pivot,
+            members: Vec::with_capacity(variables.len()),
+            reflectors: Vec::new(),
+            scales: Vec::new(),
+            triangle: Vec::new(),
+            independence: 1.0,
+        };
+        for &i in variables {
+            factor.push(model, i);
+        }
+        factor
+    }
+
+    /// Adds `variable` to a factor of `before`; `None` if it depends on them.
+    pub fn with(&self, model: &Model<T>, before: &[usize], variable: usize) -> Option<Self> {
+        let changes_pivot = match (self.pivot, &model.weight) {
+            (Some(p), Some(w)) => model.norm[variable] * w[p] < model.norm[p] * w[variable],
+            (None, Some(_)) => true,
+            _ => false,
+        };
+        let grown = if changes_pivot {
+            let all: Vec<usize> = before.iter().copied().chain([variable]).collect();
+            Self::new(model, &all)
+        } else {
+            let mut grown = self.clone();
+            grown.push(model, variable);
+            grown
+        };
+        (grown.rank() > self.rank()).then_some(grown)
+    }
+
+    /// Takes the listed variables by the part of their columns that lies outside the span
+    /// of those taken, largest share first, as long as it is above `share`.
+    pub fn pivoted(model: &Model<T>, variables: &[usize], share: f64) -> Self {
+        let mut taken = Vec::new();
+        let mut factor = Self::new(model, &taken);
+        loop {
+            let outside = |i: usize| {
+                let rest = factor.solve(model, model.column(i), T::ZERO).residual;
+                (T::dot(&rest, &rest).sqrt() / model.norm[i]).to_f64()
+            };
+            let best = variables
+                .iter()
+                .filter(|&&i| model.norm[i] > T::ZERO && !factor.contains(i))
+                .map(|&i| (i, outside(i)))
+                .reduce(|a, b| if b.1 > a.1 { b } else { a });
+            let grown = match best {
+                Some((i, part)) if part > share => {
+                    let grown = factor.with(model, &taken, i);
+                    taken.push(i);
+                    grown
+                }
+                _ => None,
+            };
+            let Some(grown) = grown else {
+                return factor;
+            };
+            factor = grown;
+        }
+    }
+
+    /// Number of variables that may move: the members and the pivot.
+    pub fn rank(&self) -> usize {
+        self.members.len() + usize::from(self.pivot.is_some())
+    }
+
+    /// Whether `variable` may move.
+    pub fn contains(&self, variable: usize) -> bool {
+        self.pivot == Some(variable) || self.members.contains(&variable)
+    }
+
+    /// Relative size of what rounding leaves where zero is meant.
+    pub fn noise(&self) -> f64 {
+        (16 * self.rows) as f64 * T::EPSILON / self.independence
+    }
+
+    fn push(&mut self, model: &Model<T>, variable: usize) {
+        let (rows, rank) = (self.rows, self.members.len());
+        if self.pivot == Some(variable) || rank == rows {
+            return;
+        }
+        let mut column = model.column(variable).to_vec();
+        if let Some(p) = self.pivot {
+            T::add_scaled(
+                &mut column,
+                -(model.weight_of(variable) / model.weight_of(p)),
+                model.column(p),
+            );
+        }
+        self.reflect(&mut column);
+        let outside = T::dot(&column[rank..], &column[rank..]).sqrt();
+        if outside <= model.norm[variable] * T::of(dependence::<T>()) {
+            return;
+        }
+        self.independence = self
+            .independence
+            .min((outside / model.norm[variable]).to_f64());
+        let diagonal = if column[rank] > T::ZERO {
+            -outside
+        } else {
+            outside
+        };
+        let mut reflector = column.clone();
+        reflector[..rank].fill(T::ZERO);
+        reflector[rank] -= diagonal;
+        self.scales.push(-(T::ONE / (diagonal * reflector[rank])));
+        self.reflectors.extend(reflector);
+        column[rank] = diagonal;
+        self.triangle.extend(column);
+        self.members.push(variable);
+    }
+
+    fn reflect_by(&self, k: usize, vector: &mut [T]) {
+        let reflector = &self.reflectors[k * self.rows + k..(k + 1) * self.rows];
+        let factor = -(self.scales[k] * T::dot(reflector, &vector[k..]));
+        T::add_scaled(&mut vector[k..], factor, reflector);
+    }
+
+    /// Multiplies by Q'.
+    fn reflect(&self, vector: &mut [T]) {
+        for k in 0..self.members.len() {
+            self.reflect_by(k, vector);
+        }
+    }
+
+    /// Minimises `|target - sum a_i x_i|` over the members with `sum w_i x_i = total`.
+    pub fn solve(&self, model: &Model<T>, target: &[T], total: T) -> Minimiser<T> {
+        let rank = self.members.len();
+        let mut rest = target.to_vec();
+        if let Some(p) = self.pivot {
+            T::add_scaled(&mut rest, -(total / model.weight_of(p)), model.column(p));
+        }
+        self.reflect(&mut rest);
+        let mut x = vec![T::ZERO; model.count()];
+        let mut left = total;
+        for k in (0..rank).rev() {
+            let column = &self.triangle[k * self.rows..(k + 1) * self.rows];
+            let value = rest[k] / column[k];
+            T::add_scaled(&mut rest[..k], -value, &column[..k]);
+            x[self.members[k]] = value;
+            left -= model.weight_of(self.members[k]) * value;
+        }
+        if let Some(p) = self.pivot {
+            x[p] = left / model.weight_of(p);
+        }
+        // The residual is what no member reaches, turned back: no cancellation.
+        rest[..rank].fill(T::ZERO);
+        for k in (0..rank).rev() {
+            self.reflect_by(k, &mut rest);
+        }
+        Minimiser { x, residual: rest }
+    }
+
+    /// An orthonormal basis of the members' columns (reduced ones, with an equality).
+    pub fn orthonormal(&self) -> Vec<Vec<T>> {
+        let rank = self.members.len();
+        (0..rank)
+            .map(|k| {
+                let mut vector = vec![T::ZERO; self.rows];
+                vector[k] = T::ONE;
+                for l in (0..rank).rev() {
+                    self.reflect_by(l, &mut vector);
+                }
+                vector
+            })
+            .collect()
+    }
+
+    /// Reduced gradients `a_i'r - nu w_i` of every variable; zero for the members.
+    pub fn gradient(&self, model: &Model<T>, residual: &[T]) -> Vec<T> {
+        let nu = self.pivot.map_or(T::ZERO, |p| {
+            T::dot(model.column(p), residual) / model.weight_of(p)
+        });
+        let mut gradient: Vec<T> = (0..model.count())
+            .map(|i| T::dot(model.column(i), residual) - nu * model.weight_of(i))
+            .collect();
+        for &i in self.members.iter().chain(&self.pivot) {
+            gradient[i] = T::ZERO;
+        }
+        gradient
+    }
+
+    /// Natural size of variable `i`'s reduced gradient per unit of residual.
+    pub fn gradient_scale(&self, model: &Model<T>, i: usize) -> T {
+        let shift = self
+            .pivot
+            .map_or(T::ZERO, |p| model.norm[p] / model.weight_of(p));
+        model.norm[i] + model.weight_of(i) * shift
+    }
+
+    /// Size of a rate that rounding leaves where variable `i` should stand still.
+    pub fn rate_noise(&self, model: &Model<T>, i: usize, rates: &[T], target_norm: T) -> T {
+        let mut scale = target_norm;
+        if self.pivot == Some(i) {
+            let moved = self.members.iter().fold(T::ZERO, |s, &j| {
+                s + model.weight_of(j) * (rates[j].abs() + target_norm)
+            });
+            scale = scale.larger(moved / model.weight_of(i));
+        }
+        scale * T::of(self.noise())
+    }
+}

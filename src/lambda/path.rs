@@ -1,0 +1,419 @@
+//! The solved path in SI units: errors and currents at any force constant.
+
+use std::fmt;
+
+use crate::numerics::double_double::DoubleDouble;
+use crate::numerics::real::Real;
+
+use super::follow::{Bounds, Piece, Place, Trace};
+use super::model::Model;
+use super::power;
+use super::problem::ForceProblem;
+use super::reduce::{Reduced, power_of_two, times_power};
+
+/// What changes at a breakpoint. Coils are numbered from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Event {
+    /// A coil begins to carry current.
+    LeavesZero(usize),
+    /// A coil's current has gone back to zero and stays there.
+    ReturnsToZero(usize),
+    /// A coil meets its upper limit.
+    MeetsUpper(usize),
+    /// A coil comes back from its upper limit.
+    LeavesUpper(usize),
+    /// A coil meets its lower limit (below zero).
+    MeetsLower(usize),
+    /// A coil comes back from its lower limit (below zero).
+    LeavesLower(usize),
+    /// The sum of the currents meets its limit.
+    TotalMeetsLimit,
+    /// The sum of the currents falls below its limit again.
+    TotalLeavesLimit,
+}
+
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::LeavesZero(i) => write!(f, "coil {i} leaves zero"),
+            Self::ReturnsToZero(i) => write!(f, "coil {i} returns to zero"),
+            Self::MeetsUpper(i) => write!(f, "coil {i} meets its upper limit"),
+            Self::LeavesUpper(i) => write!(f, "coil {i} comes back from its upper limit"),
+            Self::MeetsLower(i) => write!(f, "coil {i} meets its lower limit"),
+            Self::LeavesLower(i) => write!(f, "coil {i} comes back from its lower limit"),
+            Self::TotalMeetsLimit => write!(f, "the sum meets its limit"),
+            Self::TotalLeavesLimit => write!(f, "the sum leaves its limit"),
+        }
+    }
+}
+
+/// A force constant at which the path turns.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Breakpoint {
+    /// Force constant, N/m.
+    pub lambda_n_per_m: f64,
+    /// Currents there, A.
+    pub currents_a: Vec<f64>,
+    /// What changes there; several at once are common.
+    pub events: Vec<Event>,
+}
+
+/// Where a coil or the sum stands between two breakpoints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Standing {
+    Lower,
+    Upper,
+    Between,
+}
+
+/// One piece in SI units.
+#[derive(Debug, Clone)]
+struct SiPiece {
+    /// Its start and what that rounds off: on a steep piece the remainder counts.
+    start: f64,
+    start_rest: f64,
+    currents: Vec<f64>,
+    rates: Vec<f64>,
+    residual: Vec<f64>,
+    residual_rate: Vec<f64>,
+    /// Per coil, then for the sum.
+    standing: Vec<Standing>,
+}
+
+/// What least-power currents need where the currents of a minimiser are not unique.
+#[derive(Debug, Clone)]
+struct Ambiguous {
+    model: Model<DoubleDouble>,
+    bounds: Bounds<DoubleDouble>,
+    pieces: Vec<Piece<DoubleDouble>>,
+    cost: Vec<DoubleDouble>,
+    heights: DoubleDouble,
+    lambda_scale: i32,
+}
+
+/// e* and the currents as functions of the force constant, exact on every piece.
+#[derive(Debug, Clone)]
+pub struct Path {
+    pieces: Vec<SiPiece>,
+    ambiguous: Option<Box<Ambiguous>>,
+    lower_a: Vec<f64>,
+    upper_a: Vec<f64>,
+    total_max_a: Option<f64>,
+    current_scale: Vec<i32>,
+    /// First pieces after each breakpoint.
+    turns: Vec<usize>,
+}
+
+impl Path {
+    /// Converts a scaled path.
+    pub(super) fn new<T: Real>(
+        problem: &ForceProblem,
+        reduced: &Reduced<T>,
+        bounds: &Bounds<T>,
+        trace: &Trace<T>,
+    ) -> Self {
+        let coils = problem.coils();
+        let force = reduced.force_unit_n();
+        let scale = reduced.lambda_scale;
+        let current_scale: Vec<i32> = (0..coils).map(|i| reduced.current_scale(i)).collect();
+        let pieces = trace
+            .pieces
+            .iter()
+            .map(|piece| {
+                let nearest = piece.start.to_f64();
+                let rest = (piece.start - T::of(nearest)).to_f64();
+                let (x, residual) = (&piece.x, &piece.residual);
+                let current =
+                    |i: usize, v: T, more: i32| times_power(v.to_f64(), more - current_scale[i]);
+                SiPiece {
+                    start: times_power(nearest, scale),
+                    start_rest: times_power(rest, scale),
+                    currents: (0..coils).map(|i| current(i, x[i], 0)).collect(),
+                    rates: (0..coils)
+                        .map(|i| current(i, piece.x_rate[i], -scale))
+                        .collect(),
+                    residual: residual.iter().map(|v| v.to_f64() * force).collect(),
+                    residual_rate: piece
+                        .residual_rate
+                        .iter()
+                        .map(|v| times_power(v.to_f64() * force, -scale))
+                        .collect(),
+                    standing: (0..piece.x.len())
+                        .map(|i| {
+                            let upper = bounds.upper[i].unwrap_or(bounds.total);
+                            standing_of(
+                                piece.place[i],
+                                x[i],
+                                piece.x_rate[i],
+                                bounds.lower[i],
+                                upper,
+                            )
+                        })
+                        .collect(),
+                }
+            })
+            .collect();
+        let mut path = Self {
+            pieces,
+            ambiguous: None,
+            lower_a: problem.lower_a.to_vec(),
+            upper_a: problem.upper_a.to_vec(),
+            total_max_a: problem.total_max_a,
+            current_scale,
+            turns: Vec::new(),
+        };
+        path.turns = path.turns();
+        path
+    }
+
+    /// Makes `currents` those of least power among equally good ones.
+    pub(super) fn with_least_power(
+        mut self,
+        problem: &ForceProblem,
+        reduced: &Reduced<DoubleDouble>,
+        trace: &Trace<DoubleDouble>,
+    ) -> Self {
+        let (model, bounds) = reduced.limited(problem);
+        let most = self.current_scale.iter().copied().max().unwrap_or(0);
+        let cost = problem
+            .resistance_ohm
+            .iter()
+            .zip(&self.current_scale)
+            .map(|(&ohm, &k)| {
+                Real::sqrt(DoubleDouble::of(ohm)) * DoubleDouble::of(power_of_two(most - k))
+            })
+            .collect();
+        let heights = reduced.heights();
+        self.ambiguous = Some(Box::new(Ambiguous {
+            model,
+            bounds,
+            pieces: trace.pieces.clone(),
+            cost,
+            heights: Real::sqrt(DoubleDouble::dot(heights, heights)),
+            lambda_scale: reduced.lambda_scale,
+        }));
+        self.turns = self.turns();
+        self
+    }
+
+    /// Index of the piece that holds `lambda`, and the step from its start.
+    fn locate(&self, lambda: f64) -> (usize, f64) {
+        let step = |piece: &SiPiece| (lambda - piece.start) - piece.start_rest;
+        let index = self
+            .pieces
+            .partition_point(|piece| step(piece) >= 0.0)
+            .saturating_sub(1);
+        (index, step(&self.pieces[index]))
+    }
+
+    /// Mean square error e*(lambda), N^2, for `lambda_n_per_m >= 0`.
+    #[must_use]
+    pub fn error_n2(&self, lambda_n_per_m: f64) -> f64 {
+        let (index, step) = self.locate(lambda_n_per_m);
+        let piece = &self.pieces[index];
+        let square = |(r, d): (&f64, &f64)| (r + step * d).powi(2);
+        piece
+            .residual
+            .iter()
+            .zip(&piece.residual_rate)
+            .map(square)
+            .sum()
+    }
+
+    /// The best currents at `lambda_n_per_m >= 0`, A; where several are equally good, those of
+    /// least power.
+    #[must_use]
+    pub fn currents_a(&self, lambda_n_per_m: f64) -> Vec<f64> {
+        let (index, step) = self.locate(lambda_n_per_m);
+        let coils = self.upper_a.len();
+        let within = |i: usize, current: f64| current.clamp(self.lower_a[i], self.upper_a[i]) + 0.0;
+        if let Some(a) = &self.ambiguous {
+            let lambda = DoubleDouble::of(times_power(lambda_n_per_m, -a.lambda_scale));
+            let norm = lambda * a.heights;
+            let x =
+                power::least_power(&a.model, &a.bounds, &a.cost, &a.pieces[index], lambda, norm);
+            return (0..coils)
+                .map(|i| within(i, times_power(x[i].to_f64(), -self.current_scale[i])))
+                .collect();
+        }
+        let piece = &self.pieces[index];
+        (0..coils)
+            .map(|i| within(i, piece.currents[i] + step * piece.rates[i]))
+            .collect()
+    }
+
+    /// `e* = A lambda^2 + B lambda + C` on every piece: its start, N/m, and A, B, C.
+    #[must_use]
+    pub fn quadratics(&self) -> Vec<(f64, [f64; 3])> {
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+        self.turns
+            .iter()
+            .map(|&k| {
+                let piece = &self.pieces[k];
+                let a = dot(&piece.residual_rate, &piece.residual_rate);
+                let b = 2.0 * dot(&piece.residual, &piece.residual_rate);
+                let c = dot(&piece.residual, &piece.residual);
+                (
+                    piece.start,
+                    [
+                        a,
+                        b - 2.0 * a * piece.start,
+                        c + piece.start * (a * piece.start - b),
+                    ],
+                )
+            })
+            .collect()
+    }
+
+    /// All force constants at which the path turns, from 0 on, with currents and events.
+    #[must_use]
+    pub fn breakpoints(&self) -> Vec<Breakpoint> {
+        let mut before = self.standing_at_zero();
+        let mut all = Vec::with_capacity(self.turns.len());
+        for (k, &turn) in self.turns.iter().enumerate() {
+            let start = self.pieces[turn].start;
+            let end = self.turns.get(k + 1).map(|&next| self.pieces[next].start);
+            let after = self.standing(turn, end);
+            let mut events = Vec::new();
+            for i in 0..after.len() {
+                self.changes(i, before[i], after[i], &mut events);
+            }
+            if k == 0 {
+                self.first_moves(&after, end, &mut events);
+            }
+            all.push(Breakpoint {
+                lambda_n_per_m: start,
+                currents_a: self.currents_a(start),
+                events,
+            });
+            before = after;
+        }
+        all
+    }
+
+    /// First force constant beyond which no coil follows any more; `None` where the path never turns.
+    pub(super) fn last_turn(&self) -> Option<f64> {
+        let last = self.turns.last().map(|&k| self.pieces[k].start);
+        last.filter(|&lambda| lambda > 0.0)
+    }
+
+    /// Pieces at which something visible changes: ties within rounding count once, and where
+    /// currents are ambiguous only a change of the fit counts.
+    fn turns(&self) -> Vec<usize> {
+        let mut turns = vec![0];
+        for (k, piece) in self.pieces.iter().enumerate().skip(1) {
+            let last = turns[turns.len() - 1];
+            let before = &self.pieces[last];
+            let scale: f64 = before.residual_rate.iter().map(|v| v.abs()).sum();
+            let change = piece.residual_rate.iter().zip(&before.residual_rate);
+            let same_fit =
+                change.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs())) <= 1e-14 * scale;
+            let same_standing = self.ambiguous.is_some() || piece.standing == before.standing;
+            if same_fit && same_standing {
+                continue;
+            }
+            if piece.start - before.start <= 1e-14 * piece.start {
+                turns.pop();
+            }
+            turns.push(k);
+        }
+        turns
+    }
+
+    fn standing_at_zero(&self) -> Vec<Standing> {
+        let of_coil = |i: usize| match (self.lower_a[i] < 0.0, self.upper_a[i] > 0.0) {
+            (true, true) => Standing::Between,
+            (true, false) => Standing::Upper,
+            _ => Standing::Lower,
+        };
+        let mut standing: Vec<Standing> = (0..self.upper_a.len()).map(of_coil).collect();
+        standing.extend(self.total_max_a.map(|_| Standing::Between));
+        standing
+    }
+
+    /// Standing on the piece `turn`, which lasts until `end`.
+    fn standing(&self, turn: usize, end: Option<f64>) -> Vec<Standing> {
+        if self.ambiguous.is_none() {
+            return self.pieces[turn].standing.clone();
+        }
+        let start = self.pieces[turn].start;
+        let currents = self.currents_a(end.map_or(2.0 * start + 1.0, |end| 0.5 * (start + end)));
+        let near = |a: f64, b: f64, range: f64| (a - b).abs() <= 1e-13 * range;
+        let mut standing: Vec<Standing> = (0..currents.len())
+            .map(|i| {
+                let range = self.upper_a[i] - self.lower_a[i];
+                if near(currents[i], self.lower_a[i], range) {
+                    Standing::Lower
+                } else if near(currents[i], self.upper_a[i], range) {
+                    Standing::Upper
+                } else {
+                    Standing::Between
+                }
+            })
+            .collect();
+        standing.extend(self.total_max_a.map(|total| {
+            let sum: f64 = currents.iter().sum();
+            if near(sum, total, total) {
+                Standing::Lower
+            } else {
+                Standing::Between
+            }
+        }));
+        standing
+    }
+
+    fn changes(&self, i: usize, before: Standing, after: Standing, events: &mut Vec<Event>) {
+        if before == after {
+            return;
+        }
+        if i == self.upper_a.len() {
+            let met = after == Standing::Lower;
+            events.push(if met {
+                Event::TotalMeetsLimit
+            } else {
+                Event::TotalLeavesLimit
+            });
+            return;
+        }
+        let zero_below = self.lower_a[i] == 0.0;
+        let zero_above = self.upper_a[i] == 0.0;
+        match before {
+            Standing::Lower if zero_below => events.push(Event::LeavesZero(i)),
+            Standing::Upper if zero_above => events.push(Event::LeavesZero(i)),
+            Standing::Lower => events.push(Event::LeavesLower(i)),
+            Standing::Upper => events.push(Event::LeavesUpper(i)),
+            Standing::Between => {}
+        }
+        match after {
+            Standing::Lower if zero_below => events.push(Event::ReturnsToZero(i)),
+            Standing::Upper if zero_above => events.push(Event::ReturnsToZero(i)),
+            Standing::Lower => events.push(Event::MeetsLower(i)),
+            Standing::Upper => events.push(Event::MeetsUpper(i)),
+            Standing::Between => {}
+        }
+    }
+
+    /// Coils that may go both ways leave zero without leaving a limit.
+    fn first_moves(&self, after: &[Standing], end: Option<f64>, events: &mut Vec<Event>) {
+        let currents = self.currents_a(end.map_or(1.0, |end| 0.5 * end));
+        for (i, current) in currents.iter().enumerate() {
+            let both_ways = self.lower_a[i] < 0.0 && self.upper_a[i] > 0.0;
+            if both_ways && after[i] == Standing::Between && *current != 0.0 {
+                events.push(Event::LeavesZero(i));
+            }
+        }
+    }
+}
+
+/// A free variable that rests on a bound stands there, although its multiplier is zero.
+fn standing_of<T: Real>(place: Place, x: T, rate: T, lower: T, upper: T) -> Standing {
+    let rests_on =
+        |bound: T| rate == T::ZERO && (x - bound).abs() <= T::of(1e-14) * (upper - lower);
+    match place {
+        Place::Low | Place::Pinned => Standing::Lower,
+        Place::High => Standing::Upper,
+        Place::Free | Place::Held if rests_on(lower) => Standing::Lower,
+        Place::Free | Place::Held if rests_on(upper) => Standing::Upper,
+        Place::Free | Place::Held => Standing::Between,
+    }
+}

@@ -1,0 +1,169 @@
+//! Among equally good currents, those of least power.
+//!
+//! Where columns depend on each other the best fit is unique but the currents are not.
+//! All minimisers share the fit and every bound whose multiplier is not zero; what is
+//! left is a least-distance problem over the dependences, solved as Lawson and Hanson
+//! do: by non-negative least squares on its constraints.
+
+use crate::numerics::real::Real;
+
+use super::cone::{self, Role};
+use super::follow::{Bounds, Piece, Place};
+use super::model::{Factor, Model};
+
+/// The scaled currents of least `sum (cost_i x_i)^2` that fit as well as `piece` does at `lambda`.
+pub(super) fn least_power<T: Real>(
+    model: &Model<T>,
+    bounds: &Bounds<T>,
+    cost: &[T],
+    piece: &Piece<T>,
+    lambda: T,
+    target_norm: T,
+) -> Vec<T> {
+    let coils = cost.len();
+    let mut x = piece.x_at(lambda);
+    x.truncate(coils);
+    for (i, x) in x.iter_mut().enumerate() {
+        *x = clipped(bounds, i, *x);
+    }
+    let gradient = piece.gradient_at(lambda);
+    // A bound is left out only if its multiplier is surely there.
+    let sure = |i: usize| {
+        gradient[i].abs() > T::of(100.0 * piece.noise) * target_norm * piece.gradient_scale[i]
+    };
+    let open: Vec<usize> = (0..coils)
+        .filter(|&i| match piece.place[i] {
+            Place::Pinned => false,
+            Place::Free | Place::Held => true,
+            Place::Low | Place::High => !sure(i),
+        })
+        .collect();
+    let sum_is_fixed = model.weight.is_some() && piece.place[coils] == Place::Low && sure(coils);
+    let heaviest = open
+        .iter()
+        .fold(T::ZERO, |most, &i| most.larger(model.weight_of(i)));
+    let mut rows = model.rows;
+    let mut columns = Vec::new();
+    for &i in &open {
+        columns.extend_from_slice(model.column(i));
+        if sum_is_fixed {
+            columns.push(model.weight_of(i) / heaviest);
+        }
+    }
+    rows += usize::from(sum_is_fixed);
+    let kept = Model::new(rows, columns, None);
+    let moves = dependences(&kept, &open, cost);
+    if moves.is_empty() {
+        return x;
+    }
+    // In p_k = cost x the least power is the least distance, and p = still + basis u.
+    let count = open.len();
+    let p: Vec<T> = open.iter().map(|&i| cost[i] * x[i]).collect();
+    let mut still = p.clone();
+    for vector in &moves {
+        T::add_scaled(&mut still, -T::dot(vector, &p), vector);
+    }
+    let mut constraints = Constraints {
+        rows: Vec::new(),
+        bounds: Vec::new(),
+    };
+    for (k, &i) in open.iter().enumerate() {
+        let row: Vec<T> = moves.iter().map(|vector| vector[k]).collect();
+        constraints.at_least(&row, cost[i] * bounds.lower[i] - still[k]);
+        if let Some(upper) = bounds.upper[i] {
+            let row: Vec<T> = row.iter().map(|&v| -v).collect();
+            constraints.at_least(&row, still[k] - cost[i] * upper);
+        }
+    }
+    if model.weight.is_some() && !sum_is_fixed {
+        let share: Vec<T> = open.iter().map(|&i| model.weight_of(i) / cost[i]).collect();
+        let row: Vec<T> = moves.iter().map(|vector| -T::dot(vector, &share)).collect();
+        let others = (0..coils).filter(|i| !open.contains(i));
+        let used = others.fold(T::dot(&still, &share), |s, i| s + model.weight_of(i) * x[i]);
+        constraints.at_least(&row, used - bounds.total);
+    }
+    let Some(u) = constraints.nearest(moves.len()) else {
+        return x;
+    };
+    let mut best = still;
+    for (vector, &u) in moves.iter().zip(&u) {
+        T::add_scaled(&mut best, u, vector);
+    }
+    for k in 0..count {
+        x[open[k]] = clipped(bounds, open[k], best[k] / cost[open[k]]);
+    }
+    x
+}
+
+fn clipped<T: Real>(bounds: &Bounds<T>, i: usize, x: T) -> T {
+    let x = x.larger(bounds.lower[i]);
+    bounds.upper[i].map_or(x, |upper| x.smaller(upper))
+}
+
+/// An orthonormal basis, in `cost x`, of the changes that the kept columns do not see.
+fn dependences<T: Real>(kept: &Model<T>, open: &[usize], cost: &[T]) -> Vec<Vec<T>> {
+    let all: Vec<usize> = (0..open.len()).collect();
+    let factor = Factor::pivoted(kept, &all, 0.0);
+    let mut columns = Vec::new();
+    let mut count = 0;
+    for j in (0..open.len()).filter(|&j| !factor.contains(j)) {
+        let shares = factor.solve(kept, kept.column(j), T::ZERO).x;
+        columns.extend((0..open.len()).map(|k| {
+            let change = if k == j { T::ONE } else { -shares[k] };
+            cost[open[k]] * change
+        }));
+        count += 1;
+    }
+    if count == 0 {
+        return Vec::new();
+    }
+    let moves = Model::new(open.len(), columns, None);
+    Factor::new(&moves, &(0..count).collect::<Vec<_>>()).orthonormal()
+}
+
+/// Linear inequalities `row . u >= bound`, rows of unit length.
+struct Constraints<T> {
+    rows: Vec<Vec<T>>,
+    bounds: Vec<T>,
+}
+
+impl<T: Real> Constraints<T> {
+    fn at_least(&mut self, row: &[T], bound: T) {
+        let length = T::dot(row, row).sqrt();
+        // A variable that no change reaches has nothing to say.
+        if length.to_f64() > T::EPSILON.powf(0.7) {
+            self.rows.push(row.iter().map(|&v| v / length).collect());
+            self.bounds.push(bound / length);
+        }
+    }
+
+    /// The point of least length that satisfies all; `None` if rounding leaves none.
+    fn nearest(&self, size: usize) -> Option<Vec<T>> {
+        let unit = self
+            .bounds
+            .iter()
+            .fold(T::ZERO, |most, b| most.larger(b.abs()));
+        if self.bounds.iter().all(|&b| b <= T::ZERO) {
+            return Some(vec![T::ZERO; size]);
+        }
+        let mut columns = Vec::new();
+        for (row, &bound) in self.rows.iter().zip(&self.bounds) {
+            columns.extend_from_slice(row);
+            columns.push(bound / unit);
+        }
+        let model = Model::new(size + 1, columns, None);
+        let mut target = vec![T::ZERO; size + 1];
+        target[size] = T::ONE;
+        let found = cone::solve(&model, &vec![Role::Rising; self.rows.len()], &target);
+        let height = found.residual[size];
+        if !found.converged || height.to_f64() <= T::EPSILON.sqrt() {
+            return None;
+        }
+        Some(
+            found.residual[..size]
+                .iter()
+                .map(|&r| -(r / height) * unit)
+                .collect(),
+        )
+    }
+}

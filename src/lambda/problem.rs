@@ -1,0 +1,220 @@
+//! What is solved: forces per ampere at the points, heights and limits.
+
+use rayon::prelude::*;
+
+/// Forces, heights and limits of one object (eq. 9 and 10). Borrowed, never copied.
+#[derive(Debug, Clone, Copy)]
+pub struct ForceProblem<'a> {
+    /// Force per ampere of every coil at every point, N/A: row by row, one row a point.
+    pub forces_n_per_a: &'a [f64],
+    /// Height of each point, m: the wanted force there is lambda times it.
+    pub height_m: &'a [f64],
+    /// Force at each point without any current, N; `None`: none.
+    pub offset_n: Option<&'a [f64]>,
+    /// Lower current limit of each coil, A (<= 0).
+    pub lower_a: &'a [f64],
+    /// Upper current limit of each coil, A (>= 0).
+    pub upper_a: &'a [f64],
+    /// Limit of the sum of the currents, A (>= 0).
+    pub total_max_a: Option<f64>,
+    /// Resistance of each coil, ohm (> 0): among equally good currents those of least power are taken.
+    pub resistance_ohm: &'a [f64],
+}
+
+/// Which force constant is chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Criterion {
+    /// The largest whose error, added by the limits, stays below the just-noticeable difference.
+    #[default]
+    Jnd,
+    /// Where the first limit binds.
+    Linear,
+    /// Where the last coil stops following.
+    Saturation,
+}
+
+/// How the problem is solved.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// The chosen force constant.
+    pub criterion: Criterion,
+    /// w of the just-noticeable difference, relative to the RMS of the wanted force.
+    pub jnd_weight: f64,
+    /// A force constant at which currents and errors are wanted besides, N/m.
+    pub at_n_per_m: Option<f64>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            criterion: Criterion::Jnd,
+            jnd_weight: crate::units::FORCE_JND,
+            at_n_per_m: None,
+        }
+    }
+}
+
+/// Why a problem cannot be stated. Each names the entry at fault.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ProblemError {
+    /// No points.
+    #[error("no constraint points: at least one height is needed")]
+    NoPoints,
+    /// No coils.
+    #[error("no coils: at least one current limit is needed")]
+    NoCoils,
+    /// A list of the wrong length.
+    #[error("{name} has {found} entries, expected {expected}")]
+    Length {
+        /// Which list.
+        name: &'static str,
+        /// Entries found.
+        found: usize,
+        /// Entries expected.
+        expected: usize,
+    },
+    /// Infinite or not a number.
+    #[error("{name}[{index}] is {value}: only finite numbers can be used")]
+    NotFinite {
+        /// Which list.
+        name: &'static str,
+        /// Position in the list; for forces point * coils + coil.
+        index: usize,
+        /// The value found.
+        value: f64,
+    },
+    /// On the wrong side of zero.
+    #[error("{name}[{index}] is {value}, expected {expected}")]
+    Sign {
+        /// Which list.
+        name: &'static str,
+        /// Position in the list.
+        index: usize,
+        /// The value found.
+        value: f64,
+        /// What was expected.
+        expected: &'static str,
+    },
+}
+
+/// The first entry that is not finite.
+fn finite(name: &'static str, values: &[f64]) -> Result<(), ProblemError> {
+    // One pass without branches over the common case.
+    let clean = |part: &[f64]| {
+        part.iter()
+            .fold(true, |clean, value| clean & value.is_finite())
+    };
+    if values.par_chunks(65_536).all(clean) {
+        return Ok(());
+    }
+    let found = values
+        .iter()
+        .copied()
+        .enumerate()
+        .find(|(_, value)| !value.is_finite());
+    found.map_or(Ok(()), |(index, value)| {
+        Err(ProblemError::NotFinite { name, index, value })
+    })
+}
+
+fn signed(
+    name: &'static str,
+    values: &[f64],
+    expected: &'static str,
+    good: impl Fn(f64) -> bool,
+) -> Result<(), ProblemError> {
+    finite(name, values)?;
+    let found = values
+        .iter()
+        .copied()
+        .enumerate()
+        .find(|&(_, value)| !good(value));
+    found.map_or(Ok(()), |(index, value)| {
+        Err(ProblemError::Sign {
+            name,
+            index,
+            value,
+            expected,
+        })
+    })
+}
+
+impl ForceProblem<'_> {
+    /// Number of points.
+    #[must_use]
+    pub fn points(&self) -> usize {
+        self.height_m.len()
+    }
+
+    /// Number of coils.
+    #[must_use]
+    pub fn coils(&self) -> usize {
+        self.upper_a.len()
+    }
+
+    /// Checks shapes, finiteness and signs.
+    ///
+    /// # Errors
+    /// The first fault found.
+    pub fn validate(&self, settings: &Settings) -> Result<(), ProblemError> {
+        let (points, coils) = (self.points(), self.coils());
+        if points == 0 {
+            return Err(ProblemError::NoPoints);
+        }
+        if coils == 0 {
+            return Err(ProblemError::NoCoils);
+        }
+        let lengths = [
+            ("forces_n_per_a", self.forces_n_per_a.len(), points * coils),
+            ("lower_a", self.lower_a.len(), coils),
+            ("resistance_ohm", self.resistance_ohm.len(), coils),
+            (
+                "offset_n",
+                self.offset_n.map_or(points, <[f64]>::len),
+                points,
+            ),
+        ];
+        for (name, found, expected) in lengths {
+            if found != expected {
+                return Err(ProblemError::Length {
+                    name,
+                    found,
+                    expected,
+                });
+            }
+        }
+        finite("forces_n_per_a", self.forces_n_per_a)?;
+        finite("height_m", self.height_m)?;
+        finite("offset_n", self.offset_n.unwrap_or(&[]))?;
+        signed("lower_a", self.lower_a, "a limit of zero or below", |v| {
+            v <= 0.0
+        })?;
+        signed("upper_a", self.upper_a, "a limit of zero or above", |v| {
+            v >= 0.0
+        })?;
+        signed(
+            "resistance_ohm",
+            self.resistance_ohm,
+            "a positive resistance",
+            |v| v > 0.0,
+        )?;
+        signed(
+            "total_max_a",
+            self.total_max_a.as_slice(),
+            "a limit of zero or above",
+            |v| v >= 0.0,
+        )?;
+        signed(
+            "jnd_weight",
+            &[settings.jnd_weight],
+            "a weight of zero or above",
+            |v| v >= 0.0,
+        )?;
+        signed(
+            "at_n_per_m",
+            settings.at_n_per_m.as_slice(),
+            "zero or above",
+            |v| v >= 0.0,
+        )
+    }
+}

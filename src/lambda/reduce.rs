@@ -1,0 +1,311 @@
+//! From points and coils to a small scaled least-squares problem.
+//!
+//! The columns of forces, the heights and the offset go through one QR of
+//! `[G, h, -offset] / sqrt(n)`; what remains has as many rows as columns. All scales
+//! are powers of two: with `2^k_i` near the norm of coil i's column,
+//! `x_i = I_i 2^(k_i - f)` and `lambda' = lambda 2^(k_h - f)`, where `2^f` newtons is
+//! the largest force within the limits. Every column then has a norm between 1 and 2.
+
+use rayon::prelude::*;
+
+use crate::numerics::qr::{Triangle, triangular_factor};
+use crate::numerics::real::Real;
+
+use super::follow::Bounds;
+use super::model::{Factor, Model};
+use super::problem::ForceProblem;
+
+/// A dependence among columns below this share of a column lies within the rounding of its entries.
+const HIDDEN_IN_ROUNDING: f64 = 64.0 * f64::EPSILON;
+
+/// `2^exponent`, or the nearest end of the normal range.
+pub(super) fn power_of_two(exponent: i32) -> f64 {
+    f64::from_bits(((exponent.clamp(-1022, 1023) + 1023) as u64) << 52)
+}
+
+/// `value 2^exponent`, rounded only outside the normal range.
+pub(super) fn times_power(value: f64, exponent: i32) -> f64 {
+    let half = exponent / 2;
+    value * power_of_two(half) * power_of_two(exponent - half)
+}
+
+/// The exponent k with `2^k <= |value| < 2^(k+1)`; 0 for 0.
+pub(super) fn exponent_of(value: f64) -> i32 {
+    if value == 0.0 {
+        return 0;
+    }
+    let biased = ((value.to_bits() >> 52) & 0x7ff) as i32;
+    if biased == 0 {
+        exponent_of(value * power_of_two(200)) - 200
+    } else {
+        biased - 1023
+    }
+}
+
+/// Largest absolute value of every column: coils, heights, offset.
+pub(super) fn largest_entries(problem: &ForceProblem) -> Vec<f64> {
+    let coils = problem.coils();
+    let largest = |values: &[f64]| values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    let columns: Vec<Vec<f64>> = problem
+        .forces_n_per_a
+        .par_chunks(coils * 16_384)
+        .map(|rows| {
+            let mut most = vec![0.0_f64; coils];
+            for row in rows.chunks_exact(coils) {
+                for (most, value) in most.iter_mut().zip(row) {
+                    *most = most.max(value.abs());
+                }
+            }
+            most
+        })
+        .collect();
+    let coil = |i: usize| columns.iter().fold(0.0_f64, |most, part| most.max(part[i]));
+    let rest = [Some(problem.height_m), problem.offset_n];
+    (0..coils)
+        .map(coil)
+        .chain(rest.into_iter().flatten().map(largest))
+        .collect()
+}
+
+/// The triangular factor and the exponents of its columns' scales.
+#[derive(Debug, Clone)]
+pub(super) struct Reduced<T> {
+    /// R of `[G, h, -offset] / sqrt(n)`, column i divided by `2^scale[i]`.
+    columns: Vec<Vec<T>>,
+    /// Powers of two, of order of each column's root mean square.
+    scale: Vec<i32>,
+    coils: usize,
+    /// Exponent f of the unit of force.
+    force_scale: i32,
+    /// The same of lambda': `lambda = lambda' 2^lambda_scale`.
+    pub lambda_scale: i32,
+}
+
+impl<T: Real> Reduced<T> {
+    /// One pass over the points.
+    pub fn new(problem: &ForceProblem, largest: &[f64]) -> Self {
+        let (points, coils) = (problem.points(), problem.coils());
+        let entry_scale: Vec<i32> = largest.iter().map(|&v| exponent_of(v)).collect();
+        let triangle: Triangle<T> =
+            triangular_factor(points, largest.len(), |range, block, stride| {
+                let rows = &problem.forces_n_per_a[range.start * coils..range.end * coils];
+                for (j, (column, &k)) in
+                    block.chunks_exact_mut(stride).zip(&entry_scale).enumerate()
+                {
+                    let scaled = |v: f64| T::of(times_power(v, -k));
+                    if j < coils {
+                        // In range of one power of two nearly always: one product an entry.
+                        if k.abs() < 1000 {
+                            let factor = power_of_two(-k);
+                            for (to, row) in column.iter_mut().zip(rows.chunks_exact(coils)) {
+                                *to = T::of(row[j] * factor);
+                            }
+                        } else {
+                            for (to, row) in column.iter_mut().zip(rows.chunks_exact(coils)) {
+                                *to = scaled(row[j]);
+                            }
+                        }
+                    } else if j == coils {
+                        for (to, &v) in column.iter_mut().zip(&problem.height_m[range.clone()]) {
+                            *to = scaled(v);
+                        }
+                    } else if let Some(offset) = problem.offset_n {
+                        for (to, &v) in column.iter_mut().zip(&offset[range.clone()]) {
+                            *to = -scaled(v);
+                        }
+                    }
+                }
+            });
+        let root = T::ONE / T::of(points as f64).sqrt();
+        let mut scale = Vec::with_capacity(largest.len());
+        let mut columns = Vec::with_capacity(largest.len());
+        for (j, k) in entry_scale.into_iter().enumerate() {
+            let column: Vec<T> = triangle.column(j).iter().map(|&v| v * root).collect();
+            let more = exponent_of(T::dot(&column, &column).sqrt().to_f64());
+            let factor = T::of(power_of_two(-more));
+            columns.push(column.into_iter().map(|v| v * factor).collect());
+            scale.push(k + more);
+        }
+        let reach = |i: usize| problem.upper_a[i].max(-problem.lower_a[i]);
+        let force_scale = (0..coils)
+            .filter(|&i| reach(i) > 0.0 && largest[i] > 0.0)
+            .map(|i| exponent_of(reach(i)) + scale[i])
+            .max()
+            .unwrap_or(0);
+        let lambda_scale = force_scale - scale[coils];
+        Self {
+            columns,
+            scale,
+            coils,
+            force_scale,
+            lambda_scale,
+        }
+    }
+
+    fn rows(&self) -> usize {
+        self.columns.len()
+    }
+
+    fn model(&self, weight: Option<Vec<T>>) -> Model<T> {
+        let mut columns = self.columns[..self.coils].concat();
+        if weight.is_some() {
+            columns.extend(std::iter::repeat_n(T::ZERO, self.rows()));
+        }
+        Model::new(self.rows(), columns, weight)
+    }
+
+    /// Condition number of the coils' columns in the Frobenius norm, each scaled to unit
+    /// length; infinite where they depend on each other.
+    pub fn condition(&self) -> f64 {
+        let n = self.coils;
+        let unit = |j: usize, i: usize| {
+            let column = &self.columns[j];
+            (column[i] / T::dot(column, column).sqrt()).to_f64()
+        };
+        let mut total = 0.0;
+        for k in 0..n {
+            // Column k of the inverse, by back substitution.
+            let mut inverse = vec![0.0; k + 1];
+            for i in (0..=k).rev() {
+                let known: f64 = (i + 1..=k).map(|j| unit(j, i) * inverse[j]).sum();
+                inverse[i] = (if i == k { 1.0 } else { 0.0 } - known) / unit(i, i);
+            }
+            total += inverse.iter().map(|v| v * v).sum::<f64>();
+        }
+        let condition = (n as f64 * total).sqrt();
+        if condition.is_finite() {
+            condition
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    /// Number of independent columns among the coils'.
+    pub fn rank(&self) -> usize {
+        let model = self.model(None);
+        let coils: Vec<usize> = (0..self.coils).collect();
+        Factor::pivoted(&model, &coils, 0.0).rank()
+    }
+
+    /// The same problem with every dependence that only rounding hides made exact, or `None`
+    /// where there is none.
+    pub fn with_clean_dependences(&self) -> Option<Self> {
+        let model = self.model(None);
+        let coils: Vec<usize> = (0..self.coils).collect();
+        let factor = Factor::pivoted(&model, &coils, HIDDEN_IN_ROUNDING);
+        if factor.rank() == self.rank() {
+            return None;
+        }
+        let mut clean = self.clone();
+        for j in (0..self.coils).filter(|&j| !factor.contains(j) && model.norm[j] > T::ZERO) {
+            let shares = factor.solve(&model, model.column(j), T::ZERO).x;
+            let mut column = vec![T::ZERO; self.rows()];
+            for i in (0..self.coils).filter(|&i| factor.contains(i)) {
+                if (shares[i] * model.norm[i] / model.norm[j]).abs() > T::of(HIDDEN_IN_ROUNDING) {
+                    T::add_scaled(&mut column, shares[i], model.column(i));
+                }
+            }
+            clean.columns[j] = column;
+        }
+        Some(clean)
+    }
+
+    /// The target's direction per unit of lambda', in units of force.
+    pub fn heights(&self) -> &[T] {
+        &self.columns[self.coils]
+    }
+
+    /// What the currents must make up for at lambda = 0.
+    pub fn offset(&self) -> Option<Vec<T>> {
+        let column = self.columns.get(self.coils + 1)?;
+        let factor = T::of(times_power(
+            1.0,
+            self.scale[self.coils + 1] - self.force_scale,
+        ));
+        Some(column.iter().map(|&v| v * factor).collect())
+    }
+
+    /// `x_i = I_i 2^(this)`.
+    pub fn current_scale(&self, i: usize) -> i32 {
+        self.scale[i] - self.force_scale
+    }
+
+    /// One unit of force in newtons.
+    pub fn force_unit_n(&self) -> f64 {
+        power_of_two(self.force_scale)
+    }
+
+    /// The problem with all its limits; a limit on the sum has its slack as the last variable.
+    pub fn limited(&self, problem: &ForceProblem) -> (Model<T>, Bounds<T>) {
+        let scaled = |i: usize, v: f64| T::of(times_power(v, self.current_scale(i)));
+        let mut lower: Vec<T> = (0..self.coils)
+            .map(|i| scaled(i, problem.lower_a[i]))
+            .collect();
+        let mut upper: Vec<Option<T>> = (0..self.coils)
+            .map(|i| Some(scaled(i, problem.upper_a[i])))
+            .collect();
+        let Some(total_a) = problem.total_max_a else {
+            return (
+                self.model(None),
+                Bounds {
+                    lower,
+                    upper,
+                    total: T::ZERO,
+                },
+            );
+        };
+        // In units of the limit itself; of the largest coil's share where it is zero.
+        let ampere = |i: usize| -self.current_scale(i);
+        let unit = if total_a > 0.0 {
+            exponent_of(total_a)
+        } else {
+            (0..self.coils).map(ampere).max().unwrap_or(0)
+        };
+        let mut weight: Vec<T> = (0..self.coils)
+            .map(|i| T::of(power_of_two(ampere(i) - unit)))
+            .collect();
+        weight.push(T::ONE);
+        lower.push(T::ZERO);
+        upper.push(None);
+        (
+            self.model(Some(weight)),
+            Bounds {
+                lower,
+                upper,
+                total: T::of(times_power(total_a, -unit)),
+            },
+        )
+    }
+
+    /// The problem without upper limits and without a limit on the sum.
+    pub fn unlimited(&self, problem: &ForceProblem) -> (Model<T>, Bounds<T>) {
+        let lower = (0..self.coils)
+            .map(|i| T::of(times_power(problem.lower_a[i], self.current_scale(i))))
+            .collect();
+        let bounds = Bounds {
+            lower,
+            upper: vec![None; self.coils],
+            total: T::ZERO,
+        };
+        (self.model(None), bounds)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exponents_invert_powers_of_two() {
+        for k in [-1074, -1030, -1022, -7, 0, 1, 700, 1023] {
+            let value = times_power(1.0, k);
+            assert_eq!(exponent_of(value), k);
+            assert_eq!(
+                times_power(1.3 * value, -k.max(-1022)) / times_power(1.3, k - k.max(-1022)),
+                1.0
+            );
+        }
+        assert_eq!(exponent_of(-0.7), -1);
+        assert_eq!(exponent_of(0.0), 0);
+    }
+}

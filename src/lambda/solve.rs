@@ -1,0 +1,352 @@
+//! The whole of eq. 9 and 10 for one object: precision, path, criteria, certificate.
+
+use crate::accuracy::StageAccuracy;
+use crate::numerics::double_double::DoubleDouble;
+use crate::numerics::real::Real;
+use crate::units::DETECTION_THRESHOLD_N;
+
+use super::certificate;
+use super::criteria::Comparison;
+use super::follow::{Bounds, Follower, Trace};
+use super::model::Model;
+use super::path::Path;
+use super::problem::{Criterion, ForceProblem, ProblemError, Settings};
+use super::reduce::{Reduced, largest_entries, times_power};
+
+/// Above this condition number of the coils' columns doubles do not decide.
+const PLAIN_CONDITION: f64 = 1e3;
+/// Above this ratio of current limits, with a limit on the sum, doubles do not decide.
+const PLAIN_SPREAD: f64 = 1e4;
+/// Error of e*, relative to lambda^2 mean(h^2), up to which doubles are enough.
+const PLAIN_ERROR: f64 = 2e-14;
+/// Largest relative violation of optimality that is taken for rounding: its square counts.
+const FLAW: f64 = 1e-8;
+
+/// How far a solution may be trusted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// The path is exact.
+    Solved,
+    /// All heights are zero: no force is wanted, no limit binds.
+    NothingWanted,
+    /// No current within the limits' signs brings the force nearer to the wanted one.
+    NothingRendered,
+    /// The path could not be followed to its end; numbers beyond its last breakpoint are not the minimum.
+    Stalled,
+}
+
+/// The arithmetic that decided.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Precision {
+    /// 53 bits.
+    Double,
+    /// About 105 bits, from the points on.
+    DoubleDouble,
+}
+
+/// Currents at one force constant and what they are worth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OperatingPoint {
+    /// Force constant, N/m.
+    pub lambda_n_per_m: f64,
+    /// Currents, A.
+    pub currents_a: Vec<f64>,
+    /// Root of the mean square error e*, N.
+    pub rms_error_n: f64,
+    /// The same relative to lambda rms(h); `None` where that is zero.
+    pub relative_rms_error: Option<f64>,
+    /// Largest error at a point, N.
+    pub worst_error_n: f64,
+    /// Proof of optimality: the mean square error at these currents is at most this far above its minimum, N^2.
+    pub duality_gap_n2: f64,
+}
+
+/// The path, the force constants and the currents of one object.
+#[derive(Debug, Clone)]
+pub struct Solution {
+    /// Where the first limit binds, N/m; `None`: none ever does.
+    pub lambda_linear_n_per_m: Option<f64>,
+    /// The largest with `e* - e_0 <= w^2 lambda^2 mean(h^2)`, N/m; `None`: all are.
+    pub lambda_jnd_n_per_m: Option<f64>,
+    /// The last breakpoint, N/m, beyond which no coil follows; `None` where nothing ever binds.
+    pub lambda_saturation_n_per_m: Option<f64>,
+    /// Below it the lowest point is not felt, N/m; `None` where that height is not positive.
+    pub lambda_floor_n_per_m: Option<f64>,
+    /// The force constant that the criterion chooses, with its currents.
+    pub chosen: Option<OperatingPoint>,
+    /// The same at the force constant asked for besides.
+    pub at: Option<OperatingPoint>,
+    /// Number of independent columns of forces.
+    pub rank: usize,
+    /// e* and the currents anywhere.
+    pub path: Path,
+    /// How far to trust it.
+    pub status: Status,
+    /// The arithmetic used.
+    pub precision: Precision,
+    /// Estimated error of e*.
+    pub accuracy: StageAccuracy,
+}
+
+/// Both paths in one precision.
+struct Solved<T> {
+    reduced: Reduced<T>,
+    model: Model<T>,
+    bounds: Bounds<T>,
+    limited: Trace<T>,
+    unlimited: Trace<T>,
+    /// Rounding in e*, relative to `lambda^2 mean(h^2)`.
+    error: f64,
+    flaw: f64,
+}
+
+impl<T: Real> Solved<T> {
+    fn new(problem: &ForceProblem, reduced: Reduced<T>) -> Self {
+        let offset = reduced.offset();
+        let heights = reduced.heights();
+        let (model, bounds) = reduced.limited(problem);
+        let follower = Follower {
+            model: &model,
+            bounds: &bounds,
+        };
+        let limited = follower.path(offset.as_deref(), heights);
+        let (free_model, free_bounds) = reduced.unlimited(problem);
+        let free = Follower {
+            model: &free_model,
+            bounds: &free_bounds,
+        };
+        let unlimited = free.path(offset.as_deref(), heights);
+        let flaw = follower
+            .flaw(&limited, offset.as_deref(), heights)
+            .max(free.flaw(&unlimited, offset.as_deref(), heights));
+        let size = T::dot(heights, heights).sqrt();
+        let error = rounding(&model, &limited, size).max(rounding(&free_model, &unlimited, size));
+        Self {
+            model,
+            bounds,
+            limited,
+            unlimited,
+            error,
+            flaw,
+            reduced,
+        }
+    }
+
+    fn reliable(&self) -> bool {
+        self.limited.complete && self.unlimited.complete && self.flaw <= FLAW
+    }
+
+    /// e* at scaled lambda, relative to `lambda^2 mean(h^2)`.
+    fn relative_error(&self, lambda: T) -> f64 {
+        let pieces = &self.limited.pieces;
+        let k = pieces
+            .partition_point(|piece| piece.start <= lambda)
+            .saturating_sub(1);
+        let residual = pieces[k].residual_at(lambda);
+        let heights = self.reduced.heights();
+        (T::dot(&residual, &residual) / (lambda * lambda * T::dot(heights, heights))).to_f64()
+    }
+
+    /// Whether both describe the same e*, as far as it is asked for.
+    fn agrees_with(&self, other: &Self) -> bool {
+        let starts = self
+            .limited
+            .pieces
+            .iter()
+            .chain(&other.limited.pieces)
+            .map(|piece| piece.start);
+        starts
+            .filter(|&lambda| lambda > T::ZERO)
+            .flat_map(|lambda| [lambda, lambda + lambda])
+            .all(|lambda| {
+                (self.relative_error(lambda) - other.relative_error(lambda)).abs() <= PLAIN_ERROR
+            })
+    }
+}
+
+/// First-order effect of the columns' rounding on e*, at the breakpoints: twice the residual
+/// times the sum of all columns' contributions, and a margin for the sums over points.
+fn rounding<T: Real>(model: &Model<T>, trace: &Trace<T>, size: T) -> f64 {
+    let mut worst = 1.0_f64;
+    for piece in &trace.pieces {
+        let wanted = piece.start * size;
+        // On the first piece everything grows with lambda: take it at lambda' = 1.
+        let (x, residual, wanted) = if wanted > T::ZERO {
+            (piece.x.clone(), piece.residual.clone(), wanted)
+        } else {
+            (piece.x_rate.clone(), piece.residual_rate.clone(), size)
+        };
+        if wanted > T::ZERO {
+            let moved = x
+                .iter()
+                .zip(&model.norm)
+                .fold(T::ZERO, |s, (&x, &n)| s + x.abs() * n);
+            let share = T::dot(&residual, &residual).sqrt() / wanted * (moved / wanted + T::ONE);
+            worst = worst.max(share.to_f64());
+        }
+    }
+    20.0 * T::EPSILON * worst
+}
+
+/// Solves eq. 9 and 10: the exact path of e*(lambda), the force constants on it, and the
+/// currents at the chosen one.
+///
+/// Doubles are used where columns are well conditioned, double-double (from the points on)
+/// where they are not; what was used is reported. The result does not depend on the number
+/// of threads.
+///
+/// # Errors
+/// Where the problem is malformed: lists of the wrong length, numbers that are not finite,
+/// limits of the wrong sign.
+pub fn solve(problem: &ForceProblem, settings: &Settings) -> Result<Solution, ProblemError> {
+    problem.validate(settings)?;
+    let largest = largest_entries(problem);
+    if let Some(plain) = solve_plainly(problem, &largest) {
+        let rank = problem.coils();
+        let path = Path::new(problem, &plain.reduced, &plain.bounds, &plain.limited);
+        return Ok(finish(problem, settings, &plain, path, rank));
+    }
+    let solved = solve_finely(problem, &largest);
+    let rank = solved.reduced.rank();
+    let mut path = Path::new(problem, &solved.reduced, &solved.bounds, &solved.limited);
+    if rank < problem.coils() {
+        path = path.with_least_power(problem, &solved.reduced, &solved.limited);
+    }
+    Ok(finish(problem, settings, &solved, path, rank))
+}
+
+/// In doubles, where they are enough.
+fn solve_plainly(problem: &ForceProblem, largest: &[f64]) -> Option<Solved<f64>> {
+    let reach = |i: usize| problem.upper_a[i].max(-problem.lower_a[i]);
+    let (least, most) = (0..problem.coils())
+        .map(reach)
+        .filter(|&r| r > 0.0)
+        .fold((f64::INFINITY, 0.0_f64), |(least, most), r| {
+            (least.min(r), most.max(r))
+        });
+    if problem.total_max_a.is_some() && most > PLAIN_SPREAD * least {
+        return None;
+    }
+    if problem.points() < problem.coils() || largest[..problem.coils()].contains(&0.0) {
+        return None;
+    }
+    let reduced = Reduced::<f64>::new(problem, largest);
+    if reduced.condition() > PLAIN_CONDITION {
+        return None;
+    }
+    let solved = Solved::new(problem, reduced);
+    (solved.reliable() && solved.error <= PLAIN_ERROR).then_some(solved)
+}
+
+/// In double-double. Where dependences lie within the rounding of the forces, they are taken
+/// as exact, provided that this does not show in e*.
+fn solve_finely(problem: &ForceProblem, largest: &[f64]) -> Solved<DoubleDouble> {
+    let reduced = Reduced::<DoubleDouble>::new(problem, largest);
+    let clean = reduced.with_clean_dependences();
+    let literal = Solved::new(problem, reduced);
+    if let Some(clean) = clean {
+        let clean = Solved::new(problem, clean);
+        if clean.reliable() && (clean.agrees_with(&literal) || !literal.reliable()) {
+            return clean;
+        }
+    }
+    literal
+}
+
+fn finish<T: Real>(
+    problem: &ForceProblem,
+    settings: &Settings,
+    solved: &Solved<T>,
+    path: Path,
+    rank: usize,
+) -> Solution {
+    let heights = solved.reduced.heights();
+    let comparison = Comparison {
+        limited: &solved.limited,
+        unlimited: &solved.unlimited,
+        mean_square: T::dot(heights, heights),
+    };
+    let si = |lambda: T| times_power(lambda.to_f64(), solved.reduced.lambda_scale);
+    let wanted = comparison.mean_square > T::ZERO;
+    let unique = rank == problem.coils();
+    let linear = match (wanted, unique) {
+        (false, _) => None,
+        (true, true) => comparison.linear(&solved.model, &solved.bounds),
+        (true, false) => comparison.linear_by_error(),
+    };
+    let jnd = match linear {
+        None => None,
+        Some(lambda) if settings.jnd_weight == 0.0 => Some(lambda),
+        Some(_) => comparison.jnd(settings.jnd_weight),
+    };
+    let linear = linear.map(si);
+    let jnd = jnd.map(si);
+    let saturation = path.last_turn().or(linear.filter(|&lambda| lambda == 0.0));
+    let lambda = match settings.criterion {
+        Criterion::Linear => linear,
+        Criterion::Jnd => jnd,
+        Criterion::Saturation => saturation,
+    };
+    let unmoved = |trace: &Trace<T>| {
+        trace
+            .pieces
+            .iter()
+            .all(|piece| piece.x.iter().chain(&piece.x_rate).all(|&x| x == T::ZERO))
+    };
+    let status = if !solved.reliable() {
+        Status::Stalled
+    } else if !wanted {
+        Status::NothingWanted
+    } else if unmoved(&solved.unlimited) {
+        Status::NothingRendered
+    } else {
+        Status::Solved
+    };
+    let lowest = problem
+        .height_m
+        .iter()
+        .copied()
+        .fold(f64::INFINITY, f64::min);
+    let rms_height_m = {
+        let unit = times_power(solved.reduced.force_unit_n(), -solved.reduced.lambda_scale);
+        comparison.mean_square.sqrt().to_f64() * unit
+    };
+    let double = T::EPSILON >= f64::EPSILON;
+    let evaluate = |lambda: f64| {
+        let currents_a = path.currents_a(lambda);
+        let check = certificate::check::<T>(problem, lambda, &currents_a);
+        let rms_error_n = path.error_n2(lambda).sqrt();
+        let scale = lambda * rms_height_m;
+        OperatingPoint {
+            lambda_n_per_m: lambda,
+            currents_a,
+            rms_error_n,
+            relative_rms_error: (scale > 0.0).then(|| rms_error_n / scale),
+            worst_error_n: check.worst_n,
+            duality_gap_n2: check.gap_n2,
+        }
+    };
+    Solution {
+        lambda_linear_n_per_m: linear,
+        lambda_jnd_n_per_m: jnd,
+        lambda_saturation_n_per_m: saturation,
+        lambda_floor_n_per_m: (lowest > 0.0).then(|| DETECTION_THRESHOLD_N / lowest),
+        chosen: lambda.map(evaluate),
+        at: settings.at_n_per_m.map(evaluate),
+        rank,
+        status,
+        precision: if double {
+            Precision::Double
+        } else {
+            Precision::DoubleDouble
+        },
+        accuracy: StageAccuracy {
+            estimate: solved.error + 4.0 * f64::EPSILON + solved.flaw * solved.flaw,
+            relative_to: "lambda^2 mean(h^2)".to_owned(),
+            method:
+                "first-order rounding bound of the QR, optimality conditions at every breakpoint"
+                    .to_owned(),
+        },
+        path,
+    }
+}

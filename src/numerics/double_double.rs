@@ -1,0 +1,207 @@
+//! Numbers of about 31 decimal digits: the unevaluated sum of two doubles.
+//!
+//! Error-free sums after Knuth, error-free products after Dekker (by splitting, so that
+//! no fused multiply-add is needed: without the hardware flag that is a function call).
+//! Relative errors: sum 3 x 2^-106, product 8 x 2^-106, quotient and root 16 x 2^-106,
+//! for magnitudes between 1e-140 and 1e140; outside it low parts may be lost.
+
+use std::cmp::Ordering;
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+/// `hi + lo` with `|lo| <= ulp(hi) / 2`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DoubleDouble {
+    hi: f64,
+    lo: f64,
+}
+
+/// `a + b = s + e` exactly.
+fn two_sum(a: f64, b: f64) -> (f64, f64) {
+    let s = a + b;
+    let part = s - a;
+    (s, (a - (s - part)) + (b - part))
+}
+
+/// The same where `|a| >= |b|`.
+fn fast_two_sum(a: f64, b: f64) -> (f64, f64) {
+    let s = a + b;
+    (s, b - (s - a))
+}
+
+/// `a` as a sum of two numbers of 26 bits.
+fn split(a: f64) -> (f64, f64) {
+    let t = 134_217_729.0 * a;
+    let high = t - (t - a);
+    (high, a - high)
+}
+
+/// `a b = p + e` exactly.
+fn two_product(a: f64, b: f64) -> (f64, f64) {
+    let p = a * b;
+    let ((ah, al), (bh, bl)) = (split(a), split(b));
+    (p, ((ah * bh - p) + ah * bl + al * bh) + al * bl)
+}
+
+impl DoubleDouble {
+    /// The double `value`.
+    #[must_use]
+    pub const fn exactly(value: f64) -> Self {
+        Self { hi: value, lo: 0.0 }
+    }
+
+    /// The nearest double.
+    #[must_use]
+    pub fn nearest(self) -> f64 {
+        self.hi
+    }
+
+    /// What the nearest double leaves.
+    #[must_use]
+    pub fn remainder(self) -> f64 {
+        self.lo
+    }
+
+    /// Square root; 0 for 0, NaN below.
+    #[must_use]
+    pub fn square_root(self) -> Self {
+        if self.hi == 0.0 {
+            return Self::exactly(0.0);
+        }
+        // Two Newton steps from the double's root.
+        let half = Self::exactly(0.5);
+        let mut root = Self::exactly(self.hi.sqrt());
+        for _ in 0..2 {
+            root = (root + self / root) * half;
+        }
+        root
+    }
+}
+
+impl Add for DoubleDouble {
+    type Output = Self;
+    fn add(self, rhs: Self) -> Self {
+        let (s, e) = two_sum(self.hi, rhs.hi);
+        let (t, f) = two_sum(self.lo, rhs.lo);
+        let (s, e) = fast_two_sum(s, e + t);
+        let (hi, lo) = fast_two_sum(s, e + f);
+        Self { hi, lo }
+    }
+}
+
+impl Neg for DoubleDouble {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self {
+            hi: -self.hi,
+            lo: -self.lo,
+        }
+    }
+}
+
+impl Sub for DoubleDouble {
+    type Output = Self;
+    fn sub(self, rhs: Self) -> Self {
+        self + -rhs
+    }
+}
+
+impl Mul for DoubleDouble {
+    type Output = Self;
+    fn mul(self, rhs: Self) -> Self {
+        let (p, e) = two_product(self.hi, rhs.hi);
+        let (hi, lo) = fast_two_sum(p, e + (self.hi * rhs.lo + self.lo * rhs.hi));
+        Self { hi, lo }
+    }
+}
+
+impl Div for DoubleDouble {
+    type Output = Self;
+    /// Long division: three quotient digits of 53 bits.
+    fn div(self, rhs: Self) -> Self {
+        let first = self.hi / rhs.hi;
+        let rest = self - rhs * Self::exactly(first);
+        let second = rest.hi / rhs.hi;
+        let rest = rest - rhs * Self::exactly(second);
+        let third = rest.hi / rhs.hi;
+        let (hi, lo) = fast_two_sum(first, second);
+        Self { hi, lo } + Self::exactly(third)
+    }
+}
+
+impl AddAssign for DoubleDouble {
+    fn add_assign(&mut self, rhs: Self) {
+        *self = *self + rhs;
+    }
+}
+
+impl SubAssign for DoubleDouble {
+    fn sub_assign(&mut self, rhs: Self) {
+        *self = *self - rhs;
+    }
+}
+
+impl PartialOrd for DoubleDouble {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        match self.hi.partial_cmp(&other.hi) {
+            Some(Ordering::Equal) => self.lo.partial_cmp(&other.lo),
+            order => order,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ULP: f64 = 1.0 / (1_u128 << 106) as f64;
+
+    fn integer(value: i128) -> DoubleDouble {
+        let hi = value as f64;
+        DoubleDouble {
+            hi,
+            lo: (value - hi as i128) as f64,
+        }
+    }
+
+    fn as_integer(value: DoubleDouble) -> i128 {
+        value.hi as i128 + value.lo as i128
+    }
+
+    /// Odd numbers of up to 50 bits.
+    fn numbers() -> impl Iterator<Item = i128> {
+        (1..400_u64).map(|k| {
+            let bits = k.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 14;
+            i128::from(bits | 1) * if k % 3 == 0 { -1 } else { 1 }
+        })
+    }
+
+    #[test]
+    fn sums_and_products_of_integers_are_exact() {
+        for (a, b) in numbers().zip(numbers().skip(7)) {
+            assert_eq!(as_integer(integer(a) * integer(b)), a * b);
+            let (c, d) = (a * b, a << 40);
+            assert_eq!(as_integer(integer(c) + integer(d)), c + d);
+            assert_eq!(as_integer(integer(c) - integer(d)), c - d);
+            assert_eq!(integer(c) < integer(d), c < d);
+        }
+    }
+
+    #[test]
+    fn quotients_and_roots_multiply_back() {
+        for (a, b) in numbers().zip(numbers().skip(11)) {
+            let (x, y) = (integer(a * b), integer(b * 3));
+            let back = (x / y) * y - x;
+            assert!(
+                back.hi.abs() <= 24.0 * ULP * x.hi.abs(),
+                "{a} {b}: {back:?}"
+            );
+            let x = integer((a * b).abs());
+            let root = x.square_root();
+            let back = root * root - x;
+            assert!(back.hi.abs() <= 48.0 * ULP * x.hi, "{a} {b}: {back:?}");
+        }
+        let third = DoubleDouble::exactly(1.0) / DoubleDouble::exactly(3.0);
+        let back = third * DoubleDouble::exactly(3.0) - DoubleDouble::exactly(1.0);
+        assert!(back.hi.abs() <= 4.0 * ULP);
+    }
+}

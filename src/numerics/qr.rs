@@ -1,0 +1,188 @@
+//! The triangular factor of a tall matrix, by Householder reflections over fixed row chunks.
+//!
+//! Each chunk of rows is stacked under the running factor and reduced; groups of
+//! chunks run in parallel and are merged in order, so that the result does not
+//! depend on the number of threads. The backward error is that of a plain
+//! Householder QR, column by column; the matrix times its transpose is never formed.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::real::Real;
+
+/// Rows reduced at a time: ten columns of them stay in the first-level cache.
+const CHUNK_ROWS: usize = 256;
+/// Chunks of one parallel task.
+const GROUP_CHUNKS: usize = 64;
+
+/// An upper triangular factor: column `j` holds its entries `0..=j`, the rest is zero.
+#[derive(Debug, Clone)]
+pub struct Triangle<T> {
+    size: usize,
+    /// Column by column, `size` entries each.
+    entries: Vec<T>,
+}
+
+impl<T: Real> Triangle<T> {
+    fn zero(size: usize) -> Self {
+        Self {
+            size,
+            entries: vec![T::ZERO; size * size],
+        }
+    }
+
+    /// Number of rows and columns.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Column `j`, all `size` entries.
+    #[must_use]
+    pub fn column(&self, j: usize) -> &[T] {
+        &self.entries[j * self.size..(j + 1) * self.size]
+    }
+
+    /// Replaces this factor by that of itself over `block`: `rows` rows stored
+    /// column by column, `stride` apart. The block is overwritten.
+    fn absorb(&mut self, block: &mut [T], rows: usize, stride: usize) {
+        let n = self.size;
+        for j in 0..n {
+            let (head, tail) = block.split_at_mut((j + 1) * stride);
+            let v = &head[j * stride..j * stride + rows];
+            let below = T::dot(v, v);
+            if below <= T::ZERO {
+                continue;
+            }
+            let alpha = self.entries[j * n + j];
+            let norm = (alpha * alpha + below).sqrt();
+            let beta = if alpha > T::ZERO { -norm } else { norm };
+            let top = alpha - beta;
+            // H = 1 - (top, v)(top, v)' * scale, with |(top, v)|^2 = -2 beta top.
+            let scale = -(T::ONE / (beta * top));
+            self.entries[j * n + j] = beta;
+            for k in j + 1..n {
+                let c = &mut tail[(k - j - 1) * stride..(k - j - 1) * stride + rows];
+                let r = &mut self.entries[k * n + j];
+                let factor = -(scale * (top * *r + T::dot(v, c)));
+                *r += factor * top;
+                T::add_scaled(c, factor, v);
+            }
+        }
+    }
+}
+
+/// R of `A = QR`, `A` of `rows` rows and `columns` columns (`rows` may be the smaller).
+///
+/// `fill(range, block, stride)` writes rows `range` of `A` into `block` column by
+/// column, columns `stride` apart. Entries should be of order one at most, with their
+/// squares far from overflow. Signs of R's diagonal are arbitrary.
+pub fn triangular_factor<T: Real>(
+    rows: usize,
+    columns: usize,
+    fill: impl Fn(Range<usize>, &mut [T], usize) + Sync,
+) -> Triangle<T> {
+    let group_rows = CHUNK_ROWS * GROUP_CHUNKS;
+    let reduce = |group: usize| {
+        let end = rows.min((group + 1) * group_rows);
+        let mut factor = Triangle::zero(columns);
+        let mut block = vec![T::ZERO; CHUNK_ROWS * columns];
+        for start in (group * group_rows..end).step_by(CHUNK_ROWS) {
+            let range = start..end.min(start + CHUNK_ROWS);
+            let filled = range.len();
+            fill(range, &mut block, CHUNK_ROWS);
+            factor.absorb(&mut block, filled, CHUNK_ROWS);
+        }
+        factor
+    };
+    let groups = rows.div_ceil(group_rows);
+    if groups <= 1 {
+        return reduce(0);
+    }
+    let factors: Vec<Triangle<T>> = (0..groups).into_par_iter().map(reduce).collect();
+    let mut merged = Triangle::zero(columns);
+    for mut factor in factors {
+        merged.absorb(&mut factor.entries, columns, columns);
+    }
+    merged
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::double_double::DoubleDouble;
+
+    /// A full, badly balanced matrix whose entries are exact in both precisions.
+    fn entry(i: usize, j: usize) -> f64 {
+        ((i * 31 + j * 17) % 101) as f64 / 64.0 - 0.7 + if i == j { 3.0 } else { 0.0 }
+    }
+
+    fn factor<T: Real>(rows: usize, columns: usize) -> Triangle<T> {
+        triangular_factor(rows, columns, |range, block, stride| {
+            for j in 0..columns {
+                for (k, i) in range.clone().enumerate() {
+                    block[j * stride + k] = T::of(entry(i, j));
+                }
+            }
+        })
+    }
+
+    /// Largest |R'R - A'A|, relative to the columns' norms.
+    fn gram_error<T: Real>(rows: usize, columns: usize) -> f64 {
+        let r = factor::<T>(rows, columns);
+        let gram = |j: usize, k: usize| {
+            (0..rows).fold(T::ZERO, |s, i| s + T::of(entry(i, j)) * T::of(entry(i, k)))
+        };
+        let mut worst = 0.0_f64;
+        for j in 0..columns {
+            for k in 0..columns {
+                let error = (T::dot(r.column(j), r.column(k)) - gram(j, k)).abs();
+                worst = worst.max((error / (gram(j, j) * gram(k, k)).sqrt()).to_f64());
+            }
+        }
+        worst
+    }
+
+    #[test]
+    fn r_has_the_gram_matrix_of_the_rows_in_both_precisions() {
+        for (rows, columns) in [(1, 3), (2, 2), (7, 4), (256, 5), (300, 3), (40_000, 4)] {
+            let (plain, double) = (
+                gram_error::<f64>(rows, columns),
+                gram_error::<DoubleDouble>(rows, columns),
+            );
+            assert!(
+                plain < 1e-14 * (1.0 + rows as f64 / 1e3),
+                "{rows} x {columns}: {plain:e}"
+            );
+            assert!(
+                double < 1e-30 * (1.0 + rows as f64 / 1e3),
+                "{rows} x {columns}: {double:e}"
+            );
+        }
+    }
+
+    #[test]
+    fn one_thread_and_three_give_the_same_bits() {
+        let pool = |n| {
+            rayon::ThreadPoolBuilder::new()
+                .num_threads(n)
+                .build()
+                .expect("a small pool")
+        };
+        let one = pool(1).install(|| factor::<f64>(50_001, 4));
+        let three = pool(3).install(|| factor::<f64>(50_001, 4));
+        for j in 0..4 {
+            assert_eq!(one.column(j), three.column(j));
+        }
+    }
+
+    #[test]
+    fn entries_below_the_diagonal_are_zero() {
+        let r = factor::<f64>(513, 5);
+        for j in 0..5 {
+            assert!(r.column(j)[j + 1..].iter().all(|&x| x == 0.0));
+            assert!(r.column(j)[j] != 0.0);
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! The scalar of the small dense algebra: `f64`, or double-double where 53 bits are not enough.
+
+use std::fmt::Debug;
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+use super::double_double::DoubleDouble;
+
+/// A real number of fixed precision.
+pub trait Real:
+    Copy
+    + Debug
+    + Send
+    + Sync
+    + PartialOrd
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+    + SubAssign
+    + 'static
+{
+    /// 0.
+    const ZERO: Self;
+    /// 1.
+    const ONE: Self;
+    /// Relative error of one operation, rounded up.
+    const EPSILON: f64;
+
+    /// The number `value`, exactly.
+    fn of(value: f64) -> Self;
+    /// The nearest double.
+    fn to_f64(self) -> f64;
+    /// Square root of a number that is not negative.
+    fn sqrt(self) -> Self;
+    /// Absolute value.
+    fn abs(self) -> Self;
+
+    /// Sum of products over the shorter length.
+    fn dot(a: &[Self], b: &[Self]) -> Self {
+        a.iter()
+            .zip(b)
+            .fold(Self::ZERO, |sum, (&x, &y)| sum + x * y)
+    }
+
+    /// `y += factor x` over the shorter length.
+    fn add_scaled(y: &mut [Self], factor: Self, x: &[Self]) {
+        for (y, &x) in y.iter_mut().zip(x) {
+            *y += factor * x;
+        }
+    }
+
+    /// The larger of two numbers.
+    fn larger(self, other: Self) -> Self {
+        if other > self { other } else { self }
+    }
+
+    /// The smaller of two numbers.
+    fn smaller(self, other: Self) -> Self {
+        if other < self { other } else { self }
+    }
+}
+
+impl Real for f64 {
+    const ZERO: Self = 0.0;
+    const ONE: Self = 1.0;
+    const EPSILON: f64 = f64::EPSILON;
+
+    fn of(value: f64) -> Self {
+        value
+    }
+
+    fn to_f64(self) -> f64 {
+        self
+    }
+
+    fn sqrt(self) -> Self {
+        self.sqrt()
+    }
+
+    fn abs(self) -> Self {
+        self.abs()
+    }
+
+    /// Eight running sums: the compiler may keep them in vector registers, and their order is fixed.
+    fn dot(a: &[Self], b: &[Self]) -> Self {
+        let (a8, a_rest) = a.as_chunks::<8>();
+        let (b8, b_rest) = b.as_chunks::<8>();
+        let mut lanes = [0.0; 8];
+        for (x, y) in a8.iter().zip(b8) {
+            for k in 0..8 {
+                lanes[k] += x[k] * y[k];
+            }
+        }
+        let rest: f64 = a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum();
+        let pairs = [
+            lanes[0] + lanes[4],
+            lanes[1] + lanes[5],
+            lanes[2] + lanes[6],
+            lanes[3] + lanes[7],
+        ];
+        (pairs[0] + pairs[2]) + (pairs[1] + pairs[3]) + rest
+    }
+}
+
+impl Real for DoubleDouble {
+    const ZERO: Self = DoubleDouble::exactly(0.0);
+    const ONE: Self = DoubleDouble::exactly(1.0);
+    /// 2^-102: the worst of the operations stays below it.
+    const EPSILON: f64 = 1.0 / (1_u128 << 102) as f64;
+
+    fn of(value: f64) -> Self {
+        DoubleDouble::exactly(value)
+    }
+
+    fn to_f64(self) -> f64 {
+        self.nearest()
+    }
+
+    fn sqrt(self) -> Self {
+        self.square_root()
+    }
+
+    fn abs(self) -> Self {
+        if self < Self::ZERO { -self } else { self }
+    }
+
+    /// Four running sums hide the latency of the long additions.
+    fn dot(a: &[Self], b: &[Self]) -> Self {
+        let (a4, a_rest) = a.as_chunks::<4>();
+        let (b4, b_rest) = b.as_chunks::<4>();
+        let mut lanes = [Self::ZERO; 4];
+        for (x, y) in a4.iter().zip(b4) {
+            for k in 0..4 {
+                lanes[k] += x[k] * y[k];
+            }
+        }
+        let rest = a_rest
+            .iter()
+            .zip(b_rest)
+            .fold(Self::ZERO, |sum, (&x, &y)| sum + x * y);
+        (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]) + rest
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_vector_sum_of_products_is_exact_on_small_integers() {
+        for n in 0..40 {
+            let a: Vec<f64> = (0..n).map(|i| f64::from(3 * i - 7)).collect();
+            let b: Vec<f64> = (0..n).map(|i| f64::from(i * i % 11)).collect();
+            let plain: f64 = a.iter().zip(&b).map(|(x, y)| x * y).sum();
+            assert_eq!(f64::dot(&a, &b), plain);
+        }
+    }
+}
