@@ -488,7 +488,9 @@ fn check_criteria(seed: u64, case: &Case, search: &Search, solution: &Solution) 
 fn small_problems_match_exhaustive_search() {
     let mut bad = 0;
     for seed in 0..std::env::var("N").map_or(3000, |v| v.parse().unwrap()) {
-        if std::panic::catch_unwind(|| check_small(seed)).is_err() { bad += 1; }
+        if std::panic::catch_unwind(|| check_small(seed)).is_err() {
+            bad += 1;
+        }
     }
     assert_eq!(bad, 0);
 }

@@ -317,6 +317,8 @@ fn read_bounded(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
         return Err(io::Error::new(io::ErrorKind::InvalidData, message));
     }
     let mut content = Vec::with_capacity(metadata.len() as usize);
-    File::open(path)?.take(max_bytes).read_to_end(&mut content)?;
+    File::open(path)?
+        .take(max_bytes)
+        .read_to_end(&mut content)?;
     Ok(content)
 }

@@ -6,12 +6,11 @@ pub fn push_number(text: &mut Vec<u8>, value: f64) {
     let mut buffer = zmij::Buffer::new();
     let digits = buffer.format(value);
     let digits = digits.strip_suffix(".0").unwrap_or(digits);
-    match digits.split_once('+') {
-        Some((mantissa, exponent)) => {
-            text.extend_from_slice(mantissa.as_bytes());
-            text.extend_from_slice(exponent.as_bytes());
-        }
-        None => text.extend_from_slice(digits.as_bytes()),
+    if value.abs() < 1e16 {
+        text.extend_from_slice(digits.as_bytes());
+    } else {
+        // "7e+17": the plus says nothing.
+        text.extend(digits.bytes().filter(|&byte| byte != b'+'));
     }
 }
 

@@ -145,16 +145,28 @@ pub fn write_samples<V: AsRef<[f64]>>(
 ) -> io::Result<()> {
     let names = ["x_m", "y_m", "z_m", "coil"];
     let mut lines = Lines::begin(out, names.iter().chain(columns).copied())?;
+    // Positions and coils are formatted once, not once a row.
+    let coil_cells: Vec<Vec<u8>> = coils
+        .iter()
+        .map(|&coil| {
+            let mut cell = Vec::new();
+            push_index(&mut cell, coil);
+            cell.push(b',');
+            cell
+        })
+        .collect();
+    let mut position = Vec::new();
     for (index, point) in points.enumerate() {
         let start = lines.block.len();
         for value in point {
             lines.number(value)?;
         }
-        // The position is formatted once for all coils.
-        let position = lines.block.split_off(start);
-        for (place, &coil) in coils.iter().enumerate() {
+        position.clear();
+        position.extend_from_slice(&lines.block[start..]);
+        lines.block.truncate(start);
+        for (place, cell) in coil_cells.iter().enumerate() {
             lines.block.extend_from_slice(&position);
-            lines.index(coil);
+            lines.block.extend_from_slice(cell);
             for &value in values(index, place).as_ref() {
                 lines.number(value)?;
             }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::artefact::FileEntry;
+use super::artefact::{FileEntry, Input};
 use super::atomic::{FileSet, FolderDraft, Overwrite, WriteError, Written, write};
 use super::consistent;
 use super::json::to_json;
@@ -28,18 +28,16 @@ pub struct BundleContent<'a> {
     pub currents: &'a [CurrentRow],
     /// `lambda.json`.
     pub lambda: &'a LambdaFile,
+    /// Files kept beside them as they are: name and content.
+    pub extra: &'a [(&'a str, &'a [u8])],
 }
 
 /// Refuses early, before a long computation, when the bundle at `target` must not be replaced.
 ///
 /// # Errors
 /// [`WriteError`].
-pub fn check_bundle_target(
-    target: &Path,
-    force: bool,
-    manifest: &Manifest,
-) -> Result<(), WriteError> {
-    FolderDraft::begin(target, overwrite_bundle(target, force, manifest)).map(drop)
+pub fn check_bundle_target(target: &Path, force: bool, inputs: &[Input]) -> Result<(), WriteError> {
+    FolderDraft::begin(target, overwrite_bundle(target, force, inputs)).map(drop)
 }
 
 /// Writes a bundle whole or not at all; `timing` becomes `timing.json`, which no manifest lists.
@@ -65,7 +63,7 @@ pub fn write_bundle<T: Serialize + ?Sized>(
         path: target.to_path_buf(),
         message,
     })?;
-    let mut draft = FolderDraft::begin(target, overwrite_bundle(target, force, &manifest))?;
+    let mut draft = FolderDraft::begin(target, overwrite_bundle(target, force, &manifest.inputs))?;
     manifest.files = vec![
         draft.write("map.npz", |out| {
             out.write_all(&to_npz(content.map).map_err(invalid)?)
@@ -76,6 +74,11 @@ pub fn write_bundle<T: Serialize + ?Sized>(
             out.write_all(&to_json(content.lambda).map_err(invalid)?)
         })?,
     ];
+    for (name, bytes) in content.extra {
+        manifest
+            .files
+            .push(draft.write(name, |out| out.write_all(bytes))?);
+    }
     draft.write("timing.json", |out| {
         out.write_all(&to_json(timing).map_err(invalid)?)
     })?;
@@ -86,8 +89,8 @@ pub fn write_bundle<T: Serialize + ?Sized>(
     Ok(manifest)
 }
 
-fn overwrite_bundle(target: &Path, force: bool, manifest: &Manifest) -> Overwrite {
-    Overwrite::new(force, target.join("manifest.json"), &manifest.inputs)
+fn overwrite_bundle(target: &Path, force: bool, inputs: &[Input]) -> Overwrite {
+    Overwrite::new(force, target.join("manifest.json"), inputs)
 }
 
 /// Which formats of a map are wanted beside `map.npz`.

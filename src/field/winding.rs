@@ -183,6 +183,17 @@ impl Winding {
         })
     }
 
+    /// dB_z/dz and (dB_r/dz)/r per ampere by another route than [`Winding::field`]: the loops'
+    /// own derivatives integrated over the whole section. Slower; made to check the first.
+    /// Domain: outside the conductor.
+    #[must_use]
+    pub fn gradient_by_section(&self, r_m: f64, z_m: f64) -> (f64, f64) {
+        let sums = self.along_z(r_m, z_m, Want::FieldAndGradient);
+        let (lo, hi) = self.offsets_m(r_m);
+        let scale = MU_0_T_M_PER_A * self.turns / ((hi - lo) * self.length_m);
+        (scale * sums.dbz_dz, scale * sums.dbr_dz_over_r)
+    }
+
     /// Radial integrals over the loops of one end face, `u_m` below the point.
     fn face(&self, r_m: f64, u_m: f64, with_sheet: bool) -> Face {
         let (lo, hi) = self.offsets_m(r_m);

@@ -142,10 +142,15 @@ pub fn evaluate(
                 current_max_a: scene.upper_a[coil],
             })
             .collect();
-        ArrayFacts { coils, mutual_inductance_h: matrix }
+        ArrayFacts {
+            coils,
+            mutual_inductance_h: matrix,
+        }
     });
     let accuracy = accuracy(&scene);
-    let worst = accuracy["field"].estimate.max(accuracy["inductance"].estimate);
+    let worst = accuracy["field"]
+        .estimate
+        .max(accuracy["inductance"].estimate);
     Ok(Evaluation {
         schema_version: SCHEMA_VERSION,
         fluxform_version: FLUXFORM_VERSION,
@@ -206,8 +211,11 @@ fn accuracy(scene: &Scene) -> BTreeMap<&'static str, StageAccuracy> {
     if scene.coils.len() > 1 {
         let gap_m = nearest_gap_m(scene);
         let apart = gap_m >= 0.1 * scene.winding.outer_radius_m;
-        let estimate =
-            if apart { mutual::RELATIVE_ERROR } else { mutual::RELATIVE_ERROR_TOUCHING };
+        let estimate = if apart {
+            mutual::RELATIVE_ERROR
+        } else {
+            mutual::RELATIVE_ERROR_TOUCHING
+        };
         accuracy.insert(
             "mutual_inductance",
             stage(

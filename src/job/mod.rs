@@ -66,7 +66,8 @@ impl JobError {
         match self {
             Self::Interrupted(_) | Self::Shape(ShapeError::Interrupted(_)) => 130,
             Self::Write(_) => 4,
-            Self::Bundle(error) if error.is_damage() => 5,
+            Self::Bundle(BundleError::NoBundle { .. } | BundleError::Schema { .. }) => 3,
+            Self::Bundle(_) => 5,
             _ => 3,
         }
     }

@@ -94,7 +94,11 @@ pub fn probe(
 
 fn scaled(mut field: CartesianField, gain: f64) -> CartesianField {
     field.field_t_per_a.iter_mut().for_each(|b| *b *= gain);
-    field.gradient_t_per_m_per_a.as_flattened_mut().iter_mut().for_each(|g| *g *= gain);
+    field
+        .gradient_t_per_m_per_a
+        .as_flattened_mut()
+        .iter_mut()
+        .for_each(|g| *g *= gain);
     field
 }
 
@@ -116,8 +120,9 @@ impl ProbeTable {
                 .flat_map(|p| std::iter::repeat_n(p[axis], self.coils))
                 .collect()
         };
-        let coil: Vec<i64> =
-            (0..self.fields.len()).map(|row| (row % self.coils) as i64).collect();
+        let coil: Vec<i64> = (0..self.fields.len())
+            .map(|row| (row % self.coils) as i64)
+            .collect();
         let mut names = Vec::new();
         let mut values: Vec<Vec<f64>> = Vec::new();
         let mut add = |name, value: &dyn Fn(&CartesianField) -> f64| {
@@ -141,7 +146,12 @@ impl ProbeTable {
             ("z_m", Column::Number(&z)),
             ("coil", Column::Index(&coil)),
         ];
-        columns.extend(names.iter().zip(&values).map(|(n, v)| (*n, Column::Number(v))));
+        columns.extend(
+            names
+                .iter()
+                .zip(&values)
+                .map(|(n, v)| (*n, Column::Number(v))),
+        );
         write_columns(out, &columns)
     }
 }

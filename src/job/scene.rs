@@ -68,7 +68,11 @@ impl<'a> Scene<'a> {
             .iter()
             .zip(&design.array.gain)
             .enumerate()
-            .map(|(number, (axis_m, gain))| PlacedCoil { number, axis_m: *axis_m, gain: *gain })
+            .map(|(number, (axis_m, gain))| PlacedCoil {
+                number,
+                axis_m: *axis_m,
+                gain: *gain,
+            })
             .collect();
         let magnet = &design.magnet;
         let moment = dipole::cylinder_moment_a_m2(
@@ -89,7 +93,12 @@ impl<'a> Scene<'a> {
             coils,
             moment_a_m2: dipole::tilted_moment_a_m2(along_z, magnet.tilt_deg),
             upper_a: design.supply.current_max_a.iter().map(rated).collect(),
-            lower_a: design.supply.current_min_a.iter().map(|l| -rated(&-l)).collect(),
+            lower_a: design
+                .supply
+                .current_min_a
+                .iter()
+                .map(|l| -rated(&-l))
+                .collect(),
             circuit,
         })
     }
@@ -160,7 +169,11 @@ impl<'a> Scene<'a> {
             })
             .collect();
         let z_m: Vec<f64> = points_m.iter().map(|p| p[2]).collect();
-        let wanted = if self.tilted() { Wanted::Gradient } else { Wanted::Gz };
+        let wanted = if self.tilted() {
+            Wanted::Gradient
+        } else {
+            Wanted::Gz
+        };
         let gradients = self.winding.gradients(&r_m, &z_m, tolerance, wanted)?;
         let [m_x, m_y, m_z] = self.moment_a_m2;
         for (row, point) in points_m.iter().enumerate() {

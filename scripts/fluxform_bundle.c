@@ -1,0 +1,508 @@
+/* Loads the map of a fluxform bundle and interpolates it; see fluxform_bundle.h.
+ *
+ * Built with -DFLUXFORM_BUNDLE_MAIN it is a program: `program map.npz` reads lines "x y z" (m) and
+ * prints the force per ampere [N/A] of every coil for each:
+ *   cc -std=c99 -O2 -DFLUXFORM_BUNDLE_MAIN fluxform_bundle.c -o forces
+ */
+#include "fluxform_bundle.h"
+
+#include <limits.h>
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define SCHEMA_MAJOR 1
+#define MAX_DIMENSIONS 6
+
+/* ---- the file in memory -------------------------------------------------------------------- */
+
+typedef struct {
+    const unsigned char *data;
+    size_t size;
+    char *message;
+    size_t message_size;
+} archive;
+
+static int fail(const archive *a, const char *name, const char *what)
+{
+    if (a->message && a->message_size > 0)
+        snprintf(a->message, a->message_size, "%s%s%s", name, *name ? ": " : "", what);
+    return -1;
+}
+
+static uint32_t u16(const unsigned char *p)
+{
+    return (uint32_t)p[0] | (uint32_t)p[1] << 8;
+}
+
+static uint32_t u32(const unsigned char *p)
+{
+    return u16(p) | u16(p + 2) << 16;
+}
+
+static uint64_t u64(const unsigned char *p)
+{
+    return (uint64_t)u32(p) | (uint64_t)u32(p + 4) << 32;
+}
+
+static double f64(const unsigned char *p)
+{
+    uint64_t bits = u64(p);
+    double value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+static unsigned char *read_file(const char *path, size_t *size, const archive *a)
+{
+    FILE *file = fopen(path, "rb");
+    unsigned char *data = NULL;
+    long length = -1;
+    if (!file) {
+        fail(a, path, "cannot be opened");
+        return NULL;
+    }
+    if (fseek(file, 0, SEEK_END) == 0)
+        length = ftell(file);
+    if (length <= 0 || length == LONG_MAX || fseek(file, 0, SEEK_SET) != 0)
+        fail(a, path, "cannot be read");
+    else if (!(data = malloc((size_t)length)))
+        fail(a, path, "does not fit into memory");
+    else if (fread(data, 1, (size_t)length, file) != (size_t)length) {
+        fail(a, path, "cannot be read");
+        free(data);
+        data = NULL;
+    }
+    fclose(file);
+    *size = (size_t)length;
+    return data;
+}
+
+static uint32_t crc32_of(const unsigned char *data, size_t size)
+{
+    uint32_t table[256], crc = 0xffffffffu;
+    for (uint32_t i = 0; i < 256; i++) {
+        uint32_t c = i;
+        for (int k = 0; k < 8; k++)
+            c = c & 1 ? 0xedb88320u ^ c >> 1 : c >> 1;
+        table[i] = c;
+    }
+    for (size_t i = 0; i < size; i++)
+        crc = table[(crc ^ data[i]) & 0xff] ^ crc >> 8;
+    return ~crc;
+}
+
+/* ---- stored zip and NPY 1.0 ---------------------------------------------------------------- */
+
+typedef struct {
+    const unsigned char *data; /* elements of 8 bytes, little-endian */
+    size_t dimensions;
+    size_t shape[MAX_DIMENSIONS];
+    size_t count;
+} array;
+
+/* The bytes of an entry: 1 found, 0 absent, -1 damaged. */
+static int find_entry(const archive *a, const char *name, const unsigned char **data, size_t *size)
+{
+    const size_t end_size = 22, head_size = 46, local_size = 30;
+    size_t end, at, entries;
+    char wanted[64];
+    snprintf(wanted, sizeof wanted, "%s.npy", name);
+    if (a->size < end_size)
+        return fail(a, "", "not a zip archive");
+    /* The end record may be followed by a comment of at most 65535 bytes. */
+    end = a->size - end_size;
+    while (u32(a->data + end) != 0x06054b50u) {
+        if (end == 0 || a->size - end > end_size + 65535)
+            return fail(a, "", "not a zip archive, or cut short");
+        end--;
+    }
+    entries = u16(a->data + end + 10);
+    at = u32(a->data + end + 16);
+    for (size_t i = 0; i < entries; i++) {
+        const unsigned char *head;
+        size_t name_size, step;
+        if (at > end || end - at < head_size || u32(a->data + at) != 0x02014b50u)
+            return fail(a, "", "the archive's directory is damaged");
+        head = a->data + at;
+        name_size = u16(head + 28);
+        step = head_size + name_size + u16(head + 30) + u16(head + 32);
+        if (end - at < step)
+            return fail(a, "", "the archive's directory is damaged");
+        if (name_size == strlen(wanted) && memcmp(head + head_size, wanted, name_size) == 0) {
+            size_t stored = u32(head + 20), local = u32(head + 42), begin;
+            if (u16(head + 10) != 0 || (u16(head + 8) & 1) || stored != u32(head + 24))
+                return fail(a, name, "is compressed, encrypted or larger than 4 GiB");
+            if (local > a->size || a->size - local < local_size || u32(a->data + local) != 0x04034b50u)
+                return fail(a, name, "lies outside the file");
+            begin = local_size + u16(a->data + local + 26) + u16(a->data + local + 28);
+            if (a->size - local < begin || a->size - local - begin < stored)
+                return fail(a, name, "lies outside the file");
+            *data = a->data + local + begin;
+            *size = stored;
+            if (crc32_of(*data, *size) != u32(head + 16))
+                return fail(a, name, "is damaged (CRC)");
+            return 1;
+        }
+        at += step;
+    }
+    return 0;
+}
+
+/* Compares header text with what numpy writes, blanks aside; moves on. */
+static int skip(const char **text, const char *end, const char *expected)
+{
+    const char *p = *text;
+    for (; *expected; expected++) {
+        while (p < end && *p == ' ')
+            p++;
+        if (p >= end || *p != *expected)
+            return 0;
+        p++;
+    }
+    while (p < end && *p == ' ')
+        p++;
+    *text = p;
+    return 1;
+}
+
+static int parse_shape(const char **text, const char *end, array *out)
+{
+    out->dimensions = 0;
+    out->count = 1;
+    while (*text < end && **text >= '0' && **text <= '9') {
+        size_t size = 0;
+        if (out->dimensions == MAX_DIMENSIONS)
+            return 0;
+        for (; *text < end && **text >= '0' && **text <= '9'; (*text)++) {
+            size_t digit = (size_t)(**text - '0');
+            if (size > (SIZE_MAX - digit) / 10)
+                return 0;
+            size = 10 * size + digit;
+        }
+        if (size != 0 && out->count > SIZE_MAX / 8 / size)
+            return 0;
+        out->count *= size;
+        out->shape[out->dimensions++] = size;
+        if (!skip(text, end, ","))
+            break;
+    }
+    return 1;
+}
+
+/* An array of the archive: 1 found, 0 absent, -1 damaged. `kind` is "<f8" or "<i8". */
+static int find_array(const archive *a, const char *name, const char *kind, size_t dimensions, array *out)
+{
+    const unsigned char *data = NULL;
+    const char *text, *end;
+    char start[64];
+    size_t size = 0, length;
+    int found = find_entry(a, name, &data, &size);
+    if (found <= 0)
+        return found;
+    if (size < 10 || memcmp(data, "\x93NUMPY\x01\x00", 8) != 0)
+        return fail(a, name, "is not an NPY 1.0 array");
+    length = u16(data + 8);
+    if (size - 10 < length)
+        return fail(a, name, "ends within its header");
+    text = (const char *)data + 10;
+    end = text + length;
+    snprintf(start, sizeof start, "{'descr':'%s','fortran_order':False,'shape':(", kind);
+    if (!skip(&text, end, start) || !parse_shape(&text, end, out) || !skip(&text, end, ")"))
+        return fail(a, name, "is not of the expected kind, C order, little-endian");
+    if (out->dimensions != dimensions || out->count != (size - 10 - length) / 8 || (size - 10 - length) % 8)
+        return fail(a, name, "does not hold what its shape says");
+    out->data = data + 10 + length;
+    return 1;
+}
+
+/* ---- loading ------------------------------------------------------------------------------- */
+
+/* Like find_array, but the array must be there. */
+static int need(const archive *a, const char *name, const char *kind, size_t dimensions, array *out)
+{
+    int found = find_array(a, name, kind, dimensions, out);
+    return found == 0 ? fail(a, name, "is missing") : found < 0 ? -1 : 0;
+}
+
+/* Copies an array of finite numbers; NULL on failure. */
+static double *copy(const archive *a, const char *name, const array *from)
+{
+    double *to = malloc(from->count ? from->count * sizeof *to : 1);
+    if (!to) {
+        fail(a, name, "does not fit into memory");
+        return NULL;
+    }
+    for (size_t i = 0; i < from->count; i++) {
+        to[i] = f64(from->data + 8 * i);
+        if (!isfinite(to[i])) {
+            fail(a, name, "holds a number that is not finite");
+            free(to);
+            return NULL;
+        }
+    }
+    return to;
+}
+
+static int load_line(const archive *a, const char *name, double **values, size_t *count)
+{
+    array from;
+    if (need(a, name, "<f8", 1, &from) || !(*values = copy(a, name, &from)))
+        return -1;
+    *count = from.count;
+    return 0;
+}
+
+static int load_axis(const archive *a, const char *name, double **nodes, size_t *count)
+{
+    if (load_line(a, name, nodes, count))
+        return -1;
+    if (*count == 0)
+        return fail(a, name, "has no nodes");
+    for (size_t i = 1; i < *count; i++)
+        if (!((*nodes)[i - 1] < (*nodes)[i]))
+            return fail(a, name, "must increase from node to node");
+    return 0;
+}
+
+static int load_scalar(const archive *a, const char *name, double *value)
+{
+    array from;
+    int found = find_array(a, name, "<f8", 0, &from);
+    if (found == 1) {
+        *value = f64(from.data);
+        if (!isfinite(*value))
+            return fail(a, name, "is not finite");
+    }
+    return found;
+}
+
+static int load_coils(fluxform_bundle *b, const archive *a)
+{
+    array from;
+    size_t count;
+    if (load_line(a, "current_max_a", &b->current_max_a, &b->coil_count))
+        return -1;
+    if (load_line(a, "current_min_a", &b->current_min_a, &count) || count != b->coil_count)
+        return fail(a, "current_min_a", "must hold one number a coil");
+    if (load_line(a, "resistance_ohm", &b->resistance_ohm, &count) || count != b->coil_count)
+        return fail(a, "resistance_ohm", "must hold one number a coil");
+    if (need(a, "coil", "<i8", 1, &from))
+        return -1;
+    b->map_count = from.count;
+    if (!(b->coil = malloc(from.count ? from.count * sizeof *b->coil : 1)))
+        return fail(a, "coil", "does not fit into memory");
+    for (size_t i = 0; i < from.count; i++) {
+        uint64_t index = u64(from.data + 8 * i);
+        if (index >= b->coil_count || (i > 0 && index <= b->coil[i - 1]))
+            return fail(a, "coil", "must hold increasing indices of coils");
+        b->coil[i] = (size_t)index;
+    }
+    return 0;
+}
+
+static int load_map(fluxform_bundle *b, const archive *a, const char *name, size_t dimensions, double **values)
+{
+    array from;
+    const size_t shape[MAX_DIMENSIONS] = {b->map_count, b->nz, b->ny, b->nx, 3, 3};
+    if (need(a, name, "<f8", dimensions, &from))
+        return -1;
+    for (size_t i = 0; i < dimensions; i++)
+        if (from.shape[i] != shape[i])
+            return fail(a, name, "does not have the shape of its axes");
+    return (*values = copy(a, name, &from)) ? 0 : -1;
+}
+
+static int load_all(fluxform_bundle *b, const archive *a)
+{
+    array from;
+    int tilted;
+    if (need(a, "schema_version", "<i8", 1, &from))
+        return -1;
+    if (from.count != 3 || u64(from.data) != SCHEMA_MAJOR)
+        return fail(a, "schema_version", "is not one that this loader reads");
+    if (load_axis(a, "x_m", &b->x_m, &b->nx) || load_axis(a, "y_m", &b->y_m, &b->ny) ||
+        load_axis(a, "z_m", &b->z_m, &b->nz) || load_coils(b, a))
+        return -1;
+    if (need(a, "moment_a_m2", "<f8", 1, &from))
+        return -1;
+    if (from.count != 3)
+        return fail(a, "moment_a_m2", "must hold three numbers");
+    for (size_t i = 0; i < 3; i++) {
+        b->moment_a_m2[i] = f64(from.data + 8 * i);
+        if (!isfinite(b->moment_a_m2[i]))
+            return fail(a, "moment_a_m2", "holds a number that is not finite");
+    }
+    if (load_map(b, a, "gz_t_per_m_per_a", 4, &b->gz_t_per_m_per_a))
+        return -1;
+    tilted = b->moment_a_m2[0] != 0 || b->moment_a_m2[1] != 0;
+    if (tilted && load_map(b, a, "gradient_t_per_m_per_a", 6, &b->gradient_t_per_m_per_a))
+        return -1;
+    b->has_total_current_max = load_scalar(a, "total_current_max_a", &b->total_current_max_a);
+    b->has_lambda = load_scalar(a, "lambda_n_per_m", &b->lambda_n_per_m);
+    return b->has_total_current_max < 0 || b->has_lambda < 0 ? -1 : 0;
+}
+
+int fluxform_bundle_open(fluxform_bundle *bundle, const char *path, char *message, size_t message_size)
+{
+    archive a = {NULL, 0, message, message_size};
+    unsigned char *data;
+    int outcome;
+    memset(bundle, 0, sizeof *bundle);
+    if (!(data = read_file(path, &a.size, &a)))
+        return -1;
+    a.data = data;
+    outcome = load_all(bundle, &a);
+    free(data);
+    if (outcome)
+        fluxform_bundle_close(bundle);
+    return outcome;
+}
+
+void fluxform_bundle_close(fluxform_bundle *bundle)
+{
+    free(bundle->x_m);
+    free(bundle->y_m);
+    free(bundle->z_m);
+    free(bundle->coil);
+    free(bundle->gz_t_per_m_per_a);
+    free(bundle->gradient_t_per_m_per_a);
+    free(bundle->current_min_a);
+    free(bundle->current_max_a);
+    free(bundle->resistance_ohm);
+    memset(bundle, 0, sizeof *bundle);
+}
+
+/* ---- tricubic Lagrange interpolation -------------------------------------------------------- */
+
+typedef struct {
+    size_t start, count;
+    double weights[4];
+} stencil;
+
+/* The (at most) four nearest nodes and their weights; 0 outside the nodes' range. */
+static int find_stencil(const double *nodes, size_t n, double position, stencil *s)
+{
+    size_t low = 0, high = n;
+    if (!(nodes[0] <= position && position <= nodes[n - 1]))
+        return 0;
+    while (low < high) { /* the number of nodes <= position */
+        size_t middle = low + (high - low) / 2;
+        if (nodes[middle] <= position)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    s->count = n < 4 ? n : 4;
+    s->start = low < 2 ? 0 : low - 2;
+    if (s->start > n - s->count)
+        s->start = n - s->count;
+    for (size_t k = 0; k < s->count; k++) {
+        const double *near = nodes + s->start;
+        double above = 1, below = 1;
+        for (size_t j = 0; j < s->count; j++)
+            if (j != k) {
+                above *= position - near[j];
+                below *= near[k] - near[j];
+            }
+        s->weights[k] = above / below;
+    }
+    return 1;
+}
+
+typedef struct {
+    stencil x, y, z;
+} cell;
+
+static int find_cell(const fluxform_bundle *b, double x, double y, double z, cell *c)
+{
+    return find_stencil(b->x_m, b->nx, x, &c->x) && find_stencil(b->y_m, b->ny, y, &c->y) &&
+           find_stencil(b->z_m, b->nz, z, &c->z);
+}
+
+static double interpolate(const fluxform_bundle *b, const cell *c, const double *values, size_t components)
+{
+    double sum = 0;
+    for (size_t k = 0; k < c->z.count; k++) {
+        double plane = 0;
+        for (size_t j = 0; j < c->y.count; j++) {
+            size_t node = ((c->z.start + k) * b->ny + c->y.start + j) * b->nx + c->x.start;
+            double row = 0;
+            for (size_t i = 0; i < c->x.count; i++)
+                row += c->x.weights[i] * values[(node + i) * components];
+            plane += c->y.weights[j] * row;
+        }
+        sum += c->z.weights[k] * plane;
+    }
+    return sum;
+}
+
+int fluxform_gz_per_ampere(const fluxform_bundle *b, double x, double y, double z, double *gz)
+{
+    const size_t nodes = b->nx * b->ny * b->nz;
+    cell c;
+    for (size_t i = 0; i < b->coil_count; i++)
+        gz[i] = 0;
+    if (!find_cell(b, x, y, z, &c))
+        return 0;
+    for (size_t i = 0; i < b->map_count; i++)
+        gz[b->coil[i]] = interpolate(b, &c, b->gz_t_per_m_per_a + i * nodes, 1);
+    return 1;
+}
+
+int fluxform_force_per_ampere(const fluxform_bundle *b, double x, double y, double z, double *force)
+{
+    const size_t nodes = b->nx * b->ny * b->nz;
+    const double *m = b->moment_a_m2;
+    cell c;
+    if (!b->gradient_t_per_m_per_a) {
+        int inside = fluxform_gz_per_ampere(b, x, y, z, force);
+        for (size_t i = 0; i < b->coil_count; i++)
+            force[i] *= m[2];
+        return inside;
+    }
+    for (size_t i = 0; i < b->coil_count; i++)
+        force[i] = 0;
+    if (!find_cell(b, x, y, z, &c))
+        return 0;
+    for (size_t i = 0; i < b->map_count; i++) {
+        /* dB_x/dz, dB_y/dz, dB_z/dz are components 2, 5 and 8. */
+        const double *block = b->gradient_t_per_m_per_a + 9 * i * nodes;
+        force[b->coil[i]] = m[0] * interpolate(b, &c, block + 2, 9) +
+                            m[1] * interpolate(b, &c, block + 5, 9) +
+                            m[2] * interpolate(b, &c, block + 8, 9);
+    }
+    return 1;
+}
+
+#ifdef FLUXFORM_BUNDLE_MAIN
+int main(int argc, char **argv)
+{
+    fluxform_bundle bundle;
+    char message[256];
+    double x, y, z, *force;
+    if (argc != 2) {
+        fprintf(stderr, "usage: %s map.npz < points\n", argv[0]);
+        return 2;
+    }
+    if (fluxform_bundle_open(&bundle, argv[1], message, sizeof message)) {
+        fprintf(stderr, "%s\n", message);
+        return 3;
+    }
+    if (!(force = malloc(bundle.coil_count ? bundle.coil_count * sizeof *force : 1))) {
+        fluxform_bundle_close(&bundle);
+        return 3;
+    }
+    while (scanf("%lf %lf %lf", &x, &y, &z) == 3) {
+        fluxform_force_per_ampere(&bundle, x, y, z, force);
+        for (size_t i = 0; i < bundle.coil_count; i++)
+            printf("%s%.17g", i ? " " : "", force[i]);
+        printf("\n");
+    }
+    free(force);
+    fluxform_bundle_close(&bundle);
+    return 0;
+}
+#endif

@@ -1,0 +1,412 @@
+//! `calibrate`: map, points and lambda for each shape, one bundle each.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::JobError;
+use super::discretize::{self, point_rows, points_grid};
+use super::lambda::{LambdaOptions, LambdaReport, solve};
+use super::map::{MAP_TOLERANCE, accuracy, arrays, runtime, summary, workspace_grid};
+use super::scene::Scene;
+use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
+use crate::bundle::manifest::{LambdaSummary, LeftOut, Manifest};
+use crate::bundle::table::CurrentRow;
+use crate::bundle::write::{BundleContent, check_bundle_target, write_bundle};
+use crate::design::Design;
+use crate::map::tabulate::{Grid, PlacedCoil};
+use crate::map::{Components, FieldMap, interpolation_error, tabulate};
+use crate::progress::Progress;
+use crate::shape::document::ShapeDocument;
+
+/// The name under which a bundle keeps the design it was made from.
+pub const DESIGN_FILE: &str = "design.toml";
+
+/// How far from the object's points the map still reaches by default, m: the seed's largest
+/// deviation between finger and surface is 14 mm.
+pub const DEFAULT_REACH_M: f64 = 0.020;
+
+/// What is asked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CalibrateOptions {
+    /// Folder under which `<design>/<shape>/` is written.
+    pub out: PathBuf,
+    /// Replace what is there, whatever it is.
+    pub force: bool,
+    /// The force constant's criterion; its `tolerance` is that of the forces.
+    pub lambda: LambdaOptions,
+    /// The map reaches this far from the object's points, within the workspace, m.
+    pub reach_m: f64,
+}
+
+/// The design, its text and its entry among the inputs.
+#[derive(Debug, Clone, Copy)]
+pub struct DesignSource<'a> {
+    /// Validated.
+    pub design: &'a Design,
+    /// The file's text, which every bundle keeps.
+    pub text: &'a str,
+    /// Path as given, digest.
+    pub input: &'a Input,
+}
+
+/// One shape and the entry of its document among the inputs, if it is a file.
+#[derive(Debug, Clone)]
+pub struct ShapeSource {
+    /// Validated.
+    pub document: ShapeDocument,
+    /// Path as given, digest; `None` for a surface given with flags.
+    pub input: Option<Input>,
+}
+
+/// What was made.
+#[derive(Debug, Clone)]
+pub struct CalibrateReport {
+    /// One entry a shape, in the order given.
+    pub bundles: Vec<BundleReport>,
+}
+
+/// One bundle.
+#[derive(Debug, Clone)]
+pub struct BundleReport {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// `manifest.json` as written.
+    pub manifest: Manifest,
+    /// The force constant.
+    pub lambda: LambdaReport,
+}
+
+impl CalibrateReport {
+    /// Whether every shape has a force constant and every tolerance was reached.
+    #[must_use]
+    pub fn as_wished(&self) -> bool {
+        self.bundles.iter().all(|bundle| bundle.lambda.as_wished())
+    }
+}
+
+/// Calibrates `source` for every shape; each bundle is whole before the next begins.
+///
+/// # Errors
+/// Two shapes of one name; a design or shape that cannot be computed; an output that must not
+/// be replaced or cannot be written; interruption. Finished bundles are kept.
+pub fn run(
+    source: DesignSource,
+    shapes: &[ShapeSource],
+    options: &CalibrateOptions,
+    progress: &dyn Progress,
+) -> Result<CalibrateReport, JobError> {
+    for (i, shape) in shapes.iter().enumerate() {
+        if shapes[..i]
+            .iter()
+            .any(|other| other.document.name == shape.document.name)
+        {
+            return Err(JobError::Input(format!(
+                "two shapes are called {:?}: their bundles would share a folder; rename one",
+                shape.document.name
+            )));
+        }
+    }
+    let scene = Scene::new(source.design)?;
+    let bundles = shapes
+        .iter()
+        .map(|shape| calibrate_one(&scene, source, shape, options, progress))
+        .collect::<Result<_, _>>()?;
+    Ok(CalibrateReport { bundles })
+}
+
+/// Seconds of one stage, as `timing.json` tells them.
+#[derive(Serialize)]
+struct StageSeconds {
+    stage: String,
+    seconds: f64,
+}
+
+fn calibrate_one(
+    scene: &Scene,
+    source: DesignSource,
+    shape: &ShapeSource,
+    options: &CalibrateOptions,
+    progress: &dyn Progress,
+) -> Result<BundleReport, JobError> {
+    progress.take_seconds();
+    let folder = options
+        .out
+        .join(&scene.design.name)
+        .join(&shape.document.name);
+    let inputs = std::iter::once(source.input)
+        .chain(&shape.input)
+        .cloned()
+        .collect();
+    let points = discretize::run(&shape.document, inputs, progress)?;
+    check_bundle_target(&folder, options.force, &points.summary.inputs)?;
+    let lambda = solve(scene, points, &options.lambda, progress)?;
+    let tolerance = options.lambda.tolerance.unwrap_or(MAP_TOLERANCE);
+    let needed = NeededMap::new(scene, &lambda, options.reach_m, tolerance, progress)?;
+    let manifest = manifest(scene, &lambda, &needed);
+    let currents = current_rows(scene, &lambda);
+    let rows = point_rows(&lambda.points.discretized.points);
+    let map = arrays(&needed.map, runtime(scene, lambda.file.lambda_n_per_m));
+    let timing: Vec<StageSeconds> = progress
+        .take_seconds()
+        .into_iter()
+        .map(|(stage, seconds)| StageSeconds { stage, seconds })
+        .collect();
+    progress.check()?;
+    progress.begin("write", 1);
+    let content = BundleContent {
+        manifest,
+        map: &map,
+        points: &rows,
+        currents: &currents,
+        lambda: &lambda.file,
+        extra: &[(DESIGN_FILE, source.text.as_bytes())],
+    };
+    let manifest = write_bundle(&folder, options.force, &content, &timing)?;
+    progress.end();
+    Ok(BundleReport {
+        folder,
+        manifest,
+        lambda,
+    })
+}
+
+/// The part of the maps that an object needs, and what was left out of it.
+struct NeededMap {
+    map: FieldMap,
+    components: Components,
+    between: crate::map::InterpolationError,
+    left_out: Vec<LeftOut>,
+}
+
+impl NeededMap {
+    fn new(
+        scene: &Scene,
+        lambda: &LambdaReport,
+        reach_m: f64,
+        tolerance: f64,
+        progress: &dyn Progress,
+    ) -> Result<Self, JobError> {
+        let mut left_out = Vec::new();
+        let grid = needed_grid(scene.design, lambda, reach_m, &mut left_out);
+        let components = if scene.tilted() {
+            Components::Gradient
+        } else {
+            left_out.push(LeftOut {
+                what: "field and transverse gradient".to_owned(),
+                why: "an upright dipole's vertical force needs dB_z/dz alone (eq. 5)".to_owned(),
+                error_cost: 0.0,
+            });
+            Components::Gz
+        };
+        let driven: Vec<PlacedCoil> = scene
+            .coils
+            .iter()
+            .filter(|coil| largest_current_a(scene, coil.number) > 0.0)
+            .copied()
+            .collect();
+        if driven.len() < scene.coils.len() {
+            left_out.push(LeftOut {
+                what: format!("{} coils", scene.coils.len() - driven.len()),
+                why: "their current limits are zero".to_owned(),
+                error_cost: 0.0,
+            });
+        }
+        let mut map = tabulate(
+            &scene.winding,
+            &driven,
+            &grid,
+            components,
+            tolerance,
+            progress,
+        )?;
+        let kept = drop_weak_coils(scene, &mut map, &driven, tolerance, &mut left_out);
+        progress.begin("interpolation error", 1);
+        let between = interpolation_error(
+            &scene.winding,
+            &kept,
+            &grid,
+            &map.gz_t_per_m_per_a,
+            tolerance,
+        )?;
+        progress.end();
+        Ok(Self {
+            map,
+            components,
+            between,
+            left_out,
+        })
+    }
+}
+
+fn largest_current_a(scene: &Scene, coil: usize) -> f64 {
+    scene.upper_a[coil].max(-scene.lower_a[coil])
+}
+
+/// Removes coils whose largest force anywhere on the map stays below `tolerance` of the largest
+/// that any coil can give.
+fn drop_weak_coils(
+    scene: &Scene,
+    map: &mut FieldMap,
+    coils: &[PlacedCoil],
+    tolerance: f64,
+    left_out: &mut Vec<LeftOut>,
+) -> Vec<PlacedCoil> {
+    let nodes = map.x_m.len() * map.y_m.len() * map.z_m.len();
+    let strength: Vec<f64> = coils
+        .iter()
+        .zip(map.gz_t_per_m_per_a.chunks_exact(nodes.max(1)))
+        .map(|(coil, gz)| {
+            let largest = gz.iter().fold(0.0_f64, |most, g| most.max(g.abs()));
+            largest * largest_current_a(scene, coil.number)
+        })
+        .collect();
+    let strongest = strength.iter().copied().fold(0.0, f64::max);
+    let keep: Vec<bool> = strength
+        .iter()
+        .map(|s| *s > tolerance * strongest)
+        .collect();
+    if keep.iter().all(|keep| *keep) || strongest == 0.0 {
+        return coils.to_vec();
+    }
+    let weak: f64 = strength
+        .iter()
+        .zip(&keep)
+        .filter(|(_, keep)| !**keep)
+        .map(|(s, _)| s)
+        .sum();
+    left_out.push(LeftOut {
+        what: format!("{} coils", keep.iter().filter(|keep| !**keep).count()),
+        why: "at their largest currents together they change no force on the map by more than \
+              this part of the largest that one coil gives"
+            .to_owned(),
+        error_cost: weak / strongest,
+    });
+    let retain = |values: &mut Vec<f64>, components: usize| {
+        let size = (nodes * components).max(1);
+        let kept: Vec<f64> = values
+            .chunks_exact(size)
+            .zip(&keep)
+            .filter(|(_, keep)| **keep)
+            .flat_map(|(block, _)| block.iter().copied())
+            .collect();
+        *values = kept;
+    };
+    retain(&mut map.gz_t_per_m_per_a, 1);
+    if let Some(gradient) = &mut map.gradient_t_per_m_per_a {
+        retain(gradient, 9);
+    }
+    let kept: Vec<PlacedCoil> = coils
+        .iter()
+        .zip(&keep)
+        .filter(|(_, keep)| **keep)
+        .map(|(coil, _)| *coil)
+        .collect();
+    map.coils = kept.iter().map(|coil| coil.number).collect();
+    kept
+}
+
+/// The nodes of the workspace within reach of the object's points, one cell beyond.
+fn needed_grid(
+    design: &Design,
+    lambda: &LambdaReport,
+    reach_m: f64,
+    left_out: &mut Vec<LeftOut>,
+) -> Grid {
+    let points = &lambda.points.discretized.points;
+    let whole = workspace_grid(design);
+    let part = |nodes: &[f64], values: &[f64]| -> Vec<f64> {
+        let lowest = values.iter().copied().fold(f64::INFINITY, f64::min) - reach_m;
+        let highest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max) + reach_m;
+        // The last node at or below the range, the first at or above it; four nodes at least,
+        // so that the interpolation keeps its degree.
+        let mut start = nodes
+            .partition_point(|node| *node <= lowest)
+            .saturating_sub(1);
+        let mut end = (nodes.partition_point(|node| *node < highest) + 1).min(nodes.len());
+        while end - start < 4.min(nodes.len()) {
+            start = start.saturating_sub(1);
+            end = (end + 1).min(nodes.len());
+        }
+        nodes[start..end].to_vec()
+    };
+    let grid = Grid {
+        x_m: part(&whole.x_m, &points.x_m),
+        y_m: part(&whole.y_m, &points.y_m),
+        z_m: part(&whole.z_m, &points.height_m),
+    };
+    let count = |grid: &Grid| grid.x_m.len() * grid.y_m.len() * grid.z_m.len();
+    if count(&grid) < count(&whole) {
+        left_out.push(LeftOut {
+            what: format!(
+                "{} of {} workspace nodes",
+                count(&whole) - count(&grid),
+                count(&whole)
+            ),
+            why: format!(
+                "farther than {} mm from every point of the object",
+                reach_m * 1000.0
+            ),
+            error_cost: 0.0,
+        });
+    }
+    grid
+}
+
+fn manifest(scene: &Scene, lambda: &LambdaReport, needed: &NeededMap) -> Manifest {
+    let file = &lambda.file;
+    let mut accuracies = file.accuracy.clone();
+    accuracies.insert("map".to_owned(), accuracy(&needed.map));
+    Manifest {
+        schema_version: SCHEMA_VERSION.to_owned(),
+        fluxform_version: FLUXFORM_VERSION.to_owned(),
+        design: file.design.clone(),
+        shape: file.shape.clone(),
+        inputs: file.inputs.clone(),
+        units: UNITS.to_owned(),
+        array: scene.array_geometry(),
+        limits: scene.current_limits(),
+        resistance_ohm: scene.resistances_ohm(),
+        magnet: scene.magnet_summary(),
+        lambda: LambdaSummary {
+            lambda_n_per_m: file.lambda_n_per_m,
+            criterion: file.criterion.clone(),
+        },
+        points: points_grid(&lambda.points.discretized.points),
+        map: summary(&needed.map, needed.components, needed.between),
+        left_out: needed.left_out.clone(),
+        accuracy: accuracies,
+        files: Vec::new(),
+    }
+}
+
+/// Static currents, zero where there is no force constant.
+fn current_rows(scene: &Scene, lambda: &LambdaReport) -> Vec<CurrentRow> {
+    let currents = lambda.file.currents_a.as_deref();
+    scene
+        .coils
+        .iter()
+        .map(|coil| CurrentRow {
+            coil: coil.number,
+            x_m: coil.axis_m[0],
+            y_m: coil.axis_m[1],
+            current_a: currents.map_or(0.0, |currents| currents[coil.number]),
+        })
+        .collect()
+}
+
+/// Whether points lie outside the workspace, where a runtime has no map: how many.
+#[must_use]
+pub fn points_outside(manifest: &Manifest, report: &LambdaReport) -> usize {
+    let inside = |axis: &crate::bundle::manifest::AxisSummary, value: f64| {
+        axis.from_m <= value && value <= axis.to_m
+    };
+    let points = &report.points.discretized.points;
+    (0..points.len())
+        .filter(|i| {
+            !(inside(&manifest.map.x_m, points.x_m[*i])
+                && inside(&manifest.map.y_m, points.y_m[*i])
+                && inside(&manifest.map.z_m, points.height_m[*i]))
+        })
+        .count()
+}

@@ -1,0 +1,243 @@
+//! `lambda`: the force constant of one object, from forces computed at its points.
+
+use std::collections::BTreeMap;
+
+use super::discretize::{self, PointsReport};
+use super::scene::Scene;
+use super::{JobError, KERNEL_ERROR};
+use crate::accuracy::StageAccuracy;
+use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
+use crate::bundle::lambda_file::{AtLambda, LambdaFile, PathStep};
+use crate::design::Design;
+use crate::lambda::{self, Criterion, ForceProblem, Precision, Settings, Solution, Status};
+use crate::progress::Progress;
+use crate::shape::document::ShapeDocument;
+
+/// What is asked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LambdaOptions {
+    /// Criterion, its weight, and a force constant of interest.
+    pub settings: Settings,
+    /// Tolerance of the forces; `None` for the default.
+    pub tolerance: Option<f64>,
+}
+
+impl LambdaReport {
+    /// Whether a force can be rendered: a force constant above zero, to the tolerance asked for.
+    #[must_use]
+    pub fn as_wished(&self) -> bool {
+        self.file.lambda_n_per_m.is_some_and(|lambda| lambda > 0.0) && self.accuracy_reached
+    }
+}
+
+impl Default for LambdaOptions {
+    fn default() -> Self {
+        Self {
+            settings: Settings::default(),
+            tolerance: None,
+        }
+    }
+}
+
+/// The force constant and everything told with it.
+#[derive(Debug, Clone)]
+pub struct LambdaReport {
+    /// The points.
+    pub points: PointsReport,
+    /// The JSON result.
+    pub file: LambdaFile,
+    /// How far the solution goes.
+    pub status: Status,
+    /// The arithmetic that was needed.
+    pub precision: Precision,
+    /// What a careful person would mention.
+    pub warnings: Vec<String>,
+    /// Whether the tolerance asked for was reached.
+    pub accuracy_reached: bool,
+}
+
+/// Solves eq. 9 and 10 for `document` on `design`.
+///
+/// # Errors
+/// A design or shape that cannot be computed; interruption.
+pub fn run(
+    design: &Design,
+    document: &ShapeDocument,
+    inputs: Vec<Input>,
+    options: &LambdaOptions,
+    progress: &dyn Progress,
+) -> Result<LambdaReport, JobError> {
+    let scene = Scene::new(design)?;
+    let points = discretize::run(document, inputs, progress)?;
+    solve(&scene, points, options, progress)
+}
+
+/// The force constant for points that are known.
+pub(super) fn solve(
+    scene: &Scene,
+    points: PointsReport,
+    options: &LambdaOptions,
+    progress: &dyn Progress,
+) -> Result<LambdaReport, JobError> {
+    let tolerance = options.tolerance.unwrap_or(KERNEL_ERROR);
+    let positions = positions_m(&points);
+    let forces = scene.forces_n_per_a(&positions, tolerance, progress)?;
+    progress.begin("lambda", 1);
+    let resistance_ohm = scene.resistances_ohm();
+    let problem = ForceProblem {
+        forces_n_per_a: &forces,
+        height_m: &points.discretized.points.height_m,
+        offset_n: None,
+        lower_a: &scene.lower_a,
+        upper_a: &scene.upper_a,
+        total_max_a: scene.design.supply.total_current_max_a,
+        resistance_ohm: &resistance_ohm,
+    };
+    let solution = lambda::solve(&problem, &options.settings)?;
+    progress.end();
+    let warnings = warnings(&points, &solution, options);
+    Ok(LambdaReport {
+        file: file(
+            scene,
+            &points,
+            &solution,
+            options,
+            tolerance.max(KERNEL_ERROR),
+        ),
+        status: solution.status,
+        precision: solution.precision,
+        warnings,
+        accuracy_reached: tolerance >= KERNEL_ERROR,
+        points,
+    })
+}
+
+/// Where the magnet's centre is wanted: the constraint points, m.
+pub(super) fn positions_m(points: &PointsReport) -> Vec<[f64; 3]> {
+    let points = &points.discretized.points;
+    (0..points.len())
+        .map(|i| [points.x_m[i], points.y_m[i], points.height_m[i]])
+        .collect()
+}
+
+/// How artefacts and the command line call a criterion.
+#[must_use]
+pub fn criterion_name(criterion: Criterion) -> &'static str {
+    match criterion {
+        Criterion::Jnd => "jnd",
+        Criterion::Linear => "linear",
+        Criterion::Saturation => "saturation",
+    }
+}
+
+fn warnings(points: &PointsReport, solution: &Solution, options: &LambdaOptions) -> Vec<String> {
+    let mut warnings = points.summary.warnings.clone();
+    match solution.status {
+        Status::Solved => {}
+        Status::NothingWanted => warnings.push(
+            "every height is zero: no force is wanted, so no limit binds and lambda is null"
+                .to_owned(),
+        ),
+        Status::NothingRendered => warnings.push(
+            "no current within the limits pushes the magnet up at these points: lambda is null; \
+             check magnet.polarity (\"repel\" for drivers that do not reverse), current_max_a and \
+             the object's place"
+                .to_owned(),
+        ),
+        Status::Stalled => warnings.push(
+            "the path could not be followed to its end: numbers beyond its last breakpoint are \
+             not the minimum; please report this design and shape"
+                .to_owned(),
+        ),
+    }
+    let wanted = criterion_name(options.settings.criterion);
+    if solution.chosen.is_none() && solution.status == Status::Solved {
+        warnings.push(format!(
+            "the limits never bind by the criterion {wanted}: lambda is null; \
+             choose another with --criterion"
+        ));
+    }
+    if solution
+        .chosen
+        .as_ref()
+        .is_some_and(|chosen| chosen.lambda_n_per_m == 0.0)
+    {
+        warnings.push(format!(
+            "lambda is 0: a limit of zero already adds more error than the criterion {wanted} \
+             allows; raise it, or leave coils that carry no current out of the array \
+             (positions_mm)"
+        ));
+    } else if let (Some(chosen), Some(floor)) = (&solution.chosen, solution.lambda_floor_n_per_m)
+        && chosen.lambda_n_per_m < floor
+    {
+        warnings.push(format!(
+            "the lowest point is not felt: lambda {:.4} N/m gives it less than the 0.8 mN a \
+             finger feels (lambda_floor {floor:.4} N/m)",
+            chosen.lambda_n_per_m
+        ));
+    }
+    warnings
+}
+
+fn file(
+    scene: &Scene,
+    points: &PointsReport,
+    solution: &Solution,
+    options: &LambdaOptions,
+    force_error: f64,
+) -> LambdaFile {
+    let chosen = solution.chosen.as_ref();
+    let forces = StageAccuracy {
+        estimate: force_error,
+        relative_to: "the largest |grad B| at the point's height".to_owned(),
+        method: "a-priori quadrature bound, evaluated at the points directly".to_owned(),
+    };
+    let accuracy = BTreeMap::from([
+        ("points".to_owned(), points.discretized.accuracy.clone()),
+        ("forces".to_owned(), forces),
+        ("lambda".to_owned(), solution.accuracy.clone()),
+    ]);
+    LambdaFile {
+        schema_version: SCHEMA_VERSION.to_owned(),
+        fluxform_version: FLUXFORM_VERSION.to_owned(),
+        design: scene.design.name.clone(),
+        shape: points.summary.shape.clone(),
+        inputs: points.summary.inputs.clone(),
+        lambda_linear_n_per_m: solution.lambda_linear_n_per_m,
+        lambda_jnd_n_per_m: solution.lambda_jnd_n_per_m,
+        lambda_saturation_n_per_m: solution.lambda_saturation_n_per_m,
+        lambda_floor_n_per_m: solution.lambda_floor_n_per_m,
+        lambda_n_per_m: chosen.map(|point| point.lambda_n_per_m),
+        criterion: criterion_name(options.settings.criterion).to_owned(),
+        jnd: options.settings.jnd_weight,
+        currents_a: chosen.map(|point| point.currents_a.clone()),
+        rms_error_n: chosen.map(|point| point.rms_error_n),
+        worst_error_n: chosen.map(|point| point.worst_error_n),
+        relative_rms_error: chosen.and_then(|point| point.relative_rms_error),
+        duality_gap_n2: chosen.map(|point| point.duality_gap_n2),
+        rank: solution.rank,
+        points: points.summary.points,
+        path: solution
+            .path
+            .breakpoints()
+            .into_iter()
+            .map(|point| PathStep {
+                lambda_n_per_m: point.lambda_n_per_m,
+                currents_a: point.currents_a,
+                event: events(&point.events),
+            })
+            .collect(),
+        at: solution.at.as_ref().map(|point| AtLambda {
+            lambda_n_per_m: point.lambda_n_per_m,
+            currents_a: point.currents_a.clone(),
+            rms_error_n: point.rms_error_n,
+            worst_error_n: point.worst_error_n,
+        }),
+        accuracy,
+    }
+}
+
+fn events(events: &[lambda::Event]) -> String {
+    let told: Vec<String> = events.iter().map(ToString::to_string).collect();
+    told.join("; ")
+}

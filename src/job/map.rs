@@ -1,0 +1,199 @@
+//! `map`: gradient maps over the workspace, and the map's files.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use super::scene::Scene;
+use super::{JobError, KERNEL_ERROR};
+use crate::accuracy::StageAccuracy;
+use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
+use crate::bundle::atomic::Overwrite;
+use crate::bundle::manifest::{AxisSummary, Interpolation, MapSidecar, MapSummary};
+use crate::bundle::npz::{MapArrays, Runtime};
+use crate::bundle::write::{MapFormats, write_map_files};
+use crate::design::Design;
+use crate::map::tabulate::Grid;
+use crate::map::{Components, FieldMap, InterpolationError, interpolation_error, tabulate};
+use crate::progress::Progress;
+
+/// Default tolerance of a map, relative to the largest |grad B| at each height.
+pub const MAP_TOLERANCE: f64 = 1e-9;
+
+/// What is asked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MapRequest {
+    /// What the map holds.
+    pub components: Components,
+    /// Tolerance; `None` for [`MAP_TOLERANCE`].
+    pub tolerance: Option<f64>,
+    /// Folder of the files.
+    pub out: PathBuf,
+    /// Formats beside `map.npz`.
+    pub formats: MapFormats,
+    /// Replace what is there, whatever it is.
+    pub force: bool,
+}
+
+/// What was made.
+#[derive(Debug, Clone)]
+pub struct MapReport {
+    /// `map.json` as written.
+    pub sidecar: MapSidecar,
+    /// Folder of the files.
+    pub folder: PathBuf,
+    /// Nodes times coils.
+    pub point_coils: usize,
+    /// Distinct distances from the coils' axes.
+    pub distinct_radii: usize,
+    /// Whether radial tables replaced direct sums.
+    pub tabulated: bool,
+    /// Whether the tolerance asked for was reached.
+    pub accuracy_reached: bool,
+}
+
+/// Tabulates the maps of `design` and writes them.
+///
+/// # Errors
+/// A design that cannot be computed; an output that must not be replaced or cannot be written.
+pub fn run(
+    design: &Design,
+    inputs: Vec<Input>,
+    request: &MapRequest,
+    progress: &dyn Progress,
+) -> Result<MapReport, JobError> {
+    let scene = Scene::new(design)?;
+    Overwrite::new(request.force, request.out.join("map.json"), &inputs)
+        .check(&request.out.join("map.npz"))?;
+    let tolerance = request.tolerance.unwrap_or(MAP_TOLERANCE);
+    let grid = workspace_grid(design);
+    let map = tabulate(
+        &scene.winding,
+        &scene.coils,
+        &grid,
+        request.components,
+        tolerance,
+        progress,
+    )?;
+    progress.begin("interpolation error", 1);
+    let between = interpolation_error(
+        &scene.winding,
+        &scene.coils,
+        &grid,
+        &map.gz_t_per_m_per_a,
+        tolerance,
+    )?;
+    progress.end();
+    progress.check()?;
+    let sidecar = MapSidecar {
+        schema_version: SCHEMA_VERSION.to_owned(),
+        fluxform_version: FLUXFORM_VERSION.to_owned(),
+        design: design.name.clone(),
+        inputs,
+        units: UNITS.to_owned(),
+        array: scene.array_geometry(),
+        magnet: scene.magnet_summary(),
+        map: summary(&map, request.components, between),
+        accuracy: BTreeMap::from([("map".to_owned(), accuracy(&map))]),
+        files: Vec::new(),
+    };
+    let runtime = runtime(&scene, None);
+    let arrays = arrays(&map, runtime);
+    progress.begin("write", 1);
+    let sidecar = write_map_files(
+        &request.out,
+        request.force,
+        &sidecar,
+        &arrays,
+        request.formats,
+    )?;
+    progress.end();
+    Ok(MapReport {
+        sidecar,
+        folder: request.out.clone(),
+        point_coils: map.gz_t_per_m_per_a.len(),
+        distinct_radii: map.distinct_radii,
+        tabulated: map.tabulated,
+        accuracy_reached: tolerance >= KERNEL_ERROR,
+    })
+}
+
+/// The nodes of the design's workspace.
+pub(super) fn workspace_grid(design: &Design) -> Grid {
+    let workspace = &design.workspace;
+    Grid {
+        x_m: workspace.x_m.nodes(),
+        y_m: workspace.y_m.nodes(),
+        z_m: workspace.z_m.nodes(),
+    }
+}
+
+/// The map's grid, coils and interpolation as artefacts tell them.
+pub(super) fn summary(
+    map: &FieldMap,
+    components: Components,
+    between: InterpolationError,
+) -> MapSummary {
+    let definition = format!(
+        "of dB_z/dz, relative to the largest |dB_z/dz| at that height: 1.25 times the largest \
+         difference from direct values at {} places in the middles of cells and edges",
+        between.samples
+    );
+    MapSummary {
+        x_m: AxisSummary::of_nodes(&map.x_m),
+        y_m: AxisSummary::of_nodes(&map.y_m),
+        z_m: AxisSummary::of_nodes(&map.z_m),
+        coil: indices(map),
+        components: match components {
+            Components::Gz => "gz",
+            Components::Gradient => "gradient",
+            Components::All => "all",
+        }
+        .to_owned(),
+        interpolation: Interpolation::tricubic(between.largest, definition),
+    }
+}
+
+/// The map's own error at its nodes.
+pub(super) fn accuracy(map: &FieldMap) -> StageAccuracy {
+    StageAccuracy {
+        estimate: map.relative_error.max(KERNEL_ERROR),
+        relative_to: "the largest |grad B| at the node's height".to_owned(),
+        method: if map.tabulated {
+            "a-priori bounds of the radial quadrature and of the radial table"
+        } else {
+            "a-priori bound of the radial quadrature"
+        }
+        .to_owned(),
+    }
+}
+
+/// What a runtime needs besides the map.
+pub(super) fn runtime(scene: &Scene, lambda_n_per_m: Option<f64>) -> Runtime {
+    Runtime {
+        moment_a_m2: scene.moment_a_m2,
+        current_min_a: scene.lower_a.clone(),
+        current_max_a: scene.upper_a.clone(),
+        resistance_ohm: scene.resistances_ohm(),
+        total_current_max_a: scene.design.supply.total_current_max_a,
+        lambda_n_per_m,
+    }
+}
+
+/// The map as arrays of `map.npz`, borrowed.
+pub(super) fn arrays(map: &FieldMap, runtime: Runtime) -> MapArrays<'_> {
+    MapArrays {
+        x_m: Cow::Borrowed(&map.x_m),
+        y_m: Cow::Borrowed(&map.y_m),
+        z_m: Cow::Borrowed(&map.z_m),
+        coil: Cow::Owned(indices(map)),
+        gz_t_per_m_per_a: Cow::Borrowed(&map.gz_t_per_m_per_a),
+        gradient_t_per_m_per_a: map.gradient_t_per_m_per_a.as_deref().map(Cow::Borrowed),
+        field_t_per_a: map.field_t_per_a.as_deref().map(Cow::Borrowed),
+        runtime,
+    }
+}
+
+fn indices(map: &FieldMap) -> Vec<i64> {
+    map.coils.iter().map(|coil| *coil as i64).collect()
+}

@@ -1,0 +1,426 @@
+//! `verify`: a bundle's checksums and layout, and its numbers by an independent route.
+//!
+//! The maps and forces were made by telescoped end-face integrals with shared distances and
+//! tables; here every sampled value is the loops' derivative integrated over the section,
+//! directly at the point. The optimality of the currents is judged by the duality gap, which
+//! does not trust the solver.
+
+use std::path::Path;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::calibrate::DESIGN_FILE;
+use super::scene::Scene;
+use super::{JobError, KERNEL_ERROR};
+use crate::bundle::artefact::{Input, sha256_hex};
+use crate::bundle::load::Bundle;
+use crate::design::{Design, Need};
+use crate::lambda::{self, Criterion, ForceProblem, Settings};
+use crate::numerics::lagrange;
+use crate::progress::Progress;
+
+/// Map nodes sampled, and force-matrix entries sampled.
+const SAMPLES: usize = 2000;
+/// Largest difference of a force constant that is solved for again, relative.
+const LAMBDA_AGREES: f64 = 1e-8;
+/// Largest duality gap, relative to the mean square of the wanted force.
+const GAP_ALLOWED: f64 = 1e-10;
+
+/// What was checked.
+#[derive(Debug, Clone, Serialize)]
+pub struct VerifyReport {
+    /// Name of the design.
+    pub design: String,
+    /// Name of the shape.
+    pub shape: String,
+    /// Every check.
+    pub checks: Vec<Check>,
+    /// What is worth knowing and no fault of the bundle.
+    pub notes: Vec<String>,
+    /// Whether all passed.
+    pub passed: bool,
+}
+
+/// One check.
+#[derive(Debug, Clone, Serialize)]
+pub struct Check {
+    /// What was checked.
+    pub name: &'static str,
+    /// What was measured.
+    pub measured: f64,
+    /// The most it may be.
+    pub allowed: f64,
+    /// Whether it passed.
+    pub passed: bool,
+    /// How.
+    pub how: String,
+}
+
+/// Verifies the bundle at `path`.
+///
+/// # Errors
+/// A bundle that is damaged or inconsistent; interruption. Numbers that do not agree are no
+/// error: see [`VerifyReport::passed`].
+pub fn run(path: &Path, progress: &dyn Progress) -> Result<VerifyReport, JobError> {
+    progress.begin("verify", 4);
+    let bundle = Bundle::open(path)?;
+    progress.advance(1);
+    let design = design(&bundle)?;
+    let scene = Scene::new(&design)?;
+    let mut checks = vec![
+        check(
+            "files",
+            0.0,
+            0.0,
+            "sizes, digests and schema of every listed file".to_owned(),
+        ),
+        scene_agrees(&bundle, &scene),
+    ];
+    checks.push(map_nodes(&bundle, &scene));
+    checks.push(between_nodes(&bundle, &scene));
+    progress.advance(1);
+    progress.check()?;
+    checks.extend(force_constant(&bundle, &scene, progress)?);
+    progress.advance(1);
+    let notes = changed_inputs(&bundle);
+    progress.end();
+    Ok(VerifyReport {
+        design: bundle.manifest.design,
+        shape: bundle.manifest.shape,
+        passed: checks.iter().all(|check| check.passed),
+        checks,
+        notes,
+    })
+}
+
+fn check(name: &'static str, measured: f64, allowed: f64, how: String) -> Check {
+    // A measurement that is not a number fails, and stays out of the report.
+    let passed = measured <= allowed;
+    let measured = if measured.is_finite() {
+        measured
+    } else {
+        f64::MAX
+    };
+    Check {
+        name,
+        measured,
+        allowed,
+        passed,
+        how,
+    }
+}
+
+/// An error relative to a size; nothing is no error of nothing.
+fn ratio(error: f64, size: f64) -> f64 {
+    if error == 0.0 { 0.0 } else { error / size }
+}
+
+/// The design kept in the bundle; its digest was checked with the others'.
+fn design(bundle: &Bundle) -> Result<Design, JobError> {
+    let path = bundle.folder.join(DESIGN_FILE);
+    let (design, _) = Design::read(&path, Need::CALIBRATE)
+        .map_err(|invalid| JobError::Input(invalid.to_string()))?;
+    Ok(design)
+}
+
+fn difference(a: &[f64], b: &[f64]) -> f64 {
+    if a.len() != b.len() {
+        return f64::INFINITY;
+    }
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| {
+            if a == b {
+                0.0
+            } else {
+                (a - b).abs() / a.abs().max(b.abs())
+            }
+        })
+        .fold(0.0, f64::max)
+}
+
+/// Positions, gains, limits and moment against the design.
+fn scene_agrees(bundle: &Bundle, scene: &Scene) -> Check {
+    let manifest = &bundle.manifest;
+    let ours = scene.array_geometry();
+    let limits = scene.current_limits();
+    let worst = [
+        difference(
+            manifest.array.positions_m.as_flattened(),
+            ours.positions_m.as_flattened(),
+        ),
+        difference(&manifest.array.gain, &ours.gain),
+        difference(&manifest.limits.current_max_a, &limits.current_max_a),
+        difference(&manifest.limits.current_min_a, &limits.current_min_a),
+        difference(
+            manifest.limits.total_current_max_a.as_slice(),
+            limits.total_current_max_a.as_slice(),
+        ),
+        difference(&manifest.magnet.moment_a_m2, &scene.moment_a_m2),
+        difference(&manifest.resistance_ohm, &scene.resistances_ohm()),
+    ]
+    .into_iter()
+    .fold(0.0, f64::max);
+    let how = "positions, gains, limits, resistance and moment against design.toml";
+    check("scene", worst, 1e-14, how.to_owned())
+}
+
+/// Indices spread evenly and irregularly over 0..count: multiples of the golden ratio.
+fn spread(count: usize, samples: usize) -> Vec<usize> {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    let samples = samples.min(count);
+    (0..samples)
+        .map(|i| (((i as f64 * GOLDEN).fract() * count as f64) as usize).min(count - 1))
+        .collect()
+}
+
+/// dB_z/dz of a coil at a point, integrated over the section, with its gain.
+fn direct(scene: &Scene, coil: usize, point: [f64; 3]) -> f64 {
+    let coil = &scene.coils[coil];
+    let r = (point[0] - coil.axis_m[0]).hypot(point[1] - coil.axis_m[1]);
+    coil.gain * scene.winding.gradient_by_section(r, point[2]).0
+}
+
+/// Largest |dB_z/dz| at a height: on the axis or anywhere of the map's plane.
+fn largest_in_plane(bundle: &Bundle, level: usize) -> f64 {
+    let map = &bundle.map;
+    let plane = map.x_m.len() * map.y_m.len();
+    (0..map.coil.len())
+        .flat_map(|coil| {
+            let start = (coil * map.z_m.len() + level) * plane;
+            &map.gz_t_per_m_per_a[start..start + plane]
+        })
+        .fold(0.0, |most: f64, g| most.max(g.abs()))
+}
+
+fn map_nodes(bundle: &Bundle, scene: &Scene) -> Check {
+    let map = &bundle.map;
+    let [coils, nz, ny, nx] = map.shape();
+    let sizes: Vec<f64> = (0..nz)
+        .map(|level| largest_in_plane(bundle, level))
+        .collect();
+    let worst = spread(coils * nz * ny * nx, SAMPLES)
+        .par_iter()
+        .map(|index| {
+            let (x, y, z) = (index % nx, index / nx % ny, index / (nx * ny) % nz);
+            let coil = map.coil[index / (nx * ny * nz)] as usize;
+            let exact = direct(scene, coil, [map.x_m[x], map.y_m[y], map.z_m[z]]);
+            let error = (map.gz_t_per_m_per_a[*index] - exact).abs();
+            ratio(error, sizes[z])
+        })
+        .reduce(|| 0.0, f64::max);
+    let allowed = bundle
+        .manifest
+        .accuracy
+        .get("map")
+        .map_or(0.0, |stage| stage.estimate);
+    let how = format!("{SAMPLES} nodes against integrals over the winding's section");
+    check("map nodes", worst, allowed.max(KERNEL_ERROR), how)
+}
+
+fn between_nodes(bundle: &Bundle, scene: &Scene) -> Check {
+    let map = &bundle.map;
+    let [coils, nz, ny, nx] = map.shape();
+    let cells = [nx, ny, nz].map(|n| n.saturating_sub(1).max(1));
+    let nodes = nx * ny * nz;
+    let at = |nodes: &[f64], cell: usize, t: f64| match nodes.get(cell + 1) {
+        Some(next) => nodes[cell] + t * (next - nodes[cell]),
+        None => nodes[cell],
+    };
+    let worst = spread(coils * cells[0] * cells[1] * cells[2], SAMPLES)
+        .par_iter()
+        .map(|index| {
+            let (i, rest) = (index % cells[0], index / cells[0]);
+            let (j, rest) = (rest % cells[1], rest / cells[1]);
+            let (k, place) = (rest % cells[2], rest / cells[2]);
+            // Places inside the cells, different from cell to cell.
+            let t = |salt: usize| ((index * 7 + salt * 13) % 29) as f64 / 29.0;
+            let point = [
+                at(&map.x_m, i, t(1)),
+                at(&map.y_m, j, t(2)),
+                at(&map.z_m, k, t(3)),
+            ];
+            let Some(cell) = lagrange::locate([&map.x_m, &map.y_m, &map.z_m], point) else {
+                return f64::INFINITY;
+            };
+            let value = cell.value(&map.gz_t_per_m_per_a[place * nodes..(place + 1) * nodes]);
+            let exact = direct(scene, map.coil[place] as usize, point);
+            // The lower of the two planes around the point has the larger values.
+            ratio((value - exact).abs(), largest_in_plane(bundle, k))
+        })
+        .reduce(|| 0.0, f64::max);
+    let allowed = bundle.manifest.map.interpolation.largest_error;
+    let how = format!("{SAMPLES} places between nodes, interpolated as the loaders do");
+    check("map between nodes", worst, allowed.max(KERNEL_ERROR), how)
+}
+
+/// The force constant, the currents and their errors from forces computed anew.
+fn force_constant(
+    bundle: &Bundle,
+    scene: &Scene,
+    progress: &dyn Progress,
+) -> Result<Vec<Check>, JobError> {
+    let positions: Vec<[f64; 3]> = bundle
+        .points
+        .iter()
+        .map(|p| [p.x_m, p.y_m, p.height_m])
+        .collect();
+    let forces = scene.forces_n_per_a(&positions, KERNEL_ERROR, progress)?;
+    let coils = scene.coils.len();
+    let mut checks = vec![sampled_forces(scene, &positions, &forces)];
+
+    let heights: Vec<f64> = bundle.points.iter().map(|p| p.height_m).collect();
+    let stored = &bundle.lambda;
+    let resistance_ohm = scene.resistances_ohm();
+    let problem = ForceProblem {
+        forces_n_per_a: &forces,
+        height_m: &heights,
+        offset_n: None,
+        lower_a: &scene.lower_a,
+        upper_a: &scene.upper_a,
+        total_max_a: scene.design.supply.total_current_max_a,
+        resistance_ohm: &resistance_ohm,
+    };
+    let criterion = match stored.criterion.as_str() {
+        "linear" => Criterion::Linear,
+        "saturation" => Criterion::Saturation,
+        _ => Criterion::Jnd,
+    };
+    let settings = Settings {
+        criterion,
+        jnd_weight: stored.jnd,
+        at_n_per_m: stored.lambda_n_per_m,
+    };
+    let again = lambda::solve(&problem, &settings)?;
+    let constants = [
+        (stored.lambda_linear_n_per_m, again.lambda_linear_n_per_m),
+        (stored.lambda_jnd_n_per_m, again.lambda_jnd_n_per_m),
+        (
+            stored.lambda_saturation_n_per_m,
+            again.lambda_saturation_n_per_m,
+        ),
+        (stored.lambda_floor_n_per_m, again.lambda_floor_n_per_m),
+        (
+            stored.lambda_n_per_m,
+            again.chosen.as_ref().map(|c| c.lambda_n_per_m),
+        ),
+    ];
+    let worst = constants
+        .iter()
+        .map(|(told, found)| difference(told.as_slice(), found.as_slice()))
+        .fold(0.0, f64::max);
+    let how = "all force constants solved for again";
+    checks.push(check("lambda", worst, LAMBDA_AGREES, how.to_owned()));
+
+    let (Some(lambda), Some(currents)) = (stored.lambda_n_per_m, &stored.currents_a) else {
+        return Ok(checks);
+    };
+    let residual: Vec<f64> = forces
+        .chunks_exact(coils)
+        .zip(&heights)
+        .map(|(row, h)| lambda * h - row.iter().zip(currents).map(|(g, i)| g * i).sum::<f64>())
+        .collect();
+    let n = heights.len() as f64;
+    let wanted = lambda * lambda * heights.iter().map(|h| h * h).sum::<f64>() / n;
+    let mean_square = residual.iter().map(|e| e * e).sum::<f64>() / n;
+    let rms = stored
+        .rms_error_n
+        .map_or(f64::INFINITY, |told| (told - mean_square.sqrt()).abs());
+    let how = "the mean square error summed over all points";
+    checks.push(check(
+        "rms error",
+        ratio(rms, wanted.sqrt()),
+        LAMBDA_AGREES,
+        how.to_owned(),
+    ));
+    let worst = residual.iter().fold(0.0_f64, |most, e| most.max(e.abs()));
+    let worst = stored
+        .worst_error_n
+        .map_or(f64::INFINITY, |told| (told - worst).abs());
+    let how = "the largest error over all points";
+    checks.push(check(
+        "worst error",
+        ratio(worst, wanted.sqrt()),
+        LAMBDA_AGREES,
+        how.to_owned(),
+    ));
+    let gap = ratio(duality_gap(&problem, &residual, currents), wanted);
+    let how = "proof of optimality: no currents within the limits are better by more";
+    checks.push(check("duality gap", gap, GAP_ALLOWED, how.to_owned()));
+    Ok(checks)
+}
+
+fn sampled_forces(scene: &Scene, positions: &[[f64; 3]], forces: &[f64]) -> Check {
+    let coils = scene.coils.len();
+    let largest = forces.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
+    let [m_x, m_y, m_z] = scene.moment_a_m2;
+    let worst = spread(forces.len(), SAMPLES)
+        .par_iter()
+        .map(|index| {
+            let (point, coil) = (positions[index / coils], &scene.coils[index % coils]);
+            let (dx, dy) = (point[0] - coil.axis_m[0], point[1] - coil.axis_m[1]);
+            let (gz, gr) = scene.winding.gradient_by_section(dx.hypot(dy), point[2]);
+            let exact = coil.gain * (m_z * gz + gr * (m_x * dx + m_y * dy));
+            (forces[*index] - exact).abs()
+        })
+        .reduce(|| 0.0, f64::max);
+    let how = format!("{SAMPLES} entries of the force matrix by integrals over the section");
+    // The estimate is relative to |grad B| at each height; the lowest points have the largest.
+    check("forces", ratio(worst, largest), 10.0 * KERNEL_ERROR, how)
+}
+
+/// 2 (max over the feasible z of s'z - s'x), s = G'r/n: a fractional knapsack (physics of the
+/// bound: the error is convex, so no feasible currents lie below its tangent).
+fn duality_gap(problem: &ForceProblem, residual: &[f64], currents: &[f64]) -> f64 {
+    let coils = currents.len();
+    let n = residual.len() as f64;
+    let mut slope = vec![0.0; coils];
+    for (row, r) in problem.forces_n_per_a.chunks_exact(coils).zip(residual) {
+        for (s, g) in slope.iter_mut().zip(row) {
+            *s += g * r / n;
+        }
+    }
+    // Start every coil at its better end, then give back the cheapest ones until the sum fits.
+    let mut z: Vec<f64> = slope
+        .iter()
+        .enumerate()
+        .map(|(i, s)| {
+            if *s > 0.0 {
+                problem.upper_a[i]
+            } else {
+                problem.lower_a[i]
+            }
+        })
+        .collect();
+    if let Some(total) = problem.total_max_a {
+        let mut excess = z.iter().sum::<f64>() - total;
+        let mut order: Vec<usize> = (0..coils).collect();
+        order.sort_by(|a, b| slope[*a].total_cmp(&slope[*b]));
+        for i in order {
+            let back = excess.min(z[i] - problem.lower_a[i]).max(0.0);
+            z[i] -= back;
+            excess -= back;
+        }
+    }
+    let gain: f64 = slope
+        .iter()
+        .zip(z.iter().zip(currents))
+        .map(|(s, (z, x))| s * (z - x))
+        .sum();
+    (2.0 * gain).max(0.0)
+}
+
+/// Input files that are still at their paths and are not what they were.
+fn changed_inputs(bundle: &Bundle) -> Vec<String> {
+    let changed = |input: &&Input| {
+        std::fs::read(&input.path).is_ok_and(|bytes| sha256_hex(&bytes) != input.sha256)
+    };
+    bundle
+        .manifest
+        .inputs
+        .iter()
+        .filter(changed)
+        .map(|input| format!("{} has changed since the bundle was made", input.path))
+        .collect()
+}

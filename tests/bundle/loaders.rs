@@ -1,0 +1,224 @@
+//! The loaders in Rust, Python and C on the same bundle.
+
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use fluxform::bundle::load::Bundle;
+use fluxform::bundle::npz::MapArrays;
+
+use crate::sample::*;
+
+/// Positions in and slightly around the map; nodes, borders and corners among them.
+fn positions(map: &MapArrays) -> Vec<[f64; 3]> {
+    let mut seed = 7;
+    let axes = [&map.x_m, &map.y_m, &map.z_m];
+    (0..1000)
+        .map(|i| {
+            axes.map(|axis| {
+                let (from, to) = (axis[0], axis[axis.len() - 1]);
+                let t = random(&mut seed);
+                match (i % 10, axis.len()) {
+                    (_, 1) => from,
+                    (0, n) => axis[(t * n as f64) as usize],
+                    (1, _) => {
+                        if t < 0.5 {
+                            from
+                        } else {
+                            to
+                        }
+                    }
+                    (2, _) => from + (to - from) * (1.2 * t - 0.1),
+                    _ => from + (to - from) * t,
+                }
+            })
+        })
+        .collect()
+}
+
+fn numbers(line: &str) -> Vec<f64> {
+    line.split_whitespace()
+        .map(|word| word.parse().unwrap())
+        .collect()
+}
+
+/// Runs a program on the positions as lines of text and parses the forces it prints; `None` when
+/// the program is not there.
+fn forces_from(mut command: Command, at: &[[f64; 3]]) -> Option<Vec<Vec<f64>>> {
+    let mut child = command
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .ok()?;
+    let text: String = at
+        .iter()
+        .map(|p| format!("{} {} {}\n", p[0], p[1], p[2]))
+        .collect();
+    let mut stdin = child.stdin.take().unwrap();
+    let feeder = std::thread::spawn(move || stdin.write_all(text.as_bytes()));
+    let output = child.wait_with_output().unwrap();
+    feeder.join().unwrap().unwrap();
+    assert!(output.status.success(), "{command:?} failed");
+    let text = String::from_utf8(output.stdout).unwrap();
+    Some(text.lines().map(numbers).collect())
+}
+
+const PYTHON_READS_STDIN: &str = "\
+import sys, numpy as np
+sys.path.insert(0, sys.argv[1])
+from load_bundle import Bundle
+points = np.loadtxt(sys.stdin, ndmin=2)
+for row in Bundle(sys.argv[2]).force_per_ampere(points):
+    print(*map(repr, map(float, row)))
+";
+
+/// The C loader as a program; `None` without a C compiler.
+fn c_loader(folder: &Path, flags: &[&str]) -> Option<PathBuf> {
+    let program = folder.join("forces");
+    let built = Command::new("cc")
+        .args([
+            "-std=c99",
+            "-Wall",
+            "-Wextra",
+            "-Wpedantic",
+            "-Werror",
+            "-O2",
+        ])
+        .args(flags)
+        .arg("-DFLUXFORM_BUNDLE_MAIN")
+        .arg(scripts().join("fluxform_bundle.c"))
+        .arg("-o")
+        .arg(&program)
+        .arg("-lm")
+        .status()
+        .ok()?;
+    // Extra flags, such as sanitizers, may be unknown here; the plain build must work.
+    assert!(
+        built.success() || !flags.is_empty(),
+        "the C loader does not compile"
+    );
+    built.success().then_some(program)
+}
+
+fn compare(loader: &str, found: &[Vec<f64>], want: &[Vec<f64>]) {
+    assert_eq!(found.len(), want.len(), "{loader}");
+    let mut worst = 0.0f64;
+    for (found, want) in found.iter().zip(want) {
+        assert_eq!(found.len(), want.len(), "{loader}");
+        let scale = want.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        for (f, w) in found.iter().zip(want) {
+            assert!((f - w).abs() <= 1e-12 * scale, "{loader}: {f} and {w}");
+            if scale > 0.0 {
+                worst = worst.max((f - w).abs() / scale);
+            }
+        }
+    }
+    eprintln!("{loader}: largest difference {worst:.1e} of the largest force at the point");
+}
+
+#[test]
+fn rust_python_and_c_give_the_same_forces() {
+    for (name, tilted, samples) in [
+        ("upright", false, [13, 17, 11]),
+        ("tilted", true, [13, 9, 11]),
+        ("short axes", false, [2, 3, 1]),
+    ] {
+        let folder = temporary();
+        let target = folder.path().join("bundle");
+        let sample = sample(tilted, samples);
+        sample.write(&target, false).unwrap();
+        let bundle = Bundle::open(&target).unwrap();
+        let at = positions(&bundle.map);
+        let mut outside = 0;
+        let want: Vec<Vec<f64>> = at
+            .iter()
+            .map(|&p| {
+                let mut force = vec![f64::NAN; bundle.coil_count()];
+                outside += usize::from(!bundle.force_per_ampere(p, &mut force));
+                force
+            })
+            .collect();
+        assert!((20..120).contains(&outside), "{outside} outside");
+        // The interpolation itself: against the analytic field.
+        if samples[2] > 4 {
+            for (p, force) in at.iter().zip(&want).filter(|(_, force)| force[0] != 0.0) {
+                let g = gradient([-0.05, -0.05], *p);
+                let m = bundle.map.runtime.moment_a_m2;
+                let exact = m[0] * g[2] + m[1] * g[5] + m[2] * g[8];
+                assert!((force[0] - exact).abs() < 2e-2, "{force:?} {exact}");
+                assert_eq!(force[2], 0.0);
+            }
+        }
+        if has_numpy() {
+            let mut python = Command::new("python3");
+            python
+                .args(["-c", PYTHON_READS_STDIN])
+                .arg(scripts())
+                .arg(&target);
+            compare(
+                &format!("{name}, Python"),
+                &forces_from(python, &at).unwrap(),
+                &want,
+            );
+        } else {
+            eprintln!("skipped: no python3 with numpy");
+        }
+        match c_loader(folder.path(), &[]) {
+            Some(program) => {
+                let mut c = Command::new(program);
+                c.arg(target.join("map.npz"));
+                compare(&format!("{name}, C"), &forces_from(c, &at).unwrap(), &want);
+            }
+            None => eprintln!("skipped: no C compiler"),
+        }
+    }
+}
+
+#[test]
+fn the_c_loader_survives_damaged_files() {
+    let folder = temporary();
+    let Some(program) = c_loader(
+        folder.path(),
+        &[
+            "-g",
+            "-fsanitize=address,undefined",
+            "-fno-sanitize-recover=all",
+        ],
+    ) else {
+        eprintln!("skipped: no C compiler with sanitizers");
+        return;
+    };
+    let target = folder.path().join("bundle");
+    sample(true, [3, 2, 2]).write(&target, false).unwrap();
+    let bytes = fs::read(target.join("map.npz")).unwrap();
+    let mut seed = 3;
+    let damaged = folder.path().join("damaged.npz");
+    let directory = bytes.len() - 1400; // names, offsets and sizes of the central directory
+    for round in 0..150 {
+        let mut edited = bytes.clone();
+        match round % 3 {
+            0 => edited.truncate((random(&mut seed) * bytes.len() as f64) as usize),
+            1 => edited[(random(&mut seed) * bytes.len() as f64) as usize] ^= 1 << (round % 8),
+            _ => {
+                let at = directory + (random(&mut seed) * 1390.0) as usize;
+                edited[at..at + 4].fill((random(&mut seed) * 256.0) as u8);
+            }
+        }
+        fs::write(&damaged, &edited).unwrap();
+        let output = Command::new(&program)
+            .arg(&damaged)
+            .stdin(Stdio::null())
+            .output()
+            .unwrap();
+        let words = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(
+            matches!(output.status.code(), Some(0 | 3)),
+            "round {round}: {words}"
+        );
+        assert!(
+            !words.contains("Sanitizer") && !words.contains("runtime error"),
+            "{words}"
+        );
+    }
+}

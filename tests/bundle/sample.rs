@@ -1,0 +1,265 @@
+//! A synthetic bundle of an analytic field, and helpers.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use fluxform::accuracy::StageAccuracy;
+use fluxform::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
+use fluxform::bundle::atomic::WriteError;
+use fluxform::bundle::lambda_file::{AtLambda, LambdaFile, PathStep};
+use fluxform::bundle::manifest::*;
+use fluxform::bundle::npz::{MapArrays, Runtime};
+use fluxform::bundle::table::{CurrentRow, PointRow};
+use fluxform::bundle::write::{BundleContent, write_bundle};
+use fluxform::numerics::axis::Axis;
+use serde_json::json;
+
+/// A small bundle of an analytic field: a magnetic charge below each coil.
+pub struct Sample {
+    pub manifest: Manifest,
+    pub map: MapArrays<'static>,
+    pub points: Vec<PointRow>,
+    pub currents: Vec<CurrentRow>,
+    pub lambda: LambdaFile,
+}
+
+pub const CHARGE_DEPTH_M: f64 = 0.037;
+
+/// dB_i/dx_j of coil charges q = 1e-4 T m^2 at (x0, y0, -depth).
+pub fn gradient(coil_m: [f64; 2], at: [f64; 3]) -> [f64; 9] {
+    let d = [at[0] - coil_m[0], at[1] - coil_m[1], at[2] + CHARGE_DEPTH_M];
+    let r2 = d.iter().map(|v| v * v).sum::<f64>();
+    let mut g = [0.0; 9];
+    for i in 0..3 {
+        for j in 0..3 {
+            let delta = if i == j { r2 } else { 0.0 };
+            g[3 * i + j] = 1e-4 * (delta - 3.0 * d[i] * d[j]) / r2.powf(2.5);
+        }
+    }
+    g
+}
+
+pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
+    let axis = |from, to, samples| Axis { from, to, samples };
+    let x = axis(-0.05, 0.05, samples[0]);
+    let y = axis(-0.043, 0.051, samples[1]);
+    let z = axis(0.01, if samples[2] > 1 { 0.08 } else { 0.01 }, samples[2]);
+    let positions_m = vec![[-0.05, -0.05], [0.05, -0.05], [-0.05, 0.05], [0.05, 0.05]];
+    let coil = vec![0i64, 1, 3]; // coil 2 carries no current and is left out
+    let moment_a_m2 = if tilted {
+        [0.13, -0.07, -0.89]
+    } else {
+        [0.0, 0.0, -0.90941]
+    };
+    let (mut gz, mut all) = (Vec::new(), Vec::new());
+    for &c in &coil {
+        for z in z.nodes() {
+            for y in y.nodes() {
+                for x in x.nodes() {
+                    let g = gradient(positions_m[c as usize], [x, y, z]);
+                    gz.push(g[8]);
+                    all.extend(g);
+                }
+            }
+        }
+    }
+    let (current_min_a, current_max_a) = (vec![0.0, -0.7, 0.0, 0.0], vec![2.0, 2.0, 1.3, 2.0]);
+    let resistance_ohm = vec![6.07, 6.08, 6.09, 6.11];
+    let currents_a = vec![1.3, -0.7, 0.0, 0.9];
+    let map = MapArrays {
+        x_m: x.nodes().into(),
+        y_m: y.nodes().into(),
+        z_m: z.nodes().into(),
+        coil: coil.clone().into(),
+        gz_t_per_m_per_a: gz.into(),
+        gradient_t_per_m_per_a: tilted.then(|| all.into()),
+        field_t_per_a: None,
+        runtime: Runtime {
+            moment_a_m2,
+            current_min_a: current_min_a.clone(),
+            current_max_a: current_max_a.clone(),
+            resistance_ohm: resistance_ohm.clone(),
+            total_current_max_a: Some(5.3),
+            lambda_n_per_m: Some(5.9878),
+        },
+    };
+    let grid = axis(-0.04, 0.04, 5);
+    let present: Vec<bool> = (0..25).map(|n| n != 0 && n != 24).collect();
+    let points: Vec<PointRow> = (0..25)
+        .filter(|&n| present[n])
+        .map(|n| PointRow {
+            x_m: grid.node(n % 5),
+            y_m: grid.node(n / 5),
+            height_m: 0.03 + 0.001 * n as f64,
+            normal: [0.0, 0.6, 0.8],
+        })
+        .collect();
+    let accuracy = BTreeMap::from([(
+        "map".to_owned(),
+        StageAccuracy {
+            estimate: 1e-9,
+            relative_to: "largest |grad B| at that height".to_owned(),
+            method: "a-priori bound".to_owned(),
+        },
+    )]);
+    let inputs = vec![
+        Input::of_bytes("designs/a.toml", b"design"),
+        Input::of_bytes("shapes/b.toml", b"shape"),
+    ];
+    let currents = (0..4)
+        .map(|coil| CurrentRow {
+            coil,
+            x_m: positions_m[coil][0],
+            y_m: positions_m[coil][1],
+            current_a: currents_a[coil],
+        })
+        .collect();
+    let lambda = LambdaFile {
+        schema_version: SCHEMA_VERSION.to_owned(),
+        fluxform_version: FLUXFORM_VERSION.to_owned(),
+        design: "a".to_owned(),
+        shape: "b".to_owned(),
+        inputs: inputs.clone(),
+        lambda_linear_n_per_m: Some(4.9429),
+        lambda_jnd_n_per_m: Some(6.007),
+        lambda_saturation_n_per_m: Some(5.9878),
+        lambda_floor_n_per_m: None,
+        lambda_n_per_m: Some(5.9878),
+        criterion: "saturation".to_owned(),
+        jnd: 0.07,
+        currents_a: Some(currents_a),
+        rms_error_n: Some(0.0071),
+        worst_error_n: Some(0.031),
+        relative_rms_error: Some(0.0175),
+        duality_gap_n2: Some(1.3e-19),
+        rank: 3,
+        points: points.len(),
+        path: vec![PathStep {
+            lambda_n_per_m: 4.9429,
+            currents_a: vec![2.0, 0.7, 0.0, 1.3],
+            event: "coil 0 meets its upper limit".to_owned(),
+        }],
+        at: Some(AtLambda {
+            lambda_n_per_m: 2.1,
+            currents_a: vec![0.7; 4],
+            rms_error_n: 0.0013,
+            worst_error_n: 0.0017,
+        }),
+        accuracy: accuracy.clone(),
+    };
+    let manifest = Manifest {
+        schema_version: SCHEMA_VERSION.to_owned(),
+        fluxform_version: FLUXFORM_VERSION.to_owned(),
+        design: "a".to_owned(),
+        shape: "b".to_owned(),
+        inputs,
+        units: UNITS.to_owned(),
+        array: ArrayGeometry {
+            positions_m,
+            coupling: "none".to_owned(),
+            gain: vec![1.0; 4],
+        },
+        limits: CurrentLimits {
+            current_min_a,
+            current_max_a,
+            total_current_max_a: Some(5.3),
+        },
+        resistance_ohm,
+        magnet: MagnetSummary {
+            moment_a_m2,
+            model: "dipole".to_owned(),
+            polarity: "repel".to_owned(),
+            diameter_m: 0.01,
+            length_m: 0.01,
+        },
+        lambda: LambdaSummary {
+            lambda_n_per_m: Some(5.9878),
+            criterion: "saturation".to_owned(),
+        },
+        points: PointsGrid::new(grid, grid, &present),
+        map: MapSummary {
+            x_m: x.into(),
+            y_m: y.into(),
+            z_m: z.into(),
+            coil,
+            components: "gz".to_owned(),
+            interpolation: Interpolation::tricubic(
+                1.3e-6,
+                "relative to the largest |g| at that height, sampled",
+            ),
+        },
+        left_out: vec![LeftOut {
+            what: "coil 2".to_owned(),
+            why: "carries no current".to_owned(),
+            error_cost: 0.0,
+        }],
+        accuracy,
+        files: Vec::new(),
+    };
+    Sample {
+        manifest,
+        map,
+        points,
+        currents,
+        lambda,
+    }
+}
+
+impl Sample {
+    pub fn write(&self, target: &Path, force: bool) -> Result<Manifest, WriteError> {
+        let content = BundleContent {
+            manifest: self.manifest.clone(),
+            map: &self.map,
+            points: &self.points,
+            currents: &self.currents,
+            lambda: &self.lambda,
+        };
+        write_bundle(target, force, &content, &json!({ "total_s": 0.013 }))
+    }
+}
+
+pub fn sidecar(manifest: &Manifest) -> MapSidecar {
+    MapSidecar {
+        schema_version: manifest.schema_version.clone(),
+        fluxform_version: manifest.fluxform_version.clone(),
+        design: manifest.design.clone(),
+        inputs: manifest.inputs.clone(),
+        units: manifest.units.clone(),
+        array: manifest.array.clone(),
+        magnet: manifest.magnet.clone(),
+        map: manifest.map.clone(),
+        accuracy: manifest.accuracy.clone(),
+        files: Vec::new(),
+    }
+}
+
+pub fn temporary() -> tempfile::TempDir {
+    tempfile::tempdir().unwrap()
+}
+
+pub fn assert_no_leftovers(folder: &Path) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let name = entry.unwrap().file_name().into_string().unwrap();
+        assert!(!name.contains("fluxform"), "{name} is left");
+    }
+}
+
+pub fn random(seed: &mut u64) -> f64 {
+    *seed = seed
+        .wrapping_mul(6_364_136_223_846_793_005)
+        .wrapping_add(1_442_695_040_888_963_407);
+    (*seed >> 11) as f64 / (1u64 << 53) as f64
+}
+
+pub fn scripts() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts")
+}
+
+pub fn has_numpy() -> bool {
+    let probe = Command::new("python3")
+        .args(["-c", "import numpy"])
+        .stderr(Stdio::null())
+        .status();
+    probe.is_ok_and(|status| status.success())
+}

@@ -1,0 +1,182 @@
+//! The main job from documents to a verified bundle.
+
+use std::path::{Path, PathBuf};
+
+use fluxform::bundle::artefact::Input;
+use fluxform::design::{Design, Need};
+use fluxform::job::calibrate::{
+    self, CalibrateOptions, CalibrateReport, DEFAULT_REACH_M, DesignSource, ShapeSource,
+};
+use fluxform::job::lambda::LambdaOptions;
+use fluxform::job::{JobError, evaluate, verify};
+use fluxform::progress::Silent;
+use fluxform::shape::document::ShapeDocument;
+
+fn here(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+fn calibrate_text(text: &str, shapes: &[&str], out: &Path) -> Result<CalibrateReport, JobError> {
+    let path = here("designs/seed_air.toml");
+    let (design, _) = Design::from_toml(text, &path, Need::CALIBRATE).expect("a valid design");
+    let input = Input::of_bytes("designs/seed_air.toml", text.as_bytes());
+    let shapes: Vec<ShapeSource> = shapes
+        .iter()
+        .map(|name| {
+            let path = here(name);
+            let (document, _) = ShapeDocument::read(&path).expect("a valid shape");
+            let bytes = std::fs::read(&path).expect("readable");
+            ShapeSource {
+                document,
+                input: Some(Input::of_bytes(*name, &bytes)),
+            }
+        })
+        .collect();
+    let options = CalibrateOptions {
+        out: out.to_path_buf(),
+        force: false,
+        lambda: LambdaOptions::default(),
+        reach_m: DEFAULT_REACH_M,
+    };
+    let source = DesignSource {
+        design: &design,
+        text,
+        input: &input,
+    };
+    calibrate::run(source, &shapes, &options, &Silent)
+}
+
+fn seed_air() -> String {
+    std::fs::read_to_string(here("designs/seed_air.toml")).expect("shipped design")
+}
+
+const SHAPES: [&str; 4] = [
+    "shapes/flat.toml",
+    "shapes/half_sphere.toml",
+    "shapes/half_cylinder.toml",
+    "shapes/wedge.toml",
+];
+
+#[test]
+fn the_seed_shapes_are_calibrated_and_verified() {
+    let out = tempfile::tempdir().expect("a temporary folder");
+    let report = calibrate_text(&seed_air(), &SHAPES, out.path()).expect("calibrates");
+    assert!(report.as_wished());
+    assert_eq!(report.bundles.len(), 4);
+    for bundle in &report.bundles {
+        let file = &bundle.lambda.file;
+        let lambda = file.lambda_n_per_m.expect("a force constant");
+        let linear = file.lambda_linear_n_per_m.expect("linear");
+        assert!(lambda > linear && linear > 0.0, "{lambda} {linear}");
+        let verified = verify::run(&bundle.folder, &Silent).expect("opens");
+        for check in &verified.checks {
+            assert!(check.passed, "{}: {check:?}", file.shape);
+        }
+    }
+    // Flat: the force of air coils is 7.8 times below the cored ones' 4.94 N/m.
+    let flat = &report.bundles[0].lambda.file;
+    assert_eq!(flat.points, 3721);
+    assert!((flat.relative_rms_error.expect("error") - 0.07).abs() < 0.05);
+}
+
+#[test]
+fn a_bundle_with_a_wrong_number_fails_its_checks() {
+    let out = tempfile::tempdir().expect("a temporary folder");
+    let report = calibrate_text(&seed_air(), &SHAPES[..1], out.path()).expect("calibrates");
+    let folder = &report.bundles[0].folder;
+    // The same bundle, but its design says 1428 turns: every map value is off by 7e-4.
+    let design = folder.join("design.toml");
+    let text = std::fs::read_to_string(&design).expect("kept design");
+    let wrong = text.replace("turns = 1429", "turns = 1428");
+    assert_ne!(text, wrong);
+    #[allow(clippy::disallowed_methods)]
+    std::fs::write(&design, &wrong).expect("writable");
+    // The digest tells first.
+    let error = verify::run(folder, &Silent).expect_err("a changed file");
+    assert_eq!(error.exit_code(), 5);
+    assert!(error.to_string().contains("design.toml"), "{error}");
+    // With the digest forged, the numbers tell.
+    let manifest = folder.join("manifest.json");
+    let listed = std::fs::read_to_string(&manifest).expect("manifest");
+    let forged = listed.replace(
+        &Input::of_bytes("", text.as_bytes()).sha256,
+        &Input::of_bytes("", wrong.as_bytes()).sha256,
+    );
+    #[allow(clippy::disallowed_methods)]
+    std::fs::write(&manifest, forged).expect("writable");
+    let report = verify::run(folder, &Silent).expect("opens");
+    assert!(!report.passed);
+    let failed: Vec<&str> = report
+        .checks
+        .iter()
+        .filter(|c| !c.passed)
+        .map(|c| c.name)
+        .collect();
+    assert!(
+        failed.contains(&"map nodes") && failed.contains(&"rms error"),
+        "{failed:?}"
+    );
+}
+
+#[test]
+fn what_an_object_does_not_need_is_left_out() {
+    let text = seed_air().replace(
+        "current_max_a = 2.0",
+        "current_max_a = [2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 0.0]",
+    );
+    let out = tempfile::tempdir().expect("a temporary folder");
+    let report = calibrate_text(&text, &SHAPES[..1], out.path()).expect("calibrates");
+    let manifest = &report.bundles[0].manifest;
+    assert_eq!(manifest.map.coil, (0..8).collect::<Vec<i64>>());
+    let told: Vec<&str> = manifest.left_out.iter().map(|l| l.what.as_str()).collect();
+    assert!(told.iter().any(|what| what.contains("1 coils")), "{told:?}");
+    assert!(
+        told.iter().any(|what| what.contains("workspace nodes")),
+        "{told:?}"
+    );
+    assert!(
+        verify::run(&report.bundles[0].folder, &Silent)
+            .expect("opens")
+            .passed
+    );
+}
+
+#[test]
+fn a_cored_design_gives_no_number() {
+    let path = here("designs/seed.toml");
+    let (design, _) = Design::read(&path, Need::EVALUATE).expect("a valid design");
+    let error = evaluate::evaluate(&design, Vec::new(), None).expect_err("no core model yet");
+    assert_eq!(error.exit_code(), 3);
+    assert!(error.to_string().contains("not modelled"), "{error}");
+}
+
+#[test]
+fn the_seed_air_coil() {
+    let path = here("designs/seed_air.toml");
+    let (design, _) = Design::read(&path, Need::EVALUATE).expect("a valid design");
+    let result = evaluate::evaluate(&design, Vec::new(), None).expect("evaluates");
+    assert!((result.coil.resistance_ohm - 6.0753).abs() < 5e-5);
+    assert!((result.coil.inductance_h - 0.014_501_926_063_452_128).abs() < 1e-14);
+    assert!(
+        (result.target.gradient_t_per_m_per_a / -0.054_820_592_063_778_707 - 1.0).abs() < 1e-12
+    );
+    assert!((result.target.force_n - 0.099_71).abs() < 5e-6);
+    assert!(!result.limits["resistance_ohm"].met && result.limits["settling_s"].met);
+    let array = result.array.expect("nine coils");
+    let matrix = &array.mutual_inductance_h;
+    for i in 0..9 {
+        for j in 0..9 {
+            assert_eq!(matrix[i][j], matrix[j][i]);
+        }
+        // Nine ampere push flux out of every coil: the rows' sums stay positive.
+        assert!(matrix[i].iter().sum::<f64>() > 0.0);
+    }
+}
+
+#[test]
+fn two_shapes_of_one_name_are_refused() {
+    let out = tempfile::tempdir().expect("a temporary folder");
+    let shapes = ["shapes/flat.toml", "shapes/flat.toml"];
+    let error = calibrate_text(&seed_air(), &shapes, out.path()).expect_err("equal names");
+    assert!(error.to_string().contains("flat"), "{error}");
+}
