@@ -71,27 +71,18 @@ pub enum Colour {
     Never,
 }
 
-/// The commands.
+/// The commands; each tells of itself in its own file.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// See [`evaluate`].
     Evaluate(evaluate::Evaluate),
-    /// See [`probe`].
     Probe(probe::Probe),
-    /// See [`map`].
     #[command(visible_alias = "tabulate")]
     Map(map::Map),
-    /// See [`discretize`].
     Discretize(discretize::Discretize),
-    /// See [`lambda`].
     Lambda(lambda::Lambda),
-    /// See [`calibrate`].
     Calibrate(calibrate::Calibrate),
-    /// See [`verify`].
     Verify(verify::Verify),
-    /// See [`completions`].
     Completions(completions::Completions),
-    /// See [`man`].
     Man(man::Man),
 }
 

@@ -96,20 +96,28 @@ impl State {
         let Some(stage) = self.stages.last().filter(|s| s.began.elapsed() >= DELAY) else {
             return;
         };
-        let bar = self.drawn.get_or_insert_with(|| {
-            let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
-            bar.set_style(style(stage.total));
-            bar.with_elapsed(stage.began.elapsed())
-        });
-        if stage.total > 1 {
-            bar.set_length(stage.total);
-            bar.set_position(stage.done.min(stage.total));
-        }
-        bar.set_message(if interrupt::asked() {
-            format!("{} (stopping)", stage.name)
+        let (name, elapsed) = (&stage.name, stage.began.elapsed());
+        let message = if interrupt::asked() {
+            format!("{name} (stopping)")
         } else {
-            stage.name.clone()
+            name.clone()
+        };
+        let bar = self.drawn.get_or_insert_with(|| {
+            let bar = ProgressBar::hidden();
+            bar.set_style(style(stage.total));
+            bar.with_elapsed(elapsed)
         });
+        bar.set_message(message);
+        if stage.total > 1 {
+            let done = stage.done.min(stage.total);
+            bar.set_length(stage.total);
+            bar.set_position(done);
+            bar.set_prefix(left(elapsed, done, stage.total));
+        }
+        // Shown last: the first drawing is whole.
+        if bar.is_hidden() {
+            bar.set_draw_target(ProgressDrawTarget::stderr());
+        }
         bar.tick();
     }
 
@@ -120,9 +128,22 @@ impl State {
     }
 }
 
+/// The time left, if it goes on as it went.
+fn left(elapsed: Duration, done: u64, total: u64) -> String {
+    if done == 0 {
+        return String::new();
+    }
+    let seconds = elapsed.as_secs_f64() * (total - done) as f64 / done as f64;
+    match seconds.ceil() as u64 {
+        s @ 0..120 => format!(", {s} s left"),
+        s @ 120..7200 => format!(", {} min left", s.div_ceil(60)),
+        s => format!(", {} h left", s.div_ceil(3600)),
+    }
+}
+
 fn style(total: u64) -> ProgressStyle {
     let template = if total > 1 {
-        "{msg:20} [{bar:40}] {percent:>3} %, {eta} left"
+        "{msg:20} [{bar:40}] {percent:>3} %{prefix}"
     } else {
         "{msg:20} {spinner} {elapsed}"
     };
@@ -185,6 +206,15 @@ mod tests {
         assert_eq!(names, ["inner", "outer"]);
         assert!(seconds[0].1 <= seconds[1].1);
         assert!(bar.take_seconds().is_empty());
+    }
+
+    #[test]
+    fn the_time_left_is_in_proportion() {
+        let second = Duration::from_secs(1);
+        assert_eq!(left(second, 0, 7), "");
+        assert_eq!(left(7 * second, 7, 20), ", 13 s left");
+        assert_eq!(left(70 * second, 7, 40), ", 6 min left");
+        assert_eq!(left(700 * second, 1, 14), ", 3 h left");
     }
 
     #[test]

@@ -81,7 +81,11 @@ impl Failure {
                 .iter()
                 .flat_map(|document| FaultEntry::of(&document.faults))
                 .collect(),
-            Self::Table(table) => table.faults.iter().map(FaultEntry::message).collect(),
+            Self::Table(table) => table
+                .faults
+                .iter()
+                .map(|fault| FaultEntry::message(fault))
+                .collect(),
             _ => Vec::new(),
         }
     }
@@ -128,14 +132,14 @@ pub struct FaultEntry {
 }
 
 impl FaultEntry {
-    fn message(message: &String) -> Self {
+    fn message(message: &str) -> Self {
         Self {
             severity: "error".to_owned(),
             file: None,
             line: None,
             column: None,
             key: None,
-            message: message.clone(),
+            message: message.to_owned(),
             help: None,
         }
     }

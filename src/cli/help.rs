@@ -60,7 +60,7 @@ pub fn main() -> String {
   130  interrupted; what was finished is kept
 
 Examples:
-  # the main job: maps, points, force constant and currents of four shapes
+  # the main job: maps, points, force constants and currents of two objects
   fluxform calibrate designs/seed_air.toml shapes/flat.toml shapes/wedge.toml
   # what one coil is worth
   fluxform evaluate designs/seed_air.toml

@@ -1,17 +1,17 @@
 //! Arguments, commands, the printer, the progress bar and the exit codes.
 
-pub mod args;
-pub mod bar;
-pub mod commands;
-pub mod documents;
-pub mod exit;
-pub mod failure;
-pub mod help;
+mod args;
+mod bar;
+mod commands;
+mod documents;
+mod exit;
+mod failure;
+mod help;
 mod interrupt;
-pub mod layout;
-pub mod printer;
-pub mod quantity;
-pub mod values;
+mod layout;
+mod printer;
+mod quantity;
+mod values;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

@@ -51,10 +51,14 @@ pub fn number(value: f64) -> String {
 /// `value` in `unit` with the prefix that suits it: 0.0145019 H is `14.502 mH`.
 #[must_use]
 pub fn si(value: f64, unit: &str) -> String {
+    si_to(value, unit, DIGITS)
+}
+
+fn si_to(value: f64, unit: &str, digits: i32) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value} {unit}");
     }
-    let rounded: f64 = format!("{:.*e}", (DIGITS - 1) as usize, value)
+    let rounded: f64 = format!("{:.*e}", (digits - 1) as usize, value)
         .parse()
         .unwrap_or(value);
     let exponent = rounded.abs().log10().floor() as i32;
@@ -63,7 +67,26 @@ pub fn si(value: f64, unit: &str) -> String {
         .rev()
         .find(|(power, _)| *power <= exponent)
         .unwrap_or(PREFIXES[0]);
-    format!("{} {prefix}{unit}", number(value / 10f64.powi(power)))
+    format!(
+        "{} {prefix}{unit}",
+        number_to(value / 10f64.powi(power), digits)
+    )
+}
+
+/// A force: millinewtons below one newton.
+#[must_use]
+pub fn force(force_n: f64) -> String {
+    if force_n.abs() < 1.0 {
+        format!("{} mN", number(force_n * 1000.0))
+    } else {
+        format!("{} N", number(force_n))
+    }
+}
+
+/// A length's error: one or two digits.
+#[must_use]
+pub fn length_error(error_m: f64) -> String {
+    si_to(error_m, "m", 2)
 }
 
 /// A length in millimetres.
@@ -94,7 +117,7 @@ pub fn error(estimate: f64) -> String {
 /// A file size.
 #[must_use]
 pub fn bytes(bytes: u64) -> String {
-    si(bytes as f64, "B")
+    si_to(bytes as f64, "B", 3)
 }
 
 /// `n` things: `1 coil`, `9 coils`.
@@ -136,7 +159,10 @@ mod tests {
         assert_eq!(error(1e-12), "1e-12");
         assert_eq!(error(3.26e-10), "3.3e-10");
         assert_eq!(mass(0.4763), "476.3 g");
-        assert_eq!(bytes(2_345_678), "2.3457 MB");
+        assert_eq!(bytes(2_345_678), "2.35 MB");
+        assert_eq!(force(0.000_641_3), "0.6413 mN");
+        assert_eq!(force(-1.3), "-1.3 N");
+        assert_eq!(length_error(2.980_2e-9), "3 nm");
         assert_eq!(count(1, "coil"), "1 coil");
     }
 }

@@ -16,7 +16,7 @@ use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::printer::{Place, Printer};
-use crate::cli::quantity::{bytes, count, error, number, percent, si};
+use crate::cli::quantity::{bytes, count, error, length_error, number, percent};
 use crate::cli::values::{self, FileArgument};
 use crate::design::{Design, Need};
 use crate::job::calibrate::{
@@ -35,10 +35,10 @@ use crate::job::calibrate::{
 #[command(after_help = page(Codes::Writing, &[
     ("fluxform calibrate designs/seed_air.toml shapes/flat.toml shapes/half_sphere.toml",
      "two objects; the bundles go to results/seed_air/"),
-    ("fluxform calibrate designs/seed_air.toml shapes/wedge.stl --unit mm --translate 0,0,30 --out calibrated",
+    ("fluxform calibrate designs/seed_air.toml shapes/wedge.stl --unit mm --translate 0,0,30",
      "a surface given directly; its bundle is called wedge"),
-    ("fluxform calibrate designs/seed_air.toml shapes/flat.toml --criterion linear --format json --force",
-     "another criterion, replacing what is there, told to a program"),
+    ("fluxform calibrate designs/seed_air.toml shapes/flat.toml --criterion linear --force",
+     "another criterion, replacing what is there"),
 ]))]
 pub struct Calibrate {
     /// Design file (TOML), `-` for standard input
@@ -209,7 +209,7 @@ fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> String {
     sheet.line(
         "lambda",
         &format!(
-            "chosen by {}; relative error is of the rms force",
+            "chosen by {}; errors are of the force, relative to the rms force",
             describe::criterion(&file.criterion, file.jnd)
         ),
     );
@@ -262,10 +262,10 @@ fn shapes_table(report: &CalibrateReport) -> String {
         "lambda N/m",
         "linear",
         "saturation",
-        "rms error",
+        "rms mN",
         "relative",
-        "worst",
-        "coils at limit",
+        "worst mN",
+        "at limit",
     ];
     let or_none = |value: Option<String>| value.unwrap_or_else(|| "none".to_owned());
     let row = |bundle: &BundleReport| {
@@ -276,9 +276,9 @@ fn shapes_table(report: &CalibrateReport) -> String {
             or_none(file.lambda_n_per_m.map(number)),
             or_none(file.lambda_linear_n_per_m.map(number)),
             or_none(file.lambda_saturation_n_per_m.map(number)),
-            or_none(file.rms_error_n.map(|n| si(n, "N"))),
+            or_none(file.rms_error_n.map(|n| number(n * 1000.0))),
             or_none(file.relative_rms_error.map(percent)),
-            or_none(file.worst_error_n.map(|n| si(n, "N"))),
+            or_none(file.worst_error_n.map(|n| number(n * 1000.0))),
             or_none(at_limit(bundle)),
         ]
     };
@@ -299,7 +299,7 @@ fn at_limit(bundle: &BundleReport) -> Option<String> {
         .zip(limits.current_min_a.iter().zip(&limits.current_max_a))
         .filter(|(current, (min, max))| current >= max || (current <= min && **min < 0.0))
         .count();
-    Some(format!("{bound} of {}", currents.len()))
+    Some(count(bound, "coil"))
 }
 
 /// The largest error of each stage over all shapes.
@@ -317,8 +317,8 @@ fn accuracies(report: &CalibrateReport) -> String {
         .map(|bundle| bundle.manifest.map.interpolation.largest_error)
         .fold(0.0, f64::max);
     format!(
-        "heights {}, forces {}, map nodes {}, between nodes {}",
-        si(largest("points"), "m"),
+        "heights {}; forces {}, map nodes {}, between nodes {} of the largest gradient at their height",
+        length_error(largest("points")),
         error(largest("forces")),
         error(largest("map")),
         error(between)

@@ -10,7 +10,7 @@ use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
 use crate::cli::printer::{Place, Printer};
-use crate::cli::quantity::{count, error, mm, si};
+use crate::cli::quantity::{count, length_error, mm, number};
 use crate::cli::values::FileArgument;
 use crate::job::JobError;
 use crate::job::discretize::{PointsReport, PointsSummary, run};
@@ -27,7 +27,7 @@ use crate::job::discretize::{PointsReport, PointsSummary, run};
     ("fluxform discretize shapes/half_sphere.toml --out points.csv", "a shape file"),
     ("fluxform discretize shapes/wedge.stl --unit mm --translate 0,0,30 --grid 31x31 --out -",
      "a surface given directly; the table goes to standard output"),
-    ("fluxform discretize shapes/flat.stl --unit mm --translate 0,0,50 --x -20,20 --y -20,20 --out flat.csv",
+    ("fluxform discretize shapes/flat.stl --unit mm --translate 0,0,50 --x -20,20 --out flat.csv",
      "a part of it"),
 ]))]
 pub struct Discretize {
@@ -109,10 +109,7 @@ impl Discretize {
             let outside = count(summary.outside, "grid point");
             sheet.line("left out", &format!("{outside} without surface"));
         }
-        let corner = |c: &[f64; 3]| {
-            c.map(|v| crate::cli::quantity::number(v * 1000.0))
-                .join(", ")
-        };
+        let corner = |c: &[f64; 3]| c.map(|v| number(v * 1000.0)).join(", ");
         sheet.line(
             "surface",
             &format!(
@@ -128,12 +125,10 @@ impl Discretize {
             ),
         );
         if let Some(stage) = summary.accuracy.get("points") {
-            let estimate = if stage.estimate == 0.0 {
-                error(0.0)
-            } else {
-                si(stage.estimate, "m")
-            };
-            sheet.line("accuracy", &format!("heights to {estimate}"));
+            sheet.line(
+                "accuracy",
+                &format!("heights to {}", length_error(stage.estimate)),
+            );
         }
         if let FileArgument::Path(path) = &self.out {
             sheet.line("written to", &path.display().to_string());

@@ -9,7 +9,7 @@ use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::printer::{Place, Printer};
-use crate::cli::quantity::{mass, mm, number, percent, si};
+use crate::cli::quantity::{force, mass, mm, number, percent, si};
 use crate::cli::values::FileArgument;
 use crate::design::{Design, Need};
 use crate::job::evaluate::{Evaluation, evaluate};
@@ -101,15 +101,15 @@ fn summary(design: &Design, result: &Evaluation) -> String {
         ),
     );
     let way = match target.force_n {
-        force if force > 0.0 => " up",
-        force if force < 0.0 => " down",
+        f if f > 0.0 => " up",
+        f if f < 0.0 => " down",
         _ => "",
     };
     sheet.line(
         "target",
         &format!(
             "{}{way} on the magnet, {} above the coil at {}\nfield {}, gradient {}",
-            si(target.force_n.abs(), "N"),
+            force(target.force_n.abs()),
             mm(target.height_m),
             si(target.current_a, "A"),
             si(target.field_t_per_a, "T/A"),

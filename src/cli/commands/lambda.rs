@@ -11,7 +11,7 @@ use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
 use crate::cli::printer::{Place, Printer};
-use crate::cli::quantity::{count, mm, number, percent, si};
+use crate::cli::quantity::{count, force, mm, number, percent};
 use crate::cli::values::{self, FileArgument};
 use crate::design::{Design, Need};
 use crate::job::lambda::{LambdaOptions, LambdaReport, run};
@@ -29,8 +29,8 @@ use crate::lambda::{Criterion, Precision, Settings};
     ("fluxform lambda designs/seed_air.toml shapes/half_sphere.toml", "the seed's half-sphere"),
     ("fluxform lambda designs/seed_air.toml shapes/wedge.toml --criterion linear --at 2.0",
      "the constant at which the first limit binds, and what 2 N/m would give"),
-    ("fluxform lambda designs/seed_air.toml shapes/flat.stl --unit mm --translate 0,0,50 --format json",
-     "a surface given directly, for a program"),
+    ("fluxform lambda designs/seed_air.toml shapes/flat.stl --unit mm --translate 0,0,50",
+     "a surface given directly"),
 ]))]
 pub struct Lambda {
     /// Design file (TOML), `-` for standard input
@@ -177,8 +177,8 @@ fn summary(design: &Design, report: &LambdaReport) -> String {
             &format!(
                 "{} N/m: error rms {}, worst {}",
                 number(at.lambda_n_per_m),
-                si(at.rms_error_n, "N"),
-                si(at.worst_error_n, "N")
+                force(at.rms_error_n),
+                force(at.worst_error_n)
             ),
         );
         sheet.line("", &describe::currents(design, &at.currents_a));
@@ -212,7 +212,7 @@ fn operating_point(sheet: &mut Sheet, report: &LambdaReport) {
             "force",
             &format!(
                 "{} wanted at the mean height, {}",
-                si(lambda * mean_m, "N"),
+                force(lambda * mean_m),
                 mm(mean_m)
             ),
         );
@@ -223,7 +223,7 @@ fn operating_point(sheet: &mut Sheet, report: &LambdaReport) {
         });
         sheet.line(
             "error",
-            &format!("rms {}{relative}, worst {}", si(rms, "N"), si(worst, "N")),
+            &format!("rms {}{relative}, worst {}", force(rms), force(worst)),
         );
     }
 }

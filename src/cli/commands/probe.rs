@@ -32,7 +32,7 @@ use crate::job::probe::{ProbeComponents, ProbeTable, probe};
 #[command(after_help = page(Codes::Reading, &[
     ("printf 'x_m,y_m,z_m\\n0.007,0.013,0.03\\n' | fluxform probe designs/seed_air.toml -",
      "one point from standard input"),
-    ("printf 'x_m,y_m,z_m\\n0,0,0.03\\n' | fluxform probe designs/seed_air.toml - --components gz --quiet",
+    ("printf 'x_m,y_m,z_m\\n0,0,0.03\\n' | fluxform probe designs/seed_air.toml - --components gz -q",
      "only dBz/dz, and no summary"),
 ]))]
 pub struct Probe {
