@@ -70,6 +70,9 @@ pub(super) fn solve(model: &Model, roles: &[Role], likely: &[bool], target: &[Nu
                 }
                 _ => basis.retain(|j| !violators.contains(j)),
             }
+            if basis.is_empty() && model.weight.is_some() {
+                basis.extend(first_of_the_sum(model, roles, target));
+            }
             entered = None;
             factor = Factor::new(model, &basis);
             continue;

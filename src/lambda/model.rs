@@ -25,6 +25,8 @@ const MOST_BLUR: f64 = 1e-9;
 /// A column whose part outside the span of the others is below this share depends on them:
 /// exact copies leave 1e-31, and no two different columns of doubles come near it.
 const DEPENDENT: f64 = 1e-25;
+/// The same in units of the rounding that nearly dependent columns amplify.
+const DEPENDENT_ROUNDINGS: f64 = 1e3;
 
 impl Model {
     /// Columns stored one after another, `rows` entries each.
@@ -204,7 +206,8 @@ impl Factor {
         }
         self.reflect(&mut column);
         let outside = Num::dot(&column[rank..], &column[rank..]).sqrt();
-        if outside <= model.norm[variable] * Num::of(DEPENDENT) {
+        let least = DEPENDENT.max(DEPENDENT_ROUNDINGS * Num::EPSILON / self.independence);
+        if outside <= model.norm[variable] * Num::of(least) {
             return;
         }
         self.independence = self
