@@ -180,3 +180,21 @@ fn two_shapes_of_one_name_are_refused() {
     let error = calibrate_text(&seed_air(), &shapes, out.path()).expect_err("equal names");
     assert!(error.to_string().contains("flat"), "{error}");
 }
+
+#[test]
+fn points_outside_the_workspace_are_told() {
+    let text = seed_air().replace("z_mm = [10.0, 80.0, 29]", "z_mm = [10.0, 40.0, 13]");
+    assert_ne!(text, seed_air());
+    let out = tempfile::tempdir().expect("a temporary folder");
+    let report = calibrate_text(&text, &SHAPES[..1], out.path()).expect("calibrates");
+    let warnings = &report.bundles[0].lambda.warnings;
+    assert!(
+        warnings.iter().any(|w| w.contains("3721 of 3721 points")),
+        "{warnings:?}"
+    );
+    assert!(
+        verify::run(&report.bundles[0].folder, &Silent)
+            .expect("opens")
+            .passed
+    );
+}

@@ -10,7 +10,7 @@ use super::lambda::{LambdaOptions, LambdaReport, solve};
 use super::map::{MAP_TOLERANCE, accuracy, arrays, runtime, summary, workspace_grid};
 use super::scene::Scene;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
-use crate::bundle::manifest::{LambdaSummary, LeftOut, Manifest};
+use crate::bundle::manifest::{AxisSummary, LambdaSummary, LeftOut, Manifest};
 use crate::bundle::table::CurrentRow;
 use crate::bundle::write::{BundleContent, check_bundle_target, write_bundle};
 use crate::design::Design;
@@ -140,10 +140,11 @@ fn calibrate_one(
         .collect();
     let points = discretize::run(&shape.document, inputs, progress)?;
     check_bundle_target(&folder, options.force, &points.summary.inputs)?;
-    let lambda = solve(scene, points, &options.lambda, progress)?;
+    let mut lambda = solve(scene, points, &options.lambda, progress)?;
     let tolerance = options.lambda.tolerance.unwrap_or(MAP_TOLERANCE);
     let needed = NeededMap::new(scene, &lambda, options.reach_m, tolerance, progress)?;
     let manifest = manifest(scene, &lambda, &needed);
+    lambda.warnings.extend(outside_warning(&manifest, &lambda));
     let currents = current_rows(scene, &lambda);
     let rows = point_rows(&lambda.points.discretized.points);
     let map = arrays(&needed.map, runtime(scene, lambda.file.lambda_n_per_m));
@@ -395,18 +396,22 @@ fn current_rows(scene: &Scene, lambda: &LambdaReport) -> Vec<CurrentRow> {
         .collect()
 }
 
-/// Whether points lie outside the workspace, where a runtime has no map: how many.
-#[must_use]
-pub fn points_outside(manifest: &Manifest, report: &LambdaReport) -> usize {
-    let inside = |axis: &crate::bundle::manifest::AxisSummary, value: f64| {
-        axis.from_m <= value && value <= axis.to_m
-    };
-    let points = &report.points.discretized.points;
-    (0..points.len())
+/// A sentence on the points that lie outside the map, where a runtime gives no force.
+fn outside_warning(manifest: &Manifest, lambda: &LambdaReport) -> Option<String> {
+    let inside = |axis: &AxisSummary, value: f64| axis.from_m <= value && value <= axis.to_m;
+    let points = &lambda.points.discretized.points;
+    let outside = (0..points.len())
         .filter(|i| {
             !(inside(&manifest.map.x_m, points.x_m[*i])
                 && inside(&manifest.map.y_m, points.y_m[*i])
                 && inside(&manifest.map.z_m, points.height_m[*i]))
         })
-        .count()
+        .count();
+    (outside > 0).then(|| {
+        format!(
+            "{outside} of {} points lie outside the design's workspace: lambda counts them, but a \
+             runtime has no map there and gives no force; enlarge [workspace]",
+            points.len()
+        )
+    })
 }

@@ -16,10 +16,14 @@ impl Axis {
     #[must_use]
     pub fn node(&self, index: usize) -> f64 {
         let last = self.samples.saturating_sub(1);
-        if last == 0 {
+        // The ends are given back as they are: even (last * from) / last rounds.
+        if index == 0 {
             return self.from;
         }
-        // Weights from the two ends: exact at both, and symmetric under reversal.
+        if index == last {
+            return self.to;
+        }
+        // Weights from the two ends: symmetric under reversal.
         let (a, b) = ((last - index) as f64, index as f64);
         (a * self.from + b * self.to) / last as f64
     }
@@ -57,6 +61,14 @@ mod tests {
         assert_eq!(nodes[60], 0.05);
         for i in 0..61 {
             assert_eq!(nodes[i], -nodes[60 - i]);
+        }
+        for samples in 2..200 {
+            let axis = Axis {
+                from: -0.043,
+                to: 0.05,
+                samples,
+            };
+            assert_eq!((axis.node(0), axis.node(samples - 1)), (-0.043, 0.05));
         }
         let skew = Axis {
             from: 0.013,

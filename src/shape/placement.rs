@@ -1,5 +1,7 @@
 //! From a file's coordinates to metres: unit, rotation about x, then y, then z, translation.
 
+use nalgebra::{Matrix3, Vector3};
+
 use crate::shape::document::Placement;
 
 /// Unit and placement as one map of points; right angles rotate exactly.
@@ -7,8 +9,8 @@ use crate::shape::document::Placement;
 pub struct Transform {
     /// A coordinate is multiplied by the first, divided by the second; one of them is 1.
     unit: [f64; 2],
-    /// Rows of the rotation; `None` for the identity.
-    rotation: Option<[[f64; 3]; 3]>,
+    /// `None` for the identity.
+    rotation: Option<Matrix3<f64>>,
     translate_m: [f64; 3],
 }
 
@@ -24,10 +26,9 @@ impl Transform {
             [unit_m, 1.0]
         };
         let rotation = rotation(placement.rotate_deg);
-        let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         Self {
             unit,
-            rotation: (rotation != identity).then_some(rotation),
+            rotation: (rotation != Matrix3::identity()).then_some(rotation),
             translate_m: placement.translate_m,
         }
     }
@@ -36,8 +37,8 @@ impl Transform {
     #[must_use]
     pub fn apply(&self, point: [f64; 3]) -> [f64; 3] {
         let mut p = point.map(|c| self.length_m(c));
-        if let Some(rows) = &self.rotation {
-            p = rows.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2]);
+        if let Some(rotation) = &self.rotation {
+            p = (rotation * Vector3::from(p)).into();
         }
         [0, 1, 2].map(|k| p[k] + self.translate_m[k])
     }
@@ -63,13 +64,12 @@ pub fn sin_cos_deg(angle_deg: f64) -> (f64, f64) {
 }
 
 /// Rz Ry Rx: the fixed axes, x first.
-fn rotation(rotate_deg: [f64; 3]) -> [[f64; 3]; 3] {
+fn rotation(rotate_deg: [f64; 3]) -> Matrix3<f64> {
     let [(sx, cx), (sy, cy), (sz, cz)] = rotate_deg.map(sin_cos_deg);
-    [
-        [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
-        [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
-        [-sy, cy * sx, cy * cx],
-    ]
+    let about_x = Matrix3::new(1.0, 0.0, 0.0, 0.0, cx, -sx, 0.0, sx, cx);
+    let about_y = Matrix3::new(cy, 0.0, sy, 0.0, 1.0, 0.0, -sy, 0.0, cy);
+    let about_z = Matrix3::new(cz, -sz, 0.0, sz, cz, 0.0, 0.0, 0.0, 1.0);
+    about_z * about_y * about_x
 }
 
 #[cfg(test)]

@@ -214,6 +214,7 @@ impl Sample {
             points: &self.points,
             currents: &self.currents,
             lambda: &self.lambda,
+            extra: &[],
         };
         write_bundle(target, force, &content, &json!({ "total_s": 0.013 }))
     }

@@ -1,0 +1,251 @@
+//! Maps against direct evaluation, and their interpolation error against other places.
+
+use fluxform::field::frame::to_cartesian;
+use fluxform::field::winding::Winding;
+use fluxform::map::tabulate::{Grid, PlacedCoil};
+use fluxform::map::{Components, FieldMap, interpolation_error, tabulate};
+use fluxform::numerics::axis::Axis;
+use fluxform::numerics::lagrange;
+use fluxform::progress::Silent;
+
+fn seed() -> Winding {
+    Winding {
+        inner_radius_m: 0.012,
+        outer_radius_m: 0.019,
+        length_m: 0.1,
+        turns: 1429.0,
+    }
+}
+
+/// Nine coils; `skew` moves them off the grid so that no two distances repeat.
+fn coils(skew: f64) -> Vec<PlacedCoil> {
+    (0..9)
+        .map(|number| {
+            let (column, row) = ((number % 3) as f64 - 1.0, (number / 3) as f64 - 1.0);
+            let offset = skew * (1.3 + number as f64);
+            PlacedCoil {
+                number,
+                axis_m: [0.05 * column + offset, 0.05 * row - 0.7 * offset],
+                gain: 1.0 + 0.01 * number as f64,
+            }
+        })
+        .collect()
+}
+
+fn grid(samples: usize, from: f64) -> Grid {
+    Grid {
+        x_m: Axis {
+            from: -0.05,
+            to: 0.05,
+            samples,
+        }
+        .nodes(),
+        y_m: Axis {
+            from: -0.047,
+            to: 0.05,
+            samples,
+        }
+        .nodes(),
+        z_m: Axis {
+            from,
+            to: 0.08,
+            samples: 9,
+        }
+        .nodes(),
+    }
+}
+
+/// Largest error of every component relative to the largest |grad B| (|B|) at the height.
+fn worst_error(map: &FieldMap, winding: &Winding, coils: &[PlacedCoil]) -> f64 {
+    let (nx, ny, nz) = (map.x_m.len(), map.y_m.len(), map.z_m.len());
+    let gradient = map.gradient_t_per_m_per_a.as_ref().expect("gradient");
+    let field = map.field_t_per_a.as_ref().expect("field");
+    let mut worst = 0.0_f64;
+    for k in 0..nz {
+        let (mut error, mut size) = (0.0_f64, 0.0_f64);
+        let (mut field_error, mut field_size) = (0.0_f64, 0.0_f64);
+        for (c, coil) in coils.iter().enumerate() {
+            for place in (0..nx * ny).step_by(7) {
+                let (dx, dy) = (
+                    map.x_m[place % nx] - coil.axis_m[0],
+                    map.y_m[place / nx] - coil.axis_m[1],
+                );
+                let axial = winding
+                    .field(dx.hypot(dy), map.z_m[k])
+                    .expect("off the edges");
+                let exact = to_cartesian(&axial, dx, dy);
+                let node = (c * nz + k) * nx * ny + place;
+                size = size.max(coil.gain * axial.gradient_norm());
+                for (i, g) in exact
+                    .gradient_t_per_m_per_a
+                    .as_flattened()
+                    .iter()
+                    .enumerate()
+                {
+                    error = error.max((gradient[9 * node + i] - coil.gain * g).abs());
+                }
+                let gz = coil.gain * axial.dbz_dz;
+                error = error.max((map.gz_t_per_m_per_a[node] - gz).abs());
+                for (i, b) in exact.field_t_per_a.iter().enumerate() {
+                    field_size = field_size.max(coil.gain * b.abs());
+                    field_error = field_error.max((field[3 * node + i] - coil.gain * b).abs());
+                }
+            }
+        }
+        worst = worst.max(error / size).max(field_error / field_size);
+    }
+    worst
+}
+
+#[test]
+fn every_node_keeps_the_tolerance() {
+    for (skew, samples, from) in [(0.0, 31, 0.01), (1.37e-4, 41, 0.01), (1.37e-4, 31, 0.0004)] {
+        for tolerance in [1e-5, 1e-9, 1e-12] {
+            let (winding, coils, grid) = (seed(), coils(skew), grid(samples, from));
+            let map = tabulate(&winding, &coils, &grid, Components::All, tolerance, &Silent)
+                .expect("a map");
+            let error = worst_error(&map, &winding, &coils);
+            assert!(error < tolerance, "skew {skew} {tolerance:e}: {error:e}");
+        }
+    }
+}
+
+#[test]
+fn distances_that_do_not_repeat_use_a_table() {
+    let (winding, coils, grid) = (seed(), coils(1.37e-4), grid(41, 0.01));
+    let map = tabulate(&winding, &coils, &grid, Components::Gz, 1e-9, &Silent).expect("a map");
+    assert!(
+        map.tabulated && map.distinct_radii > 10_000,
+        "{}",
+        map.distinct_radii
+    );
+}
+
+#[test]
+fn the_bytes_do_not_depend_on_the_threads() {
+    let bits = |threads: usize| -> Vec<u64> {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("a pool");
+        let map = pool.install(|| {
+            tabulate(
+                &seed(),
+                &coils(1.37e-4),
+                &grid(23, 0.007),
+                Components::All,
+                1e-9,
+                &Silent,
+            )
+        });
+        let map = map.expect("a map");
+        [
+            map.gz_t_per_m_per_a,
+            map.gradient_t_per_m_per_a.expect("g"),
+            map.field_t_per_a.expect("b"),
+        ]
+        .concat()
+        .into_iter()
+        .map(f64::to_bits)
+        .collect()
+    };
+    let one = bits(1);
+    assert_eq!(one, bits(2));
+    assert_eq!(one, bits(5));
+}
+
+#[test]
+fn a_map_on_the_top_face_is_exact_off_the_edges() {
+    let winding = seed();
+    let grid = Grid {
+        x_m: Axis {
+            from: -0.0503,
+            to: 0.0497,
+            samples: 14,
+        }
+        .nodes(),
+        y_m: Axis {
+            from: -0.0301,
+            to: 0.0333,
+            samples: 9,
+        }
+        .nodes(),
+        z_m: vec![0.0, 1e-7, 1e-3],
+    };
+    let coils = coils(1.1e-5);
+    let map = tabulate(&winding, &coils, &grid, Components::All, 1e-9, &Silent).expect("a map");
+    let error = worst_error(&map, &winding, &coils);
+    assert!(error < 1e-9, "{error:e}");
+}
+
+#[test]
+fn a_node_on_an_edge_is_refused_with_its_place() {
+    let grid = Grid {
+        x_m: vec![0.012],
+        y_m: vec![0.0],
+        z_m: vec![0.0],
+    };
+    let coil = PlacedCoil {
+        number: 0,
+        axis_m: [0.0, 0.0],
+        gain: 1.0,
+    };
+    let error = tabulate(&seed(), &[coil], &grid, Components::Gz, 1e-9, &Silent)
+        .expect_err("the edge's gradient is unbounded");
+    assert!(error.to_string().contains("0.012"), "{error}");
+}
+
+#[test]
+fn the_interpolation_error_covers_other_places() {
+    for from in [0.005, 0.02] {
+        let (winding, coils) = (seed(), coils(0.0));
+        let grid = grid(31, from);
+        let map = tabulate(&winding, &coils, &grid, Components::Gz, 1e-9, &Silent).expect("a map");
+        let told = interpolation_error(&winding, &coils, &grid, &map.gz_t_per_m_per_a, 1e-9)
+            .expect("an error");
+        let nodes = grid.x_m.len() * grid.y_m.len() * grid.z_m.len();
+        let mut worst = 0.0_f64;
+        let mut state = 1_u64;
+        for k in 0..grid.z_m.len() - 1 {
+            let largest = (0..200)
+                .map(|i| {
+                    winding
+                        .field(2e-4 * f64::from(i), grid.z_m[k + 1])
+                        .expect("above")
+                        .dbz_dz
+                        .abs()
+                })
+                .fold(0.0, f64::max);
+            for _ in 0..3000 {
+                let mut unit = || {
+                    state = state
+                        .wrapping_mul(6364136223846793005)
+                        .wrapping_add(1442695040888963407);
+                    (state >> 11) as f64 / (1_u64 << 53) as f64
+                };
+                let coil = (unit() * 9.0) as usize;
+                let z = grid.z_m[k] + unit() * (grid.z_m[k + 1] - grid.z_m[k]);
+                let point = [0.1 * unit() - 0.05, 0.097 * unit() - 0.047, z];
+                let cell =
+                    lagrange::locate([&grid.x_m, &grid.y_m, &grid.z_m], point).expect("inside");
+                let value = cell.value(&map.gz_t_per_m_per_a[coil * nodes..(coil + 1) * nodes]);
+                let (dx, dy) = (
+                    point[0] - coils[coil].axis_m[0],
+                    point[1] - coils[coil].axis_m[1],
+                );
+                let exact =
+                    coils[coil].gain * winding.field(dx.hypot(dy), z).expect("above").dbz_dz;
+                // The plane above the cell has the smaller values: the stricter measure of two
+                // would be the plane through the point, where they lie between.
+                worst = worst.max((value - exact).abs() / largest);
+            }
+        }
+        // Relative to the plane above instead of the plane through the point: up to twice as large.
+        assert!(told.largest * 2.0 > worst, "{:e} {worst:e}", told.largest);
+        assert!(
+            told.largest < 20.0 * worst,
+            "not a guess: {:e} {worst:e}",
+            told.largest
+        );
+    }
+}
