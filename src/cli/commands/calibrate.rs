@@ -20,8 +20,7 @@ use crate::cli::quantity::{bytes, count, error, length_error, number, percent};
 use crate::cli::values::{self, FileArgument};
 use crate::design::{Design, Need};
 use crate::job::calibrate::{
-    BundleReport, CalibrateOptions, CalibrateReport, DEFAULT_REACH_M, DesignSource, points_outside,
-    run,
+    BundleReport, CalibrateOptions, CalibrateReport, DEFAULT_REACH_M, DesignSource, run,
 };
 
 /// The main job: maps, points, force constant and currents, one bundle a shape
@@ -154,14 +153,6 @@ fn warn(report: &CalibrateReport, printer: &Printer) {
         let shape = &bundle.manifest.shape;
         for warning in &bundle.lambda.warnings {
             printer.warning(&format!("{shape}: {warning}"));
-        }
-        let outside = points_outside(&bundle.manifest, &bundle.lambda);
-        if outside > 0 {
-            printer.warning(&format!(
-                "{shape}: {outside} of {} points lie outside the design's [workspace], where a \
-                 runtime has no map and the force is zero; enlarge the workspace or move the object",
-                bundle.lambda.file.points
-            ));
         }
     }
 }
