@@ -9,7 +9,6 @@ use crate::bundle::json::JsonError;
 use crate::bundle::read_table::TableError;
 use crate::design::{Faults, InvalidDocument};
 use crate::job::JobError;
-use crate::shape::ShapeError;
 
 /// Why a command did not end well.
 #[derive(Debug, thiserror::Error)]
@@ -66,7 +65,7 @@ impl Failure {
     #[must_use]
     pub fn message(&self) -> String {
         match self {
-            Self::Job(JobError::Interrupted(_) | JobError::Shape(ShapeError::Interrupted(_))) => {
+            Self::Job(JobError::Interrupted(_)) => {
                 "interrupted; what was finished is kept, nothing is half written".to_owned()
             }
             _ => self.to_string(),

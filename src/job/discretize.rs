@@ -15,7 +15,7 @@ use crate::bundle::manifest::{AxisSummary, PointsGrid};
 use crate::bundle::table::{PointRow, write_points};
 use crate::progress::Progress;
 use crate::shape::document::{ShapeDocument, SurfaceSource};
-use crate::shape::{ConstraintPoints, Discretized, discretize};
+use crate::shape::{ConstraintPoints, Discretized, ShapeError, discretize};
 
 /// The points and what is to be told about them.
 #[derive(Debug, Clone)]
@@ -78,7 +78,13 @@ pub fn run(
     progress: &dyn Progress,
 ) -> Result<PointsReport, JobError> {
     let inputs = with_surface(document, inputs)?;
-    let discretized = discretize(document, progress)?;
+    let discretized = discretize(document, progress).map_err(|source| match source {
+        ShapeError::Interrupted(interrupted) => JobError::from(interrupted),
+        source => JobError::Shape {
+            name: document.name.clone(),
+            source,
+        },
+    })?;
     let facts = discretized.points.facts();
     let summary = PointsSummary {
         schema_version: SCHEMA_VERSION,

@@ -14,7 +14,7 @@ use crate::progress::Progress;
 use crate::shape::document::ShapeDocument;
 
 /// What is asked.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LambdaOptions {
     /// Criterion, its weight, and a force constant of interest.
     pub settings: Settings,
@@ -27,15 +27,6 @@ impl LambdaReport {
     #[must_use]
     pub fn as_wished(&self) -> bool {
         self.file.lambda_n_per_m.is_some_and(|lambda| lambda > 0.0) && self.accuracy_reached
-    }
-}
-
-impl Default for LambdaOptions {
-    fn default() -> Self {
-        Self {
-            settings: Settings::default(),
-            tolerance: None,
-        }
     }
 }
 

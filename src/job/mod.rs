@@ -33,8 +33,13 @@ pub enum JobError {
     #[error(transparent)]
     OnEdge(#[from] OnEdge),
     /// The shape gives no points.
-    #[error(transparent)]
-    Shape(#[from] ShapeError),
+    #[error("shape {name:?}: {source}")]
+    Shape {
+        /// Name of the shape.
+        name: String,
+        /// Why.
+        source: ShapeError,
+    },
     /// The force problem cannot be stated.
     #[error(transparent)]
     Problem(#[from] ProblemError),
@@ -64,7 +69,7 @@ impl JobError {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Interrupted(_) | Self::Shape(ShapeError::Interrupted(_)) => 130,
+            Self::Interrupted(_) => 130,
             Self::Write(_) => 4,
             Self::Bundle(BundleError::NoBundle { .. } | BundleError::Schema { .. }) => 3,
             Self::Bundle(_) => 5,

@@ -25,7 +25,8 @@ const LOWEST: usize = 4;
 const HIGHEST: usize = 1;
 
 /// Compares the interpolated dB_z/dz ([coil, z, y, x] on `grid`) with direct values in the
-/// middle of cells, and of edges along each axis, in the four lowest layers and the highest.
+/// middle of cells, and of edges along each axis, in the four lowest layers and the highest, for
+/// the innermost and the outermost coil.
 ///
 /// # Errors
 /// See [`tabulate`].
@@ -68,12 +69,21 @@ pub fn interpolation_error(
         z_m: layers(z_m),
     });
     let nodes = x.len() * y.len() * z.len();
+    let watched = innermost_and_outermost(coils, grid);
+    let placed: Vec<PlacedCoil> = watched.iter().map(|coil| coils[*coil]).collect();
     let mut worst = InterpolationError {
         largest: 0.0,
         samples: 0,
     };
     for places in staggered {
-        let exact = tabulate(winding, coils, &places, Components::Gz, tolerance, &Silent)?;
+        let exact = tabulate(
+            winding,
+            &placed,
+            &places,
+            Components::Gz,
+            tolerance,
+            &Silent,
+        )?;
         let plane = places.x_m.len() * places.y_m.len();
         let stencils = |nodes: &[f64], at: &[f64]| -> Vec<lagrange::Stencil> {
             at.iter()
@@ -86,9 +96,9 @@ pub fn interpolation_error(
         for (k, stencil_z) in along_z.iter().enumerate() {
             let mut error = 0.0_f64;
             let mut size = 0.0_f64;
-            for coil in 0..coils.len() {
+            for (place, coil) in watched.iter().enumerate() {
                 let map = &gz[coil * nodes..(coil + 1) * nodes];
-                let start = (coil * places.z_m.len() + k) * plane;
+                let start = (place * places.z_m.len() + k) * plane;
                 let values =
                     interpolate_plane(map, [x.len(), y.len()], stencil_z, &along_y, &along_x);
                 for (value, direct) in values
@@ -102,10 +112,28 @@ pub fn interpolation_error(
             if size > 0.0 {
                 worst.largest = worst.largest.max(SAFETY * error / size);
             }
-            worst.samples += plane * coils.len();
+            worst.samples += plane * watched.len();
         }
     }
     Ok(worst)
+}
+
+/// The coils nearest to the grid's centre and farthest from it, by index: the coils are alike,
+/// and where one stands decides whether its peak falls on inner cells or on the border's.
+fn innermost_and_outermost(coils: &[PlacedCoil], grid: &Grid) -> Vec<usize> {
+    let middle = |nodes: &[f64]| 0.5 * (nodes[0] + nodes[nodes.len() - 1]);
+    let (cx, cy) = (middle(&grid.x_m), middle(&grid.y_m));
+    let distance = |coil: &PlacedCoil| (coil.axis_m[0] - cx).hypot(coil.axis_m[1] - cy);
+    let mut order: Vec<usize> = (0..coils.len()).collect();
+    order.sort_by(|a, b| distance(&coils[*a]).total_cmp(&distance(&coils[*b])));
+    let mut ends: Vec<usize> = order
+        .first()
+        .into_iter()
+        .chain(order.last())
+        .copied()
+        .collect();
+    ends.dedup();
+    ends
 }
 
 /// One height of a tensor-product interpolation: along z, then y, then x.
