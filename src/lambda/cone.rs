@@ -81,26 +81,10 @@ pub(super) fn solve(model: &Model, roles: &[Role], likely: &[bool], target: &[Nu
             blocked.fill(false);
         }
         let gradient = factor.gradient(model, &candidate.residual);
-        loop {
-            let best = most_wanted(
-                model,
-                roles,
-                &basis,
-                &blocked,
-                &gradient,
-                &factor,
-                target_norm,
-            );
-            let Some(i) = best else {
-                return Direction {
-                    rate,
-                    residual: candidate.residual,
-                    gradient,
-                    factor,
-                    blocked,
-                    converged: true,
-                };
-            };
+        for i in most_wanted(model, roles, &gradient, &factor, target_norm) {
+            if blocked[i] || basis.contains(&i) {
+                continue;
+            }
             if let Some(grown) = factor.with(model, &basis, i) {
                 factor = grown;
                 basis.push(i);
@@ -108,6 +92,16 @@ pub(super) fn solve(model: &Model, roles: &[Role], likely: &[bool], target: &[Nu
                 break;
             }
             blocked[i] = true;
+        }
+        if entered.is_none() {
+            return Direction {
+                rate,
+                residual: candidate.residual,
+                gradient,
+                factor,
+                blocked,
+                converged: true,
+            };
         }
     }
     let last = factor.solve(model, target, Num::ZERO);
@@ -169,34 +163,30 @@ fn step(roles: &[Role], basis: &[usize], rate: &mut Vec<Num>, goal: &[Num]) -> O
     Some(stopped)
 }
 
-/// The one-sided variable outside the basis with the largest relative gain.
+/// The one-sided variables that gain by moving, largest relative gain first.
 fn most_wanted(
     model: &Model,
     roles: &[Role],
-    basis: &[usize],
-    blocked: &[bool],
     gradient: &[Num],
     factor: &Factor,
     target_norm: Num,
-) -> Option<usize> {
-    let noise = Num::of(factor.noise(model)) * target_norm;
-    let mut best: Option<(usize, Num)> = None;
-    for i in (0..roles.len()).filter(|&i| !blocked[i]) {
-        let gain = match roles[i] {
-            Role::Rising => gradient[i],
-            Role::Falling => -gradient[i],
-            _ => continue,
-        };
-        let scale = factor.gradient_scale(model, i);
-        if gain <= noise * scale || basis.contains(&i) {
-            continue;
-        }
-        let relative = gain / scale;
-        if best.is_none_or(|(_, most)| relative > most) {
-            best = Some((i, relative));
-        }
-    }
-    best.map(|(i, _)| i)
+) -> Vec<usize> {
+    let noise = factor.noise(model) * target_norm.to_f64();
+    let mut wanted: Vec<(usize, f64)> = factor
+        .gradient_scales(model)
+        .iter()
+        .enumerate()
+        .filter_map(|(i, scale)| {
+            let gain = match roles[i] {
+                Role::Rising => gradient[i].to_f64(),
+                Role::Falling => -gradient[i].to_f64(),
+                _ => return None,
+            };
+            (gain > noise * scale.to_f64()).then(|| (i, gain / scale.to_f64()))
+        })
+        .collect();
+    wanted.sort_by(|a, b| b.1.total_cmp(&a.1));
+    wanted.into_iter().map(|(i, _)| i).collect()
 }
 
 #[cfg(test)]
@@ -241,10 +231,10 @@ mod tests {
         for (a, b) in residual.iter().zip(&d.residual) {
             assert!((*a - *b).abs().to_f64() < 1e-28);
         }
-        for i in 0..4 {
-            assert!(!moves_wrongly(roles[i], d.rate[i]));
+        for (i, &role) in roles.iter().enumerate() {
+            assert!(!moves_wrongly(role, d.rate[i]));
             let (gradient, rate) = (d.gradient[i].to_f64(), d.rate[i].to_f64());
-            match roles[i] {
+            match role {
                 Role::Rising => assert!(gradient < 1e-28 && (gradient * rate).abs() < 1e-28),
                 Role::Falling => assert!(gradient > -1e-28 && (gradient * rate).abs() < 1e-28),
                 Role::Free | Role::Held => assert!(gradient.abs() < 1e-28),

@@ -369,9 +369,7 @@ impl Follower<'_> {
             start: state.lambda,
             gradient: factor.gradient(self.model, &residual),
             gradient_rate: direction.gradient.clone(),
-            gradient_scale: (0..roles.len())
-                .map(|i| factor.gradient_scale(self.model, i))
-                .collect(),
+            gradient_scale: factor.gradient_scales(self.model),
             noise: factor.noise(self.model),
             blur: factor.blur(self.model, share),
             place,

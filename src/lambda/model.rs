@@ -298,12 +298,14 @@ impl Factor {
         gradient
     }
 
-    /// Natural size of variable `i`'s reduced gradient per unit of residual.
-    pub fn gradient_scale(&self, model: &Model, i: usize) -> Num {
+    /// Natural sizes of the reduced gradients per unit of residual.
+    pub fn gradient_scales(&self, model: &Model) -> Vec<Num> {
         let shift = self
             .pivot
             .map_or(Num::ZERO, |p| model.norm[p] / model.weight_of(p));
-        model.norm[i] + model.weight_of(i) * shift
+        (0..model.count())
+            .map(|i| model.norm[i] + model.weight_of(i) * shift)
+            .collect()
     }
 
     /// Size of a rate that rounding leaves where variable `i` should stand still; `blur` is

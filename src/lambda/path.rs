@@ -58,6 +58,9 @@ pub struct Breakpoint {
     pub events: Vec<Event>,
 }
 
+/// Relative differences up to this are rounding in a path that is told.
+const TIE: f64 = 1e-14;
+
 /// Where a coil or the sum stands between two breakpoints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Standing {
@@ -289,7 +292,7 @@ impl Path {
         all
     }
 
-    /// First force constant beyond which no coil follows any more; `None` where the path never turns.
+    /// The force constant beyond which no coil follows any more; `None` where the path never turns.
     pub(super) fn last_turn(&self) -> Option<f64> {
         let last = self.turns.last().map(|&k| self.pieces[k].start);
         last.filter(|&lambda| lambda > 0.0)
@@ -298,24 +301,29 @@ impl Path {
     /// Pieces at which something visible changes: ties within rounding count once, and where
     /// currents are ambiguous only a change of the fit counts.
     fn turns(&self) -> Vec<usize> {
-        let mut turns = vec![0];
-        for (k, piece) in self.pieces.iter().enumerate().skip(1) {
-            let last = turns[turns.len() - 1];
-            let before = &self.pieces[last];
-            let scale: f64 = before.residual_rate.iter().map(|v| v.abs()).sum();
-            let change = piece.residual_rate.iter().zip(&before.residual_rate);
-            let same_fit =
-                change.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs())) <= 1e-14 * scale;
-            let same_standing = self.ambiguous.is_some() || piece.standing == before.standing;
-            if same_fit && same_standing {
-                continue;
-            }
-            if piece.start - before.start <= 1e-14 * piece.start {
+        let mut turns: Vec<usize> = Vec::new();
+        for (k, piece) in self.pieces.iter().enumerate() {
+            if turns
+                .last()
+                .is_some_and(|&last| piece.start - self.pieces[last].start <= TIE * piece.start)
+            {
                 turns.pop();
             }
-            turns.push(k);
+            if turns
+                .last()
+                .is_none_or(|&last| self.differ(&self.pieces[last], piece))
+            {
+                turns.push(k);
+            }
         }
         turns
+    }
+
+    fn differ(&self, before: &SiPiece, after: &SiPiece) -> bool {
+        let pairs = || before.residual_rate.iter().zip(&after.residual_rate);
+        let scale: f64 = pairs().map(|(b, _)| b.abs()).sum();
+        let fit = pairs().any(|(b, a)| (a - b).abs() > TIE * scale);
+        fit || (self.ambiguous.is_none() && before.standing != after.standing)
     }
 
     fn standing_at_zero(&self) -> Vec<Standing> {

@@ -106,7 +106,9 @@ impl Reduced {
                     let (a, b) = factors(k);
                     let scaled = |v: &f64| T::of(v * a * b);
                     match (j.checked_sub(coils), problem.offset_n) {
-                        (None, _) => copy(column, rows.iter().skip(j).step_by(coils).map(scaled)),
+                        (None, _) => {
+                            copy(column, rows.chunks_exact(coils).map(|row| scaled(&row[j])));
+                        }
                         (Some(0), _) => {
                             copy(column, problem.height_m[range.clone()].iter().map(scaled))
                         }

@@ -67,13 +67,9 @@ impl DoubleDouble {
         if self.hi == 0.0 {
             return Self::exactly(0.0);
         }
-        // Two Newton steps from the double's root.
-        let half = Self::exactly(0.5);
-        let mut root = Self::exactly(self.hi.sqrt());
-        for _ in 0..2 {
-            root = (root + self / root) * half;
-        }
-        root
+        // One Newton step doubles the double root's digits.
+        let root = Self::exactly(self.hi.sqrt());
+        (root + self / root) * Self::exactly(0.5)
     }
 }
 
@@ -116,15 +112,12 @@ impl Mul for DoubleDouble {
 
 impl Div for DoubleDouble {
     type Output = Self;
-    /// Long division: three quotient digits of 53 bits.
+    /// Long division: two quotient digits of 53 bits.
     fn div(self, rhs: Self) -> Self {
         let first = self.hi / rhs.hi;
         let rest = self - rhs * Self::exactly(first);
-        let second = rest.hi / rhs.hi;
-        let rest = rest - rhs * Self::exactly(second);
-        let third = rest.hi / rhs.hi;
-        let (hi, lo) = fast_two_sum(first, second);
-        Self { hi, lo } + Self::exactly(third)
+        let (hi, lo) = fast_two_sum(first, rest.hi / rhs.hi);
+        Self { hi, lo }
     }
 }
 

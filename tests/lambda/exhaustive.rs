@@ -41,6 +41,12 @@ fn check_small(seed: u64) {
             "{seed} at {lambda}: {currents:?}"
         );
     }
+    let breakpoints = solution.path.breakpoints();
+    let told = breakpoints.iter().skip(1).all(|b| !b.events.is_empty());
+    assert!(
+        told || solution.rank < case.coils(),
+        "{seed}: {breakpoints:?}"
+    );
     check_criteria(seed, &case, &search, &solution);
 }
 

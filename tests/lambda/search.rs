@@ -158,12 +158,11 @@ pub fn eliminate(mut rows: Vec<Vec<D>>, size: usize) -> Option<Vec<D>> {
         if Real::abs(rows[k][k]) < d(1e-25) {
             return None;
         }
-        for i in k + 1..size {
-            let factor = rows[i][k] / rows[k][k];
-            for j in k..=size {
-                let term = factor * rows[k][j];
-                rows[i][j] -= term;
-            }
+        let (above, below) = rows.split_at_mut(k + 1);
+        let top = &above[k];
+        for row in below {
+            let factor = row[k] / top[k];
+            D::add_scaled(&mut row[k..], -factor, &top[k..]);
         }
     }
     let mut x = vec![D::ZERO; size];

@@ -10,7 +10,7 @@ constants are roots of the quadratic that holds around them, to 50 digits.
 
     python3 tests/oracles/lambda.py > tests/oracles/lambda.json
 
-Needs numpy (to make the matrices) and mpmath. Takes a few minutes.
+Needs numpy (to make the matrices) and mpmath. Takes about twenty seconds.
 """
 
 import json
