@@ -164,12 +164,12 @@ fn the_seed_air_coil() {
     assert!(!result.limits["resistance_ohm"].met && result.limits["settling_s"].met);
     let array = result.array.expect("nine coils");
     let matrix = &array.mutual_inductance_h;
-    for i in 0..9 {
-        for j in 0..9 {
-            assert_eq!(matrix[i][j], matrix[j][i]);
+    for (i, row) in matrix.iter().enumerate() {
+        for (j, value) in row.iter().enumerate() {
+            assert_eq!(*value, matrix[j][i]);
         }
         // Nine ampere push flux out of every coil: the rows' sums stay positive.
-        assert!(matrix[i].iter().sum::<f64>() > 0.0);
+        assert!(row.iter().sum::<f64>() > 0.0);
     }
 }
 

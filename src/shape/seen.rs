@@ -3,8 +3,8 @@
 //! Vertices are put into one canonical order first, so that neighbours evaluate a shared edge
 //! identically and orientation does not matter. Sides are decided by exact predicates.
 
+use crate::numerics::double_double::DoubleDouble;
 use robust::{Coord, orient2d};
-use twofloat::TwoFloat;
 
 use crate::shape::mesh::{Triangle, cross, minus};
 
@@ -213,9 +213,8 @@ fn magnitude(a: Vertex, b: Vertex, p: Point) -> f64 {
 
 /// [`side`] to full relative accuracy, in double-double.
 fn precise_side(a: Vertex, b: Vertex, p: Point) -> f64 {
-    let [ax, ay] = [0, 1].map(|k| TwoFloat::new_sub(a[k], p[k]));
-    let [bx, by] = [0, 1].map(|k| TwoFloat::new_sub(b[k], p[k]));
-    (ax * by - ay * bx).hi()
+    let offset = |v: Vertex, k: usize| DoubleDouble::exactly(v[k]) - DoubleDouble::exactly(p[k]);
+    (offset(a, 0) * offset(b, 1) - offset(a, 1) * offset(b, 0)).nearest()
 }
 
 /// Height of the edge at its point beside `p`; depends on the two ends alone.

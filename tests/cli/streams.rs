@@ -163,6 +163,8 @@ fn a_closed_pipe_ends_quietly() {
 fn a_full_disk_is_an_error_not_a_panic() {
     let place = Place::new();
     let run_into_full = |args: &[&str]| {
+        // A device, opened and not made.
+        #[allow(clippy::disallowed_methods)]
         let full = File::options().write(true).open("/dev/full").unwrap();
         let mut command = place.command(args);
         let child = command.stdout(full).stderr(Stdio::piped()).spawn().unwrap();
