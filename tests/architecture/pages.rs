@@ -103,31 +103,19 @@ fn the_readme_and_the_gate_run_the_same_tests() {
     assert!(read("README.md").lines().any(|line| line == command));
 }
 
-/// The README's table names every command the program has, in both directions.
+/// A dependency that nothing names only costs time.
 #[test]
-fn the_readme_has_a_row_for_every_command() {
-    let page: BTreeSet<String> = read("README.md")
-        .lines()
-        .filter_map(|line| line.strip_prefix("| `"))
-        .filter_map(|row| row.split(['`', ' ']).next())
-        .map(str::to_owned)
-        .collect();
-    let run = std::process::Command::new(env!("CARGO_BIN_EXE_fluxform"))
-        .arg("--help")
-        .output()
-        .unwrap();
-    let help = String::from_utf8(run.stdout).unwrap();
-    let commands: BTreeSet<String> = help
-        .lines()
-        .skip_while(|line| *line != "Commands:")
-        .skip(1)
-        .take_while(|line| !line.trim().is_empty())
-        .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
-        .filter_map(|line| line.split_whitespace().next())
-        .filter(|name| *name != "help")
-        .map(str::to_owned)
-        .collect();
-    assert_eq!(page, commands, "README's table and `fluxform --help`");
+fn every_dependency_is_used() {
+    let sources = sources();
+    let manifest: toml::Table = read("Cargo.toml").parse().unwrap();
+    for name in manifest["dependencies"].as_table().unwrap().keys() {
+        let in_code = name.replace('-', "_");
+        let used = sources.iter().any(|s| s.tokens.contains(&in_code));
+        assert!(
+            used,
+            "nothing under src names {name}: delete the dependency"
+        );
+    }
 }
 
 #[test]
