@@ -126,7 +126,8 @@ impl Winding {
     /// the top face, anywhere: outside, in the bore, inside the conductor.
     ///
     /// Error: below 1e-12 of |grad B| (of |B| for the field), sampled in the tests against
-    /// 30-digit values. On a boundary of the conductor the outer values are given.
+    /// 40-digit values; inside a disc thinner than a hundredth of its depth, or on its faces,
+    /// that ratio's digits are lost. On a boundary of the conductor the outer values are given.
     ///
     /// # Errors
     /// [`OnEdge`] on the winding's edges.
@@ -137,35 +138,30 @@ impl Winding {
             return Err(OnEdge { r_m, z_m });
         }
         let distance_m = self.distance_m(r_m, z_m);
-        let sums = if self.length_m < SHORT * distance_m {
+        let outside = distance_m > 0.0;
+        let short = self.length_m < SHORT * distance_m;
+        let thin = outside && self.length_m < THIN * (hi - lo);
+        let sums = if short || thin {
             self.along_z(r_m, z_m, Want::FieldAndGradient)
         } else {
             let limit = FACE_LIMIT * self.outer_radius_m;
-            // The field's own differences cancel where the winding is far off or a thin disc.
-            let far = distance_m > FAR * self.outer_radius_m;
-            let thin = distance_m > 0.0 && self.length_m < THIN * (hi - lo);
-            let by_faces = !far && !thin;
+            // Far above, the faces' solid angles cancel; beside the winding they do not.
+            let by_faces = distance_m <= FAR * self.outer_radius_m || hi < 0.0;
             // Outside: above the top face, below the bottom face.
             let top = self.face(r_m, away_from_zero(z_m, limit, 1.0), by_faces);
             let bottom = self.face(r_m, away_from_zero(bottom_m, limit, -1.0), by_faces);
-            let mut sums = Sums {
-                b_z: bottom.sheet - top.sheet,
+            Sums {
+                b_z: if by_faces {
+                    bottom.sheet - top.sheet
+                } else {
+                    self.along_z(r_m, z_m, Want::FieldOnly).b_z
+                },
                 b_r_over_r: top.a_phi_over_r - bottom.a_phi_over_r,
                 dbz_dz: bottom.b_z - top.b_z,
                 dbr_dz_over_r: bottom.b_r_over_r - top.b_r_over_r,
-            };
-            if !by_faces {
-                let field = self.along_z(r_m, z_m, Want::FieldOnly);
-                sums.b_z = field.b_z;
-                // B_r is small in a long bore, where its integral cancels and its faces do not.
-                if thin {
-                    sums.b_r_over_r = field.b_r_over_r;
-                }
             }
-            sums
         };
-        // Over the width as the quadrature saw it: a - r is rounded when r is large.
-        let scale = MU_0_T_M_PER_A * self.turns / ((hi - lo) * self.length_m);
+        let scale = MU_0_T_M_PER_A * self.current_density_per_m2();
         let inside = lo < 0.0 && hi > 0.0 && z_m < 0.0 && bottom_m > 0.0;
         let dbz_dz = scale * sums.dbz_dz;
         let br_over_r = scale * sums.b_r_over_r;
@@ -189,17 +185,34 @@ impl Winding {
     #[must_use]
     pub fn gradient_by_section(&self, r_m: f64, z_m: f64) -> (f64, f64) {
         let sums = self.along_z(r_m, z_m, Want::FieldAndGradient);
-        let (lo, hi) = self.offsets_m(r_m);
-        let scale = MU_0_T_M_PER_A * self.turns / ((hi - lo) * self.length_m);
+        let scale = MU_0_T_M_PER_A * self.current_density_per_m2();
         (scale * sums.dbz_dz, scale * sums.dbr_dz_over_r)
+    }
+
+    /// Nodes over the section's radii for loops `u_m` below a point: offset a - r, radius a and
+    /// weight. Near the section the offset keeps its digits, farther off the radius does.
+    fn for_each_radius(&self, r_m: f64, u_m: f64, mut visit: impl FnMut(f64, f64, f64)) {
+        let (lo, hi) = self.offsets_m(r_m);
+        let width = self.outer_radius_m - self.inner_radius_m;
+        if lo.max(-hi) > width {
+            let (a1, a2) = (self.inner_radius_m, self.outer_radius_m);
+            let radius = gauss::bernstein_radius(a1, a2, r_m, u_m);
+            gauss::panel(a1, a2, radius, TOLERANCE, &mut |a, weight| {
+                visit(a - r_m, a, weight);
+            });
+        } else {
+            // The width as rounded against r.
+            let stretch = width / (hi - lo);
+            gauss::graded(lo, hi, u_m, TOLERANCE, |offset, weight| {
+                visit(offset, r_m + offset, stretch * weight);
+            });
+        }
     }
 
     /// Radial integrals over the loops of one end face, `u_m` below the point.
     fn face(&self, r_m: f64, u_m: f64, with_sheet: bool) -> Face {
-        let (lo, hi) = self.offsets_m(r_m);
         let mut face = Face::default();
-        gauss::graded(lo, hi, u_m, TOLERANCE, |offset_m, weight| {
-            let radius_m = r_m + offset_m;
+        self.for_each_radius(r_m, u_m, |offset_m, radius_m, weight| {
             let ring = ring_field(RingPoint {
                 radius_m,
                 r_m,
@@ -221,7 +234,7 @@ impl Winding {
         let (lo, hi) = self.offsets_m(r_m);
         let radial_gap = lo.max(-hi).max(0.0);
         let mut sums = Sums::default();
-        // The same for the length against a large height.
+        // The length as rounded against a large height.
         let stretch = self.length_m / ((z_m + self.length_m) - z_m);
         // u = z - z' runs over [z, z + L]; the loops are singular at u = +- i |a - r|.
         gauss::graded(
@@ -231,9 +244,8 @@ impl Winding {
             TOLERANCE,
             |u_m, weight_z| {
                 // and at one height at a - r = +- i u.
-                gauss::graded(lo, hi, u_m, TOLERANCE, |offset_m, weight_r| {
+                self.for_each_radius(r_m, u_m, |offset_m, radius_m, weight_r| {
                     let weight = stretch * weight_z * weight_r;
-                    let radius_m = r_m + offset_m;
                     match want {
                         Want::FieldOnly => {
                             let ring = ring_field(RingPoint {

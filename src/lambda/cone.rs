@@ -3,6 +3,7 @@
 //! Lawson and Hanson's active-set method for non-negative least squares, with
 //! two-sided variables, either sign of one-sided ones, and one equality.
 
+use crate::numerics::double_double::DoubleDouble as Num;
 use crate::numerics::real::Real;
 
 use super::model::{Factor, Model};
@@ -23,38 +24,43 @@ pub(super) enum Role {
 }
 
 /// The minimiser of `|target - A d|` over the cone with `w'd = 0`.
-pub(super) struct Direction<T> {
+pub(super) struct Direction {
     /// d.
-    pub rate: Vec<T>,
+    pub rate: Vec<Num>,
     /// `target - A d`.
-    pub residual: Vec<T>,
+    pub residual: Vec<Num>,
     /// Reduced gradients `A'(residual) - nu w`.
-    pub gradient: Vec<T>,
+    pub gradient: Vec<Num>,
     /// Factor of the variables that move.
-    pub factor: Factor<T>,
+    pub factor: Factor,
     /// One-sided variables that rounding alone would let in.
     pub blocked: Vec<bool>,
     /// False when the iteration limit was met: the direction is not the minimiser.
     pub converged: bool,
 }
 
-/// Minimises `|target - A d|`.
-pub(super) fn solve<T: Real>(model: &Model<T>, roles: &[Role], target: &[T]) -> Direction<T> {
+/// Minimises `|target - A d|`; starts with the one-sided variables that are `likely` to move.
+pub(super) fn solve(model: &Model, roles: &[Role], likely: &[bool], target: &[Num]) -> Direction {
     let count = model.count();
-    let target_norm = T::dot(target, target).sqrt();
+    let target_norm = Num::dot(target, target).sqrt();
     let with_role = |role: Role| (0..count).filter(move |&i| roles[i] == role);
     let mut basis: Vec<usize> = with_role(Role::Free).chain(with_role(Role::Held)).collect();
     if basis.is_empty() && model.weight.is_some() {
         basis.extend(first_of_the_sum(model, roles, target));
     }
+    basis.extend(
+        (0..count)
+            .filter(|&i| likely[i] && !basis.contains(&i))
+            .collect::<Vec<_>>(),
+    );
     let mut factor = Factor::new(model, &basis);
-    let mut rate = vec![T::ZERO; count];
+    let mut rate = vec![Num::ZERO; count];
     let mut blocked = vec![false; count];
     // The variable that has just entered, and is not yet known to move the right way.
     let mut entered = None;
     let limit = 30 * (count + 3);
     for _ in 0..limit {
-        let candidate = factor.solve(model, target, T::ZERO);
+        let candidate = factor.solve(model, target, Num::ZERO);
         if let Some(violators) = step(roles, &basis, &mut rate, &candidate.x) {
             match entered {
                 // In exact arithmetic a variable enters in the direction of its gradient.
@@ -63,6 +69,9 @@ pub(super) fn solve<T: Real>(model: &Model<T>, roles: &[Role], target: &[T]) -> 
                     basis.retain(|&j| j != i);
                 }
                 _ => basis.retain(|j| !violators.contains(j)),
+            }
+            if basis.is_empty() && model.weight.is_some() {
+                basis.extend(first_of_the_sum(model, roles, target));
             }
             entered = None;
             factor = Factor::new(model, &basis);
@@ -101,7 +110,7 @@ pub(super) fn solve<T: Real>(model: &Model<T>, roles: &[Role], target: &[T]) -> 
             blocked[i] = true;
         }
     }
-    let last = factor.solve(model, target, T::ZERO);
+    let last = factor.solve(model, target, Num::ZERO);
     let gradient = factor.gradient(model, &last.residual);
     Direction {
         rate: last.x,
@@ -115,8 +124,8 @@ pub(super) fn solve<T: Real>(model: &Model<T>, roles: &[Role], target: &[T]) -> 
 
 /// Where nothing two-sided carries the equality: the variable whose multiplier leaves
 /// every rising one satisfied (or, without rising ones, every falling one).
-fn first_of_the_sum<T: Real>(model: &Model<T>, roles: &[Role], target: &[T]) -> Option<usize> {
-    let pressure = |i: usize| T::dot(model.column(i), target) / model.weight_of(i);
+fn first_of_the_sum(model: &Model, roles: &[Role], target: &[Num]) -> Option<usize> {
+    let pressure = |i: usize| Num::dot(model.column(i), target) / model.weight_of(i);
     let with_role = |role: Role| (0..roles.len()).filter(move |&i| roles[i] == role);
     with_role(Role::Rising)
         .reduce(|p, i| if pressure(i) > pressure(p) { i } else { p })
@@ -125,22 +134,17 @@ fn first_of_the_sum<T: Real>(model: &Model<T>, roles: &[Role], target: &[T]) -> 
         })
 }
 
-fn moves_wrongly<T: Real>(role: Role, rate: T) -> bool {
+fn moves_wrongly(role: Role, rate: Num) -> bool {
     match role {
-        Role::Rising => rate < T::ZERO,
-        Role::Falling => rate > T::ZERO,
+        Role::Rising => rate < Num::ZERO,
+        Role::Falling => rate > Num::ZERO,
         _ => false,
     }
 }
 
 /// Moves `rate` to `goal`, or as far as the signs allow; then the variables that stopped it.
-fn step<T: Real>(
-    roles: &[Role],
-    basis: &[usize],
-    rate: &mut Vec<T>,
-    goal: &[T],
-) -> Option<Vec<usize>> {
-    let mut share: Option<T> = None;
+fn step(roles: &[Role], basis: &[usize], rate: &mut Vec<Num>, goal: &[Num]) -> Option<Vec<usize>> {
+    let mut share: Option<Num> = None;
     for &i in basis.iter().filter(|&&i| moves_wrongly(roles[i], goal[i])) {
         let reach = rate[i] / (rate[i] - goal[i]);
         share = Some(share.map_or(reach, |s| s.smaller(reach)));
@@ -160,23 +164,23 @@ fn step<T: Real>(
         *r += share * (g - *r);
     }
     for &i in &stopped {
-        rate[i] = T::ZERO;
+        rate[i] = Num::ZERO;
     }
     Some(stopped)
 }
 
 /// The one-sided variable outside the basis with the largest relative gain.
-fn most_wanted<T: Real>(
-    model: &Model<T>,
+fn most_wanted(
+    model: &Model,
     roles: &[Role],
     basis: &[usize],
     blocked: &[bool],
-    gradient: &[T],
-    factor: &Factor<T>,
-    target_norm: T,
+    gradient: &[Num],
+    factor: &Factor,
+    target_norm: Num,
 ) -> Option<usize> {
-    let noise = T::of(factor.noise()) * target_norm;
-    let mut best: Option<(usize, T)> = None;
+    let noise = Num::of(factor.noise(model)) * target_norm;
+    let mut best: Option<(usize, Num)> = None;
     for i in (0..roles.len()).filter(|&i| !blocked[i]) {
         let gain = match roles[i] {
             Role::Rising => gradient[i],
@@ -199,31 +203,52 @@ fn most_wanted<T: Real>(
 mod tests {
     use super::*;
 
+    fn numbers(values: &[f64]) -> Vec<Num> {
+        values.iter().map(|&v| Num::exactly(v)).collect()
+    }
+
     /// Columns in R^3 with generic entries; the last is the slack of a sum.
-    fn model(weight: Option<Vec<f64>>) -> Model<f64> {
-        let columns = vec![1.3, 0.2, -0.4, 0.7, 1.1, 0.3, -0.6, 0.9, 1.7, 0.0, 0.0, 0.0];
-        Model::new(3, columns, weight)
+    fn model(weight: Option<Vec<f64>>) -> Model {
+        let columns = [1.3, 0.2, -0.4, 0.7, 1.1, 0.3, -0.6, 0.9, 1.7, 0.0, 0.0, 0.0];
+        Model::new(
+            3,
+            numbers(&columns),
+            weight.map(|w| numbers(&w)),
+            Num::EPSILON,
+        )
     }
 
     /// The gradient must vanish for what moves and point outwards for what does not.
-    fn assert_optimal(model: &Model<f64>, roles: &[Role], target: &[f64]) {
-        let d = solve(model, roles, target);
-        assert!(d.converged);
-        let mut residual = target.to_vec();
-        for i in 0..4 {
-            f64::add_scaled(&mut residual, -d.rate[i], model.column(i));
+    fn assert_optimal(model: &Model, roles: [Role; 4], target: &[f64]) {
+        for likely in [
+            [false; 4],
+            roles.map(|role| role == Role::Rising || role == Role::Falling),
+        ] {
+            assert_direction(model, &roles, &likely, target);
         }
-        let sum: f64 = (0..4).map(|i| model.weight_of(i) * d.rate[i]).sum();
-        assert!(sum.abs() < 1e-14);
+    }
+
+    fn assert_direction(model: &Model, roles: &[Role; 4], likely: &[bool; 4], target: &[f64]) {
+        let d = solve(model, roles, likely, &numbers(target));
+        assert!(d.converged);
+        let mut residual = numbers(target);
+        let mut sum = Num::ZERO;
         for i in 0..4 {
-            assert!((residual[i.min(2)] - d.residual[i.min(2)]).abs() < 1e-14);
+            Num::add_scaled(&mut residual, -d.rate[i], model.column(i));
+            sum += model.weight_of(i) * d.rate[i];
+        }
+        assert!(sum.abs().to_f64() < 1e-28);
+        for (a, b) in residual.iter().zip(&d.residual) {
+            assert!((*a - *b).abs().to_f64() < 1e-28);
+        }
+        for i in 0..4 {
             assert!(!moves_wrongly(roles[i], d.rate[i]));
-            let g = d.gradient[i];
+            let (gradient, rate) = (d.gradient[i].to_f64(), d.rate[i].to_f64());
             match roles[i] {
-                Role::Rising => assert!(g < 1e-13 && (g * d.rate[i]).abs() < 1e-13),
-                Role::Falling => assert!(g > -1e-13 && (g * d.rate[i]).abs() < 1e-13),
-                Role::Free | Role::Held => assert!(g.abs() < 1e-13),
-                Role::Fixed => assert_eq!(d.rate[i], 0.0),
+                Role::Rising => assert!(gradient < 1e-28 && (gradient * rate).abs() < 1e-28),
+                Role::Falling => assert!(gradient > -1e-28 && (gradient * rate).abs() < 1e-28),
+                Role::Free | Role::Held => assert!(gradient.abs() < 1e-28),
+                Role::Fixed => assert_eq!(rate, 0.0),
             }
         }
     }
@@ -251,7 +276,7 @@ mod tests {
                     continue;
                 }
                 for target in &targets {
-                    assert_optimal(&model, &roles, target);
+                    assert_optimal(&model, roles, target);
                 }
             }
         }
@@ -259,9 +284,14 @@ mod tests {
 
     #[test]
     fn a_copied_column_is_held_still() {
-        let model = Model::new(2, vec![0.7, 1.3, 0.7, 1.3], None);
-        let d = solve(&model, &[Role::Free, Role::Held], &[1.1, 0.4]);
+        let model = Model::new(2, numbers(&[0.7, 1.3, 0.7, 1.3]), None, Num::EPSILON);
+        let d = solve(
+            &model,
+            &[Role::Free, Role::Held],
+            &[false; 2],
+            &numbers(&[1.1, 0.4]),
+        );
         assert!(d.factor.contains(0) && !d.factor.contains(1));
-        assert_eq!(d.rate[1], 0.0);
+        assert_eq!(d.rate[1], Num::ZERO);
     }
 }

@@ -1,54 +1,58 @@
 //! The force constants on a followed path (eq. 10), in scaled units.
 
+use crate::numerics::double_double::DoubleDouble as Num;
 use crate::numerics::real::Real;
 
 use super::follow::{Bounds, Piece, Trace};
 use super::model::Model;
 
+/// Above this share of `lambda^2 mean(h^2)` e* has left e_0 where currents are not unique.
+const VISIBLE: f64 = 1e-24;
+
 /// e* and the error e_0 without upper limits, both as functions of lambda.
-pub(super) struct Comparison<'a, T> {
+pub(super) struct Comparison<'a> {
     /// The path under all limits.
-    pub limited: &'a Trace<T>,
+    pub limited: &'a Trace,
     /// The path without upper limits and without a limit on the sum.
-    pub unlimited: &'a Trace<T>,
+    pub unlimited: &'a Trace,
     /// Mean of h^2, scaled.
-    pub mean_square: T,
+    pub mean_square: Num,
 }
 
 /// On one stretch between breakpoints of either path.
-struct Stretch<'a, T> {
-    start: T,
-    end: Option<T>,
-    limited: &'a Piece<T>,
-    unlimited: &'a Piece<T>,
+struct Stretch<'a> {
+    start: Num,
+    end: Option<Num>,
+    limited: &'a Piece,
+    unlimited: &'a Piece,
 }
 
-fn square<T: Real>(v: &[T]) -> T {
-    T::dot(v, v)
+fn square(v: &[Num]) -> Num {
+    Num::dot(v, v)
 }
 
-impl<T: Real> Stretch<'_, T> {
+impl Stretch<'_> {
     /// `e* - e_0` at `start + step` as coefficients of 1, step, step^2.
-    fn excess(&self) -> [T; 3] {
+    fn excess(&self) -> [Num; 3] {
         let (r, s) = (
             self.limited.residual_at(self.start),
             self.unlimited.residual_at(self.start),
         );
         let (dr, ds) = (&self.limited.residual_rate, &self.unlimited.residual_rate);
-        let two = T::of(2.0);
+        let two = Num::of(2.0);
         [
             square(&r) - square(&s),
-            two * (T::dot(&r, dr) - T::dot(&s, ds)),
+            two * (Num::dot(&r, dr) - Num::dot(&s, ds)),
             square(dr) - square(ds),
         ]
     }
 }
 
-impl<'a, T: Real> Comparison<'a, T> {
-    fn stretches(&self) -> Vec<Stretch<'a, T>> {
+impl<'a> Comparison<'a> {
+    fn stretches(&self) -> Vec<Stretch<'a>> {
         let (mut i, mut k) = (0, 0);
         let (a, b) = (&self.limited.pieces, &self.unlimited.pieces);
-        let mut start = T::ZERO;
+        let mut start = Num::ZERO;
         let mut all = Vec::new();
         loop {
             let (next_a, next_b) = (a.get(i + 1).map(|p| p.start), b.get(k + 1).map(|p| p.start));
@@ -73,15 +77,15 @@ impl<'a, T: Real> Comparison<'a, T> {
 
     /// Where the first limit binds, if the unlimited currents are unique: the first lambda at
     /// which they leave the bounds (slack last in the model, its weights among `limited`'s).
-    pub fn linear(&self, model: &Model<T>, bounds: &Bounds<T>) -> Option<T> {
+    pub fn linear(&self, model: &Model, bounds: &Bounds) -> Option<Num> {
         let slope = self.mean_square.sqrt();
         let pieces = &self.unlimited.pieces;
         let coils = pieces[0].x.len();
-        let mut first: Option<T> = None;
+        let mut first: Option<Num> = None;
         for (k, piece) in pieces.iter().enumerate() {
-            let floor = T::of(piece.noise) * slope;
-            let mut meet = |distance: T, rate: T, floor: T| {
-                let lambda = if distance < T::ZERO {
+            let floor = Num::of(piece.blur) * slope;
+            let mut meet = |distance: Num, rate: Num, floor: Num| {
+                let lambda = if distance < Num::ZERO {
                     piece.start
                 } else if rate > floor {
                     piece.start + distance / rate
@@ -94,10 +98,10 @@ impl<'a, T: Real> Comparison<'a, T> {
                 }
             };
             // Of the sum: its value, its rate, and the rate that rounding may make up.
-            let mut sums = [T::ZERO; 3];
+            let mut sums = [Num::ZERO; 3];
             for i in 0..coils {
                 let (x, rate, weight) = (piece.x[i], piece.x_rate[i], model.weight_of(i));
-                let blur = floor + T::of(piece.noise) * rate.abs();
+                let blur = floor + Num::of(piece.blur) * rate.abs();
                 for (sum, term) in sums.iter_mut().zip([x, rate, blur]) {
                     *sum += weight * term;
                 }
@@ -120,12 +124,12 @@ impl<'a, T: Real> Comparison<'a, T> {
     }
 
     /// The same from the errors alone: the start of the first stretch on which e* leaves e_0.
-    pub fn linear_by_error(&self) -> Option<T> {
-        let visible = T::of(T::EPSILON.powf(0.75)) * self.mean_square;
+    pub fn linear_by_error(&self) -> Option<Num> {
+        let visible = Num::of(VISIBLE) * self.mean_square;
         self.stretches().iter().find_map(|stretch| {
             let length = match stretch.end {
                 Some(end) => end - stretch.start,
-                None => stretch.start + T::ONE,
+                None => stretch.start + Num::ONE,
             };
             let lambda = stretch.start + length;
             let [c, b, a] = stretch.excess();
@@ -135,19 +139,19 @@ impl<'a, T: Real> Comparison<'a, T> {
     }
 
     /// The largest lambda with `e* - e_0 <= weight^2 lambda^2 mean(h^2)`; `None`: all of them.
-    pub fn jnd(&self, weight: f64) -> Option<T> {
-        let share = T::of(weight) * T::of(weight) * self.mean_square;
+    pub fn jnd(&self, weight: f64) -> Option<Num> {
+        let share = Num::of(weight) * Num::of(weight) * self.mean_square;
         for stretch in self.stretches().iter().rev() {
             let start = stretch.start;
             let [c, b, a] = stretch.excess();
             let c = c - share * start * start;
-            let b = b - T::of(2.0) * share * start;
+            let b = b - Num::of(2.0) * share * start;
             let a = a - share;
-            if stretch.end.is_none() && a <= T::ZERO {
+            if stretch.end.is_none() && a <= Num::ZERO {
                 return None;
             }
             let crossing = upward_crossing(a, b, c);
-            if c <= T::ZERO {
+            if c <= Num::ZERO {
                 // The signs at both ends decide; the root may miss an end by rounding.
                 let lambda = crossing.map(|step| start + step);
                 return lambda.map_or(stretch.end, |l| {
@@ -160,41 +164,45 @@ impl<'a, T: Real> Comparison<'a, T> {
                 return Some(start + step);
             }
         }
-        Some(T::ZERO)
+        Some(Num::ZERO)
     }
 }
 
 /// A distance that rounding may have made negative is zero.
-fn beyond_rounding<T: Real>(distance: T, rounding: T) -> T {
+fn beyond_rounding(distance: Num, rounding: Num) -> Num {
     if distance.abs() <= rounding {
-        T::ZERO
+        Num::ZERO
     } else {
         distance
     }
 }
 
 /// The step >= 0 at which `c + b step + a step^2` crosses zero upwards.
-fn upward_crossing<T: Real>(a: T, b: T, c: T) -> Option<T> {
-    let four = T::of(4.0);
+fn upward_crossing(a: Num, b: Num, c: Num) -> Option<Num> {
+    let four = Num::of(4.0);
     let discriminant = b * b - four * a * c;
-    if discriminant < T::ZERO {
+    if discriminant < Num::ZERO {
         return None;
     }
     let root = discriminant.sqrt();
-    let two = T::of(2.0);
-    let step = if b > T::ZERO {
+    let two = Num::of(2.0);
+    let step = if b > Num::ZERO {
         -(two * c) / (b + root)
-    } else if a == T::ZERO {
+    } else if a == Num::ZERO {
         return None;
     } else {
         (root - b) / (two * a)
     };
-    (step >= T::ZERO).then_some(step)
+    (step >= Num::ZERO).then_some(step)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::upward_crossing;
+    use super::{Num, Real};
+
+    fn upward_crossing(a: f64, b: f64, c: f64) -> Option<f64> {
+        super::upward_crossing(Num::of(a), Num::of(b), Num::of(c)).map(Real::to_f64)
+    }
 
     #[test]
     fn upward_crossings_are_found_on_either_side_of_a_parabola() {

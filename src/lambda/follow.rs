@@ -6,18 +6,22 @@
 //! breakpoint the next direction is itself a small minimisation over all constraints
 //! that are about to change, so that ties need no special case.
 
+use crate::numerics::double_double::DoubleDouble as Num;
 use crate::numerics::real::Real;
 
 use super::cone::{self, Role};
 use super::model::Model;
 
+/// Relative distance from a bound or a zero multiplier that counts as none.
+const GRAIN: f64 = 1e-27;
+
 /// Bounds of the variables; `None` above: unbounded.
 #[derive(Debug, Clone)]
-pub(super) struct Bounds<T> {
-    pub lower: Vec<T>,
-    pub upper: Vec<Option<T>>,
+pub(super) struct Bounds {
+    pub lower: Vec<Num>,
+    pub upper: Vec<Option<Num>>,
     /// Right-hand side of the model's equality.
-    pub total: T,
+    pub total: Num,
 }
 
 /// Where a variable stands on a piece.
@@ -37,102 +41,96 @@ pub(super) enum Place {
 
 /// One linear piece; values at its start and rates per unit of lambda.
 #[derive(Debug, Clone)]
-pub(super) struct Piece<T> {
-    pub start: T,
+pub(super) struct Piece {
+    pub start: Num,
     pub place: Vec<Place>,
-    pub x: Vec<T>,
-    pub x_rate: Vec<T>,
+    pub x: Vec<Num>,
+    pub x_rate: Vec<Num>,
     /// Target minus fit.
-    pub residual: Vec<T>,
-    pub residual_rate: Vec<T>,
+    pub residual: Vec<Num>,
+    pub residual_rate: Vec<Num>,
     /// Reduced gradients.
-    pub gradient: Vec<T>,
-    gradient_rate: Vec<T>,
+    pub gradient: Vec<Num>,
+    gradient_rate: Vec<Num>,
     /// Natural size of a gradient per unit of residual.
-    pub gradient_scale: Vec<T>,
+    pub gradient_scale: Vec<Num>,
     /// Relative size of rounding on this piece.
     pub noise: f64,
+    /// The same of its rates.
+    pub blur: f64,
 }
 
 /// The pieces in order, the last one without end.
 #[derive(Debug, Clone)]
-pub(super) struct Trace<T> {
-    pub pieces: Vec<Piece<T>>,
+pub(super) struct Trace {
+    pub pieces: Vec<Piece>,
     /// False when the iteration limit was met: the last piece is not the minimiser.
     pub complete: bool,
 }
 
 /// A line of targets, `constant + lambda slope`.
 #[derive(Debug, Clone)]
-pub(super) struct Target<T> {
-    pub constant: Vec<T>,
-    pub slope: Vec<T>,
+pub(super) struct Target {
+    pub constant: Vec<Num>,
+    pub slope: Vec<Num>,
 }
 
 /// Values at one lambda, with the rates by which they were reached.
-struct State<T> {
-    lambda: T,
+struct State {
+    lambda: Num,
     place: Vec<Place>,
-    x: Vec<T>,
-    x_rate: Vec<T>,
-    gradient: Vec<T>,
-    gradient_rate: Vec<T>,
-    gradient_scale: Vec<T>,
-    noise: f64,
+    x: Vec<Num>,
+    x_rate: Vec<Num>,
+    gradient: Vec<Num>,
+    gradient_rate: Vec<Num>,
+    gradient_scale: Vec<Num>,
 }
 
-fn norm<T: Real>(v: &[T]) -> T {
-    T::dot(v, v).sqrt()
+fn norm(v: &[Num]) -> Num {
+    Num::dot(v, v).sqrt()
 }
 
-/// Relative distance in lambda below which two events are one: far above rounding, and
-/// so small that its square does not show in the error.
-fn tie<T: Real>() -> T {
-    T::of(T::EPSILON.powf(0.65))
-}
-
-impl<T: Real> Piece<T> {
+impl Piece {
     /// Values of the variables at `lambda`.
-    pub fn x_at(&self, lambda: T) -> Vec<T> {
+    pub fn x_at(&self, lambda: Num) -> Vec<Num> {
         advance(&self.x, &self.x_rate, lambda - self.start)
     }
 
     /// Residual at `lambda`.
-    pub fn residual_at(&self, lambda: T) -> Vec<T> {
+    pub fn residual_at(&self, lambda: Num) -> Vec<Num> {
         advance(&self.residual, &self.residual_rate, lambda - self.start)
     }
 
     /// Reduced gradients at `lambda`.
-    pub fn gradient_at(&self, lambda: T) -> Vec<T> {
+    pub fn gradient_at(&self, lambda: Num) -> Vec<Num> {
         advance(&self.gradient, &self.gradient_rate, lambda - self.start)
     }
 }
 
-fn advance<T: Real>(value: &[T], rate: &[T], by: T) -> Vec<T> {
+fn advance(value: &[Num], rate: &[Num], by: Num) -> Vec<Num> {
     value.iter().zip(rate).map(|(&v, &r)| v + by * r).collect()
 }
 
 /// What a problem needs to be followed.
-pub(super) struct Follower<'a, T> {
-    pub model: &'a Model<T>,
-    pub bounds: &'a Bounds<T>,
+pub(super) struct Follower<'a> {
+    pub model: &'a Model,
+    pub bounds: &'a Bounds,
 }
 
-impl<T: Real> Follower<'_, T> {
+impl Follower<'_> {
     /// The path from the zero target at `lambda = 0`, where `x = 0` (the slack takes what
     /// the equality leaves), along `offset` first and then along `slope`.
-    pub fn path(&self, offset: Option<&[T]>, slope: &[T]) -> Trace<T> {
+    pub fn path(&self, offset: Option<&[Num]>, slope: &[Num]) -> Trace {
         let count = self.model.count();
-        let zero = vec![T::ZERO; self.model.rows];
+        let zero = vec![Num::ZERO; self.model.rows];
         let mut state = State {
-            lambda: T::ZERO,
+            lambda: Num::ZERO,
             place: (0..count).map(|i| self.place_of_zero(i)).collect(),
-            x: vec![T::ZERO; count],
-            x_rate: vec![T::ZERO; count],
-            gradient: vec![T::ZERO; count],
-            gradient_rate: vec![T::ZERO; count],
+            x: vec![Num::ZERO; count],
+            x_rate: vec![Num::ZERO; count],
+            gradient: vec![Num::ZERO; count],
+            gradient_rate: vec![Num::ZERO; count],
             gradient_scale: self.model.norm.clone(),
-            noise: T::EPSILON,
         };
         if self.model.weight.is_some() {
             state.x[count - 1] = self.bounds.total;
@@ -153,18 +151,17 @@ impl<T: Real> Follower<'_, T> {
                 constant: zero,
                 slope: offset.to_vec(),
             },
-            Some(T::ONE),
+            Some(Num::ONE),
         );
         let last = &approach.pieces[approach.pieces.len() - 1];
         let state = State {
-            lambda: T::ZERO,
+            lambda: Num::ZERO,
             place: last.place.clone(),
-            x: last.x_at(T::ONE),
-            x_rate: vec![T::ZERO; count],
-            gradient: last.gradient_at(T::ONE),
-            gradient_rate: vec![T::ZERO; count],
+            x: last.x_at(Num::ONE),
+            x_rate: vec![Num::ZERO; count],
+            gradient: last.gradient_at(Num::ONE),
+            gradient_rate: vec![Num::ZERO; count],
             gradient_scale: last.gradient_scale.clone(),
-            noise: last.noise,
         };
         let target = Target {
             constant: offset.to_vec(),
@@ -180,7 +177,7 @@ impl<T: Real> Follower<'_, T> {
         let value = if self.model.weight.is_some() && i + 1 == self.model.count() {
             self.bounds.total
         } else {
-            T::ZERO
+            Num::ZERO
         };
         match self.bounds.upper[i] {
             Some(upper) if upper <= lower => Place::Pinned,
@@ -190,8 +187,8 @@ impl<T: Real> Follower<'_, T> {
         }
     }
 
-    fn follow(&self, mut state: State<T>, target: &Target<T>, end: Option<T>) -> Trace<T> {
-        let mut pieces: Vec<Piece<T>> = Vec::new();
+    fn follow(&self, mut state: State, target: &Target, end: Option<Num>) -> Trace {
+        let mut pieces: Vec<Piece> = Vec::new();
         let limit = 200 * (self.model.count() + 2);
         for _ in 0..limit {
             let Some((piece, event)) = self.leave(&state, target) else {
@@ -210,7 +207,6 @@ impl<T: Real> Follower<'_, T> {
                         gradient: piece.gradient_at(lambda),
                         gradient_rate: piece.gradient_rate.clone(),
                         gradient_scale: piece.gradient_scale.clone(),
-                        noise: piece.noise,
                     };
                 }
                 _ => {
@@ -232,10 +228,17 @@ impl<T: Real> Follower<'_, T> {
 
     /// The piece that begins at `state` and the step to its end, `None` for no end. An event
     /// that would end it at once makes its constraint one more that may change here.
-    fn leave(&self, state: &State<T>, target: &Target<T>) -> Option<(Piece<T>, Option<T>)> {
+    fn leave(&self, state: &State, target: &Target) -> Option<(Piece, Option<Num>)> {
         let mut roles = self.roles(state, target);
         for _ in 0..=2 * self.model.count() {
-            let direction = cone::solve(self.model, &roles, &target.slope);
+            let likely: Vec<bool> = roles
+                .iter()
+                .zip(&state.place)
+                .map(|(role, place)| {
+                    *role != Role::Fixed && matches!(place, Place::Low | Place::High)
+                })
+                .collect();
+            let direction = cone::solve(self.model, &roles, &likely, &target.slope);
             if !direction.converged {
                 return None;
             }
@@ -243,7 +246,7 @@ impl<T: Real> Follower<'_, T> {
             let Some((i, step, role)) = self.next_event(&piece, &roles, &direction, target) else {
                 return Some((piece, None));
             };
-            if step > tie::<T>() * state.lambda || roles[i] == role {
+            if step > Num::of(self.tie()) * state.lambda || roles[i] == role {
                 return Some((piece, Some(step)));
             }
             roles[i] = role;
@@ -251,24 +254,29 @@ impl<T: Real> Follower<'_, T> {
         None
     }
 
+    /// Relative distance in lambda below which two events are one: about the columns' error.
+    fn tie(&self) -> f64 {
+        100.0 * self.model.epsilon
+    }
+
     /// Which variables may move where: those at a bound whose multiplier is zero, or will
     /// be at once, become one-sided, and so do those that meet a bound.
-    fn roles(&self, state: &State<T>, target: &Target<T>) -> Vec<Role> {
+    fn roles(&self, state: &State, target: &Target) -> Vec<Role> {
         let size = norm(&target.constant) + state.lambda.abs() * norm(&target.slope);
-        let noise = T::of(state.noise);
-        let soon = tie::<T>() * state.lambda;
+        let grain = Num::of(GRAIN);
+        let soon = Num::of(self.tie()) * state.lambda;
         let slack = self.model.weight.as_ref().map(|_| self.model.count() - 1);
         (0..self.model.count())
             .map(|i| match state.place[i] {
                 Place::Pinned => Role::Fixed,
                 Place::Low | Place::High => {
                     let (role, sign) = match state.place[i] {
-                        Place::Low => (Role::Rising, T::ONE),
-                        _ => (Role::Falling, -T::ONE),
+                        Place::Low => (Role::Rising, Num::ONE),
+                        _ => (Role::Falling, -Num::ONE),
                     };
                     let distance = -(sign * state.gradient[i]);
-                    let approach = (sign * state.gradient_rate[i]).larger(T::ZERO);
-                    let near = (noise * size * state.gradient_scale[i]).larger(soon * approach);
+                    let approach = (sign * state.gradient_rate[i]).larger(Num::ZERO);
+                    let near = (grain * size * state.gradient_scale[i]).larger(soon * approach);
                     if distance <= near { role } else { Role::Fixed }
                 }
                 Place::Free | Place::Held => {
@@ -280,7 +288,7 @@ impl<T: Real> Follower<'_, T> {
                     } else {
                         range
                     };
-                    let near = |rate: T| (noise * range).larger(soon * rate.larger(T::ZERO));
+                    let near = |rate: Num| (grain * range).larger(soon * rate.larger(Num::ZERO));
                     if up.is_some_and(|up| up <= near(state.x_rate[i]) && up < down) {
                         Role::Falling
                     } else if down <= near(-state.x_rate[i]) {
@@ -298,11 +306,11 @@ impl<T: Real> Follower<'_, T> {
     /// Solves the piece from its active set.
     fn piece(
         &self,
-        state: &State<T>,
-        target: &Target<T>,
+        state: &State,
+        target: &Target,
         roles: &[Role],
-        direction: &cone::Direction<T>,
-    ) -> Piece<T> {
+        direction: &cone::Direction,
+    ) -> Piece {
         let factor = &direction.factor;
         let place: Vec<Place> = (0..roles.len())
             .map(|i| match roles[i] {
@@ -314,7 +322,7 @@ impl<T: Real> Follower<'_, T> {
             })
             .collect();
         let still = |i: usize| match place[i] {
-            Place::Pinned => T::ZERO,
+            Place::Pinned => Num::ZERO,
             Place::Low => self.bounds.lower[i],
             Place::High => self.bounds.upper[i].unwrap_or(state.x[i]),
             Place::Free | Place::Held => state.x[i],
@@ -326,7 +334,7 @@ impl<T: Real> Follower<'_, T> {
             .model
             .remainder(&target.constant, self.bounds.total, fixed);
         let base = factor.solve(self.model, &rest, total);
-        let at = |base: T, rate: T| base + state.lambda * rate;
+        let at = |base: Num, rate: Num| base + state.lambda * rate;
         let x = (0..roles.len())
             .map(|i| {
                 if place[i] == Place::Free {
@@ -341,16 +349,22 @@ impl<T: Real> Follower<'_, T> {
                 if place[i] == Place::Free {
                     direction.rate[i]
                 } else {
-                    T::ZERO
+                    Num::ZERO
                 }
             })
             .collect();
-        let residual: Vec<T> = base
+        let residual: Vec<Num> = base
             .residual
             .iter()
             .zip(&direction.residual)
             .map(|(&b, &r)| at(b, r))
             .collect();
+        let slope = norm(&target.slope);
+        let share = if slope > Num::ZERO {
+            (norm(&direction.residual) / slope).to_f64()
+        } else {
+            0.0
+        };
         Piece {
             start: state.lambda,
             gradient: factor.gradient(self.model, &residual),
@@ -358,7 +372,8 @@ impl<T: Real> Follower<'_, T> {
             gradient_scale: (0..roles.len())
                 .map(|i| factor.gradient_scale(self.model, i))
                 .collect(),
-            noise: factor.noise(),
+            noise: factor.noise(self.model),
+            blur: factor.blur(self.model, share),
             place,
             x,
             x_rate,
@@ -371,15 +386,15 @@ impl<T: Real> Follower<'_, T> {
     /// role that it takes there.
     fn next_event(
         &self,
-        piece: &Piece<T>,
+        piece: &Piece,
         roles: &[Role],
-        direction: &cone::Direction<T>,
-        target: &Target<T>,
-    ) -> Option<(usize, T, Role)> {
+        direction: &cone::Direction,
+        target: &Target,
+    ) -> Option<(usize, Num, Role)> {
         let slope = norm(&target.slope);
-        let mut first: Option<(usize, T, Role)> = None;
-        let mut offer = |i: usize, distance: T, rate: T, role: Role| {
-            let step = distance.larger(T::ZERO) / rate;
+        let mut first: Option<(usize, Num, Role)> = None;
+        let mut offer = |i: usize, distance: Num, rate: Num, role: Role| {
+            let step = distance.larger(Num::ZERO) / rate;
             if first.is_none_or(|(_, least, _)| step < least) {
                 first = Some((i, step, role));
             }
@@ -388,14 +403,14 @@ impl<T: Real> Follower<'_, T> {
             match piece.place[i] {
                 Place::Free => {
                     let rate = piece.x_rate[i];
-                    if rate.abs()
-                        <= direction
-                            .factor
-                            .rate_noise(self.model, i, &piece.x_rate, slope)
-                    {
+                    let rates = &piece.x_rate;
+                    let still = direction
+                        .factor
+                        .rate_noise(self.model, i, rates, slope, piece.blur);
+                    if rate.abs() <= still {
                         continue;
                     }
-                    if rate < T::ZERO {
+                    if rate < Num::ZERO {
                         offer(i, piece.x[i] - self.bounds.lower[i], -rate, Role::Rising);
                     } else if let Some(upper) = self.bounds.upper[i] {
                         offer(i, upper - piece.x[i], rate, Role::Falling);
@@ -403,11 +418,11 @@ impl<T: Real> Follower<'_, T> {
                 }
                 Place::Low | Place::High if role == Role::Fixed || !direction.blocked[i] => {
                     let (sign, role) = match piece.place[i] {
-                        Place::Low => (T::ONE, Role::Rising),
-                        _ => (-T::ONE, Role::Falling),
+                        Place::Low => (Num::ONE, Role::Rising),
+                        _ => (-Num::ONE, Role::Falling),
                     };
                     let rate = sign * piece.gradient_rate[i];
-                    if rate > T::of(piece.noise) * slope * piece.gradient_scale[i] {
+                    if rate > Num::of(piece.noise) * slope * piece.gradient_scale[i] {
                         offer(i, -(sign * piece.gradient[i]), rate, role);
                     }
                 }
@@ -419,14 +434,14 @@ impl<T: Real> Follower<'_, T> {
 
     /// Largest relative violation of the optimality conditions at the pieces' starts, and of
     /// the residual's continuity: its square is the error that it leaves in e*.
-    pub fn flaw(&self, trace: &Trace<T>, offset: Option<&[T]>, slope: &[T]) -> f64 {
-        let mut worst = T::ZERO;
+    pub fn flaw(&self, trace: &Trace, offset: Option<&[Num]>, slope: &[Num]) -> f64 {
+        let mut worst = Num::ZERO;
         for (k, piece) in trace.pieces.iter().enumerate() {
-            let size = offset.map_or(T::ZERO, norm) + piece.start * norm(slope);
-            if size <= T::ZERO {
+            let size = offset.map_or(Num::ZERO, norm) + piece.start * norm(slope);
+            if size <= Num::ZERO {
                 continue;
             }
-            let mut see = |violation: T| worst = worst.larger(violation / size);
+            let mut see = |violation: Num| worst = worst.larger(violation / size);
             for i in 0..self.model.count() {
                 let x = piece.x[i] * self.model.norm[i];
                 see(self.bounds.lower[i] * self.model.norm[i] - x);
@@ -435,14 +450,14 @@ impl<T: Real> Follower<'_, T> {
                 }
                 let scale = piece.gradient_scale[i];
                 match piece.place[i] {
-                    Place::Low if scale > T::ZERO => see(piece.gradient[i] / scale),
-                    Place::High if scale > T::ZERO => see(-(piece.gradient[i] / scale)),
+                    Place::Low if scale > Num::ZERO => see(piece.gradient[i] / scale),
+                    Place::High if scale > Num::ZERO => see(-(piece.gradient[i] / scale)),
                     _ => {}
                 }
             }
             if k > 0 {
                 let reached = trace.pieces[k - 1].residual_at(piece.start);
-                let jump: Vec<T> = reached
+                let jump: Vec<Num> = reached
                     .iter()
                     .zip(&piece.residual)
                     .map(|(&a, &b)| a - b)
@@ -454,7 +469,7 @@ impl<T: Real> Follower<'_, T> {
     }
 
     /// A piece that stays where `state` is: only for a path that could not begin.
-    fn standstill(&self, state: &State<T>, target: &Target<T>) -> Piece<T> {
+    fn standstill(&self, state: &State, target: &Target) -> Piece {
         let values = state.x.iter().copied().enumerate();
         let (rest, _) = self
             .model
@@ -463,13 +478,14 @@ impl<T: Real> Follower<'_, T> {
             start: state.lambda,
             place: state.place.clone(),
             x: state.x.clone(),
-            x_rate: vec![T::ZERO; state.x.len()],
+            x_rate: vec![Num::ZERO; state.x.len()],
             residual: advance(&rest, &target.slope, state.lambda),
             residual_rate: target.slope.clone(),
             gradient: state.gradient.clone(),
-            gradient_rate: vec![T::ZERO; state.x.len()],
+            gradient_rate: vec![Num::ZERO; state.x.len()],
             gradient_scale: state.gradient_scale.clone(),
-            noise: state.noise,
+            noise: self.model.epsilon,
+            blur: self.model.epsilon,
         }
     }
 }

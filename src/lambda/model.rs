@@ -1,38 +1,46 @@
 //! Least squares over scaled currents: columns, their factorisation, an optional sum row.
 
+use crate::numerics::double_double::DoubleDouble as Num;
 use crate::numerics::real::Real;
 
 /// Columns `a_i` of one least-squares problem and the weights of its equality
 /// `sum w_i x_i = total` (a limit on the sum enters as an equality with a slack
 /// variable, whose column is zero).
 #[derive(Debug, Clone)]
-pub(super) struct Model<T> {
+pub(super) struct Model {
     /// Length of a column.
     pub rows: usize,
-    columns: Vec<T>,
+    columns: Vec<Num>,
     /// Euclidean norms of the columns.
-    pub norm: Vec<T>,
+    pub norm: Vec<Num>,
     /// Positive weights of the equality, if there is one.
-    pub weight: Option<Vec<T>>,
+    pub weight: Option<Vec<Num>>,
+    /// Relative error of the columns themselves.
+    pub epsilon: f64,
 }
 
-/// A column whose part outside the span of the others is below this share depends on them.
-pub(super) fn dependence<T: Real>() -> f64 {
-    T::EPSILON.powf(0.8)
-}
+/// Rates above this share of the target are never taken for rounding.
+const MOST_BLUR: f64 = 1e-9;
 
-impl<T: Real> Model<T> {
+/// A column whose part outside the span of the others is below this share depends on them:
+/// exact copies leave 1e-31, and no two different columns of doubles come near it.
+const DEPENDENT: f64 = 1e-25;
+/// The same in units of the rounding that nearly dependent columns amplify.
+const DEPENDENT_ROUNDINGS: f64 = 1e3;
+
+impl Model {
     /// Columns stored one after another, `rows` entries each.
-    pub fn new(rows: usize, columns: Vec<T>, weight: Option<Vec<T>>) -> Self {
+    pub fn new(rows: usize, columns: Vec<Num>, weight: Option<Vec<Num>>, epsilon: f64) -> Self {
         let norm = columns
             .chunks_exact(rows)
-            .map(|c| T::dot(c, c).sqrt())
+            .map(|c| Num::dot(c, c).sqrt())
             .collect();
         Self {
             rows,
             columns,
             norm,
             weight,
+            epsilon,
         }
     }
 
@@ -42,26 +50,26 @@ impl<T: Real> Model<T> {
     }
 
     /// Column `i`.
-    pub fn column(&self, i: usize) -> &[T] {
+    pub fn column(&self, i: usize) -> &[Num] {
         &self.columns[i * self.rows..(i + 1) * self.rows]
     }
 
     /// Weight of variable `i` in the equality, 0 without one.
-    pub fn weight_of(&self, i: usize) -> T {
-        self.weight.as_ref().map_or(T::ZERO, |w| w[i])
+    pub fn weight_of(&self, i: usize) -> Num {
+        self.weight.as_ref().map_or(Num::ZERO, |w| w[i])
     }
 
     /// `target - sum a_i x_i` over the listed variables, and what they leave of `total`.
     pub fn remainder(
         &self,
-        target: &[T],
-        total: T,
-        fixed: impl Iterator<Item = (usize, T)>,
-    ) -> (Vec<T>, T) {
+        target: &[Num],
+        total: Num,
+        fixed: impl Iterator<Item = (usize, Num)>,
+    ) -> (Vec<Num>, Num) {
         let (mut rest, mut left) = (target.to_vec(), total);
         for (i, x) in fixed {
-            if x != T::ZERO {
-                T::add_scaled(&mut rest, -x, self.column(i));
+            if x != Num::ZERO {
+                Num::add_scaled(&mut rest, -x, self.column(i));
                 left -= self.weight_of(i) * x;
             }
         }
@@ -73,31 +81,31 @@ impl<T: Real> Model<T> {
 /// is the chosen variable of the smallest column per weight, so that the reduced columns
 /// `a_j - (w_j / w_p) a_p` never grow beyond twice the originals.
 #[derive(Debug, Clone)]
-pub(super) struct Factor<T> {
+pub(super) struct Factor {
     rows: usize,
     pivot: Option<usize>,
     /// Variables in the order of their columns, the pivot not among them.
     members: Vec<usize>,
     /// Householder vectors, `rows` entries each.
-    reflectors: Vec<T>,
-    scales: Vec<T>,
+    reflectors: Vec<Num>,
+    scales: Vec<Num>,
     /// Columns of the triangle, `rows` entries each.
-    triangle: Vec<T>,
+    triangle: Vec<Num>,
     /// Smallest share of a member's column that lies outside the span of those before it.
     independence: f64,
 }
 
 /// The minimiser over the members of a factor.
-pub(super) struct Minimiser<T> {
+pub(super) struct Minimiser {
     /// One entry a variable; zero where not a member.
-    pub x: Vec<T>,
+    pub x: Vec<Num>,
     /// Target minus fit.
-    pub residual: Vec<T>,
+    pub residual: Vec<Num>,
 }
 
-impl<T: Real> Factor<T> {
+impl Factor {
     /// Factorises the listed variables in order, leaving out those that depend on earlier ones.
-    pub fn new(model: &Model<T>, variables: &[usize]) -> Self {
+    pub fn new(model: &Model, variables: &[usize]) -> Self {
         let pivot = model.weight.as_ref().and_then(|w| {
             let per_weight = |i: usize| model.norm[i] / w[i];
             variables
@@ -121,7 +129,7 @@ impl<T: Real> Factor<T> {
     }
 
     /// Adds `variable` to a factor of `before`; `None` if it depends on them.
-    pub fn with(&self, model: &Model<T>, before: &[usize], variable: usize) -> Option<Self> {
+    pub fn with(&self, model: &Model, before: &[usize], variable: usize) -> Option<Self> {
         let changes_pivot = match (self.pivot, &model.weight) {
             (Some(p), Some(w)) => model.norm[variable] * w[p] < model.norm[p] * w[variable],
             (None, Some(_)) => true,
@@ -140,17 +148,17 @@ impl<T: Real> Factor<T> {
 
     /// Takes the listed variables by the part of their columns that lies outside the span
     /// of those taken, largest share first, as long as it is above `share`.
-    pub fn pivoted(model: &Model<T>, variables: &[usize], share: f64) -> Self {
+    pub fn pivoted(model: &Model, variables: &[usize], share: f64) -> Self {
         let mut taken = Vec::new();
         let mut factor = Self::new(model, &taken);
         loop {
             let outside = |i: usize| {
-                let rest = factor.solve(model, model.column(i), T::ZERO).residual;
-                (T::dot(&rest, &rest).sqrt() / model.norm[i]).to_f64()
+                let rest = factor.solve(model, model.column(i), Num::ZERO).residual;
+                (Num::dot(&rest, &rest).sqrt() / model.norm[i]).to_f64()
             };
             let best = variables
                 .iter()
-                .filter(|&&i| model.norm[i] > T::ZERO && !factor.contains(i))
+                .filter(|&&i| model.norm[i] > Num::ZERO && !factor.contains(i))
                 .map(|&i| (i, outside(i)))
                 .reduce(|a, b| if b.1 > a.1 { b } else { a });
             let grown = match best {
@@ -178,74 +186,75 @@ impl<T: Real> Factor<T> {
         self.pivot == Some(variable) || self.members.contains(&variable)
     }
 
-    /// Relative size of what rounding leaves where zero is meant.
-    pub fn noise(&self) -> f64 {
-        (16 * self.rows) as f64 * T::EPSILON / self.independence
+    /// Relative size of the gradients that errors of the columns leave where zero is meant.
+    pub fn noise(&self, model: &Model) -> f64 {
+        (4 * self.rows) as f64 * model.epsilon / self.independence
     }
 
-    fn push(&mut self, model: &Model<T>, variable: usize) {
+    fn push(&mut self, model: &Model, variable: usize) {
         let (rows, rank) = (self.rows, self.members.len());
         if self.pivot == Some(variable) || rank == rows {
             return;
         }
         let mut column = model.column(variable).to_vec();
         if let Some(p) = self.pivot {
-            T::add_scaled(
+            Num::add_scaled(
                 &mut column,
                 -(model.weight_of(variable) / model.weight_of(p)),
                 model.column(p),
             );
         }
         self.reflect(&mut column);
-        let outside = T::dot(&column[rank..], &column[rank..]).sqrt();
-        if outside <= model.norm[variable] * T::of(dependence::<T>()) {
+        let outside = Num::dot(&column[rank..], &column[rank..]).sqrt();
+        let least = DEPENDENT.max(DEPENDENT_ROUNDINGS * Num::EPSILON / self.independence);
+        if outside <= model.norm[variable] * Num::of(least) {
             return;
         }
         self.independence = self
             .independence
             .min((outside / model.norm[variable]).to_f64());
-        let diagonal = if column[rank] > T::ZERO {
+        let diagonal = if column[rank] > Num::ZERO {
             -outside
         } else {
             outside
         };
         let mut reflector = column.clone();
-        reflector[..rank].fill(T::ZERO);
+        reflector[..rank].fill(Num::ZERO);
         reflector[rank] -= diagonal;
-        self.scales.push(-(T::ONE / (diagonal * reflector[rank])));
+        self.scales.push(-(Num::ONE / (diagonal * reflector[rank])));
         self.reflectors.extend(reflector);
         column[rank] = diagonal;
         self.triangle.extend(column);
         self.members.push(variable);
     }
 
-    fn reflect_by(&self, k: usize, vector: &mut [T]) {
+    fn reflect_by(&self, k: usize, vector: &mut [Num]) {
         let reflector = &self.reflectors[k * self.rows + k..(k + 1) * self.rows];
-        let factor = -(self.scales[k] * T::dot(reflector, &vector[k..]));
-        T::add_scaled(&mut vector[k..], factor, reflector);
+        let factor = -(self.scales[k] * Num::dot(reflector, &vector[k..]));
+        Num::add_scaled(&mut vector[k..], factor, reflector);
     }
 
     /// Multiplies by Q'.
-    fn reflect(&self, vector: &mut [T]) {
+    fn reflect(&self, vector: &mut [Num]) {
         for k in 0..self.members.len() {
             self.reflect_by(k, vector);
         }
     }
 
     /// Minimises `|target - sum a_i x_i|` over the members with `sum w_i x_i = total`.
-    pub fn solve(&self, model: &Model<T>, target: &[T], total: T) -> Minimiser<T> {
+    pub fn solve(&self, model: &Model, target: &[Num], total: Num) -> Minimiser {
         let rank = self.members.len();
         let mut rest = target.to_vec();
         if let Some(p) = self.pivot {
-            T::add_scaled(&mut rest, -(total / model.weight_of(p)), model.column(p));
+            Num::add_scaled(&mut rest, -(total / model.weight_of(p)), model.column(p));
         }
         self.reflect(&mut rest);
-        let mut x = vec![T::ZERO; model.count()];
+        let mut x = vec![Num::ZERO; model.count()];
         let mut left = total;
         for k in (0..rank).rev() {
             let column = &self.triangle[k * self.rows..(k + 1) * self.rows];
             let value = rest[k] / column[k];
-            T::add_scaled(&mut rest[..k], -value, &column[..k]);
+            Num::add_scaled(&mut rest[..k], -value, &column[..k]);
             x[self.members[k]] = value;
             left -= model.weight_of(self.members[k]) * value;
         }
@@ -253,7 +262,7 @@ impl<T: Real> Factor<T> {
             x[p] = left / model.weight_of(p);
         }
         // The residual is what no member reaches, turned back: no cancellation.
-        rest[..rank].fill(T::ZERO);
+        rest[..rank].fill(Num::ZERO);
         for k in (0..rank).rev() {
             self.reflect_by(k, &mut rest);
         }
@@ -261,12 +270,12 @@ impl<T: Real> Factor<T> {
     }
 
     /// An orthonormal basis of the members' columns (reduced ones, with an equality).
-    pub fn orthonormal(&self) -> Vec<Vec<T>> {
+    pub fn orthonormal(&self) -> Vec<Vec<Num>> {
         let rank = self.members.len();
         (0..rank)
             .map(|k| {
-                let mut vector = vec![T::ZERO; self.rows];
-                vector[k] = T::ONE;
+                let mut vector = vec![Num::ZERO; self.rows];
+                vector[k] = Num::ONE;
                 for l in (0..rank).rev() {
                     self.reflect_by(l, &mut vector);
                 }
@@ -276,36 +285,50 @@ impl<T: Real> Factor<T> {
     }
 
     /// Reduced gradients `a_i'r - nu w_i` of every variable; zero for the members.
-    pub fn gradient(&self, model: &Model<T>, residual: &[T]) -> Vec<T> {
-        let nu = self.pivot.map_or(T::ZERO, |p| {
-            T::dot(model.column(p), residual) / model.weight_of(p)
+    pub fn gradient(&self, model: &Model, residual: &[Num]) -> Vec<Num> {
+        let nu = self.pivot.map_or(Num::ZERO, |p| {
+            Num::dot(model.column(p), residual) / model.weight_of(p)
         });
-        let mut gradient: Vec<T> = (0..model.count())
-            .map(|i| T::dot(model.column(i), residual) - nu * model.weight_of(i))
+        let mut gradient: Vec<Num> = (0..model.count())
+            .map(|i| Num::dot(model.column(i), residual) - nu * model.weight_of(i))
             .collect();
         for &i in self.members.iter().chain(&self.pivot) {
-            gradient[i] = T::ZERO;
+            gradient[i] = Num::ZERO;
         }
         gradient
     }
 
     /// Natural size of variable `i`'s reduced gradient per unit of residual.
-    pub fn gradient_scale(&self, model: &Model<T>, i: usize) -> T {
+    pub fn gradient_scale(&self, model: &Model, i: usize) -> Num {
         let shift = self
             .pivot
-            .map_or(T::ZERO, |p| model.norm[p] / model.weight_of(p));
+            .map_or(Num::ZERO, |p| model.norm[p] / model.weight_of(p));
         model.norm[i] + model.weight_of(i) * shift
     }
 
-    /// Size of a rate that rounding leaves where variable `i` should stand still.
-    pub fn rate_noise(&self, model: &Model<T>, i: usize, rates: &[T], target_norm: T) -> T {
+    /// Size of a rate that rounding leaves where variable `i` should stand still; `blur` is
+    /// the same relative to the target.
+    pub fn rate_noise(
+        &self,
+        model: &Model,
+        i: usize,
+        rates: &[Num],
+        target_norm: Num,
+        blur: f64,
+    ) -> Num {
         let mut scale = target_norm;
         if self.pivot == Some(i) {
-            let moved = self.members.iter().fold(T::ZERO, |s, &j| {
+            let moved = self.members.iter().fold(Num::ZERO, |s, &j| {
                 s + model.weight_of(j) * (rates[j].abs() + target_norm)
             });
             scale = scale.larger(moved / model.weight_of(i));
         }
-        scale * T::of(self.noise())
+        scale * Num::of(blur)
+    }
+
+    /// The same of the rates: a residual of the given share of the
+    /// target is felt with the square of the condition.
+    pub fn blur(&self, model: &Model, residual_share: f64) -> f64 {
+        (self.noise(model) * (1.0 + residual_share / self.independence)).min(MOST_BLUR)
     }
 }

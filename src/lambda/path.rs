@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::numerics::double_double::DoubleDouble;
+use crate::numerics::double_double::DoubleDouble as Num;
 use crate::numerics::real::Real;
 
 use super::follow::{Bounds, Piece, Place, Trace};
@@ -83,11 +83,11 @@ struct SiPiece {
 /// What least-power currents need where the currents of a minimiser are not unique.
 #[derive(Debug, Clone)]
 struct Ambiguous {
-    model: Model<DoubleDouble>,
-    bounds: Bounds<DoubleDouble>,
-    pieces: Vec<Piece<DoubleDouble>>,
-    cost: Vec<DoubleDouble>,
-    heights: DoubleDouble,
+    model: Model,
+    bounds: Bounds,
+    pieces: Vec<Piece>,
+    cost: Vec<Num>,
+    heights: Num,
     lambda_scale: i32,
 }
 
@@ -106,11 +106,11 @@ pub struct Path {
 
 impl Path {
     /// Converts a scaled path.
-    pub(super) fn new<T: Real>(
+    pub(super) fn new(
         problem: &ForceProblem,
-        reduced: &Reduced<T>,
-        bounds: &Bounds<T>,
-        trace: &Trace<T>,
+        reduced: &Reduced,
+        bounds: &Bounds,
+        trace: &Trace,
     ) -> Self {
         let coils = problem.coils();
         let force = reduced.force_unit_n();
@@ -121,10 +121,10 @@ impl Path {
             .iter()
             .map(|piece| {
                 let nearest = piece.start.to_f64();
-                let rest = (piece.start - T::of(nearest)).to_f64();
+                let rest = (piece.start - Num::of(nearest)).to_f64();
                 let (x, residual) = (&piece.x, &piece.residual);
                 let current =
-                    |i: usize, v: T, more: i32| times_power(v.to_f64(), more - current_scale[i]);
+                    |i: usize, v: Num, more: i32| times_power(v.to_f64(), more - current_scale[i]);
                 SiPiece {
                     start: times_power(nearest, scale),
                     start_rest: times_power(rest, scale),
@@ -170,8 +170,8 @@ impl Path {
     pub(super) fn with_least_power(
         mut self,
         problem: &ForceProblem,
-        reduced: &Reduced<DoubleDouble>,
-        trace: &Trace<DoubleDouble>,
+        reduced: &Reduced,
+        trace: &Trace,
     ) -> Self {
         let (model, bounds) = reduced.limited(problem);
         let most = self.current_scale.iter().copied().max().unwrap_or(0);
@@ -179,9 +179,7 @@ impl Path {
             .resistance_ohm
             .iter()
             .zip(&self.current_scale)
-            .map(|(&ohm, &k)| {
-                Real::sqrt(DoubleDouble::of(ohm)) * DoubleDouble::of(power_of_two(most - k))
-            })
+            .map(|(&ohm, &k)| Real::sqrt(Num::of(ohm)) * Num::of(power_of_two(most - k)))
             .collect();
         let heights = reduced.heights();
         self.ambiguous = Some(Box::new(Ambiguous {
@@ -189,7 +187,7 @@ impl Path {
             bounds,
             pieces: trace.pieces.clone(),
             cost,
-            heights: Real::sqrt(DoubleDouble::dot(heights, heights)),
+            heights: Real::sqrt(Num::dot(heights, heights)),
             lambda_scale: reduced.lambda_scale,
         }));
         self.turns = self.turns();
@@ -228,7 +226,7 @@ impl Path {
         let coils = self.upper_a.len();
         let within = |i: usize, current: f64| current.clamp(self.lower_a[i], self.upper_a[i]) + 0.0;
         if let Some(a) = &self.ambiguous {
-            let lambda = DoubleDouble::of(times_power(lambda_n_per_m, -a.lambda_scale));
+            let lambda = Num::of(times_power(lambda_n_per_m, -a.lambda_scale));
             let norm = lambda * a.heights;
             let x =
                 power::least_power(&a.model, &a.bounds, &a.cost, &a.pieces[index], lambda, norm);
@@ -406,9 +404,9 @@ impl Path {
 }
 
 /// A free variable that rests on a bound stands there, although its multiplier is zero.
-fn standing_of<T: Real>(place: Place, x: T, rate: T, lower: T, upper: T) -> Standing {
+fn standing_of(place: Place, x: Num, rate: Num, lower: Num, upper: Num) -> Standing {
     let rests_on =
-        |bound: T| rate == T::ZERO && (x - bound).abs() <= T::of(1e-14) * (upper - lower);
+        |bound: Num| rate == Num::ZERO && (x - bound).abs() <= Num::of(1e-14) * (upper - lower);
     match place {
         Place::Low | Place::Pinned => Standing::Lower,
         Place::High => Standing::Upper,

@@ -5,21 +5,25 @@
 //! left is a least-distance problem over the dependences, solved as Lawson and Hanson
 //! do: by non-negative least squares on its constraints.
 
+use crate::numerics::double_double::DoubleDouble as Num;
 use crate::numerics::real::Real;
 
 use super::cone::{self, Role};
 use super::follow::{Bounds, Piece, Place};
 use super::model::{Factor, Model};
 
+/// A variable that the dependences move by less than this share is not moved by them.
+const UNREACHED: f64 = 1e-22;
+
 /// The scaled currents of least `sum (cost_i x_i)^2` that fit as well as `piece` does at `lambda`.
-pub(super) fn least_power<T: Real>(
-    model: &Model<T>,
-    bounds: &Bounds<T>,
-    cost: &[T],
-    piece: &Piece<T>,
-    lambda: T,
-    target_norm: T,
-) -> Vec<T> {
+pub(super) fn least_power(
+    model: &Model,
+    bounds: &Bounds,
+    cost: &[Num],
+    piece: &Piece,
+    lambda: Num,
+    target_norm: Num,
+) -> Vec<Num> {
     let coils = cost.len();
     let mut x = piece.x_at(lambda);
     x.truncate(coils);
@@ -29,7 +33,7 @@ pub(super) fn least_power<T: Real>(
     let gradient = piece.gradient_at(lambda);
     // A bound is left out only if its multiplier is surely there.
     let sure = |i: usize| {
-        gradient[i].abs() > T::of(100.0 * piece.noise) * target_norm * piece.gradient_scale[i]
+        gradient[i].abs() > Num::of(100.0 * piece.noise) * target_norm * piece.gradient_scale[i]
     };
     let open: Vec<usize> = (0..coils)
         .filter(|&i| match piece.place[i] {
@@ -41,7 +45,7 @@ pub(super) fn least_power<T: Real>(
     let sum_is_fixed = model.weight.is_some() && piece.place[coils] == Place::Low && sure(coils);
     let heaviest = open
         .iter()
-        .fold(T::ZERO, |most, &i| most.larger(model.weight_of(i)));
+        .fold(Num::ZERO, |most, &i| most.larger(model.weight_of(i)));
     let mut rows = model.rows;
     let mut columns = Vec::new();
     for &i in &open {
@@ -51,35 +55,40 @@ pub(super) fn least_power<T: Real>(
         }
     }
     rows += usize::from(sum_is_fixed);
-    let kept = Model::new(rows, columns, None);
+    let kept = Model::new(rows, columns, None, Num::EPSILON);
     let moves = dependences(&kept, &open, cost);
     if moves.is_empty() {
         return x;
     }
     // In p_k = cost x the least power is the least distance, and p = still + basis u.
     let count = open.len();
-    let p: Vec<T> = open.iter().map(|&i| cost[i] * x[i]).collect();
+    let p: Vec<Num> = open.iter().map(|&i| cost[i] * x[i]).collect();
     let mut still = p.clone();
     for vector in &moves {
-        T::add_scaled(&mut still, -T::dot(vector, &p), vector);
+        Num::add_scaled(&mut still, -Num::dot(vector, &p), vector);
     }
     let mut constraints = Constraints {
         rows: Vec::new(),
         bounds: Vec::new(),
     };
     for (k, &i) in open.iter().enumerate() {
-        let row: Vec<T> = moves.iter().map(|vector| vector[k]).collect();
+        let row: Vec<Num> = moves.iter().map(|vector| vector[k]).collect();
         constraints.at_least(&row, cost[i] * bounds.lower[i] - still[k]);
         if let Some(upper) = bounds.upper[i] {
-            let row: Vec<T> = row.iter().map(|&v| -v).collect();
+            let row: Vec<Num> = row.iter().map(|&v| -v).collect();
             constraints.at_least(&row, still[k] - cost[i] * upper);
         }
     }
     if model.weight.is_some() && !sum_is_fixed {
-        let share: Vec<T> = open.iter().map(|&i| model.weight_of(i) / cost[i]).collect();
-        let row: Vec<T> = moves.iter().map(|vector| -T::dot(vector, &share)).collect();
+        let share: Vec<Num> = open.iter().map(|&i| model.weight_of(i) / cost[i]).collect();
+        let row: Vec<Num> = moves
+            .iter()
+            .map(|vector| -Num::dot(vector, &share))
+            .collect();
         let others = (0..coils).filter(|i| !open.contains(i));
-        let used = others.fold(T::dot(&still, &share), |s, i| s + model.weight_of(i) * x[i]);
+        let used = others.fold(Num::dot(&still, &share), |s, i| {
+            s + model.weight_of(i) * x[i]
+        });
         constraints.at_least(&row, used - bounds.total);
     }
     let Some(u) = constraints.nearest(moves.len()) else {
@@ -87,7 +96,7 @@ pub(super) fn least_power<T: Real>(
     };
     let mut best = still;
     for (vector, &u) in moves.iter().zip(&u) {
-        T::add_scaled(&mut best, u, vector);
+        Num::add_scaled(&mut best, u, vector);
     }
     for k in 0..count {
         x[open[k]] = clipped(bounds, open[k], best[k] / cost[open[k]]);
@@ -95,21 +104,21 @@ pub(super) fn least_power<T: Real>(
     x
 }
 
-fn clipped<T: Real>(bounds: &Bounds<T>, i: usize, x: T) -> T {
+fn clipped(bounds: &Bounds, i: usize, x: Num) -> Num {
     let x = x.larger(bounds.lower[i]);
     bounds.upper[i].map_or(x, |upper| x.smaller(upper))
 }
 
 /// An orthonormal basis, in `cost x`, of the changes that the kept columns do not see.
-fn dependences<T: Real>(kept: &Model<T>, open: &[usize], cost: &[T]) -> Vec<Vec<T>> {
+fn dependences(kept: &Model, open: &[usize], cost: &[Num]) -> Vec<Vec<Num>> {
     let all: Vec<usize> = (0..open.len()).collect();
     let factor = Factor::pivoted(kept, &all, 0.0);
     let mut columns = Vec::new();
     let mut count = 0;
     for j in (0..open.len()).filter(|&j| !factor.contains(j)) {
-        let shares = factor.solve(kept, kept.column(j), T::ZERO).x;
+        let shares = factor.solve(kept, kept.column(j), Num::ZERO).x;
         columns.extend((0..open.len()).map(|k| {
-            let change = if k == j { T::ONE } else { -shares[k] };
+            let change = if k == j { Num::ONE } else { -shares[k] };
             cost[open[k]] * change
         }));
         count += 1;
@@ -117,46 +126,52 @@ fn dependences<T: Real>(kept: &Model<T>, open: &[usize], cost: &[T]) -> Vec<Vec<
     if count == 0 {
         return Vec::new();
     }
-    let moves = Model::new(open.len(), columns, None);
+    let moves = Model::new(open.len(), columns, None, Num::EPSILON);
     Factor::new(&moves, &(0..count).collect::<Vec<_>>()).orthonormal()
 }
 
 /// Linear inequalities `row . u >= bound`, rows of unit length.
-struct Constraints<T> {
-    rows: Vec<Vec<T>>,
-    bounds: Vec<T>,
+struct Constraints {
+    rows: Vec<Vec<Num>>,
+    bounds: Vec<Num>,
 }
 
-impl<T: Real> Constraints<T> {
-    fn at_least(&mut self, row: &[T], bound: T) {
-        let length = T::dot(row, row).sqrt();
+impl Constraints {
+    fn at_least(&mut self, row: &[Num], bound: Num) {
+        let length = Num::dot(row, row).sqrt();
         // A variable that no change reaches has nothing to say.
-        if length.to_f64() > T::EPSILON.powf(0.7) {
+        if length.to_f64() > UNREACHED {
             self.rows.push(row.iter().map(|&v| v / length).collect());
             self.bounds.push(bound / length);
         }
     }
 
     /// The point of least length that satisfies all; `None` if rounding leaves none.
-    fn nearest(&self, size: usize) -> Option<Vec<T>> {
+    fn nearest(&self, size: usize) -> Option<Vec<Num>> {
         let unit = self
             .bounds
             .iter()
-            .fold(T::ZERO, |most, b| most.larger(b.abs()));
-        if self.bounds.iter().all(|&b| b <= T::ZERO) {
-            return Some(vec![T::ZERO; size]);
+            .fold(Num::ZERO, |most, b| most.larger(b.abs()));
+        if self.bounds.iter().all(|&b| b <= Num::ZERO) {
+            return Some(vec![Num::ZERO; size]);
         }
         let mut columns = Vec::new();
         for (row, &bound) in self.rows.iter().zip(&self.bounds) {
             columns.extend_from_slice(row);
             columns.push(bound / unit);
         }
-        let model = Model::new(size + 1, columns, None);
-        let mut target = vec![T::ZERO; size + 1];
-        target[size] = T::ONE;
-        let found = cone::solve(&model, &vec![Role::Rising; self.rows.len()], &target);
+        let count = self.rows.len();
+        let model = Model::new(size + 1, columns, None, Num::EPSILON);
+        let mut target = vec![Num::ZERO; size + 1];
+        target[size] = Num::ONE;
+        let found = cone::solve(
+            &model,
+            &vec![Role::Rising; count],
+            &vec![false; count],
+            &target,
+        );
         let height = found.residual[size];
-        if !found.converged || height.to_f64() <= T::EPSILON.sqrt() {
+        if !found.converged || height.to_f64() <= 1e-15 {
             return None;
         }
         Some(

@@ -8,6 +8,7 @@
 
 use rayon::prelude::*;
 
+use crate::numerics::double_double::DoubleDouble as Num;
 use crate::numerics::qr::{Triangle, triangular_factor};
 use crate::numerics::real::Real;
 
@@ -69,9 +70,9 @@ pub(super) fn largest_entries(problem: &ForceProblem) -> Vec<f64> {
 
 /// The triangular factor and the exponents of its columns' scales.
 #[derive(Debug, Clone)]
-pub(super) struct Reduced<T> {
+pub(super) struct Reduced {
     /// R of `[G, h, -offset] / sqrt(n)`, column i divided by `2^scale[i]`.
-    columns: Vec<Vec<T>>,
+    columns: Vec<Vec<Num>>,
     /// Powers of two, of order of each column's root mean square.
     scale: Vec<i32>,
     coils: usize,
@@ -79,50 +80,54 @@ pub(super) struct Reduced<T> {
     force_scale: i32,
     /// The same of lambda': `lambda = lambda' 2^lambda_scale`.
     pub lambda_scale: i32,
+    /// Relative error of an operation on the points.
+    pub epsilon: f64,
 }
 
-impl<T: Real> Reduced<T> {
+fn copy<T>(to: &mut [T], from: impl Iterator<Item = T>) {
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = from;
+    }
+}
+
+impl Reduced {
     /// One pass over the points.
-    pub fn new(problem: &ForceProblem, largest: &[f64]) -> Self {
+    pub fn new<T: Real>(problem: &ForceProblem, largest: &[f64]) -> Self {
         let (points, coils) = (problem.points(), problem.coils());
         let entry_scale: Vec<i32> = largest.iter().map(|&v| exponent_of(v)).collect();
+        // Two factors: the scale of a column of tiny entries alone would overflow.
+        let factors = |k: i32| (power_of_two(-k / 2), power_of_two(-k - -k / 2));
         let triangle: Triangle<T> =
             triangular_factor(points, largest.len(), |range, block, stride| {
                 let rows = &problem.forces_n_per_a[range.start * coils..range.end * coils];
                 for (j, (column, &k)) in
                     block.chunks_exact_mut(stride).zip(&entry_scale).enumerate()
                 {
-                    let scaled = |v: f64| T::of(times_power(v, -k));
-                    if j < coils {
-                        // In range of one power of two nearly always: one product an entry.
-                        if k.abs() < 1000 {
-                            let factor = power_of_two(-k);
-                            for (to, row) in column.iter_mut().zip(rows.chunks_exact(coils)) {
-                                *to = T::of(row[j] * factor);
-                            }
-                        } else {
-                            for (to, row) in column.iter_mut().zip(rows.chunks_exact(coils)) {
-                                *to = scaled(row[j]);
-                            }
+                    let (a, b) = factors(k);
+                    let scaled = |v: &f64| T::of(v * a * b);
+                    match (j.checked_sub(coils), problem.offset_n) {
+                        (None, _) => copy(column, rows.iter().skip(j).step_by(coils).map(scaled)),
+                        (Some(0), _) => {
+                            copy(column, problem.height_m[range.clone()].iter().map(scaled))
                         }
-                    } else if j == coils {
-                        for (to, &v) in column.iter_mut().zip(&problem.height_m[range.clone()]) {
-                            *to = scaled(v);
-                        }
-                    } else if let Some(offset) = problem.offset_n {
-                        for (to, &v) in column.iter_mut().zip(&offset[range.clone()]) {
-                            *to = -scaled(v);
+                        (_, offset) => {
+                            let offset = offset.map_or(&[][..], |offset| &offset[range.clone()]);
+                            copy(column, offset.iter().map(|v| -scaled(v)));
                         }
                     }
                 }
             });
-        let root = T::ONE / T::of(points as f64).sqrt();
+        let root = Num::ONE / Num::of(points as f64).sqrt();
         let mut scale = Vec::with_capacity(largest.len());
         let mut columns = Vec::with_capacity(largest.len());
         for (j, k) in entry_scale.into_iter().enumerate() {
-            let column: Vec<T> = triangle.column(j).iter().map(|&v| v * root).collect();
-            let more = exponent_of(T::dot(&column, &column).sqrt().to_f64());
-            let factor = T::of(power_of_two(-more));
+            let column: Vec<Num> = triangle
+                .column(j)
+                .iter()
+                .map(|&v| v.widened() * root)
+                .collect();
+            let more = exponent_of(Num::dot(&column, &column).sqrt().to_f64());
+            let factor = Num::of(power_of_two(-more));
             columns.push(column.into_iter().map(|v| v * factor).collect());
             scale.push(k + more);
         }
@@ -139,6 +144,7 @@ impl<T: Real> Reduced<T> {
             coils,
             force_scale,
             lambda_scale,
+            epsilon: T::EPSILON,
         }
     }
 
@@ -146,12 +152,12 @@ impl<T: Real> Reduced<T> {
         self.columns.len()
     }
 
-    fn model(&self, weight: Option<Vec<T>>) -> Model<T> {
+    fn model(&self, weight: Option<Vec<Num>>) -> Model {
         let mut columns = self.columns[..self.coils].concat();
         if weight.is_some() {
-            columns.extend(std::iter::repeat_n(T::ZERO, self.rows()));
+            columns.extend(std::iter::repeat_n(Num::ZERO, self.rows()));
         }
-        Model::new(self.rows(), columns, weight)
+        Model::new(self.rows(), columns, weight, self.epsilon)
     }
 
     /// Condition number of the coils' columns in the Frobenius norm, each scaled to unit
@@ -160,7 +166,7 @@ impl<T: Real> Reduced<T> {
         let n = self.coils;
         let unit = |j: usize, i: usize| {
             let column = &self.columns[j];
-            (column[i] / T::dot(column, column).sqrt()).to_f64()
+            (column[i] / Num::dot(column, column).sqrt()).to_f64()
         };
         let mut total = 0.0;
         for k in 0..n {
@@ -197,12 +203,12 @@ impl<T: Real> Reduced<T> {
             return None;
         }
         let mut clean = self.clone();
-        for j in (0..self.coils).filter(|&j| !factor.contains(j) && model.norm[j] > T::ZERO) {
-            let shares = factor.solve(&model, model.column(j), T::ZERO).x;
-            let mut column = vec![T::ZERO; self.rows()];
+        for j in (0..self.coils).filter(|&j| !factor.contains(j) && model.norm[j] > Num::ZERO) {
+            let shares = factor.solve(&model, model.column(j), Num::ZERO).x;
+            let mut column = vec![Num::ZERO; self.rows()];
             for i in (0..self.coils).filter(|&i| factor.contains(i)) {
-                if (shares[i] * model.norm[i] / model.norm[j]).abs() > T::of(HIDDEN_IN_ROUNDING) {
-                    T::add_scaled(&mut column, shares[i], model.column(i));
+                if (shares[i] * model.norm[i] / model.norm[j]).abs() > Num::of(HIDDEN_IN_ROUNDING) {
+                    Num::add_scaled(&mut column, shares[i], model.column(i));
                 }
             }
             clean.columns[j] = column;
@@ -211,14 +217,14 @@ impl<T: Real> Reduced<T> {
     }
 
     /// The target's direction per unit of lambda', in units of force.
-    pub fn heights(&self) -> &[T] {
+    pub fn heights(&self) -> &[Num] {
         &self.columns[self.coils]
     }
 
     /// What the currents must make up for at lambda = 0.
-    pub fn offset(&self) -> Option<Vec<T>> {
+    pub fn offset(&self) -> Option<Vec<Num>> {
         let column = self.columns.get(self.coils + 1)?;
-        let factor = T::of(times_power(
+        let factor = Num::of(times_power(
             1.0,
             self.scale[self.coils + 1] - self.force_scale,
         ));
@@ -235,13 +241,18 @@ impl<T: Real> Reduced<T> {
         power_of_two(self.force_scale)
     }
 
+    /// One unit of the target's direction in metres.
+    pub fn height_unit_m(&self) -> f64 {
+        power_of_two(self.scale[self.coils])
+    }
+
     /// The problem with all its limits; a limit on the sum has its slack as the last variable.
-    pub fn limited(&self, problem: &ForceProblem) -> (Model<T>, Bounds<T>) {
-        let scaled = |i: usize, v: f64| T::of(times_power(v, self.current_scale(i)));
-        let mut lower: Vec<T> = (0..self.coils)
+    pub fn limited(&self, problem: &ForceProblem) -> (Model, Bounds) {
+        let scaled = |i: usize, v: f64| Num::of(times_power(v, self.current_scale(i)));
+        let mut lower: Vec<Num> = (0..self.coils)
             .map(|i| scaled(i, problem.lower_a[i]))
             .collect();
-        let mut upper: Vec<Option<T>> = (0..self.coils)
+        let mut upper: Vec<Option<Num>> = (0..self.coils)
             .map(|i| Some(scaled(i, problem.upper_a[i])))
             .collect();
         let Some(total_a) = problem.total_max_a else {
@@ -250,7 +261,7 @@ impl<T: Real> Reduced<T> {
                 Bounds {
                     lower,
                     upper,
-                    total: T::ZERO,
+                    total: Num::ZERO,
                 },
             );
         };
@@ -261,31 +272,31 @@ impl<T: Real> Reduced<T> {
         } else {
             (0..self.coils).map(ampere).max().unwrap_or(0)
         };
-        let mut weight: Vec<T> = (0..self.coils)
-            .map(|i| T::of(power_of_two(ampere(i) - unit)))
+        let mut weight: Vec<Num> = (0..self.coils)
+            .map(|i| Num::of(power_of_two(ampere(i) - unit)))
             .collect();
-        weight.push(T::ONE);
-        lower.push(T::ZERO);
+        weight.push(Num::ONE);
+        lower.push(Num::ZERO);
         upper.push(None);
         (
             self.model(Some(weight)),
             Bounds {
                 lower,
                 upper,
-                total: T::of(times_power(total_a, -unit)),
+                total: Num::of(times_power(total_a, -unit)),
             },
         )
     }
 
     /// The problem without upper limits and without a limit on the sum.
-    pub fn unlimited(&self, problem: &ForceProblem) -> (Model<T>, Bounds<T>) {
+    pub fn unlimited(&self, problem: &ForceProblem) -> (Model, Bounds) {
         let lower = (0..self.coils)
-            .map(|i| T::of(times_power(problem.lower_a[i], self.current_scale(i))))
+            .map(|i| Num::of(times_power(problem.lower_a[i], self.current_scale(i))))
             .collect();
         let bounds = Bounds {
             lower,
             upper: vec![None; self.coils],
-            total: T::ZERO,
+            total: Num::ZERO,
         };
         (self.model(None), bounds)
     }
@@ -300,10 +311,8 @@ mod tests {
         for k in [-1074, -1030, -1022, -7, 0, 1, 700, 1023] {
             let value = times_power(1.0, k);
             assert_eq!(exponent_of(value), k);
-            assert_eq!(
-                times_power(1.3 * value, -k.max(-1022)) / times_power(1.3, k - k.max(-1022)),
-                1.0
-            );
+            let kept = if k < -1030 { 1.0 } else { 0.75 };
+            assert_eq!(times_power(times_power(0.75, k), -k), kept);
         }
         assert_eq!(exponent_of(-0.7), -1);
         assert_eq!(exponent_of(0.0), 0);

@@ -1,13 +1,13 @@
 //! The whole of eq. 9 and 10 for one object: precision, path, criteria, certificate.
 
 use crate::accuracy::StageAccuracy;
-use crate::numerics::double_double::DoubleDouble;
+use crate::numerics::double_double::DoubleDouble as Num;
 use crate::numerics::real::Real;
 use crate::units::DETECTION_THRESHOLD_N;
 
 use super::certificate;
 use super::criteria::Comparison;
-use super::follow::{Bounds, Follower, Trace};
+use super::follow::{Bounds, Follower, Piece, Trace};
 use super::model::Model;
 use super::path::Path;
 use super::problem::{Criterion, ForceProblem, ProblemError, Settings};
@@ -15,8 +15,6 @@ use super::reduce::{Reduced, largest_entries, times_power};
 
 /// Above this condition number of the coils' columns doubles do not decide.
 const PLAIN_CONDITION: f64 = 1e3;
-/// Above this ratio of current limits, with a limit on the sum, doubles do not decide.
-const PLAIN_SPREAD: f64 = 1e4;
 /// Error of e*, relative to lambda^2 mean(h^2), up to which doubles are enough.
 const PLAIN_ERROR: f64 = 2e-14;
 /// Largest relative violation of optimality that is taken for rounding: its square counts.
@@ -35,12 +33,12 @@ pub enum Status {
     Stalled,
 }
 
-/// The arithmetic that decided.
+/// The arithmetic in which the points were reduced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Precision {
     /// 53 bits.
     Double,
-    /// About 105 bits, from the points on.
+    /// About 105 bits.
     DoubleDouble,
 }
 
@@ -88,20 +86,20 @@ pub struct Solution {
     pub accuracy: StageAccuracy,
 }
 
-/// Both paths in one precision.
-struct Solved<T> {
-    reduced: Reduced<T>,
-    model: Model<T>,
-    bounds: Bounds<T>,
-    limited: Trace<T>,
-    unlimited: Trace<T>,
+/// Both paths of one reduced problem.
+struct Solved {
+    reduced: Reduced,
+    model: Model,
+    bounds: Bounds,
+    limited: Trace,
+    unlimited: Trace,
     /// Rounding in e*, relative to `lambda^2 mean(h^2)`.
     error: f64,
     flaw: f64,
 }
 
-impl<T: Real> Solved<T> {
-    fn new(problem: &ForceProblem, reduced: Reduced<T>) -> Self {
+impl Solved {
+    fn new(problem: &ForceProblem, reduced: Reduced) -> Self {
         let offset = reduced.offset();
         let heights = reduced.heights();
         let (model, bounds) = reduced.limited(problem);
@@ -119,7 +117,7 @@ impl<T: Real> Solved<T> {
         let flaw = follower
             .flaw(&limited, offset.as_deref(), heights)
             .max(free.flaw(&unlimited, offset.as_deref(), heights));
-        let size = T::dot(heights, heights).sqrt();
+        let size = Num::dot(heights, heights).sqrt();
         let error = rounding(&model, &limited, size).max(rounding(&free_model, &unlimited, size));
         Self {
             model,
@@ -137,14 +135,14 @@ impl<T: Real> Solved<T> {
     }
 
     /// e* at scaled lambda, relative to `lambda^2 mean(h^2)`.
-    fn relative_error(&self, lambda: T) -> f64 {
+    fn relative_error(&self, lambda: Num) -> f64 {
         let pieces = &self.limited.pieces;
         let k = pieces
             .partition_point(|piece| piece.start <= lambda)
             .saturating_sub(1);
         let residual = pieces[k].residual_at(lambda);
         let heights = self.reduced.heights();
-        (T::dot(&residual, &residual) / (lambda * lambda * T::dot(heights, heights))).to_f64()
+        (Num::dot(&residual, &residual) / (lambda * lambda * Num::dot(heights, heights))).to_f64()
     }
 
     /// Whether both describe the same e*, as far as it is asked for.
@@ -156,7 +154,7 @@ impl<T: Real> Solved<T> {
             .chain(&other.limited.pieces)
             .map(|piece| piece.start);
         starts
-            .filter(|&lambda| lambda > T::ZERO)
+            .filter(|&lambda| lambda > Num::ZERO)
             .flat_map(|lambda| [lambda, lambda + lambda])
             .all(|lambda| {
                 (self.relative_error(lambda) - other.relative_error(lambda)).abs() <= PLAIN_ERROR
@@ -164,35 +162,35 @@ impl<T: Real> Solved<T> {
     }
 }
 
-/// First-order effect of the columns' rounding on e*, at the breakpoints: twice the residual
-/// times the sum of all columns' contributions, and a margin for the sums over points.
-fn rounding<T: Real>(model: &Model<T>, trace: &Trace<T>, size: T) -> f64 {
+/// First-order effect of the columns' rounding on e*, at the breakpoints: the residual times
+/// the sum of all columns' contributions, and a margin for the sums over points.
+fn rounding(model: &Model, trace: &Trace, size: Num) -> f64 {
     let mut worst = 1.0_f64;
     for piece in &trace.pieces {
-        let wanted = piece.start * size;
-        // On the first piece everything grows with lambda: take it at lambda' = 1.
-        let (x, residual, wanted) = if wanted > T::ZERO {
-            (piece.x.clone(), piece.residual.clone(), wanted)
+        // On the first piece everything grows with lambda: its rates will do.
+        let (x, residual, wanted) = if piece.start > Num::ZERO {
+            (&piece.x, &piece.residual, piece.start * size)
         } else {
-            (piece.x_rate.clone(), piece.residual_rate.clone(), size)
+            (&piece.x_rate, &piece.residual_rate, size)
         };
-        if wanted > T::ZERO {
+        if wanted > Num::ZERO {
             let moved = x
                 .iter()
                 .zip(&model.norm)
-                .fold(T::ZERO, |s, (&x, &n)| s + x.abs() * n);
-            let share = T::dot(&residual, &residual).sqrt() / wanted * (moved / wanted + T::ONE);
+                .fold(Num::ZERO, |s, (&x, &n)| s + x.abs() * n);
+            let share = Num::dot(residual, residual).sqrt() / wanted * (moved / wanted + Num::ONE);
             worst = worst.max(share.to_f64());
         }
     }
-    20.0 * T::EPSILON * worst
+    20.0 * model.epsilon * worst
 }
 
 /// Solves eq. 9 and 10: the exact path of e*(lambda), the force constants on it, and the
 /// currents at the chosen one.
 ///
-/// Doubles are used where columns are well conditioned, double-double (from the points on)
-/// where they are not; what was used is reported. The result does not depend on the number
+/// The points are reduced in doubles where their columns are well conditioned, in
+/// double-double where they are not; what was used is reported. The small problem that
+/// remains is always followed in double-double. The result does not depend on the number
 /// of threads.
 ///
 /// # Errors
@@ -202,9 +200,16 @@ pub fn solve(problem: &ForceProblem, settings: &Settings) -> Result<Solution, Pr
     problem.validate(settings)?;
     let largest = largest_entries(problem);
     if let Some(plain) = solve_plainly(problem, &largest) {
-        let rank = problem.coils();
         let path = Path::new(problem, &plain.reduced, &plain.bounds, &plain.limited);
-        return Ok(finish(problem, settings, &plain, path, rank));
+        let rank = problem.coils();
+        return Ok(finish::<f64>(
+            problem,
+            settings,
+            &plain,
+            path,
+            rank,
+            Precision::Double,
+        ));
     }
     let solved = solve_finely(problem, &largest);
     let rank = solved.reduced.rank();
@@ -212,25 +217,22 @@ pub fn solve(problem: &ForceProblem, settings: &Settings) -> Result<Solution, Pr
     if rank < problem.coils() {
         path = path.with_least_power(problem, &solved.reduced, &solved.limited);
     }
-    Ok(finish(problem, settings, &solved, path, rank))
+    Ok(finish::<Num>(
+        problem,
+        settings,
+        &solved,
+        path,
+        rank,
+        Precision::DoubleDouble,
+    ))
 }
 
-/// In doubles, where they are enough.
-fn solve_plainly(problem: &ForceProblem, largest: &[f64]) -> Option<Solved<f64>> {
-    let reach = |i: usize| problem.upper_a[i].max(-problem.lower_a[i]);
-    let (least, most) = (0..problem.coils())
-        .map(reach)
-        .filter(|&r| r > 0.0)
-        .fold((f64::INFINITY, 0.0_f64), |(least, most), r| {
-            (least.min(r), most.max(r))
-        });
-    if problem.total_max_a.is_some() && most > PLAIN_SPREAD * least {
-        return None;
-    }
+/// Reduced in doubles, where that is enough.
+fn solve_plainly(problem: &ForceProblem, largest: &[f64]) -> Option<Solved> {
     if problem.points() < problem.coils() || largest[..problem.coils()].contains(&0.0) {
         return None;
     }
-    let reduced = Reduced::<f64>::new(problem, largest);
+    let reduced = Reduced::new::<f64>(problem, largest);
     if reduced.condition() > PLAIN_CONDITION {
         return None;
     }
@@ -238,10 +240,10 @@ fn solve_plainly(problem: &ForceProblem, largest: &[f64]) -> Option<Solved<f64>>
     (solved.reliable() && solved.error <= PLAIN_ERROR).then_some(solved)
 }
 
-/// In double-double. Where dependences lie within the rounding of the forces, they are taken
+/// Reduced in double-double. Dependences that lie within the rounding of the forces are taken
 /// as exact, provided that this does not show in e*.
-fn solve_finely(problem: &ForceProblem, largest: &[f64]) -> Solved<DoubleDouble> {
-    let reduced = Reduced::<DoubleDouble>::new(problem, largest);
+fn solve_finely(problem: &ForceProblem, largest: &[f64]) -> Solved {
+    let reduced = Reduced::new::<Num>(problem, largest);
     let clean = reduced.with_clean_dependences();
     let literal = Solved::new(problem, reduced);
     if let Some(clean) = clean {
@@ -253,45 +255,45 @@ fn solve_finely(problem: &ForceProblem, largest: &[f64]) -> Solved<DoubleDouble>
     literal
 }
 
+/// Reads the force constants off the path and evaluates currents in the precision `T`.
 fn finish<T: Real>(
     problem: &ForceProblem,
     settings: &Settings,
-    solved: &Solved<T>,
+    solved: &Solved,
     path: Path,
     rank: usize,
+    precision: Precision,
 ) -> Solution {
     let heights = solved.reduced.heights();
     let comparison = Comparison {
         limited: &solved.limited,
         unlimited: &solved.unlimited,
-        mean_square: T::dot(heights, heights),
+        mean_square: Num::dot(heights, heights),
     };
-    let si = |lambda: T| times_power(lambda.to_f64(), solved.reduced.lambda_scale);
-    let wanted = comparison.mean_square > T::ZERO;
-    let unique = rank == problem.coils();
-    let linear = match (wanted, unique) {
-        (false, _) => None,
-        (true, true) => comparison.linear(&solved.model, &solved.bounds),
-        (true, false) => comparison.linear_by_error(),
+    let wanted = comparison.mean_square > Num::ZERO;
+    let linear = if !wanted {
+        None
+    } else if rank == problem.coils() {
+        comparison.linear(&solved.model, &solved.bounds)
+    } else {
+        comparison.linear_by_error()
     };
     let jnd = match linear {
         None => None,
         Some(lambda) if settings.jnd_weight == 0.0 => Some(lambda),
         Some(_) => comparison.jnd(settings.jnd_weight),
     };
-    let linear = linear.map(si);
-    let jnd = jnd.map(si);
+    let si = |lambda: Num| times_power(lambda.to_f64(), solved.reduced.lambda_scale);
+    let (linear, jnd) = (linear.map(si), jnd.map(si));
     let saturation = path.last_turn().or(linear.filter(|&lambda| lambda == 0.0));
-    let lambda = match settings.criterion {
+    let chosen = match settings.criterion {
         Criterion::Linear => linear,
         Criterion::Jnd => jnd,
         Criterion::Saturation => saturation,
     };
-    let unmoved = |trace: &Trace<T>| {
-        trace
-            .pieces
-            .iter()
-            .all(|piece| piece.x.iter().chain(&piece.x_rate).all(|&x| x == T::ZERO))
+    let unmoved = |trace: &Trace| {
+        let all = |piece: &Piece| piece.x.iter().chain(&piece.x_rate).all(|&x| x == Num::ZERO);
+        trace.pieces.iter().all(all)
     };
     let status = if !solved.reliable() {
         Status::Stalled
@@ -307,11 +309,7 @@ fn finish<T: Real>(
         .iter()
         .copied()
         .fold(f64::INFINITY, f64::min);
-    let rms_height_m = {
-        let unit = times_power(solved.reduced.force_unit_n(), -solved.reduced.lambda_scale);
-        comparison.mean_square.sqrt().to_f64() * unit
-    };
-    let double = T::EPSILON >= f64::EPSILON;
+    let rms_height_m = comparison.mean_square.sqrt().to_f64() * solved.reduced.height_unit_m();
     let evaluate = |lambda: f64| {
         let currents_a = path.currents_a(lambda);
         let check = certificate::check::<T>(problem, lambda, &currents_a);
@@ -331,15 +329,11 @@ fn finish<T: Real>(
         lambda_jnd_n_per_m: jnd,
         lambda_saturation_n_per_m: saturation,
         lambda_floor_n_per_m: (lowest > 0.0).then(|| DETECTION_THRESHOLD_N / lowest),
-        chosen: lambda.map(evaluate),
+        chosen: chosen.map(evaluate),
         at: settings.at_n_per_m.map(evaluate),
         rank,
         status,
-        precision: if double {
-            Precision::Double
-        } else {
-            Precision::DoubleDouble
-        },
+        precision,
         accuracy: StageAccuracy {
             estimate: solved.error + 4.0 * f64::EPSILON + solved.flaw * solved.flaw,
             relative_to: "lambda^2 mean(h^2)".to_owned(),

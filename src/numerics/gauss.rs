@@ -122,6 +122,12 @@ fn panels(lo: f64, hi: f64, distance: f64, tolerance: f64, visit: &mut impl FnMu
         panels(middle, hi, distance, tolerance, visit);
         return;
     }
+    panel(lo, hi, radius, tolerance, visit);
+}
+
+/// Visits nodes and weights of one panel `lo..hi` for an integrand whose singularities lie
+/// outside the ellipse of Bernstein radius `radius`, with an error below `tolerance`.
+pub fn panel(lo: f64, hi: f64, radius: f64, tolerance: f64, visit: &mut impl FnMut(f64, f64)) {
     // One node more: on a wide ellipse the integrand may grow like the square of its size.
     let order = order_for(radius, PANEL_SCALE, tolerance).unwrap_or(MAX_ORDER);
     let rule = rule((order + 1).min(MAX_ORDER));

@@ -32,6 +32,8 @@ pub trait Real:
     fn of(value: f64) -> Self;
     /// The nearest double.
     fn to_f64(self) -> f64;
+    /// The same number in double-double.
+    fn widened(self) -> DoubleDouble;
     /// Square root of a number that is not negative.
     fn sqrt(self) -> Self;
     /// Absolute value.
@@ -75,6 +77,10 @@ impl Real for f64 {
         self
     }
 
+    fn widened(self) -> DoubleDouble {
+        DoubleDouble::exactly(self)
+    }
+
     fn sqrt(self) -> Self {
         self.sqrt()
     }
@@ -116,6 +122,10 @@ impl Real for DoubleDouble {
 
     fn to_f64(self) -> f64 {
         self.nearest()
+    }
+
+    fn widened(self) -> DoubleDouble {
+        self
     }
 
     fn sqrt(self) -> Self {

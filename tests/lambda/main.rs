@@ -1,0 +1,10 @@
+//! The path of e*(lambda): against exhaustive search, exact rational solutions, its own
+//! certificate, closed forms and scaling laws.
+
+mod arrays;
+mod case;
+mod edges;
+mod exhaustive;
+mod oracle;
+mod power;
+mod search;
