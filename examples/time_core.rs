@@ -1,4 +1,4 @@
-//! Time of the computations alone on a design: nothing is read or written meanwhile.
+//! Time of the computations alone on a design, then of the stages of `map` with its writing.
 //!
 //! ```text
 //! cargo run --release --locked --example time_core -- [DESIGN] [THREADS]
@@ -12,14 +12,17 @@
 
 use std::error::Error;
 use std::path::Path;
+use std::sync::Mutex;
 use std::time::Instant;
 
+use fluxform::bundle::write::MapFormats;
 use fluxform::design::{Design, Need};
+use fluxform::job::map::{self, MapRequest};
 use fluxform::job::scene::Scene;
 use fluxform::lambda::{self, ForceProblem, Settings};
 use fluxform::map::tabulate::{Components, Grid, tabulate};
 use fluxform::numerics::axis::Axis;
-use fluxform::progress::Silent;
+use fluxform::progress::{Progress, Silent};
 
 const MAP_TOLERANCE: f64 = 1e-9;
 const FORCE_TOLERANCE: f64 = 1e-12;
@@ -27,6 +30,50 @@ type Failure = Box<dyn Error + Send + Sync>;
 
 /// The flat surface's height.
 const HEIGHT_M: f64 = 0.05;
+
+/// Measures the stages of a job.
+#[derive(Default)]
+struct Stages(Mutex<Vec<(String, Instant, f64)>>);
+
+impl Progress for Stages {
+    fn begin(&self, stage: &str, _total: u64) {
+        let mut stages = self.0.lock().expect("no holder panics");
+        stages.push((stage.to_owned(), Instant::now(), 0.0));
+    }
+    fn end(&self) {
+        if let Some((_, start, seconds)) = self.0.lock().expect("no holder panics").last_mut() {
+            *seconds = start.elapsed().as_secs_f64();
+        }
+    }
+}
+
+/// The stages of `map`, each the least of a few runs.
+fn stages(design: &Design) -> Result<(), Failure> {
+    const RUNS: usize = 9;
+    let mut least: Vec<(String, f64)> = Vec::new();
+    for _ in 0..RUNS {
+        let folder = tempfile::tempdir()?;
+        let request = MapRequest {
+            components: Components::Gz,
+            tolerance: None,
+            out: folder.path().join("map"),
+            formats: MapFormats::default(),
+            force: false,
+        };
+        let measured = Stages::default();
+        map::run(design, Vec::new(), &request, &measured)?;
+        let found = measured.0.into_inner().expect("no holder panics");
+        least.resize(found.len(), (String::new(), f64::INFINITY));
+        for (best, (stage, _, seconds)) in least.iter_mut().zip(found) {
+            *best = (stage, best.1.min(seconds));
+        }
+    }
+    println!("\n| stage of `map` | least s |\n|---|---|");
+    for (stage, seconds) in least {
+        println!("| {stage} | {seconds:.6} |");
+    }
+    Ok(())
+}
 
 /// Runs `work` a few times; prints seconds and, per item, nanoseconds.
 fn time<T>(
@@ -70,9 +117,9 @@ fn flat(scene: &Scene, design: &Design, nodes: usize) -> Result<(Vec<f64>, Vec<f
 }
 
 fn measure(design: &Design) -> Result<(), Failure> {
-    let scene = Scene::new(design)?;
     println!("| computation | items | least s | median s | ns an item |");
     println!("|---|---|---|---|---|");
+    let scene = time("scene: coil, inductance", 1, 21, || Ok(Scene::new(design)?))?;
     let workspace = &design.workspace;
     let grid = Grid {
         x_m: workspace.x_m.nodes(),
@@ -113,7 +160,7 @@ fn measure(design: &Design) -> Result<(), Failure> {
             Ok(lambda::solve(&problem, &Settings::default())?)
         })?;
     }
-    Ok(())
+    stages(design)
 }
 
 fn main() -> Result<(), Failure> {
