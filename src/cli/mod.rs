@@ -1,9 +1,148 @@
 //! Arguments, commands, the printer, the progress bar and the exit codes.
 
+mod args;
+mod bar;
+mod commands;
+mod documents;
+mod exit;
+mod failure;
+mod help;
+mod interrupt;
+mod layout;
+mod printer;
+mod quantity;
+mod values;
+
 use std::ffi::OsString;
 use std::process::ExitCode;
 
+use clap::error::ErrorKind;
+use clap::{ColorChoice, CommandFactory, FromArgMatches};
+
+use args::{Arguments, Colour, Command, Common, Format};
+use exit::Exit;
+use failure::Failure;
+use printer::{Printer, say};
+
 /// Runs the command line and returns the process's exit code.
-pub fn main(_args: impl Iterator<Item = OsString>) -> ExitCode {
-    ExitCode::SUCCESS
+pub fn main(args: impl Iterator<Item = OsString>) -> ExitCode {
+    std::panic::set_hook(Box::new(|panic| say(&panic_message(panic))));
+    let args: Vec<OsString> = args.collect();
+    let parsed = Arguments::command()
+        .color(colour_of(&args))
+        .try_get_matches_from(&args)
+        .and_then(|matches| Arguments::from_arg_matches(&matches));
+    let arguments = match parsed {
+        Ok(arguments) => arguments,
+        Err(error) => return not_parsed(&error, &args).into(),
+    };
+    interrupt::listen();
+    let printer = Printer::new(&arguments.common);
+    match run(&arguments, &printer) {
+        Ok(()) => Exit::Done.into(),
+        Err(failure) => {
+            printer.failure(&failure);
+            failure.exit().into()
+        }
+    }
+}
+
+fn run(arguments: &Arguments, printer: &Printer) -> Result<(), Failure> {
+    if let Some(threads) = arguments.common.threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global()
+            .map_err(|error| Failure::Usage(format!("--threads {threads}: {error}")))?;
+    }
+    match &arguments.command {
+        Command::Evaluate(command) => command.run(printer),
+        Command::Probe(command) => command.run(printer),
+        Command::Map(command) => command.run(printer),
+        Command::Discretize(command) => command.run(printer),
+        Command::Lambda(command) => command.run(printer),
+        Command::Calibrate(command) => command.run(printer),
+        Command::Verify(command) => command.run(printer),
+        Command::Completions(command) => command.run(printer),
+        Command::Man(command) => command.run(printer),
+    }
+}
+
+/// What clap has to say: help, the version, or wrong usage.
+fn not_parsed(error: &clap::Error, args: &[OsString]) -> Exit {
+    let asked = matches!(
+        error.kind(),
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion
+    );
+    if !asked && value_of(args, "--format") == Some("json") {
+        let common = Common {
+            format: Format::Json,
+            quiet: false,
+            threads: None,
+            color: Colour::Never,
+        };
+        let told = error.render().to_string();
+        let message = told.trim().trim_start_matches("error: ").to_owned();
+        Printer::new(&common).failure(&Failure::Usage(message));
+    } else {
+        // A closed pipe: nobody is left to read the help.
+        let _ = error.print();
+    }
+    if asked { Exit::Done } else { Exit::Usage }
+}
+
+/// The colours of help and usage errors, which are told before the arguments are known.
+fn colour_of(args: &[OsString]) -> ColorChoice {
+    match value_of(args, "--color") {
+        Some("always") => ColorChoice::Always,
+        Some("never") => ColorChoice::Never,
+        _ => ColorChoice::Auto,
+    }
+}
+
+/// The last value of a long option among raw arguments.
+fn value_of<'a>(args: &'a [OsString], option: &str) -> Option<&'a str> {
+    let mut value = None;
+    for (i, arg) in args.iter().enumerate() {
+        let Some(arg) = arg.to_str() else { continue };
+        if arg == option {
+            value = args.get(i + 1).and_then(|next| next.to_str());
+        } else if let Some(rest) = arg.strip_prefix(option)
+            && let Some(rest) = rest.strip_prefix('=')
+        {
+            value = Some(rest);
+        }
+    }
+    value
+}
+
+fn panic_message(panic: &std::panic::PanicHookInfo) -> String {
+    let what = panic.payload_as_str().unwrap_or("no message");
+    let place = panic
+        .location()
+        .map_or_else(String::new, |place| format!(" at {place}"));
+    format!(
+        "error: fluxform {} stopped on a mistake of its own{place}: {what}\n\
+         Please report this line with the command and its input files.",
+        env!("CARGO_PKG_VERSION")
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_arguments_are_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn an_option_is_found_in_either_spelling() {
+        let args: Vec<OsString> = ["fluxform", "--format=human", "--format", "json"]
+            .map(OsString::from)
+            .to_vec();
+        assert_eq!(value_of(&args, "--format"), Some("json"));
+        assert_eq!(value_of(&args[..2], "--format"), Some("human"));
+        assert_eq!(value_of(&args, "--color"), None);
+    }
 }

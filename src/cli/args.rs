@@ -1,0 +1,149 @@
+//! The arguments that commands share, and the command line as a whole.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use super::commands::{
+    calibrate, completions, discretize, evaluate, lambda, man, map, probe, verify,
+};
+use super::{help, values};
+
+/// Design the coils of a magnetic haptic display, map their field gradients and solve the force
+/// constant of an object.
+///
+/// A design file describes coils, magnet and drivers; a shape file or a surface describes the
+/// object to be felt. `calibrate` joins them into a bundle that a runtime loads: gradient maps, the
+/// object's points, the largest force constant lambda that the currents can render, and the
+/// currents. Results go to standard output or to files, messages to standard error.
+#[derive(Debug, Parser)]
+#[command(
+    name = "fluxform",
+    version,
+    max_term_width = 100,
+    subcommand_required = true,
+    arg_required_else_help = true,
+    disable_help_subcommand = true,
+    after_help = help::main()
+)]
+pub struct Arguments {
+    /// What every command takes.
+    #[command(flatten)]
+    pub common: Common,
+    /// The command.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What every command takes.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Common options")]
+pub struct Common {
+    /// How results are told: a summary for people, or one JSON object in SI units
+    #[arg(long, global = true, value_enum, default_value_t = Format::Human)]
+    pub format: Format,
+    /// Say nothing but errors and the data asked for (JSON, CSV, `--out -`)
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
+    /// Threads to compute with [default: all cores]; results do not depend on it
+    #[arg(long, global = true, value_name = "N", value_parser = values::threads, allow_hyphen_values = true)]
+    pub threads: Option<usize>,
+    /// Colours in messages; `auto` means on terminals, unless NO_COLOR is set
+    #[arg(long, global = true, value_enum, default_value_t = Colour::Auto, value_name = "WHEN")]
+    pub color: Colour,
+}
+
+/// How results are told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// A summary for people
+    Human,
+    /// One JSON object
+    Json,
+}
+
+/// When messages are coloured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Colour {
+    /// On terminals, unless NO_COLOR is set
+    Auto,
+    /// Always
+    Always,
+    /// Never
+    Never,
+}
+
+/// The commands; each tells of itself in its own file.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    Evaluate(evaluate::Evaluate),
+    Probe(probe::Probe),
+    #[command(visible_alias = "tabulate")]
+    Map(map::Map),
+    Discretize(discretize::Discretize),
+    Lambda(lambda::Lambda),
+    Calibrate(calibrate::Calibrate),
+    Verify(verify::Verify),
+    Completions(completions::Completions),
+    Man(man::Man),
+}
+
+/// The allowed error.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct Tolerance {
+    /// Allowed error relative to |grad B| at the point (maps: to the largest |grad B| at that
+    /// height), 1e-15 to 1e-1
+    #[arg(long, value_name = "T", value_parser = values::tolerance, allow_hyphen_values = true)]
+    pub tolerance: Option<f64>,
+}
+
+/// Where what is written may replace what is there.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct Writing {
+    /// Replace existing output whatever it is; without it, only output of the same inputs is
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// How a surface that is given directly, without a shape file, is to be taken.
+#[derive(Debug, Clone, Args)]
+#[command(
+    next_help_heading = "Surfaces given directly (not for shape files, which say it themselves)"
+)]
+pub struct SurfaceFlags {
+    /// Unit of the surface's coordinates: mm, cm, m, in, ft or um; required for STL, OBJ and PLY
+    #[arg(long, value_name = "UNIT", value_parser = values::unit)]
+    pub unit: Option<f64>,
+    /// Rotate about x, then y, then z, in degrees, before translating
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::rotation, allow_hyphen_values = true)]
+    pub rotate: Option<values::Rotation>,
+    /// Move by so many millimetres
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::translation, allow_hyphen_values = true)]
+    pub translate: Option<values::Translation>,
+    /// Constraint points along x and y [default: 61x61]
+    #[arg(long, value_name = "NxM", value_parser = values::grid_size)]
+    pub grid: Option<values::GridSize>,
+    /// Extent of the points along x in millimetres [default: the surface's own]
+    #[arg(long, value_name = "FROM,TO", value_parser = values::ends, allow_hyphen_values = true)]
+    pub x: Option<values::Ends>,
+    /// Extent of the points along y in millimetres [default: the surface's own]
+    #[arg(long, value_name = "FROM,TO", value_parser = values::ends, allow_hyphen_values = true)]
+    pub y: Option<values::Ends>,
+}
+
+impl SurfaceFlags {
+    /// The flags that were given.
+    #[must_use]
+    pub fn given(&self) -> Vec<&'static str> {
+        let flags = [
+            (self.unit.is_some(), "--unit"),
+            (self.rotate.is_some(), "--rotate"),
+            (self.translate.is_some(), "--translate"),
+            (self.grid.is_some(), "--grid"),
+            (self.x.is_some(), "--x"),
+            (self.y.is_some(), "--y"),
+        ];
+        flags
+            .into_iter()
+            .filter_map(|(given, name)| given.then_some(name))
+            .collect()
+    }
+}

@@ -1,0 +1,326 @@
+//! `calibrate`: maps, points, force constant and currents of objects, one bundle each.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::lambda::{CriterionFlags, no_constant};
+use super::{accuracy_check, begin, describe, folder};
+use crate::bundle::artefact::{FLUXFORM_VERSION, SCHEMA_VERSION};
+use crate::bundle::manifest::Manifest;
+use crate::cli::args::{SurfaceFlags, Tolerance, Writing};
+use crate::cli::documents;
+use crate::cli::failure::Failure;
+use crate::cli::help::{Codes, page};
+use crate::cli::layout::{Sheet, Side, table};
+use crate::cli::printer::{Place, Printer};
+use crate::cli::quantity::{bytes, count, error, length_error, number, percent};
+use crate::cli::values::{self, FileArgument};
+use crate::design::{Design, Need};
+use crate::job::calibrate::{
+    BundleReport, CalibrateOptions, CalibrateReport, DEFAULT_REACH_M, DesignSource, points_outside,
+    run,
+};
+
+/// The main job: maps, points, force constant and currents, one bundle a shape
+///
+/// For every shape: samples its surface, finds the force constant and the static currents from
+/// forces computed at its points, tabulates the part of the maps that the object needs, and writes
+/// all of it as one bundle, OUT/<design>/<shape>/, that a runtime loads. A bundle is whole before
+/// the next begins. What the object does not need is left out of the map, and what that costs is
+/// told.
+#[derive(Debug, Args)]
+#[command(after_help = page(Codes::Writing, &[
+    ("fluxform calibrate designs/seed_air.toml shapes/flat.toml shapes/half_sphere.toml",
+     "two objects; the bundles go to results/seed_air/"),
+    ("fluxform calibrate designs/seed_air.toml shapes/wedge.stl --unit mm --translate 0,0,30",
+     "a surface given directly; its bundle is called wedge"),
+    ("fluxform calibrate designs/seed_air.toml shapes/flat.toml --criterion linear --force",
+     "another criterion, replacing what is there"),
+]))]
+pub struct Calibrate {
+    /// Design file (TOML), `-` for standard input
+    #[arg(value_name = "DESIGN")]
+    design: FileArgument,
+    /// Shape files (TOML) or surfaces (STL); no two of the same name
+    #[arg(value_name = "SHAPE", required = true)]
+    shapes: Vec<FileArgument>,
+    /// Folder under which <design>/<shape>/ is written
+    #[arg(long, value_name = "DIR", default_value = "results")]
+    out: FileArgument,
+    /// How far from the object's points the maps reach within the workspace, millimetres
+    /// [default: 20]
+    #[arg(long, value_name = "MM", value_parser = values::length, allow_hyphen_values = true)]
+    reach: Option<f64>,
+    #[command(flatten)]
+    criterion: CriterionFlags,
+    #[command(flatten)]
+    writing: Writing,
+    #[command(flatten)]
+    tolerance: Tolerance,
+    #[command(flatten)]
+    surface: SurfaceFlags,
+}
+
+/// What is told to programs.
+#[derive(Serialize)]
+struct CalibrateSummary<'a> {
+    schema_version: &'static str,
+    fluxform_version: &'static str,
+    design: &'a str,
+    bundles: Vec<BundleSummary<'a>>,
+}
+
+/// One bundle; the keys are those of `lambda.json` and `manifest.json`.
+#[derive(Serialize)]
+struct BundleSummary<'a> {
+    shape: &'a str,
+    folder: String,
+    points: usize,
+    outside: usize,
+    criterion: &'a str,
+    lambda_linear_n_per_m: Option<f64>,
+    lambda_jnd_n_per_m: Option<f64>,
+    lambda_saturation_n_per_m: Option<f64>,
+    lambda_floor_n_per_m: Option<f64>,
+    lambda_n_per_m: Option<f64>,
+    currents_a: Option<&'a [f64]>,
+    rms_error_n: Option<f64>,
+    worst_error_n: Option<f64>,
+    relative_rms_error: Option<f64>,
+    rank: usize,
+    manifest: &'a Manifest,
+}
+
+impl Calibrate {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
+        let out = folder(&self.out)?;
+        let lambda = self.criterion.options(self.tolerance.tolerance)?;
+        let (document, shapes) = documents::design_and_shapes(
+            &self.design,
+            Need::CALIBRATE,
+            &self.shapes,
+            &self.surface,
+            printer,
+        )?;
+        let design = &document.design;
+        let source = DesignSource {
+            design,
+            text: &document.text,
+            input: &document.input,
+        };
+        let options = CalibrateOptions {
+            out,
+            force: self.writing.force,
+            lambda,
+            reach_m: self.reach.unwrap_or(DEFAULT_REACH_M),
+        };
+        let bar = begin(printer);
+        let report = run(source, &shapes, &options, &bar)?;
+        drop(bar);
+        warn(&report, printer);
+        let json = CalibrateSummary {
+            schema_version: SCHEMA_VERSION,
+            fluxform_version: FLUXFORM_VERSION,
+            design: &design.name,
+            bundles: report.bundles.iter().map(bundle_summary).collect(),
+        };
+        let json = printer.with_warnings(&json);
+        let folder = options.out.join(&design.name);
+        printer.summary(Place::Output, &json, || summary(design, &report, &folder))?;
+        accuracy_check(report.bundles.iter().all(|b| b.lambda.accuracy_reached))?;
+        let without: Vec<&str> = report
+            .bundles
+            .iter()
+            .filter(|bundle| bundle.lambda.file.lambda_n_per_m.is_none())
+            .map(|bundle| bundle.manifest.shape.as_str())
+            .collect();
+        if without.is_empty() {
+            Ok(())
+        } else {
+            Err(no_constant(&without))
+        }
+    }
+}
+
+fn warn(report: &CalibrateReport, printer: &Printer) {
+    for bundle in &report.bundles {
+        let shape = &bundle.manifest.shape;
+        for warning in &bundle.lambda.warnings {
+            printer.warning(&format!("{shape}: {warning}"));
+        }
+        let outside = points_outside(&bundle.manifest, &bundle.lambda);
+        if outside > 0 {
+            printer.warning(&format!(
+                "{shape}: {outside} of {} points lie outside the design's [workspace], where a \
+                 runtime has no map and the force is zero; enlarge the workspace or move the object",
+                bundle.lambda.file.points
+            ));
+        }
+    }
+}
+
+fn bundle_summary(bundle: &BundleReport) -> BundleSummary<'_> {
+    let file = &bundle.lambda.file;
+    BundleSummary {
+        shape: &file.shape,
+        folder: bundle.folder.display().to_string(),
+        points: file.points,
+        outside: bundle.lambda.points.summary.outside,
+        criterion: &file.criterion,
+        lambda_linear_n_per_m: file.lambda_linear_n_per_m,
+        lambda_jnd_n_per_m: file.lambda_jnd_n_per_m,
+        lambda_saturation_n_per_m: file.lambda_saturation_n_per_m,
+        lambda_floor_n_per_m: file.lambda_floor_n_per_m,
+        lambda_n_per_m: file.lambda_n_per_m,
+        currents_a: file.currents_a.as_deref(),
+        rms_error_n: file.rms_error_n,
+        worst_error_n: file.worst_error_n,
+        relative_rms_error: file.relative_rms_error,
+        rank: file.rank,
+        manifest: &bundle.manifest,
+    }
+}
+
+fn size(manifest: &Manifest) -> u64 {
+    manifest.files.iter().map(|file| file.bytes).sum()
+}
+
+fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> String {
+    let mut sheet = Sheet::new(&format!(
+        "{} on {} ({})",
+        count(report.bundles.len(), "shape"),
+        design.name,
+        describe::array(design)
+    ));
+    sheet.gap();
+    sheet.raw(&shapes_table(report));
+    sheet.gap();
+    let Some(first) = report.bundles.first() else {
+        return sheet.finish();
+    };
+    let file = &first.lambda.file;
+    sheet.line(
+        "lambda",
+        &format!(
+            "chosen by {}; errors are of the force, relative to the rms force",
+            describe::criterion(&file.criterion, file.jnd)
+        ),
+    );
+    sheet.line("accuracy", &accuracies(report));
+    let left_out: BTreeSet<String> = report
+        .bundles
+        .iter()
+        .flat_map(|bundle| {
+            let parts = describe::left_out(&bundle.manifest.left_out);
+            let shape = &bundle.manifest.shape;
+            parts
+                .lines()
+                .map(|part| told_of(shape, part, report))
+                .collect::<Vec<_>>()
+        })
+        .collect();
+    let left_out: Vec<String> = left_out.into_iter().collect();
+    sheet.line("left out", &left_out.join("\n"));
+    let total = report.bundles.iter().map(|b| size(&b.manifest)).sum();
+    sheet.line(
+        "written to",
+        &format!(
+            "{}: {}, {}",
+            folder.display(),
+            count(report.bundles.len(), "bundle"),
+            bytes(total)
+        ),
+    );
+    sheet.finish()
+}
+
+/// A line about every shape stands for itself; others begin with their shape.
+fn told_of(shape: &str, part: &str, report: &CalibrateReport) -> String {
+    let of_all = report.bundles.iter().all(|bundle| {
+        describe::left_out(&bundle.manifest.left_out)
+            .lines()
+            .any(|other| other == part)
+    });
+    if of_all {
+        part.to_owned()
+    } else {
+        format!("{shape}: {part}")
+    }
+}
+
+fn shapes_table(report: &CalibrateReport) -> String {
+    let head = [
+        "shape",
+        "points",
+        "lambda N/m",
+        "linear",
+        "saturation",
+        "rms mN",
+        "relative",
+        "worst mN",
+        "at limit",
+    ];
+    let or_none = |value: Option<String>| value.unwrap_or_else(|| "none".to_owned());
+    let row = |bundle: &BundleReport| {
+        let file = &bundle.lambda.file;
+        vec![
+            file.shape.clone(),
+            file.points.to_string(),
+            or_none(file.lambda_n_per_m.map(number)),
+            or_none(file.lambda_linear_n_per_m.map(number)),
+            or_none(file.lambda_saturation_n_per_m.map(number)),
+            or_none(file.rms_error_n.map(|n| number(n * 1000.0))),
+            or_none(file.relative_rms_error.map(percent)),
+            or_none(file.worst_error_n.map(|n| number(n * 1000.0))),
+            or_none(at_limit(bundle)),
+        ]
+    };
+    let rows: Vec<Vec<String>> = std::iter::once(head.map(str::to_owned).to_vec())
+        .chain(report.bundles.iter().map(row))
+        .collect();
+    let mut sides = [Side::Right; 9];
+    sides[0] = Side::Left;
+    table(&sides, &rows)
+}
+
+/// How many coils carry all they may.
+fn at_limit(bundle: &BundleReport) -> Option<String> {
+    let currents = bundle.lambda.file.currents_a.as_ref()?;
+    let limits = &bundle.manifest.limits;
+    let bound = currents
+        .iter()
+        .zip(limits.current_min_a.iter().zip(&limits.current_max_a))
+        .filter(|(current, (min, max))| current >= max || (current <= min && **min < 0.0))
+        .count();
+    Some(count(bound, "coil"))
+}
+
+/// The largest error of each stage over all shapes.
+fn accuracies(report: &CalibrateReport) -> String {
+    let largest = |stage: &str| {
+        let stages = report.bundles.iter();
+        stages
+            .filter_map(|bundle| bundle.manifest.accuracy.get(stage))
+            .map(|accuracy| accuracy.estimate)
+            .fold(0.0, f64::max)
+    };
+    let between = report
+        .bundles
+        .iter()
+        .map(|bundle| bundle.manifest.map.interpolation.largest_error)
+        .fold(0.0, f64::max);
+    format!(
+        "heights {}; forces {}, map nodes {}, between nodes {} of the largest gradient at their height",
+        length_error(largest("points")),
+        error(largest("forces")),
+        error(largest("map")),
+        error(between)
+    )
+}

@@ -1,0 +1,121 @@
+//! Pieces of summaries that several commands tell alike.
+
+use crate::accuracy::StageAccuracy;
+use crate::bundle::manifest::{AxisSummary, LeftOut};
+use crate::cli::layout::grid;
+use crate::cli::quantity::{count, error, number, percent};
+use crate::design::Design;
+
+/// Coils beyond this many are told in sum, not one by one.
+const COILS_SHOWN: usize = 100;
+/// Columns of coils that stand in no grid.
+const COLUMNS: usize = 8;
+/// Most columns that fit a screen.
+const COLUMNS_MAX: usize = 12;
+
+/// Each stage's estimated error, one line a stage.
+pub fn accuracy<'a>(stages: impl IntoIterator<Item = (&'a str, &'a StageAccuracy)>) -> String {
+    let lines: Vec<String> = stages
+        .into_iter()
+        .map(|(name, stage)| {
+            let (name, to) = (name.replace('_', " "), &stage.relative_to);
+            format!("{name} {} of {to}", error(stage.estimate))
+        })
+        .collect();
+    lines.join("\n")
+}
+
+/// The array in a few words.
+pub fn array(design: &Design) -> String {
+    let coils = count(design.array.positions_m.len(), "coil");
+    match design.array.grid {
+        Some(array) if array.rows * array.columns > 1 => format!(
+            "{coils}, {} x {} at a pitch of {} mm",
+            array.rows,
+            array.columns,
+            number(array.pitch_m * 1000.0)
+        ),
+        _ => coils,
+    }
+}
+
+/// Currents as the coils stand, seen from above: y grows upwards, x to the right.
+pub fn currents(design: &Design, currents_a: &[f64]) -> String {
+    let cells: Vec<String> = currents_a.iter().map(|a| format!("{a:.4}")).collect();
+    if cells.len() == 1 {
+        return format!("{} A", cells[0]);
+    }
+    if cells.len() <= COILS_SHOWN
+        && let Some(array) = design.array.grid.filter(|a| a.columns <= COLUMNS_MAX)
+        && array.rows * array.columns == cells.len()
+    {
+        let from_top: Vec<String> = cells
+            .chunks(array.columns)
+            .rev()
+            .flatten()
+            .cloned()
+            .collect();
+        return format!(
+            "A, seen from above (x to the right, y up)\n{}",
+            grid(&from_top, array.columns)
+        );
+    }
+    if cells.len() <= COILS_SHOWN {
+        return format!("A, coil 0 first\n{}", grid(&cells, COLUMNS));
+    }
+    let fold = |start, pick: fn(f64, f64) -> f64| currents_a.iter().copied().fold(start, pick);
+    format!(
+        "{}, from {} to {} A; all of them with --format json",
+        count(cells.len(), "coil"),
+        number(fold(f64::INFINITY, f64::min)),
+        number(fold(f64::NEG_INFINITY, f64::max))
+    )
+}
+
+/// An axis in millimetres.
+pub fn axis(name: &str, axis: &AxisSummary) -> String {
+    let mm = |length_m: f64| number(length_m * 1000.0);
+    format!(
+        "{name} {} to {} mm in {}",
+        mm(axis.from_m),
+        mm(axis.to_m),
+        count(axis.samples, "sample")
+    )
+}
+
+/// What was left out and what it costs, one line each.
+pub fn left_out(parts: &[LeftOut]) -> String {
+    let lines: Vec<String> = parts
+        .iter()
+        .map(|part| {
+            let cost = if part.error_cost == 0.0 {
+                "costs no accuracy".to_owned()
+            } else {
+                format!("costs {}", error(part.error_cost))
+            };
+            format!("{}: {}; {cost}", part.what, part.why)
+        })
+        .collect();
+    if lines.is_empty() {
+        "nothing".to_owned()
+    } else {
+        lines.join("\n")
+    }
+}
+
+/// A force constant, or that there is none.
+pub fn force_constant(lambda_n_per_m: Option<f64>) -> String {
+    lambda_n_per_m.map_or_else(
+        || "none".to_owned(),
+        |lambda| format!("{} N/m", number(lambda)),
+    )
+}
+
+/// How the force constant was chosen.
+pub fn criterion(name: &str, jnd: f64) -> String {
+    if name == "jnd" {
+        format!("jnd at {}", percent(jnd))
+    } else {
+        name.to_owned()
+    }
+}

@@ -1,0 +1,246 @@
+//! `lambda`: the force constant of one object.
+
+use std::slice::from_ref;
+
+use clap::{Args, ValueEnum};
+
+use super::{accuracy_check, begin, describe};
+use crate::cli::args::{SurfaceFlags, Tolerance};
+use crate::cli::documents;
+use crate::cli::failure::Failure;
+use crate::cli::help::{Codes, page};
+use crate::cli::layout::Sheet;
+use crate::cli::printer::{Place, Printer};
+use crate::cli::quantity::{count, force, mm, number, percent};
+use crate::cli::values::{self, FileArgument};
+use crate::design::{Design, Need};
+use crate::job::lambda::{LambdaOptions, LambdaReport, run};
+use crate::lambda::{Criterion, Precision, Settings};
+
+/// The largest force constant of one object, and its currents
+///
+/// Finds the force constant lambda of an object: the magnet on a finger at height h is to feel the
+/// force lambda h. One set of static currents serves the whole object; the least mean square error
+/// over the object's points is followed exactly from lambda = 0 to where no coil moves any more,
+/// and the constants are read off that path. Forces are computed at the points directly, not
+/// through a map. A lambda that is null ends with exit code 4.
+#[derive(Debug, Args)]
+#[command(after_help = page(Codes::Reading, &[
+    ("fluxform lambda designs/seed_air.toml shapes/half_sphere.toml", "the seed's half-sphere"),
+    ("fluxform lambda designs/seed_air.toml shapes/wedge.toml --criterion linear --at 2.0",
+     "the constant at which the first limit binds, and what 2 N/m would give"),
+    ("fluxform lambda designs/seed_air.toml shapes/flat.stl --unit mm --translate 0,0,50",
+     "a surface given directly"),
+]))]
+pub struct Lambda {
+    /// Design file (TOML), `-` for standard input
+    #[arg(value_name = "DESIGN")]
+    design: FileArgument,
+    /// Shape file (TOML, `-` for standard input) or the surface itself (STL)
+    #[arg(value_name = "SHAPE")]
+    shape: FileArgument,
+    #[command(flatten)]
+    criterion: CriterionFlags,
+    #[command(flatten)]
+    tolerance: Tolerance,
+    #[command(flatten)]
+    surface: SurfaceFlags,
+}
+
+/// How the force constant is chosen.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct CriterionFlags {
+    /// Which force constant is chosen
+    #[arg(long, value_enum, default_value_t = Wanted::Jnd)]
+    criterion: Wanted,
+    /// Just-noticeable difference: the error that saturation may add, relative to the rms force
+    #[arg(long, value_name = "PART", default_value_t = crate::units::FORCE_JND,
+          value_parser = values::jnd, allow_hyphen_values = true)]
+    jnd: f64,
+    /// Tell currents and errors at this force constant too, N/m
+    #[arg(long, value_name = "LAMBDA", value_parser = values::force_constant,
+          allow_hyphen_values = true)]
+    at: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Wanted {
+    /// The largest at which saturation adds less than a just-noticeable difference
+    Jnd,
+    /// The largest at which no limit binds
+    Linear,
+    /// The largest at which a coil still moves
+    Saturation,
+    /// Not in this version
+    Maxmin,
+}
+
+impl CriterionFlags {
+    /// The settings that the flags ask for.
+    ///
+    /// # Errors
+    /// Wrong usage: a criterion that is not built.
+    pub fn options(self, tolerance: Option<f64>) -> Result<LambdaOptions, Failure> {
+        let criterion = match self.criterion {
+            Wanted::Jnd => Criterion::Jnd,
+            Wanted::Linear => Criterion::Linear,
+            Wanted::Saturation => Criterion::Saturation,
+            Wanted::Maxmin => {
+                return Err(Failure::Usage(
+                    "--criterion maxmin: this version does not have it; choose jnd, linear or \
+                     saturation"
+                        .to_owned(),
+                ));
+            }
+        };
+        Ok(LambdaOptions {
+            settings: Settings {
+                criterion,
+                jnd_weight: self.jnd,
+                at_n_per_m: self.at,
+            },
+            tolerance,
+        })
+    }
+}
+
+impl Lambda {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
+        let options = self.criterion.options(self.tolerance.tolerance)?;
+        let (document, shapes) = documents::design_and_shapes(
+            &self.design,
+            Need::LAMBDA,
+            from_ref(&self.shape),
+            &self.surface,
+            printer,
+        )?;
+        let design = &document.design;
+        let bar = begin(printer);
+        for shape in shapes {
+            let inputs = std::iter::once(document.input.clone())
+                .chain(shape.input)
+                .collect();
+            let report = run(design, &shape.document, inputs, &options, &bar)?;
+            for warning in &report.warnings {
+                printer.warning(warning);
+            }
+            let json = printer.with_warnings(&report.file);
+            printer.summary(Place::Output, &json, || summary(design, &report))?;
+            accuracy_check(report.accuracy_reached)?;
+            if report.file.lambda_n_per_m.is_none() {
+                return Err(no_constant(&[report.file.shape.as_str()]));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The result is there, but there is no force constant.
+pub fn no_constant(shapes: &[&str]) -> Failure {
+    Failure::Unmet(format!(
+        "the chosen lambda is null for {}: see the warnings",
+        shapes.join(", ")
+    ))
+}
+
+fn summary(design: &Design, report: &LambdaReport) -> String {
+    let file = &report.file;
+    let mut sheet = Sheet::new(&format!(
+        "{} on {}: lambda {}",
+        file.shape,
+        file.design,
+        describe::force_constant(file.lambda_n_per_m)
+    ));
+    let constants = [
+        ("linear", file.lambda_linear_n_per_m),
+        ("jnd", file.lambda_jnd_n_per_m),
+        ("saturation", file.lambda_saturation_n_per_m),
+        ("floor", file.lambda_floor_n_per_m),
+    ];
+    let constants = constants.map(|(name, lambda)| {
+        let told = lambda.map_or_else(|| "none".to_owned(), number);
+        format!("{name} {told}")
+    });
+    sheet.line("lambda", &format!("{} N/m", constants.join(", ")));
+    sheet.line("chosen by", &describe::criterion(&file.criterion, file.jnd));
+    operating_point(&mut sheet, report);
+    if let Some(currents) = &file.currents_a {
+        sheet.line("currents", &describe::currents(design, currents));
+    }
+    if let Some(at) = &file.at {
+        sheet.line(
+            "at",
+            &format!(
+                "{} N/m: error rms {}, worst {}",
+                number(at.lambda_n_per_m),
+                force(at.rms_error_n),
+                force(at.worst_error_n)
+            ),
+        );
+        sheet.line("", &describe::currents(design, &at.currents_a));
+    }
+    sheet.line(
+        "path",
+        &format!(
+            "{}; rank {} of {}{}",
+            count(file.path.len(), "breakpoint"),
+            file.rank,
+            count(design.array.positions_m.len(), "coil"),
+            match report.precision {
+                Precision::Double => "",
+                Precision::DoubleDouble => "; in 31 digits, for nearly dependent coils",
+            }
+        ),
+    );
+    sheet.line("points", &points(report));
+    let stages = file.accuracy.iter();
+    let stages = stages.map(|(name, stage)| (name.as_str(), stage));
+    sheet.line("accuracy", &describe::accuracy(stages));
+    sheet.finish()
+}
+
+fn operating_point(sheet: &mut Sheet, report: &LambdaReport) {
+    let file = &report.file;
+    let heights = &report.points.discretized.points.height_m;
+    let mean_m = heights.iter().sum::<f64>() / heights.len() as f64;
+    if let Some(lambda) = file.lambda_n_per_m {
+        sheet.line(
+            "force",
+            &format!(
+                "{} wanted at the mean height, {}",
+                force(lambda * mean_m),
+                mm(mean_m)
+            ),
+        );
+    }
+    if let (Some(rms), Some(worst)) = (file.rms_error_n, file.worst_error_n) {
+        let relative = file.relative_rms_error.map_or_else(String::new, |part| {
+            format!(" ({} of the rms force)", percent(part))
+        });
+        sheet.line(
+            "error",
+            &format!("rms {}{relative}, worst {}", force(rms), force(worst)),
+        );
+    }
+}
+
+/// How many points there are, how high, and what was left out.
+fn points(report: &LambdaReport) -> String {
+    let points = &report.points.summary;
+    let outside = if points.outside > 0 {
+        let outside = count(points.outside, "grid point");
+        format!("; {outside} without surface left out")
+    } else {
+        String::new()
+    };
+    format!(
+        "{}, {} to {} high{outside}",
+        points.points,
+        mm(points.min_height_m),
+        mm(points.max_height_m)
+    )
+}

@@ -1,0 +1,73 @@
+//! `man`: the manual pages.
+
+use std::io;
+
+use clap::{Args, CommandFactory};
+use clap_mangen::Man as Page;
+
+use super::folder;
+use crate::bundle::atomic::{FileSet, Overwrite};
+use crate::cli::args::{Arguments, Writing};
+use crate::cli::failure::Failure;
+use crate::cli::help::{Codes, page};
+use crate::cli::printer::{Printer, say};
+use crate::cli::quantity::count;
+use crate::cli::values::FileArgument;
+use crate::job::JobError;
+
+/// Print the manual page, or write all of them
+///
+/// Prints the main manual page; with --out writes it and one page a command into a folder, as
+/// fluxform.1, fluxform-calibrate.1 and so on.
+#[derive(Debug, Args)]
+#[command(after_help = page(Codes::Pages, &[
+    ("fluxform man > fluxform.1", "the main page; read it with: man ./fluxform.1"),
+    ("fluxform man --out man1", "all pages"),
+]))]
+pub struct Man {
+    /// Folder to write all pages to
+    #[arg(long, value_name = "DIR")]
+    out: Option<FileArgument>,
+    #[command(flatten)]
+    writing: Writing,
+}
+
+impl Man {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
+        let mut command = Arguments::command();
+        command.build();
+        let Some(out) = &self.out else {
+            let main = rendered(&command)?;
+            return printer.data(|out| out.write_all(&main));
+        };
+        let folder = folder(out)?;
+        let overwrite = Overwrite::new(self.writing.force, folder.join("fluxform.1"), &[]);
+        let mut set = FileSet::begin(&folder, overwrite).map_err(JobError::from)?;
+        let mut pages = vec![("fluxform.1".to_owned(), rendered(&command)?)];
+        for sub in command.get_subcommands() {
+            // Building gave it the name of its page.
+            let name = sub.get_display_name().unwrap_or(sub.get_name());
+            pages.push((format!("{name}.1"), rendered(sub)?));
+        }
+        for (name, text) in &pages {
+            set.write(name, |out| out.write_all(text))
+                .map_err(JobError::from)?;
+        }
+        set.commit().map_err(JobError::from)?;
+        if !printer.quiet() {
+            let pages = count(pages.len(), "page");
+            say(&format!("{}: {pages}", folder.display()));
+        }
+        Ok(())
+    }
+}
+
+fn rendered(command: &clap::Command) -> io::Result<Vec<u8>> {
+    let mut text = Vec::new();
+    Page::new(command.clone()).render(&mut text)?;
+    Ok(text)
+}

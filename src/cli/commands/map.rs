@@ -1,0 +1,168 @@
+//! `map`: gradient maps over the workspace.
+
+use std::path::Path;
+
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+
+use super::{accuracy_check, begin, describe, folder};
+use crate::bundle::manifest::MapSidecar;
+use crate::bundle::write::MapFormats;
+use crate::cli::args::{Tolerance, Writing};
+use crate::cli::documents;
+use crate::cli::failure::Failure;
+use crate::cli::help::{Codes, page};
+use crate::cli::layout::Sheet;
+use crate::cli::printer::{Place, Printer};
+use crate::cli::quantity::{bytes, count, error};
+use crate::cli::values::FileArgument;
+use crate::design::Need;
+use crate::job::map::{MapReport, MapRequest, run};
+use crate::map::Components;
+
+/// Tabulate the gradient maps of every coil over the workspace
+///
+/// Tabulates the gradient of every coil's field per ampere over the workspace grid of the design
+/// and writes map.npz (NumPy, little-endian doubles with axes and units) and map.json beside it;
+/// on request also map.csv and map.vti, which ParaView opens. The error at the nodes and the error
+/// of interpolating between them are told.
+#[derive(Debug, Args)]
+#[command(after_help = page(Codes::Writing, &[
+    ("fluxform map designs/seed_air.toml --out maps", "dBz/dz of all coils"),
+    ("fluxform map designs/seed_air.toml --out maps_vtk --vtk --tolerance 1e-6",
+     "for ParaView, less accurate"),
+    ("fluxform tabulate designs/seed_air.toml --out maps --format json --force",
+     "replace what is there, and tell a program"),
+]))]
+pub struct Map {
+    /// Design file (TOML), `-` for standard input
+    #[arg(value_name = "DESIGN")]
+    design: FileArgument,
+    /// What the map holds
+    #[arg(long, value_enum, default_value_t = Wanted::Gz)]
+    components: Wanted,
+    /// Folder of the files [default: results/<design>]
+    #[arg(long, value_name = "DIR")]
+    out: Option<FileArgument>,
+    /// Write map.csv too
+    #[arg(long)]
+    csv: bool,
+    /// Write map.vti too
+    #[arg(long)]
+    vtk: bool,
+    #[command(flatten)]
+    writing: Writing,
+    #[command(flatten)]
+    tolerance: Tolerance,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Wanted {
+    /// dBz/dz
+    Gz,
+    /// dBz/dz and the gradient tensor
+    Gradient,
+    /// dBz/dz, the gradient tensor and the field
+    All,
+}
+
+#[derive(Serialize)]
+struct MapSummary<'a> {
+    #[serde(flatten)]
+    sidecar: &'a MapSidecar,
+    folder: String,
+    point_coils: usize,
+    distinct_radii: usize,
+    tabulated: bool,
+}
+
+impl Map {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
+        let out = self.out.as_ref().map(folder).transpose()?;
+        let document = documents::design(&self.design, Need::MAP, printer)?;
+        let design = &document.design;
+        let request = MapRequest {
+            components: match self.components {
+                Wanted::Gz => Components::Gz,
+                Wanted::Gradient => Components::Gradient,
+                Wanted::All => Components::All,
+            },
+            tolerance: self.tolerance.tolerance,
+            out: out.unwrap_or_else(|| Path::new("results").join(&design.name)),
+            formats: MapFormats {
+                csv: self.csv,
+                vtk: self.vtk,
+            },
+            force: self.writing.force,
+        };
+        let bar = begin(printer);
+        let report = run(design, vec![document.input], &request, &bar)?;
+        drop(bar);
+        let json = MapSummary {
+            sidecar: &report.sidecar,
+            folder: report.folder.display().to_string(),
+            point_coils: report.point_coils,
+            distinct_radii: report.distinct_radii,
+            tabulated: report.tabulated,
+        };
+        let json = printer.with_warnings(&json);
+        printer.summary(Place::Output, &json, || summary(&report))?;
+        accuracy_check(report.accuracy_reached)
+    }
+}
+
+fn summary(report: &MapReport) -> String {
+    let map = &report.sidecar.map;
+    let mut sheet = Sheet::new(&format!(
+        "{}: maps of {} over the workspace",
+        report.sidecar.design,
+        count(map.coil.len(), "coil")
+    ));
+    let components = match map.components.as_str() {
+        "gz" => "dBz/dz",
+        "gradient" => "dBz/dz and the gradient tensor",
+        _ => "dBz/dz, the gradient tensor and the field",
+    };
+    sheet.line("components", &format!("{components}, per ampere"));
+    let axes = [("x", &map.x_m), ("y", &map.y_m), ("z", &map.z_m)];
+    let axes = axes.map(|(name, axis)| describe::axis(name, axis));
+    sheet.line("grid", &axes.join(", "));
+    sheet.line(
+        "work",
+        &format!(
+            "{} of nodes and coils, {} from the axes{}",
+            count(report.point_coils, "pair"),
+            count(report.distinct_radii, "distinct distance"),
+            if report.tabulated {
+                ", through radial tables"
+            } else {
+                ""
+            }
+        ),
+    );
+    let stages = report.sidecar.accuracy.iter();
+    let stages = stages.map(|(name, stage)| (name.as_str(), stage));
+    sheet.line("accuracy", &describe::accuracy(stages));
+    sheet.line(
+        "between",
+        &format!(
+            "nodes {} of the largest |dBz/dz| at that height, with {}",
+            error(map.interpolation.largest_error),
+            map.interpolation.name
+        ),
+    );
+    let files = report.sidecar.files.iter();
+    let files: Vec<String> = files
+        .map(|file| format!("{} ({})", file.path, bytes(file.bytes)))
+        .chain(std::iter::once("map.json".to_owned()))
+        .collect();
+    sheet.line(
+        "written to",
+        &format!("{}: {}", report.folder.display(), files.join(", ")),
+    );
+    sheet.finish()
+}

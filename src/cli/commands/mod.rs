@@ -1,0 +1,52 @@
+//! One file a command: its arguments, and its summary for people.
+
+pub mod calibrate;
+pub mod completions;
+pub mod discretize;
+pub mod evaluate;
+pub mod lambda;
+pub mod man;
+pub mod map;
+pub mod probe;
+pub mod verify;
+
+mod describe;
+
+use std::path::PathBuf;
+
+use super::bar::Bar;
+use super::failure::Failure;
+use super::interrupt;
+use super::printer::Printer;
+use super::values::FileArgument;
+
+/// A job begins: Ctrl-C asks it to stop, a bar shows how far it is.
+fn begin(printer: &Printer) -> Bar {
+    interrupt::working();
+    Bar::new(printer.draws())
+}
+
+/// The folder that `file` names.
+///
+/// # Errors
+/// Wrong usage: a folder cannot be a standard stream.
+fn folder(file: &FileArgument) -> Result<PathBuf, Failure> {
+    match file {
+        FileArgument::Path(path) => Ok(path.clone()),
+        FileArgument::Standard => Err(Failure::Usage(
+            "--out names a folder here, which standard output (-) is not; name a folder".to_owned(),
+        )),
+    }
+}
+
+/// The result is there, but its accuracy is not as wished.
+fn accuracy_check(reached: bool) -> Result<(), Failure> {
+    if reached {
+        return Ok(());
+    }
+    Err(Failure::Unmet(
+        "the accuracy asked for with --tolerance was not reached: see the accuracy that was; \
+         the result itself is given"
+            .to_owned(),
+    ))
+}

@@ -1,0 +1,170 @@
+//! `probe`: field and gradient at given points.
+
+use std::collections::BTreeMap;
+
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+
+use super::{accuracy_check, begin};
+use crate::accuracy::StageAccuracy;
+use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
+use crate::bundle::atomic::{self, Overwrite};
+use crate::bundle::read_table::read_columns;
+use crate::cli::args::{Tolerance, Writing};
+use crate::cli::documents;
+use crate::cli::failure::Failure;
+use crate::cli::help::{Codes, page};
+use crate::cli::layout::Sheet;
+use crate::cli::printer::{Place, Printer};
+use crate::cli::quantity::{count, error};
+use crate::cli::values::FileArgument;
+use crate::design::Need;
+use crate::job::JobError;
+use crate::job::probe::{ProbeComponents, ProbeTable, probe};
+
+/// Field and gradient per ampere of every coil at given points
+///
+/// Computes the field and its gradient per ampere of every coil at the points of a CSV table with
+/// the columns x_m, y_m and z_m, exactly and not through a map. The result is a CSV table with one
+/// row a point and coil, in the points' order and coil by coil within a point. With --format json
+/// the same columns come as arrays of one JSON object.
+#[derive(Debug, Args)]
+#[command(after_help = page(Codes::Reading, &[
+    ("printf 'x_m,y_m,z_m\\n0.007,0.013,0.03\\n' | fluxform probe designs/seed_air.toml -",
+     "one point from standard input"),
+    ("printf 'x_m,y_m,z_m\\n0,0,0.03\\n' | fluxform probe designs/seed_air.toml - --components gz -q",
+     "only dBz/dz, and no summary"),
+]))]
+pub struct Probe {
+    /// Design file (TOML), `-` for standard input
+    #[arg(value_name = "DESIGN")]
+    design: FileArgument,
+    /// CSV table with the columns x_m, y_m, z_m; `-` for standard input
+    #[arg(value_name = "POINTS")]
+    points: FileArgument,
+    /// What is told at each point
+    #[arg(long, value_enum, default_value_t = Components::All)]
+    components: Components,
+    /// Where the table goes; `-` is standard output
+    #[arg(long, value_name = "FILE", default_value = "-")]
+    out: FileArgument,
+    #[command(flatten)]
+    writing: Writing,
+    #[command(flatten)]
+    tolerance: Tolerance,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Components {
+    /// Field and gradient: twelve columns
+    All,
+    /// Gradient: nine columns
+    Gradient,
+    /// dBz/dz alone
+    Gz,
+}
+
+/// What is told about the table; with its columns where standard output holds nothing else.
+#[derive(Serialize)]
+struct ProbeSummary {
+    schema_version: &'static str,
+    fluxform_version: &'static str,
+    design: String,
+    inputs: Vec<Input>,
+    points: usize,
+    rows: usize,
+    accuracy: BTreeMap<&'static str, StageAccuracy>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    columns: Option<BTreeMap<String, Vec<f64>>>,
+}
+
+impl Probe {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
+        documents::one_standard_input([&self.design, &self.points])?;
+        let document = documents::design(&self.design, Need::PROBE, printer)?;
+        let (points_m, points_input) = documents::points(&self.points)?;
+        let points = points_m.len();
+        let components = match self.components {
+            Components::All => ProbeComponents::All,
+            Components::Gradient => ProbeComponents::Gradient,
+            Components::Gz => ProbeComponents::Gz,
+        };
+        let inputs = vec![document.input, points_input];
+        let overwrite = Overwrite::new(self.writing.force, self.out.as_given(), &inputs);
+        if let FileArgument::Path(path) = &self.out {
+            overwrite.check(path).map_err(JobError::from)?;
+        }
+        let bar = begin(printer);
+        let design = &document.design;
+        let table = probe(design, points_m, components, self.tolerance.tolerance, &bar)?;
+        drop(bar);
+        let mut summary = ProbeSummary {
+            schema_version: SCHEMA_VERSION,
+            fluxform_version: FLUXFORM_VERSION,
+            design: design.name.clone(),
+            inputs,
+            points,
+            rows: table.rows(),
+            accuracy: BTreeMap::from([("field", accuracy(&table))]),
+            columns: None,
+        };
+        let place = match &self.out {
+            FileArgument::Standard if printer.json() => {
+                summary.columns = Some(columns(&table)?);
+                Place::Output
+            }
+            FileArgument::Standard => {
+                printer.data(|out| table.write(out))?;
+                Place::Error
+            }
+            FileArgument::Path(path) => {
+                atomic::write(path, &overwrite, |out| table.write(out)).map_err(JobError::from)?;
+                Place::Output
+            }
+        };
+        let json = printer.with_warnings(&summary);
+        printer.summary(place, &json, || self.told(&summary))?;
+        accuracy_check(table.accuracy_reached)
+    }
+
+    fn told(&self, summary: &ProbeSummary) -> String {
+        let mut sheet = Sheet::new(&format!(
+            "{}: {} at {}",
+            summary.design,
+            count(summary.rows, "row"),
+            count(summary.points, "point")
+        ));
+        let stage = &summary.accuracy["field"];
+        sheet.line(
+            "accuracy",
+            &format!("{} of {}", error(stage.estimate), stage.relative_to),
+        );
+        if let FileArgument::Path(path) = &self.out {
+            sheet.line("written to", &path.display().to_string());
+        }
+        sheet.finish()
+    }
+}
+
+fn accuracy(table: &ProbeTable) -> StageAccuracy {
+    StageAccuracy {
+        estimate: table.relative_error,
+        relative_to: "|grad B| at the point".to_owned(),
+        method: "a-priori quadrature bound; rounding sampled against 40-digit values".to_owned(),
+    }
+}
+
+/// The table's columns by their names: its CSV read back, every number to the last bit.
+fn columns(table: &ProbeTable) -> Result<BTreeMap<String, Vec<f64>>, Failure> {
+    let mut csv = Vec::new();
+    table.write(&mut csv)?;
+    let header = csv.split(|b| *b == b'\n').next().unwrap_or_default();
+    let header = String::from_utf8_lossy(header).into_owned();
+    let names: Vec<&str> = header.split(',').collect();
+    let values = read_columns("the table", csv.as_slice(), &names)?;
+    Ok(names.into_iter().map(str::to_owned).zip(values).collect())
+}

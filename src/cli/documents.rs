@@ -1,0 +1,237 @@
+//! From the files on the command line to validated documents; every fault in one run.
+
+use std::io::{self, Read};
+use std::path::Path;
+
+use super::args::SurfaceFlags;
+use super::failure::Failure;
+use super::printer::Printer;
+use super::values::{FileArgument, GridSize};
+use crate::bundle::artefact::Input;
+use crate::bundle::read_table::read_columns;
+use crate::design::{Design, Faults, InvalidDocument, Need, source};
+use crate::job::calibrate::ShapeSource;
+use crate::shape::document::{Placement, RawSurface, RawSurfaceError, ShapeDocument};
+
+/// Samples of a surface that says nothing of its grid.
+const SAMPLES: GridSize = GridSize([61, 61]);
+
+/// A design, its text, and its entry among the inputs.
+#[derive(Debug)]
+pub struct DesignDocument {
+    /// Validated.
+    pub design: Design,
+    /// As read.
+    pub text: String,
+    /// Path as given, digest.
+    pub input: Input,
+}
+
+/// The design that a command needs.
+///
+/// # Errors
+/// Every fault in it.
+pub fn design(
+    file: &FileArgument,
+    need: Need,
+    printer: &Printer,
+) -> Result<DesignDocument, Failure> {
+    let (document, warnings) =
+        read_design(file, need).map_err(|fault| Failure::Documents(vec![fault]))?;
+    printer.document_warnings(&warnings);
+    Ok(document)
+}
+
+/// A design and shapes.
+///
+/// # Errors
+/// Every fault in any of them; wrong usage, such as a surface without a unit.
+pub fn design_and_shapes(
+    design_file: &FileArgument,
+    need: Need,
+    shape_files: &[FileArgument],
+    flags: &SurfaceFlags,
+    printer: &Printer,
+) -> Result<(DesignDocument, Vec<ShapeSource>), Failure> {
+    one_standard_input(std::iter::once(design_file).chain(shape_files))?;
+    let design = read_design(design_file, need);
+    let shapes = read_shapes(shape_files, flags);
+    match (design, shapes) {
+        (Ok((design, warnings)), Ok(shapes)) => {
+            printer.document_warnings(&warnings);
+            Ok((design, told(shapes, printer)))
+        }
+        (Err(fault), Err(Failure::Documents(mut faults))) => {
+            faults.insert(0, fault);
+            Err(Failure::Documents(faults))
+        }
+        // Wrong usage first: it is the quickest to mend.
+        (_, Err(failure)) => Err(failure),
+        (Err(fault), Ok(_)) => Err(Failure::Documents(vec![fault])),
+    }
+}
+
+/// Shapes alone.
+///
+/// # Errors
+/// As [`design_and_shapes`].
+pub fn shapes(
+    files: &[FileArgument],
+    flags: &SurfaceFlags,
+    printer: &Printer,
+) -> Result<Vec<ShapeSource>, Failure> {
+    Ok(told(read_shapes(files, flags)?, printer))
+}
+
+/// The points of a CSV table with columns `x_m,y_m,z_m`, and its entry among the inputs.
+///
+/// # Errors
+/// Every cell that is no number; a file that cannot be read.
+pub fn points(file: &FileArgument) -> Result<(Vec<[f64; 3]>, Input), Failure> {
+    let path = file.as_given();
+    let name = path.display().to_string();
+    let cannot = |error: io::Error| Failure::Input(format!("{name}: cannot be read: {error}"));
+    let bytes = if file.is_standard() {
+        let mut bytes = Vec::new();
+        io::stdin().lock().read_to_end(&mut bytes).map(|_| bytes)
+    } else if path.is_dir() {
+        let what = "expected a CSV table with columns x_m,y_m,z_m, found a directory";
+        return Err(Failure::Input(format!("{name}: {what}")));
+    } else {
+        std::fs::read(path)
+    }
+    .map_err(cannot)?;
+    let columns = read_columns(&name, bytes.as_slice(), &["x_m", "y_m", "z_m"])?;
+    let points = (0..columns[0].len())
+        .map(|row| [columns[0][row], columns[1][row], columns[2][row]])
+        .collect();
+    Ok((points, Input::of_bytes(name, &bytes)))
+}
+
+/// At most one of `files` may be standard input.
+///
+/// # Errors
+/// Wrong usage.
+pub fn one_standard_input<'a>(
+    files: impl IntoIterator<Item = &'a FileArgument>,
+) -> Result<(), Failure> {
+    let standard = files.into_iter().filter(|file| file.is_standard()).count();
+    if standard > 1 {
+        let message = format!("standard input (-) was named {standard} times: it is read once");
+        return Err(Failure::Usage(message));
+    }
+    Ok(())
+}
+
+fn text_of(file: &FileArgument) -> Result<String, InvalidDocument> {
+    match file {
+        FileArgument::Standard => source::text_from(io::stdin().lock(), Path::new("-")),
+        FileArgument::Path(path) => source::text_of(path),
+    }
+}
+
+fn input_of(path: &Path, text: &str) -> Input {
+    Input::of_bytes(path.display().to_string(), text.as_bytes())
+}
+
+fn read_design(
+    file: &FileArgument,
+    need: Need,
+) -> Result<(DesignDocument, Faults), InvalidDocument> {
+    let text = text_of(file)?;
+    let path = file.as_given();
+    let (design, warnings) = Design::from_toml(&text, path, need)?;
+    let input = input_of(path, &text);
+    let document = DesignDocument {
+        design,
+        text,
+        input,
+    };
+    Ok((document, warnings))
+}
+
+/// A shape, and the warnings where a document describes it.
+type ReadShape = (ShapeSource, Option<Faults>);
+
+fn told(shapes: Vec<ReadShape>, printer: &Printer) -> Vec<ShapeSource> {
+    let tell = |(shape, warnings): ReadShape| {
+        if let Some(warnings) = warnings {
+            printer.document_warnings(&warnings);
+        }
+        shape
+    };
+    shapes.into_iter().map(tell).collect()
+}
+
+/// Whether a shape is described by a document (as opposed to a surface given directly).
+fn is_document(file: &FileArgument) -> bool {
+    file.is_standard()
+        || file
+            .as_given()
+            .extension()
+            .is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
+}
+
+fn read_shapes(files: &[FileArgument], flags: &SurfaceFlags) -> Result<Vec<ReadShape>, Failure> {
+    let given = flags.given();
+    if !given.is_empty() && files.iter().all(is_document) {
+        return Err(Failure::Usage(format!(
+            "{} cannot be used with a shape file ({}): the file itself says it, with unit, \
+             translate_mm, rotate_deg and [points]; the flags are for a surface given directly",
+            given.join(" "),
+            files[0].as_given().display()
+        )));
+    }
+    let mut shapes = Vec::new();
+    let mut refused = Vec::new();
+    for file in files {
+        if !is_document(file) {
+            shapes.push((raw_surface(file.as_given(), flags)?, None));
+            continue;
+        }
+        let read = text_of(file).and_then(|text| {
+            let path = file.as_given();
+            let (document, warnings) = ShapeDocument::from_toml(&text, path)?;
+            let input = Some(input_of(path, &text));
+            Ok((ShapeSource { document, input }, Some(warnings)))
+        });
+        match read {
+            Ok(shape) => shapes.push(shape),
+            Err(fault) => refused.push(fault),
+        }
+    }
+    if refused.is_empty() {
+        Ok(shapes)
+    } else {
+        Err(Failure::Documents(refused))
+    }
+}
+
+fn raw_surface(path: &Path, flags: &SurfaceFlags) -> Result<ShapeSource, Failure> {
+    if path.is_dir() {
+        return Err(Failure::Input(format!(
+            "{}: expected a shape file (.toml) or a surface, found a directory; name the file \
+             inside it",
+            path.display()
+        )));
+    }
+    let surface = RawSurface {
+        path: path.to_owned(),
+        unit_m: flags.unit,
+        placement: Placement {
+            translate_m: flags.translate.map_or([0.0; 3], |t| t.0),
+            rotate_deg: flags.rotate.map_or([0.0; 3], |r| r.0),
+        },
+        samples: flags.grid.unwrap_or(SAMPLES).0,
+        x_m: flags.x.map(|ends| ends.0),
+        y_m: flags.y.map(|ends| ends.0),
+    };
+    let document = ShapeDocument::raw(&surface).map_err(|error| match error {
+        RawSurfaceError::UnknownFormat { .. } => Failure::Input(error.to_string()),
+        _ => Failure::Usage(error.to_string()),
+    })?;
+    Ok(ShapeSource {
+        document,
+        input: None,
+    })
+}

@@ -1,0 +1,70 @@
+//! The end of every help page: exit codes and examples.
+
+/// The exit codes that a command can end with besides 0 and 2.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Codes {
+    /// Prints only.
+    None,
+    /// Reads documents, prints.
+    Reading,
+    /// Reads documents, writes files.
+    Writing,
+    /// Verifies.
+    Verifying,
+    /// Writes files that need no input.
+    Pages,
+}
+
+impl Codes {
+    fn lines(self) -> &'static str {
+        match self {
+            Self::None => "",
+            Self::Reading => {
+                "\n  3    a bad input file: every fault is told with its place\n  \
+                 4    a result, but not as wished (see above)\n  \
+                 130  interrupted"
+            }
+            Self::Writing => {
+                "\n  3    a bad input file: every fault is told with its place\n  \
+                 4    a result, but not as wished; or an output that exists or cannot be written\n  \
+                 130  interrupted; what was finished is kept"
+            }
+            Self::Verifying => "\n  3    not a bundle\n  5    a check failed\n  130  interrupted",
+            Self::Pages => "\n  4    an output exists or cannot be written",
+        }
+    }
+}
+
+/// Exit codes and examples: what is typed, and what for.
+#[must_use]
+pub fn page(codes: Codes, examples: &[(&str, &str)]) -> String {
+    let mut text = format!(
+        "Exit codes:\n  0    done\n  2    wrong usage{}\n\nExamples:",
+        codes.lines()
+    );
+    for (command, purpose) in examples {
+        text.push_str(&format!("\n  # {purpose}\n  {command}"));
+    }
+    text
+}
+
+/// The end of the main page.
+#[must_use]
+pub fn main() -> String {
+    "Exit codes:
+  0    done; also when the reader of a pipe goes away
+  2    wrong usage; also a raw surface without --unit
+  3    a bad input file: every fault is told with its place
+  4    a result, but not as wished; or an output that exists or cannot be written
+  5    a verification failed
+  130  interrupted; what was finished is kept
+
+Examples:
+  # the main job: maps, points, force constants and currents of two objects
+  fluxform calibrate designs/seed_air.toml shapes/flat.toml shapes/wedge.toml
+  # what one coil is worth
+  fluxform evaluate designs/seed_air.toml
+  # more about a command
+  fluxform lambda --help"
+        .to_owned()
+}

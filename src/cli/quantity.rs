@@ -1,0 +1,168 @@
+//! Numbers for people: nice units, few digits.
+
+/// Significant digits on screen.
+const DIGITS: i32 = 5;
+
+const PREFIXES: [(i32, &str); 8] = [
+    (-12, "p"),
+    (-9, "n"),
+    (-6, "u"),
+    (-3, "m"),
+    (0, ""),
+    (3, "k"),
+    (6, "M"),
+    (9, "G"),
+];
+
+/// `value` rounded to `digits` significant digits, without trailing zeros.
+#[must_use]
+pub fn number_to(value: f64, digits: i32) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    // Through the decimal digits: they tell the exponent after rounding.
+    let rounded = format!("{:.*e}", (digits - 1).max(0) as usize, value);
+    let exponent: i32 = rounded
+        .split_once('e')
+        .and_then(|(_, exponent)| exponent.parse().ok())
+        .unwrap_or(0);
+    if !(-4..digits.max(6)).contains(&exponent) {
+        let (mantissa, _) = rounded.split_once('e').unwrap_or((&rounded, ""));
+        return format!("{}e{exponent}", trimmed(mantissa));
+    }
+    let decimals = (digits - 1 - exponent).max(0) as usize;
+    trimmed(&format!("{value:.decimals$}")).to_owned()
+}
+
+fn trimmed(text: &str) -> &str {
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.')
+    } else {
+        text
+    }
+}
+
+/// `value` with five significant digits.
+#[must_use]
+pub fn number(value: f64) -> String {
+    number_to(value, DIGITS)
+}
+
+/// `value` in `unit` with the prefix that suits it: 0.0145019 H is `14.502 mH`.
+#[must_use]
+pub fn si(value: f64, unit: &str) -> String {
+    si_to(value, unit, DIGITS)
+}
+
+fn si_to(value: f64, unit: &str, digits: i32) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value} {unit}");
+    }
+    let rounded: f64 = format!("{:.*e}", (digits - 1) as usize, value)
+        .parse()
+        .unwrap_or(value);
+    let exponent = rounded.abs().log10().floor() as i32;
+    let (power, prefix) = PREFIXES
+        .into_iter()
+        .rev()
+        .find(|(power, _)| *power <= exponent)
+        .unwrap_or(PREFIXES[0]);
+    format!(
+        "{} {prefix}{unit}",
+        number_to(value / 10f64.powi(power), digits)
+    )
+}
+
+/// A force: millinewtons below one newton.
+#[must_use]
+pub fn force(force_n: f64) -> String {
+    if force_n.abs() < 1.0 {
+        format!("{} mN", number(force_n * 1000.0))
+    } else {
+        format!("{} N", number(force_n))
+    }
+}
+
+/// A length's error: one or two digits.
+#[must_use]
+pub fn length_error(error_m: f64) -> String {
+    si_to(error_m, "m", 2)
+}
+
+/// A length in millimetres.
+#[must_use]
+pub fn mm(length_m: f64) -> String {
+    format!("{} mm", number(length_m * 1000.0))
+}
+
+/// A mass, grams below one kilogram.
+#[must_use]
+pub fn mass(mass_kg: f64) -> String {
+    si(mass_kg * 1000.0, "g")
+}
+
+/// A part of one in percent.
+#[must_use]
+pub fn percent(part: f64) -> String {
+    format!("{} %", number_to(part * 100.0, 3))
+}
+
+/// An estimated error: one or two digits and an exponent.
+#[must_use]
+pub fn error(estimate: f64) -> String {
+    let text = format!("{estimate:.1e}");
+    text.replace(".0e", "e")
+}
+
+/// A file size.
+#[must_use]
+pub fn bytes(bytes: u64) -> String {
+    si_to(bytes as f64, "B", 3)
+}
+
+/// `n` things: `1 coil`, `9 coils`.
+#[must_use]
+pub fn count(n: usize, thing: &str) -> String {
+    if n == 1 {
+        format!("1 {thing}")
+    } else {
+        format!("{n} {thing}s")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_prefix_suits_the_rounded_number() {
+        assert_eq!(si(0.014_501_926, "H"), "14.502 mH");
+        assert_eq!(si(6.0753, "ohm"), "6.0753 ohm");
+        assert_eq!(si(-0.0997, "N"), "-99.7 mN");
+        assert_eq!(si(0.999_999_7, "N"), "1 N");
+        assert_eq!(si(999.9, "V"), "999.9 V");
+        assert_eq!(si(2.0, "A"), "2 A");
+        assert_eq!(si(0.0, "A"), "0 A");
+        assert_eq!(si(3.1e-16, "T"), "0.00031 pT");
+    }
+
+    #[test]
+    fn five_digits_without_idle_zeros() {
+        assert_eq!(number(1429.0), "1429");
+        assert_eq!(number(1_428.571_43), "1428.6");
+        assert_eq!(number(123_456.7), "123457");
+        assert_eq!(number(0.000_123_456), "0.00012346");
+        assert_eq!(number(1.234_567e-7), "1.2346e-7");
+        assert_eq!(number(1e12), "1e12");
+        assert_eq!(mm(0.0383), "38.3 mm");
+        assert_eq!(percent(0.123_456), "12.3 %");
+        assert_eq!(error(1e-12), "1e-12");
+        assert_eq!(error(3.26e-10), "3.3e-10");
+        assert_eq!(mass(0.4763), "476.3 g");
+        assert_eq!(bytes(2_345_678), "2.35 MB");
+        assert_eq!(force(0.000_641_3), "0.6413 mN");
+        assert_eq!(force(-1.3), "-1.3 N");
+        assert_eq!(length_error(2.980_2e-9), "3 nm");
+        assert_eq!(count(1, "coil"), "1 coil");
+    }
+}

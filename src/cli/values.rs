@@ -1,0 +1,223 @@
+//! Argument values, validated where they are read.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use crate::shape::document::parse_unit;
+use crate::units::m_from_mm;
+
+/// Most threads that may be asked for.
+const THREADS_MAX: usize = 1024;
+/// Tolerances that make sense, relative.
+const TOLERANCE: std::ops::RangeInclusive<f64> = 1e-15..=1e-1;
+
+/// A file, or `-` for standard input or output.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum FileArgument {
+    /// `-`.
+    Standard,
+    /// Anything else.
+    Path(PathBuf),
+}
+
+impl From<OsString> for FileArgument {
+    fn from(text: OsString) -> Self {
+        if text == "-" {
+            Self::Standard
+        } else {
+            Self::Path(text.into())
+        }
+    }
+}
+
+impl FileArgument {
+    /// The path as given, `-` for a standard stream.
+    #[must_use]
+    pub fn as_given(&self) -> &Path {
+        match self {
+            Self::Standard => Path::new("-"),
+            Self::Path(path) => path,
+        }
+    }
+
+    /// True for `-`.
+    #[must_use]
+    pub fn is_standard(&self) -> bool {
+        *self == Self::Standard
+    }
+}
+
+/// Samples along x and y.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GridSize(pub [usize; 2]);
+
+/// Lengths, m, of three comma-separated millimetres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Translation(pub [f64; 3]);
+
+/// Three angles, degrees.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rotation(pub [f64; 3]);
+
+/// Two ends, m, of two comma-separated millimetres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ends(pub [f64; 2]);
+
+fn number(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err(format!("{text:?} is not a finite number")),
+    }
+}
+
+fn numbers<const N: usize>(text: &str, expected: &str) -> Result<[f64; N], String> {
+    let parts: Vec<&str> = text.split(',').collect();
+    if parts.len() != N {
+        return Err(format!("expected {expected}, found {} values", parts.len()));
+    }
+    let mut values = [0.0; N];
+    for (value, part) in values.iter_mut().zip(parts) {
+        *value = number(part).map_err(|fault| format!("expected {expected}: {fault}"))?;
+    }
+    Ok(values)
+}
+
+/// `X,Y,Z` in millimetres.
+pub fn translation(text: &str) -> Result<Translation, String> {
+    numbers(text, "X,Y,Z in millimetres, like 0,0,30").map(|v| Translation(v.map(m_from_mm)))
+}
+
+/// `X,Y,Z` in degrees.
+pub fn rotation(text: &str) -> Result<Rotation, String> {
+    numbers(text, "X,Y,Z in degrees, like 0,0,45").map(Rotation)
+}
+
+/// `FROM,TO` in millimetres.
+pub fn ends(text: &str) -> Result<Ends, String> {
+    let [from, to] = numbers(text, "FROM,TO in millimetres, like -50,50")?;
+    if from <= to {
+        Ok(Ends([from, to].map(m_from_mm)))
+    } else {
+        Err(format!(
+            "runs backwards, from {from} to {to} mm: write the smaller end first"
+        ))
+    }
+}
+
+/// `NxM`: samples along x and y.
+pub fn grid_size(text: &str) -> Result<GridSize, String> {
+    let sizes: Option<Vec<usize>> = text
+        .split(['x', 'X'])
+        .map(|part| part.parse().ok().filter(|n| *n > 0))
+        .collect();
+    match sizes.as_deref() {
+        Some([x, y]) => Ok(GridSize([*x, *y])),
+        _ => Err("expected NxM, two whole numbers from 1, like 61x61".to_owned()),
+    }
+}
+
+/// A unit of length; its metres.
+pub fn unit(text: &str) -> Result<f64, String> {
+    parse_unit(text).ok_or_else(|| "expected mm, cm, m, in, ft or um".to_owned())
+}
+
+/// A relative tolerance.
+pub fn tolerance(text: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    if TOLERANCE.contains(&value) {
+        Ok(value)
+    } else {
+        Err(format!(
+            "{value:e} is no tolerance: expected {:e} to {:e}, the allowed error relative to the \
+             field gradient |grad B|, like 1e-9",
+            TOLERANCE.start(),
+            TOLERANCE.end()
+        ))
+    }
+}
+
+/// A weight greater than zero.
+pub fn jnd(text: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    if value > 0.0 {
+        Ok(value)
+    } else {
+        Err(format!(
+            "{value} is no just-noticeable difference: expected a part of the force greater than \
+             0, like 0.07"
+        ))
+    }
+}
+
+/// A force constant, N/m.
+pub fn force_constant(text: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    if value >= 0.0 {
+        Ok(value)
+    } else {
+        Err(format!(
+            "{value} is no force constant: expected N/m, 0 or more, like 2.0"
+        ))
+    }
+}
+
+/// A length in millimetres, 0 or more; m.
+pub fn length(text: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    if value >= 0.0 {
+        Ok(m_from_mm(value))
+    } else {
+        Err(format!(
+            "{value} is no distance: expected millimetres, 0 or more"
+        ))
+    }
+}
+
+/// A number of threads.
+pub fn threads(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(n) if (1..=THREADS_MAX).contains(&n) => Ok(n),
+        _ => Err(format!("expected a whole number from 1 to {THREADS_MAX}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_taken_in_metres_and_degrees() {
+        assert_eq!(
+            translation("-7,1.3,30").unwrap(),
+            Translation([-0.007, 0.0013, 0.03])
+        );
+        assert_eq!(
+            rotation("0, -12.5,90").unwrap(),
+            Rotation([0.0, -12.5, 90.0])
+        );
+        assert_eq!(ends("-50,13").unwrap(), Ends([-0.05, 0.013]));
+        assert_eq!(grid_size("61x7").unwrap(), GridSize([61, 7]));
+        assert_eq!(unit("in").unwrap(), 0.0254);
+    }
+
+    #[test]
+    fn what_is_no_value_is_refused_with_what_was_expected() {
+        assert!(translation("1,2").unwrap_err().contains("found 2 values"));
+        assert!(
+            translation("1,2,nan")
+                .unwrap_err()
+                .contains("\"nan\" is not a finite number")
+        );
+        assert!(ends("3,-3").unwrap_err().contains("smaller end first"));
+        for bad in ["61", "0x3", "3x-3", "1x2x3", "axb", ""] {
+            assert!(grid_size(bad).is_err(), "{bad}");
+        }
+        for bad in ["0", "-1e-9", "0.5", "1e-16", "inf", "few"] {
+            assert!(tolerance(bad).is_err(), "{bad}");
+        }
+        assert_eq!(tolerance("1e-15").unwrap(), 1e-15);
+        assert!(threads("0").is_err() && threads("-1").is_err() && threads("2").is_ok());
+        assert!(jnd("0").is_err() && force_constant("-2").is_err() && length("-1").is_err());
+        assert!(unit("inches").is_err());
+    }
+}

@@ -1,0 +1,15 @@
+//! The binary as its users meet it: exit codes, streams, files, messages.
+#![cfg(unix)] // signals, /dev/full, links
+
+#[path = "cli/files.rs"]
+mod files;
+#[path = "cli/help.rs"]
+mod help;
+#[path = "cli/interrupt.rs"]
+mod interrupt;
+#[path = "cli/messages.rs"]
+mod messages;
+#[path = "cli/streams.rs"]
+mod streams;
+#[path = "cli/support.rs"]
+mod support;

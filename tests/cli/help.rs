@@ -1,0 +1,91 @@
+//! Help pages, their examples, completions and manual pages.
+
+use crate::support::Place;
+
+const COMMANDS: [&str; 9] = [
+    "evaluate",
+    "probe",
+    "map",
+    "discretize",
+    "lambda",
+    "calibrate",
+    "verify",
+    "completions",
+    "man",
+];
+
+#[test]
+fn every_command_explains_itself() {
+    let place = Place::new();
+    let main = place.run(&["--help"]).ends(0).out;
+    for command in COMMANDS {
+        assert!(main.contains(&format!("\n  {command} ")), "{main}");
+        let page = place.run(&[command, "--help"]).ends(0).out;
+        for part in ["Usage:", "Exit codes:", "Examples:", "--quiet"] {
+            assert!(page.contains(part), "{command}: {part}");
+        }
+        assert!(page.contains(&format!("fluxform {command} ")), "{page}");
+        let about = page.split("\n\n").nth(1).unwrap();
+        assert!(about.len() > 100, "{command} has no paragraph: {about}");
+        assert!(page.lines().filter(|l| l.starts_with("  # ")).count() >= 2);
+    }
+    let version = place.run(&["--version"]).ends(0).out;
+    assert_eq!(
+        version.trim(),
+        concat!("fluxform ", env!("CARGO_PKG_VERSION"))
+    );
+}
+
+#[test]
+fn every_example_works() {
+    let place = Place::new();
+    for command in COMMANDS {
+        let page = place.run(&[command, "--help"]).ends(0).out;
+        let examples = page.split("Examples:").nth(1).unwrap();
+        let lines: Vec<&str> = examples
+            .lines()
+            .map(str::trim)
+            .filter(|line| line.contains("fluxform ") && !line.starts_with('#'))
+            .collect();
+        assert!(lines.len() >= 2, "{examples}");
+        for line in lines {
+            assert!(line.len() < 98, "wrapped on a usual terminal: {line}");
+            let ran = place.shell(line);
+            assert_eq!(ran.code, Some(0), "{line}: {ran:#?}");
+        }
+    }
+}
+
+#[test]
+fn no_command_is_wrong_usage_and_so_is_an_unknown_one() {
+    let place = Place::new();
+    place.run(&[]).ends(2).says(&["Usage:"]);
+    place.run(&["evaluat", "x"]).ends(2).says(&["evaluate"]);
+    let told = place.run(&["map", "--format", "json"]).ends(2).error();
+    assert_eq!(told["error"]["code"], 2);
+}
+
+#[test]
+fn completions_and_manual_pages() {
+    let place = Place::new();
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let script = place.run(&["completions", shell]).ends(0).out;
+        assert!(script.contains("calibrate"), "{shell}");
+    }
+    place.run(&["completions", "csh"]).ends(2);
+    assert!(place.run(&["man"]).ends(0).out.contains(".TH fluxform 1"));
+    place.run(&["man", "--out", "man1"]).ends(0);
+    for command in COMMANDS {
+        let page = place.read(&format!("man1/fluxform-{command}.1"));
+        let page = String::from_utf8(page).unwrap();
+        assert!(
+            page.contains(&format!(".TH fluxform-{command} 1")),
+            "{page}"
+        );
+    }
+    place
+        .run(&["man", "--out", "man1"])
+        .ends(4)
+        .says(&["exists", "--force"]);
+    place.run(&["man", "--out", "man1", "--force"]).ends(0);
+}
