@@ -20,8 +20,7 @@ use crate::cli::quantity::{bytes, count, error, length_error, number, percent};
 use crate::cli::values::{self, FileArgument};
 use crate::design::{Design, Need};
 use crate::job::calibrate::{
-    BundleReport, CalibrateOptions, CalibrateReport, DEFAULT_REACH_M, DesignSource, points_outside,
-    run,
+    BundleReport, CalibrateOptions, CalibrateReport, DEFAULT_REACH_M, DesignSource, run,
 };
 
 /// The main job: maps, points, force constant and currents, one bundle a shape
@@ -155,14 +154,6 @@ fn warn(report: &CalibrateReport, printer: &Printer) {
         for warning in &bundle.lambda.warnings {
             printer.warning(&format!("{shape}: {warning}"));
         }
-        let outside = points_outside(&bundle.manifest, &bundle.lambda);
-        if outside > 0 {
-            printer.warning(&format!(
-                "{shape}: {outside} of {} points lie outside the design's [workspace], where a \
-                 runtime has no map and the force is zero; enlarge the workspace or move the object",
-                bundle.lambda.file.points
-            ));
-        }
     }
 }
 
@@ -290,7 +281,7 @@ fn shapes_table(report: &CalibrateReport) -> String {
     table(&sides, &rows)
 }
 
-/// How many coils carry all they may.
+/// How many coils carry all they may, and whether their sum does.
 fn at_limit(bundle: &BundleReport) -> Option<String> {
     let currents = bundle.lambda.file.currents_a.as_ref()?;
     let limits = &bundle.manifest.limits;
@@ -299,7 +290,12 @@ fn at_limit(bundle: &BundleReport) -> Option<String> {
         .zip(limits.current_min_a.iter().zip(&limits.current_max_a))
         .filter(|(current, (min, max))| current >= max || (current <= min && **min < 0.0))
         .count();
-    Some(count(bound, "coil"))
+    // Rounding may leave the sum a few bits below its limit.
+    let sum: f64 = currents.iter().sum();
+    let total = limits.total_current_max_a;
+    let full = total.is_some_and(|total| sum >= total * (1.0 - 1e-12));
+    let coils = count(bound, "coil");
+    Some(if full { format!("{coils}, sum") } else { coils })
 }
 
 /// The largest error of each stage over all shapes.
