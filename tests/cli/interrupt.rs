@@ -41,6 +41,8 @@ fn a_long_job_stops_and_leaves_nothing_half_written() {
             "0,0,30",
             "--grid",
             "2000x2000",
+            "--format",
+            "json",
         ])
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
@@ -58,6 +60,7 @@ fn a_long_job_stops_and_leaves_nothing_half_written() {
     let (code, said) = wait(child);
     assert_eq!(code, Some(130), "{said}");
     assert!(said.contains("interrupted"), "{said}");
+    assert!(said.contains("\"code\": 130"), "{said}");
     let left: Vec<_> = place
         .path("results/seed_air")
         .read_dir()

@@ -200,6 +200,17 @@ fn what_cannot_be_read_is_named() {
 }
 
 #[test]
+fn points_without_a_map_are_warned_of() {
+    let place = Place::new();
+    let small = "name = \"far\"\nprimitive = \"flat\"\ntranslate_mm = [30, 0, 0]\n";
+    place.write("far.toml", &format!("{small}[points]\nx_mm = [0, 80, 9]\n"));
+    place
+        .run(&["calibrate", SEED, "far.toml"])
+        .ends(0)
+        .says(&["warning: far: ", "outside the design's workspace"]);
+}
+
+#[test]
 fn steel_is_refused_not_ignored() {
     let place = Place::new();
     for args in [

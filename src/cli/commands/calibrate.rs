@@ -281,7 +281,7 @@ fn shapes_table(report: &CalibrateReport) -> String {
     table(&sides, &rows)
 }
 
-/// How many coils carry all they may.
+/// How many coils carry all they may, and whether their sum does.
 fn at_limit(bundle: &BundleReport) -> Option<String> {
     let currents = bundle.lambda.file.currents_a.as_ref()?;
     let limits = &bundle.manifest.limits;
@@ -290,7 +290,12 @@ fn at_limit(bundle: &BundleReport) -> Option<String> {
         .zip(limits.current_min_a.iter().zip(&limits.current_max_a))
         .filter(|(current, (min, max))| current >= max || (current <= min && **min < 0.0))
         .count();
-    Some(count(bound, "coil"))
+    // Rounding may leave the sum a few bits below its limit.
+    let sum: f64 = currents.iter().sum();
+    let total = limits.total_current_max_a;
+    let full = total.is_some_and(|total| sum >= total * (1.0 - 1e-12));
+    let coils = count(bound, "coil");
+    Some(if full { format!("{coils}, sum") } else { coils })
 }
 
 /// The largest error of each stage over all shapes.

@@ -3,7 +3,7 @@
 use crate::accuracy::StageAccuracy;
 use crate::bundle::manifest::{AxisSummary, LeftOut};
 use crate::cli::layout::grid;
-use crate::cli::quantity::{count, error, number, percent};
+use crate::cli::quantity::{count, error, length_error, mm, number, percent};
 use crate::design::Design;
 
 /// Coils beyond this many are told in sum, not one by one.
@@ -19,6 +19,9 @@ pub fn accuracy<'a>(stages: impl IntoIterator<Item = (&'a str, &'a StageAccuracy
         .into_iter()
         .map(|(name, stage)| {
             let (name, to) = (name.replace('_', " "), &stage.relative_to);
+            if to == "1 m" {
+                return format!("{name} {}", length_error(stage.estimate));
+            }
             format!("{name} {} of {to}", error(stage.estimate))
         })
         .collect();
@@ -81,6 +84,15 @@ pub fn axis(name: &str, axis: &AxisSummary) -> String {
         mm(axis.to_m),
         count(axis.samples, "sample")
     )
+}
+
+/// The heights that points have.
+pub fn heights(min_m: f64, max_m: f64) -> String {
+    if min_m == max_m {
+        mm(min_m)
+    } else {
+        format!("{} to {}", mm(min_m), mm(max_m))
+    }
 }
 
 /// What was left out and what it costs, one line each.

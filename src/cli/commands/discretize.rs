@@ -94,9 +94,8 @@ impl Discretize {
         sheet.line(
             "heights",
             &format!(
-                "{} to {}, rms {}",
-                mm(summary.min_height_m),
-                mm(summary.max_height_m),
+                "{}, rms {}",
+                describe::heights(summary.min_height_m, summary.max_height_m),
                 mm(summary.rms_height_m)
             ),
         );

@@ -238,9 +238,8 @@ fn points(report: &LambdaReport) -> String {
         String::new()
     };
     format!(
-        "{}, {} to {} high{outside}",
+        "{}, {} high{outside}",
         points.points,
-        mm(points.min_height_m),
-        mm(points.max_height_m)
+        describe::heights(points.min_height_m, points.max_height_m)
     )
 }

@@ -1,0 +1,125 @@
+//! The pages that describe the house, held against it.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::source::{files, read, sources};
+
+const MOST_LINES: usize = 800;
+const MOST_LINES_OF_MAIN: usize = 30;
+const ENTRY: &str = "- `";
+
+/// The entries of a page's section: lines "- `name` - what it is".
+fn entries(page: &str, section: &str) -> BTreeMap<String, String> {
+    let mut found = BTreeMap::new();
+    let mut inside = false;
+    for line in read(page).lines() {
+        if let Some(title) = line.strip_prefix("## ") {
+            inside = title == section;
+        } else if let (true, Some(entry)) = (inside, line.strip_prefix(ENTRY)) {
+            let (name, what) = entry
+                .split_once("` - ")
+                .unwrap_or_else(|| panic!("{page}: not \"- `name` - what it is\": {line}"));
+            assert!(what.len() > 10, "{page}: {name} needs a line of its own");
+            let before = found.insert(name.to_owned(), what.to_owned());
+            assert!(before.is_none(), "{page}: {name} stands there twice");
+        }
+    }
+    assert!(!found.is_empty(), "{page} has no entries under {section:?}");
+    found
+}
+
+fn names(entries: &BTreeMap<String, String>) -> BTreeSet<String> {
+    entries.keys().cloned().collect()
+}
+
+fn assert_same(what: &str, page: &BTreeSet<String>, tree: &BTreeSet<String>) {
+    let missing: Vec<_> = tree.difference(page).collect();
+    let gone: Vec<_> = page.difference(tree).collect();
+    assert!(
+        missing.is_empty() && gone.is_empty(),
+        "src/DESIGN.md, {what}: without a line: {missing:?}; line without a thing: {gone:?}"
+    );
+}
+
+#[test]
+fn the_design_page_has_one_line_for_every_file() {
+    let tree = files()
+        .iter()
+        .filter_map(|path| path.strip_prefix("src/"))
+        .filter(|path| *path != "DESIGN.md")
+        .map(str::to_owned)
+        .collect();
+    assert_same("files", &names(&entries("src/DESIGN.md", "Files")), &tree);
+}
+
+#[test]
+fn the_design_page_has_one_line_for_every_dependency() {
+    let manifest: toml::Table = read("Cargo.toml").parse().unwrap();
+    let tree = ["dependencies", "dev-dependencies"]
+        .iter()
+        .flat_map(|kind| manifest[*kind].as_table().unwrap().keys().cloned())
+        .collect();
+    let page = names(&entries("src/DESIGN.md", "Dependencies"));
+    assert_same("dependencies", &page, &tree);
+}
+
+#[test]
+fn no_file_holds_two_ideas() {
+    for path in files() {
+        let is_code = [".rs", ".py", ".c", ".h", ".sh"]
+            .iter()
+            .any(|ending| path.ends_with(ending));
+        if is_code {
+            let lines = read(&path).lines().count();
+            assert!(lines <= MOST_LINES, "{path} has {lines} lines: split it");
+        }
+    }
+    let main = read("src/main.rs").lines().count();
+    assert!(main < MOST_LINES_OF_MAIN, "main.rs has {main} lines");
+}
+
+/// Places that exist on one machine only.
+#[test]
+fn no_file_names_a_place_of_one_machine() {
+    let places =
+        ["/wo#rk/", "/tm#p/", "/ro#ot/", "/ho#me/", "/Us#ers/"].map(|p| p.replace('#', ""));
+    for path in files() {
+        let bytes = std::fs::read(crate::source::root().join(&path)).unwrap();
+        let Ok(text) = String::from_utf8(bytes) else {
+            continue; // no text file
+        };
+        for place in &places {
+            let line = text.lines().position(|line| line.contains(place.as_str()));
+            assert!(line.is_none(), "{path}:{} names {place}", line.unwrap() + 1);
+        }
+    }
+}
+
+/// What a reader is told to type is what the gate runs.
+#[test]
+fn the_readme_and_the_gate_run_the_same_tests() {
+    let command = "cargo test --locked";
+    assert!(read(".ci/run").lines().any(|line| line == command));
+    assert!(read("README.md").lines().any(|line| line == command));
+}
+
+/// A dependency that nothing names only costs time.
+#[test]
+fn every_dependency_is_used() {
+    let sources = sources();
+    let manifest: toml::Table = read("Cargo.toml").parse().unwrap();
+    for name in manifest["dependencies"].as_table().unwrap().keys() {
+        let in_code = name.replace('-', "_");
+        let used = sources.iter().any(|s| s.tokens.contains(&in_code));
+        assert!(
+            used,
+            "nothing under src names {name}: delete the dependency"
+        );
+    }
+}
+
+#[test]
+fn the_source_is_found_at_all() {
+    assert!(sources().iter().any(|s| s.path == "numerics/gauss.rs"));
+    assert!(files().contains(&".ci/run".to_owned()));
+}

@@ -1,0 +1,81 @@
+//! The README shows what the program really says.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::Command;
+
+fn readme() -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
+    std::fs::read_to_string(path).unwrap()
+}
+
+fn says(arguments: &[&str]) -> String {
+    let run = Command::new(env!("CARGO_BIN_EXE_fluxform"))
+        .args(arguments)
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output()
+        .unwrap();
+    let errors = String::from_utf8(run.stderr).unwrap();
+    assert!(run.status.success(), "{arguments:?}: {errors}");
+    String::from_utf8(run.stdout).unwrap()
+}
+
+/// Without the line that names the folder.
+fn but_the_folder(text: &str) -> Vec<&str> {
+    text.lines()
+        .map(str::trim_end)
+        .filter(|line| !line.trim_start().starts_with("written to"))
+        .collect()
+}
+
+#[test]
+fn the_first_command_prints_what_the_readme_shows() {
+    let readme = readme();
+    let mark = "cargo run --release --locked -- ";
+    let (_, rest) = readme.split_once(mark).unwrap();
+    let (command, rest) = rest.split_once('\n').unwrap();
+    let (_, rest) = rest.split_once("```text\n").unwrap();
+    let (shown, _) = rest.split_once("```").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let mut arguments: Vec<&str> = command.split(' ').collect();
+    assert_eq!(arguments[0], "calibrate");
+    arguments.extend(["--out", folder.path().to_str().unwrap()]);
+    let printed = says(&arguments);
+    assert_eq!(but_the_folder(shown), but_the_folder(&printed));
+}
+
+#[test]
+fn the_table_of_numbers_is_what_the_commands_print() {
+    let readme = readme();
+    let coil = says(&["evaluate", "designs/seed_air.toml"]);
+    let flat = says(&["lambda", "designs/seed_air.toml", "shapes/flat.toml"]);
+    for (printed, value) in [
+        (&coil, "6.0753 ohm"),
+        (&coil, "99.709 mN"),
+        (&coil, "11.935 ms"),
+        (&flat, "0.62098 N/m"),
+    ] {
+        assert!(printed.contains(value), "no {value} in:\n{printed}");
+        assert!(readme.contains(value), "no {value} in README.md");
+    }
+}
+
+#[test]
+fn every_command_has_a_row_and_every_row_is_a_command() {
+    let readme = readme();
+    let rows: BTreeSet<&str> = readme
+        .lines()
+        .filter_map(|line| line.strip_prefix("| `"))
+        .filter_map(|row| row.split(['`', ' ']).next())
+        .collect();
+    let help = says(&["--help"]);
+    let commands: BTreeSet<&str> = help
+        .lines()
+        .skip_while(|line| *line != "Commands:")
+        .skip(1)
+        .take_while(|line| !line.is_empty())
+        .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next())
+        .collect();
+    assert_eq!(rows, commands, "README.md's table and `fluxform --help`");
+}
