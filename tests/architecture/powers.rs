@@ -1,6 +1,6 @@
 //! Who may write files, print, end the process, read clocks or be unsafe.
 //!
-//! The lints in `Cargo.toml` and `clippy.toml` forbid these things; here it is held that the
+//! The lints in `Cargo.toml` and `.clippy.toml` forbid these things; here it is held that the
 //! lints are in force, and that only the files named below are exempt. A name that needs no
 //! exemption any more fails too, so the lists only shrink.
 
@@ -171,7 +171,7 @@ fn the_lints_are_in_force() {
     ] {
         assert_eq!(level("clippy", lint), "deny", "{lint}");
     }
-    let clippy: toml::Table = read("clippy.toml").parse().unwrap();
+    let clippy: toml::Table = read(".clippy.toml").parse().unwrap();
     let refused: Vec<&str> = clippy["disallowed-methods"]
         .as_array()
         .unwrap()
@@ -192,7 +192,7 @@ fn the_lints_are_in_force() {
         "std::time::Instant::now",
         "std::time::SystemTime::now",
     ] {
-        assert!(refused.contains(&method), "clippy.toml lost {method}");
+        assert!(refused.contains(&method), ".clippy.toml lost {method}");
     }
     assert!(
         read(".ci/run").contains("cargo clippy --all-targets --locked -- -D warnings"),

@@ -23,9 +23,12 @@ pub(super) fn temporary_file(folder: &Path) -> io::Result<NamedTempFile> {
 pub(super) fn temporary_folder(folder: &Path) -> io::Result<(TempDir, Option<File>)> {
     loop {
         let draft = builder(0o777).tempdir_in(folder)?;
-        // Folders cannot be opened, hence not locked, on every system.
-        let Ok(handle) = File::open(draft.path()) else {
-            return Ok((draft, None));
+        let handle = match File::open(draft.path()) {
+            Ok(handle) => handle,
+            // A cleaner came before the lock.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+            // Folders cannot be opened, hence not locked, on every system.
+            Err(_) => return Ok((draft, None)),
         };
         if claim(&handle, draft.path()) {
             return Ok((draft, Some(handle)));

@@ -1,7 +1,7 @@
 //! Time of the computations alone on a design, then of the stages of `map` with its writing.
 //!
 //! ```text
-//! cargo run --release --locked --example time_core -- [DESIGN] [THREADS]
+//! cargo bench --locked --bench time_core -- [DESIGN] [THREADS]
 //! ```
 //!
 //! Default: `designs/seed_air.toml`, one thread. The least and the median of the repeats stand
