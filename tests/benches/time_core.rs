@@ -164,7 +164,9 @@ fn measure(design: &Design) -> Result<(), Failure> {
 }
 
 fn main() -> Result<(), Failure> {
-    let mut arguments = std::env::args().skip(1);
+    let mut arguments = std::env::args()
+        .skip(1)
+        .filter(|argument| argument != "--bench");
     let path = arguments
         .next()
         .unwrap_or_else(|| "designs/seed_air.toml".to_owned());
