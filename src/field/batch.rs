@@ -80,7 +80,7 @@ impl Winding {
     /// where the exact path must be used.
     ///
     /// The integrand is singular at a = r +- i u. With rho the Bernstein radius of that point
-    /// about the panel the n-node error is below [`BOUND_SCALE`] M rho^(-2n), relatively, where
+    /// about the panel the n-node error is below 16 M rho^(-2n), relatively, where
     /// M = (1 + h rho / (2 c))^2 is the growth of a^2 on that ellipse about the panel's
     /// centre c and half-width h.
     #[must_use]

@@ -85,7 +85,7 @@ pub struct TargetFacts {
 pub struct ArrayFacts {
     /// One entry a coil.
     pub coils: Vec<ArrayCoil>,
-    /// Inductance matrix, H: [i][j] is the flux through coil i for one ampere in coil j.
+    /// Inductance matrix, H: `[i][j]` is the flux through coil i for one ampere in coil j.
     pub mutual_inductance_h: Vec<Vec<f64>>,
 }
 
