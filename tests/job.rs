@@ -8,7 +8,8 @@ use fluxform::job::calibrate::{
     self, CalibrateOptions, CalibrateReport, DEFAULT_REACH_M, DesignSource, ShapeSource,
 };
 use fluxform::job::lambda::LambdaOptions;
-use fluxform::job::{JobError, evaluate, verify};
+use fluxform::job::probe::ProbeComponents;
+use fluxform::job::{JobError, evaluate, probe, verify};
 use fluxform::progress::Silent;
 use fluxform::shape::document::ShapeDocument;
 
@@ -196,5 +197,17 @@ fn points_outside_the_workspace_are_told() {
         verify::run(&report.bundles[0].folder, &Silent)
             .expect("opens")
             .passed
+    );
+}
+
+#[test]
+fn a_probe_on_an_edge_is_told_with_its_number_and_coil() {
+    let (design, _) = Design::read(&here("designs/seed_air.toml"), Need::PROBE).expect("valid");
+    let points = vec![[0.0, 0.0, 0.03], [0.012, 0.0, 0.0]];
+    let error = probe::probe(&design, points, ProbeComponents::All, None, &Silent)
+        .expect_err("an edge of coil 4");
+    assert!(
+        error.to_string().contains("point 2 ") && error.to_string().contains("coil 4"),
+        "{error}"
     );
 }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::scene::Scene;
 use super::{JobError, KERNEL_ERROR};
-use crate::bundle::table::{Column, write_columns};
+use crate::bundle::table::{FIELD_COLUMNS, GRADIENT_COLUMNS, write_samples};
 use crate::design::Design;
 use crate::field::frame::{CartesianField, to_cartesian};
 use crate::progress::Progress;
@@ -36,19 +36,6 @@ pub struct ProbeTable {
     pub accuracy_reached: bool,
 }
 
-const FIELD: [&str; 3] = ["bx_t_per_a", "by_t_per_a", "bz_t_per_a"];
-const GRADIENT: [&str; 9] = [
-    "dbx_dx_t_per_m_per_a",
-    "dbx_dy_t_per_m_per_a",
-    "dbx_dz_t_per_m_per_a",
-    "dby_dx_t_per_m_per_a",
-    "dby_dy_t_per_m_per_a",
-    "dby_dz_t_per_m_per_a",
-    "dbz_dx_t_per_m_per_a",
-    "dbz_dy_t_per_m_per_a",
-    "dbz_dz_t_per_m_per_a",
-];
-
 /// Points between two looks at the interruption flag.
 const PORTION: usize = 256;
 
@@ -67,13 +54,20 @@ pub fn probe(
     progress.begin("probe", points_m.len() as u64);
     let portions = points_m
         .par_chunks(PORTION)
-        .map(|points| {
+        .enumerate()
+        .map(|(portion, points)| {
             progress.check()?;
             let mut fields = Vec::with_capacity(points.len() * scene.coils.len());
-            for [x, y, z] in points {
+            for (row, [x, y, z]) in points.iter().enumerate() {
                 for coil in &scene.coils {
                     let (dx, dy) = (x - coil.axis_m[0], y - coil.axis_m[1]);
-                    let axial = scene.winding.field(dx.hypot(dy), *z)?;
+                    let axial = scene.winding.field(dx.hypot(dy), *z).map_err(|on_edge| {
+                        let number = portion * PORTION + row + 1;
+                        JobError::Input(format!(
+                            "point {number} ({x}, {y}, {z} m), coil {}: {on_edge}",
+                            coil.number
+                        ))
+                    })?;
                     fields.push(scaled(to_cartesian(&axial, dx, dy), coil.gain));
                 }
             }
@@ -114,44 +108,30 @@ impl ProbeTable {
     /// # Errors
     /// The writer's.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
-        let position = |axis: usize| -> Vec<f64> {
-            self.points_m
-                .iter()
-                .flat_map(|p| std::iter::repeat_n(p[axis], self.coils))
-                .collect()
-        };
-        let coil: Vec<i64> = (0..self.fields.len())
-            .map(|row| (row % self.coils) as i64)
-            .collect();
-        let mut names = Vec::new();
-        let mut values: Vec<Vec<f64>> = Vec::new();
-        let mut add = |name, value: &dyn Fn(&CartesianField) -> f64| {
-            names.push(name);
-            values.push(self.fields.iter().map(value).collect());
-        };
+        let mut columns: Vec<&str> = Vec::new();
         if self.components == ProbeComponents::All {
-            for (i, name) in FIELD.into_iter().enumerate() {
-                add(name, &|f| f.field_t_per_a[i]);
-            }
+            columns.extend(FIELD_COLUMNS);
         }
-        for (i, name) in GRADIENT.into_iter().enumerate() {
-            if self.components != ProbeComponents::Gz || i == 8 {
-                add(name, &|f| f.gradient_t_per_m_per_a[i / 3][i % 3]);
-            }
-        }
-        let (x, y, z) = (position(0), position(1), position(2));
-        let mut columns = vec![
-            ("x_m", Column::Number(&x)),
-            ("y_m", Column::Number(&y)),
-            ("z_m", Column::Number(&z)),
-            ("coil", Column::Index(&coil)),
-        ];
-        columns.extend(
-            names
-                .iter()
-                .zip(&values)
-                .map(|(n, v)| (*n, Column::Number(v))),
-        );
-        write_columns(out, &columns)
+        let first = if self.components == ProbeComponents::Gz {
+            8
+        } else {
+            0
+        };
+        columns.extend(&GRADIENT_COLUMNS[first..]);
+        let coils: Vec<i64> = (0..self.coils as i64).collect();
+        write_samples(
+            out,
+            &columns,
+            self.points_m.iter().copied(),
+            &coils,
+            |point, coil| {
+                let field = &self.fields[point * self.coils + coil];
+                let gradient = &field.gradient_t_per_m_per_a.as_flattened()[first..];
+                match self.components {
+                    ProbeComponents::All => [&field.field_t_per_a, gradient].concat(),
+                    ProbeComponents::Gradient | ProbeComponents::Gz => gradient.to_vec(),
+                }
+            },
+        )
     }
 }
