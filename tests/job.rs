@@ -211,3 +211,22 @@ fn a_probe_on_an_edge_is_told_with_its_number_and_coil() {
         "{error}"
     );
 }
+
+#[test]
+fn a_workspace_from_the_top_face_up_is_verified() {
+    let text = seed_air().replace("z_mm = [10.0, 80.0, 29]", "z_mm = [0.0, 70.0, 29]");
+    assert_ne!(text, seed_air());
+    let out = tempfile::tempdir().expect("a temporary folder");
+    // The wedge from 0 to 50 mm: its map begins on the windings' faces.
+    let shape = out.path().join("low.toml");
+    #[allow(clippy::disallowed_methods)]
+    std::fs::write(
+        &shape,
+        "name = \"low\"\nprimitive = \"wedge\"\nlow_mm = 3.0\nhigh_mm = 50.0\n",
+    )
+    .expect("writable");
+    let shape = shape.to_str().expect("a plain path");
+    let report = calibrate_text(&text, &[shape], out.path()).expect("calibrates");
+    let verified = verify::run(&report.bundles[0].folder, &Silent).expect("opens");
+    assert!(verified.passed, "{:?}", verified.checks);
+}

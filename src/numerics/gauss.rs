@@ -98,6 +98,8 @@ pub fn order_for(radius: f64, scale: f64, tolerance: f64) -> Option<usize> {
 
 /// Panels are halved until the singularities lie outside this Bernstein radius.
 const PANEL_RADIUS: f64 = 2.8;
+/// Closest singularity that panels are graded to, relative to the interval's farther end.
+const NEAREST: f64 = 1e-18;
 /// Constant of the bound `scale * radius^(-2 n)` for poles and logarithms.
 const PANEL_SCALE: f64 = 4.0 * PI;
 
