@@ -9,7 +9,7 @@ use fluxform::job::calibrate::{
 };
 use fluxform::job::lambda::LambdaOptions;
 use fluxform::job::probe::ProbeComponents;
-use fluxform::job::{JobError, evaluate, probe, verify};
+use fluxform::job::{JobError, evaluate, lambda, probe, verify};
 use fluxform::progress::Silent;
 use fluxform::shape::document::ShapeDocument;
 
@@ -74,10 +74,24 @@ fn the_seed_shapes_are_calibrated_and_verified() {
             assert!(check.passed, "{}: {check:?}", file.shape);
         }
     }
-    // Flat: the force of air coils is 7.8 times below the cored ones' 4.94 N/m.
-    let flat = &report.bundles[0].lambda.file;
-    assert_eq!(flat.points, 3721);
-    assert!((flat.relative_rms_error.expect("error") - 0.07).abs() < 0.05);
+    assert_eq!(report.bundles[0].lambda.file.points, 3721);
+}
+
+#[test]
+fn the_jnd_is_what_the_limits_may_add_to_the_error() {
+    let (design, _) = Design::read(&here("designs/seed_air.toml"), Need::LAMBDA).expect("valid");
+    let (document, _) = ShapeDocument::read(&here("shapes/flat.toml")).expect("a valid shape");
+    // Below lambda_linear the relative error is rho_0.
+    let at = 0.3;
+    let mut options = LambdaOptions::default();
+    options.settings.at_n_per_m = Some(at);
+    let report = lambda::run(&design, &document, Vec::new(), &options, &Silent).expect("solves");
+    let file = &report.file;
+    assert!(at < file.lambda_linear_n_per_m.expect("linear"));
+    let floor = file.at.as_ref().expect("asked for").rms_error_n / (at * 0.05);
+    let chosen = file.relative_rms_error.expect("a force constant");
+    let added = chosen * chosen - floor * floor;
+    assert!((added - 0.07 * 0.07).abs() < 1e-12, "{added:e}");
 }
 
 #[test]

@@ -255,7 +255,6 @@ impl Winding {
                                 u_m,
                             });
                             sums.b_z += weight * ring.b_z;
-                            sums.b_r_over_r += weight * ring.b_r_over_r;
                         }
                         Want::FieldAndGradient => {
                             let u_m = Dual::variable(u_m);
