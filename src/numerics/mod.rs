@@ -7,5 +7,8 @@ pub mod double_double;
 pub mod dual;
 pub mod gauss;
 pub mod lagrange;
+pub mod lagrange_basis;
+pub mod log_rule;
 pub mod qr;
 pub mod real;
+pub mod ring_functions;
