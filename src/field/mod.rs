@@ -5,4 +5,5 @@ pub mod dipole;
 pub mod frame;
 pub mod ring;
 pub mod steel;
+pub mod source;
 pub mod winding;
