@@ -251,8 +251,7 @@ pub(super) fn points(b: &[f64], h: &[f64]) -> Result<(), BhCurveError> {
                 relative_permeability,
             });
         }
-        // Not `>`: the quotient may have overflowed.
-        if !(relative_permeability <= LARGEST_RELATIVE_PERMEABILITY) {
+        if relative_permeability > LARGEST_RELATIVE_PERMEABILITY {
             return Err(BhCurveError::Unbounded {
                 row,
                 b_t,
