@@ -1,5 +1,7 @@
 //! Steel: cores that the coils magnetise.
 
+pub mod bh_check;
+pub mod bh_curve;
 pub mod cored_coil;
 pub mod double_layer;
 pub mod generatrix;
