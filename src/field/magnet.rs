@@ -219,17 +219,20 @@ impl MagnetRule {
     /// Torque about the centre, N m, from fields and gradients at the nodes:
     /// sum of m_k x B_k + r_k x F_k.
     #[must_use]
-    pub fn torque_n_m(&self, fields_t: &[[f64; 3]], gradients_t_per_m: &[[[f64; 3]; 3]]) -> [f64; 3] {
+    pub fn torque_n_m(
+        &self,
+        fields_t: &[[f64; 3]],
+        gradients_t_per_m: &[[[f64; 3]; 3]],
+    ) -> [f64; 3] {
         self.expect(fields_t.len());
         self.expect(gradients_t_per_m.len());
-        self.nodes
-            .iter()
-            .zip(fields_t)
-            .zip(gradients_t_per_m)
-            .fold([0.0; 3], |sum, ((node, field), gradient)| {
+        self.nodes.iter().zip(fields_t).zip(gradients_t_per_m).fold(
+            [0.0; 3],
+            |sum, ((node, field), gradient)| {
                 let lever = cross(node.offset_m, dipole::force_n(node.moment_a_m2, *gradient));
                 add(sum, add(cross(node.moment_a_m2, *field), lever))
-            })
+            },
+        )
     }
 
     /// Vertical force of an upright magnet, N, from dB_z/dz at the nodes.
@@ -239,7 +242,10 @@ impl MagnetRule {
     /// matters.
     #[must_use]
     pub fn vertical_force_n(&self, dbz_dz_t_per_m: &[f64]) -> f64 {
-        assert!(self.is_upright(), "a tilted magnet needs the gradient of B_z");
+        assert!(
+            self.is_upright(),
+            "a tilted magnet needs the gradient of B_z"
+        );
         self.expect(dbz_dz_t_per_m.len());
         self.nodes
             .iter()
@@ -266,13 +272,14 @@ impl MagnetRule {
     pub fn force_of_orders_differs_n(&self, gradients_t_per_m: &[[[f64; 3]; 3]]) -> Option<f64> {
         self.expect(gradients_t_per_m.len());
         let lower = self.lower.as_ref()?;
-        let coarse = lower
-            .iter()
-            .zip(gradients_t_per_m)
-            .fold([0.0; 3], |sum, (factor, gradient)| {
-                let share = self.moment_a_m2.map(|m| factor * m);
-                add(sum, dipole::force_n(share, *gradient))
-            });
+        let coarse =
+            lower
+                .iter()
+                .zip(gradients_t_per_m)
+                .fold([0.0; 3], |sum, (factor, gradient)| {
+                    let share = self.moment_a_m2.map(|m| factor * m);
+                    add(sum, dipole::force_n(share, *gradient))
+                });
         let fine = self.force_n(gradients_t_per_m);
         let difference: [f64; 3] = std::array::from_fn(|i| fine[i] - coarse[i]);
         Some(dot(difference, difference).sqrt())
