@@ -54,8 +54,16 @@ fn distance(a: Vector, b: Vector) -> f64 {
     norm(std::array::from_fn(|i| a[i] - b[i]))
 }
 
-/// Force and torque by a rule, per ampere.
+/// Force and torque by a rule in the seed coil's field, per ampere.
 fn by_rule(rule: &MagnetRule, centre: Vector) -> (Vector, Vector) {
+    by_rule_in(rule, centre, &at)
+}
+
+fn by_rule_in(
+    rule: &MagnetRule,
+    centre: Vector,
+    at: &dyn Fn(Vector) -> CartesianField,
+) -> (Vector, Vector) {
     let fields: Vec<_> = rule
         .nodes()
         .iter()
@@ -69,6 +77,15 @@ fn by_rule(rule: &MagnetRule, centre: Vector) -> (Vector, Vector) {
 /// Force and torque on a sheet of current M on the cylinder's side, per ampere of the coil:
 /// sums over azimuth and length that are converged to rounding.
 fn by_current_sheet(size: Cylinder, tilt_deg: [f64; 2], centre: Vector) -> (Vector, Vector) {
+    by_current_sheet_in(size, tilt_deg, centre, &at)
+}
+
+fn by_current_sheet_in(
+    size: Cylinder,
+    tilt_deg: [f64; 2],
+    centre: Vector,
+    at: &dyn Fn(Vector) -> CartesianField,
+) -> (Vector, Vector) {
     let m = tilted_moment_a_m2(-1.0, tilt_deg);
     let e1 = {
         let v = cross([0.3, 0.9, 0.1], m);
@@ -140,6 +157,60 @@ fn the_table_of_nodes_against_accuracy() {
             line += &format!("  {nodes:>4} ({:.0e}, {:.0e})", errors[0], errors[1]);
         }
         println!("{line}");
+    }
+}
+
+/// Field of a unit charge at the origin, in units in which its gradient at distance 1 is 2.
+fn charge(p: Vector) -> CartesianField {
+    let r = norm(p);
+    CartesianField {
+        field_t_per_a: p.map(|x| x / r.powi(3)),
+        gradient_t_per_m_per_a: std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                let delta = if i == j { 1.0 } else { 0.0 };
+                delta / r.powi(3) - 3.0 * p[i] * p[j] / r.powi(5)
+            })
+        }),
+    }
+}
+
+#[test]
+fn the_bound_holds_for_a_charge_at_the_nearest_place() {
+    // The worst that the rule promises to stand; relative to the charge's gradient 2 / distance^3.
+    println!("height (tolerance): nodes, factor, errors with the charge under axis, rim and aside");
+    for height in [0.0085, 0.01, 0.02, 0.03] {
+        for tolerance in [1e-3, 1e-6, 1e-9] {
+            for tilt in [[0.0; 2], TILT_DEG] {
+                let m = moment(SEED_MAGNET, tilt);
+                let sources = Sources::Below { height_m: height };
+                let Ok(rule) = MagnetRule::cylinder(SEED_MAGNET, m, sources, tolerance) else {
+                    assert!(height <= 0.01 && tolerance < 1e-5);
+                    continue;
+                };
+                let size = norm(m) * 2.0 / height.powi(3);
+                let mut line = String::new();
+                for aside in [0.0, 0.4, -0.4, 0.9] {
+                    let centre = [aside * height, 0.1 * height, height];
+                    let (force, torque) = by_rule_in(&rule, centre, &charge);
+                    let (exact_force, exact_torque) =
+                        by_current_sheet_in(SEED_MAGNET, tilt, centre, &charge);
+                    let error = distance(force, exact_force) / size;
+                    line += &format!(" {error:.0e}");
+                    assert!(
+                        error < tolerance,
+                        "{height} {tolerance:e} {tilt:?}: {error:e}"
+                    );
+                    // The field of the charge is height / 2 times its gradient.
+                    let turn = distance(torque, exact_torque) / (0.5 * size * height);
+                    assert!(
+                        turn < 3.0 * tolerance,
+                        "{height} {tolerance:e} {tilt:?}: {turn:e}"
+                    );
+                }
+                let (nodes, factor) = (rule.nodes().len(), rule.amplification());
+                println!("{height} ({tolerance:e}): {nodes:>4} {factor:.0}{line}");
+            }
+        }
     }
 }
 

@@ -19,9 +19,11 @@ use crate::numerics::gauss;
 /// Sources closer than R / 0.8 are left to the volume rule.
 const LARGEST_RATIO: f64 = 0.8;
 /// Most nodes worth trying.
-const MOST_NODES: usize = 19;
+const MOST_NODES: usize = 27;
+/// Part of the tolerance that rounding, amplified by the factors, may take.
+const ROUNDING_SHARE: f64 = 0.1;
 /// Largest sum of |w_k|: factors grow where nodes crowd at the centre.
-const LARGEST_AMPLIFICATION: f64 = 100.0;
+const LARGEST_AMPLIFICATION: f64 = 1e4;
 /// Spreads of the nodes that are tried, as parts of R.
 const SPREADS: usize = 40;
 /// The bound's series ends where its terms are below this.
@@ -29,6 +31,7 @@ const SERIES_END: f64 = 1e-20;
 
 /// A rule in units of R: distances from the centre (each but zero stands for a pair), factors.
 struct Candidate {
+    count: usize,
     distances: Vec<f64>,
     /// A pair's factors together.
     factors: Vec<f64>,
@@ -36,20 +39,20 @@ struct Candidate {
     amplification: f64,
 }
 
-/// The rule with the fewest nodes whose bound is at most `tolerance`; among those with equally
-/// many, the one that amplifies least.
+/// The rule that keeps `tolerance` with the least work: nodes times the digits that the caller
+/// must give each of them, tolerance over amplification.
 pub(super) fn rule(magnet: &Placed, distance_m: f64, tolerance: f64) -> Option<MagnetRule> {
     let ratio = magnet.size.reach_m() / distance_m;
     if ratio > LARGEST_RATIO {
         return None;
     }
     let moments = moments(magnet, ratio);
-    let candidate = (1..=MOST_NODES).find_map(|count| {
-        spreads()
-            .filter_map(|spread| candidate(count, spread, &moments, ratio))
-            .filter(|c| c.bound <= tolerance)
-            .min_by(|a, b| a.amplification.total_cmp(&b.amplification))
-    })?;
+    let rounding = |c: &Candidate| c.amplification * f64::EPSILON;
+    let candidate = (1..=MOST_NODES)
+        .flat_map(|count| spreads().map(move |spread| (count, spread)))
+        .filter_map(|(count, spread)| candidate(count, spread, &moments, ratio))
+        .filter(|c| c.bound <= tolerance && rounding(c) <= ROUNDING_SHARE * tolerance)
+        .min_by(|a, b| a.work(tolerance).total_cmp(&b.work(tolerance)))?;
     Some(candidate.placed(magnet, &moments))
 }
 
@@ -112,6 +115,7 @@ fn candidate(count: usize, spread: f64, moments: &[f64], ratio: f64) -> Option<C
         }
     }
     Some(Candidate {
+        count,
         distances,
         factors,
         bound,
@@ -142,6 +146,10 @@ fn matched(distances: &[f64], moments: &[f64]) -> Vec<f64> {
 }
 
 impl Candidate {
+    fn work(&self, tolerance: f64) -> f64 {
+        self.count as f64 * (self.amplification / tolerance).max(1.0).ln()
+    }
+
     fn placed(self, magnet: &Placed, moments: &[f64]) -> MagnetRule {
         // The lower rule goes without the innermost node or pair.
         let lower = (self.distances.len() > 1).then(|| {
