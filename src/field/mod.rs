@@ -5,6 +5,6 @@ pub mod dipole;
 pub mod frame;
 pub mod magnet;
 pub mod ring;
-pub mod steel;
 pub mod source;
+pub mod steel;
 pub mod winding;

@@ -6,6 +6,7 @@ pub mod dispatch;
 pub mod double_double;
 pub mod dual;
 pub mod gauss;
+pub mod gmres;
 pub mod lagrange;
 pub mod lagrange_basis;
 pub mod log_rule;

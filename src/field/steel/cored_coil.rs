@@ -18,6 +18,7 @@ use super::CoreShape;
 use super::double_layer::operators;
 use super::generatrix::{Face, Generatrix, Resolution};
 use super::magnetized::MagnetizedCore;
+use super::response::{mean, system};
 use crate::field::winding::{AxialField, OnEdge, Winding};
 use crate::numerics::gauss;
 use crate::numerics::lagrange_basis::Basis;
@@ -167,9 +168,7 @@ impl CoredCoil {
         relative_permeability: f64,
         resolution: &Resolution,
     ) -> Result<Self, OnEdge> {
-        let gap = (winding.inner_radius_m - shape.radius_m).max(0.0);
-        let tip = gap.max(resolution.tip.sqrt() * shape.radius_m.min(winding.length_m));
-        let outline = Generatrix::new(shape, &[(0.0, tip), (-winding.length_m, tip)], resolution);
+        let outline = Generatrix::of_coil(winding, shape, resolution);
         let excitation = Excitation::new(winding, &outline)?;
         let w = operators(&outline, 1, resolution.quadrature).remove(0);
         let density = solve(&outline, w, relative_permeability, &excitation.potential);
@@ -214,28 +213,13 @@ fn solve(
     relative_permeability: f64,
     potential: &DVector<f64>,
 ) -> DVector<f64> {
-    let inverse = 1.0 / relative_permeability;
     let share = (relative_permeability - 1.0) / relative_permeability;
-    let areas: Vec<f64> = outline.areas_m2().collect();
-    let total: f64 = areas.iter().sum();
-    let mean = |v: &DVector<f64>| v.iter().zip(&areas).map(|(v, a)| v * a).sum::<f64>() / total;
-    let count = areas.len();
-    let mut matrix = w;
-    for (column, area) in areas.iter().enumerate() {
-        for row in 0..count {
-            matrix[(row, column)] += area / total;
-        }
-    }
-    matrix *= share;
-    for i in 0..count {
-        matrix[(i, i)] += inverse;
-    }
-    let centred = potential.add_scalar(-mean(potential));
-    let mut density = matrix
+    let centred = potential.add_scalar(-mean(outline, potential.iter()));
+    let mut density = system(outline, w, relative_permeability, 0)
         .lu()
         .solve(&(centred * share))
         .expect("eigenvalues of W lie in [0, 1], so those of the matrix are positive");
-    let shift = mean(&density);
+    let shift = mean(outline, density.iter());
     density.add_scalar_mut(-shift);
     density
 }

@@ -1,11 +1,15 @@
 //! Steel: cores that the coils magnetise.
 
+pub mod array;
 pub mod bh_check;
 pub mod bh_curve;
 pub mod cored_coil;
+pub mod coupling;
 pub mod double_layer;
 pub mod generatrix;
 pub mod magnetized;
+pub mod response;
+pub mod symmetry;
 
 /// A cylindrical core on the coil's axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
