@@ -156,6 +156,36 @@ fn agrees_with_direct_integration() {
 }
 
 #[test]
+fn agrees_with_the_inverted_laplace_transform() {
+    let cases: Vec<serde_json::Value> =
+        serde_json::from_str(include_str!("oracles/transient.json")).unwrap();
+    assert_eq!(cases.len(), 7);
+    for case in cases {
+        let value = |key: &str| case[key].as_f64().unwrap();
+        let found = of(&VoltageStep {
+            resistance_ohm: value("resistance_ohm"),
+            air_inductance_h: value("air_inductance_h"),
+            inductance_h: value("inductance_h"),
+            relative_permeability: value("relative_permeability"),
+            conductivity_s_per_m: value("conductivity_s_per_m"),
+            core_radius_m: value("core_radius_m"),
+            core_energy_share: value("core_energy_share"),
+            air_share: value("air_share"),
+        });
+        for (found, wanted) in [
+            (found.current_95_s, value("current_95_s")),
+            (found.force_95_s, value("force_95_s")),
+        ] {
+            assert!(
+                (found / wanted - 1.0).abs() < 1e-12,
+                "{case}: {found} {wanted}: {:e}",
+                found / wanted - 1.0
+            );
+        }
+    }
+}
+
+#[test]
 fn the_seed_lags_as_finite_elements_say() {
     let winding = Winding {
         inner_radius_m: 0.012,

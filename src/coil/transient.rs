@@ -117,7 +117,8 @@ pub enum TransientError {
 impl VoltageStep {
     /// Times to 95 % of the final current and force.
     ///
-    /// The sum over the modes and the root are exact to 1e-9 of the time; the estimate is the
+    /// The sum over the modes and the root keep 1e-12 of the time (the tests hold them against the
+    /// inverted Laplace transform, `tests/oracles/transient.py`); the estimate is the
     /// model's: the largest change of the force's time under two other closures for N, all of the
     /// air coil's energy inside the core, and the static gain of the gradient instead of the
     /// inductance's.
