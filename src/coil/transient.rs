@@ -124,7 +124,7 @@ impl VoltageStep {
     /// inductance's.
     ///
     /// # Errors
-    /// An input outside its domain; a diffusion time over 1e10 times L_air / R.
+    /// An input outside its domain; a diffusion time over 2.6e10 times L_air / R.
     pub fn settling(&self) -> Result<Settling, TransientError> {
         self.validate()?;
         let tau_s = self.inductance_h / self.resistance_ohm;
