@@ -1,6 +1,7 @@
 //! Quadrature, dense algebra, interpolation, vector dispatch, grid axes: no physics.
 
 pub mod axis;
+pub mod bessel;
 pub mod chebyshev;
 pub mod dispatch;
 pub mod double_double;
