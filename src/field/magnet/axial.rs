@@ -98,8 +98,8 @@ fn candidate(count: usize, spread: f64, moments: &[f64], ratio: f64) -> Option<C
         .map(|x| spread * x)
         .collect();
     let factors = matched(&distances, moments);
-    let amplification = factors.iter().map(|w| w.abs()).sum();
-    if !(amplification <= LARGEST_AMPLIFICATION) {
+    let amplification: f64 = factors.iter().map(|w| w.abs()).sum();
+    if amplification > LARGEST_AMPLIFICATION {
         return None;
     }
     // |c_l| <= growth(l) / distance^l times the size of the field; rounding of the factors is seen
@@ -129,9 +129,9 @@ fn matched(distances: &[f64], moments: &[f64]) -> Vec<f64> {
     let squares: Vec<f64> = distances.iter().map(|s| s * s).collect();
     let last = squares.len() - 1;
     let mut w = moments[..=last].to_vec();
-    for k in 0..last {
+    for (k, square) in squares[..last].iter().enumerate() {
         for i in (k + 1..=last).rev() {
-            w[i] -= squares[k] * w[i - 1];
+            w[i] -= square * w[i - 1];
         }
     }
     for k in (0..last).rev() {
