@@ -442,3 +442,21 @@ fn what_cannot_be_done_is_refused() {
         Err(NoRule::NotANumber)
     );
 }
+
+#[test]
+fn on_the_axis_an_upright_magnet_feels_no_side_force_and_no_torque() {
+    let m = moment(SEED_MAGNET, [0.0; 2]);
+    for (height, tolerance) in [(0.03, 1e-9), (0.009, 1e-6)] {
+        let sources = Sources::Below { height_m: height };
+        let rule = MagnetRule::cylinder(SEED_MAGNET, m, sources, tolerance).expect("a gap");
+        let centre = [0.0, 0.0, height];
+        let (force, torque) = by_rule(&rule, centre);
+        let (force_size, torque_size) = sizes(m, centre);
+        assert!(force[0].hypot(force[1]) < 1e-14 * force_size, "{force:?}");
+        assert!(norm(torque) < 1e-14 * torque_size, "{torque:?}");
+        // Turned over, it is pushed the other way.
+        let over = MagnetRule::cylinder(SEED_MAGNET, m.map(|v| -v), sources, tolerance);
+        let pushed = by_rule(&over.expect("a gap"), centre).0;
+        assert!((pushed[2] + force[2]).abs() < 1e-14 * force_size);
+    }
+}
