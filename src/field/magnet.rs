@@ -9,8 +9,21 @@
 //!
 //! Outside its sources every component of grad B, and of n x B + r x dB/dn too, is harmonic. The
 //! cylinder's mean of a harmonic function depends on its values on the cylinder's axis alone, so
-//! few nodes, all on the axis, do ([`axial`]); they need a ball around the magnet free of sources.
-//! Closer than that the volume itself is integrated ([`solid`]).
+//! few nodes, all on the axis, do (`magnet::axial`); they need a ball around the magnet free of sources.
+//! Closer than that the volume itself is integrated (`magnet::solid`).
+//!
+//! Nodes for the seed's magnet, and the force's error in the field of the seed's winding 8 mm off
+//! its axis, from `cargo test --test magnet -- --nocapture the_table` (upright; tilted by 23 and
+//! -41 degrees needs as many on the axis, more in the volume):
+//!
+//! | height | bound 1e-3 | 1e-6 | 1e-9 | 1e-12 |
+//! |---|---|---|---|---|
+//! | 10 mm | 119 (5e-7) | 476 (6e-11) | 1114 (2e-14) | 2323 (3e-15) |
+//! | 20 mm | 5 (2e-5) | 11 (2e-9) | 19 (1e-13) | 663 (1e-15) |
+//! | 30 mm | 4 (1e-4) | 7 (5e-9) | 13 (3e-12) | 371 (2e-15) |
+//! | 50 mm | 2 (6e-5) | 5 (3e-7) | 9 (5e-11) | 13 (1e-14) |
+//!
+//! The bound is met within a factor of two by a point charge at the nearest place.
 
 mod axial;
 mod solid;

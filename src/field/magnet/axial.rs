@@ -98,8 +98,8 @@ fn candidate(count: usize, spread: f64, moments: &[f64], ratio: f64) -> Option<C
         .map(|x| spread * x)
         .collect();
     let factors = matched(&distances, moments);
-    let amplification = factors.iter().map(|w| w.abs()).sum();
-    if !(amplification <= LARGEST_AMPLIFICATION) {
+    let amplification: f64 = factors.iter().map(|w| w.abs()).sum();
+    if amplification > LARGEST_AMPLIFICATION {
         return None;
     }
     // |c_l| <= growth(l) / distance^l times the size of the field; rounding of the factors is seen
@@ -129,9 +129,9 @@ fn matched(distances: &[f64], moments: &[f64]) -> Vec<f64> {
     let squares: Vec<f64> = distances.iter().map(|s| s * s).collect();
     let last = squares.len() - 1;
     let mut w = moments[..=last].to_vec();
-    for k in 0..last {
+    for (k, square) in squares[..last].iter().enumerate() {
         for i in (k + 1..=last).rev() {
-            w[i] -= squares[k] * w[i - 1];
+            w[i] -= square * w[i - 1];
         }
     }
     for k in (0..last).rev() {
@@ -184,4 +184,59 @@ fn mirrored<'a>(distances: &'a [f64], factors: &'a [f64]) -> impl Iterator<Item 
         let share = if *s > 0.0 { 0.5 } else { 1.0 };
         (*s, share * w)
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::magnet::Cylinder;
+
+    fn magnet(diameter_m: f64, length_m: f64) -> Placed {
+        Placed {
+            size: Cylinder {
+                diameter_m,
+                length_m,
+            },
+            axis: [0.0, 0.0, 1.0],
+            moment_a_m2: [0.0, 0.0, -0.7],
+        }
+    }
+
+    #[test]
+    fn the_multipoles_are_means_of_harmonic_polynomials() {
+        for (a, h) in [(0.7, 1.3), (1.3, 0.01), (0.01, 1.7)] {
+            let magnet = magnet(2.0 * a, h);
+            let reach = magnet.size.reach_m();
+            let moments = moments(&magnet, 0.3);
+            // Means of z^2 - r^2/2 and z^4 - 3 z^2 r^2 + 3 r^4 / 8.
+            let second = h * h / 12.0 - a * a / 4.0;
+            let fourth = h.powi(4) / 80.0 - h * h * a * a / 8.0 + a.powi(4) / 8.0;
+            assert!((moments[0] - 1.0).abs() < 1e-15);
+            assert!(
+                (moments[1] - second / reach.powi(2)).abs() < 2e-16,
+                "{a} {h}"
+            );
+            assert!(
+                (moments[2] - fourth / reach.powi(4)).abs() < 5e-16,
+                "{a} {h}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_rule_is_exact_up_to_its_degree_and_no_further() {
+        let moments = moments(&magnet(1.4, 1.3), 0.3);
+        for count in 1..=11 {
+            let rule = candidate(count, 0.97, &moments, 0.3).expect("moderate factors");
+            let miss = |k: usize| {
+                let sum: f64 = mirrored(&rule.distances, &rule.factors)
+                    .map(|(s, w)| w * s.powi(2 * k as i32))
+                    .sum();
+                (sum - moments[k]).abs()
+            };
+            let exact = count.div_ceil(2);
+            assert!((0..exact).all(|k| miss(k) < 1e-15 * rule.amplification.max(4.0)));
+            assert!(miss(exact) > 1e-6, "{count}: {:e}", miss(exact));
+        }
+    }
 }
