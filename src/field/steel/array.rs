@@ -405,6 +405,31 @@ mod tests {
                 a.relative_residual,
                 t.elapsed()
             );
+            let t = std::time::Instant::now();
+            let src = super::super::sources::ArraySources::new(&a, 0.01, 0.01, tol);
+            let t1 = t.elapsed();
+            let json: serde_json::Value = serde_json::from_str(&std::fs::read_to_string("/work/shared/reference/fem_array_centre.json").unwrap()).unwrap();
+            let rows = json["rows"].as_array().unwrap();
+            let f = |r: &serde_json::Value, k: &str| r[k].as_f64().unwrap();
+            let pts: Vec<[f64;3]> = rows.iter().map(|r| [f(r,"x_mm")*1e-3, f(r,"y_mm")*1e-3, f(r,"z_mm")*1e-3]).collect();
+            let mut out = vec![0.0; 9*8*pts.len()];
+            src.sample(&pts, super::super::sources::Parts::All, &mut out);
+            let mut worst: f64 = 0.0; let mut worst_b: f64 = 0.0;
+            for (j,p) in pts.iter().enumerate() {
+                let air = winding.field(p[0].hypot(p[1]), p[2]).unwrap();
+                let gz = out[(4*8+4)*pts.len()+j] + air.dbz_dz;
+                let bz = out[(4*8+7)*pts.len()+j] + air.b_z;
+                let peak = if p[2] < 0.04 {0.4719665} else {0.1237929};
+                worst = worst.max((gz - f(&rows[j], "dBzdz_array_T_per_m_per_A")).abs()/peak);
+                worst_b = worst_b.max((bz - f(&rows[j], "Bz_array_T_per_A")).abs()/0.0078);
+                if j == 8 || j==9 {println!("    {p:?} {gz:.10}");}
+            }
+            let grid: Vec<[f64;3]> = (0..2000).map(|i| [1e-3*((i*37%100) as f64-50.0), 1e-3*((i*61%100) as f64-50.0), 0.01+1e-4*(i%700) as f64]).collect();
+            let t = std::time::Instant::now();
+            let mut out = vec![0.0; 9*grid.len()];
+            src.sample(&grid, super::super::sources::Parts::Gz, &mut out);
+            let dt = t.elapsed();
+            println!("   sources {} made {:?} sample 2000: {:?} worst gz {:.1e} bz {:.1e} {}", src.count(), t1, dt, worst, worst_b, out[5]);
             println!(
                 "   L44 {:.6} L00 {:.6} M01 {:.8} M10 {:.8} M04 {:.8} M40 {:.8}",
                 0.01450192606 + a.added_inductance_h[(4, 4)],

@@ -9,6 +9,7 @@ pub mod double_layer;
 pub mod generatrix;
 pub mod magnetized;
 pub mod response;
+pub mod sources;
 pub mod symmetry;
 
 /// A cylindrical core on the coil's axis.
