@@ -4,10 +4,13 @@
 //! distance asks for, whatever the layer does at the edges. The dipoles of all cores are shared
 //! by all drives, which differ in their moments alone: one pass over them serves every drive.
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
 use super::array::CoupledArray;
+use super::generatrix::Generatrix;
+use super::magnetized::MagnetizedCore;
 use super::response::Rings;
 use crate::numerics::dispatch::{self, Kernel, LANES, Lanes};
 use crate::units::MU_0_T_M_PER_A;
@@ -44,6 +47,13 @@ impl Parts {
     }
 }
 
+/// How close points come, and how well they want to know.
+struct Near {
+    lowest_m: f64,
+    distance_m: f64,
+    tolerance: f64,
+}
+
 /// Dipoles that stand for all cores of an array, for every drive.
 #[derive(Debug, Clone)]
 pub struct ArraySources {
@@ -59,28 +69,72 @@ impl ArraySources {
     /// Dipoles for points no closer than `distance_m` to any core and no lower than `lowest_m`,
     /// to a relative error `tolerance`.
     #[must_use]
-    pub fn new(array: &CoupledArray, lowest_m: f64, distance_m: f64, tolerance: f64) -> Self {
+    pub fn of_array(array: &CoupledArray, lowest_m: f64, distance_m: f64, tolerance: f64) -> Self {
         let response = &array.response;
-        let shape = response.outline.shape;
+        Self::new(
+            &response.outline,
+            &array.positions_m,
+            response.layers.len(),
+            |drive, core| array.layers(drive, core),
+            Near {
+                lowest_m,
+                distance_m,
+                tolerance,
+            },
+        )
+    }
+
+    /// The same for one core under its own winding, standing at the origin: one drive.
+    #[must_use]
+    pub fn of_core(core: &MagnetizedCore, lowest_m: f64, distance_m: f64, tolerance: f64) -> Self {
+        let density = core.density_a();
+        Self::new(
+            core.outline(),
+            &[[0.0, 0.0]],
+            1,
+            |_, _| DMatrix::from_column_slice(density.len(), 1, density),
+            Near {
+                lowest_m,
+                distance_m,
+                tolerance,
+            },
+        )
+    }
+
+    fn new(
+        outline: &Generatrix,
+        positions_m: &[[f64; 2]],
+        modes: usize,
+        layers: impl Fn(usize, usize) -> DMatrix<f64> + Sync,
+        near: Near,
+    ) -> Self {
+        let Near {
+            lowest_m,
+            distance_m,
+            tolerance,
+        } = near;
+        let shape = outline.shape;
         let floor_m = distance_m.max(CLOSEST * shape.radius_m);
         let distance = |z_m: f64| floor_m.max(lowest_m - z_m);
         let order = (4.0 - 1.3 * tolerance.log10()).ceil().max(3.0) as usize;
-        let rings = Rings::new(&response.outline, order, |z| PANEL * distance(z));
-        let modes = response.layers.len();
-        let drives = array.positions_m.len();
+        let rings = Rings::new(outline, order, |z| PANEL * distance(z));
+        let drives = positions_m.len();
         let angles: Vec<usize> = rings
             .rings
             .iter()
             .map(|ring| {
                 let ratio = distance(ring.z_m) / ring.r_m;
                 let decay = (1.0 + 0.5 * ratio * ratio).acosh();
-                let needed = modes + ((1.0 / tolerance).ln() / decay).ceil() as usize;
+                // The gradient of a dipole's field has azimuthal modes n^2.5 exp(-n decay).
+                let digits = (1.0 / tolerance).ln();
+                let growth = 2.5 * (digits / decay).max(1.0).ln();
+                let needed = modes + ((digits + growth) / decay).ceil() as usize;
                 needed.clamp(2 * modes + 1, MOST_ANGLES)
             })
             .collect();
 
         let mut places = Vec::new();
-        for position in &array.positions_m {
+        for position in positions_m {
             for (ring, angles) in rings.rings.iter().zip(&angles) {
                 places.extend((0..*angles).map(|k| {
                     let (s, c) = (TAU * (k as f64 + 0.5) / *angles as f64).sin_cos();
@@ -102,8 +156,7 @@ impl ArraySources {
             .enumerate()
             .for_each(|(core, out)| {
                 for drive in 0..drives {
-                    let by_mode =
-                        rings.moments(&response.outline, &array.layers(drive, core));
+                    let by_mode = rings.moments(&layers(drive, core));
                     let mut place = 0;
                     for (ring, angles) in angles.iter().enumerate() {
                         let turn = TAU / *angles as f64;
