@@ -7,5 +7,8 @@ pub mod double_double;
 pub mod dual;
 pub mod gauss;
 pub mod lagrange;
+pub mod laplace;
+pub mod matrix;
 pub mod qr;
 pub mod real;
+pub mod spectral;
