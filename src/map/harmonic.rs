@@ -2,8 +2,8 @@
 //!
 //! Every Cartesian component of a field above its sources is harmonic, so its values on the six
 //! faces of a box decide it inside: the samples grow with the box's surface, not its volume. The
-//! faces are interpolated to one tensor grid, Laplace's equation gives the rest, and a Legendre
-//! series in x and y at every node of z, cut where the field no longer needs it, is the table.
+//! faces are interpolated to one tensor grid and Laplace's equation gives the rest. The table keeps
+//! every layer, a node of z, on the nodes in x and y that its own distance from the sources needs.
 
 use rayon::prelude::*;
 
@@ -27,37 +27,26 @@ pub struct Extent {
 /// The field of every drive in a box.
 #[derive(Debug, Clone)]
 pub struct Table {
-    x: Spectral,
-    y: Spectral,
+    extent: Extent,
     z: Spectral,
-    /// [series][node of z]
-    blocks: Vec<Vec<Block>>,
+    layers: Vec<Layer>,
+    /// Where every layer's values begin, and their number.
+    starts: Vec<usize>,
+    /// [series], then layer by layer [y, x].
+    values: Vec<Vec<f64>>,
     /// Largest component at every node of z: of the gradient, T/m/A, and of the field, T/A.
     sizes: Vec<[f64; 2]>,
     /// Number of points that were sampled.
     pub samples: usize,
 }
 
-/// Legendre coefficients of one plane, [degree in y, degree in x].
+/// One node of z: the nodes in x and y that it needs.
 #[derive(Debug, Clone)]
-struct Block {
-    rows: usize,
-    columns: usize,
-    coefficients: Vec<f64>,
-}
-
-/// Share of the tolerance that cutting the series may take.
-const CUT: f64 = 0.1;
-
-/// One node of z: where its values are sampled, and how they reach the table's nodes.
 struct Layer {
     x: Spectral,
     y: Spectral,
     /// Sampled all over; on its border otherwise.
     full: bool,
-    /// From the layer's nodes to the table's, [table node, layer node].
-    to_x: Vec<f64>,
-    to_y: Vec<f64>,
 }
 
 impl Layer {
@@ -78,14 +67,40 @@ impl Layer {
         }
         points
     }
+}
 
-    /// Values at [`Layer::points`] to a plane of the table's nodes, [y, x].
-    fn spread(&self, values: &[f64], plane: &mut [f64]) {
-        let (mx, my) = (self.x.len(), self.y.len());
+/// Between the nodes of a layer and those of the lowest, which has most.
+struct Transfer {
+    full: bool,
+    /// [node below, layer's node], and for x its transpose.
+    to_x: Vec<f64>,
+    to_x_transposed: Vec<f64>,
+    to_y: Vec<f64>,
+    /// [layer's node, node below]; for x transposed.
+    from_x_transposed: Vec<f64>,
+    from_y: Vec<f64>,
+}
+
+impl Transfer {
+    fn new(layer: &Layer, lowest: &Layer) -> Self {
+        let to_x = rows(&layer.x, &lowest.x.nodes);
+        Self {
+            full: layer.full,
+            to_x_transposed: transpose(&to_x, layer.x.len()),
+            to_x,
+            to_y: rows(&layer.y, &lowest.y.nodes),
+            from_x_transposed: transpose(&rows(&lowest.x, &layer.x.nodes), lowest.x.len()),
+            from_y: rows(&lowest.y, &layer.y.nodes),
+        }
+    }
+
+    /// Values at [`Layer::points`] to a plane of the lowest layer's nodes, [y, x].
+    fn spread(&self, layer: &Layer, values: &[f64], plane: &mut [f64]) {
+        let (mx, my) = (layer.x.len(), layer.y.len());
         let (nx, ny) = (self.to_x.len() / mx, self.to_y.len() / my);
         if self.full {
             let mut half = vec![0.0; my * nx];
-            product(values, &transpose(&self.to_x, mx), mx, &mut half);
+            product(values, &self.to_x_transposed, mx, &mut half);
             product(&self.to_y, &half, my, plane);
             return;
         }
@@ -101,6 +116,15 @@ impl Layer {
             let start = side * (ny - 1) * nx;
             product(&self.to_x, row, mx, &mut plane[start..start + nx]);
         }
+    }
+
+    /// A plane of the lowest layer's nodes to the layer's own.
+    fn gather(&self, layer: &Layer, plane: &[f64], out: &mut [f64]) {
+        let (mx, my) = (layer.x.len(), layer.y.len());
+        let (nx, ny) = (self.to_x.len() / mx, self.to_y.len() / my);
+        let mut half = vec![0.0; my * nx];
+        product(&self.from_y, plane, ny, &mut half);
+        product(&half, &self.from_x_transposed, nx, out);
     }
 }
 
@@ -147,71 +171,64 @@ impl Table {
             let nodes = Spectral::strip_nodes(from, to, z - top_m, tolerance);
             Spectral::strip(from, to, nodes)
         };
-        let (x, y) = (axis(extent.x_m, from), axis(extent.y_m, from));
         let layers: Vec<Layer> = (z.nodes.iter().enumerate())
             .map(|(k, z_m)| {
-                let (own_x, own_y) = (axis(extent.x_m, *z_m), axis(extent.y_m, *z_m));
+                let (x, y) = (axis(extent.x_m, *z_m), axis(extent.y_m, *z_m));
+                let end = k == 0 || k + 1 == z.len();
                 Layer {
-                    full: k == 0 || k + 1 == z.len() || x.len() == 1 || y.len() == 1,
-                    to_x: rows(&own_x, &x.nodes),
-                    to_y: rows(&own_y, &y.nodes),
-                    x: own_x,
-                    y: own_y,
+                    full: end || x.len() == 1 || y.len() == 1,
+                    x,
+                    y,
                 }
             })
             .collect();
-        let mut points = Vec::new();
-        let mut starts = vec![0];
+        let lowest = &layers[0];
+        let (x, y) = (&lowest.x, &lowest.y);
+        let transfers: Vec<Transfer> = (layers.iter())
+            .map(|layer| Transfer::new(layer, lowest))
+            .collect();
+        let (mut points, mut asked, mut starts) = (Vec::new(), vec![0], vec![0]);
         for (layer, z_m) in layers.iter().zip(&z.nodes) {
             points.extend(layer.points(*z_m));
-            starts.push(points.len());
+            asked.push(points.len());
+            starts.push(starts[starts.len() - 1] + layer.x.len() * layer.y.len());
         }
         let count = sampler.drives() * series(components);
         let mut samples = vec![0.0; count * points.len()];
         sampler.sample(&points, components, &mut samples)?;
 
         let plane = x.len() * y.len();
-        let laplace = Laplace::new(&x, &y, &z);
-        let nodal: Vec<Vec<f64>> = samples
+        let laplace = Laplace::new(x, y, &z);
+        let values: Vec<Vec<f64>> = samples
             .par_chunks_exact(points.len())
-            .map(|values| {
+            .map(|samples| {
                 let mut u = vec![0.0; plane * z.len()];
-                for (k, (layer, out)) in layers.iter().zip(u.chunks_exact_mut(plane)).enumerate() {
-                    layer.spread(&values[starts[k]..starts[k + 1]], out);
+                for (k, out) in u.chunks_exact_mut(plane).enumerate() {
+                    transfers[k].spread(&layers[k], &samples[asked[k]..asked[k + 1]], out);
                 }
                 laplace.fill(&mut u);
-                u
+                let mut values = vec![0.0; starts[z.len()]];
+                for (k, plane) in u.chunks_exact(plane).enumerate() {
+                    let out = &mut values[starts[k]..starts[k + 1]];
+                    transfers[k].gather(&layers[k], plane, out);
+                }
+                values
             })
             .collect();
         let mut sizes = vec![[0.0_f64; 2]; z.len()];
-        for (place, u) in nodal.iter().enumerate() {
-            for (size, out) in sizes.iter_mut().zip(u.chunks_exact(plane)) {
+        for (place, values) in values.iter().enumerate() {
+            for (k, size) in sizes.iter_mut().enumerate() {
                 let size = &mut size[kind(place, components)];
-                *size = out.iter().fold(*size, |size, value| size.max(value.abs()));
+                let layer = &values[starts[k]..starts[k + 1]];
+                *size = (layer.iter()).fold(*size, |size, value| size.max(value.abs()));
             }
         }
-        let (to_x, to_y) = (transpose(&x.to_legendre(), x.len()), y.to_legendre());
-        let blocks = nodal
-            .into_par_iter()
-            .enumerate()
-            .map(|(place, u)| {
-                (u.chunks_exact(plane).zip(&sizes))
-                    .map(|(values, size)| {
-                        let mut half = vec![0.0; plane];
-                        product(values, &to_x, x.len(), &mut half);
-                        let mut full = vec![0.0; plane];
-                        product(&to_y, &half, y.len(), &mut full);
-                        let budget = CUT * tolerance * size[kind(place, components)];
-                        Block::cut(&full, x.len(), budget)
-                    })
-                    .collect()
-            })
-            .collect();
         Ok(Self {
-            x,
-            y,
+            extent,
             z,
-            blocks,
+            layers,
+            starts,
+            values,
             sizes,
             samples: points.len(),
         })
@@ -220,25 +237,20 @@ impl Table {
     /// The box.
     #[must_use]
     pub fn extent(&self) -> Extent {
-        let [x_m, y_m, z_m] =
-            [&self.x, &self.y, &self.z].map(|axis| [axis.nodes[0], axis.nodes[axis.len() - 1]]);
-        Extent { x_m, y_m, z_m }
+        self.extent
     }
 
-    /// Numbers of nodes along x, y and z.
+    /// Numbers of nodes along x and y in the lowest layer, and along z.
     #[must_use]
     pub fn degrees(&self) -> [usize; 3] {
-        [self.x.len(), self.y.len(), self.z.len()]
+        let lowest = &self.layers[0];
+        [lowest.x.len(), lowest.y.len(), self.z.len()]
     }
 
-    /// Number of coefficients kept, over all drives and components.
+    /// Number of values kept, over all drives and components.
     #[must_use]
     pub fn coefficients(&self) -> usize {
-        self.blocks
-            .iter()
-            .flatten()
-            .map(|block| block.coefficients.len())
-            .sum()
+        self.values.iter().map(Vec::len).sum()
     }
 
     /// Nodes of z, m: between them the interpolation along z errs most.
@@ -254,118 +266,72 @@ impl Table {
         &self.sizes
     }
 
-    /// What evaluation at (`x_m`, `y_m`), nodes of a grid, has in common for all heights.
+    /// What evaluation on a grid within the box has in common for all drives and components.
     #[must_use]
-    pub fn stencil(&self, x_m: &[f64], y_m: &[f64]) -> Stencil {
-        let polynomials = |axis: &Spectral, points: &[f64]| -> Vec<f64> {
-            let n = axis.len();
-            let mut out = vec![0.0; n * points.len()];
-            for (point, out) in points.iter().zip(out.chunks_exact_mut(n)) {
-                axis.legendre(*point, out);
-            }
-            transpose(&out, n)
-        };
-        Stencil {
-            x: polynomials(&self.x, x_m),
-            y: polynomials(&self.y, y_m),
-            columns: x_m.len(),
-            rows: y_m.len(),
-        }
-    }
-
-    /// One component of one drive (`place` = drive times components plus component) on a grid at
-    /// height `z_m` within the box, [y, x].
-    pub fn plane(&self, place: usize, z_m: f64, stencil: &Stencil, out: &mut [f64]) {
-        let block = self.block(place, z_m);
-        let mut half = vec![0.0; block.rows * stencil.columns];
-        let along_x = &stencil.x[..block.columns * stencil.columns];
-        product(&block.coefficients, along_x, block.columns, &mut half);
-        let along_y = &stencil.y[..block.rows * stencil.rows];
-        let along_y = transpose(along_y, stencil.rows);
-        product(&along_y, &half, block.rows, out);
-    }
-
-    /// The same at scattered points of one height.
-    #[must_use]
-    pub fn points(&self, place: usize, z_m: f64, points_m: &[[f64; 2]]) -> Vec<f64> {
-        let block = self.block(place, z_m);
-        let (mut px, mut py) = (vec![0.0; block.columns], vec![0.0; block.rows]);
-        points_m
-            .iter()
-            .map(|[x, y]| {
-                self.x.legendre(*x, &mut px);
-                self.y.legendre(*y, &mut py);
-                (block.coefficients.chunks_exact(block.columns).zip(&py))
-                    .map(|(row, py)| py * row.iter().zip(&px).map(|(c, p)| c * p).sum::<f64>())
-                    .sum()
+    pub fn stencil(&self, x_m: &[f64], y_m: &[f64], z_m: &[f64]) -> Stencil {
+        let layers = (self.layers.iter())
+            .map(|layer| {
+                let x = transpose(&rows(&layer.x, x_m), layer.x.len());
+                (x, rows(&layer.y, y_m))
             })
-            .collect()
+            .collect();
+        Stencil {
+            layers,
+            z: rows(&self.z, z_m),
+            columns: x_m.len(),
+            plane: x_m.len() * y_m.len(),
+        }
     }
 
-    /// The series at one height. Degrees that the node below does not need, no node above does:
-    /// the field is the smoother the farther it is from its sources.
-    fn block(&self, place: usize, z_m: f64) -> Block {
-        let blocks = &self.blocks[place];
-        let below = self.z.nodes.partition_point(|node| *node <= z_m).max(1) - 1;
-        let most = |size: fn(&Block) -> usize| blocks[below..].iter().map(size).max();
-        let rows = most(|block| block.rows).unwrap_or(1);
-        let columns = most(|block| block.columns).unwrap_or(1);
-        let mut coefficients = vec![0.0; rows * columns];
-        for (block, weight) in blocks.iter().zip(self.z.cardinal(z_m)) {
-            let lines = block.coefficients.chunks_exact(block.columns);
-            for (out, line) in coefficients.chunks_exact_mut(columns).zip(lines) {
-                for (value, c) in out.iter_mut().zip(line) {
-                    *value += weight * c;
-                }
+    /// One component of one drive (`place` = drive times components plus component) on the
+    /// stencil's grid, [z, y, x].
+    #[must_use]
+    pub fn grid(&self, place: usize, stencil: &Stencil) -> Vec<f64> {
+        let plane = stencil.plane;
+        let mut planes = vec![0.0; self.z.len() * plane];
+        for (k, (x, y)) in stencil.layers.iter().enumerate() {
+            let values = &self.values[place][self.starts[k]..self.starts[k + 1]];
+            let (mx, my) = (self.layers[k].x.len(), self.layers[k].y.len());
+            let mut half = vec![0.0; my * stencil.columns];
+            product(values, x, mx, &mut half);
+            product(y, &half, my, &mut planes[k * plane..(k + 1) * plane]);
+        }
+        let mut out = vec![0.0; stencil.z.len() / self.z.len() * plane];
+        product(&stencil.z, &planes, self.z.len(), &mut out);
+        out
+    }
+
+    /// Every component of every drive at one point within the box, [series].
+    #[must_use]
+    pub fn at(&self, [x_m, y_m, z_m]: [f64; 3]) -> Vec<f64> {
+        let mut out = vec![0.0; self.values.len()];
+        for (k, weight) in self.z.cardinal(z_m).into_iter().enumerate() {
+            let layer = &self.layers[k];
+            let (x, y) = (layer.x.cardinal(x_m), layer.y.cardinal(y_m));
+            for (out, values) in out.iter_mut().zip(&self.values) {
+                let values = &values[self.starts[k]..self.starts[k + 1]];
+                let sum: f64 = (values.chunks_exact(x.len()).zip(&y))
+                    .map(|(row, y)| y * row.iter().zip(&x).map(|(v, x)| v * x).sum::<f64>())
+                    .sum();
+                *out += weight * sum;
             }
         }
-        Block {
-            rows,
-            columns,
-            coefficients,
-        }
+        out
     }
 }
 
-/// Polynomials at the nodes of a grid.
+/// Weights of a table's nodes on a grid.
 #[derive(Debug, Clone)]
 pub struct Stencil {
-    /// [degree, node]
-    x: Vec<f64>,
-    y: Vec<f64>,
+    /// For every layer along x, [node, grid], and along y, [grid, node].
+    layers: Vec<(Vec<f64>, Vec<f64>)>,
+    /// [grid, node]
+    z: Vec<f64>,
     columns: usize,
-    rows: usize,
+    plane: usize,
 }
 
 /// Of the gradient or of the field.
 pub(super) fn kind(place: usize, components: Components) -> usize {
     usize::from(place % series(components) >= GRADIENT)
-}
-
-impl Block {
-    /// The series without its highest degrees, as far as their sum stays below `budget`.
-    fn cut(full: &[f64], columns: usize, budget: f64) -> Self {
-        let rows = full.len() / columns;
-        let sums = |outer: usize, at: &dyn Fn(usize, usize) -> f64, inner: usize| -> usize {
-            let mut left = 0.5 * budget;
-            (1..outer)
-                .rev()
-                .find(|i| {
-                    left -= (0..inner).map(|j| at(*i, j).abs()).sum::<f64>();
-                    left < 0.0
-                })
-                .map_or(1, |last| last + 1)
-        };
-        let kept_rows = sums(rows, &|i, j| full[i * columns + j], columns);
-        let kept_columns = sums(columns, &|i, j| full[j * columns + i], rows);
-        Self {
-            rows: kept_rows,
-            columns: kept_columns,
-            coefficients: full
-                .chunks_exact(columns)
-                .take(kept_rows)
-                .flat_map(|row| row[..kept_columns].iter().copied())
-                .collect(),
-        }
-    }
 }

@@ -38,6 +38,8 @@ pub struct TableReport {
 /// The certificate must stay below this share of the tolerance: places that were not looked at
 /// may be worse.
 const SHARE: f64 = 0.5;
+/// Share of the tolerance at which the first attempt aims.
+const FIRST: f64 = 0.4;
 /// Attempts to reach the tolerance; after the last, planes are sampled directly.
 const ATTEMPTS: usize = 3;
 /// How far below what is needed the next attempt aims.
@@ -65,7 +67,7 @@ impl<'a> SampledField<'a> {
             table: None,
             report: TableReport::default(),
         };
-        let mut aim = SHARE * tolerance;
+        let mut aim = FIRST * tolerance;
         progress.begin("table", ATTEMPTS as u64);
         for _ in 0..ATTEMPTS {
             progress.check()?;
@@ -165,41 +167,51 @@ impl<'a> SampledField<'a> {
             });
             progress.advance(1);
         }
-        let stencil = (self.table.as_ref()).map(|table| table.stencil(&grid.x_m, &grid.y_m));
-        let planes = coils.len() * heights;
-        let mut gz_out = vec![0.0; planes * plane];
-        let mut gradient = vec![0.0; planes * plane * if count > 1 { 9 } else { 0 }];
-        let mut field = vec![0.0; planes * plane * if count > GRADIENT { 3 } else { 0 }];
-        // One plane of one coil is one piece of work.
-        let pieces: Vec<_> = pieces(&mut gz_out, planes)
+        let reached: Vec<f64> = (grid.z_m.iter().zip(&direct))
+            .filter_map(|(z_m, direct)| direct.is_none().then_some(*z_m))
+            .collect();
+        let table = (self.table.as_ref().filter(|_| !reached.is_empty()))
+            .map(|table| (table, table.stencil(&grid.x_m, &grid.y_m, &reached)));
+        let whole = heights * plane;
+        let mut gz_out = vec![0.0; coils.len() * whole];
+        let mut gradient = vec![0.0; coils.len() * whole * if count > 1 { 9 } else { 0 }];
+        let mut field = vec![0.0; coils.len() * whole * if count > GRADIENT { 3 } else { 0 }];
+        // One coil is one piece of work.
+        let pieces: Vec<_> = pieces(&mut gz_out, coils.len())
             .into_iter()
-            .zip(pieces(&mut gradient, planes))
-            .zip(pieces(&mut field, planes))
+            .zip(pieces(&mut gradient, coils.len()))
+            .zip(pieces(&mut field, coils.len()))
+            .zip(coils)
             .collect();
         pieces
             .into_par_iter()
-            .enumerate()
-            .for_each(|(piece, ((gz_out, gradient), field))| {
-                let (coil, k) = (&coils[piece / heights], piece % heights);
+            .for_each(|(((gz_out, gradient), field), coil)| {
                 let first = coil.number * count;
-                let mut values = match &direct[k] {
-                    Some(all) => all[first * plane..(first + count) * plane].to_vec(),
-                    None => vec![0.0; count * plane],
-                };
-                if let (None, Some(table), Some(stencil)) = (&direct[k], &self.table, &stencil) {
-                    for (c, out) in values.chunks_exact_mut(plane.max(1)).enumerate() {
-                        table.plane(first + c, grid.z_m[k], stencil, out);
-                    }
-                }
-                values.iter_mut().for_each(|value| *value *= coil.gain);
-                gz_out.copy_from_slice(gz(&values, self.components, plane));
+                // [component], each [z, y, x].
+                let values: Vec<Vec<f64>> = (first..first + count)
+                    .into_par_iter()
+                    .map(|place| {
+                        let tabulated = (table.as_ref())
+                            .map_or_else(Vec::new, |(table, stencil)| table.grid(place, stencil));
+                        let mut tabulated = tabulated.chunks_exact(plane.max(1));
+                        let mut values = Vec::with_capacity(whole);
+                        for direct in &direct {
+                            let found = match direct {
+                                Some(all) => Some(&all[place * plane..(place + 1) * plane]),
+                                None => tabulated.next(),
+                            };
+                            values.extend(found.into_iter().flatten().map(|v| coil.gain * v));
+                        }
+                        values
+                    })
+                    .collect();
+                gz_out.copy_from_slice(&values[gz(self.components)]);
                 for (at, out) in gradient.chunks_exact_mut(9).enumerate() {
-                    let five = std::array::from_fn(|c| values[c * plane + at]);
-                    out.copy_from_slice(&tensor(five));
+                    out.copy_from_slice(&tensor(std::array::from_fn(|c| values[c][at])));
                 }
                 for (at, out) in field.chunks_exact_mut(3).enumerate() {
-                    for (axis, value) in out.iter_mut().enumerate() {
-                        *value = values[(GRADIENT + axis) * plane + at];
+                    for (value, component) in out.iter_mut().zip(&values[GRADIENT..]) {
+                        *value = component[at];
                     }
                 }
             });
@@ -283,11 +295,14 @@ fn certify(
         let mut errors = [0.0_f64; 2];
         // The field falls with height: it is no smaller here than at the next node.
         let mut sizes = table.sizes()[k.min(nodes.len() - 1)];
+        let values: Vec<Vec<f64>> = (plane.par_iter())
+            .map(|[x, y]| table.at([*x, *y, *z_m]))
+            .collect();
         for place in 0..count {
             let kind = kind(place, components);
             let row = &exact[place * points.len() + start..][..plane.len()];
-            for (direct, value) in row.iter().zip(table.points(place, *z_m, plane)) {
-                let error = (direct - value).abs();
+            for (direct, values) in row.iter().zip(&values) {
+                let error = (direct - values[place]).abs();
                 // A value that is none must not pass.
                 errors[kind] = errors[kind].max(if error.is_nan() { f64::INFINITY } else { error });
                 sizes[kind] = sizes[kind].max(direct.abs());

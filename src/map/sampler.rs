@@ -42,13 +42,12 @@ pub fn series(components: Components) -> usize {
 /// Independent components of the gradient.
 pub const GRADIENT: usize = 5;
 
-/// dB_z/dz of a drive's values, which have `stride` entries a component.
-pub(super) fn gz(values: &[f64], components: Components, stride: usize) -> &[f64] {
-    let place = match components {
+/// Place of dB_z/dz among the components.
+pub(super) fn gz(components: Components) -> usize {
+    match components {
         Components::Gz => 0,
         Components::Gradient | Components::All => GRADIENT - 1,
-    };
-    &values[place * stride..(place + 1) * stride]
+    }
 }
 
 /// The nine components of the gradient from its five.
