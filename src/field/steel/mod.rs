@@ -7,6 +7,8 @@ pub mod cored_coil;
 pub mod coupling;
 pub mod double_layer;
 pub mod generatrix;
+pub mod inside;
+pub mod layer_gradient;
 pub mod magnetized;
 pub mod response;
 pub mod sources;
