@@ -4,4 +4,5 @@ pub mod batch;
 pub mod dipole;
 pub mod frame;
 pub mod ring;
+pub mod steel;
 pub mod winding;

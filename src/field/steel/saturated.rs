@@ -1,0 +1,267 @@
+//! A core whose permeability depends on the field: the interior's potential coupled to the
+//! boundary-integral operator of its surface, by Newton's method.
+//!
+//! The total potential in the core is u (H = -grad u). The steel's own field outside is that of a
+//! double layer of density v on the surface. With W = 1/2 + D (D the double layer's principal
+//! value, W 1 = 0), phi the source's potential on the surface and S the weak map from boundary
+//! values to flux of the Laplacian in the core:
+//!
+//! ```text
+//! u = phi - W v                        continuity of the potential,
+//! F(u) = S (u + v)                     continuity of the flux,
+//! ```
+//!
+//! F(u) being the flux through the surface of the u that satisfies div B = 0 inside. With a
+//! constant permeability v = (mu - 1) u and (1 + (mu - 1) W) u = phi. Inner values and v are
+//! corrected together: with S_mu the condensed tangent stiffness,
+//! (S_mu W + S (1 - W)) dv = F - S (u + v). The equations are the stationary point of a convex
+//! energy, so the derivative of that energy along a correction decides the length of the step.
+//! The constant in v is free and has no effect: it stays that of the start.
+
+#[cfg(test)]
+mod crude;
+mod newton;
+#[cfg(test)]
+mod tests;
+
+use nalgebra::{DMatrix, DVector};
+
+use self::newton::State;
+use super::interior::{Interior, MeshError, Sample};
+use super::permeability::Permeability;
+use super::trace::Trace;
+use crate::numerics::gauss;
+use crate::units::MU_0_T_M_PER_A;
+
+/// Newton corrections below this part of u, in the energy norm, end the iteration; the error
+/// that is left is about its square.
+const TOLERANCE: f64 = 1e-8;
+/// Corrections after which the iteration is given up; 5 to 15 are usual.
+const MAX_STEPS: usize = 80;
+/// A step is long enough when the energy's slope at its end is this part of that at its start.
+const SLOPE_LEFT: f64 = 0.5;
+/// Trials of one step's length.
+const MAX_TRIALS: usize = 12;
+/// Depth below the surface from which on the peak of |B| is taken, m; a tenth of the radius
+/// where that is less. At the edges |B| has no bound.
+const SKIN_M: f64 = 1e-3;
+
+/// What cannot be set up.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SetupError {
+    /// The interior's mesh.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// Nodes a panel outside what the quadrature has.
+    #[error("panels of {order} nodes are not made")]
+    Order {
+        /// As asked for.
+        order: usize,
+    },
+    /// A matrix or vector does not fit the panels.
+    #[error("the surface has {expected} nodes, its operator {found}")]
+    Size {
+        /// Number of Gauss nodes on the surface.
+        expected: usize,
+        /// Rows or columns given.
+        found: usize,
+    },
+}
+
+/// How the iteration ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// The corrections fell below the tolerance.
+    Converged,
+    /// They did not, within the allowed number, or the equations could not be solved (input or
+    /// law not finite, a law that does not grow).
+    Stalled,
+}
+
+/// One Newton correction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// Energy norm of the correction, relative to that of u.
+    pub correction: f64,
+    /// Part of it that was taken.
+    pub length: f64,
+}
+
+/// A core's state under one source.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solution {
+    /// Whether the numbers can be used.
+    pub status: Status,
+    /// Density of the equivalent double layer at the surface's Gauss nodes, A.
+    pub v_a: DVector<f64>,
+    /// Total potential at the interior's nodes, A.
+    pub u_a: DVector<f64>,
+    /// The corrections in their order.
+    pub steps: Vec<Step>,
+    v_boundary_a: DVector<f64>,
+}
+
+/// |B| in a core.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CoreField {
+    /// Largest |B| at least 1 mm (at most a tenth of the radius) inside the surface, T.
+    pub peak_b_t: f64,
+    /// Where it was found: radius and height, m.
+    pub peak_at_m: (f64, f64),
+    /// Mean of |B| over the volume, T.
+    pub mean_b_t: f64,
+    /// Part of u that elements of one degree less miss, in the energy norm.
+    pub resolution: f64,
+}
+
+/// A core ready to be solved under any axisymmetric source and law.
+#[derive(Debug)]
+pub struct SaturatedCore {
+    interior: Interior,
+    trace: Trace,
+    /// W on the boundary's nodes.
+    w: DMatrix<f64>,
+    /// S (1 - W), m.
+    outer_m: DMatrix<f64>,
+}
+
+impl SaturatedCore {
+    /// A core with the panels' breakpoints in r (from 0 to R) and z (bottom to top), `order` Gauss
+    /// nodes a panel, elements of `degree` (`order - 1` carries all that the panels know), and W
+    /// on the Gauss nodes: bottom face outwards, side upwards, top face inwards.
+    ///
+    /// # Errors
+    /// [`SetupError`].
+    pub fn new(
+        r_breaks_m: &[f64],
+        z_breaks_m: &[f64],
+        order: usize,
+        degree: usize,
+        w: &DMatrix<f64>,
+    ) -> Result<Self, SetupError> {
+        if order == 0 || order > gauss::MAX_ORDER {
+            return Err(SetupError::Order { order });
+        }
+        let interior = Interior::new(r_breaks_m, z_breaks_m, degree)?;
+        let panels = 2 * (r_breaks_m.len() - 1) + z_breaks_m.len() - 1;
+        let trace = Trace::new(panels, order, degree);
+        for found in [w.nrows(), w.ncols()] {
+            let expected = trace.gauss_count();
+            if found != expected {
+                return Err(SetupError::Size { expected, found });
+            }
+        }
+        let w = trace.operator_on_boundary(w);
+        let outer_m = interior.laplace_schur_m() - interior.laplace_schur_m() * &w;
+        Ok(Self {
+            interior,
+            trace,
+            w,
+            outer_m,
+        })
+    }
+
+    /// The interior's mesh.
+    #[must_use]
+    pub fn interior(&self) -> &Interior {
+        &self.interior
+    }
+
+    /// Solves for the source's potential `phi_a` (A; H = -grad phi) at the surface's Gauss nodes,
+    /// from the state `start` of a similar problem or from a core of constant permeability.
+    ///
+    /// Error: see [`Status`]; of the discretisation, [`CoreField::resolution`].
+    ///
+    /// # Errors
+    /// [`SetupError::Size`] when `phi_a` has another length than the surface's nodes.
+    pub fn solve(
+        &self,
+        phi_a: &DVector<f64>,
+        law: &impl Permeability,
+        start: Option<&Solution>,
+    ) -> Result<Solution, SetupError> {
+        let expected = self.trace.gauss_count();
+        if phi_a.len() != expected {
+            let found = phi_a.len();
+            return Err(SetupError::Size { expected, found });
+        }
+        let phi = self.trace.to_boundary(phi_a);
+        let v = match start {
+            Some(start) if start.v_boundary_a.len() == phi.len() => start.v_boundary_a.clone(),
+            _ => self.linear_start(&phi, law),
+        };
+        let u = self.interior.harmonic(&(&phi - &self.w * &v));
+        let mut state = State {
+            flux: self.interior.flux(&u, law),
+            u,
+            v,
+        };
+        let mut steps = Vec::new();
+        let mut status = Status::Stalled;
+        while status == Status::Stalled && steps.len() < MAX_STEPS {
+            let Some((change, slope)) = self.correction(&state, law) else {
+                break;
+            };
+            let energy = state.u.dot(&state.flux);
+            // A slope upwards is rounding: the correction is then as small as can be had.
+            let correction = ((-slope).max(0.0) / energy).sqrt();
+            let done = energy == 0.0 || correction <= TOLERANCE;
+            let (length, next) = if done {
+                (1.0, self.moved(&state, &change, 1.0, law))
+            } else {
+                self.search(&state, &change, slope, law)
+            };
+            state = next;
+            steps.push(Step {
+                correction: if energy == 0.0 { 0.0 } else { correction },
+                length,
+            });
+            if done {
+                status = Status::Converged;
+            }
+        }
+        Ok(Solution {
+            status,
+            v_a: self.trace.to_gauss(&state.v),
+            u_a: state.u,
+            steps,
+            v_boundary_a: state.v,
+        })
+    }
+
+    /// |B| of a solution.
+    #[must_use]
+    pub fn field(&self, solution: &Solution, law: &impl Permeability) -> CoreField {
+        let b_t = |sample: Sample| {
+            let h = sample.h_a_per_m();
+            MU_0_T_M_PER_A * law.response(h).relative * h
+        };
+        let (r_breaks, _) = self.interior.breaks_m();
+        let radius_m = r_breaks[r_breaks.len() - 1];
+        let mut peak = (0.0, (0.0, 0.0));
+        self.interior
+            .sample_inside(&solution.u_a, SKIN_M.min(0.1 * radius_m), |sample| {
+                let b = b_t(sample);
+                if b > peak.0 {
+                    peak = (b, (sample.r_m, sample.z_m));
+                }
+            });
+        let volume_m3 = self.interior.volume_m3();
+        CoreField {
+            peak_b_t: peak.0,
+            peak_at_m: peak.1,
+            mean_b_t: self.interior.integral(&solution.u_a, b_t) / volume_m3,
+            resolution: self.interior.resolution(&solution.u_a, law),
+        }
+    }
+
+    /// Flux that the steel links with a coil of potential `phi_per_a` (per ampere, at the Gauss
+    /// nodes; the coil's own flux is not in it), Wb:
+    /// mu_0 int M . H_coil dV = mu_0 int v d_n phi dS.
+    #[must_use]
+    pub fn flux_linkage_wb(&self, solution: &Solution, phi_per_a: &DVector<f64>) -> f64 {
+        let phi = self.trace.to_boundary(phi_per_a);
+        let normal = self.interior.laplace_schur_m() * phi;
+        MU_0_T_M_PER_A * solution.v_boundary_a.dot(&normal)
+    }
+}
