@@ -204,7 +204,11 @@ impl Interior {
             rows * columns,
         );
         interior.laplace = interior
-            .linearize(&DVector::zeros(rows * columns), &Constant { relative: 1.0 })
+            .linearize(
+                &DVector::zeros(rows * columns),
+                &Constant { relative: 1.0 },
+                0.0,
+            )
             .map_err(|NotPositive| MeshError::Breakpoints { axis: "r and z" })?;
         Ok(interior)
     }
@@ -279,7 +283,7 @@ impl Interior {
         for index in 0..self.cell_count() {
             let cell = self.cell(index);
             let nodes = self.element_nodes(cell);
-            let load = self.element(cell, &nodes, u, law, false).load;
+            let load = self.element(cell, &nodes, u, law, None).load;
             for (&node, value) in nodes.iter().zip(&load) {
                 flux[node] += value;
             }
@@ -287,9 +291,13 @@ impl Interior {
         flux
     }
 
-    /// Tangent stiffness and [`Interior::flux`] at u, condensed onto the boundary: a change of
+    /// Stiffness and [`Interior::flux`] at u, condensed onto the boundary: a change of
     /// the boundary values by d changes the flux, once the inner equations are satisfied, from
     /// `load` by `matrix` d.
+    ///
+    /// That is the tangent when `secant` is 0. Along grad u the permeability is the mean of dB/dH
+    /// and B / H, the latter's share being `secant` (0 to 1): where B saturates a stiffer system,
+    /// whose corrections are shorter where the tangent's would be too long.
     ///
     /// # Errors
     /// [`NotPositive`] when the law's differential permeability is not positive or u not finite.
@@ -297,10 +305,11 @@ impl Interior {
         &self,
         u: &DVector<f64>,
         law: &impl Permeability,
+        secant: f64,
     ) -> Result<Condensed, NotPositive> {
         self.plan.condense(|index| {
             let cell = self.cell(index);
-            self.element(cell, &self.element_nodes(cell), u, law, true)
+            self.element(cell, &self.element_nodes(cell), u, law, Some(secant))
         })
     }
 
@@ -452,19 +461,20 @@ impl Interior {
         (r_m, z_m, TAU * r_m * weight)
     }
 
-    /// One element's flux and, when wanted, its tangent stiffness.
+    /// One element's flux and, with a share of the secant, its stiffness.
     fn element(
         &self,
         cell: Cell,
         nodes: &[usize],
         u: &DVector<f64>,
         law: &impl Permeability,
-        with_matrix: bool,
+        secant: Option<f64>,
     ) -> Element {
         let Reference { values, slopes, .. } = &self.reference;
         let count = self.reference.degree + 1;
         let (stretch_r, stretch_z) = cell.stretch();
         let (mut flux_r, mut flux_z) = self.gradients(cell, &self.local(nodes, u));
+        let tangent_share = 1.0 - secant.unwrap_or(0.0);
         let mut tangent = [(); 3].map(|()| DMatrix::zeros(count, count));
         for b in 0..count {
             for a in 0..count {
@@ -481,7 +491,7 @@ impl Interior {
                 } else {
                     (0.0, 0.0)
                 };
-                let along = response.differential - response.relative;
+                let along = tangent_share * (response.differential - response.relative);
                 tangent[0][at] =
                     weight * stretch_r * stretch_r * (response.relative + along * e_r * e_r);
                 tangent[1][at] = weight * stretch_r * stretch_z * along * e_r * e_z;
@@ -491,7 +501,7 @@ impl Interior {
         }
         let load = slopes.tr_mul(&flux_r) * values + values.tr_mul(&flux_z) * slopes;
         let load = DVector::from_column_slice(load.as_slice());
-        let matrix = if with_matrix {
+        let matrix = if secant.is_some() {
             self.stiffness(&tangent)
         } else {
             DMatrix::zeros(0, 0)

@@ -33,13 +33,18 @@ use super::trace::Trace;
 use crate::numerics::gauss;
 use crate::units::MU_0_T_M_PER_A;
 
-/// Newton corrections below this part of u, in the energy norm, end the iteration; the error
+/// Corrections below this part of u, in the energy norm, end the iteration; the error
 /// that is left is about its square.
 const TOLERANCE: f64 = 1e-8;
 /// Corrections after which the iteration is given up; 5 to 15 are usual.
 const MAX_STEPS: usize = 80;
 /// A step is long enough when the energy's slope at its end is this part of that at its start.
 const SLOPE_LEFT: f64 = 0.5;
+/// Share of the secant in the stiffness (see [`Interior::linearize`]) to begin with; after a full
+/// step it is multiplied by the second number, after a shorter one by its inverse plus the third.
+const SECANT: (f64, f64, f64) = (0.3, 0.3, 0.1);
+/// Below this share the tangent itself is taken.
+const SECANT_LEAST: f64 = 0.02;
 /// Trials of one step's length.
 const MAX_TRIALS: usize = 12;
 /// Depth below the surface from which on the peak of |B| is taken, m; a tenth of the radius
@@ -197,9 +202,10 @@ impl SaturatedCore {
             v,
         };
         let mut steps = Vec::new();
+        let mut secant = SECANT.0;
         let mut status = Status::Stalled;
         while status == Status::Stalled && steps.len() < MAX_STEPS {
-            let Some((change, slope)) = self.correction(&state, law) else {
+            let Some((change, slope)) = self.correction(&state, law, secant) else {
                 break;
             };
             let energy = state.u.dot(&state.flux);
@@ -212,6 +218,13 @@ impl SaturatedCore {
                 self.search(&state, &change, slope, law)
             };
             state = next;
+            secant = if length < 1.0 {
+                (secant / SECANT.1 + SECANT.2).min(1.0)
+            } else if secant > SECANT_LEAST {
+                secant * SECANT.1
+            } else {
+                0.0
+            };
             steps.push(Step {
                 correction: if energy == 0.0 { 0.0 } else { correction },
                 length,

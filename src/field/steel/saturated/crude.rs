@@ -96,7 +96,9 @@ impl Surface {
                 });
             }
             let sum: f64 = w.row(target).sum();
-            if (sum + 0.5_f64).abs() > 1e-9 { println!("row {target} {r} {z} {:e}", sum + 0.5); }
+            if (sum + 0.5_f64).abs() > 1e-9 {
+                println!("row {target} {r} {z} {:e}", sum + 0.5);
+            }
             w[(target, target)] -= sum;
         }
         w

@@ -58,11 +58,12 @@ impl SaturatedCore {
         &self,
         state: &State,
         law: &impl Permeability,
+        secant: f64,
     ) -> Option<(Change, f64)> {
-        let tangent = self.interior.linearize(&state.u, law).ok()?;
+        let tangent = self.interior.linearize(&state.u, law, secant).ok()?;
         let mut system = &tangent.matrix * &self.w + &self.outer_m;
-        // Constants in v have no effect; the residual's sum is zero. One more row and column in
-        // one: it asks the correction's sum to be zero.
+        // Constants in v have no effect and the residual's sum is zero: with a constant added to
+        // every entry the correction is the one whose sum is zero.
         let count = system.nrows();
         let scale = system.diagonal().amax();
         system.add_scalar_mut(scale / count as f64);
