@@ -1,7 +1,9 @@
 //! Maps against direct evaluation, and their interpolation error against other places.
 
+use fluxform::field::batch::{Gradients, Wanted};
 use fluxform::field::frame::to_cartesian;
-use fluxform::field::winding::Winding;
+use fluxform::field::source::AxialSource;
+use fluxform::field::winding::{OnEdge, Winding};
 use fluxform::map::tabulate::{Grid, PlacedCoil};
 use fluxform::map::{Components, FieldMap, interpolation_error, tabulate};
 use fluxform::numerics::axis::Axis;
@@ -107,6 +109,58 @@ fn every_node_keeps_the_tolerance() {
             let error = worst_error(&map, &winding, &coils);
             assert!(error < tolerance, "skew {skew} {tolerance:e}: {error:e}");
         }
+    }
+}
+
+/// A winding with its top face at a height.
+struct Raised {
+    winding: Winding,
+    by_m: f64,
+}
+
+impl Raised {
+    fn below(&self, z_m: &[f64]) -> Vec<f64> {
+        z_m.iter().map(|z| z - self.by_m).collect()
+    }
+}
+
+impl AxialSource for Raised {
+    fn gradients(
+        &self,
+        r_m: &[f64],
+        z_m: &[f64],
+        tolerance: f64,
+        wanted: Wanted,
+    ) -> Result<Gradients, OnEdge> {
+        let z_m = self.below(z_m);
+        self.winding.gradients(r_m, &z_m, tolerance, wanted)
+    }
+
+    fn axial_fields(&self, r_m: &[f64], z_m: &[f64], tolerance: f64) -> Result<Vec<f64>, OnEdge> {
+        self.winding.axial_fields(r_m, &self.below(z_m), tolerance)
+    }
+
+    fn top_m(&self) -> f64 {
+        self.by_m
+    }
+}
+
+#[test]
+fn a_source_that_rises_above_zero_keeps_the_tolerance() {
+    let (winding, coils, low) = (seed(), coils(1.37e-4), grid(31, 0.0017));
+    let source = Raised {
+        winding,
+        by_m: 0.013,
+    };
+    let mut high = low.clone();
+    high.z_m.iter_mut().for_each(|z| *z += source.by_m);
+    for tolerance in [1e-5, 1e-9] {
+        let mut map =
+            tabulate(&source, &coils, &high, Components::All, tolerance, &Silent).expect("a map");
+        assert!(map.tabulated, "the table is what the height decides");
+        map.z_m = low.z_m.clone();
+        let error = worst_error(&map, &winding, &coils);
+        assert!(error < tolerance, "{tolerance:e}: {error:e}");
     }
 }
 

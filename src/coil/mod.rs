@@ -4,3 +4,4 @@ pub mod circuit;
 pub mod inductance;
 pub mod limits;
 pub mod mutual;
+pub mod transient;

@@ -17,6 +17,9 @@ use crate::units::{COPPER_TEMPERATURE_COEFFICIENT_PER_K, REFERENCE_TEMPERATURE_C
 /// Most map values, coils times workspace nodes: 8 GB of doubles.
 pub const MAP_VALUES_MAX: f64 = 1e9;
 
+/// A core longer than this many times the coil's larger size is no plausible one.
+const CORE_LENGTH_PLAUSIBLE: f64 = 20.0;
+
 /// Adds every physical fault of `draft` to `sink`.
 pub(super) fn check(draft: &Draft, need: Need, sink: &Sink) {
     wire(&draft.wire, sink);
@@ -197,6 +200,21 @@ fn core_fits(core: &CoreDraft, coil: Option<&CoilDraft>, sink: &Sink) {
         let help = "the core spans the winding's length plus above_mm plus below_mm";
         error(sink, "core.below_mm", &core.below.span, message, help);
     }
+    let long = CORE_LENGTH_PLAUSIBLE * coil.length.value.max(coil.outer.value);
+    if length > long {
+        let (key, end) = if core.above.value > core.below.value {
+            ("core.above_mm", &core.above)
+        } else {
+            ("core.below_mm", &core.below)
+        };
+        let message = format!(
+            "the core is {} long, {:.0} times the winding's length",
+            mm(length),
+            length / coil.length.value
+        );
+        let help = "above_mm and below_mm are the core's overhang, in millimetres";
+        sink.add(Fault::warning(key, message).at(&end.span).help(help));
+    }
 }
 
 fn array_overlap(draft: &Draft, need: Need, sink: &Sink) {
@@ -344,7 +362,7 @@ fn workspace(draft: &Draft, need: Need, sink: &Sink) {
             message,
             "begin at 0 or higher".to_owned(),
         );
-    } else if let Some(face) = core_top_inside(draft, [&x.value, &y.value], lowest) {
+    } else if let Some(face) = core_top_inside(draft, [&x.value, &y.value], lowest, 0.0) {
         let message = format!(
             "the workspace begins at z = {} and reaches into a core, whose top is at z = {}",
             mm(lowest),
@@ -358,6 +376,8 @@ fn workspace(draft: &Draft, need: Need, sink: &Sink) {
             message,
             format!("begin at {} or higher", number(face)),
         );
+    } else {
+        magnet_in_core(draft, [&x.value, &y.value], z, sink);
     }
     let coils = draft.array.layout.positions_m().len();
     let samples = [x, y, z].map(|axis| axis.value.samples as f64);
@@ -378,8 +398,30 @@ fn workspace(draft: &Draft, need: Need, sink: &Sink) {
     }
 }
 
-/// The cores' top, where it stands above `lowest` inside the workspace's footprint.
-fn core_top_inside(draft: &Draft, [x, y]: [&Axis; 2], lowest: f64) -> Option<f64> {
+/// A map holds at points where no magnet can be; that is worth a word, no more.
+fn magnet_in_core(draft: &Draft, footprint: [&Axis; 2], z: &Located<Axis>, sink: &Sink) {
+    let half = draft.magnet.length / 2.0;
+    let bottom = z.value.from - half;
+    let margin = draft.magnet.diameter / 2.0;
+    if let Some(face) = core_top_inside(draft, footprint, bottom, margin) {
+        let message = format!(
+            "a magnet centred at the workspace's lower end, z = {}, spans z = {} to {} and overlaps the core, whose top is at z = {}",
+            mm(z.value.from),
+            mm(bottom),
+            mm(z.value.from + half),
+            mm(face)
+        );
+        let help = format!("from z = {} on there is room for it", mm(face + half));
+        sink.add(
+            Fault::warning("workspace.z_mm", message)
+                .at(&z.span)
+                .help(help),
+        );
+    }
+}
+
+/// The cores' top, where it stands above `lowest` within `margin` of the workspace's footprint.
+fn core_top_inside(draft: &Draft, [x, y]: [&Axis; 2], lowest: f64, margin: f64) -> Option<f64> {
     let core = draft.core.as_ref()?;
     let radius = draft.coil.as_ref()?.inner.value / 2.0 - core.clearance.value;
     if !exceeds(core.above.value, lowest) {
@@ -390,6 +432,6 @@ fn core_top_inside(draft: &Draft, [x, y]: [&Axis; 2], lowest: f64) -> Option<f64
         (axis.from - place).max(place - axis.to).max(0.0)
     };
     let positions = draft.array.layout.positions_m();
-    let meets = |p: &[f64; 2]| exceeds(radius, beyond(x, p[0]).hypot(beyond(y, p[1])));
+    let meets = |p: &[f64; 2]| exceeds(radius + margin, beyond(x, p[0]).hypot(beyond(y, p[1])));
     positions.iter().any(meets).then_some(core.above.value)
 }

@@ -1,6 +1,7 @@
 //! The input documents: types, validation, messages. Lengths are metres inside.
 
 pub mod array;
+pub mod bh_table;
 mod checks;
 pub mod diagnostics;
 pub mod model;

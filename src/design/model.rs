@@ -77,8 +77,9 @@ pub struct Core {
     pub below_m: f64,
     /// Material.
     pub steel: Steel,
-    /// Flux density above which a warning is due, T.
-    pub knee_t: f64,
+    /// Flux density above which a warning is due, T; `None`, with a curve only, for the knee
+    /// that the curve itself shows.
+    pub knee_t: Option<f64>,
     /// Conductivity, S/m, for the transient estimate.
     pub conductivity_s_per_m: f64,
 }

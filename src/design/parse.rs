@@ -195,11 +195,14 @@ fn core_m(draft: CoreDraft, path: &Path) -> Core {
         clearance_m: m_from_mm(draft.clearance.value),
         above_m: m_from_mm(draft.above.value),
         below_m: m_from_mm(draft.below.value),
+        knee_t: match draft.bh_curve {
+            Some(_) => draft.knee_t,
+            None => draft.knee_t.or(Some(sections::LOW_CARBON_KNEE_T)),
+        },
         steel: match draft.bh_curve {
             Some(file) => Steel::Curve(beside(file)),
             None => Steel::Linear(draft.relative_permeability),
         },
-        knee_t: draft.knee_t,
         conductivity_s_per_m: draft.conductivity_s_per_m,
     }
 }

@@ -120,24 +120,43 @@ impl Rule {
                 spaced(self.unit)
             )
         };
-        Some(Fault::error(key, message).at(span))
+        let fault = Fault::error(key, message).at(span);
+        Some(match self.meant(value) {
+            Some((slip, meant)) if self.bound.admits(meant) => {
+                fault.help(advice(slip, value, meant))
+            }
+            _ => fault,
+        })
+    }
+
+    /// The slip that `value` looks like, and the value that was then meant.
+    fn meant(&self, value: f64) -> Option<(&'static Slip, f64)> {
+        let size = value.abs();
+        let slip = self.slips.iter().find(|s| s.from < size && size < s.to)?;
+        Some((slip, twelve_digits(value * slip.times)))
     }
 
     /// The warning where `value` looks like one in another unit.
     #[must_use]
     pub fn warning(&self, key: &str, value: f64, span: &Range<usize>) -> Option<Fault> {
-        let size = value.abs();
-        let slip = self.slips.iter().find(|s| s.from < size && size < s.to)?;
+        let (slip, meant) = self.meant(value)?;
         let found = quantity(value, self.unit);
         let message = format!("{found} looks like {}", slip.unit);
-        let help = format!(
-            "write {} if {} {} is meant",
-            number(twelve_digits(value * slip.times)),
-            number(value),
-            slip.unit
-        );
-        Some(Fault::warning(key, message).at(span).help(help))
+        Some(
+            Fault::warning(key, message)
+                .at(span)
+                .help(advice(slip, value, meant)),
+        )
     }
+}
+
+fn advice(slip: &Slip, value: f64, meant: f64) -> String {
+    format!(
+        "write {} if {} {} is meant",
+        number(meant),
+        number(value),
+        slip.unit
+    )
 }
 
 fn spaced(unit: &str) -> String {

@@ -14,6 +14,9 @@ use crate::units::{MU_0_T_M_PER_A, REFERENCE_TEMPERATURE_C, m_from_mm};
 /// Absolute zero, C.
 const ABSOLUTE_ZERO_C: f64 = -273.15;
 
+/// Knee of low-carbon steel that is described by its permeability alone, T.
+pub const LOW_CARBON_KNEE_T: f64 = 1.5;
+
 /// Resistivity of copper at 20 C, ohm m.
 const COPPER_RESISTIVITY_OHM_M: f64 = 1.68e-8;
 
@@ -54,6 +57,11 @@ const MAGNETIZATION_A_PER_M: Rule = Rule::any("A/m").slips(&[
 const CONDUCTIVITY_S_PER_M: Rule = Rule::any("S/m")
     .bound(Bound::NotNegative)
     .slips(&[slip(0.0, 1000.0, "MS/m", 1e6)]);
+/// From vacuum to beyond any metal. The slips: mu itself in H/m, and thousands.
+const RELATIVE_PERMEABILITY: Rule = Rule::any("").bound(Bound::Within(1.0, 1e9)).slips(&[
+    slip(MU_0_T_M_PER_A, 0.125, "H/m", 1.0 / MU_0_T_M_PER_A),
+    slip(0.125, 1.0, "thousands", 1000.0),
+]);
 const AMPERE: Rule = Rule::any("A");
 
 /// `[coil]`, mm.
@@ -115,7 +123,7 @@ pub struct CoreDraft {
     pub below: Located<f64>,
     pub relative_permeability: f64,
     pub bh_curve: Option<String>,
-    pub knee_t: f64,
+    pub knee_t: Option<f64>,
     pub conductivity_s_per_m: f64,
 }
 
@@ -125,14 +133,12 @@ pub fn core(mut s: Section<'_>) -> Option<CoreDraft> {
         above: s.number_or("above_mm", &OFFSET_MM, 0.0),
         below: s.number_or("below_mm", &OFFSET_MM, 10.0),
         relative_permeability: s
-            .number_or(
-                "relative_permeability",
-                &Rule::any("").bound(Bound::AtLeast(1.0)),
-                1000.0,
-            )
+            .number_or("relative_permeability", &RELATIVE_PERMEABILITY, 1000.0)
             .value,
         bh_curve: s.text("bh_curve").map(|text| text.value),
-        knee_t: s.number_or("knee_t", &Rule::any("T").positive(), 1.5).value,
+        knee_t: s
+            .number("knee_t", &Rule::any("T").positive())
+            .map(|knee| knee.value),
         conductivity_s_per_m: s
             .number_or("conductivity_s_per_m", &CONDUCTIVITY_S_PER_M, 5.8e6)
             .value,

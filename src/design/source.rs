@@ -9,22 +9,55 @@ use super::diagnostics::{Fault, InvalidDocument, place_of};
 /// Largest document that is read, bytes (4 MiB): several times what ten thousand coils need.
 pub const DOCUMENT_MAX_BYTES: u64 = 4 << 20;
 
+/// What a text is, for the messages about one that cannot be read.
+#[derive(Debug, Clone, Copy)]
+struct Kind {
+    name: &'static str,
+    too_large: &'static str,
+    not_utf8: &'static str,
+}
+
+const DOCUMENT: Kind = Kind {
+    name: "TOML file",
+    too_large: "is this the TOML document, or the surface itself?",
+    not_utf8: "save the file as UTF-8; a surface needs its own ending (.stl, .obj, ...)",
+};
+
+const TABLE: Kind = Kind {
+    name: "CSV table",
+    too_large: "is this the table?",
+    not_utf8: "save the table as text: CSV in UTF-8",
+};
+
 /// The text of the document at `path`.
 ///
 /// # Errors
 /// A missing file, a directory, a file over 4 MiB or not in UTF-8, or what the system says.
 pub fn text_of(path: &Path) -> Result<String, InvalidDocument> {
+    text_at(path, DOCUMENT)
+}
+
+/// The text of the CSV table at `path`, which a document names.
+///
+/// # Errors
+/// As [`text_of`].
+pub fn table_text_of(path: &Path) -> Result<String, InvalidDocument> {
+    text_at(path, TABLE)
+}
+
+fn text_at(path: &Path, kind: Kind) -> Result<String, InvalidDocument> {
     let refuse = |fault| Err(InvalidDocument::unreadable(path, fault));
     match fs::metadata(path) {
         Err(error) => return refuse(cannot_read(&error)),
         Ok(found) if found.is_dir() => {
-            let fault = Fault::error("", "expected a TOML file, found a directory");
+            let message = format!("expected a {}, found a directory", kind.name);
+            let fault = Fault::error("", message);
             return refuse(fault.help("name the file inside it"));
         }
         Ok(_) => {}
     }
     match File::open(path) {
-        Ok(file) => text_from(file, path),
+        Ok(file) => text_read(file, path, kind),
         Err(error) => refuse(cannot_read(&error)),
     }
 }
@@ -34,20 +67,23 @@ pub fn text_of(path: &Path) -> Result<String, InvalidDocument> {
 /// # Errors
 /// A document over 4 MiB or not in UTF-8, or what the system says.
 pub fn text_from(stream: impl Read, path: &Path) -> Result<String, InvalidDocument> {
-    let mut bytes = Vec::new();
-    let result = stream.take(DOCUMENT_MAX_BYTES + 1).read_to_end(&mut bytes);
-    text_of_bytes(result.map(|_| bytes)).map_err(|fault| InvalidDocument::unreadable(path, fault))
+    text_read(stream, path, DOCUMENT)
 }
 
-fn text_of_bytes(bytes: io::Result<Vec<u8>>) -> Result<String, Fault> {
+fn text_read(stream: impl Read, path: &Path, kind: Kind) -> Result<String, InvalidDocument> {
+    let mut bytes = Vec::new();
+    let result = stream.take(DOCUMENT_MAX_BYTES + 1).read_to_end(&mut bytes);
+    text_of_bytes(result.map(|_| bytes), kind)
+        .map_err(|fault| InvalidDocument::unreadable(path, fault))
+}
+
+fn text_of_bytes(bytes: io::Result<Vec<u8>>, kind: Kind) -> Result<String, Fault> {
     let bytes = bytes.map_err(|error| cannot_read(&error))?;
     if bytes.len() as u64 > DOCUMENT_MAX_BYTES {
         let message = format!("the file is larger than {DOCUMENT_MAX_BYTES} bytes");
-        return Err(
-            Fault::error("", message).help("is this the TOML document, or the surface itself?")
-        );
+        return Err(Fault::error("", message).help(kind.too_large));
     }
-    String::from_utf8(bytes).map_err(|error| not_utf8(&error))
+    String::from_utf8(bytes).map_err(|error| not_utf8(&error, kind))
 }
 
 fn cannot_read(error: &io::Error) -> Fault {
@@ -59,7 +95,7 @@ fn cannot_read(error: &io::Error) -> Fault {
     }
 }
 
-fn not_utf8(error: &std::string::FromUtf8Error) -> Fault {
+fn not_utf8(error: &std::string::FromUtf8Error, kind: Kind) -> Fault {
     let good = error.utf8_error().valid_up_to();
     let text = String::from_utf8_lossy(&error.as_bytes()[..good]);
     let place = place_of(&text, good);
@@ -68,8 +104,7 @@ fn not_utf8(error: &std::string::FromUtf8Error) -> Fault {
         "the text is not UTF-8: byte 0x{byte:02x} at line {}, column {}",
         place.line, place.column
     );
-    Fault::error("", message)
-        .help("save the file as UTF-8; a surface needs its own ending (.stl, .obj, ...)")
+    Fault::error("", message).help(kind.not_utf8)
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The error of interpolating a map between its nodes.
 
 use super::tabulate::{Components, Grid, MapError, PlacedCoil, tabulate};
-use crate::field::winding::Winding;
+use crate::field::source::AxialSource;
 use crate::numerics::lagrange;
 use crate::progress::Silent;
 
@@ -31,7 +31,7 @@ const HIGHEST: usize = 1;
 /// # Errors
 /// See [`tabulate`].
 pub fn interpolation_error(
-    winding: &Winding,
+    source: &dyn AxialSource,
     coils: &[PlacedCoil],
     grid: &Grid,
     gz: &[f64],
@@ -76,14 +76,7 @@ pub fn interpolation_error(
         samples: 0,
     };
     for places in staggered {
-        let exact = tabulate(
-            winding,
-            &placed,
-            &places,
-            Components::Gz,
-            tolerance,
-            &Silent,
-        )?;
+        let exact = tabulate(source, &placed, &places, Components::Gz, tolerance, &Silent)?;
         let plane = places.x_m.len() * places.y_m.len();
         let stencils = |nodes: &[f64], at: &[f64]| -> Vec<lagrange::Stencil> {
             at.iter()

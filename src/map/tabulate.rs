@@ -9,7 +9,8 @@ use rayon::prelude::*;
 use super::radii::Radii;
 use crate::field::batch::Wanted;
 use crate::field::frame::to_cartesian;
-use crate::field::winding::{AxialField, OnEdge, Winding};
+use crate::field::source::AxialSource;
+use crate::field::winding::{AxialField, OnEdge};
 use crate::numerics::chebyshev::{Evaluation, Layout};
 use crate::numerics::dispatch;
 use crate::progress::{Interrupted, Progress};
@@ -54,7 +55,7 @@ pub struct FieldMap {
 /// Why a map could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum MapError {
-    /// A node lies on an edge of a winding.
+    /// A node lies on an edge of a source.
     #[error(transparent)]
     OnEdge(#[from] OnEdge),
     /// The user asked to stop.
@@ -90,14 +91,14 @@ const TABLE_GAIN: usize = 4;
 /// Share of the tolerance given to the direct sums; the table takes as much, rounding the rest.
 const SHARE: f64 = 0.4;
 
-/// Maps of identical `coils` with `winding` over `grid`, every component to `tolerance`
-/// relative to the largest |grad B| at its height. The bytes do not depend on the number of
-/// threads.
+/// Maps of identical `coils`, each with `source` about its axis, over `grid`, every component to
+/// `tolerance` relative to the largest |grad B| at its height. The bytes do not depend on the
+/// number of threads.
 ///
 /// # Errors
-/// A node on a winding's edge; interruption.
+/// A node on an edge of the source; interruption.
 pub fn tabulate(
-    winding: &Winding,
+    source: &dyn AxialSource,
     coils: &[PlacedCoil],
     grid: &Grid,
     components: Components,
@@ -112,7 +113,7 @@ pub fn tabulate(
         .par_iter()
         .map(|z_m| {
             progress.check()?;
-            let level = Level::new(winding, &radii.distinct_m, *z_m, components, tolerance)?;
+            let level = Level::new(source, &radii.distinct_m, *z_m, components, tolerance)?;
             progress.advance(1);
             Ok(level)
         })
@@ -202,20 +203,21 @@ struct Level {
 
 impl Level {
     fn new(
-        winding: &Winding,
+        source: &dyn AxialSource,
         radii_m: &[f64],
         z_m: f64,
         components: Components,
         tolerance: f64,
     ) -> Result<Self, OnEdge> {
         let most = radii_m.len() / TABLE_GAIN;
+        let above_m = z_m - source.top_m();
         let layout = radii_m
             .last()
-            .and_then(|last| Layout::new(radii_m[0], *last, z_m, SHARE * tolerance, most));
+            .and_then(|last| Layout::new(radii_m[0], *last, above_m, SHARE * tolerance, most));
         let Some(layout) = layout else {
-            return Self::direct(winding, radii_m, z_m, components, SHARE * tolerance);
+            return Self::direct(source, radii_m, z_m, components, SHARE * tolerance);
         };
-        let nodes = Self::direct(winding, &layout.nodes(), z_m, components, SHARE * tolerance)?;
+        let nodes = Self::direct(source, &layout.nodes(), z_m, components, SHARE * tolerance)?;
         let lookup = |values: &[f64]| {
             if values.is_empty() {
                 return Vec::new();
@@ -239,7 +241,7 @@ impl Level {
     }
 
     fn direct(
-        winding: &Winding,
+        source: &dyn AxialSource,
         radii_m: &[f64],
         z_m: f64,
         components: Components,
@@ -250,9 +252,9 @@ impl Level {
             Components::Gradient | Components::All => Wanted::Gradient,
         };
         let heights = vec![z_m; radii_m.len()];
-        let gradients = winding.gradients(radii_m, &heights, tolerance, wanted)?;
+        let gradients = source.gradients(radii_m, &heights, tolerance, wanted)?;
         let b_z = if components == Components::All {
-            winding.axial_fields(radii_m, &heights, tolerance)?
+            source.axial_fields(radii_m, &heights, tolerance)?
         } else {
             Vec::new()
         };

@@ -1,11 +1,16 @@
 //! Quadrature, dense algebra, interpolation, vector dispatch, grid axes: no physics.
 
 pub mod axis;
+pub mod bessel;
 pub mod chebyshev;
 pub mod dispatch;
 pub mod double_double;
 pub mod dual;
 pub mod gauss;
+pub mod gmres;
 pub mod lagrange;
+pub mod lagrange_basis;
+pub mod log_rule;
 pub mod qr;
 pub mod real;
+pub mod ring_functions;

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use fluxform::design::bh_table::read_bh_table;
 use fluxform::design::{Coupling, Design, Limits, MagnetModel, Need, Polarity, Steel};
 
 use crate::support::{CORED, SOUND, but, read, sound, sound_but};
@@ -60,7 +61,10 @@ fn every_key_arrives_in_si() {
         (core.clearance_m, core.above_m, core.below_m),
         (0.0, 0.0, 0.01)
     );
-    assert_eq!((core.steel, core.knee_t), (Steel::Linear(1000.0), 1.5));
+    assert_eq!(
+        (core.steel, core.knee_t),
+        (Steel::Linear(1000.0), Some(1.5))
+    );
     assert_eq!(core.conductivity_s_per_m, 5.8e6);
     assert_eq!(d.magnet.magnetization_a_per_m, 1.1579e6);
     assert_eq!((d.magnet.diameter_m, d.magnet.length_m), (0.01, 0.01));
@@ -178,6 +182,37 @@ fn the_steel_s_table_lies_beside_the_design() {
         sound(&absolute).core.unwrap().steel,
         Steel::Curve(PathBuf::from("/s.csv"))
     );
+}
+
+#[test]
+fn a_curve_has_its_own_knee_unless_the_file_names_one() {
+    let knee = |keys: &str| {
+        sound(&format!("{SOUND}[core]\n{keys}"))
+            .core
+            .unwrap()
+            .knee_t
+    };
+    assert_eq!(knee(""), Some(1.5));
+    assert_eq!(knee("relative_permeability = 1300\n"), Some(1.5));
+    assert_eq!(knee("bh_curve = \"s.csv\"\n"), None);
+    assert_eq!(knee("bh_curve = \"s.csv\"\nknee_t = 1.3\n"), Some(1.3));
+}
+
+#[test]
+fn the_curve_s_design_is_the_seed_but_for_its_steel() {
+    let (seed, mut curve) = (
+        committed("designs/seed.toml"),
+        committed("designs/seed_1010.toml"),
+    );
+    let core = curve.core.as_mut().unwrap();
+    let Steel::Curve(table) = &core.steel else {
+        panic!("{:?}", core.steel)
+    };
+    assert_eq!(read_bh_table(table).unwrap().b_t.len(), 38);
+    core.steel = Steel::Linear(1000.0);
+    core.knee_t = Some(1.5);
+    curve.name = seed.name.clone();
+    assert_eq!(curve, seed);
 }
 
 #[test]

@@ -276,7 +276,23 @@ fn the_core_fits_the_bore() {
             ),
             (
                 with("relative_permeability = 0.7"),
-                "d.toml:9:25: error: core.relative_permeability: expected at least 1, found 0.7",
+                "d.toml:9:25: error: core.relative_permeability: expected between 1 and 1e9, found 0.7 (write 700 if 0.7 thousands is meant)",
+            ),
+            (
+                with("relative_permeability = 0.001"),
+                "d.toml:9:25: error: core.relative_permeability: expected between 1 and 1e9, found 0.001 (write 795.774715459 if 0.001 H/m is meant)",
+            ),
+            (
+                with("relative_permeability = 0"),
+                "d.toml:9:25: error: core.relative_permeability: expected between 1 and 1e9, found 0",
+            ),
+            (
+                with("relative_permeability = -700"),
+                "d.toml:9:25: error: core.relative_permeability: expected between 1 and 1e9, found -700",
+            ),
+            (
+                with("relative_permeability = 1.3e9"),
+                "d.toml:9:25: error: core.relative_permeability: expected between 1 and 1e9, found 1.3e9",
             ),
             (
                 with("relative_permeability = 700\nbh_curve = \"a.csv\""),
@@ -303,6 +319,35 @@ fn the_core_fits_the_bore() {
         )
         .is_ok()
     );
+}
+
+#[test]
+fn every_permeability_from_vacuum_to_a_thousand_million_is_read() {
+    for mu in ["1", "1.000000001", "1e9"] {
+        let text = but(
+            CORED,
+            "[core]",
+            &format!("[core]\nrelative_permeability = {mu}"),
+        );
+        assert_eq!(warned(&text, Need::EVALUATE), [""; 0]);
+    }
+}
+
+#[test]
+fn a_core_far_longer_than_its_winding_is_a_warning() {
+    let with = |keys: &str| but(CORED, "[core]", &format!("[core]\n{keys}"));
+    assert_eq!(
+        warned(&with("below_mm = 10000"), Need::EVALUATE),
+        [
+            "d.toml:9:12: warning: core.below_mm: the core is 10100 mm long, 101 times the winding's length (above_mm and below_mm are the core's overhang, in millimetres)"
+        ]
+    );
+    let said = warned(&with("above_mm = 2000"), Need::LAMBDA);
+    assert!(
+        said[2].contains("core.above_mm: the core is 2110 mm long"),
+        "{said:?}"
+    );
+    assert_eq!(warned(&with("below_mm = 1900"), Need::EVALUATE), [""; 0]);
 }
 
 #[test]
@@ -370,6 +415,22 @@ fn the_workspace_lies_above_the_coils() {
             "d.toml:1:1: error: workspace.z_mm: the workspace begins at z = 10 mm and reaches into a core, whose top is at z = 13 mm (begin at 13 or higher)"
         ]
     );
+    // The magnet is larger than its centre; the map itself is sound.
+    let said = "workspace.z_mm: a magnet centred at the workspace's lower end, z = 13.7 mm, spans z = 8.7 mm to 18.7 mm and overlaps the core, whose top is at z = 13 mm (from z = 18 mm on there is room for it)";
+    assert_eq!(
+        warned(&over(&proud, "z_mm = [13.7, 80, 3]"), Need::MAP),
+        [format!("d.toml:15:8: warning: {said}")]
+    );
+    assert_eq!(
+        warned(&over(&proud, "z_mm = [18, 80, 3]"), Need::MAP),
+        [""; 0]
+    );
+    // Its edge reaches as far as its radius: 20.5 - 12 - 5 mm beside the row.
+    let beside = |y: &str| {
+        let keys = format!("z_mm = [13.7, 80, 3]\ny_mm = [{y}, {y}, 1]");
+        warned(&over(&proud, &keys), Need::MAP).len()
+    };
+    assert_eq!((beside("3.4"), beside("3.6")), (0, 1));
     // Between the cores there is room: the nearest axis is 20.5 mm away, the core 12 mm thick.
     assert!(
         read(

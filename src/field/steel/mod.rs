@@ -1,9 +1,43 @@
-//! The steel core of one coil.
+//! Steel: cores that the coils magnetise.
 
+pub mod array;
+pub mod bh_check;
+pub mod bh_curve;
 pub mod condensation;
+pub mod cored_coil;
+pub mod coupling;
+pub mod double_layer;
+pub mod generatrix;
 pub mod interior;
 pub mod lobatto;
+pub mod magnetized;
 pub mod permeability;
+pub mod response;
 pub mod saturated;
-
+pub mod symmetry;
 pub mod trace;
+
+/// A cylindrical core on the coil's axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CoreShape {
+    /// Radius, m; > 0.
+    pub radius_m: f64,
+    /// Height of the bottom face, m.
+    pub bottom_m: f64,
+    /// Height of the top face, m; above the bottom.
+    pub top_m: f64,
+}
+
+impl CoreShape {
+    /// Length, m.
+    #[must_use]
+    pub fn length_m(&self) -> f64 {
+        self.top_m - self.bottom_m
+    }
+
+    /// Volume, m^3.
+    #[must_use]
+    pub fn volume_m3(&self) -> f64 {
+        std::f64::consts::PI * self.radius_m * self.radius_m * self.length_m()
+    }
+}

@@ -18,8 +18,6 @@
 //! energy, so the derivative of that energy along a correction decides the length of the step.
 //! The constant in v is free and has no effect: it stays that of the start.
 
-#[cfg(test)]
-mod crude;
 mod newton;
 #[cfg(test)]
 mod tests;
@@ -27,10 +25,11 @@ mod tests;
 use nalgebra::{DMatrix, DVector};
 
 use self::newton::State;
+use super::double_layer::operators;
+use super::generatrix::{Face, Generatrix};
 use super::interior::{Interior, MeshError, Sample};
 use super::permeability::Permeability;
 use super::trace::Trace;
-use crate::numerics::gauss;
 use crate::units::MU_0_T_M_PER_A;
 
 /// Corrections below this part of u, in the energy norm, end the iteration; the error
@@ -50,28 +49,6 @@ const MAX_TRIALS: usize = 12;
 /// Depth below the surface from which on the peak of |B| is taken, m; a tenth of the radius
 /// where that is less. At the edges |B| has no bound.
 const SKIN_M: f64 = 1e-3;
-
-/// What cannot be set up.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum SetupError {
-    /// The interior's mesh.
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
-    /// Nodes a panel outside what the quadrature has.
-    #[error("panels of {order} nodes are not made")]
-    Order {
-        /// As asked for.
-        order: usize,
-    },
-    /// A matrix or vector does not fit the panels.
-    #[error("the surface has {expected} nodes, its operator {found}")]
-    Size {
-        /// Number of Gauss nodes on the surface.
-        expected: usize,
-        /// Rows or columns given.
-        found: usize,
-    },
-}
 
 /// How the iteration ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -131,32 +108,26 @@ pub struct SaturatedCore {
 }
 
 impl SaturatedCore {
-    /// A core with the panels' breakpoints in r (from 0 to R) and z (bottom to top), `order` Gauss
-    /// nodes a panel, elements of `degree` (`order - 1` carries all that the panels know), and W
-    /// on the Gauss nodes: bottom face outwards, side upwards, top face inwards.
+    /// The core of `outline`: elements on its panels' tensor product, of the degree that the
+    /// panels' nodes carry; `quadrature` as in [`super::generatrix::Resolution`].
+    ///
+    /// Domain: an outline as [`Generatrix::new`] makes it, of two nodes a panel at least.
     ///
     /// # Errors
-    /// [`SetupError`].
-    pub fn new(
-        r_breaks_m: &[f64],
-        z_breaks_m: &[f64],
-        order: usize,
-        degree: usize,
-        w: &DMatrix<f64>,
-    ) -> Result<Self, SetupError> {
-        if order == 0 || order > gauss::MAX_ORDER {
-            return Err(SetupError::Order { order });
-        }
-        let interior = Interior::new(r_breaks_m, z_breaks_m, degree)?;
-        let panels = 2 * (r_breaks_m.len() - 1) + z_breaks_m.len() - 1;
-        let trace = Trace::new(panels, order, degree);
-        for found in [w.nrows(), w.ncols()] {
-            let expected = trace.gauss_count();
-            if found != expected {
-                return Err(SetupError::Size { expected, found });
-            }
-        }
-        let w = trace.operator_on_boundary(w);
+    /// [`MeshError`] when panels are too small for their place to be told from their neighbours'.
+    pub fn new(outline: &Generatrix, quadrature: f64) -> Result<Self, MeshError> {
+        let breaks = |face: Face| -> Vec<f64> {
+            let mut of_face = outline.panels.iter().filter(|panel| panel.face == face);
+            let first = of_face.clone().next().map(|panel| panel.from_m);
+            first
+                .into_iter()
+                .chain(of_face.by_ref().map(|panel| panel.to_m))
+                .collect()
+        };
+        let degree = outline.order - 1;
+        let interior = Interior::new(&breaks(Face::Bottom), &breaks(Face::Side), degree)?;
+        let trace = Trace::new(outline.panels.len(), outline.order, degree);
+        let w = trace.operator_on_boundary(&operators(outline, 1, quadrature).remove(0));
         let outer_m = interior.laplace_schur_m() - interior.laplace_schur_m() * &w;
         Ok(Self {
             interior,
@@ -177,19 +148,15 @@ impl SaturatedCore {
     ///
     /// Error: see [`Status`]; of the discretisation, [`CoreField::resolution`].
     ///
-    /// # Errors
-    /// [`SetupError::Size`] when `phi_a` has another length than the surface's nodes.
+    /// # Panics
+    /// When `phi_a` has another length than the outline's nodes.
     pub fn solve(
         &self,
         phi_a: &DVector<f64>,
         law: &impl Permeability,
         start: Option<&Solution>,
-    ) -> Result<Solution, SetupError> {
-        let expected = self.trace.gauss_count();
-        if phi_a.len() != expected {
-            let found = phi_a.len();
-            return Err(SetupError::Size { expected, found });
-        }
+    ) -> Solution {
+        assert_eq!(phi_a.len(), self.trace.gauss_count(), "one value a node");
         let phi = self.trace.to_boundary(phi_a);
         let v = match start {
             Some(start) if start.v_boundary_a.len() == phi.len() => start.v_boundary_a.clone(),
@@ -233,13 +200,13 @@ impl SaturatedCore {
                 status = Status::Converged;
             }
         }
-        Ok(Solution {
+        Solution {
             status,
             v_a: self.trace.to_gauss(&state.v),
             u_a: state.u,
             steps,
             v_boundary_a: state.v,
-        })
+        }
     }
 
     /// |B| of a solution.

@@ -1,4 +1,5 @@
 use super::*;
+use crate::field::steel::permeability::Froehlich;
 
 const R_M: f64 = 0.7;
 const Z_M: (f64, f64) = (-0.9, 1.3);
@@ -19,22 +20,6 @@ fn nodal(mesh: &Interior, f: impl Fn(f64, f64) -> f64) -> DVector<f64> {
         mesh.node_count(),
         mesh.nodes_m().into_iter().map(|(r, z)| f(r, z)),
     )
-}
-
-/// A law of the shape of saturating steel: mu = 1 + m / (h0 + h).
-#[derive(Clone, Copy)]
-struct Froehlich {
-    m: f64,
-    h0: f64,
-}
-
-impl Permeability for Froehlich {
-    fn response(&self, h: f64) -> crate::field::steel::permeability::Response {
-        crate::field::steel::permeability::Response {
-            relative: 1.0 + self.m / (self.h0 + h),
-            differential: 1.0 + self.m * self.h0 / (self.h0 + h).powi(2),
-        }
-    }
 }
 
 /// Modified Bessel functions I0 and I1 by their series.

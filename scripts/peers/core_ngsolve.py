@@ -1,0 +1,131 @@
+#!/usr/bin/env python3
+"""One coil with its linear steel core by axisymmetric finite elements of high order (NGSolve).
+
+    python3 scripts/peers/core_ngsolve.py DESIGN
+
+Solves for w = A_phi / r (smooth on the axis, where B_z = 2 w) in a half-disc of radius BALL_M
+whose rim carries the dipole's condition dw/dn = -3 w / BALL_M; the mesh is refined in proportion
+towards the core's edges. One thread. Prints one JSON object: the gradient at the target, the
+inductance, the unknowns, and the CPU seconds of meshing, solving and evaluating together.
+
+compare_core.py calls this; scripts/peers/requirements.txt lists what it needs.
+"""
+
+import json
+import math
+import os
+import sys
+import time
+import tomllib
+
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[variable] = "1"
+
+import ngsolve
+from netgen.occ import Circle, Glue, MoveTo, OCCGeometry
+from ngsolve import H1, BilinearForm, CoefficientFunction, GridFunction, InnerProduct
+from ngsolve import LinearForm, Mesh, ds, dx, grad, x
+
+ORDER = 8
+EDGE_LEVELS = 16  # refinements towards the core's edges, each by EDGE_RATIO
+EDGE_RATIO = 0.15
+BALL_M = 3.0
+NEAR_M = 0.12  # within this distance of the core's middle elements are at most NEAR_SIZE_M wide
+NEAR_SIZE_M = 0.015
+MU_0 = 4e-7 * math.pi
+
+
+def rectangle(r0, r1, z0, z1, name):
+    face = MoveTo(r0, z0).Rectangle(r1 - r0, z1 - z0).Face()
+    face.faces.name = name
+    return face
+
+
+def half_disc(radius_m, z_m):
+    disc = Circle((0, z_m), radius_m).Face()
+    face = disc * MoveTo(0, z_m - 2 * radius_m).Rectangle(2 * radius_m, 4 * radius_m).Face()
+    face.faces.name = "air"
+    return face
+
+
+def mesh_of(coil, core):
+    """Regions core, coil and air; the rim is called `outer`."""
+    core_r, bottom, top = core
+    middle = (bottom + top) / 2
+    steel = rectangle(0, core_r, bottom, top, "core")
+    winding = rectangle(*coil, "coil")
+    near = half_disc(NEAR_M, middle)
+    near.faces.maxh = NEAR_SIZE_M
+    far = half_disc(BALL_M, middle) - near
+    shape = Glue([steel, winding, near - steel - winding, far])
+    for vertex in shape.vertices:
+        r, z = vertex.p.x, vertex.p.y
+        if abs(r - core_r) < 1e-9 and min(abs(z - bottom), abs(z - top)) < 1e-9:
+            vertex.hpref = 1
+    for edge in shape.edges:
+        r, z = edge.center.x, edge.center.y
+        edge.name = "outer" if r > 1e-9 and math.hypot(r, z - middle) > 0.5 * BALL_M else "inner"
+    mesh = Mesh(OCCGeometry(shape, dim=2).GenerateMesh(maxh=BALL_M / 3, grading=0.4))
+    mesh.Curve(ORDER)
+    mesh.RefineHP(EDGE_LEVELS, EDGE_RATIO)
+    return mesh
+
+
+def solve(coil, core, turns, permeability, height_m):
+    """dB_z/dz per ampere on the axis at height_m, inductance, number of unknowns."""
+    mesh = mesh_of(coil, core)
+    space = H1(mesh, order=ORDER)
+    w, v = space.TnT()
+
+    def flux(u):
+        """B turned by a right angle, over sqrt(r): grad(r^2 u) / r."""
+        return CoefficientFunction((x * grad(u)[0] + 2 * u, x * grad(u)[1]))
+
+    reluctivity = mesh.MaterialCF({"core": 1 / permeability}, default=1.0) / MU_0
+    form = BilinearForm(space, symmetric=True)
+    form += reluctivity * x * flux(w) * flux(v) * dx(bonus_intorder=4)
+    form += x**3 * w * v / (MU_0 * BALL_M) * ds("outer")
+    form.Assemble()
+    inner_m, outer_m, bottom_m, top_m = coil
+    density = turns / ((outer_m - inner_m) * (top_m - bottom_m))
+    source = LinearForm(density * x**2 * v * dx("coil")).Assemble()
+    solution = GridFunction(space)
+    inverse = form.mat.Inverse(space.FreeDofs(), "sparsecholesky")
+    solution.vec.data = inverse * source.vec
+    inductance_h = 2 * math.pi * InnerProduct(source.vec, solution.vec)
+    return 2 * grad(solution)[1](mesh(0, height_m)), inductance_h, space.ndof
+
+
+def main():
+    with open(sys.argv[1], "rb") as file:
+        design = tomllib.load(file)
+    coil, core = design["coil"], design["core"]
+    inner_m, outer_m = coil["inner_diameter_mm"] / 2000, coil["outer_diameter_mm"] / 2000
+    length_m = coil["length_mm"] / 1000
+    core_m = (
+        inner_m - core["clearance_mm"] / 1000,
+        -length_m - core["below_mm"] / 1000,
+        core["above_mm"] / 1000,
+    )
+    ngsolve.SetNumThreads(1)
+    ngsolve.ngsglobals.msg_level = 0
+    start = time.process_time()
+    gradient, inductance_h, unknowns = solve(
+        (inner_m, outer_m, -length_m, 0),
+        core_m,
+        coil["turns"],
+        core["relative_permeability"],
+        design.get("target", {}).get("height_mm", 30.0) / 1000,
+    )
+    result = {
+        "gradient_t_per_m_per_a": gradient,
+        "inductance_h": inductance_h,
+        "cpu_s": time.process_time() - start,
+        "unknowns": unknowns,
+        "ngsolve": ngsolve.__version__,
+    }
+    print(json.dumps(result))
+
+
+if __name__ == "__main__":
+    main()

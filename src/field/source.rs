@@ -1,0 +1,50 @@
+//! What a map needs of an axisymmetric source, be it a winding alone or one with its core.
+
+use super::batch::{Gradients, Wanted};
+use super::winding::{OnEdge, Winding};
+
+/// A source that is symmetric about the z axis, per ampere. Outside its conductors and cores the
+/// field is the gradient of a harmonic function.
+pub trait AxialSource: Sync {
+    /// Gradients per ampere at points (`r_m`, `z_m`), to `tolerance` relative to the largest
+    /// |grad B| at each point's height.
+    ///
+    /// # Errors
+    /// [`OnEdge`] where the gradient is unbounded at a point.
+    fn gradients(
+        &self,
+        r_m: &[f64],
+        z_m: &[f64],
+        tolerance: f64,
+        wanted: Wanted,
+    ) -> Result<Gradients, OnEdge>;
+
+    /// B_z per ampere, T/A, to `tolerance` relative to the largest |B| at each point's height.
+    ///
+    /// # Errors
+    /// [`OnEdge`] where the gradient is unbounded at a point.
+    fn axial_fields(&self, r_m: &[f64], z_m: &[f64], tolerance: f64) -> Result<Vec<f64>, OnEdge>;
+
+    /// Height of the highest singularity, m: the field is analytic above it.
+    fn top_m(&self) -> f64;
+}
+
+impl AxialSource for Winding {
+    fn gradients(
+        &self,
+        r_m: &[f64],
+        z_m: &[f64],
+        tolerance: f64,
+        wanted: Wanted,
+    ) -> Result<Gradients, OnEdge> {
+        Self::gradients(self, r_m, z_m, tolerance, wanted)
+    }
+
+    fn axial_fields(&self, r_m: &[f64], z_m: &[f64], tolerance: f64) -> Result<Vec<f64>, OnEdge> {
+        Self::axial_fields(self, r_m, z_m, tolerance)
+    }
+
+    fn top_m(&self) -> f64 {
+        0.0
+    }
+}

@@ -1,0 +1,419 @@
+//! An array of identical cored coils: all cores respond to each driven coil.
+//!
+//! With q the moments of every core on its exchange grid, T one core's response, K the
+//! potential that moments send to the other cores and p that of the driven winding,
+//!
+//! ```text
+//! q - T K q = T p + q_own,
+//! ```
+//!
+//! q_own being the driven coil's own core under its own winding, solved on the fine outline.
+//! Plain iteration stalls (the array's cores return each other's flux); GMRES needs a dozen steps.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+
+use super::CoreShape;
+use super::cored_coil::Excitation;
+use super::coupling::{between_cores, from_winding, grid_points};
+use super::generatrix::{Generatrix, Resolution};
+use super::response::{Response, Rings};
+use super::symmetry::{Motion, motions};
+use crate::field::winding::{OnEdge, Winding};
+use crate::numerics::gmres::gmres;
+
+/// Most azimuthal modes; beyond, the stated error grows.
+const MOST_MODES: usize = 17;
+/// Most applications of the coupling.
+const MOST_STEPS: usize = 120;
+/// Share of the tolerance given to the linear solver.
+const SOLVER_SHARE: f64 = 0.01;
+
+/// How finely a coupled array is solved.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ArrayResolution {
+    /// The outline of each core.
+    pub outline: Resolution,
+    /// Azimuthal modes.
+    pub modes: usize,
+    /// Length of the exchange panels, m.
+    pub panel_m: f64,
+    /// Exchange rings a panel.
+    pub order: usize,
+    /// Relative residual of the linear solver.
+    pub residual: f64,
+}
+
+impl ArrayResolution {
+    /// The resolution for a relative error `tolerance`, `closest_m` being the smallest distance
+    /// of two axes.
+    ///
+    /// A mode m that a core sends to another, and gets back, decays like ((d - R)/R)^(-2 m); the
+    /// kernels between two cores are analytic within their gap.
+    #[must_use]
+    pub fn for_tolerance(tolerance: f64, shape: CoreShape, closest_m: f64) -> Self {
+        let tolerance = tolerance.clamp(1e-9, 0.1);
+        let outline = Resolution::for_tolerance(tolerance);
+        let residual = SOLVER_SHARE * tolerance;
+        if closest_m.is_infinite() {
+            return Self {
+                outline,
+                modes: 1,
+                panel_m: shape.length_m().max(shape.radius_m),
+                order: 2,
+                residual,
+            };
+        }
+        let radius_m = shape.radius_m;
+        let decay = 2.0 * ((closest_m - radius_m) / radius_m).ln();
+        let modes = 2 + ((1.0 / tolerance).ln() / decay.max(1e-3)).ceil() as usize;
+        let gap_m = (closest_m - 2.0 * radius_m).max(0.05 * radius_m);
+        Self {
+            outline,
+            modes: modes.clamp(2, MOST_MODES),
+            panel_m: 1.5 * gap_m,
+            order: (2.0 - 1.3 * tolerance.log10()).ceil() as usize,
+            residual,
+        }
+    }
+
+    /// The next coarser resolution.
+    #[must_use]
+    pub fn coarser(&self) -> Self {
+        Self {
+            outline: self.outline.coarser(),
+            modes: (self.modes - 1).max(1),
+            order: (self.order - 1).max(2),
+            ..*self
+        }
+    }
+}
+
+/// The solved array, per ampere in each coil.
+#[derive(Debug, Clone)]
+pub struct CoupledArray {
+    /// Axes, m.
+    pub positions_m: Vec<[f64; 2]>,
+    /// The winding of every coil.
+    pub winding: Winding,
+    /// One core's response.
+    pub response: Response,
+    /// Layer of mode 0 of a driven coil's own core under its own winding, A/A, on the nodes.
+    pub own_layer: DVector<f64>,
+    /// Potential sent to every core by all others, [drive][core][exchange grid], A/A.
+    pub potentials: Vec<Vec<Vec<f64>>>,
+    /// What the steel adds to self and mutual inductances, [coil, drive], H.
+    pub added_inductance_h: DMatrix<f64>,
+    /// Relative residual of the linear solver.
+    pub relative_residual: f64,
+    /// Applications of the coupling.
+    pub iterations: usize,
+}
+
+impl CoupledArray {
+    /// Solves at one resolution.
+    ///
+    /// Domain: cores apart by more than nothing, windings apart or touching.
+    ///
+    /// # Errors
+    /// A node of the outline on the winding's edge.
+    pub fn at_resolution(
+        winding: &Winding,
+        shape: CoreShape,
+        relative_permeability: f64,
+        positions_m: &[[f64; 2]],
+        resolution: &ArrayResolution,
+    ) -> Result<Self, OnEdge> {
+        let outline = Generatrix::of_coil(winding, shape, &resolution.outline);
+        let excitation = Excitation::new(winding, &outline)?;
+        let exchange = Rings::new(&outline, resolution.order, |_| resolution.panel_m);
+        // A multiple of four, for the array's symmetries; enough for the modes' products.
+        let angles = (2 * resolution.modes).next_multiple_of(4);
+        let response = Response::new(
+            outline,
+            exchange,
+            angles,
+            resolution.modes,
+            relative_permeability,
+            resolution.outline.quadrature,
+        );
+        let own_layer = response.axial_layer(&excitation.potential);
+        let mut array = Self {
+            positions_m: positions_m.to_vec(),
+            winding: *winding,
+            response,
+            own_layer,
+            potentials: Vec::new(),
+            added_inductance_h: DMatrix::zeros(positions_m.len(), positions_m.len()),
+            relative_residual: 0.0,
+            iterations: 0,
+        };
+        array.couple(&excitation, resolution);
+        Ok(array)
+    }
+
+    fn couple(&mut self, excitation: &Excitation, resolution: &ArrayResolution) {
+        let cores = self.positions_m.len();
+        let size = self.response.size();
+        let points = grid_points(&self.response);
+        let links = Links::new(&self.positions_m);
+        let blocks: Vec<DMatrix<f64>> = links
+            .offsets_m
+            .par_iter()
+            .map(|offset| between_cores(&points, self.response.angles, *offset))
+            .collect();
+        let sent: Vec<(Vec<f64>, Vec<f64>)> = links
+            .offsets_m
+            .par_iter()
+            .map(|o| from_winding(&self.winding, &points, *o, resolution.residual))
+            .collect();
+        let response = self.response.matrix();
+        let symmetries = motions(&self.positions_m);
+        let drives = representatives(cores, &symmetries);
+
+        // Moments [size, core] side by side for every drive: column = drive * cores + core.
+        let columns = drives.len() * cores;
+        let mut potentials = DMatrix::zeros(size, columns);
+        for (place, drive) in drives.iter().enumerate() {
+            for core in (0..cores).filter(|c| c != drive) {
+                let link = links.index[core * cores + drive];
+                potentials
+                    .column_mut(place * cores + core)
+                    .copy_from_slice(&sent[link].0);
+            }
+        }
+        let own = self.own_moments();
+        let mut rhs = &response * &potentials;
+        for (place, drive) in drives.iter().enumerate() {
+            rhs.column_mut(place * cores + drive).axpy(1.0, &own, 1.0);
+        }
+        let stack = |m: DMatrix<f64>| {
+            m.reshape_generic(nalgebra::Dyn(size * cores), nalgebra::Dyn(drives.len()))
+        };
+        let unstack = |m: &DMatrix<f64>| {
+            m.clone()
+                .reshape_generic(nalgebra::Dyn(size), nalgebra::Dyn(columns))
+        };
+        let outcome = gmres(&stack(rhs), resolution.residual, MOST_STEPS, |moments| {
+            let moments = unstack(moments);
+            let back = &response * links.send(&blocks, &moments, cores);
+            stack(moments - back)
+        });
+        self.relative_residual = outcome.relative_residual;
+        self.iterations = outcome.iterations;
+        let moments = unstack(&outcome.solutions);
+        potentials += links.send(&blocks, &moments, cores);
+
+        // Every drive from its representative.
+        let of_drive = |drive: usize| {
+            let (place, motion) = drives
+                .iter()
+                .enumerate()
+                .find_map(|(place, first)| {
+                    symmetries
+                        .iter()
+                        .find(|m| m.coil[*first] == drive)
+                        .map(|m| (place, m))
+                })
+                .expect("every coil is the image of a representative");
+            let moved = |from: &DMatrix<f64>| -> Vec<Vec<f64>> {
+                let mut out = vec![Vec::new(); cores];
+                for core in 0..cores {
+                    out[motion.coil[core]] =
+                        self.moved(motion, from.column(place * cores + core).as_slice());
+                }
+                out
+            };
+            (moved(&potentials), moved(&moments))
+        };
+        let all: Vec<_> = (0..cores).map(of_drive).collect();
+
+        // Flux through coil i of the layers of all cores.
+        let own_flux = {
+            let areas: Vec<f64> = self.response.outline.areas_m2().collect();
+            let weighted = DVector::from_iterator(
+                areas.len(),
+                areas
+                    .iter()
+                    .zip(&excitation.normal_field_t_per_a)
+                    .map(|(a, b)| -a * b),
+            );
+            (
+                weighted.dot(&self.own_layer),
+                self.response.layers[0].tr_mul(&weighted),
+            )
+        };
+        let rings = self.response.exchange.rings.len();
+        let turn = TAU / self.response.angles as f64;
+        for (drive, (potentials, moments)) in all.iter().enumerate() {
+            for coil in 0..cores {
+                let mut flux = if coil == drive { own_flux.0 } else { 0.0 };
+                for values in potentials[coil].chunks(rings) {
+                    let share: f64 = values
+                        .iter()
+                        .zip(own_flux.1.iter())
+                        .map(|(a, b)| a * b)
+                        .sum();
+                    flux += share / self.response.angles as f64;
+                }
+                for core in (0..cores).filter(|c| *c != coil) {
+                    let link = links.index[core * cores + coil];
+                    let normal = &sent[link].1;
+                    flux -= turn
+                        * moments[core]
+                            .iter()
+                            .zip(normal)
+                            .map(|(q, b)| q * b)
+                            .sum::<f64>();
+                }
+                self.added_inductance_h[(coil, drive)] = flux;
+            }
+        }
+        self.potentials = all.into_iter().map(|(p, _)| p).collect();
+    }
+
+    /// Moments of the driven coil's own core on the exchange grid.
+    fn own_moments(&self) -> DVector<f64> {
+        let layer = DMatrix::from_column_slice(self.own_layer.len(), 1, self.own_layer.as_slice());
+        let ring = self
+            .response
+            .exchange
+            .moments(&self.response.outline, &layer);
+        DVector::from_iterator(
+            self.response.size(),
+            (0..self.response.angles).flat_map(|_| ring.iter().copied()),
+        )
+    }
+
+    fn moved(&self, motion: &Motion, values: &[f64]) -> Vec<f64> {
+        let rings = self.response.exchange.rings.len();
+        let mut out = vec![0.0; values.len()];
+        for (k, block) in values.chunks(rings).enumerate() {
+            let to = motion.angle(k, self.response.angles);
+            out[to * rings..(to + 1) * rings].copy_from_slice(block);
+        }
+        out
+    }
+
+    /// Layers of one core for one driven coil, on the nodes: column 0 for mode 0, then cosine
+    /// and sine of every mode, A/A.
+    #[must_use]
+    pub fn layers(&self, drive: usize, core: usize) -> DMatrix<f64> {
+        let modes = self.response.modes_of(&self.potentials[drive][core]);
+        let mut layers = self.response.layers_of(&modes);
+        if drive == core {
+            layers.column_mut(0).axpy(1.0, &self.own_layer, 1.0);
+        }
+        layers
+    }
+}
+
+/// The pairs of cores by their offset: many share one.
+struct Links {
+    offsets_m: Vec<[f64; 2]>,
+    /// [receiver, sender]; meaningless on the diagonal.
+    index: Vec<usize>,
+}
+
+impl Links {
+    fn new(positions_m: &[[f64; 2]]) -> Self {
+        let cores = positions_m.len();
+        let mut offsets_m: Vec<[f64; 2]> = Vec::new();
+        let mut index = vec![usize::MAX; cores * cores];
+        let extent = positions_m
+            .iter()
+            .flatten()
+            .fold(0.0_f64, |e, x| e.max(x.abs()));
+        // Positions from a grid differ by rounding only.
+        let same = |a: f64, b: f64| (a - b).abs() <= 1e-12 * extent;
+        for receiver in 0..cores {
+            for sender in (0..cores).filter(|s| *s != receiver) {
+                let (a, b) = (positions_m[receiver], positions_m[sender]);
+                let offset = [a[0] - b[0], a[1] - b[1]];
+                let known = offsets_m
+                    .iter()
+                    .position(|o| same(o[0], offset[0]) && same(o[1], offset[1]));
+                index[receiver * cores + sender] = known.unwrap_or_else(|| {
+                    offsets_m.push(offset);
+                    offsets_m.len() - 1
+                });
+            }
+        }
+        Self { offsets_m, index }
+    }
+
+    /// Potentials at every core of the moments of all others; columns as in `moments`.
+    fn send(&self, blocks: &[DMatrix<f64>], moments: &DMatrix<f64>, cores: usize) -> DMatrix<f64> {
+        let drives = moments.ncols() / cores;
+        let size = moments.nrows();
+        // One receiver is one piece of work; its senders are added in order.
+        let received: Vec<DMatrix<f64>> = (0..cores)
+            .into_par_iter()
+            .map(|receiver| {
+                let mut sum = DMatrix::zeros(size, drives);
+                for sender in (0..cores).filter(|s| *s != receiver) {
+                    let block = &blocks[self.index[receiver * cores + sender]];
+                    let from =
+                        DMatrix::from_fn(size, drives, |i, d| moments[(i, d * cores + sender)]);
+                    sum.gemm(1.0, block, &from, 1.0);
+                }
+                sum
+            })
+            .collect();
+        DMatrix::from_fn(size, moments.ncols(), |i, column| {
+            received[column % cores][(i, column / cores)]
+        })
+    }
+}
+
+/// The first coil of every set of equivalent ones.
+fn representatives(cores: usize, symmetries: &[Motion]) -> Vec<usize> {
+    (0..cores)
+        .filter(|coil| symmetries.iter().all(|m| m.coil[*coil] >= *coil))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seed() {
+        let winding = Winding {
+            inner_radius_m: 0.012,
+            outer_radius_m: 0.019,
+            length_m: 0.1,
+            turns: 1429.0,
+        };
+        let shape = CoreShape {
+            radius_m: 0.012,
+            bottom_m: -0.11,
+            top_m: 0.0,
+        };
+        let positions: Vec<[f64; 2]> = (0..9)
+            .map(|i| [0.05 * ((i % 3) as f64 - 1.0), 0.05 * ((i / 3) as f64 - 1.0)])
+            .collect();
+        for tol in [1e-2, 1e-3, 1e-4, 1e-5] {
+            let res = ArrayResolution::for_tolerance(tol, shape, 0.05);
+            let t = std::time::Instant::now();
+            let a = CoupledArray::at_resolution(&winding, shape, 1000.0, &positions, &res).unwrap();
+            println!(
+                "{tol:e} {res:?} size {} its {} res {:.1e} {:?}",
+                a.response.size(),
+                a.iterations,
+                a.relative_residual,
+                t.elapsed()
+            );
+            println!(
+                "   L44 {:.6} L00 {:.6} M01 {:.8} M10 {:.8} M04 {:.8} M40 {:.8}",
+                0.01450192606 + a.added_inductance_h[(4, 4)],
+                0.01450192606 + a.added_inductance_h[(0, 0)],
+                a.added_inductance_h[(0, 1)],
+                a.added_inductance_h[(1, 0)],
+                a.added_inductance_h[(0, 4)],
+                a.added_inductance_h[(4, 0)]
+            );
+        }
+    }
+}

@@ -1,0 +1,297 @@
+//! The linear response of one core to a smooth field from outside.
+//!
+//! What neighbours send varies slowly over a core, and a core's own double layer acts on its
+//! neighbours through kernels that are smooth over it. Both pass through a few rings: the
+//! potential sent is sampled there, and the layer is felt as moments there, whatever its shape
+//! at the edges. The azimuth is a regular grid of angles, in which one core is block-circulant.
+
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::TAU;
+
+use super::double_layer::operators;
+use super::generatrix::{Face, Generatrix};
+use crate::numerics::gauss;
+use crate::numerics::lagrange_basis::Basis;
+
+/// A ring of the exchange grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ring {
+    /// Radius, m.
+    pub r_m: f64,
+    /// Height, m.
+    pub z_m: f64,
+    /// Outer normal (r, z).
+    pub normal: [f64; 2],
+}
+
+/// Rings on a core's outline and the interpolation from them to the outline's nodes.
+#[derive(Debug, Clone)]
+pub struct Rings {
+    /// The rings.
+    pub rings: Vec<Ring>,
+    /// [outline node, ring].
+    pub to_nodes: DMatrix<f64>,
+}
+
+impl Rings {
+    /// Gauss nodes, `order` a panel, on each face cut into panels at most `length_m(z)` long,
+    /// z being the panel's height closest to where the rings are looked at from.
+    #[must_use]
+    pub fn new(outline: &Generatrix, order: usize, length_m: impl Fn(f64) -> f64) -> Self {
+        let shape = outline.shape;
+        let rule = gauss::rule(order);
+        let basis = Basis::new(rule);
+        // (face, from, to), the side from the top down.
+        let mut panels: Vec<(Face, f64, f64)> = Vec::new();
+        for (face, z_m) in [(Face::Bottom, shape.bottom_m), (Face::Top, shape.top_m)] {
+            let pieces = (shape.radius_m / length_m(z_m)).ceil().max(1.0);
+            for piece in 0..pieces as usize {
+                let edge = |k: usize| shape.radius_m * k as f64 / pieces;
+                panels.push((face, edge(piece), edge(piece + 1)));
+            }
+        }
+        let mut top = shape.top_m;
+        while top > shape.bottom_m {
+            let left = top - shape.bottom_m;
+            let mut length = length_m(top).min(left);
+            // No sliver at the end.
+            if left - length < 0.5 * length {
+                length = if left < 1.2 * length {
+                    left
+                } else {
+                    0.5 * left
+                };
+            }
+            let bottom = if length >= left {
+                shape.bottom_m
+            } else {
+                top - length
+            };
+            panels.push((Face::Side, bottom, top));
+            top = bottom;
+        }
+        let mut rings = Vec::with_capacity(panels.len() * order);
+        let mut to_nodes = DMatrix::zeros(outline.nodes.len(), panels.len() * order);
+        let mut weights = vec![0.0; order];
+        for (index, (face, from, to)) in panels.iter().enumerate() {
+            let at = |x: f64| from + 0.5 * (to - from) * (1.0 + x);
+            rings.extend(rule.nodes.iter().map(|x| {
+                let (r_m, z_m, normal) = shape.on(*face, at(*x));
+                Ring { r_m, z_m, normal }
+            }));
+            for (row, (node, panel)) in outline
+                .nodes
+                .iter()
+                .zip(outline.panels.iter().flat_map(|p| vec![p; outline.order]))
+                .enumerate()
+            {
+                let coordinate = if *face == Face::Side {
+                    node.z_m
+                } else {
+                    node.r_m
+                };
+                if panel.face != *face || coordinate < *from || coordinate > *to {
+                    continue;
+                }
+                basis.weights(2.0 * (coordinate - from) / (to - from) - 1.0, &mut weights);
+                for (place, weight) in weights.iter().enumerate() {
+                    to_nodes[(row, index * order + place)] = *weight;
+                }
+            }
+        }
+        Self { rings, to_nodes }
+    }
+
+    /// Moments on the rings of layers on the nodes: [ring, layer], A m^2 a radian.
+    #[must_use]
+    pub fn moments(&self, outline: &Generatrix, layers: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut weighted = layers.clone();
+        for (mut row, node) in weighted.row_iter_mut().zip(&outline.nodes) {
+            row *= node.r_m * node.weight_m;
+        }
+        self.to_nodes.tr_mul(&weighted)
+    }
+}
+
+/// One core's response: potentials on the exchange grid to layers and to moments.
+#[derive(Debug, Clone)]
+pub struct Response {
+    /// The outline on which the layers live.
+    pub outline: Generatrix,
+    /// The exchange rings.
+    pub exchange: Rings,
+    /// Angles of the exchange grid, theta = k tau / angles.
+    pub angles: usize,
+    /// For every mode: layer on the nodes for a unit potential on each ring.
+    pub layers: Vec<DMatrix<f64>>,
+    /// For every mode: moments on the rings for a unit potential on each ring.
+    moments: Vec<DMatrix<f64>>,
+    /// Mode 0 for a potential given on the nodes.
+    axial: nalgebra::LU<f64, nalgebra::Dyn, nalgebra::Dyn>,
+    share: f64,
+}
+
+impl Response {
+    /// Responses of modes 0 to `modes` - 1 of a core with permeability `relative_permeability`.
+    #[must_use]
+    pub fn new(
+        outline: Generatrix,
+        exchange: Rings,
+        angles: usize,
+        modes: usize,
+        relative_permeability: f64,
+        quadrature: f64,
+    ) -> Self {
+        let share = (relative_permeability - 1.0) / relative_permeability;
+        let systems: Vec<_> = operators(&outline, modes, quadrature)
+            .into_iter()
+            .enumerate()
+            .map(|(mode, w)| system(&outline, w, relative_permeability, mode).lu())
+            .collect();
+        let layers: Vec<DMatrix<f64>> = systems
+            .iter()
+            .enumerate()
+            .map(|(mode, lu)| {
+                let rhs = &exchange.to_nodes * share;
+                let mut layers = lu.solve(&rhs).unwrap_or(rhs);
+                if mode == 0 {
+                    for mut column in layers.column_iter_mut() {
+                        let mean = mean(&outline, column.iter());
+                        column.add_scalar_mut(-mean);
+                    }
+                }
+                layers
+            })
+            .collect();
+        let moments = layers
+            .iter()
+            .map(|l| exchange.moments(&outline, l))
+            .collect();
+        let axial = systems
+            .into_iter()
+            .next()
+            .unwrap_or_else(|| DMatrix::identity(1, 1).lu());
+        Self {
+            outline,
+            exchange,
+            angles,
+            layers,
+            moments,
+            axial,
+            share,
+        }
+    }
+
+    /// Number of unknowns a core.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.angles * self.exchange.rings.len()
+    }
+
+    /// The layer of mode 0 for a potential on the nodes, its mean zero.
+    #[must_use]
+    pub fn axial_layer(&self, potential: &DVector<f64>) -> DVector<f64> {
+        let centred = potential.add_scalar(-mean(&self.outline, potential.iter()));
+        let rhs = centred * self.share;
+        let mut layer = self.axial.solve(&rhs).unwrap_or(rhs);
+        let shift = mean(&self.outline, layer.iter());
+        layer.add_scalar_mut(-shift);
+        layer
+    }
+
+    /// The core's moments for potentials on the exchange grid: a dense block-circulant matrix,
+    /// index = angle * rings + ring.
+    #[must_use]
+    pub fn matrix(&self) -> DMatrix<f64> {
+        let rings = self.exchange.rings.len();
+        let angles = self.angles;
+        // The block for an angle difference.
+        let blocks: Vec<DMatrix<f64>> = (0..angles)
+            .map(|k| {
+                let mut block = DMatrix::zeros(rings, rings);
+                for (mode, moments) in self.moments.iter().enumerate() {
+                    let factor = if mode == 0 { 1.0 } else { 2.0 };
+                    let phase = TAU * ((mode * k) % angles) as f64 / angles as f64;
+                    block += moments * (factor / angles as f64 * phase.cos());
+                }
+                block
+            })
+            .collect();
+        let mut matrix = DMatrix::zeros(self.size(), self.size());
+        for row in 0..angles {
+            for column in 0..angles {
+                matrix
+                    .view_mut((row * rings, column * rings), (rings, rings))
+                    .copy_from(&blocks[(row + angles - column) % angles]);
+            }
+        }
+        matrix
+    }
+
+    /// Azimuthal modes of a potential on the exchange grid: column 0 for mode 0, then cosine and
+    /// sine of every mode; [ring, column].
+    #[must_use]
+    pub fn modes_of(&self, potential: &[f64]) -> DMatrix<f64> {
+        let rings = self.exchange.rings.len();
+        let mut out = DMatrix::zeros(rings, 2 * self.layers.len() - 1);
+        for (k, values) in potential.chunks(rings).enumerate() {
+            for mode in 0..self.layers.len() {
+                let factor = if mode == 0 { 1.0 } else { 2.0 } / self.angles as f64;
+                let (s, c) =
+                    (TAU * ((mode * k) % self.angles) as f64 / self.angles as f64).sin_cos();
+                for (ring, value) in values.iter().enumerate() {
+                    out[(ring, (2 * mode).saturating_sub(1))] += factor * c * value;
+                    if mode > 0 {
+                        out[(ring, 2 * mode)] += factor * s * value;
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    /// Layers on the nodes for the modes that [`Response::modes_of`] gives, same columns.
+    #[must_use]
+    pub fn layers_of(&self, modes: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut out = DMatrix::zeros(self.outline.nodes.len(), modes.ncols());
+        for column in 0..modes.ncols() {
+            let mode = column.div_ceil(2);
+            out.set_column(column, &(&self.layers[mode] * modes.column(column)));
+        }
+        out
+    }
+}
+
+/// (1/mu_r) + (1 - 1/mu_r) W, with the constants of mode 0 kept finite.
+#[must_use]
+pub fn system(
+    outline: &Generatrix,
+    w: DMatrix<f64>,
+    relative_permeability: f64,
+    mode: usize,
+) -> DMatrix<f64> {
+    let inverse = 1.0 / relative_permeability;
+    let share = (relative_permeability - 1.0) / relative_permeability;
+    let mut matrix = w;
+    if mode == 0 {
+        let total: f64 = outline.areas_m2().sum();
+        for (mut column, area) in matrix.column_iter_mut().zip(outline.areas_m2()) {
+            column.add_scalar_mut(area / total);
+        }
+    }
+    matrix *= share;
+    for i in 0..matrix.nrows() {
+        matrix[(i, i)] += inverse;
+    }
+    matrix
+}
+
+/// Mean over the outline's surface.
+pub fn mean<'a>(outline: &Generatrix, values: impl Iterator<Item = &'a f64>) -> f64 {
+    let (mut sum, mut total) = (0.0, 0.0);
+    for (value, area) in values.zip(outline.areas_m2()) {
+        sum += value * area;
+        total += area;
+    }
+    sum / total
+}
