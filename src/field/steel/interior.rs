@@ -252,12 +252,6 @@ impl Interior {
         std::f64::consts::PI * radius_m * radius_m * height_m
     }
 
-    /// Degree of the elements.
-    #[must_use]
-    pub fn degree(&self) -> usize {
-        self.reference.degree
-    }
-
     /// Breakpoints in r and in z, m.
     #[must_use]
     pub fn breaks_m(&self) -> (&[f64], &[f64]) {
@@ -374,8 +368,8 @@ impl Interior {
     }
 
     /// How well the elements resolve u: the part of u that polynomials of one degree less miss,
-    /// in the energy norm int mu |grad u|^2, relative to u's own. The energy's error is about
-    /// the square of it.
+    /// in the energy norm int mu |grad u|^2, relative to u's own. It tells a mesh that is too
+    /// coarse from one that is not; it is no bound.
     #[must_use]
     pub fn resolution(&self, u: &DVector<f64>, law: &impl Permeability) -> f64 {
         let nodes = &self.reference.nodes;

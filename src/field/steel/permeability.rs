@@ -81,21 +81,24 @@ mod tests {
 
     #[test]
     fn a_curves_response_is_its_own() {
-        let b_t = [0.0, 0.7, 1.3, 1.6, 1.9];
-        let curve = BhCurve::new(&b_t, &[0.0, 130.0, 700.0, 5100.0, 31e3]).expect("a good curve");
-        for h in [3.0, 130.0, 420.0, 4e3, 28e3, 9e5] {
+        let b_t = [0.0, 0.4, 0.7, 1.3, 1.6, 1.9];
+        let curve =
+            BhCurve::new(&b_t, &[0.0, 70.0, 130.0, 700.0, 5100.0, 31e3]).expect("a good curve");
+        for h in [3.0, 99.0, 420.0, 4e3, 28e3, 9e5] {
             let response = curve.response(h);
             let b = MU_0_T_M_PER_A * response.relative * h;
             assert!((curve.h_a_per_m(b) / h - 1.0).abs() < 1e-13);
             let step = 1e-5 * h;
             let slope = (curve.b_t(h + step) - curve.b_t(h - step)) / (2.0 * step);
-            // A central difference, one-sided at a point of the table.
             let differential = MU_0_T_M_PER_A * response.differential;
             assert!((slope / differential - 1.0).abs() < 1e-4, "{h}");
         }
         let (zero, weak) = (curve.response(0.0), curve.response(1e-3));
         assert!((zero.relative / weak.relative - 1.0).abs() < 1e-4);
         assert_eq!(zero.relative, zero.differential);
-        assert!(zero.relative.is_finite());
+        // A table that turns upwards at once begins with no slope: mu has no limit there.
+        let steep = BhCurve::new(&[0.0, 0.7, 1.3], &[0.0, 130.0, 1700.0]).expect("a good curve");
+        assert_eq!(steep.dh_db(0.0), 0.0);
+        assert!(steep.response(0.0).relative > 1e5 && steep.response(0.0).relative.is_finite());
     }
 }

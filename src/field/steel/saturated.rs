@@ -92,7 +92,7 @@ pub struct CoreField {
     pub peak_at_m: (f64, f64),
     /// Mean of |B| over the volume, T.
     pub mean_b_t: f64,
-    /// Part of u that elements of one degree less miss, in the energy norm.
+    /// See [`Interior::resolution`].
     pub resolution: f64,
 }
 
@@ -146,7 +146,9 @@ impl SaturatedCore {
     /// Solves for the source's potential `phi_a` (A; H = -grad phi) at the surface's Gauss nodes,
     /// from the state `start` of a similar problem or from a core of constant permeability.
     ///
-    /// Error: see [`Status`]; of the discretisation, [`CoreField::resolution`].
+    /// Error: of the iteration, see [`Status`]; of the discretisation, the difference between two
+    /// outlines' results. On an outline for 1e-4 field and flux of the tested coils are within 2e-4
+    /// of those on the finest; a table's kinks, where they lie in the core, converge slowest.
     ///
     /// # Panics
     /// When `phi_a` has another length than the outline's nodes.
