@@ -6,7 +6,10 @@ pub mod evaluate;
 pub mod lambda;
 pub mod map;
 pub mod probe;
+pub mod maps;
 pub mod scene;
+pub mod single;
+pub mod steel;
 pub mod verify;
 
 use crate::bundle::atomic::WriteError;

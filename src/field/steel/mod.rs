@@ -16,6 +16,7 @@ pub mod magnetized;
 pub mod permeability;
 pub mod response;
 pub mod saturated;
+pub mod source;
 pub mod sources;
 pub mod symmetry;
 pub mod trace;
