@@ -19,7 +19,7 @@ use super::CoreShape;
 use super::array::CoupledArray;
 use super::cored_coil::CoredCoil;
 use super::double_layer::operators;
-use super::generatrix::{Face, Generatrix, Resolution};
+use super::generatrix::{Face, Generatrix, Panel, Resolution};
 use super::layer_gradient::{COMPONENTS, gradient_operators};
 use crate::field::winding::{OnEdge, Winding};
 use crate::numerics::gauss;
@@ -65,7 +65,7 @@ pub struct CoreField {
     /// Mean of |B| over the whole core's volume, T.
     pub mean_t: f64,
     /// Estimated error of either, relative to it: the larger. Of outline and modes, half of what
-    /// the last polynomial degree of every panel and the last mode contribute; of the mean, what
+    /// the last polynomial degrees of every panel and the last mode contribute; of the mean, what
     /// a node a panel less changes.
     pub relative_error: f64,
 }
@@ -253,42 +253,64 @@ fn norm(b: [f64; 3]) -> f64 {
     b[0].hypot(b[1]).hypot(b[2])
 }
 
-/// The layers without every panel's highest polynomial degree and without the last mode.
+/// The layers without every panel's highest polynomial degree, without the upper half of the
+/// degrees next to the steel's edges, where they decay slowly, and without the last mode.
 fn reduced(outline: &Generatrix, layers: &DMatrix<f64>) -> DMatrix<f64> {
     let order = outline.order;
-    let rule = gauss::rule(order);
-    let highest: Vec<f64> = rule
-        .nodes
-        .iter()
-        .map(|x| {
-            let (mut before, mut value) = (0.0, 1.0);
-            for k in 1..order {
-                let k = k as f64;
-                (before, value) = (
-                    value,
-                    ((2.0 * k - 1.0) * x * value - (k - 1.0) * before) / k,
-                );
-            }
-            value
-        })
+    let polynomials = legendre(order);
+    let weights = &gauss::rule(order).weights;
+    let panels = &outline.panels;
+    let at_edge = |index: usize| {
+        let other = |neighbour: Option<&Panel>| {
+            neighbour.is_some_and(|panel| panel.face != panels[index].face)
+        };
+        other(index.checked_sub(1).map(|i| &panels[i])) || other(panels.get(index + 1))
+    };
+    let kept: Vec<usize> = (0..panels.len())
+        .map(|index| if at_edge(index) { order / 2 } else { order - 1 })
         .collect();
-    let weighted: Vec<f64> = highest
-        .iter()
-        .zip(&rule.weights)
-        .map(|(p, w)| p * w)
-        .collect();
-    let square: f64 = highest.iter().zip(&weighted).map(|(p, w)| p * w).sum();
     let mut out = layers.clone();
-    for panel in out.as_mut_slice().chunks_mut(order) {
-        let share = panel.iter().zip(&weighted).map(|(v, w)| v * w).sum::<f64>() / square;
-        for (value, p) in panel.iter_mut().zip(&highest) {
-            *value -= share * p;
+    for (values, kept) in out
+        .as_mut_slice()
+        .chunks_mut(order)
+        .zip(kept.iter().cycle())
+    {
+        for polynomial in &polynomials[*kept..] {
+            let weighted = || polynomial.iter().zip(weights).map(|(p, w)| p * w);
+            let square: f64 = weighted().zip(polynomial).map(|(a, p)| a * p).sum();
+            let share = weighted()
+                .zip(values.iter())
+                .map(|(a, v)| a * v)
+                .sum::<f64>()
+                / square;
+            for (value, p) in values.iter_mut().zip(polynomial) {
+                *value -= share * p;
+            }
         }
     }
     let columns = out.ncols();
     if columns > 1 {
         out.columns_mut(columns - 2, 2).fill(0.0);
     }
+    out
+}
+
+/// Legendre polynomials of degree 0 to `order` - 1 on the nodes of that order.
+fn legendre(order: usize) -> Vec<Vec<f64>> {
+    let nodes = &gauss::rule(order).nodes;
+    let mut out = vec![vec![1.0; order], nodes.clone()];
+    for degree in 2..order {
+        let k = degree as f64;
+        let next = nodes
+            .iter()
+            .enumerate()
+            .map(|(i, x)| {
+                ((2.0 * k - 1.0) * x * out[degree - 1][i] - (k - 1.0) * out[degree - 2][i]) / k
+            })
+            .collect();
+        out.push(next);
+    }
+    out.truncate(order);
     out
 }
 
