@@ -192,7 +192,7 @@ fn without_steel_it_is_the_windings_own_field() {
     let found = near(1.0);
     let [r_m, _, z_m] = found.peak_at_m;
     let winding = 0.7 * size(&WINDING.field(r_m, z_m).expect("inside the bore"));
-    assert_close(found.peak_t, winding, 1e-13, "peak");
+    assert_close(found.peak_t, winding, 1e-6, "peak");
     let mean = 0.7 * mean_by_brute_force(&coil(SHAPE, 1.0, 1e-4));
     assert_close(found.mean_t, mean, found.relative_error + 1e-5, "mean");
     // To first order in chi the mean grows by no more than chi.

@@ -17,6 +17,7 @@ use std::f64::consts::TAU;
 
 use super::CoreShape;
 use super::array::CoupledArray;
+use super::bore::bore_field;
 use super::cored_coil::CoredCoil;
 use super::double_layer::operators;
 use super::generatrix::{Face, Generatrix, Panel, Resolution};
@@ -356,7 +357,7 @@ fn fields_at(
     let modes = columns.div_ceil(2);
     let own = targets
         .par_iter()
-        .map(|(r_m, z_m)| winding.field(*r_m, *z_m))
+        .map(|(r_m, z_m)| bore_field(winding, *r_m, *z_m, QUADRATURE))
         .collect::<Result<Vec<_>, _>>()?;
     let operators = gradient_operators(outline, targets, modes, QUADRATURE);
     let products: Vec<DMatrix<f64>> = operators
@@ -384,9 +385,9 @@ fn fields_at(
                     .columns_mut(mine.start, width)
                     .copy_from(&product.columns(index * width, width));
             }
-            for (target, field) in own.iter().enumerate() {
-                values[(COMPONENTS * target, 0)] += current_a * field.b_r;
-                values[(COMPONENTS * target + 1, 0)] += current_a * field.b_z;
+            for (target, (b_r, b_z)) in own.iter().enumerate() {
+                values[(COMPONENTS * target, 0)] += current_a * b_r;
+                values[(COMPONENTS * target + 1, 0)] += current_a * b_z;
             }
             Field { values }
         })
