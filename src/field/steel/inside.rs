@@ -65,9 +65,10 @@ pub struct CoreField {
     pub peak_at_m: [f64; 3],
     /// Mean of |B| over the whole core's volume, T.
     pub mean_t: f64,
-    /// Estimated error of either, relative to it: the larger. Of outline and modes, half of what
-    /// the last polynomial degrees of every panel and the last mode contribute; of the mean, what
-    /// a node a panel less changes.
+    /// Estimated error of either, relative to it: the larger. Of outline and modes, what the
+    /// last polynomial degrees of every panel and the last mode contribute; of the mean, what a
+    /// node a panel less changes. No less than the estimate of the coil's own solution, if that
+    /// has one.
     pub relative_error: f64,
 }
 
@@ -101,8 +102,12 @@ impl CoredCoil {
             current_a,
             position_m: [0.0, 0.0],
         };
-        let fields = core_fields(outline, &self.winding, &[core], depth_m)?;
-        Ok(fields[0])
+        let field = core_fields(outline, &self.winding, &[core], depth_m)?[0];
+        Ok(CoreField {
+            // A coil solved at a resolution of the caller's has no estimate, NaN: max drops it.
+            relative_error: field.relative_error.max(self.relative_error),
+            ..field
+        })
     }
 }
 
@@ -234,8 +239,8 @@ fn core_fields(
             let less = fine.mean(&fields[index + cores.len()], first_fine);
             let coarser = coarse.mean(&fields[index], first_coarse);
             let share = |error: f64, of: f64| if of > 0.0 { error / of } else { 0.0 };
-            let relative_error = share(0.5 * lost + (scanned - peak_t).abs(), peak_t).max(share(
-                0.5 * (less - mean_t).abs() + (coarser - mean_t).abs(),
+            let relative_error = share(lost + (scanned - peak_t).abs(), peak_t).max(share(
+                (less - mean_t).abs() + (coarser - mean_t).abs(),
                 mean_t,
             ));
             let (sin, cos) = angle.sin_cos();
