@@ -4,6 +4,7 @@ pub mod array;
 pub mod bh_check;
 pub mod bh_curve;
 pub mod condensation;
+pub mod bore;
 pub mod cored_coil;
 pub mod coupling;
 pub mod double_layer;
