@@ -8,12 +8,15 @@ pub mod cored_coil;
 pub mod coupling;
 pub mod double_layer;
 pub mod generatrix;
+pub mod inside;
 pub mod interior;
+pub mod layer_gradient;
 pub mod lobatto;
 pub mod magnetized;
 pub mod permeability;
 pub mod response;
 pub mod saturated;
+pub mod sources;
 pub mod symmetry;
 pub mod trace;
 
