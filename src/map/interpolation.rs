@@ -1,6 +1,6 @@
 //! The error of interpolating a map between its nodes.
 
-use super::tabulate::{Components, Grid, MapError, PlacedCoil, tabulate};
+use super::tabulate::{Components, FieldMap, Grid, MapError, PlacedCoil, tabulate};
 use crate::field::source::AxialSource;
 use crate::numerics::lagrange;
 use crate::progress::Silent;
@@ -24,9 +24,10 @@ const SAFETY: f64 = 1.25;
 const LOWEST: usize = 4;
 const HIGHEST: usize = 1;
 
-/// Compares the interpolated dB_z/dz ([coil, z, y, x] on `grid`) with direct values in the
-/// middle of cells, and of edges along each axis, in the four lowest layers and the highest, for
-/// the innermost and the outermost coil.
+/// Direct maps of coils on a grid.
+pub type Direct<'a> = &'a dyn Fn(&[PlacedCoil], &Grid) -> Result<FieldMap, MapError>;
+
+/// [`interpolation_error_by`] for identical coils, each with `source` about its axis.
 ///
 /// # Errors
 /// See [`tabulate`].
@@ -36,6 +37,24 @@ pub fn interpolation_error(
     grid: &Grid,
     gz: &[f64],
     tolerance: f64,
+) -> Result<InterpolationError, MapError> {
+    let direct = |coils: &[PlacedCoil], places: &Grid| {
+        tabulate(source, coils, places, Components::Gz, tolerance, &Silent)
+    };
+    interpolation_error_by(&direct, coils, grid, gz)
+}
+
+/// Compares the interpolated dB_z/dz ([coil, z, y, x] on `grid`) with direct values in the
+/// middle of cells, and of edges along each axis, in the four lowest layers and the highest, for
+/// the innermost and the outermost coil.
+///
+/// # Errors
+/// Those of `direct`.
+pub fn interpolation_error_by(
+    direct: Direct<'_>,
+    coils: &[PlacedCoil],
+    grid: &Grid,
+    gz: &[f64],
 ) -> Result<InterpolationError, MapError> {
     let [x, y, z] = [&grid.x_m, &grid.y_m, &grid.z_m];
     let middles = |nodes: &[f64]| -> Vec<f64> {
@@ -76,7 +95,7 @@ pub fn interpolation_error(
         samples: 0,
     };
     for places in staggered {
-        let exact = tabulate(source, &placed, &places, Components::Gz, tolerance, &Silent)?;
+        let exact = direct(&placed, &places)?;
         let plane = places.x_m.len() * places.y_m.len();
         let stencils = |nodes: &[f64], at: &[f64]| -> Vec<lagrange::Stencil> {
             at.iter()

@@ -19,9 +19,11 @@ use super::cored_coil::Excitation;
 use super::coupling::{between_cores, from_winding, grid_points};
 use super::generatrix::{Generatrix, Resolution};
 use super::response::{Response, Rings};
+use super::sources::{ArraySources, Parts};
 use super::symmetry::{Motion, motions};
 use crate::field::winding::{OnEdge, Winding};
 use crate::numerics::gmres::gmres;
+use crate::units::MU_0_T_M_PER_A;
 
 /// Most azimuthal modes; beyond, the stated error grows.
 const MOST_MODES: usize = 17;
@@ -54,7 +56,8 @@ impl ArrayResolution {
     #[must_use]
     pub fn for_tolerance(tolerance: f64, shape: CoreShape, closest_m: f64) -> Self {
         let tolerance = tolerance.clamp(1e-9, 0.1);
-        let outline = Resolution::for_tolerance(tolerance);
+        // The outline is the cheap part, and the edges' error decays slowest.
+        let outline = Resolution::for_tolerance(0.3 * tolerance);
         let residual = SOLVER_SHARE * tolerance;
         if closest_m.is_infinite() {
             return Self {
@@ -105,13 +108,109 @@ pub struct CoupledArray {
     pub potentials: Vec<Vec<Vec<f64>>>,
     /// What the steel adds to self and mutual inductances, [coil, drive], H.
     pub added_inductance_h: DMatrix<f64>,
+    /// Estimated error: of the gradients above, relative to the largest |grad B| at the height,
+    /// and of the inductances, relative to the largest; the larger. Half the difference from the
+    /// next coarser resolution.
+    pub relative_error: f64,
     /// Relative residual of the linear solver.
     pub relative_residual: f64,
     /// Applications of the coupling.
     pub iterations: usize,
 }
 
+/// Refinements after which a tolerance that is not reached is given up, with its estimate.
+const MOST_REFINEMENTS: usize = 3;
+/// Distance above the cores, in radii, below which no error is estimated.
+const CLOSEST: f64 = 0.1;
+/// Places about every coil at which two resolutions are compared, in units of its outer radius.
+const PLACES: [[f64; 2]; 4] = [[0.0, 0.0], [0.7, 0.2], [-0.4, 1.1], [1.5, -1.2]];
+
 impl CoupledArray {
+    /// Solves to an estimated error below `tolerance` at heights from `lowest_m` up, or as far as
+    /// the caps on resolution allow: [`CoupledArray::relative_error`] says what was reached.
+    ///
+    /// Domain: as for [`CoupledArray::at_resolution`].
+    ///
+    /// # Errors
+    /// A node of the outline on the winding's edge.
+    pub fn new(
+        winding: &Winding,
+        shape: CoreShape,
+        relative_permeability: f64,
+        positions_m: &[[f64; 2]],
+        tolerance: f64,
+        lowest_m: f64,
+    ) -> Result<Self, OnEdge> {
+        let closest_m = closest_m(positions_m);
+        let lowest_m = lowest_m.max(shape.top_m.max(0.0) + CLOSEST * shape.radius_m);
+        let solve = |resolution: &ArrayResolution| {
+            Self::at_resolution(
+                winding,
+                shape,
+                relative_permeability,
+                positions_m,
+                resolution,
+            )
+        };
+        let mut aim = tolerance;
+        let mut best: Option<Self> = None;
+        for _ in 0..=MOST_REFINEMENTS {
+            let resolution = ArrayResolution::for_tolerance(aim, shape, closest_m);
+            let coarse = solve(&resolution.coarser())?;
+            let mut fine = solve(&resolution)?;
+            fine.relative_error = 0.5 * fine.difference(&coarse, lowest_m, tolerance)?;
+            let better = best
+                .as_ref()
+                .is_none_or(|b| fine.relative_error < b.relative_error);
+            let reached = fine.relative_error <= tolerance;
+            if better {
+                best = Some(fine);
+            }
+            if reached || !better {
+                break;
+            }
+            aim *= 0.3;
+        }
+        Ok(best.expect("at least one resolution was solved"))
+    }
+
+    fn difference(&self, other: &Self, lowest_m: f64, tolerance: f64) -> Result<f64, OnEdge> {
+        let shape = self.response.outline.shape;
+        let drives = self.positions_m.len();
+        let distance_m = lowest_m - shape.top_m;
+        let sources =
+            |array: &Self| ArraySources::of_array(array, lowest_m, distance_m, 0.1 * tolerance);
+        let (fine, coarse) = (sources(self), sources(other));
+        let parts = Parts::Gradient;
+        let mut worst = 0.0_f64;
+        for height in [0.0, 1.0, 4.0] {
+            let z_m = lowest_m + height * shape.radius_m;
+            let reach = self.winding.outer_radius_m;
+            let points: Vec<[f64; 3]> = self
+                .positions_m
+                .iter()
+                .flat_map(|[x, y]| PLACES.map(|[dx, dy]| [x + reach * dx, y + reach * dy, z_m]))
+                .collect();
+            let mut values = vec![0.0; drives * parts.count() * points.len()];
+            let mut others = values.clone();
+            fine.sample(&points, parts, &mut values);
+            coarse.sample(&points, parts, &mut others);
+            // The winding's own gradient adds to the largest, which lies above it.
+            let air = self.winding.field(0.0, z_m)?.gradient_norm();
+            let size = values.iter().fold(0.0_f64, |m, v| m.max(v.abs())) + air;
+            let difference = values
+                .iter()
+                .zip(&others)
+                .fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+            worst = worst.max(difference / size);
+        }
+        let added = &self.added_inductance_h;
+        let size = added
+            .amax()
+            .max(0.1 * MU_0_T_M_PER_A * self.winding.turns.powi(2) * self.winding.inner_radius_m);
+        Ok(worst.max((added - &other.added_inductance_h).amax() / size))
+    }
+
     /// Solves at one resolution.
     ///
     /// Domain: cores apart by more than nothing, windings apart or touching.
@@ -146,6 +245,7 @@ impl CoupledArray {
             own_layer,
             potentials: Vec::new(),
             added_inductance_h: DMatrix::zeros(positions_m.len(), positions_m.len()),
+            relative_error: f64::NAN,
             relative_residual: 0.0,
             iterations: 0,
         };
@@ -276,10 +376,7 @@ impl CoupledArray {
     /// Moments of the driven coil's own core on the exchange grid.
     fn own_moments(&self) -> DVector<f64> {
         let layer = DMatrix::from_column_slice(self.own_layer.len(), 1, self.own_layer.as_slice());
-        let ring = self
-            .response
-            .exchange
-            .moments(&self.response.outline, &layer);
+        let ring = self.response.exchange.moments(&layer);
         DVector::from_iterator(
             self.response.size(),
             (0..self.response.angles).flat_map(|_| ring.iter().copied()),
@@ -307,6 +404,18 @@ impl CoupledArray {
         }
         layers
     }
+}
+
+/// Smallest distance of two axes, m; infinite for one coil.
+#[must_use]
+pub fn closest_m(positions_m: &[[f64; 2]]) -> f64 {
+    let mut closest = f64::INFINITY;
+    for (i, a) in positions_m.iter().enumerate() {
+        for b in &positions_m[i + 1..] {
+            closest = closest.min((a[0] - b[0]).hypot(a[1] - b[1]));
+        }
+    }
+    closest
 }
 
 /// The pairs of cores by their offset: many share one.
@@ -404,6 +513,69 @@ mod tests {
                 a.iterations,
                 a.relative_residual,
                 t.elapsed()
+            );
+            let t = std::time::Instant::now();
+            let n = CoupledArray::new(&winding, shape, 1000.0, &positions, tol, 0.01).unwrap();
+            println!(
+                "   new: est {:.1e} {:?} size {}",
+                n.relative_error,
+                t.elapsed(),
+                n.response.size()
+            );
+            let src = super::super::sources::ArraySources::of_array(&a, 0.01, 0.01, tol);
+            let t1 = t.elapsed();
+            let json: serde_json::Value = serde_json::from_str(
+                &std::fs::read_to_string("/work/shared/reference/fem_array_centre.json").unwrap(),
+            )
+            .unwrap();
+            let rows = json["rows"].as_array().unwrap();
+            let f = |r: &serde_json::Value, k: &str| r[k].as_f64().unwrap();
+            let pts: Vec<[f64; 3]> = rows
+                .iter()
+                .map(|r| {
+                    [
+                        f(r, "x_mm") * 1e-3,
+                        f(r, "y_mm") * 1e-3,
+                        f(r, "z_mm") * 1e-3,
+                    ]
+                })
+                .collect();
+            let mut out = vec![0.0; 9 * 8 * pts.len()];
+            src.sample(&pts, super::super::sources::Parts::All, &mut out);
+            let mut worst: f64 = 0.0;
+            let mut worst_b: f64 = 0.0;
+            for (j, p) in pts.iter().enumerate() {
+                let air = winding.field(p[0].hypot(p[1]), p[2]).unwrap();
+                let gz = out[(4 * 8 + 4) * pts.len() + j] + air.dbz_dz;
+                let bz = out[(4 * 8 + 7) * pts.len() + j] + air.b_z;
+                let peak = if p[2] < 0.04 { 0.4719665 } else { 0.1237929 };
+                worst = worst.max((gz - f(&rows[j], "dBzdz_array_T_per_m_per_A")).abs() / peak);
+                worst_b = worst_b.max((bz - f(&rows[j], "Bz_array_T_per_A")).abs() / 0.0078);
+                if j == 8 || j == 9 {
+                    println!("    {p:?} {gz:.10}");
+                }
+            }
+            let grid: Vec<[f64; 3]> = (0..2000)
+                .map(|i| {
+                    [
+                        1e-3 * ((i * 37 % 100) as f64 - 50.0),
+                        1e-3 * ((i * 61 % 100) as f64 - 50.0),
+                        0.01 + 1e-4 * (i % 700) as f64,
+                    ]
+                })
+                .collect();
+            let t = std::time::Instant::now();
+            let mut out = vec![0.0; 9 * grid.len()];
+            src.sample(&grid, super::super::sources::Parts::Gz, &mut out);
+            let dt = t.elapsed();
+            println!(
+                "   sources {} made {:?} sample 2000: {:?} worst gz {:.1e} bz {:.1e} {}",
+                src.count(),
+                t1,
+                dt,
+                worst,
+                worst_b,
+                out[5]
             );
             println!(
                 "   L44 {:.6} L00 {:.6} M01 {:.8} M10 {:.8} M04 {:.8} M40 {:.8}",

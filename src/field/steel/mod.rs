@@ -3,13 +3,22 @@
 pub mod array;
 pub mod bh_check;
 pub mod bh_curve;
+pub mod condensation;
 pub mod cored_coil;
 pub mod coupling;
 pub mod double_layer;
 pub mod generatrix;
+pub mod inside;
+pub mod interior;
+pub mod layer_gradient;
+pub mod lobatto;
 pub mod magnetized;
+pub mod permeability;
 pub mod response;
+pub mod saturated;
+pub mod sources;
 pub mod symmetry;
+pub mod trace;
 
 /// A cylindrical core on the coil's axis.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -29,9 +29,15 @@ pub struct Ring {
 pub struct Rings {
     /// The rings.
     pub rings: Vec<Ring>,
-    /// [outline node, ring].
+    /// Values on the rings to values on the outline's nodes, [outline node, ring].
     pub to_nodes: DMatrix<f64>,
+    /// Layers on the outline's nodes to moments on the rings, [outline node, ring].
+    gather: DMatrix<f64>,
 }
+
+/// Nodes by which a panel's quadrature exceeds its layer's: kernels seen from the distance at
+/// which rings do vary faster over the outline's wide panels than the layer does.
+const FINER: usize = 8;
 
 impl Rings {
     /// Gauss nodes, `order` a panel, on each face cut into panels at most `length_m(z)` long,
@@ -71,45 +77,68 @@ impl Rings {
             top = bottom;
         }
         let mut rings = Vec::with_capacity(panels.len() * order);
-        let mut to_nodes = DMatrix::zeros(outline.nodes.len(), panels.len() * order);
-        let mut weights = vec![0.0; order];
-        for (index, (face, from, to)) in panels.iter().enumerate() {
-            let at = |x: f64| from + 0.5 * (to - from) * (1.0 + x);
+        for (face, from, to) in &panels {
             rings.extend(rule.nodes.iter().map(|x| {
-                let (r_m, z_m, normal) = shape.on(*face, at(*x));
+                let (r_m, z_m, normal) = shape.on(*face, from + 0.5 * (to - from) * (1.0 + x));
                 Ring { r_m, z_m, normal }
             }));
-            for (row, (node, panel)) in outline
-                .nodes
+        }
+        // Weights of all rings at a place of a face; (ring, weight) of those that have one.
+        let mut weights = vec![0.0; order];
+        let mut at = |face: Face, coordinate: f64, put: &mut dyn FnMut(usize, f64)| {
+            for (index, (of, from, to)) in panels.iter().enumerate() {
+                if *of == face && (*from..=*to).contains(&coordinate) {
+                    basis.weights(2.0 * (coordinate - from) / (to - from) - 1.0, &mut weights);
+                    for (place, weight) in weights.iter().enumerate() {
+                        put(index * order + place, *weight);
+                    }
+                    return;
+                }
+            }
+        };
+        let mut to_nodes = DMatrix::zeros(outline.nodes.len(), rings.len());
+        let mut gather = DMatrix::zeros(outline.nodes.len(), rings.len());
+        let finer = gauss::rule(outline.order + FINER);
+        let layer = Basis::new(gauss::rule(outline.order));
+        let mut shares = vec![0.0; outline.order];
+        for (index, panel) in outline.panels.iter().enumerate() {
+            let first = index * outline.order;
+            for (place, node) in outline.nodes[first..first + outline.order]
                 .iter()
-                .zip(outline.panels.iter().flat_map(|p| vec![p; outline.order]))
                 .enumerate()
             {
-                let coordinate = if *face == Face::Side {
+                let coordinate = if panel.face == Face::Side {
                     node.z_m
                 } else {
                     node.r_m
                 };
-                if panel.face != *face || coordinate < *from || coordinate > *to {
-                    continue;
-                }
-                basis.weights(2.0 * (coordinate - from) / (to - from) - 1.0, &mut weights);
-                for (place, weight) in weights.iter().enumerate() {
-                    to_nodes[(row, index * order + place)] = *weight;
-                }
+                at(panel.face, coordinate, &mut |ring, weight| {
+                    to_nodes[(first + place, ring)] = weight;
+                });
+            }
+            let half = 0.5 * (panel.to_m - panel.from_m);
+            for (x, weight) in finer.nodes.iter().zip(&finer.weights) {
+                let coordinate = panel.from_m + half * (1.0 + x);
+                let r_m = shape.on(panel.face, coordinate).0;
+                layer.weights(*x, &mut shares);
+                at(panel.face, coordinate, &mut |ring, value| {
+                    for (place, share) in shares.iter().enumerate() {
+                        gather[(first + place, ring)] += half.abs() * weight * r_m * share * value;
+                    }
+                });
             }
         }
-        Self { rings, to_nodes }
+        Self {
+            rings,
+            to_nodes,
+            gather,
+        }
     }
 
     /// Moments on the rings of layers on the nodes: [ring, layer], A m^2 a radian.
     #[must_use]
-    pub fn moments(&self, outline: &Generatrix, layers: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut weighted = layers.clone();
-        for (mut row, node) in weighted.row_iter_mut().zip(&outline.nodes) {
-            row *= node.r_m * node.weight_m;
-        }
-        self.to_nodes.tr_mul(&weighted)
+    pub fn moments(&self, layers: &DMatrix<f64>) -> DMatrix<f64> {
+        self.gather.tr_mul(layers)
     }
 }
 
@@ -163,10 +192,7 @@ impl Response {
                 layers
             })
             .collect();
-        let moments = layers
-            .iter()
-            .map(|l| exchange.moments(&outline, l))
-            .collect();
+        let moments = layers.iter().map(|l| exchange.moments(l)).collect();
         let axial = systems
             .into_iter()
             .next()

@@ -1,0 +1,328 @@
+//! The steel's field above a solved array, as that of few point dipoles.
+//!
+//! Seen from some distance a core's layer is its moments on rings that are no finer than the
+//! distance asks for, whatever the layer does at the edges. The dipoles of all cores are shared
+//! by all drives, which differ in their moments alone: one pass over them serves every drive.
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use std::f64::consts::{PI, TAU};
+
+use super::array::CoupledArray;
+use super::generatrix::Generatrix;
+use super::magnetized::MagnetizedCore;
+use super::response::Rings;
+use crate::numerics::dispatch::{self, Kernel, LANES, Lanes};
+use crate::units::MU_0_T_M_PER_A;
+
+/// Points of one piece of work; fixed, so that results do not depend on threads.
+const CHUNK: usize = 64;
+/// Length of a ring panel relative to its distance from the points.
+const PANEL: f64 = 1.5;
+/// Points closer to the steel than this multiple of its radius are treated as this far.
+const CLOSEST: f64 = 0.02;
+/// Most angles of a ring.
+const MOST_ANGLES: usize = 400;
+
+/// Which components are wanted, in the order of [`ArraySources::sample`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Parts {
+    /// dB_z/dz.
+    Gz,
+    /// dB_x/dx, dB_x/dy, dB_x/dz, dB_y/dz, dB_z/dz.
+    Gradient,
+    /// The gradient's five, then B_x, B_y, B_z.
+    All,
+}
+
+impl Parts {
+    /// Number of components.
+    #[must_use]
+    pub fn count(self) -> usize {
+        match self {
+            Self::Gz => 1,
+            Self::Gradient => 5,
+            Self::All => 8,
+        }
+    }
+}
+
+/// How close points come, and how well they want to know.
+struct Near {
+    lowest_m: f64,
+    distance_m: f64,
+    tolerance: f64,
+}
+
+/// Dipoles that stand for all cores of an array, for every drive.
+#[derive(Debug, Clone)]
+pub struct ArraySources {
+    drives: usize,
+    top_m: f64,
+    /// Position (m) and outer normal of every dipole.
+    places: Vec<[f64; 6]>,
+    /// Layer moments of every dipole, [dipole, drive], A m^2 per ampere.
+    moments: Vec<f64>,
+}
+
+impl ArraySources {
+    /// Dipoles for points no closer than `distance_m` to any core and no lower than `lowest_m`,
+    /// to a relative error `tolerance`.
+    #[must_use]
+    pub fn of_array(array: &CoupledArray, lowest_m: f64, distance_m: f64, tolerance: f64) -> Self {
+        let response = &array.response;
+        Self::new(
+            &response.outline,
+            &array.positions_m,
+            response.layers.len(),
+            |drive, core| array.layers(drive, core),
+            Near {
+                lowest_m,
+                distance_m,
+                tolerance,
+            },
+        )
+    }
+
+    /// The same for one core under its own winding, standing at the origin: one drive.
+    #[must_use]
+    pub fn of_core(core: &MagnetizedCore, lowest_m: f64, distance_m: f64, tolerance: f64) -> Self {
+        let density = core.density_a();
+        Self::new(
+            core.outline(),
+            &[[0.0, 0.0]],
+            1,
+            |_, _| DMatrix::from_column_slice(density.len(), 1, density),
+            Near {
+                lowest_m,
+                distance_m,
+                tolerance,
+            },
+        )
+    }
+
+    fn new(
+        outline: &Generatrix,
+        positions_m: &[[f64; 2]],
+        modes: usize,
+        layers: impl Fn(usize, usize) -> DMatrix<f64> + Sync,
+        near: Near,
+    ) -> Self {
+        let Near {
+            lowest_m,
+            distance_m,
+            tolerance,
+        } = near;
+        let shape = outline.shape;
+        let floor_m = distance_m.max(CLOSEST * shape.radius_m);
+        let distance = |z_m: f64| floor_m.max(lowest_m - z_m);
+        let order = (4.0 - 1.3 * tolerance.log10()).ceil().max(3.0) as usize;
+        let rings = Rings::new(outline, order, |z| PANEL * distance(z));
+        let drives = positions_m.len();
+        let angles: Vec<usize> = rings
+            .rings
+            .iter()
+            .map(|ring| {
+                let ratio = distance(ring.z_m) / ring.r_m;
+                let decay = (1.0 + 0.5 * ratio * ratio).acosh();
+                // The gradient of a dipole's field has azimuthal modes n^2.5 exp(-n decay).
+                let digits = (1.0 / tolerance).ln();
+                let growth = 2.5 * (digits / decay).max(1.0).ln();
+                let needed = modes + ((digits + growth) / decay).ceil() as usize;
+                needed.clamp(2 * modes + 1, MOST_ANGLES)
+            })
+            .collect();
+
+        let mut places = Vec::new();
+        for position in positions_m {
+            for (ring, angles) in rings.rings.iter().zip(&angles) {
+                places.extend((0..*angles).map(|k| {
+                    let (s, c) = (TAU * (k as f64 + 0.5) / *angles as f64).sin_cos();
+                    [
+                        position[0] + ring.r_m * c,
+                        position[1] + ring.r_m * s,
+                        ring.z_m,
+                        ring.normal[0] * c,
+                        ring.normal[0] * s,
+                        ring.normal[1],
+                    ]
+                }));
+            }
+        }
+        let a_core = places.len() / drives.max(1);
+        let mut moments = vec![0.0; places.len() * drives];
+        moments
+            .par_chunks_mut((a_core * drives).max(1))
+            .enumerate()
+            .for_each(|(core, out)| {
+                for drive in 0..drives {
+                    let by_mode = rings.moments(&layers(drive, core));
+                    let mut place = 0;
+                    for (ring, angles) in angles.iter().enumerate() {
+                        let turn = TAU / *angles as f64;
+                        for k in 0..*angles {
+                            let theta = turn * (k as f64 + 0.5);
+                            let mut moment = by_mode[(ring, 0)];
+                            for mode in 1..modes {
+                                let (s, c) = (mode as f64 * theta).sin_cos();
+                                moment += c * by_mode[(ring, 2 * mode - 1)]
+                                    + s * by_mode[(ring, 2 * mode)];
+                            }
+                            out[(place + k) * drives + drive] = turn * moment;
+                        }
+                        place += angles;
+                    }
+                }
+            });
+        Self {
+            drives,
+            top_m: shape.top_m,
+            places,
+            moments,
+        }
+    }
+
+    /// Number of drives.
+    #[must_use]
+    pub fn drives(&self) -> usize {
+        self.drives
+    }
+
+    /// Height of the cores' top, m.
+    #[must_use]
+    pub fn top_m(&self) -> f64 {
+        self.top_m
+    }
+
+    /// Number of dipoles.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.places.len()
+    }
+
+    /// The steel's field per ampere of every drive at `points_m`, [drive, component, point].
+    ///
+    /// # Panics
+    /// When `out` has another length than drives x components x points.
+    pub fn sample(&self, points_m: &[[f64; 3]], parts: Parts, out: &mut [f64]) {
+        let columns = self.drives * parts.count();
+        assert_eq!(out.len(), columns * points_m.len());
+        let chunks: Vec<Vec<f64>> = points_m
+            .par_chunks(CHUNK)
+            .map(|points| {
+                dispatch::run(Pass {
+                    sources: self,
+                    points,
+                    parts,
+                })
+            })
+            .collect();
+        for (chunk, values) in chunks.iter().enumerate() {
+            let count = values.len() / columns;
+            for column in 0..columns {
+                let at = column * points_m.len() + chunk * CHUNK;
+                out[at..at + count].copy_from_slice(&values[column * count..(column + 1) * count]);
+            }
+        }
+    }
+}
+
+/// One chunk of points, [drive, component, point].
+struct Pass<'a> {
+    sources: &'a ArraySources,
+    points: &'a [[f64; 3]],
+    parts: Parts,
+}
+
+impl Kernel for Pass<'_> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn run<const FMA: bool>(self) -> Vec<f64> {
+        match self.parts {
+            Parts::Gz => self.run_parts::<FMA, 1>(),
+            Parts::Gradient => self.run_parts::<FMA, 5>(),
+            Parts::All => self.run_parts::<FMA, 8>(),
+        }
+    }
+}
+
+impl Pass<'_> {
+    #[inline(always)]
+    fn run_parts<const FMA: bool, const PARTS: usize>(self) -> Vec<f64> {
+        let drives = self.sources.drives;
+        let count = self.points.len();
+        let mut out = vec![0.0; drives * PARTS * count];
+        for (group, points) in self.points.chunks(LANES).enumerate() {
+            let axis = |i: usize| {
+                Lanes(std::array::from_fn(|lane| {
+                    points[lane.min(points.len() - 1)][i]
+                }))
+            };
+            let (x, y, z) = (axis(0), axis(1), axis(2));
+            let mut sums = vec![[Lanes::splat(0.0); PARTS]; drives];
+            for (place, moments) in self
+                .sources
+                .places
+                .iter()
+                .zip(self.sources.moments.chunks_exact(drives))
+            {
+                let kernel = dipole::<FMA, PARTS>([x, y, z], place);
+                for (sum, moment) in sums.iter_mut().zip(moments) {
+                    let moment = Lanes::splat(*moment);
+                    for (sum, part) in sum.iter_mut().zip(&kernel) {
+                        *sum = part.mul_add::<FMA>(moment, *sum);
+                    }
+                }
+            }
+            for (drive, sum) in sums.iter().enumerate() {
+                for (part, value) in sum.iter().enumerate() {
+                    let at = (drive * PARTS + part) * count + group * LANES;
+                    let end = at + points.len();
+                    value.store(&mut out[at..end]);
+                }
+            }
+        }
+        out
+    }
+}
+
+/// Field of a layer element of unit moment: of a point dipole -n, A m^2.
+#[inline(always)]
+fn dipole<const FMA: bool, const PARTS: usize>(
+    [x, y, z]: [Lanes; 3],
+    place: &[f64; 6],
+) -> [Lanes; PARTS] {
+    let [px, py, pz, nx, ny, nz] = *place;
+    let (dx, dy, dz) = (x - px, y - py, z - pz);
+    let square = dx.mul_add::<FMA>(dx, dy.mul_add::<FMA>(dy, dz * dz));
+    let inverse2 = Lanes::splat(1.0) / square;
+    let inverse = inverse2.sqrt();
+    let inverse3 = inverse * inverse2;
+    let along = (dx * nx) + (dy * ny) + (dz * nz);
+    let scale = inverse3 * inverse2 * (-3.0 * MU_0_T_M_PER_A / (4.0 * PI));
+    // G_ij = scale (n_i d_j + n_j d_i + s (delta_ij - 5 d_i d_j / d^2)).
+    let steep = along * inverse2 * -5.0;
+    let zz = scale * (dz * (2.0 * nz) + along + steep * (dz * dz));
+    let mut out = [Lanes::splat(0.0); PARTS];
+    if PARTS == 1 {
+        out[0] = zz;
+        return out;
+    }
+    let mut parts = [Lanes::splat(0.0); 8];
+    parts[0] = scale * (dx * (2.0 * nx) + along + steep * (dx * dx));
+    parts[1] = scale * (dy * nx + dx * ny + steep * (dx * dy));
+    parts[2] = scale * (dz * nx + dx * nz + steep * (dx * dz));
+    parts[3] = scale * (dz * ny + dy * nz + steep * (dy * dz));
+    parts[4] = zz;
+    if PARTS == 8 {
+        // B_i = scale s d_i + mu_0 n_i / (4 pi d^3).
+        let even = inverse3 * (MU_0_T_M_PER_A / (4.0 * PI));
+        let strength = scale * along;
+        parts[5] = strength * dx + even * nx;
+        parts[6] = strength * dy + even * ny;
+        parts[7] = strength * dz + even * nz;
+    }
+    out.copy_from_slice(&parts[..PARTS]);
+    out
+}
