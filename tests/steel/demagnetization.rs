@@ -165,6 +165,9 @@ fn the_moment_goes_from_its_first_order_to_its_limit() {
         assert!((ratio - 2.0).abs() < 2e-3, "mode {mode}: {ratio}");
         // A body that no field enters, mu_r = 0, repels: more than -1 per unit volume.
         let repelled = at(1e-9);
-        assert!(repelled < -1.0 && repelled > -3.0, "mode {mode}: {repelled}");
+        assert!(
+            repelled < -1.0 && repelled > -3.0,
+            "mode {mode}: {repelled}"
+        );
     }
 }

@@ -73,13 +73,9 @@ fn extreme_shapes_keep_their_estimate() {
                 mu_r,
             };
             let solved = design.solve(1e-6);
-            let fine = CoredCoil::at_resolution(
-                &winding,
-                core,
-                mu_r,
-                &Resolution::for_tolerance(1e-9),
-            )
-            .expect("off the edges");
+            let fine =
+                CoredCoil::at_resolution(&winding, core, mu_r, &Resolution::for_tolerance(1e-9))
+                    .expect("off the edges");
             let error = design.difference(&fine, &solved);
             let estimate = solved.relative_error;
             println!("{name}, mu_r {mu_r:e}: error {error:.1e}, estimate {estimate:.1e}");
@@ -88,7 +84,10 @@ fn extreme_shapes_keep_their_estimate() {
                 true || error <= estimate.max(1e-9),
                 "{name}, mu_r {mu_r:e}: error {error:e}, estimate {estimate:e}"
             );
-            assert!(true||estimate <= 1e-6, "{name}, mu_r {mu_r:e}: {estimate:e}");
+            assert!(
+                true || estimate <= 1e-6,
+                "{name}, mu_r {mu_r:e}: {estimate:e}"
+            );
             assert!(
                 (mu_r - 1.0) * solved.added_inductance_h > 0.0,
                 "{name}, mu_r {mu_r:e}: {:e} H",
@@ -123,7 +122,9 @@ fn weak_steel_acts_in_proportion_to_its_susceptibility() {
         let per_chi = |chi: f64| {
             let mu_r = 1.0 + chi;
             let coil = Design { mu_r, ..design }.solve(1e-8);
-            let at = coil.core.field(0.7 * design.core.radius_m, design.lowest_m());
+            let at = coil
+                .core
+                .field(0.7 * design.core.radius_m, design.lowest_m());
             let chi = mu_r - 1.0;
             [at.b_z / chi, at.dbz_dz / chi, coil.added_inductance_h / chi]
         };

@@ -30,12 +30,10 @@ fn the_gradient_is_the_fields_derivative_outside_and_inside() {
         ] {
             let at = core.field(r_m, z_m);
             let h = 2e-3 * radius.min(0.5 * shape.length_m());
-            let along_r = |pick: fn(&AxialField) -> f64| {
-                derivative(|d| pick(&core.field(r_m + d, z_m)), h)
-            };
-            let along_z = |pick: fn(&AxialField) -> f64| {
-                derivative(|d| pick(&core.field(r_m, z_m + d)), h)
-            };
+            let along_r =
+                |pick: fn(&AxialField) -> f64| derivative(|d| pick(&core.field(r_m + d, z_m)), h);
+            let along_z =
+                |pick: fn(&AxialField) -> f64| derivative(|d| pick(&core.field(r_m, z_m + d)), h);
             let size = at.gradient_norm();
             for (name, value, expected) in [
                 ("dBr/dr", at.dbr_dr, along_r(|f| f.b_r)),

@@ -70,7 +70,10 @@ fn the_surface_charge_agrees_on_generic_designs() {
             mu_r: value("mu_r"),
         };
         // The oracle's coarser solution is within 6e-8; its finer one is far better than that.
-        assert!(value("error") < 6e-8, "the oracle itself is uncertain: {case}");
+        assert!(
+            value("error") < 6e-8,
+            "the oracle itself is uncertain: {case}"
+        );
         let allowed = 1e-9;
         let coil = design.solve(1e-9);
         let error = coil.added_inductance_h / value("added_inductance_h") - 1.0;
