@@ -129,6 +129,8 @@ impl Generatrix {
             .iter()
             .copied()
             .filter(|(z, _)| *z > bottom_m + tip_m && *z < top_m - tip_m)
+            // No panel beside a mark may be long against its distance from the steel's edge.
+            .map(|(z, length)| (z, length.min(z - bottom_m).min(top_m - z)))
             .collect();
         inner.sort_by(|a, b| a.0.total_cmp(&b.0));
         heights.extend(inner);
