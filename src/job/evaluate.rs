@@ -300,8 +300,14 @@ fn array(
             let depth_m = peak_depth_m(array.response.outline.shape);
             inside = array.core_fields(&scene.upper_a, depth_m)?;
             if let Some(core) = &scene.core {
-                let peak = inside.iter().fold(0.0_f64, |most, field| most.max(field.peak_t));
-                notes.extend(above_knee(peak, core.knee_t, "a core of the array with all coils at their rated currents"));
+                let peak = inside
+                    .iter()
+                    .fold(0.0_f64, |most, field| most.max(field.peak_t));
+                notes.extend(above_knee(
+                    peak,
+                    core.knee_t,
+                    "a core of the array with all coils at their rated currents",
+                ));
             }
         }
     }
@@ -339,7 +345,10 @@ fn transient(
 ) -> Option<TransientFacts> {
     let core = scene.core.as_ref()?;
     let air_inductance_h = scene.circuit.inductance_h;
-    let air = scene.winding.field(0.0, scene.design.target_height_m).ok()?;
+    let air = scene
+        .winding
+        .field(0.0, scene.design.target_height_m)
+        .ok()?;
     let shape = core.shape;
     let step = VoltageStep {
         resistance_ohm: scene.circuit.resistance_ohm,

@@ -13,8 +13,8 @@ use crate::bundle::manifest::{AxisSummary, Interpolation, MapSidecar, MapSummary
 use crate::bundle::npz::{MapArrays, Runtime};
 use crate::bundle::write::{MapFormats, write_map_files};
 use crate::design::Design;
-use crate::map::tabulate::Grid;
 use crate::map::sampled::TableReport;
+use crate::map::tabulate::Grid;
 use crate::map::{Components, FieldMap, InterpolationError};
 use crate::progress::Progress;
 

@@ -160,7 +160,8 @@ impl<'a> Scene<'a> {
     ) -> Result<Vec<f64>, JobError> {
         let coils = self.coils.len();
         let lowest_m = points_m.iter().fold(f64::INFINITY, |z, p| z.min(p[2]));
-        let rule = self.magnet_rule(lowest_m, MAGNET_SHARE * solved.tolerance.max(MAGNET_FINEST))?;
+        let rule =
+            self.magnet_rule(lowest_m, MAGNET_SHARE * solved.tolerance.max(MAGNET_FINEST))?;
         let mut forces = vec![0.0; points_m.len() * coils];
         progress.begin("forces", points_m.len() as u64);
         let reach_m = rule.nodes().iter().fold(0.0_f64, |reach, node| {

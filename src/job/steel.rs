@@ -189,8 +189,10 @@ impl Solved {
             Steel::Alone(_) => {
                 for (coil, out) in scene.coils.iter().zip(out.chunks_exact_mut(block.max(1))) {
                     let [x, y] = coil.axis_m;
-                    let own: Vec<[f64; 3]> =
-                        points_m.iter().map(|p| [p[0] - x, p[1] - y, p[2]]).collect();
+                    let own: Vec<[f64; 3]> = points_m
+                        .iter()
+                        .map(|p| [p[0] - x, p[1] - y, p[2]])
+                        .collect();
                     sources.sample(&own, parts, out);
                 }
             }

@@ -215,8 +215,13 @@ impl<'a> Route<'a> {
         let square: f64 = moment.iter().map(|m| m * m).sum();
         let mut out = vec![[0.0; 3]; wanted.len()];
         for node in self.rule.nodes() {
-            let share: f64 =
-                node.moment_a_m2.iter().zip(moment).map(|(a, b)| a * b).sum::<f64>() / square;
+            let share: f64 = node
+                .moment_a_m2
+                .iter()
+                .zip(moment)
+                .map(|(a, b)| a * b)
+                .sum::<f64>()
+                / square;
             let places: Vec<[f64; 3]> = centres
                 .iter()
                 .map(|p| std::array::from_fn(|i| p[i] + node.offset_m[i]))
@@ -224,7 +229,8 @@ impl<'a> Route<'a> {
             let steel = match self.solved.sources(self.scene, &places, 0.0)? {
                 Some(sources) => {
                     let parts = Parts::Gradient;
-                    self.solved.steel_fields(self.scene, &sources, &places, parts)
+                    self.solved
+                        .steel_fields(self.scene, &sources, &places, parts)
                 }
                 None => Vec::new(),
             };
@@ -234,7 +240,10 @@ impl<'a> Route<'a> {
                 let (zz, rz_over_r) = of_winding(self.scene, dx.hypot(dy), place[2]);
                 let part = |component: usize| {
                     let block = wanted[row].0 * Parts::Gradient.count() + component;
-                    steel.get(block * places.len() + row).copied().unwrap_or(0.0)
+                    steel
+                        .get(block * places.len() + row)
+                        .copied()
+                        .unwrap_or(0.0)
                 };
                 let factor = coil.gain * share;
                 sums[0] += factor * (rz_over_r * dx + part(2));
@@ -352,7 +361,12 @@ fn between_nodes(bundle: &Bundle, route: &Route) -> Result<Check, JobError> {
         .fold(0.0, f64::max);
     let allowed = bundle.manifest.map.interpolation.largest_error;
     let how = format!("{SAMPLES} places between nodes, interpolated as the loaders do");
-    Ok(check("map between nodes", worst, allowed.max(KERNEL_ERROR), how))
+    Ok(check(
+        "map between nodes",
+        worst,
+        allowed.max(KERNEL_ERROR),
+        how,
+    ))
 }
 
 /// The force constant, the currents and their errors from forces computed anew.
@@ -462,7 +476,12 @@ fn force_constant(
     ));
     let gap = ratio(duality_gap(&problem, &residual, currents), wanted);
     let how = "proof of optimality: no currents within the limits are better by more";
-    checks.push(check("duality gap", gap, slack.max(GAP_ALLOWED), how.to_owned()));
+    checks.push(check(
+        "duality gap",
+        gap,
+        slack.max(GAP_ALLOWED),
+        how.to_owned(),
+    ));
     Ok(checks)
 }
 
@@ -492,7 +511,9 @@ fn sampled_forces(
     let how = format!("{SAMPLES} entries of the force matrix by an independent route");
     // The estimate is relative to |grad B| at each height; the lowest points have the largest.
     let stated = bundle.manifest.accuracy.get("forces");
-    let allowed = stated.map_or(0.0, |stage| stage.estimate).max(10.0 * KERNEL_ERROR);
+    let allowed = stated
+        .map_or(0.0, |stage| stage.estimate)
+        .max(10.0 * KERNEL_ERROR);
     Ok(check("forces", ratio(worst, largest), allowed, how))
 }
 

@@ -3,8 +3,8 @@
 pub mod array;
 pub mod bh_check;
 pub mod bh_curve;
-pub mod condensation;
 pub mod bore;
+pub mod condensation;
 pub mod cored_coil;
 pub mod coupling;
 pub mod double_layer;
