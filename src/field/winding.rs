@@ -77,6 +77,23 @@ impl AxialField {
     }
 }
 
+impl std::ops::Add for AxialField {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            b_r: self.b_r + other.b_r,
+            b_z: self.b_z + other.b_z,
+            dbr_dr: self.dbr_dr + other.dbr_dr,
+            dbr_dz: self.dbr_dz + other.dbr_dz,
+            dbr_dz_over_r: self.dbr_dz_over_r + other.dbr_dz_over_r,
+            dbz_dr: self.dbz_dr + other.dbz_dr,
+            dbz_dz: self.dbz_dz + other.dbz_dz,
+            br_over_r: self.br_over_r + other.br_over_r,
+        }
+    }
+}
+
 /// A point at which the gradient does not exist: on one of the winding's four edges, where it
 /// grows like the logarithm of the distance.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]

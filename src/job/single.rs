@@ -9,8 +9,12 @@ use super::{JobError, KERNEL_ERROR};
 use crate::accuracy::StageAccuracy;
 use crate::coil::inductance;
 use crate::field::frame::to_cartesian;
-use crate::field::steel::cored_coil::CoredCoil;
+use crate::field::steel::bh_curve::BhCurve;
+use crate::field::steel::cored_coil::{CoredCoil, Excitation};
+use crate::field::steel::generatrix::{Generatrix, Resolution};
 use crate::field::steel::inside::peak_depth_m;
+use crate::field::steel::magnetized::MagnetizedCore;
+use crate::field::steel::saturated::{CoreField, SaturatedCore, Status};
 use crate::field::winding::{AxialField, Winding};
 use crate::units::STEEL_DENSITY_KG_PER_M3;
 
@@ -38,7 +42,14 @@ pub(super) struct Single {
 enum Source {
     Air(Winding),
     Cored(Box<CoredCoil>),
+    Saturated(Winding, Box<MagnetizedCore>),
 }
+
+/// Default tolerance of one coil along a B-H curve: the curve's kinks cross the elements, so
+/// that digits are dear.
+const SATURATED_TOLERANCE: f64 = 3e-4;
+/// Refinements after which a tolerance that is not reached is given up, with its estimate.
+const MAX_REFINEMENTS: usize = 3;
 
 /// The force on the magnet at the target.
 pub(super) struct TargetForce {
@@ -93,9 +104,8 @@ impl Single {
                 tolerance: tolerance.unwrap_or(KERNEL_ERROR),
             });
         };
-        let tolerance = tolerance.unwrap_or(CORED_TOLERANCE);
         let shape = core.shape;
-        if height_m <= shape.top_m && scene.core.is_some() {
+        if height_m <= shape.top_m {
             return Err(JobError::Input(format!(
                 "target.height_mm = {}: the core's top is at {} mm; raise the target or lower the \
                  core (core.above_mm)",
@@ -103,6 +113,12 @@ impl Single {
                 shape.top_m * 1e3
             )));
         }
+        if let Material::Curve(curve) = &core.material
+            && scene.rated_current_a() > 0.0
+        {
+            return Self::saturated(scene, core, curve, tolerance);
+        }
+        let tolerance = tolerance.unwrap_or(CORED_TOLERANCE);
         let mu_r = core.relative_permeability();
         let coil = CoredCoil::new(&scene.winding, shape, mu_r, tolerance, height_m)?;
         let current_a = scene.rated_current_a();
@@ -169,6 +185,103 @@ impl Single {
         })
     }
 
+    /// The coil at its rated current along `curve`.
+    fn saturated(
+        scene: &Scene,
+        core: &SceneCore,
+        curve: &BhCurve,
+        tolerance: Option<f64>,
+    ) -> Result<Self, JobError> {
+        let tolerance = tolerance.unwrap_or(SATURATED_TOLERANCE);
+        let height_m = scene.design.target_height_m;
+        let current_a = scene.rated_current_a();
+        let mut aim = tolerance;
+        let mut state = None;
+        for _ in 0..=MAX_REFINEMENTS {
+            let resolution = Resolution::for_tolerance(aim);
+            let coarse = AtCurrent::new(scene, core, curve, current_a, &resolution.coarser())?;
+            let fine = AtCurrent::new(scene, core, curve, current_a, &resolution)?;
+            let field = fine.field(scene, height_m)?;
+            let other = coarse.field(scene, height_m)?;
+            let error = ((field.dbz_dz - other.dbz_dz).abs() / field.gradient_norm())
+                .max((fine.flux_linkage_wb / coarse.flux_linkage_wb - 1.0).abs());
+            let reached = error <= tolerance;
+            state = Some((fine, field, error));
+            if reached {
+                break;
+            }
+            aim *= 0.1;
+        }
+        let Some((state, field, error)) = state else {
+            return Err(JobError::Input(
+                "no resolution of the core was solved".to_owned(),
+            ));
+        };
+        let shape = core.shape;
+        let initial = core.relative_permeability();
+        let linear = CoredCoil::new(&scene.winding, shape, initial, tolerance, height_m)?;
+        let linear = linear.field(0.0, height_m)?;
+        let method = "difference of two resolutions of the core's surface and inside";
+        let accuracy = BTreeMap::from([
+            (
+                "field",
+                stage(error, "|grad B| (|B|) at the target", method),
+            ),
+            ("inductance", stage(error, "the flux linkage", method)),
+            (
+                "core_field",
+                stage(
+                    state.inside.resolution.max(error),
+                    "the peak and the mean",
+                    "what the elements' highest degree contributes",
+                ),
+            ),
+        ]);
+        let mean_t = state.inside.mean_b_t;
+        let facts = CoreFacts {
+            radius_m: shape.radius_m,
+            length_m: shape.length_m(),
+            mass_kg: shape.volume_m3() * STEEL_DENSITY_KG_PER_M3,
+            relative_permeability: initial,
+            material: "curve",
+            peak_field_t: state.inside.peak_b_t,
+            peak_at_m: [state.inside.peak_at_m.0, state.inside.peak_at_m.1],
+            mean_field_t: mean_t,
+            knee_t: core.knee_t,
+            deviation_from_linear: Some(field.dbz_dz / linear.dbz_dz - 1.0),
+        };
+        let mut notes = core.warnings.clone();
+        if state.inside.peak_b_t > core.knee_t {
+            notes.push(format!(
+                "the core at the rated current reaches {:.2} T, above the steel's knee at {:.2} T: \
+                 the force is {:.1} % off that of linear steel, and forces of several currents do \
+                 not add up",
+                state.inside.peak_b_t,
+                core.knee_t,
+                100.0 * (field.dbz_dz / linear.dbz_dz - 1.0)
+            ));
+        }
+        if curve.largest_b_t() < state.inside.peak_b_t {
+            notes.push(format!(
+                "the B-H table ends at {} T, below the core's {:.2} T: beyond its last point the \
+                 steel is taken as saturated (slope mu_0)",
+                curve.largest_b_t(),
+                state.inside.peak_b_t
+            ));
+        }
+        Ok(Self {
+            inductance_h: state.flux_linkage_wb / current_a,
+            flux_linkage_wb: Some(state.flux_linkage_wb),
+            field,
+            relative_permeability: curve.relative_permeability(mean_t).max(1.0),
+            core: Some(facts),
+            accuracy,
+            notes,
+            source: Source::Saturated(scene.winding, Box::new(state.layer)),
+            tolerance,
+        })
+    }
+
     /// The force at the target on the axis at `current_a`.
     pub(super) fn force(&self, scene: &Scene, current_a: f64) -> Result<TargetForce, JobError> {
         let height_m = scene.design.target_height_m;
@@ -196,6 +309,7 @@ impl Single {
         Ok(match &self.source {
             Source::Air(winding) => winding.field(r_m, z_m)?,
             Source::Cored(coil) => coil.field(r_m, z_m)?,
+            Source::Saturated(winding, core) => winding.field(r_m, z_m)? + core.field(r_m, z_m),
         })
     }
 }
@@ -210,5 +324,44 @@ pub(super) fn above_knee(peak_t: f64, knee_t: f64, whose: &str) -> Option<String
     })
 }
 
-#[allow(dead_code)]
-fn _unused(_: &SceneCore) {}
+/// A coil along a B-H curve at one current and one resolution.
+struct AtCurrent {
+    /// Per ampere.
+    layer: MagnetizedCore,
+    flux_linkage_wb: f64,
+    inside: CoreField,
+}
+
+impl AtCurrent {
+    fn new(
+        scene: &Scene,
+        core: &SceneCore,
+        curve: &BhCurve,
+        current_a: f64,
+        resolution: &Resolution,
+    ) -> Result<Self, JobError> {
+        let outline = Generatrix::of_coil(&scene.winding, core.shape, resolution);
+        let excitation = Excitation::new(&scene.winding, &outline)?;
+        let solver = SaturatedCore::new(&outline, resolution.quadrature)
+            .map_err(|fault| JobError::Input(format!("[core] with a B-H curve: {fault}")))?;
+        let solution = solver.solve(&(&excitation.potential * current_a), curve, None);
+        if solution.status == Status::Stalled {
+            return Err(JobError::Input(format!(
+                "[core] with a B-H curve: no state of the steel was found at {current_a} A; check \
+                 the curve for jumps, or give core.relative_permeability"
+            )));
+        }
+        let steel = solver.flux_linkage_wb(&solution, &excitation.potential);
+        let inside = solver.field(&solution, curve);
+        let density = (&solution.v_a / current_a).as_slice().to_vec();
+        Ok(Self {
+            layer: MagnetizedCore::new(outline, density),
+            flux_linkage_wb: scene.circuit.inductance_h * current_a + steel,
+            inside,
+        })
+    }
+
+    fn field(&self, scene: &Scene, height_m: f64) -> Result<AxialField, JobError> {
+        Ok(scene.winding.field(0.0, height_m)? + self.layer.field(0.0, height_m))
+    }
+}

@@ -191,18 +191,7 @@ impl CoredCoil {
     /// # Errors
     /// A point on the winding's edge.
     pub fn field(&self, r_m: f64, z_m: f64) -> Result<AxialField, OnEdge> {
-        let air = self.winding.field(r_m, z_m)?;
-        let steel = self.core.field(r_m, z_m);
-        Ok(AxialField {
-            b_r: air.b_r + steel.b_r,
-            b_z: air.b_z + steel.b_z,
-            dbr_dr: air.dbr_dr + steel.dbr_dr,
-            dbr_dz: air.dbr_dz + steel.dbr_dz,
-            dbr_dz_over_r: air.dbr_dz_over_r + steel.dbr_dz_over_r,
-            dbz_dr: air.dbz_dr + steel.dbz_dr,
-            dbz_dz: air.dbz_dz + steel.dbz_dz,
-            br_over_r: air.br_over_r + steel.br_over_r,
-        })
+        Ok(self.winding.field(r_m, z_m)? + self.core.field(r_m, z_m))
     }
 }
 
