@@ -8,6 +8,7 @@ pub mod coupling;
 pub mod double_layer;
 pub mod generatrix;
 pub mod magnetized;
+pub mod passive;
 pub mod response;
 pub mod symmetry;
 
