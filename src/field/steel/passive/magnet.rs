@@ -4,6 +4,9 @@ use super::NoPull;
 use super::reaction::Dipole;
 use crate::field::magnet::{Cylinder, MagnetRule, Sources};
 
+/// Height, in radii of the ball around the magnet, from which dipoles on its axis do.
+const FAR_REACHES: f64 = 1.3;
+
 /// Moment and, where it is not a point, size of the magnet.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PassiveMagnet {
@@ -75,6 +78,19 @@ impl PassiveMagnet {
     #[must_use]
     pub fn rule(&self, z_m: f64) -> Vec<Dipole> {
         dipoles(&self.magnet_rule(z_m))
+    }
+
+    /// Few dipoles on the magnet's axis that stand for it to `tolerance` from a height that
+    /// allows them; closer they are a guess for what matters little there.
+    #[must_use]
+    pub fn few_dipoles(&self, tolerance: f64) -> Vec<Dipole> {
+        let Some(size) = self.size else {
+            return self.rule(self.lowest_m);
+        };
+        let height_m = (self.lowest_m - self.top_m).max(FAR_REACHES * size.reach_m());
+        let sources = Sources::Below { height_m };
+        MagnetRule::cylinder(size, self.moment_a_m2, sources, tolerance)
+            .map_or_else(|_| self.rule(self.lowest_m), |rule| dipoles(&rule))
     }
 
     /// How far the lowest dipole of a rule is above the steel.
