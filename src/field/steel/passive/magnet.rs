@@ -5,7 +5,11 @@ use super::reaction::Dipole;
 use crate::field::magnet::{Cylinder, MagnetRule, Sources};
 
 /// Height, in radii of the ball around the magnet, from which dipoles on its axis do.
-const FAR_REACHES: f64 = 1.3;
+const FAR_REACHES: f64 = 2.0;
+/// Rules of up to so many nodes are used at every height: a change of rule is a small jump.
+const ONE_RULE: usize = 32;
+/// Part of the tolerance allowed to rules that change with the height.
+const JUMPS: f64 = 0.3;
 
 /// Moment and, where it is not a point, size of the magnet.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,6 +19,8 @@ pub struct PassiveMagnet {
     top_m: f64,
     lowest_m: f64,
     tolerance: f64,
+    /// The height from which the magnet has one rule.
+    fixed_m: f64,
 }
 
 impl PassiveMagnet {
@@ -32,19 +38,24 @@ impl PassiveMagnet {
         if !moment_a_m2.iter().all(|m| m.is_finite()) {
             return Err(NoPull::NotANumber);
         }
-        let magnet = Self {
+        let mut magnet = Self {
             moment_a_m2,
             size,
             top_m,
             lowest_m,
             tolerance,
+            fixed_m: lowest_m,
         };
         if size.is_none() && lowest_m <= top_m {
             return Err(NoPull::TouchesSteel {
                 gap_m: lowest_m - top_m,
             });
         }
-        magnet.try_rule(lowest_m)?;
+        if magnet.try_rule(lowest_m)?.nodes().len() > ONE_RULE {
+            magnet.fixed_m = f64::INFINITY;
+            magnet.tolerance *= JUMPS;
+            magnet.try_rule(lowest_m)?;
+        }
         Ok(magnet)
     }
 
@@ -70,7 +81,7 @@ impl PassiveMagnet {
     #[must_use]
     pub fn magnet_rule(&self, z_m: f64) -> MagnetRule {
         // Rounding of a table's lowest node must not fail where the promised height did not.
-        self.try_rule(z_m.max(self.lowest_m))
+        self.try_rule(z_m.clamp(self.lowest_m, self.fixed_m))
             .unwrap_or_else(|_| MagnetRule::dipole(self.moment_a_m2))
     }
 
