@@ -287,14 +287,15 @@ fn aim_share(tolerance: f64) -> f64 {
 }
 
 fn couple(pulled: &Pulled, magnet: &PassiveMagnet, closest_m: f64, tolerance: f64) -> Neighbours {
+    let dipoles = magnet.few_dipoles(tolerance);
     Neighbours::new(
         pulled.shape,
         pulled.relative_permeability,
         pulled.positions_m,
         closest_m,
-        magnet.gap_m(),
+        magnet.gap_of_m(&dipoles),
         tolerance,
-        magnet.few_dipoles(tolerance),
+        dipoles,
     )
 }
 
@@ -392,78 +393,5 @@ impl Checks {
                 norm(reaction::minus(found, *sure)) / norm(*sure)
             })
             .fold(0.0, f64::max)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn seed() {
-        let shape = CoreShape {
-            radius_m: 0.012,
-            bottom_m: -0.11,
-            top_m: 0.0,
-        };
-        let positions: Vec<[f64; 2]> = (0..9)
-            .map(|i| [0.05 * ((i % 3) as f64 - 1.0), 0.05 * ((i / 3) as f64 - 1.0)])
-            .collect();
-        let m = 1.1579e6 * std::f64::consts::PI * 2.5e-5 * 0.01;
-        let cyl = Some(Cylinder {
-            diameter_m: 0.01,
-            length_m: 0.01,
-        });
-        for (tilt, size, z) in [
-            (false, None, [0.01, 0.08]),
-            (false, None, [0.05, 0.05]),
-            (false, cyl, [0.05, 0.05]),
-            (false, None, [0.006, 0.08]),
-            (false, cyl, [0.02, 0.08]),
-            (false, cyl, [0.01, 0.08]),
-            (true, None, [0.01, 0.08]),
-            (true, cyl, [0.02, 0.08]),
-        ] {
-            for tol in [1e-3] {
-                let pulled = Pulled {
-                    shape,
-                    relative_permeability: 1000.0,
-                    positions_m: &positions,
-                    coupled: true,
-                    moment_a_m2: if tilt {
-                        [0.4 * m, -0.3 * m, 0.75f64.sqrt() * m]
-                    } else {
-                        [0.0, 0.0, m]
-                    },
-                    size,
-                    region: Region {
-                        x_m: [-0.05, 0.05],
-                        y_m: [-0.05, 0.05],
-                        z_m: z,
-                    },
-                };
-                let t = std::time::Instant::now();
-                let pull = PassivePull::new(&pulled, tol).unwrap();
-                let dt = t.elapsed();
-                println!(
-                    "{tilt} {} {z:?} tol {tol:e}: new {dt:?} est {:.1e} share {:.2}",
-                    size.is_some(),
-                    pull.relative_error,
-                    pull.coupling_share
-                );
-                let points: Vec<[f64; 3]> = (0..3721)
-                    .map(|i| {
-                        [
-                            -0.05 + 0.1 * (i % 61) as f64 / 60.0,
-                            -0.05 + 0.1 * (i / 61) as f64 / 60.0,
-                            0.05,
-                        ]
-                    })
-                    .collect();
-                let t = std::time::Instant::now();
-                let f = pull.forces_z_n(&points);
-                println!("   3721 points {:?} {} {}", t.elapsed(), f[1860], f[700]);
-            }
-        }
     }
 }

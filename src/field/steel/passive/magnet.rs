@@ -107,8 +107,13 @@ impl PassiveMagnet {
     /// How far the lowest dipole of a rule is above the steel.
     #[must_use]
     pub fn gap_m(&self) -> f64 {
-        let lowest = self
-            .rule(self.lowest_m)
+        self.gap_of_m(&self.rule(self.lowest_m))
+    }
+
+    /// The same of given dipoles about the centre.
+    #[must_use]
+    pub fn gap_of_m(&self, dipoles: &[Dipole]) -> f64 {
+        let lowest = dipoles
             .iter()
             .fold(0.0_f64, |lowest, d| lowest.min(d.at_m[2]));
         self.lowest_m + lowest - self.top_m

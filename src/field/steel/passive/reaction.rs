@@ -144,7 +144,11 @@ impl Reaction {
         let phase = |k: usize, column: usize| {
             let mode = column.div_ceil(2);
             let (s, c) = (turn * ((mode * k) % angles) as f64).sin_cos();
-            if column > 0 && column % 2 == 0 { s } else { c }
+            if column > 0 && column.is_multiple_of(2) {
+                s
+            } else {
+                c
+            }
         };
         let to_modes = DMatrix::from_fn(angles, columns, |k, column| {
             let factor = if column == 0 { 1.0 } else { 2.0 };
