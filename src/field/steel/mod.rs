@@ -14,6 +14,7 @@ pub mod interior;
 pub mod layer_gradient;
 pub mod lobatto;
 pub mod magnetized;
+pub mod passive;
 pub mod permeability;
 pub mod response;
 pub mod saturated;

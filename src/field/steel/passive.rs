@@ -1,0 +1,397 @@
+//! The pull of the unpowered steel on the magnet.
+//!
+//! The magnet magnetises the cores; their field at the magnet pulls it towards them. In linear
+//! steel the energy at a place p is W(p) = -(1/2) sum_k m_k . B_induced(p + o_k) and the force
+//! F = -grad W, which is sum_k (m_k . grad) B_induced with the induced field held fixed.
+
+pub mod isolated;
+pub mod magnet;
+pub mod neighbours;
+pub mod reaction;
+pub mod table;
+
+use rayon::prelude::*;
+use thiserror::Error;
+
+use super::CoreShape;
+use crate::field::magnet::{Cylinder, NoRule};
+use isolated::{Isolated, placed};
+use magnet::PassiveMagnet;
+use neighbours::Neighbours;
+use reaction::{Reaction, ReactionResolution};
+use table::Grid;
+
+/// Where the magnet's centre may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Region {
+    /// From and to, m, along x, y and z.
+    pub x_m: [f64; 2],
+    /// See `x_m`.
+    pub y_m: [f64; 2],
+    /// See `x_m`.
+    pub z_m: [f64; 2],
+}
+
+/// Why there is no pull.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+pub enum NoPull {
+    /// A size, place or tolerance that is not a number in its range.
+    #[error(
+        "sizes, permeability and tolerance must be positive numbers, places finite and ordered"
+    )]
+    NotANumber,
+    /// The region reaches down to the steel's top.
+    #[error("the magnet may touch the steel (gap {gap_m:e} m): the pull is known above it only")]
+    TouchesSteel {
+        /// Height above the steel, m.
+        gap_m: f64,
+    },
+    /// Two cores overlap or touch.
+    #[error("two cores are {distance_m:e} m apart, less than their diameter")]
+    CoresOverlap {
+        /// Distance of their axes, m.
+        distance_m: f64,
+    },
+    /// The magnet's cylinder touches the steel, or nearly.
+    #[error(transparent)]
+    Magnet(#[from] NoRule),
+}
+
+/// What [`PassivePull::new`] needs to know.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pulled<'a> {
+    /// Every core, about its axis.
+    pub shape: CoreShape,
+    /// mu_r > 0 of the steel.
+    pub relative_permeability: f64,
+    /// Axes, m.
+    pub positions_m: &'a [[f64; 2]],
+    /// Whether the cores magnetise each other too.
+    pub coupled: bool,
+    /// Moment of the magnet, A m^2.
+    pub moment_a_m2: [f64; 3],
+    /// Size of the magnet; a point dipole without.
+    pub size: Option<Cylinder>,
+    /// Where the magnet's centre may be.
+    pub region: Region,
+}
+
+/// The pull over a region.
+#[derive(Debug, Clone)]
+pub struct PassivePull {
+    positions_m: Vec<[f64; 2]>,
+    isolated: Option<Isolated>,
+    neighbours: Option<Neighbours>,
+    /// Estimated error of a force, relative to its length: the largest difference from finer
+    /// solutions at places spread over the region, plus the bound of the magnet's dipoles.
+    pub relative_error: f64,
+    /// Largest share of the cores' coupling in the force at those places, relative to its length;
+    /// zero when it is left out.
+    pub coupling_share: f64,
+}
+
+/// Places at which the error is looked for.
+const CHECKS: usize = 12;
+/// Refinements of the table, each by `GROWTH`.
+const MOST_REFINEMENTS: usize = 5;
+const GROWTH: f64 = 1.35;
+/// Tolerance of what the coupling adds over that of the force.
+const COARSER: f64 = 10.0;
+/// Refinements of the coupling.
+const MOST_COUPLINGS: usize = 3;
+/// Points a portion of work.
+const CHUNK: usize = 64;
+
+impl PassivePull {
+    /// Prepares the pull to an estimated error of `tolerance`, or as near to it as its tables
+    /// get: [`PassivePull::relative_error`] says what was reached.
+    ///
+    /// Domain: the whole magnet above the highest steel.
+    ///
+    /// # Errors
+    /// [`NoPull`].
+    pub fn new(pulled: &Pulled, tolerance: f64) -> Result<Self, NoPull> {
+        let closest_m = check(pulled, tolerance)?;
+        let shape = pulled.shape;
+        let region = pulled.region;
+        let aim = 0.3 * tolerance;
+        let magnet = PassiveMagnet::new(
+            pulled.moment_a_m2,
+            pulled.size,
+            shape.top_m,
+            region.z_m[0],
+            0.5 * aim,
+        )?;
+        let gap_m = magnet.gap_m();
+        let resolution = ReactionResolution::for_tolerance(aim, shape, gap_m);
+        let reaction = Reaction::new(shape, pulled.relative_permeability, &resolution);
+        let mut grid = Grid {
+            scale_m: shape.radius_m + gap_m,
+            far_m: farthest(pulled).max(1e-3 * (shape.radius_m + gap_m)),
+            base_m: shape.top_m,
+            heights_m: region.z_m,
+            nodes: [12, 8],
+        };
+        // A single height still has a slope.
+        let span = region.z_m[0] - shape.top_m;
+        grid.heights_m[1] = grid.heights_m[1].max(region.z_m[0] + 0.05 * span);
+        let checks = Checks::new(pulled, &magnet, &resolution, &grid);
+        let mut best: Option<(f64, Isolated)> = None;
+        for _ in 0..=MOST_REFINEMENTS {
+            let Some(isolated) = Isolated::new(&reaction, &magnet, grid) else {
+                return Ok(Self {
+                    positions_m: Vec::new(),
+                    isolated: None,
+                    neighbours: None,
+                    relative_error: 0.0,
+                    coupling_share: 0.0,
+                });
+            };
+            let error = checks.error_of(&isolated);
+            let [across, up] = isolated.tails();
+            if best.as_ref().is_none_or(|(e, _)| error < *e) {
+                best = Some((error, isolated));
+            }
+            if error <= 2.0 * aim {
+                break;
+            }
+            for (tail, nodes) in [across, up].iter().zip(&mut grid.nodes) {
+                if *tail >= 0.3 * across.max(up) {
+                    *nodes = (GROWTH * *nodes as f64).ceil() as usize;
+                }
+            }
+        }
+        let (table_error, isolated) = best.expect("at least one table was made");
+        let mut pull = Self {
+            positions_m: pulled.positions_m.to_vec(),
+            isolated: Some(isolated),
+            neighbours: None,
+            relative_error: 0.0,
+            coupling_share: 0.0,
+        };
+        let places_m = spread(pulled);
+        let alone: Vec<_> = places_m.iter().map(|at| pull.force_n(*at)).collect();
+        let mut added = vec![[0.0; 3]; places_m.len()];
+        let mut coupling_error_n = vec![0.0; places_m.len()];
+        if pulled.coupled && pulled.positions_m.len() > 1 {
+            let mut aim = (COARSER * tolerance).clamp(1e-6, 0.1);
+            let solve = |aim| couple(pulled, &magnet, closest_m, aim);
+            let of = |n: &Neighbours| -> Vec<[f64; 3]> {
+                places_m.par_iter().map(|at| n.force_n(*at)).collect()
+            };
+            let mut coarse = solve(aim);
+            added = of(&coarse);
+            for _ in 0..MOST_COUPLINGS {
+                aim *= 0.2;
+                let fine = solve(aim);
+                let finer = of(&fine);
+                let mut worst = 0.0_f64;
+                for (k, error) in coupling_error_n.iter_mut().enumerate() {
+                    *error = norm(reaction::minus(added[k], finer[k]));
+                    let total: [f64; 3] = std::array::from_fn(|i| alone[k][i] + finer[k][i]);
+                    worst = worst.max(*error / norm(total));
+                }
+                if worst <= aim_share(tolerance) {
+                    break;
+                }
+                // The difference stands for the finer one from here, on the safe side.
+                (coarse, added) = (fine, finer);
+            }
+            pull.neighbours = Some(coarse);
+        }
+        let rule_error = magnet.magnet_rule(region.z_m[0]).bound();
+        for (k, at) in places_m.iter().enumerate() {
+            let total: [f64; 3] = std::array::from_fn(|i| alone[k][i] + added[k][i]);
+            let size = norm(total);
+            let of_tables: f64 =
+                pull.each_n(*at).map(norm).sum::<f64>() * (table_error + rule_error);
+            pull.relative_error = pull
+                .relative_error
+                .max((of_tables + coupling_error_n[k]) / size);
+            pull.coupling_share = pull.coupling_share.max(norm(added[k]) / size);
+        }
+        Ok(pull)
+    }
+
+    /// Forces of every core alone, N.
+    fn each_n(&self, at_m: [f64; 3]) -> impl Iterator<Item = [f64; 3]> + '_ {
+        self.isolated.iter().flat_map(move |isolated| {
+            self.positions_m
+                .iter()
+                .map(move |[x, y]| isolated.force_n([at_m[0] - x, at_m[1] - y, at_m[2]]))
+        })
+    }
+
+    /// Force on the magnet with its centre at `at_m` in the region, N.
+    #[must_use]
+    pub fn force_n(&self, at_m: [f64; 3]) -> [f64; 3] {
+        let added = self.neighbours.as_ref().map(|n| n.force_n(at_m));
+        self.each_n(at_m).chain(added).fold([0.0; 3], |sum, force| {
+            std::array::from_fn(|i| sum[i] + force[i])
+        })
+    }
+
+    /// Vertical forces at many places, N.
+    #[must_use]
+    pub fn forces_z_n(&self, at_m: &[[f64; 3]]) -> Vec<f64> {
+        at_m.par_iter()
+            .with_min_len(CHUNK)
+            .map(|at| {
+                let added = self.neighbours.as_ref().map(|n| n.force_z_n(*at));
+                self.each_n(*at).map(|f| f[2]).chain(added).sum()
+            })
+            .collect()
+    }
+}
+
+/// Smallest distance of two axes, m; infinite for one.
+fn check(pulled: &Pulled, tolerance: f64) -> Result<f64, NoPull> {
+    let CoreShape {
+        radius_m,
+        bottom_m,
+        top_m,
+    } = pulled.shape;
+    let Region { x_m, y_m, z_m } = pulled.region;
+    let positive = [
+        radius_m,
+        top_m - bottom_m,
+        pulled.relative_permeability,
+        tolerance,
+    ];
+    let finite = [x_m, y_m, z_m]
+        .iter()
+        .chain(pulled.positions_m)
+        .flatten()
+        .all(|v| v.is_finite());
+    let ordered = [x_m, y_m, z_m].iter().all(|[from, to]| from <= to);
+    if !positive.iter().all(|v| v.is_finite() && *v > 0.0) || !finite || !ordered {
+        return Err(NoPull::NotANumber);
+    }
+    let mut closest_m = f64::INFINITY;
+    for (i, a) in pulled.positions_m.iter().enumerate() {
+        for b in &pulled.positions_m[..i] {
+            closest_m = closest_m.min((a[0] - b[0]).hypot(a[1] - b[1]));
+        }
+    }
+    if closest_m <= 2.0 * radius_m {
+        return Err(NoPull::CoresOverlap {
+            distance_m: closest_m,
+        });
+    }
+    Ok(closest_m)
+}
+
+/// The part of the tolerance that the coupling may take.
+fn aim_share(tolerance: f64) -> f64 {
+    0.3 * tolerance
+}
+
+fn couple(pulled: &Pulled, magnet: &PassiveMagnet, closest_m: f64, tolerance: f64) -> Neighbours {
+    let dipoles = magnet.few_dipoles(tolerance);
+    Neighbours::new(
+        pulled.shape,
+        pulled.relative_permeability,
+        pulled.positions_m,
+        closest_m,
+        magnet.gap_of_m(&dipoles),
+        tolerance,
+        dipoles,
+    )
+}
+
+/// Places of the region: over the first axes at the lowest height, then a Kronecker sequence.
+fn spread(pulled: &Pulled) -> Vec<[f64; 3]> {
+    let Region { x_m, y_m, z_m } = pulled.region;
+    let over = pulled
+        .positions_m
+        .iter()
+        .take(CHECKS)
+        .map(|[x, y]| [x.clamp(x_m[0], x_m[1]), y.clamp(y_m[0], y_m[1]), z_m[0]]);
+    let top_m = pulled.shape.top_m;
+    let within = (0..2 * CHECKS).map(|k| {
+        let part = |step: f64| (0.5 + step * k as f64).fract();
+        let at = |[from, to]: [f64; 2], part: f64| from + part * (to - from);
+        let height = (z_m[1] - top_m) / (z_m[0] - top_m);
+        let z = top_m + (z_m[0] - top_m) * height.powf(part(0.819_172_513));
+        [
+            at(x_m, part(0.671_043_607)),
+            at(y_m, part(0.549_700_478)),
+            z.clamp(z_m[0], z_m[1]),
+        ]
+    });
+    over.chain(within).collect()
+}
+
+fn norm(v: [f64; 3]) -> f64 {
+    reaction::dot(v, v).sqrt()
+}
+
+/// Largest distance of the region from an axis, m.
+fn farthest(pulled: &Pulled) -> f64 {
+    let away = |[from, to]: [f64; 2], at: f64| (from - at).abs().max((to - at).abs());
+    pulled.positions_m.iter().fold(0.0_f64, |far, [x, y]| {
+        far.max(away(pulled.region.x_m, *x).hypot(away(pulled.region.y_m, *y)))
+    })
+}
+
+/// Forces of one core by the finer solution, without tables.
+struct Checks {
+    places_m: Vec<[f64; 3]>,
+    forces_n: Vec<[f64; 3]>,
+}
+
+impl Checks {
+    fn new(
+        pulled: &Pulled,
+        magnet: &PassiveMagnet,
+        resolution: &ReactionResolution,
+        grid: &Grid,
+    ) -> Self {
+        let finer = Reaction::new(
+            pulled.shape,
+            pulled.relative_permeability,
+            &resolution.finer(),
+        );
+        let places_m: Vec<[f64; 3]> = (0..CHECKS)
+            .map(|k| {
+                // Spread over the table: the corners, then a Kronecker sequence.
+                let golden = |step: f64| (0.5 + step * k as f64).fract();
+                let (u, v) = match k {
+                    0..4 => ((k % 2) as f64, (k / 2) as f64),
+                    _ => (golden(0.754_877_666), golden(0.569_840_291)),
+                };
+                let r_m = grid.scale_m * (u * (grid.far_m / grid.scale_m).asinh()).sinh();
+                let [lo, hi] = grid.heights_m.map(|z| (z - grid.base_m).ln());
+                let (s, c) = (2.399_963_23 * k as f64).sin_cos();
+                let z_m = grid.base_m + (lo + v * (hi - lo)).exp();
+                [
+                    r_m * c,
+                    r_m * s,
+                    z_m.clamp(grid.heights_m[0], grid.heights_m[1]),
+                ]
+            })
+            .collect();
+        let forces_n = places_m
+            .par_iter()
+            .map(|at| {
+                let rule = magnet.magnet_rule(at[2]);
+                let fields = finer.induced(&placed(&magnet::dipoles(&rule), *at));
+                let gradients: Vec<_> = fields.iter().map(|f| f.gradient_t_per_m).collect();
+                rule.force_n(&gradients)
+            })
+            .collect();
+        Self { places_m, forces_n }
+    }
+
+    /// Largest difference, relative to the force.
+    fn error_of(&self, isolated: &Isolated) -> f64 {
+        self.places_m
+            .iter()
+            .zip(&self.forces_n)
+            .map(|(at, sure)| {
+                let found = isolated.force_n(*at);
+                norm(reaction::minus(found, *sure)) / norm(*sure)
+            })
+            .fold(0.0, f64::max)
+    }
+}
