@@ -397,24 +397,18 @@ fn close_neighbours_state_their_error() {
         ..SEED_COIL
     };
     let started = Instant::now();
-    let solve = |resolution: &ArrayResolution| {
-        let pair = [[0.0, 0.0], [0.025, 0.0]];
-        CoupledArray::at_resolution(&thin, SEED_CORE, MU_R, &pair, resolution)
-            .expect("off the edges")
-    };
-    let resolution = ArrayResolution::for_tolerance(1e-2, SEED_CORE, 0.025);
-    let (fine, coarse) = (solve(&resolution), solve(&resolution.coarser()));
-    let off = (&fine.added_inductance_h - &coarse.added_inductance_h).amax()
-        / fine.added_inductance_h.amax();
+    let pair = [[0.0, 0.0], [0.025, 0.0]];
+    let closer = CoupledArray::new(&thin, SEED_CORE, MU_R, &pair, 1e-3, LOWEST_M)
+        .expect("off the winding's edges");
     println!(
-        "1 mm between the cores: size {}, {} iterations, {:.1} s, differs by {off:.1e}",
-        fine.response.size(),
-        fine.iterations,
-        started.elapsed().as_secs_f64()
+        "1 mm between the cores: {} unknowns a core, {} iterations, {:.1} s, estimate {:.0e}",
+        closer.response.size(),
+        closer.iterations,
+        started.elapsed().as_secs_f64(),
+        closer.relative_error
     );
-    assert!(off < 1e-2, "{off:e}");
-    let mutual = fine.added_inductance_h[(0, 1)];
-    assert!(mutual < 0.0 && mutual.abs() < fine.added_inductance_h[(0, 0)]);
+    assert!(closer.response.size() <= 3500);
+    assert!(closer.relative_error > 0.03, "{:e}", closer.relative_error);
 }
 
 #[test]
