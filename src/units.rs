@@ -25,3 +25,6 @@ pub const FORCE_JND: f64 = 0.07;
 pub fn m_from_mm(length_mm: f64) -> f64 {
     length_mm / 1000.0
 }
+
+/// Density of low-carbon steel, kg/m^3 (7.85 to 7.87 g/cm^3 in handbooks).
+pub const STEEL_DENSITY_KG_PER_M3: f64 = 7870.0;

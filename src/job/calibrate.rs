@@ -4,18 +4,20 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::JobError;
 use super::discretize::{self, point_rows, points_grid};
 use super::lambda::{LambdaOptions, LambdaReport, solve};
-use super::map::{MAP_TOLERANCE, accuracy, arrays, runtime, summary, workspace_grid};
-use super::scene::Scene;
+use super::map::{MAP_TOLERANCE, arrays, runtime, summary, workspace_grid};
+use super::maps::SceneMap;
+use super::scene::{MAGNET_SHARE, Scene};
+use super::steel::{Solved, Steel};
+use super::{JobError, KERNEL_ERROR, steel};
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
 use crate::bundle::manifest::{AxisSummary, LambdaSummary, LeftOut, Manifest};
 use crate::bundle::table::CurrentRow;
 use crate::bundle::write::{BundleContent, check_bundle_target, write_bundle};
 use crate::design::Design;
 use crate::map::tabulate::{Grid, PlacedCoil};
-use crate::map::{Components, FieldMap, interpolation_error, tabulate};
+use crate::map::{Components, FieldMap};
 use crate::progress::Progress;
 use crate::shape::document::ShapeDocument;
 
@@ -108,11 +110,36 @@ pub fn run(
         }
     }
     let scene = Scene::new(source.design)?;
+    let solved = BothSolved::new(&scene, options.lambda.tolerance, progress)?;
     let bundles = shapes
         .iter()
-        .map(|shape| calibrate_one(&scene, source, shape, options, progress))
+        .map(|shape| calibrate_one(&scene, &solved, source, shape, options, progress))
         .collect::<Result<_, _>>()?;
     Ok(CalibrateReport { bundles })
+}
+
+/// The sources as forces and as maps ask for them: of steel one solution serves both.
+struct BothSolved {
+    forces: Solved,
+    map: Solved,
+}
+
+impl BothSolved {
+    fn new(
+        scene: &Scene,
+        tolerance: Option<f64>,
+        progress: &dyn Progress,
+    ) -> Result<Self, JobError> {
+        let lowest_m = scene.design.workspace.z_m.from;
+        progress.begin("steel", 1);
+        let map = steel::solve(scene, tolerance, MAP_TOLERANCE, lowest_m)?;
+        let forces = match map.steel {
+            Steel::None => steel::solve(scene, tolerance, KERNEL_ERROR, lowest_m)?,
+            Steel::Alone(_) | Steel::Coupled(_) => map.clone(),
+        };
+        progress.end();
+        Ok(Self { forces, map })
+    }
 }
 
 /// Seconds of one stage, as `timing.json` tells them.
@@ -124,6 +151,7 @@ struct StageSeconds {
 
 fn calibrate_one(
     scene: &Scene,
+    solved: &BothSolved,
     source: DesignSource,
     shape: &ShapeSource,
     options: &CalibrateOptions,
@@ -140,14 +168,13 @@ fn calibrate_one(
         .collect();
     let points = discretize::run(&shape.document, inputs, progress)?;
     check_bundle_target(&folder, options.force, &points.summary.inputs)?;
-    let mut lambda = solve(scene, points, &options.lambda, progress)?;
-    let tolerance = options.lambda.tolerance.unwrap_or(MAP_TOLERANCE);
-    let needed = NeededMap::new(scene, &lambda, options.reach_m, tolerance, progress)?;
+    let mut lambda = solve(scene, &solved.forces, points, &options.lambda, progress)?;
+    let needed = NeededMap::new(scene, &solved.map, &lambda, options.reach_m, progress)?;
     let manifest = manifest(scene, &lambda, &needed);
     lambda.warnings.extend(outside_warning(&manifest, &lambda));
     let currents = current_rows(scene, &lambda);
     let rows = point_rows(&lambda.points.discretized.points);
-    let map = arrays(&needed.map, runtime(scene, lambda.file.lambda_n_per_m));
+    let map = arrays(&needed.made.map, runtime(scene, lambda.file.lambda_n_per_m));
     let timing: Vec<StageSeconds> = progress
         .take_seconds()
         .into_iter()
@@ -174,18 +201,17 @@ fn calibrate_one(
 
 /// The part of the maps that an object needs, and what was left out of it.
 struct NeededMap {
-    map: FieldMap,
+    made: SceneMap,
     components: Components,
-    between: crate::map::InterpolationError,
     left_out: Vec<LeftOut>,
 }
 
 impl NeededMap {
     fn new(
         scene: &Scene,
+        solved: &Solved,
         lambda: &LambdaReport,
         reach_m: f64,
-        tolerance: f64,
         progress: &dyn Progress,
     ) -> Result<Self, JobError> {
         let mut left_out = Vec::new();
@@ -213,28 +239,26 @@ impl NeededMap {
                 error_cost: 0.0,
             });
         }
-        let mut map = tabulate(
-            &scene.winding,
+        let rule = scene.magnet_rule(grid.z_m[0], MAGNET_SHARE * solved.tolerance)?;
+        let mut made = SceneMap::new(
+            scene,
+            solved,
             &driven,
             &grid,
             components,
-            tolerance,
+            Some(&rule),
             progress,
         )?;
-        let kept = drop_weak_coils(scene, &mut map, &driven, tolerance, &mut left_out);
-        progress.begin("interpolation error", 1);
-        let between = interpolation_error(
-            &scene.winding,
-            &kept,
-            &grid,
-            &map.gz_t_per_m_per_a,
-            tolerance,
-        )?;
-        progress.end();
+        drop_weak_coils(
+            scene,
+            &mut made.map,
+            &driven,
+            solved.tolerance,
+            &mut left_out,
+        );
         Ok(Self {
-            map,
+            made,
             components,
-            between,
             left_out,
         })
     }
@@ -252,7 +276,7 @@ fn drop_weak_coils(
     coils: &[PlacedCoil],
     tolerance: f64,
     left_out: &mut Vec<LeftOut>,
-) -> Vec<PlacedCoil> {
+) {
     let nodes = map.x_m.len() * map.y_m.len() * map.z_m.len();
     let strength: Vec<f64> = coils
         .iter()
@@ -268,7 +292,7 @@ fn drop_weak_coils(
         .map(|s| *s > tolerance * strongest)
         .collect();
     if keep.iter().all(|keep| *keep) || strongest == 0.0 {
-        return coils.to_vec();
+        return;
     }
     let weak: f64 = strength
         .iter()
@@ -297,14 +321,12 @@ fn drop_weak_coils(
     if let Some(gradient) = &mut map.gradient_t_per_m_per_a {
         retain(gradient, 9);
     }
-    let kept: Vec<PlacedCoil> = coils
+    map.coils = coils
         .iter()
         .zip(&keep)
         .filter(|(_, keep)| **keep)
-        .map(|(coil, _)| *coil)
+        .map(|(coil, _)| coil.number)
         .collect();
-    map.coils = kept.iter().map(|coil| coil.number).collect();
-    kept
 }
 
 /// The nodes of the workspace within reach of the object's points, one cell beyond.
@@ -357,7 +379,7 @@ fn needed_grid(
 fn manifest(scene: &Scene, lambda: &LambdaReport, needed: &NeededMap) -> Manifest {
     let file = &lambda.file;
     let mut accuracies = file.accuracy.clone();
-    accuracies.insert("map".to_owned(), accuracy(&needed.map));
+    accuracies.insert("map".to_owned(), needed.made.accuracy.clone());
     Manifest {
         schema_version: SCHEMA_VERSION.to_owned(),
         fluxform_version: FLUXFORM_VERSION.to_owned(),
@@ -374,7 +396,7 @@ fn manifest(scene: &Scene, lambda: &LambdaReport, needed: &NeededMap) -> Manifes
             criterion: file.criterion.clone(),
         },
         points: points_grid(&lambda.points.discretized.points),
-        map: summary(&needed.map, needed.components, needed.between),
+        map: summary(&needed.made.map, needed.components, needed.made.between),
         left_out: needed.left_out.clone(),
         accuracy: accuracies,
         files: Vec::new(),

@@ -5,12 +5,18 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::scene::Scene;
-use super::{JobError, KERNEL_ERROR};
+use super::single::{Single, above_knee};
+use super::steel::{CORED_TOLERANCE, Steel};
+use super::{JobError, KERNEL_ERROR, steel};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::coil::limits::{self, LimitCheck};
-use crate::coil::{inductance, mutual};
+use crate::coil::mutual;
+use crate::coil::transient::{VoltageStep, core_energy_share};
 use crate::design::Design;
+use crate::field::steel::array::closest_m;
+use crate::field::steel::inside::peak_depth_m;
+use crate::units::STEEL_DENSITY_KG_PER_M3;
 
 /// What `evaluate` tells; all SI.
 #[derive(Debug, Clone, Serialize)]
@@ -27,6 +33,12 @@ pub struct Evaluation {
     pub coil: CoilFacts,
     /// What it does at the target.
     pub target: TargetFacts,
+    /// The steel; absent for air coils.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub core: Option<CoreFacts>,
+    /// Current and force after a voltage step; absent for air coils.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub transient: Option<TransientFacts>,
     /// Limits by name.
     pub limits: BTreeMap<&'static str, LimitCheck>,
     /// The array; absent for a single coil.
@@ -36,6 +48,9 @@ pub struct Evaluation {
     pub accuracy: BTreeMap<&'static str, StageAccuracy>,
     /// Whether the tolerance asked for was reached.
     pub accuracy_reached: bool,
+    /// What a careful person would mention.
+    #[serde(skip)]
+    pub notes: Vec<String>,
 }
 
 /// The coil and its circuit.
@@ -51,15 +66,18 @@ pub struct CoilFacts {
     pub turns: f64,
     /// Resistance at the wire's temperature, ohm.
     pub resistance_ohm: f64,
-    /// Self inductance, H.
+    /// Self inductance, H; with a B-H curve the flux linkage over the rated current.
     pub inductance_h: f64,
+    /// Flux linkage at the rated current, Wb; told with a B-H curve.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flux_linkage_wb: Option<f64>,
     /// L/R, s.
     pub time_constant_s: f64,
     /// Five time constants, s.
     pub settling_s: f64,
     /// Length of wire, m.
     pub wire_length_m: f64,
-    /// Mass of the copper, kg.
+    /// Mass of wire and core, kg.
     pub mass_kg: f64,
     /// Heat at the rated current, W.
     pub power_w: f64,
@@ -76,8 +94,51 @@ pub struct TargetFacts {
     pub gradient_t_per_m_per_a: f64,
     /// B_z on the axis, T/A.
     pub field_t_per_a: f64,
-    /// Upward force at the rated current, N.
+    /// Upward force at the rated current, N; the unpowered steel's pull included where the
+    /// design asks for it.
     pub force_n: f64,
+    /// Force vector at the rated current, N, as `force_n`.
+    pub force_vector_n: [f64; 3],
+    /// Torque on the magnet about its centre at the rated current, N m, the steel's pull left out.
+    pub torque_n_m: [f64; 3],
+    /// Upward force of the unpowered steel, N; absent for air coils.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub passive_force_n: Option<f64>,
+}
+
+/// The steel of the coil.
+#[derive(Debug, Clone, Serialize)]
+pub struct CoreFacts {
+    /// Radius, m.
+    pub radius_m: f64,
+    /// Length, m.
+    pub length_m: f64,
+    /// Mass, kg.
+    pub mass_kg: f64,
+    /// The permeability of linear steel; with a B-H curve that of its origin.
+    pub relative_permeability: f64,
+    /// `linear` or `curve`.
+    pub material: &'static str,
+    /// Largest |B| at the rated current, well inside the surface, T.
+    pub peak_field_t: f64,
+    /// Where: radius and height, m.
+    pub peak_at_m: [f64; 2],
+    /// Mean of |B| over the core, T.
+    pub mean_field_t: f64,
+    /// Flux density above which the steel is no longer linear, T.
+    pub knee_t: f64,
+    /// With a B-H curve: force at the rated current over that of the linear solution, less one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub deviation_from_linear: Option<f64>,
+}
+
+/// After a voltage step, with eddy currents in the solid core.
+#[derive(Debug, Clone, Serialize)]
+pub struct TransientFacts {
+    /// Time until the current reaches 95 % of its final value, s.
+    pub current_95_s: f64,
+    /// Time until the force does, s.
+    pub force_95_s: f64,
 }
 
 /// The array's inductances.
@@ -100,6 +161,12 @@ pub struct ArrayCoil {
     pub y_m: f64,
     /// Self inductance among its neighbours, H; without steel the same as alone.
     pub inductance_h: f64,
+    /// Largest |B| in its core with all coils at their rated currents, T; absent for air coils.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub peak_field_t: Option<f64>,
+    /// Mean |B| there, T.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_field_t: Option<f64>,
     /// Upper current limit, A.
     pub current_max_a: f64,
 }
@@ -115,7 +182,7 @@ impl Evaluation {
 /// Evaluates the coil of `design` alone, and the array's inductance matrix.
 ///
 /// # Errors
-/// A design that cannot be computed; a target on the winding's edge.
+/// A design that cannot be computed; a target on the winding's edge or in the steel.
 pub fn evaluate(
     design: &Design,
     inputs: Vec<Input>,
@@ -123,34 +190,33 @@ pub fn evaluate(
 ) -> Result<Evaluation, JobError> {
     let scene = Scene::new(design)?;
     let height_m = design.target_height_m;
-    let field = scene.winding.field(0.0, height_m)?;
     let current_a = scene.rated_current_a();
-    let circuit = &scene.circuit;
+    let single = Single::new(&scene, tolerance)?;
+    let mut circuit = scene.circuit;
+    circuit.inductance_h = single.inductance_h;
     let power_w = circuit.power_w(current_a);
-    let inductance_h = circuit.inductance_h;
-    let array = (scene.coils.len() > 1).then(|| {
-        let axes = &design.array.positions_m;
-        let matrix = mutual::inductance_matrix_h(&scene.winding, inductance_h, axes);
-        let coils = axes
-            .iter()
-            .enumerate()
-            .map(|(coil, [x_m, y_m])| ArrayCoil {
-                coil,
-                x_m: *x_m,
-                y_m: *y_m,
-                inductance_h,
-                current_max_a: scene.upper_a[coil],
-            })
-            .collect();
-        ArrayFacts {
-            coils,
-            mutual_inductance_h: matrix,
-        }
-    });
-    let accuracy = accuracy(&scene);
+    let steel_kg = scene
+        .core
+        .as_ref()
+        .map_or(0.0, |core| core.shape.volume_m3() * STEEL_DENSITY_KG_PER_M3);
+    let mass_kg = circuit.wire_mass_kg + steel_kg;
+    let mut accuracy = single.accuracy.clone();
+    let mut notes = single.notes.clone();
+    let force = single.force(&scene, current_a)?;
+    let array = array(&scene, &mut accuracy, &mut notes)?;
+    let transient = transient(&scene, &single, &mut accuracy);
+    let steel = single.core.is_some();
+    let asked = tolerance.unwrap_or(if steel { CORED_TOLERANCE } else { KERNEL_ERROR });
     let worst = accuracy["field"]
         .estimate
         .max(accuracy["inductance"].estimate);
+    let checks = limits::check(
+        design,
+        &circuit,
+        power_w,
+        mass_kg,
+        single.core.as_ref().map(|core| core.peak_field_t),
+    );
     Ok(Evaluation {
         schema_version: SCHEMA_VERSION,
         fluxform_version: FLUXFORM_VERSION,
@@ -162,80 +228,148 @@ pub fn evaluate(
             length_m: scene.coil.length_m,
             turns: circuit.turns,
             resistance_ohm: circuit.resistance_ohm,
-            inductance_h,
+            inductance_h: circuit.inductance_h,
+            flux_linkage_wb: single.flux_linkage_wb,
             time_constant_s: circuit.time_constant_s(),
             settling_s: circuit.settling_s(),
             wire_length_m: circuit.wire_length_m,
-            mass_kg: circuit.wire_mass_kg,
+            mass_kg,
             power_w,
         },
         target: TargetFacts {
             height_m,
             current_a,
-            gradient_t_per_m_per_a: field.dbz_dz,
-            field_t_per_a: field.b_z,
-            // On the axis the transverse components of the gradient's last column vanish.
-            force_n: scene.moment_a_m2[2] * field.dbz_dz * current_a,
+            gradient_t_per_m_per_a: single.field.dbz_dz,
+            field_t_per_a: single.field.b_z,
+            force_n: force.force_n[2],
+            force_vector_n: force.force_n,
+            torque_n_m: force.torque_n_m,
+            passive_force_n: force.passive_n,
         },
-        limits: limits::check(design, circuit, power_w, circuit.wire_mass_kg, None),
+        core: single.core,
+        transient,
+        limits: checks,
         array,
         accuracy,
-        accuracy_reached: worst <= tolerance.unwrap_or(KERNEL_ERROR),
+        accuracy_reached: worst <= asked,
+        notes,
     })
 }
 
-fn accuracy(scene: &Scene) -> BTreeMap<&'static str, StageAccuracy> {
-    let stage = |estimate, relative_to: &str, method: &str| StageAccuracy {
-        estimate,
-        relative_to: relative_to.to_owned(),
-        method: method.to_owned(),
-    };
-    let mut accuracy = BTreeMap::from([
-        (
-            "field",
-            stage(
-                KERNEL_ERROR,
-                "|grad B| (|B| for the field) at the target",
-                "a-priori quadrature bound 1e-15; rounding sampled against 40-digit values",
-            ),
-        ),
-        (
-            "inductance",
-            stage(
-                inductance::RELATIVE_ERROR,
-                "the inductance",
-                "a-priori quadrature bound; sampled against 20-digit values",
-            ),
-        ),
-    ]);
-    if scene.coils.len() > 1 {
-        let gap_m = nearest_gap_m(scene);
-        let apart = gap_m >= 0.1 * scene.winding.outer_radius_m;
-        let estimate = if apart {
-            mutual::RELATIVE_ERROR
-        } else {
-            mutual::RELATIVE_ERROR_TOUCHING
-        };
-        accuracy.insert(
-            "mutual_inductance",
-            stage(
-                estimate,
-                "each mutual inductance",
-                "a-priori quadrature bound for the narrowest gap between windings",
-            ),
-        );
+/// The array among its neighbours; `None` for a single coil.
+fn array(
+    scene: &Scene,
+    accuracy: &mut BTreeMap<&'static str, StageAccuracy>,
+    notes: &mut Vec<String>,
+) -> Result<Option<ArrayFacts>, JobError> {
+    if scene.coils.len() < 2 {
+        return Ok(None);
     }
-    accuracy
-}
-
-/// The narrowest gap between two windings, m.
-fn nearest_gap_m(scene: &Scene) -> f64 {
     let axes = &scene.design.array.positions_m;
-    let mut nearest = f64::INFINITY;
-    for (i, [xi, yi]) in axes.iter().enumerate() {
-        for [xj, yj] in &axes[i + 1..] {
-            nearest = nearest.min((xi - xj).hypot(yi - yj));
+    let inductance_h = scene.circuit.inductance_h;
+    let mut matrix = mutual::inductance_matrix_h(&scene.winding, inductance_h, axes);
+    let gap_m = closest_m(axes) - 2.0 * scene.winding.outer_radius_m;
+    let mut estimate = if gap_m >= 0.1 * scene.winding.outer_radius_m {
+        mutual::RELATIVE_ERROR
+    } else {
+        mutual::RELATIVE_ERROR_TOUCHING
+    };
+    let mut method = "a-priori quadrature bound for the narrowest gap between windings";
+    let mut relative_to = "each mutual inductance";
+    let lowest_m = scene.design.target_height_m;
+    let solved = steel::solve(scene, None, KERNEL_ERROR, lowest_m)?;
+    let mut inside = Vec::new();
+    match &solved.steel {
+        Steel::None => {}
+        Steel::Alone(coil) => {
+            for (i, row) in matrix.iter_mut().enumerate() {
+                row[i] += coil.added_inductance_h;
+            }
+            method = "neighbours' cores left out (coupling = \"none\"): mutual inductances are \
+                      those of the windings in air";
+        }
+        Steel::Coupled(array) => {
+            for (i, row) in matrix.iter_mut().enumerate() {
+                for (j, value) in row.iter_mut().enumerate() {
+                    *value += array.added_inductance_h[(i, j)];
+                }
+            }
+            estimate = estimate.max(array.relative_error);
+            relative_to = "the largest self inductance";
+            method = "coupled cores by two resolutions";
+            let depth_m = peak_depth_m(array.response.outline.shape);
+            inside = array.core_fields(&scene.upper_a, depth_m)?;
+            if let Some(core) = &scene.core {
+                let peak = inside
+                    .iter()
+                    .fold(0.0_f64, |most, field| most.max(field.peak_t));
+                notes.extend(above_knee(
+                    peak,
+                    core.knee_t,
+                    "a core of the array with all coils at their rated currents",
+                ));
+            }
         }
     }
-    nearest - 2.0 * scene.winding.outer_radius_m
+    accuracy.insert(
+        "mutual_inductance",
+        StageAccuracy {
+            estimate,
+            relative_to: relative_to.to_owned(),
+            method: method.to_owned(),
+        },
+    );
+    let coils = axes
+        .iter()
+        .enumerate()
+        .map(|(coil, [x_m, y_m])| ArrayCoil {
+            coil,
+            x_m: *x_m,
+            y_m: *y_m,
+            inductance_h: matrix[coil][coil],
+            peak_field_t: inside.get(coil).map(|field| field.peak_t),
+            mean_field_t: inside.get(coil).map(|field| field.mean_t),
+            current_max_a: scene.upper_a[coil],
+        })
+        .collect();
+    Ok(Some(ArrayFacts {
+        coils,
+        mutual_inductance_h: matrix,
+    }))
+}
+
+fn transient(
+    scene: &Scene,
+    single: &Single,
+    accuracy: &mut BTreeMap<&'static str, StageAccuracy>,
+) -> Option<TransientFacts> {
+    let core = scene.core.as_ref()?;
+    let air_inductance_h = scene.circuit.inductance_h;
+    let air = scene
+        .winding
+        .field(0.0, scene.design.target_height_m)
+        .ok()?;
+    let shape = core.shape;
+    let step = VoltageStep {
+        resistance_ohm: scene.circuit.resistance_ohm,
+        air_inductance_h,
+        inductance_h: single.inductance_h,
+        relative_permeability: single.relative_permeability,
+        conductivity_s_per_m: core.conductivity_s_per_m,
+        core_radius_m: shape.radius_m,
+        core_energy_share: core_energy_share(
+            &scene.winding,
+            shape.radius_m,
+            shape.bottom_m,
+            shape.top_m,
+            air_inductance_h,
+        ),
+        air_share: (air.dbz_dz / single.field.dbz_dz).clamp(0.0, 1.0),
+    };
+    let settling = step.settling().ok()?;
+    accuracy.insert("transient", settling.accuracy.clone());
+    Some(TransientFacts {
+        current_95_s: settling.current_95_s,
+        force_95_s: settling.force_95_s,
+    })
 }

@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 
 use super::discretize::{self, PointsReport};
-use super::scene::Scene;
-use super::{JobError, KERNEL_ERROR};
+use super::scene::{MAGNET_SHARE, Scene};
+use super::steel::{EVALUATION_SHARE, Solved, Steel};
+use super::{JobError, KERNEL_ERROR, steel};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::bundle::lambda_file::{AtLambda, LambdaFile, PathStep};
-use crate::design::Design;
+use crate::design::{Design, MagnetModel};
 use crate::lambda::{self, Criterion, ForceProblem, Precision, Settings, Solution, Status};
 use crate::progress::Progress;
 use crate::shape::document::ShapeDocument;
@@ -60,19 +61,23 @@ pub fn run(
 ) -> Result<LambdaReport, JobError> {
     let scene = Scene::new(design)?;
     let points = discretize::run(document, inputs, progress)?;
-    solve(&scene, points, options, progress)
+    let lowest_m = lowest_m(&points);
+    progress.begin("steel", 1);
+    let solved = steel::solve(&scene, options.tolerance, KERNEL_ERROR, lowest_m)?;
+    progress.end();
+    solve(&scene, &solved, points, options, progress)
 }
 
 /// The force constant for points that are known.
 pub(super) fn solve(
     scene: &Scene,
+    solved: &Solved,
     points: PointsReport,
     options: &LambdaOptions,
     progress: &dyn Progress,
 ) -> Result<LambdaReport, JobError> {
-    let tolerance = options.tolerance.unwrap_or(KERNEL_ERROR);
     let positions = positions_m(&points);
-    let forces = scene.forces_n_per_a(&positions, tolerance, progress)?;
+    let forces = scene.forces_n_per_a(solved, &positions, progress)?;
     progress.begin("lambda", 1);
     let resistance_ohm = scene.resistances_ohm();
     let problem = ForceProblem {
@@ -88,19 +93,19 @@ pub(super) fn solve(
     progress.end();
     let warnings = warnings(&points, &solution, options);
     Ok(LambdaReport {
-        file: file(
-            scene,
-            &points,
-            &solution,
-            options,
-            tolerance.max(KERNEL_ERROR),
-        ),
+        file: file(scene, solved, &points, &solution, options),
         status: solution.status,
         precision: solution.precision,
         warnings,
-        accuracy_reached: tolerance >= KERNEL_ERROR,
+        accuracy_reached: solved.tolerance >= KERNEL_ERROR && solved.reached(),
         points,
     })
+}
+
+/// The lowest of the points, m.
+pub(super) fn lowest_m(points: &PointsReport) -> f64 {
+    let heights = &points.discretized.points.height_m;
+    heights.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
 /// Where the magnet's centre is wanted: the constraint points, m.
@@ -172,17 +177,13 @@ fn warnings(points: &PointsReport, solution: &Solution, options: &LambdaOptions)
 
 fn file(
     scene: &Scene,
+    solved: &Solved,
     points: &PointsReport,
     solution: &Solution,
     options: &LambdaOptions,
-    force_error: f64,
 ) -> LambdaFile {
     let chosen = solution.chosen.as_ref();
-    let forces = StageAccuracy {
-        estimate: force_error,
-        relative_to: "the largest |grad B| at the point's height".to_owned(),
-        method: "a-priori quadrature bound, evaluated at the points directly".to_owned(),
-    };
+    let forces = forces_accuracy(scene, solved);
     let accuracy = BTreeMap::from([
         ("points".to_owned(), points.discretized.accuracy.clone()),
         ("forces".to_owned(), forces),
@@ -225,6 +226,34 @@ fn file(
             worst_error_n: point.worst_error_n,
         }),
         accuracy,
+    }
+}
+
+/// What is known of the forces' error.
+fn forces_accuracy(scene: &Scene, solved: &Solved) -> StageAccuracy {
+    let rules = solved.tolerance.max(KERNEL_ERROR);
+    let magnet = match scene.design.magnet.model {
+        MagnetModel::Dipole => 0.0,
+        MagnetModel::Cylinder => MAGNET_SHARE * rules,
+    };
+    let method = match solved.steel {
+        Steel::None => "a-priori quadrature bound, evaluated at the points directly",
+        Steel::Alone(_) => {
+            "steel by two resolutions, a-priori quadrature bound, evaluated at the points directly"
+        }
+        Steel::Coupled(_) => {
+            "coupled steel by two resolutions, a-priori quadrature bound, evaluated at the points \
+             directly"
+        }
+    };
+    let estimate = match solved.steel {
+        Steel::None => rules,
+        Steel::Alone(_) | Steel::Coupled(_) => EVALUATION_SHARE * rules + solved.steel_error,
+    };
+    StageAccuracy {
+        estimate: estimate + magnet,
+        relative_to: "the largest |grad B| at the point's height".to_owned(),
+        method: method.to_owned(),
     }
 }
 

@@ -4,17 +4,18 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use super::maps::SceneMap;
 use super::scene::Scene;
-use super::{JobError, KERNEL_ERROR};
-use crate::accuracy::StageAccuracy;
+use super::{JobError, KERNEL_ERROR, steel};
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
 use crate::bundle::atomic::Overwrite;
 use crate::bundle::manifest::{AxisSummary, Interpolation, MapSidecar, MapSummary};
 use crate::bundle::npz::{MapArrays, Runtime};
 use crate::bundle::write::{MapFormats, write_map_files};
 use crate::design::Design;
+use crate::map::sampled::TableReport;
 use crate::map::tabulate::Grid;
-use crate::map::{Components, FieldMap, InterpolationError, interpolation_error, tabulate};
+use crate::map::{Components, FieldMap, InterpolationError};
 use crate::progress::Progress;
 
 /// Default tolerance of a map, relative to the largest |grad B| at each height.
@@ -48,6 +49,8 @@ pub struct MapReport {
     pub distinct_radii: usize,
     /// Whether radial tables replaced direct sums.
     pub tabulated: bool,
+    /// The compact form of a coupled array's steel, where there is one.
+    pub table: Option<TableReport>,
     /// Whether the tolerance asked for was reached.
     pub accuracy_reached: bool,
 }
@@ -65,25 +68,21 @@ pub fn run(
     let scene = Scene::new(design)?;
     Overwrite::new(request.force, request.out.join("map.json"), &inputs)
         .check(&request.out.join("map.npz"))?;
-    let tolerance = request.tolerance.unwrap_or(MAP_TOLERANCE);
     let grid = workspace_grid(design);
-    let map = tabulate(
-        &scene.winding,
+    let lowest_m = grid.z_m.first().copied().unwrap_or(0.0);
+    progress.begin("steel", 1);
+    let solved = steel::solve(&scene, request.tolerance, MAP_TOLERANCE, lowest_m)?;
+    progress.end();
+    let made = SceneMap::new(
+        &scene,
+        &solved,
         &scene.coils,
         &grid,
         request.components,
-        tolerance,
+        None,
         progress,
     )?;
-    progress.begin("interpolation error", 1);
-    let between = interpolation_error(
-        &scene.winding,
-        &scene.coils,
-        &grid,
-        &map.gz_t_per_m_per_a,
-        tolerance,
-    )?;
-    progress.end();
+    let map = &made.map;
     progress.check()?;
     let sidecar = MapSidecar {
         schema_version: SCHEMA_VERSION.to_owned(),
@@ -93,12 +92,12 @@ pub fn run(
         units: UNITS.to_owned(),
         array: scene.array_geometry(),
         magnet: scene.magnet_summary(),
-        map: summary(&map, request.components, between),
-        accuracy: BTreeMap::from([("map".to_owned(), accuracy(&map))]),
+        map: summary(map, request.components, made.between),
+        accuracy: BTreeMap::from([("map".to_owned(), made.accuracy.clone())]),
         files: Vec::new(),
     };
     let runtime = runtime(&scene, None);
-    let arrays = arrays(&map, runtime);
+    let arrays = arrays(map, runtime);
     progress.begin("write", 1);
     let sidecar = write_map_files(
         &request.out,
@@ -114,7 +113,8 @@ pub fn run(
         point_coils: map.gz_t_per_m_per_a.len(),
         distinct_radii: map.distinct_radii,
         tabulated: map.tabulated,
-        accuracy_reached: tolerance >= KERNEL_ERROR,
+        table: made.table,
+        accuracy_reached: solved.tolerance >= KERNEL_ERROR && solved.reached(),
     })
 }
 
@@ -152,20 +152,6 @@ pub(super) fn summary(
         }
         .to_owned(),
         interpolation: Interpolation::tricubic(between.largest, definition),
-    }
-}
-
-/// The map's own error at its nodes.
-pub(super) fn accuracy(map: &FieldMap) -> StageAccuracy {
-    StageAccuracy {
-        estimate: map.relative_error.max(KERNEL_ERROR),
-        relative_to: "the largest |grad B| at the node's height".to_owned(),
-        method: if map.tabulated {
-            "a-priori bounds of the radial quadrature and of the radial table"
-        } else {
-            "a-priori bound of the radial quadrature"
-        }
-        .to_owned(),
     }
 }
 

@@ -5,8 +5,11 @@ pub mod discretize;
 pub mod evaluate;
 pub mod lambda;
 pub mod map;
+pub mod maps;
 pub mod probe;
 pub mod scene;
+pub mod single;
+pub mod steel;
 pub mod verify;
 
 use crate::bundle::atomic::WriteError;

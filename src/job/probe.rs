@@ -5,10 +5,12 @@ use std::io::{self, Write};
 use rayon::prelude::*;
 
 use super::scene::Scene;
-use super::{JobError, KERNEL_ERROR};
+use super::steel::{EVALUATION_SHARE, Steel};
+use super::{JobError, KERNEL_ERROR, steel};
 use crate::bundle::table::{FIELD_COLUMNS, GRADIENT_COLUMNS, write_samples};
 use crate::design::Design;
 use crate::field::frame::{CartesianField, to_cartesian};
+use crate::field::steel::sources::Parts;
 use crate::progress::Progress;
 
 /// What is asked at the points.
@@ -30,8 +32,10 @@ pub struct ProbeTable {
     coils: usize,
     /// [point, coil]
     fields: Vec<CartesianField>,
-    /// Estimated error relative to |grad B| at the point.
+    /// Estimated error relative to |grad B| at the point; with steel, to the largest at its height.
     pub relative_error: f64,
+    /// Whether it is relative to the largest at the height.
+    pub relative_to_height: bool,
     /// Whether the tolerance asked for was reached.
     pub accuracy_reached: bool,
 }
@@ -51,7 +55,14 @@ pub fn probe(
     progress: &dyn Progress,
 ) -> Result<ProbeTable, JobError> {
     let scene = Scene::new(design)?;
-    progress.begin("probe", points_m.len() as u64);
+    let lowest_m = points_m.iter().fold(f64::INFINITY, |z, p| z.min(p[2]));
+    let solved = steel::solve(&scene, tolerance, KERNEL_ERROR, lowest_m)?;
+    let count = points_m.len();
+    let added = match solved.sources(&scene, &points_m, 0.0)? {
+        Some(sources) => solved.steel_fields(&scene, &sources, &points_m, Parts::All),
+        None => Vec::new(),
+    };
+    progress.begin("probe", count as u64);
     let portions = points_m
         .par_chunks(PORTION)
         .enumerate()
@@ -68,7 +79,13 @@ pub fn probe(
                             coil.number
                         ))
                     })?;
-                    fields.push(scaled(to_cartesian(&axial, dx, dy), coil.gain));
+                    let mut field = to_cartesian(&axial, dx, dy);
+                    if !added.is_empty() {
+                        let point = portion * PORTION + row;
+                        let first = coil.number * Parts::All.count();
+                        add(&mut field, |part| added[(first + part) * count + point]);
+                    }
+                    fields.push(scaled(field, coil.gain));
                 }
             }
             progress.advance(points.len() as u64);
@@ -81,9 +98,29 @@ pub fn probe(
         coils: scene.coils.len(),
         fields: portions.concat(),
         points_m,
-        relative_error: KERNEL_ERROR,
-        accuracy_reached: KERNEL_ERROR <= tolerance.unwrap_or(KERNEL_ERROR),
+        relative_error: match solved.steel {
+            Steel::None => KERNEL_ERROR,
+            Steel::Alone(_) | Steel::Coupled(_) => {
+                solved.steel_error + EVALUATION_SHARE * solved.tolerance
+            }
+        },
+        relative_to_height: !matches!(solved.steel, Steel::None),
+        accuracy_reached: solved.tolerance >= KERNEL_ERROR && solved.reached(),
     })
+}
+
+/// Adds what steel gives: five components of the gradient, then the field.
+fn add(field: &mut CartesianField, part: impl Fn(usize) -> f64) {
+    let [xx, xy, xz, yz, zz] = std::array::from_fn(&part);
+    let tensor = [[xx, xy, xz], [xy, -xx - zz, yz], [xz, yz, zz]];
+    for (sums, rows) in field.gradient_t_per_m_per_a.iter_mut().zip(tensor) {
+        for (sum, value) in sums.iter_mut().zip(rows) {
+            *sum += value;
+        }
+    }
+    for (axis, sum) in field.field_t_per_a.iter_mut().enumerate() {
+        *sum += part(5 + axis);
+    }
 }
 
 fn scaled(mut field: CartesianField, gain: f64) -> CartesianField {

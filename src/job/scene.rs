@@ -3,17 +3,23 @@
 use rayon::prelude::*;
 
 use super::JobError;
+use super::steel::{SceneCore, Solved};
 use crate::bundle::manifest::{ArrayGeometry, CurrentLimits, MagnetSummary};
 use crate::coil::circuit::{self, Circuit};
 use crate::design::{Coil, Coupling, Design, MagnetModel, Polarity};
 use crate::field::batch::Wanted;
 use crate::field::dipole;
-use crate::field::winding::{OnEdge, Winding};
+use crate::field::magnet::{Cylinder, MagnetRule, Sources};
+use crate::field::steel::sources::{ArraySources, Parts};
+use crate::field::winding::Winding;
 use crate::map::tabulate::PlacedCoil;
 use crate::progress::Progress;
 
 /// Points handed to one thread at a time; fixed, so that bytes do not depend on threads.
 const PORTION: usize = 4096;
+/// Share of the tolerance given to the magnet's dipoles, and the finest asked of them.
+pub(super) const MAGNET_SHARE: f64 = 0.3;
+const MAGNET_FINEST: f64 = 1e-9;
 
 /// A design made ready for computing.
 #[derive(Debug, Clone)]
@@ -24,7 +30,9 @@ pub struct Scene<'a> {
     pub coil: Coil,
     /// The winding.
     pub winding: Winding,
-    /// Resistance, inductance, wire.
+    /// The steel of every core; `None` for air coils.
+    pub core: Option<SceneCore>,
+    /// Resistance, inductance without steel, wire.
     pub circuit: Circuit,
     /// The coils of the array.
     pub coils: Vec<PlacedCoil>,
@@ -40,28 +48,18 @@ impl<'a> Scene<'a> {
     /// Makes a design ready.
     ///
     /// # Errors
-    /// [`JobError::NotModelled`] for a steel core or a cylindrical magnet, which this version
-    /// does not compute: no wrong number is given.
+    /// A design without a coil; a B-H table that cannot be used.
     pub fn new(design: &'a Design) -> Result<Self, JobError> {
-        if design.core.is_some() {
-            return Err(JobError::NotModelled(format!(
-                "[core]: steel cores are not modelled by this version, and without the core the \
-                 force of {:?} would be several times too small; leave the section out for an \
-                 air coil (designs/seed_air.toml is the seed's array without cores)",
-                design.name
-            )));
-        }
-        if design.magnet.model == MagnetModel::Cylinder {
-            return Err(JobError::NotModelled(
-                "magnet.model: the finite cylinder is not modelled by this version; \
-                 use model = \"dipole\" (at 30 mm the seed's magnet differs by 0.7 %)"
-                    .to_owned(),
-            ));
-        }
         let coil = design.coil.ok_or_else(|| {
             JobError::Input("the design has no [coil] section, which this command needs".to_owned())
         })?;
         let circuit = Circuit::of_air_coil(&coil, &design.wire);
+        let winding = circuit::winding(&coil, &design.wire);
+        let core = design
+            .core
+            .as_ref()
+            .map(|core| SceneCore::new(core, &winding))
+            .transpose()?;
         let coils = design
             .array
             .positions_m
@@ -89,7 +87,8 @@ impl<'a> Scene<'a> {
         Ok(Self {
             design,
             coil,
-            winding: circuit::winding(&coil, &design.wire),
+            winding,
+            core,
             coils,
             moment_a_m2: dipole::tilted_moment_a_m2(along_z, magnet.tilt_deg),
             upper_a: design.supply.current_max_a.iter().map(rated).collect(),
@@ -121,31 +120,62 @@ impl<'a> Scene<'a> {
         vec![self.circuit.resistance_ohm; self.coils.len()]
     }
 
-    /// Upward force per ampere of every coil at every point, N/A, [point, coil], each to
-    /// `tolerance` relative to the largest |grad B| at the point's height: directly at the
-    /// points, not through a map.
+    /// The dipoles that stand for the magnet at heights from `lowest_m` up.
     ///
     /// # Errors
-    /// A point on a winding's edge; interruption.
+    /// A magnet that touches what it is attracted by.
+    pub fn magnet_rule(&self, lowest_m: f64, tolerance: f64) -> Result<MagnetRule, JobError> {
+        let magnet = &self.design.magnet;
+        if magnet.model == MagnetModel::Dipole {
+            return Ok(MagnetRule::dipole(self.moment_a_m2));
+        }
+        let top_m = self.core.as_ref().map_or(0.0, |c| c.shape.top_m.max(0.0));
+        let size = Cylinder {
+            diameter_m: magnet.diameter_m,
+            length_m: magnet.length_m,
+        };
+        let sources = Sources::Below {
+            height_m: lowest_m - top_m,
+        };
+        MagnetRule::cylinder(size, self.moment_a_m2, sources, tolerance).map_err(|fault| {
+            JobError::Input(format!(
+                "[magnet] model = \"cylinder\" with its centre {} mm above the windings' top face: \
+                 {fault}; raise the magnet, or use model = \"dipole\"",
+                lowest_m * 1e3
+            ))
+        })
+    }
+
+    /// Upward force per ampere of every coil at every point, N/A, [point, coil], to the tolerance
+    /// of `solved` relative to the largest |grad B| at the point's height: directly at the points,
+    /// not through a map.
+    ///
+    /// # Errors
+    /// A point on a winding's edge or on the steel; interruption.
     pub fn forces_n_per_a(
         &self,
+        solved: &Solved,
         points_m: &[[f64; 3]],
-        tolerance: f64,
         progress: &dyn Progress,
     ) -> Result<Vec<f64>, JobError> {
         let coils = self.coils.len();
+        let lowest_m = points_m.iter().fold(f64::INFINITY, |z, p| z.min(p[2]));
+        let rule =
+            self.magnet_rule(lowest_m, MAGNET_SHARE * solved.tolerance.max(MAGNET_FINEST))?;
         let mut forces = vec![0.0; points_m.len() * coils];
         progress.begin("forces", points_m.len() as u64);
+        let reach_m = rule.nodes().iter().fold(0.0_f64, |reach, node| {
+            let [x, y, z] = node.offset_m;
+            reach.max(x.hypot(y).hypot(z))
+        });
+        // As fine as the nearest of all points needs, whatever the portion.
+        let sources = solved.sources(self, points_m, reach_m)?;
         forces
             .par_chunks_mut(PORTION * coils)
             .zip(points_m.par_chunks(PORTION))
             .try_for_each(|(rows, points)| -> Result<(), JobError> {
                 progress.check()?;
-                for (column, coil) in self.coils.iter().enumerate() {
-                    self.force_column(coil, points, tolerance, |row, force| {
-                        rows[row * coils + column] = force;
-                    })?;
-                }
+                self.add_forces(solved, sources.as_ref(), &rule, points, rows)?;
                 progress.advance(points.len() as u64);
                 Ok(())
             })?;
@@ -153,37 +183,61 @@ impl<'a> Scene<'a> {
         Ok(forces)
     }
 
-    fn force_column(
+    fn add_forces(
         &self,
-        coil: &PlacedCoil,
+        solved: &Solved,
+        sources: Option<&ArraySources>,
+        rule: &MagnetRule,
         points_m: &[[f64; 3]],
-        tolerance: f64,
-        mut put: impl FnMut(usize, f64),
-    ) -> Result<(), OnEdge> {
-        let offset = |p: &[f64; 3]| (p[0] - coil.axis_m[0], p[1] - coil.axis_m[1]);
-        let r_m: Vec<f64> = points_m
-            .iter()
-            .map(|p| {
-                let (dx, dy) = offset(p);
-                dx.hypot(dy)
-            })
-            .collect();
-        let z_m: Vec<f64> = points_m.iter().map(|p| p[2]).collect();
-        let wanted = if self.tilted() {
-            Wanted::Gradient
+        rows: &mut [f64],
+    ) -> Result<(), JobError> {
+        let coils = self.coils.len();
+        let tilted = !rule.is_upright();
+        let (wanted, parts) = if tilted {
+            (Wanted::Gradient, Parts::Gradient)
         } else {
-            Wanted::Gz
+            (Wanted::Gz, Parts::Gz)
         };
-        let gradients = self.winding.gradients(&r_m, &z_m, tolerance, wanted)?;
-        let [m_x, m_y, m_z] = self.moment_a_m2;
-        for (row, point) in points_m.iter().enumerate() {
-            let mut force = m_z * gradients.dbz_dz[row];
-            if self.tilted() {
-                // dB_x/dz = (dx / r) dB_r/dz, and the same along y.
-                let (dx, dy) = offset(point);
-                force += gradients.dbr_dz_over_r[row] * (m_x * dx + m_y * dy);
+        let tolerance = solved.tolerance / rule.amplification();
+        for node in rule.nodes() {
+            let [m_x, m_y, m_z] = node.moment_a_m2;
+            let places: Vec<[f64; 3]> = points_m
+                .iter()
+                .map(|p| std::array::from_fn(|i| p[i] + node.offset_m[i]))
+                .collect();
+            let steel = sources.map_or_else(Vec::new, |sources| {
+                solved.steel_fields(self, sources, &places, parts)
+            });
+            let count = places.len();
+            let z_m: Vec<f64> = places.iter().map(|p| p[2]).collect();
+            for (column, coil) in self.coils.iter().enumerate() {
+                let offset = |p: &[f64; 3]| (p[0] - coil.axis_m[0], p[1] - coil.axis_m[1]);
+                let r_m: Vec<f64> = places
+                    .iter()
+                    .map(|p| {
+                        let (dx, dy) = offset(p);
+                        dx.hypot(dy)
+                    })
+                    .collect();
+                let air = self.winding.gradients(&r_m, &z_m, tolerance, wanted)?;
+                let part = |component: usize, row: usize| {
+                    let block = column * parts.count() + component;
+                    steel.get(block * count + row).copied().unwrap_or(0.0)
+                };
+                for (row, place) in places.iter().enumerate() {
+                    let mut force;
+                    if tilted {
+                        // dB_x/dz = (dx / r) dB_r/dz, and the same along y.
+                        let (dx, dy) = offset(place);
+                        force = m_z * (air.dbz_dz[row] + part(4, row));
+                        force += air.dbr_dz_over_r[row] * (m_x * dx + m_y * dy);
+                        force += m_x * part(2, row) + m_y * part(3, row);
+                    } else {
+                        force = m_z * (air.dbz_dz[row] + part(0, row));
+                    }
+                    rows[row * coils + column] += coil.gain * force;
+                }
             }
-            put(row, coil.gain * force);
         }
         Ok(())
     }
@@ -218,7 +272,11 @@ impl<'a> Scene<'a> {
         let magnet = &self.design.magnet;
         MagnetSummary {
             moment_a_m2: self.moment_a_m2,
-            model: "dipole".to_owned(),
+            model: match magnet.model {
+                MagnetModel::Dipole => "dipole",
+                MagnetModel::Cylinder => "cylinder",
+            }
+            .to_owned(),
             polarity: match magnet.polarity {
                 Polarity::Repel => "repel",
                 Polarity::Attract => "attract",

@@ -17,9 +17,10 @@ use std::f64::consts::TAU;
 
 use super::CoreShape;
 use super::array::CoupledArray;
+use super::bore::bore_field;
 use super::cored_coil::CoredCoil;
 use super::double_layer::operators;
-use super::generatrix::{Face, Generatrix, Resolution};
+use super::generatrix::{Face, Generatrix, Panel, Resolution};
 use super::layer_gradient::{COMPONENTS, gradient_operators};
 use crate::field::winding::{OnEdge, Winding};
 use crate::numerics::gauss;
@@ -64,9 +65,10 @@ pub struct CoreField {
     pub peak_at_m: [f64; 3],
     /// Mean of |B| over the whole core's volume, T.
     pub mean_t: f64,
-    /// Estimated error of either, relative to it: the larger. Of outline and modes, half of what
-    /// the last polynomial degree of every panel and the last mode contribute; of the mean, what
-    /// a node a panel less changes.
+    /// Estimated error of either, relative to it: the larger. Of outline and modes, what the
+    /// last polynomial degrees of every panel and the last mode contribute; of the mean, what a
+    /// node a panel less changes. No less than the estimate of the coil's own solution, if that
+    /// has one.
     pub relative_error: f64,
 }
 
@@ -100,8 +102,12 @@ impl CoredCoil {
             current_a,
             position_m: [0.0, 0.0],
         };
-        let fields = core_fields(outline, &self.winding, &[core], depth_m)?;
-        Ok(fields[0])
+        let field = core_fields(outline, &self.winding, &[core], depth_m)?[0];
+        Ok(CoreField {
+            // A coil solved at a resolution of the caller's has no estimate, NaN: max drops it.
+            relative_error: field.relative_error.max(self.relative_error),
+            ..field
+        })
     }
 }
 
@@ -233,8 +239,8 @@ fn core_fields(
             let less = fine.mean(&fields[index + cores.len()], first_fine);
             let coarser = coarse.mean(&fields[index], first_coarse);
             let share = |error: f64, of: f64| if of > 0.0 { error / of } else { 0.0 };
-            let relative_error = share(0.5 * lost + (scanned - peak_t).abs(), peak_t).max(share(
-                0.5 * (less - mean_t).abs() + (coarser - mean_t).abs(),
+            let relative_error = share(lost + (scanned - peak_t).abs(), peak_t).max(share(
+                (less - mean_t).abs() + (coarser - mean_t).abs(),
                 mean_t,
             ));
             let (sin, cos) = angle.sin_cos();
@@ -253,42 +259,64 @@ fn norm(b: [f64; 3]) -> f64 {
     b[0].hypot(b[1]).hypot(b[2])
 }
 
-/// The layers without every panel's highest polynomial degree and without the last mode.
+/// The layers without every panel's highest polynomial degree, without the upper half of the
+/// degrees next to the steel's edges, where they decay slowly, and without the last mode.
 fn reduced(outline: &Generatrix, layers: &DMatrix<f64>) -> DMatrix<f64> {
     let order = outline.order;
-    let rule = gauss::rule(order);
-    let highest: Vec<f64> = rule
-        .nodes
-        .iter()
-        .map(|x| {
-            let (mut before, mut value) = (0.0, 1.0);
-            for k in 1..order {
-                let k = k as f64;
-                (before, value) = (
-                    value,
-                    ((2.0 * k - 1.0) * x * value - (k - 1.0) * before) / k,
-                );
-            }
-            value
-        })
+    let polynomials = legendre(order);
+    let weights = &gauss::rule(order).weights;
+    let panels = &outline.panels;
+    let at_edge = |index: usize| {
+        let other = |neighbour: Option<&Panel>| {
+            neighbour.is_some_and(|panel| panel.face != panels[index].face)
+        };
+        other(index.checked_sub(1).map(|i| &panels[i])) || other(panels.get(index + 1))
+    };
+    let kept: Vec<usize> = (0..panels.len())
+        .map(|index| if at_edge(index) { order / 2 } else { order - 1 })
         .collect();
-    let weighted: Vec<f64> = highest
-        .iter()
-        .zip(&rule.weights)
-        .map(|(p, w)| p * w)
-        .collect();
-    let square: f64 = highest.iter().zip(&weighted).map(|(p, w)| p * w).sum();
     let mut out = layers.clone();
-    for panel in out.as_mut_slice().chunks_mut(order) {
-        let share = panel.iter().zip(&weighted).map(|(v, w)| v * w).sum::<f64>() / square;
-        for (value, p) in panel.iter_mut().zip(&highest) {
-            *value -= share * p;
+    for (values, kept) in out
+        .as_mut_slice()
+        .chunks_mut(order)
+        .zip(kept.iter().cycle())
+    {
+        for polynomial in &polynomials[*kept..] {
+            let weighted = || polynomial.iter().zip(weights).map(|(p, w)| p * w);
+            let square: f64 = weighted().zip(polynomial).map(|(a, p)| a * p).sum();
+            let share = weighted()
+                .zip(values.iter())
+                .map(|(a, v)| a * v)
+                .sum::<f64>()
+                / square;
+            for (value, p) in values.iter_mut().zip(polynomial) {
+                *value -= share * p;
+            }
         }
     }
     let columns = out.ncols();
     if columns > 1 {
         out.columns_mut(columns - 2, 2).fill(0.0);
     }
+    out
+}
+
+/// Legendre polynomials of degree 0 to `order` - 1 on the nodes of that order.
+fn legendre(order: usize) -> Vec<Vec<f64>> {
+    let nodes = &gauss::rule(order).nodes;
+    let mut out = vec![vec![1.0; order], nodes.clone()];
+    for degree in 2..order {
+        let k = degree as f64;
+        let next = nodes
+            .iter()
+            .enumerate()
+            .map(|(i, x)| {
+                ((2.0 * k - 1.0) * x * out[degree - 1][i] - (k - 1.0) * out[degree - 2][i]) / k
+            })
+            .collect();
+        out.push(next);
+    }
+    out.truncate(order);
     out
 }
 
@@ -334,7 +362,7 @@ fn fields_at(
     let modes = columns.div_ceil(2);
     let own = targets
         .par_iter()
-        .map(|(r_m, z_m)| winding.field(*r_m, *z_m))
+        .map(|(r_m, z_m)| bore_field(winding, *r_m, *z_m, QUADRATURE))
         .collect::<Result<Vec<_>, _>>()?;
     let operators = gradient_operators(outline, targets, modes, QUADRATURE);
     let products: Vec<DMatrix<f64>> = operators
@@ -362,9 +390,9 @@ fn fields_at(
                     .columns_mut(mine.start, width)
                     .copy_from(&product.columns(index * width, width));
             }
-            for (target, field) in own.iter().enumerate() {
-                values[(COMPONENTS * target, 0)] += current_a * field.b_r;
-                values[(COMPONENTS * target + 1, 0)] += current_a * field.b_z;
+            for (target, (b_r, b_z)) in own.iter().enumerate() {
+                values[(COMPONENTS * target, 0)] += current_a * b_r;
+                values[(COMPONENTS * target + 1, 0)] += current_a * b_z;
             }
             Field { values }
         })

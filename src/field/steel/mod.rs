@@ -3,6 +3,7 @@
 pub mod array;
 pub mod bh_check;
 pub mod bh_curve;
+pub mod bore;
 pub mod condensation;
 pub mod cored_coil;
 pub mod coupling;
@@ -16,6 +17,7 @@ pub mod magnetized;
 pub mod permeability;
 pub mod response;
 pub mod saturated;
+pub mod source;
 pub mod sources;
 pub mod symmetry;
 pub mod trace;

@@ -7,6 +7,8 @@ use crate::field::steel::permeability::Permeability;
 
 /// Trials of the uniform permeability to begin with.
 const START_TRIALS: usize = 12;
+/// Smallest susceptibility that is tried.
+const LEAST_CHI: f64 = 1e-3;
 
 /// Iterates that satisfy u = phi - W v on the boundary.
 pub(super) struct State {
@@ -33,24 +35,23 @@ impl SaturatedCore {
             let h = (u.dot(&(schur * &u)).max(0.0) / volume_m3).sqrt();
             (u, law.response(h).relative - 1.0)
         };
-        // The field falls as chi grows, B / H may rise before it falls: bisection on log chi
-        // between chi at the mean field of the weakest and of the strongest core.
-        let mut hi = (law.response(0.0).relative - 1.0).max(1e-3);
-        let (mut u, found) = solve(hi);
-        if found >= hi {
-            return u * hi;
-        }
-        let mut lo = 1e-3_f64.min(hi);
+        // Bisection on log chi for a core whose own mean field gives it that chi.
+        let mut chi = (law.response(0.0).relative - 1.0).max(LEAST_CHI);
+        let (mut lo, mut hi) = (LEAST_CHI, chi);
+        let (mut u, mut found) = solve(chi);
         for _ in 0..START_TRIALS {
+            if found >= chi {
+                lo = chi;
+            } else {
+                hi = chi;
+            }
             if hi < 1.3 * lo {
                 break;
             }
-            let chi = (lo * hi).sqrt();
-            let found;
+            chi = (lo * hi).sqrt();
             (u, found) = solve(chi);
-            if found > chi { lo = chi } else { hi = chi }
         }
-        u * (lo * hi).sqrt()
+        u * chi
     }
 
     /// Newton's correction, and the energy's slope along it; `None` when there is none.
@@ -108,7 +109,7 @@ impl SaturatedCore {
     }
 
     /// Moves along a change until the slope has fallen enough. It grows with the length, because
-    /// the energy is convex: regula falsi (Illinois) finds where it is zero.
+    /// the energy is convex: regula falsi, the kept end counting half, finds where it is zero.
     pub(super) fn search(
         &self,
         state: &State,
@@ -121,7 +122,6 @@ impl SaturatedCore {
         let mut trial = self.moved(state, change, length, law);
         for _ in 1..MAX_TRIALS {
             let found = self.slope(&trial.flux, &self.through(&trial), change);
-            // Not a number: too far.
             if found.abs() <= SLOPE_LEFT * slope.abs() {
                 break;
             }
@@ -131,6 +131,7 @@ impl SaturatedCore {
                     *value *= 0.5;
                 }
             } else {
+                // What is not a number lies too far.
                 after = Some((length, if found.is_finite() { found } else { -before.1 }));
                 before.1 *= 0.5;
             }

@@ -1,0 +1,214 @@
+//! One coil alone with its core, linear or along a B-H curve, at the rated current.
+
+use std::collections::BTreeMap;
+
+use super::evaluate::CoreFacts;
+use super::scene::{MAGNET_SHARE, Scene};
+use super::steel::{CORED_TOLERANCE, Material, SceneCore};
+use super::{JobError, KERNEL_ERROR};
+use crate::accuracy::StageAccuracy;
+use crate::coil::inductance;
+use crate::field::frame::to_cartesian;
+use crate::field::steel::cored_coil::CoredCoil;
+use crate::field::steel::inside::peak_depth_m;
+use crate::field::winding::{AxialField, Winding};
+use crate::units::STEEL_DENSITY_KG_PER_M3;
+
+/// One coil alone, per ampere; with a B-H curve at the rated current, divided by it.
+pub(super) struct Single {
+    /// Self inductance, H.
+    pub inductance_h: f64,
+    /// Flux linkage at the rated current, Wb; with a B-H curve.
+    pub flux_linkage_wb: Option<f64>,
+    /// Field at the target on the axis.
+    pub field: AxialField,
+    /// The permeability that the transient estimate uses.
+    pub relative_permeability: f64,
+    /// The steel.
+    pub core: Option<CoreFacts>,
+    /// Each stage's estimated error.
+    pub accuracy: BTreeMap<&'static str, StageAccuracy>,
+    /// What a careful person would mention.
+    pub notes: Vec<String>,
+    source: Source,
+    tolerance: f64,
+}
+
+/// Where the field comes from.
+enum Source {
+    Air(Winding),
+    Cored(Box<CoredCoil>),
+}
+
+/// The force on the magnet at the target.
+pub(super) struct TargetForce {
+    /// N.
+    pub force_n: [f64; 3],
+    /// About the magnet's centre, N m.
+    pub torque_n_m: [f64; 3],
+    /// Upward pull of the unpowered steel, N.
+    pub passive_n: Option<f64>,
+}
+
+fn stage(estimate: f64, relative_to: &str, method: &str) -> StageAccuracy {
+    StageAccuracy {
+        estimate,
+        relative_to: relative_to.to_owned(),
+        method: method.to_owned(),
+    }
+}
+
+impl Single {
+    pub(super) fn new(scene: &Scene, tolerance: Option<f64>) -> Result<Self, JobError> {
+        let height_m = scene.design.target_height_m;
+        let air_inductance_h = scene.circuit.inductance_h;
+        let Some(core) = &scene.core else {
+            let accuracy = BTreeMap::from([
+                (
+                    "field",
+                    stage(
+                        KERNEL_ERROR,
+                        "|grad B| (|B| for the field) at the target",
+                        "a-priori quadrature bound 1e-15; rounding sampled against 40-digit values",
+                    ),
+                ),
+                (
+                    "inductance",
+                    stage(
+                        inductance::RELATIVE_ERROR,
+                        "the inductance",
+                        "a-priori quadrature bound; sampled against 20-digit values",
+                    ),
+                ),
+            ]);
+            return Ok(Self {
+                inductance_h: air_inductance_h,
+                flux_linkage_wb: None,
+                field: scene.winding.field(0.0, height_m)?,
+                relative_permeability: 1.0,
+                core: None,
+                accuracy,
+                notes: Vec::new(),
+                source: Source::Air(scene.winding),
+                tolerance: tolerance.unwrap_or(KERNEL_ERROR),
+            });
+        };
+        let tolerance = tolerance.unwrap_or(CORED_TOLERANCE);
+        let shape = core.shape;
+        if height_m <= shape.top_m && scene.core.is_some() {
+            return Err(JobError::Input(format!(
+                "target.height_mm = {}: the core's top is at {} mm; raise the target or lower the \
+                 core (core.above_mm)",
+                height_m * 1e3,
+                shape.top_m * 1e3
+            )));
+        }
+        let mu_r = core.relative_permeability();
+        let coil = CoredCoil::new(&scene.winding, shape, mu_r, tolerance, height_m)?;
+        let current_a = scene.rated_current_a();
+        let inside = coil.core_field(current_a, peak_depth_m(shape))?;
+        let accuracy = BTreeMap::from([
+            (
+                "field",
+                stage(
+                    coil.relative_error,
+                    "the largest |grad B| (|B|) at the target's height",
+                    "half the difference of two resolutions of the core's surface",
+                ),
+            ),
+            (
+                "inductance",
+                stage(
+                    coil.relative_error,
+                    "the inductance",
+                    "half the difference of two resolutions of the core's surface",
+                ),
+            ),
+            (
+                "core_field",
+                stage(
+                    inside.relative_error,
+                    "the peak and the mean",
+                    "two resolutions of the core's surface and of the scan",
+                ),
+            ),
+        ]);
+        let facts = CoreFacts {
+            radius_m: shape.radius_m,
+            length_m: shape.length_m(),
+            mass_kg: shape.volume_m3() * STEEL_DENSITY_KG_PER_M3,
+            relative_permeability: mu_r,
+            material: "linear",
+            peak_field_t: inside.peak_t,
+            peak_at_m: [
+                inside.peak_at_m[0].hypot(inside.peak_at_m[1]),
+                inside.peak_at_m[2],
+            ],
+            mean_field_t: inside.mean_t,
+            knee_t: core.knee_t,
+            deviation_from_linear: None,
+        };
+        let mut notes = core.warnings.clone();
+        if matches!(core.material, Material::Linear(_)) {
+            notes.extend(above_knee(
+                inside.peak_t,
+                core.knee_t,
+                "the core at the rated current",
+            ));
+        }
+        Ok(Self {
+            inductance_h: air_inductance_h + coil.added_inductance_h,
+            flux_linkage_wb: None,
+            field: coil.field(0.0, height_m)?,
+            relative_permeability: mu_r,
+            core: Some(facts),
+            accuracy,
+            notes,
+            source: Source::Cored(Box::new(coil)),
+            tolerance,
+        })
+    }
+
+    /// The force at the target on the axis at `current_a`.
+    pub(super) fn force(&self, scene: &Scene, current_a: f64) -> Result<TargetForce, JobError> {
+        let height_m = scene.design.target_height_m;
+        let rule = scene.magnet_rule(height_m, MAGNET_SHARE * self.tolerance.max(1e-9))?;
+        let (mut fields, mut gradients) = (Vec::new(), Vec::new());
+        for node in rule.nodes() {
+            let [x, y, z] = node.offset_m;
+            let axial = self.at(x.hypot(y), height_m + z)?;
+            let mut field = to_cartesian(&axial, x, y);
+            field.field_t_per_a.iter_mut().for_each(|b| *b *= current_a);
+            for row in &mut field.gradient_t_per_m_per_a {
+                row.iter_mut().for_each(|g| *g *= current_a);
+            }
+            fields.push(field.field_t_per_a);
+            gradients.push(field.gradient_t_per_m_per_a);
+        }
+        Ok(TargetForce {
+            force_n: rule.force_n(&gradients),
+            torque_n_m: rule.torque_n_m(&fields, &gradients),
+            passive_n: None,
+        })
+    }
+
+    fn at(&self, r_m: f64, z_m: f64) -> Result<AxialField, JobError> {
+        Ok(match &self.source {
+            Source::Air(winding) => winding.field(r_m, z_m)?,
+            Source::Cored(coil) => coil.field(r_m, z_m)?,
+        })
+    }
+}
+
+/// A sentence on steel that is taken as linear where it is not.
+pub(super) fn above_knee(peak_t: f64, knee_t: f64, whose: &str) -> Option<String> {
+    (peak_t > knee_t).then(|| {
+        format!(
+            "{whose} reaches {peak_t:.2} T, above the steel's knee at {knee_t} T, but is taken as \
+             linear: the force will be smaller than told; give core.bh_curve, or lower the current"
+        )
+    })
+}
+
+#[allow(dead_code)]
+fn _unused(_: &SceneCore) {}

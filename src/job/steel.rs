@@ -1,0 +1,272 @@
+//! The steel of a design: its material, its solution, and the field it adds.
+
+use super::JobError;
+use super::scene::Scene;
+use crate::design::bh_table::read_bh_table;
+use crate::design::{Core, Coupling, Design, Steel as Described};
+use crate::field::steel::CoreShape;
+use crate::field::steel::array::CoupledArray;
+use crate::field::steel::bh_curve::BhCurve;
+use crate::field::steel::cored_coil::CoredCoil;
+use crate::field::steel::sources::{ArraySources, Parts};
+use crate::field::winding::Winding;
+
+/// Default tolerance of one cored coil and of its maps.
+pub const CORED_TOLERANCE: f64 = 1e-6;
+/// Default tolerance of a coupled array.
+pub const COUPLED_TOLERANCE: f64 = 1e-4;
+/// Share of the tolerance given to evaluating a solution.
+pub(super) const EVALUATION_SHARE: f64 = 0.1;
+/// Points closer to the steel's surface than this multiple of its radius are refused.
+const CLOSEST: f64 = 0.02;
+
+/// The steel of every core of a design.
+#[derive(Debug, Clone)]
+pub struct SceneCore {
+    /// Each core, its winding's axis at the origin.
+    pub shape: CoreShape,
+    /// How the steel magnetises.
+    pub material: Material,
+    /// Flux density above which a warning is due, T.
+    pub knee_t: f64,
+    /// S/m.
+    pub conductivity_s_per_m: f64,
+    /// What a careful person would mention about the material.
+    pub warnings: Vec<String>,
+}
+
+/// How the steel magnetises.
+#[derive(Debug, Clone)]
+pub enum Material {
+    /// A constant relative permeability.
+    Linear(f64),
+    /// A curve.
+    Curve(Box<BhCurve>),
+}
+
+impl SceneCore {
+    /// The core that `core` describes in the bore of `winding`.
+    ///
+    /// # Errors
+    /// A B-H table that cannot be read or cannot be a steel's.
+    pub fn new(core: &Core, winding: &Winding) -> Result<Self, JobError> {
+        let shape = CoreShape {
+            radius_m: winding.inner_radius_m - core.clearance_m,
+            bottom_m: -(winding.length_m + core.below_m),
+            top_m: core.above_m,
+        };
+        let mut warnings = Vec::new();
+        let (material, knee_t) = match &core.steel {
+            Described::Linear(mu_r) => (Material::Linear(*mu_r), core.knee_t),
+            Described::Curve(path) => {
+                let table =
+                    read_bh_table(path).map_err(|fault| JobError::Input(fault.to_string()))?;
+                let curve = BhCurve::new(&table.b_t, &table.h_a_per_m).map_err(|fault| {
+                    JobError::Input(format!("core.bh_curve {}: {fault}", path.display()))
+                })?;
+                warnings.extend(curve.warnings().iter().map(ToString::to_string));
+                let knee_t = core.knee_t.unwrap_or_else(|| curve.knee_t());
+                (Material::Curve(Box::new(curve)), Some(knee_t))
+            }
+        };
+        Ok(Self {
+            shape,
+            material,
+            knee_t: knee_t.unwrap_or(f64::INFINITY),
+            conductivity_s_per_m: core.conductivity_s_per_m,
+            warnings,
+        })
+    }
+
+    /// The permeability that linear solutions use: the constant one, or the curve's at the origin.
+    #[must_use]
+    pub fn relative_permeability(&self) -> f64 {
+        match &self.material {
+            Material::Linear(mu_r) => *mu_r,
+            Material::Curve(curve) => curve.initial_relative_permeability(),
+        }
+    }
+}
+
+/// The solved steel of a scene.
+#[derive(Debug, Clone)]
+pub enum Steel {
+    /// There is none.
+    None,
+    /// Every core answers to its own winding alone.
+    Alone(Box<CoredCoil>),
+    /// All cores answer to every winding.
+    Coupled(Box<CoupledArray>),
+}
+
+/// A scene's field sources, ready to be evaluated.
+#[derive(Debug, Clone)]
+pub struct Solved {
+    /// The steel.
+    pub steel: Steel,
+    /// The tolerance asked for, relative to the largest |grad B| at a height.
+    pub tolerance: f64,
+    /// Estimated error of the steel's solution, relative to the same; 0 without steel.
+    pub steel_error: f64,
+    /// Permeability of the linear solution.
+    pub relative_permeability: f64,
+}
+
+impl Solved {
+    /// Whether the solution is as good as asked for.
+    #[must_use]
+    pub fn reached(&self) -> bool {
+        self.steel_error <= self.tolerance
+    }
+
+    /// The dipoles that stand for the steel at places within `reach_m` of `points_m`; `None`
+    /// without steel.
+    ///
+    /// # Errors
+    /// A point on the steel's surface or hardly off it.
+    pub fn sources(
+        &self,
+        scene: &Scene,
+        points_m: &[[f64; 3]],
+        reach_m: f64,
+    ) -> Result<Option<ArraySources>, JobError> {
+        let Some(core) = &scene.core else {
+            return Ok(None);
+        };
+        let shape = core.shape;
+        let (mut lowest_m, mut distance_m) = (f64::INFINITY, f64::INFINITY);
+        for (number, [x, y, z]) in points_m.iter().enumerate() {
+            lowest_m = lowest_m.min(*z);
+            // Seen from farther than its length a core needs no finer rings.
+            if *z > shape.top_m + shape.length_m() {
+                continue;
+            }
+            for coil in &scene.coils {
+                let r = (x - coil.axis_m[0]).hypot(y - coil.axis_m[1]);
+                let distance = distance_to_surface_m(shape, r, *z);
+                if distance - reach_m < CLOSEST * shape.radius_m {
+                    return Err(JobError::Input(format!(
+                        "point {} ({x}, {y}, {z} m) is {:.3} mm from the surface of the core of \
+                         coil {}, where the field is not resolved; keep {:.3} mm away from it",
+                        number + 1,
+                        distance * 1e3,
+                        coil.number,
+                        (reach_m + CLOSEST * shape.radius_m) * 1e3
+                    )));
+                }
+                distance_m = distance_m.min(distance);
+            }
+        }
+        let distance_m = distance_m.min(shape.length_m()) - reach_m;
+        let lowest_m = lowest_m - reach_m;
+        let tolerance = EVALUATION_SHARE * self.tolerance;
+        Ok(match &self.steel {
+            Steel::None => None,
+            Steel::Alone(coil) => Some(ArraySources::of_core(
+                &coil.core, lowest_m, distance_m, tolerance,
+            )),
+            Steel::Coupled(array) => Some(ArraySources::of_array(
+                array, lowest_m, distance_m, tolerance,
+            )),
+        })
+    }
+
+    /// The steel's part of the field per ampere of every coil at `points_m`, by the dipoles that
+    /// [`Solved::sources`] gave for them: [coil, component, point], gains not applied.
+    #[must_use]
+    pub fn steel_fields(
+        &self,
+        scene: &Scene,
+        sources: &ArraySources,
+        points_m: &[[f64; 3]],
+        parts: Parts,
+    ) -> Vec<f64> {
+        let block = parts.count() * points_m.len();
+        let mut out = vec![0.0; scene.coils.len() * block];
+        match &self.steel {
+            Steel::None => {}
+            Steel::Coupled(_) => sources.sample(points_m, parts, &mut out),
+            Steel::Alone(_) => {
+                for (coil, out) in scene.coils.iter().zip(out.chunks_exact_mut(block.max(1))) {
+                    let [x, y] = coil.axis_m;
+                    let own: Vec<[f64; 3]> = points_m
+                        .iter()
+                        .map(|p| [p[0] - x, p[1] - y, p[2]])
+                        .collect();
+                    sources.sample(&own, parts, out);
+                }
+            }
+        }
+        out
+    }
+}
+
+/// Distance from a core's surface, m.
+fn distance_to_surface_m(shape: CoreShape, r_m: f64, z_m: f64) -> f64 {
+    let beside = r_m - shape.radius_m;
+    let beyond = (z_m - shape.top_m).max(shape.bottom_m - z_m);
+    if beside < 0.0 && beyond < 0.0 {
+        return -beside.max(beyond);
+    }
+    beside.max(0.0).hypot(beyond.max(0.0))
+}
+
+/// Solves the steel of `scene`, to `tolerance` or the default, for heights from `lowest_m` up.
+///
+/// # Errors
+/// An outline that meets a winding's edge.
+pub fn solve(
+    scene: &Scene,
+    tolerance: Option<f64>,
+    air_default: f64,
+    lowest_m: f64,
+) -> Result<Solved, JobError> {
+    let Some(core) = &scene.core else {
+        return Ok(Solved {
+            steel: Steel::None,
+            tolerance: tolerance.unwrap_or(air_default),
+            steel_error: 0.0,
+            relative_permeability: 1.0,
+        });
+    };
+    let relative_permeability = core.relative_permeability();
+    if coupled(scene.design) {
+        let tolerance = tolerance.unwrap_or(COUPLED_TOLERANCE);
+        let array = CoupledArray::new(
+            &scene.winding,
+            core.shape,
+            relative_permeability,
+            &scene.design.array.positions_m,
+            tolerance,
+            lowest_m,
+        )?;
+        return Ok(Solved {
+            tolerance,
+            steel_error: array.relative_error,
+            steel: Steel::Coupled(Box::new(array)),
+            relative_permeability,
+        });
+    }
+    let tolerance = tolerance.unwrap_or(CORED_TOLERANCE);
+    let coil = CoredCoil::new(
+        &scene.winding,
+        core.shape,
+        relative_permeability,
+        tolerance,
+        lowest_m,
+    )?;
+    Ok(Solved {
+        tolerance,
+        steel_error: coil.relative_error,
+        steel: Steel::Alone(Box::new(coil)),
+        relative_permeability,
+    })
+}
+
+/// Whether the design's cores are coupled.
+#[must_use]
+pub fn coupled(design: &Design) -> bool {
+    design.core.is_some()
+        && design.array.coupling == Coupling::Full
+        && design.array.positions_m.len() > 1
+}
