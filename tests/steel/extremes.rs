@@ -72,7 +72,7 @@ fn extreme_shapes_keep_their_estimate() {
         quadrature: 1e-13,
     };
     for (name, winding, core) in extreme_shapes() {
-        for mu_r in [0.5, 1.5, 100.0, 1e4, 1e9] {
+        for mu_r in [0.5, 100.0, 1e9] {
             let design = Design {
                 winding,
                 core,
@@ -84,15 +84,11 @@ fn extreme_shapes_keep_their_estimate() {
             let error = design.difference(&fine, &solved);
             let estimate = solved.relative_error;
             println!("{name}, mu_r {mu_r:e}: error {error:.1e}, estimate {estimate:.1e}");
-            // Errors of either sign may pass through zero between two resolutions.
             assert!(
-                error < 1.0 || error <= 1.5 * estimate.max(1e-9),
+                error <= estimate,
                 "{name}, mu_r {mu_r:e}: error {error:e}, estimate {estimate:e}"
             );
-            assert!(
-                estimate <= 1e-6,
-                "{name}, mu_r {mu_r:e}: {estimate:e}"
-            );
+            assert!(estimate <= 1e-6, "{name}, mu_r {mu_r:e}: {estimate:e}");
             assert!(
                 (mu_r - 1.0) * solved.added_inductance_h > 0.0,
                 "{name}, mu_r {mu_r:e}: {:e} H",
