@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use fluxform::coil::inductance::self_inductance_h;
 use fluxform::coil::mutual::mutual_inductance_h;
+use fluxform::field::frame::to_cartesian;
 use fluxform::field::steel::CoreShape;
 use fluxform::field::steel::array::{ArrayResolution, CoupledArray};
 use fluxform::field::steel::cored_coil::CoredCoil;
@@ -397,24 +398,18 @@ fn close_neighbours_state_their_error() {
         ..SEED_COIL
     };
     let started = Instant::now();
-    let solve = |resolution: &ArrayResolution| {
-        let pair = [[0.0, 0.0], [0.025, 0.0]];
-        CoupledArray::at_resolution(&thin, SEED_CORE, MU_R, &pair, resolution)
-            .expect("off the edges")
-    };
-    let resolution = ArrayResolution::for_tolerance(1e-2, SEED_CORE, 0.025);
-    let (fine, coarse) = (solve(&resolution), solve(&resolution.coarser()));
-    let off = (&fine.added_inductance_h - &coarse.added_inductance_h).amax()
-        / fine.added_inductance_h.amax();
+    let pair = [[0.0, 0.0], [0.025, 0.0]];
+    let closer = CoupledArray::new(&thin, SEED_CORE, MU_R, &pair, 1e-3, LOWEST_M)
+        .expect("off the winding's edges");
     println!(
-        "1 mm between the cores: size {}, {} iterations, {:.1} s, differs by {off:.1e}",
-        fine.response.size(),
-        fine.iterations,
-        started.elapsed().as_secs_f64()
+        "1 mm between the cores: {} unknowns a core, {} iterations, {:.1} s, estimate {:.0e}",
+        closer.response.size(),
+        closer.iterations,
+        started.elapsed().as_secs_f64(),
+        closer.relative_error
     );
-    assert!(off < 1e-2, "{off:e}");
-    let mutual = fine.added_inductance_h[(0, 1)];
-    assert!(mutual < 0.0 && mutual.abs() < fine.added_inductance_h[(0, 0)]);
+    assert!(closer.response.size() <= 3500);
+    assert!(closer.relative_error > 0.03, "{:e}", closer.relative_error);
 }
 
 #[test]
@@ -434,8 +429,7 @@ fn twenty_five_coils_are_solved() {
     assert!(added[(12, 12)] > added[(7, 7)] && added[(7, 7)] > added[(0, 0)]);
 }
 
-/// A recessed, thicker and a protruding core beside each other would be another problem; one
-/// shape for all is what the type says. What may vary is where the cores stand in their coils.
+/// A core between two coils takes their flux: they see less of each other.
 #[test]
 fn neighbours_weaken_what_a_coil_sends_beyond_them() {
     let shape = CoreShape {
@@ -454,4 +448,89 @@ fn neighbours_weaken_what_a_coil_sends_beyond_them() {
         three.added_inductance_h[(0, 2)],
     );
     assert!(without < 0.0 && with > without, "{without:e} {with:e}");
+}
+
+/// The dipoles that stand for a core against its field by loops, down to a fiftieth of a radius.
+#[test]
+fn near_fields_by_dipoles_are_those_by_loops() {
+    let design = Design {
+        winding: SEED_COIL,
+        core: SEED_CORE,
+        mu_r: MU_R,
+    };
+    let core = design.solve(1e-8).core;
+    for distance_m in [0.0003, 0.0021, 0.017] {
+        let sources = ArraySources::of_core(&core, distance_m, distance_m, 1e-7);
+        let points: Vec<[f64; 3]> = [0.0, 0.0031, 0.0089, 0.0117, 0.0163, 0.041]
+            .map(|r| [0.6 * r, -0.8 * r, distance_m])
+            .to_vec();
+        let mut out = vec![0.0; Parts::All.count() * points.len()];
+        sources.sample(&points, Parts::All, &mut out);
+        let fields: Vec<_> = points
+            .iter()
+            .map(|[x, y, z]| to_cartesian(&core.field(x.hypot(*y), *z), *x, *y))
+            .collect();
+        let steepest = fields
+            .iter()
+            .flat_map(|f| f.gradient_t_per_m_per_a.into_iter().flatten())
+            .fold(0.0_f64, |m, g| m.max(g.abs()));
+        let strongest = fields
+            .iter()
+            .flat_map(|f| f.field_t_per_a)
+            .fold(0.0_f64, |m, b| m.max(b.abs()));
+        for (i, field) in fields.iter().enumerate() {
+            let g = field.gradient_t_per_m_per_a;
+            let b = field.field_t_per_a;
+            let expected = [
+                g[0][0], g[0][1], g[0][2], g[1][2], g[2][2], b[0], b[1], b[2],
+            ];
+            for (part, expected) in expected.into_iter().enumerate() {
+                let size = if part < 5 { steepest } else { strongest };
+                let off = (out[part * points.len() + i] - expected).abs() / size;
+                assert!(
+                    off < 1e-6,
+                    "{distance_m} m above, point {i}, part {part}: off by {off:e}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_field_of_an_array_is_divergence_free_and_a_gradient() {
+    let array = at(&SCATTER, 1e-4, 0.05);
+    let sources = ArraySources::of_array(&array, LOWEST_M, LOWEST_M, 1e-7);
+    let h = 1e-4;
+    let centre = [0.013, -0.022, 0.019];
+    let mut points = vec![centre];
+    for axis in 0..3 {
+        for step in [-2.0, -1.0, 1.0, 2.0] {
+            let mut point = centre;
+            point[axis] += step * h;
+            points.push(point);
+        }
+    }
+    let count = points.len();
+    let mut out = vec![0.0; SCATTER.len() * Parts::All.count() * count];
+    sources.sample(&points, Parts::All, &mut out);
+    for drive in 0..SCATTER.len() {
+        let value = |part: usize, point: usize| out[(drive * 8 + part) * count + point];
+        // d B_i / d x_j by differences of fourth order.
+        let slope = |i: usize, j: usize| {
+            let b = |k: usize| value(5 + i, 1 + 4 * j + k);
+            (8.0 * (b(2) - b(1)) - (b(3) - b(0))) / (12.0 * h)
+        };
+        let size = value(4, 0).abs().max(value(0, 0).abs());
+        for (name, off) in [
+            ("div B", slope(0, 0) + slope(1, 1) + slope(2, 2)),
+            ("curl B", slope(0, 2) - slope(2, 0)),
+            ("dBx/dx", value(0, 0) - slope(0, 0)),
+            ("dBx/dy", value(1, 0) - slope(0, 1)),
+            ("dBx/dz", value(2, 0) - slope(0, 2)),
+            ("dBy/dz", value(3, 0) - slope(1, 2)),
+            ("dBz/dz", value(4, 0) - slope(2, 2)),
+        ] {
+            assert!(off.abs() < 1e-7 * size, "drive {drive}: {name} {off:e}");
+        }
+    }
 }

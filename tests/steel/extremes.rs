@@ -65,29 +65,30 @@ fn extreme_shapes() -> Vec<(&'static str, Winding, CoreShape)> {
 /// The estimate covers the error; the tolerance is reached; the steel takes up energy.
 #[test]
 fn extreme_shapes_keep_their_estimate() {
+    let finest = Resolution {
+        order: 15,
+        ratio: 0.2,
+        tip: 1e-6,
+        quadrature: 1e-13,
+    };
     for (name, winding, core) in extreme_shapes() {
-        for mu_r in [0.5, 1.5, 100.0, 1e4, 1e9] {
+        for mu_r in [0.5, 100.0, 1e9] {
             let design = Design {
                 winding,
                 core,
                 mu_r,
             };
             let solved = design.solve(1e-6);
-            let fine =
-                CoredCoil::at_resolution(&winding, core, mu_r, &Resolution::for_tolerance(1e-9))
-                    .expect("off the edges");
+            let fine = CoredCoil::at_resolution(&winding, core, mu_r, &finest)
+                .expect("off the winding's edges");
             let error = design.difference(&fine, &solved);
             let estimate = solved.relative_error;
             println!("{name}, mu_r {mu_r:e}: error {error:.1e}, estimate {estimate:.1e}");
-            // Below 1e-9 it is the finer solution that errs.
             assert!(
-                true || error <= estimate.max(1e-9),
+                error <= estimate,
                 "{name}, mu_r {mu_r:e}: error {error:e}, estimate {estimate:e}"
             );
-            assert!(
-                true || estimate <= 1e-6,
-                "{name}, mu_r {mu_r:e}: {estimate:e}"
-            );
+            assert!(estimate <= 1e-6, "{name}, mu_r {mu_r:e}: {estimate:e}");
             assert!(
                 (mu_r - 1.0) * solved.added_inductance_h > 0.0,
                 "{name}, mu_r {mu_r:e}: {:e} H",

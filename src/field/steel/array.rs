@@ -27,6 +27,10 @@ use crate::units::MU_0_T_M_PER_A;
 
 /// Most azimuthal modes; beyond, the stated error grows.
 const MOST_MODES: usize = 17;
+/// Most unknowns a core, and most entries of all the dense matrices (2.4 GB): cores closer than
+/// about half their radius ask for more, and the stated error grows.
+const MOST_UNKNOWNS: usize = 3500;
+const MOST_ENTRIES: usize = 300_000_000;
 /// Most applications of the coupling.
 const MOST_STEPS: usize = 120;
 /// Share of the tolerance given to the linear solver.
@@ -79,6 +83,34 @@ impl ArrayResolution {
             order: (2.0 - 1.3 * tolerance.log10()).ceil() as usize,
             residual,
         }
+    }
+
+    /// Unknowns a core.
+    fn unknowns(&self, shape: CoreShape) -> usize {
+        let panels = |length_m: f64| (length_m / self.panel_m).ceil().max(1.0) as usize;
+        let rings = self.order * (panels(shape.length_m()) + 2 * panels(shape.radius_m));
+        rings * (2 * self.modes).next_multiple_of(4)
+    }
+
+    /// Longer exchange panels, if these would take more memory than the caps for an array with
+    /// `offsets` different offsets between cores.
+    fn within_memory(mut self, shape: CoreShape, offsets: usize) -> Self {
+        let entries = (MOST_ENTRIES / (offsets + 1)) as f64;
+        let most = MOST_UNKNOWNS.min(entries.sqrt() as usize);
+        while self.unknowns(shape) > most && self.panel_m < shape.length_m() + shape.radius_m {
+            self.panel_m *= 1.1;
+        }
+        self
+    }
+
+    /// Error of what the closest cores exchange, relative: aliasing in the azimuth, quadrature
+    /// along the panels.
+    fn exchange_error(&self, shape: CoreShape, closest_m: f64) -> f64 {
+        let radius_m = shape.radius_m;
+        let azimuth = (radius_m / (closest_m - radius_m)).powf(2.0 * self.modes as f64);
+        let ratio = 2.0 * (closest_m - 2.0 * radius_m) / self.panel_m;
+        let along = (ratio + 1.0_f64.hypot(ratio)).powf(-2.0 * self.order as f64);
+        azimuth.max(along)
     }
 
     /// The next coarser resolution.
@@ -142,6 +174,7 @@ impl CoupledArray {
         lowest_m: f64,
     ) -> Result<Self, OnEdge> {
         let closest_m = closest_m(positions_m);
+        let offsets = Links::new(positions_m).offsets_m.len();
         let lowest_m = lowest_m.max(shape.top_m.max(0.0) + CLOSEST * shape.radius_m);
         let solve = |resolution: &ArrayResolution| {
             Self::at_resolution(
@@ -155,10 +188,14 @@ impl CoupledArray {
         let mut aim = tolerance;
         let mut best: Option<Self> = None;
         for _ in 0..=MOST_REFINEMENTS {
-            let resolution = ArrayResolution::for_tolerance(aim, shape, closest_m);
+            let resolution =
+                ArrayResolution::for_tolerance(aim, shape, closest_m).within_memory(shape, offsets);
             let coarse = solve(&resolution.coarser())?;
             let mut fine = solve(&resolution)?;
-            fine.relative_error = 0.5 * fine.difference(&coarse, lowest_m, tolerance)?;
+            // Where the caps bind, two wrong solutions may agree by chance.
+            let exchange = resolution.exchange_error(shape, closest_m);
+            fine.relative_error =
+                exchange.max(0.5 * fine.difference(&coarse, lowest_m, tolerance)?);
             let better = best
                 .as_ref()
                 .is_none_or(|b| fine.relative_error < b.relative_error);
@@ -166,7 +203,7 @@ impl CoupledArray {
             if better {
                 best = Some(fine);
             }
-            if reached || !better {
+            if reached || !better || exchange > tolerance {
                 break;
             }
             aim *= 0.3;

@@ -76,7 +76,7 @@ impl Resolution {
     /// The double layer's density behaves like rho^(2/3) at an edge of the steel, and what a tip
     /// panel of length t does wrong is felt outside like t^(5/3); each further node on panels
     /// graded by a fifth gains about a digit. The constants are those of the table that
-    /// `cargo test --lib converges -- --nocapture` prints.
+    /// `cargo test --test steel converges -- --nocapture` prints.
     #[must_use]
     pub fn for_tolerance(tolerance: f64) -> Self {
         let tolerance = tolerance.clamp(1e-12, 0.1);

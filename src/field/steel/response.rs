@@ -35,10 +35,6 @@ pub struct Rings {
     gather: DMatrix<f64>,
 }
 
-/// Nodes by which a panel's quadrature exceeds its layer's: kernels seen from the distance at
-/// which rings do vary faster over the outline's wide panels than the layer does.
-const FINER: usize = 8;
-
 impl Rings {
     /// Gauss nodes, `order` a panel, on each face cut into panels at most `length_m(z)` long,
     /// z being the panel's height closest to where the rings are looked at from.
@@ -98,9 +94,10 @@ impl Rings {
         };
         let mut to_nodes = DMatrix::zeros(outline.nodes.len(), rings.len());
         let mut gather = DMatrix::zeros(outline.nodes.len(), rings.len());
-        let finer = gauss::rule(outline.order + FINER);
+        let product = gauss::rule((outline.order + order).div_ceil(2));
         let layer = Basis::new(gauss::rule(outline.order));
         let mut shares = vec![0.0; outline.order];
+        let mut values = vec![0.0; order];
         for (index, panel) in outline.panels.iter().enumerate() {
             let first = index * outline.order;
             for (place, node) in outline.nodes[first..first + outline.order]
@@ -116,16 +113,29 @@ impl Rings {
                     to_nodes[(first + place, ring)] = weight;
                 });
             }
-            let half = 0.5 * (panel.to_m - panel.from_m);
-            for (x, weight) in finer.nodes.iter().zip(&finer.weights) {
-                let coordinate = panel.from_m + half * (1.0 + x);
-                let r_m = shape.on(panel.face, coordinate).0;
-                layer.weights(*x, &mut shares);
-                at(panel.face, coordinate, &mut |ring, value| {
-                    for (place, share) in shares.iter().enumerate() {
-                        gather[(first + place, ring)] += half.abs() * weight * r_m * share * value;
+            // Layer times interpolation times r is a polynomial on what two panels share.
+            let (lo, hi) = panel.range_m();
+            for (of, (face, from, to)) in panels.iter().enumerate() {
+                let (lo, hi) = (lo.max(*from), hi.min(*to));
+                if *face != panel.face || lo >= hi {
+                    continue;
+                }
+                let (half, middle) = (0.5 * (hi - lo), 0.5 * (lo + hi));
+                for (x, weight) in product.nodes.iter().zip(&product.weights) {
+                    let coordinate = middle + half * x;
+                    let weight = half * weight * shape.on(panel.face, coordinate).0;
+                    let length = panel.to_m - panel.from_m;
+                    layer.weights(
+                        2.0 * (coordinate - panel.from_m) / length - 1.0,
+                        &mut shares,
+                    );
+                    basis.weights(2.0 * (coordinate - from) / (to - from) - 1.0, &mut values);
+                    for (ring, value) in values.iter().enumerate() {
+                        for (place, share) in shares.iter().enumerate() {
+                            gather[(first + place, of * order + ring)] += weight * share * value;
+                        }
                     }
-                });
+                }
             }
         }
         Self {

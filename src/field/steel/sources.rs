@@ -22,7 +22,7 @@ const PANEL: f64 = 1.5;
 /// Points closer to the steel than this multiple of its radius are treated as this far.
 const CLOSEST: f64 = 0.02;
 /// Most angles of a ring.
-const MOST_ANGLES: usize = 400;
+const MOST_ANGLES: usize = 2000;
 
 /// Which components are wanted, in the order of [`ArraySources::sample`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -124,7 +124,8 @@ impl ArraySources {
             .iter()
             .map(|ring| {
                 let ratio = distance(ring.z_m) / ring.r_m;
-                let decay = (1.0 + 0.5 * ratio * ratio).acosh();
+                // Slowest where r^2 = ring^2 + distance^2.
+                let decay = ratio.asinh();
                 // The gradient of a dipole's field has azimuthal modes n^2.5 exp(-n decay).
                 let digits = (1.0 / tolerance).ln();
                 let growth = 2.5 * (digits / decay).max(1.0).ln();
