@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::scene::Scene;
 use super::single::{Single, above_knee};
-use super::steel::{CORED_TOLERANCE, Steel};
+use super::steel::Steel;
 use super::{JobError, KERNEL_ERROR, steel};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
@@ -191,7 +191,7 @@ pub fn evaluate(
     let scene = Scene::new(design)?;
     let height_m = design.target_height_m;
     let current_a = scene.rated_current_a();
-    let single = Single::new(&scene, tolerance)?;
+    let mut single = Single::new(&scene, tolerance)?;
     let mut circuit = scene.circuit;
     circuit.inductance_h = single.inductance_h;
     let power_w = circuit.power_w(current_a);
@@ -200,13 +200,12 @@ pub fn evaluate(
         .as_ref()
         .map_or(0.0, |core| core.shape.volume_m3() * STEEL_DENSITY_KG_PER_M3);
     let mass_kg = circuit.wire_mass_kg + steel_kg;
+    let force = single.force(&scene, current_a)?;
     let mut accuracy = single.accuracy.clone();
     let mut notes = single.notes.clone();
-    let force = single.force(&scene, current_a)?;
     let array = array(&scene, &mut accuracy, &mut notes)?;
     let transient = transient(&scene, &single, &mut accuracy);
-    let steel = single.core.is_some();
-    let asked = tolerance.unwrap_or(if steel { CORED_TOLERANCE } else { KERNEL_ERROR });
+    let asked = single.tolerance;
     let worst = accuracy["field"]
         .estimate
         .max(accuracy["inductance"].estimate);

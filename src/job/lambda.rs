@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::discretize::{self, PointsReport};
 use super::scene::{MAGNET_SHARE, Scene};
 use super::steel::{EVALUATION_SHARE, Solved, Steel};
-use super::{JobError, KERNEL_ERROR, steel};
+use super::{JobError, KERNEL_ERROR, passive, steel};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::bundle::lambda_file::{AtLambda, LambdaFile, PathStep};
@@ -78,12 +78,18 @@ pub(super) fn solve(
 ) -> Result<LambdaReport, JobError> {
     let positions = positions_m(&points);
     let forces = scene.forces_n_per_a(solved, &positions, progress)?;
+    let pull = if scene.design.magnet.passive_force {
+        passive::pull(scene, &positions, false)?
+    } else {
+        None
+    };
+    let offset_n = pull.as_ref().map(|pull| pull.forces_z_n(&positions));
     progress.begin("lambda", 1);
     let resistance_ohm = scene.resistances_ohm();
     let problem = ForceProblem {
         forces_n_per_a: &forces,
         height_m: &points.discretized.points.height_m,
-        offset_n: None,
+        offset_n: offset_n.as_deref(),
         lower_a: &scene.lower_a,
         upper_a: &scene.upper_a,
         total_max_a: scene.design.supply.total_current_max_a,
@@ -92,8 +98,13 @@ pub(super) fn solve(
     let solution = lambda::solve(&problem, &options.settings)?;
     progress.end();
     let warnings = warnings(&points, &solution, options);
+    let mut file = file(scene, solved, &points, &solution, options);
+    if let Some(pull) = &pull {
+        file.accuracy
+            .insert("passive_force".to_owned(), passive::accuracy(pull));
+    }
     Ok(LambdaReport {
-        file: file(scene, solved, &points, &solution, options),
+        file,
         status: solution.status,
         precision: solution.precision,
         warnings,

@@ -6,6 +6,7 @@ pub mod evaluate;
 pub mod lambda;
 pub mod map;
 pub mod maps;
+pub mod passive;
 pub mod probe;
 pub mod scene;
 pub mod single;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::evaluate::CoreFacts;
 use super::scene::{MAGNET_SHARE, Scene};
 use super::steel::{CORED_TOLERANCE, Material, SceneCore};
-use super::{JobError, KERNEL_ERROR};
+use super::{JobError, KERNEL_ERROR, passive};
 use crate::accuracy::StageAccuracy;
 use crate::coil::inductance;
 use crate::field::frame::to_cartesian;
@@ -35,7 +35,8 @@ pub(super) struct Single {
     /// What a careful person would mention.
     pub notes: Vec<String>,
     source: Source,
-    tolerance: f64,
+    /// The tolerance asked for, or the default.
+    pub tolerance: f64,
 }
 
 /// Where the field comes from.
@@ -298,10 +299,23 @@ impl Single {
             fields.push(field.field_t_per_a);
             gradients.push(field.gradient_t_per_m_per_a);
         }
+        let mut force_n = rule.force_n(&gradients);
+        let place = [0.0, 0.0, height_m];
+        let pull = passive::pull(scene, &[place], true)?;
+        if let Some(pull) = &pull {
+            let stage = passive::accuracy(pull);
+            self.accuracy.insert("passive_force", stage);
+        }
+        let pulled_n = pull.map(|pull| pull.force_n(place));
+        if let (Some(pulled_n), true) = (pulled_n, scene.design.magnet.passive_force) {
+            for (force, pulled) in force_n.iter_mut().zip(pulled_n) {
+                *force += pulled;
+            }
+        }
         Ok(TargetForce {
-            force_n: rule.force_n(&gradients),
+            force_n,
             torque_n_m: rule.torque_n_m(&fields, &gradients),
-            passive_n: None,
+            passive_n: pulled_n.map(|force| force[2]),
         })
     }
 

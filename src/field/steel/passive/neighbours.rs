@@ -214,7 +214,7 @@ impl Basis {
                 gram += &potential * potential.transpose();
                 cross += project(&normal) * potential.transpose();
             }
-            let moments = response.exchange.moments(&response.outline, layers);
+            let moments = response.exchange.moments(layers);
             let eigen = gram.symmetric_eigen();
             for (place, square) in eigen.eigenvalues.iter().enumerate() {
                 let x: DVector<f64> = eigen.eigenvectors.column(place).into();
