@@ -284,7 +284,7 @@ impl Single {
     }
 
     /// The force at the target on the axis at `current_a`.
-    pub(super) fn force(&self, scene: &Scene, current_a: f64) -> Result<TargetForce, JobError> {
+    pub(super) fn force(&mut self, scene: &Scene, current_a: f64) -> Result<TargetForce, JobError> {
         let height_m = scene.design.target_height_m;
         let rule = scene.magnet_rule(height_m, MAGNET_SHARE * self.tolerance.max(1e-9))?;
         let (mut fields, mut gradients) = (Vec::new(), Vec::new());
