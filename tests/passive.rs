@@ -318,3 +318,32 @@ fn what_cannot_be_is_said() {
         Err(NoPull::NotANumber)
     ));
 }
+
+/// Each core's field at the others takes a sixth off the pull of nine at 50 mm.
+#[test]
+fn the_coupling_of_nine_cores_is_no_small_correction() {
+    let positions: Vec<[f64; 2]> = (0..9)
+        .map(|i| [0.05 * f64::from(i % 3 - 1), 0.05 * f64::from(i / 3 - 1)])
+        .collect();
+    let alone = Pulled {
+        positions_m: &positions,
+        region: Region {
+            x_m: [-0.05, 0.05],
+            y_m: [-0.05, 0.05],
+            z_m: [0.05, 0.05],
+        },
+        ..one([0.05, 0.05])
+    };
+    let coupled = Pulled {
+        coupled: true,
+        ..alone
+    };
+    let [alone, coupled] = [alone, coupled].map(|p| PassivePull::new(&p, 1e-3).unwrap());
+    assert_eq!(alone.coupling_share, 0.0);
+    for pull in [&alone, &coupled] {
+        assert!(pull.relative_error <= 1e-3, "{}", pull.relative_error);
+    }
+    let at = [0.0, 0.0, 0.05];
+    let ratio = coupled.force_n(at)[2] / alone.force_n(at)[2];
+    assert!((ratio - 0.8495).abs() < 2e-3, "{ratio}");
+}

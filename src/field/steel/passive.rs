@@ -3,6 +3,11 @@
 //! The magnet magnetises the cores; their field at the magnet pulls it towards them. In linear
 //! steel the energy at a place p is W(p) = -(1/2) sum_k m_k . B_induced(p + o_k) and the force
 //! F = -grad W, which is sum_k (m_k . grad) B_induced with the induced field held fixed.
+//!
+//! Every core alone is a table over distance and height (`isolated`); what the cores' magnetising
+//! each other changes is a quadratic form in a few numbers a core (`neighbours`). It is no small
+//! correction: of nine cores 24 mm wide and 110 mm long, 50 mm apart, a sixth of the pull at
+//! 50 mm over the middle one, and more than a third in places.
 
 pub mod isolated;
 pub mod magnet;
@@ -93,7 +98,7 @@ pub struct PassivePull {
 /// Places at which the error is looked for.
 const CHECKS: usize = 12;
 /// Refinements of the table, each by `GROWTH`.
-const MOST_REFINEMENTS: usize = 5;
+const MOST_REFINEMENTS: usize = 7;
 const GROWTH: f64 = 1.35;
 /// Tolerance of what the coupling adds over that of the force.
 const COARSER: f64 = 10.0;
@@ -106,7 +111,8 @@ impl PassivePull {
     /// Prepares the pull to an estimated error of `tolerance`, or as near to it as its tables
     /// get: [`PassivePull::relative_error`] says what was reached.
     ///
-    /// Domain: the whole magnet above the highest steel.
+    /// Domain: the whole magnet above the highest steel. Closer to it than half a core's radius
+    /// the work grows and a tolerance of 1e-3 may not be reached.
     ///
     /// # Errors
     /// [`NoPull`].
@@ -283,7 +289,7 @@ fn check(pulled: &Pulled, tolerance: f64) -> Result<f64, NoPull> {
 
 /// The part of the tolerance that the coupling may take.
 fn aim_share(tolerance: f64) -> f64 {
-    0.3 * tolerance
+    0.5 * tolerance
 }
 
 fn couple(pulled: &Pulled, magnet: &PassiveMagnet, closest_m: f64, tolerance: f64) -> Neighbours {

@@ -26,6 +26,8 @@ use crate::units::MU_0_T_M_PER_A;
 
 /// Longest panel of the exchange grid, in distances from the magnet.
 const PANEL: f64 = 1.5;
+/// Shortest panel worth having, in radii: closer magnets are left to the estimate.
+const SHORTEST: f64 = 0.2;
 /// Most angles of the exchange grid.
 const MOST_ANGLES: f64 = 48.0;
 
@@ -64,7 +66,10 @@ impl Neighbours {
         // The magnet's field is sampled on the same rings: shorter panels close to it, and
         // angles enough for its modes not to pass for lower ones.
         let exchange = Rings::new(&outline, resolution.order, |z_m| {
-            resolution.panel_m.min(PANEL * (gap_m + shape.top_m - z_m))
+            let near_m = PANEL * (gap_m + shape.top_m - z_m);
+            resolution
+                .panel_m
+                .min(near_m.max(SHORTEST * shape.radius_m))
         });
         let near = gap_m / shape.radius_m;
         let eta = (1.0 + 0.5 * near * near).acosh();
