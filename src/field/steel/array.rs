@@ -384,9 +384,9 @@ impl CoupledArray {
         let rings = self.response.exchange.rings.len();
         let turn = TAU / self.response.angles as f64;
         for (drive, (potentials, moments)) in all.iter().enumerate() {
-            for coil in 0..cores {
+            for (coil, at_coil) in potentials.iter().enumerate() {
                 let mut flux = if coil == drive { own_flux.0 } else { 0.0 };
-                for values in potentials[coil].chunks(rings) {
+                for values in at_coil.chunks(rings) {
                     let share: f64 = values
                         .iter()
                         .zip(own_flux.1.iter())
