@@ -101,7 +101,7 @@ pub struct TargetFacts {
     pub force_vector_n: [f64; 3],
     /// Torque on the magnet about its centre at the rated current, N m, the steel's pull left out.
     pub torque_n_m: [f64; 3],
-    /// Upward force of the unpowered steel, N; absent for air coils.
+    /// Upward force of the unpowered steel, N; told where the design asks for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub passive_force_n: Option<f64>,
 }

@@ -300,22 +300,24 @@ impl Single {
             gradients.push(field.gradient_t_per_m_per_a);
         }
         let mut force_n = rule.force_n(&gradients);
-        let place = [0.0, 0.0, height_m];
-        let pull = passive::pull(scene, &[place], true)?;
-        if let Some(pull) = &pull {
-            let stage = passive::accuracy(pull);
-            self.accuracy.insert("passive_force", stage);
-        }
-        let pulled_n = pull.map(|pull| pull.force_n(place));
-        if let (Some(pulled_n), true) = (pulled_n, scene.design.magnet.passive_force) {
-            for (force, pulled) in force_n.iter_mut().zip(pulled_n) {
-                *force += pulled;
+        // What a design does not ask for is not computed.
+        let mut passive_n = None;
+        if scene.design.magnet.passive_force {
+            let place = [0.0, 0.0, height_m];
+            if let Some(pull) = passive::pull(scene, &[place], true)? {
+                let pulled_n = pull.force_n(place);
+                for (force, pulled) in force_n.iter_mut().zip(pulled_n) {
+                    *force += pulled;
+                }
+                passive_n = Some(pulled_n[2]);
+                let stage = passive::accuracy(&pull);
+                self.accuracy.insert("passive_force", stage);
             }
         }
         Ok(TargetForce {
             force_n,
             torque_n_m: rule.torque_n_m(&fields, &gradients),
-            passive_n: pulled_n.map(|force| force[2]),
+            passive_n,
         })
     }
 
