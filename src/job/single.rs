@@ -357,7 +357,7 @@ impl AtCurrent {
         resolution: &Resolution,
     ) -> Result<Self, JobError> {
         let outline = Generatrix::of_coil(&scene.winding, core.shape, resolution);
-        let excitation = Excitation::new(&scene.winding, &outline)?;
+        let excitation = Excitation::new(&scene.winding, &outline, resolution.quadrature)?;
         let solver = SaturatedCore::new(&outline, resolution.quadrature)
             .map_err(|fault| JobError::Input(format!("[core] with a B-H curve: {fault}")))?;
         let solution = solver.solve(&(&excitation.potential * current_a), curve, None);

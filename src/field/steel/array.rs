@@ -262,7 +262,7 @@ impl CoupledArray {
         resolution: &ArrayResolution,
     ) -> Result<Self, OnEdge> {
         let outline = Generatrix::of_coil(winding, shape, &resolution.outline);
-        let excitation = Excitation::new(winding, &outline)?;
+        let excitation = Excitation::new(winding, &outline, resolution.outline.quadrature)?;
         let exchange = Rings::new(&outline, resolution.order, |_| resolution.panel_m);
         // A multiple of four, for the array's symmetries; enough for the modes' products.
         let angles = (2 * resolution.modes).next_multiple_of(4);

@@ -26,7 +26,7 @@ pub fn bore_field(
     let (lo, hi) = (winding.inner_radius_m - r_m, winding.outer_radius_m - r_m);
     let bottom_m = z_m + winding.length_m;
     let reach = winding.outer_radius_m;
-    let near = lo > 0.0 && z_m < reach && bottom_m > -reach;
+    let near = lo >= 0.0 && z_m < reach && bottom_m > -reach;
     if !near || winding.length_m < SHORT * reach {
         return winding.field(r_m, z_m).map(|field| (field.b_r, field.b_z));
     }

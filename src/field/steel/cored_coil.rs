@@ -15,6 +15,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::CoreShape;
+use super::bore::bore_field;
 use super::double_layer::operators;
 use super::generatrix::{Face, Generatrix, Resolution};
 use super::magnetized::MagnetizedCore;
@@ -34,11 +35,12 @@ pub struct Excitation {
 }
 
 impl Excitation {
-    /// Samples the winding's field along the outline and integrates its tangential part.
+    /// Samples the winding's field along the outline, to `tolerance` of one end's, and integrates
+    /// its tangential part.
     ///
     /// # Errors
     /// A node on the winding's edge.
-    pub fn new(winding: &Winding, outline: &Generatrix) -> Result<Self, OnEdge> {
+    pub fn new(winding: &Winding, outline: &Generatrix, tolerance: f64) -> Result<Self, OnEdge> {
         let order = outline.order;
         let basis = Basis::new(gauss::rule(order));
         let integral = basis.integral();
@@ -48,12 +50,12 @@ impl Excitation {
         for (panel, nodes) in outline.panels.iter().zip(outline.nodes.chunks(order)) {
             let mut tangential = Vec::with_capacity(order);
             for node in nodes {
-                let field = winding.field(node.r_m, node.z_m)?;
-                normal_field_t_per_a.push(node.normal[0] * field.b_r + node.normal[1] * field.b_z);
+                let (b_r, b_z) = bore_field(winding, node.r_m, node.z_m, tolerance)?;
+                normal_field_t_per_a.push(node.normal[0] * b_r + node.normal[1] * b_z);
                 tangential.push(match panel.face {
-                    Face::Bottom => field.b_r,
-                    Face::Side => field.b_z,
-                    Face::Top => -field.b_r,
+                    Face::Bottom => b_r,
+                    Face::Side => b_z,
+                    Face::Top => -b_r,
                 });
             }
             let scale = 0.5 * panel.length_m() / MU_0_T_M_PER_A;
@@ -169,7 +171,7 @@ impl CoredCoil {
         resolution: &Resolution,
     ) -> Result<Self, OnEdge> {
         let outline = Generatrix::of_coil(winding, shape, resolution);
-        let excitation = Excitation::new(winding, &outline)?;
+        let excitation = Excitation::new(winding, &outline, resolution.quadrature)?;
         let w = operators(&outline, 1, resolution.quadrature).remove(0);
         let density = solve(&outline, w, relative_permeability, &excitation.potential);
         let added_inductance_h = -outline

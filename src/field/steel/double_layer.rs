@@ -29,13 +29,20 @@ const MAX_HALVINGS: usize = 60;
 pub fn kernel(r_m: f64, source_r_m: f64, dr_m: f64, dz_m: f64, normal: [f64; 2], out: &mut [f64]) {
     let product = 2.0 * r_m * source_r_m;
     let excess = (dr_m * dr_m + dz_m * dz_m) / product;
-    let modes = out.len();
-    let mut inverse = [0.0; MAX_MODES];
-    azimuthal_integrals(excess, &mut inverse[..modes], out);
+    // Clearing room for all modes would cost as much as one of them.
+    let (mut one, mut all);
+    let inverse: &mut [f64] = if out.len() == 1 {
+        one = [0.0];
+        &mut one
+    } else {
+        all = [0.0; MAX_MODES];
+        &mut all[..out.len()]
+    };
+    azimuthal_integrals(excess, inverse, out);
     let scale = source_r_m / (4.0 * PI * product * product.sqrt());
     // n'.(x - y) = n_r (r cos psi - r') + n_z (z - z'), r cos psi = r chi - r (chi - cos psi).
     let radial = (dr_m * (r_m + source_r_m) + dz_m * dz_m) / (2.0 * source_r_m);
-    for (cubed, inverse) in out.iter_mut().zip(&inverse) {
+    for (cubed, inverse) in out.iter_mut().zip(inverse.iter()) {
         let along_r = radial * *cubed - r_m * inverse;
         *cubed = scale * (normal[0] * along_r + normal[1] * dz_m * *cubed);
     }

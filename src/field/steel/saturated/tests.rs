@@ -32,7 +32,7 @@ fn case(tolerance: f64) -> Case {
     let resolution = Resolution::for_tolerance(tolerance);
     let outline = Generatrix::of_coil(&WINDING, SHAPE, &resolution);
     let core = SaturatedCore::new(&outline, resolution.quadrature).expect("a good outline");
-    let excitation = Excitation::new(&WINDING, &outline).expect("no node on an edge");
+    let excitation = Excitation::new(&WINDING, &outline, 1e-12).expect("no node on an edge");
     Case {
         outline,
         core,
