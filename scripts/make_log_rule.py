@@ -40,4 +40,4 @@ nodes, weights = newton(
     [mpf(a) / 2 * draw * t ** (draw - 1) for a, t in zip(w, start)],
 )
 for t, a in sorted(zip(nodes, weights)):
-    print(f"    [{mp.nstr(t, 17, min_fixed=-20)}, {mp.nstr(a, 17, min_fixed=-20)}],")
+    print(f"    [{float(t)!r}, {float(a)!r}],")

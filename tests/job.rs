@@ -1,5 +1,8 @@
 //! The main job from documents to a verified bundle.
 
+#[path = "job/cored.rs"]
+mod cored;
+
 use std::path::{Path, PathBuf};
 
 use fluxform::bundle::artefact::Input;
@@ -8,16 +11,16 @@ use fluxform::job::calibrate::{
     self, CalibrateOptions, CalibrateReport, DEFAULT_REACH_M, DesignSource, ShapeSource,
 };
 use fluxform::job::lambda::LambdaOptions;
-use fluxform::job::probe::ProbeComponents;
+use fluxform::job::probe::{ProbeComponents, ProbeRequest};
 use fluxform::job::{JobError, evaluate, lambda, probe, verify};
 use fluxform::progress::Silent;
 use fluxform::shape::document::ShapeDocument;
 
-fn here(path: &str) -> PathBuf {
+pub fn here(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
 }
 
-fn calibrate_text(text: &str, shapes: &[&str], out: &Path) -> Result<CalibrateReport, JobError> {
+pub fn calibrate_text(text: &str, shapes: &[&str], out: &Path) -> Result<CalibrateReport, JobError> {
     let path = here("designs/seed_air.toml");
     let (design, _) = Design::from_toml(text, &path, Need::CALIBRATE).expect("a valid design");
     let input = Input::of_bytes("designs/seed_air.toml", text.as_bytes());
@@ -51,7 +54,7 @@ fn seed_air() -> String {
     std::fs::read_to_string(here("designs/seed_air.toml")).expect("shipped design")
 }
 
-const SHAPES: [&str; 4] = [
+pub const SHAPES: [&str; 4] = [
     "shapes/flat.toml",
     "shapes/half_sphere.toml",
     "shapes/half_cylinder.toml",
@@ -157,15 +160,6 @@ fn what_an_object_does_not_need_is_left_out() {
 }
 
 #[test]
-fn a_cored_design_gives_no_number() {
-    let path = here("designs/seed.toml");
-    let (design, _) = Design::read(&path, Need::EVALUATE).expect("a valid design");
-    let error = evaluate::evaluate(&design, Vec::new(), None).expect_err("no core model yet");
-    assert_eq!(error.exit_code(), 3);
-    assert!(error.to_string().contains("not modelled"), "{error}");
-}
-
-#[test]
 fn the_seed_air_coil() {
     let path = here("designs/seed_air.toml");
     let (design, _) = Design::read(&path, Need::EVALUATE).expect("a valid design");
@@ -218,7 +212,12 @@ fn points_outside_the_workspace_are_told() {
 fn a_probe_on_an_edge_is_told_with_its_number_and_coil() {
     let (design, _) = Design::read(&here("designs/seed_air.toml"), Need::PROBE).expect("valid");
     let points = vec![[0.0, 0.0, 0.03], [0.012, 0.0, 0.0]];
-    let error = probe::probe(&design, points, ProbeComponents::All, None, &Silent)
+    let request = ProbeRequest {
+        components: ProbeComponents::All,
+        force: false,
+        tolerance: None,
+    };
+    let error = probe::probe(&design, points, request, &Silent)
         .expect_err("an edge of coil 4");
     assert!(
         error.to_string().contains("point 2 ") && error.to_string().contains("coil 4"),

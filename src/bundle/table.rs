@@ -24,6 +24,16 @@ pub const GRADIENT_COLUMNS: [&str; 9] = [
     "dbz_dz_t_per_m_per_a",
 ];
 
+/// Columns of the force on the magnet and the torque about its centre, N/A and N m/A.
+pub const FORCE_COLUMNS: [&str; 6] = [
+    "force_x_n_per_a",
+    "force_y_n_per_a",
+    "force_z_n_per_a",
+    "torque_x_n_m_per_a",
+    "torque_y_n_m_per_a",
+    "torque_z_n_m_per_a",
+];
+
 /// Columns of `points.csv`.
 pub const POINT_COLUMNS: [&str; 6] = ["x_m", "y_m", "height_m", "normal_x", "normal_y", "normal_z"];
 

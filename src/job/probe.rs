@@ -1,16 +1,17 @@
-//! `probe`: field and gradient of every coil at given points.
+//! `probe`: field, gradient and force of every coil at given points.
 
 use std::io::{self, Write};
 
 use rayon::prelude::*;
 
-use super::scene::Scene;
-use super::steel::{EVALUATION_SHARE, Steel};
+use super::scene::{MAGNET_FINEST, MAGNET_SHARE, Scene};
+use super::steel::{EVALUATION_SHARE, Solved, Steel};
 use super::{JobError, KERNEL_ERROR, steel};
-use crate::bundle::table::{FIELD_COLUMNS, GRADIENT_COLUMNS, write_samples};
+use crate::bundle::table::{FIELD_COLUMNS, FORCE_COLUMNS, GRADIENT_COLUMNS, write_samples};
 use crate::design::Design;
 use crate::field::frame::{CartesianField, to_cartesian};
-use crate::field::steel::sources::Parts;
+use crate::field::magnet::MagnetRule;
+use crate::field::steel::sources::{ArraySources, Parts};
 use crate::progress::Progress;
 
 /// What is asked at the points.
@@ -32,81 +33,164 @@ pub struct ProbeTable {
     coils: usize,
     /// [point, coil]
     fields: Vec<CartesianField>,
+    /// [point, coil]: force (N/A) and torque about the centre (N m/A) of the magnet; where asked.
+    forces: Vec<[f64; 6]>,
     /// Estimated error relative to |grad B| at the point; with steel, to the largest at its height.
     pub relative_error: f64,
     /// Whether it is relative to the largest at the height.
     pub relative_to_height: bool,
+    /// Estimated error of the forces, relative to |m| times the largest |grad B| at the height.
+    pub force_error: Option<f64>,
     /// Whether the tolerance asked for was reached.
     pub accuracy_reached: bool,
+}
+
+/// What is asked of [`probe`].
+#[derive(Debug, Clone, Copy)]
+pub struct ProbeRequest {
+    /// Parts of the field.
+    pub components: ProbeComponents,
+    /// Force and torque on the design's magnet besides, its centre at the points.
+    pub force: bool,
+    /// Tolerance; `None` for the default.
+    pub tolerance: Option<f64>,
 }
 
 /// Points between two looks at the interruption flag.
 const PORTION: usize = 256;
 
-/// Field and gradient of every coil of `design` at `points_m`, to 1e-12 of |grad B| at the point.
+/// Field and gradient of every coil of `design` at `points_m`: in air to 1e-12 of |grad B| at the
+/// point, with steel to the tolerance of the largest |grad B| at its height.
 ///
 /// # Errors
-/// A design that cannot be computed; a point on a winding's edge; interruption.
+/// A design that cannot be computed; a point on a winding's edge or on the steel; a magnet that
+/// touches the array, where the force is asked for; interruption.
 pub fn probe(
     design: &Design,
     points_m: Vec<[f64; 3]>,
-    components: ProbeComponents,
-    tolerance: Option<f64>,
+    request: ProbeRequest,
     progress: &dyn Progress,
 ) -> Result<ProbeTable, JobError> {
     let scene = Scene::new(design)?;
     let lowest_m = points_m.iter().fold(f64::INFINITY, |z, p| z.min(p[2]));
-    let solved = steel::solve(&scene, tolerance, KERNEL_ERROR, lowest_m)?;
-    let count = points_m.len();
-    let added = match solved.sources(&scene, &points_m, 0.0)? {
-        Some(sources) => solved.steel_fields(&scene, &sources, &points_m, Parts::All),
-        None => Vec::new(),
+    let solved = steel::solve(&scene, request.tolerance, KERNEL_ERROR, lowest_m)?;
+    let rule = request
+        .force
+        .then(|| scene.magnet_rule(lowest_m, MAGNET_SHARE * solved.tolerance.max(MAGNET_FINEST)))
+        .transpose()?;
+    let nodes = rule.as_ref().map_or(&[][..], MagnetRule::nodes);
+    let reach_m = nodes.iter().fold(0.0_f64, |reach, node| {
+        let [x, y, z] = node.offset_m;
+        reach.max(x.hypot(y).hypot(z))
+    });
+    let places = Places {
+        scene: &scene,
+        solved: &solved,
+        sources: solved.sources(&scene, &points_m, reach_m)?,
     };
-    progress.begin("probe", count as u64);
+    progress.begin("probe", points_m.len() as u64);
     let portions = points_m
         .par_chunks(PORTION)
         .enumerate()
         .map(|(portion, points)| {
             progress.check()?;
-            let mut fields = Vec::with_capacity(points.len() * scene.coils.len());
-            for (row, [x, y, z]) in points.iter().enumerate() {
-                for coil in &scene.coils {
-                    let (dx, dy) = (x - coil.axis_m[0], y - coil.axis_m[1]);
-                    let axial = scene.winding.field(dx.hypot(dy), *z).map_err(|on_edge| {
-                        let number = portion * PORTION + row + 1;
-                        JobError::Input(format!(
-                            "point {number} ({x}, {y}, {z} m), coil {}: {on_edge}",
-                            coil.number
-                        ))
-                    })?;
-                    let mut field = to_cartesian(&axial, dx, dy);
-                    if !added.is_empty() {
-                        let point = portion * PORTION + row;
-                        let first = coil.number * Parts::All.count();
-                        add(&mut field, |part| added[(first + part) * count + point]);
-                    }
-                    fields.push(scaled(field, coil.gain));
-                }
-            }
+            let first = portion * PORTION + 1;
+            let fields = places.fields(points, first)?;
+            let forces = rule
+                .as_ref()
+                .map_or_else(|| Ok(Vec::new()), |rule| places.forces(points, first, rule))?;
             progress.advance(points.len() as u64);
-            Ok(fields)
+            Ok((fields, forces))
         })
         .collect::<Result<Vec<_>, JobError>>()?;
     progress.end();
+    let (fields, forces): (Vec<_>, Vec<_>) = portions.into_iter().unzip();
+    let relative_error = match solved.steel {
+        Steel::None => KERNEL_ERROR,
+        Steel::Alone(_) | Steel::Coupled(_) => {
+            solved.steel_error + EVALUATION_SHARE * solved.tolerance
+        }
+    };
     Ok(ProbeTable {
-        components,
+        components: request.components,
         coils: scene.coils.len(),
-        fields: portions.concat(),
+        fields: fields.concat(),
+        forces: forces.concat(),
         points_m,
-        relative_error: match solved.steel {
-            Steel::None => KERNEL_ERROR,
-            Steel::Alone(_) | Steel::Coupled(_) => {
-                solved.steel_error + EVALUATION_SHARE * solved.tolerance
-            }
-        },
+        relative_error,
         relative_to_height: !matches!(solved.steel, Steel::None),
+        force_error: rule.map(|rule| relative_error * rule.amplification() + rule.bound()),
         accuracy_reached: solved.tolerance >= KERNEL_ERROR && solved.reached(),
     })
+}
+
+/// What gives the field at any place.
+struct Places<'a> {
+    scene: &'a Scene<'a>,
+    solved: &'a Solved,
+    sources: Option<ArraySources>,
+}
+
+impl Places<'_> {
+    /// Field and gradient per ampere, [point, coil]; the first of `points_m` is told as number
+    /// `first`.
+    fn fields(&self, points_m: &[[f64; 3]], first: usize) -> Result<Vec<CartesianField>, JobError> {
+        let scene = self.scene;
+        let count = points_m.len();
+        let added = self.sources.as_ref().map_or_else(Vec::new, |sources| {
+            self.solved
+                .steel_fields(scene, sources, points_m, Parts::All)
+        });
+        let mut fields = Vec::with_capacity(count * scene.coils.len());
+        for (row, [x, y, z]) in points_m.iter().enumerate() {
+            for (column, coil) in scene.coils.iter().enumerate() {
+                let (dx, dy) = (x - coil.axis_m[0], y - coil.axis_m[1]);
+                let axial = scene.winding.field(dx.hypot(dy), *z).map_err(|on_edge| {
+                    JobError::Input(format!(
+                        "point {} ({x}, {y}, {z} m), coil {}: {on_edge}",
+                        first + row,
+                        coil.number
+                    ))
+                })?;
+                let mut field = to_cartesian(&axial, dx, dy);
+                if !added.is_empty() {
+                    let block = column * Parts::All.count();
+                    add(&mut field, |part| added[(block + part) * count + row]);
+                }
+                fields.push(scaled(field, coil.gain));
+            }
+        }
+        Ok(fields)
+    }
+
+    /// Force and torque per ampere on the magnet that `rule` stands for, [point, coil].
+    fn forces(
+        &self,
+        points_m: &[[f64; 3]],
+        first: usize,
+        rule: &MagnetRule,
+    ) -> Result<Vec<[f64; 6]>, JobError> {
+        let mut felt = Vec::with_capacity(rule.nodes().len());
+        for node in rule.nodes() {
+            let moved: Vec<[f64; 3]> = points_m
+                .iter()
+                .map(|p| std::array::from_fn(|i| p[i] + node.offset_m[i]))
+                .collect();
+            felt.push(self.fields(&moved, first)?);
+        }
+        let pairs = points_m.len() * self.scene.coils.len();
+        Ok((0..pairs)
+            .map(|pair| {
+                let at_nodes = felt.iter().map(|fields| &fields[pair]);
+                let (fields, gradients): (Vec<_>, Vec<_>) = at_nodes
+                    .map(|field| (field.field_t_per_a, field.gradient_t_per_m_per_a))
+                    .unzip();
+                let [fx, fy, fz] = rule.force_n(&gradients);
+                let [tx, ty, tz] = rule.torque_n_m(&fields, &gradients);
+                [fx, fy, fz, tx, ty, tz]
+            })
+            .collect())
+    }
 }
 
 /// Adds what steel gives: five components of the gradient, then the field.
@@ -155,6 +239,9 @@ impl ProbeTable {
             0
         };
         columns.extend(&GRADIENT_COLUMNS[first..]);
+        if !self.forces.is_empty() {
+            columns.extend(FORCE_COLUMNS);
+        }
         let coils: Vec<i64> = (0..self.coils as i64).collect();
         write_samples(
             out,
@@ -162,12 +249,15 @@ impl ProbeTable {
             self.points_m.iter().copied(),
             &coils,
             |point, coil| {
-                let field = &self.fields[point * self.coils + coil];
-                let gradient = &field.gradient_t_per_m_per_a.as_flattened()[first..];
-                match self.components {
-                    ProbeComponents::All => [&field.field_t_per_a, gradient].concat(),
-                    ProbeComponents::Gradient | ProbeComponents::Gz => gradient.to_vec(),
+                let pair = point * self.coils + coil;
+                let field = &self.fields[pair];
+                let mut row = Vec::with_capacity(columns.len());
+                if self.components == ProbeComponents::All {
+                    row.extend(field.field_t_per_a);
                 }
+                row.extend(&field.gradient_t_per_m_per_a.as_flattened()[first..]);
+                row.extend(self.forces.get(pair).into_iter().flatten());
+                row
             },
         )
     }

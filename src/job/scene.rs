@@ -19,7 +19,7 @@ use crate::progress::Progress;
 const PORTION: usize = 4096;
 /// Share of the tolerance given to the magnet's dipoles, and the finest asked of them.
 pub(super) const MAGNET_SHARE: f64 = 0.3;
-const MAGNET_FINEST: f64 = 1e-9;
+pub(super) const MAGNET_FINEST: f64 = 1e-9;
 
 /// A design made ready for computing.
 #[derive(Debug, Clone)]

@@ -4,7 +4,7 @@
 //! cargo bench --locked --bench time_core -- [DESIGN] [THREADS]
 //! ```
 //!
-//! Default: `designs/seed_air.toml`, one thread. The least and the median of the repeats stand
+//! Default: `designs/seed.toml`, one thread. The least and the median of the repeats stand
 //! beside each other: on a machine with other work the least is the better measure.
 
 // A measurement: it reads the clock and prints.
@@ -19,6 +19,7 @@ use fluxform::bundle::write::MapFormats;
 use fluxform::design::{Design, Need};
 use fluxform::job::map::{self, MapRequest};
 use fluxform::job::scene::Scene;
+use fluxform::job::steel::{self, Solved};
 use fluxform::lambda::{self, ForceProblem, Settings};
 use fluxform::map::tabulate::{Components, Grid, tabulate};
 use fluxform::numerics::axis::Axis;
@@ -97,7 +98,12 @@ fn time<T>(
 }
 
 /// Forces and heights of a flat surface over the workspace, `nodes` along each side.
-fn flat(scene: &Scene, design: &Design, nodes: usize) -> Result<(Vec<f64>, Vec<f64>), Failure> {
+fn flat(
+    scene: &Scene,
+    solved: &Solved,
+    design: &Design,
+    nodes: usize,
+) -> Result<(Vec<f64>, Vec<f64>), Failure> {
     let side = |axis: &Axis| Axis {
         samples: nodes,
         ..*axis
@@ -108,10 +114,14 @@ fn flat(scene: &Scene, design: &Design, nodes: usize) -> Result<(Vec<f64>, Vec<f
         .iter()
         .flat_map(|y| x_m.iter().map(move |x| [*x, *y, HEIGHT_M]))
         .collect();
-    let what = format!("forces at {} points, directly, 1e-12", points.len());
+    let what = format!(
+        "forces at {} points, directly, {:.0e}",
+        points.len(),
+        solved.tolerance
+    );
     let repeats = if nodes > 100 { 3 } else { 21 };
     let forces = time(&what, points.len() * scene.coils.len(), repeats, || {
-        Ok(scene.forces_n_per_a(&points, FORCE_TOLERANCE, &Silent)?)
+        Ok(scene.forces_n_per_a(solved, &points, &Silent)?)
     })?;
     Ok((forces, vec![HEIGHT_M; points.len()]))
 }
@@ -120,6 +130,9 @@ fn measure(design: &Design) -> Result<(), Failure> {
     println!("| computation | items | least s | median s | ns an item |");
     println!("|---|---|---|---|---|");
     let scene = time("scene: coil, inductance", 1, 21, || Ok(Scene::new(design)?))?;
+    let solved = time("steel, default tolerance; nothing without", 1, 5, || {
+        Ok(steel::solve(&scene, None, FORCE_TOLERANCE, HEIGHT_M)?)
+    })?;
     let workspace = &design.workspace;
     let grid = Grid {
         x_m: workspace.x_m.nodes(),
@@ -132,19 +145,24 @@ fn measure(design: &Design) -> Result<(), Failure> {
         ("gradient", Components::Gradient),
         ("all", Components::All),
     ] {
-        time(&format!("map of {name}, 1e-9"), nodes, 21, || {
-            Ok(tabulate(
-                &scene.winding,
-                &scene.coils,
-                &grid,
-                components,
-                MAP_TOLERANCE,
-                &Silent,
-            )?)
-        })?;
+        time(
+            &format!("map of {name}, windings alone, 1e-9"),
+            nodes,
+            21,
+            || {
+                Ok(tabulate(
+                    &scene.winding,
+                    &scene.coils,
+                    &grid,
+                    components,
+                    MAP_TOLERANCE,
+                    &Silent,
+                )?)
+            },
+        )?;
     }
     for nodes in [61, 1000] {
-        let (forces, heights) = flat(&scene, design, nodes)?;
+        let (forces, heights) = flat(&scene, &solved, design, nodes)?;
         let problem = ForceProblem {
             forces_n_per_a: &forces,
             height_m: &heights,
@@ -169,7 +187,7 @@ fn main() -> Result<(), Failure> {
         .filter(|argument| argument != "--bench");
     let path = arguments
         .next()
-        .unwrap_or_else(|| "designs/seed_air.toml".to_owned());
+        .unwrap_or_else(|| "designs/seed.toml".to_owned());
     let threads = arguments.next().map_or(Ok(1), |text| text.parse())?;
     let (design, _) = Design::read(Path::new(&path), Need::CALIBRATE)?;
     println!("`{path}`, {threads} thread(s)\n");

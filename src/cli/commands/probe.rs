@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::{accuracy_check, begin};
+use super::{accuracy_check, begin, describe};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::bundle::atomic::{self, Overwrite};
@@ -16,24 +16,28 @@ use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
 use crate::cli::printer::{Place, Printer};
-use crate::cli::quantity::{count, error};
+use crate::cli::quantity::count;
 use crate::cli::values::FileArgument;
 use crate::design::Need;
 use crate::job::JobError;
-use crate::job::probe::{ProbeComponents, ProbeTable, probe};
+use crate::job::probe::{ProbeComponents, ProbeRequest, ProbeTable, probe};
 
 /// Field and gradient per ampere of every coil at given points
 ///
 /// Computes the field and its gradient per ampere of every coil at the points of a CSV table with
-/// the columns x_m, y_m and z_m, exactly and not through a map. The result is a CSV table with one
-/// row a point and coil, in the points' order and coil by coil within a point. With --format json
-/// the same columns come as arrays of one JSON object.
+/// the columns x_m, y_m and z_m, directly and not through a map. The result is a CSV table with one
+/// row a point and coil, in the points' order and coil by coil within a point. With --magnet-force the
+/// force and torque on the design's magnet follow, its centre at the points; the pull of unpowered
+/// steel is not part of them. With --format json the same columns come as arrays of one JSON
+/// object.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Reading, &[
-    ("printf 'x_m,y_m,z_m\\n0.007,0.013,0.03\\n' | fluxform probe designs/seed_air.toml -",
+    ("printf 'x_m,y_m,z_m\\n0.007,0.013,0.03\\n' | fluxform probe designs/seed.toml -",
      "one point from standard input"),
-    ("printf 'x_m,y_m,z_m\\n0,0,0.03\\n' | fluxform probe designs/seed_air.toml - --components gz -q",
+    ("printf 'x_m,y_m,z_m\\n0,0,0.03\\n' | fluxform probe designs/seed.toml - --components gz -q",
      "only dBz/dz, and no summary"),
+    ("printf 'x_m,y_m,z_m\\n0,0.01,0.03\\n' | fluxform probe designs/seed.toml - --magnet-force",
+     "what the magnet feels there, besides"),
 ]))]
 pub struct Probe {
     /// Design file (TOML), `-` for standard input
@@ -45,6 +49,9 @@ pub struct Probe {
     /// What is told at each point
     #[arg(long, value_enum, default_value_t = Components::All)]
     components: Components,
+    /// Tell force and torque on the magnet per ampere too: six columns
+    #[arg(long)]
+    magnet_force: bool,
     /// Where the table goes; `-` is standard output
     #[arg(long, value_name = "FILE", default_value = "-")]
     out: FileArgument,
@@ -100,7 +107,12 @@ impl Probe {
         }
         let bar = begin(printer);
         let design = &document.design;
-        let table = probe(design, points_m, components, self.tolerance.tolerance, &bar)?;
+        let request = ProbeRequest {
+            components,
+            force: self.magnet_force,
+            tolerance: self.tolerance.tolerance,
+        };
+        let table = probe(design, points_m, request, &bar)?;
         drop(bar);
         let mut summary = ProbeSummary {
             schema_version: SCHEMA_VERSION,
@@ -109,7 +121,7 @@ impl Probe {
             inputs,
             points,
             rows: table.rows(),
-            accuracy: BTreeMap::from([("field", accuracy(&table))]),
+            accuracy: accuracy(&table),
             columns: None,
         };
         let place = match &self.out {
@@ -138,11 +150,8 @@ impl Probe {
             count(summary.rows, "row"),
             count(summary.points, "point")
         ));
-        let stage = &summary.accuracy["field"];
-        sheet.line(
-            "accuracy",
-            &format!("{} of {}", error(stage.estimate), stage.relative_to),
-        );
+        let stages = summary.accuracy.iter().map(|(name, stage)| (*name, stage));
+        sheet.line("accuracy", &describe::accuracy(stages));
         if let FileArgument::Path(path) = &self.out {
             sheet.line("written to", &path.display().to_string());
         }
@@ -150,12 +159,31 @@ impl Probe {
     }
 }
 
-fn accuracy(table: &ProbeTable) -> StageAccuracy {
-    StageAccuracy {
-        estimate: table.relative_error,
-        relative_to: "|grad B| at the point".to_owned(),
-        method: "a-priori quadrature bound; rounding sampled against 40-digit values".to_owned(),
-    }
+fn accuracy(table: &ProbeTable) -> BTreeMap<&'static str, StageAccuracy> {
+    let stage = |estimate, relative_to: &str, method: &str| StageAccuracy {
+        estimate,
+        relative_to: relative_to.to_owned(),
+        method: method.to_owned(),
+    };
+    let field = if table.relative_to_height {
+        stage(
+            table.relative_error,
+            "the largest |grad B| at the point's height",
+            "steel by two resolutions, a-priori bound of its evaluation",
+        )
+    } else {
+        stage(
+            table.relative_error,
+            "|grad B| at the point",
+            "a-priori quadrature bound; rounding sampled against 40-digit values",
+        )
+    };
+    let force = table.force_error.map(|estimate| {
+        let to = "the moment times the largest |grad B| at the point's height";
+        let method = "the field's error and the a-priori bound of the magnet's dipoles";
+        ("force", stage(estimate, to, method))
+    });
+    std::iter::once(("field", field)).chain(force).collect()
 }
 
 /// The table's columns by their names: its CSV read back, every number to the last bit.
