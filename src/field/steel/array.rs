@@ -76,6 +76,13 @@ impl ArrayResolution {
         }
     }
 
+    /// Angles of the exchange grid: a multiple of four, for the array's symmetries; enough for
+    /// the modes' products.
+    #[must_use]
+    pub fn angles(&self) -> usize {
+        (2 * self.modes).next_multiple_of(4)
+    }
+
     /// The next coarser resolution.
     #[must_use]
     pub fn coarser(&self) -> Self {
@@ -222,12 +229,10 @@ impl CoupledArray {
         let outline = Generatrix::of_coil(winding, shape, &resolution.outline);
         let excitation = Excitation::new(winding, &outline)?;
         let exchange = Rings::new(&outline, resolution.order, |_| resolution.panel_m);
-        // A multiple of four, for the array's symmetries; enough for the modes' products.
-        let angles = (2 * resolution.modes).next_multiple_of(4);
         let response = Response::new(
             outline,
             exchange,
-            angles,
+            resolution.angles(),
             resolution.modes,
             relative_permeability,
             resolution.outline.quadrature,

@@ -92,6 +92,24 @@ impl Coupling {
         &self.windings[self.links.index[receiver * self.cores + sender]]
     }
 
+    /// Potentials at every core's grid, of `size` points, of the windings of all others with
+    /// `currents_a`, A.
+    #[must_use]
+    pub fn of_windings(&self, currents_a: &[f64], size: usize) -> DMatrix<f64> {
+        let mut sum = DMatrix::zeros(size, self.cores);
+        for (receiver, mut column) in sum.column_iter_mut().enumerate() {
+            for (sender, current_a) in currents_a.iter().enumerate() {
+                if sender != receiver {
+                    let sent = &self.winding(receiver, sender).potential;
+                    for (value, potential) in column.iter_mut().zip(sent) {
+                        *value += current_a * potential;
+                    }
+                }
+            }
+        }
+        sum
+    }
+
     /// Solves q - T K q = T p + q_own: `sent` are the potentials p of the other coils' windings,
     /// `own` the moments that cores have without what others send, both
     /// [exchange grid, problem * cores + core].

@@ -17,6 +17,7 @@ pub mod magnetized;
 pub mod permeability;
 pub mod response;
 pub mod saturated;
+pub mod saturated_array;
 pub mod source;
 pub mod sources;
 pub mod symmetry;
