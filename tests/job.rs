@@ -1,8 +1,5 @@
 //! The main job from documents to a verified bundle.
 
-#[path = "job/cored.rs"]
-mod cored;
-
 use std::path::{Path, PathBuf};
 
 use fluxform::bundle::artefact::Input;
@@ -16,11 +13,11 @@ use fluxform::job::{JobError, evaluate, lambda, probe, verify};
 use fluxform::progress::Silent;
 use fluxform::shape::document::ShapeDocument;
 
-pub fn here(path: &str) -> PathBuf {
+fn here(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
 }
 
-pub fn calibrate_text(text: &str, shapes: &[&str], out: &Path) -> Result<CalibrateReport, JobError> {
+fn calibrate_text(text: &str, shapes: &[&str], out: &Path) -> Result<CalibrateReport, JobError> {
     let path = here("designs/seed_air.toml");
     let (design, _) = Design::from_toml(text, &path, Need::CALIBRATE).expect("a valid design");
     let input = Input::of_bytes("designs/seed_air.toml", text.as_bytes());
@@ -54,7 +51,7 @@ fn seed_air() -> String {
     std::fs::read_to_string(here("designs/seed_air.toml")).expect("shipped design")
 }
 
-pub const SHAPES: [&str; 4] = [
+const SHAPES: [&str; 4] = [
     "shapes/flat.toml",
     "shapes/half_sphere.toml",
     "shapes/half_cylinder.toml",
@@ -217,8 +214,7 @@ fn a_probe_on_an_edge_is_told_with_its_number_and_coil() {
         force: false,
         tolerance: None,
     };
-    let error = probe::probe(&design, points, request, &Silent)
-        .expect_err("an edge of coil 4");
+    let error = probe::probe(&design, points, request, &Silent).expect_err("an edge of coil 4");
     assert!(
         error.to_string().contains("point 2 ") && error.to_string().contains("coil 4"),
         "{error}"

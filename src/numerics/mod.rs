@@ -1,5 +1,6 @@
 //! Quadrature, dense algebra, interpolation, vector dispatch, grid axes: no physics.
 
+pub mod anderson;
 pub mod axis;
 pub mod bessel;
 pub mod chebyshev;

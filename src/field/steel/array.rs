@@ -11,18 +11,15 @@
 //! Plain iteration stalls (the array's cores return each other's flux); GMRES needs a dozen steps.
 
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
-use std::f64::consts::TAU;
 
 use super::CoreShape;
 use super::cored_coil::Excitation;
-use super::coupling::{between_cores, from_winding, grid_points};
+use super::coupling::{Coupling, different_offsets};
 use super::generatrix::{Generatrix, Resolution};
 use super::response::{Response, Rings};
 use super::sources::{ArraySources, Parts};
 use super::symmetry::{Motion, motions};
 use crate::field::winding::{OnEdge, Winding};
-use crate::numerics::gmres::gmres;
 use crate::units::MU_0_T_M_PER_A;
 
 /// Most azimuthal modes; beyond, the stated error grows.
@@ -31,8 +28,6 @@ const MOST_MODES: usize = 17;
 /// about half their radius ask for more, and the stated error grows.
 const MOST_UNKNOWNS: usize = 3500;
 const MOST_ENTRIES: usize = 300_000_000;
-/// Most applications of the coupling.
-const MOST_STEPS: usize = 120;
 /// Share of the tolerance given to the linear solver.
 const SOLVER_SHARE: f64 = 0.01;
 
@@ -89,7 +84,7 @@ impl ArrayResolution {
     fn unknowns(&self, shape: CoreShape) -> usize {
         let panels = |length_m: f64| (length_m / self.panel_m).ceil().max(1.0) as usize;
         let rings = self.order * (panels(shape.length_m()) + 2 * panels(shape.radius_m));
-        rings * (2 * self.modes).next_multiple_of(4)
+        rings * self.angles()
     }
 
     /// Longer exchange panels, if these would take more memory than the caps for an array with
@@ -111,6 +106,13 @@ impl ArrayResolution {
         let ratio = 2.0 * (closest_m - 2.0 * radius_m) / self.panel_m;
         let along = (ratio + 1.0_f64.hypot(ratio)).powf(-2.0 * self.order as f64);
         azimuth.max(along)
+    }
+
+    /// Angles of the exchange grid: a multiple of four, for the array's symmetries; enough for
+    /// the modes' products.
+    #[must_use]
+    pub fn angles(&self) -> usize {
+        (2 * self.modes).next_multiple_of(4)
     }
 
     /// The next coarser resolution.
@@ -174,7 +176,7 @@ impl CoupledArray {
         lowest_m: f64,
     ) -> Result<Self, OnEdge> {
         let closest_m = closest_m(positions_m);
-        let offsets = Links::new(positions_m).offsets_m.len();
+        let offsets = different_offsets(positions_m);
         let lowest_m = lowest_m.max(shape.top_m.max(0.0) + CLOSEST * shape.radius_m);
         let solve = |resolution: &ArrayResolution| {
             Self::at_resolution(
@@ -264,12 +266,10 @@ impl CoupledArray {
         let outline = Generatrix::of_coil(winding, shape, &resolution.outline);
         let excitation = Excitation::new(winding, &outline, resolution.outline.quadrature)?;
         let exchange = Rings::new(&outline, resolution.order, |_| resolution.panel_m);
-        // A multiple of four, for the array's symmetries; enough for the modes' products.
-        let angles = (2 * resolution.modes).next_multiple_of(4);
         let response = Response::new(
             outline,
             exchange,
-            angles,
+            resolution.angles(),
             resolution.modes,
             relative_permeability,
             resolution.outline.quadrature,
@@ -293,54 +293,31 @@ impl CoupledArray {
     fn couple(&mut self, excitation: &Excitation, resolution: &ArrayResolution) {
         let cores = self.positions_m.len();
         let size = self.response.size();
-        let points = grid_points(&self.response);
-        let links = Links::new(&self.positions_m);
-        let blocks: Vec<DMatrix<f64>> = links
-            .offsets_m
-            .par_iter()
-            .map(|offset| between_cores(&points, self.response.angles, *offset))
-            .collect();
-        let sent: Vec<(Vec<f64>, Vec<f64>)> = links
-            .offsets_m
-            .par_iter()
-            .map(|o| from_winding(&self.winding, &points, *o, resolution.residual))
-            .collect();
-        let response = self.response.matrix();
+        let coupling = Coupling::new(
+            &self.winding,
+            &self.positions_m,
+            &self.response,
+            resolution.residual,
+        );
         let symmetries = motions(&self.positions_m);
         let drives = representatives(cores, &symmetries);
 
         // Moments [size, core] side by side for every drive: column = drive * cores + core.
         let columns = drives.len() * cores;
-        let mut potentials = DMatrix::zeros(size, columns);
+        let mut sent = DMatrix::zeros(size, columns);
+        let mut own = DMatrix::zeros(size, columns);
+        let own_moments = self.response.on_grid(&self.own_layer);
         for (place, drive) in drives.iter().enumerate() {
             for core in (0..cores).filter(|c| c != drive) {
-                let link = links.index[core * cores + drive];
-                potentials
-                    .column_mut(place * cores + core)
-                    .copy_from_slice(&sent[link].0);
+                sent.column_mut(place * cores + core)
+                    .copy_from_slice(&coupling.winding(core, *drive).potential);
             }
+            own.set_column(place * cores + drive, &own_moments);
         }
-        let own = self.own_moments();
-        let mut rhs = &response * &potentials;
-        for (place, drive) in drives.iter().enumerate() {
-            rhs.column_mut(place * cores + drive).axpy(1.0, &own, 1.0);
-        }
-        let stack = |m: DMatrix<f64>| {
-            m.reshape_generic(nalgebra::Dyn(size * cores), nalgebra::Dyn(drives.len()))
-        };
-        let unstack = |m: &DMatrix<f64>| {
-            m.clone()
-                .reshape_generic(nalgebra::Dyn(size), nalgebra::Dyn(columns))
-        };
-        let outcome = gmres(&stack(rhs), resolution.residual, MOST_STEPS, |moments| {
-            let moments = unstack(moments);
-            let back = &response * links.send(&blocks, &moments, cores);
-            stack(moments - back)
-        });
-        self.relative_residual = outcome.relative_residual;
-        self.iterations = outcome.iterations;
-        let moments = unstack(&outcome.solutions);
-        potentials += links.send(&blocks, &moments, cores);
+        let solved = coupling.solve(sent, &own, resolution.residual);
+        self.relative_residual = solved.relative_residual;
+        self.iterations = solved.iterations;
+        let (potentials, moments) = (solved.potentials, solved.moments);
 
         // Every drive from its representative.
         let of_drive = |drive: usize| {
@@ -367,57 +344,22 @@ impl CoupledArray {
         let all: Vec<_> = (0..cores).map(of_drive).collect();
 
         // Flux through coil i of the layers of all cores.
-        let own_flux = {
-            let areas: Vec<f64> = self.response.outline.areas_m2().collect();
-            let weighted = DVector::from_iterator(
-                areas.len(),
-                areas
-                    .iter()
-                    .zip(&excitation.normal_field_t_per_a)
-                    .map(|(a, b)| -a * b),
-            );
-            (
-                weighted.dot(&self.own_layer),
-                self.response.layers[0].tr_mul(&weighted),
-            )
-        };
+        let weights = excitation.flux_weights_wb_per_a(&self.response.outline);
+        let own_flux = weights.dot(&self.own_layer);
+        let by_ring = self.response.layers[0].tr_mul(&weights);
         let rings = self.response.exchange.rings.len();
-        let turn = TAU / self.response.angles as f64;
         for (drive, (potentials, moments)) in all.iter().enumerate() {
             for (coil, at_coil) in potentials.iter().enumerate() {
-                let mut flux = if coil == drive { own_flux.0 } else { 0.0 };
+                let mut flux = if coil == drive { own_flux } else { 0.0 };
                 for values in at_coil.chunks(rings) {
-                    let share: f64 = values
-                        .iter()
-                        .zip(own_flux.1.iter())
-                        .map(|(a, b)| a * b)
-                        .sum();
+                    let share: f64 = values.iter().zip(by_ring.iter()).map(|(a, b)| a * b).sum();
                     flux += share / self.response.angles as f64;
                 }
-                for core in (0..cores).filter(|c| *c != coil) {
-                    let link = links.index[core * cores + coil];
-                    let normal = &sent[link].1;
-                    flux -= turn
-                        * moments[core]
-                            .iter()
-                            .zip(normal)
-                            .map(|(q, b)| q * b)
-                            .sum::<f64>();
-                }
+                flux += coupling.flux_of_others_wb(coil, |core| &moments[core]);
                 self.added_inductance_h[(coil, drive)] = flux;
             }
         }
         self.potentials = all.into_iter().map(|(p, _)| p).collect();
-    }
-
-    /// Moments of the driven coil's own core on the exchange grid.
-    fn own_moments(&self) -> DVector<f64> {
-        let layer = DMatrix::from_column_slice(self.own_layer.len(), 1, self.own_layer.as_slice());
-        let ring = self.response.exchange.moments(&layer);
-        DVector::from_iterator(
-            self.response.size(),
-            (0..self.response.angles).flat_map(|_| ring.iter().copied()),
-        )
     }
 
     fn moved(&self, motion: &Motion, values: &[f64]) -> Vec<f64> {
@@ -453,64 +395,6 @@ pub fn closest_m(positions_m: &[[f64; 2]]) -> f64 {
         }
     }
     closest
-}
-
-/// The pairs of cores by their offset: many share one.
-struct Links {
-    offsets_m: Vec<[f64; 2]>,
-    /// [receiver, sender]; meaningless on the diagonal.
-    index: Vec<usize>,
-}
-
-impl Links {
-    fn new(positions_m: &[[f64; 2]]) -> Self {
-        let cores = positions_m.len();
-        let mut offsets_m: Vec<[f64; 2]> = Vec::new();
-        let mut index = vec![usize::MAX; cores * cores];
-        let extent = positions_m
-            .iter()
-            .flatten()
-            .fold(0.0_f64, |e, x| e.max(x.abs()));
-        // Positions from a grid differ by rounding only.
-        let same = |a: f64, b: f64| (a - b).abs() <= 1e-12 * extent;
-        for receiver in 0..cores {
-            for sender in (0..cores).filter(|s| *s != receiver) {
-                let (a, b) = (positions_m[receiver], positions_m[sender]);
-                let offset = [a[0] - b[0], a[1] - b[1]];
-                let known = offsets_m
-                    .iter()
-                    .position(|o| same(o[0], offset[0]) && same(o[1], offset[1]));
-                index[receiver * cores + sender] = known.unwrap_or_else(|| {
-                    offsets_m.push(offset);
-                    offsets_m.len() - 1
-                });
-            }
-        }
-        Self { offsets_m, index }
-    }
-
-    /// Potentials at every core of the moments of all others; columns as in `moments`.
-    fn send(&self, blocks: &[DMatrix<f64>], moments: &DMatrix<f64>, cores: usize) -> DMatrix<f64> {
-        let drives = moments.ncols() / cores;
-        let size = moments.nrows();
-        // One receiver is one piece of work; its senders are added in order.
-        let received: Vec<DMatrix<f64>> = (0..cores)
-            .into_par_iter()
-            .map(|receiver| {
-                let mut sum = DMatrix::zeros(size, drives);
-                for sender in (0..cores).filter(|s| *s != receiver) {
-                    let block = &blocks[self.index[receiver * cores + sender]];
-                    let from =
-                        DMatrix::from_fn(size, drives, |i, d| moments[(i, d * cores + sender)]);
-                    sum.gemm(1.0, block, &from, 1.0);
-                }
-                sum
-            })
-            .collect();
-        DMatrix::from_fn(size, moments.ncols(), |i, column| {
-            received[column % cores][(i, column / cores)]
-        })
-    }
 }
 
 /// The first coil of every set of equivalent ones.

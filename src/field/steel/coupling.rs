@@ -1,17 +1,178 @@
-//! What sources send to the exchange grid of a core some way off.
+//! What sources send to the exchange grid of a core some way off, and the cores of an array
+//! coupled by it.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Dyn};
+use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
 use super::response::{Response, Ring};
 use crate::field::winding::Winding;
 use crate::numerics::gauss;
+use crate::numerics::gmres::gmres;
 use crate::numerics::ring_functions::azimuthal_integrals;
 use crate::units::MU_0_T_M_PER_A;
 
+/// Most applications of the coupling.
+const MOST_STEPS: usize = 120;
+
+/// What a winding sends to a core's exchange grid, per ampere.
+#[derive(Debug, Clone)]
+pub struct Sent {
+    /// Potential, A/A.
+    pub potential: Vec<f64>,
+    /// n.B, T/A.
+    pub normal_field_t: Vec<f64>,
+}
+
+/// What the coils of an array do to each other's cores, ready to be solved for any currents.
+#[derive(Debug)]
+pub struct Coupling {
+    cores: usize,
+    links: Links,
+    /// Potentials at the receiver for moments of the sender, for every offset.
+    blocks: Vec<DMatrix<f64>>,
+    /// Of the sender's winding at the receiver, for every offset.
+    windings: Vec<Sent>,
+    /// One core's moments for potentials on its grid.
+    response: DMatrix<f64>,
+    /// Angle between two of the grid's, rad.
+    turn: f64,
+}
+
+/// A solved coupling; columns as in the problem's.
+#[derive(Debug)]
+pub struct Coupled {
+    /// Potential sent to every core by all others, windings and cores, on the exchange grid.
+    pub potentials: DMatrix<f64>,
+    /// Moments of every core on the exchange grid.
+    pub moments: DMatrix<f64>,
+    /// Relative residual of the linear solver.
+    pub relative_residual: f64,
+    /// Applications of the coupling.
+    pub iterations: usize,
+}
+
+impl Coupling {
+    /// The coupling of coils at `positions_m` whose cores respond by `response`; `tolerance` is
+    /// that of the windings' potentials.
+    ///
+    /// Domain: cores apart, windings apart or touching.
+    #[must_use]
+    pub fn new(
+        winding: &Winding,
+        positions_m: &[[f64; 2]],
+        response: &Response,
+        tolerance: f64,
+    ) -> Self {
+        let points = grid_points(response);
+        let links = Links::new(positions_m);
+        let blocks = links
+            .offsets_m
+            .par_iter()
+            .map(|offset| between_cores(&points, response.angles, *offset))
+            .collect();
+        let windings = links
+            .offsets_m
+            .par_iter()
+            .map(|offset| from_winding(winding, &points, *offset, tolerance))
+            .collect();
+        Self {
+            cores: positions_m.len(),
+            links,
+            blocks,
+            windings,
+            response: response.matrix(),
+            turn: TAU / response.angles as f64,
+        }
+    }
+
+    /// What the winding of coil `sender` sends to the core of another, `receiver`.
+    #[must_use]
+    pub fn winding(&self, receiver: usize, sender: usize) -> &Sent {
+        &self.windings[self.links.index[receiver * self.cores + sender]]
+    }
+
+    /// Potentials at every core's grid, of `size` points, of the windings of all others with
+    /// `currents_a`, A.
+    #[must_use]
+    pub fn of_windings(&self, currents_a: &[f64], size: usize) -> DMatrix<f64> {
+        let mut sum = DMatrix::zeros(size, self.cores);
+        for (receiver, mut column) in sum.column_iter_mut().enumerate() {
+            for (sender, current_a) in currents_a.iter().enumerate() {
+                if sender != receiver {
+                    let sent = &self.winding(receiver, sender).potential;
+                    for (value, potential) in column.iter_mut().zip(sent) {
+                        *value += current_a * potential;
+                    }
+                }
+            }
+        }
+        sum
+    }
+
+    /// Solves q - T K q = T p + q_own: `sent` are the potentials p of the other coils' windings,
+    /// `own` the moments that cores have without what others send, both
+    /// [exchange grid, problem * cores + core].
+    #[must_use]
+    pub fn solve(&self, sent: DMatrix<f64>, own: &DMatrix<f64>, residual: f64) -> Coupled {
+        let (size, columns) = own.shape();
+        let problems = columns / self.cores.max(1);
+        let stack = |m: DMatrix<f64>| m.reshape_generic(Dyn(size * self.cores), Dyn(problems));
+        let unstack = |m: &DMatrix<f64>| m.clone().reshape_generic(Dyn(size), Dyn(columns));
+        let rhs = &self.response * &sent + own;
+        let outcome = gmres(&stack(rhs), residual, MOST_STEPS, |moments| {
+            let moments = unstack(moments);
+            let back = &self.response * self.send(&moments);
+            stack(moments - back)
+        });
+        let moments = unstack(&outcome.solutions);
+        Coupled {
+            potentials: sent + self.send(&moments),
+            moments,
+            relative_residual: outcome.relative_residual,
+            iterations: outcome.iterations,
+        }
+    }
+
+    /// Flux through a coil of all cores but its own, Wb, `moments(core)` being theirs.
+    #[must_use]
+    pub fn flux_of_others_wb<'a>(&self, coil: usize, moments: impl Fn(usize) -> &'a [f64]) -> f64 {
+        let mut flux = 0.0;
+        for core in (0..self.cores).filter(|c| *c != coil) {
+            let normal = &self.winding(core, coil).normal_field_t;
+            let sum: f64 = moments(core).iter().zip(normal).map(|(q, b)| q * b).sum();
+            flux -= self.turn * sum;
+        }
+        flux
+    }
+
+    /// Potentials at every core of the moments of all others; columns as in `moments`.
+    fn send(&self, moments: &DMatrix<f64>) -> DMatrix<f64> {
+        let cores = self.cores;
+        let problems = moments.ncols() / cores.max(1);
+        let size = moments.nrows();
+        // One receiver is one piece of work; its senders are added in order.
+        let received: Vec<DMatrix<f64>> = (0..cores)
+            .into_par_iter()
+            .map(|receiver| {
+                let mut sum = DMatrix::zeros(size, problems);
+                for sender in (0..cores).filter(|s| *s != receiver) {
+                    let block = &self.blocks[self.links.index[receiver * cores + sender]];
+                    let from =
+                        DMatrix::from_fn(size, problems, |i, p| moments[(i, p * cores + sender)]);
+                    sum.gemm(1.0, block, &from, 1.0);
+                }
+                sum
+            })
+            .collect();
+        DMatrix::from_fn(size, moments.ncols(), |i, column| {
+            received[column % cores][(i, column / cores)]
+        })
+    }
+}
+
 /// Points and outer normals of an exchange grid, index = angle * rings + ring.
-#[must_use]
-pub fn grid_points(response: &Response) -> Vec<([f64; 3], [f64; 3])> {
+pub(super) fn grid_points(response: &Response) -> Vec<([f64; 3], [f64; 3])> {
     (0..response.angles)
         .flat_map(|k| {
             let (s, c) = (TAU * k as f64 / response.angles as f64).sin_cos();
@@ -28,8 +189,7 @@ pub fn grid_points(response: &Response) -> Vec<([f64; 3], [f64; 3])> {
 
 /// Potential at the grid of a core at `offset_m` from the sender, for unit moments on the
 /// sender's grid: -(1/4 pi) n'.(x - y)/|x - y|^3 dtheta, [receiver, sender].
-#[must_use]
-pub fn between_cores(
+pub(super) fn between_cores(
     points: &[([f64; 3], [f64; 3])],
     angles: usize,
     offset_m: [f64; 2],
@@ -56,13 +216,12 @@ pub fn between_cores(
 ///
 /// Outside its bore the winding is two charged discs: it has the field of the magnetisation
 /// M_z(r) = J (a2 - max(r, a1)) between its faces.
-#[must_use]
-pub fn from_winding(
+fn from_winding(
     winding: &Winding,
     points: &[([f64; 3], [f64; 3])],
     offset_m: [f64; 2],
     tolerance: f64,
-) -> (Vec<f64>, Vec<f64>) {
+) -> Sent {
     let (a1, a2) = (winding.inner_radius_m, winding.outer_radius_m);
     let density = winding.current_density_per_m2();
     let nearest = points
@@ -79,7 +238,7 @@ pub fn from_winding(
             discs.push((r, weight * density * (a2 - r.max(a1))));
         });
     }
-    points
+    let (potential, normal_field_t) = points
         .iter()
         .map(|(x, n)| {
             let (dx, dy) = (x[0] + offset_m[0], x[1] + offset_m[1]);
@@ -106,5 +265,50 @@ pub fn from_winding(
             let normal = slope_r * (n[0] * c + n[1] * s) + slope_z * n[2];
             (potential, -MU_0_T_M_PER_A * normal)
         })
-        .unzip()
+        .unzip();
+    Sent {
+        potential,
+        normal_field_t,
+    }
+}
+
+/// Number of different offsets between cores: each has a matrix.
+pub(super) fn different_offsets(positions_m: &[[f64; 2]]) -> usize {
+    Links::new(positions_m).offsets_m.len()
+}
+
+/// The pairs of cores by their offset: many share one.
+#[derive(Debug)]
+struct Links {
+    offsets_m: Vec<[f64; 2]>,
+    /// [receiver, sender]; meaningless on the diagonal.
+    index: Vec<usize>,
+}
+
+impl Links {
+    fn new(positions_m: &[[f64; 2]]) -> Self {
+        let cores = positions_m.len();
+        let mut offsets_m: Vec<[f64; 2]> = Vec::new();
+        let mut index = vec![usize::MAX; cores * cores];
+        let extent = positions_m
+            .iter()
+            .flatten()
+            .fold(0.0_f64, |e, x| e.max(x.abs()));
+        // Positions from a grid differ by rounding only.
+        let same = |a: f64, b: f64| (a - b).abs() <= 1e-12 * extent;
+        for receiver in 0..cores {
+            for sender in (0..cores).filter(|s| *s != receiver) {
+                let (a, b) = (positions_m[receiver], positions_m[sender]);
+                let offset = [a[0] - b[0], a[1] - b[1]];
+                let known = offsets_m
+                    .iter()
+                    .position(|o| same(o[0], offset[0]) && same(o[1], offset[1]));
+                index[receiver * cores + sender] = known.unwrap_or_else(|| {
+                    offsets_m.push(offset);
+                    offsets_m.len() - 1
+                });
+            }
+        }
+        Self { offsets_m, index }
+    }
 }

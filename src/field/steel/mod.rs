@@ -18,6 +18,7 @@ pub mod passive;
 pub mod permeability;
 pub mod response;
 pub mod saturated;
+pub mod saturated_array;
 pub mod source;
 pub mod sources;
 pub mod symmetry;

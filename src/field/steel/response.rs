@@ -286,6 +286,17 @@ impl Response {
         out
     }
 
+    /// Moments on the exchange grid of a layer of mode 0 on the nodes.
+    #[must_use]
+    pub fn on_grid(&self, layer: &DVector<f64>) -> DVector<f64> {
+        let layer = DMatrix::from_column_slice(layer.len(), 1, layer.as_slice());
+        let ring = self.exchange.moments(&layer);
+        DVector::from_iterator(
+            self.size(),
+            (0..self.angles).flat_map(|_| ring.iter().copied()),
+        )
+    }
+
     /// Layers on the nodes for the modes that [`Response::modes_of`] gives, same columns.
     #[must_use]
     pub fn layers_of(&self, modes: &DMatrix<f64>) -> DMatrix<f64> {

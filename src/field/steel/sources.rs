@@ -12,6 +12,7 @@ use super::array::CoupledArray;
 use super::generatrix::Generatrix;
 use super::magnetized::MagnetizedCore;
 use super::response::Rings;
+use super::saturated_array::SaturatedArray;
 use crate::numerics::dispatch::{self, Kernel, LANES, Lanes};
 use crate::units::MU_0_T_M_PER_A;
 
@@ -75,7 +76,30 @@ impl ArraySources {
             &response.outline,
             &array.positions_m,
             response.layers.len(),
+            array.positions_m.len(),
             |drive, core| array.layers(drive, core),
+            Near {
+                lowest_m,
+                distance_m,
+                tolerance,
+            },
+        )
+    }
+
+    /// The same for a saturated array at its working point: one drive, of all its currents.
+    #[must_use]
+    pub fn of_saturated(
+        array: &SaturatedArray,
+        lowest_m: f64,
+        distance_m: f64,
+        tolerance: f64,
+    ) -> Self {
+        Self::new(
+            array.outline(),
+            &array.positions_m,
+            array.modes(),
+            1,
+            |_, core| array.layers(core).clone(),
             Near {
                 lowest_m,
                 distance_m,
@@ -92,6 +116,7 @@ impl ArraySources {
             core.outline(),
             &[[0.0, 0.0]],
             1,
+            1,
             |_, _| DMatrix::from_column_slice(density.len(), 1, density),
             Near {
                 lowest_m,
@@ -105,6 +130,7 @@ impl ArraySources {
         outline: &Generatrix,
         positions_m: &[[f64; 2]],
         modes: usize,
+        drives: usize,
         layers: impl Fn(usize, usize) -> DMatrix<f64> + Sync,
         near: Near,
     ) -> Self {
@@ -118,7 +144,6 @@ impl ArraySources {
         let distance = |z_m: f64| floor_m.max(lowest_m - z_m);
         let order = (4.0 - 1.3 * tolerance.log10()).ceil().max(3.0) as usize;
         let rings = Rings::new(outline, order, |z| PANEL * distance(z));
-        let drives = positions_m.len();
         let angles: Vec<usize> = rings
             .rings
             .iter()
@@ -150,7 +175,7 @@ impl ArraySources {
                 }));
             }
         }
-        let a_core = places.len() / drives.max(1);
+        let a_core = places.len() / positions_m.len().max(1);
         let mut moments = vec![0.0; places.len() * drives];
         moments
             .par_chunks_mut((a_core * drives).max(1))

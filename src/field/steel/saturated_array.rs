@@ -1,0 +1,552 @@
+//! An array of identical cored coils at given currents, whose steel saturates.
+//!
+//! Every core's layer is the linear one, of a reference permeability, and a correction of the
+//! axisymmetric mode. With phi the potential of that mode on a core's outline, of its own winding
+//! and of all that others send,
+//!
+//! ```text
+//! delta = v(phi) - v_lin(phi),     q - T K q = T p + q_own + q(delta),
+//! ```
+//!
+//! v being what [`SaturatedCore`] finds and the second equation that of the linear array (see
+//! [`super::array`]). What the cores send changes phi; that fixed point is sought by Anderson's
+//! iteration, the unknowns being the potentials of mode 0 on the exchange rings.
+//!
+//! The other modes stay linear: across the core the permeability that counts is the secant, and a
+//! cylinder's transverse magnetisation is all but that of infinite permeability as long as the
+//! secant is some tens. The reference is the secant of the most saturated core, and what the
+//! initial permeability in its place changes is part of the stated error.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::CoreShape;
+use super::array::{ArrayResolution, closest_m};
+use super::cored_coil::Excitation;
+use super::coupling::Coupling;
+use super::generatrix::Generatrix;
+use super::interior::MeshError;
+use super::permeability::Permeability;
+use super::response::{Response, Rings, mean};
+use super::saturated::{CoreField, SaturatedCore, Solution, Status};
+use super::sources::{ArraySources, Parts};
+use super::symmetry::motions;
+use crate::field::winding::{OnEdge, Winding};
+use crate::numerics::anderson::Anderson;
+use crate::units::MU_0_T_M_PER_A;
+
+/// Iterates that the acceleration remembers.
+const DEPTH: usize = 5;
+/// Steps after which the iteration is given up; 3 to 10 are usual.
+const MOST_STEPS: usize = 60;
+/// Change of the potentials, relative to the largest on any core and in units of the linear
+/// solver's residual, at which the iteration ends.
+const SETTLED: f64 = 3.0;
+/// Refinements after which a tolerance that is not reached is given up, with its estimate.
+const MOST_REFINEMENTS: usize = 2;
+/// Distance above the cores, in radii, below which no error is estimated.
+const CLOSEST: f64 = 0.1;
+/// Places about every coil at which two solutions are compared, in units of its outer radius.
+const PLACES: [[f64; 2]; 4] = [[0.0, 0.0], [0.7, 0.2], [-0.4, 1.1], [1.5, -1.2]];
+
+/// Why an array cannot be solved.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SaturatedArrayError {
+    /// A node of the outline lies on the winding's edge.
+    #[error(transparent)]
+    OnEdge(#[from] OnEdge),
+    /// The core cannot be meshed.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// As many currents as coils are needed.
+    #[error("{currents} currents were given for {coils} coils")]
+    Currents {
+        /// Currents given.
+        currents: usize,
+        /// Coils there are.
+        coils: usize,
+    },
+}
+
+/// The array at its working point.
+#[derive(Debug, Clone)]
+pub struct SaturatedArray {
+    /// Whether the numbers can be used.
+    pub status: Status,
+    /// Axes, m.
+    pub positions_m: Vec<[f64; 2]>,
+    /// Current in every coil, A.
+    pub currents_a: Vec<f64>,
+    /// The winding of every coil.
+    pub winding: Winding,
+    /// Relative permeability of the modes that are not axisymmetric.
+    pub reference_permeability: f64,
+    /// |B| in every core, of the axisymmetric mode: what lies across the axis adds its square.
+    pub fields: Vec<CoreField>,
+    /// Flux of all cores through every coil, Wb; the windings' own flux is not in it.
+    pub flux_linkage_wb: Vec<f64>,
+    /// Estimated error: of the total gradient above, relative to the largest |grad B| at the
+    /// height, and of the flux, relative to the largest; the larger. Half the difference from the
+    /// next coarser resolution plus [`SaturatedArray::modes_error`].
+    pub relative_error: f64,
+    /// The part of it that is due to the other modes being linear: what they change when their
+    /// permeability is the initial one.
+    pub modes_error: f64,
+    /// Change of the potentials in every step of the iteration, relative to the largest.
+    pub steps: Vec<f64>,
+    response: Response,
+    /// Total layers of every core on the nodes, columns as [`SaturatedArray::layers`] has them, A.
+    layers_a: Vec<DMatrix<f64>>,
+    /// Where another solution of the same array can start from.
+    state: State,
+}
+
+/// Unknowns of the iteration.
+#[derive(Debug, Clone)]
+struct State {
+    /// Potential of mode 0 that others send, [ring, core], A.
+    sent_a: DMatrix<f64>,
+    /// Every core's last solution.
+    cores: Vec<Option<Solution>>,
+}
+
+/// What one resolution needs for any permeability of reference.
+struct Setup {
+    outline: Generatrix,
+    excitation: Excitation,
+    core: SaturatedCore,
+    resolution: ArrayResolution,
+}
+
+impl Setup {
+    fn new(
+        winding: &Winding,
+        shape: CoreShape,
+        resolution: &ArrayResolution,
+    ) -> Result<Self, SaturatedArrayError> {
+        let outline = Generatrix::of_coil(winding, shape, &resolution.outline);
+        let excitation = Excitation::new(winding, &outline, resolution.outline.quadrature)?;
+        let core = SaturatedCore::new(&outline, resolution.outline.quadrature)?;
+        Ok(Self {
+            outline,
+            excitation,
+            core,
+            resolution: *resolution,
+        })
+    }
+}
+
+impl SaturatedArray {
+    /// Solves for `currents_a` to an estimated error below `tolerance` at heights from `lowest_m`
+    /// up, or as far as the method and the caps on resolution allow:
+    /// [`SaturatedArray::relative_error`] says what was reached.
+    ///
+    /// Domain: as for [`super::array::CoupledArray::at_resolution`], and a law as
+    /// [`Permeability`] asks for.
+    ///
+    /// # Errors
+    /// See [`SaturatedArrayError`].
+    pub fn new(
+        winding: &Winding,
+        shape: CoreShape,
+        law: &(impl Permeability + Sync),
+        positions_m: &[[f64; 2]],
+        currents_a: &[f64],
+        tolerance: f64,
+        lowest_m: f64,
+    ) -> Result<Self, SaturatedArrayError> {
+        check(positions_m, currents_a)?;
+        let closest_m = closest_m(positions_m);
+        let lowest_m = lowest_m.max(shape.top_m.max(0.0) + CLOSEST * shape.radius_m);
+        let initial = law.response(0.0).relative;
+        let mut aim = tolerance;
+        let mut best: Option<Self> = None;
+        let mut modes_error = None;
+        for _ in 0..=MOST_REFINEMENTS {
+            let resolution = ArrayResolution::for_tolerance(aim, shape, closest_m);
+            let solve = |setup: &Setup, reference: f64, start: Option<&State>| {
+                Self::solve(
+                    winding,
+                    setup,
+                    law,
+                    positions_m,
+                    currents_a,
+                    reference,
+                    start,
+                )
+            };
+            let setup = Setup::new(winding, shape, &resolution.coarser())?;
+            let first = solve(&setup, initial, None);
+            let reference = first.least_secant(&setup.core, law);
+            let coarse = solve(&setup, reference, Some(&first.state));
+            let modes_error = match modes_error {
+                Some(known) => known,
+                None => *modes_error.insert(coarse.difference(&first, lowest_m, tolerance)?),
+            };
+            let setup = Setup::new(winding, shape, &resolution)?;
+            let mut fine = solve(&setup, reference, None);
+            let outline_error = 0.5 * fine.difference(&coarse, lowest_m, tolerance)?;
+            fine.modes_error = modes_error;
+            fine.relative_error = outline_error + modes_error;
+            let better = best
+                .as_ref()
+                .is_none_or(|b| fine.relative_error < b.relative_error);
+            // What the modes do wrong, no resolution mends.
+            let reached = outline_error <= (tolerance - modes_error).max(0.3 * tolerance);
+            if better {
+                best = Some(fine);
+            }
+            if reached || !better {
+                break;
+            }
+            aim *= 0.3;
+        }
+        Ok(best.expect("at least one resolution was solved"))
+    }
+
+    /// Solves at one resolution, with a given permeability of the modes that are not
+    /// axisymmetric; no error is estimated.
+    ///
+    /// # Errors
+    /// See [`SaturatedArrayError`].
+    pub fn at_resolution(
+        winding: &Winding,
+        shape: CoreShape,
+        law: &(impl Permeability + Sync),
+        positions_m: &[[f64; 2]],
+        currents_a: &[f64],
+        reference_permeability: f64,
+        resolution: &ArrayResolution,
+    ) -> Result<Self, SaturatedArrayError> {
+        check(positions_m, currents_a)?;
+        let setup = Setup::new(winding, shape, resolution)?;
+        Ok(Self::solve(
+            winding,
+            &setup,
+            law,
+            positions_m,
+            currents_a,
+            reference_permeability,
+            None,
+        ))
+    }
+
+    fn solve(
+        winding: &Winding,
+        setup: &Setup,
+        law: &(impl Permeability + Sync),
+        positions_m: &[[f64; 2]],
+        currents_a: &[f64],
+        reference_permeability: f64,
+        start: Option<&State>,
+    ) -> Self {
+        let resolution = &setup.resolution;
+        let exchange = Rings::new(&setup.outline, resolution.order, |_| resolution.panel_m);
+        let response = Response::new(
+            setup.outline.clone(),
+            exchange,
+            resolution.angles(),
+            resolution.modes,
+            reference_permeability,
+            resolution.outline.quadrature,
+        );
+        let coupling = Coupling::new(winding, positions_m, &response, resolution.residual);
+        let problem = Problem {
+            setup,
+            response: &response,
+            coupling: &coupling,
+            own_layer: response.axial_layer(&setup.excitation.potential),
+            windings: coupling.of_windings(currents_a, response.size()),
+            currents_a,
+            alike: alike(positions_m, currents_a),
+        };
+        let cores = positions_m.len();
+        let mut state = start.cloned().unwrap_or_else(|| State {
+            sent_a: DMatrix::zeros(response.exchange.rings.len(), cores),
+            cores: vec![None; cores],
+        });
+        let solved = problem.iterate(&mut state, law);
+        let solutions: Vec<&Solution> = state.cores.iter().flatten().collect();
+        let fields = solutions
+            .iter()
+            .map(|solution| setup.core.field(solution, law))
+            .collect();
+        let weights = setup.excitation.flux_weights_wb_per_a(&setup.outline);
+        let flux_linkage_wb = (0..cores)
+            .map(|coil| {
+                weights.dot(&solved.layers_a[coil].column(0))
+                    + coupling.flux_of_others_wb(coil, |core| {
+                        let rows = solved.moments.nrows();
+                        &solved.moments.as_slice()[core * rows..(core + 1) * rows]
+                    })
+            })
+            .collect();
+        Self {
+            status: solved.status,
+            positions_m: positions_m.to_vec(),
+            currents_a: currents_a.to_vec(),
+            winding: *winding,
+            reference_permeability,
+            fields,
+            flux_linkage_wb,
+            relative_error: f64::NAN,
+            modes_error: f64::NAN,
+            steps: solved.steps,
+            layers_a: solved.layers_a,
+            response,
+            state,
+        }
+    }
+
+    /// Total layers of one core on the nodes of [`SaturatedArray::outline`]: column 0 for mode 0,
+    /// then cosine and sine of every mode, A.
+    #[must_use]
+    pub fn layers(&self, core: usize) -> &DMatrix<f64> {
+        &self.layers_a[core]
+    }
+
+    /// The outline of every core.
+    #[must_use]
+    pub fn outline(&self) -> &Generatrix {
+        &self.response.outline
+    }
+
+    /// Number of azimuthal modes.
+    #[must_use]
+    pub fn modes(&self) -> usize {
+        self.response.layers.len()
+    }
+
+    /// Smallest ratio of mean |B| to mean |H| of any core, over mu_0.
+    fn least_secant(&self, core: &SaturatedCore, law: &impl Permeability) -> f64 {
+        let interior = core.interior();
+        self.state
+            .cores
+            .iter()
+            .flatten()
+            .map(|solution| {
+                let sum = |weight: &dyn Fn(f64) -> f64| {
+                    interior.integral(&solution.u_a, |at| {
+                        let h = at.h_a_per_m();
+                        h * weight(h)
+                    })
+                };
+                let b = sum(&|h| law.response(h).relative);
+                let h = sum(&|_| 1.0);
+                if h > 0.0 { b / h } else { f64::INFINITY }
+            })
+            .fold(law.response(0.0).relative, f64::min)
+    }
+
+    /// Largest difference of the gradients at a few heights, relative to the largest |grad B|
+    /// there, and of the flux.
+    fn difference(&self, other: &Self, lowest_m: f64, tolerance: f64) -> Result<f64, OnEdge> {
+        let shape = self.outline().shape;
+        let current_a = self.currents_a.iter().fold(0.0_f64, |m, i| m.max(i.abs()));
+        if current_a == 0.0 {
+            return Ok(0.0);
+        }
+        let distance_m = lowest_m - shape.top_m;
+        let sources =
+            |array: &Self| ArraySources::of_saturated(array, lowest_m, distance_m, 0.1 * tolerance);
+        let (fine, coarse) = (sources(self), sources(other));
+        let parts = Parts::Gradient;
+        let reach = self.winding.outer_radius_m;
+        let mut worst = 0.0_f64;
+        for height in [0.0, 1.0, 4.0] {
+            let z_m = lowest_m + height * shape.radius_m;
+            let points: Vec<[f64; 3]> = self
+                .positions_m
+                .iter()
+                .flat_map(|[x, y]| PLACES.map(|[dx, dy]| [x + reach * dx, y + reach * dy, z_m]))
+                .collect();
+            let mut values = vec![0.0; parts.count() * points.len()];
+            let mut others = values.clone();
+            fine.sample(&points, parts, &mut values);
+            coarse.sample(&points, parts, &mut others);
+            let air = current_a * self.winding.field(0.0, z_m)?.gradient_norm();
+            let size = values.iter().fold(0.0_f64, |m, v| m.max(v.abs())) + air;
+            worst = worst.max(farthest(&values, &others) / size);
+        }
+        let turns = self.winding.turns;
+        let least = 0.1 * MU_0_T_M_PER_A * turns * turns * self.winding.inner_radius_m * current_a;
+        let size = self
+            .flux_linkage_wb
+            .iter()
+            .fold(least, |m, f| m.max(f.abs()));
+        Ok(worst.max(farthest(&self.flux_linkage_wb, &other.flux_linkage_wb) / size))
+    }
+}
+
+/// The fixed point of one array.
+struct Problem<'a> {
+    setup: &'a Setup,
+    response: &'a Response,
+    coupling: &'a Coupling,
+    /// Linear layer of a core under its own winding, A/A.
+    own_layer: DVector<f64>,
+    /// Potential sent to every core by the other coils' windings, A.
+    windings: DMatrix<f64>,
+    currents_a: &'a [f64],
+    /// For every core the first one in the same state.
+    alike: Vec<usize>,
+}
+
+/// What the iteration ends with.
+struct Solved {
+    status: Status,
+    steps: Vec<f64>,
+    layers_a: Vec<DMatrix<f64>>,
+    moments: DMatrix<f64>,
+}
+
+impl Problem<'_> {
+    fn iterate(&self, state: &mut State, law: &(impl Permeability + Sync)) -> Solved {
+        let residual = self.setup.resolution.residual;
+        let (rings, cores) = state.sent_a.shape();
+        let scale = self.scale();
+        let mut anderson = Anderson::new(DEPTH);
+        let mut steps = Vec::new();
+        loop {
+            let layers = self.cores(state, law);
+            let corrections = self.corrections(&state.sent_a, &layers);
+            let mut own = DMatrix::zeros(self.response.size(), cores);
+            for (core, correction) in corrections.iter().enumerate() {
+                let layer = &self.own_layer * self.currents_a[core] + correction;
+                own.set_column(core, &self.response.on_grid(&layer));
+            }
+            let solved = self
+                .coupling
+                .solve(self.windings.clone(), &own, 0.1 * residual);
+            let modes: Vec<DMatrix<f64>> = solved
+                .potentials
+                .column_iter()
+                .map(|p| self.response.modes_of(p.into_owned().as_slice()))
+                .collect();
+            let axial: Vec<DVector<f64>> = modes.iter().map(|m| m.column(0).into_owned()).collect();
+            let image = DMatrix::from_columns(&axial);
+            // A potential's constant is no field.
+            let change = (0..cores)
+                .map(|core| {
+                    let change = image.column(core) - state.sent_a.column(core);
+                    change.add_scalar(-change.mean()).amax()
+                })
+                .fold(0.0, f64::max);
+            let relative = if scale > 0.0 { change / scale } else { change };
+            steps.push(relative);
+            let found = state
+                .cores
+                .iter()
+                .all(|c| c.as_ref().is_some_and(|c| c.status == Status::Converged));
+            let settled = relative <= SETTLED * residual;
+            if settled || steps.len() >= MOST_STEPS || !relative.is_finite() {
+                let layers_a = modes
+                    .iter()
+                    .zip(&corrections)
+                    .enumerate()
+                    .map(|(core, (modes, correction))| {
+                        let mut layers = self.response.layers_of(modes);
+                        let own = &self.own_layer * self.currents_a[core] + correction;
+                        layers.column_mut(0).axpy(1.0, &own, 1.0);
+                        layers
+                    })
+                    .collect();
+                return Solved {
+                    status: if settled && found {
+                        Status::Converged
+                    } else {
+                        Status::Stalled
+                    },
+                    steps,
+                    layers_a,
+                    moments: solved.moments,
+                };
+            }
+            let flat = |m: &DMatrix<f64>| DVector::from_column_slice(m.as_slice());
+            let next = anderson.next(&flat(&state.sent_a), flat(&image));
+            state.sent_a = DMatrix::from_column_slice(rings, cores, next.as_slice());
+        }
+    }
+
+    /// Largest potential on a core, of all coils' currents together: half its rise from end to
+    /// end.
+    fn scale(&self) -> f64 {
+        let own = &self.setup.excitation.potential;
+        let current_a = self.currents_a.iter().fold(0.0_f64, |m, i| m.max(i.abs()));
+        0.5 * current_a * (own.max() - own.min())
+    }
+
+    /// Layers of mode 0 of all cores, under their own windings and the potentials sent.
+    fn cores(&self, state: &mut State, law: &(impl Permeability + Sync)) -> Vec<DVector<f64>> {
+        let to_nodes = &self.response.exchange.to_nodes;
+        let found: Vec<Option<Solution>> = (0..self.alike.len())
+            .into_par_iter()
+            .map(|core| {
+                (self.alike[core] == core).then(|| {
+                    let phi = &self.setup.excitation.potential * self.currents_a[core]
+                        + to_nodes * state.sent_a.column(core);
+                    self.setup.core.solve(&phi, law, state.cores[core].as_ref())
+                })
+            })
+            .collect();
+        state.cores = self
+            .alike
+            .iter()
+            .map(|&first| found[first].clone())
+            .collect();
+        state
+            .cores
+            .iter()
+            .flatten()
+            .map(|solution| {
+                let shift = mean(&self.setup.outline, solution.v_a.iter());
+                solution.v_a.add_scalar(-shift)
+            })
+            .collect()
+    }
+
+    /// What the layers of mode 0 have beyond the linear ones.
+    fn corrections(&self, sent_a: &DMatrix<f64>, layers: &[DVector<f64>]) -> Vec<DVector<f64>> {
+        layers
+            .iter()
+            .enumerate()
+            .map(|(core, layer)| {
+                let linear = &self.response.layers[0] * sent_a.column(core);
+                layer - linear - &self.own_layer * self.currents_a[core]
+            })
+            .collect()
+    }
+}
+
+fn check(positions_m: &[[f64; 2]], currents_a: &[f64]) -> Result<(), SaturatedArrayError> {
+    if positions_m.len() == currents_a.len() {
+        Ok(())
+    } else {
+        Err(SaturatedArrayError::Currents {
+            currents: currents_a.len(),
+            coils: positions_m.len(),
+        })
+    }
+}
+
+/// For every coil the first one that a motion of the array, currents and all, brings it to.
+fn alike(positions_m: &[[f64; 2]], currents_a: &[f64]) -> Vec<usize> {
+    let kept: Vec<_> = motions(positions_m)
+        .into_iter()
+        .filter(|m| {
+            m.coil
+                .iter()
+                .zip(currents_a)
+                .all(|(&to, i)| currents_a[to] == *i)
+        })
+        .collect();
+    (0..positions_m.len())
+        .map(|coil| kept.iter().map(|m| m.coil[coil]).fold(coil, usize::min))
+        .collect()
+}
+
+fn farthest(a: &[f64], b: &[f64]) -> f64 {
+    a.iter()
+        .zip(b)
+        .fold(0.0, |m, (a, b)| f64::max(m, (a - b).abs()))
+}
