@@ -3,7 +3,7 @@
 //!
 //! The rooms, in the direction of their imports:
 //! `numerics` < `design` < `field` < `coil` < `map`; `shape` beside them;
-//! `lambda` on numbers alone; `bundle` writes and reads artefacts; `job` joins
+//! `lambda` on numbers alone; `bundle` writes and reads artefacts, `plot` draws; `job` joins
 //! them into what a command does; `cli` is the only room that talks.
 
 pub mod accuracy;
@@ -24,6 +24,7 @@ pub mod shape;
 pub mod lambda;
 
 pub mod bundle;
+pub mod plot;
 
 pub mod job;
 

@@ -14,6 +14,7 @@ pub mod npz;
 pub mod number;
 pub mod read_table;
 pub mod schema;
+pub mod sweep;
 pub mod table;
 pub mod vtk;
 pub mod write;

@@ -4,9 +4,10 @@ use schemars::{JsonSchema, schema_for};
 
 use super::lambda_file::LambdaFile;
 use super::manifest::{Manifest, MapSidecar};
+use super::sweep::{PlanFile, PointFile};
 
 /// The committed schemas: file name and text.
-pub const SCHEMAS: [(&str, &str); 3] = [
+pub const SCHEMAS: [(&str, &str); 5] = [
     (
         "manifest.schema.json",
         include_str!("schema/manifest.schema.json"),
@@ -16,15 +17,25 @@ pub const SCHEMAS: [(&str, &str); 3] = [
         "lambda.schema.json",
         include_str!("schema/lambda.schema.json"),
     ),
+    (
+        "sweep_plan.schema.json",
+        include_str!("schema/sweep_plan.schema.json"),
+    ),
+    (
+        "sweep_point.schema.json",
+        include_str!("schema/sweep_point.schema.json"),
+    ),
 ];
 
 /// The schemas as the structs have them now, in the order of [`SCHEMAS`].
 #[must_use]
-pub fn generated() -> [String; 3] {
+pub fn generated() -> [String; 5] {
     [
         text::<Manifest>(),
         text::<MapSidecar>(),
         text::<LambdaFile>(),
+        text::<PlanFile>(),
+        text::<PointFile>(),
     ]
 }
 

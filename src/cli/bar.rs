@@ -112,7 +112,8 @@ impl State {
             let done = stage.done.min(stage.total);
             bar.set_length(stage.total);
             bar.set_position(done);
-            bar.set_prefix(left(elapsed, done, stage.total));
+            let left = left(elapsed, done, stage.total);
+            bar.set_prefix(format!("{}{left}", rate(elapsed, done, stage.total)));
         }
         // Shown last: the first drawing is whole.
         if bar.is_hidden() {
@@ -126,6 +127,13 @@ impl State {
             bar.finish_and_clear();
         }
     }
+}
+
+/// How many of how many, and how many a second.
+fn rate(elapsed: Duration, done: u64, total: u64) -> String {
+    let a_second = done as f64 / elapsed.as_secs_f64().max(1e-3);
+    let digits = usize::from(a_second < 10.0);
+    format!(", {done} of {total}, {a_second:.digits$}/s")
 }
 
 /// The time left, if it goes on as it went.
@@ -143,7 +151,7 @@ fn left(elapsed: Duration, done: u64, total: u64) -> String {
 
 fn style(total: u64) -> ProgressStyle {
     let template = if total > 1 {
-        "{msg:20} [{bar:40}] {percent:>3} %{prefix}"
+        "{msg:20} [{bar:30}] {percent:>3} %{prefix}"
     } else {
         "{msg:20} {spinner} {elapsed}"
     };
@@ -206,6 +214,13 @@ mod tests {
         assert_eq!(names, ["inner", "outer"]);
         assert!(seconds[0].1 <= seconds[1].1);
         assert!(bar.take_seconds().is_empty());
+    }
+
+    #[test]
+    fn the_rate_is_per_second() {
+        let second = Duration::from_secs(1);
+        assert_eq!(rate(7 * second, 910, 10_000), ", 910 of 10000, 130/s");
+        assert_eq!(rate(10 * second, 13, 20), ", 13 of 20, 1.3/s");
     }
 
     #[test]

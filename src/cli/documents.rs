@@ -9,6 +9,7 @@ use super::printer::Printer;
 use super::values::{FileArgument, GridSize};
 use crate::bundle::artefact::Input;
 use crate::bundle::read_table::read_columns;
+use crate::bundle::sweep::PlanFile;
 use crate::design::{Design, Faults, InvalidDocument, Need, source};
 use crate::job::calibrate::ShapeSource;
 use crate::shape::document::{Placement, RawSurface, RawSurfaceError, ShapeDocument};
@@ -88,24 +89,40 @@ pub fn shapes(
 /// # Errors
 /// Every cell that is no number; a file that cannot be read.
 pub fn points(file: &FileArgument) -> Result<(Vec<[f64; 3]>, Input), Failure> {
-    let path = file.as_given();
-    let name = path.display().to_string();
-    let cannot = |error: io::Error| Failure::Input(format!("{name}: cannot be read: {error}"));
-    let bytes = if file.is_standard() {
-        let mut bytes = Vec::new();
-        io::stdin().lock().read_to_end(&mut bytes).map(|_| bytes)
-    } else if path.is_dir() {
-        let what = "expected a CSV table with columns x_m,y_m,z_m, found a directory";
-        return Err(Failure::Input(format!("{name}: {what}")));
-    } else {
-        std::fs::read(path)
-    }
-    .map_err(cannot)?;
+    let name = file.as_given().display().to_string();
+    let bytes = bytes_of(file, "a CSV table with columns x_m,y_m,z_m")?;
     let columns = read_columns(&name, bytes.as_slice(), &["x_m", "y_m", "z_m"])?;
     let points = (0..columns[0].len())
         .map(|row| [columns[0][row], columns[1][row], columns[2][row]])
         .collect();
     Ok((points, Input::of_bytes(name, &bytes)))
+}
+
+/// The plan of a sweep, and its entry among the inputs.
+///
+/// # Errors
+/// A file that cannot be read, that is no plan, or a plan that was edited.
+pub fn plan(file: &FileArgument) -> Result<(PlanFile, Input), Failure> {
+    let name = file.as_given().display().to_string();
+    let bytes = bytes_of(file, "the plan of a sweep")?;
+    let plan = PlanFile::parse(&name, &bytes).map_err(Failure::Input)?;
+    Ok((plan, Input::of_bytes(name, &bytes)))
+}
+
+/// The bytes of a file or of standard input; `what` was expected.
+fn bytes_of(file: &FileArgument, what: &str) -> Result<Vec<u8>, Failure> {
+    let path = file.as_given();
+    let name = path.display();
+    if file.is_standard() {
+        let mut bytes = Vec::new();
+        io::stdin().lock().read_to_end(&mut bytes).map(|_| bytes)
+    } else if path.is_dir() {
+        let message = format!("{name}: expected {what}, found a directory");
+        return Err(Failure::Input(message));
+    } else {
+        std::fs::read(path)
+    }
+    .map_err(|error| Failure::Input(format!("{name}: cannot be read: {error}")))
 }
 
 /// At most one of `files` may be standard input.

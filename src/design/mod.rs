@@ -10,6 +10,7 @@ pub mod reader;
 pub mod rule;
 pub(crate) mod sections;
 pub mod source;
+pub mod template;
 pub mod values;
 pub mod words;
 

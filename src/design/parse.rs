@@ -87,6 +87,19 @@ impl Design {
         })
     }
 
+    /// Whether every key of `text` is known and every value of its kind and within its bounds;
+    /// whether the parts fit together is not asked.
+    ///
+    /// # Errors
+    /// Every fault found.
+    pub fn check_keys(text: &str, path: &Path) -> Result<(), InvalidDocument> {
+        read_document(text, path, |root, _| {
+            Draft::read(root, Need::SWEEP);
+            Some(())
+        })
+        .map(|_| ())
+    }
+
     /// The design in the file `path`, as [`Design::from_toml`].
     ///
     /// # Errors

@@ -6,14 +6,14 @@ use serde::Serialize;
 
 use super::JobError;
 use super::neighbours::{self, ArrayFacts};
+use super::rated::Rated;
 use super::scene::Scene;
 use super::single::Single;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
-use crate::coil::limits::{self, LimitCheck};
+use crate::coil::limits::LimitCheck;
 use crate::coil::transient::{VoltageStep, core_energy_share};
 use crate::design::Design;
-use crate::units::STEEL_DENSITY_KG_PER_M3;
 
 /// What `evaluate` tells; all SI.
 #[derive(Debug, Clone, Serialize)]
@@ -157,32 +157,20 @@ pub fn evaluate(
 ) -> Result<Evaluation, JobError> {
     let scene = Scene::new(design)?;
     let height_m = design.target_height_m;
-    let current_a = scene.rated_current_a();
-    let mut single = Single::new(&scene, tolerance)?;
-    let mut circuit = scene.circuit;
-    circuit.inductance_h = single.inductance_h;
-    let power_w = circuit.power_w(current_a);
-    let steel_kg = scene
-        .core
-        .as_ref()
-        .map_or(0.0, |core| core.shape.volume_m3() * STEEL_DENSITY_KG_PER_M3);
-    let mass_kg = circuit.wire_mass_kg + steel_kg;
-    let force = single.force(&scene, current_a)?;
+    let Rated {
+        single,
+        circuit,
+        current_a,
+        power_w,
+        mass_kg,
+        force,
+        limits,
+        accuracy_reached,
+    } = Rated::new(&scene, tolerance)?;
     let mut accuracy = single.accuracy.clone();
     let mut notes = single.notes.clone();
     let array = neighbours::array(&scene, &mut accuracy, &mut notes)?;
     let transient = transient(&scene, &single, &mut accuracy);
-    let asked = single.tolerance;
-    let worst = accuracy["field"]
-        .estimate
-        .max(accuracy["inductance"].estimate);
-    let checks = limits::check(
-        design,
-        &circuit,
-        power_w,
-        mass_kg,
-        single.core.as_ref().map(|core| core.peak_field_t),
-    );
     Ok(Evaluation {
         schema_version: SCHEMA_VERSION,
         fluxform_version: FLUXFORM_VERSION,
@@ -214,10 +202,10 @@ pub fn evaluate(
         },
         core: single.core,
         transient,
-        limits: checks,
+        limits,
         array,
         accuracy,
-        accuracy_reached: worst <= asked,
+        accuracy_reached,
         notes,
     })
 }

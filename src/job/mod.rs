@@ -10,9 +10,11 @@ pub mod maps;
 pub mod neighbours;
 pub mod passive;
 pub mod probe;
+mod rated;
 pub mod scene;
 pub mod single;
 pub mod steel;
+pub mod sweep;
 pub mod verify;
 pub mod working_point;
 
@@ -53,6 +55,9 @@ pub enum JobError {
     /// An artefact was not written.
     #[error(transparent)]
     Write(#[from] WriteError),
+    /// Results of a sweep that are missing or belong to another one.
+    #[error("{0}")]
+    Sweep(String),
     /// A bundle cannot be used.
     #[error(transparent)]
     Bundle(#[from] BundleError),
@@ -77,7 +82,7 @@ impl JobError {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Interrupted(_) => 130,
-            Self::Write(_) => 4,
+            Self::Write(_) | Self::Sweep(_) => 4,
             Self::Bundle(BundleError::NoBundle { .. } | BundleError::Schema { .. }) => 3,
             Self::Bundle(_) => 5,
             _ => 3,

@@ -26,11 +26,12 @@ const ROOMS: &[(&str, &[&str])] = &[
     ),
     ("lambda", &["units", "progress", "accuracy", "numerics"]),
     ("bundle", &["units", "accuracy", "numerics"]),
+    ("plot", &[]),
     (
         "job",
         &[
             "units", "progress", "accuracy", "numerics", "design", "field", "coil", "map", "shape",
-            "lambda", "bundle",
+            "lambda", "bundle", "plot",
         ],
     ),
     (

@@ -97,6 +97,11 @@ const POWERS: &[Power] = &[
         marks: &["clap", "clap_complete", "clap_mangen"],
         holders: &["cli/"],
     },
+    Power {
+        name: "the plotting crate",
+        marks: &["kuva"],
+        holders: &["plot/"],
+    },
 ];
 
 fn covers(holder: &str, path: &str) -> bool {

@@ -3,6 +3,7 @@
 //! A file is written beside its target under a temporary name, fsynced, renamed into place, and
 //! its folder fsynced: it is whole or absent whenever the program ends. [`FileSet`] does that for
 //! a file and its sidecar, [`FolderDraft`] for a whole folder (see there for the scheme).
+//! [`write_unforced`] leaves out the fsyncs, for files whose reader recognises a torn one.
 //! Temporary names are `.fluxform-*.tmp`; their writer holds a lock on them, so that the next run
 //! can tell a killed run's leftovers ([`clean_leftovers`]) from another run's work.
 //!
@@ -12,6 +13,7 @@ mod file;
 mod folder;
 mod leftovers;
 mod overwrite;
+mod unforced;
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -22,6 +24,7 @@ pub use folder::FolderDraft;
 pub(crate) use folder::check_name;
 pub use leftovers::clean_leftovers;
 pub use overwrite::{Overwrite, Record};
+pub use unforced::write_unforced;
 
 /// What was written: size and digest of the bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -8,6 +8,7 @@ pub mod lambda;
 pub mod man;
 pub mod map;
 pub mod probe;
+pub mod sweep;
 pub mod verify;
 
 mod describe;

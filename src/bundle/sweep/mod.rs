@@ -1,0 +1,11 @@
+//! The files of a sweep: the plan, one small file a point, the table.
+
+mod plan;
+mod point;
+mod store;
+mod table;
+
+pub use plan::{Axis, Mode, PlanFile, Value};
+pub use point::{PointFile, Row, Status};
+pub use store::{Found, PointStore};
+pub use table::{ROW_COLUMNS, TableWriter};

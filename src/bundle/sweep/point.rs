@@ -1,0 +1,193 @@
+//! A point's file: its row, whose it is, and a checksum.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::bundle::artefact::{FLUXFORM_VERSION, SCHEMA_VERSION, sha256_hex};
+use crate::bundle::json::{JsonError, to_json};
+
+/// How a point ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// Computed to the tolerance.
+    Done,
+    /// Computed, but not to the tolerance.
+    AccuracyNotReached,
+    /// The design cannot be computed; the message says why.
+    Failed,
+}
+
+impl Status {
+    /// As files tell it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Done => "done",
+            Self::AccuracyNotReached => "accuracy_not_reached",
+            Self::Failed => "failed",
+        }
+    }
+}
+
+/// What is tabulated of one design: one coil alone at its rated current, SI.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Row {
+    /// Number of turns.
+    pub turns: f64,
+    /// Resistance at the wire's temperature.
+    pub resistance_ohm: f64,
+    /// Self inductance; with a B-H curve the flux linkage over the current.
+    pub inductance_h: f64,
+    /// Five time constants.
+    pub settling_s: f64,
+    /// Heat.
+    pub power_w: f64,
+    /// Mass of wire and core.
+    pub mass_kg: f64,
+    /// Length of wire.
+    pub wire_length_m: f64,
+    /// The rated current.
+    pub current_a: f64,
+    /// dB_z/dz at the target.
+    pub gradient_t_per_m_per_a: f64,
+    /// Upward force on the magnet at the target.
+    pub force_n: f64,
+    /// Largest |B| in the core; null for air coils.
+    pub core_peak_field_t: Option<f64>,
+    /// Whether the design's limits are met.
+    pub limits_met: bool,
+}
+
+/// A point's file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PointFile {
+    /// Layout, `major.minor.patch`.
+    pub schema_version: String,
+    /// Program that computed it.
+    pub fluxform_version: String,
+    /// The plan it belongs to.
+    pub plan_sha256: String,
+    /// Which point of the plan, from 0.
+    pub index: u64,
+    /// How it ended.
+    pub status: Status,
+    /// Why it failed.
+    pub message: Option<String>,
+    /// Absent where it failed.
+    pub row: Option<Row>,
+    /// Digest of this file with this value empty, as compact JSON: a torn file is recognised.
+    pub point_sha256: String,
+}
+
+/// What every point's file begins with.
+const OPENING: &[u8] = b"{\n  \"schema_version\": \"";
+
+impl PointFile {
+    /// A sealed point.
+    #[must_use]
+    pub fn new(plan_sha256: &str, index: u64, outcome: Result<(Row, Status), String>) -> Self {
+        let (row, status, message) = match outcome {
+            Ok((row, status)) => (Some(row), status, None),
+            Err(message) => (None, Status::Failed, Some(message)),
+        };
+        let mut point = Self {
+            schema_version: SCHEMA_VERSION.to_owned(),
+            fluxform_version: FLUXFORM_VERSION.to_owned(),
+            plan_sha256: plan_sha256.to_owned(),
+            index,
+            status,
+            message,
+            row,
+            point_sha256: String::new(),
+        };
+        point.point_sha256 = point.digest();
+        point
+    }
+
+    /// The file's bytes.
+    ///
+    /// # Errors
+    /// A number that is none.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, JsonError> {
+        to_json(self)
+    }
+
+    /// The point in `bytes`; `None` where they are no whole point.
+    #[must_use]
+    pub fn parse(bytes: &[u8]) -> Option<Self> {
+        let point: Self = serde_json::from_slice(bytes).ok()?;
+        let whole = point.digest() == point.point_sha256;
+        let told = (point.status == Status::Failed) == point.row.is_none();
+        (whole && told).then_some(point)
+    }
+
+    /// Whether `bytes`, which are no whole point, may be what a lost system left of one: empty,
+    /// zeros, or a beginning of ours.
+    #[must_use]
+    pub fn is_torn(bytes: &[u8]) -> bool {
+        let common = bytes.len().min(OPENING.len());
+        bytes[..common] == OPENING[..common] || bytes.iter().all(|byte| *byte == 0)
+    }
+
+    fn digest(&self) -> String {
+        let open = Self {
+            point_sha256: String::new(),
+            ..self.clone()
+        };
+        sha256_hex(&serde_json::to_vec(&open).unwrap_or_default())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point() -> PointFile {
+        let row = Row {
+            turns: 1428.571_428_571_4,
+            resistance_ohm: 0.1 + 0.2,
+            inductance_h: 5e-324,
+            settling_s: 0.011_9,
+            power_w: 7.0,
+            mass_kg: 0.3,
+            wire_length_m: 13.0,
+            current_a: 2.0,
+            gradient_t_per_m_per_a: -0.7,
+            force_n: 0.099_709,
+            core_peak_field_t: None,
+            limits_met: true,
+        };
+        PointFile::new("abc", 7, Ok((row, Status::Done)))
+    }
+
+    #[test]
+    fn a_point_is_read_back_to_the_bit_and_any_cut_or_change_is_seen() {
+        let bytes = point().to_bytes().unwrap();
+        assert_eq!(PointFile::parse(&bytes), Some(point()));
+        // The final newline alone may go: nothing is lost with it.
+        for cut in 0..bytes.len() - 1 {
+            assert_eq!(PointFile::parse(&bytes[..cut]), None, "{cut}");
+            assert!(PointFile::is_torn(&bytes[..cut]));
+        }
+        let text = String::from_utf8(bytes).unwrap();
+        for (from, to) in [
+            ("1428", "1429"),
+            ("\"index\": 7", "\"index\": 8"),
+            ("done", "failed"),
+        ] {
+            assert_eq!(PointFile::parse(text.replace(from, to).as_bytes()), None);
+        }
+        assert!(PointFile::is_torn(&[0; 700]));
+        assert!(!PointFile::is_torn(b"precious"));
+    }
+
+    #[test]
+    fn a_number_that_is_none_is_no_file() {
+        let mut row = point().row.unwrap();
+        row.force_n = f64::NAN;
+        let error = PointFile::new("abc", 7, Ok((row, Status::Done))).to_bytes();
+        assert!(error.unwrap_err().to_string().contains("row.force_n"));
+    }
+}

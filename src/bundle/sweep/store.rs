@@ -1,0 +1,147 @@
+//! The folder of a sweep: `plan.json`, and `points/000/000123.json`, a thousand to a folder.
+//!
+//! A point's file is renamed into place but not forced to the disk: when the system is lost the
+//! last seconds' points may be empty or cut short, which their checksum shows, and they are
+//! computed again. Forcing each one would take longer than computing it.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::{PlanFile, PointFile};
+use crate::bundle::artefact::FLUXFORM_VERSION;
+use crate::bundle::atomic::{Overwrite, WriteError, clean_leftovers, write_unforced};
+use crate::bundle::json::JsonError;
+use crate::bundle::write::write_json;
+
+/// Points in one folder.
+const FOLDER: u64 = 1000;
+
+/// A sweep's folder.
+#[derive(Debug, Clone)]
+pub struct PointStore {
+    folder: PathBuf,
+}
+
+/// What stands where a point's file belongs.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Found {
+    /// The point, by this version of the program.
+    Point(Box<PointFile>),
+    /// Nothing, a torn file, or the point by another version.
+    Nothing,
+    /// Something else: not ours, or of another plan. The text says which.
+    Foreign(String),
+}
+
+impl PointStore {
+    /// The store in `folder`, which may not exist yet.
+    #[must_use]
+    pub fn new(folder: &Path) -> Self {
+        Self {
+            folder: folder.to_path_buf(),
+        }
+    }
+
+    /// The file of point `index`.
+    #[must_use]
+    pub fn path(&self, index: u64) -> PathBuf {
+        self.subfolder(index).join(name(index))
+    }
+
+    fn subfolder(&self, index: u64) -> PathBuf {
+        let folder = format!("{:03}", index / FOLDER);
+        self.folder.join("points").join(folder)
+    }
+
+    /// Makes the folder this plan's: writes `plan.json` into it and removes what killed runs left
+    /// beside the points `indices`.
+    ///
+    /// # Errors
+    /// [`WriteError`]; also when the folder belongs to another plan and `force` is not given.
+    pub fn claim(
+        &self,
+        plan: &PlanFile,
+        force: bool,
+        indices: std::ops::Range<u64>,
+    ) -> Result<(), WriteError> {
+        let path = self.folder.join("plan.json");
+        let found = std::fs::read(&path).ok();
+        let ours = found
+            .as_deref()
+            .and_then(|bytes| PlanFile::parse("", bytes).ok())
+            .is_some_and(|found| found.plan_sha256 == plan.plan_sha256);
+        if found.is_some() && !ours && !force {
+            return Err(WriteError::OutputExists {
+                path,
+                reason: "and is another plan: the folder holds another sweep".to_owned(),
+            });
+        }
+        if !ours {
+            write_json(&path, &Overwrite::Force, plan)?;
+        }
+        if !indices.is_empty() {
+            for folder in indices.start / FOLDER..=(indices.end - 1) / FOLDER {
+                clean_leftovers(&self.subfolder(folder * FOLDER));
+            }
+        }
+        Ok(())
+    }
+
+    /// What stands where point `index` of the plan with this digest belongs.
+    ///
+    /// # Errors
+    /// A file that is there and cannot be read.
+    pub fn find(&self, plan_sha256: &str, index: u64) -> Result<Found, WriteError> {
+        let path = self.path(index);
+        let bytes = match std::fs::read(&path) {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Found::Nothing),
+            Err(error) => return Err(WriteError::from_io("read", &path, error)),
+        };
+        Ok(match PointFile::parse(&bytes) {
+            Some(point) if point.plan_sha256 != plan_sha256 => {
+                Found::Foreign("and belongs to another plan".to_owned())
+            }
+            Some(point) if point.index != index => {
+                Found::Foreign(format!("and is point {} of the plan", point.index))
+            }
+            Some(point) if point.fluxform_version != FLUXFORM_VERSION => Found::Nothing,
+            Some(point) => Found::Point(Box::new(point)),
+            None if PointFile::is_torn(&bytes) => Found::Nothing,
+            None => Found::Foreign("and is no point of a sweep".to_owned()),
+        })
+    }
+
+    /// Writes a point; whatever is there is replaced.
+    ///
+    /// # Errors
+    /// [`WriteError`]; a number that is none is [`WriteError::Content`].
+    pub fn write(&self, point: &PointFile) -> Result<(), WriteError> {
+        let bytes = point.to_bytes().map_err(|error: JsonError| {
+            let path = self.path(point.index);
+            WriteError::Content {
+                path,
+                message: error.to_string(),
+            }
+        })?;
+        write_unforced(&self.subfolder(point.index), &name(point.index), &bytes)
+    }
+}
+
+fn name(index: u64) -> String {
+    format!("{index:06}.json")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thousand_points_to_a_folder() {
+        let store = PointStore::new(Path::new("out"));
+        let path = |index| store.path(index).display().to_string();
+        assert_eq!(path(0), "out/points/000/000000.json");
+        assert_eq!(path(123_456), "out/points/123/123456.json");
+        assert_eq!(path(9_999_999), "out/points/9999/9999999.json");
+    }
+}

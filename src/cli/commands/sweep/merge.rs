@@ -1,0 +1,150 @@
+//! `sweep merge`: a plan's points as one table and one plot.
+
+use clap::Args;
+use serde::Serialize;
+
+use crate::cli::args::Writing;
+use crate::cli::commands::{begin, folder};
+use crate::cli::documents;
+use crate::cli::failure::Failure;
+use crate::cli::help::{Codes, page};
+use crate::cli::layout::Sheet;
+use crate::cli::printer::{Place, Printer};
+use crate::cli::quantity::{bytes, count, force};
+use crate::cli::values::FileArgument;
+use crate::job::sweep::merge::{
+    MergeFiles, MergeReport, MergeRequest, MergeSummary, merge, merge_table,
+};
+
+/// Join the points of a plan into one table, and plot the best designs
+///
+/// Writes one row a point, in the order of the plan, to a CSV table; beside it NAME.svg, force
+/// against resistance, mass and settling time with the designs that no other one beats,
+/// NAME_pareto.csv with those designs, and NAME.json. The best are chosen among the designs that
+/// meet their limits, if any does. Missing points are named and end with exit code 4 and no table,
+/// unless --partial asks for what there is: then the exit code is 0 and the missing are told as a
+/// warning. Points of another plan are refused.
+#[derive(Debug, Args)]
+#[command(after_help = page(Codes::Writing, &[
+    ("fluxform sweep merge wires.json wires --out wires.csv", "all points of one folder"),
+    ("fluxform sweep merge limits.json here there --partial --out - > limits.csv",
+     "what there is so far, from two folders"),
+]))]
+pub struct Merge {
+    /// Plan (JSON), `-` for standard input
+    #[arg(value_name = "PLAN")]
+    plan: FileArgument,
+    /// Folders that `sweep run` wrote to
+    #[arg(value_name = "DIR", required = true)]
+    folders: Vec<FileArgument>,
+    /// Where the table goes; `-` is standard output, and then there is no plot
+    #[arg(long, value_name = "FILE", default_value = "sweep.csv")]
+    out: FileArgument,
+    /// Merge what there is, even if points are missing
+    #[arg(long)]
+    partial: bool,
+    #[command(flatten)]
+    writing: Writing,
+}
+
+#[derive(Serialize)]
+struct Told<'a> {
+    #[serde(flatten)]
+    summary: &'a MergeSummary,
+    table: String,
+}
+
+impl Merge {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
+        let request = MergeRequest {
+            folders: self.folders.iter().map(folder).collect::<Result<_, _>>()?,
+            partial: self.partial,
+        };
+        let (plan, input) = documents::plan(&self.plan)?;
+        let (report, place) = match &self.out {
+            FileArgument::Standard => {
+                let bar = begin(printer);
+                let (table, report) = merge_table(&plan, input, &request, &bar)?;
+                drop(bar);
+                printer.data(|out| out.write_all(&table))?;
+                (report, Place::Error)
+            }
+            FileArgument::Path(path) => {
+                let ending = path.extension().unwrap_or_default();
+                if ending == "json" || ending == "svg" {
+                    return Err(Failure::Usage(format!(
+                        "--out {}: expected the name of the table, like sweep.csv; the plot and \
+                         the sidecar get its name with .svg and .json",
+                        path.display()
+                    )));
+                }
+                let files = MergeFiles {
+                    table: path.clone(),
+                    force: self.writing.force,
+                };
+                let bar = begin(printer);
+                let report = merge(&plan, input, &request, &files, &bar)?;
+                drop(bar);
+                (report, Place::Output)
+            }
+        };
+        if report.summary.missing > 0 {
+            printer.warning(&format!(
+                "{} of {} points are missing: {}",
+                report.summary.missing, report.summary.points, report.missing
+            ));
+        }
+        let json = Told {
+            summary: &report.summary,
+            table: self.out.as_given().display().to_string(),
+        };
+        let json = printer.with_warnings(&json);
+        printer.summary(place, &json, || self.told(&report))
+    }
+
+    fn told(&self, report: &MergeReport) -> String {
+        let summary = &report.summary;
+        let rows = count(summary.rows as usize, "design");
+        let mut sheet = Sheet::new(&format!("{}: a sweep of {rows}", summary.design));
+        let mut line = format!("{} meet their limits", summary.limits_met);
+        if summary.failed > 0 {
+            line += &format!(", {} cannot be computed", summary.failed);
+        }
+        if summary.inaccurate > 0 {
+            line += &format!(", {} miss the accuracy asked for", summary.inaccurate);
+        }
+        sheet.line("designs", &line);
+        if let Some(largest_n) = summary.largest_force_n {
+            let among = if summary.front_meets_limits {
+                "those that meet their limits"
+            } else {
+                "all, because none meets its limits"
+            };
+            sheet.line(
+                "best",
+                &format!(
+                    "{} on the fronts among {among}; largest force {} of all",
+                    summary.front,
+                    force(largest_n)
+                ),
+            );
+        }
+        if let FileArgument::Path(path) = &self.out {
+            let files: Vec<String> = summary
+                .files
+                .iter()
+                .map(|file| format!("{} ({})", file.path, bytes(file.bytes)))
+                .collect();
+            let folder = path
+                .parent()
+                .filter(|folder| !folder.as_os_str().is_empty());
+            let folder = folder.map_or(".".to_owned(), |folder| folder.display().to_string());
+            sheet.line("written to", &format!("{folder}: {}", files.join(", ")));
+        }
+        sheet.finish()
+    }
+}

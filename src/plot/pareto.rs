@@ -1,0 +1,228 @@
+//! Gain against three costs, one panel each, with the front that no other point beats.
+
+use std::collections::HashSet;
+
+use kuva::backend::svg::SvgBackend;
+use kuva::plot::{LegendEntry, LegendShape, LinePlot, ScatterPlot};
+use kuva::render::figure::Figure;
+use kuva::render::layout::Layout;
+use kuva::render::plots::Plot;
+
+/// A panel's size, px.
+const PANEL_PX: [f64; 2] = [400.0, 380.0];
+/// Cells of a panel along x and y: of the points of one kind that fall into a cell only the first
+/// is drawn, so that ten million points are no larger a picture than ten thousand.
+const CELLS: [f64; 2] = [240.0, 180.0];
+/// Colours that stay apart for the colour-blind and in print.
+const MET: &str = "#0072b2";
+const UNMET: &str = "#b5b5b5";
+const FRONT: &str = "#d55e00";
+
+/// A cost, held against the gain.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Panel {
+    /// Name of the cost.
+    pub name: &'static str,
+    /// Its SI unit.
+    pub unit: &'static str,
+    /// One value a point.
+    pub values: Vec<f64>,
+    /// Positions of the points on the front, ascending in cost.
+    pub front: Vec<usize>,
+}
+
+/// Points with one gain and three costs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParetoPlot {
+    /// Above all panels.
+    pub title: String,
+    /// Name of the gain.
+    pub gain: &'static str,
+    /// Its SI unit.
+    pub gain_unit: &'static str,
+    /// One value a point.
+    pub gains: Vec<f64>,
+    /// Whether a point meets its limits.
+    pub limits_met: Vec<bool>,
+    /// What the front's points are.
+    pub front: &'static str,
+    /// The costs.
+    pub panels: [Panel; 3],
+}
+
+impl ParetoPlot {
+    /// The drawing.
+    #[must_use]
+    pub fn svg(&self) -> String {
+        let (factor, unit) = readable(&self.gains, self.gain_unit);
+        let gains: Vec<f64> = self.gains.iter().map(|gain| gain * factor).collect();
+        let label = format!("{} / {unit}", self.gain);
+        let mut cells = Vec::new();
+        let mut layouts = Vec::new();
+        for panel in &self.panels {
+            let (plots, layout) = self.panel(panel, &gains);
+            cells.push(plots);
+            layouts.push(layout.with_y_label(label.clone()));
+        }
+        let figure = Figure::new(1, 3)
+            .with_title(self.title.clone())
+            .with_cell_size(PANEL_PX[0], PANEL_PX[1])
+            .with_plots(cells)
+            .with_layouts(layouts)
+            .with_shared_legend_bottom()
+            .with_shared_legend_entries(self.legend());
+        SvgBackend::default().render_scene(&figure.render())
+    }
+
+    fn panel(&self, panel: &Panel, gains: &[f64]) -> (Vec<Plot>, Layout) {
+        let (factor, unit) = readable(&panel.values, panel.unit);
+        let costs: Vec<f64> = panel.values.iter().map(|value| value * factor).collect();
+        let (x, y) = (extent(&costs), extent(gains));
+        let cloud = |met: bool, colour: &str| {
+            let points = (0..costs.len()).filter(|at| self.limits_met[*at] == met);
+            let points: Vec<(f64, f64)> = points.map(|at| (costs[at], gains[at])).collect();
+            ScatterPlot::new()
+                .with_data(thinned(&points, x, y))
+                .with_color(colour)
+                .with_size(2.0)
+        };
+        let front: Vec<(f64, f64)> = panel
+            .front
+            .iter()
+            .map(|&at| (costs[at], gains[at]))
+            .collect();
+        let plots = vec![
+            Plot::Scatter(cloud(false, UNMET)),
+            Plot::Scatter(cloud(true, MET)),
+            Plot::Line(LinePlot::new().with_data(front.clone()).with_color(FRONT)),
+            Plot::Scatter(
+                ScatterPlot::new()
+                    .with_data(front)
+                    .with_color(FRONT)
+                    .with_size(3.0),
+            ),
+        ];
+        let layout = Layout::new(x, y)
+            .with_x_label(format!("{} / {unit}", panel.name))
+            .with_ticks(5);
+        (plots, layout)
+    }
+
+    fn legend(&self) -> Vec<LegendEntry> {
+        let entry = |label: &str, colour: &str| LegendEntry {
+            label: label.to_owned(),
+            color: colour.to_owned(),
+            shape: LegendShape::Circle,
+            dasharray: None,
+        };
+        vec![
+            entry("meets its limits", MET),
+            entry("does not", UNMET),
+            entry(self.front, FRONT),
+        ]
+    }
+}
+
+/// The factor and the unit that make the largest value readable.
+fn readable(values: &[f64], unit: &str) -> (f64, String) {
+    let size = |most: f64, value: &f64| most.max(value.abs());
+    let largest = values.iter().fold(0.0, size);
+    match unit {
+        _ if largest >= 1.0 || largest == 0.0 => (1.0, unit.to_owned()),
+        "kg" if largest >= 1e-3 => (1e3, "g".to_owned()),
+        "kg" => (1e6, "mg".to_owned()),
+        _ if largest >= 1e-3 => (1e3, format!("m{unit}")),
+        _ => (1e6, format!("u{unit}")),
+    }
+}
+
+/// The range of an axis, with room at both ends.
+fn extent(values: &[f64]) -> (f64, f64) {
+    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if low > high {
+        return (0.0, 1.0);
+    }
+    let room = if high > low {
+        0.05 * (high - low)
+    } else {
+        0.1 * high.abs().max(1e-12)
+    };
+    (low - room, high + room)
+}
+
+/// The first point in each cell.
+fn thinned(points: &[(f64, f64)], x: (f64, f64), y: (f64, f64)) -> Vec<(f64, f64)> {
+    let cell = |value: f64, (low, high): (f64, f64), cells: f64| {
+        ((value - low) / (high - low) * cells).floor() as i64
+    };
+    let mut taken = HashSet::new();
+    let first = |point: &&(f64, f64)| {
+        taken.insert((cell(point.0, x, CELLS[0]), cell(point.1, y, CELLS[1])))
+    };
+    points.iter().filter(first).copied().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn drawing(count: usize) -> ParetoPlot {
+        let values = |scale: f64| {
+            (0..count)
+                .map(|i| scale * (1.3 + (0.7 * i as f64).sin()))
+                .collect()
+        };
+        let panel = |name, unit, scale| Panel {
+            name,
+            unit,
+            values: values(scale),
+            front: (0..count.min(3)).collect(),
+        };
+        ParetoPlot {
+            title: "a: designs".to_owned(),
+            gain: "force",
+            gain_unit: "N",
+            gains: values(0.07),
+            limits_met: (0..count).map(|i| i % 3 != 0).collect(),
+            front: "best",
+            panels: [
+                panel("resistance", "ohm", 7.0),
+                panel("mass", "kg", 0.3),
+                panel("settling time", "s", 1e-5),
+            ],
+        }
+    }
+
+    #[test]
+    fn axes_carry_units_that_suit_their_values() {
+        let svg = drawing(30).svg();
+        for label in [
+            "force / mN",
+            "resistance / ohm",
+            "mass / g",
+            "settling time / us",
+            "best",
+        ] {
+            assert!(svg.contains(label), "{label}");
+        }
+        assert_eq!(svg, drawing(30).svg());
+    }
+
+    #[test]
+    fn few_points_and_many_are_drawn() {
+        for count in [0, 1, 2] {
+            let svg = drawing(count).svg();
+            assert!(
+                svg.ends_with("</svg>") && !svg.contains("NaN"),
+                "{count}: {svg}"
+            );
+        }
+        let mut same = drawing(7);
+        same.gains = vec![0.7; 7];
+        assert!(!same.svg().contains("NaN"));
+        let circles = |svg: &str| svg.matches("<circle").count();
+        let many = circles(&drawing(200_000).svg());
+        assert!(many < 20_000, "{many}");
+    }
+}
