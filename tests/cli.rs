@@ -13,3 +13,5 @@ mod messages;
 mod streams;
 #[path = "cli/support.rs"]
 mod support;
+#[path = "cli/sweep.rs"]
+mod sweep;

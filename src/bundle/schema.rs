@@ -4,10 +4,10 @@ use schemars::{JsonSchema, schema_for};
 
 use super::lambda_file::LambdaFile;
 use super::manifest::{Manifest, MapSidecar};
-use super::sweep::{PlanFile, PointFile};
+use super::sweep::{MergeSummary, PlanFile, PointFile};
 
 /// The committed schemas: file name and text.
-pub const SCHEMAS: [(&str, &str); 5] = [
+pub const SCHEMAS: [(&str, &str); 6] = [
     (
         "manifest.schema.json",
         include_str!("schema/manifest.schema.json"),
@@ -25,17 +25,22 @@ pub const SCHEMAS: [(&str, &str); 5] = [
         "sweep_point.schema.json",
         include_str!("schema/sweep_point.schema.json"),
     ),
+    (
+        "sweep.schema.json",
+        include_str!("schema/sweep.schema.json"),
+    ),
 ];
 
 /// The schemas as the structs have them now, in the order of [`SCHEMAS`].
 #[must_use]
-pub fn generated() -> [String; 5] {
+pub fn generated() -> [String; 6] {
     [
         text::<Manifest>(),
         text::<MapSidecar>(),
         text::<LambdaFile>(),
         text::<PlanFile>(),
         text::<PointFile>(),
+        text::<MergeSummary>(),
     ]
 }
 

@@ -148,7 +148,9 @@ fn extent(values: &[f64]) -> (f64, f64) {
     } else {
         0.1 * high.abs().max(1e-12)
     };
-    (low - room, high + room)
+    let below = low - room;
+    // Nothing negative is shown where nothing is.
+    (if low >= 0.0 { below.max(0.0) } else { below }, high + room)
 }
 
 /// The first point in each cell.

@@ -2,7 +2,7 @@
 
 use crate::support::Place;
 
-const COMMANDS: [&str; 9] = [
+const COMMANDS: [&str; 10] = [
     "evaluate",
     "probe",
     "map",
@@ -10,6 +10,7 @@ const COMMANDS: [&str; 9] = [
     "lambda",
     "calibrate",
     "verify",
+    "sweep",
     "completions",
     "man",
 ];

@@ -101,7 +101,7 @@ impl FileSet {
         self.overwrite.check(&target)?;
         // A link is followed: the file it leads to is replaced, not the link.
         let target = target.canonicalize().unwrap_or(target);
-        let beside = target.parent().unwrap_or(&self.folder);
+        let beside = beside(&target, &self.folder);
         let fail = |error| WriteError::from_io("write", &target, error);
         let mut file = temporary_file(beside).map_err(fail)?;
         let written = fill(file.as_file_mut(), content)
@@ -120,7 +120,7 @@ impl FileSet {
         for (file, target) in self.staged.into_iter().rev() {
             file.persist(&target)
                 .map_err(|error| WriteError::from_io("write", &target, error.error))?;
-            let folder = target.parent().unwrap_or(&self.folder).to_path_buf();
+            let folder = beside(&target, &self.folder).to_path_buf();
             if !folders.contains(&folder) {
                 folders.push(folder);
             }
@@ -129,6 +129,14 @@ impl FileSet {
             sync_folder(&folder).map_err(|error| WriteError::from_io("write", &folder, error))?;
         }
         Ok(())
+    }
+}
+
+/// The folder of `target`; `folder` for a bare name, which has none of its own.
+fn beside<'a>(target: &'a Path, folder: &'a Path) -> &'a Path {
+    match target.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => folder,
     }
 }
 

@@ -3,9 +3,11 @@
 mod plan;
 mod point;
 mod store;
+mod summary;
 mod table;
 
 pub use plan::{Axis, Mode, PlanFile, Value};
 pub use point::{PointFile, Row, Status};
 pub use store::{Found, PointStore};
+pub use summary::MergeSummary;
 pub use table::{ROW_COLUMNS, TableWriter};

@@ -5,14 +5,12 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::Serialize;
 
 use super::front::front;
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION};
 use crate::bundle::atomic::{FileSet, Overwrite, WriteError, Written};
 use crate::bundle::json::to_json;
-use crate::bundle::sweep::{Found, PlanFile, PointFile, PointStore, TableWriter};
+use crate::bundle::sweep::{Found, MergeSummary, PlanFile, PointFile, PointStore, TableWriter};
 use crate::job::JobError;
 use crate::plot::pareto::{Panel, ParetoPlot};
 use crate::progress::Progress;
@@ -44,41 +42,6 @@ pub struct MergeFiles {
     pub table: PathBuf,
     /// Replace what is there.
     pub force: bool,
-}
-
-/// `sweep.json` beside the table.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct MergeSummary {
-    /// Layout, `major.minor.patch`.
-    pub schema_version: &'static str,
-    /// Program that wrote it.
-    pub fluxform_version: &'static str,
-    /// Name of the design.
-    pub design: String,
-    /// The plan, then the plan's own inputs.
-    pub inputs: Vec<Input>,
-    /// Digest that the plan carries.
-    pub plan_sha256: String,
-    /// Designs of the plan.
-    pub points: u64,
-    /// Rows of the table.
-    pub rows: u64,
-    /// Points that were missing.
-    pub missing: u64,
-    /// Rows of designs that cannot be computed.
-    pub failed: u64,
-    /// Rows whose accuracy is not the one asked for.
-    pub inaccurate: u64,
-    /// Designs that meet all their limits.
-    pub limits_met: u64,
-    /// Whether the fronts are among those alone; where none meets them, among all.
-    pub front_meets_limits: bool,
-    /// Designs on a front.
-    pub front: u64,
-    /// The designs' largest force, N; absent where there is none.
-    pub largest_force_n: Option<f64>,
-    /// Table, plot and front.
-    pub files: Vec<FileEntry>,
 }
 
 /// A merged sweep.
@@ -384,8 +347,8 @@ fn summary(plan: &PlanFile, plan_input: Input) -> MergeSummary {
     let mut inputs = vec![plan_input];
     inputs.extend(plan.inputs.iter().cloned());
     MergeSummary {
-        schema_version: SCHEMA_VERSION,
-        fluxform_version: FLUXFORM_VERSION,
+        schema_version: SCHEMA_VERSION.to_owned(),
+        fluxform_version: FLUXFORM_VERSION.to_owned(),
         design: plan.design.clone(),
         inputs,
         plan_sha256: plan.plan_sha256.clone(),

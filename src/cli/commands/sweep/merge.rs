@@ -3,6 +3,7 @@
 use clap::Args;
 use serde::Serialize;
 
+use crate::bundle::sweep::MergeSummary;
 use crate::cli::args::Writing;
 use crate::cli::commands::{begin, folder};
 use crate::cli::documents;
@@ -12,9 +13,7 @@ use crate::cli::layout::Sheet;
 use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{bytes, count, force};
 use crate::cli::values::FileArgument;
-use crate::job::sweep::merge::{
-    MergeFiles, MergeReport, MergeRequest, MergeSummary, merge, merge_table,
-};
+use crate::job::sweep::merge::{MergeFiles, MergeReport, MergeRequest, merge, merge_table};
 
 /// Join the points of a plan into one table, and plot the best designs
 ///

@@ -1,0 +1,459 @@
+//! Sweeps: plans, shards, kills, and that nothing of it shows in the merged bytes.
+
+use std::path::Path;
+use std::process::{Child, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
+
+use serde_json::Value;
+
+use crate::support::{Place, SEED};
+
+const FILES: [&str; 3] = ["sweep.csv", "sweep.svg", "sweep_pareto.csv"];
+
+/// A plan of 7 x 13 x 3 designs.
+fn planned(place: &Place) {
+    place
+        .run(&[
+            "sweep",
+            "plan",
+            SEED,
+            "--set",
+            "wire.diameter_mm=0.5:0.8:0.05",
+            "--set",
+            "coil.outer_diameter_mm=26:38:1",
+            "--set",
+            "limits.resistance_max_ohm=4,6,8",
+            "--out",
+            "plan.json",
+        ])
+        .ends(0);
+}
+
+fn merged(place: &Place, folder: &str, out: &str) -> Vec<Vec<u8>> {
+    let table = format!("{out}/sweep.csv");
+    place
+        .run(&["sweep", "merge", "plan.json", folder, "--out", &table])
+        .ends(0);
+    FILES
+        .map(|file| place.read(&format!("{out}/{file}")))
+        .to_vec()
+}
+
+fn point(folder: &str, index: usize) -> String {
+    format!("{folder}/points/{:03}/{index:06}.json", index / 1000)
+}
+
+#[test]
+fn shards_and_threads_leave_no_trace() {
+    let place = Place::new();
+    planned(&place);
+    for (threads, out) in [("1", "one"), ("2", "two")] {
+        let args = ["sweep", "run", "plan.json", "--threads", threads, "--out"];
+        place.run(&[&args[..], &[out]].concat()).ends(0);
+    }
+    let shards = ["3/7", "1/7", "7/7", "2/7", "5/7", "6/7", "4/7"];
+    for (number, shard) in shards.iter().enumerate() {
+        // Two folders, as of two machines.
+        let out = if number < 3 { "here" } else { "there" };
+        place
+            .run(&["sweep", "run", "plan.json", "--shard", shard, "--out", out])
+            .ends(0);
+    }
+    let whole = merged(&place, "one", "a");
+    assert!(whole == merged(&place, "two", "b"));
+    place
+        .run(&[
+            "sweep",
+            "merge",
+            "plan.json",
+            "here",
+            "there",
+            "--out",
+            "c/sweep.csv",
+        ])
+        .ends(0);
+    for (file, bytes) in FILES.iter().zip(&whole) {
+        assert!(*bytes == place.read(&format!("c/{file}")), "{file}");
+    }
+    let table = String::from_utf8(whole[0].clone()).unwrap();
+    let mut rows = table.lines();
+    let head = rows.next().unwrap();
+    assert!(head.starts_with(
+        "index,wire.diameter_mm,coil.outer_diameter_mm,limits.resistance_max_ohm,turns,"
+    ));
+    let rows: Vec<Vec<&str>> = rows.map(|row| row.split(',').collect()).collect();
+    assert_eq!(rows.len(), 7 * 13 * 3);
+    for (index, row) in rows.iter().enumerate() {
+        assert_eq!(row[0], index.to_string());
+    }
+    assert_eq!(rows[0][1..4], ["0.5", "26", "4"]);
+    assert_eq!(rows[1][1..4], ["0.5", "26", "6"]);
+    assert_eq!(rows[3][1..4], ["0.5", "27", "4"]);
+    assert_eq!(rows[272][1..4], ["0.8", "38", "8"]);
+    // The limit decides what is met and nothing else.
+    let met = head
+        .split(',')
+        .position(|name| name == "limits_met")
+        .unwrap();
+    assert_eq!(rows[0][4..met], rows[2][4..met]);
+    let stdout = place.run(&["sweep", "merge", "plan.json", "one", "--out", "-"]);
+    assert_eq!(stdout.ends(0).out, table);
+}
+
+#[test]
+fn a_row_is_what_evaluate_says() {
+    let place = Place::new();
+    let values = [
+        "--set",
+        "wire.diameter_mm=0.55",
+        "--set",
+        "coil.length_mm=70",
+    ];
+    let plan = ["sweep", "plan", SEED, "--out", "plan.json"];
+    place.run(&[&plan[..], &values].concat()).ends(0);
+    place
+        .run(&["sweep", "run", "plan.json", "--out", "p"])
+        .ends(0);
+    let text: Value = serde_json::from_slice(&place.read(&point("p", 0))).unwrap();
+    let design = place
+        .seed()
+        .replace("diameter_mm = 0.7", "diameter_mm = 0.55");
+    let design = design.replace("length_mm = 100.0", "length_mm = 70.0");
+    place.write("design.toml", &design);
+    let told = place.run(&["evaluate", "design.toml", "--format", "json"]);
+    let told = told.ends(0).json();
+    let row = &text["row"];
+    for key in [
+        "turns",
+        "resistance_ohm",
+        "inductance_h",
+        "settling_s",
+        "power_w",
+        "mass_kg",
+        "wire_length_m",
+    ] {
+        assert_eq!(row[key], told["coil"][key], "{key}");
+    }
+    for key in ["current_a", "gradient_t_per_m_per_a", "force_n"] {
+        assert_eq!(row[key], told["target"][key], "{key}");
+    }
+    let limits = told["limits"].as_object().unwrap();
+    let met = limits.values().all(|limit| limit["met"] == true);
+    assert_eq!(row["limits_met"], met);
+}
+
+fn spawn(place: &Place, args: &[&str]) -> Child {
+    let mut command = place.command(args);
+    command.stdout(Stdio::null()).stderr(Stdio::null());
+    command.spawn().unwrap()
+}
+
+fn wait_for(path: &Path) {
+    for _ in 0..60_000 {
+        if path.exists() {
+            return;
+        }
+        sleep(Duration::from_millis(1));
+    }
+    panic!("{} never came", path.display());
+}
+
+fn long_plan(place: &Place) {
+    let set = [
+        "--set",
+        "target.height_mm=10:69.9:0.1",
+        "--set",
+        "coil.turns=700,1300,1429",
+    ];
+    let plan = ["sweep", "plan", SEED, "--out", "plan.json"];
+    place.run(&[&plan[..], &set].concat()).ends(0);
+}
+
+#[test]
+fn a_run_that_is_killed_three_times_ends_as_if_it_had_not_been() {
+    let place = Place::new();
+    long_plan(&place);
+    let run = ["sweep", "run", "plan.json", "--threads", "1", "--out"];
+    for index in [200, 700, 1200] {
+        let mut child = spawn(&place, &[&run[..], &["killed"]].concat());
+        wait_for(&place.path(&point("killed", index)));
+        child.kill().unwrap();
+        assert_eq!(child.wait().unwrap().code(), None, "killed, not ended");
+        assert!(!place.path(&point("killed", 1799)).exists());
+    }
+    let json = [&run[..], &["killed", "--format", "json"]].concat();
+    let last = place.run(&json).ends(0).json();
+    assert!(last["kept"].as_u64().unwrap() > 1200, "{last}");
+    assert_eq!(last["points"], 1800);
+    let left = ["000", "001"].map(|folder| {
+        let entries = place.path("killed/points").join(folder).read_dir().unwrap();
+        entries.count()
+    });
+    assert_eq!(left, [1000, 800], "no temporary files are left");
+    place
+        .run(&["sweep", "run", "plan.json", "--out", "whole"])
+        .ends(0);
+    assert!(merged(&place, "killed", "a") == merged(&place, "whole", "b"));
+}
+
+#[test]
+fn two_runs_may_share_a_folder() {
+    let place = Place::new();
+    planned(&place);
+    let run = [
+        "sweep",
+        "run",
+        "plan.json",
+        "--force",
+        "--threads",
+        "1",
+        "--out",
+        "shared",
+    ];
+    let both = [spawn(&place, &run), spawn(&place, &run)];
+    for mut child in both {
+        assert_eq!(child.wait().unwrap().code(), Some(0));
+    }
+    place
+        .run(&["sweep", "run", "plan.json", "--out", "alone"])
+        .ends(0);
+    assert!(merged(&place, "shared", "a") == merged(&place, "alone", "b"));
+    let count = place.path("shared/points/000").read_dir().unwrap().count();
+    assert_eq!(count, 273);
+}
+
+#[test]
+fn an_interrupted_run_keeps_its_points() {
+    let place = Place::new();
+    long_plan(&place);
+    let run = ["sweep", "run", "plan.json", "--threads", "1", "--out", "p"];
+    let mut child = spawn(&place, &run);
+    wait_for(&place.path(&point("p", 200)));
+    let sent = std::process::Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status();
+    assert!(sent.unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert!(place.path(&point("p", 200)).exists());
+    place
+        .run(&["sweep", "merge", "plan.json", "p"])
+        .ends(4)
+        .says(&["of 1800 points are missing", "-1799", "--partial"]);
+    assert!(!place.path("sweep.csv").exists());
+    let told = place.run(&[
+        "sweep",
+        "merge",
+        "plan.json",
+        "p",
+        "--partial",
+        "--format",
+        "json",
+    ]);
+    let told = told.ends(0).json();
+    assert!(
+        told["warnings"][0]
+            .as_str()
+            .unwrap()
+            .contains("are missing")
+    );
+    let sum = told["rows"].as_u64().unwrap() + told["missing"].as_u64().unwrap();
+    assert_eq!(sum, 1800);
+    // The same plan's fuller table replaces it.
+    place
+        .run(&[&run[..], &["--threads", "2"][..0]].concat())
+        .ends(0);
+    place.run(&["sweep", "merge", "plan.json", "p"]).ends(0);
+}
+
+#[test]
+fn torn_points_are_computed_again_and_foreign_ones_are_left_alone() {
+    let place = Place::new();
+    planned(&place);
+    let run = ["sweep", "run", "plan.json", "--out", "p"];
+    place.run(&run).ends(0);
+    let whole = merged(&place, "p", "a");
+    let text = String::from_utf8(place.read(&point("p", 7))).unwrap();
+    place.write(&point("p", 7), "");
+    place.write(&point("p", 8), &text[..100]);
+    place.write(
+        &point("p", 9),
+        &text.replace("\"turns\": 1", "\"turns\": 2"),
+    );
+    place
+        .run(&["sweep", "merge", "plan.json", "p", "--out", "b.csv"])
+        .ends(4)
+        .says(&["3 of 273 points are missing: 7-9"]);
+    let told = place.run(&[&run[..], &["--format", "json"]].concat());
+    assert_eq!(told.ends(0).json()["computed"], 3);
+    assert!(whole == merged(&place, "p", "b"));
+
+    place.write(&point("p", 7), "precious\n");
+    place.run(&run).ends(4).says(&["000007.json", "--force"]);
+    assert_eq!(place.read(&point("p", 7)), b"precious\n");
+    place
+        .run(&["sweep", "merge", "plan.json", "p", "--out", "c.csv"])
+        .ends(4)
+        .says(&["000007.json"]);
+    place
+        .run(&[&run[..], &["--index", "7", "--force"]].concat())
+        .ends(0);
+    assert!(whole == merged(&place, "p", "d"));
+}
+
+#[test]
+fn points_of_another_plan_are_refused() {
+    let place = Place::new();
+    planned(&place);
+    let other = [
+        "sweep",
+        "plan",
+        SEED,
+        "--set",
+        "coil.turns=700:760:1",
+        "--out",
+        "other.json",
+    ];
+    place.run(&other).ends(0);
+    place
+        .run(&["sweep", "run", "plan.json", "--shard", "1/7", "--out", "p"])
+        .ends(0);
+    let run = ["sweep", "run", "other.json", "--shard", "2/2", "--out", "p"];
+    place
+        .run(&run)
+        .ends(4)
+        .says(&["another plan", "p/plan.json"]);
+    place.run(&[&run[..], &["--force"]].concat()).ends(0);
+    for (plan, index) in [("plan.json", "000039"), ("other.json", "000000")] {
+        place
+            .run(&["sweep", "merge", plan, "p", "--partial"])
+            .ends(4)
+            .says(&["belongs to another plan"]);
+        let _ = index;
+    }
+}
+
+#[test]
+fn an_edited_plan_is_refused() {
+    let place = Place::new();
+    planned(&place);
+    let text = String::from_utf8(place.read("plan.json")).unwrap();
+    place.write("edited.json", &text.replace("0.55", "0.56"));
+    for step in [&["run"][..], &["merge"]] {
+        let (folder, out): (&[&str], &[&str]) = match step[0] {
+            "run" => (&[], &["--out", "p"]),
+            _ => (&["p"], &["--out", "s.csv"]),
+        };
+        place
+            .run(&[&["sweep"], step, &["edited.json"], folder, out].concat())
+            .ends(3)
+            .says(&["edited.json", "changed after it was made", "sweep plan"]);
+    }
+    place
+        .run(&["sweep", "run", SEED, "--out", "p"])
+        .ends(3)
+        .says(&["not a plan"]);
+    place
+        .run(&["sweep", "run", "none.json", "--out", "p"])
+        .ends(3);
+    assert!(!place.path("p").exists());
+    // The same plan again is no matter, another one is.
+    planned(&place);
+    place
+        .run(&[
+            "sweep",
+            "plan",
+            SEED,
+            "--set",
+            "coil.turns=700",
+            "--out",
+            "plan.json",
+        ])
+        .ends(4)
+        .says(&["plan.json", "--force"]);
+}
+
+#[test]
+fn absurd_settings_are_wrong_usage_and_bad_values_bad_input() {
+    let place = Place::new();
+    let plan = ["sweep", "plan", SEED, "--out", "-", "--set"];
+    for (set, said) in [
+        ("coil.turns=1:2:0", "STEP is 0"),
+        ("coil.turns=1:2:-1", "leads down"),
+        ("coil.turns=1:1e12:1", "values are more than"),
+        ("coil.turns=", "empty value"),
+        ("coil.turns=nan", "finite"),
+        ("coil.turns", "KEY=FROM:TO:STEP"),
+    ] {
+        place
+            .run(&[&plan[..], &[set]].concat())
+            .ends(2)
+            .says(&[said]);
+    }
+    let twice = ["coil.turns=1,2", "--set", "coil.turns=3"];
+    place
+        .run(&[&plan[..], &twice].concat())
+        .ends(2)
+        .says(&["coil.turns"]);
+    place.run(&plan[..5]).ends(2).says(&["--set"]);
+    let ran = place.run(&[&plan[..], &["wire.diameter_mm=0.7,-0.7"]].concat());
+    let ran = ran.ends(3).says(&["wire.diameter_mm = -0.7"]);
+    assert!(ran.out.is_empty());
+    let ran = place.run(&[&plan[..], &["wire.diametre_mm=0.7"]].concat());
+    ran.ends(3).says(&["did you mean diameter_mm?"]);
+    planned(&place);
+    let run = ["sweep", "run", "plan.json", "--out", "p"];
+    place.run(&[&run[..], &["--shard", "4/3"]].concat()).ends(2);
+    place
+        .run(&[&run[..], &["--index", "273"]].concat())
+        .ends(2)
+        .says(&["272"]);
+}
+
+#[test]
+fn a_design_that_cannot_be_computed_is_a_row() {
+    let place = Place::new();
+    let sets = [
+        "--set",
+        "coil.inner_diameter_mm=24,37,39",
+        "--set",
+        "array.coupling=full,none",
+    ];
+    let plan = ["sweep", "plan", SEED, "--out", "plan.json"];
+    place.run(&[&plan[..], &sets].concat()).ends(0);
+    let run = ["sweep", "run", "plan.json", "--out", "p"];
+    let said = [
+        "2 of 6 designs cannot be computed",
+        "point 4",
+        "coil.inner_diameter_mm",
+    ];
+    place.run(&run).ends(4).says(&said);
+    // Nothing is left to do, and that is still not as wished.
+    place.run(&run).ends(4).says(&said);
+    place.run(&["sweep", "merge", "plan.json", "p"]).ends(0);
+    let table = String::from_utf8(place.read("sweep.csv")).unwrap();
+    let rows: Vec<&str> = table.lines().collect();
+    assert!(rows[1].starts_with("0,24,full,1429,") && rows[1].ends_with(",done,"));
+    assert!(
+        rows[5].starts_with("4,39,full,,,") && rows[5].contains(",failed,"),
+        "{table}"
+    );
+}
+
+#[test]
+fn each_step_explains_itself_and_its_examples_work() {
+    let place = Place::new();
+    for step in ["plan", "run", "merge"] {
+        let page = place.run(&["sweep", step, "--help"]).ends(0).out;
+        let about = page.split("\n\n").nth(1).unwrap();
+        assert!(about.len() > 100, "{step}: {about}");
+        let examples = page.split("Examples:").nth(1).unwrap().replace("\\\n", "");
+        let lines: Vec<&str> = examples.lines().map(str::trim).collect();
+        let lines = lines.iter().filter(|line| line.starts_with("fluxform "));
+        for line in lines.clone() {
+            let ran = place.shell(line);
+            assert_eq!(ran.code, Some(0), "{line}: {ran:#?}");
+        }
+        assert!(lines.count() >= 2, "{examples}");
+    }
+}
