@@ -26,8 +26,8 @@ pub const SCHEMAS: [(&str, &str); 6] = [
         include_str!("schema/sweep_point.schema.json"),
     ),
     (
-        "sweep.schema.json",
-        include_str!("schema/sweep.schema.json"),
+        "sweep_merge.schema.json",
+        include_str!("schema/sweep_merge.schema.json"),
     ),
 ];
 

@@ -415,7 +415,7 @@ fn a_design_that_cannot_be_computed_is_a_row() {
     let place = Place::new();
     let sets = [
         "--set",
-        "coil.inner_diameter_mm=24,37,39",
+        "coil.inner_diameter_mm=24,36,39",
         "--set",
         "array.coupling=full,none",
     ];

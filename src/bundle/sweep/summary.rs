@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::bundle::artefact::{FileEntry, Input};
 
-/// `sweep.json` beside the table.
+/// `sweep_merge.json` beside `sweep.csv`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MergeSummary {
     /// Layout, `major.minor.patch`.

@@ -249,7 +249,7 @@ mod tests {
             ("a=1:2:nan", "three finite numbers"),
             ("a=1:inf:1", "three finite numbers"),
             ("a=1:2:3:4", "three finite numbers"),
-            ("a=1e9:1.0000001e9:1e-5", "is lost"),
+            ("a=1e9:1.000000001e9:1e-5", "is lost"),
             ("a=", "empty value"),
             ("a=1,,2", "empty value"),
             ("a=1,nan", "not a finite number"),

@@ -100,7 +100,11 @@ pub fn merge(
     };
     let folder = files.table.parent().unwrap_or(Path::new(""));
     let mut summary = summary(plan, plan_input);
-    let overwrite = Overwrite::new(files.force, folder.join(name(".json")), &summary.inputs);
+    let overwrite = Overwrite::new(
+        files.force,
+        folder.join(name("_merge.json")),
+        &summary.inputs,
+    );
     let mut set = FileSet::begin(folder, overwrite)?;
     let table = files.table.file_name().unwrap_or_default();
     let table = table.to_string_lossy().into_owned();
@@ -144,7 +148,7 @@ pub fn merge(
     listed.push(entry(front_name, written));
     tell(&mut summary, &gathered, best.len() as u64, among_met);
     summary.files = listed;
-    set.write(&name(".json"), |out| {
+    set.write(&name("_merge.json"), |out| {
         let bytes =
             to_json(&summary).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))?;
         out.write_all(&bytes)

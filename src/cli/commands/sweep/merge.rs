@@ -19,7 +19,7 @@ use crate::job::sweep::merge::{MergeFiles, MergeReport, MergeRequest, merge, mer
 ///
 /// Writes one row a point, in the order of the plan, to a CSV table; beside it NAME.svg, force
 /// against resistance, mass and settling time with the designs that no other one beats,
-/// NAME_pareto.csv with those designs, and NAME.json. The best are chosen among the designs that
+/// NAME_pareto.csv with those designs, and NAME_merge.json. The best are chosen among the designs that
 /// meet their limits, if any does. Missing points are named and end with exit code 4 and no table,
 /// unless --partial asks for what there is: then the exit code is 0 and the missing are told as a
 /// warning. Points of another plan are refused.
@@ -76,8 +76,8 @@ impl Merge {
                 let ending = path.extension().unwrap_or_default();
                 if ending == "json" || ending == "svg" {
                     return Err(Failure::Usage(format!(
-                        "--out {}: expected the name of the table, like sweep.csv; the plot and \
-                         the sidecar get its name with .svg and .json",
+                        "--out {}: expected the name of the table, like sweep.csv; plot and \
+                         summary get names of their own beside it",
                         path.display()
                     )));
                 }
