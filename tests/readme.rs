@@ -61,6 +61,31 @@ fn the_table_of_numbers_is_what_the_commands_print() {
 }
 
 #[test]
+fn the_sweep_prints_what_the_readme_shows() {
+    let readme = readme();
+    let (_, rest) = readme.split_once("## Sweep designs").unwrap();
+    let (_, rest) = rest.split_once("```sh\n").unwrap();
+    let (commands, rest) = rest.split_once("```").unwrap();
+    let (_, rest) = rest.split_once("```text\n").unwrap();
+    let (shown, _) = rest.split_once("```").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let mut printed = String::new();
+    for command in commands.lines() {
+        let arguments = command.strip_prefix("fluxform ").unwrap().split(' ');
+        let inside = |argument: &str| folder.path().join(argument).display().to_string();
+        let arguments: Vec<String> = arguments
+            .map(|argument| match argument {
+                "plan.json" | "points" | "sweep.csv" => inside(argument),
+                other => other.to_owned(),
+            })
+            .collect();
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        printed += &says(&arguments);
+    }
+    assert_eq!(but_the_folder(shown), but_the_folder(&printed));
+}
+
+#[test]
 fn every_command_has_a_row_and_every_row_is_a_command() {
     let readme = readme();
     let rows: BTreeSet<&str> = readme
