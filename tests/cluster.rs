@@ -1,6 +1,7 @@
 //! A sweep as a cluster runs it: GNU parallel and a Slurm of its own, each killed half way and
 //! begun again. Skips what is not installed, and says so.
 #![cfg(unix)]
+#![allow(clippy::print_stderr)] // what was skipped, and why
 
 use std::path::Path;
 use std::process::Command;

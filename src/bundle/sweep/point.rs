@@ -146,7 +146,7 @@ mod tests {
 
     fn point() -> PointFile {
         let row = Row {
-            turns: 1428.571_428_571_4,
+            turns: 1_428.571_428_571_4,
             resistance_ohm: 0.1 + 0.2,
             inductance_h: 5e-324,
             settling_s: 0.011_9,
