@@ -7,6 +7,7 @@ pub mod lambda;
 pub mod map;
 pub mod maps;
 pub mod passive;
+pub mod passive_map;
 pub mod probe;
 pub mod scene;
 pub mod single;
