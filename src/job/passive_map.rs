@@ -11,6 +11,7 @@ use std::f64::consts::PI;
 use super::scene::Scene;
 use super::{JobError, passive};
 use crate::accuracy::StageAccuracy;
+use crate::design::MagnetModel;
 use crate::field::steel::passive::PassivePull;
 use crate::map::tabulate::Grid;
 use crate::numerics::lagrange;
@@ -65,8 +66,8 @@ impl PassiveMap {
         };
         let top_m = core.shape.top_m;
         let axial_m = match scene.design.magnet.model {
-            crate::design::MagnetModel::Dipole => 0.0,
-            crate::design::MagnetModel::Cylinder => 0.5 * scene.design.magnet.length_m,
+            MagnetModel::Dipole => 0.0,
+            MagnetModel::Cylinder => 0.5 * scene.design.magnet.length_m,
         };
         let turns = symmetries(&scene.design.array.positions_m, scene.moment_a_m2, ranges);
         let mut aim = TABLE_SHARE * tolerance;
@@ -281,7 +282,11 @@ impl Table {
                     let half = 0.5 * (range[1] - range[0]);
                     Nodes::new(range, enough(aim, away_m, half))
                 };
-                let (x, y) = (nodes(x), nodes(y));
+                let (mut x, mut y) = (nodes(x), nodes(y));
+                if turns.iter().any(|turn| turn.swap) {
+                    let count = x.count.max(y.count);
+                    (x.count, y.count) = (count, count);
+                }
                 let firsts = firsts([x.count, y.count], turns);
                 let own: Vec<usize> = (0..firsts.len()).filter(|i| firsts[*i] == *i).collect();
                 let places: Vec<[f64; 3]> = own
