@@ -483,3 +483,73 @@ fn between(table: &Table, grid: &Grid, values: &[f64]) -> (f64, usize) {
     }
     (worst, samples)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SQUARE: [[f64; 2]; 3] = [[-0.05, 0.05], [-0.05, 0.05], [0.01, 0.08]];
+
+    fn grid_of(pitch: [f64; 2]) -> Vec<[f64; 2]> {
+        (0..9)
+            .map(|i| {
+                [
+                    pitch[0] * f64::from(i % 3 - 1),
+                    pitch[1] * f64::from(i / 3 - 1),
+                ]
+            })
+            .collect()
+    }
+
+    #[test]
+    fn only_what_keeps_array_magnet_and_region_is_a_symmetry() {
+        let upright = [0.0, 0.0, -0.9];
+        let count = |axes: &[[f64; 2]], moment, region| symmetries(axes, moment, region).len();
+        assert_eq!(count(&grid_of([0.05, 0.05]), upright, SQUARE), 8);
+        assert_eq!(count(&grid_of([0.05, 0.04]), upright, SQUARE), 4);
+        let lower = [[-0.05, 0.05], [-0.05, 0.03], [0.01, 0.08]];
+        assert_eq!(count(&grid_of([0.05, 0.05]), upright, lower), 2);
+        assert_eq!(count(&grid_of([0.05, 0.05]), [0.13, 0.0, -0.9], SQUARE), 2);
+        assert_eq!(count(&grid_of([0.05, 0.05]), [0.07, 0.07, 0.9], SQUARE), 2);
+        assert_eq!(count(&grid_of([0.05, 0.05]), [0.07, 0.05, 0.9], SQUARE), 1);
+        assert_eq!(count(&[[0.013, 0.007]], upright, SQUARE), 1);
+    }
+
+    #[test]
+    fn every_node_has_its_first_in_its_orbit() {
+        let turns = symmetries(&grid_of([0.05, 0.05]), [0.0, 0.0, 1.3], SQUARE);
+        let firsts = firsts([7, 7], &turns);
+        assert!(firsts.iter().all(|first| firsts[*first] == *first));
+        let own = (0..49).filter(|i| firsts[*i] == *i).count();
+        assert_eq!(own, 10); // 4 * 5 / 2
+    }
+
+    #[test]
+    fn polynomials_come_back_and_more_nodes_are_better() {
+        let of = |nodes: Nodes, f: &dyn Fn(f64) -> f64, at: f64| {
+            let weights = nodes.weights(at);
+            weights
+                .iter()
+                .enumerate()
+                .map(|(k, w)| w * f(nodes.at(k)))
+                .sum::<f64>()
+        };
+        let cubic = |x: f64| 0.7 - 1.3 * x + 2.1 * x * x - 0.9 * x * x * x;
+        let nodes = Nodes::new([-0.3, 1.7], 4);
+        for at in [-0.3, 0.11, nodes.at(2), 1.7] {
+            assert!((of(nodes, &cubic, at) - cubic(at)).abs() < 1e-14);
+        }
+        assert_eq!(nodes.at(0) - 0.7, 0.7 - nodes.at(3));
+        // Singular `away` beside the axis: the rule's count gives the error aimed at.
+        let (away, aim) = (0.013, 1e-5);
+        let peak = |x: f64| away * away / (x * x + away * away);
+        let count = enough(aim, away, 0.05);
+        let nodes = Nodes::new([-0.05, 0.05], count);
+        let worst = (0..500)
+            .map(|i| -0.05 + 0.1 * f64::from(i) / 499.0)
+            .map(|x| (of(nodes, &peak, x) - peak(x)).abs())
+            .fold(0.0, f64::max);
+        assert!(worst < 5.0 * aim, "{count}: {worst:e}");
+        assert!(enough(1e-3, away, 0.05) < count);
+    }
+}
