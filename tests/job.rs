@@ -327,6 +327,7 @@ fn a_bundle_keeps_its_magnetisation_curve_wherever_it_goes() {
     );
     let elsewhere = tempfile::tempdir().expect("a temporary folder");
     let folder = elsewhere.path().join("moved");
+    #[allow(clippy::disallowed_methods)]
     std::fs::rename(&report.bundles[0].folder, &folder).expect("moved");
     let verified = verify::run(&folder, &Silent).expect("opens");
     assert_eq!(failed(&verified), [""; 0], "{:?}", verified.checks);
