@@ -28,6 +28,8 @@ use crate::progress::Progress;
 
 /// Map nodes sampled, and force-matrix entries sampled.
 const SAMPLES: usize = 2000;
+/// The fewest that are sampled.
+const FEWEST: usize = 200;
 /// Largest difference of a force constant that is solved for again, relative.
 const LAMBDA_AGREES: f64 = 1e-8;
 /// How much a force constant may move with the stated error of steel's forces.
@@ -224,6 +226,12 @@ impl<'a> Route<'a> {
         })
     }
 
+    /// Places sampled: fewer where the magnet is made of many dipoles, each of which costs as much
+    /// as a place.
+    fn samples(&self) -> usize {
+        (SAMPLES / self.rule.nodes().len().max(1)).clamp(FEWEST, SAMPLES)
+    }
+
     /// dB_x/dz, dB_y/dz, dB_z/dz of a coil at a point, the mean that the magnet feels, gains
     /// applied; for every (coil, point).
     fn gradients(&self, wanted: &[(usize, [f64; 3])]) -> Result<Vec<[f64; 3]>, JobError> {
@@ -305,7 +313,7 @@ fn map_nodes(bundle: &Bundle, route: &Route) -> Result<Check, JobError> {
     let sizes: Vec<f64> = (0..nz)
         .map(|level| largest_in_plane(bundle, level))
         .collect();
-    let places = spread(coils * nz * ny * nx, SAMPLES);
+    let places = spread(coils * nz * ny * nx, route.samples());
     let wanted: Vec<(usize, [f64; 3])> = places
         .iter()
         .map(|index| {
@@ -328,7 +336,7 @@ fn map_nodes(bundle: &Bundle, route: &Route) -> Result<Check, JobError> {
         .accuracy
         .get("map")
         .map_or(0.0, |stage| stage.estimate);
-    let how = format!("{SAMPLES} nodes by an independent route");
+    let how = format!("{} nodes by an independent route", places.len());
     Ok(check("map nodes", worst, allowed.max(KERNEL_ERROR), how))
 }
 
@@ -343,7 +351,7 @@ fn between_nodes(bundle: &Bundle, route: &Route) -> Result<Check, JobError> {
     };
     // (layer, coil's place in the map, point)
     let places: Vec<(usize, usize, [f64; 3])> =
-        spread(coils * cells[0] * cells[1] * cells[2], SAMPLES)
+        spread(coils * cells[0] * cells[1] * cells[2], route.samples())
             .into_iter()
             .map(|index| {
                 let (i, rest) = (index % cells[0], index / cells[0]);
@@ -377,7 +385,10 @@ fn between_nodes(bundle: &Bundle, route: &Route) -> Result<Check, JobError> {
         })
         .fold(0.0, f64::max);
     let allowed = bundle.manifest.map.interpolation.largest_error;
-    let how = format!("{SAMPLES} places between nodes, interpolated as the loaders do");
+    let how = format!(
+        "{} places between nodes, interpolated as the loaders do",
+        places.len()
+    );
     Ok(check(
         "map between nodes",
         worst,
@@ -650,7 +661,7 @@ fn sampled_forces(
     let coils = route.scene.coils.len();
     let largest = forces.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
     let moment = route.scene.moment_a_m2;
-    let places = spread(forces.len(), SAMPLES);
+    let places = spread(forces.len(), route.samples());
     let wanted: Vec<(usize, [f64; 3])> = places
         .iter()
         .map(|index| (index % coils, positions[index / coils]))
@@ -664,7 +675,10 @@ fn sampled_forces(
             (forces[*index] - exact).abs()
         })
         .fold(0.0, f64::max);
-    let how = format!("{SAMPLES} entries of the force matrix by an independent route");
+    let how = format!(
+        "{} entries of the force matrix by an independent route",
+        places.len()
+    );
     // The estimate is relative to |grad B| at each height; the lowest points have the largest.
     let stated = bundle.manifest.accuracy.get("forces");
     let allowed = stated
