@@ -22,7 +22,7 @@ const TABLE_SHARE: f64 = 0.3;
 const ATTEMPTS: usize = 3;
 /// Places off the nodes at which the table is compared with the pull itself.
 const HELD_OUT: usize = 48;
-/// Places find the largest error but for this factor: for a tilted cylinder from 10 mm up a finer
+/// Places find the largest error but for this factor: for a tilted cylinder over a flat object at 50 mm a finer
 /// map differs somewhere by one and a half times what the places of both showed.
 const MISSED: f64 = 2.0;
 /// Most nodes along one axis.
@@ -101,8 +101,8 @@ impl PassiveMap {
                 estimate: MISSED * (pull.relative_error + error),
                 relative_to: "the largest pull at the node's height".to_owned(),
                 method: format!(
-                    "{MISSED} times the sum of the pull's own error by finer solutions at places spread over the grid, \
-                     {:.1e}, and that of tabulating it by comparison at {HELD_OUT} places off the \
+                    "{MISSED} times the sum of the pull's own error by finer solutions at places \
+                     spread over the grid, {:.1e}, and that of tabulating it by comparison at {HELD_OUT} places off the \
                      table's nodes, {error:.1e}",
                     pull.relative_error
                 ),
