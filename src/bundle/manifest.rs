@@ -239,6 +239,21 @@ pub struct MapSummary {
     pub components: String,
     /// Between the nodes.
     pub interpolation: Interpolation,
+    /// The unpowered steel's pull, where `map.npz` holds it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub passive_force: Option<PassiveForce>,
+}
+
+/// The unpowered steel's pull on the magnet. The force is the sum over the coils of current times
+/// force per ampere, plus this.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PassiveForce {
+    /// The array of `map.npz`, `[z, y, x]`, N, positive upwards.
+    pub array: String,
+    /// Largest pull at the nodes of the lowest plane, N.
+    pub largest_n: f64,
+    /// Between the nodes.
+    pub interpolation: Interpolation,
 }
 
 /// How values between nodes are found.

@@ -152,6 +152,7 @@ pub(super) fn summary(
         }
         .to_owned(),
         interpolation: Interpolation::tricubic(between.largest, definition),
+        passive_force: None,
     }
 }
 
@@ -177,6 +178,7 @@ pub(super) fn arrays(map: &FieldMap, runtime: Runtime) -> MapArrays<'_> {
         gz_t_per_m_per_a: Cow::Borrowed(&map.gz_t_per_m_per_a),
         gradient_t_per_m_per_a: map.gradient_t_per_m_per_a.as_deref().map(Cow::Borrowed),
         field_t_per_a: map.field_t_per_a.as_deref().map(Cow::Borrowed),
+        passive_force_n: None,
         runtime,
     }
 }
