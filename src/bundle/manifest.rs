@@ -242,6 +242,26 @@ pub struct MapSummary {
     /// The unpowered steel's pull, where `map.npz` holds it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub passive_force: Option<PassiveForce>,
+    /// The whole field at given currents, where `map.npz` holds it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub working_point: Option<WorkingPointMap>,
+}
+
+/// The map of all coils together at given currents, their steel along its B-H curve: there the
+/// coils' maps do not add up.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct WorkingPointMap {
+    /// The array of `map.npz`, `[z, y, x]`, T/m.
+    pub array: String,
+    /// Current in every coil of the array, A.
+    pub currents_a: Vec<f64>,
+    /// Largest difference from the sum of the coils' maps times their currents, relative to the
+    /// largest value at the node's height.
+    pub deviation_from_linear: f64,
+    /// Largest |B| in every core, T.
+    pub peak_field_t: Vec<f64>,
+    /// Mean |B| in every core, T.
+    pub mean_field_t: Vec<f64>,
 }
 
 /// The unpowered steel's pull on the magnet. The force is the sum over the coils of current times

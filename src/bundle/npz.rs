@@ -40,6 +40,8 @@ pub struct MapArrays<'a> {
     pub field_t_per_a: Option<Cow<'a, [f64]>>,
     /// Vertical pull of the unpowered steel on the magnet, `[z, y, x]`, N, positive upwards.
     pub passive_force_n: Option<Cow<'a, [f64]>>,
+    /// dB_z/dz of all coils at the working point's currents, `[z, y, x]`, T/m.
+    pub working_point_gz_t_per_m: Option<Cow<'a, [f64]>>,
     /// What a runtime needs besides the maps.
     pub runtime: Runtime,
 }
@@ -96,6 +98,8 @@ const GRADIENT: &str = "gradient_t_per_m_per_a";
 const FIELD: &str = "field_t_per_a";
 /// The pull of the unpowered steel.
 pub const PASSIVE: &str = "passive_force_n";
+/// The whole map at a working point.
+pub const WORKING_POINT: &str = "working_point_gz_t_per_m";
 const VERSION: &str = "schema_version";
 const MOMENT: &str = "moment_a_m2";
 const CURRENT_MIN: &str = "current_min_a";
@@ -145,6 +149,7 @@ impl MapArrays<'_> {
         let gradient = self.gradient_t_per_m_per_a.as_deref();
         let field = self.field_t_per_a.as_deref();
         let passive = self.passive_force_n.as_deref();
+        let working_point = self.working_point_gz_t_per_m.as_deref();
         let [_, nz, ny, nx] = self.shape();
         for (name, values, count) in [
             (X, &*self.x_m, self.x_m.len()),
@@ -165,6 +170,11 @@ impl MapArrays<'_> {
                 PASSIVE,
                 passive.unwrap_or_default(),
                 passive.map_or(0, |_| nz.saturating_mul(ny).saturating_mul(nx)),
+            ),
+            (
+                WORKING_POINT,
+                working_point.unwrap_or_default(),
+                working_point.map_or(0, |_| nz.saturating_mul(ny).saturating_mul(nx)),
             ),
             (MOMENT, &runtime.moment_a_m2, 3),
             (CURRENT_MIN, &runtime.current_min_a, coils),
@@ -203,7 +213,8 @@ pub fn to_npz(map: &MapArrays) -> Result<Vec<u8>, NpzError> {
     let numbers = map.gz_t_per_m_per_a.len()
         + map.gradient_t_per_m_per_a.as_ref().map_or(0, |a| a.len())
         + map.field_t_per_a.as_ref().map_or(0, |a| a.len())
-        + map.passive_force_n.as_ref().map_or(0, |a| a.len());
+        + map.passive_force_n.as_ref().map_or(0, |a| a.len())
+        + map.working_point_gz_t_per_m.as_ref().map_or(0, |a| a.len());
     let room = numbers * npy::ELEMENT_BYTES + (64 << 10);
     let mut archive = Archive(ZipWriter::new(Cursor::new(Vec::with_capacity(room))));
     archive
@@ -235,8 +246,13 @@ impl Archive {
         if let Some(values) = &map.field_t_per_a {
             self.put(FIELD, &[coils, nz, ny, nx, 3], values)?;
         }
-        if let Some(values) = &map.passive_force_n {
-            self.put(PASSIVE, &[nz, ny, nx], values)?;
+        for (name, values) in [
+            (PASSIVE, &map.passive_force_n),
+            (WORKING_POINT, &map.working_point_gz_t_per_m),
+        ] {
+            if let Some(values) = values {
+                self.put(name, &[nz, ny, nx], values)?;
+            }
         }
         self.put(MOMENT, &[3], &runtime.moment_a_m2)?;
         for (name, values) in [
@@ -313,6 +329,7 @@ pub fn from_npz(bytes: &[u8]) -> Result<MapArrays<'static>, NpzError> {
     let gradient: Option<Vec<f64>> = arrays.get(GRADIENT, &[c, z, y, x, Some(3), Some(3)])?;
     let field: Option<Vec<f64>> = arrays.get(FIELD, &[c, z, y, x, Some(3)])?;
     let passive: Option<Vec<f64>> = arrays.get(PASSIVE, &[z, y, x])?;
+    let working_point: Option<Vec<f64>> = arrays.get(WORKING_POINT, &[z, y, x])?;
     let map = MapArrays {
         x_m: x_m.into(),
         y_m: y_m.into(),
@@ -322,6 +339,7 @@ pub fn from_npz(bytes: &[u8]) -> Result<MapArrays<'static>, NpzError> {
         gradient_t_per_m_per_a: gradient.map(Cow::Owned),
         field_t_per_a: field.map(Cow::Owned),
         passive_force_n: passive.map(Cow::Owned),
+        working_point_gz_t_per_m: working_point.map(Cow::Owned),
         runtime: Runtime {
             moment_a_m2: [moment[0], moment[1], moment[2]],
             current_min_a: arrays.need(CURRENT_MIN, &[coils])?,
@@ -428,6 +446,7 @@ mod tests {
             gradient_t_per_m_per_a: Some(values(48 * 9, 1.3).into()),
             field_t_per_a: Some(values(48 * 3, 2.1).into()),
             passive_force_n: Some(values(24, 1.7).into()),
+            working_point_gz_t_per_m: Some(values(24, 1.3).into()),
             runtime: Runtime {
                 moment_a_m2: [0.0, 0.0, -0.909],
                 current_min_a: vec![0.0, -0.7, 0.0],

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::discretize::{self, PointsReport};
 use super::scene::{MAGNET_SHARE, Scene};
 use super::steel::{EVALUATION_SHARE, Solved, Steel};
-use super::working_point::{WorkingPoint, relative_difference};
+use super::working_point::{WorkingPoint, relative_difference, superposition_ends};
 use super::{JobError, KERNEL_ERROR, passive, steel};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
@@ -14,9 +14,6 @@ use crate::design::{Design, MagnetModel};
 use crate::lambda::{self, Criterion, ForceProblem, Precision, Settings, Solution, Status};
 use crate::progress::Progress;
 use crate::shape::document::ShapeDocument;
-
-/// Deviation from superposition above which a warning is due.
-const SUPERPOSITION_WARNING: f64 = 0.01;
 
 /// What is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -115,7 +112,12 @@ pub(super) fn solve(
         if let Some((facts, accuracy)) =
             at_working_point(scene, &asked, options.tolerance, progress)?
         {
-            warnings.extend(superposition_ends(scene, &facts));
+            warnings.extend(superposition_ends(
+                scene,
+                facts.deviation_from_linear,
+                &facts.peak_field_t,
+                "the forces that lambda was solved with",
+            ));
             file.accuracy.insert("working_point".to_owned(), accuracy);
             file.working_point = Some(facts);
         }
@@ -183,21 +185,6 @@ fn at_working_point(
         mean_field_t: point.mean_field_t.clone(),
     };
     Ok(Some((facts, point.accuracy())))
-}
-
-/// A sentence on forces that do not add up.
-fn superposition_ends(scene: &Scene, facts: &WorkingPointForces) -> Option<String> {
-    (facts.deviation_from_linear > SUPERPOSITION_WARNING).then(|| {
-        let peak_t = facts.peak_field_t.iter().copied().fold(0.0, f64::max);
-        let knee_t = scene.core.as_ref().map_or(f64::INFINITY, |core| core.knee_t);
-        format!(
-            "superposition ends along the B-H curve: at the chosen currents the forces differ by up \
-             to {:.1} % of the largest from those that lambda was solved with (the cores reach \
-             {peak_t:.2} T, the knee is at {knee_t:.2} T); lower supply.current_max_a until \
-             working_point.deviation_from_linear is small enough",
-            100.0 * facts.deviation_from_linear
-        )
-    })
 }
 
 /// The lowest of the points, m.

@@ -236,7 +236,7 @@ fn widest(grid: &Grid, shares: &[([f64; 3], f64)]) -> Grid {
 }
 
 /// Nodes of a grid's lowest plane: where it comes closest to the coils.
-fn lowest_plane(grid: &Grid) -> Vec<[f64; 3]> {
+pub(super) fn lowest_plane(grid: &Grid) -> Vec<[f64; 3]> {
     let z_m = grid.z_m.first().copied().unwrap_or(0.0);
     grid.y_m
         .iter()

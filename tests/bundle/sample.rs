@@ -82,6 +82,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
         gradient_t_per_m_per_a: tilted.then(|| all.into()),
         field_t_per_a: None,
         passive_force_n: None,
+        working_point_gz_t_per_m: None,
         runtime: Runtime {
             moment_a_m2,
             current_min_a: current_min_a.clone(),
@@ -153,6 +154,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
             rms_error_n: 0.0013,
             worst_error_n: 0.0017,
         }),
+        working_point: None,
         accuracy: accuracy.clone(),
     };
     let manifest = Manifest {
@@ -196,6 +198,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
                 "relative to the largest |g| at that height, sampled",
             ),
             passive_force: None,
+            working_point: None,
         },
         left_out: vec![LeftOut {
             what: "coil 2".to_owned(),

@@ -92,6 +92,7 @@ impl Map {
                 Wanted::All => Components::All,
             },
             tolerance: self.tolerance.tolerance,
+            currents_a: None,
             out: out.unwrap_or_else(|| Path::new("results").join(&design.name)),
             formats: MapFormats {
                 csv: self.csv,
