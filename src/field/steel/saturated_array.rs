@@ -86,8 +86,8 @@ pub struct SaturatedArray {
     /// Flux of all cores through every coil, Wb; the windings' own flux is not in it.
     pub flux_linkage_wb: Vec<f64>,
     /// Estimated error: of the total gradient above, relative to the largest |grad B| at the
-    /// height, and of the flux, relative to the largest; the larger. Half the difference from the
-    /// next coarser resolution plus [`SaturatedArray::modes_error`]; infinite where the iteration
+    /// height, and of the flux, relative to the largest; the larger. The difference from the next
+    /// coarser resolution (saturated elements converge too unevenly for half of it) plus [`SaturatedArray::modes_error`]; infinite where the iteration
     /// stalled at either.
     pub relative_error: f64,
     /// The part of it that is due to the other modes being linear: what they change when their
@@ -190,8 +190,7 @@ impl SaturatedArray {
             };
             let setup = Setup::new(winding, shape, &resolution)?;
             let mut fine = solve(&setup, reference, None);
-            let outline_error =
-                exchange_error.max(0.5 * fine.difference(&coarse, lowest_m, tolerance)?);
+            let outline_error = exchange_error.max(fine.difference(&coarse, lowest_m, tolerance)?);
             fine.modes_error = modes_error;
             let all_found = [&first, &coarse, &fine]
                 .iter()
