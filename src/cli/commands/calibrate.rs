@@ -32,11 +32,11 @@ use crate::job::calibrate::{
 /// told.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Writing, &[
-    ("fluxform calibrate designs/seed_air.toml shapes/flat.toml shapes/half_sphere.toml",
-     "two objects; the bundles go to results/seed_air/"),
-    ("fluxform calibrate designs/seed_air.toml shapes/wedge.stl --unit mm --translate 0,0,30",
+    ("fluxform calibrate designs/seed.toml shapes/flat.toml shapes/half_sphere.toml",
+     "two objects; the bundles go to results/seed/"),
+    ("fluxform calibrate designs/seed.toml shapes/wedge.stl --unit mm --translate 0,0,30",
      "a surface given directly; its bundle is called wedge"),
-    ("fluxform calibrate designs/seed_air.toml shapes/flat.toml --criterion linear --force",
+    ("fluxform calibrate designs/seed.toml shapes/flat.toml --criterion linear --force",
      "another criterion, replacing what is there"),
 ]))]
 pub struct Calibrate {
@@ -312,8 +312,15 @@ fn accuracies(report: &CalibrateReport) -> String {
         .iter()
         .map(|bundle| bundle.manifest.map.interpolation.largest_error)
         .fold(0.0, f64::max);
+    let pull = largest("passive_force");
+    let pull = if pull > 0.0 {
+        format!("; steel's pull {} of itself", error(pull))
+    } else {
+        String::new()
+    };
     format!(
-        "heights {}; forces {}, map nodes {}, between nodes {} of the largest gradient at their height",
+        "heights {}; forces {}, map nodes {}, between nodes {} of the largest gradient at their \
+         height{pull}",
         length_error(largest("points")),
         error(largest("forces")),
         error(largest("map")),

@@ -26,10 +26,10 @@ use crate::lambda::{Criterion, Precision, Settings};
 /// through a map. A lambda that is null ends with exit code 4.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Reading, &[
-    ("fluxform lambda designs/seed_air.toml shapes/half_sphere.toml", "the seed's half-sphere"),
-    ("fluxform lambda designs/seed_air.toml shapes/wedge.toml --criterion linear --at 2.0",
+    ("fluxform lambda designs/seed.toml shapes/half_sphere.toml", "the seed's half-sphere"),
+    ("fluxform lambda designs/seed.toml shapes/wedge.toml --criterion linear --at 2.0",
      "the constant at which the first limit binds, and what 2 N/m would give"),
-    ("fluxform lambda designs/seed_air.toml shapes/flat.stl --unit mm --translate 0,0,50",
+    ("fluxform lambda designs/seed.toml shapes/flat.stl --unit mm --translate 0,0,50",
      "a surface given directly"),
 ]))]
 pub struct Lambda {
