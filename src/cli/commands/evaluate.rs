@@ -10,7 +10,7 @@ use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::printer::{Place, Printer};
-use crate::cli::quantity::{force, mass, mm, number, percent, si};
+use crate::cli::quantity::{force, mass, mm, number, number_to, percent, si};
 use crate::cli::values::FileArgument;
 use crate::design::{Design, Need};
 use crate::job::evaluate::{
@@ -164,13 +164,14 @@ fn steel_core(core: &CoreFacts, target: &TargetFacts) -> String {
         )
     };
     let mut text = format!(
-        "{} diameter, {} long; {material}\n|B| up to {}, {} on average at {}; the knee is at {}",
+        "{} diameter, {} long; {material}\n\
+         |B| up to {} T, {} T on average at {}; the knee is at {} T",
         mm(2.0 * core.radius_m),
         mm(core.length_m),
-        si(core.peak_field_t, "T"),
-        si(core.mean_field_t, "T"),
+        number_to(core.peak_field_t, 4),
+        number_to(core.mean_field_t, 4),
         si(target.current_a, "A"),
-        si(core.knee_t, "T")
+        number_to(core.knee_t, 4)
     );
     if let Some(deviation) = core.deviation_from_linear {
         text.push_str(&format!(
@@ -184,11 +185,14 @@ fn steel_core(core: &CoreFacts, target: &TargetFacts) -> String {
 
 /// After a voltage step.
 fn step(transient: &TransientFacts, stage: Option<&StageAccuracy>) -> String {
-    let error = stage.map_or_else(String::new, |stage| {
-        format!(", give or take {}", percent(stage.estimate))
-    });
+    let error = match stage {
+        Some(stage) if stage.estimate > 0.0 => {
+            format!(", give or take {}", percent(stage.estimate))
+        }
+        _ => String::new(),
+    };
     format!(
-        "95 % of the current after {}, of the force after {}{error} (eddy currents in the steel)",
+        "with eddy currents in the steel 95 % of the current after {}, of the force after {}{error}",
         si(transient.current_95_s, "s"),
         si(transient.force_95_s, "s")
     )
@@ -217,10 +221,17 @@ fn felt(target: &TargetFacts) -> String {
     }
     let [x, y, _] = target.force_vector_n;
     if x != 0.0 || y != 0.0 {
-        let vector = target.force_vector_n.map(force).join(", ");
-        let torque = target.torque_n_m.map(|t| si(t, "N m")).join(", ");
-        text.push_str(&format!("\nforce along x, y, z {vector}"));
-        text.push_str(&format!("\ntorque about x, y, z {torque}"));
+        let vector = |values: [f64; 3], unit: &str| {
+            // What rounding leaves of a zero is not worth its digits.
+            let largest = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+            let told = |v: f64| if v.abs() < 1e-12 * largest { 0.0 } else { v };
+            values.map(|v| si(told(v), unit)).join(", ")
+        };
+        text.push_str(&format!(
+            "\nforce along x, y, z {}\ntorque about x, y, z {}",
+            vector(target.force_vector_n, "N"),
+            vector(target.torque_n_m, "N m")
+        ));
     }
     text.push_str(&format!(
         "\nfield {}, gradient {}",

@@ -112,11 +112,11 @@ impl TableSummary {
             return "sampled at every node".to_owned();
         };
         format!(
-            "from {} up a harmonic function by {} on the faces of the workspace, {}\n\
-             within {} of the largest gradient at each height at {}",
+            "from {} up by a harmonic function, {} from {}\n\
+             within {} of the largest gradient at each height, compared at {}",
             mm(from_m),
-            count(self.samples, "sample"),
             bytes(self.bytes),
+            count(self.samples, "sample"),
             error(self.certificate),
             count(self.checks, "place")
         )

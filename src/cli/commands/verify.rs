@@ -14,7 +14,7 @@ use crate::job::verify::{Check, VerifyReport, run};
 ///
 /// Checks that a bundle is whole and as it was written, and computes its numbers again by an
 /// independent route: map nodes and forces by integrals over the windings' section and the steel
-/// solved anew at another resolution, the force constants solved for again, the currents'
+/// solved anew to a finer tolerance, the force constants solved for again, the currents'
 /// optimality by a bound that does not trust the solver.
 /// Any check that fails ends with exit code 5.
 #[derive(Debug, Args)]
@@ -38,6 +38,9 @@ impl Verify {
         let bar = begin(printer);
         let report = run(&self.bundle, &bar)?;
         drop(bar);
+        for note in &report.notes {
+            printer.warning(note);
+        }
         let json = printer.with_warnings(&report);
         printer.summary(Place::Output, &json, || self.summary(&report))?;
         let failed: Vec<&str> = report
