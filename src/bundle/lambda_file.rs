@@ -55,8 +55,28 @@ pub struct LambdaFile {
     /// Currents and errors at the lambda asked for with `--at`; absent when none was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at: Option<AtLambda>,
+    /// What the steel really does at the chosen currents; with a B-H curve only, along which
+    /// forces of several currents do not add up.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub working_point: Option<WorkingPointForces>,
     /// Each stage's estimated error.
     pub accuracy: BTreeMap<String, StageAccuracy>,
+}
+
+/// Forces along the B-H curve at the chosen currents.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct WorkingPointForces {
+    /// Largest difference from the sum of the coils' forces with which lambda was solved, at any
+    /// point, relative to the largest force.
+    pub deviation_from_linear: f64,
+    /// Root mean square of the force error, N.
+    pub rms_error_n: f64,
+    /// Largest force error, N.
+    pub worst_error_n: f64,
+    /// Largest |B| in every core, T.
+    pub peak_field_t: Vec<f64>,
+    /// Mean |B| in every core, T.
+    pub mean_field_t: Vec<f64>,
 }
 
 /// A breakpoint.

@@ -153,6 +153,15 @@ impl MagnetRule {
         }
     }
 
+    /// How far the dipoles are from the magnet's centre at most, m.
+    #[must_use]
+    pub fn reach_m(&self) -> f64 {
+        self.nodes.iter().fold(0.0_f64, |reach, node| {
+            let [x, y, z] = node.offset_m;
+            reach.max(x.hypot(y).hypot(z))
+        })
+    }
+
     /// The cylinder, with the fewest nodes whose a-priori bound is at most `tolerance`.
     ///
     /// The moment's direction is the cylinder's axis. `tolerance` is relative to the gradient (or

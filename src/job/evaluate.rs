@@ -4,18 +4,15 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::JobError;
+use super::neighbours::{self, ArrayFacts};
 use super::scene::Scene;
-use super::single::{Single, above_knee};
-use super::steel::Steel;
-use super::{JobError, KERNEL_ERROR, steel};
+use super::single::Single;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::coil::limits::{self, LimitCheck};
-use crate::coil::mutual;
 use crate::coil::transient::{VoltageStep, core_energy_share};
 use crate::design::Design;
-use crate::field::steel::array::closest_m;
-use crate::field::steel::inside::peak_depth_m;
 use crate::units::STEEL_DENSITY_KG_PER_M3;
 
 /// What `evaluate` tells; all SI.
@@ -141,36 +138,6 @@ pub struct TransientFacts {
     pub force_95_s: f64,
 }
 
-/// The array's inductances.
-#[derive(Debug, Clone, Serialize)]
-pub struct ArrayFacts {
-    /// One entry a coil.
-    pub coils: Vec<ArrayCoil>,
-    /// Inductance matrix, H: `[i][j]` is the flux through coil i for one ampere in coil j.
-    pub mutual_inductance_h: Vec<Vec<f64>>,
-}
-
-/// One coil among its neighbours.
-#[derive(Debug, Clone, Serialize)]
-pub struct ArrayCoil {
-    /// Index.
-    pub coil: usize,
-    /// Axis, m.
-    pub x_m: f64,
-    /// Axis, m.
-    pub y_m: f64,
-    /// Self inductance among its neighbours, H; without steel the same as alone.
-    pub inductance_h: f64,
-    /// Largest |B| in its core with all coils at their rated currents, T; absent for air coils.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub peak_field_t: Option<f64>,
-    /// Mean |B| there, T.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mean_field_t: Option<f64>,
-    /// Upper current limit, A.
-    pub current_max_a: f64,
-}
-
 impl Evaluation {
     /// Whether every limit is met.
     #[must_use]
@@ -203,7 +170,7 @@ pub fn evaluate(
     let force = single.force(&scene, current_a)?;
     let mut accuracy = single.accuracy.clone();
     let mut notes = single.notes.clone();
-    let array = array(&scene, &mut accuracy, &mut notes)?;
+    let array = neighbours::array(&scene, &mut accuracy, &mut notes)?;
     let transient = transient(&scene, &single, &mut accuracy);
     let asked = single.tolerance;
     let worst = accuracy["field"]
@@ -253,88 +220,6 @@ pub fn evaluate(
         accuracy_reached: worst <= asked,
         notes,
     })
-}
-
-/// The array among its neighbours; `None` for a single coil.
-fn array(
-    scene: &Scene,
-    accuracy: &mut BTreeMap<&'static str, StageAccuracy>,
-    notes: &mut Vec<String>,
-) -> Result<Option<ArrayFacts>, JobError> {
-    if scene.coils.len() < 2 {
-        return Ok(None);
-    }
-    let axes = &scene.design.array.positions_m;
-    let inductance_h = scene.circuit.inductance_h;
-    let mut matrix = mutual::inductance_matrix_h(&scene.winding, inductance_h, axes);
-    let gap_m = closest_m(axes) - 2.0 * scene.winding.outer_radius_m;
-    let mut estimate = if gap_m >= 0.1 * scene.winding.outer_radius_m {
-        mutual::RELATIVE_ERROR
-    } else {
-        mutual::RELATIVE_ERROR_TOUCHING
-    };
-    let mut method = "a-priori quadrature bound for the narrowest gap between windings";
-    let mut relative_to = "each mutual inductance";
-    let lowest_m = scene.design.target_height_m;
-    let solved = steel::solve(scene, None, KERNEL_ERROR, lowest_m)?;
-    let mut inside = Vec::new();
-    match &solved.steel {
-        Steel::None => {}
-        Steel::Alone(coil) => {
-            for (i, row) in matrix.iter_mut().enumerate() {
-                row[i] += coil.added_inductance_h;
-            }
-            method = "neighbours' cores left out (coupling = \"none\"): mutual inductances are \
-                      those of the windings in air";
-        }
-        Steel::Coupled(array) => {
-            for (i, row) in matrix.iter_mut().enumerate() {
-                for (j, value) in row.iter_mut().enumerate() {
-                    *value += array.added_inductance_h[(i, j)];
-                }
-            }
-            estimate = estimate.max(array.relative_error);
-            relative_to = "the largest self inductance";
-            method = "coupled cores by two resolutions";
-            let depth_m = peak_depth_m(array.response.outline.shape);
-            inside = array.core_fields(&scene.upper_a, depth_m)?;
-            if let Some(core) = &scene.core {
-                let peak = inside
-                    .iter()
-                    .fold(0.0_f64, |most, field| most.max(field.peak_t));
-                notes.extend(above_knee(
-                    peak,
-                    core.knee_t,
-                    "a core of the array with all coils at their rated currents",
-                ));
-            }
-        }
-    }
-    accuracy.insert(
-        "mutual_inductance",
-        StageAccuracy {
-            estimate,
-            relative_to: relative_to.to_owned(),
-            method: method.to_owned(),
-        },
-    );
-    let coils = axes
-        .iter()
-        .enumerate()
-        .map(|(coil, [x_m, y_m])| ArrayCoil {
-            coil,
-            x_m: *x_m,
-            y_m: *y_m,
-            inductance_h: matrix[coil][coil],
-            peak_field_t: inside.get(coil).map(|field| field.peak_t),
-            mean_field_t: inside.get(coil).map(|field| field.mean_t),
-            current_max_a: scene.upper_a[coil],
-        })
-        .collect();
-    Ok(Some(ArrayFacts {
-        coils,
-        mutual_inductance_h: matrix,
-    }))
 }
 
 fn transient(

@@ -5,14 +5,18 @@ use std::collections::BTreeMap;
 use super::discretize::{self, PointsReport};
 use super::scene::{MAGNET_SHARE, Scene};
 use super::steel::{EVALUATION_SHARE, Solved, Steel};
+use super::working_point::{WorkingPoint, relative_difference};
 use super::{JobError, KERNEL_ERROR, passive, steel};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
-use crate::bundle::lambda_file::{AtLambda, LambdaFile, PathStep};
+use crate::bundle::lambda_file::{AtLambda, LambdaFile, PathStep, WorkingPointForces};
 use crate::design::{Design, MagnetModel};
 use crate::lambda::{self, Criterion, ForceProblem, Precision, Settings, Solution, Status};
 use crate::progress::Progress;
 use crate::shape::document::ShapeDocument;
+
+/// Deviation from superposition above which a warning is due.
+const SUPERPOSITION_WARNING: f64 = 0.01;
 
 /// What is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -97,8 +101,25 @@ pub(super) fn solve(
     };
     let solution = lambda::solve(&problem, &options.settings)?;
     progress.end();
-    let warnings = warnings(&points, &solution, options);
+    let mut warnings = warnings(&points, &solution, options);
     let mut file = file(scene, solved, &points, &solution, options);
+    if let Some(chosen) = &solution.chosen {
+        let asked = Asked {
+            currents_a: &chosen.currents_a,
+            lambda_n_per_m: chosen.lambda_n_per_m,
+            heights_m: &points.discretized.points.height_m,
+            positions_m: &positions,
+            forces_n_per_a: &forces,
+            offset_n: offset_n.as_deref(),
+        };
+        if let Some((facts, accuracy)) =
+            at_working_point(scene, &asked, options.tolerance, progress)?
+        {
+            warnings.extend(superposition_ends(scene, &facts));
+            file.accuracy.insert("working_point".to_owned(), accuracy);
+            file.working_point = Some(facts);
+        }
+    }
     if let Some(pull) = &pull {
         file.accuracy
             .insert("passive_force".to_owned(), passive::accuracy(pull));
@@ -110,6 +131,72 @@ pub(super) fn solve(
         warnings,
         accuracy_reached: solved.tolerance >= KERNEL_ERROR && solved.reached(),
         points,
+    })
+}
+
+/// What was chosen, and from what.
+struct Asked<'a> {
+    currents_a: &'a [f64],
+    lambda_n_per_m: f64,
+    heights_m: &'a [f64],
+    positions_m: &'a [[f64; 3]],
+    forces_n_per_a: &'a [f64],
+    offset_n: Option<&'a [f64]>,
+}
+
+/// Forces along the B-H curve at the chosen currents; `None` without a curve.
+fn at_working_point(
+    scene: &Scene,
+    asked: &Asked,
+    tolerance: Option<f64>,
+    progress: &dyn Progress,
+) -> Result<Option<(WorkingPointForces, StageAccuracy)>, JobError> {
+    let lowest_m = asked
+        .heights_m
+        .iter()
+        .copied()
+        .fold(f64::INFINITY, f64::min);
+    progress.begin("working point", 1);
+    let Some(point) = WorkingPoint::new(scene, asked.currents_a, tolerance, lowest_m)? else {
+        progress.end();
+        return Ok(None);
+    };
+    let forces_n = point.forces_n(scene, asked.positions_m, progress)?;
+    progress.end();
+    let linear_n: Vec<f64> = asked
+        .forces_n_per_a
+        .chunks_exact(asked.currents_a.len())
+        .map(|row| row.iter().zip(asked.currents_a).map(|(f, i)| f * i).sum())
+        .collect();
+    let (mut squares, mut worst_n) = (0.0, 0.0_f64);
+    for (row, force) in forces_n.iter().enumerate() {
+        let offset = asked.offset_n.map_or(0.0, |offset| offset[row]);
+        let error = force + offset - asked.lambda_n_per_m * asked.heights_m[row];
+        squares += error * error;
+        worst_n = worst_n.max(error.abs());
+    }
+    let facts = WorkingPointForces {
+        deviation_from_linear: relative_difference(&forces_n, &linear_n),
+        rms_error_n: (squares / forces_n.len() as f64).sqrt(),
+        worst_error_n: worst_n,
+        peak_field_t: point.peak_field_t.clone(),
+        mean_field_t: point.mean_field_t.clone(),
+    };
+    Ok(Some((facts, point.accuracy())))
+}
+
+/// A sentence on forces that do not add up.
+fn superposition_ends(scene: &Scene, facts: &WorkingPointForces) -> Option<String> {
+    (facts.deviation_from_linear > SUPERPOSITION_WARNING).then(|| {
+        let peak_t = facts.peak_field_t.iter().copied().fold(0.0, f64::max);
+        let knee_t = scene.core.as_ref().map_or(f64::INFINITY, |core| core.knee_t);
+        format!(
+            "superposition ends along the B-H curve: at the chosen currents the forces differ by up \
+             to {:.1} % of the largest from those that lambda was solved with (the cores reach \
+             {peak_t:.2} T, the knee is at {knee_t:.2} T); lower supply.current_max_a until \
+             working_point.deviation_from_linear is small enough",
+            100.0 * facts.deviation_from_linear
+        )
     })
 }
 
@@ -236,6 +323,7 @@ fn file(
             rms_error_n: point.rms_error_n,
             worst_error_n: point.worst_error_n,
         }),
+        working_point: None,
         accuracy,
     }
 }

@@ -265,6 +265,15 @@ fn accuracy(map: &FieldMap, solved: &Solved, magnet: f64) -> StageAccuracy {
     }
 }
 
+/// What is sampled for a map's components.
+pub(super) fn parts_of(components: Components) -> Parts {
+    match components {
+        Components::Gz => Parts::Gz,
+        Components::Gradient => Parts::Gradient,
+        Components::All => Parts::All,
+    }
+}
+
 impl Sampler for ArraySources {
     fn drives(&self) -> usize {
         Self::drives(self)
@@ -280,12 +289,7 @@ impl Sampler for ArraySources {
         components: Components,
         out: &mut [f64],
     ) -> Result<(), MapError> {
-        let parts = match components {
-            Components::Gz => Parts::Gz,
-            Components::Gradient => Parts::Gradient,
-            Components::All => Parts::All,
-        };
-        Self::sample(self, points_m, parts, out);
+        Self::sample(self, points_m, parts_of(components), out);
         Ok(())
     }
 }

@@ -1,17 +1,20 @@
 //! What a command does, from documents to results and artefacts. No screens, no clocks.
 
+pub mod at_current;
 pub mod calibrate;
 pub mod discretize;
 pub mod evaluate;
 pub mod lambda;
 pub mod map;
 pub mod maps;
+pub mod neighbours;
 pub mod passive;
 pub mod probe;
 pub mod scene;
 pub mod single;
 pub mod steel;
 pub mod verify;
+pub mod working_point;
 
 use crate::bundle::atomic::WriteError;
 use crate::bundle::load::BundleError;

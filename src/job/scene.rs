@@ -164,12 +164,8 @@ impl<'a> Scene<'a> {
             self.magnet_rule(lowest_m, MAGNET_SHARE * solved.tolerance.max(MAGNET_FINEST))?;
         let mut forces = vec![0.0; points_m.len() * coils];
         progress.begin("forces", points_m.len() as u64);
-        let reach_m = rule.nodes().iter().fold(0.0_f64, |reach, node| {
-            let [x, y, z] = node.offset_m;
-            reach.max(x.hypot(y).hypot(z))
-        });
         // As fine as the nearest of all points needs, whatever the portion.
-        let sources = solved.sources(self, points_m, reach_m)?;
+        let sources = solved.sources(self, points_m, rule.reach_m())?;
         forces
             .par_chunks_mut(PORTION * coils)
             .zip(points_m.par_chunks(PORTION))
@@ -220,20 +216,17 @@ impl<'a> Scene<'a> {
                     })
                     .collect();
                 let air = self.winding.gradients(&r_m, &z_m, tolerance, wanted)?;
-                let part = |component: usize, row: usize| {
-                    let block = column * parts.count() + component;
-                    steel.get(block * count + row).copied().unwrap_or(0.0)
-                };
+                let block = parts.count() * count;
+                let steel = steel.get(column * block..(column + 1) * block);
                 for (row, place) in places.iter().enumerate() {
-                    let mut force;
+                    let mut force = m_z * air.dbz_dz[row];
                     if tilted {
                         // dB_x/dz = (dx / r) dB_r/dz, and the same along y.
                         let (dx, dy) = offset(place);
-                        force = m_z * (air.dbz_dz[row] + part(4, row));
                         force += air.dbr_dz_over_r[row] * (m_x * dx + m_y * dy);
-                        force += m_x * part(2, row) + m_y * part(3, row);
-                    } else {
-                        force = m_z * (air.dbz_dz[row] + part(0, row));
+                    }
+                    if let Some(steel) = steel {
+                        force += upward_n(node.moment_a_m2, parts, steel, row);
                     }
                     rows[row * coils + column] += coil.gain * force;
                 }
@@ -285,5 +278,17 @@ impl<'a> Scene<'a> {
             diameter_m: magnet.diameter_m,
             length_m: magnet.length_m,
         }
+    }
+}
+
+/// Upward force on a dipole at one of the points at which one drive's `parts` were sampled,
+/// [component, point]: m . dB/dz, N (per ampere if they are).
+pub(super) fn upward_n(moment_a_m2: [f64; 3], parts: Parts, values: &[f64], row: usize) -> f64 {
+    let count = values.len() / parts.count();
+    let part = |component: usize| values[component * count + row];
+    let [m_x, m_y, m_z] = moment_a_m2;
+    match parts {
+        Parts::Gz => m_z * part(0),
+        Parts::Gradient | Parts::All => m_x * part(2) + m_y * part(3) + m_z * part(4),
     }
 }

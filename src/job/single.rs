@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::at_current::{AtCurrent, SATURATED_TOLERANCE};
 use super::evaluate::CoreFacts;
 use super::scene::{MAGNET_SHARE, Scene};
 use super::steel::{CORED_TOLERANCE, Material, SceneCore};
@@ -10,11 +11,9 @@ use crate::accuracy::StageAccuracy;
 use crate::coil::inductance;
 use crate::field::frame::to_cartesian;
 use crate::field::steel::bh_curve::BhCurve;
-use crate::field::steel::cored_coil::{CoredCoil, Excitation};
-use crate::field::steel::generatrix::{Generatrix, Resolution};
+use crate::field::steel::cored_coil::CoredCoil;
 use crate::field::steel::inside::peak_depth_m;
 use crate::field::steel::magnetized::MagnetizedCore;
-use crate::field::steel::saturated::{CoreField, SaturatedCore, Status};
 use crate::field::winding::{AxialField, Winding};
 use crate::units::STEEL_DENSITY_KG_PER_M3;
 
@@ -45,12 +44,6 @@ enum Source {
     Cored(Box<CoredCoil>),
     Saturated(Winding, Box<MagnetizedCore>),
 }
-
-/// Default tolerance of one coil along a B-H curve: the curve's kinks cross the elements, so
-/// that digits are dear.
-const SATURATED_TOLERANCE: f64 = 3e-4;
-/// Refinements after which a tolerance that is not reached is given up, with its estimate.
-const MAX_REFINEMENTS: usize = 3;
 
 /// The force on the magnet at the target.
 pub(super) struct TargetForce {
@@ -196,28 +189,9 @@ impl Single {
         let tolerance = tolerance.unwrap_or(SATURATED_TOLERANCE);
         let height_m = scene.design.target_height_m;
         let current_a = scene.rated_current_a();
-        let mut aim = tolerance;
-        let mut state = None;
-        for _ in 0..=MAX_REFINEMENTS {
-            let resolution = Resolution::for_tolerance(aim);
-            let coarse = AtCurrent::new(scene, core, curve, current_a, &resolution.coarser())?;
-            let fine = AtCurrent::new(scene, core, curve, current_a, &resolution)?;
-            let field = fine.field(scene, height_m)?;
-            let other = coarse.field(scene, height_m)?;
-            let error = ((field.dbz_dz - other.dbz_dz).abs() / field.gradient_norm())
-                .max((fine.flux_linkage_wb / coarse.flux_linkage_wb - 1.0).abs());
-            let reached = error <= tolerance;
-            state = Some((fine, field, error));
-            if reached {
-                break;
-            }
-            aim *= 0.1;
-        }
-        let Some((state, field, error)) = state else {
-            return Err(JobError::Input(
-                "no resolution of the core was solved".to_owned(),
-            ));
-        };
+        let state = AtCurrent::new(scene, core, curve, current_a, tolerance, height_m)?;
+        let (field, error) = (state.field(scene, height_m)?, state.relative_error);
+        let inductance_h = scene.circuit.inductance_h + state.added_inductance_h;
         let shape = core.shape;
         let initial = core.relative_permeability();
         let linear = CoredCoil::new(&scene.winding, shape, initial, tolerance, height_m)?;
@@ -271,8 +245,8 @@ impl Single {
             ));
         }
         Ok(Self {
-            inductance_h: state.flux_linkage_wb / current_a,
-            flux_linkage_wb: Some(state.flux_linkage_wb),
+            inductance_h,
+            flux_linkage_wb: Some(inductance_h * current_a),
             field,
             relative_permeability: curve.relative_permeability(mean_t).max(1.0),
             core: Some(facts),
@@ -338,46 +312,4 @@ pub(super) fn above_knee(peak_t: f64, knee_t: f64, whose: &str) -> Option<String
              linear: the force will be smaller than told; give core.bh_curve, or lower the current"
         )
     })
-}
-
-/// A coil along a B-H curve at one current and one resolution.
-struct AtCurrent {
-    /// Per ampere.
-    layer: MagnetizedCore,
-    flux_linkage_wb: f64,
-    inside: CoreField,
-}
-
-impl AtCurrent {
-    fn new(
-        scene: &Scene,
-        core: &SceneCore,
-        curve: &BhCurve,
-        current_a: f64,
-        resolution: &Resolution,
-    ) -> Result<Self, JobError> {
-        let outline = Generatrix::of_coil(&scene.winding, core.shape, resolution);
-        let excitation = Excitation::new(&scene.winding, &outline, resolution.quadrature)?;
-        let solver = SaturatedCore::new(&outline, resolution.quadrature)
-            .map_err(|fault| JobError::Input(format!("[core] with a B-H curve: {fault}")))?;
-        let solution = solver.solve(&(&excitation.potential * current_a), curve, None);
-        if solution.status == Status::Stalled {
-            return Err(JobError::Input(format!(
-                "[core] with a B-H curve: no state of the steel was found at {current_a} A; check \
-                 the curve for jumps, or give core.relative_permeability"
-            )));
-        }
-        let steel = solver.flux_linkage_wb(&solution, &excitation.potential);
-        let inside = solver.field(&solution, curve);
-        let density = (&solution.v_a / current_a).as_slice().to_vec();
-        Ok(Self {
-            layer: MagnetizedCore::new(outline, density),
-            flux_linkage_wb: scene.circuit.inductance_h * current_a + steel,
-            inside,
-        })
-    }
-
-    fn field(&self, scene: &Scene, height_m: f64) -> Result<AxialField, JobError> {
-        Ok(scene.winding.field(0.0, height_m)? + self.layer.field(0.0, height_m))
-    }
 }

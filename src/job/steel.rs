@@ -1,6 +1,7 @@
 //! The steel of a design: its material, its solution, and the field it adds.
 
 use super::JobError;
+use super::at_current::{AtCurrent, SATURATED_TOLERANCE};
 use super::scene::Scene;
 use crate::design::bh_table::read_bh_table;
 use crate::design::{Core, Coupling, Design, Steel as Described};
@@ -8,6 +9,7 @@ use crate::field::steel::CoreShape;
 use crate::field::steel::array::CoupledArray;
 use crate::field::steel::bh_curve::BhCurve;
 use crate::field::steel::cored_coil::CoredCoil;
+use crate::field::steel::magnetized::MagnetizedCore;
 use crate::field::steel::sources::{ArraySources, Parts};
 use crate::field::winding::Winding;
 
@@ -94,9 +96,18 @@ pub enum Steel {
     /// There is none.
     None,
     /// Every core answers to its own winding alone.
-    Alone(Box<CoredCoil>),
+    Alone(Box<AloneCore>),
     /// All cores answer to every winding.
     Coupled(Box<CoupledArray>),
+}
+
+/// A core that answers to its own winding alone.
+#[derive(Debug, Clone)]
+pub struct AloneCore {
+    /// Its layer per ampere.
+    pub layer: MagnetizedCore,
+    /// What it adds to the winding's inductance, H.
+    pub added_inductance_h: f64,
 }
 
 /// A scene's field sources, ready to be evaluated.
@@ -108,7 +119,9 @@ pub struct Solved {
     pub tolerance: f64,
     /// Estimated error of the steel's solution, relative to the same; 0 without steel.
     pub steel_error: f64,
-    /// Permeability of the linear solution.
+    /// Permeability of the linear solution. With a B-H curve the cores of coils that are not
+    /// coupled follow the curve at the rated current; those that are coupled are linear, of the
+    /// permeability at the mean |B| of one coil alone at the rated current.
     pub relative_permeability: f64,
 }
 
@@ -133,37 +146,15 @@ impl Solved {
         let Some(core) = &scene.core else {
             return Ok(None);
         };
-        let shape = core.shape;
-        let (mut lowest_m, mut distance_m) = (f64::INFINITY, f64::INFINITY);
-        for (number, [x, y, z]) in points_m.iter().enumerate() {
-            lowest_m = lowest_m.min(*z);
-            // Seen from farther than its length a core needs no finer rings.
-            if *z > shape.top_m + shape.length_m() {
-                continue;
-            }
-            for coil in &scene.coils {
-                let r = (x - coil.axis_m[0]).hypot(y - coil.axis_m[1]);
-                let distance = distance_to_surface_m(shape, r, *z);
-                if distance - reach_m < CLOSEST * shape.radius_m {
-                    return Err(JobError::Input(format!(
-                        "point {} ({x}, {y}, {z} m) is {:.3} mm from the surface of the core of \
-                         coil {}, where the field is not resolved; keep {:.3} mm away from it",
-                        number + 1,
-                        distance * 1e3,
-                        coil.number,
-                        (reach_m + CLOSEST * shape.radius_m) * 1e3
-                    )));
-                }
-                distance_m = distance_m.min(distance);
-            }
-        }
-        let distance_m = distance_m.min(shape.length_m()) - reach_m;
-        let lowest_m = lowest_m - reach_m;
+        let (lowest_m, distance_m) = clearance_m(scene, core, points_m, reach_m)?;
         let tolerance = EVALUATION_SHARE * self.tolerance;
         Ok(match &self.steel {
             Steel::None => None,
             Steel::Alone(coil) => Some(ArraySources::of_core(
-                &coil.core, lowest_m, distance_m, tolerance,
+                &coil.layer,
+                lowest_m,
+                distance_m,
+                tolerance,
             )),
             Steel::Coupled(array) => Some(ArraySources::of_array(
                 array, lowest_m, distance_m, tolerance,
@@ -201,6 +192,47 @@ impl Solved {
     }
 }
 
+/// How low places within `reach_m` of `points_m` go, and how close to any core: at most its
+/// length, beyond which rings need be no finer; m.
+///
+/// # Errors
+/// A point on the steel's surface or hardly off it.
+pub(super) fn clearance_m(
+    scene: &Scene,
+    core: &SceneCore,
+    points_m: &[[f64; 3]],
+    reach_m: f64,
+) -> Result<(f64, f64), JobError> {
+    let shape = core.shape;
+    let (mut lowest_m, mut distance_m) = (f64::INFINITY, f64::INFINITY);
+    for (number, [x, y, z]) in points_m.iter().enumerate() {
+        lowest_m = lowest_m.min(*z);
+        // Seen from farther than its length a core needs no finer rings.
+        if *z > shape.top_m + shape.length_m() {
+            continue;
+        }
+        for coil in &scene.coils {
+            let r = (x - coil.axis_m[0]).hypot(y - coil.axis_m[1]);
+            let distance = distance_to_surface_m(shape, r, *z);
+            if distance - reach_m < CLOSEST * shape.radius_m {
+                return Err(JobError::Input(format!(
+                    "point {} ({x}, {y}, {z} m) is {:.3} mm from the surface of the core of \
+                     coil {}, where the field is not resolved; keep {:.3} mm away from it",
+                    number + 1,
+                    distance * 1e3,
+                    coil.number,
+                    (reach_m + CLOSEST * shape.radius_m) * 1e3
+                )));
+            }
+            distance_m = distance_m.min(distance);
+        }
+    }
+    Ok((
+        lowest_m - reach_m,
+        distance_m.min(shape.length_m()) - reach_m,
+    ))
+}
+
 /// Distance from a core's surface, m.
 fn distance_to_surface_m(shape: CoreShape, r_m: f64, z_m: f64) -> f64 {
     let beside = r_m - shape.radius_m;
@@ -214,7 +246,7 @@ fn distance_to_surface_m(shape: CoreShape, r_m: f64, z_m: f64) -> f64 {
 /// Solves the steel of `scene`, to `tolerance` or the default, for heights from `lowest_m` up.
 ///
 /// # Errors
-/// An outline that meets a winding's edge.
+/// An outline that meets a winding's edge; a B-H curve along which no state is found.
 pub fn solve(
     scene: &Scene,
     tolerance: Option<f64>,
@@ -229,7 +261,20 @@ pub fn solve(
             relative_permeability: 1.0,
         });
     };
-    let relative_permeability = core.relative_permeability();
+    let current_a = scene.rated_current_a();
+    let at_current = match &core.material {
+        Material::Curve(curve) if current_a > 0.0 => {
+            let tolerance = tolerance.unwrap_or(SATURATED_TOLERANCE);
+            let state = AtCurrent::new(scene, core, curve, current_a, tolerance, lowest_m)?;
+            let secant = curve.relative_permeability(state.inside.mean_b_t).max(1.0);
+            Some((state, secant, tolerance))
+        }
+        Material::Curve(_) | Material::Linear(_) => None,
+    };
+    let relative_permeability = match &at_current {
+        Some((_, secant, _)) => *secant,
+        None => core.relative_permeability(),
+    };
     if coupled(scene.design) {
         let tolerance = tolerance.unwrap_or(COUPLED_TOLERANCE);
         let array = CoupledArray::new(
@@ -247,18 +292,38 @@ pub fn solve(
             relative_permeability,
         });
     }
-    let tolerance = tolerance.unwrap_or(CORED_TOLERANCE);
-    let coil = CoredCoil::new(
-        &scene.winding,
-        core.shape,
-        relative_permeability,
-        tolerance,
-        lowest_m,
-    )?;
+    let (alone, steel_error, tolerance) = match at_current {
+        Some((state, _, tolerance)) => (
+            AloneCore {
+                layer: state.layer,
+                added_inductance_h: state.added_inductance_h,
+            },
+            state.relative_error,
+            tolerance,
+        ),
+        None => {
+            let tolerance = tolerance.unwrap_or(CORED_TOLERANCE);
+            let coil = CoredCoil::new(
+                &scene.winding,
+                core.shape,
+                relative_permeability,
+                tolerance,
+                lowest_m,
+            )?;
+            (
+                AloneCore {
+                    layer: coil.core,
+                    added_inductance_h: coil.added_inductance_h,
+                },
+                coil.relative_error,
+                tolerance,
+            )
+        }
+    };
     Ok(Solved {
         tolerance,
-        steel_error: coil.relative_error,
-        steel: Steel::Alone(Box::new(coil)),
+        steel_error,
+        steel: Steel::Alone(Box::new(alone)),
         relative_permeability,
     })
 }

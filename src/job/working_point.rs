@@ -1,0 +1,313 @@
+//! The steel at given currents in all coils, along its B-H curve: what superposition leaves out.
+
+use super::JobError;
+use super::at_current::{AtCurrent, no_state};
+use super::maps::parts_of;
+use super::scene::{MAGNET_SHARE, Scene, upward_n};
+use super::steel::{EVALUATION_SHARE, Material, SceneCore, Solved, Steel, clearance_m, coupled};
+use crate::accuracy::StageAccuracy;
+use crate::field::steel::bh_curve::BhCurve;
+use crate::field::steel::saturated::Status;
+use crate::field::steel::saturated_array::SaturatedArray;
+use crate::field::steel::sources::{ArraySources, Parts};
+use crate::map::Components;
+use crate::map::sampler::Sampler;
+use crate::map::tabulate::MapError;
+use crate::progress::Progress;
+
+/// Default tolerance of the steel at a working point, relative to the largest |grad B| at a
+/// height: what the modes that are taken as linear leave is of this order.
+pub const WORKING_POINT_TOLERANCE: f64 = 1e-3;
+
+/// The cores at a working point.
+#[derive(Debug, Clone)]
+pub struct WorkingPoint {
+    /// Current in every coil, A.
+    pub currents_a: Vec<f64>,
+    /// Largest |B| in every core, T.
+    pub peak_field_t: Vec<f64>,
+    /// Mean |B| in every core, T.
+    pub mean_field_t: Vec<f64>,
+    /// Flux linkage of every coil, the neighbours' windings left out, Wb.
+    pub steel_flux_linkage_wb: Vec<f64>,
+    /// Estimated error of the total gradient above, relative to the largest |grad B| at the
+    /// height.
+    pub relative_error: f64,
+    tolerance: f64,
+    cores: Cores,
+}
+
+#[derive(Debug, Clone)]
+enum Cores {
+    /// Every core under its own winding: the coils' effective currents, A, and the states, of
+    /// which coils of the same current share one; `None` without current.
+    Alone(Vec<(f64, Option<AtCurrent>)>),
+    /// All under all.
+    Coupled(Box<SaturatedArray>),
+}
+
+impl WorkingPoint {
+    /// Solves the cores of `scene` at `currents_a` for heights from `lowest_m` up; `None` where
+    /// superposition holds: without a B-H curve.
+    ///
+    /// A coil whose map has a measured gain counts with that much more current.
+    ///
+    /// # Errors
+    /// A core that cannot be solved.
+    pub fn new(
+        scene: &Scene,
+        currents_a: &[f64],
+        tolerance: Option<f64>,
+        lowest_m: f64,
+    ) -> Result<Option<Self>, JobError> {
+        let Some((core, curve)) = curved(scene) else {
+            return Ok(None);
+        };
+        let tolerance = tolerance
+            .unwrap_or(WORKING_POINT_TOLERANCE)
+            .max(WORKING_POINT_TOLERANCE);
+        let effective_a: Vec<f64> = currents_a
+            .iter()
+            .zip(&scene.coils)
+            .map(|(current, coil)| current * coil.gain)
+            .collect();
+        let mut made = if coupled(scene.design) {
+            Self::coupled(scene, core, curve, &effective_a, tolerance, lowest_m)?
+        } else {
+            Self::alone(scene, core, curve, &effective_a, tolerance, lowest_m)?
+        };
+        made.currents_a = currents_a.to_vec();
+        Ok(Some(made))
+    }
+
+    fn coupled(
+        scene: &Scene,
+        core: &SceneCore,
+        curve: &BhCurve,
+        currents_a: &[f64],
+        tolerance: f64,
+        lowest_m: f64,
+    ) -> Result<Self, JobError> {
+        let array = SaturatedArray::new(
+            &scene.winding,
+            core.shape,
+            curve,
+            &scene.design.array.positions_m,
+            currents_a,
+            tolerance,
+            lowest_m,
+        )
+        .map_err(|fault| JobError::Input(format!("[core] with a B-H curve: {fault}")))?;
+        if array.status == Status::Stalled {
+            let most_a = currents_a.iter().fold(0.0_f64, |m, i| m.max(i.abs()));
+            return Err(no_state(most_a));
+        }
+        Ok(Self {
+            currents_a: Vec::new(),
+            peak_field_t: array.fields.iter().map(|f| f.peak_b_t).collect(),
+            mean_field_t: array.fields.iter().map(|f| f.mean_b_t).collect(),
+            steel_flux_linkage_wb: array.flux_linkage_wb.clone(),
+            relative_error: array.relative_error,
+            tolerance,
+            cores: Cores::Coupled(Box::new(array)),
+        })
+    }
+
+    fn alone(
+        scene: &Scene,
+        core: &SceneCore,
+        curve: &BhCurve,
+        currents_a: &[f64],
+        tolerance: f64,
+        lowest_m: f64,
+    ) -> Result<Self, JobError> {
+        let mut states: Vec<(f64, Option<AtCurrent>)> = Vec::new();
+        for current in currents_a {
+            let known = states
+                .iter()
+                .find(|(other, _)| other.abs() == current.abs());
+            let state = match known {
+                Some((_, state)) => state.clone(),
+                None if *current == 0.0 => None,
+                None => Some(AtCurrent::new(
+                    scene,
+                    core,
+                    curve,
+                    current.abs(),
+                    tolerance,
+                    lowest_m,
+                )?),
+            };
+            states.push((*current, state));
+        }
+        let of = |pick: &dyn Fn(f64, &AtCurrent) -> f64| -> Vec<f64> {
+            states
+                .iter()
+                .map(|(current, state)| state.as_ref().map_or(0.0, |state| pick(*current, state)))
+                .collect()
+        };
+        Ok(Self {
+            currents_a: Vec::new(),
+            peak_field_t: of(&|_, state| state.inside.peak_b_t),
+            mean_field_t: of(&|_, state| state.inside.mean_b_t),
+            steel_flux_linkage_wb: of(&|current, state| current * state.added_inductance_h),
+            relative_error: of(&|_, state| state.relative_error)
+                .into_iter()
+                .fold(0.0, f64::max),
+            tolerance,
+            cores: Cores::Alone(states),
+        })
+    }
+
+    /// The error of the steel's solution.
+    #[must_use]
+    pub fn accuracy(&self) -> StageAccuracy {
+        StageAccuracy {
+            estimate: self.relative_error + EVALUATION_SHARE * self.tolerance,
+            relative_to: "the largest |grad B| at a height".to_owned(),
+            method: "two resolutions of cores that follow their B-H curve, the modes across the \
+                     axis taken as linear and this varied"
+                .to_owned(),
+        }
+    }
+
+    /// The steel's total field for points no closer than `distance_m` to any core and no lower
+    /// than `lowest_m`.
+    #[must_use]
+    pub fn field(&self, scene: &Scene, lowest_m: f64, distance_m: f64) -> TotalField {
+        let tolerance = EVALUATION_SHARE * self.tolerance;
+        let parts = match &self.cores {
+            Cores::Coupled(array) => vec![(
+                1.0,
+                [0.0, 0.0],
+                ArraySources::of_saturated(array, lowest_m, distance_m, tolerance),
+            )],
+            Cores::Alone(states) => states
+                .iter()
+                .zip(&scene.coils)
+                .filter_map(|((current, state), coil)| {
+                    let layer = &state.as_ref()?.layer;
+                    let sources = ArraySources::of_core(layer, lowest_m, distance_m, tolerance);
+                    Some((*current, coil.axis_m, sources))
+                })
+                .collect(),
+        };
+        let top_m = scene.core.as_ref().map_or(0.0, |core| core.shape.top_m);
+        TotalField { parts, top_m }
+    }
+
+    /// Upward force on the magnet at every point, N, windings and steel, the pull of the
+    /// unpowered steel left out.
+    ///
+    /// # Errors
+    /// A point on the steel; interruption.
+    pub fn forces_n(
+        &self,
+        scene: &Scene,
+        points_m: &[[f64; 3]],
+        progress: &dyn Progress,
+    ) -> Result<Vec<f64>, JobError> {
+        let air = Solved {
+            steel: Steel::None,
+            tolerance: EVALUATION_SHARE * self.tolerance,
+            steel_error: 0.0,
+            relative_permeability: 1.0,
+        };
+        let per_ampere = scene.forces_n_per_a(&air, points_m, progress)?;
+        let mut total: Vec<f64> = per_ampere
+            .chunks_exact(scene.coils.len())
+            .map(|row| row.iter().zip(&self.currents_a).map(|(f, i)| f * i).sum())
+            .collect();
+        let lowest_m = points_m.iter().fold(f64::INFINITY, |z, p| z.min(p[2]));
+        let rule = scene.magnet_rule(lowest_m, MAGNET_SHARE * self.tolerance)?;
+        let Some(core) = &scene.core else {
+            return Ok(total);
+        };
+        let (lowest_m, distance_m) = clearance_m(scene, core, points_m, rule.reach_m())?;
+        let field = self.field(scene, lowest_m, distance_m);
+        let parts = if rule.is_upright() {
+            Parts::Gz
+        } else {
+            Parts::Gradient
+        };
+        for node in rule.nodes() {
+            let places: Vec<[f64; 3]> = points_m
+                .iter()
+                .map(|p| std::array::from_fn(|i| p[i] + node.offset_m[i]))
+                .collect();
+            let steel = field.at(&places, parts);
+            for (row, force) in total.iter_mut().enumerate() {
+                *force += upward_n(node.moment_a_m2, parts, &steel, row);
+            }
+        }
+        Ok(total)
+    }
+}
+
+/// The steel's field at a working point: the sum of all cores'.
+#[derive(Debug, Clone)]
+pub struct TotalField {
+    /// Current, axis, and the dipoles per ampere, their core at the origin.
+    parts: Vec<(f64, [f64; 2], ArraySources)>,
+    top_m: f64,
+}
+
+impl TotalField {
+    /// The field at `points_m`, [component, point].
+    #[must_use]
+    pub fn at(&self, points_m: &[[f64; 3]], parts: Parts) -> Vec<f64> {
+        let mut total = vec![0.0; parts.count() * points_m.len()];
+        let mut one = total.clone();
+        for (current, [x, y], sources) in &self.parts {
+            let own: Vec<[f64; 3]> = points_m
+                .iter()
+                .map(|p| [p[0] - x, p[1] - y, p[2]])
+                .collect();
+            sources.sample(&own, parts, &mut one);
+            for (total, one) in total.iter_mut().zip(&one) {
+                *total += current * one;
+            }
+        }
+        total
+    }
+}
+
+impl Sampler for TotalField {
+    fn drives(&self) -> usize {
+        1
+    }
+
+    fn top_m(&self) -> f64 {
+        self.top_m
+    }
+
+    fn sample(
+        &self,
+        points_m: &[[f64; 3]],
+        components: Components,
+        out: &mut [f64],
+    ) -> Result<(), MapError> {
+        out.copy_from_slice(&self.at(points_m, parts_of(components)));
+        Ok(())
+    }
+}
+
+/// The core and its B-H curve; `None` for a design without one.
+fn curved<'a>(scene: &'a Scene) -> Option<(&'a SceneCore, &'a BhCurve)> {
+    let core = scene.core.as_ref()?;
+    match &core.material {
+        Material::Curve(curve) => Some((core, curve)),
+        Material::Linear(_) => None,
+    }
+}
+
+/// Largest difference of two lists, relative to the largest of the first.
+#[must_use]
+pub fn relative_difference(values: &[f64], others: &[f64]) -> f64 {
+    let size = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let worst = values
+        .iter()
+        .zip(others)
+        .fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+    if worst > 0.0 { worst / size } else { 0.0 }
+}
