@@ -13,9 +13,8 @@ use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{force, mass, mm, number, number_to, percent, si};
 use crate::cli::values::FileArgument;
 use crate::design::{Design, Need};
-use crate::job::evaluate::{
-    ArrayFacts, CoreFacts, Evaluation, TargetFacts, TransientFacts, evaluate,
-};
+use crate::job::evaluate::{CoreFacts, Evaluation, TargetFacts, TransientFacts, evaluate};
+use crate::job::neighbours::{ArrayFacts, WorkingPointFacts};
 
 /// Evaluate one coil as given: circuit, field and force at the target, limits
 ///
@@ -141,6 +140,9 @@ fn summary(design: &Design, result: &Evaluation) -> String {
                 percent(largest / coil.inductance_h)
             ),
         );
+        if let Some(point) = &array.working_point {
+            sheet.line("", &all_at_once(array, point));
+        }
         cores(&mut sheet, design, array);
     }
     let stages = result.accuracy.iter().map(|(name, stage)| (*name, stage));
@@ -239,6 +241,28 @@ fn felt(target: &TargetFacts) -> String {
         si(target.gradient_t_per_m_per_a, "T/m/A")
     ));
     text
+}
+
+/// All coils at their rated currents, along the B-H curve.
+fn all_at_once(array: &ArrayFacts, point: &WorkingPointFacts) -> String {
+    let linear = array
+        .relative_permeability
+        .map_or_else(String::new, |mu_r| {
+            format!("linear with relative permeability {}; ", number(mu_r))
+        });
+    let flux = |start, pick: fn(f64, f64) -> f64| {
+        si(
+            point.flux_linkage_wb.iter().copied().fold(start, pick),
+            "Wb",
+        )
+    };
+    format!(
+        "{linear}all coils at once {} off that along the B-H curve\n\
+         flux linkage then from {} to {}",
+        percent(point.deviation_from_linear),
+        flux(f64::INFINITY, f64::min),
+        flux(f64::NEG_INFINITY, f64::max)
+    )
 }
 
 /// Flux density in the cores of an array, where they are coupled.
