@@ -1,5 +1,8 @@
 //! The main job from documents to a verified bundle.
 
+#[path = "job/cored.rs"]
+mod cored;
+
 use std::path::{Path, PathBuf};
 
 use fluxform::bundle::artefact::Input;

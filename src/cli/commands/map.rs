@@ -14,24 +14,26 @@ use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
 use crate::cli::printer::{Place, Printer};
-use crate::cli::quantity::{bytes, count, error};
+use crate::cli::quantity::{bytes, count, error, mm};
 use crate::cli::values::FileArgument;
 use crate::design::Need;
 use crate::job::map::{MapReport, MapRequest, run};
 use crate::map::Components;
+use crate::map::sampled::TableReport;
 
 /// Tabulate the gradient maps of every coil over the workspace
 ///
 /// Tabulates the gradient of every coil's field per ampere over the workspace grid of the design
 /// and writes map.npz (NumPy, little-endian doubles with axes and units) and map.json beside it;
 /// on request also map.csv and map.vti, which ParaView opens. The error at the nodes and the error
-/// of interpolating between them are told.
+/// of interpolating between them are told; of arrays with coupled steel cores also the compact form
+/// that stood for the steel, and how far it was seen to be off.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Writing, &[
-    ("fluxform map designs/seed_air.toml --out maps", "dBz/dz of all coils"),
+    ("fluxform map designs/seed.toml --out maps", "dBz/dz of all coils"),
     ("fluxform map designs/seed_air.toml --out maps_vtk --vtk --tolerance 1e-6",
      "for ParaView, less accurate"),
-    ("fluxform tabulate designs/seed_air.toml --out maps --format json --force",
+    ("fluxform tabulate designs/seed.toml --out maps --format json --force",
      "replace what is there, and tell a program"),
 ]))]
 pub struct Map {
@@ -74,6 +76,51 @@ struct MapSummary<'a> {
     point_coils: usize,
     distinct_radii: usize,
     tabulated: bool,
+    /// The compact form of a coupled array's steel.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    table: Option<TableSummary>,
+}
+
+/// The compact form that stood for the steel of a coupled array.
+#[derive(Serialize)]
+struct TableSummary {
+    /// From this height up; below it, and where it is null, places are sampled one by one.
+    from_m: Option<f64>,
+    samples: usize,
+    nodes: [usize; 3],
+    coefficients: usize,
+    bytes: u64,
+    checks: usize,
+    certificate: f64,
+}
+
+impl TableSummary {
+    fn of(table: &TableReport) -> Self {
+        Self {
+            from_m: table.from_m,
+            samples: table.samples,
+            nodes: table.degrees,
+            coefficients: table.coefficients,
+            bytes: (table.coefficients * size_of::<f64>()) as u64,
+            checks: table.checks,
+            certificate: table.certificate,
+        }
+    }
+
+    fn told(&self) -> String {
+        let Some(from_m) = self.from_m else {
+            return "sampled at every node".to_owned();
+        };
+        format!(
+            "from {} up by a harmonic function, {} from {}\n\
+             within {} of the largest gradient at each height, compared at {}",
+            mm(from_m),
+            bytes(self.bytes),
+            count(self.samples, "sample"),
+            error(self.certificate),
+            count(self.checks, "place")
+        )
+    }
 }
 
 impl Map {
@@ -109,6 +156,7 @@ impl Map {
             point_coils: report.point_coils,
             distinct_radii: report.distinct_radii,
             tabulated: report.tabulated,
+            table: report.table.as_ref().map(TableSummary::of),
         };
         let json = printer.with_warnings(&json);
         printer.summary(Place::Output, &json, || summary(&report))?;
@@ -145,6 +193,9 @@ fn summary(report: &MapReport) -> String {
             }
         ),
     );
+    if let Some(table) = &report.table {
+        sheet.line("steel", &TableSummary::of(table).told());
+    }
     let stages = report.sidecar.accuracy.iter();
     let stages = stages.map(|(name, stage)| (name.as_str(), stage));
     sheet.line("accuracy", &describe::accuracy(stages));
