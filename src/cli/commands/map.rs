@@ -14,9 +14,9 @@ use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
 use crate::cli::printer::{Place, Printer};
-use crate::cli::quantity::{bytes, count, error, mm};
+use crate::cli::quantity::{bytes, count, error, mm, percent};
 use crate::cli::values::FileArgument;
-use crate::design::Need;
+use crate::design::{Design, Need, Steel};
 use crate::job::map::{MapReport, MapRequest, run};
 use crate::map::Components;
 use crate::map::sampled::TableReport;
@@ -43,6 +43,15 @@ pub struct Map {
     /// What the map holds
     #[arg(long, value_enum, default_value_t = Wanted::Gz)]
     components: Wanted,
+    /// Currents at which cores with a B-H curve are mapped together too, A: one for all coils, or
+    /// one a coil [default: the rated currents]
+    #[arg(
+        long,
+        value_name = "A,...",
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
+    currents: Vec<f64>,
     /// Folder of the files [default: results/<design>]
     #[arg(long, value_name = "DIR")]
     out: Option<FileArgument>,
@@ -124,6 +133,36 @@ impl TableSummary {
 }
 
 impl Map {
+    /// The working point's currents, where any are given.
+    fn currents_a(&self, design: &Design) -> Result<Option<Vec<f64>>, Failure> {
+        let coils = design.array.positions_m.len();
+        let fault = |why: String| Err(Failure::Usage(format!("--currents: {why}")));
+        if self.currents.is_empty() {
+            return Ok(None);
+        }
+        let curved = design
+            .core
+            .as_ref()
+            .is_some_and(|core| matches!(core.steel, Steel::Curve(_)));
+        if !curved {
+            return fault(
+                "without core.bh_curve the coils' maps add up at any currents; leave it out"
+                    .to_owned(),
+            );
+        }
+        if let Some(wrong) = self.currents.iter().find(|i| !i.is_finite()) {
+            return fault(format!("{wrong} is no current"));
+        }
+        match self.currents.as_slice() {
+            [all] => Ok(Some(vec![*all; coils])),
+            each if each.len() == coils => Ok(Some(each.to_vec())),
+            each => fault(format!(
+                "{} values for {coils} coils; give one for all, or one a coil",
+                each.len()
+            )),
+        }
+    }
+
     /// Runs the command.
     ///
     /// # Errors
@@ -139,7 +178,7 @@ impl Map {
                 Wanted::All => Components::All,
             },
             tolerance: self.tolerance.tolerance,
-            currents_a: None,
+            currents_a: self.currents_a(design)?,
             out: out.unwrap_or_else(|| Path::new("results").join(&design.name)),
             formats: MapFormats {
                 csv: self.csv,
@@ -150,6 +189,9 @@ impl Map {
         let bar = begin(printer);
         let report = run(design, vec![document.input], &request, &bar)?;
         drop(bar);
+        for warning in &report.warnings {
+            printer.warning(warning);
+        }
         let json = MapSummary {
             sidecar: &report.sidecar,
             folder: report.folder.display().to_string(),
@@ -159,12 +201,12 @@ impl Map {
             table: report.table.as_ref().map(TableSummary::of),
         };
         let json = printer.with_warnings(&json);
-        printer.summary(Place::Output, &json, || summary(&report))?;
+        printer.summary(Place::Output, &json, || summary(design, &report))?;
         accuracy_check(report.accuracy_reached)
     }
 }
 
-fn summary(report: &MapReport) -> String {
+fn summary(design: &Design, report: &MapReport) -> String {
     let map = &report.sidecar.map;
     let mut sheet = Sheet::new(&format!(
         "{}: maps of {} over the workspace",
@@ -195,6 +237,17 @@ fn summary(report: &MapReport) -> String {
     );
     if let Some(table) = &report.table {
         sheet.line("steel", &TableSummary::of(table).told());
+    }
+    if let Some(point) = &map.working_point {
+        let peak_t = point.peak_field_t.iter().copied().fold(0.0, f64::max);
+        sheet.line(
+            "together",
+            &format!(
+                "up to {} of the largest off the sum of the coils' maps, cores up to {peak_t:.3} T",
+                percent(point.deviation_from_linear)
+            ),
+        );
+        sheet.line("at", &describe::currents(design, &point.currents_a));
     }
     let stages = report.sidecar.accuracy.iter();
     let stages = stages.map(|(name, stage)| (name.as_str(), stage));
