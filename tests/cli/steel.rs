@@ -173,9 +173,17 @@ fn the_steel_s_part_stands_in_the_summary() {
         assert!(linear.contains(told), "{told}: {linear}");
     }
     let curve = place.run(&["evaluate", "designs/seed_1010.toml"]).ends(0);
-    for told in ["flux linkage 371.", "a B-H curve", "less than with"] {
+    for told in [
+        "flux linkage 371.",
+        "a B-H curve",
+        "less than with",
+        "off that along the B-H curve",
+    ] {
         assert!(curve.out.contains(told), "{told}: {}", curve.out);
     }
+    let lambda = ["lambda", "designs/seed_1010.toml", "shapes/flat.toml"];
+    let lambda = place.run(&lambda).ends(0).out;
+    assert!(lambda.contains("% off those added up"), "{lambda}");
     let felt = "tilt_deg = [10.0, 5.0]\npassive_force = true\nmodel = \"cylinder\"";
     let tilted = evaluate(&place, "model = \"dipole\"", felt).ends(0).out;
     for told in [
