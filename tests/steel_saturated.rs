@@ -398,7 +398,8 @@ fn incremental_inductances_are_symmetric() {
 fn the_stated_error_bounds_the_difference_from_a_finer_solution() {
     let nine = grid(3, 3);
     let mixed = [6.0, 1.3, 8.0, -2.0, 4.4, 0.0, 7.7, -5.1, 3.0];
-    let cases: [(&[[f64; 2]], &[f64], f64); 5] = [
+    type Case<'a> = (&'a [[f64; 2]], &'a [f64], f64);
+    let cases: [Case; 5] = [
         (&nine, &[2.0; 9], 3e-3),
         (&nine, &mixed, 1e-2),
         (&SCATTER, &MIXED_A, 1e-2),
