@@ -87,8 +87,9 @@ pub struct SaturatedArray {
     pub flux_linkage_wb: Vec<f64>,
     /// Estimated error: of the total gradient above, relative to the largest |grad B| at the
     /// height, and of the flux, relative to the largest; the larger. The difference from the next
-    /// coarser resolution (saturated elements converge too unevenly for half of it) plus [`SaturatedArray::modes_error`]; infinite where the iteration
-    /// stalled at either.
+    /// coarser resolution (elements across the knee converge too unevenly for half of it to be
+    /// enough), or what the caps on resolution cost where that is more, plus
+    /// [`SaturatedArray::modes_error`]; infinite where the iteration stalled at either.
     pub relative_error: f64,
     /// The part of it that is due to the other modes being linear: what they change when their
     /// permeability is the initial one.
