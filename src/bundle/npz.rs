@@ -492,6 +492,7 @@ mod tests {
         map.gradient_t_per_m_per_a.is_none()
             || map.field_t_per_a.is_none()
             || map.passive_force_n.is_none()
+            || map.working_point_gz_t_per_m.is_none()
             || map.runtime.total_current_max_a.is_none()
     }
 

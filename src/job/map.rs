@@ -115,9 +115,12 @@ pub fn run(
     let mut accuracy = BTreeMap::from([("map".to_owned(), made.accuracy.clone())]);
     let currents_a = request.currents_a.as_deref().unwrap_or(&scene.upper_a);
     progress.begin("working point", 1);
-    let point = WorkingPoint::new(&scene, currents_a, request.tolerance, lowest_m)?;
+    let point = WorkingPoint::new(&scene, &solved, currents_a, request.tolerance, lowest_m)?;
     let mut whole = None;
-    let mut warnings = Vec::new();
+    let mut warnings = scene
+        .core
+        .as_ref()
+        .map_or_else(Vec::new, |core| core.warnings.clone());
     if let Some(point) = &point {
         let gz = point.gz_t_per_m(&scene, &grid, progress)?;
         let deviation_from_linear = deviation(&gz, map, currents_a);

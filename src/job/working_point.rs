@@ -7,6 +7,7 @@ use super::scene::{MAGNET_SHARE, Scene, upward_n};
 use super::steel::{EVALUATION_SHARE, Material, SceneCore, Solved, Steel, clearance_m, coupled};
 use crate::accuracy::StageAccuracy;
 use crate::field::steel::bh_curve::BhCurve;
+use crate::field::steel::inside::peak_depth_m;
 use crate::field::steel::saturated::Status;
 use crate::field::steel::saturated_array::SaturatedArray;
 use crate::field::steel::sources::{ArraySources, Parts};
@@ -28,9 +29,10 @@ const SUPERPOSITION_WARNING: f64 = 0.01;
 pub struct WorkingPoint {
     /// Current in every coil, A.
     pub currents_a: Vec<f64>,
-    /// Largest |B| in every core, T.
+    /// Largest |B| in every core, T: of the axisymmetric mode along the curve, and what the other
+    /// modes add to it in the linear array.
     pub peak_field_t: Vec<f64>,
-    /// Mean |B| in every core, T.
+    /// Mean |B| in every core, of the axisymmetric mode, T.
     pub mean_field_t: Vec<f64>,
     /// Flux linkage of every coil, the neighbours' windings left out, Wb.
     pub steel_flux_linkage_wb: Vec<f64>,
@@ -51,7 +53,7 @@ enum Cores {
 }
 
 impl WorkingPoint {
-    /// Solves the cores of `scene` at `currents_a` for heights from `lowest_m` up; `None` where
+    /// Solves the cores of `scene`, linear in `solved`, at `currents_a` for heights from `lowest_m` up; `None` where
     /// superposition holds: without a B-H curve.
     ///
     /// A coil whose map has a measured gain counts with that much more current.
@@ -60,6 +62,7 @@ impl WorkingPoint {
     /// A core that cannot be solved.
     pub fn new(
         scene: &Scene,
+        solved: &Solved,
         currents_a: &[f64],
         tolerance: Option<f64>,
         lowest_m: f64,
@@ -80,6 +83,13 @@ impl WorkingPoint {
         } else {
             Self::alone(scene, core, curve, &effective_a, tolerance, lowest_m)?
         };
+        if let Steel::Coupled(array) = &solved.steel {
+            let depth_m = peak_depth_m(core.shape);
+            let added = array.transverse_peaks_t(&effective_a, depth_m)?;
+            for (peak, added) in made.peak_field_t.iter_mut().zip(added) {
+                *peak += added;
+            }
+        }
         made.currents_a = currents_a.to_vec();
         Ok(Some(made))
     }

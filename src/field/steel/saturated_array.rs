@@ -205,7 +205,13 @@ impl SaturatedArray {
                 .as_ref()
                 .is_none_or(|b| fine.relative_error < b.relative_error);
             // What the modes do wrong, no resolution mends.
-            let reached = outline_error <= (tolerance - modes_error).max(0.3 * tolerance);
+            let left = tolerance - modes_error;
+            let reached = outline_error
+                <= if left > 0.0 {
+                    left.max(0.3 * tolerance)
+                } else {
+                    tolerance
+                };
             if better {
                 best = Some(fine);
             }
