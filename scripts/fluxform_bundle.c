@@ -1,7 +1,7 @@
 /* Loads the map of a fluxform bundle and interpolates it; see fluxform_bundle.h.
  *
  * Built with -DFLUXFORM_BUNDLE_MAIN it is a program: `program map.npz` reads lines "x y z" (m) and
- * prints the force per ampere [N/A] of every coil for each:
+ * prints for each the force per ampere [N/A] of every coil and the unpowered steel's pull [N]:
  *   cc -std=c99 -O2 -DFLUXFORM_BUNDLE_MAIN fluxform_bundle.c -o forces
  */
 #include "fluxform_bundle.h"
@@ -315,6 +315,18 @@ static int load_map(fluxform_bundle *b, const archive *a, const char *name, size
     return (*values = copy(a, name, &from)) ? 0 : -1;
 }
 
+static int load_passive(fluxform_bundle *b, const archive *a)
+{
+    const char *name = "passive_force_n";
+    array from;
+    int found = find_array(a, name, "<f8", 3, &from);
+    if (found <= 0)
+        return found;
+    if (from.shape[0] != b->nz || from.shape[1] != b->ny || from.shape[2] != b->nx)
+        return fail(a, name, "does not have the shape of its axes");
+    return (b->passive_force_n = copy(a, name, &from)) ? 0 : -1;
+}
+
 static int load_all(fluxform_bundle *b, const archive *a)
 {
     array from;
@@ -339,6 +351,8 @@ static int load_all(fluxform_bundle *b, const archive *a)
         return -1;
     tilted = b->moment_a_m2[0] != 0 || b->moment_a_m2[1] != 0;
     if (tilted && load_map(b, a, "gradient_t_per_m_per_a", 6, &b->gradient_t_per_m_per_a))
+        return -1;
+    if (load_passive(b, a))
         return -1;
     b->has_total_current_max = load_scalar(a, "total_current_max_a", &b->total_current_max_a);
     b->has_lambda = load_scalar(a, "lambda_n_per_m", &b->lambda_n_per_m);
@@ -369,6 +383,7 @@ void fluxform_bundle_close(fluxform_bundle *bundle)
     free(bundle->coil);
     free(bundle->gz_t_per_m_per_a);
     free(bundle->gradient_t_per_m_per_a);
+    free(bundle->passive_force_n);
     free(bundle->current_min_a);
     free(bundle->current_max_a);
     free(bundle->resistance_ohm);
@@ -477,12 +492,23 @@ int fluxform_force_per_ampere(const fluxform_bundle *b, double x, double y, doub
     return 1;
 }
 
+int fluxform_passive_force(const fluxform_bundle *b, double x, double y, double z, double *force)
+{
+    cell c;
+    *force = 0;
+    if (!find_cell(b, x, y, z, &c))
+        return 0;
+    if (b->passive_force_n)
+        *force = interpolate(b, &c, b->passive_force_n, 1);
+    return 1;
+}
+
 #ifdef FLUXFORM_BUNDLE_MAIN
 int main(int argc, char **argv)
 {
     fluxform_bundle bundle;
     char message[256];
-    double x, y, z, *force;
+    double x, y, z, pull, *force;
     if (argc != 2) {
         fprintf(stderr, "usage: %s map.npz < points\n", argv[0]);
         return 2;
@@ -498,8 +524,9 @@ int main(int argc, char **argv)
     while (scanf("%lf %lf %lf", &x, &y, &z) == 3) {
         fluxform_force_per_ampere(&bundle, x, y, z, force);
         for (size_t i = 0; i < bundle.coil_count; i++)
-            printf("%s%.17g", i ? " " : "", force[i]);
-        printf("\n");
+            printf("%.17g ", force[i]);
+        fluxform_passive_force(&bundle, x, y, z, &pull);
+        printf("%.17g\n", pull);
     }
     free(force);
     fluxform_bundle_close(&bundle);

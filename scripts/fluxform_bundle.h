@@ -28,6 +28,7 @@ typedef struct fluxform_bundle {
     size_t map_count;             /* coils whose maps were kept ... */
     size_t *coil;                 /* ... and their indices in the array */
     double *gz_t_per_m_per_a;     /* [map][z][y][x] */
+    double *passive_force_n;      /* [z][y][x]; NULL where the unpowered steel's pull is left out */
     double *gradient_t_per_m_per_a; /* [map][z][y][x][3][3]; NULL unless the magnet is tilted */
     double moment_a_m2[3];        /* the magnet */
     size_t coil_count;            /* coils of the array */
@@ -52,6 +53,10 @@ int fluxform_gz_per_ampere(const fluxform_bundle *bundle, double x_m, double y_m
 
 /* Upward force on the magnet's centre [N/A], in the same manner. */
 int fluxform_force_per_ampere(const fluxform_bundle *bundle, double x_m, double y_m, double z_m, double *force);
+
+/* What the unpowered steel adds to that force whatever the currents [N], up positive: zero for
+ * bundles without it. Returns 1; outside the map 0, with zero. */
+int fluxform_passive_force(const fluxform_bundle *bundle, double x_m, double y_m, double z_m, double *force);
 
 #ifdef __cplusplus
 }

@@ -5,6 +5,7 @@
     bundle = Bundle("results/seed/flat")
     force = bundle.force_per_ampere([[0.01, 0.0, 0.05]])   # N/A, one row a point, one column a coil
     total = force @ bundle.currents_a                      # N
+    total += bundle.passive_force([[0.01, 0.0, 0.05]])     # N, the unpowered steel's pull; 0 without
 
 or on the command line: lambda, and the force of the static currents at points given as x,y,z in m:
 
@@ -53,15 +54,21 @@ class Bundle:
         self.currents_a = _table(files["currents.csv"], "currents.csv")["current_a"]
         self.map = _arrays(files["map.npz"])
         self.lambda_n_per_m = self.manifest["lambda"]["lambda_n_per_m"]
-        name = self.manifest["map"]["interpolation"]["name"]
-        if name != INTERPOLATION:
-            raise BundleError(f"interpolation {name!r}, this loader implements {INTERPOLATION!r}")
+        told = self.manifest["map"]
+        passive = told.get("passive_force")
+        for told in [told] if passive is None else [told, passive]:
+            name = told["interpolation"]["name"]
+            if name != INTERPOLATION:
+                raise BundleError(f"interpolation {name!r}, this loader implements {INTERPOLATION!r}")
+        if (passive is not None) != ("passive_force_n" in self.map):
+            raise BundleError("map.npz must have passive_force_n where the manifest tells of it")
         grid = tuple(len(self.map[key]) for key in ("coil", "z_m", "y_m", "x_m"))
         coils = (self.coil_count,)
         for key, shape in (
             ("gz_t_per_m_per_a", grid),
             ("gradient_t_per_m_per_a", grid + (3, 3)),
             ("field_t_per_a", grid + (3,)),
+            ("passive_force_n", grid[1:]),
             ("moment_a_m2", (3,)),
             ("current_min_a", coils),
             ("resistance_ohm", coils),
@@ -107,9 +114,21 @@ class Bundle:
             for row, moment in enumerate((m_x, m_y, m_z))
         )
 
+    def passive_force(self, points_m):
+        """What the unpowered steel adds to the force [N], up positive; zero outside or without it."""
+        points_m = np.atleast_2d(np.asarray(points_m, dtype=float))
+        result = np.zeros((len(points_m), 1))
+        if "passive_force_n" in self.map:
+            self._fill(self.map["passive_force_n"][None], points_m, result, [0])
+        return result[:, 0]
+
     def _interpolate(self, values, points_m):
         points_m = np.atleast_2d(np.asarray(points_m, dtype=float))
         result = np.zeros((len(points_m), self.coil_count))
+        self._fill(values, points_m, result, self.map["coil"])
+        return result
+
+    def _fill(self, values, points_m, result, columns):
         where = np.flatnonzero(self.inside(points_m))
         for start in range(0, len(where), CHUNK_POINTS):
             rows = where[start : start + CHUNK_POINTS]
@@ -120,8 +139,7 @@ class Bundle:
             near = values[:, iz[:, :, None, None], iy[:, None, :, None], ix[:, None, None, :]]
             # Axes of near: coil, point, then the nodes along z, y, x.
             found = np.einsum("cpkji,pk,pj,pi->pc", near, wz, wy, wx, optimize=False)
-            result[np.ix_(rows, self.map["coil"])] = found
-        return result
+            result[np.ix_(rows, columns)] = found
 
     def _read_manifest(self):
         path = os.path.join(self.folder, "manifest.json")
@@ -227,11 +245,12 @@ def main(arguments):
         bundle = Bundle(arguments[0])
         print(f"lambda_n_per_m {bundle.lambda_n_per_m}")
         force_per_ampere = bundle.force_per_ampere(points)
+        passive_force = bundle.passive_force(points)
     except (BundleError, OSError) as error:
         print(error, file=sys.stderr)
         return 3
-    for point, per_ampere in zip(points, force_per_ampere):
-        force = float(per_ampere @ bundle.currents_a)
+    for point, per_ampere, passive in zip(points, force_per_ampere, passive_force):
+        force = float(per_ampere @ bundle.currents_a + passive)
         print(",".join(repr(float(v)) for v in point), f"force_n {force!r}", "per_ampere", *map(float, per_ampere))
     return 0
 

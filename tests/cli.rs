@@ -9,6 +9,8 @@ mod help;
 mod interrupt;
 #[path = "cli/messages.rs"]
 mod messages;
+#[path = "cli/steel.rs"]
+mod steel;
 #[path = "cli/streams.rs"]
 mod streams;
 #[path = "cli/support.rs"]

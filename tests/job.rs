@@ -1,8 +1,13 @@
 //! The main job from documents to a verified bundle.
 
+#[path = "job/cored.rs"]
+mod cored;
+
 use std::path::{Path, PathBuf};
 
 use fluxform::bundle::artefact::Input;
+use fluxform::bundle::load::Bundle;
+use fluxform::bundle::npz::{from_npz, to_npz};
 use fluxform::design::{Design, Need};
 use fluxform::job::calibrate::{
     self, CalibrateOptions, CalibrateReport, DEFAULT_REACH_M, DesignSource, ShapeSource,
@@ -238,4 +243,124 @@ fn a_workspace_from_the_top_face_up_is_verified() {
     let report = calibrate_text(&text, &[shape], out.path()).expect("calibrates");
     let verified = verify::run(&report.bundles[0].folder, &Silent).expect("opens");
     assert!(verified.passed, "{:?}", verified.checks);
+}
+
+/// A shipped design on a coarse workspace.
+fn small(design: &str) -> String {
+    let text = std::fs::read_to_string(here(design)).expect("shipped design");
+    let small = text
+        .replace("x_mm = [-50.0, 50.0, 61]", "x_mm = [-50.0, 50.0, 24]")
+        .replace("y_mm = [-50.0, 50.0, 61]", "y_mm = [-50.0, 50.0, 21]")
+        .replace("z_mm = [10.0, 80.0, 29]", "z_mm = [25.0, 65.0, 13]");
+    assert_ne!(text, small);
+    small
+}
+
+/// A wedge with few points, for a coarse workspace.
+#[allow(clippy::disallowed_methods)]
+fn small_shape(folder: &Path) -> String {
+    let path = folder.join("low.toml");
+    let text = "name = \"low\"\nprimitive = \"wedge\"\nlow_mm = 30.0\nhigh_mm = 50.0\n\
+                [points]\nx_mm = [-50.0, 50.0, 9]\ny_mm = [-50.0, 50.0, 8]\n";
+    std::fs::write(&path, text).expect("writable");
+    path.to_str().expect("a plain path").to_owned()
+}
+
+/// Replaces a file of a bundle and the digest that its manifest tells of it.
+#[allow(clippy::disallowed_methods)]
+fn forge(folder: &Path, name: &str, bytes: &[u8]) {
+    let before = std::fs::read(folder.join(name)).expect("a file of the bundle");
+    assert_eq!(before.len(), bytes.len(), "the manifest tells the size too");
+    let manifest = folder.join("manifest.json");
+    let told = std::fs::read_to_string(&manifest).expect("manifest");
+    let forged = told.replace(
+        &Input::of_bytes("", &before).sha256,
+        &Input::of_bytes("", bytes).sha256,
+    );
+    assert_ne!(told, forged);
+    std::fs::write(&manifest, forged).expect("writable");
+    std::fs::write(folder.join(name), bytes).expect("writable");
+}
+
+fn failed(report: &verify::VerifyReport) -> Vec<&'static str> {
+    let failed = report.checks.iter().filter(|check| !check.passed);
+    failed.map(|check| check.name).collect()
+}
+
+#[test]
+fn the_steels_pull_is_kept_in_the_bundle_and_verified() {
+    let out = tempfile::tempdir().expect("a temporary folder");
+    let text = small("designs/seed.toml").replace("[magnet] ", "[magnet]\npassive_force = true");
+    let shape = small_shape(out.path());
+    let report = calibrate_text(&text, &[&shape], out.path()).expect("calibrates");
+    let folder = &report.bundles[0].folder;
+    let told = report.bundles[0].manifest.map.passive_force.as_ref();
+    assert!(told.expect("a pull").interpolation.largest_error < 0.05);
+    let verified = verify::run(folder, &Silent).expect("opens");
+    assert_eq!(failed(&verified), [""; 0], "{:?}", verified.checks);
+
+    // Over the middle core the steel pulls down, -27.2 mN for one core alone at 30 mm.
+    let bundle = Bundle::open(folder).expect("opens");
+    let pull = bundle.passive_force_n([0.0, 0.0, 0.03]).expect("inside");
+    assert!((-0.031..-0.024).contains(&pull), "{pull}");
+
+    let bytes = std::fs::read(folder.join("map.npz")).expect("map");
+    let mut map = from_npz(&bytes).expect("a map");
+    let mut pulls = map.passive_force_n.expect("a pull").into_owned();
+    let nodes = map.x_m.len() * map.y_m.len();
+    let largest = pulls[..nodes].iter().fold(0.0_f64, |m, f| m.max(f.abs()));
+    pulls[nodes / 3] += 0.003 * largest;
+    map.passive_force_n = Some(pulls.into());
+    forge(folder, "map.npz", &to_npz(&map).expect("bytes"));
+    let verified = verify::run(folder, &Silent).expect("opens");
+    assert_eq!(failed(&verified), ["passive force nodes"]);
+}
+
+#[test]
+fn a_bundle_keeps_its_magnetisation_curve_wherever_it_goes() {
+    let out = tempfile::tempdir().expect("a temporary folder");
+    let shape = small_shape(out.path());
+    let report = calibrate_text(&small("designs/seed_1010.toml"), &[&shape], out.path())
+        .expect("calibrates");
+    let inputs = &report.bundles[0].manifest.inputs;
+    assert!(
+        inputs
+            .iter()
+            .any(|input| input.path.ends_with("steel_1010.csv"))
+    );
+    let elsewhere = tempfile::tempdir().expect("a temporary folder");
+    let folder = elsewhere.path().join("moved");
+    #[allow(clippy::disallowed_methods)]
+    std::fs::rename(&report.bundles[0].folder, &folder).expect("moved");
+    let verified = verify::run(&folder, &Silent).expect("opens");
+    assert_eq!(failed(&verified), [""; 0], "{:?}", verified.checks);
+
+    let table = folder.join("bh_curve.csv");
+    let text = std::fs::read_to_string(&table).expect("the kept table");
+    // Close to the mean |B| of a coil at its rated current.
+    let row = text.lines().nth(6).expect("a point at 0.51 T");
+    let (b, h) = row.split_once(',').expect("two columns");
+    let h: f64 = h.parse().expect("a number");
+    let mut changed = format!("{}", 1.15 * h);
+    changed.truncate(row.len() - b.len() - 1);
+    while changed.len() < row.len() - b.len() - 1 {
+        changed.push(if changed.contains('.') { '0' } else { '.' });
+    }
+    let wrong = text.replacen(row, &format!("{b},{changed}"), 1);
+    assert_ne!(text, wrong);
+    #[allow(clippy::disallowed_methods)]
+    std::fs::write(&table, &wrong).expect("writable");
+    let error = verify::run(&folder, &Silent).expect_err("a changed table");
+    assert_eq!(error.exit_code(), 5);
+    assert!(error.to_string().contains("bh_curve.csv"), "{error}");
+    // With the digest forged, the numbers tell.
+    #[allow(clippy::disallowed_methods)]
+    std::fs::write(&table, &text).expect("writable");
+    forge(&folder, "bh_curve.csv", wrong.as_bytes());
+    let verified = verify::run(&folder, &Silent).expect("opens");
+    assert!(
+        failed(&verified).contains(&"map nodes"),
+        "{:?}",
+        verified.checks
+    );
 }

@@ -47,13 +47,19 @@ fn the_first_command_prints_what_the_readme_shows() {
 #[test]
 fn the_table_of_numbers_is_what_the_commands_print() {
     let readme = readme();
-    let coil = says(&["evaluate", "designs/seed_air.toml"]);
-    let flat = says(&["lambda", "designs/seed_air.toml", "shapes/flat.toml"]);
+    let coil = says(&["evaluate", "designs/seed.toml"]);
+    let flat = says(&["lambda", "designs/seed.toml", "shapes/flat.toml"]);
+    let air = says(&["evaluate", "designs/seed_air.toml"]);
+    let flat_air = says(&["lambda", "designs/seed_air.toml", "shapes/flat.toml"]);
     for (printed, value) in [
         (&coil, "6.0753 ohm"),
-        (&coil, "99.709 mN"),
-        (&coil, "11.935 ms"),
-        (&flat, "0.62098 N/m"),
+        (&coil, "778.87 mN"),
+        (&coil, "151.51 ms"),
+        (&coil, "99.112 ms, give or take 5.41 %"),
+        (&flat, "3.2544 N/m"),
+        (&air, "99.709 mN"),
+        (&air, "11.935 ms"),
+        (&flat_air, "0.62098 N/m"),
     ] {
         assert!(printed.contains(value), "no {value} in:\n{printed}");
         assert!(readme.contains(value), "no {value} in README.md");
@@ -83,6 +89,32 @@ fn the_sweep_prints_what_the_readme_shows() {
         printed += &says(&arguments);
     }
     assert_eq!(but_the_folder(shown), but_the_folder(&printed));
+}
+
+#[test]
+fn the_table_of_force_constants_is_what_its_script_prints() {
+    let run = Command::new("python3")
+        .args(["scripts/seed_table.py", env!("CARGO_BIN_EXE_fluxform")])
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output();
+    let Ok(run) = run else {
+        #[allow(clippy::print_stderr)] // a test may tell that it was skipped
+        {
+            eprintln!("skipped: no python3");
+        }
+        return;
+    };
+    let errors = String::from_utf8(run.stderr).unwrap();
+    assert!(run.status.success(), "{errors}");
+    let printed = String::from_utf8(run.stdout).unwrap();
+    let readme = readme();
+    assert!(printed.lines().count() > 6, "{printed}");
+    for part in printed.split("\n\n") {
+        assert!(
+            readme.contains(part.trim_end()),
+            "not in README.md:\n{part}"
+        );
+    }
 }
 
 #[test]

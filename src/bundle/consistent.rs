@@ -2,7 +2,7 @@
 
 use super::lambda_file::LambdaFile;
 use super::manifest::{AxisSummary, INTERPOLATION, Manifest};
-use super::npz::MapArrays;
+use super::npz::{MapArrays, PASSIVE};
 use super::table::{CurrentRow, PointRow};
 
 /// Points and axes' ends may differ by this from what the manifest says, relative to the largest
@@ -118,6 +118,23 @@ fn check_map(manifest: &Manifest, map: &MapArrays) -> Result<(), String> {
         &*map.coil,
         told.coil.as_slice(),
     )?;
+    same(
+        "map.npz has a passive_force_n where the manifest tells of it",
+        map.passive_force_n.is_some(),
+        told.passive_force.is_some(),
+    )?;
+    if let Some(passive) = &told.passive_force {
+        same(
+            "the passive force's array is known",
+            passive.array.as_str(),
+            PASSIVE,
+        )?;
+        same(
+            "the interpolation of the passive force is known",
+            passive.interpolation.name.as_str(),
+            INTERPOLATION,
+        )?;
+    }
     same(
         "the interpolation is known",
         told.interpolation.name.as_str(),

@@ -202,6 +202,15 @@ impl Bundle {
         }
     }
 
+    /// What the unpowered steel adds to the force on the magnet's centre at (x, y, z) m, N,
+    /// positive upwards, interpolated: zero for bundles without it. `None` outside the map.
+    #[must_use]
+    pub fn passive_force_n(&self, position_m: [f64; 3]) -> Option<f64> {
+        let cell = locate([&self.map.x_m, &self.map.y_m, &self.map.z_m], position_m)?;
+        let pull = self.map.passive_force_n.as_ref();
+        Some(pull.map_or(0.0, |pull| cell.value(pull)))
+    }
+
     fn nodes(&self) -> usize {
         self.map.x_m.len() * self.map.y_m.len() * self.map.z_m.len()
     }

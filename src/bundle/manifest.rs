@@ -239,6 +239,41 @@ pub struct MapSummary {
     pub components: String,
     /// Between the nodes.
     pub interpolation: Interpolation,
+    /// The unpowered steel's pull, where `map.npz` holds it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub passive_force: Option<PassiveForce>,
+    /// The whole field at given currents, where `map.npz` holds it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub working_point: Option<WorkingPointMap>,
+}
+
+/// The map of all coils together at given currents, their steel along its B-H curve: there the
+/// coils' maps do not add up.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct WorkingPointMap {
+    /// The array of `map.npz`, `[z, y, x]`, T/m.
+    pub array: String,
+    /// Current in every coil of the array, A.
+    pub currents_a: Vec<f64>,
+    /// Largest difference from the sum of the coils' maps times their currents, relative to the
+    /// largest value at the node's height.
+    pub deviation_from_linear: f64,
+    /// Largest |B| in every core, T.
+    pub peak_field_t: Vec<f64>,
+    /// Mean |B| in every core, T.
+    pub mean_field_t: Vec<f64>,
+}
+
+/// The unpowered steel's pull on the magnet. The force is the sum over the coils of current times
+/// force per ampere, plus this.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PassiveForce {
+    /// The array of `map.npz`, `[z, y, x]`, N, positive upwards.
+    pub array: String,
+    /// Largest pull at the nodes of the lowest plane, N.
+    pub largest_n: f64,
+    /// Between the nodes.
+    pub interpolation: Interpolation,
 }
 
 /// How values between nodes are found.

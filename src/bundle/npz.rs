@@ -5,7 +5,8 @@
 //! programs need not read JSON: `schema_version` (i64, 3), `moment_a_m2` (3), and one entry a coil
 //! of the array: `current_min_a`, `current_max_a`, `resistance_ohm`; where there are such,
 //! `total_current_max_a` and `lambda_n_per_m` (no dimension). `coil` holds the indices of the
-//! coils whose maps were kept; the others give no force.
+//! coils whose maps were kept; the others give no force. `passive_force_n`, where it is there, is
+//! what the unpowered steel adds to the force.
 
 use std::borrow::Cow;
 use std::io::{self, Cursor, Read, Write};
@@ -37,6 +38,10 @@ pub struct MapArrays<'a> {
     pub gradient_t_per_m_per_a: Option<Cow<'a, [f64]>>,
     /// B, `[coil, z, y, x, 3]`, T/A.
     pub field_t_per_a: Option<Cow<'a, [f64]>>,
+    /// Vertical pull of the unpowered steel on the magnet, `[z, y, x]`, N, positive upwards.
+    pub passive_force_n: Option<Cow<'a, [f64]>>,
+    /// dB_z/dz of all coils at the working point's currents, `[z, y, x]`, T/m.
+    pub working_point_gz_t_per_m: Option<Cow<'a, [f64]>>,
     /// What a runtime needs besides the maps.
     pub runtime: Runtime,
 }
@@ -91,6 +96,10 @@ const COIL: &str = "coil";
 const GZ: &str = "gz_t_per_m_per_a";
 const GRADIENT: &str = "gradient_t_per_m_per_a";
 const FIELD: &str = "field_t_per_a";
+/// The pull of the unpowered steel.
+pub const PASSIVE: &str = "passive_force_n";
+/// The whole map at a working point.
+pub const WORKING_POINT: &str = "working_point_gz_t_per_m";
 const VERSION: &str = "schema_version";
 const MOMENT: &str = "moment_a_m2";
 const CURRENT_MIN: &str = "current_min_a";
@@ -139,6 +148,9 @@ impl MapArrays<'_> {
         let lambda = runtime.lambda_n_per_m.as_slice();
         let gradient = self.gradient_t_per_m_per_a.as_deref();
         let field = self.field_t_per_a.as_deref();
+        let passive = self.passive_force_n.as_deref();
+        let working_point = self.working_point_gz_t_per_m.as_deref();
+        let [_, nz, ny, nx] = self.shape();
         for (name, values, count) in [
             (X, &*self.x_m, self.x_m.len()),
             (Y, &*self.y_m, self.y_m.len()),
@@ -153,6 +165,16 @@ impl MapArrays<'_> {
                 FIELD,
                 field.unwrap_or_default(),
                 field.map_or(0, |_| nodes.saturating_mul(3)),
+            ),
+            (
+                PASSIVE,
+                passive.unwrap_or_default(),
+                passive.map_or(0, |_| nz.saturating_mul(ny).saturating_mul(nx)),
+            ),
+            (
+                WORKING_POINT,
+                working_point.unwrap_or_default(),
+                working_point.map_or(0, |_| nz.saturating_mul(ny).saturating_mul(nx)),
             ),
             (MOMENT, &runtime.moment_a_m2, 3),
             (CURRENT_MIN, &runtime.current_min_a, coils),
@@ -190,7 +212,9 @@ pub fn to_npz(map: &MapArrays) -> Result<Vec<u8>, NpzError> {
     map.validate()?;
     let numbers = map.gz_t_per_m_per_a.len()
         + map.gradient_t_per_m_per_a.as_ref().map_or(0, |a| a.len())
-        + map.field_t_per_a.as_ref().map_or(0, |a| a.len());
+        + map.field_t_per_a.as_ref().map_or(0, |a| a.len())
+        + map.passive_force_n.as_ref().map_or(0, |a| a.len())
+        + map.working_point_gz_t_per_m.as_ref().map_or(0, |a| a.len());
     let room = numbers * npy::ELEMENT_BYTES + (64 << 10);
     let mut archive = Archive(ZipWriter::new(Cursor::new(Vec::with_capacity(room))));
     archive
@@ -221,6 +245,14 @@ impl Archive {
         }
         if let Some(values) = &map.field_t_per_a {
             self.put(FIELD, &[coils, nz, ny, nx, 3], values)?;
+        }
+        for (name, values) in [
+            (PASSIVE, &map.passive_force_n),
+            (WORKING_POINT, &map.working_point_gz_t_per_m),
+        ] {
+            if let Some(values) = values {
+                self.put(name, &[nz, ny, nx], values)?;
+            }
         }
         self.put(MOMENT, &[3], &runtime.moment_a_m2)?;
         for (name, values) in [
@@ -296,6 +328,8 @@ pub fn from_npz(bytes: &[u8]) -> Result<MapArrays<'static>, NpzError> {
     let gz: Vec<f64> = arrays.need(GZ, &[c, z, y, x])?;
     let gradient: Option<Vec<f64>> = arrays.get(GRADIENT, &[c, z, y, x, Some(3), Some(3)])?;
     let field: Option<Vec<f64>> = arrays.get(FIELD, &[c, z, y, x, Some(3)])?;
+    let passive: Option<Vec<f64>> = arrays.get(PASSIVE, &[z, y, x])?;
+    let working_point: Option<Vec<f64>> = arrays.get(WORKING_POINT, &[z, y, x])?;
     let map = MapArrays {
         x_m: x_m.into(),
         y_m: y_m.into(),
@@ -304,6 +338,8 @@ pub fn from_npz(bytes: &[u8]) -> Result<MapArrays<'static>, NpzError> {
         gz_t_per_m_per_a: gz.into(),
         gradient_t_per_m_per_a: gradient.map(Cow::Owned),
         field_t_per_a: field.map(Cow::Owned),
+        passive_force_n: passive.map(Cow::Owned),
+        working_point_gz_t_per_m: working_point.map(Cow::Owned),
         runtime: Runtime {
             moment_a_m2: [moment[0], moment[1], moment[2]],
             current_min_a: arrays.need(CURRENT_MIN, &[coils])?,
@@ -409,6 +445,8 @@ mod tests {
             gz_t_per_m_per_a: values(48, 0.7).into(),
             gradient_t_per_m_per_a: Some(values(48 * 9, 1.3).into()),
             field_t_per_a: Some(values(48 * 3, 2.1).into()),
+            passive_force_n: Some(values(24, 1.7).into()),
+            working_point_gz_t_per_m: Some(values(24, 1.3).into()),
             runtime: Runtime {
                 moment_a_m2: [0.0, 0.0, -0.909],
                 current_min_a: vec![0.0, -0.7, 0.0],
@@ -453,6 +491,8 @@ mod tests {
     fn optional_lost(map: &MapArrays) -> bool {
         map.gradient_t_per_m_per_a.is_none()
             || map.field_t_per_a.is_none()
+            || map.passive_force_n.is_none()
+            || map.working_point_gz_t_per_m.is_none()
             || map.runtime.total_current_max_a.is_none()
     }
 
@@ -467,6 +507,10 @@ mod tests {
         refuse(
             |m| m.gz_t_per_m_per_a.to_mut()[7] = f64::NAN,
             "gz_t_per_m_per_a holds a number that is not finite",
+        );
+        refuse(
+            |m| m.passive_force_n = Some(vec![-0.7; 23].into()),
+            "passive_force_n must hold 24 numbers, holds 23",
         );
         refuse(|m| m.x_m.to_mut()[2] = 0.01, "x_m must increase");
         refuse(|m| m.z_m.to_mut()[3] = f64::INFINITY, "z_m holds");

@@ -347,6 +347,8 @@ mod tests {
             gz_t_per_m_per_a: vec![0.5, 0.6, 0.7, 0.8].into(),
             gradient_t_per_m_per_a: None,
             field_t_per_a: None,
+            passive_force_n: None,
+            working_point_gz_t_per_m: None,
             runtime: Runtime {
                 moment_a_m2: [0.0, 0.0, 1.0],
                 current_min_a: vec![],

@@ -61,9 +61,9 @@ pub fn main() -> String {
 
 Examples:
   # the main job: maps, points, force constants and currents of two objects
-  fluxform calibrate designs/seed_air.toml shapes/flat.toml shapes/wedge.toml
+  fluxform calibrate designs/seed.toml shapes/flat.toml shapes/wedge.toml
   # what one coil is worth
-  fluxform evaluate designs/seed_air.toml
+  fluxform evaluate designs/seed.toml
   # more about a command
   fluxform lambda --help"
         .to_owned()

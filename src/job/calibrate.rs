@@ -1,5 +1,6 @@
 //! `calibrate`: map, points and lambda for each shape, one bundle each.
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 
 use serde::Serialize;
@@ -8,14 +9,19 @@ use super::discretize::{self, point_rows, points_grid};
 use super::lambda::{LambdaOptions, LambdaReport, solve};
 use super::map::{MAP_TOLERANCE, arrays, runtime, summary, workspace_grid};
 use super::maps::SceneMap;
+use super::passive::PASSIVE_TOLERANCE;
+use super::passive_map::PassiveMap;
 use super::scene::{MAGNET_SHARE, Scene};
 use super::steel::{Solved, Steel};
 use super::{JobError, KERNEL_ERROR, steel};
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
-use crate::bundle::manifest::{AxisSummary, LambdaSummary, LeftOut, Manifest};
+use crate::bundle::manifest::{
+    AxisSummary, Interpolation, LambdaSummary, LeftOut, Manifest, PassiveForce,
+};
+use crate::bundle::npz::PASSIVE;
 use crate::bundle::table::CurrentRow;
 use crate::bundle::write::{BundleContent, check_bundle_target, write_bundle};
-use crate::design::Design;
+use crate::design::{Design, Steel as Described, source};
 use crate::map::tabulate::{Grid, PlacedCoil};
 use crate::map::{Components, FieldMap};
 use crate::progress::Progress;
@@ -23,6 +29,12 @@ use crate::shape::document::ShapeDocument;
 
 /// The name under which a bundle keeps the design it was made from.
 pub const DESIGN_FILE: &str = "design.toml";
+
+/// The name under which a bundle keeps the table of its design's magnetisation curve.
+pub const CURVE_FILE: &str = "bh_curve.csv";
+
+/// The stage of the map of the unpowered steel's pull among a bundle's accuracies.
+pub const PASSIVE_STAGE: &str = "passive_force_map";
 
 /// How far from the object's points the map still reaches by default, m: the seed's largest
 /// deviation between finger and surface is 14 mm.
@@ -111,11 +123,35 @@ pub fn run(
     }
     let scene = Scene::new(source.design)?;
     let solved = BothSolved::new(&scene, options.lambda.tolerance, progress)?;
+    let curve = curve_table(source.design)?;
     let bundles = shapes
         .iter()
-        .map(|shape| calibrate_one(&scene, &solved, source, shape, options, progress))
+        .map(|shape| {
+            let kept = Kept {
+                source,
+                curve: curve.as_ref(),
+            };
+            calibrate_one(&scene, &solved, kept, shape, options, progress)
+        })
         .collect::<Result<_, _>>()?;
     Ok(CalibrateReport { bundles })
+}
+
+/// The table of the design's magnetisation curve: its entry among the inputs and its text.
+fn curve_table(design: &Design) -> Result<Option<(Input, String)>, JobError> {
+    let Some(Described::Curve(path)) = design.core.as_ref().map(|core| &core.steel) else {
+        return Ok(None);
+    };
+    let text = source::table_text_of(path).map_err(|fault| JobError::Input(fault.to_string()))?;
+    let input = Input::of_bytes(path.display().to_string(), text.as_bytes());
+    Ok(Some((input, text)))
+}
+
+/// What a bundle keeps as it is.
+#[derive(Clone, Copy)]
+struct Kept<'a> {
+    source: DesignSource<'a>,
+    curve: Option<&'a (Input, String)>,
 }
 
 /// The sources as forces and as maps ask for them: of steel one solution serves both.
@@ -152,7 +188,7 @@ struct StageSeconds {
 fn calibrate_one(
     scene: &Scene,
     solved: &BothSolved,
-    source: DesignSource,
+    Kept { source, curve }: Kept,
     shape: &ShapeSource,
     options: &CalibrateOptions,
     progress: &dyn Progress,
@@ -163,6 +199,7 @@ fn calibrate_one(
         .join(&scene.design.name)
         .join(&shape.document.name);
     let inputs = std::iter::once(source.input)
+        .chain(curve.map(|(input, _)| input))
         .chain(&shape.input)
         .cloned()
         .collect();
@@ -170,11 +207,15 @@ fn calibrate_one(
     check_bundle_target(&folder, options.force, &points.summary.inputs)?;
     let mut lambda = solve(scene, &solved.forces, points, &options.lambda, progress)?;
     let needed = NeededMap::new(scene, &solved.map, &lambda, options.reach_m, progress)?;
-    let manifest = manifest(scene, &lambda, &needed);
+    let passive = passive_map(scene, &needed.made.map, progress)?;
+    let manifest = manifest(scene, &lambda, &needed, passive.as_ref());
     lambda.warnings.extend(outside_warning(&manifest, &lambda));
     let currents = current_rows(scene, &lambda);
     let rows = point_rows(&lambda.points.discretized.points);
-    let map = arrays(&needed.made.map, runtime(scene, lambda.file.lambda_n_per_m));
+    let mut map = arrays(&needed.made.map, runtime(scene, lambda.file.lambda_n_per_m));
+    map.passive_force_n = passive.as_ref().map(|p| Cow::Borrowed(&*p.force_z_n));
+    let mut extra = vec![(DESIGN_FILE, source.text.as_bytes())];
+    extra.extend(curve.map(|(_, text)| (CURVE_FILE, text.as_bytes())));
     let timing: Vec<StageSeconds> = progress
         .take_seconds()
         .into_iter()
@@ -188,7 +229,7 @@ fn calibrate_one(
         points: &rows,
         currents: &currents,
         lambda: &lambda.file,
-        extra: &[(DESIGN_FILE, source.text.as_bytes())],
+        extra: &extra,
     };
     let manifest = write_bundle(&folder, options.force, &content, &timing)?;
     progress.end();
@@ -197,6 +238,26 @@ fn calibrate_one(
         manifest,
         lambda,
     })
+}
+
+/// The unpowered steel's pull on the map's nodes, where the design asks for it.
+fn passive_map(
+    scene: &Scene,
+    map: &FieldMap,
+    progress: &dyn Progress,
+) -> Result<Option<PassiveMap>, JobError> {
+    if !scene.design.magnet.passive_force || scene.core.is_none() {
+        return Ok(None);
+    }
+    progress.begin("passive force", 1);
+    let grid = Grid {
+        x_m: map.x_m.clone(),
+        y_m: map.y_m.clone(),
+        z_m: map.z_m.clone(),
+    };
+    let passive = PassiveMap::new(scene, &grid, PASSIVE_TOLERANCE)?;
+    progress.end();
+    Ok(passive)
 }
 
 /// The part of the maps that an object needs, and what was left out of it.
@@ -376,10 +437,24 @@ fn needed_grid(
     grid
 }
 
-fn manifest(scene: &Scene, lambda: &LambdaReport, needed: &NeededMap) -> Manifest {
+fn manifest(
+    scene: &Scene,
+    lambda: &LambdaReport,
+    needed: &NeededMap,
+    passive: Option<&PassiveMap>,
+) -> Manifest {
     let file = &lambda.file;
     let mut accuracies = file.accuracy.clone();
     accuracies.insert("map".to_owned(), needed.made.accuracy.clone());
+    let mut map = summary(&needed.made.map, needed.components, needed.made.between);
+    if let Some(passive) = passive {
+        accuracies.insert(PASSIVE_STAGE.to_owned(), passive.accuracy.clone());
+        map.passive_force = Some(PassiveForce {
+            array: PASSIVE.to_owned(),
+            largest_n: passive.largest_n,
+            interpolation: Interpolation::tricubic(passive.between, passive.definition()),
+        });
+    }
     Manifest {
         schema_version: SCHEMA_VERSION.to_owned(),
         fluxform_version: FLUXFORM_VERSION.to_owned(),
@@ -396,7 +471,7 @@ fn manifest(scene: &Scene, lambda: &LambdaReport, needed: &NeededMap) -> Manifes
             criterion: file.criterion.clone(),
         },
         points: points_grid(&lambda.points.discretized.points),
-        map: summary(&needed.made.map, needed.components, needed.made.between),
+        map,
         left_out: needed.left_out.clone(),
         accuracy: accuracies,
         files: Vec::new(),

@@ -4,19 +4,18 @@ use std::collections::BTreeMap;
 
 use super::discretize::{self, PointsReport};
 use super::scene::{MAGNET_SHARE, Scene};
-use super::steel::{EVALUATION_SHARE, Solved, Steel};
-use super::working_point::{WorkingPoint, relative_difference};
+use super::single::above_knee;
+use super::steel::{EVALUATION_SHARE, Material, Solved, Steel};
+use super::working_point::{WorkingPoint, relative_difference, superposition_ends};
 use super::{JobError, KERNEL_ERROR, passive, steel};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::bundle::lambda_file::{AtLambda, LambdaFile, PathStep, WorkingPointForces};
 use crate::design::{Design, MagnetModel};
+use crate::field::steel::inside::peak_depth_m;
 use crate::lambda::{self, Criterion, ForceProblem, Precision, Settings, Solution, Status};
 use crate::progress::Progress;
 use crate::shape::document::ShapeDocument;
-
-/// Deviation from superposition above which a warning is due.
-const SUPERPOSITION_WARNING: f64 = 0.01;
 
 /// What is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -102,6 +101,21 @@ pub(super) fn solve(
     let solution = lambda::solve(&problem, &options.settings)?;
     progress.end();
     let mut warnings = warnings(&points, &solution, options);
+    if let Some(core) = &scene.core {
+        warnings.extend(core.warnings.iter().cloned());
+    }
+    if let (Some(chosen), Steel::Coupled(array), Some(core)) =
+        (&solution.chosen, &solved.steel, &scene.core)
+        && matches!(core.material, Material::Linear(_))
+    {
+        let fields = array.core_fields(&chosen.currents_a, peak_depth_m(core.shape))?;
+        let peak_t = fields.iter().fold(0.0_f64, |most, f| most.max(f.peak_t));
+        warnings.extend(above_knee(
+            peak_t,
+            core.knee_t,
+            "a core of the array at the chosen currents",
+        ));
+    }
     let mut file = file(scene, solved, &points, &solution, options);
     if let Some(chosen) = &solution.chosen {
         let asked = Asked {
@@ -113,9 +127,14 @@ pub(super) fn solve(
             offset_n: offset_n.as_deref(),
         };
         if let Some((facts, accuracy)) =
-            at_working_point(scene, &asked, options.tolerance, progress)?
+            at_working_point(scene, solved, &asked, options.tolerance, progress)?
         {
-            warnings.extend(superposition_ends(scene, &facts));
+            warnings.extend(superposition_ends(
+                scene,
+                facts.deviation_from_linear,
+                &facts.peak_field_t,
+                "the forces that lambda was solved with",
+            ));
             file.accuracy.insert("working_point".to_owned(), accuracy);
             file.working_point = Some(facts);
         }
@@ -147,6 +166,7 @@ struct Asked<'a> {
 /// Forces along the B-H curve at the chosen currents; `None` without a curve.
 fn at_working_point(
     scene: &Scene,
+    solved: &Solved,
     asked: &Asked,
     tolerance: Option<f64>,
     progress: &dyn Progress,
@@ -157,7 +177,8 @@ fn at_working_point(
         .copied()
         .fold(f64::INFINITY, f64::min);
     progress.begin("working point", 1);
-    let Some(point) = WorkingPoint::new(scene, asked.currents_a, tolerance, lowest_m)? else {
+    let Some(point) = WorkingPoint::new(scene, solved, asked.currents_a, tolerance, lowest_m)?
+    else {
         progress.end();
         return Ok(None);
     };
@@ -183,21 +204,6 @@ fn at_working_point(
         mean_field_t: point.mean_field_t.clone(),
     };
     Ok(Some((facts, point.accuracy())))
-}
-
-/// A sentence on forces that do not add up.
-fn superposition_ends(scene: &Scene, facts: &WorkingPointForces) -> Option<String> {
-    (facts.deviation_from_linear > SUPERPOSITION_WARNING).then(|| {
-        let peak_t = facts.peak_field_t.iter().copied().fold(0.0, f64::max);
-        let knee_t = scene.core.as_ref().map_or(f64::INFINITY, |core| core.knee_t);
-        format!(
-            "superposition ends along the B-H curve: at the chosen currents the forces differ by up \
-             to {:.1} % of the largest from those that lambda was solved with (the cores reach \
-             {peak_t:.2} T, the knee is at {knee_t:.2} T); lower supply.current_max_a until \
-             working_point.deviation_from_linear is small enough",
-            100.0 * facts.deviation_from_linear
-        )
-    })
 }
 
 /// The lowest of the points, m.

@@ -6,11 +6,14 @@ use std::path::PathBuf;
 
 use super::maps::SceneMap;
 use super::scene::Scene;
+use super::working_point::{WorkingPoint, relative_difference, superposition_ends};
 use super::{JobError, KERNEL_ERROR, steel};
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
 use crate::bundle::atomic::Overwrite;
-use crate::bundle::manifest::{AxisSummary, Interpolation, MapSidecar, MapSummary};
-use crate::bundle::npz::{MapArrays, Runtime};
+use crate::bundle::manifest::{
+    AxisSummary, Interpolation, MapSidecar, MapSummary, WorkingPointMap,
+};
+use crate::bundle::npz::{MapArrays, Runtime, WORKING_POINT};
 use crate::bundle::write::{MapFormats, write_map_files};
 use crate::design::Design;
 use crate::map::sampled::TableReport;
@@ -28,6 +31,9 @@ pub struct MapRequest {
     pub components: Components,
     /// Tolerance; `None` for [`MAP_TOLERANCE`].
     pub tolerance: Option<f64>,
+    /// Currents of the working point, A, one a coil; `None` for the rated ones. Without a B-H
+    /// curve there is no working point.
+    pub currents_a: Option<Vec<f64>>,
     /// Folder of the files.
     pub out: PathBuf,
     /// Formats beside `map.npz`.
@@ -51,8 +57,30 @@ pub struct MapReport {
     pub tabulated: bool,
     /// The compact form of a coupled array's steel, where there is one.
     pub table: Option<TableReport>,
+    /// What a careful person would mention.
+    pub warnings: Vec<String>,
     /// Whether the tolerance asked for was reached.
     pub accuracy_reached: bool,
+}
+
+/// Largest difference of `gz` from the sum of the coils' maps times their currents, relative to
+/// the largest value at the same height.
+fn deviation(gz: &[f64], map: &FieldMap, currents_a: &[f64]) -> f64 {
+    let plane = map.x_m.len() * map.y_m.len();
+    let mut sum = vec![0.0; gz.len()];
+    for (coil, values) in map
+        .coils
+        .iter()
+        .zip(map.gz_t_per_m_per_a.chunks_exact(gz.len()))
+    {
+        for (sum, value) in sum.iter_mut().zip(values) {
+            *sum += currents_a[*coil] * value;
+        }
+    }
+    gz.chunks_exact(plane)
+        .zip(sum.chunks_exact(plane))
+        .map(|(values, others)| relative_difference(values, others))
+        .fold(0.0, f64::max)
 }
 
 /// Tabulates the maps of `design` and writes them.
@@ -83,6 +111,36 @@ pub fn run(
         progress,
     )?;
     let map = &made.map;
+    let mut summary = summary(map, request.components, made.between);
+    let mut accuracy = BTreeMap::from([("map".to_owned(), made.accuracy.clone())]);
+    let currents_a = request.currents_a.as_deref().unwrap_or(&scene.upper_a);
+    progress.begin("working point", 1);
+    let point = WorkingPoint::new(&scene, &solved, currents_a, request.tolerance, lowest_m)?;
+    let mut whole = None;
+    let mut warnings = scene
+        .core
+        .as_ref()
+        .map_or_else(Vec::new, |core| core.warnings.clone());
+    if let Some(point) = &point {
+        let gz = point.gz_t_per_m(&scene, &grid, progress)?;
+        let deviation_from_linear = deviation(&gz, map, currents_a);
+        accuracy.insert("working_point".to_owned(), point.accuracy());
+        warnings.extend(superposition_ends(
+            &scene,
+            deviation_from_linear,
+            &point.peak_field_t,
+            "the maps",
+        ));
+        summary.working_point = Some(WorkingPointMap {
+            array: WORKING_POINT.to_owned(),
+            currents_a: currents_a.to_vec(),
+            deviation_from_linear,
+            peak_field_t: point.peak_field_t.clone(),
+            mean_field_t: point.mean_field_t.clone(),
+        });
+        whole = Some(gz);
+    }
+    progress.end();
     progress.check()?;
     let sidecar = MapSidecar {
         schema_version: SCHEMA_VERSION.to_owned(),
@@ -92,12 +150,13 @@ pub fn run(
         units: UNITS.to_owned(),
         array: scene.array_geometry(),
         magnet: scene.magnet_summary(),
-        map: summary(map, request.components, made.between),
-        accuracy: BTreeMap::from([("map".to_owned(), made.accuracy.clone())]),
+        map: summary,
+        accuracy,
         files: Vec::new(),
     };
     let runtime = runtime(&scene, None);
-    let arrays = arrays(map, runtime);
+    let mut arrays = arrays(map, runtime);
+    arrays.working_point_gz_t_per_m = whole.map(Cow::Owned);
     progress.begin("write", 1);
     let sidecar = write_map_files(
         &request.out,
@@ -114,6 +173,7 @@ pub fn run(
         distinct_radii: map.distinct_radii,
         tabulated: map.tabulated,
         table: made.table,
+        warnings,
         accuracy_reached: solved.tolerance >= KERNEL_ERROR && solved.reached(),
     })
 }
@@ -152,6 +212,8 @@ pub(super) fn summary(
         }
         .to_owned(),
         interpolation: Interpolation::tricubic(between.largest, definition),
+        passive_force: None,
+        working_point: None,
     }
 }
 
@@ -177,6 +239,8 @@ pub(super) fn arrays(map: &FieldMap, runtime: Runtime) -> MapArrays<'_> {
         gz_t_per_m_per_a: Cow::Borrowed(&map.gz_t_per_m_per_a),
         gradient_t_per_m_per_a: map.gradient_t_per_m_per_a.as_deref().map(Cow::Borrowed),
         field_t_per_a: map.field_t_per_a.as_deref().map(Cow::Borrowed),
+        passive_force_n: None,
+        working_point_gz_t_per_m: None,
         runtime,
     }
 }

@@ -51,7 +51,7 @@ impl SceneMap {
         let shares = shares(rule);
         // A grid through every place that a node of the magnet can take.
         let widest = widest(grid, &shares);
-        let corners = corners(&widest);
+        let lowest = lowest_plane(grid);
         let (table, map, between) = match &solved.steel {
             Steel::None => {
                 let tolerance = solved.tolerance / rule.amplification();
@@ -71,7 +71,9 @@ impl SceneMap {
             Steel::Alone(_) => {
                 let tolerance = MAP_SHARE * solved.tolerance / rule.amplification();
                 // The nearest core decides how fine the rings are; seen from its own axis.
-                let steel = solved.sources(scene, &corners, 0.0)?.ok_or_else(no_steel)?;
+                let steel = solved
+                    .sources(scene, &lowest, rule.reach_m())?
+                    .ok_or_else(no_steel)?;
                 let source = CoredSource {
                     winding: scene.winding,
                     steel,
@@ -86,7 +88,9 @@ impl SceneMap {
             }
             Steel::Coupled(_) => {
                 let tolerance = MAP_SHARE * solved.tolerance / rule.amplification();
-                let steel = solved.sources(scene, &corners, 0.0)?.ok_or_else(no_steel)?;
+                let steel = solved
+                    .sources(scene, &lowest, rule.reach_m())?
+                    .ok_or_else(no_steel)?;
                 let sampled = SampledField::new(&steel, &widest, components, tolerance, progress)?;
                 let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
                     let mut map =
@@ -232,7 +236,7 @@ fn widest(grid: &Grid, shares: &[([f64; 3], f64)]) -> Grid {
 }
 
 /// Nodes of a grid's lowest plane: where it comes closest to the coils.
-fn corners(grid: &Grid) -> Vec<[f64; 3]> {
+pub(super) fn lowest_plane(grid: &Grid) -> Vec<[f64; 3]> {
     let z_m = grid.z_m.first().copied().unwrap_or(0.0);
     grid.y_m
         .iter()

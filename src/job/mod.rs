@@ -9,6 +9,7 @@ pub mod map;
 pub mod maps;
 pub mod neighbours;
 pub mod passive;
+pub mod passive_map;
 pub mod probe;
 mod rated;
 pub mod scene;

@@ -89,7 +89,7 @@ pub(super) fn array(
     let lowest_m = scene.design.target_height_m;
     let solved = steel::solve(scene, None, KERNEL_ERROR, lowest_m)?;
     let (mut peak_t, mut mean_t) = (Vec::new(), Vec::new());
-    let working_point = match WorkingPoint::new(scene, &scene.upper_a, None, lowest_m)? {
+    let working_point = match WorkingPoint::new(scene, &solved, &scene.upper_a, None, lowest_m)? {
         Some(point) => {
             accuracy.insert("working_point", point.accuracy());
             peak_t.clone_from(&point.peak_field_t);

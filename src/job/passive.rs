@@ -1,12 +1,18 @@
 //! The pull of the unpowered steel on a scene's magnet.
 
+use rayon::prelude::*;
+
 use super::JobError;
 use super::scene::Scene;
 use super::steel::coupled;
 use crate::accuracy::StageAccuracy;
 use crate::design::MagnetModel;
 use crate::field::magnet::Cylinder;
-use crate::field::steel::passive::{PassivePull, Pulled, Region};
+use crate::field::steel::passive::isolated::placed;
+use crate::field::steel::passive::magnet::{PassiveMagnet, dipoles};
+use crate::field::steel::passive::neighbours::Neighbours;
+use crate::field::steel::passive::reaction::{Reaction, ReactionResolution};
+use crate::field::steel::passive::{NoPull, PassivePull, Pulled, Region};
 
 /// Tolerance of the pull, relative to its own length: a small force beside the coils'.
 pub const PASSIVE_TOLERANCE: f64 = 1e-3;
@@ -21,9 +27,95 @@ pub fn pull(
     places_m: &[[f64; 3]],
     alone: bool,
 ) -> Result<Option<PassivePull>, JobError> {
-    let Some(core) = &scene.core else {
+    pull_to(scene, places_m, alone, PASSIVE_TOLERANCE)
+}
+
+/// [`pull`] to another tolerance.
+///
+/// # Errors
+/// A magnet that touches the steel.
+pub fn pull_to(
+    scene: &Scene,
+    places_m: &[[f64; 3]],
+    alone: bool,
+    tolerance: f64,
+) -> Result<Option<PassivePull>, JobError> {
+    let Some(pulled) = pulled(scene, places_m, alone) else {
         return Ok(None);
     };
+    PassivePull::new(&pulled, tolerance)
+        .map(Some)
+        .map_err(|fault| too_close(&pulled, fault))
+}
+
+/// Vertical pull at `places_m` by another route than [`pull`]'s, N; `None` without steel. There a
+/// core's share is the slope of a tabulated energy; here it is the gradient of the field that the
+/// core sends back, computed anew for every place. The cores' coupling is solved to `tolerance`.
+///
+/// # Errors
+/// A magnet that touches the steel.
+pub fn direct_z_n(
+    scene: &Scene,
+    places_m: &[[f64; 3]],
+    tolerance: f64,
+) -> Result<Option<Vec<f64>>, JobError> {
+    let Some(pulled) = pulled(scene, places_m, false) else {
+        return Ok(None);
+    };
+    let shape = pulled.shape;
+    let mu_r = pulled.relative_permeability;
+    let magnet = PassiveMagnet::new(
+        pulled.moment_a_m2,
+        pulled.size,
+        shape.top_m,
+        pulled.region.z_m[0],
+        0.5 * tolerance,
+    )
+    .map_err(|fault| too_close(&pulled, fault))?;
+    let resolution = ReactionResolution::for_tolerance(tolerance, shape, magnet.gap_m());
+    let core = Reaction::new(shape, mu_r, &resolution.finer());
+    let axes = pulled.positions_m;
+    let closest_m = axes
+        .iter()
+        .enumerate()
+        .flat_map(|(i, a)| {
+            axes[..i]
+                .iter()
+                .map(move |b| (a[0] - b[0]).hypot(a[1] - b[1]))
+        })
+        .fold(f64::INFINITY, f64::min);
+    let neighbours = (pulled.coupled && axes.len() > 1).then(|| {
+        let few = magnet.few_dipoles(tolerance);
+        let gap_m = magnet.gap_of_m(&few);
+        Neighbours::new(shape, mu_r, axes, closest_m, gap_m, tolerance, few)
+    });
+    Ok(Some(
+        places_m
+            .par_iter()
+            .map(|[x, y, z]| {
+                let rule = magnet.magnet_rule(*z);
+                let about_centre = dipoles(&rule);
+                let alone: f64 = axes
+                    .iter()
+                    .map(|axis| {
+                        let at = [x - axis[0], y - axis[1], *z];
+                        let back = core.induced(&placed(&about_centre, at));
+                        let gradients: Vec<_> = back.iter().map(|f| f.gradient_t_per_m).collect();
+                        rule.force_n(&gradients)[2]
+                    })
+                    .sum();
+                alone
+                    + neighbours
+                        .as_ref()
+                        .map_or(0.0, |n| n.force_z_n([*x, *y, *z]))
+            })
+            .collect(),
+    ))
+}
+
+/// What the pull's solvers need to know; `None` without steel.
+fn pulled<'a>(scene: &'a Scene, places_m: &[[f64; 3]], alone: bool) -> Option<Pulled<'a>> {
+    let core = scene.core.as_ref()?;
     let range = |axis: usize| {
         places_m
             .iter()
@@ -32,7 +124,7 @@ pub fn pull(
             })
     };
     let magnet = &scene.design.magnet;
-    let pulled = Pulled {
+    Some(Pulled {
         shape: core.shape,
         relative_permeability: core.relative_permeability(),
         positions_m: if alone {
@@ -51,15 +143,15 @@ pub fn pull(
             y_m: range(1),
             z_m: range(2),
         },
-    };
-    PassivePull::new(&pulled, PASSIVE_TOLERANCE)
-        .map(Some)
-        .map_err(|fault| {
-            JobError::Input(format!(
-                "[magnet] passive_force, with its centre from {} mm up: {fault}; raise the magnet",
-                pulled.region.z_m[0] * 1e3
-            ))
-        })
+    })
+}
+
+fn too_close(pulled: &Pulled, fault: NoPull) -> JobError {
+    JobError::Input(format!(
+        "[magnet] passive_force, with its centre from {} mm up: {fault}; raise the magnet or the \
+         workspace",
+        pulled.region.z_m[0] * 1e3
+    ))
 }
 
 /// The pull's estimated error.

@@ -123,7 +123,7 @@ impl Single {
                 stage(
                     coil.relative_error,
                     "the largest |grad B| (|B|) at the target's height",
-                    "half the difference of two resolutions of the core's surface",
+                    "the difference of two resolutions of the core's surface",
                 ),
             ),
             (
@@ -131,7 +131,7 @@ impl Single {
                 stage(
                     coil.relative_error,
                     "the inductance",
-                    "half the difference of two resolutions of the core's surface",
+                    "the difference of two resolutions of the core's surface",
                 ),
             ),
             (

@@ -10,21 +10,26 @@ use std::path::Path;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::calibrate::DESIGN_FILE;
+use super::calibrate::{CURVE_FILE, DESIGN_FILE, PASSIVE_STAGE};
+use super::passive::{self, PASSIVE_TOLERANCE};
+use super::passive_map::PassiveMap;
 use super::scene::Scene;
 use super::steel::{Solved, Steel};
 use super::{JobError, KERNEL_ERROR, steel};
-use crate::bundle::artefact::{Input, sha256_hex};
-use crate::bundle::load::Bundle;
-use crate::design::{Design, Need};
+use crate::bundle::artefact::{FileEntry, Input, sha256_hex};
+use crate::bundle::load::{Bundle, BundleError};
+use crate::design::{Design, Need, Steel as Described};
 use crate::field::magnet::MagnetRule;
 use crate::field::steel::sources::Parts;
 use crate::lambda::{self, Criterion, ForceProblem, Settings};
+use crate::map::tabulate::Grid;
 use crate::numerics::lagrange;
 use crate::progress::Progress;
 
 /// Map nodes sampled, and force-matrix entries sampled.
 const SAMPLES: usize = 2000;
+/// The fewest that are sampled.
+const FEWEST: usize = 200;
 /// Largest difference of a force constant that is solved for again, relative.
 const LAMBDA_AGREES: f64 = 1e-8;
 /// How much a force constant may move with the stated error of steel's forces.
@@ -68,7 +73,7 @@ pub struct Check {
 /// A bundle that is damaged or inconsistent; interruption. Numbers that do not agree are no
 /// error: see [`VerifyReport::passed`].
 pub fn run(path: &Path, progress: &dyn Progress) -> Result<VerifyReport, JobError> {
-    progress.begin("verify", 4);
+    progress.begin("verify", 5);
     let bundle = Bundle::open(path)?;
     progress.advance(1);
     let design = design(&bundle)?;
@@ -88,6 +93,9 @@ pub fn run(path: &Path, progress: &dyn Progress) -> Result<VerifyReport, JobErro
     progress.advance(1);
     progress.check()?;
     checks.extend(force_constant(&bundle, &route, progress)?);
+    progress.advance(1);
+    progress.check()?;
+    checks.extend(passive_force(&bundle, &scene)?);
     progress.advance(1);
     let notes = changed_inputs(&bundle);
     progress.end();
@@ -122,11 +130,22 @@ fn ratio(error: f64, size: f64) -> f64 {
     if error == 0.0 { 0.0 } else { error / size }
 }
 
-/// The design kept in the bundle; its digest was checked with the others'.
+/// The design kept in the bundle, its magnetisation curve the copy kept beside it; their digests
+/// were checked with the others'.
 fn design(bundle: &Bundle) -> Result<Design, JobError> {
     let path = bundle.folder.join(DESIGN_FILE);
-    let (design, _) = Design::read(&path, Need::CALIBRATE)
+    let (mut design, _) = Design::read(&path, Need::CALIBRATE)
         .map_err(|invalid| JobError::Input(invalid.to_string()))?;
+    if let Some(core) = &mut design.core
+        && let Described::Curve(curve) = &mut core.steel
+    {
+        let kept = |file: &FileEntry| file.path == CURVE_FILE;
+        if !bundle.manifest.files.iter().any(kept) {
+            let message = format!("has a core.bh_curve, but the bundle keeps no {CURVE_FILE}");
+            return Err(BundleError::Content { path, message }.into());
+        }
+        *curve = bundle.folder.join(CURVE_FILE);
+    }
     Ok(design)
 }
 
@@ -205,6 +224,12 @@ impl<'a> Route<'a> {
             solved: steel::solve(scene, Some(tolerance), KERNEL_ERROR, lowest_m)?,
             rule: scene.magnet_rule(lowest_m, tolerance)?,
         })
+    }
+
+    /// Places sampled: fewer where the magnet is made of many dipoles, each of which costs as much
+    /// as a place.
+    fn samples(&self) -> usize {
+        (SAMPLES / self.rule.nodes().len().max(1)).clamp(FEWEST, SAMPLES)
     }
 
     /// dB_x/dz, dB_y/dz, dB_z/dz of a coil at a point, the mean that the magnet feels, gains
@@ -288,7 +313,7 @@ fn map_nodes(bundle: &Bundle, route: &Route) -> Result<Check, JobError> {
     let sizes: Vec<f64> = (0..nz)
         .map(|level| largest_in_plane(bundle, level))
         .collect();
-    let places = spread(coils * nz * ny * nx, SAMPLES);
+    let places = spread(coils * nz * ny * nx, route.samples());
     let wanted: Vec<(usize, [f64; 3])> = places
         .iter()
         .map(|index| {
@@ -311,7 +336,7 @@ fn map_nodes(bundle: &Bundle, route: &Route) -> Result<Check, JobError> {
         .accuracy
         .get("map")
         .map_or(0.0, |stage| stage.estimate);
-    let how = format!("{SAMPLES} nodes by an independent route");
+    let how = format!("{} nodes by an independent route", places.len());
     Ok(check("map nodes", worst, allowed.max(KERNEL_ERROR), how))
 }
 
@@ -326,7 +351,7 @@ fn between_nodes(bundle: &Bundle, route: &Route) -> Result<Check, JobError> {
     };
     // (layer, coil's place in the map, point)
     let places: Vec<(usize, usize, [f64; 3])> =
-        spread(coils * cells[0] * cells[1] * cells[2], SAMPLES)
+        spread(coils * cells[0] * cells[1] * cells[2], route.samples())
             .into_iter()
             .map(|index| {
                 let (i, rest) = (index % cells[0], index / cells[0]);
@@ -360,7 +385,10 @@ fn between_nodes(bundle: &Bundle, route: &Route) -> Result<Check, JobError> {
         })
         .fold(0.0, f64::max);
     let allowed = bundle.manifest.map.interpolation.largest_error;
-    let how = format!("{SAMPLES} places between nodes, interpolated as the loaders do");
+    let how = format!(
+        "{} places between nodes, interpolated as the loaders do",
+        places.len()
+    );
     Ok(check(
         "map between nodes",
         worst,
@@ -390,7 +418,6 @@ fn force_constant(
             FORCES_MOVE * stated.map_or(0.0, |stage| stage.estimate)
         }
     };
-    let agrees = slack.max(LAMBDA_AGREES);
     let solved = match &route.solved.steel {
         Steel::None => steel::solve(scene, None, KERNEL_ERROR, lowest_m)?,
         Steel::Alone(_) | Steel::Coupled(_) => route.solved.clone(),
@@ -401,11 +428,14 @@ fn force_constant(
 
     let heights: Vec<f64> = bundle.points.iter().map(|p| p.height_m).collect();
     let stored = &bundle.lambda;
+    let offset_n = offset_n(scene, &positions)?;
+    let slack = slack + passive_slack(bundle, offset_n.as_deref(), &heights);
+    let agrees = slack.max(LAMBDA_AGREES);
     let resistance_ohm = scene.resistances_ohm();
     let problem = ForceProblem {
         forces_n_per_a: &forces,
         height_m: &heights,
-        offset_n: None,
+        offset_n: offset_n.as_deref(),
         lower_a: &scene.lower_a,
         upper_a: &scene.upper_a,
         total_max_a: scene.design.supply.total_current_max_a,
@@ -447,8 +477,12 @@ fn force_constant(
     };
     let residual: Vec<f64> = forces
         .chunks_exact(coils)
-        .zip(&heights)
-        .map(|(row, h)| lambda * h - row.iter().zip(currents).map(|(g, i)| g * i).sum::<f64>())
+        .enumerate()
+        .map(|(point, row)| {
+            let pull = offset_n.as_ref().map_or(0.0, |offset| offset[point]);
+            let pushed: f64 = row.iter().zip(currents).map(|(g, i)| g * i).sum();
+            lambda * heights[point] - pull - pushed
+        })
         .collect();
     let n = heights.len() as f64;
     let wanted = lambda * lambda * heights.iter().map(|h| h * h).sum::<f64>() / n;
@@ -485,6 +519,139 @@ fn force_constant(
     Ok(checks)
 }
 
+/// The unpowered steel's pull at the points, finer than the bundle's; `None` where the design does
+/// not ask for it.
+fn offset_n(scene: &Scene, positions: &[[f64; 3]]) -> Result<Option<Vec<f64>>, JobError> {
+    if !scene.design.magnet.passive_force {
+        return Ok(None);
+    }
+    let pull = passive::pull_to(scene, positions, false, FINER * PASSIVE_TOLERANCE)?;
+    Ok(pull.map(|pull| pull.forces_z_n(positions)))
+}
+
+/// How much the pull's stated error may move force constants and errors, relative.
+fn passive_slack(bundle: &Bundle, offset_n: Option<&[f64]>, heights: &[f64]) -> f64 {
+    let Some(offset_n) = offset_n else { return 0.0 };
+    let stated = bundle.manifest.accuracy.get("passive_force");
+    let estimate = stated.map_or(0.0, |stage| stage.estimate);
+    let rms = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let told = [
+        bundle.lambda.lambda_n_per_m,
+        bundle.lambda.lambda_linear_n_per_m,
+    ];
+    let least = told
+        .into_iter()
+        .flatten()
+        .filter(|l| *l > 0.0)
+        .fold(f64::INFINITY, f64::min);
+    FORCES_MOVE * estimate * ratio(rms(offset_n), least * rms(heights)).min(1.0)
+}
+
+/// Places at which the pull is computed by another route: on nodes, and as many between them.
+const PULL_SAMPLES: usize = 40;
+
+/// The map of the unpowered steel's pull: every node against a finer map, some of them and places
+/// between them against another route.
+fn passive_force(bundle: &Bundle, scene: &Scene) -> Result<Vec<Check>, JobError> {
+    const NODES: &str = "passive force nodes";
+    let map = &bundle.map;
+    let wanted = scene.design.magnet.passive_force && scene.core.is_some();
+    let (Some(values), Some(told)) = (&map.passive_force_n, &bundle.manifest.map.passive_force)
+    else {
+        let how = "the design has passive_force, the bundle holds none: make it anew".to_owned();
+        return Ok(wanted
+            .then(|| check(NODES, f64::MAX, 0.0, how))
+            .into_iter()
+            .collect());
+    };
+    if !wanted {
+        let how = "the bundle holds a passive force, the design has none".to_owned();
+        return Ok(vec![check(NODES, f64::MAX, 0.0, how)]);
+    }
+    let stated = bundle.manifest.accuracy.get(PASSIVE_STAGE);
+    let stated = stated.map_or(0.0, |stage| stage.estimate);
+    let tolerance = FINER * PASSIVE_TOLERANCE;
+    let grid = Grid {
+        x_m: map.x_m.to_vec(),
+        y_m: map.y_m.to_vec(),
+        z_m: map.z_m.to_vec(),
+    };
+    let Some(finer) = PassiveMap::new(scene, &grid, tolerance)? else {
+        return Ok(Vec::new());
+    };
+    let [_, nz, ny, nx] = map.shape();
+    let sizes: Vec<f64> = finer
+        .force_z_n
+        .chunks_exact(nx * ny)
+        .map(|plane| plane.iter().fold(0.0_f64, |most, f| most.max(f.abs())))
+        .collect();
+    let worst = values
+        .iter()
+        .zip(&finer.force_z_n)
+        .enumerate()
+        .map(|(i, (told, found))| ratio((told - found).abs(), sizes[i / (nx * ny)]))
+        .fold(0.0, f64::max);
+    let allowed = stated + finer.accuracy.estimate;
+    let mut checks = vec![check(
+        NODES,
+        worst,
+        allowed,
+        "every node against a finer map of the pull".to_owned(),
+    )];
+
+    // The level below a place, and the place; the first half on nodes.
+    let cells = [nx, ny, nz].map(|n| n.saturating_sub(1).max(1));
+    let places: Vec<(usize, [f64; 3])> = spread(nx * ny * nz, PULL_SAMPLES)
+        .into_iter()
+        .map(|i| (i / (nx * ny), [i % nx, i / nx % ny, i / (nx * ny)], 0.0))
+        .chain(
+            spread(cells[0] * cells[1] * cells[2], PULL_SAMPLES)
+                .into_iter()
+                .map(|i| {
+                    let k = i / (cells[0] * cells[1]);
+                    (k, [i % cells[0], i / cells[0] % cells[1], k], 0.43)
+                }),
+        )
+        .map(|(level, cell, t)| {
+            let at = |nodes: &[f64], i: usize| match nodes.get(i + 1) {
+                Some(next) => nodes[i] + t * (next - nodes[i]),
+                None => nodes[i],
+            };
+            let [x, y, z] = cell;
+            (
+                level,
+                [at(&grid.x_m, x), at(&grid.y_m, y), at(&grid.z_m, z)],
+            )
+        })
+        .collect();
+    let points: Vec<[f64; 3]> = places.iter().map(|(_, at)| *at).collect();
+    let Some(sure) = passive::direct_z_n(scene, &points, tolerance)? else {
+        return Ok(checks);
+    };
+    let errors: Vec<f64> = places
+        .iter()
+        .zip(&sure)
+        .map(|((level, at), sure)| {
+            let found = bundle.passive_force_n(*at).unwrap_or(f64::INFINITY);
+            ratio((found - sure).abs(), sizes[*level])
+        })
+        .collect();
+    let (on, between) = errors.split_at(PULL_SAMPLES.min(nx * ny * nz));
+    let worst = |errors: &[f64]| errors.iter().copied().fold(0.0, f64::max);
+    let how = format!("{} nodes by the field that the steel sends back", on.len());
+    checks.push(check("passive force", worst(on), stated + tolerance, how));
+    checks.push(check(
+        "passive force between nodes",
+        worst(between),
+        told.interpolation.largest_error + stated + tolerance,
+        format!(
+            "{} places between nodes, interpolated as the loaders do",
+            between.len()
+        ),
+    ));
+    Ok(checks)
+}
+
 fn sampled_forces(
     bundle: &Bundle,
     route: &Route,
@@ -494,7 +661,7 @@ fn sampled_forces(
     let coils = route.scene.coils.len();
     let largest = forces.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
     let moment = route.scene.moment_a_m2;
-    let places = spread(forces.len(), SAMPLES);
+    let places = spread(forces.len(), route.samples());
     let wanted: Vec<(usize, [f64; 3])> = places
         .iter()
         .map(|index| (index % coils, positions[index / coils]))
@@ -508,7 +675,10 @@ fn sampled_forces(
             (forces[*index] - exact).abs()
         })
         .fold(0.0, f64::max);
-    let how = format!("{SAMPLES} entries of the force matrix by an independent route");
+    let how = format!(
+        "{} entries of the force matrix by an independent route",
+        places.len()
+    );
     // The estimate is relative to |grad B| at each height; the lowest points have the largest.
     let stated = bundle.manifest.accuracy.get("forces");
     let allowed = stated

@@ -2,31 +2,37 @@
 
 use super::JobError;
 use super::at_current::{AtCurrent, no_state};
-use super::maps::parts_of;
+use super::maps::{lowest_plane, parts_of};
 use super::scene::{MAGNET_SHARE, Scene, upward_n};
 use super::steel::{EVALUATION_SHARE, Material, SceneCore, Solved, Steel, clearance_m, coupled};
 use crate::accuracy::StageAccuracy;
 use crate::field::steel::bh_curve::BhCurve;
+use crate::field::steel::inside::peak_depth_m;
 use crate::field::steel::saturated::Status;
 use crate::field::steel::saturated_array::SaturatedArray;
 use crate::field::steel::sources::{ArraySources, Parts};
 use crate::map::Components;
+use crate::map::sampled::SampledField;
 use crate::map::sampler::Sampler;
-use crate::map::tabulate::MapError;
+use crate::map::tabulate::{Grid, MapError, PlacedCoil, tabulate};
 use crate::progress::Progress;
 
 /// Default tolerance of the steel at a working point, relative to the largest |grad B| at a
 /// height: what the modes that are taken as linear leave is of this order.
 pub const WORKING_POINT_TOLERANCE: f64 = 1e-3;
 
+/// Deviation from superposition above which a warning is due.
+const SUPERPOSITION_WARNING: f64 = 0.01;
+
 /// The cores at a working point.
 #[derive(Debug, Clone)]
 pub struct WorkingPoint {
     /// Current in every coil, A.
     pub currents_a: Vec<f64>,
-    /// Largest |B| in every core, T.
+    /// Largest |B| in every core, T: of the axisymmetric mode along the curve, and what the other
+    /// modes add to it in the linear array.
     pub peak_field_t: Vec<f64>,
-    /// Mean |B| in every core, T.
+    /// Mean |B| in every core, of the axisymmetric mode, T.
     pub mean_field_t: Vec<f64>,
     /// Flux linkage of every coil, the neighbours' windings left out, Wb.
     pub steel_flux_linkage_wb: Vec<f64>,
@@ -47,7 +53,7 @@ enum Cores {
 }
 
 impl WorkingPoint {
-    /// Solves the cores of `scene` at `currents_a` for heights from `lowest_m` up; `None` where
+    /// Solves the cores of `scene`, linear in `solved`, at `currents_a` for heights from `lowest_m` up; `None` where
     /// superposition holds: without a B-H curve.
     ///
     /// A coil whose map has a measured gain counts with that much more current.
@@ -56,6 +62,7 @@ impl WorkingPoint {
     /// A core that cannot be solved.
     pub fn new(
         scene: &Scene,
+        solved: &Solved,
         currents_a: &[f64],
         tolerance: Option<f64>,
         lowest_m: f64,
@@ -76,6 +83,13 @@ impl WorkingPoint {
         } else {
             Self::alone(scene, core, curve, &effective_a, tolerance, lowest_m)?
         };
+        if let Steel::Coupled(array) = &solved.steel {
+            let depth_m = peak_depth_m(core.shape);
+            let added = array.transverse_peaks_t(&effective_a, depth_m)?;
+            for (peak, added) in made.peak_field_t.iter_mut().zip(added) {
+                *peak += added;
+            }
+        }
         made.currents_a = currents_a.to_vec();
         Ok(Some(made))
     }
@@ -196,6 +210,54 @@ impl WorkingPoint {
         TotalField { parts, top_m }
     }
 
+    /// dB_z/dz of all coils together at the nodes of `grid`, [z, y, x], T/m.
+    ///
+    /// # Errors
+    /// A node on a winding's edge or on the steel; interruption.
+    pub fn gz_t_per_m(
+        &self,
+        scene: &Scene,
+        grid: &Grid,
+        progress: &dyn Progress,
+    ) -> Result<Vec<f64>, JobError> {
+        let tolerance = EVALUATION_SHARE * self.tolerance;
+        let windings = tabulate(
+            &scene.winding,
+            &scene.coils,
+            grid,
+            Components::Gz,
+            tolerance,
+            progress,
+        )?;
+        let nodes = grid.x_m.len() * grid.y_m.len() * grid.z_m.len();
+        let mut whole = vec![0.0; nodes];
+        let mut add = |values: &[f64], factor: f64| {
+            for (whole, value) in whole.iter_mut().zip(values) {
+                *whole += factor * value;
+            }
+        };
+        // Gains stand in the maps already.
+        for (values, current) in windings
+            .gz_t_per_m_per_a
+            .chunks_exact(nodes.max(1))
+            .zip(&self.currents_a)
+        {
+            add(values, *current);
+        }
+        if let Some(core) = &scene.core {
+            let (lowest_m, distance_m) = clearance_m(scene, core, &lowest_plane(grid), 0.0)?;
+            let steel = self.field(scene, lowest_m, distance_m);
+            let sampled = SampledField::new(&steel, grid, Components::Gz, tolerance, progress)?;
+            let all = PlacedCoil {
+                number: 0,
+                axis_m: [0.0, 0.0],
+                gain: 1.0,
+            };
+            add(&sampled.map(&[all], grid, progress)?.gz_t_per_m_per_a, 1.0);
+        }
+        Ok(whole)
+    }
+
     /// Upward force on the magnet at every point, N, windings and steel, the pull of the
     /// unpowered steel left out.
     ///
@@ -242,6 +304,29 @@ impl WorkingPoint {
         }
         Ok(total)
     }
+}
+
+/// A sentence on `what`, per ampere, that does not add up to the state at the working point.
+pub(super) fn superposition_ends(
+    scene: &Scene,
+    deviation_from_linear: f64,
+    peak_field_t: &[f64],
+    what: &str,
+) -> Option<String> {
+    (deviation_from_linear > SUPERPOSITION_WARNING).then(|| {
+        let peak_t = peak_field_t.iter().copied().fold(0.0, f64::max);
+        let knee_t = scene
+            .core
+            .as_ref()
+            .map_or(f64::INFINITY, |core| core.knee_t);
+        format!(
+            "superposition ends along the B-H curve: at the working point's currents the state \
+             differs by up to {:.1} % of the largest from the sum of {what} (the cores reach \
+             {peak_t:.2} T, the knee is at {knee_t:.2} T); lower the currents until \
+             working_point.deviation_from_linear is small enough",
+            100.0 * deviation_from_linear
+        )
+    })
 }
 
 /// The steel's field at a working point: the sum of all cores'.

@@ -57,6 +57,7 @@ fn stages(design: &Design) -> Result<(), Failure> {
         let request = MapRequest {
             components: Components::Gz,
             tolerance: None,
+            currents_a: None,
             out: folder.path().join("map"),
             formats: MapFormats::default(),
             force: false,

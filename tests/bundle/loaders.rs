@@ -69,8 +69,9 @@ import sys, numpy as np
 sys.path.insert(0, sys.argv[1])
 from load_bundle import Bundle
 points = np.loadtxt(sys.stdin, ndmin=2)
-for row in Bundle(sys.argv[2]).force_per_ampere(points):
-    print(*map(repr, map(float, row)))
+bundle = Bundle(sys.argv[2])
+for row, pull in zip(bundle.force_per_ampere(points), bundle.passive_force(points)):
+    print(*map(repr, map(float, [*row, pull])))
 ";
 
 /// The C loader as a program; `None` without a C compiler.
@@ -119,14 +120,18 @@ fn compare(loader: &str, found: &[Vec<f64>], want: &[Vec<f64>]) {
 
 #[test]
 fn rust_python_and_c_give_the_same_forces() {
-    for (name, tilted, samples) in [
-        ("upright", false, [13, 17, 11]),
-        ("tilted", true, [13, 9, 11]),
-        ("short axes", false, [2, 3, 1]),
+    for (name, tilted, pulled, samples) in [
+        ("upright", false, false, [13, 17, 11]),
+        ("upright with pull", false, true, [13, 17, 11]),
+        ("tilted with pull", true, true, [13, 9, 11]),
+        ("short axes", false, true, [2, 3, 1]),
     ] {
         let folder = temporary();
         let target = folder.path().join("bundle");
-        let sample = sample(tilted, samples);
+        let mut sample = sample(tilted, samples);
+        if pulled {
+            sample = sample.with_pull();
+        }
         sample.write(&target, false).unwrap();
         let bundle = Bundle::open(&target).unwrap();
         let at = positions(&bundle.map);
@@ -135,7 +140,11 @@ fn rust_python_and_c_give_the_same_forces() {
             .iter()
             .map(|&p| {
                 let mut force = vec![f64::NAN; bundle.coil_count()];
-                outside += usize::from(!bundle.force_per_ampere(p, &mut force));
+                let inside = bundle.force_per_ampere(p, &mut force);
+                let pull = bundle.passive_force_n(p);
+                assert_eq!(pull.is_some(), inside);
+                outside += usize::from(!inside);
+                force.push(pull.unwrap_or(0.0));
                 force
             })
             .collect();
@@ -148,6 +157,9 @@ fn rust_python_and_c_give_the_same_forces() {
                 let exact = m[0] * g[2] + m[1] * g[5] + m[2] * g[8];
                 assert!((force[0] - exact).abs() < 2e-2, "{force:?} {exact}");
                 assert_eq!(force[2], 0.0);
+                let pull = if pulled { pull_n(*p) } else { 0.0 };
+                let found = force[bundle.coil_count()];
+                assert!((found - pull).abs() <= 1e-2 * pull.abs(), "{found} {pull}");
             }
         }
         if has_numpy() {
@@ -190,7 +202,10 @@ fn the_c_loader_survives_damaged_files() {
         return;
     };
     let target = folder.path().join("bundle");
-    sample(true, [3, 2, 2]).write(&target, false).unwrap();
+    sample(true, [3, 2, 2])
+        .with_pull()
+        .write(&target, false)
+        .unwrap();
     let bytes = fs::read(target.join("map.npz")).unwrap();
     let mut seed = 3;
     let damaged = folder.path().join("damaged.npz");

@@ -40,6 +40,12 @@ pub fn gradient(coil_m: [f64; 2], at: [f64; 3]) -> [f64; 9] {
     g
 }
 
+/// A pull with no symmetry, N.
+pub fn pull_n([x, y, z]: [f64; 3]) -> f64 {
+    let away = (x - 0.013).powi(2) + (y + 0.021).powi(2) + (z + 0.04).powi(2);
+    -3e-3 * (away / 0.0049).powf(-1.7)
+}
+
 pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
     let axis = |from, to, samples| Axis { from, to, samples };
     let x = axis(-0.05, 0.05, samples[0]);
@@ -75,6 +81,8 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
         gz_t_per_m_per_a: gz.into(),
         gradient_t_per_m_per_a: tilted.then(|| all.into()),
         field_t_per_a: None,
+        passive_force_n: None,
+        working_point_gz_t_per_m: None,
         runtime: Runtime {
             moment_a_m2,
             current_min_a: current_min_a.clone(),
@@ -146,6 +154,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
             rms_error_n: 0.0013,
             worst_error_n: 0.0017,
         }),
+        working_point: None,
         accuracy: accuracy.clone(),
     };
     let manifest = Manifest {
@@ -188,6 +197,8 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
                 1.3e-6,
                 "relative to the largest |g| at that height, sampled",
             ),
+            passive_force: None,
+            working_point: None,
         },
         left_out: vec![LeftOut {
             what: "coil 2".to_owned(),
@@ -207,6 +218,24 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
 }
 
 impl Sample {
+    /// The sample of a bundle that holds the unpowered steel's pull too.
+    pub fn with_pull(mut self) -> Self {
+        let map = &self.map;
+        let mut pull = Vec::new();
+        for z in map.z_m.iter() {
+            for y in map.y_m.iter() {
+                pull.extend(map.x_m.iter().map(|x| pull_n([*x, *y, *z])));
+            }
+        }
+        self.manifest.map.passive_force = Some(PassiveForce {
+            array: "passive_force_n".to_owned(),
+            largest_n: 0.9,
+            interpolation: Interpolation::tricubic(1.7e-4, "sampled"),
+        });
+        self.map.passive_force_n = Some(pull.into());
+        self
+    }
+
     pub fn write(&self, target: &Path, force: bool) -> Result<Manifest, WriteError> {
         let content = BundleContent {
             manifest: self.manifest.clone(),

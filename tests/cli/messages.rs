@@ -211,22 +211,6 @@ fn points_without_a_map_are_warned_of() {
 }
 
 #[test]
-fn steel_is_refused_not_ignored() {
-    let place = Place::new();
-    for args in [
-        &["evaluate", "designs/seed.toml"][..],
-        &["map", "designs/seed.toml"],
-        &["calibrate", "designs/seed.toml", "shapes/flat.toml"],
-    ] {
-        place
-            .run(args)
-            .ends(3)
-            .says(&["steel cores are not modelled"]);
-    }
-    assert!(!place.path("results").exists());
-}
-
-#[test]
 fn two_shapes_of_one_name_are_an_error() {
     let place = Place::new();
     place

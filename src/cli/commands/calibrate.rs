@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::lambda::{CriterionFlags, no_constant};
 use super::{accuracy_check, begin, describe, folder};
 use crate::bundle::artefact::{FLUXFORM_VERSION, SCHEMA_VERSION};
+use crate::bundle::lambda_file::WorkingPointForces;
 use crate::bundle::manifest::Manifest;
 use crate::cli::args::{SurfaceFlags, Tolerance, Writing};
 use crate::cli::documents;
@@ -16,7 +17,7 @@ use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::printer::{Place, Printer};
-use crate::cli::quantity::{bytes, count, error, length_error, number, percent};
+use crate::cli::quantity::{bytes, count, error, length_error, number, number_to, percent};
 use crate::cli::values::{self, FileArgument};
 use crate::design::{Design, Need};
 use crate::job::calibrate::{
@@ -32,11 +33,11 @@ use crate::job::calibrate::{
 /// told.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Writing, &[
-    ("fluxform calibrate designs/seed_air.toml shapes/flat.toml shapes/half_sphere.toml",
-     "two objects; the bundles go to results/seed_air/"),
-    ("fluxform calibrate designs/seed_air.toml shapes/wedge.stl --unit mm --translate 0,0,30",
+    ("fluxform calibrate designs/seed.toml shapes/flat.toml shapes/half_sphere.toml",
+     "two objects; the bundles go to results/seed/"),
+    ("fluxform calibrate designs/seed.toml shapes/wedge.stl --unit mm --translate 0,0,30",
      "a surface given directly; its bundle is called wedge"),
-    ("fluxform calibrate designs/seed_air.toml shapes/flat.toml --criterion linear --force",
+    ("fluxform calibrate designs/seed.toml shapes/flat.toml --criterion linear --force",
      "another criterion, replacing what is there"),
 ]))]
 pub struct Calibrate {
@@ -205,6 +206,9 @@ fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> String {
         ),
     );
     sheet.line("accuracy", &accuracies(report));
+    if let Some(told) = working_points(report) {
+        sheet.line("steel", &told);
+    }
     let left_out: BTreeSet<String> = report
         .bundles
         .iter()
@@ -298,6 +302,26 @@ fn at_limit(bundle: &BundleReport) -> Option<String> {
     Some(if full { format!("{coils}, sum") } else { coils })
 }
 
+/// How far forces along the B-H curve are off those added up, where the design gives a curve.
+fn working_points(report: &CalibrateReport) -> Option<String> {
+    let points: Vec<&WorkingPointForces> = report
+        .bundles
+        .iter()
+        .filter_map(|bundle| bundle.lambda.file.working_point.as_ref())
+        .collect();
+    let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
+    (!points.is_empty()).then(|| {
+        format!(
+            "along its B-H curve forces {} off those added up at most; |B| up to {} T",
+            percent(largest(&mut points.iter().map(|p| p.deviation_from_linear))),
+            number_to(
+                largest(&mut points.iter().flat_map(|p| p.peak_field_t.iter().copied())),
+                4
+            )
+        )
+    })
+}
+
 /// The largest error of each stage over all shapes.
 fn accuracies(report: &CalibrateReport) -> String {
     let largest = |stage: &str| {
@@ -312,8 +336,15 @@ fn accuracies(report: &CalibrateReport) -> String {
         .iter()
         .map(|bundle| bundle.manifest.map.interpolation.largest_error)
         .fold(0.0, f64::max);
+    let pull = largest("passive_force");
+    let pull = if pull > 0.0 {
+        format!("; steel's pull {} of itself", error(pull))
+    } else {
+        String::new()
+    };
     format!(
-        "heights {}; forces {}, map nodes {}, between nodes {} of the largest gradient at their height",
+        "heights {}; forces {}, map nodes {}, between nodes {} of the largest gradient at their \
+         height{pull}",
         length_error(largest("points")),
         error(largest("forces")),
         error(largest("map")),

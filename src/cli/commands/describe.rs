@@ -44,9 +44,14 @@ pub fn array(design: &Design) -> String {
 
 /// Currents as the coils stand, seen from above: y grows upwards, x to the right.
 pub fn currents(design: &Design, currents_a: &[f64]) -> String {
-    let cells: Vec<String> = currents_a.iter().map(|a| format!("{a:.4}")).collect();
+    per_coil(design, "A", currents_a, 4)
+}
+
+/// One value a coil, with so many decimals, as the coils stand.
+pub fn per_coil(design: &Design, unit: &str, values: &[f64], decimals: usize) -> String {
+    let cells: Vec<String> = values.iter().map(|v| format!("{v:.decimals$}")).collect();
     if cells.len() == 1 {
-        return format!("{} A", cells[0]);
+        return format!("{} {unit}", cells[0]);
     }
     if cells.len() <= COILS_SHOWN
         && let Some(array) = design.array.grid.filter(|a| a.columns <= COLUMNS_MAX)
@@ -59,16 +64,16 @@ pub fn currents(design: &Design, currents_a: &[f64]) -> String {
             .cloned()
             .collect();
         return format!(
-            "A, seen from above (x to the right, y up)\n{}",
+            "{unit}, seen from above (x to the right, y up)\n{}",
             grid(&from_top, array.columns)
         );
     }
     if cells.len() <= COILS_SHOWN {
-        return format!("A, coil 0 first\n{}", grid(&cells, COLUMNS));
+        return format!("{unit}, coil 0 first\n{}", grid(&cells, COLUMNS));
     }
-    let fold = |start, pick: fn(f64, f64) -> f64| currents_a.iter().copied().fold(start, pick);
+    let fold = |start, pick: fn(f64, f64) -> f64| values.iter().copied().fold(start, pick);
     format!(
-        "{}, from {} to {} A; all of them with --format json",
+        "{}, from {} to {} {unit}; all of them with --format json",
         count(cells.len(), "coil"),
         number(fold(f64::INFINITY, f64::min)),
         number(fold(f64::NEG_INFINITY, f64::max))

@@ -5,13 +5,14 @@ use std::slice::from_ref;
 use clap::{Args, ValueEnum};
 
 use super::{accuracy_check, begin, describe};
+use crate::bundle::lambda_file::WorkingPointForces;
 use crate::cli::args::{SurfaceFlags, Tolerance};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
 use crate::cli::printer::{Place, Printer};
-use crate::cli::quantity::{count, force, mm, number, percent};
+use crate::cli::quantity::{count, force, mm, number, number_to, percent};
 use crate::cli::values::{self, FileArgument};
 use crate::design::{Design, Need};
 use crate::job::lambda::{LambdaOptions, LambdaReport, run};
@@ -26,10 +27,10 @@ use crate::lambda::{Criterion, Precision, Settings};
 /// through a map. A lambda that is null ends with exit code 4.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Reading, &[
-    ("fluxform lambda designs/seed_air.toml shapes/half_sphere.toml", "the seed's half-sphere"),
-    ("fluxform lambda designs/seed_air.toml shapes/wedge.toml --criterion linear --at 2.0",
+    ("fluxform lambda designs/seed.toml shapes/half_sphere.toml", "the seed's half-sphere"),
+    ("fluxform lambda designs/seed.toml shapes/wedge.toml --criterion linear --at 2.0",
      "the constant at which the first limit binds, and what 2 N/m would give"),
-    ("fluxform lambda designs/seed_air.toml shapes/flat.stl --unit mm --translate 0,0,50",
+    ("fluxform lambda designs/seed.toml shapes/flat.stl --unit mm --translate 0,0,50",
      "a surface given directly"),
 ]))]
 pub struct Lambda {
@@ -168,6 +169,9 @@ fn summary(design: &Design, report: &LambdaReport) -> String {
     sheet.line("lambda", &format!("{} N/m", constants.join(", ")));
     sheet.line("chosen by", &describe::criterion(&file.criterion, file.jnd));
     operating_point(&mut sheet, report);
+    if let Some(point) = &file.working_point {
+        sheet.line("steel", &along_the_curve(point));
+    }
     if let Some(currents) = &file.currents_a {
         sheet.line("currents", &describe::currents(design, currents));
     }
@@ -201,6 +205,19 @@ fn summary(design: &Design, report: &LambdaReport) -> String {
     let stages = stages.map(|(name, stage)| (name.as_str(), stage));
     sheet.line("accuracy", &describe::accuracy(stages));
     sheet.finish()
+}
+
+/// What the steel does at the chosen currents, where it follows a curve.
+fn along_the_curve(point: &WorkingPointForces) -> String {
+    let peak_t = point.peak_field_t.iter().copied().fold(0.0, f64::max);
+    format!(
+        "along its B-H curve forces {} off those added up: error rms {}, worst {}; \
+         |B| up to {} T",
+        percent(point.deviation_from_linear),
+        force(point.rms_error_n),
+        force(point.worst_error_n),
+        number_to(peak_t, 4)
+    )
 }
 
 fn operating_point(sheet: &mut Sheet, report: &LambdaReport) {

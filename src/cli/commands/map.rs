@@ -14,24 +14,26 @@ use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
 use crate::cli::printer::{Place, Printer};
-use crate::cli::quantity::{bytes, count, error};
+use crate::cli::quantity::{bytes, count, error, mm, percent};
 use crate::cli::values::FileArgument;
-use crate::design::Need;
+use crate::design::{Design, Need, Steel};
 use crate::job::map::{MapReport, MapRequest, run};
 use crate::map::Components;
+use crate::map::sampled::TableReport;
 
 /// Tabulate the gradient maps of every coil over the workspace
 ///
 /// Tabulates the gradient of every coil's field per ampere over the workspace grid of the design
 /// and writes map.npz (NumPy, little-endian doubles with axes and units) and map.json beside it;
 /// on request also map.csv and map.vti, which ParaView opens. The error at the nodes and the error
-/// of interpolating between them are told.
+/// of interpolating between them are told; of arrays with coupled steel cores also the compact form
+/// that stood for the steel, and how far it was seen to be off.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Writing, &[
-    ("fluxform map designs/seed_air.toml --out maps", "dBz/dz of all coils"),
+    ("fluxform map designs/seed.toml --out maps", "dBz/dz of all coils"),
     ("fluxform map designs/seed_air.toml --out maps_vtk --vtk --tolerance 1e-6",
      "for ParaView, less accurate"),
-    ("fluxform tabulate designs/seed_air.toml --out maps --format json --force",
+    ("fluxform tabulate designs/seed.toml --out maps --format json --force",
      "replace what is there, and tell a program"),
 ]))]
 pub struct Map {
@@ -41,6 +43,15 @@ pub struct Map {
     /// What the map holds
     #[arg(long, value_enum, default_value_t = Wanted::Gz)]
     components: Wanted,
+    /// Currents at which cores with a B-H curve are mapped together too, A: one for all coils, or
+    /// one a coil [default: the rated currents]
+    #[arg(
+        long,
+        value_name = "A,...",
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
+    currents: Vec<f64>,
     /// Folder of the files [default: results/<design>]
     #[arg(long, value_name = "DIR")]
     out: Option<FileArgument>,
@@ -74,9 +85,84 @@ struct MapSummary<'a> {
     point_coils: usize,
     distinct_radii: usize,
     tabulated: bool,
+    /// The compact form of a coupled array's steel.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    table: Option<TableSummary>,
+}
+
+/// The compact form that stood for the steel of a coupled array.
+#[derive(Serialize)]
+struct TableSummary {
+    /// From this height up; below it, and where it is null, places are sampled one by one.
+    from_m: Option<f64>,
+    samples: usize,
+    nodes: [usize; 3],
+    coefficients: usize,
+    bytes: u64,
+    checks: usize,
+    certificate: f64,
+}
+
+impl TableSummary {
+    fn of(table: &TableReport) -> Self {
+        Self {
+            from_m: table.from_m,
+            samples: table.samples,
+            nodes: table.degrees,
+            coefficients: table.coefficients,
+            bytes: (table.coefficients * size_of::<f64>()) as u64,
+            checks: table.checks,
+            certificate: table.certificate,
+        }
+    }
+
+    fn told(&self) -> String {
+        let Some(from_m) = self.from_m else {
+            return "sampled at every node".to_owned();
+        };
+        format!(
+            "from {} up by a harmonic function, {} from {}\n\
+             within {} of the largest gradient at each height, compared at {}",
+            mm(from_m),
+            bytes(self.bytes),
+            count(self.samples, "sample"),
+            error(self.certificate),
+            count(self.checks, "place")
+        )
+    }
 }
 
 impl Map {
+    /// The working point's currents, where any are given.
+    fn currents_a(&self, design: &Design) -> Result<Option<Vec<f64>>, Failure> {
+        let coils = design.array.positions_m.len();
+        let fault = |why: String| Err(Failure::Usage(format!("--currents: {why}")));
+        if self.currents.is_empty() {
+            return Ok(None);
+        }
+        let curved = design
+            .core
+            .as_ref()
+            .is_some_and(|core| matches!(core.steel, Steel::Curve(_)));
+        if !curved {
+            return fault(
+                "without core.bh_curve the coils' maps add up at any currents; leave it out"
+                    .to_owned(),
+            );
+        }
+        if let Some(wrong) = self.currents.iter().find(|i| !i.is_finite()) {
+            return fault(format!("{wrong} is no current"));
+        }
+        match self.currents.as_slice() {
+            [all] => Ok(Some(vec![*all; coils])),
+            each if each.len() == coils => Ok(Some(each.to_vec())),
+            each => fault(format!(
+                "{} values for {coils} coils; give one for all, or one a coil",
+                each.len()
+            )),
+        }
+    }
+
     /// Runs the command.
     ///
     /// # Errors
@@ -92,6 +178,7 @@ impl Map {
                 Wanted::All => Components::All,
             },
             tolerance: self.tolerance.tolerance,
+            currents_a: self.currents_a(design)?,
             out: out.unwrap_or_else(|| Path::new("results").join(&design.name)),
             formats: MapFormats {
                 csv: self.csv,
@@ -102,20 +189,24 @@ impl Map {
         let bar = begin(printer);
         let report = run(design, vec![document.input], &request, &bar)?;
         drop(bar);
+        for warning in &report.warnings {
+            printer.warning(warning);
+        }
         let json = MapSummary {
             sidecar: &report.sidecar,
             folder: report.folder.display().to_string(),
             point_coils: report.point_coils,
             distinct_radii: report.distinct_radii,
             tabulated: report.tabulated,
+            table: report.table.as_ref().map(TableSummary::of),
         };
         let json = printer.with_warnings(&json);
-        printer.summary(Place::Output, &json, || summary(&report))?;
+        printer.summary(Place::Output, &json, || summary(design, &report))?;
         accuracy_check(report.accuracy_reached)
     }
 }
 
-fn summary(report: &MapReport) -> String {
+fn summary(design: &Design, report: &MapReport) -> String {
     let map = &report.sidecar.map;
     let mut sheet = Sheet::new(&format!(
         "{}: maps of {} over the workspace",
@@ -144,6 +235,20 @@ fn summary(report: &MapReport) -> String {
             }
         ),
     );
+    if let Some(table) = &report.table {
+        sheet.line("steel", &TableSummary::of(table).told());
+    }
+    if let Some(point) = &map.working_point {
+        let peak_t = point.peak_field_t.iter().copied().fold(0.0, f64::max);
+        sheet.line(
+            "together",
+            &format!(
+                "up to {} of the largest off the sum of the coils' maps, cores up to {peak_t:.3} T",
+                percent(point.deviation_from_linear)
+            ),
+        );
+        sheet.line("at", &describe::currents(design, &point.currents_a));
+    }
     let stages = report.sidecar.accuracy.iter();
     let stages = stages.map(|(name, stage)| (name.as_str(), stage));
     sheet.line("accuracy", &describe::accuracy(stages));

@@ -13,14 +13,15 @@ use crate::job::verify::{Check, VerifyReport, run};
 /// Check a bundle: checksums, layout, and its numbers recomputed
 ///
 /// Checks that a bundle is whole and as it was written, and computes its numbers again by an
-/// independent route: map nodes and forces by integrals over the windings' section, the force
-/// constants solved for again, the currents' optimality by a bound that does not trust the solver.
+/// independent route: map nodes and forces by integrals over the windings' section and the steel
+/// solved anew to a finer tolerance, the force constants solved for again, the currents'
+/// optimality by a bound that does not trust the solver.
 /// Any check that fails ends with exit code 5.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Verifying, &[
-    ("fluxform calibrate designs/seed_air.toml shapes/flat.toml", "make a bundle"),
-    ("fluxform verify results/seed_air/flat", "verify it"),
-    ("fluxform verify results/seed_air/flat --format json", "for a program"),
+    ("fluxform calibrate designs/seed.toml shapes/flat.toml", "make a bundle"),
+    ("fluxform verify results/seed/flat", "verify it"),
+    ("fluxform verify results/seed/flat --format json", "for a program"),
 ]))]
 pub struct Verify {
     /// Folder of a bundle, with its manifest.json
@@ -37,6 +38,9 @@ impl Verify {
         let bar = begin(printer);
         let report = run(&self.bundle, &bar)?;
         drop(bar);
+        for note in &report.notes {
+            printer.warning(note);
+        }
         let json = printer.with_warnings(&report);
         printer.summary(Place::Output, &json, || self.summary(&report))?;
         let failed: Vec<&str> = report

@@ -89,7 +89,7 @@ impl ArrayResolution {
 
     /// Longer exchange panels, if these would take more memory than the caps for an array with
     /// `offsets` different offsets between cores.
-    fn within_memory(mut self, shape: CoreShape, offsets: usize) -> Self {
+    pub(super) fn within_memory(mut self, shape: CoreShape, offsets: usize) -> Self {
         let entries = (MOST_ENTRIES / (offsets + 1)) as f64;
         let most = MOST_UNKNOWNS.min(entries.sqrt() as usize);
         while self.unknowns(shape) > most && self.panel_m < shape.length_m() + shape.radius_m {
@@ -100,7 +100,7 @@ impl ArrayResolution {
 
     /// Error of what the closest cores exchange, relative: aliasing in the azimuth, quadrature
     /// along the panels.
-    fn exchange_error(&self, shape: CoreShape, closest_m: f64) -> f64 {
+    pub(super) fn exchange_error(&self, shape: CoreShape, closest_m: f64) -> f64 {
         let radius_m = shape.radius_m;
         let azimuth = (radius_m / (closest_m - radius_m)).powf(2.0 * self.modes as f64);
         let ratio = 2.0 * (closest_m - 2.0 * radius_m) / self.panel_m;

@@ -133,14 +133,15 @@ impl CoredCoil {
             let better = best
                 .as_ref()
                 .is_none_or(|b| fine.relative_error < b.relative_error);
-            let reached = fine.relative_error <= tolerance;
+            let error = fine.relative_error;
+            let reached = error <= tolerance;
             if better {
                 best = Some(fine);
             }
             if reached || !better {
                 break;
             }
-            aim *= 0.1;
+            aim *= (0.5 * tolerance / error).clamp(0.01, 0.5);
         }
         Ok(best.expect("at least one resolution was solved"))
     }

@@ -83,7 +83,7 @@ impl Resolution {
         Self {
             order: (2.0 - tolerance.log10()).ceil() as usize,
             ratio: 0.2,
-            tip: (100.0 * tolerance).powf(0.6).min(0.2),
+            tip: (100.0 * tolerance).powf(0.6).min(0.16),
             quadrature: 0.01 * tolerance,
         }
     }

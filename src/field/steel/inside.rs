@@ -120,6 +120,29 @@ impl CoupledArray {
     /// # Errors
     /// A point on the winding's edge: the cores are not in the bores.
     pub fn core_fields(&self, currents_a: &[f64], depth_m: f64) -> Result<Vec<CoreField>, OnEdge> {
+        self.core_fields_of(currents_a, depth_m, false)
+    }
+
+    /// What all other modes add to the largest |B| of the axisymmetric one in every core, T.
+    ///
+    /// # Errors
+    /// As [`CoupledArray::core_fields`].
+    pub fn transverse_peaks_t(&self, currents_a: &[f64], depth_m: f64) -> Result<Vec<f64>, OnEdge> {
+        let all = self.core_fields_of(currents_a, depth_m, false)?;
+        let axial = self.core_fields_of(currents_a, depth_m, true)?;
+        Ok(all
+            .iter()
+            .zip(&axial)
+            .map(|(all, axial)| (all.peak_t - axial.peak_t).max(0.0))
+            .collect())
+    }
+
+    fn core_fields_of(
+        &self,
+        currents_a: &[f64],
+        depth_m: f64,
+        axial_only: bool,
+    ) -> Result<Vec<CoreField>, OnEdge> {
         let outline = &self.response.outline;
         let count = self.positions_m.len();
         let mut modes: Vec<DMatrix<f64>> = Vec::with_capacity(count);
@@ -130,7 +153,12 @@ impl CoupledArray {
                     *sum += current * value;
                 }
             }
-            modes.push(self.response.modes_of(&potential));
+            let mut of_core = self.response.modes_of(&potential);
+            if axial_only {
+                let columns = of_core.ncols();
+                of_core.columns_mut(1, columns - 1).fill(0.0);
+            }
+            modes.push(of_core);
         }
         let sent = incident_layers(outline, &self.response.exchange.to_nodes, &modes);
         let cores: Vec<Core> = modes

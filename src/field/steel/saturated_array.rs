@@ -23,7 +23,7 @@ use rayon::prelude::*;
 use super::CoreShape;
 use super::array::{ArrayResolution, closest_m};
 use super::cored_coil::Excitation;
-use super::coupling::Coupling;
+use super::coupling::{Coupling, different_offsets};
 use super::generatrix::Generatrix;
 use super::interior::MeshError;
 use super::permeability::Permeability;
@@ -86,8 +86,10 @@ pub struct SaturatedArray {
     /// Flux of all cores through every coil, Wb; the windings' own flux is not in it.
     pub flux_linkage_wb: Vec<f64>,
     /// Estimated error: of the total gradient above, relative to the largest |grad B| at the
-    /// height, and of the flux, relative to the largest; the larger. Half the difference from the
-    /// next coarser resolution plus [`SaturatedArray::modes_error`].
+    /// height, and of the flux, relative to the largest; the larger. The difference from the next
+    /// coarser resolution (elements across the knee converge too unevenly for half of it to be
+    /// enough), or what the caps on resolution cost where that is more, plus
+    /// [`SaturatedArray::modes_error`]; infinite where the iteration stalled at either.
     pub relative_error: f64,
     /// The part of it that is due to the other modes being linear: what they change when their
     /// permeability is the initial one.
@@ -157,13 +159,17 @@ impl SaturatedArray {
     ) -> Result<Self, SaturatedArrayError> {
         check(positions_m, currents_a)?;
         let closest_m = closest_m(positions_m);
+        let offsets = different_offsets(positions_m);
         let lowest_m = lowest_m.max(shape.top_m.max(0.0) + CLOSEST * shape.radius_m);
         let initial = law.response(0.0).relative;
         let mut aim = tolerance;
         let mut best: Option<Self> = None;
         let mut modes_error = None;
         for _ in 0..=MOST_REFINEMENTS {
-            let resolution = ArrayResolution::for_tolerance(aim, shape, closest_m);
+            let resolution =
+                ArrayResolution::for_tolerance(aim, shape, closest_m).within_memory(shape, offsets);
+            // Where the caps bind, two wrong solutions may agree by chance.
+            let exchange_error = resolution.exchange_error(shape, closest_m);
             let solve = |setup: &Setup, reference: f64, start: Option<&State>| {
                 Self::solve(
                     winding,
@@ -185,18 +191,31 @@ impl SaturatedArray {
             };
             let setup = Setup::new(winding, shape, &resolution)?;
             let mut fine = solve(&setup, reference, None);
-            let outline_error = 0.5 * fine.difference(&coarse, lowest_m, tolerance)?;
+            let outline_error = exchange_error.max(fine.difference(&coarse, lowest_m, tolerance)?);
             fine.modes_error = modes_error;
-            fine.relative_error = outline_error + modes_error;
+            let all_found = [&first, &coarse, &fine]
+                .iter()
+                .all(|solved| solved.status == Status::Converged);
+            fine.relative_error = if all_found {
+                outline_error + modes_error
+            } else {
+                f64::INFINITY
+            };
             let better = best
                 .as_ref()
                 .is_none_or(|b| fine.relative_error < b.relative_error);
             // What the modes do wrong, no resolution mends.
-            let reached = outline_error <= (tolerance - modes_error).max(0.3 * tolerance);
+            let left = tolerance - modes_error;
+            let reached = outline_error
+                <= if left > 0.0 {
+                    left.max(0.3 * tolerance)
+                } else {
+                    tolerance
+                };
             if better {
                 best = Some(fine);
             }
-            if reached || !better {
+            if reached || !better || exchange_error > tolerance {
                 break;
             }
             aim *= 0.3;

@@ -1,0 +1,306 @@
+//! Designs with steel: what is refused, what is warned of, what the summaries tell.
+
+use crate::support::{Place, Ran};
+
+const CORED: &str = "designs/seed.toml";
+
+/// The shipped design with `from` replaced by `to`, as `design.toml`.
+fn changed(place: &Place, from: &str, to: &str) {
+    let text = String::from_utf8(place.read(CORED)).unwrap();
+    let new = text.replace(from, to);
+    assert_ne!(new, text, "{from} is not in {CORED}");
+    place.write("design.toml", &new);
+}
+
+fn evaluate(place: &Place, from: &str, to: &str) -> Ran {
+    changed(place, from, to);
+    place.run(&["evaluate", "design.toml"])
+}
+
+/// `evaluate` with the steel of a table.
+fn with_table(place: &Place, rows: &str) -> Ran {
+    place.write("steel.csv", &format!("b_t,h_a_per_m\n{rows}"));
+    evaluate(
+        place,
+        "relative_permeability = 1000.0",
+        "bh_curve = \"steel.csv\"",
+    )
+}
+
+#[test]
+fn cores_that_cannot_be_are_refused_with_their_line() {
+    let place = Place::new();
+    let refused = |from: &str, to: &str, words: &[&str]| {
+        evaluate(&place, from, to)
+            .ends(3)
+            .says(&["design.toml"])
+            .says(words);
+    };
+    refused(
+        "clearance_mm = 0.0",
+        "clearance_mm = -1.0",
+        &[
+            "core.clearance_mm",
+            "26 mm in diameter",
+            "thicker than the bore",
+        ],
+    );
+    refused(
+        "pitch_mm = 50.0",
+        "pitch_mm = 20.0",
+        &["array.pitch_mm", "coils 0 and 1 overlap"],
+    );
+    refused(
+        "relative_permeability = 1000.0",
+        "relative_permeability = 0.001",
+        &["core.relative_permeability", "between 1 and 1e9"],
+    );
+    refused(
+        "below_mm = 10.0",
+        "below_mm = -100.0",
+        &["core.below_mm", "no length"],
+    );
+    refused(
+        "relative_permeability = 1000.0",
+        "relative_permeability = 1000.0\nbh_curve = \"steel.csv\"",
+        &["exclude each other"],
+    );
+}
+
+#[test]
+fn a_magnet_or_a_workspace_inside_the_steel_is_refused() {
+    let place = Place::new();
+    evaluate(&place, "height_mm = 30.0", "height_mm = 3.0")
+        .ends(3)
+        .says(&[
+            "target.height_mm",
+            "overlaps the core",
+            "5 mm or higher",
+            "^|^",
+        ]);
+    changed(&place, "above_mm = 0.0", "above_mm = 17.0");
+    let map = place.run(&["map", "design.toml", "--out", "maps"]);
+    map.ends(3).says(&[
+        "workspace.z_mm",
+        "reaches into a core",
+        "begin at 17 or higher",
+    ]);
+    assert!(!place.path("maps").exists());
+    // A point hardly off the steel, where the field is not resolved.
+    let points = "x_m,y_m,z_m\n0,0,0.03\n0.05,0,0.0001\n";
+    place
+        .run_with_input(&["probe", CORED, "-"], points)
+        .ends(3)
+        .says(&["point 2 ", "core of coil 5", "keep 0.240 mm away"]);
+}
+
+#[test]
+fn tables_that_are_no_magnetisation_curve_are_refused() {
+    let place = Place::new();
+    with_table(&place, "0,0\n0.5,100\n1.0,180\n0.9,300\n1.6,2000\n")
+        .ends(3)
+        .says(&["steel.csv:5", "b_t", "0.9", "sort the rows"]);
+    with_table(&place, "0.1,20\n0.5,100\n1.0,180\n1.5,1000\n")
+        .ends(3)
+        .says(&["steel.csv", "0.1 T", "expected 0,0", "add the row"]);
+    with_table(&place, "0,0\n0.5,1e6\n1.0,2e6\n1.5,3e6\n")
+        .ends(3)
+        .says(&["steel.csv", "row 2", "less permeable than vacuum"]);
+    with_table(&place, "0,0\n0.5,fast\n")
+        .ends(3)
+        .says(&["steel.csv:3", "fast"]);
+    place.write("steel.csv", "h,b\n0,0\n");
+    place
+        .run(&["evaluate", "design.toml"])
+        .ends(3)
+        .says(&["steel.csv:1", "b_t,h_a_per_m"]);
+    changed(
+        &place,
+        "relative_permeability = 1000.0",
+        "bh_curve = \"none.csv\"",
+    );
+    for command in ["evaluate", "map"] {
+        place
+            .run(&[command, "design.toml"])
+            .ends(3)
+            .says(&["none.csv", "check the path"]);
+    }
+}
+
+#[test]
+fn a_table_in_another_unit_is_warned_of() {
+    let place = Place::new();
+    let kilo = "0,0\n0.5,0.1\n1.0,0.18\n1.5,1.0\n1.9,15\n2.1,60\n2.3,200\n";
+    with_table(&place, kilo)
+        .ends(0)
+        .says(&["warning: ", "kA/m", "multiply h_a_per_m by 1000"]);
+    let json = place.run(&["evaluate", "design.toml", "--format", "json"]);
+    let told = json.ends(0).json()["warnings"][0].clone();
+    assert!(told.as_str().unwrap().contains("kA/m"), "{told}");
+}
+
+#[test]
+fn a_core_above_its_knee_is_warned_of() {
+    let place = Place::new();
+    let ran = evaluate(&place, "current_max_a = 2.0", "current_max_a = 5.0").ends(0);
+    let ran = ran.says(&[
+        "warning: ",
+        "1.78 T",
+        "knee at 1.5 T",
+        "taken as linear",
+        "core.bh_curve",
+    ]);
+    assert!(ran.out.contains("|B| up to 1.782 T"), "{}", ran.out);
+    let quiet = place.run(&["evaluate", "design.toml", "-q"]).ends(0);
+    assert!(quiet.err.is_empty(), "{}", quiet.err);
+    let low = place.run(&["evaluate", CORED]).ends(0);
+    assert!(low.err.is_empty(), "{}", low.err);
+}
+
+#[test]
+fn the_steel_s_part_stands_in_the_summary() {
+    let place = Place::new();
+    let linear = place.run(&["evaluate", CORED]).ends(0).out;
+    for told in [
+        "778.87 mN up",
+        "476.14 g and 391.63 g of steel",
+        "relative permeability 1000",
+        "|B| up to 0.7128 T",
+        "95 % of the current after 93.24",
+        "core peak",
+        "core mean",
+    ] {
+        assert!(linear.contains(told), "{told}: {linear}");
+    }
+    let curve = place.run(&["evaluate", "designs/seed_1010.toml"]).ends(0);
+    for told in [
+        "flux linkage 371.",
+        "a B-H curve",
+        "less than with",
+        "off that along the B-H curve",
+    ] {
+        assert!(curve.out.contains(told), "{told}: {}", curve.out);
+    }
+    let lambda = ["lambda", "designs/seed_1010.toml", "shapes/flat.toml"];
+    let lambda = place.run(&lambda).ends(0).out;
+    assert!(lambda.contains("% off those added up"), "{lambda}");
+    let felt = "tilt_deg = [10.0, 5.0]\npassive_force = true\nmodel = \"cylinder\"";
+    let tilted = evaluate(&place, "model = \"dipole\"", felt).ends(0).out;
+    for told in [
+        "down by the unpowered steel",
+        "force along x, y, z ",
+        "torque about x, y, z ",
+        "passive force",
+    ] {
+        assert!(tilted.contains(told), "{told}: {tilted}");
+    }
+}
+
+#[test]
+fn the_compact_form_of_a_map_is_told() {
+    let place = Place::new();
+    let args = ["map", CORED, "--out", "maps"];
+    let told = place.run(&args).ends(0).out;
+    assert!(told.contains("by a harmonic function"), "{told}");
+    let json = place.run(&[&args[..], &["--format", "json"]].concat());
+    let table = json.ends(0).json()["table"].clone();
+    let number = |key: &str| table[key].as_f64().unwrap();
+    assert_eq!(number("from_m"), 0.01);
+    assert_eq!(number("bytes"), 8.0 * number("coefficients"));
+    assert!(number("bytes") < 7.77e6 && number("samples") < 107_909.0);
+    assert!(number("certificate") < 3e-5 && number("checks") > 100.0);
+    // Nothing of it where nothing is sampled.
+    let air = [
+        "map",
+        "designs/seed_air.toml",
+        "--out",
+        "air",
+        "--format",
+        "json",
+    ];
+    assert!(place.run(&air).ends(0).json().get("table").is_none());
+}
+
+#[test]
+fn a_probe_tells_the_force_on_the_magnet() {
+    let place = Place::new();
+    let points = "x_m,y_m,z_m\n0.007,0.013,0.031\n0.03,-0.02,0.047\n";
+    let probe = |design: &str, more: &[&str]| {
+        let args = [&["probe", design, "-", "--format", "json"], more].concat();
+        place.run_with_input(&args, points).ends(0).json()
+    };
+    let column = |probe: &serde_json::Value, name: &str| -> Vec<f64> {
+        let values = probe["columns"][name].as_array().unwrap();
+        values.iter().map(|value| value.as_f64().unwrap()).collect()
+    };
+    let without = probe(CORED, &[]);
+    assert!(without["columns"].get("force_z_n_per_a").is_none());
+    assert!(without["accuracy"].get("force").is_none());
+    let to = without["accuracy"]["field"]["relative_to"]
+        .as_str()
+        .unwrap();
+    assert!(to.contains("at the point's height"), "{to}");
+    let with = probe(CORED, &["--magnet-force"]);
+    assert_eq!(
+        column(&with, "dbz_dz_t_per_m_per_a"),
+        column(&without, "dbz_dz_t_per_m_per_a")
+    );
+    // An upright dipole: F = m_z grad B_z, torque = m x B, m pointing down.
+    let moment = -1.1579e6 * std::f64::consts::PI * 0.005_f64.powi(2) * 0.01;
+    let largest = |values: &[f64]| values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    for (force, field, sign) in [
+        ("force_x_n_per_a", "dbz_dx_t_per_m_per_a", 1.0),
+        ("force_y_n_per_a", "dbz_dy_t_per_m_per_a", 1.0),
+        ("force_z_n_per_a", "dbz_dz_t_per_m_per_a", 1.0),
+        ("torque_x_n_m_per_a", "by_t_per_a", -1.0),
+        ("torque_y_n_m_per_a", "bx_t_per_a", 1.0),
+    ] {
+        let (felt, field) = (column(&with, force), column(&with, field));
+        for (felt, field) in felt.iter().zip(&field) {
+            let expected = sign * moment * field;
+            let allowed = 1e-12 * largest(&[moment * field, moment]);
+            assert!(
+                (felt - expected).abs() < allowed,
+                "{force} {felt} {expected}"
+            );
+        }
+    }
+    assert!(
+        column(&with, "torque_z_n_m_per_a")
+            .iter()
+            .all(|t| *t == 0.0)
+    );
+    // The magnet's size changes the force a little, and its error is told.
+    changed(&place, "model = \"dipole\"", "model = \"cylinder\"");
+    let cylinder = probe("design.toml", &["--magnet-force"]);
+    let (small, large) = (
+        column(&with, "force_z_n_per_a"),
+        column(&cylinder, "force_z_n_per_a"),
+    );
+    let change = small
+        .iter()
+        .zip(&large)
+        .map(|(a, b)| (a - b).abs() / largest(&small))
+        .fold(0.0, f64::max);
+    assert!((1e-3..2e-2).contains(&change), "{change}");
+    let error = cylinder["accuracy"]["force"]["estimate"].as_f64().unwrap();
+    assert!((1e-7..1e-3).contains(&error), "{error}");
+    // As a table: six columns more.
+    let table = place.run_with_input(
+        &["probe", CORED, "-", "--components", "gz", "--magnet-force"],
+        points,
+    );
+    let header = table.ends(0).out.lines().next().unwrap().to_owned();
+    assert!(header.ends_with(
+        ",dbz_dz_t_per_m_per_a,force_x_n_per_a,force_y_n_per_a,force_z_n_per_a,\
+         torque_x_n_m_per_a,torque_y_n_m_per_a,torque_z_n_m_per_a"
+    ));
+    // Where the magnet has no room there is no force.
+    place
+        .run_with_input(
+            &["probe", "design.toml", "-", "--magnet-force"],
+            "x_m,y_m,z_m\n0,0,0.004\n",
+        )
+        .ends(3)
+        .says(&["magnet"]);
+}
