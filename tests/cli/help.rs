@@ -76,7 +76,8 @@ fn completions_and_manual_pages() {
     place.run(&["completions", "csh"]).ends(2);
     assert!(place.run(&["man"]).ends(0).out.contains(".TH fluxform 1"));
     place.run(&["man", "--out", "man1"]).ends(0);
-    for command in COMMANDS {
+    let steps = ["sweep-plan", "sweep-run", "sweep-merge"];
+    for command in COMMANDS.into_iter().chain(steps) {
         let page = place.read(&format!("man1/fluxform-{command}.1"));
         let page = String::from_utf8(page).unwrap();
         assert!(

@@ -424,7 +424,7 @@ fn a_design_that_cannot_be_computed_is_a_row() {
     let said = [
         "2 of 6 designs cannot be computed",
         "point 4",
-        "coil.inner_diameter_mm",
+        "coil.outer_diameter_mm",
     ];
     place.run(&run).ends(4).says(&said);
     // Nothing is left to do, and that is still not as wished.

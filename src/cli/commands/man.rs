@@ -48,11 +48,7 @@ impl Man {
         let overwrite = Overwrite::new(self.writing.force, folder.join("fluxform.1"), &[]);
         let mut set = FileSet::begin(&folder, overwrite).map_err(JobError::from)?;
         let mut pages = vec![("fluxform.1".to_owned(), rendered(&command)?)];
-        for sub in command.get_subcommands() {
-            // Building gave it the name of its page.
-            let name = sub.get_display_name().unwrap_or(sub.get_name());
-            pages.push((format!("{name}.1"), rendered(sub)?));
-        }
+        add_pages(&command, &mut pages)?;
         for (name, text) in &pages {
             set.write(name, |out| out.write_all(text))
                 .map_err(JobError::from)?;
@@ -64,6 +60,17 @@ impl Man {
         }
         Ok(())
     }
+}
+
+/// Adds the pages of the commands below `command`.
+fn add_pages(command: &clap::Command, pages: &mut Vec<(String, Vec<u8>)>) -> io::Result<()> {
+    for sub in command.get_subcommands() {
+        // Building gave it the name of its page.
+        let name = sub.get_display_name().unwrap_or(sub.get_name());
+        pages.push((format!("{name}.1"), rendered(sub)?));
+        add_pages(sub, pages)?;
+    }
+    Ok(())
 }
 
 fn rendered(command: &clap::Command) -> io::Result<Vec<u8>> {
