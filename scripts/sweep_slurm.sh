@@ -6,7 +6,7 @@
 #   fluxform sweep merge plan.json points --out sweep.csv
 #
 # A task that was killed or ran out of time is submitted again with the same line: points that are
-# there are kept. The folder must be one that all nodes see. FLUXFORM names the program where it is
+# there are kept. Designs that cannot be computed are rows that say so, no failed tasks. The folder must be one that all nodes see. FLUXFORM names the program where it is
 # not on the PATH.
 #SBATCH --job-name=fluxform-sweep
 #SBATCH --nodes=1
@@ -24,4 +24,4 @@ count=${SLURM_ARRAY_TASK_COUNT:?}
 shard=$((SLURM_ARRAY_TASK_ID - first + 1))
 
 exec "${FLUXFORM:-fluxform}" sweep run "$plan" --out "$folder" \
-    --shard "$shard/$count" --threads "${SLURM_CPUS_PER_TASK:-1}"
+    --shard "$shard/$count" --threads "${SLURM_CPUS_PER_TASK:-1}" --allow-failed

@@ -7,7 +7,9 @@ use std::path::Path;
 use std::process::Command;
 
 fn run(with: &str, tool: &str) {
-    let there = Command::new(tool).arg("--version").output();
+    // Slurm's tools tell their version only where Slurm is configured.
+    let look = format!("command -v {tool}");
+    let there = Command::new("sh").args(["-c", &look]).output();
     if !there.is_ok_and(|output| output.status.success()) {
         eprintln!("skipped: no {tool}");
         return;

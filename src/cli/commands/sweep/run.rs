@@ -19,7 +19,8 @@ use crate::job::sweep::run::{Part, RunReport, run};
 /// small file points/000/000123.json of the folder. Points that are there are kept, so a run that
 /// was killed or interrupted goes on where it stopped; several runs may share a folder, on one
 /// machine or many. A design that cannot be computed becomes a row that says why; the exit code is
-/// then 4 when all points are done. A file of another plan is never touched.
+/// then 4 when all points are done, unless --allow-failed is given. A file of another plan is never
+/// touched without --force.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Writing, &[
     ("fluxform sweep run wires.json --out wires", "all points, on all cores"),
@@ -40,6 +41,9 @@ pub struct Run {
     /// Only the point with this index, counted from 0
     #[arg(long, value_name = "K", conflicts_with = "shard")]
     index: Option<u64>,
+    /// End with 0 even if designs cannot be computed: their rows say so
+    #[arg(long)]
+    allow_failed: bool,
     /// Compute points anew that are there, and replace files of another plan
     #[arg(long)]
     force: bool,
@@ -99,7 +103,7 @@ impl Run {
         };
         let json = printer.with_warnings(&json);
         printer.summary(Place::Output, &json, || self.told(&plan.design, &report))?;
-        unmet(&report)
+        unmet(&report, self.allow_failed)
     }
 
     fn told(&self, design: &str, report: &RunReport) -> String {
@@ -117,9 +121,9 @@ impl Run {
 }
 
 /// The points are there, but not all as wished.
-fn unmet(report: &RunReport) -> Result<(), Failure> {
+fn unmet(report: &RunReport, allow_failed: bool) -> Result<(), Failure> {
     let mut parts = Vec::new();
-    if let Some((index, message)) = &report.first_failure {
+    if let (Some((index, message)), false) = (&report.first_failure, allow_failed) {
         parts.push(format!(
             "{} of {} cannot be computed, and their rows say why; the first is point {index}: \
              {message}",
