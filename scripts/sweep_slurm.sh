@@ -6,8 +6,8 @@
 #   fluxform sweep merge plan.json points --out sweep.csv
 #
 # A task that was killed or ran out of time is submitted again with the same line: points that are
-# there are kept. Designs that cannot be computed are rows that say so, no failed tasks. The folder must be one that all nodes see. FLUXFORM names the program where it is
-# not on the PATH.
+# there are kept. Designs that cannot be computed are rows that say so, not failed tasks. The folder
+# must be one that all nodes see. FLUXFORM names the program where it is not on the PATH.
 #SBATCH --job-name=fluxform-sweep
 #SBATCH --nodes=1
 #SBATCH --ntasks=1
