@@ -235,7 +235,7 @@ mod tests {
                 .unwrap_err()
                 .contains("sead")
         );
-        let newer = text.replace("\"1.0.0\"", "\"2.0.0\"");
+        let newer = text.replace(&format!("\"{SCHEMA_VERSION}\""), "\"99.0.0\"");
         assert!(
             PlanFile::parse("p", newer.as_bytes())
                 .unwrap_err()
