@@ -1,0 +1,380 @@
+//! Proven upper bounds of the force over whole boxes of air coils.
+//!
+//! A cell is a box in inner radius, depth and length. Force per ampere grows with depth and
+//! length and with a larger window; the amount of wire and the inductance grow with all three
+//! (a loop's mutual inductance to another grows with the mean radius at a given offset), and so
+//! do the inductance's derivatives by depth and length. So a cell's corners enclose everything,
+//! and derivatives in interval arithmetic give second-order bounds around its middle:
+//!
+//! ```text
+//! ln F(x) <= ln F(x) - sum lambda_j h_j(x) <= [the same at the middle] + sum_i max D_i (x_i - m_i)
+//! ```
+//!
+//! for any lambda >= 0, because h_j <= 0 for every coil within its limits. The multipliers of
+//! the best coil known make the right side flat where it matters. Rounding is outwards; the
+//! kernels' stated errors are added.
+
+use super::axis_gradient::{self, axis_gradient};
+use super::domain::Domain;
+use super::model::Window;
+use super::problem::{LimitName, Problem, Regime};
+use crate::coil::circuit::SETTLING_TIME_CONSTANTS;
+use crate::coil::section_integrals::{self, SectionIntegrals, section_integrals};
+use crate::numerics::interval::Interval;
+use crate::units::MU_0_T_M_PER_A;
+
+/// A box of windows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cell {
+    /// Inner radius, m.
+    pub inner: Interval,
+    /// Depth, m.
+    pub depth: Interval,
+    /// Length, m.
+    pub length: Interval,
+}
+
+/// Multipliers in the limits' logarithms; any numbers that are not negative give a bound.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Multipliers {
+    /// Of the largest volume of wire.
+    pub most: f64,
+    /// Of the least.
+    pub least: f64,
+    /// Of the outer radius (any sign where it is given).
+    pub outer: f64,
+    /// Of the settling time.
+    pub settling: f64,
+}
+
+impl Multipliers {
+    /// Those of a local optimum.
+    #[must_use]
+    pub fn of(problem: &Problem<'_>, multipliers: &[f64]) -> Self {
+        let mut sums = Self::default();
+        for (bound, &lambda) in problem.bounds.iter().zip(multipliers) {
+            match (bound.name, problem.regime) {
+                (LimitName::Current, _) | (LimitName::Power, Regime::Supply) => {
+                    sums.least += lambda.max(0.0);
+                }
+                (
+                    LimitName::Resistance
+                    | LimitName::Power
+                    | LimitName::Voltage
+                    | LimitName::Mass
+                    | LimitName::WireLength,
+                    _,
+                ) => sums.most += lambda.max(0.0),
+                (LimitName::OuterDiameter, _) => sums.outer += lambda.max(0.0),
+                (LimitName::FixedOuter, _) => sums.outer += lambda,
+                (LimitName::Settling, _) => sums.settling += lambda.max(0.0),
+                _ => {}
+            }
+        }
+        sums
+    }
+}
+
+/// What bounds the cells of one problem.
+#[derive(Debug, Clone, Copy)]
+pub struct Bounding<'a> {
+    problem: &'a Problem<'a>,
+    dipoles: &'a [(f64, f64)],
+    /// The limits' ranges.
+    pub domain: Domain,
+    multipliers: Multipliers,
+    with_settling: bool,
+    /// mu_0 J, T per metre of h.
+    strength: f64,
+}
+
+/// Slack of comparisons with a limit, relative: more than the corners' rounding.
+const SLACK: f64 = 1e-12;
+
+impl<'a> Bounding<'a> {
+    /// Bounds for `problem` over `domain`; `None` for a coil with a core. Without
+    /// `with_settling` that limit is left out: still an upper bound.
+    #[must_use]
+    pub fn new(
+        problem: &'a Problem<'a>,
+        domain: Domain,
+        multipliers: Multipliers,
+        with_settling: bool,
+    ) -> Option<Self> {
+        Some(Self {
+            dipoles: problem.model.air_dipoles()?,
+            problem,
+            domain,
+            multipliers,
+            with_settling: with_settling && domain.settling_max_s.is_finite(),
+            strength: MU_0_T_M_PER_A * problem.strand.turns_per_m2(),
+        })
+    }
+
+    /// The cell without what the limits exclude; `None` where nothing is left.
+    #[must_use]
+    pub fn contracted(&self, mut cell: Cell) -> Option<Cell> {
+        let domain = &self.domain;
+        let meet = |interval: &mut Interval, lo: f64, hi: f64| {
+            // Ends are kept where they are within rounding of each other.
+            let (lo, hi) = (lo * (1.0 - SLACK), hi * (1.0 + SLACK));
+            interval.lo = interval.lo.max(lo);
+            interval.hi = interval.hi.min(hi);
+            interval.lo <= interval.hi
+        };
+        for _ in 0..2 {
+            let (a, w, l) = (cell.inner, cell.depth, cell.length);
+            // a + w within the outer radii.
+            let lo = (domain.outer_m[0] - w.hi).min(a.hi);
+            if !meet(&mut cell.inner, lo.max(0.0), domain.outer_m[1] - w.lo) {
+                return None;
+            }
+            let lo = (domain.outer_m[0] - a.hi).min(w.hi);
+            if !meet(&mut cell.depth, lo.max(0.0), domain.outer_m[1] - a.lo) {
+                return None;
+            }
+            // (2 a + w) w l within the volumes.
+            let [least, most] = domain.volume_m3;
+            let ring = |a: f64, w: f64| (2.0 * a + w) * w;
+            if !meet(&mut cell.length, least / ring(a.hi, w.hi), most / ring(a.lo, w.lo)) {
+                return None;
+            }
+            let inner = |v: f64, w: f64, l: f64| 0.5 * (v / (w * l) - w);
+            let lo = inner(least, w.hi, l.hi);
+            if !meet(&mut cell.inner, lo.max(0.0).min(a.hi), inner(most, w.lo, l.lo)) {
+                return None;
+            }
+            // w^2 + 2 a w = v / l.
+            let depth = |v: f64, a: f64, l: f64| {
+                let c = v / l;
+                if c.is_finite() { c / (a + (a * a + c).sqrt()) } else { c }
+            };
+            let lo = depth(least, a.hi, l.hi).min(w.hi);
+            if !meet(&mut cell.depth, lo, depth(most, a.lo, l.lo)) {
+                return None;
+            }
+        }
+        Some(cell)
+    }
+
+    fn corner(inner: f64, depth: f64, length: f64) -> Window {
+        Window {
+            inner_radius_m: inner,
+            depth_m: depth,
+            length_m: length,
+        }
+    }
+
+    /// Upper bound of ln F over a contracted cell; `None` where it holds no coil within the
+    /// limits.
+    #[must_use]
+    pub fn ln_force(&self, cell: &Cell) -> Option<f64> {
+        let settling = if self.with_settling {
+            Some(self.settling(cell)?)
+        } else {
+            None
+        };
+        let (a, w, l) = (cell.inner, cell.depth, cell.length);
+        // The largest window that holds every window of the cell.
+        let outer_hi = (a.hi + w.hi).min(self.domain.outer_m[1]);
+        let largest = Self::corner(a.lo, outer_hi - a.lo, l.hi);
+        // and the smallest that all of them hold, if any.
+        let common = (a.lo + w.lo) - a.hi;
+        let most = self.force_per_ampere(&largest);
+        let current_hi = match self.problem.regime {
+            Regime::Driver => self.problem.task.current_max_a,
+            Regime::Supply => {
+                let least = self.resistance_ohm(a.lo, w.lo, l.lo);
+                self.problem.task.voltage_v.unwrap_or(0.0) / least
+            }
+        };
+        let corner = (most * current_hi).ln() + 8.0 * axis_gradient::RELATIVE_ERROR;
+        if !(common > 0.0) {
+            return Some(corner);
+        }
+        let least = self.force_per_ampere(&Self::corner(a.hi, common, l.lo));
+        let h = Interval::new(least, most).widened(8.0 * axis_gradient::RELATIVE_ERROR);
+        let slopes = self.slopes_of_ln_force(cell, h);
+        let mut bound = corner.min(self.mean_value(cell, slopes, Multipliers::default(), None));
+        if self.multipliers != Multipliers::default() {
+            bound = bound.min(self.mean_value(cell, slopes, self.multipliers, settling.as_ref()));
+        }
+        Some(bound)
+    }
+
+    fn resistance_ohm(&self, a: f64, w: f64, l: f64) -> f64 {
+        (2.0 * a + w) * w * l * self.problem.strand.resistance_per_volume()
+    }
+
+    fn force_per_ampere(&self, window: &Window) -> f64 {
+        let sum: f64 = self
+            .dipoles
+            .iter()
+            .map(|&(z, moment)| moment * axis_gradient(window, z).value)
+            .sum();
+        self.strength * sum
+    }
+
+    /// Derivatives of ln(force per ampere) by inner radius, depth and length over a cell whose
+    /// force per ampere lies in `force`.
+    fn slopes_of_ln_force(&self, cell: &Cell, force: Interval) -> [Interval; 3] {
+        let mut sums = [Interval::point(0.0); 3];
+        for &(z, moment) in self.dipoles {
+            let slopes = axis_slopes(cell, z);
+            for (sum, slope) in sums.iter_mut().zip(slopes) {
+                *sum = *sum + slope * (moment * self.strength);
+            }
+        }
+        sums.map(|slope| slope / force)
+    }
+
+    /// The Lagrangian's second-order bound.
+    fn mean_value(
+        &self,
+        cell: &Cell,
+        slopes: [Interval; 3],
+        lambda: Multipliers,
+        settling: Option<&Settling>,
+    ) -> f64 {
+        let (a, w, l) = (cell.inner, cell.depth, cell.length);
+        let [a_m, w_m, l_m] = [a, w, l].map(|i| 0.5 * (i.lo + i.hi));
+        let middle = Self::corner(a_m, w_m, l_m);
+        let domain = &self.domain;
+        // ln F = ln(force per ampere) + ln I, and I = V/R is a constant less ln(volume).
+        let by_volume = match self.problem.regime {
+            Regime::Driver => lambda.least - lambda.most,
+            Regime::Supply => lambda.least - lambda.most - 1.0,
+        };
+        let volume_m = (2.0 * a_m + w_m) * w_m * l_m;
+        let current = match self.problem.regime {
+            Regime::Driver => self.problem.task.current_max_a.ln(),
+            Regime::Supply => (self.problem.task.voltage_v.unwrap_or(0.0)
+                / self.resistance_ohm(a_m, w_m, l_m))
+            .ln(),
+        };
+        let mut value = self.force_per_ampere(&middle).ln() + current;
+        let term = |weight: f64, ratio: f64| if weight == 0.0 { 0.0 } else { weight * ratio.ln() };
+        value -= term(lambda.most, volume_m / domain.volume_m3[1]);
+        value += term(lambda.least, volume_m / domain.volume_m3[0]);
+        value -= term(lambda.outer, (a_m + w_m) / domain.outer_m[1]);
+        let weight_sum = 1.0 + lambda.most + lambda.least + lambda.outer.abs();
+        let mut margin = 32.0 * axis_gradient::RELATIVE_ERROR * weight_sum;
+        let one = Interval::point(1.0);
+        let across = one / (a + a + w);
+        // Of ln(volume) and ln(outer radius).
+        let volume = [across * 2.0, one / w + across, one / l];
+        let outer = one / (a + w);
+        let mut derivative = slopes;
+        for (i, slope) in derivative.iter_mut().enumerate() {
+            *slope = *slope + volume[i] * by_volume;
+            if i < 2 {
+                *slope = *slope - outer * lambda.outer;
+            }
+        }
+        if let Some(settling) = settling
+            && lambda.settling > 0.0
+        {
+            let sums = section_integrals(a_m, w_m, l_m);
+            let ratio = self.settling_s(sums.value, volume_m) / domain.settling_max_s;
+            value -= lambda.settling * ratio.ln();
+            margin += 4.0 * lambda.settling * section_integrals::RELATIVE_ERROR;
+            for (i, slope) in derivative.iter_mut().enumerate() {
+                *slope = *slope - (settling.slopes[i] - volume[i]) * lambda.settling;
+            }
+        }
+        let mut rise = Interval::point(0.0);
+        for (slope, (interval, at)) in derivative.iter().zip([(a, a_m), (w, w_m), (l, l_m)]) {
+            let away = interval - Interval::point(at);
+            rise = rise + *slope * away;
+        }
+        value + rise.hi + margin
+    }
+
+    fn settling_s(&self, sums: f64, volume: f64) -> f64 {
+        let strand = &self.problem.strand;
+        SETTLING_TIME_CONSTANTS * self.strength * strand.turns_per_m2() * sums
+            / (volume * strand.resistance_per_volume())
+    }
+
+    /// The inductance over the cell; `None` where every coil settles too slowly.
+    fn settling(&self, cell: &Cell) -> Option<Settling> {
+        let (a, w, l) = (cell.inner, cell.depth, cell.length);
+        let error = 2.0 * section_integrals::RELATIVE_ERROR;
+        let lo = section_integrals(a.lo, w.lo, l.lo);
+        // L / l grows with l, so that the slowest end of the cell's length is its lower one.
+        let volume_hi = (2.0 * a.hi + w.hi) * w.hi * l.lo;
+        let fastest = self.settling_s(lo.value * (1.0 - error), volume_hi);
+        if fastest > self.domain.settling_max_s {
+            return None;
+        }
+        let hi = section_integrals(a.hi, w.hi, l.hi);
+        let between = |x: f64, y: f64| Interval::new(x.min(y), y.max(x)).widened(error);
+        let value = between(lo.value, hi.value);
+        let by_depth = between(lo.by_depth, hi.by_depth);
+        let by_length = between(lo.by_length, hi.by_length);
+        let inner = between(lo.inner, hi.inner);
+        let mut by_inner = by_depth - inner;
+        if a.lo > 0.0 {
+            // Homogeneous of degree five: a L_a = 5 L - w L_w - l L_l.
+            by_inner = by_inner.and((value * 5.0 - w * by_depth - l * by_length) / a);
+        }
+        let SectionIntegrals { .. } = lo;
+        Some(Settling {
+            slopes: [by_inner / value, by_depth / value, by_length / value],
+        })
+    }
+}
+
+/// Derivatives of ln L over a cell.
+struct Settling {
+    slopes: [Interval; 3],
+}
+
+/// Derivatives of h over a cell by inner radius (depth held), depth and length.
+fn axis_slopes(cell: &Cell, z_m: f64) -> [Interval; 3] {
+    let outer = cell.inner + cell.depth;
+    let z = Interval::point(z_m);
+    let far = z + cell.length;
+    let difference = |a: Interval| {
+        let (s1, s2) = ((a.square() + z.square()).sqrt(), (a.square() + far.square()).sqrt());
+        // a / s grows with a; ratios of the same a are taken at their ends.
+        let angle = rising(a, z);
+        let ratio = Interval::new(
+            ((Interval::point(a.lo).square() + z.square()).sqrt()
+                / (Interval::point(a.lo).square() + far.square()).sqrt())
+            .lo,
+            ((Interval::point(a.hi).square() + z.square()).sqrt()
+                / (Interval::point(a.hi).square() + far.square()).sqrt())
+            .hi,
+        );
+        let closer = (cell.length / (s1 + s2)) * ((z + far) / s2);
+        angle.square() * closer * (ratio.square() + ratio + Interval::point(1.0)) / s1 * 0.5
+    };
+    let (at_inner, at_outer) = (difference(cell.inner), difference(outer));
+    let by_difference = at_outer - at_inner;
+    // The same as the integral of D' over the depth, better for thin windings:
+    // D' = int 3/2 a u (2 u^2 - 3 a^2) / (a^2 + u^2)^(7/2) du from z to z + L.
+    let a = Interval::new(cell.inner.lo, outer.hi);
+    let u = Interval::new(z_m, far.hi);
+    let s = (a.square() + u.square()).sqrt();
+    let curl = a * u * (u.square() * 2.0 - a.square() * 3.0) / (s.square().square() * s.square() * s);
+    let by_inner = by_difference.and(curl * cell.length * cell.depth * 1.5);
+    // E(a2) - E(a1), and as the integral of 3/2 a^2 u / (a^2 + u^2)^(5/2) over the depth.
+    let end = |a: Interval| {
+        let angle = rising(a, far);
+        angle * angle.square() / far * 0.5
+    };
+    let s = (a.square() + far.square()).sqrt();
+    let kernel = a.square() * far / (s.square().square() * s) * 1.5;
+    let by_length = (end(outer) - end(cell.inner)).and(kernel * cell.depth);
+    [by_inner, at_outer, by_length]
+}
+
+/// a / sqrt(a^2 + u^2): grows with a, falls with u.
+fn rising(a: Interval, u: Interval) -> Interval {
+    let at = |a: f64, u: f64| {
+        let (a, u) = (Interval::point(a), Interval::point(u));
+        a / (a.square() + u.square()).sqrt()
+    };
+    Interval::new(at(a.lo, u.hi).lo.max(0.0), at(a.hi, u.lo).hi)
+}
