@@ -19,7 +19,7 @@ use super::domain::Domain;
 use super::model::Window;
 use super::problem::{LimitName, Problem, Regime};
 use crate::coil::circuit::SETTLING_TIME_CONSTANTS;
-use crate::coil::section_integrals::{self, SectionIntegrals, section_integrals};
+use crate::coil::section_integrals::{self, section_integrals};
 use crate::numerics::interval::Interval;
 use crate::units::MU_0_T_M_PER_A;
 
@@ -76,7 +76,7 @@ impl Multipliers {
 }
 
 /// What bounds the cells of one problem.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub struct Bounding<'a> {
     problem: &'a Problem<'a>,
     dipoles: &'a [(f64, f64)],
@@ -157,6 +157,20 @@ impl<'a> Bounding<'a> {
         Some(cell)
     }
 
+    /// ln F of one window, whatever its limits.
+    #[must_use]
+    pub fn ln_force_at(&self, window: &Window) -> f64 {
+        let (a, w, l) = (window.inner_radius_m, window.depth_m, window.length_m);
+        (self.force_per_ampere(window) * self.current_a(self.resistance_ohm(a, w, l))).ln()
+    }
+
+    fn current_a(&self, resistance_ohm: f64) -> f64 {
+        match self.problem.regime {
+            Regime::Driver => self.problem.task.current_max_a,
+            Regime::Supply => self.problem.task.voltage_v.unwrap_or(0.0) / resistance_ohm,
+        }
+    }
+
     fn corner(inner: f64, depth: f64, length: f64) -> Window {
         Window {
             inner_radius_m: inner,
@@ -181,13 +195,7 @@ impl<'a> Bounding<'a> {
         // and the smallest that all of them hold, if any.
         let common = (a.lo + w.lo) - a.hi;
         let most = self.force_per_ampere(&largest);
-        let current_hi = match self.problem.regime {
-            Regime::Driver => self.problem.task.current_max_a,
-            Regime::Supply => {
-                let least = self.resistance_ohm(a.lo, w.lo, l.lo);
-                self.problem.task.voltage_v.unwrap_or(0.0) / least
-            }
-        };
+        let current_hi = self.current_a(self.resistance_ohm(a.lo, w.lo, l.lo));
         let corner = (most * current_hi).ln() + 8.0 * axis_gradient::RELATIVE_ERROR;
         if !(common > 0.0) {
             return Some(corner);
@@ -246,13 +254,7 @@ impl<'a> Bounding<'a> {
             Regime::Supply => lambda.least - lambda.most - 1.0,
         };
         let volume_m = (2.0 * a_m + w_m) * w_m * l_m;
-        let current = match self.problem.regime {
-            Regime::Driver => self.problem.task.current_max_a.ln(),
-            Regime::Supply => (self.problem.task.voltage_v.unwrap_or(0.0)
-                / self.resistance_ohm(a_m, w_m, l_m))
-            .ln(),
-        };
-        let mut value = self.force_per_ampere(&middle).ln() + current;
+        let mut value = self.ln_force_at(&middle);
         let term = |weight: f64, ratio: f64| if weight == 0.0 { 0.0 } else { weight * ratio.ln() };
         value -= term(lambda.most, volume_m / domain.volume_m3[1]);
         value += term(lambda.least, volume_m / domain.volume_m3[0]);
@@ -318,7 +320,6 @@ impl<'a> Bounding<'a> {
             // Homogeneous of degree five: a L_a = 5 L - w L_w - l L_l.
             by_inner = by_inner.and((value * 5.0 - w * by_depth - l * by_length) / a);
         }
-        let SectionIntegrals { .. } = lo;
         Some(Settling {
             slopes: [by_inner / value, by_depth / value, by_length / value],
         })

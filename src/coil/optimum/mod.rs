@@ -1,31 +1,53 @@
 //! The coil of equation 11.
 pub mod air;
 pub mod axis_gradient;
+pub mod branch;
+pub mod diagnosis;
 pub mod domain;
+pub mod enclosure;
 pub mod model;
+pub mod outcome;
 pub mod problem;
+pub mod scalar;
+pub mod search;
 pub mod sequential;
 pub mod starts;
+pub mod valley;
 #[cfg(test)]
 mod probe {
-    use super::*; use super::air::*; use super::problem::*; use super::model::*; use super::domain::*;
-    use crate::design::*; use crate::field::magnet::MagnetRule;
+    use super::air::*; use super::problem::*; use super::model::*; use super::search::*;
+    use crate::design::*; use crate::field::magnet::MagnetRule; use crate::progress::Silent;
+    fn run(name:&str, d:f64, h:f64, limits:Limits, fixed:Fixed, v:Option<f64>) {
+        let wire = Wire{diameter_m:d,conductor_diameter_m:d,resistivity_ohm_m:1.68e-8,temperature_c:20.0,choices_m:vec![]};
+        let air = AirCoil::new(h,&MagnetRule::dipole([0.0,0.0,-0.90941])).unwrap();
+        let task = Task{limits,fixed,current_max_a:2.0,voltage_v:v,strands:Strand::choices(&wire)};
+        let t=std::time::Instant::now();
+        let o = optimise(&air,&task,&Settings{valley:false,cells:0,..Settings::default()},&Silent).unwrap();
+        let t1=t.elapsed(); let t=std::time::Instant::now();
+        let o2 = optimise(&air,&task,&Settings{cells:400000,..Settings::default()},&Silent).unwrap();
+        println!("== {name}: {:?} {:?}\n   {:?} eval {} starts {} local {t1:?} all {:?} valley {:?}", o.status, o.best.as_ref().map(|b|(b.window,b.force_n,b.turns)), o2.certificate, o.evaluations,o.starts,t.elapsed(), o2.valley_m);
+        if let Some(b)=o2.best { for l in b.limits { if l.active {println!("     {} {} {} {}", l.name.key(), l.value,l.limit,l.sensitivity_n_per_unit);} } }
+    }
     #[test] fn probe() {
-        let wire = Wire{diameter_m:0.0007,conductor_diameter_m:0.0007,resistivity_ohm_m:1.68e-8,temperature_c:20.0,choices_m:vec![]};
-        let air = AirCoil::new(0.03,&MagnetRule::dipole([0.0,0.0,-0.90941])).unwrap();
-        for (od,set) in [(0.038,Some(0.1)),(0.038,None),(0.05,Some(0.1)),(0.05,None),(0.05,Some(0.01)),(0.05,Some(0.005))] {
-        let task = Task{limits:Limits{resistance_max_ohm:Some(6.0),settling_max_s:set,outer_diameter_max_m:Some(od),length_max_m:Some(0.1),inner_diameter_min_m:None,..Default::default()},fixed:Fixed::default(),current_max_a:2.0,voltage_v:Some(36.0),strands:Strand::choices(&wire)};
-        for p in Problem::of_wire(&air,&task,task.strands[0]) {
-            let d = Domain::of(&p);
-            println!("{:?} {:?}", p.regime, Domain::contradiction(&p).map(|c|c.message));
-            for k in 0..6 { 
-                let t=std::time::Instant::now();
-                let s = starts::start(&d,0.03,1,k);
-                if let Some(l)=sequential::solve(&p,s) {
-                 let w=Problem::window(l.x);
-                 println!("F {:.9} a1 {:.6} a2 {:.6} l {:.6} viol {:.1e} ev {} lam {:?} {:?}", (-l.point.objective).exp(), w.inner_radius_m*1e3,w.outer_radius_m()*1e3,w.length_m*1e3,l.violation(&p),l.evaluations,l.multipliers.iter().zip(&p.bounds).filter(|(m,_)|**m!=0.0).map(|(m,b)|format!("{}:{:.4}",b.name.key(),m)).collect::<Vec<_>>(), t.elapsed());
-                }
-            }
-        }}
+        let seed=Limits{resistance_max_ohm:Some(6.0),settling_max_s:Some(0.1),outer_diameter_max_m:Some(0.038),length_max_m:Some(0.1),..Default::default()};
+        let f=Fixed::default();
+        run("seed",0.0007,0.03,seed,f,Some(36.0));
+        run("seed od50",0.0007,0.03,Limits{outer_diameter_max_m:Some(0.05),..seed},f,Some(36.0));
+        run("noset",0.0007,0.03,Limits{settling_max_s:None,..seed},f,Some(36.0));
+        run("R only",0.0007,0.03,Limits{resistance_max_ohm:Some(6.0),..Default::default()},f,None);
+        run("V only",0.0007,0.03,Limits::default(),f,Some(36.0));
+        run("V + R50",0.0007,0.03,Limits{resistance_max_ohm:Some(50.0),..Default::default()},f,Some(36.0));
+        run("V + P",0.0007,0.03,Limits{power_max_w:Some(10.0),..seed},f,Some(36.0));
+        run("tau10 od50",0.0007,0.03,Limits{settling_max_s:Some(0.01),outer_diameter_max_m:Some(0.05),..seed},f,Some(36.0));
+        run("tau only sized",0.0007,0.03,Limits{settling_max_s:Some(0.01),outer_diameter_max_m:Some(0.5),length_max_m:Some(0.5),..Default::default()},f,None);
+        run("tau only",0.0007,0.03,Limits{settling_max_s:Some(0.01),..Default::default()},f,None);
+        run("thin wire far",0.00005,100.0,Limits{..seed},f,Some(36.0));
+        run("unbounded",0.0007,0.03,Limits{length_max_m:Some(0.1),..Default::default()},f,None);
+        run("tiny R",0.0007,0.03,Limits{resistance_max_ohm:Some(1e-6),..seed},f,Some(36.0));
+        run("contra",0.0007,0.03,Limits{inner_diameter_min_m:Some(0.04),..seed},f,Some(36.0));
+        run("fixed bore",0.0007,0.03,seed,Fixed{inner_diameter_m:Some(0.024),..f},Some(36.0));
+        run("fixed all",0.0007,0.03,seed,Fixed{inner_diameter_m:Some(0.024),outer_diameter_m:Some(0.038),length_m:Some(0.09)},Some(36.0));
+        run("fixed od",0.0007,0.03,seed,Fixed{outer_diameter_m:Some(0.036),..f},Some(36.0));
+        run("idmin mass",0.0007,0.03,Limits{inner_diameter_min_m:Some(0.02),mass_max_kg:Some(0.1),..seed},f,Some(36.0));
     }
 }

@@ -6,7 +6,7 @@
 //! voltage falls with the resistance: either side of the kink is a smooth problem of its own.
 
 use super::model::{CoilModel, Sloped, Strand, Window};
-use super::sequential::{Point, Smooth};
+use super::sequential::{Local, Point, Smooth};
 use crate::coil::circuit::SETTLING_TIME_CONSTANTS;
 use crate::design::Limits;
 
@@ -227,6 +227,44 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// The same wire and regime under another task.
+    #[must_use]
+    pub fn with_task<'b>(&self, task: &'b Task) -> Problem<'b>
+    where
+        'a: 'b,
+    {
+        Problem::new(self.model, task, self.strand, self.regime)
+    }
+
+    /// The problem without its limit on the settling time; `None` where it has none.
+    #[must_use]
+    pub fn without_settling(&self) -> Option<Problem<'a>> {
+        self.with_inductance.then(|| {
+            let mut bounds = self.bounds.clone();
+            bounds.retain(|bound| bound.name != LimitName::Settling);
+            Problem {
+                bounds,
+                with_inductance: false,
+                ..*self
+            }
+        })
+    }
+
+    /// The optimum of `relaxed`, this problem without one of its limits, as a point of this one.
+    #[must_use]
+    pub fn adopted(&self, relaxed: &Problem<'_>, local: &Local) -> Option<Local> {
+        let multiplier = |bound: &Bounded| {
+            let row = relaxed.bounds.iter().position(|b| b == bound);
+            row.map_or(0.0, |row| local.multipliers[row])
+        };
+        Some(Local {
+            x: local.x,
+            point: self.at(local.x)?,
+            multipliers: self.bounds.iter().map(multiplier).collect(),
+            evaluations: local.evaluations + 1,
+        })
+    }
+
     /// The coil of a window; `None` where the model does not hold.
     #[must_use]
     pub fn rate(&self, window: Window) -> Option<Rated> {
@@ -392,7 +430,7 @@ impl<'a> Problem<'a> {
         ]
     }
 
-    /// The multiplier that the model's accuracy allows to be told from zero.
+    /// The limit called `name`, where it applies.
     #[must_use]
     pub fn limit_of(&self, name: LimitName) -> Option<f64> {
         self.bounds
