@@ -16,17 +16,43 @@ use std::sync::OnceLock;
 
 use crate::numerics::gauss;
 
-/// Relative error of every integral; held by the tests against `coil::inductance`.
-pub const RELATIVE_ERROR: f64 = 1e-9;
-const TOLERANCE: f64 = 1e-11;
-/// Step of the azimuth's grid in ln tau: exp(-pi^2 / step) = 6e-13.
-const STEP: f64 = 0.35;
-/// The grid runs from exp(-this) to exp(+this).
-const REACH: f64 = 26.0;
-/// ln(TOLERANCE): what the azimuth's tails may leave out.
-const LN_TOLERANCE: f64 = -25.4;
-/// On the first panel t = t0 eta^3.
-const POWER_ORDER: usize = 14;
+/// How exactly the integrals are wanted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Accuracy {
+    /// Relative error of every integral; held by the tests against `coil::inductance`.
+    pub relative_error: f64,
+    tolerance: f64,
+    /// Step of the azimuth's grid in ln tau.
+    step: f64,
+    /// ln of what the azimuth's tails may leave out.
+    tail: f64,
+    /// Nodes of the first panel, on which t = t0 eta^3.
+    order: usize,
+    grid: &'static OnceLock<Vec<Azimuth>>,
+}
+
+/// To nine digits or more.
+pub static FINE: Accuracy = Accuracy {
+    relative_error: 1e-9,
+    tolerance: 1e-11,
+    step: 0.35,
+    tail: -25.4,
+    order: 14,
+    grid: &FINE_GRID,
+};
+/// To seven digits, in a fifth of the time.
+pub static ROUGH: Accuracy = Accuracy {
+    relative_error: 1e-7,
+    tolerance: 1e-8,
+    step: 0.5,
+    tail: -17.0,
+    order: 8,
+    grid: &ROUGH_GRID,
+};
+static FINE_GRID: OnceLock<Vec<Azimuth>> = OnceLock::new();
+static ROUGH_GRID: OnceLock<Vec<Azimuth>> = OnceLock::new();
+/// ln of the shortest winding, over its radius, for which the error is kept.
+const SHORTEST_LN: f64 = -20.0;
 /// Radii closer to the axis than this share of the largest carry nothing.
 const AXIS: f64 = 0.1;
 
@@ -47,7 +73,7 @@ pub struct SectionIntegrals {
 }
 
 /// One node of the azimuth's grid.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Azimuth {
     /// 8 tau^3 / (1 + tau^2)^2 times the step.
     weight: f64,
@@ -57,16 +83,17 @@ struct Azimuth {
     share: f64,
 }
 
-fn grid() -> &'static [Azimuth] {
-    static GRID: OnceLock<Vec<Azimuth>> = OnceLock::new();
-    GRID.get_or_init(|| {
-        let half = (REACH / STEP) as i32;
-        (-half..=half)
+/// The grid of ln tau.
+fn grid(accuracy: &'static Accuracy) -> &'static [Azimuth] {
+    accuracy.grid.get_or_init(|| {
+        let lowest = ((accuracy.tail + SHORTEST_LN) / accuracy.step) as i32;
+        let highest = (-accuracy.tail / 3.0 / accuracy.step).ceil() as i32;
+        (lowest..=highest)
             .map(|k| {
-                let tau = (f64::from(k) * STEP).exp();
+                let tau = (f64::from(k) * accuracy.step).exp();
                 let share = 1.0 / (1.0 + tau * tau);
                 Azimuth {
-                    weight: STEP * 8.0 * (tau * share) * (tau * share) * tau,
+                    weight: accuracy.step * 8.0 * (tau * share) * (tau * share) * tau,
                     four_tau2: 4.0 * tau * tau,
                     share,
                 }
@@ -79,14 +106,20 @@ fn grid() -> &'static [Azimuth] {
 ///
 /// Domain: `inner` >= 0, `depth` > 0, `length` > 0.
 #[must_use]
-pub fn section_integrals(inner: f64, depth: f64, length: f64) -> SectionIntegrals {
+pub fn section_integrals(
+    inner: f64,
+    depth: f64,
+    length: f64,
+    accuracy: &'static Accuracy,
+) -> SectionIntegrals {
+    let tolerance = accuracy.tolerance;
     let outer = inner + depth;
     let mut total = SectionIntegrals::default();
     let mut add = |t: f64, weight: f64| {
         let (lo, hi) = (inner + 0.5 * t, outer - 0.5 * t);
         let (mut sum, mut slope) = (0.0, 0.0);
-        gauss::graded(lo, hi, (0.5 * t).max(AXIS * hi), TOLERANCE, |s, weight| {
-            let (value, by_length) = aligned(s, t, length);
+        gauss::graded(lo, hi, (0.5 * t).max(AXIS * hi), tolerance, |s, weight| {
+            let (value, by_length) = aligned(s, t, length, accuracy);
             sum += weight * value;
             slope += weight * by_length;
         });
@@ -94,37 +127,39 @@ pub fn section_integrals(inner: f64, depth: f64, length: f64) -> SectionIntegral
         let stretch = (depth - t) / (hi - lo);
         total.value += weight * stretch * sum;
         total.by_length += weight * stretch * slope;
-        total.by_depth += weight * aligned(hi, t, length).0;
-        total.inner += weight * aligned(lo, t, length).0;
+        total.by_depth += weight * aligned(hi, t, length, accuracy).0;
+        total.inner += weight * aligned(lo, t, length, accuracy).0;
     };
     // Beyond the length, and beyond the loops' own size, the integrand has another shape.
     let first = depth.min(length).min(0.5 * (inner + outer));
-    let rule = gauss::rule(POWER_ORDER);
+    let rule = gauss::rule(accuracy.order);
     for (x, weight) in rule.nodes.iter().zip(&rule.weights) {
         let eta = 0.5 * (1.0 + x);
         add(first * eta * eta * eta, 1.5 * weight * first * eta * eta);
     }
     if first < depth {
-        gauss::graded(first, depth, first, TOLERANCE, add);
+        gauss::graded(first, depth, first, tolerance, add);
     }
     total
 }
 
 /// Twice the mutual inductance of two aligned sheets of radii s +- t/2, times their length
 /// squared, over mu_0, and its derivative by the length.
-fn aligned(s: f64, t: f64, length: f64) -> (f64, f64) {
+fn aligned(s: f64, t: f64, length: f64, accuracy: &'static Accuracy) -> (f64, f64) {
     let product = s * s - 0.25 * t * t;
-    let grid = grid();
+    let grid = grid(accuracy);
     let (t2, s2, l2) = (t * t, s * s, length * length);
     // Below: tau^3 where tau < t / 2 s, tau above; at the other end tau^-3.
+    // Short sheets: nearly constant from tau = length / 2 s on.
     let near = (0.5 * t / s).ln();
-    let lower = ((LN_TOLERANCE + 2.0 * near) / 3.0).max(LN_TOLERANCE);
-    let upper = -LN_TOLERANCE / 3.0;
-    let middle = (grid.len() / 2) as f64;
-    let from = (middle + lower / STEP).max(0.0) as usize;
-    let to = ((middle + upper / STEP) as usize).min(grid.len() - 1);
+    let short = (0.5 * length / s).ln().min(0.0);
+    let lower = ((accuracy.tail + 2.0 * near + short) / 3.0).max(accuracy.tail + short);
+    let upper = -accuracy.tail / 3.0;
+    let last = (grid.len() - 1) as f64;
+    let middle = last - ((upper / accuracy.step).ceil());
+    let from = (middle + lower / accuracy.step).max(0.0) as usize;
     let (mut sum, mut slope) = ([0.0; 4], [0.0; 4]);
-    let nodes = &grid[from..=to];
+    let nodes = &grid[from.min(grid.len() - 1)..];
     let (fours, rest) = nodes.as_chunks::<4>();
     let term = |node: &Azimuth| {
         let g = t2 + s2 * node.four_tau2;
@@ -180,18 +215,34 @@ mod tests {
                 length_m: l,
                 turns: w * l,
             });
-            let value = MU_0_T_M_PER_A * section_integrals(a, w, l).value;
+            let value = MU_0_T_M_PER_A * section_integrals(a, w, l, &FINE).value;
             let error = value / exact - 1.0;
             // The outer radius is rounded against the inner one.
             let rounding = 4.0 * f64::EPSILON * a / w;
-            assert!(error.abs() < RELATIVE_ERROR + rounding, "{a} {w} {l}: {error:e}");
+            assert!(error.abs() < FINE.relative_error + rounding, "{a} {w} {l}: {error:e}");
+        }
+    }
+
+    #[test]
+    fn rough_integrals_keep_their_bound() {
+        for [a, w, l] in SHAPES {
+            let fine = section_integrals(a, w, l, &FINE);
+            let rough = section_integrals(a, w, l, &ROUGH);
+            for (x, y, size) in [
+                (fine.value, rough.value, fine.value),
+                (fine.by_depth, rough.by_depth, fine.by_depth),
+                (fine.inner, rough.inner, fine.by_depth),
+                (fine.by_length, rough.by_length, fine.by_length),
+            ] {
+                assert!((x - y).abs() < ROUGH.relative_error * size, "{a} {w} {l}: {:e}", (x - y) / size);
+            }
         }
     }
 
     #[test]
     fn sheets_side_by_side_are_loops_far_apart() {
         // Two short sheets of radii 1.3 and 0.2: length squared times the loops' inductance.
-        let (value, _) = aligned(0.75, 1.1, 1e-4);
+        let (value, _) = aligned(0.75, 1.1, 1e-4, &FINE);
         let loops = mutual_over_mu_0(1.3, 0.2, 1.1, 0.0);
         assert!((value / (2.0 * 1e-8 * loops) - 1.0).abs() < 1e-7);
     }
@@ -199,20 +250,20 @@ mod tests {
     #[test]
     fn slopes_are_those_of_the_value() {
         for [a, w, l] in SHAPES {
-            let base = section_integrals(a, w, l);
+            let base = section_integrals(a, w, l, &FINE);
             let slope = [base.by_depth - base.inner, base.by_depth, base.by_length];
             // Homogeneous of degree five.
             let sum = a * slope[0] + w * slope[1] + l * slope[2];
             let size = a * base.by_depth + w * slope[1] + l * slope[2];
             assert!(
-                (sum - 5.0 * base.value).abs() < RELATIVE_ERROR * size,
+                (sum - 5.0 * base.value).abs() < FINE.relative_error * size,
                 "{a} {w} {l}: {:e}", (sum - 5.0 * base.value) / size
             );
             let remainder = |i: usize, h: f64| {
                 let mut x = [a, w, l];
                 let step = h * w.min(l);
                 x[i] += step;
-                let moved = section_integrals(x[0], x[1], x[2]).value;
+                let moved = section_integrals(x[0], x[1], x[2], &FINE).value;
                 ((moved - base.value - step * slope[i]) / base.value).abs()
             };
             for i in 0..3 {

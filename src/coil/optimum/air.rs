@@ -2,7 +2,7 @@
 
 use super::axis_gradient::{self, axis_gradient};
 use super::model::{CoilModel, NoResponse, Response, Sloped, Window};
-use crate::coil::section_integrals::{self, section_integrals};
+use crate::coil::section_integrals::{FINE, section_integrals};
 use crate::field::magnet::MagnetRule;
 use crate::units::MU_0_T_M_PER_A;
 
@@ -89,6 +89,7 @@ impl CoilModel for AirCoil {
                 window.inner_radius_m,
                 window.depth_m,
                 window.length_m,
+                &FINE,
             );
             inductance_h = Sloped {
                 value: sums.value,
@@ -104,7 +105,7 @@ impl CoilModel for AirCoil {
     }
 
     fn relative_error(&self) -> f64 {
-        section_integrals::RELATIVE_ERROR.max(axis_gradient::RELATIVE_ERROR)
+        FINE.relative_error.max(axis_gradient::RELATIVE_ERROR)
     }
 
     fn air_dipoles(&self) -> Option<&[(f64, f64)]> {

@@ -112,7 +112,8 @@ pub fn prove(
             return Ok(proof);
         }
     }
-    let share = budget / PORTIONS;
+    // Cells near the optimum fall to few portions.
+    let share = budget / 4;
     let parts: Vec<Result<Proof, Interrupted>> = queue
         .into_par_iter()
         .map(|first| search.depth_first(first, share, progress))
@@ -164,7 +165,7 @@ impl Search<'_> {
         let Some(cell) = self.bounding.contracted(cell) else {
             return;
         };
-        let Some(bound) = self.bounding.ln_force(&cell) else {
+        let Some(bound) = self.bounding.ln_force(&cell, self.enough_ln) else {
             return;
         };
         if bound <= self.enough_ln {

@@ -19,7 +19,7 @@ use super::domain::Domain;
 use super::model::Window;
 use super::problem::{LimitName, Problem, Regime};
 use crate::coil::circuit::SETTLING_TIME_CONSTANTS;
-use crate::coil::section_integrals::{self, section_integrals};
+use crate::coil::section_integrals::{ROUGH, section_integrals};
 use crate::numerics::interval::Interval;
 use crate::units::MU_0_T_M_PER_A;
 
@@ -180,34 +180,58 @@ impl<'a> Bounding<'a> {
     }
 
     /// Upper bound of ln F over a contracted cell; `None` where it holds no coil within the
-    /// limits.
+    /// limits. Bounds in their order of cost: as soon as one is at most `enough` it is returned.
     #[must_use]
-    pub fn ln_force(&self, cell: &Cell) -> Option<f64> {
-        let settling = if self.with_settling {
-            Some(self.settling(cell)?)
-        } else {
-            None
-        };
+    pub fn ln_force(&self, cell: &Cell, enough: f64) -> Option<f64> {
         let (a, w, l) = (cell.inner, cell.depth, cell.length);
         // The largest window that holds every window of the cell.
-        let outer_hi = (a.hi + w.hi).min(self.domain.outer_m[1]);
-        let largest = Self::corner(a.lo, outer_hi - a.lo, l.hi);
-        // and the smallest that all of them hold, if any.
+        let outer_hi = (a.hi + w.hi).min(self.domain.outer_m[1] * (1.0 + SLACK));
+        let most = self.force_per_ampere(&Self::corner(a.lo, outer_hi - a.lo, l.hi));
+        // The smallest that all of them hold, if any.
         let common = (a.lo + w.lo) - a.hi;
-        let most = self.force_per_ampere(&largest);
+        let least = if common > 0.0 {
+            self.force_per_ampere(&Self::corner(a.hi, common, l.lo))
+        } else {
+            0.0
+        };
+        // For thin windings the mean value over the depth is nearer.
+        let force = Interval::new(least, most)
+            .widened(8.0 * axis_gradient::RELATIVE_ERROR)
+            .and(self.force_by_depth(cell, outer_hi));
         let current_hi = self.current_a(self.resistance_ohm(a.lo, w.lo, l.lo));
-        let corner = (most * current_hi).ln() + 8.0 * axis_gradient::RELATIVE_ERROR;
-        if !(common > 0.0) {
-            return Some(corner);
+        let mut bound = (force.hi * current_hi).ln() + 8.0 * axis_gradient::RELATIVE_ERROR;
+        let mut slopes = None;
+        if bound > enough && force.lo > 0.0 {
+            let of_force = self.slopes_of_ln_force(cell, force);
+            slopes = Some(of_force);
+            bound = bound.min(self.mean_value(cell, of_force, Multipliers::default(), None));
+            let without = Multipliers {
+                settling: 0.0,
+                ..self.multipliers
+            };
+            if bound > enough && without != Multipliers::default() {
+                bound = bound.min(self.mean_value(cell, of_force, without, None));
+            }
         }
-        let least = self.force_per_ampere(&Self::corner(a.hi, common, l.lo));
-        let h = Interval::new(least, most).widened(8.0 * axis_gradient::RELATIVE_ERROR);
-        let slopes = self.slopes_of_ln_force(cell, h);
-        let mut bound = corner.min(self.mean_value(cell, slopes, Multipliers::default(), None));
-        if self.multipliers != Multipliers::default() {
-            bound = bound.min(self.mean_value(cell, slopes, self.multipliers, settling.as_ref()));
+        if bound > enough && self.with_settling {
+            let settling = self.settling(cell)?;
+            if let Some(of_force) = slopes {
+                let lagrangian = self.mean_value(cell, of_force, self.multipliers, settling.as_ref());
+                bound = bound.min(lagrangian);
+            }
         }
         Some(bound)
+    }
+
+    /// Force per ampere as depth times the difference of two loops anywhere in it.
+    fn force_by_depth(&self, cell: &Cell, outer_hi: f64) -> Interval {
+        let radii = Interval::new(cell.inner.lo, outer_hi);
+        let mut sum = Interval::point(0.0);
+        for &(z, moment) in self.dipoles {
+            let z = Interval::point(z);
+            sum = sum + difference(radii, z, cell.length) * (moment * self.strength);
+        }
+        sum * cell.depth
     }
 
     fn resistance_ohm(&self, a: f64, w: f64, l: f64) -> f64 {
@@ -276,10 +300,10 @@ impl<'a> Bounding<'a> {
         if let Some(settling) = settling
             && lambda.settling > 0.0
         {
-            let sums = section_integrals(a_m, w_m, l_m);
+            let sums = section_integrals(a_m, w_m, l_m, &ROUGH);
             let ratio = self.settling_s(sums.value, volume_m) / domain.settling_max_s;
             value -= lambda.settling * ratio.ln();
-            margin += 4.0 * lambda.settling * section_integrals::RELATIVE_ERROR;
+            margin += 1.5 * lambda.settling * ROUGH.relative_error;
             for (i, slope) in derivative.iter_mut().enumerate() {
                 *slope = *slope - (settling.slopes[i] - volume[i]) * lambda.settling;
             }
@@ -298,18 +322,22 @@ impl<'a> Bounding<'a> {
             / (volume * strand.resistance_per_volume())
     }
 
-    /// The inductance over the cell; `None` where every coil settles too slowly.
-    fn settling(&self, cell: &Cell) -> Option<Settling> {
+    /// The inductance over the cell; `None` where every coil settles too slowly, `Some(None)`
+    /// where none does, so that the limit holds nothing back.
+    fn settling(&self, cell: &Cell) -> Option<Option<Settling>> {
         let (a, w, l) = (cell.inner, cell.depth, cell.length);
-        let error = 2.0 * section_integrals::RELATIVE_ERROR;
-        let lo = section_integrals(a.lo, w.lo, l.lo);
+        let error = 2.0 * ROUGH.relative_error;
+        let lo = section_integrals(a.lo, w.lo, l.lo, &ROUGH);
         // L / l grows with l, so that the slowest end of the cell's length is its lower one.
         let volume_hi = (2.0 * a.hi + w.hi) * w.hi * l.lo;
         let fastest = self.settling_s(lo.value * (1.0 - error), volume_hi);
-        if fastest > self.domain.settling_max_s {
+        if fastest > self.domain.settling_max_s * (1.0 + SLACK) {
             return None;
         }
-        let hi = section_integrals(a.hi, w.hi, l.hi);
+        if self.multipliers.settling <= 0.0 {
+            return Some(None);
+        }
+        let hi = section_integrals(a.hi, w.hi, l.hi, &ROUGH);
         let between = |x: f64, y: f64| Interval::new(x.min(y), y.max(x)).widened(error);
         let value = between(lo.value, hi.value);
         let by_depth = between(lo.by_depth, hi.by_depth);
@@ -320,9 +348,9 @@ impl<'a> Bounding<'a> {
             // Homogeneous of degree five: a L_a = 5 L - w L_w - l L_l.
             by_inner = by_inner.and((value * 5.0 - w * by_depth - l * by_length) / a);
         }
-        Some(Settling {
+        Some(Some(Settling {
             slopes: [by_inner / value, by_depth / value, by_length / value],
-        })
+        }))
     }
 }
 
@@ -336,22 +364,7 @@ fn axis_slopes(cell: &Cell, z_m: f64) -> [Interval; 3] {
     let outer = cell.inner + cell.depth;
     let z = Interval::point(z_m);
     let far = z + cell.length;
-    let difference = |a: Interval| {
-        let (s1, s2) = ((a.square() + z.square()).sqrt(), (a.square() + far.square()).sqrt());
-        // a / s grows with a; ratios of the same a are taken at their ends.
-        let angle = rising(a, z);
-        let ratio = Interval::new(
-            ((Interval::point(a.lo).square() + z.square()).sqrt()
-                / (Interval::point(a.lo).square() + far.square()).sqrt())
-            .lo,
-            ((Interval::point(a.hi).square() + z.square()).sqrt()
-                / (Interval::point(a.hi).square() + far.square()).sqrt())
-            .hi,
-        );
-        let closer = (cell.length / (s1 + s2)) * ((z + far) / s2);
-        angle.square() * closer * (ratio.square() + ratio + Interval::point(1.0)) / s1 * 0.5
-    };
-    let (at_inner, at_outer) = (difference(cell.inner), difference(outer));
+    let (at_inner, at_outer) = (difference(cell.inner, z, cell.length), difference(outer, z, cell.length));
     let by_difference = at_outer - at_inner;
     // The same as the integral of D' over the depth, better for thin windings:
     // D' = int 3/2 a u (2 u^2 - 3 a^2) / (a^2 + u^2)^(7/2) du from z to z + L.
@@ -369,6 +382,22 @@ fn axis_slopes(cell: &Cell, z_m: f64) -> [Interval; 3] {
     let kernel = a.square() * far / (s.square().square() * s) * 1.5;
     let by_length = (end(outer) - end(cell.inner)).and(kernel * cell.depth);
     [by_inner, at_outer, by_length]
+}
+
+/// D(a), one loop's field at the top less that at the bottom, over boxes.
+fn difference(a: Interval, z: Interval, length: Interval) -> Interval {
+    let far = z + length;
+    let distance = |a: f64, u: Interval| (Interval::point(a).square() + u.square()).sqrt();
+    let over = |u| Interval::new(distance(a.lo, u).lo, distance(a.hi, u).hi);
+    let (s1, s2) = (over(z), over(far));
+    // s1 / s2 grows with a.
+    let ratio = Interval::new(
+        (distance(a.lo, z) / distance(a.lo, far)).lo,
+        (distance(a.hi, z) / distance(a.hi, far)).hi,
+    );
+    let angle = rising(a, z);
+    let closer = (length / (s1 + s2)) * ((z + far) / s2);
+    angle.square() * closer * (ratio.square() + ratio + Interval::point(1.0)) / s1 * 0.5
 }
 
 /// a / sqrt(a^2 + u^2): grows with a, falls with u.

@@ -13,6 +13,7 @@ pub mod search;
 pub mod sequential;
 pub mod starts;
 pub mod valley;
+pub mod wound;
 #[cfg(test)]
 mod probe {
     use super::air::*; use super::problem::*; use super::model::*; use super::search::*;
@@ -26,6 +27,9 @@ mod probe {
         let t1=t.elapsed(); let t=std::time::Instant::now();
         let o2 = optimise(&air,&task,&Settings{cells:400000,..Settings::default()},&Silent).unwrap();
         println!("== {name}: {:?} {:?}\n   {:?} eval {} starts {} local {t1:?} all {:?} valley {:?}", o.status, o.best.as_ref().map(|b|(b.window,b.force_n,b.turns)), o2.certificate, o.evaluations,o.starts,t.elapsed(), o2.valley_m);
+        let t=std::time::Instant::now();
+        let wo = super::wound::optimise_wound(&air,&task,&Settings{cells:400000,..Settings::default()},&Silent).unwrap();
+        println!("   WOUND {:?} {:?} alt {} {:?} in {:?}", wo.best.as_ref().map(|b|(b.layers,b.turns_per_layer,b.window.inner_radius_m*2e3,b.force_n,b.power_w)), wo.certificate, wo.alternatives.len(), wo.alternatives.iter().take(3).map(|b|(b.layers,b.turns_per_layer,b.force_n)).collect::<Vec<_>>(), t.elapsed());
         if let Some(b)=o2.best { for l in b.limits { if l.active {println!("     {} {} {} {}", l.name.key(), l.value,l.limit,l.sensitivity_n_per_unit);} } }
     }
     #[test] fn probe() {

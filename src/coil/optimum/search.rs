@@ -69,44 +69,10 @@ pub fn optimise(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Outcome, Interrupted> {
-    let mut problems: Vec<Solved<'_>> = task
-        .strands
-        .iter()
-        .flat_map(|&strand| Problem::of_wire(model, task, strand))
-        .map(|problem| Solved {
-            contradiction: Domain::contradiction(&problem),
-            missing: Domain::of(&problem).missing(&problem),
-            problem,
-            best: None,
-            evaluations: 0,
-            starts: 0,
-        })
-        .collect();
-    let open = |solved: &Solved<'_>| solved.contradiction.is_none() && solved.missing.is_empty();
-    let unbounded = problems
-        .iter()
-        .find(|s| s.contradiction.is_none() && !s.missing.is_empty())
-        .map(|s| s.missing.clone());
-    if let Some(missing) = unbounded {
-        return Ok(without_coil(Status::Unbounded { missing }, &problems));
-    }
-    let total = problems.iter().filter(|s| open(s)).count() * settings.starts;
-    progress.begin("optimise", total as u64);
-    let mut best_n = 0.0;
-    for solved in problems.iter_mut().filter(|s| open(s)) {
-        multistart(solved, settings, progress)?;
-        if let Some(force_n) = solved.force_n()
-            && force_n > best_n
-        {
-            best_n = force_n;
-            progress.improved(force_n);
-        }
-    }
-    progress.end();
-    if best_n <= 0.0 {
-        let status = diagnosis::why_none(&problems, settings, progress)?;
-        return Ok(without_coil(status, &problems));
-    }
+    let mut problems = match solve_all(model, task, settings, progress)? {
+        Ok(problems) => problems,
+        Err((status, problems)) => return Ok(without_coil(status, &problems)),
+    };
     let certificate = certify(&mut problems, settings, progress)?;
     let winner = best_of(&problems);
     let Some(winner) = winner else {
@@ -128,6 +94,55 @@ pub fn optimise(
         starts: problems.iter().map(|s| s.starts).sum(),
         valley_m,
     })
+}
+
+/// Every problem with its best local optimum, or the status that says why there is none.
+#[allow(clippy::type_complexity)]
+pub(super) fn solve_all<'a>(
+    model: &'a dyn CoilModel,
+    task: &'a Task,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Result<Vec<Solved<'a>>, (Status, Vec<Solved<'a>>)>, Interrupted> {
+    let mut problems: Vec<Solved<'_>> = task
+        .strands
+        .iter()
+        .flat_map(|&strand| Problem::of_wire(model, task, strand))
+        .map(|problem| Solved {
+            contradiction: Domain::contradiction(&problem),
+            missing: Domain::of(&problem).missing(&problem),
+            problem,
+            best: None,
+            evaluations: 0,
+            starts: 0,
+        })
+        .collect();
+    let open = |solved: &Solved<'_>| solved.contradiction.is_none() && solved.missing.is_empty();
+    let unbounded = problems
+        .iter()
+        .find(|s| s.contradiction.is_none() && !s.missing.is_empty())
+        .map(|s| s.missing.clone());
+    if let Some(missing) = unbounded {
+        return Ok(Err((Status::Unbounded { missing }, problems)));
+    }
+    let total = problems.iter().filter(|s| open(s)).count() * settings.starts;
+    progress.begin("optimise", total as u64);
+    let mut best_n = 0.0;
+    for solved in problems.iter_mut().filter(|s| open(s)) {
+        multistart(solved, settings, progress)?;
+        if let Some(force_n) = solved.force_n()
+            && force_n > best_n
+        {
+            best_n = force_n;
+            progress.improved(force_n);
+        }
+    }
+    progress.end();
+    if best_n <= 0.0 {
+        let status = diagnosis::why_none(&problems, settings, progress)?;
+        return Ok(Err((status, problems)));
+    }
+    Ok(Ok(problems))
 }
 
 pub(super) fn best_of<'b, 'a>(problems: &'b [Solved<'a>]) -> Option<&'b Solved<'a>> {

@@ -4,7 +4,7 @@ use super::model::Window;
 use super::problem::{Fixed, LimitName, Problem, Task};
 use super::scalar;
 use super::search::{Solved, keep_better};
-use super::sequential::{self, Local};
+use super::sequential::{self, FEASIBLE, Local};
 use super::domain::Domain;
 use crate::progress::{Interrupted, Progress};
 
@@ -71,16 +71,30 @@ fn best_ln_at(problem: &Problem<'_>, near: &Window, inner_m: f64) -> f64 {
     };
     let fixed = problem.with_task(&task);
     let outer = near.outer_radius_m();
-    let mut best: Option<Local> = None;
-    for depth_m in [outer - inner_m, near.depth_m] {
-        let window = Window {
+    let starts = [outer - inner_m, near.depth_m].map(|depth_m| {
+        Problem::coordinates(&Window {
             inner_radius_m: inner_m,
             depth_m: depth_m.max(problem.strand.diameter_m),
             length_m: near.length_m,
-        };
-        if let Some(local) = sequential::solve(&fixed, Problem::coordinates(&window)) {
-            keep_better(&fixed, &mut best, local);
+        })
+    });
+    // The settling time is costly to know and often holds nothing back.
+    if let Some(relaxed) = fixed.without_settling()
+        && let Some(local) = best_from(&relaxed, &starts)
+        && let Some(adopted) = fixed.adopted(&relaxed, &local)
+        && adopted.violation(&fixed) <= FEASIBLE
+    {
+        return -adopted.point.objective;
+    }
+    best_from(&fixed, &starts).map_or(f64::NEG_INFINITY, |local| -local.point.objective)
+}
+
+fn best_from(problem: &Problem<'_>, starts: &[[f64; 3]]) -> Option<Local> {
+    let mut best = None;
+    for &start in starts {
+        if let Some(local) = sequential::solve(problem, start) {
+            keep_better(problem, &mut best, local);
         }
     }
-    best.map_or(f64::NEG_INFINITY, |local| -local.point.objective)
+    best
 }
