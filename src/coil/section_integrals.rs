@@ -219,7 +219,10 @@ mod tests {
             let error = value / exact - 1.0;
             // The outer radius is rounded against the inner one.
             let rounding = 4.0 * f64::EPSILON * a / w;
-            assert!(error.abs() < FINE.relative_error + rounding, "{a} {w} {l}: {error:e}");
+            assert!(
+                error.abs() < FINE.relative_error + rounding,
+                "{a} {w} {l}: {error:e}"
+            );
         }
     }
 
@@ -234,7 +237,11 @@ mod tests {
                 (fine.inner, rough.inner, fine.by_depth),
                 (fine.by_length, rough.by_length, fine.by_length),
             ] {
-                assert!((x - y).abs() < ROUGH.relative_error * size, "{a} {w} {l}: {:e}", (x - y) / size);
+                assert!(
+                    (x - y).abs() < ROUGH.relative_error * size,
+                    "{a} {w} {l}: {:e}",
+                    (x - y) / size
+                );
             }
         }
     }
@@ -257,7 +264,8 @@ mod tests {
             let size = a * base.by_depth + w * slope[1] + l * slope[2];
             assert!(
                 (sum - 5.0 * base.value).abs() < FINE.relative_error * size,
-                "{a} {w} {l}: {:e}", (sum - 5.0 * base.value) / size
+                "{a} {w} {l}: {:e}",
+                (sum - 5.0 * base.value) / size
             );
             let remainder = |i: usize, h: f64| {
                 let mut x = [a, w, l];
@@ -268,7 +276,10 @@ mod tests {
             };
             for i in 0..3 {
                 let (coarse, fine) = (remainder(i, 2e-2), remainder(i, 2e-3));
-                assert!(fine < 0.02 * coarse || coarse < 1e-6, "{a} {w} {l} {i}: {coarse:e} {fine:e}");
+                assert!(
+                    fine < 0.02 * coarse || coarse < 1e-6,
+                    "{a} {w} {l} {i}: {coarse:e} {fine:e}"
+                );
             }
         }
     }

@@ -93,7 +93,12 @@ impl CoilModel for AirCoil {
             );
             inductance_h = Sloped {
                 value: sums.value,
-                slope: [sums.by_depth - sums.inner, sums.by_depth, sums.by_length, 0.0],
+                slope: [
+                    sums.by_depth - sums.inner,
+                    sums.by_depth,
+                    sums.by_length,
+                    0.0,
+                ],
             }
             .times(MU_0_T_M_PER_A * turns_per_m2 * turns_per_m2);
         }

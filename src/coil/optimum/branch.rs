@@ -79,8 +79,14 @@ pub fn whole(domain: &Domain) -> Cell {
     let inner_hi = domain.inner_m[1].min(domain.outer_m[1] - domain.depth_min_m);
     Cell {
         inner: Interval::new(domain.inner_m[0], inner_hi.max(domain.inner_m[0])),
-        depth: Interval::new(domain.depth_min_m, (domain.outer_m[1] - domain.inner_m[0]).max(domain.depth_min_m)),
-        length: Interval::new(domain.length_m[0], domain.length_m[1].max(domain.length_m[0])),
+        depth: Interval::new(
+            domain.depth_min_m,
+            (domain.outer_m[1] - domain.inner_m[0]).max(domain.depth_min_m),
+        ),
+        length: Interval::new(
+            domain.length_m[0],
+            domain.length_m[1].max(domain.length_m[0]),
+        ),
     }
 }
 
@@ -106,7 +112,9 @@ pub fn prove(
     let mut proof = Proof::nothing();
     let mut queue = VecDeque::from([(cell, f64::INFINITY)]);
     while queue.len() < PORTIONS {
-        let Some((cell, _)) = queue.pop_front() else { break };
+        let Some((cell, _)) = queue.pop_front() else {
+            break;
+        };
         search.visit(cell, &mut proof, |half| queue.push_back(half));
         if proof.better.is_some() {
             return Ok(proof);
@@ -206,11 +214,7 @@ impl Search<'_> {
 fn halves(cell: &Cell) -> Option<[Cell; 2]> {
     let (a, w, l) = (cell.inner, cell.depth, cell.length);
     let wide = |i: Interval, size: f64| (i.hi - i.lo) / size;
-    let widths = [
-        wide(a, a.hi + 0.5 * w.hi),
-        wide(w, w.hi),
-        wide(l, l.hi),
-    ];
+    let widths = [wide(a, a.hi + 0.5 * w.hi), wide(w, w.hi), wide(l, l.hi)];
     let most = (0..3).max_by(|&i, &j| widths[i].total_cmp(&widths[j]))?;
     let (mut low, mut high) = (*cell, *cell);
     let (below, above) = match most {

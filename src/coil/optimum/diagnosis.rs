@@ -1,8 +1,8 @@
 //! Why there is no coil, and which limit is nearest to blame.
 
+use super::domain::Domain;
 use super::model::Window;
 use super::outcome::{Status, Violation};
-use super::domain::Domain;
 use super::problem::{LimitName, Problem, Regime};
 use super::search::{Settings, Solved};
 use super::sequential::{self, FEASIBLE, Local, Point, Smooth};
@@ -73,7 +73,10 @@ pub(super) fn why_none(
             if local.violation(&Violated(problem)) > 1e3 * FEASIBLE {
                 continue;
             }
-            if least.as_ref().is_some_and(|(sum, ..)| *sum <= local.point.objective) {
+            if least
+                .as_ref()
+                .is_some_and(|(sum, ..)| *sum <= local.point.objective)
+            {
                 continue;
             }
             let window = Problem::window(local.x);
@@ -106,7 +109,7 @@ pub(super) fn why_none(
 }
 
 /// What a window breaks, worst first.
-fn violations(problem: &Problem<'_>, window: Window) -> Vec<Violation> {
+pub(super) fn violations(problem: &Problem<'_>, window: Window) -> Vec<Violation> {
     let Some(rated) = problem.rate(window) else {
         return Vec::new();
     };
@@ -116,7 +119,10 @@ fn violations(problem: &Problem<'_>, window: Window) -> Vec<Violation> {
         .iter()
         .zip(&rated.values)
         .zip(&point.rows)
-        .filter(|((bound, _), row)| **row > FEASIBLE && !bound.name.is_geometry())
+        .filter(|((bound, _), row)| {
+            let given = bound.name.is_equality() && row.abs() > FEASIBLE;
+            given || (**row > FEASIBLE && !bound.name.is_geometry())
+        })
         .map(|((bound, value), &row)| Violation {
             name: bound.name,
             value: value.value,

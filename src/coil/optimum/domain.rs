@@ -73,20 +73,23 @@ impl Domain {
             most = most.min(resistance / per_volume);
         }
         let half = |name, default: f64| limit(name).map_or(default, |v| 0.5 * v);
-        let inner_m = limit(LimitName::FixedInner).map_or(
-            [half(LimitName::InnerDiameter, 0.0), f64::INFINITY],
-            |v| [0.5 * v; 2],
-        );
-        let outer_m = limit(LimitName::FixedOuter).map_or(
-            [0.0, half(LimitName::OuterDiameter, f64::INFINITY)],
-            |v| [0.5 * v; 2],
-        );
+        let inner_m = limit(LimitName::FixedInner)
+            .map_or([half(LimitName::InnerDiameter, 0.0), f64::INFINITY], |v| {
+                [0.5 * v; 2]
+            });
+        let outer_m = limit(LimitName::FixedOuter)
+            .map_or([0.0, half(LimitName::OuterDiameter, f64::INFINITY)], |v| {
+                [0.5 * v; 2]
+            });
         let length_m = limit(LimitName::FixedLength).map_or(
             [wire_m, limit(LimitName::Length).unwrap_or(f64::INFINITY)],
             |v| [v; 2],
         );
         Self {
-            inner_m: [inner_m[0], inner_m[1].min(outer_m[1] - wire_m).max(inner_m[0])],
+            inner_m: [
+                inner_m[0],
+                inner_m[1].min(outer_m[1] - wire_m).max(inner_m[0]),
+            ],
             outer_m: [outer_m[0].max(inner_m[0] + wire_m), outer_m[1]],
             depth_min_m: wire_m,
             length_m,
@@ -100,7 +103,8 @@ impl Domain {
     pub fn contradiction(problem: &Problem<'_>) -> Option<Contradiction> {
         let limit = |name| problem.limit_of(name);
         let wanted = &problem.task.limits;
-        let either = |a: LimitName, b: LimitName| limit(a).map(|v| (a, v)).or(limit(b).map(|v| (b, v)));
+        let either =
+            |a: LimitName, b: LimitName| limit(a).map(|v| (a, v)).or(limit(b).map(|v| (b, v)));
         let mm = |v: f64| format!("{:.6} mm", v * 1e3);
         let fixed = &problem.task.fixed;
         let clash = |between: [LimitName; 2], by: f64, message: String| {
@@ -111,9 +115,27 @@ impl Domain {
             })
         };
         for (given, bound, name, fixed_name, lower) in [
-            (fixed.inner_diameter_m, wanted.inner_diameter_min_m, LimitName::InnerDiameter, LimitName::FixedInner, true),
-            (fixed.outer_diameter_m, wanted.outer_diameter_max_m, LimitName::OuterDiameter, LimitName::FixedOuter, false),
-            (fixed.length_m, wanted.length_max_m, LimitName::Length, LimitName::FixedLength, false),
+            (
+                fixed.inner_diameter_m,
+                wanted.inner_diameter_min_m,
+                LimitName::InnerDiameter,
+                LimitName::FixedInner,
+                true,
+            ),
+            (
+                fixed.outer_diameter_m,
+                wanted.outer_diameter_max_m,
+                LimitName::OuterDiameter,
+                LimitName::FixedOuter,
+                false,
+            ),
+            (
+                fixed.length_m,
+                wanted.length_max_m,
+                LimitName::Length,
+                LimitName::FixedLength,
+                false,
+            ),
         ] {
             if let (Some(given), Some(bound)) = (given, bound) {
                 let excess = if lower { bound - given } else { given - bound };
@@ -121,7 +143,12 @@ impl Domain {
                     return clash(
                         [name, fixed_name],
                         excess,
-                        format!("the given {} of {} is outside its limit of {}", name.key(), mm(given), mm(bound)),
+                        format!(
+                            "the given {} of {} is outside its limit of {}",
+                            name.key(),
+                            mm(given),
+                            mm(bound)
+                        ),
                     );
                 }
             }
@@ -139,7 +166,10 @@ impl Domain {
                     format!(
                         "an outer diameter of {} leaves no room for one layer of {} wire around a \
                          bore of {}: {} are missing",
-                        mm(outer_m), mm(wire_m), mm(inner_m), mm(missing)
+                        mm(outer_m),
+                        mm(wire_m),
+                        mm(inner_m),
+                        mm(missing)
                     ),
                 );
             }
@@ -151,7 +181,11 @@ impl Domain {
             return clash(
                 [name, LimitName::OneTurn],
                 wire_m - length_m,
-                format!("a length of {} leaves no room for one turn of {} wire", mm(length_m), mm(wire_m)),
+                format!(
+                    "a length of {} leaves no room for one turn of {} wire",
+                    mm(length_m),
+                    mm(wire_m)
+                ),
             );
         }
         let volume = Self::of(problem).volume_m3;
@@ -165,7 +199,10 @@ impl Domain {
             return clash(
                 [LimitName::Resistance, lower],
                 (ratio - 1.0) * volume[1] * problem.strand.resistance_per_volume(),
-                format!("the least resistance that {} asks for is {ratio} times the largest allowed", lower.key()),
+                format!(
+                    "the least resistance that {} asks for is {ratio} times the largest allowed",
+                    lower.key()
+                ),
             );
         }
         None

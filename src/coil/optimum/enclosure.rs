@@ -136,18 +136,30 @@ impl<'a> Bounding<'a> {
             // (2 a + w) w l within the volumes.
             let [least, most] = domain.volume_m3;
             let ring = |a: f64, w: f64| (2.0 * a + w) * w;
-            if !meet(&mut cell.length, least / ring(a.hi, w.hi), most / ring(a.lo, w.lo)) {
+            if !meet(
+                &mut cell.length,
+                least / ring(a.hi, w.hi),
+                most / ring(a.lo, w.lo),
+            ) {
                 return None;
             }
             let inner = |v: f64, w: f64, l: f64| 0.5 * (v / (w * l) - w);
             let lo = inner(least, w.hi, l.hi);
-            if !meet(&mut cell.inner, lo.max(0.0).min(a.hi), inner(most, w.lo, l.lo)) {
+            if !meet(
+                &mut cell.inner,
+                lo.max(0.0).min(a.hi),
+                inner(most, w.lo, l.lo),
+            ) {
                 return None;
             }
             // w^2 + 2 a w = v / l.
             let depth = |v: f64, a: f64, l: f64| {
                 let c = v / l;
-                if c.is_finite() { c / (a + (a * a + c).sqrt()) } else { c }
+                if c.is_finite() {
+                    c / (a + (a * a + c).sqrt())
+                } else {
+                    c
+                }
             };
             let lo = depth(least, a.hi, l.hi).min(w.hi);
             if !meet(&mut cell.depth, lo, depth(most, a.lo, l.lo)) {
@@ -216,7 +228,8 @@ impl<'a> Bounding<'a> {
         if bound > enough && self.with_settling {
             let settling = self.settling(cell)?;
             if let Some(of_force) = slopes {
-                let lagrangian = self.mean_value(cell, of_force, self.multipliers, settling.as_ref());
+                let lagrangian =
+                    self.mean_value(cell, of_force, self.multipliers, settling.as_ref());
                 bound = bound.min(lagrangian);
             }
         }
@@ -279,7 +292,13 @@ impl<'a> Bounding<'a> {
         };
         let volume_m = (2.0 * a_m + w_m) * w_m * l_m;
         let mut value = self.ln_force_at(&middle);
-        let term = |weight: f64, ratio: f64| if weight == 0.0 { 0.0 } else { weight * ratio.ln() };
+        let term = |weight: f64, ratio: f64| {
+            if weight == 0.0 {
+                0.0
+            } else {
+                weight * ratio.ln()
+            }
+        };
         value -= term(lambda.most, volume_m / domain.volume_m3[1]);
         value += term(lambda.least, volume_m / domain.volume_m3[0]);
         value -= term(lambda.outer, (a_m + w_m) / domain.outer_m[1]);
@@ -364,14 +383,18 @@ fn axis_slopes(cell: &Cell, z_m: f64) -> [Interval; 3] {
     let outer = cell.inner + cell.depth;
     let z = Interval::point(z_m);
     let far = z + cell.length;
-    let (at_inner, at_outer) = (difference(cell.inner, z, cell.length), difference(outer, z, cell.length));
+    let (at_inner, at_outer) = (
+        difference(cell.inner, z, cell.length),
+        difference(outer, z, cell.length),
+    );
     let by_difference = at_outer - at_inner;
     // The same as the integral of D' over the depth, better for thin windings:
     // D' = int 3/2 a u (2 u^2 - 3 a^2) / (a^2 + u^2)^(7/2) du from z to z + L.
     let a = Interval::new(cell.inner.lo, outer.hi);
     let u = Interval::new(z_m, far.hi);
     let s = (a.square() + u.square()).sqrt();
-    let curl = a * u * (u.square() * 2.0 - a.square() * 3.0) / (s.square().square() * s.square() * s);
+    let curl =
+        a * u * (u.square() * 2.0 - a.square() * 3.0) / (s.square().square() * s.square() * s);
     let by_inner = by_difference.and(curl * cell.length * cell.depth * 1.5);
     // E(a2) - E(a1), and as the integral of 3/2 a^2 u / (a^2 + u^2)^(5/2) over the depth.
     let end = |a: Interval| {

@@ -1,57 +1,46 @@
-//! The coil of equation 11.
+//! The coil of equation 11: the strongest force at the target within the limits.
+//!
+//! Variables are the inner and outer radius and the length; turns are what fits,
+//! N = (a2 - a1)/d x L/d, not rounded in the continuous problem. At least one layer and one turn
+//! a layer must fit: less is no coil. The rated current is min(I_max, V/R).
+//!
+//! 1. `problem`: in logarithms of mean radius, depth and length, limits become ratios of order
+//!    one and the amount of wire a plane, whatever the scale. Where the driver gives way to the
+//!    supply the force has a kink: either side is solved as its own smooth problem.
+//! 2. `search`: from many starts, `sequential` quadratic steps with exact active sets, then
+//!    Newton on the optimality conditions: coils and multipliers to 1e-10. The settling time,
+//!    whose inductance costs a thousand times more than the force, is left out first: a best coil
+//!    that meets it anyway needs no more.
+//! 3. `branch`: force, wire and inductance are monotone in the window, so boxes of coils are
+//!    bounded by their corners and, with `enclosure`'s interval derivatives and the multipliers,
+//!    to second order. No coil is better than the bound: that is the certificate.
+//! 4. `wound`: whole layers and turns under the same bounds.
+//!
+//! argmin has no solver for nonlinear limits; it does what is a search in one variable
+//! (`scalar`). A cored coil enters through [`model::CoilModel`]: it is solved alike, its
+//! certificate is of kind `multistart`.
+
 pub mod air;
 pub mod axis_gradient;
 pub mod branch;
-pub mod diagnosis;
+mod diagnosis;
 pub mod domain;
 pub mod enclosure;
 pub mod model;
 pub mod outcome;
 pub mod problem;
-pub mod scalar;
+mod scalar;
 pub mod search;
 pub mod sequential;
 pub mod starts;
+pub mod task;
+#[cfg(test)]
+mod tests;
 pub mod valley;
 pub mod wound;
-#[cfg(test)]
-mod probe {
-    use super::air::*; use super::problem::*; use super::model::*; use super::search::*;
-    use crate::design::*; use crate::field::magnet::MagnetRule; use crate::progress::Silent;
-    fn run(name:&str, d:f64, h:f64, limits:Limits, fixed:Fixed, v:Option<f64>) {
-        let wire = Wire{diameter_m:d,conductor_diameter_m:d,resistivity_ohm_m:1.68e-8,temperature_c:20.0,choices_m:vec![]};
-        let air = AirCoil::new(h,&MagnetRule::dipole([0.0,0.0,-0.90941])).unwrap();
-        let task = Task{limits,fixed,current_max_a:2.0,voltage_v:v,strands:Strand::choices(&wire)};
-        let t=std::time::Instant::now();
-        let o = optimise(&air,&task,&Settings{valley:false,cells:0,..Settings::default()},&Silent).unwrap();
-        let t1=t.elapsed(); let t=std::time::Instant::now();
-        let o2 = optimise(&air,&task,&Settings{cells:400000,..Settings::default()},&Silent).unwrap();
-        println!("== {name}: {:?} {:?}\n   {:?} eval {} starts {} local {t1:?} all {:?} valley {:?}", o.status, o.best.as_ref().map(|b|(b.window,b.force_n,b.turns)), o2.certificate, o.evaluations,o.starts,t.elapsed(), o2.valley_m);
-        let t=std::time::Instant::now();
-        let wo = super::wound::optimise_wound(&air,&task,&Settings{cells:400000,..Settings::default()},&Silent).unwrap();
-        println!("   WOUND {:?} {:?} alt {} {:?} in {:?}", wo.best.as_ref().map(|b|(b.layers,b.turns_per_layer,b.window.inner_radius_m*2e3,b.force_n,b.power_w)), wo.certificate, wo.alternatives.len(), wo.alternatives.iter().take(3).map(|b|(b.layers,b.turns_per_layer,b.force_n)).collect::<Vec<_>>(), t.elapsed());
-        if let Some(b)=o2.best { for l in b.limits { if l.active {println!("     {} {} {} {}", l.name.key(), l.value,l.limit,l.sensitivity_n_per_unit);} } }
-    }
-    #[test] fn probe() {
-        let seed=Limits{resistance_max_ohm:Some(6.0),settling_max_s:Some(0.1),outer_diameter_max_m:Some(0.038),length_max_m:Some(0.1),..Default::default()};
-        let f=Fixed::default();
-        run("seed",0.0007,0.03,seed,f,Some(36.0));
-        run("seed od50",0.0007,0.03,Limits{outer_diameter_max_m:Some(0.05),..seed},f,Some(36.0));
-        run("noset",0.0007,0.03,Limits{settling_max_s:None,..seed},f,Some(36.0));
-        run("R only",0.0007,0.03,Limits{resistance_max_ohm:Some(6.0),..Default::default()},f,None);
-        run("V only",0.0007,0.03,Limits::default(),f,Some(36.0));
-        run("V + R50",0.0007,0.03,Limits{resistance_max_ohm:Some(50.0),..Default::default()},f,Some(36.0));
-        run("V + P",0.0007,0.03,Limits{power_max_w:Some(10.0),..seed},f,Some(36.0));
-        run("tau10 od50",0.0007,0.03,Limits{settling_max_s:Some(0.01),outer_diameter_max_m:Some(0.05),..seed},f,Some(36.0));
-        run("tau only sized",0.0007,0.03,Limits{settling_max_s:Some(0.01),outer_diameter_max_m:Some(0.5),length_max_m:Some(0.5),..Default::default()},f,None);
-        run("tau only",0.0007,0.03,Limits{settling_max_s:Some(0.01),..Default::default()},f,None);
-        run("thin wire far",0.00005,100.0,Limits{..seed},f,Some(36.0));
-        run("unbounded",0.0007,0.03,Limits{length_max_m:Some(0.1),..Default::default()},f,None);
-        run("tiny R",0.0007,0.03,Limits{resistance_max_ohm:Some(1e-6),..seed},f,Some(36.0));
-        run("contra",0.0007,0.03,Limits{inner_diameter_min_m:Some(0.04),..seed},f,Some(36.0));
-        run("fixed bore",0.0007,0.03,seed,Fixed{inner_diameter_m:Some(0.024),..f},Some(36.0));
-        run("fixed all",0.0007,0.03,seed,Fixed{inner_diameter_m:Some(0.024),outer_diameter_m:Some(0.038),length_m:Some(0.09)},Some(36.0));
-        run("fixed od",0.0007,0.03,seed,Fixed{outer_diameter_m:Some(0.036),..f},Some(36.0));
-        run("idmin mass",0.0007,0.03,Limits{inner_diameter_min_m:Some(0.02),mass_max_kg:Some(0.1),..seed},f,Some(36.0));
-    }
-}
+
+pub use model::{CoilModel, Strand, Window};
+pub use outcome::{BestCoil, Certificate, CertificateKind, LimitUse, Outcome, Status};
+pub use problem::{Fixed, LimitName, Task};
+pub use search::{Settings, optimise};
+pub use wound::{WoundCoil, WoundOutcome, optimise_wound};

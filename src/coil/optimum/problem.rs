@@ -109,7 +109,10 @@ impl LimitName {
     /// Whether the value is given.
     #[must_use]
     pub fn is_equality(self) -> bool {
-        matches!(self, Self::FixedInner | Self::FixedOuter | Self::FixedLength)
+        matches!(
+            self,
+            Self::FixedInner | Self::FixedOuter | Self::FixedLength
+        )
     }
 
     /// Whether it follows from geometry and cannot be blamed on a wish.
@@ -198,7 +201,10 @@ impl<'a> Problem<'a> {
         );
         // A limit of zero is the axis.
         let inner = limits.inner_diameter_min_m.filter(|&limit| limit > 0.0);
-        add(LimitName::InnerDiameter, free(fixed.inner_diameter_m, inner));
+        add(
+            LimitName::InnerDiameter,
+            free(fixed.inner_diameter_m, inner),
+        );
         add(LimitName::Length, free(fixed.length_m, limits.length_max_m));
         add(LimitName::Resistance, limits.resistance_max_ohm);
         add(LimitName::Settling, limits.settling_max_s);

@@ -33,19 +33,26 @@ pub fn root(f: impl Fn(f64) -> f64, lo: f64, hi: f64, tolerance: f64) -> Option<
 #[must_use]
 pub fn maximum(f: impl Fn(f64) -> f64, lo: f64, hi: f64) -> (f64, f64) {
     let (at_lo, at_hi) = (f(lo), f(hi));
-    let ends = if at_hi > at_lo { (hi, at_hi) } else { (lo, at_lo) };
+    let ends = if at_hi > at_lo {
+        (hi, at_hi)
+    } else {
+        (lo, at_lo)
+    };
     if !(hi - lo > f64::EPSILON * hi.abs()) {
         return ends;
     }
-    let inside = Executor::new(Of(|x| -f(x)), BrentOpt::new(lo, hi).set_tolerance(1e-8, 0.0))
-        .configure(|state| state.max_iters(ITERATIONS))
-        .timer(false)
-        .run()
-        .ok()
-        .and_then(|result| {
-            let state = result.state();
-            Some((*state.get_best_param()?, -state.get_best_cost()))
-        });
+    let inside = Executor::new(
+        Of(|x| -f(x)),
+        BrentOpt::new(lo, hi).set_tolerance(1e-8, 0.0),
+    )
+    .configure(|state| state.max_iters(ITERATIONS))
+    .timer(false)
+    .run()
+    .ok()
+    .and_then(|result| {
+        let state = result.state();
+        Some((*state.get_best_param()?, -state.get_best_cost()))
+    });
     match inside {
         Some((x, value)) if value > ends.1 => (x, value),
         _ => ends,

@@ -55,7 +55,9 @@ pub(super) struct Solved<'a> {
 
 impl Solved<'_> {
     pub fn force_n(&self) -> Option<f64> {
-        self.best.as_ref().map(|local| (-local.point.objective).exp())
+        self.best
+            .as_ref()
+            .map(|local| (-local.point.objective).exp())
     }
 }
 
@@ -77,7 +79,10 @@ pub fn optimise(
     let winner = best_of(&problems);
     let Some(winner) = winner else {
         // best_n > 0 means one has been found.
-        return Ok(without_coil(Status::Unbounded { missing: vec![] }, &problems));
+        return Ok(without_coil(
+            Status::Unbounded { missing: vec![] },
+            &problems,
+        ));
     };
     let best = describe(winner);
     let valley_m = if settings.valley {
@@ -356,9 +361,12 @@ fn bound(
     cells: &mut usize,
     progress: &dyn Progress,
 ) -> Result<(f64, Option<Window>), Interrupted> {
-    let multipliers = solved.best.as_ref().map_or_else(Multipliers::default, |local| {
-        Multipliers::of(&solved.problem, &local.multipliers)
-    });
+    let multipliers = solved
+        .best
+        .as_ref()
+        .map_or_else(Multipliers::default, |local| {
+            Multipliers::of(&solved.problem, &local.multipliers)
+        });
     let limited = domain.settling_max_s.is_finite();
     let rounds: &[bool] = match (limited, multipliers.settling > 0.0) {
         (false, _) => &[false],
@@ -367,8 +375,7 @@ fn bound(
     };
     let mut bound_ln = f64::INFINITY;
     for &with_settling in rounds {
-        let Some(bounding) =
-            Bounding::new(&solved.problem, domain, multipliers, with_settling)
+        let Some(bounding) = Bounding::new(&solved.problem, domain, multipliers, with_settling)
         else {
             break;
         };
@@ -398,7 +405,10 @@ fn describe(solved: &Solved<'_>) -> Option<BestCoil> {
     let problem = &solved.problem;
     let window = diagnosis::snapped(problem, local);
     let rated = problem.rate(window)?;
-    let strongest = local.multipliers.iter().fold(0.0_f64, |s, v| s.max(v.abs()));
+    let strongest = local
+        .multipliers
+        .iter()
+        .fold(0.0_f64, |s, v| s.max(v.abs()));
     let limits = problem
         .bounds
         .iter()

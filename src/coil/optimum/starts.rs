@@ -18,7 +18,10 @@ pub fn start(domain: &Domain, scale_m: f64, seed: u64, index: usize) -> [f64; 3]
     let mut window = Problem::window(x);
     let mean = window.inner_radius_m + 0.5 * window.depth_m;
     let room = 2.0 * (domain.outer_m[1] - mean).min(mean - domain.inner_m[0]);
-    let depth_m = window.depth_m.min(room.max(domain.depth_min_m)).min(2.0 * mean);
+    let depth_m = window
+        .depth_m
+        .min(room.max(domain.depth_min_m))
+        .min(2.0 * mean);
     window = Window {
         inner_radius_m: mean - 0.5 * depth_m,
         depth_m,

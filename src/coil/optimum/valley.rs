@@ -1,11 +1,11 @@
 //! The flat valley: bores that cost next to no force, all else re-optimised.
 
+use super::domain::Domain;
 use super::model::Window;
 use super::problem::{Fixed, LimitName, Problem, Task};
 use super::scalar;
 use super::search::{Solved, keep_better};
 use super::sequential::{self, FEASIBLE, Local};
-use super::domain::Domain;
 use crate::progress::{Interrupted, Progress};
 
 /// Share of the best force that a coil in the valley may lack.
@@ -34,7 +34,9 @@ pub(super) fn bores_m(
     let domain = Domain::of(problem);
     let at = window.inner_radius_m;
     let size = window.outer_radius_m();
-    let lowest = problem.limit_of(LimitName::InnerDiameter).map_or(0.0, |v| 0.5 * v);
+    let lowest = problem
+        .limit_of(LimitName::InnerDiameter)
+        .map_or(0.0, |v| 0.5 * v);
     let highest = (domain.outer_m[1] - domain.depth_min_m).min(at + 64.0 * size);
     let mut ends = [at, at];
     for (end, limit) in ends.iter_mut().zip([lowest, highest]) {
@@ -52,8 +54,13 @@ pub(super) fn bores_m(
             inside = bore;
         }
         *end = match outside {
-            Some(outside) => scalar::root(margin, inside.min(outside), inside.max(outside), TOLERANCE * size)
-                .unwrap_or(inside),
+            Some(outside) => scalar::root(
+                margin,
+                inside.min(outside),
+                inside.max(outside),
+                TOLERANCE * size,
+            )
+            .unwrap_or(inside),
             None => limit,
         };
     }

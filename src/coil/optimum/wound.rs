@@ -10,11 +10,12 @@ use std::collections::{BTreeMap, VecDeque};
 use rayon::prelude::*;
 
 use super::branch::{self, GAP};
+use super::diagnosis;
 use super::domain::Domain;
 use super::enclosure::{Bounding, Cell, Multipliers};
 use super::model::{CoilModel, Strand, Window};
-use super::outcome::{Certificate, CertificateKind, LimitUse, Status};
-use super::problem::{LimitName, Problem, Task};
+use super::outcome::{Certificate, CertificateKind, LimitUse, Status, Violation};
+use super::problem::{LimitName, Problem, Regime, Task};
 use super::scalar;
 use super::search::{self, Settings, Solved};
 use super::sequential::FEASIBLE;
@@ -151,7 +152,11 @@ pub fn optimise_wound(
     for (index, solved) in open.iter().enumerate() {
         // Without a coil to compare with, any positive force counts.
         let reach_n = best_ln.max(-600.0).exp() * (1.0 - SHARE);
-        let domain = branch::finite_domain(&solved.problem, reach_n);
+        let domain = branch::finite_domain(&solved.problem, reach_n).or_else(|| {
+            // Nothing bounds the coil for certain: what is near the continuous optimum.
+            complete = false;
+            around_optimum(solved)
+        });
         let Some(part) = domain.and_then(|domain| Winder::new(solved, domain, best_ln)) else {
             complete = false;
             continue;
@@ -162,15 +167,11 @@ pub fn optimise_wound(
         progress.advance(1);
     }
     progress.end();
-    let Some(&(_, top)) = coils.iter().max_by(|a, b| a.1.ln_force.total_cmp(&b.1.ln_force)) else {
-        let status = Status::Infeasible {
-            violations: Vec::new(),
-            least: Window {
-                inner_radius_m: 0.0,
-                depth_m: 0.0,
-                length_m: 0.0,
-            },
-        };
+    let Some(&(_, top)) = coils
+        .iter()
+        .max_by(|a, b| a.1.ln_force.total_cmp(&b.1.ln_force))
+    else {
+        let status = rounded_status(&open);
         return Ok(none(status, continuous_n));
     };
     let mut list: Vec<WoundCoil> = coils
@@ -180,7 +181,9 @@ pub fn optimise_wound(
         .collect();
     list.sort_by(|a, b| b.force_n.total_cmp(&a.force_n));
     let best = list.first().cloned();
-    let alternatives = best.as_ref().map_or_else(Vec::new, |best| worth_a_look(best, &list));
+    let alternatives = best
+        .as_ref()
+        .map_or_else(Vec::new, |best| worth_a_look(best, &list));
     let upper_ln = found.upper_ln.unwrap_or(top.ln_force).max(top.ln_force);
     let gap = (upper_ln - top.ln_force).exp_m1();
     Ok(WoundOutcome {
@@ -201,6 +204,42 @@ pub fn optimise_wound(
     })
 }
 
+/// A finite box about a problem's continuous optimum.
+fn around_optimum(solved: &Solved<'_>) -> Option<Domain> {
+    const WIDER: f64 = 3.0;
+    let window = Problem::window(solved.best.as_ref()?.x);
+    let mut domain = Domain::of(&solved.problem);
+    domain.outer_m[1] = domain.outer_m[1].min(WIDER * window.outer_radius_m());
+    domain.length_m[1] = domain.length_m[1].min(WIDER * window.length_m);
+    Some(domain)
+}
+
+/// Why no coil can be wound though coils of any turns exist: what the nearest whole one breaks.
+fn rounded_status(open: &[&Solved<'_>]) -> Status {
+    let mut least: Option<(Vec<Violation>, Window)> = None;
+    for solved in open {
+        let Some(local) = &solved.best else { continue };
+        let wire_m = solved.problem.strand.diameter_m;
+        let mut window = Problem::window(local.x);
+        let whole = |length_m: f64| (length_m / wire_m).floor().max(1.0) * wire_m;
+        window.depth_m = whole(window.depth_m);
+        window.length_m = whole(window.length_m);
+        let broken = diagnosis::violations(&solved.problem, window);
+        if least.is_none() {
+            least = Some((broken, window));
+        }
+    }
+    let (violations, least) = least.unwrap_or((
+        Vec::new(),
+        Window {
+            inner_radius_m: 0.0,
+            depth_m: 0.0,
+            length_m: 0.0,
+        },
+    ));
+    Status::Infeasible { violations, least }
+}
+
 /// Coils next to a problem's continuous optimum.
 fn near_continuous(solved: &Solved<'_>) -> Vec<Leaf> {
     let Some(local) = &solved.best else {
@@ -218,7 +257,10 @@ fn near_continuous(solved: &Solved<'_>) -> Vec<Leaf> {
     let mut leaves = Vec::new();
     for layers in around(n) {
         for turns in around(m) {
-            let inner = Interval::new(domain.inner_m[0], domain.inner_m[1].min(4.0 * window.outer_radius_m()));
+            let inner = Interval::new(
+                domain.inner_m[0],
+                domain.inner_m[1].min(4.0 * window.outer_radius_m()),
+            );
             let lattice = Lattice {
                 layers: [layers; 2],
                 turns: [turns; 2],
@@ -258,9 +300,17 @@ fn best_bore(
         length_m: turns as f64 * wire_m,
     };
     let ln_force = |a: f64| bounding.ln_force_at(&window(a));
-    let (mut at, mut value) = scalar::maximum(ln_force, inner.lo, inner.hi);
+    // The contraction leaves rounding's slack on both sides.
+    let domain = &bounding.domain;
+    let lo = inner.lo.max(domain.inner_m[0]);
+    let depth_m = layers as f64 * wire_m;
+    let hi = inner.hi.min(domain.outer_m[1] - depth_m).max(lo);
+    let (mut at, mut value) = scalar::maximum(ln_force, lo, hi);
     let settling = problem.limit_of(LimitName::Settling);
-    let row = problem.bounds.iter().position(|b| b.name == LimitName::Settling);
+    let row = problem
+        .bounds
+        .iter()
+        .position(|b| b.name == LimitName::Settling);
     if let (Some(limit), Some(row)) = (settling, row) {
         let over = |a: f64| {
             problem
@@ -269,17 +319,28 @@ fn best_bore(
         };
         if over(at) > 0.0 {
             // A wider bore settles more slowly.
-            if over(inner.lo) > 0.0 {
+            if over(lo) > 0.0 {
                 return None;
             }
-            let end = scalar::root(over, inner.lo, at, 1e-13 * at)?;
-            let end = if over(end) > FEASIBLE { end * (1.0 - 1e-12) } else { end };
-            (at, value) = scalar::maximum(ln_force, inner.lo, end);
+            let end = scalar::root(over, lo, at, 1e-13 * at)?;
+            (at, value) = scalar::maximum(ln_force, lo, end);
         }
     }
-    let point = problem.scaled(&problem.rate(window(at))?);
+    let mut point = problem.scaled(&problem.rate(window(at))?);
+    // The last rounding is taken off the bore: a narrower coil has less wire.
+    let over = point.rows.iter().fold(0.0_f64, |most, &row| most.max(row));
+    if over > 0.0 && over <= FEASIBLE && problem.regime == Regime::Driver {
+        let less = (at - 4.0 * over * (at + depth_m)).max(lo);
+        point = problem.scaled(&problem.rate(window(less))?);
+        at = less;
+        value = ln_force(at);
+    }
     let met = point.rows.iter().enumerate().all(|(row, &value)| {
-        let value = if problem.bounds[row].name.is_equality() { value.abs() } else { value };
+        let value = if problem.bounds[row].name.is_equality() {
+            value.abs()
+        } else {
+            value
+        };
         value <= FEASIBLE
     });
     met.then(|| Leaf {
@@ -302,9 +363,12 @@ struct Winder<'a> {
 impl<'a> Winder<'a> {
     fn new(solved: &'a Solved<'a>, domain: Domain, best_ln: f64) -> Option<Self> {
         let problem = &solved.problem;
-        let multipliers = solved.best.as_ref().map_or_else(Multipliers::default, |local| {
-            Multipliers::of(problem, &local.multipliers)
-        });
+        let multipliers = solved
+            .best
+            .as_ref()
+            .map_or_else(Multipliers::default, |local| {
+                Multipliers::of(problem, &local.multipliers)
+            });
         let with_settling = multipliers.settling > 0.0;
         Some(Self {
             bounding: Bounding::new(problem, domain, multipliers, with_settling)?,
@@ -326,7 +390,9 @@ impl<'a> Winder<'a> {
         let mut found = Found::default();
         let mut queue = VecDeque::from([first]);
         while queue.len() < PORTIONS {
-            let Some(lattice) = queue.pop_front() else { break };
+            let Some(lattice) = queue.pop_front() else {
+                break;
+            };
             self.visit(lattice, &mut found, |half| queue.push_back(half));
         }
         let parts: Vec<Result<Found, Interrupted>> = queue
@@ -362,7 +428,10 @@ impl<'a> Winder<'a> {
             return;
         };
         lattice.inner = cell.inner;
-        for (range, span) in [(&mut lattice.layers, cell.depth), (&mut lattice.turns, cell.length)] {
+        for (range, span) in [
+            (&mut lattice.layers, cell.depth),
+            (&mut lattice.turns, cell.length),
+        ] {
             range[0] = range[0].max((span.lo / wire_m - WHOLE).ceil().max(1.0) as u64);
             range[1] = range[1].min((span.hi / wire_m + WHOLE).floor() as u64);
             if range[0] > range[1] {
@@ -387,7 +456,8 @@ impl<'a> Winder<'a> {
             self.bound_bores(tight, value.max(self.best_ln), found);
             return;
         }
-        let inner = (lattice.inner.hi - lattice.inner.lo) / (lattice.inner.hi + 0.5 * tight.depth.hi);
+        let inner =
+            (lattice.inner.hi - lattice.inner.lo) / (lattice.inner.hi + 0.5 * tight.depth.hi);
         let (mut low, mut high) = (lattice, lattice);
         let cut = |low: &mut [u64; 2], high: &mut [u64; 2]| {
             let middle = low[0] + (low[1] - low[0]) / 2;
@@ -415,8 +485,12 @@ impl<'a> Winder<'a> {
         while let Some(cell) = stack.pop() {
             count += 1;
             found.cells += 1;
-            let Some(cell) = self.bounding.contracted(cell) else { continue };
-            let Some(bound) = self.bounding.ln_force(&cell, enough) else { continue };
+            let Some(cell) = self.bounding.contracted(cell) else {
+                continue;
+            };
+            let Some(bound) = self.bounding.ln_force(&cell, enough) else {
+                continue;
+            };
             let middle = 0.5 * (cell.inner.lo + cell.inner.hi);
             let cut = middle > cell.inner.lo && middle < cell.inner.hi;
             if bound <= enough || !cut || count > BORES {
@@ -451,7 +525,12 @@ fn describe(problem: &Problem<'_>, leaf: &Leaf) -> Option<WoundCoil> {
         .bounds
         .iter()
         .enumerate()
-        .filter(|(_, bound)| !matches!(bound.name, LimitName::Axis | LimitName::OneLayer | LimitName::OneTurn))
+        .filter(|(_, bound)| {
+            !matches!(
+                bound.name,
+                LimitName::Axis | LimitName::OneLayer | LimitName::OneTurn
+            )
+        })
         .map(|(row, bound)| LimitUse {
             name: bound.name,
             value: rated.values[row].value,
