@@ -98,11 +98,9 @@ struct Search<'a> {
 impl Search<'_> {
     fn try_active(&mut self, active: &[usize]) -> Option<Minimum> {
         let size = active.len();
-        let mut matrix = [[0.0; 3]; 3];
+        // Rows that are not used keep the identity.
+        let mut matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let mut right = [0.0; 3];
-        for i in 0..3 {
-            matrix[i][i] = 1.0;
-        }
         for (i, &row) in active.iter().enumerate() {
             for (j, &column) in active.iter().enumerate() {
                 matrix[i][j] = dot(self.rows[row].normal, self.columns[column]);
@@ -165,8 +163,9 @@ pub fn solve3(mut m: [[f64; 3]; 3], mut r: [f64; 3]) -> Option<[f64; 3]> {
         r.swap(k, pivot);
         for i in k + 1..3 {
             let factor = m[i][k] / m[k][k];
-            for j in k..3 {
-                m[i][j] -= factor * m[k][j];
+            let pivot = m[k];
+            for (value, above) in m[i].iter_mut().zip(pivot).skip(k) {
+                *value -= factor * above;
             }
             r[i] -= factor * r[k];
         }

@@ -60,13 +60,10 @@ impl Sloped {
     #[must_use]
     pub fn along(self, current: Self) -> Self {
         let by_current = self.slope[3];
-        let mut slope = [0.0; 4];
-        for i in 0..3 {
-            slope[i] = self.slope[i] + by_current * current.slope[i];
-        }
+        let by_window = |i: usize| self.slope[i] + by_current * current.slope[i];
         Self {
             value: self.value,
-            slope,
+            slope: [by_window(0), by_window(1), by_window(2), 0.0],
         }
     }
 }

@@ -38,7 +38,7 @@ pub fn maximum(f: impl Fn(f64) -> f64, lo: f64, hi: f64) -> (f64, f64) {
     } else {
         (lo, at_lo)
     };
-    if !(hi - lo > f64::EPSILON * hi.abs()) {
+    if hi - lo <= f64::EPSILON * hi.abs() {
         return ends;
     }
     let inside = Executor::new(

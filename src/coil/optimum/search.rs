@@ -75,7 +75,9 @@ pub fn optimise(
         Ok(problems) => problems,
         Err((status, problems)) => return Ok(without_coil(status, &problems)),
     };
+    progress.begin("certify", problems.len() as u64);
     let certificate = certify(&mut problems, settings, progress)?;
+    progress.end();
     let winner = best_of(&problems);
     let Some(winner) = winner else {
         // best_n > 0 means one has been found.
@@ -130,7 +132,12 @@ pub(super) fn solve_all<'a>(
     if let Some(missing) = unbounded {
         return Ok(Err((Status::Unbounded { missing }, problems)));
     }
-    let total = problems.iter().filter(|s| open(s)).count() * settings.starts;
+    let rounds = if task.limits.settling_max_s.is_some() {
+        2
+    } else {
+        1
+    };
+    let total = problems.iter().filter(|s| open(s)).count() * settings.starts * rounds;
     progress.begin("optimise", total as u64);
     let mut best_n = 0.0;
     for solved in problems.iter_mut().filter(|s| open(s)) {
@@ -215,6 +222,7 @@ fn multistart(
             && best.violation(&solved.problem) <= FEASIBLE
         {
             solved.best = Some(best);
+            progress.advance(settings.starts as u64);
             return Ok(());
         }
     }
@@ -299,7 +307,6 @@ fn certify(
     if settings.cells == 0 {
         return Ok(unproven(0));
     }
-    progress.begin("certify", problems.len() as u64);
     for _ in 0..ROUNDS {
         upper_ln = best_ln;
         let mut improved = false;
@@ -331,7 +338,6 @@ fn certify(
             break;
         }
     }
-    progress.end();
     let Some(gap) = Some((upper_ln - best_ln).exp_m1()).filter(|gap| gap.is_finite()) else {
         return Ok(unproven(cells));
     };

@@ -251,7 +251,7 @@ fn polish(problem: &dyn Smooth, local: &mut Local) {
             return;
         };
         let length = (0..3).fold(0.0_f64, |s, i| s.max(solution[i].abs()));
-        if !(length < 0.1) {
+        if length.is_nan() || length >= 0.1 {
             return;
         }
         for (i, value) in x.iter_mut().enumerate() {

@@ -28,13 +28,13 @@ pub enum NoTask {
 pub fn of_design(design: &Design, fixed: Fixed) -> Result<Task, NoTask> {
     let currents = &design.supply.current_max_a;
     let current_max_a = currents.iter().copied().fold(0.0, f64::max);
-    if !(current_max_a > 0.0) {
+    if current_max_a <= 0.0 {
         return Err(NoTask::NoCurrent);
     }
     if design
         .supply
         .voltage_v
-        .is_some_and(|voltage_v| !(voltage_v > 0.0))
+        .is_some_and(|voltage_v| voltage_v <= 0.0)
     {
         return Err(NoTask::NoVoltage);
     }
