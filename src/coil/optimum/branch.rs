@@ -120,17 +120,30 @@ pub fn prove(
             return Ok(proof);
         }
     }
-    // Cells near the optimum fall to few portions.
-    let share = budget / 4;
-    let parts: Vec<Result<Proof, Interrupted>> = queue
-        .into_par_iter()
-        .map(|first| search.depth_first(first, share, progress))
-        .collect();
-    for part in parts {
-        let part = part?;
-        proof.upper_ln = proof.upper_ln.max(part.upper_ln);
-        proof.cells += part.cells;
-        proof.better = proof.better.or(part.better);
+    // Cells near the optimum fall to few portions: what the others leave of the budget is
+    // shared again, in rounds that do not depend on the threads.
+    let mut open: Vec<Vec<(Cell, f64)>> = queue.into_iter().map(|first| vec![first]).collect();
+    let mut left = budget;
+    while !open.is_empty() && left >= open.len() && proof.better.is_none() {
+        let share = left / open.len();
+        let parts: Vec<Result<(Proof, Vec<(Cell, f64)>), Interrupted>> = open
+            .into_par_iter()
+            .map(|stack| search.depth_first(stack, share, progress))
+            .collect();
+        open = Vec::new();
+        for part in parts {
+            let (part, rest) = part?;
+            proof.upper_ln = proof.upper_ln.max(part.upper_ln);
+            proof.cells += part.cells;
+            proof.better = proof.better.or(part.better);
+            left = left.saturating_sub(part.cells);
+            if !rest.is_empty() {
+                open.push(rest);
+            }
+        }
+    }
+    for (_, bound) in open.iter().flatten() {
+        proof.upper_ln = proof.upper_ln.max(*bound);
     }
     Ok(proof)
 }
@@ -143,28 +156,22 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
+    /// Works a stack off for `budget` cells; also returns what is left of it.
     fn depth_first(
         &self,
-        first: (Cell, f64),
+        mut stack: Vec<(Cell, f64)>,
         budget: usize,
         progress: &dyn Progress,
-    ) -> Result<Proof, Interrupted> {
+    ) -> Result<(Proof, Vec<(Cell, f64)>), Interrupted> {
         let mut proof = Proof::nothing();
-        let mut stack = vec![first];
-        while let Some((cell, bound)) = stack.pop() {
-            if proof.cells >= budget {
-                proof.upper_ln = proof.upper_ln.max(bound);
-                continue;
-            }
-            if proof.cells.is_multiple_of(4096) {
+        while proof.cells < budget && proof.better.is_none() {
+            let Some((cell, _)) = stack.pop() else { break };
+            if proof.cells.is_multiple_of(1024) {
                 progress.check()?;
             }
             self.visit(cell, &mut proof, |half| stack.push(half));
-            if proof.better.is_some() {
-                break;
-            }
         }
-        Ok(proof)
+        Ok((proof, stack))
     }
 
     /// Bounds a cell; hands its halves on where the bound is not good enough.

@@ -210,7 +210,9 @@ impl<'a> Bounding<'a> {
         let force = Interval::new(least, most)
             .widened(8.0 * axis_gradient::RELATIVE_ERROR)
             .and(self.force_by_depth(cell, outer_hi));
-        let current_hi = self.current_a(self.resistance_ohm(a.lo, w.lo, l.lo));
+        // The corner may hold less wire than the limits ask for.
+        let least_ohm = self.domain.volume_m3[0] * self.problem.strand.resistance_per_volume();
+        let current_hi = self.current_a(self.resistance_ohm(a.lo, w.lo, l.lo).max(least_ohm));
         let mut bound = (force.hi * current_hi).ln() + 8.0 * axis_gradient::RELATIVE_ERROR;
         let mut slopes = None;
         if bound > enough && force.lo > 0.0 {

@@ -386,10 +386,11 @@ fn bound(
             break;
         };
         // A relaxation that does not close is soon given up.
-        let budget = if limited && !with_settling {
-            settings.cells / 16
-        } else {
-            settings.cells
+        // and the inductance costs as much as many cells.
+        let budget = match (limited, with_settling) {
+            (false, _) => settings.cells,
+            (true, false) => settings.cells / 16,
+            (true, true) => settings.cells / 32,
         };
         let cell = branch::whole(&domain);
         let proof = branch::prove(&bounding, &solved.problem, cell, best_ln, budget, progress)?;

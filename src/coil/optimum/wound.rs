@@ -161,7 +161,7 @@ pub fn optimise_wound(
             complete = false;
             continue;
         };
-        let mut part = part.enumerate(settings.cells, progress)?;
+        let mut part = part.enumerate(settings.cells / 4, progress)?;
         coils.extend(part.leaves.drain(..).map(|leaf| (index, leaf)));
         found.add(part);
         progress.advance(1);
@@ -186,6 +186,7 @@ pub fn optimise_wound(
         .map_or_else(Vec::new, |best| worth_a_look(best, &list));
     let upper_ln = found.upper_ln.unwrap_or(top.ln_force).max(top.ln_force);
     let gap = (upper_ln - top.ln_force).exp_m1();
+    complete &= gap.is_finite();
     Ok(WoundOutcome {
         status: Status::Optimal,
         best,
