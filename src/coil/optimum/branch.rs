@@ -19,6 +19,9 @@ const USED: f64 = 0.9;
 /// Cells at which the work is handed to threads; fixed, so that results do not depend on them.
 const PORTIONS: usize = 64;
 
+/// Cells yet to be bounded, each with a bound that holds for it already.
+type Stack = Vec<(Cell, f64)>;
+
 /// What a search over cells proved.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proof {
@@ -122,11 +125,11 @@ pub fn prove(
     }
     // Cells near the optimum fall to few portions: what the others leave of the budget is
     // shared again, in rounds that do not depend on the threads.
-    let mut open: Vec<Vec<(Cell, f64)>> = queue.into_iter().map(|first| vec![first]).collect();
+    let mut open: Vec<Stack> = queue.into_iter().map(|first| vec![first]).collect();
     let mut left = budget;
     while !open.is_empty() && left >= open.len() && proof.better.is_none() {
         let share = left / open.len();
-        let parts: Vec<Result<(Proof, Vec<(Cell, f64)>), Interrupted>> = open
+        let parts: Vec<Result<(Proof, Stack), Interrupted>> = open
             .into_par_iter()
             .map(|stack| search.depth_first(stack, share, progress))
             .collect();
@@ -159,10 +162,10 @@ impl Search<'_> {
     /// Works a stack off for `budget` cells; also returns what is left of it.
     fn depth_first(
         &self,
-        mut stack: Vec<(Cell, f64)>,
+        mut stack: Stack,
         budget: usize,
         progress: &dyn Progress,
-    ) -> Result<(Proof, Vec<(Cell, f64)>), Interrupted> {
+    ) -> Result<(Proof, Stack), Interrupted> {
         let mut proof = Proof::nothing();
         while proof.cells < budget && proof.better.is_none() {
             let Some((cell, _)) = stack.pop() else { break };

@@ -103,14 +103,16 @@ pub fn optimise(
     })
 }
 
+/// Why there is no coil, and the problems that have none.
+type NoCoil<'a> = (Status, Vec<Solved<'a>>);
+
 /// Every problem with its best local optimum, or the status that says why there is none.
-#[allow(clippy::type_complexity)]
 pub(super) fn solve_all<'a>(
     model: &'a dyn CoilModel,
     task: &'a Task,
     settings: &Settings,
     progress: &dyn Progress,
-) -> Result<Result<Vec<Solved<'a>>, (Status, Vec<Solved<'a>>)>, Interrupted> {
+) -> Result<Result<Vec<Solved<'a>>, NoCoil<'a>>, Interrupted> {
     let mut problems: Vec<Solved<'_>> = task
         .strands
         .iter()
