@@ -94,7 +94,7 @@ def optimised(solver, start):
         return solver.optimize(start), solver.last_optimize_result()
     except nlopt.RoundoffLimited:
         return None, nlopt.ROUNDOFF_LIMITED
-    except (RuntimeError, ValueError):
+    except (RuntimeError, ValueError, nlopt.runtime_error, nlopt.invalid_argument):
         return None, nlopt.FAILURE
 
 
