@@ -24,8 +24,9 @@ Seconds stand in timing.json.
 --models FILE: {"designs": [{"inner_diameter_m", "outer_diameter_m", "length_m",
 "wire_diameter_m", "current_a", "core": true|false, "force_n", "resistance_ohm", "inductance_h"}]};
 optional "name", "conductor_diameter_m", "resistivity_ohm_m", "moment_a_m2", "target_height_m",
-defaults the seed's. The sign of force_n is not looked at. The core is that of the table (clearance 0, above 0,
-below 10 mm, mu_r 1000, target 30 mm). Air: 1e-10; cored: twice the table's stated error.
+defaults the seed's. The sign of force_n is not looked at. The core is that of the table: clearance
+0, above 0, below 10 mm, mu_r 1000, target 30 mm; inner diameter 4 to 40, (OD - ID)/2 1.4 to 14,
+length 20 to 160 mm. Air: to 1e-10; cored: to twice the table's stated error.
 
 --judge FILE: {"problems": {name: {"status", "inner_diameter_m", "outer_diameter_m", "length_m",
 "wire_diameter_m", "force_n"}}}; status "infeasible" needs nothing else, any other word means that
@@ -38,7 +39,6 @@ be left out with --partial or --subset ci.
 import argparse
 import csv
 import json
-import math
 import os
 import pathlib
 import sys

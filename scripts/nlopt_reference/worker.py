@@ -174,7 +174,7 @@ def run(task):
     if best is not None:
         del best["log_force"]
     result = {
-        "status": "optimal" if best else "infeasible",
+        "status": "found" if best else "none",
         "nlopt_codes": sorted(set(codes)),
         "starts": len(codes),
         "evaluations": trace.evaluations,
