@@ -25,7 +25,7 @@ import numpy as np
 
 MU_0 = 4e-7 * np.pi
 RADIAL_NODES = 64
-NODES = 14
+NODES = 12
 
 
 @functools.cache
