@@ -18,8 +18,9 @@ if it has one layer and one turn at least, positive bore, and meets the design's
 rated current min(I_max, V/R); turns are (OD - ID)/2/d x L/d, not rounded; with `choices_mm` the
 wire is one of them. Maximised is |m_z dB_z/dz| I at the target. reference.json holds for every
 problem the best coil of three NLopt solvers, limits active there with their sensitivities
-(dF/dlimit, of one sign: what a unit more of the limit's number brings), and each solver's end.
-Seconds stand in timing.json.
+(dF/dlimit per SI unit: negative for the least inner diameter), and each solver's end; where no
+coil exists the least violation of the limits that is possible (with a core: within the table's
+box). Seconds stand in timing.json.
 
 --models FILE: {"designs": [{"inner_diameter_m", "outer_diameter_m", "length_m",
 "wire_diameter_m", "current_a", "core": true|false, "force_n", "resistance_ohm", "inductance_h"}]};
@@ -30,7 +31,8 @@ length 20 to 160 mm. Air: to 1e-10; cored: to twice the table's stated error.
 
 --judge FILE: {"problems": {name: {"status", "inner_diameter_m", "outer_diameter_m", "length_m",
 "wire_diameter_m", "force_n"}}}; status "infeasible" needs nothing else, any other word means that
-a coil is given; optional "upper_bound_n". Judged are the status, feasibility to 1e-9 in this
+a coil is given; optional "upper_bound_n" and "sensitivity_n_per_unit": {limit: dF/dlimit, zero
+where it is not active; judged to 1e-4 of F/limit, cored 1e-3}. Judged are the status, feasibility to 1e-9 in this
 model, the force against this model (1e-9; cored: the table's error) and the objective: at least
 (1 - objective_tolerance) of the reference's. Where the optimum lies is not judged. Problems may
 be left out with --partial or --subset ci.

@@ -5,7 +5,9 @@ import math
 from . import core, problem as problem_module
 
 FEASIBLE = 1e-9
-FORCE = {"air": 1e-9}
+FORCE = 1e-9
+SENSITIVITY = {"air": 1e-4, "cored": 1e-3}
+COIL = ("inner_diameter_m", "outer_diameter_m", "length_m", "wire_diameter_m", "force_n")
 MODELS = {"force_n": 1e-10, "resistance_ohm": 1e-10, "inductance_h": 1e-10}
 
 
@@ -62,6 +64,9 @@ def judge_one(problem, wanted, claim):
         return [] if status == "infeasible" else [f"status {status!r}, but no coil meets the limits"]
     if status == "infeasible":
         return [f"status 'infeasible', but a coil gives {wanted['best']['force_n']:.9g} N"]
+    missing = [key for key in COIL if not math.isfinite(claim.get(key, math.nan))]
+    if missing:
+        return [f"status {status!r} without a finite {', '.join(missing)}"]
     faults = []
     wire_m = claim["wire_diameter_m"]
     if not any(math.isclose(wire_m, wire.wire_m, rel_tol=1e-12) for wire in problem.wires()):
@@ -84,7 +89,7 @@ def judge_one(problem, wanted, claim):
         if not by <= FEASIBLE + allowed.get(name, 0.0):
             faults.append(f"{name} exceeds its limit by {by:.2e} of it")
     force, claimed = float(value["force_n"]), abs(claim["force_n"])
-    tolerance = FORCE["air"] + (0.0 if table is None else 2 * table.gradient_error)
+    tolerance = FORCE + (0.0 if table is None else 2 * table.gradient_error)
     if not abs(claimed / force - 1) <= tolerance:
         faults.append(f"force {claimed!r} N, reference model {force!r} N, tolerance {tolerance:.1e}")
     best, tolerance = wanted["best"]["force_n"], wanted["objective_tolerance"]
@@ -94,6 +99,25 @@ def judge_one(problem, wanted, claim):
     bound = claim.get("upper_bound_n")
     if bound is not None and not bound >= best * (1 - tolerance):
         faults.append(f"upper bound {bound!r} N lies below {best!r} N, which a coil gives")
+    return faults + sensitivity_faults(problem, wanted, claim.get("sensitivity_n_per_unit", {}))
+
+
+def sensitivity_faults(problem, wanted, claimed):
+    """Claimed dF/dlimit against the multipliers, in units of F/limit.
+
+    Where the supply's kink is active they differ from side to side and are not judged.
+    """
+    if "supply" in wanted["active"]:
+        return []
+    faults = []
+    for name, got in claimed.items():
+        if name not in problem.limits:
+            faults.append(f"sensitivity to {name}, which is no limit of the design")
+            continue
+        unit = wanted["best"]["force_n"] / problem.limits[name]
+        known = wanted["active"].get(name, {}).get("sensitivity_n_per_unit", 0.0)
+        if not abs(got - known) <= SENSITIVITY["air" if problem.core is None else "cored"] * unit:
+            faults.append(f"sensitivity to {name} {got!r} N per unit, reference {known!r}")
     return faults
 
 
