@@ -144,7 +144,7 @@ pub struct Felt {
 }
 
 /// A rule whose parts cancel more than this is not worth its few dipoles.
-const MOST_AMPLIFICATION: f64 = 20.0;
+const MOST_AMPLIFICATION: f64 = 3.0;
 /// Growth of the distance from the sources at which a rule of fewer dipoles is sought.
 const FARTHER: f64 = 1.25;
 
