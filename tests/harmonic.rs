@@ -151,7 +151,8 @@ fn made(
     components: Components,
     tolerance: f64,
 ) -> (FieldMap, TableReport) {
-    let field = SampledField::new(source, grid, components, tolerance, &Silent).expect("a field");
+    let field =
+        SampledField::new(source, grid, components, tolerance, 1, &Silent).expect("a field");
     let map = field.map(&coils(), grid, &Silent).expect("a map");
     (map, field.report)
 }
@@ -295,7 +296,8 @@ fn every_component_of_every_box_keeps_the_tolerance() {
 fn a_grid_between_the_nodes_is_in_the_field_too() {
     let source = Charges::new(24);
     let grid = cube(SIDE, SIDE, (0.01, 0.08, 9));
-    let field = SampledField::new(&source, &grid, Components::Gz, 1e-6, &Silent).expect("a field");
+    let field =
+        SampledField::new(&source, &grid, Components::Gz, 1e-6, 1, &Silent).expect("a field");
     let (from, to) = (-0.049_171_3, 0.031_7);
     for z in [(0.010_3, 0.079, 5), (0.07, 0.09, 3)] {
         let other = cube((from, to, 23), (-0.0131, 0.0131, 19), z);
@@ -313,7 +315,8 @@ fn a_grid_between_the_nodes_is_in_the_field_too() {
 fn gains_and_a_choice_of_coils_are_kept() {
     let source = Charges::new(24);
     let grid = cube((-0.05, 0.05, 31), (-0.05, 0.05, 31), (0.01, 0.08, 9));
-    let field = SampledField::new(&source, &grid, Components::All, 1e-4, &Silent).expect("a field");
+    let field =
+        SampledField::new(&source, &grid, Components::All, 1e-4, 1, &Silent).expect("a field");
     let whole = field.map(&coils(), &grid, &Silent).expect("a map");
     let some: Vec<PlacedCoil> = [(7, 1.3), (2, 0.7)]
         .map(|(number, gain)| PlacedCoil {
@@ -397,7 +400,8 @@ impl Sampler for Understated {
 fn the_certificate_sees_a_table_that_is_too_coarse() {
     let source = Understated(Charges::new(24));
     let grid = cube((-0.05, 0.05, 41), (-0.05, 0.05, 41), (0.003, 0.08, 9));
-    let field = SampledField::new(&source, &grid, Components::Gz, 1e-4, &Silent).expect("a field");
+    let field =
+        SampledField::new(&source, &grid, Components::Gz, 1e-4, 1, &Silent).expect("a field");
     let map = field.map(&coils(), &grid, &Silent).expect("a map");
     let error = worst(&map, &source.0);
     assert!(field.report.samples > 0, "a table was tried");

@@ -4,4 +4,6 @@ pub mod circuit;
 pub mod inductance;
 pub mod limits;
 pub mod mutual;
+pub mod optimum;
+pub mod section_integrals;
 pub mod transient;

@@ -4,6 +4,7 @@ pub mod array;
 pub mod bh_table;
 mod checks;
 pub mod diagnostics;
+pub mod gauge;
 pub mod model;
 pub mod parse;
 pub mod reader;

@@ -53,7 +53,8 @@ pub struct Wire {
     pub resistivity_ohm_m: f64,
     /// Temperature, C.
     pub temperature_c: f64,
-    /// Insulated diameters that `optimize` may choose among, m.
+    /// Insulated diameters that `optimize` may choose among, m; each with its conductor in the
+    /// proportion of the two diameters above.
     pub choices_m: Vec<f64>,
 }
 

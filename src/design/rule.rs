@@ -74,6 +74,8 @@ pub struct Rule {
     pub bound: Bound,
     /// Values that are warned about.
     pub slips: &'static [Slip],
+    /// Whether a wire gauge, `"AWG 22"`, may stand for the millimetres of its bare wire.
+    pub gauges: bool,
 }
 
 impl Rule {
@@ -84,6 +86,7 @@ impl Rule {
             unit,
             bound: Bound::Any,
             slips: &[],
+            gauges: false,
         }
     }
 
@@ -91,6 +94,15 @@ impl Rule {
     #[must_use]
     pub const fn slips(self, slips: &'static [Slip]) -> Self {
         Self { slips, ..self }
+    }
+
+    /// The same, or a wire gauge.
+    #[must_use]
+    pub const fn gauges(self) -> Self {
+        Self {
+            gauges: true,
+            ..self
+        }
     }
 
     /// The same within `bound`.

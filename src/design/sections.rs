@@ -40,8 +40,9 @@ pub const BODY_MM: Rule = Rule::any("mm").slips(&[metres_below(0.5)]);
 const MAGNET_MM: Rule = Rule::any("mm").slips(&[metres_below(0.1)]);
 /// Gaps and overhangs, mm.
 const OFFSET_MM: Rule = Rule::any("mm").slips(&[metres_below(0.02)]);
-/// Wire diameters, mm: 8 mm is 0.008.
-const WIRE_MM: Rule = Rule::any("mm").slips(&[metres_below(0.008)]);
+/// Wire diameters, mm: 8 mm is 0.008. A gauge is the bare wire's diameter: where no other
+/// conductor is named, it is taken as the diameter over the insulation too.
+const WIRE_MM: Rule = Rule::any("mm").slips(&[metres_below(0.008)]).gauges();
 const SETTLING_MS: Rule = Rule::any("ms").slips(&[slip(0.0, 0.5, "seconds", 1000.0)]);
 /// Metals lie between 1e-8 and 2e-6.
 const RESISTIVITY_OHM_M: Rule = Rule::any("ohm m").slips(&[

@@ -4,6 +4,7 @@ use toml::Spanned;
 use toml::de::DeValue;
 
 use super::diagnostics::Fault;
+use super::gauge::awg_mm;
 use super::reader::{Found, Located, Section};
 use super::rule::{Bound, Rule};
 use super::words::{axis_fault, nearest, number, quoted};
@@ -312,8 +313,17 @@ impl<'a> Section<'a> {
 
     /// The number, or NaN and a fault.
     fn checked(&self, path: &str, found: Found<'a>, rule: &Rule) -> f64 {
-        let Some(value) = float(found.get_ref()) else {
-            self.add_wrong_type(path, found, "a number");
+        let value = match found.get_ref() {
+            DeValue::String(text) if rule.gauges => awg_mm(text),
+            other => float(other),
+        };
+        let Some(value) = value else {
+            let wanted = if rule.gauges {
+                "a number or a gauge like \"AWG 22\""
+            } else {
+                "a number"
+            };
+            self.add_wrong_type(path, found, wanted);
             return f64::NAN;
         };
         match rule.error(path, value, &found.span()) {

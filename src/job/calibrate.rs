@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::discretize::{self, point_rows, points_grid};
 use super::lambda::{LambdaOptions, LambdaReport, solve};
 use super::map::{MAP_TOLERANCE, arrays, runtime, summary, workspace_grid};
-use super::maps::SceneMap;
+use super::maps::{Felt, SceneMap};
 use super::passive::PASSIVE_TOLERANCE;
 use super::passive_map::PassiveMap;
 use super::scene::{MAGNET_SHARE, Scene};
@@ -300,16 +300,8 @@ impl NeededMap {
                 error_cost: 0.0,
             });
         }
-        let rule = scene.magnet_rule(grid.z_m[0], MAGNET_SHARE * solved.tolerance)?;
-        let mut made = SceneMap::new(
-            scene,
-            solved,
-            &driven,
-            &grid,
-            components,
-            Some(&rule),
-            progress,
-        )?;
+        let felt = Felt::by_magnet(scene, &grid.z_m, MAGNET_SHARE * solved.tolerance)?;
+        let mut made = SceneMap::new(scene, solved, &driven, &grid, components, &felt, progress)?;
         drop_weak_coils(
             scene,
             &mut made.map,

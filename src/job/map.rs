@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use super::maps::SceneMap;
+use super::maps::{Felt, SceneMap};
 use super::scene::Scene;
 use super::working_point::{WorkingPoint, relative_difference, superposition_ends};
 use super::{JobError, KERNEL_ERROR, steel};
@@ -107,7 +107,7 @@ pub fn run(
         &scene.coils,
         &grid,
         request.components,
-        None,
+        &Felt::field(),
         progress,
     )?;
     let map = &made.map;

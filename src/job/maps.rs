@@ -32,8 +32,8 @@ pub struct SceneMap {
 const MAP_SHARE: f64 = 0.3;
 
 impl SceneMap {
-    /// Maps of `coils` of `scene` over `grid`. With `rule` every value is the mean that the
-    /// magnet feels, F_z / m_z being what the map gives; without, the field itself.
+    /// Maps of `coils` of `scene` over `grid`: of the field itself, or of the mean that a magnet
+    /// feels, F_z / m_z being what the map gives.
     ///
     /// # Errors
     /// A node on a winding's edge or on the steel; interruption.
@@ -43,36 +43,33 @@ impl SceneMap {
         coils: &[PlacedCoil],
         grid: &Grid,
         components: Components,
-        rule: Option<&MagnetRule>,
+        felt: &Felt,
         progress: &dyn Progress,
     ) -> Result<Self, JobError> {
-        let dipole = MagnetRule::dipole(scene.moment_a_m2);
-        let rule = rule.unwrap_or(&dipole);
-        let shares = shares(rule);
         // A grid through every place that a node of the magnet can take.
-        let widest = widest(grid, &shares);
+        let widest = widest(grid, felt);
         let lowest = lowest_plane(grid);
         let (table, map, between) = match &solved.steel {
             Steel::None => {
-                let tolerance = solved.tolerance / rule.amplification();
+                let tolerance = solved.tolerance / felt.amplification;
                 let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
                     tabulate(&scene.winding, coils, grid, components, tolerance, p)
                 };
-                let map = mean(&one, &shares, coils, grid, components, progress)?;
+                let map = mean(&one, felt, coils, grid, components, progress)?;
                 progress.begin("interpolation error", 1);
-                let between = if shares.len() == 1 {
+                let between = if felt.is_field() {
                     let gz = &map.gz_t_per_m_per_a;
                     interpolation_error(&scene.winding, coils, grid, gz, tolerance)?
                 } else {
-                    between(&one, &shares, coils, grid, &map)?
+                    between(&one, felt, coils, grid, &map)?
                 };
                 (None, map, between)
             }
             Steel::Alone(_) => {
-                let tolerance = MAP_SHARE * solved.tolerance / rule.amplification();
+                let tolerance = MAP_SHARE * solved.tolerance / felt.amplification;
                 // The nearest core decides how fine the rings are; seen from its own axis.
                 let steel = solved
-                    .sources(scene, &lowest, rule.reach_m())?
+                    .sources(scene, &lowest, felt.reach_m)?
                     .ok_or_else(no_steel)?;
                 let source = CoredSource {
                     winding: scene.winding,
@@ -81,31 +78,38 @@ impl SceneMap {
                 let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
                     tabulate(&source, coils, grid, components, tolerance, p)
                 };
-                let map = mean(&one, &shares, coils, grid, components, progress)?;
+                let map = mean(&one, felt, coils, grid, components, progress)?;
                 progress.begin("interpolation error", 1);
-                let between = between(&one, &shares, coils, grid, &map)?;
+                let between = between(&one, felt, coils, grid, &map)?;
                 (None, map, between)
             }
             Steel::Coupled(_) => {
-                let tolerance = MAP_SHARE * solved.tolerance / rule.amplification();
+                let tolerance = MAP_SHARE * solved.tolerance / felt.amplification;
                 let steel = solved
-                    .sources(scene, &lowest, rule.reach_m())?
+                    .sources(scene, &lowest, felt.reach_m)?
                     .ok_or_else(no_steel)?;
-                let sampled = SampledField::new(&steel, &widest, components, tolerance, progress)?;
+                let sampled = SampledField::new(
+                    &steel,
+                    &widest,
+                    components,
+                    tolerance,
+                    felt.visits(),
+                    progress,
+                )?;
                 let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
                     let mut map =
                         tabulate(&scene.winding, coils, grid, components, tolerance, &Silent)?;
                     add(&mut map, &sampled.map(coils, grid, p)?, 1.0);
                     Ok(map)
                 };
-                let map = mean(&one, &shares, coils, grid, components, progress)?;
+                let map = mean(&one, felt, coils, grid, components, progress)?;
                 progress.begin("interpolation error", 1);
-                let between = between(&one, &shares, coils, grid, &map)?;
+                let between = between(&one, felt, coils, grid, &map)?;
                 (Some(sampled.report), map, between)
             }
         };
         progress.end();
-        let accuracy = accuracy(&map, solved, rule.bound());
+        let accuracy = accuracy(&map, solved, felt.bound);
         Ok(Self {
             map,
             between,
@@ -123,8 +127,96 @@ type Maker<'a> = dyn Fn(&[PlacedCoil], &Grid, Components, &dyn Progress) -> Resu
     + Sync
     + 'a;
 
+/// Offsets of a magnet's dipoles from its centre, m, and their parts of its moment.
+type Shares = Vec<([f64; 3], f64)>;
+
+/// What a map's values are the mean of: offsets of the magnet's dipoles and their parts of its
+/// moment, fewer from greater heights up.
+#[derive(Debug, Clone)]
+pub struct Felt {
+    /// Height from which the offsets (m) and parts hold, ascending.
+    layers: Vec<(f64, Shares)>,
+    /// Largest sum of the parts' magnitudes.
+    amplification: f64,
+    /// A-priori error of the means, relative to the gradient at the place.
+    bound: f64,
+    reach_m: f64,
+}
+
+/// A rule whose parts cancel more than this is not worth its few dipoles.
+const MOST_AMPLIFICATION: f64 = 3.0;
+/// Growth of the distance from the sources at which a rule of fewer dipoles is sought.
+const FARTHER: f64 = 1.25;
+
+impl Felt {
+    /// The field itself.
+    #[must_use]
+    pub fn field() -> Self {
+        Self {
+            layers: vec![(f64::NEG_INFINITY, vec![([0.0; 3], 1.0)])],
+            amplification: 1.0,
+            bound: 0.0,
+            reach_m: 0.0,
+        }
+    }
+
+    /// What the magnet of `scene` feels at the heights `z_m`, ascending, to `tolerance`.
+    ///
+    /// # Errors
+    /// A magnet that touches what it is attracted by.
+    pub fn by_magnet(scene: &Scene, z_m: &[f64], tolerance: f64) -> Result<Self, JobError> {
+        let top_m = scene.core.as_ref().map_or(0.0, |c| c.shape.top_m.max(0.0));
+        let mut felt = Self {
+            layers: Vec::new(),
+            ..Self::field()
+        };
+        let mut sought_m = f64::NEG_INFINITY;
+        for z in z_m {
+            if z - top_m < FARTHER * (sought_m - top_m) {
+                continue;
+            }
+            sought_m = *z;
+            let rule = scene.magnet_rule(*z, tolerance)?;
+            let fewer = felt
+                .layers
+                .last()
+                .is_none_or(|(_, shares)| rule.nodes().len() < shares.len());
+            if fewer && (felt.layers.is_empty() || rule.amplification() <= MOST_AMPLIFICATION) {
+                felt.amplification = felt.amplification.max(rule.amplification());
+                felt.bound = felt.bound.max(rule.bound());
+                felt.reach_m = felt.reach_m.max(rule.reach_m());
+                felt.layers.push((*z, shares(&rule)));
+            }
+        }
+        Ok(felt)
+    }
+
+    /// Whether it is the field itself.
+    fn is_field(&self) -> bool {
+        self.layers.iter().all(|(_, shares)| shares.len() == 1)
+    }
+
+    /// Most places that a value is the mean of.
+    fn visits(&self) -> usize {
+        let counts = self.layers.iter().map(|(_, shares)| shares.len());
+        counts.max().unwrap_or(1)
+    }
+
+    /// The offsets and parts at height `z_m`.
+    fn at(&self, z_m: f64) -> &[([f64; 3], f64)] {
+        let above = self.layers.partition_point(|(from, _)| *from <= z_m);
+        &self.layers[above.saturating_sub(1)].1
+    }
+
+    /// Pieces of `z_m` with the same offsets.
+    fn pieces<'a>(&self, z_m: &'a [f64]) -> Vec<&'a [f64]> {
+        z_m.chunk_by(|a, b| std::ptr::eq(self.at(*a), self.at(*b)))
+            .collect()
+    }
+}
+
 /// Offsets of the magnet's dipoles and their parts of its moment.
-fn shares(rule: &MagnetRule) -> Vec<([f64; 3], f64)> {
+fn shares(rule: &MagnetRule) -> Shares {
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let moment = rule.nodes().iter().fold([0.0; 3], |sum, node| {
         std::array::from_fn(|i| sum[i] + node.moment_a_m2[i])
@@ -146,6 +238,64 @@ fn shifted(grid: &Grid, offset_m: [f64; 3]) -> Grid {
 }
 
 fn mean(
+    one: &Maker,
+    felt: &Felt,
+    coils: &[PlacedCoil],
+    grid: &Grid,
+    components: Components,
+    progress: &dyn Progress,
+) -> Result<FieldMap, MapError> {
+    let mut pieces = Vec::new();
+    for z_m in felt.pieces(&grid.z_m) {
+        let grid = Grid {
+            z_m: z_m.to_vec(),
+            ..grid.clone()
+        };
+        let shares = felt.at(z_m[0]);
+        pieces.push(mean_of(one, shares, coils, &grid, components, progress)?);
+    }
+    if pieces.is_empty() {
+        return one(coils, grid, components, progress);
+    }
+    Ok(stacked(pieces, coils.len()))
+}
+
+/// Maps over pieces of the z axis as one.
+fn stacked(mut pieces: Vec<FieldMap>, coils: usize) -> FieldMap {
+    if pieces.len() == 1 {
+        return pieces.swap_remove(0);
+    }
+    let stack = |pick: &dyn Fn(&FieldMap) -> Option<&Vec<f64>>| -> Option<Vec<f64>> {
+        let parts: Vec<&Vec<f64>> = pieces.iter().filter_map(pick).collect();
+        let mut out = Vec::with_capacity(parts.iter().map(|p| p.len()).sum());
+        for coil in 0..coils {
+            for part in &parts {
+                let size = part.len() / coils;
+                out.extend_from_slice(&part[coil * size..(coil + 1) * size]);
+            }
+        }
+        (!parts.is_empty()).then_some(out)
+    };
+    let gz = stack(&|m| Some(&m.gz_t_per_m_per_a)).unwrap_or_default();
+    let gradient = stack(&|m| m.gradient_t_per_m_per_a.as_ref());
+    let field = stack(&|m| m.field_t_per_a.as_ref());
+    let z_m = pieces.iter().flat_map(|m| m.z_m.iter().copied()).collect();
+    let tabulated = pieces.iter().any(|m| m.tabulated);
+    let distinct_radii = pieces.iter().map(|m| m.distinct_radii).max().unwrap_or(0);
+    let relative_error = pieces.iter().fold(0.0_f64, |e, m| e.max(m.relative_error));
+    FieldMap {
+        z_m,
+        gz_t_per_m_per_a: gz,
+        gradient_t_per_m_per_a: gradient,
+        field_t_per_a: field,
+        tabulated,
+        distinct_radii,
+        relative_error,
+        ..pieces.swap_remove(0)
+    }
+}
+
+fn mean_of(
     one: &Maker,
     shares: &[([f64; 3], f64)],
     coils: &[PlacedCoil],
@@ -176,13 +326,13 @@ fn mean(
 
 fn between(
     one: &Maker,
-    shares: &[([f64; 3], f64)],
+    felt: &Felt,
     coils: &[PlacedCoil],
     grid: &Grid,
     map: &FieldMap,
 ) -> Result<InterpolationError, MapError> {
     let direct = |coils: &[PlacedCoil], places: &Grid| {
-        mean(one, shares, coils, places, Components::Gz, &Silent)
+        mean(one, felt, coils, places, Components::Gz, &Silent)
     };
     interpolation_error_by(&direct, coils, grid, &map.gz_t_per_m_per_a)
 }
@@ -217,21 +367,26 @@ fn add(map: &mut FieldMap, other: &FieldMap, factor: f64) {
     map.tabulated |= other.tabulated;
 }
 
-/// The grid whose box holds every place of the magnet's dipoles: the nodes of all shifted grids.
-fn widest(grid: &Grid, shares: &[([f64; 3], f64)]) -> Grid {
-    let all = |nodes: &[f64], axis: usize| {
-        let mut out: Vec<f64> = shares
-            .iter()
-            .flat_map(|(offset, _)| nodes.iter().map(move |x| x + offset[axis]))
-            .collect();
+/// The grid whose box holds every place of the magnet's dipoles: its ends moved outwards.
+fn widest(grid: &Grid, felt: &Felt) -> Grid {
+    let moved = |nodes: &[f64], axis: usize| {
+        let mut out = nodes.to_vec();
+        for (_, shares) in &felt.layers {
+            for (offset, _) in shares {
+                out.extend(nodes.first().map(|x| x + offset[axis]));
+                out.extend(nodes.last().map(|x| x + offset[axis]));
+            }
+        }
         out.sort_by(f64::total_cmp);
         out.dedup();
+        let (first, last) = (out.first().copied(), out.last().copied());
+        out.retain(|x| nodes.contains(x) || Some(*x) == first || Some(*x) == last);
         out
     };
     Grid {
-        x_m: all(&grid.x_m, 0),
-        y_m: all(&grid.y_m, 1),
-        z_m: all(&grid.z_m, 2),
+        x_m: moved(&grid.x_m, 0),
+        y_m: moved(&grid.y_m, 1),
+        z_m: moved(&grid.z_m, 2),
     }
 }
 

@@ -239,6 +239,9 @@ impl<'a> Route<'a> {
         let moment = self.scene.moment_a_m2;
         let square: f64 = moment.iter().map(|m| m * m).sum();
         let mut out = vec![[0.0; 3]; wanted.len()];
+        let sources = self
+            .solved
+            .sources(self.scene, &centres, self.rule.reach_m())?;
         for node in self.rule.nodes() {
             let share: f64 = node
                 .moment_a_m2
@@ -251,11 +254,11 @@ impl<'a> Route<'a> {
                 .iter()
                 .map(|p| std::array::from_fn(|i| p[i] + node.offset_m[i]))
                 .collect();
-            let steel = match self.solved.sources(self.scene, &places, 0.0)? {
+            let steel = match &sources {
                 Some(sources) => {
                     let parts = Parts::Gradient;
                     self.solved
-                        .steel_fields(self.scene, &sources, &places, parts)
+                        .steel_fields(self.scene, sources, &places, parts)
                 }
                 None => Vec::new(),
             };

@@ -247,7 +247,7 @@ impl WorkingPoint {
         if let Some(core) = &scene.core {
             let (lowest_m, distance_m) = clearance_m(scene, core, &lowest_plane(grid), 0.0)?;
             let steel = self.field(scene, lowest_m, distance_m);
-            let sampled = SampledField::new(&steel, grid, Components::Gz, tolerance, progress)?;
+            let sampled = SampledField::new(&steel, grid, Components::Gz, tolerance, 1, progress)?;
             let all = PlacedCoil {
                 number: 0,
                 axis_m: [0.0, 0.0],

@@ -49,7 +49,8 @@ const CHECKS: [usize; 2] = [64, 16];
 
 impl<'a> SampledField<'a> {
     /// Prepares the field over `workspace`: a table from the height at which it needs fewer
-    /// samples than the planes above it, none where it never does.
+    /// samples than the planes above it, each of which is visited `visits` times, none where it
+    /// never does.
     ///
     /// # Errors
     /// The sampler's; interruption.
@@ -58,6 +59,7 @@ impl<'a> SampledField<'a> {
         workspace: &Grid,
         components: Components,
         tolerance: f64,
+        visits: usize,
         progress: &dyn Progress,
     ) -> Result<Self, MapError> {
         let mut field = Self {
@@ -71,7 +73,7 @@ impl<'a> SampledField<'a> {
         progress.begin("table", ATTEMPTS as u64);
         for _ in 0..ATTEMPTS {
             progress.check()?;
-            let Some(extent) = field.worth(workspace, aim) else {
+            let Some(extent) = field.worth(workspace, aim, visits) else {
                 break;
             };
             let table = Table::new(sampler, extent, components, aim)?;
@@ -99,11 +101,11 @@ impl<'a> SampledField<'a> {
     }
 
     /// The box above the plane from which on a table saves most samples.
-    fn worth(&self, workspace: &Grid, aim: f64) -> Option<Extent> {
+    fn worth(&self, workspace: &Grid, aim: f64, visits: usize) -> Option<Extent> {
         let ends = |nodes: &[f64]| Some([*nodes.first()?, *nodes.last()?]);
         let (x_m, y_m) = (ends(&workspace.x_m)?, ends(&workspace.y_m)?);
         let z_m = &workspace.z_m;
-        let plane = (workspace.x_m.len() * workspace.y_m.len()) as f64;
+        let plane = (workspace.x_m.len() * workspace.y_m.len() * visits) as f64;
         let mut best = (0.0_f64, None);
         for (k, from) in z_m.iter().enumerate() {
             if *from <= self.sampler.top_m() {

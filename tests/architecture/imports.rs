@@ -14,7 +14,9 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("field", &["units", "numerics"]),
     (
         "coil",
-        &["units", "accuracy", "numerics", "design", "field"],
+        &[
+            "units", "progress", "accuracy", "numerics", "design", "field",
+        ],
     ),
     (
         "map",

@@ -1,0 +1,256 @@
+//! The box that limits span, contradictions among them, and limits whose absence leaves the
+//! force without a maximum.
+
+use super::problem::{LimitName, Problem, Regime};
+
+/// Ranges that every coil within the limits keeps; infinite where nothing bounds them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Domain {
+    /// Inner radius, m.
+    pub inner_m: [f64; 2],
+    /// Outer radius, m.
+    pub outer_m: [f64; 2],
+    /// Least depth: one layer, m.
+    pub depth_min_m: f64,
+    /// Length, m.
+    pub length_m: [f64; 2],
+    /// (a2^2 - a1^2) L, m^3: what limits of resistance, heat, mass and wire come to.
+    pub volume_m3: [f64; 2],
+    /// Five L/R, s.
+    pub settling_max_s: f64,
+}
+
+/// Two limits that no coil meets together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contradiction {
+    /// The two, or one and geometry.
+    pub between: [LimitName; 2],
+    /// By how much, in the first one's SI unit.
+    pub by: f64,
+    /// In words.
+    pub message: String,
+}
+
+/// Slack of a comparison of two limits.
+const TOUCHING: f64 = 1e-12;
+
+impl Domain {
+    /// The ranges of `problem`.
+    #[must_use]
+    pub fn of(problem: &Problem<'_>) -> Self {
+        let limit = |name| problem.limit_of(name);
+        let wire_m = problem.strand.diameter_m;
+        let per_volume = problem.strand.resistance_per_volume();
+        let mut least = 0.0_f64;
+        let mut most = f64::INFINITY;
+        for bound in &problem.bounds {
+            let resistance = match (bound.name, problem.regime) {
+                (LimitName::Resistance, _) => bound.limit,
+                (LimitName::Power, Regime::Driver) => {
+                    bound.limit / problem.task.current_max_a / problem.task.current_max_a
+                }
+                (LimitName::Voltage, _) => bound.limit / problem.task.current_max_a,
+                (LimitName::Mass, _) => {
+                    most = most.min(bound.limit / problem.strand.mass_per_volume());
+                    continue;
+                }
+                (LimitName::WireLength, _) => {
+                    most = most.min(bound.limit / problem.strand.length_per_volume());
+                    continue;
+                }
+                (LimitName::Power, Regime::Supply) => {
+                    let voltage_v = problem.task.voltage_v.unwrap_or(0.0);
+                    least = least.max(voltage_v / bound.limit * voltage_v / per_volume);
+                    continue;
+                }
+                (LimitName::Current, _) => {
+                    let voltage_v = problem.task.voltage_v.unwrap_or(0.0);
+                    least = least.max(voltage_v / bound.limit / per_volume);
+                    continue;
+                }
+                _ => continue,
+            };
+            most = most.min(resistance / per_volume);
+        }
+        let half = |name, default: f64| limit(name).map_or(default, |v| 0.5 * v);
+        let inner_m = limit(LimitName::FixedInner)
+            .map_or([half(LimitName::InnerDiameter, 0.0), f64::INFINITY], |v| {
+                [0.5 * v; 2]
+            });
+        let outer_m = limit(LimitName::FixedOuter)
+            .map_or([0.0, half(LimitName::OuterDiameter, f64::INFINITY)], |v| {
+                [0.5 * v; 2]
+            });
+        let length_m = limit(LimitName::FixedLength).map_or(
+            [wire_m, limit(LimitName::Length).unwrap_or(f64::INFINITY)],
+            |v| [v; 2],
+        );
+        Self {
+            inner_m: [
+                inner_m[0],
+                inner_m[1].min(outer_m[1] - wire_m).max(inner_m[0]),
+            ],
+            outer_m: [outer_m[0].max(inner_m[0] + wire_m), outer_m[1]],
+            depth_min_m: wire_m,
+            length_m,
+            volume_m3: [least, most],
+            settling_max_s: limit(LimitName::Settling).unwrap_or(f64::INFINITY),
+        }
+    }
+
+    /// The first pair of limits that exclude each other whatever the coil.
+    #[must_use]
+    pub fn contradiction(problem: &Problem<'_>) -> Option<Contradiction> {
+        let limit = |name| problem.limit_of(name);
+        let wanted = &problem.task.limits;
+        let either =
+            |a: LimitName, b: LimitName| limit(a).map(|v| (a, v)).or(limit(b).map(|v| (b, v)));
+        let mm = |v: f64| format!("{:.6} mm", v * 1e3);
+        let fixed = &problem.task.fixed;
+        let clash = |between: [LimitName; 2], by: f64, message: String| {
+            Some(Contradiction {
+                between,
+                by,
+                message,
+            })
+        };
+        for (given, bound, name, fixed_name, lower) in [
+            (
+                fixed.inner_diameter_m,
+                wanted.inner_diameter_min_m,
+                LimitName::InnerDiameter,
+                LimitName::FixedInner,
+                true,
+            ),
+            (
+                fixed.outer_diameter_m,
+                wanted.outer_diameter_max_m,
+                LimitName::OuterDiameter,
+                LimitName::FixedOuter,
+                false,
+            ),
+            (
+                fixed.length_m,
+                wanted.length_max_m,
+                LimitName::Length,
+                LimitName::FixedLength,
+                false,
+            ),
+        ] {
+            if let (Some(given), Some(bound)) = (given, bound) {
+                let excess = if lower { bound - given } else { given - bound };
+                if excess > TOUCHING * bound {
+                    return clash(
+                        [name, fixed_name],
+                        excess,
+                        format!(
+                            "the given {} of {} is outside its limit of {}",
+                            name.key(),
+                            mm(given),
+                            mm(bound)
+                        ),
+                    );
+                }
+            }
+        }
+        let wire_m = problem.strand.diameter_m;
+        let outer = either(LimitName::FixedOuter, LimitName::OuterDiameter);
+        let inner = either(LimitName::FixedInner, LimitName::InnerDiameter);
+        if let Some((outer_name, outer_m)) = outer {
+            let (inner_name, inner_m) = inner.unwrap_or((LimitName::OneLayer, 0.0));
+            let missing = inner_m + 2.0 * wire_m - outer_m;
+            if missing > TOUCHING * outer_m {
+                return clash(
+                    [outer_name, inner_name],
+                    missing,
+                    format!(
+                        "an outer diameter of {} leaves no room for one layer of {} wire around a \
+                         bore of {}: {} are missing",
+                        mm(outer_m),
+                        mm(wire_m),
+                        mm(inner_m),
+                        mm(missing)
+                    ),
+                );
+            }
+        }
+        let length = either(LimitName::FixedLength, LimitName::Length);
+        if let Some((name, length_m)) = length
+            && wire_m - length_m > TOUCHING * wire_m
+        {
+            return clash(
+                [name, LimitName::OneTurn],
+                wire_m - length_m,
+                format!(
+                    "a length of {} leaves no room for one turn of {} wire",
+                    mm(length_m),
+                    mm(wire_m)
+                ),
+            );
+        }
+        let volume = Self::of(problem).volume_m3;
+        if volume[0] > volume[1] * (1.0 + TOUCHING) {
+            let lower = if problem.limit_of(LimitName::Power).is_some() {
+                LimitName::Power
+            } else {
+                LimitName::Current
+            };
+            let ratio = volume[0] / volume[1];
+            return clash(
+                [LimitName::Resistance, lower],
+                (ratio - 1.0) * volume[1] * problem.strand.resistance_per_volume(),
+                format!(
+                    "the least resistance that {} asks for is {ratio} times the largest allowed",
+                    lower.key()
+                ),
+            );
+        }
+        None
+    }
+
+    /// Limits of which one is missing so that the force has a maximum; empty where it has one.
+    ///
+    /// At a given current a longer or wider coil always pulls harder. Any limit on the amount of
+    /// wire ends that, as do the supply's voltage and the settling time; without those it takes
+    /// both an outer diameter and a length.
+    #[must_use]
+    pub fn missing(&self, problem: &Problem<'_>) -> Vec<LimitName> {
+        let ends = self.volume_m3[1].is_finite()
+            || self.settling_max_s.is_finite()
+            || problem.regime == Regime::Supply;
+        if ends || (self.outer_m[1].is_finite() && self.length_m[1].is_finite()) {
+            return Vec::new();
+        }
+        let mut missing = Vec::new();
+        if !self.outer_m[1].is_finite() {
+            missing.push(LimitName::OuterDiameter);
+        }
+        if !self.length_m[1].is_finite() {
+            missing.push(LimitName::Length);
+        }
+        missing
+    }
+
+    /// A wide but finite box to start from, in scaled coordinates: ln of mean radius, depth and
+    /// length.
+    #[must_use]
+    pub fn starting_box(&self, scale_m: f64) -> [[f64; 2]; 3] {
+        const WIDE: f64 = 6.0;
+        let volume = if self.volume_m3[1].is_finite() {
+            self.volume_m3[1].cbrt()
+        } else {
+            self.volume_m3[0].cbrt()
+        };
+        let far = WIDE * scale_m.max(volume);
+        let outer = self.outer_m[1].min(far.max(2.0 * self.outer_m[0]));
+        let lo = self.inner_m[0] + 0.5 * self.depth_min_m;
+        let deepest = (outer - self.inner_m[0]).max(self.depth_min_m);
+        let longest = self.length_m[1].min(far.max(2.0 * self.length_m[0]));
+        let ln = |lo: f64, hi: f64| [lo.ln(), hi.max(lo).ln()];
+        [
+            ln(lo.max(0.02 * outer.min(far)).min(outer), outer),
+            ln(self.depth_min_m.max(1e-3 * deepest), deepest),
+            ln(self.length_m[0].max(1e-3 * longest), longest),
+        ]
+    }
+}

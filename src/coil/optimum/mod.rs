@@ -1,0 +1,46 @@
+//! The coil of equation 11: the strongest force at the target within the limits.
+//!
+//! Variables are the inner and outer radius and the length; turns are what fits,
+//! N = (a2 - a1)/d x L/d, not rounded in the continuous problem. At least one layer and one turn
+//! a layer must fit: less is no coil. The rated current is min(I_max, V/R).
+//!
+//! 1. `problem`: in logarithms of mean radius, depth and length, limits become ratios of order
+//!    one and the amount of wire a plane, whatever the scale. Where the driver gives way to the
+//!    supply the force has a kink: either side is solved as its own smooth problem.
+//! 2. `search`: from many starts, `sequential` quadratic steps with exact active sets, then
+//!    Newton on the optimality conditions: coils and multipliers to 1e-10. The settling time,
+//!    whose inductance costs a thousand times more than the force, is left out first: a best coil
+//!    that meets it anyway needs no more.
+//! 3. `branch`: force, wire and inductance are monotone in the window, so boxes of coils are
+//!    bounded by their corners and, with `enclosure`'s interval derivatives and the multipliers,
+//!    to second order. No coil is better than the bound: that is the certificate.
+//! 4. `wound`: whole layers and turns under the same bounds.
+//!
+//! argmin has no solver for nonlinear limits; it does what is a search in one variable
+//! (`scalar`). A cored coil enters through [`model::CoilModel`]: it is solved alike, its
+//! certificate is of kind `multistart`.
+
+pub mod air;
+pub mod axis_gradient;
+pub mod branch;
+mod diagnosis;
+pub mod domain;
+pub mod enclosure;
+pub mod model;
+pub mod outcome;
+pub mod problem;
+mod scalar;
+pub mod search;
+pub mod sequential;
+pub mod starts;
+pub mod task;
+#[cfg(test)]
+mod tests;
+pub mod valley;
+pub mod wound;
+
+pub use model::{CoilModel, Strand, Window};
+pub use outcome::{BestCoil, Certificate, CertificateKind, LimitUse, Outcome, Status};
+pub use problem::{Fixed, LimitName, Task};
+pub use search::{Settings, optimise};
+pub use wound::{WoundCoil, WoundOutcome, optimise_wound};

@@ -1,0 +1,475 @@
+//! Equation 11 in scaled coordinates: ln of force and limits over ln of mean radius, depth, length.
+//!
+//! In these three logarithms resistance, wire length and wire mass are planes, every limit is a
+//! ratio to its bound, and a wire of 0.05 mm or a target at 100 m changes nothing but an offset.
+//! The rated current min(I_max, V/R) has a kink where the supply takes over, and heat at a given
+//! voltage falls with the resistance: either side of the kink is a smooth problem of its own.
+
+use super::model::{CoilModel, Sloped, Strand, Window};
+use super::sequential::{Local, Point, Smooth};
+use crate::coil::circuit::SETTLING_TIME_CONSTANTS;
+use crate::design::Limits;
+
+/// Dimensions that are given, not sought; diameters and length in m.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Fixed {
+    /// Inner diameter, m.
+    pub inner_diameter_m: Option<f64>,
+    /// Outer diameter, m.
+    pub outer_diameter_m: Option<f64>,
+    /// Length, m.
+    pub length_m: Option<f64>,
+}
+
+/// What is asked, for one coil.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Task {
+    /// The limits.
+    pub limits: Limits,
+    /// Dimensions that are given.
+    pub fixed: Fixed,
+    /// The driver's limit, A; > 0.
+    pub current_max_a: f64,
+    /// The supply's voltage, V.
+    pub voltage_v: Option<f64>,
+    /// The wires to choose among.
+    pub strands: Vec<Strand>,
+}
+
+/// What bounds a coil. The first nine are the design file's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum LimitName {
+    /// R, ohm.
+    Resistance,
+    /// Five time constants, s.
+    Settling,
+    /// Outer diameter, m.
+    OuterDiameter,
+    /// Inner diameter, m; a lower limit.
+    InnerDiameter,
+    /// Length, m.
+    Length,
+    /// Heat, W.
+    Power,
+    /// Mass of wire and core, kg.
+    Mass,
+    /// Length of wire, m.
+    WireLength,
+    /// Flux density in the core, T.
+    CoreField,
+    /// The supply's voltage, V, where the driver's current is the rated one.
+    Voltage,
+    /// The driver's current, A, where the supply's voltage sets the rated one.
+    Current,
+    /// One layer of wire must fit.
+    OneLayer,
+    /// One turn a layer must fit.
+    OneTurn,
+    /// The inner radius is not negative.
+    Axis,
+    /// A given inner diameter.
+    FixedInner,
+    /// A given outer diameter.
+    FixedOuter,
+    /// A given length.
+    FixedLength,
+}
+
+impl LimitName {
+    /// The name that artefacts use.
+    #[must_use]
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Resistance => "resistance_ohm",
+            Self::Settling => "settling_s",
+            Self::OuterDiameter | Self::FixedOuter => "outer_diameter_m",
+            Self::InnerDiameter | Self::FixedInner => "inner_diameter_m",
+            Self::Length | Self::FixedLength => "length_m",
+            Self::Power => "power_w",
+            Self::Mass => "mass_kg",
+            Self::WireLength => "wire_length_m",
+            Self::CoreField => "core_field_t",
+            Self::Voltage => "voltage_v",
+            Self::Current => "current_a",
+            Self::OneLayer => "one_layer_m",
+            Self::OneTurn => "one_turn_m",
+            Self::Axis => "axis_m",
+        }
+    }
+
+    /// Whether the value must stay above the limit.
+    #[must_use]
+    pub fn is_lower(self) -> bool {
+        matches!(
+            self,
+            Self::InnerDiameter | Self::OneLayer | Self::OneTurn | Self::Axis
+        )
+    }
+
+    /// Whether the value is given.
+    #[must_use]
+    pub fn is_equality(self) -> bool {
+        matches!(
+            self,
+            Self::FixedInner | Self::FixedOuter | Self::FixedLength
+        )
+    }
+
+    /// Whether it follows from geometry and cannot be blamed on a wish.
+    #[must_use]
+    pub fn is_geometry(self) -> bool {
+        self.is_equality() || matches!(self, Self::OneLayer | Self::OneTurn | Self::Axis)
+    }
+}
+
+/// A limit and its size, SI.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounded {
+    /// Which.
+    pub name: LimitName,
+    /// The limit.
+    pub limit: f64,
+}
+
+/// Who sets the rated current.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Regime {
+    /// The driver: I = I_max, R I_max <= V.
+    Driver,
+    /// The supply: I = V/R <= I_max.
+    Supply,
+}
+
+/// One wire, one regime: a smooth problem.
+pub struct Problem<'a> {
+    /// The coil's physics.
+    pub model: &'a dyn CoilModel,
+    /// What is asked.
+    pub task: &'a Task,
+    /// The wire.
+    pub strand: Strand,
+    /// Who sets the current.
+    pub regime: Regime,
+    /// The limits that apply.
+    pub bounds: Vec<Bounded>,
+    with_inductance: bool,
+}
+
+/// A coil with everything that is bounded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rated {
+    /// The winding's section.
+    pub window: Window,
+    /// Rated current, A.
+    pub current_a: f64,
+    /// |force| at the target, N, by the window.
+    pub force_n: Sloped,
+    /// The bounded values, SI, in the order of the problem's bounds, by the window.
+    pub values: Vec<Sloped>,
+}
+
+impl<'a> Problem<'a> {
+    /// The regimes' problems for one wire.
+    #[must_use]
+    pub fn of_wire(model: &'a dyn CoilModel, task: &'a Task, strand: Strand) -> Vec<Self> {
+        let regimes: &[Regime] = if task.voltage_v.is_some() {
+            &[Regime::Driver, Regime::Supply]
+        } else {
+            &[Regime::Driver]
+        };
+        regimes
+            .iter()
+            .map(|&regime| Self::new(model, task, strand, regime))
+            .collect()
+    }
+
+    fn new(model: &'a dyn CoilModel, task: &'a Task, strand: Strand, regime: Regime) -> Self {
+        let (limits, fixed) = (&task.limits, &task.fixed);
+        let mut bounds = Vec::new();
+        let mut add = |name, limit: Option<f64>| {
+            if let Some(limit) = limit {
+                bounds.push(Bounded { name, limit });
+            }
+        };
+        add(LimitName::FixedInner, fixed.inner_diameter_m);
+        add(LimitName::FixedOuter, fixed.outer_diameter_m);
+        add(LimitName::FixedLength, fixed.length_m);
+        let free = |given: Option<f64>, limit: Option<f64>| limit.filter(|_| given.is_none());
+        add(
+            LimitName::OuterDiameter,
+            free(fixed.outer_diameter_m, limits.outer_diameter_max_m),
+        );
+        // A limit of zero is the axis.
+        let inner = limits.inner_diameter_min_m.filter(|&limit| limit > 0.0);
+        add(
+            LimitName::InnerDiameter,
+            free(fixed.inner_diameter_m, inner),
+        );
+        add(LimitName::Length, free(fixed.length_m, limits.length_max_m));
+        add(LimitName::Resistance, limits.resistance_max_ohm);
+        add(LimitName::Settling, limits.settling_max_s);
+        add(LimitName::Power, limits.power_max_w);
+        add(LimitName::Mass, limits.mass_max_kg);
+        add(LimitName::WireLength, limits.wire_length_max_m);
+        add(LimitName::CoreField, limits.core_field_max_t);
+        match regime {
+            Regime::Driver => add(LimitName::Voltage, task.voltage_v),
+            Regime::Supply => add(LimitName::Current, Some(task.current_max_a)),
+        }
+        add(LimitName::OneLayer, Some(strand.diameter_m));
+        if fixed.length_m.is_none() {
+            add(LimitName::OneTurn, Some(strand.diameter_m));
+        }
+        if fixed.inner_diameter_m.is_none() {
+            add(LimitName::Axis, Some(0.0));
+        }
+        Self {
+            model,
+            task,
+            strand,
+            regime,
+            bounds,
+            with_inductance: limits.settling_max_s.is_some(),
+        }
+    }
+
+    /// The same wire and regime under another task.
+    #[must_use]
+    pub fn with_task<'b>(&self, task: &'b Task) -> Problem<'b>
+    where
+        'a: 'b,
+    {
+        Problem::new(self.model, task, self.strand, self.regime)
+    }
+
+    /// The problem without its limit on the settling time; `None` where it has none.
+    #[must_use]
+    pub fn without_settling(&self) -> Option<Problem<'a>> {
+        self.with_inductance.then(|| {
+            let mut bounds = self.bounds.clone();
+            bounds.retain(|bound| bound.name != LimitName::Settling);
+            Problem {
+                bounds,
+                with_inductance: false,
+                ..*self
+            }
+        })
+    }
+
+    /// The optimum of `relaxed`, this problem without one of its limits, as a point of this one.
+    #[must_use]
+    pub fn adopted(&self, relaxed: &Problem<'_>, local: &Local) -> Option<Local> {
+        let multiplier = |bound: &Bounded| {
+            let row = relaxed.bounds.iter().position(|b| b == bound);
+            row.map_or(0.0, |row| local.multipliers[row])
+        };
+        Some(Local {
+            x: local.x,
+            point: self.at(local.x)?,
+            multipliers: self.bounds.iter().map(multiplier).collect(),
+            evaluations: local.evaluations + 1,
+        })
+    }
+
+    /// The coil of a window; `None` where the model does not hold.
+    #[must_use]
+    pub fn rate(&self, window: Window) -> Option<Rated> {
+        let volume = window.volume_over_pi_m3();
+        let resistance = volume.times(self.strand.resistance_per_volume());
+        let current = match self.regime {
+            Regime::Driver => Sloped {
+                value: self.task.current_max_a,
+                slope: [0.0; 4],
+            },
+            Regime::Supply => {
+                let value = self.task.voltage_v? / resistance.value;
+                Sloped {
+                    value,
+                    slope: resistance.slope.map(|s| -value * s / resistance.value),
+                }
+            }
+        };
+        let response = self
+            .model
+            .response(
+                &window,
+                self.strand.turns_per_m2(),
+                current.value,
+                self.with_inductance,
+            )
+            .ok()?;
+        let force_n = response.force_n.along(current);
+        if !(force_n.value > 0.0 && force_n.value.is_finite()) {
+            return None;
+        }
+        let along = |value: f64, slope: [f64; 3]| Sloped {
+            value,
+            slope: [slope[0], slope[1], slope[2], 0.0],
+        };
+        let values = self
+            .bounds
+            .iter()
+            .map(|bound| match bound.name {
+                LimitName::Resistance => resistance,
+                LimitName::Settling => ratio(response.inductance_h.along(current), resistance)
+                    .times(SETTLING_TIME_CONSTANTS),
+                LimitName::OuterDiameter | LimitName::FixedOuter => {
+                    along(2.0 * window.outer_radius_m(), [2.0, 2.0, 0.0])
+                }
+                LimitName::InnerDiameter | LimitName::FixedInner | LimitName::Axis => {
+                    along(2.0 * window.inner_radius_m, [2.0, 0.0, 0.0])
+                }
+                LimitName::Length | LimitName::FixedLength | LimitName::OneTurn => {
+                    along(window.length_m, [0.0, 0.0, 1.0])
+                }
+                LimitName::OneLayer => along(window.depth_m, [0.0, 1.0, 0.0]),
+                LimitName::Power => product(product(current, current), resistance),
+                LimitName::Mass => {
+                    let wire = volume.times(self.strand.mass_per_volume());
+                    let core = response.core_mass_kg;
+                    let mut sum = wire;
+                    sum.value += core.value;
+                    for (slope, by_core) in sum.slope.iter_mut().zip(core.slope) {
+                        *slope += by_core;
+                    }
+                    sum
+                }
+                LimitName::WireLength => volume.times(self.strand.length_per_volume()),
+                LimitName::CoreField => response.core_field_t.along(current),
+                LimitName::Voltage => product(current, resistance),
+                LimitName::Current => current,
+            })
+            .collect();
+        Some(Rated {
+            window,
+            current_a: current.value,
+            force_n,
+            values,
+        })
+    }
+
+    /// The rated coil as a point of the scaled problem.
+    #[must_use]
+    pub fn scaled(&self, rated: &Rated) -> Point {
+        let window = &rated.window;
+        let mean = window.inner_radius_m + 0.5 * window.depth_m;
+        let chain = |s: &[f64; 4]| {
+            [
+                mean * s[0],
+                window.depth_m * (s[1] - 0.5 * s[0]),
+                window.length_m * s[2],
+            ]
+        };
+        let force = rated.force_n;
+        let mut rows = Vec::with_capacity(self.bounds.len());
+        let mut normals = Vec::with_capacity(self.bounds.len());
+        for (bound, value) in self.bounds.iter().zip(&rated.values) {
+            let slope = chain(&value.slope);
+            let (row, normal) = match bound.name {
+                LimitName::InnerDiameter | LimitName::FixedInner => {
+                    // (limit - value) / (2 mean): a bore may be as small as it likes.
+                    let row = 0.5 * (bound.limit - value.value) / mean;
+                    let mut normal = slope.map(|s| -0.5 * s / mean);
+                    normal[0] -= row;
+                    (row, normal)
+                }
+                LimitName::Axis => {
+                    let row = (0.5 * window.depth_m / mean).ln();
+                    (row, [-1.0, 1.0, 0.0])
+                }
+                LimitName::CoreField if value.value <= 0.0 => (-1.0, [0.0; 3]),
+                LimitName::OneLayer | LimitName::OneTurn => (
+                    (bound.limit / value.value).ln(),
+                    slope.map(|s| -s / value.value),
+                ),
+                _ => (
+                    (value.value / bound.limit).ln(),
+                    slope.map(|s| s / value.value),
+                ),
+            };
+            rows.push(row);
+            normals.push(normal);
+        }
+        Point {
+            objective: -force.value.ln(),
+            slope: chain(&force.slope).map(|s| -s / force.value),
+            rows,
+            normals,
+        }
+    }
+
+    /// dF/d(limit), N per SI unit of the limit, from a row's multiplier at the optimum: the
+    /// force that a limit wider by one unit would add (a negative number for lower limits).
+    #[must_use]
+    pub fn sensitivity_n_per_unit(&self, row: usize, multiplier: f64, rated: &Rated) -> f64 {
+        let bound = self.bounds[row];
+        let force = rated.force_n.value;
+        match bound.name {
+            LimitName::InnerDiameter | LimitName::FixedInner => {
+                let mean = rated.window.inner_radius_m + 0.5 * rated.window.depth_m;
+                -force * multiplier * 0.5 / mean
+            }
+            LimitName::OneLayer | LimitName::OneTurn => -force * multiplier / bound.limit,
+            LimitName::Axis => 0.0,
+            _ => force * multiplier / bound.limit,
+        }
+    }
+
+    /// The window of scaled coordinates ln(mean radius), ln(depth), ln(length).
+    #[must_use]
+    pub fn window(at: [f64; 3]) -> Window {
+        let (mean, depth, length) = (at[0].exp(), at[1].exp(), at[2].exp());
+        Window {
+            inner_radius_m: (mean - 0.5 * depth).max(0.0),
+            depth_m: depth,
+            length_m: length,
+        }
+    }
+
+    /// Scaled coordinates of a window.
+    #[must_use]
+    pub fn coordinates(window: &Window) -> [f64; 3] {
+        [
+            (window.inner_radius_m + 0.5 * window.depth_m).ln(),
+            window.depth_m.ln(),
+            window.length_m.ln(),
+        ]
+    }
+
+    /// The limit called `name`, where it applies.
+    #[must_use]
+    pub fn limit_of(&self, name: LimitName) -> Option<f64> {
+        self.bounds
+            .iter()
+            .find(|bound| bound.name == name)
+            .map(|bound| bound.limit)
+    }
+}
+
+impl Smooth for Problem<'_> {
+    fn at(&self, x: [f64; 3]) -> Option<Point> {
+        if x.iter().any(|v| !v.is_finite() || v.abs() > 600.0) {
+            return None;
+        }
+        Some(self.scaled(&self.rate(Self::window(x))?))
+    }
+
+    fn is_equality(&self, row: usize) -> bool {
+        self.bounds[row].name.is_equality()
+    }
+}
+
+fn product(a: Sloped, b: Sloped) -> Sloped {
+    Sloped {
+        value: a.value * b.value,
+        slope: std::array::from_fn(|i| a.slope[i] * b.value + a.value * b.slope[i]),
+    }
+}
+
+fn ratio(a: Sloped, b: Sloped) -> Sloped {
+    let value = a.value / b.value;
+    Sloped {
+        value,
+        slope: std::array::from_fn(|i| (a.slope[i] - value * b.slope[i]) / b.value),
+    }
+}

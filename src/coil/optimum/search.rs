@@ -1,0 +1,446 @@
+//! The best coil: local searches from many starts, all wires, either side of the supply's kink.
+
+use rayon::prelude::*;
+
+use super::branch::{self, GAP};
+use super::diagnosis;
+use super::domain::{Contradiction, Domain};
+use super::enclosure::{Bounding, Multipliers};
+use super::model::{CoilModel, Window};
+use super::outcome::{
+    BestCoil, Certificate, CertificateKind, LimitUse, Outcome, Status, WireOutcome,
+};
+use super::problem::{LimitName, Problem, Task};
+use super::sequential::{self, FEASIBLE, Local};
+use super::starts;
+use super::valley;
+use crate::progress::{Interrupted, Progress};
+
+/// How the search is carried out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Local searches for each wire and regime.
+    pub starts: usize,
+    /// Shifts the sequence of starts.
+    pub seed: u64,
+    /// Boxes that a certificate may take; 0 for none.
+    pub cells: usize,
+    /// A coil to start from besides.
+    pub initial: Option<Window>,
+    /// Whether the range of nearly equal bores is wanted.
+    pub valley: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            starts: 24,
+            seed: 1,
+            cells: 4_000_000,
+            initial: None,
+            valley: true,
+        }
+    }
+}
+
+/// One problem and the best local optimum known of it.
+pub(super) struct Solved<'a> {
+    pub problem: Problem<'a>,
+    pub best: Option<Local>,
+    pub contradiction: Option<Contradiction>,
+    pub missing: Vec<LimitName>,
+    pub evaluations: usize,
+    pub starts: usize,
+}
+
+impl Solved<'_> {
+    pub fn force_n(&self) -> Option<f64> {
+        self.best
+            .as_ref()
+            .map(|local| (-local.point.objective).exp())
+    }
+}
+
+/// Maximises |force| over the coils that `task` admits.
+///
+/// # Errors
+/// Interruption.
+pub fn optimise(
+    model: &dyn CoilModel,
+    task: &Task,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Outcome, Interrupted> {
+    let mut problems = match solve_all(model, task, settings, progress)? {
+        Ok(problems) => problems,
+        Err((status, problems)) => return Ok(without_coil(status, &problems)),
+    };
+    progress.begin("certify", problems.len() as u64);
+    let certificate = certify(&mut problems, settings, progress)?;
+    progress.end();
+    let winner = best_of(&problems);
+    let Some(winner) = winner else {
+        // best_n > 0 means one has been found.
+        return Ok(without_coil(
+            Status::Unbounded { missing: vec![] },
+            &problems,
+        ));
+    };
+    let best = describe(winner);
+    let valley_m = if settings.valley {
+        valley::bores_m(winner, progress)?
+    } else {
+        None
+    };
+    Ok(Outcome {
+        status: Status::Optimal,
+        best,
+        certificate,
+        wires: wires(&problems),
+        evaluations: problems.iter().map(|s| s.evaluations).sum(),
+        starts: problems.iter().map(|s| s.starts).sum(),
+        valley_m,
+    })
+}
+
+/// Why there is no coil, and the problems that have none.
+type NoCoil<'a> = (Status, Vec<Solved<'a>>);
+
+/// Every problem with its best local optimum, or the status that says why there is none.
+pub(super) fn solve_all<'a>(
+    model: &'a dyn CoilModel,
+    task: &'a Task,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Result<Vec<Solved<'a>>, NoCoil<'a>>, Interrupted> {
+    let mut problems: Vec<Solved<'_>> = task
+        .strands
+        .iter()
+        .flat_map(|&strand| Problem::of_wire(model, task, strand))
+        .map(|problem| Solved {
+            contradiction: Domain::contradiction(&problem),
+            missing: Domain::of(&problem).missing(&problem),
+            problem,
+            best: None,
+            evaluations: 0,
+            starts: 0,
+        })
+        .collect();
+    let open = |solved: &Solved<'_>| solved.contradiction.is_none() && solved.missing.is_empty();
+    let unbounded = problems
+        .iter()
+        .find(|s| s.contradiction.is_none() && !s.missing.is_empty())
+        .map(|s| s.missing.clone());
+    if let Some(missing) = unbounded {
+        return Ok(Err((Status::Unbounded { missing }, problems)));
+    }
+    let rounds = if task.limits.settling_max_s.is_some() {
+        2
+    } else {
+        1
+    };
+    let total = problems.iter().filter(|s| open(s)).count() * settings.starts * rounds;
+    progress.begin("optimise", total as u64);
+    let mut best_n = 0.0;
+    for solved in problems.iter_mut().filter(|s| open(s)) {
+        multistart(solved, settings, progress)?;
+        if let Some(force_n) = solved.force_n()
+            && force_n > best_n
+        {
+            best_n = force_n;
+            progress.improved(force_n);
+        }
+    }
+    progress.end();
+    if best_n <= 0.0 {
+        let status = diagnosis::why_none(&problems, settings, progress)?;
+        return Ok(Err((status, problems)));
+    }
+    Ok(Ok(problems))
+}
+
+pub(super) fn best_of<'b, 'a>(problems: &'b [Solved<'a>]) -> Option<&'b Solved<'a>> {
+    let mut winner: Option<&Solved<'_>> = None;
+    for solved in problems {
+        let force = solved.force_n().unwrap_or(0.0);
+        if force > winner.and_then(Solved::force_n).unwrap_or(0.0) {
+            winner = Some(solved);
+        }
+    }
+    winner
+}
+
+fn wires(problems: &[Solved<'_>]) -> Vec<WireOutcome> {
+    let mut wires: Vec<WireOutcome> = Vec::new();
+    for solved in problems {
+        let force_n = solved.force_n();
+        match wires.iter_mut().find(|w| w.strand == solved.problem.strand) {
+            Some(wire) => {
+                wire.force_n = match (wire.force_n, force_n) {
+                    (Some(a), Some(b)) => Some(a.max(b)),
+                    (a, b) => a.or(b),
+                }
+            }
+            None => wires.push(WireOutcome {
+                strand: solved.problem.strand,
+                force_n,
+            }),
+        }
+    }
+    wires
+}
+
+fn without_coil(status: Status, problems: &[Solved<'_>]) -> Outcome {
+    Outcome {
+        status,
+        best: None,
+        certificate: Certificate {
+            kind: CertificateKind::Multistart,
+            upper_bound_n: None,
+            gap: None,
+            cells: 0,
+        },
+        wires: wires(problems),
+        evaluations: problems.iter().map(|s| s.evaluations).sum(),
+        starts: problems.iter().map(|s| s.starts).sum(),
+        valley_m: None,
+    }
+}
+
+/// Local searches from every start; the best coil within the limits is kept.
+fn multistart(
+    solved: &mut Solved<'_>,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<(), Interrupted> {
+    // The inductance costs most. Without the settling time the force can only be higher: a coil
+    // that is best without it and meets it is best with it.
+    if let Some(relaxed) = solved.problem.without_settling() {
+        let (best, evaluations) = search(&relaxed, settings, progress)?;
+        solved.evaluations += evaluations;
+        solved.starts += settings.starts;
+        if let Some(local) = best
+            && let Some(best) = solved.problem.adopted(&relaxed, &local)
+            && best.violation(&solved.problem) <= FEASIBLE
+        {
+            solved.best = Some(best);
+            progress.advance(settings.starts as u64);
+            return Ok(());
+        }
+    }
+    let (best, evaluations) = search(&solved.problem, settings, progress)?;
+    solved.evaluations += evaluations;
+    solved.starts += settings.starts;
+    solved.best = best;
+    Ok(())
+}
+
+fn search(
+    problem: &Problem<'_>,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<(Option<Local>, usize), Interrupted> {
+    let domain = Domain::of(problem);
+    let scale_m = problem.model.length_scale_m();
+    let mut points: Vec<[f64; 3]> = (0..settings.starts)
+        .map(|index| starts::start(&domain, scale_m, settings.seed, index))
+        .collect();
+    points.extend(settings.initial.as_ref().map(Problem::coordinates));
+    let found: Vec<Result<Option<Local>, Interrupted>> = points
+        .into_par_iter()
+        .map(|x| {
+            progress.check()?;
+            let local = sequential::solve(problem, x);
+            progress.advance(1);
+            Ok(local)
+        })
+        .collect();
+    let mut best: Option<Local> = None;
+    let mut evaluations = 0;
+    for local in found {
+        if let Some(local) = local? {
+            evaluations += local.evaluations;
+            keep_better(problem, &mut best, local);
+        }
+    }
+    // On the axis the force's slope vanishes: a bore may be better and not be seen from there.
+    if let Some(local) = &best
+        && problem.task.fixed.inner_diameter_m.is_none()
+    {
+        let mut window = Problem::window(local.x);
+        if window.inner_radius_m < 1e-3 * window.depth_m {
+            window.inner_radius_m = 0.05 * window.depth_m;
+            window.depth_m *= 0.95;
+            if let Some(local) = sequential::solve(problem, Problem::coordinates(&window)) {
+                evaluations += local.evaluations;
+                keep_better(problem, &mut best, local);
+            }
+        }
+    }
+    Ok((best, evaluations))
+}
+
+pub(super) fn keep_better(problem: &Problem<'_>, best: &mut Option<Local>, local: Local) {
+    let feasible = local.violation(problem) <= FEASIBLE;
+    let better = best
+        .as_ref()
+        .is_none_or(|best| local.point.objective < best.point.objective);
+    if feasible && better {
+        *best = Some(local);
+    }
+}
+
+/// Bounds every problem against the best force; searches again where a box shows a better coil.
+fn certify(
+    problems: &mut [Solved<'_>],
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Certificate, Interrupted> {
+    const ROUNDS: usize = 4;
+    let mut cells = 0;
+    let mut upper_ln = f64::NEG_INFINITY;
+    let mut best_ln = best_of(problems).map_or(f64::NEG_INFINITY, best_ln_of);
+    let unproven = |cells| Certificate {
+        kind: CertificateKind::Multistart,
+        upper_bound_n: None,
+        gap: None,
+        cells,
+    };
+    if settings.cells == 0 {
+        return Ok(unproven(0));
+    }
+    for _ in 0..ROUNDS {
+        upper_ln = best_ln;
+        let mut improved = false;
+        for solved in problems.iter_mut() {
+            if solved.contradiction.is_some() {
+                continue;
+            }
+            let Some(domain) = branch::finite_domain(&solved.problem, best_ln.exp()) else {
+                return Ok(unproven(cells));
+            };
+            let (bound, better) = bound(solved, domain, best_ln, settings, &mut cells, progress)?;
+            upper_ln = upper_ln.max(bound);
+            if let Some(window) = better {
+                let local = sequential::solve(&solved.problem, Problem::coordinates(&window));
+                if let Some(local) = local {
+                    solved.evaluations += local.evaluations;
+                    keep_better(&solved.problem, &mut solved.best, local);
+                }
+                let now = solved.best.as_ref().map_or(best_ln, |l| -l.point.objective);
+                improved |= now > best_ln;
+                best_ln = best_ln.max(now);
+                if !improved {
+                    return Ok(unproven(cells));
+                }
+            }
+            progress.advance(1);
+        }
+        if !improved {
+            break;
+        }
+    }
+    let Some(gap) = Some((upper_ln - best_ln).exp_m1()).filter(|gap| gap.is_finite()) else {
+        return Ok(unproven(cells));
+    };
+    let kind = if gap <= GAP {
+        CertificateKind::Global
+    } else {
+        CertificateKind::Multistart
+    };
+    Ok(Certificate {
+        kind,
+        upper_bound_n: Some(upper_ln.exp()),
+        gap: Some(gap),
+        cells,
+    })
+}
+
+fn best_ln_of(solved: &Solved<'_>) -> f64 {
+    solved.force_n().map_or(f64::NEG_INFINITY, f64::ln)
+}
+
+/// One problem's bound on ln F, without the settling time first where that holds nothing back.
+fn bound(
+    solved: &Solved<'_>,
+    domain: Domain,
+    best_ln: f64,
+    settings: &Settings,
+    cells: &mut usize,
+    progress: &dyn Progress,
+) -> Result<(f64, Option<Window>), Interrupted> {
+    let multipliers = solved
+        .best
+        .as_ref()
+        .map_or_else(Multipliers::default, |local| {
+            Multipliers::of(&solved.problem, &local.multipliers)
+        });
+    let limited = domain.settling_max_s.is_finite();
+    let rounds: &[bool] = match (limited, multipliers.settling > 0.0) {
+        (false, _) => &[false],
+        (true, false) => &[false, true],
+        (true, true) => &[true],
+    };
+    let mut bound_ln = f64::INFINITY;
+    for &with_settling in rounds {
+        let Some(bounding) = Bounding::new(&solved.problem, domain, multipliers, with_settling)
+        else {
+            break;
+        };
+        // A relaxation that does not close is soon given up.
+        // and the inductance costs as much as many cells.
+        let budget = match (limited, with_settling) {
+            (false, _) => settings.cells,
+            (true, false) => settings.cells / 16,
+            (true, true) => settings.cells / 32,
+        };
+        let cell = branch::whole(&domain);
+        let proof = branch::prove(&bounding, &solved.problem, cell, best_ln, budget, progress)?;
+        *cells += proof.cells;
+        if proof.better.is_some() {
+            return Ok((f64::INFINITY, proof.better));
+        }
+        bound_ln = bound_ln.min(proof.upper_ln);
+        if bound_ln <= best_ln + GAP {
+            break;
+        }
+    }
+    Ok((bound_ln, None))
+}
+
+/// The winner in SI units, with what its limits cost.
+fn describe(solved: &Solved<'_>) -> Option<BestCoil> {
+    let local = solved.best.as_ref()?;
+    let problem = &solved.problem;
+    let window = diagnosis::snapped(problem, local);
+    let rated = problem.rate(window)?;
+    let strongest = local
+        .multipliers
+        .iter()
+        .fold(0.0_f64, |s, v| s.max(v.abs()));
+    let limits = problem
+        .bounds
+        .iter()
+        .enumerate()
+        .filter(|(_, bound)| bound.name != LimitName::Axis)
+        .map(|(row, bound)| {
+            let multiplier = local.multipliers[row];
+            LimitUse {
+                name: bound.name,
+                value: rated.values[row].value,
+                limit: bound.limit,
+                active: multiplier.abs() > 1e-9 * strongest || bound.name.is_equality(),
+                sensitivity_n_per_unit: problem.sensitivity_n_per_unit(row, multiplier, &rated),
+            }
+        })
+        .collect();
+    Some(BestCoil {
+        window,
+        strand: problem.strand,
+        turns: problem.strand.turns(&window),
+        regime: problem.regime,
+        current_a: rated.current_a,
+        force_n: rated.force_n.value,
+        limits,
+    })
+}

@@ -1,0 +1,82 @@
+//! Starting points: a low-discrepancy sequence, shifted by the seed.
+
+use super::domain::Domain;
+use super::model::Window;
+use super::problem::Problem;
+
+/// Start `index` of the sequence in scaled coordinates, pulled back into what the limits on
+/// sizes and wire allow. The same for any number of threads.
+#[must_use]
+pub fn start(domain: &Domain, scale_m: f64, seed: u64, index: usize) -> [f64; 3] {
+    let ranges = domain.starting_box(scale_m);
+    let mut state = seed;
+    let x: [f64; 3] = std::array::from_fn(|i| {
+        let shift = uniform(&mut state);
+        let share = (radical_inverse(index + 1, [2, 3, 5][i]) + shift).fract();
+        ranges[i][0] + share * (ranges[i][1] - ranges[i][0])
+    });
+    let mut window = Problem::window(x);
+    let mean = window.inner_radius_m + 0.5 * window.depth_m;
+    let room = 2.0 * (domain.outer_m[1] - mean).min(mean - domain.inner_m[0]);
+    let depth_m = window
+        .depth_m
+        .min(room.max(domain.depth_min_m))
+        .min(2.0 * mean);
+    window = Window {
+        inner_radius_m: mean - 0.5 * depth_m,
+        depth_m,
+        ..window
+    };
+    // Too much wire: shorter and thinner alike.
+    let excess = window.volume_over_pi_m3().value / domain.volume_m3[1];
+    if excess > 1.0 {
+        let shrink = excess.sqrt();
+        window.length_m = (window.length_m / shrink).max(domain.length_m[0]);
+        let depth_m = (window.depth_m / shrink).max(domain.depth_min_m);
+        window.inner_radius_m += 0.5 * (window.depth_m - depth_m);
+        window.depth_m = depth_m;
+    }
+    Problem::coordinates(&window)
+}
+
+/// The digits of `index` in `base`, mirrored at the point.
+fn radical_inverse(mut index: usize, base: usize) -> f64 {
+    let (mut value, mut digit) = (0.0, 1.0);
+    while index > 0 {
+        digit /= base as f64;
+        value += digit * (index % base) as f64;
+        index /= base;
+    }
+    value
+}
+
+/// A number in 0..1 from Vigna's splitmix64.
+fn uniform(state: &mut u64) -> f64 {
+    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    let mut z = *state;
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^= z >> 31;
+    (z >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sequence_fills_the_unit_interval_evenly() {
+        let mut values: Vec<f64> = (1..=80).map(|i| radical_inverse(i, 3)).collect();
+        values.sort_by(f64::total_cmp);
+        // The first 3^4 points of base 3 are the multiples of 1/81.
+        for (k, value) in values.iter().enumerate() {
+            assert!((value - (k + 1) as f64 / 81.0).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn seeds_shift_it() {
+        let (mut a, mut b) = (7, 8);
+        assert!((uniform(&mut a) - uniform(&mut b)).abs() > 1e-3);
+    }
+}

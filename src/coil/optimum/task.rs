@@ -1,0 +1,79 @@
+//! A design file's coil as a task of the optimiser.
+
+use super::air::{AirCoil, NoAirCoil};
+use super::model::{Strand, Window};
+use super::problem::{Fixed, Task};
+use crate::design::{Coil, Design};
+use crate::field::magnet::MagnetRule;
+
+/// What cannot be optimised.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum NoTask {
+    /// The drivers give no current.
+    #[error("supply.current_max_a is zero: without current no coil exerts a force")]
+    NoCurrent,
+    /// The supply gives no voltage.
+    #[error("supply.voltage_v is zero: without current no coil exerts a force")]
+    NoVoltage,
+    /// The coil or magnet cannot be modelled.
+    #[error(transparent)]
+    NoAirCoil(#[from] NoAirCoil),
+}
+
+/// The task of `design`, its coil's dimensions free but for `fixed`. The rated current is that of
+/// the array's strongest driver, as for `evaluate`; the number of turns is what fits.
+///
+/// # Errors
+/// [`NoTask`].
+pub fn of_design(design: &Design, fixed: Fixed) -> Result<Task, NoTask> {
+    let currents = &design.supply.current_max_a;
+    let current_max_a = currents.iter().copied().fold(0.0, f64::max);
+    if current_max_a <= 0.0 {
+        return Err(NoTask::NoCurrent);
+    }
+    if design
+        .supply
+        .voltage_v
+        .is_some_and(|voltage_v| voltage_v <= 0.0)
+    {
+        return Err(NoTask::NoVoltage);
+    }
+    Ok(Task {
+        limits: design.limits,
+        fixed,
+        current_max_a,
+        voltage_v: design.supply.voltage_v,
+        strands: Strand::choices(&design.wire),
+    })
+}
+
+/// The air coil under the magnet that `magnet` stands for, at the design's target.
+///
+/// # Errors
+/// [`NoTask`].
+pub fn air_coil(design: &Design, magnet: &MagnetRule) -> Result<AirCoil, NoTask> {
+    Ok(AirCoil::new(design.target_height_m, magnet)?)
+}
+
+impl Window {
+    /// The section of a design's coil.
+    #[must_use]
+    pub fn of_coil(coil: &Coil) -> Self {
+        Self {
+            inner_radius_m: 0.5 * coil.inner_diameter_m,
+            depth_m: 0.5 * (coil.outer_diameter_m - coil.inner_diameter_m),
+            length_m: coil.length_m,
+        }
+    }
+
+    /// The coil of this section with `turns`.
+    #[must_use]
+    pub fn coil(&self, turns: f64) -> Coil {
+        Coil {
+            inner_diameter_m: 2.0 * self.inner_radius_m,
+            outer_diameter_m: 2.0 * self.outer_radius_m(),
+            length_m: self.length_m,
+            turns: Some(turns),
+        }
+    }
+}
