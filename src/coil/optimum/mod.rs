@@ -21,6 +21,7 @@
 //! certificate is of kind `multistart`.
 
 pub mod air;
+pub mod alternatives;
 pub mod axis_gradient;
 pub mod branch;
 mod diagnosis;

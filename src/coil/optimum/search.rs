@@ -409,7 +409,7 @@ fn bound(
 }
 
 /// The winner in SI units, with what its limits cost.
-fn describe(solved: &Solved<'_>) -> Option<BestCoil> {
+pub(super) fn describe(solved: &Solved<'_>) -> Option<BestCoil> {
     let local = solved.best.as_ref()?;
     let problem = &solved.problem;
     let window = diagnosis::snapped(problem, local);

@@ -14,7 +14,7 @@ use super::diagnosis;
 use super::domain::Domain;
 use super::enclosure::{Bounding, Cell, Multipliers};
 use super::model::{CoilModel, Strand, Window};
-use super::outcome::{Certificate, CertificateKind, LimitUse, Status, Violation};
+use super::outcome::{BestCoil, Certificate, CertificateKind, LimitUse, Status, Violation};
 use super::problem::{LimitName, Problem, Regime, Task};
 use super::scalar;
 use super::search::{self, Settings, Solved};
@@ -68,6 +68,12 @@ pub struct WoundOutcome {
     pub certificate: Certificate,
     /// Best force of a coil whose turns need not be whole, N.
     pub continuous_n: Option<f64>,
+    /// That coil, with what its limits cost.
+    pub continuous: Option<BestCoil>,
+    /// Evaluations of a coil by the local searches.
+    pub evaluations: usize,
+    /// Local searches.
+    pub starts: usize,
 }
 
 /// A box of coils.
@@ -118,7 +124,7 @@ pub fn optimise_wound(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<WoundOutcome, Interrupted> {
-    let none = |status: Status, continuous_n: Option<f64>| WoundOutcome {
+    let none = |status: Status, problems: &[Solved<'_>]| WoundOutcome {
         status,
         best: None,
         alternatives: Vec::new(),
@@ -128,13 +134,15 @@ pub fn optimise_wound(
             gap: None,
             cells: 0,
         },
-        continuous_n,
+        continuous_n: search::best_of(problems).and_then(Solved::force_n),
+        continuous: search::best_of(problems).and_then(search::describe),
+        evaluations: problems.iter().map(|s| s.evaluations).sum(),
+        starts: problems.iter().map(|s| s.starts).sum(),
     };
     let problems = match search::solve_all(model, task, settings, progress)? {
         Ok(problems) => problems,
-        Err((status, _)) => return Ok(none(status, None)),
+        Err((status, problems)) => return Ok(none(status, &problems)),
     };
-    let continuous_n = search::best_of(&problems).and_then(Solved::force_n);
     let open: Vec<&Solved<'_>> = problems
         .iter()
         .filter(|solved| solved.contradiction.is_none())
@@ -172,7 +180,7 @@ pub fn optimise_wound(
         .max_by(|a, b| a.1.ln_force.total_cmp(&b.1.ln_force))
     else {
         let status = rounded_status(&open);
-        return Ok(none(status, continuous_n));
+        return Ok(none(status, &problems));
     };
     let mut list: Vec<WoundCoil> = coils
         .iter()
@@ -201,7 +209,7 @@ pub fn optimise_wound(
             gap: complete.then_some(gap),
             cells: found.cells,
         },
-        continuous_n,
+        ..none(Status::Optimal, &problems)
     })
 }
 

@@ -1,0 +1,37 @@
+//! The physics that the optimiser is given for a design.
+
+use crate::coil::optimum::{CoilModel, task};
+use crate::design::Design;
+use crate::job::JobError;
+use crate::job::KERNEL_ERROR;
+use crate::job::scene::{MAGNET_FINEST, MAGNET_SHARE, magnet_rule};
+
+/// The coil of `design` as a function of its winding's window.
+///
+/// # Errors
+/// Physics that is not modelled; a magnet that no coil moves.
+pub(super) fn coil_model(
+    design: &Design,
+    tolerance: Option<f64>,
+) -> Result<Box<dyn CoilModel>, JobError> {
+    let top_m = design
+        .core
+        .as_ref()
+        .map_or(0.0, |core| core.above_m.max(0.0));
+    // As fine as the coil's own evaluation.
+    let tolerance = tolerance.unwrap_or(KERNEL_ERROR).max(MAGNET_FINEST);
+    let magnet = magnet_rule(
+        design,
+        design.target_height_m,
+        top_m,
+        MAGNET_SHARE * tolerance,
+    )?;
+    if design.core.is_some() {
+        return Err(JobError::NotModelled(
+            "optimize knows air coils only: leave out [core], or sweep its dimensions".to_owned(),
+        ));
+    }
+    let coil =
+        task::air_coil(design, &magnet).map_err(|error| JobError::Input(error.to_string()))?;
+    Ok(Box::new(coil))
+}
