@@ -1,9 +1,9 @@
 //! A design file's coil as a task of the optimiser.
 
 use super::air::{AirCoil, NoAirCoil};
-use super::model::{Strand, Window};
+use super::model::{CoilModel, Strand, Window};
 use super::problem::{Fixed, Task};
-use crate::design::{Coil, Design};
+use crate::design::{Coil, Design, Steel};
 use crate::field::magnet::MagnetRule;
 
 /// What cannot be optimised.
@@ -18,6 +18,15 @@ pub enum NoTask {
     /// The coil or magnet cannot be modelled.
     #[error(transparent)]
     NoAirCoil(#[from] NoAirCoil),
+    /// Steel whose permeability depends on the field.
+    #[error(
+        "a core with a B-H curve is not optimised: give core.relative_permeability instead of \
+         core.bh_curve, and evaluate the optimum with the curve"
+    )]
+    Curve,
+    /// A core.
+    #[error("a coil with a core is not optimised yet: leave out [core]")]
+    NotYet,
 }
 
 /// The task of `design`, its coil's dimensions free but for `fixed`. The rated current is that of
@@ -45,6 +54,19 @@ pub fn of_design(design: &Design, fixed: Fixed) -> Result<Task, NoTask> {
         voltage_v: design.supply.voltage_v,
         strands: Strand::choices(&design.wire),
     })
+}
+
+/// The coil of `design`, in air or with its core, under the magnet that `magnet` stands for, at
+/// the design's target.
+///
+/// # Errors
+/// [`NoTask`].
+pub fn coil_model(design: &Design, magnet: &MagnetRule) -> Result<Box<dyn CoilModel>, NoTask> {
+    match design.core.as_ref().map(|core| &core.steel) {
+        None => Ok(Box::new(air_coil(design, magnet)?)),
+        Some(Steel::Linear(_)) => Err(NoTask::NotYet),
+        Some(Steel::Curve(_)) => Err(NoTask::Curve),
+    }
 }
 
 /// The air coil under the magnet that `magnet` stands for, at the design's target.
