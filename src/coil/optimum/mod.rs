@@ -23,6 +23,8 @@
 pub mod air;
 pub mod axis_gradient;
 pub mod branch;
+pub mod cells;
+pub mod cored;
 mod diagnosis;
 pub mod domain;
 pub mod enclosure;
@@ -36,6 +38,8 @@ pub mod starts;
 pub mod task;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tune;
 pub mod valley;
 pub mod wound;
 
