@@ -216,7 +216,12 @@ mod tests {
     use super::*;
 
     fn line(x: f64, y: f64, thirds: &[f64]) -> Line {
-        let value = |&z: &f64| [(0.7 * x - y).sin() * (1.3 * z).exp(), 1.0 / (3.0 + x + y * z)];
+        let value = |&z: &f64| {
+            [
+                (0.7 * x - y).sin() * (1.3 * z).exp(),
+                1.0 / (3.0 + x + y * z),
+            ]
+        };
         (x < 2.0).then(|| thirds.iter().map(value).collect())
     }
 

@@ -332,12 +332,7 @@ impl CoilModel for CoredModel {
         let length_m = window.length_m + self.rule.below_m + self.rule.above_m;
         response.core_mass_kg = Sloped {
             value: section * radius_m * length_m,
-            slope: [
-                2.0 * section * length_m,
-                0.0,
-                section * radius_m,
-                0.0,
-            ],
+            slope: [2.0 * section * length_m, 0.0, section * radius_m, 0.0],
         };
         if let Some(peaks) = &self.peaks {
             let [ln, _] = peaks

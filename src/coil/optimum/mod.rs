@@ -34,6 +34,7 @@ pub mod problem;
 mod scalar;
 pub mod search;
 pub mod sequential;
+mod sharpen;
 pub mod starts;
 pub mod task;
 #[cfg(test)]

@@ -1,9 +1,10 @@
 //! A design file's coil as a task of the optimiser.
 
 use super::air::{AirCoil, NoAirCoil};
+use super::cored::{CoreRule, CoredModel, NoCoredCoil};
 use super::model::{CoilModel, Strand, Window};
 use super::problem::{Fixed, Task};
-use crate::design::{Coil, Design, Steel};
+use crate::design::{Coil, Core, Design, Steel};
 use crate::field::magnet::MagnetRule;
 
 /// What cannot be optimised.
@@ -24,9 +25,9 @@ pub enum NoTask {
          core.bh_curve, and evaluate the optimum with the curve"
     )]
     Curve,
-    /// A core.
-    #[error("a coil with a core is not optimised yet: leave out [core]")]
-    NotYet,
+    /// The coil with its core cannot be modelled.
+    #[error(transparent)]
+    NoCoredCoil(#[from] NoCoredCoil),
 }
 
 /// The task of `design`, its coil's dimensions free but for `fixed`. The rated current is that of
@@ -62,10 +63,9 @@ pub fn of_design(design: &Design, fixed: Fixed) -> Result<Task, NoTask> {
 /// # Errors
 /// [`NoTask`].
 pub fn coil_model(design: &Design, magnet: &MagnetRule) -> Result<Box<dyn CoilModel>, NoTask> {
-    match design.core.as_ref().map(|core| &core.steel) {
+    match &design.core {
         None => Ok(Box::new(air_coil(design, magnet)?)),
-        Some(Steel::Linear(_)) => Err(NoTask::NotYet),
-        Some(Steel::Curve(_)) => Err(NoTask::Curve),
+        Some(core) => Ok(Box::new(cored_coil(design, core, magnet)?)),
     }
 }
 
@@ -75,6 +75,30 @@ pub fn coil_model(design: &Design, magnet: &MagnetRule) -> Result<Box<dyn CoilMo
 /// [`NoTask`].
 pub fn air_coil(design: &Design, magnet: &MagnetRule) -> Result<AirCoil, NoTask> {
     Ok(AirCoil::new(design.target_height_m, magnet)?)
+}
+
+/// The coil with `core`, alone, under the magnet that `magnet` stands for, at the design's
+/// target.
+///
+/// # Errors
+/// [`NoTask`].
+pub fn cored_coil(design: &Design, core: &Core, magnet: &MagnetRule) -> Result<CoredModel, NoTask> {
+    let Steel::Linear(relative_permeability) = core.steel else {
+        return Err(NoTask::Curve);
+    };
+    let rule = CoreRule {
+        clearance_m: core.clearance_m,
+        above_m: core.above_m,
+        below_m: core.below_m,
+        relative_permeability,
+    };
+    let with_peak = design.limits.core_field_max_t.is_some();
+    Ok(CoredModel::new(
+        design.target_height_m,
+        magnet,
+        rule,
+        with_peak,
+    )?)
 }
 
 impl Window {
