@@ -24,6 +24,8 @@ pub mod air;
 pub mod alternatives;
 pub mod axis_gradient;
 pub mod branch;
+pub mod cells;
+pub mod cored;
 mod diagnosis;
 pub mod domain;
 pub mod enclosure;
@@ -33,10 +35,13 @@ pub mod problem;
 mod scalar;
 pub mod search;
 pub mod sequential;
+mod sharpen;
 pub mod starts;
 pub mod task;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tune;
 pub mod valley;
 pub mod wound;
 

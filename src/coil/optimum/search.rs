@@ -12,6 +12,7 @@ use super::outcome::{
 };
 use super::problem::{LimitName, Problem, Task};
 use super::sequential::{self, FEASIBLE, Local};
+use super::sharpen;
 use super::starts;
 use super::valley;
 use crate::progress::{Interrupted, Progress};
@@ -75,6 +76,10 @@ pub fn optimise(
         Ok(problems) => problems,
         Err((status, problems)) => return Ok(without_coil(status, &problems)),
     };
+    let sharp = sharpen::sharpened(model, task, &problems, progress)?;
+    if let Some(sharp) = &sharp {
+        problems = sharpen::restated(&**sharp, task, &problems);
+    }
     progress.begin("certify", problems.len() as u64);
     let certificate = certify(&mut problems, settings, progress)?;
     progress.end();

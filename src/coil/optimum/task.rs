@@ -1,9 +1,10 @@
 //! A design file's coil as a task of the optimiser.
 
 use super::air::{AirCoil, NoAirCoil};
-use super::model::{Strand, Window};
+use super::cored::{CoreRule, CoredModel, NoCoredCoil};
+use super::model::{CoilModel, Strand, Window};
 use super::problem::{Fixed, Task};
-use crate::design::{Coil, Design};
+use crate::design::{Coil, Core, Design, Steel};
 use crate::field::magnet::MagnetRule;
 
 /// What cannot be optimised.
@@ -18,6 +19,15 @@ pub enum NoTask {
     /// The coil or magnet cannot be modelled.
     #[error(transparent)]
     NoAirCoil(#[from] NoAirCoil),
+    /// Steel whose permeability depends on the field.
+    #[error(
+        "a core with a B-H curve is not optimised: give core.relative_permeability instead of \
+         core.bh_curve, and evaluate the optimum with the curve"
+    )]
+    Curve,
+    /// The coil with its core cannot be modelled.
+    #[error(transparent)]
+    NoCoredCoil(#[from] NoCoredCoil),
 }
 
 /// The task of `design`, its coil's dimensions free but for `fixed`. The rated current is that of
@@ -47,12 +57,48 @@ pub fn of_design(design: &Design, fixed: Fixed) -> Result<Task, NoTask> {
     })
 }
 
+/// The coil of `design`, in air or with its core, under the magnet that `magnet` stands for, at
+/// the design's target.
+///
+/// # Errors
+/// [`NoTask`].
+pub fn coil_model(design: &Design, magnet: &MagnetRule) -> Result<Box<dyn CoilModel>, NoTask> {
+    match &design.core {
+        None => Ok(Box::new(air_coil(design, magnet)?)),
+        Some(core) => Ok(Box::new(cored_coil(design, core, magnet)?)),
+    }
+}
+
 /// The air coil under the magnet that `magnet` stands for, at the design's target.
 ///
 /// # Errors
 /// [`NoTask`].
 pub fn air_coil(design: &Design, magnet: &MagnetRule) -> Result<AirCoil, NoTask> {
     Ok(AirCoil::new(design.target_height_m, magnet)?)
+}
+
+/// The coil with `core`, alone, under the magnet that `magnet` stands for, at the design's
+/// target.
+///
+/// # Errors
+/// [`NoTask`].
+pub fn cored_coil(design: &Design, core: &Core, magnet: &MagnetRule) -> Result<CoredModel, NoTask> {
+    let Steel::Linear(relative_permeability) = core.steel else {
+        return Err(NoTask::Curve);
+    };
+    let rule = CoreRule {
+        clearance_m: core.clearance_m,
+        above_m: core.above_m,
+        below_m: core.below_m,
+        relative_permeability,
+    };
+    let with_peak = design.limits.core_field_max_t.is_some();
+    Ok(CoredModel::new(
+        design.target_height_m,
+        magnet,
+        rule,
+        with_peak,
+    )?)
 }
 
 impl Window {
