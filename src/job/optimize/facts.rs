@@ -141,6 +141,9 @@ pub struct BestFacts {
     /// Circuit and mass.
     #[serde(flatten)]
     pub circuit: CircuitFacts,
+    /// Largest |B| in the core at the rated current, T; absent for air coils.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub core_peak_field_t: Option<f64>,
 }
 
 /// Circuit and mass of a coil.

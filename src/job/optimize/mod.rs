@@ -226,6 +226,7 @@ impl Optimization {
             wire_diameter_m: best.strand.diameter_m,
             conductor_diameter_m: best.strand.conductor_diameter_m,
             circuit: rated.circuit,
+            core_peak_field_t: rated.core_peak_field_t,
         });
         self.objective = Some(ObjectiveFacts {
             force_n,

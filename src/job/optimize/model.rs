@@ -26,12 +26,5 @@ pub(super) fn coil_model(
         top_m,
         MAGNET_SHARE * tolerance,
     )?;
-    if design.core.is_some() {
-        return Err(JobError::NotModelled(
-            "optimize knows air coils only: leave out [core], or sweep its dimensions".to_owned(),
-        ));
-    }
-    let coil =
-        task::air_coil(design, &magnet).map_err(|error| JobError::Input(error.to_string()))?;
-    Ok(Box::new(coil))
+    task::coil_model(design, &magnet).map_err(|error| JobError::Input(error.to_string()))
 }

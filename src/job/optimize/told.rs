@@ -209,6 +209,14 @@ fn other(found: &Alternative, best: &BestCoil) -> AlternativeFacts {
     }
 }
 
+/// Whether two coils differ by less than what alternatives are found to.
+fn same(a: &AlternativeFacts, b: &AlternativeFacts) -> bool {
+    let near = |a: f64, b: f64| (a - b).abs() <= 1e-3 * b;
+    near(a.size.length_m, b.size.length_m)
+        && near(a.size.outer_diameter_m, b.size.outer_diameter_m)
+        && near(a.wire_mass_kg, b.wire_mass_kg)
+}
+
 /// In what the first is better than the second by more than rounding.
 fn better(ours: [f64; 3], theirs: [f64; 3], besides: Option<&'static str>) -> Vec<&'static str> {
     let words = ["shorter", "lighter", "cooler"];
@@ -236,8 +244,11 @@ pub(super) fn wound(found: WoundOutcome) -> Search {
         better: better(traits(coil), traits(best), None),
     };
     let alternatives = found.best.as_ref().map_or_else(Vec::new, |best| {
-        let list = found.alternatives.iter().take(ALTERNATIVES_MAX);
-        list.map(|coil| alternative(coil, best)).collect()
+        let list = &found.alternatives;
+        // Of many the strongest, the weakest and those evenly between.
+        let told = list.len().min(ALTERNATIVES_MAX);
+        let at = |k: usize| k * (list.len() - 1) / (told - 1).max(1);
+        (0..told).map(|k| alternative(&list[at(k)], best)).collect()
     });
     Search {
         whole: found

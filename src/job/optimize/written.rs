@@ -225,6 +225,7 @@ pub(super) struct RatedFacts {
     /// Of the current alone, N.
     pub force_n: f64,
     pub passive_n: Option<f64>,
+    pub core_peak_field_t: Option<f64>,
     pub limits: std::collections::BTreeMap<&'static str, LimitCheck>,
     pub accuracy: std::collections::BTreeMap<&'static str, crate::accuracy::StageAccuracy>,
     pub accuracy_reached: bool,
@@ -256,6 +257,7 @@ impl RatedFacts {
             gradient_t_per_m_per_a: rated.single.field.dbz_dz,
             force_n: rated.force.force_n[2] - rated.force.passive_n.unwrap_or(0.0),
             passive_n: rated.force.passive_n,
+            core_peak_field_t: rated.single.core.as_ref().map(|core| core.peak_field_t),
             limits: rated.limits,
             accuracy: rated.single.accuracy,
             accuracy_reached: rated.accuracy_reached,

@@ -8,6 +8,9 @@ use crate::job::optimize::{
     AlternativeFacts, BestFacts, GivenFacts, LimitFacts, ObjectiveFacts, Optimization,
 };
 
+/// Most alternatives on screen; JSON has more.
+const SHOWN: usize = 6;
+
 pub fn summary(result: &Optimization, out: Option<&FileArgument>) -> String {
     let kind = if result.wound {
         "the best coil that can be wound"
@@ -62,7 +65,11 @@ fn found(sheet: &mut Sheet, result: &Optimization, coil: &BestFacts, objective: 
             count(layers as usize, "layer"),
             number(coil.turns)
         ),
-        _ => format!("{} turns", number(coil.turns)),
+        _ => format!(
+            "{} {}",
+            number(coil.turns),
+            if coil.turns == 1.0 { "turn" } else { "turns" }
+        ),
     };
     sheet.line(
         "coil",
@@ -319,7 +326,7 @@ fn alternatives(list: &[AlternativeFacts]) -> String {
     ]
     .map(str::to_owned);
     let mut rows = vec![head.to_vec()];
-    for other in list {
+    for other in shown(list) {
         let turns = match (other.layers, other.turns_per_layer) {
             (Some(layers), Some(turns)) => format!("{layers} x {turns}"),
             _ => number(other.turns),
@@ -342,10 +349,17 @@ fn alternatives(list: &[AlternativeFacts]) -> String {
     table(&sides, &rows)
 }
 
+/// The first, the last, and those evenly between.
+fn shown(list: &[AlternativeFacts]) -> impl Iterator<Item = &AlternativeFacts> {
+    let told = list.len().min(SHOWN);
+    (0..told).map(move |k| &list[k * (list.len() - 1) / (told - 1).max(1)])
+}
+
 fn told(name: &str, value: f64) -> String {
     match unit(name) {
         "mm" => mm(value),
         "g" => mass(value),
+        "" => number(value),
         unit => si(value, unit),
     }
 }
