@@ -13,6 +13,7 @@ use super::air::{AirCoil, NoAirCoil};
 use super::axis_gradient::axis_gradient;
 use super::cells::{Cells, Interpolated, Lattice, Line};
 use super::model::{CoilModel, NoResponse, Response, Sloped, Window};
+use crate::coil::section_integrals;
 use crate::field::magnet::MagnetRule;
 use crate::field::steel::CoreShape;
 use crate::field::steel::cored_coil::CoredCoil;
@@ -68,15 +69,15 @@ const THINNEST: f64 = 0.004;
 const FLATTEST: f64 = 1e-3;
 
 /// Relative accuracy of the search's solutions, and of those about the optimum.
-const COARSE: f64 = 1e-4;
-const FINE: f64 = 1e-7;
+const COARSE: f64 = 3e-4;
+const FINE: f64 = 1e-6;
 const COARSE_LATTICE: Lattice = Lattice {
     origin: [0.0; 3],
     width: [1.0, 1.2, 1.0],
-    order: [6, 6, 5],
+    order: [5, 5, 4],
 };
 const FINE_WIDTH: [f64; 3] = [0.5, 0.6, 0.8];
-const FINE_ORDER: [usize; 3] = [7, 7, 7];
+const FINE_ORDER: [usize; 3] = [6, 6, 7];
 
 /// A cored coil, alone, under a magnet on its axis.
 #[derive(Clone)]
@@ -90,6 +91,8 @@ pub struct CoredModel {
     added: Arc<Cells>,
     /// (ln of peak |B| per ampere-turn over mu_0 / core radius, nothing), where it is limited.
     peaks: Option<Arc<Cells>>,
+    /// Whether it has been sharpened.
+    sharp: bool,
     relative_error: f64,
 }
 
@@ -114,7 +117,7 @@ impl CoredModel {
         rule: CoreRule,
         with_peak: bool,
     ) -> Result<Self, NoCoredCoil> {
-        let air = AirCoil::new(height_m, magnet)?;
+        let air = AirCoil::new(height_m, magnet)?.with_accuracy(&section_integrals::ROUGH);
         let dipoles = air.air_dipoles().unwrap_or_default().to_vec();
         if dipoles.iter().any(|&(z_m, _)| z_m <= rule.above_m) {
             return Err(NoCoredCoil::BelowTop);
@@ -126,6 +129,7 @@ impl CoredModel {
             resolution: Resolution::for_tolerance(COARSE),
             added: Arc::new(Cells::new(COARSE_LATTICE)),
             peaks: with_peak.then(|| Arc::new(Cells::new(COARSE_LATTICE))),
+            sharp: false,
             relative_error: COARSE,
         })
     }
@@ -363,6 +367,9 @@ impl CoilModel for CoredModel {
     }
 
     fn sharpened(&self, window: &Window) -> Option<Box<dyn CoilModel>> {
+        if self.sharp {
+            return None;
+        }
         let at = self.coordinates(window).ok()?;
         // The best coil stands in its cell's middle, away from the borders.
         let lattice = Lattice {
@@ -373,10 +380,12 @@ impl CoilModel for CoredModel {
         let mut sharp = Self {
             resolution: Resolution::for_tolerance(FINE),
             added: Arc::new(Cells::new(lattice)),
+            sharp: true,
+            air: self.air.clone().with_accuracy(&section_integrals::FINE),
             ..self.clone()
         };
         sharp.added.fill(at, |x, y, z| sharp.line(x, y, z));
-        sharp.relative_error = sharp.checked(window)?;
+        sharp.relative_error = sharp.checked(window)?.max(FINE);
         Some(Box::new(sharp))
     }
 }
