@@ -286,7 +286,6 @@ fn a_limit_on_the_core_s_field_is_met_and_costs_force() {
     let best = |limits| {
         let outcome = optimise(&model, &task_of(limits), &quick(), &Silent);
         let outcome = outcome.expect("not interrupted");
-        eprintln!("DBG {outcome:?}");
         outcome.best.expect("an optimum")
     };
     let (free, limited) = (best(free), best(limited));
@@ -318,6 +317,48 @@ fn a_limit_on_the_core_s_field_is_met_and_costs_force() {
         .expect("inside")
         .peak_t;
     assert!((peak_t / 0.5 - 1.0).abs() < 1e-3, "{peak_t}");
+}
+
+#[test]
+fn neighbours_are_taken_into_account() {
+    let design = seed();
+    let task = task::of_design(&design, Fixed::default()).expect("a task");
+    let best = |surroundings| {
+        let model = task::coil_model_in(&design, &magnet(), surroundings).expect("a model");
+        let outcome = optimise(&*model, &task, &quick(), &Silent);
+        outcome.expect("not interrupted").best.expect("an optimum")
+    };
+    let alone = best(task::Surroundings::Alone);
+    let among = best(task::Surroundings::Neighbours);
+    // They add inductance, so that the coil that settles in time is a smaller one.
+    assert!(among.window.length_m < alone.window.length_m);
+    let neighbours = neighbours::Neighbours::new(&design.array.positions_m).expect("nine");
+    let window = among.window;
+    let shape = rule()
+        .shape(window.inner_radius_m, window.length_m)
+        .expect("fits");
+    let winding = Winding {
+        inner_radius_m: window.inner_radius_m,
+        outer_radius_m: window.outer_radius_m(),
+        length_m: window.length_m,
+        turns: among.turns,
+    };
+    let coil = CoredCoil::new(&winding, shape, 1000.0, 1e-6, HEIGHT_M).expect("off the edges");
+    let air_h = self_inductance_h(&winding);
+    let dipoles = [(HEIGHT_M, 1.0)];
+    let factors = neighbours.factors(&coil, 1000.0, &dipoles, air_h);
+    let factors = factors.expect("cores apart");
+    let (force_n, inductance_h) = direct(&window, &rule());
+    let force = 2.0 * factors[0] * force_n / among.force_n - 1.0;
+    assert!(force.abs() < 1e-5, "{force:e}");
+    let value = |name| {
+        let limit = among.limits.iter().find(|limit| limit.name == name);
+        limit.expect("limited").value
+    };
+    let settling_s =
+        5.0 * factors[1] * inductance_h / value(LimitName::Resistance) / value(LimitName::Settling);
+    assert!((settling_s - 1.0).abs() < 1e-5, "{settling_s}");
+    println!("alone {alone:?}\namong {among:?} {factors:?}");
 }
 
 #[test]

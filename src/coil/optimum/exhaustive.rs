@@ -58,9 +58,15 @@ pub(super) fn optimise(
         .as_deref()
         .map(|sharp| sharpen::restated(sharp, task, &coarse));
     let sharp = restated.as_ref().unwrap_or(&coarse);
+    // What the search did not know, of neighbours say, is screened for too.
+    let blunt_model = sharp_model.as_deref().and_then(CoilModel::blunted);
+    let screened = blunt_model
+        .as_deref()
+        .map(|blunt| sharpen::restated(blunt, task, sharp));
+    let screen = screened.as_ref().unwrap_or(&coarse);
     let continuous_n = search::best_of(sharp).and_then(Solved::force_n);
-    let open: Vec<usize> = (0..coarse.len())
-        .filter(|&index| coarse[index].contradiction.is_none())
+    let open: Vec<usize> = (0..screen.len())
+        .filter(|&index| screen[index].contradiction.is_none())
         .collect();
     progress.begin("wind", open.len() as u64);
     let doubt = DOUBT * model.relative_error();
@@ -69,19 +75,19 @@ pub(super) fn optimise(
     let mut complete = true;
     let mut best_ln = f64::NEG_INFINITY;
     for &index in &open {
-        let mut finite = Domain::of(&coarse[index].problem);
+        let mut finite = Domain::of(&screen[index].problem);
         if !(finite.outer_m[1].is_finite() && finite.length_m[1].is_finite()) {
             complete = false;
-            match around_optimum(&coarse[index]) {
+            match around_optimum(&screen[index]) {
                 Some(around) => finite = around,
                 None => continue,
             }
         }
-        let pairs = Pairs::of(&coarse[index], finite);
+        let pairs = Pairs::of(&screen[index], finite);
         if pairs.count() > PAIRS {
             complete = false;
         }
-        let leaves = pairs.leaves(best_ln + (-SHARE).ln_1p() - doubt, &coarse[index], progress)?;
+        let leaves = pairs.leaves(best_ln + (-SHARE).ln_1p() - doubt, &screen[index], progress)?;
         examined += leaves.1;
         for leaf in leaves.0 {
             best_ln = best_ln.max(leaf.ln_force);
@@ -94,7 +100,7 @@ pub(super) fn optimise(
     found.sort_by(|a, b| b.1.ln_force.total_cmp(&a.1.ln_force));
     let list = decided(&found, sharp, progress)?;
     let Some(best) = list.first().cloned() else {
-        let open: Vec<&Solved<'_>> = open.iter().map(|&index| &coarse[index]).collect();
+        let open: Vec<&Solved<'_>> = open.iter().map(|&index| &screen[index]).collect();
         return Ok(WoundOutcome::none(rounded_status(&open), continuous_n));
     };
     let enough_n = best.force_n * (1.0 - SHARE);

@@ -37,6 +37,7 @@ pub mod enclosure;
 pub mod exhaustive;
 pub mod listing;
 pub mod model;
+pub mod neighbours;
 pub mod outcome;
 pub mod problem;
 mod scalar;
