@@ -13,6 +13,9 @@ use super::air::{AirCoil, NoAirCoil};
 use super::axis_gradient::axis_gradient;
 use super::cells::{Cells, Interpolated, Lattice, Line};
 use super::model::{CoilModel, NoResponse, Response, Sloped, Window};
+use super::neighbours::Neighbours;
+use crate::coil::inductance::self_inductance_h;
+use crate::coil::section_integrals;
 use crate::field::magnet::MagnetRule;
 use crate::field::steel::CoreShape;
 use crate::field::steel::cored_coil::CoredCoil;
@@ -68,15 +71,15 @@ const THINNEST: f64 = 0.004;
 const FLATTEST: f64 = 1e-3;
 
 /// Relative accuracy of the search's solutions, and of those about the optimum.
-const COARSE: f64 = 1e-4;
-const FINE: f64 = 1e-7;
+const COARSE: f64 = 3e-4;
+const FINE: f64 = 1e-6;
 const COARSE_LATTICE: Lattice = Lattice {
     origin: [0.0; 3],
     width: [1.0, 1.2, 1.0],
-    order: [6, 6, 5],
+    order: [5, 5, 4],
 };
 const FINE_WIDTH: [f64; 3] = [0.5, 0.6, 0.8];
-const FINE_ORDER: [usize; 3] = [7, 7, 7];
+const FINE_ORDER: [usize; 3] = [6, 6, 7];
 
 /// A cored coil, alone, under a magnet on its axis.
 #[derive(Clone)]
@@ -90,7 +93,24 @@ pub struct CoredModel {
     added: Arc<Cells>,
     /// (ln of peak |B| per ampere-turn over mu_0 / core radius, nothing), where it is limited.
     peaks: Option<Arc<Cells>>,
+    /// Whether it has been sharpened.
+    sharp: bool,
+    /// The search's table, kept beside the sharp one.
+    coarse: Arc<Cells>,
+    neighbours: Option<Neighbours>,
+    factors: Factors,
     relative_error: f64,
+}
+
+/// What the tables' values are multiplied by, as found at one coil.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Factors {
+    /// Neighbours on the force.
+    force: f64,
+    /// Neighbours on the inductance.
+    inductance: f64,
+    /// The table's error on the core's peak field, which has kinks.
+    peak: f64,
 }
 
 /// What one cored coil does per ampere-turn, solved for itself.
@@ -114,20 +134,37 @@ impl CoredModel {
         rule: CoreRule,
         with_peak: bool,
     ) -> Result<Self, NoCoredCoil> {
-        let air = AirCoil::new(height_m, magnet)?;
+        let air = AirCoil::new(height_m, magnet)?.with_accuracy(&section_integrals::ROUGH);
         let dipoles = air.air_dipoles().unwrap_or_default().to_vec();
         if dipoles.iter().any(|&(z_m, _)| z_m <= rule.above_m) {
             return Err(NoCoredCoil::BelowTop);
         }
+        let coarse = Arc::new(Cells::new(COARSE_LATTICE));
         Ok(Self {
             air,
             dipoles,
             rule,
             resolution: Resolution::for_tolerance(COARSE),
-            added: Arc::new(Cells::new(COARSE_LATTICE)),
+            added: Arc::clone(&coarse),
+            coarse,
+            neighbours: None,
+            factors: Factors {
+                force: 1.0,
+                inductance: 1.0,
+                peak: 1.0,
+            },
             peaks: with_peak.then(|| Arc::new(Cells::new(COARSE_LATTICE))),
+            sharp: false,
             relative_error: COARSE,
         })
+    }
+
+    /// The same coil among the unpowered coils of an array.
+    ///
+    /// The search is for the coil alone; the neighbours' effect enters where it is sharpened.
+    #[must_use]
+    pub fn among(self, neighbours: Option<Neighbours>) -> Self {
+        Self { neighbours, ..self }
     }
 
     /// How the core sits.
@@ -224,6 +261,11 @@ impl CoredModel {
         if shape.length_m() < FLATTEST * shape.radius_m {
             return Err(no("the core is a foil"));
         }
+        if let Some(neighbours) = &self.neighbours
+            && 2.0 * window.outer_radius_m() > neighbours.spacing_m * (1.0 + 1e-9)
+        {
+            return Err(no("wider than the array's pitch"));
+        }
         let gap_m = self.dipoles.iter().fold(f64::INFINITY, |gap, d| {
             gap.min(d.0 - self.rule.above_m.max(0.0))
         });
@@ -275,6 +317,37 @@ impl CoredModel {
     }
 }
 
+impl CoredModel {
+    /// The factors that make the tables right at `window`.
+    fn factors_at(&self, window: &Window) -> Option<Factors> {
+        let mut factors = Factors {
+            force: 1.0,
+            inductance: 1.0,
+            peak: 1.0,
+        };
+        if self.peaks.is_none() && self.neighbours.is_none() {
+            return Some(factors);
+        }
+        let shape = self.rule.shape(window.inner_radius_m, window.length_m)?;
+        let depths_m = [window.depth_m];
+        let solved = self.solve(shape.radius_m, window.length_m, &depths_m, &self.resolution);
+        let (coil, _) = solved?.pop()?;
+        if let Some(neighbours) = &self.neighbours {
+            let air_h = self_inductance_h(&coil.winding);
+            let mu_r = self.rule.relative_permeability;
+            [factors.force, factors.inductance] =
+                neighbours.factors(&coil, mu_r, &self.dipoles, air_h)?;
+        }
+        if let Some(peaks) = &self.peaks {
+            let at = self.coordinates(window).ok()?;
+            let [ln, _] = peaks.at(at, |x, y, z| self.peak_line(x, y, z))?;
+            let per_ampere_turn = ln.value.exp() * MU_0_T_M_PER_A / shape.radius_m;
+            factors.peak = peak_t(&coil)? / per_ampere_turn;
+        }
+        Some(factors)
+    }
+}
+
 /// Largest |B| in the core per ampere, T/A.
 fn peak_t(coil: &CoredCoil) -> Option<f64> {
     let depth_m = peak_depth_m(coil.core.outline().shape);
@@ -308,7 +381,7 @@ impl CoilModel for CoredModel {
             .ok_or_else(unsolved)?;
         let mut factor = self.chained(window, &ratio);
         factor.value += 1.0;
-        response.force_n = product(response.force_n, factor);
+        response.force_n = product(response.force_n, factor).times(self.factors.force);
         let radius_m = window.inner_radius_m - self.rule.clearance_m;
         let area_m2 = window.depth_m * window.length_m;
         if with_inductance {
@@ -327,6 +400,7 @@ impl CoilModel for CoredModel {
             for (sum, slope) in response.inductance_h.slope.iter_mut().zip(steel.slope) {
                 *sum += slope;
             }
+            response.inductance_h = response.inductance_h.times(self.factors.inductance);
         }
         let section = PI * STEEL_DENSITY_KG_PER_M3 * radius_m;
         let length_m = window.length_m + self.rule.below_m + self.rule.above_m;
@@ -339,7 +413,7 @@ impl CoilModel for CoredModel {
                 .at(at, |x, y, z| self.peak_line(x, y, z))
                 .ok_or_else(unsolved)?;
             let ln = self.chained(window, &ln);
-            let per_turn = ln.value.exp() * MU_0_T_M_PER_A / radius_m;
+            let per_turn = self.factors.peak * ln.value.exp() * MU_0_T_M_PER_A / radius_m;
             let peak_t = per_turn * turns_per_m2 * area_m2 * current_a;
             response.core_field_t = Sloped {
                 value: peak_t,
@@ -364,19 +438,44 @@ impl CoilModel for CoredModel {
 
     fn sharpened(&self, window: &Window) -> Option<Box<dyn CoilModel>> {
         let at = self.coordinates(window).ok()?;
-        // The best coil stands in its cell's middle, away from the borders.
-        let lattice = Lattice {
-            origin: std::array::from_fn(|i| at[i] - 0.5 * FINE_WIDTH[i]),
-            width: FINE_WIDTH,
-            order: FINE_ORDER,
-        };
-        let mut sharp = Self {
-            resolution: Resolution::for_tolerance(FINE),
-            added: Arc::new(Cells::new(lattice)),
-            ..self.clone()
-        };
-        sharp.added.fill(at, |x, y, z| sharp.line(x, y, z));
-        sharp.relative_error = sharp.checked(window)?;
+        if self.sharp && self.peaks.is_none() && self.neighbours.is_none() {
+            return None;
+        }
+        let mut sharp = self.clone();
+        if !self.sharp {
+            // The best coil stands in its cell's middle, away from the borders.
+            let lattice = |order| Lattice {
+                origin: std::array::from_fn(|i| at[i] - 0.5 * FINE_WIDTH[i]),
+                width: FINE_WIDTH,
+                order,
+            };
+            sharp.sharp = true;
+            sharp.resolution = Resolution::for_tolerance(FINE);
+            sharp.added = Arc::new(Cells::new(lattice(FINE_ORDER)));
+            sharp.air = sharp.air.with_accuracy(&section_integrals::FINE);
+            sharp.added.fill(at, |x, y, z| sharp.line(x, y, z));
+            sharp.relative_error = sharp.checked(window)?.max(FINE);
+            if sharp.peaks.is_some() {
+                let peaks = Cells::new(lattice(COARSE_LATTICE.order));
+                peaks.fill(at, |x, y, z| sharp.peak_line(x, y, z));
+                sharp.peaks = Some(Arc::new(peaks));
+            }
+        }
+        sharp.factors = sharp.factors_at(window)?;
         Some(Box::new(sharp))
+    }
+
+    fn blunted(&self) -> Option<Box<dyn CoilModel>> {
+        self.sharp.then(|| {
+            let blunt: Box<dyn CoilModel> = Box::new(Self {
+                sharp: false,
+                resolution: Resolution::for_tolerance(COARSE),
+                added: Arc::clone(&self.coarse),
+                relative_error: COARSE,
+                air: self.air.clone().with_accuracy(&section_integrals::ROUGH),
+                ..self.clone()
+            });
+            blunt
+        })
     }
 }

@@ -189,4 +189,10 @@ pub trait CoilModel: Sync {
     fn sharpened(&self, _window: &Window) -> Option<Box<dyn CoilModel>> {
         None
     }
+
+    /// The coarse model again, with what was learnt when it was sharpened; `None` where it was
+    /// not.
+    fn blunted(&self) -> Option<Box<dyn CoilModel>> {
+        None
+    }
 }

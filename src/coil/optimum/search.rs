@@ -78,7 +78,10 @@ pub fn optimise(
     };
     let sharp = sharpen::sharpened(model, task, &problems, progress)?;
     if let Some(sharp) = &sharp {
-        problems = sharpen::restated(&**sharp, task, &problems);
+        let restated = sharpen::restated(&**sharp, task, &problems);
+        if best_of(&restated).is_some() {
+            problems = restated;
+        }
     }
     progress.begin("certify", problems.len() as u64);
     let certificate = certify(&mut problems, settings, progress)?;

@@ -13,6 +13,8 @@ const ROUNDS: usize = 8;
 const STANDS: f64 = 1e-5;
 /// Problems whose coarse optimum lacks more than this share of the best are not solved again.
 const CLOSE: f64 = 0.01;
+/// How much smaller, relatively, a second start is.
+const SMALLER: f64 = 0.03;
 
 /// Sharpens `model` about the best of `problems` until the optimum stands; `None` where the
 /// model cannot be sharpened.
@@ -74,11 +76,15 @@ pub(super) fn restated<'a>(
                 .is_some_and(|n| n >= best_n * (1.0 - CLOSE));
             if !close {
                 solved.best = coarse.best.clone();
-            } else if let Some(local) = &coarse.best
-                && let Some(local) = sequential::solve(&solved.problem, local.x)
-            {
-                solved.evaluations += local.evaluations;
-                keep_better(&solved.problem, &mut solved.best, local);
+            } else if let Some(local) = &coarse.best {
+                // A coil a little smaller besides: the sharp model's limits may be tighter.
+                for less in [0.0, SMALLER] {
+                    let start = local.x.map(|x| x - less);
+                    if let Some(local) = sequential::solve(&solved.problem, start) {
+                        solved.evaluations += local.evaluations;
+                        keep_better(&solved.problem, &mut solved.best, local);
+                    }
+                }
             }
             solved
         })

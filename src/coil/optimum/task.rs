@@ -3,6 +3,7 @@
 use super::air::{AirCoil, NoAirCoil};
 use super::cored::{CoreRule, CoredModel, NoCoredCoil};
 use super::model::{CoilModel, Strand, Window};
+use super::neighbours::Neighbours;
 use super::problem::{Fixed, Task};
 use crate::design::{Coil, Core, Design, Steel};
 use crate::field::magnet::MagnetRule;
@@ -57,16 +58,43 @@ pub fn of_design(design: &Design, fixed: Fixed) -> Result<Task, NoTask> {
     })
 }
 
-/// The coil of `design`, in air or with its core, under the magnet that `magnet` stands for, at
+/// What stands beside the coil that is optimised.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Surroundings {
+    /// Nothing: equation 11's coil.
+    #[default]
+    Alone,
+    /// The array's other coils, unpowered, their cores magnetised: the coil nearest to the
+    /// array's centre is optimised, all coils being alike. Nothing changes without cores.
+    Neighbours,
+}
+
+/// The coil of `design`, in air or with its core, alone, under the magnet that `magnet` stands for, at
 /// the design's target.
 ///
 /// # Errors
 /// [`NoTask`].
 pub fn coil_model(design: &Design, magnet: &MagnetRule) -> Result<Box<dyn CoilModel>, NoTask> {
-    match &design.core {
-        None => Ok(Box::new(air_coil(design, magnet)?)),
-        Some(core) => Ok(Box::new(cored_coil(design, core, magnet)?)),
-    }
+    coil_model_in(design, magnet, Surroundings::Alone)
+}
+
+/// The same in given surroundings.
+///
+/// # Errors
+/// [`NoTask`].
+pub fn coil_model_in(
+    design: &Design,
+    magnet: &MagnetRule,
+    surroundings: Surroundings,
+) -> Result<Box<dyn CoilModel>, NoTask> {
+    let Some(core) = &design.core else {
+        return Ok(Box::new(air_coil(design, magnet)?));
+    };
+    let alone = cored_coil(design, core, magnet)?;
+    Ok(Box::new(match surroundings {
+        Surroundings::Alone => alone,
+        Surroundings::Neighbours => alone.among(Neighbours::new(&design.array.positions_m)),
+    }))
 }
 
 /// The air coil under the magnet that `magnet` stands for, at the design's target.
