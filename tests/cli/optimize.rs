@@ -310,7 +310,7 @@ fn another_file_is_not_replaced() {
 #[test]
 fn a_sweep_optimises_each_design() {
     let place = Place::new();
-    let set = "limits.resistance_max_ohm=0.0001,3,6";
+    let set = "limits.resistance_max_ohm=0.00009,3,6";
     for (mode, column) in [
         (&["--optimize"][..], ",,"),
         (&["--optimize", "--wound"], ",26,85,"),

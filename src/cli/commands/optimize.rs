@@ -66,14 +66,16 @@ pub struct Optimize {
 
 /// A dimension that is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-#[value(rename_all = "snake_case")]
 enum Key {
     /// The bore
-    InnerDiameterMm,
+    #[value(name = "inner_diameter_mm")]
+    InnerDiameter,
     /// The outer diameter
-    OuterDiameterMm,
+    #[value(name = "outer_diameter_mm")]
+    OuterDiameter,
     /// The length
-    LengthMm,
+    #[value(name = "length_mm")]
+    Length,
 }
 
 fn starts(text: &str) -> Result<usize, String> {
@@ -117,9 +119,9 @@ impl Optimize {
 
     fn request(&self) -> OptimizeRequest {
         let dimension = |key: &Key| match key {
-            Key::InnerDiameterMm => Dimension::InnerDiameter,
-            Key::OuterDiameterMm => Dimension::OuterDiameter,
-            Key::LengthMm => Dimension::Length,
+            Key::InnerDiameter => Dimension::InnerDiameter,
+            Key::OuterDiameter => Dimension::OuterDiameter,
+            Key::Length => Dimension::Length,
         };
         OptimizeRequest {
             wound: self.wound,
@@ -173,8 +175,7 @@ impl Optimize {
         if self.writing.force || !path.is_file() {
             return Ok(());
         }
-        let there = std::fs::read(path).unwrap_or_default();
-        if there.starts_with(mark.as_bytes()) {
+        if documents::begins_with(path, mark) {
             return Ok(());
         }
         Err(JobError::from(WriteError::OutputExists {

@@ -84,7 +84,7 @@ fn infeasible(violations: &[Violation], wound: bool) -> String {
     };
     format!(
         "no {kind} meets the limits: nearest to blame is {}; even the coil that misses least has \
-         {value:.5} {unit} where {limit:.5} {unit} are allowed, {:.3} % off{besides}",
+         {value:.5} {unit} where {limit:.5} {unit} are allowed, {:.1} % off{besides}",
         design_key(worst.name),
         worst.excess.exp_m1().abs() * 100.0
     )
@@ -163,7 +163,13 @@ pub(super) fn continuous(found: Outcome, around: &[Alternative]) -> Search {
         continuous_n: found.best.as_ref().map(|best| best.force_n),
         continuous: found.best.clone(),
         alternatives: found.best.as_ref().map_or_else(Vec::new, |best| {
-            around.iter().map(|a| other(a, best)).collect()
+            let mut list: Vec<AlternativeFacts> = Vec::new();
+            for coil in around.iter().map(|coil| other(coil, best)) {
+                if !list.iter().any(|known| same(known, &coil)) {
+                    list.push(coil);
+                }
+            }
+            list
         }),
         best: found.best,
         certificate: found.certificate,
