@@ -105,13 +105,38 @@ pub struct CoredModel {
 /// What the tables' values are multiplied by, as found at one coil.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Factors {
-    /// Neighbours on the force.
-    force: f64,
-    /// Neighbours on the inductance.
-    inductance: f64,
+    /// Neighbours on force and inductance; nothing without them.
+    neighbours: Option<[Power; 2]>,
     /// The table's error on the core's peak field, which has kinks.
     peak: f64,
 }
+
+/// A product of powers of core radius, length and a2/a1: a factor with its slopes at one coil.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Power {
+    at: [f64; 3],
+    value: f64,
+    exponents: [f64; 3],
+}
+
+impl Power {
+    fn interpolated(&self, at: [f64; 3]) -> Interpolated {
+        let ln: f64 = (0..3)
+            .map(|i| self.exponents[i] * (at[i] - self.at[i]))
+            .sum();
+        let value = self.value * ln.exp();
+        Interpolated {
+            value,
+            slope: self.exponents.map(|e| e * value),
+        }
+    }
+}
+
+/// Step of the differences that make the exponents, in logarithms: downwards, where no pitch is
+/// exceeded.
+const STEP: f64 = -0.1;
+/// Exponents are kept while no coordinate has moved farther than this.
+const KEPT: f64 = 0.05;
 
 /// What one cored coil does per ampere-turn, solved for itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -149,8 +174,7 @@ impl CoredModel {
             coarse,
             neighbours: None,
             factors: Factors {
-                force: 1.0,
-                inductance: 1.0,
+                neighbours: None,
                 peak: 1.0,
             },
             peaks: with_peak.then(|| Arc::new(Cells::new(COARSE_LATTICE))),
@@ -321,30 +345,55 @@ impl CoredModel {
     /// The factors that make the tables right at `window`.
     fn factors_at(&self, window: &Window) -> Option<Factors> {
         let mut factors = Factors {
-            force: 1.0,
-            inductance: 1.0,
+            neighbours: None,
             peak: 1.0,
         };
-        if self.peaks.is_none() && self.neighbours.is_none() {
-            return Some(factors);
-        }
-        let shape = self.rule.shape(window.inner_radius_m, window.length_m)?;
-        let depths_m = [window.depth_m];
-        let solved = self.solve(shape.radius_m, window.length_m, &depths_m, &self.resolution);
-        let (coil, _) = solved?.pop()?;
+        let at = self.coordinates(window).ok()?;
         if let Some(neighbours) = &self.neighbours {
-            let air_h = self_inductance_h(&coil.winding);
-            let mu_r = self.rule.relative_permeability;
-            [factors.force, factors.inductance] =
-                neighbours.factors(&coil, mu_r, &self.dipoles, air_h)?;
+            let value = self.among_factors(neighbours, at)?;
+            let close = |power: &Power| (0..3).all(|i| (power.at[i] - at[i]).abs() <= KEPT);
+            let exponents = match self.factors.neighbours {
+                Some(old) if old.iter().all(close) => old.map(|power| power.exponents),
+                _ => {
+                    let mut exponents = [[0.0; 3]; 2];
+                    for i in 0..3 {
+                        let mut moved = at;
+                        moved[i] += STEP;
+                        let there = self.among_factors(neighbours, moved)?;
+                        for f in 0..2 {
+                            exponents[f][i] = (there[f] / value[f]).ln() / STEP;
+                        }
+                    }
+                    exponents
+                }
+            };
+            factors.neighbours = Some(std::array::from_fn(|f| Power {
+                at,
+                value: value[f],
+                exponents: exponents[f],
+            }));
         }
         if let Some(peaks) = &self.peaks {
-            let at = self.coordinates(window).ok()?;
+            let shape = self.rule.shape(window.inner_radius_m, window.length_m)?;
+            let depths_m = [window.depth_m];
+            let solved = self.solve(shape.radius_m, window.length_m, &depths_m, &self.resolution);
+            let (coil, _) = solved?.pop()?;
             let [ln, _] = peaks.at(at, |x, y, z| self.peak_line(x, y, z))?;
             let per_ampere_turn = ln.value.exp() * MU_0_T_M_PER_A / shape.radius_m;
             factors.peak = peak_t(&coil)? / per_ampere_turn;
         }
         Some(factors)
+    }
+
+    /// What the neighbours multiply force and inductance of the coil at table coordinates by.
+    fn among_factors(&self, neighbours: &Neighbours, at: [f64; 3]) -> Option<[f64; 2]> {
+        let (radius_m, length_m) = (at[0].exp(), at[1].exp());
+        let depths_m = self.depths_m(radius_m, &[at[2]]);
+        let solved = self.solve(radius_m, length_m, &depths_m, &self.resolution);
+        let (coil, _) = solved?.pop()?;
+        let air_h = self_inductance_h(&coil.winding);
+        let mu_r = self.rule.relative_permeability;
+        neighbours.factors(&coil, mu_r, &self.dipoles, air_h)
     }
 }
 
@@ -381,7 +430,11 @@ impl CoilModel for CoredModel {
             .ok_or_else(unsolved)?;
         let mut factor = self.chained(window, &ratio);
         factor.value += 1.0;
-        response.force_n = product(response.force_n, factor).times(self.factors.force);
+        response.force_n = product(response.force_n, factor);
+        if let Some([force, _]) = &self.factors.neighbours {
+            let by = self.chained(window, &force.interpolated(at));
+            response.force_n = product(response.force_n, by);
+        }
         let radius_m = window.inner_radius_m - self.rule.clearance_m;
         let area_m2 = window.depth_m * window.length_m;
         if with_inductance {
@@ -400,7 +453,10 @@ impl CoilModel for CoredModel {
             for (sum, slope) in response.inductance_h.slope.iter_mut().zip(steel.slope) {
                 *sum += slope;
             }
-            response.inductance_h = response.inductance_h.times(self.factors.inductance);
+            if let Some([_, inductance]) = &self.factors.neighbours {
+                let by = self.chained(window, &inductance.interpolated(at));
+                response.inductance_h = product(response.inductance_h, by);
+            }
         }
         let section = PI * STEEL_DENSITY_KG_PER_M3 * radius_m;
         let length_m = window.length_m + self.rule.below_m + self.rule.above_m;

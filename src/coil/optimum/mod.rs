@@ -49,8 +49,6 @@ pub mod starts;
 pub mod task;
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod tune;
 pub mod valley;
 pub mod wound;
 

@@ -1,7 +1,8 @@
 //! What an array's other cores, unpowered, do to one coil: factors of its force and inductance.
 //!
-//! Factors vary slowly with the coil's dimensions. They are computed at one coil and held while
-//! the coil alone is optimised, and again at what comes out, until that stands.
+//! Factors vary slowly with the coil's dimensions. They are computed at one coil, with their slopes,
+//! and taken as powers of the dimensions while the coil alone is optimised; again at what comes
+//! out, until that stands: then values and slopes are those of the coupled array.
 
 use crate::field::steel::CoreShape;
 use crate::field::steel::array::CoupledArray;
