@@ -93,9 +93,10 @@ def markdown(table, reference, solvers):
             word = "" if math.isfinite(solved(table, reference, name, solver)) else ", failed"
             cells.append(f"{seconds:.3g} s, {error:.0e}{word}")
         print(f"| {name} | " + " | ".join(cells) + " |")
-    failures = [sum(not math.isfinite(solved(table, reference, n, s)) for n in table) for s in solvers]
+    tried = [[name for name in table if s in table[name]] for s in solvers]
+    failures = [sum(math.isinf(solved(table, reference, n, s)) for n in names) for s, names in zip(solvers, tried)]
     totals = [sum(table[n].get(s, (0.0, 0.0))[0] for n in table) for s in solvers]
-    print("| **failures** | " + " | ".join(f"{f} of {len(table)}" for f in failures) + " |")
+    print("| **failures** | " + " | ".join(f"{f} of {len(names)}" for f, names in zip(failures, tried)) + " |")
     print("| **CPU s in all** | " + " | ".join(f"{t:.3g}" for t in totals) + " |")
 
 
@@ -115,7 +116,8 @@ def draw(path, table, reference, solvers):
     left.set(xlabel="CPU time, s", ylabel=f"force lacking, relative (below {FLOOR:g} drawn there)")
     left.set_title("Every problem: error against time")
     left.legend()
-    for solver, ratios in profile(table, reference, solvers).items():
+    everywhere = [solver for solver in solvers if all(solver in table[name] for name in table)]
+    for solver, ratios in profile(table, reference, everywhere).items():
         done = [r for r in ratios if math.isfinite(r)]
         shares = [(k + 1) / len(ratios) for k in range(len(done))]
         right.step([1, *done, 1e6], [0, *shares, shares[-1] if shares else 0], where="post", label=solver)
