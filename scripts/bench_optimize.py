@@ -8,7 +8,9 @@
 NLopt's seconds are those of one solver with all its starts in a process that is already running;
 fluxform's are those of the whole process, one thread, certificate left out (`fluxform`) or
 included (`fluxform_proven`, air coils only). Both are CPU time. An error is what a solver's best feasible coil
-lacks of the reference's force; a solver fails where that is more than the objective's tolerance.
+lacks of the reference's force, which is the best of NLopt's own; with a core NLopt reads a table
+made beforehand, while fluxform solves for the steel and finds valley and alternatives besides.
+A solver fails where that is more than the objective's tolerance.
 """
 
 import argparse
