@@ -80,6 +80,8 @@ const COARSE_LATTICE: Lattice = Lattice {
 };
 const FINE_WIDTH: [f64; 3] = [0.5, 0.6, 0.8];
 const FINE_ORDER: [usize; 3] = [6, 6, 7];
+/// Largest width of a cell along ln(a2/a1), relative to its middle.
+const WITHIN: f64 = 1.8;
 
 /// A cored coil, alone, under a magnet on its axis.
 #[derive(Clone)]
@@ -499,10 +501,13 @@ impl CoilModel for CoredModel {
         }
         let mut sharp = self.clone();
         if !self.sharp {
-            // The best coil stands in its cell's middle, away from the borders.
+            // The best coil stands in its cell's middle, away from the borders; no winding in
+            // the cell is without depth.
+            let mut width = FINE_WIDTH;
+            width[2] = width[2].min(WITHIN * at[2]);
             let lattice = |order| Lattice {
-                origin: std::array::from_fn(|i| at[i] - 0.5 * FINE_WIDTH[i]),
-                width: FINE_WIDTH,
+                origin: std::array::from_fn(|i| at[i] - 0.5 * width[i]),
+                width,
                 order,
             };
             sharp.sharp = true;
@@ -510,7 +515,13 @@ impl CoilModel for CoredModel {
             sharp.added = Arc::new(Cells::new(lattice(FINE_ORDER)));
             sharp.air = sharp.air.with_accuracy(&section_integrals::FINE);
             sharp.added.fill(at, |x, y, z| sharp.line(x, y, z));
-            sharp.relative_error = sharp.checked(window)?.max(FINE);
+            // Beside the middle, which may be a node.
+            let beside = Window {
+                inner_radius_m: 0.97 * window.inner_radius_m,
+                depth_m: 0.93 * window.depth_m,
+                length_m: 1.04 * window.length_m,
+            };
+            sharp.relative_error = sharp.checked(&beside)?.max(FINE);
             if sharp.peaks.is_some() {
                 let peaks = Cells::new(lattice(COARSE_LATTICE.order));
                 peaks.fill(at, |x, y, z| sharp.peak_line(x, y, z));

@@ -165,8 +165,8 @@ fn taylor_test_of_force_and_every_limit() {
 #[test]
 fn meets_the_reference_optima() {
     let folder = Path::new("tests/oracles/nlopt");
-    let text = std::fs::read_to_string(folder.join("reference.json")).expect("committed");
-    let reference: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let text = include_str!("../../../tests/oracles/nlopt/reference.json");
+    let reference: serde_json::Value = serde_json::from_str(text).expect("JSON");
     for name in ["seed_cored", "cored_mass", "cored_wire_choices"] {
         let wanted = &reference["problems"][name];
         let path = folder.join(format!("designs/{name}.toml"));
@@ -378,4 +378,30 @@ fn what_cannot_be_is_told() {
     };
     let refused = CoredModel::new(HEIGHT_M, &magnet(), high, false).err();
     assert_eq!(refused, Some(NoCoredCoil::BelowTop));
+}
+
+/// A cell as wide as for thick windings would reach windings without depth, and its slopes there
+/// would be those of nonsense that no value at its middle shows.
+#[test]
+fn slopes_of_a_thin_winding_around_a_thick_core() {
+    let thin = Window {
+        inner_radius_m: 0.0135,
+        depth_m: 0.0035,
+        length_m: 0.1,
+    };
+    let rule = rule();
+    let sharp = model(rule, false).sharpened(&thin).expect("a core fits");
+    let by_depth = sharp
+        .response(&thin, 1.0 / 0.49e-6, 1.0, false)
+        .expect("in the domain")
+        .force_n
+        .slope[1];
+    let force_n = |depth_m: f64| direct(&Window { depth_m, ..thin }, &rule).0;
+    let step_m = 2e-5;
+    let difference =
+        (force_n(thin.depth_m + step_m) - force_n(thin.depth_m - step_m)) / (2.0 * step_m);
+    assert!(
+        (by_depth / difference - 1.0).abs() < 1e-3,
+        "{by_depth} {difference}"
+    );
 }
