@@ -332,3 +332,35 @@ fn a_sweep_optimises_each_design() {
         );
     }
 }
+
+/// Two coils, one beside the other: the neighbour's core takes flux away.
+#[test]
+fn neighbours_cores_change_the_best_force() {
+    let place = Place::new();
+    let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/designs/seed.toml"))
+        .expect("the shipped design")
+        .replace("rows = 3", "rows = 1")
+        .replace("columns = 3", "columns = 2");
+    place.write("pair.toml", &text);
+    let found = place
+        .run(&[
+            "optimize",
+            "pair.toml",
+            "--neighbours",
+            "--starts",
+            "2",
+            "--format",
+            "json",
+        ])
+        .ends(0)
+        .json();
+    let among_n = number(&found, "objective/force_n");
+    let alone_n = number(&found, "objective/alone_force_n");
+    assert!(among_n > 0.0 && alone_n > 0.0);
+    assert!(
+        (among_n / alone_n - 1.0).abs() > 1e-3,
+        "{among_n} {alone_n}"
+    );
+    let settling = &found["limits"]["settling_s"];
+    assert!(number(settling, "value") <= number(settling, "limit") * (1.0 + 1e-9));
+}

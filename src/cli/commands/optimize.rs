@@ -43,6 +43,10 @@ pub struct Optimize {
     /// Whole layers and whole turns a layer
     #[arg(long)]
     wound: bool,
+    /// Among the array's other coils: their unpowered cores count for force and settling of the
+    /// coil nearest to the centre, where the design couples them
+    #[arg(long)]
+    neighbours: bool,
     /// Local searches for every wire, besides that from the design's own coil
     #[arg(long, value_name = "N", default_value_t = 24, value_parser = starts)]
     starts: usize,
@@ -125,6 +129,7 @@ impl Optimize {
         };
         OptimizeRequest {
             wound: self.wound,
+            neighbours: self.neighbours,
             fixed: self.fix.iter().map(dimension).collect(),
             starts: self.starts,
             seed: self.seed,

@@ -114,6 +114,9 @@ pub fn optimise(
 /// Why there is no coil, and the problems that have none.
 type NoCoil<'a> = (Status, Vec<Solved<'a>>);
 
+/// How many times more starts are tried where none found a coil.
+const PATIENCE: usize = 3;
+
 /// Every problem with its best local optimum, or the status that says why there is none.
 pub(super) fn solve_all<'a>(
     model: &'a dyn CoilModel,
@@ -148,18 +151,28 @@ pub(super) fn solve_all<'a>(
         1
     };
     let total = problems.iter().filter(|s| open(s)).count() * settings.starts * rounds;
-    progress.begin("optimise", total as u64);
     let mut best_n = 0.0;
-    for solved in problems.iter_mut().filter(|s| open(s)) {
-        multistart(solved, settings, progress)?;
-        if let Some(force_n) = solved.force_n()
-            && force_n > best_n
-        {
-            best_n = force_n;
-            progress.improved(force_n);
+    // That no start finds a coil is no proof: more are tried before it is said.
+    for patience in [1, PATIENCE] {
+        let settings = Settings {
+            starts: patience * settings.starts,
+            ..*settings
+        };
+        progress.begin("optimise", (patience * total) as u64);
+        for solved in problems.iter_mut().filter(|s| open(s)) {
+            multistart(solved, &settings, progress)?;
+            if let Some(force_n) = solved.force_n()
+                && force_n > best_n
+            {
+                best_n = force_n;
+                progress.improved(force_n);
+            }
+        }
+        progress.end();
+        if best_n > 0.0 {
+            break;
         }
     }
-    progress.end();
     if best_n <= 0.0 {
         let status = diagnosis::why_none(&problems, settings, progress)?;
         return Ok(Err((status, problems)));

@@ -163,24 +163,7 @@ pub fn solve(problem: &dyn Smooth, start: [f64; 3]) -> Option<Local> {
         evaluations,
     };
     polish(problem, &mut local);
-    refit(problem, &mut local);
     Some(local)
-}
-
-/// The multipliers at the place reached, where a search that was cut short left those of its last
-/// step: the ones that leave the Lagrangian the least slope.
-fn refit(problem: &dyn Smooth, local: &mut Local) {
-    const IDENTITY: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let Some((found, _)) = step(problem, &local.point, IDENTITY) else {
-        return;
-    };
-    let left = |multipliers: &[f64]| {
-        let slope = lagrangian_slope(&local.point, multipliers);
-        dot(slope, slope)
-    };
-    if left(&found.multipliers) < left(&local.multipliers) {
-        local.multipliers = found.multipliers;
-    }
 }
 
 fn lagrangian_slope(point: &Point, multipliers: &[f64]) -> [f64; 3] {

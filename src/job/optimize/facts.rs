@@ -178,6 +178,9 @@ pub struct ObjectiveFacts {
     pub gradient_t_per_m_per_a: f64,
     /// Height of the magnet's centre, m.
     pub height_m: f64,
+    /// The force of the coil alone, N; told where `force_n` is that among the neighbours' cores.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub alone_force_n: Option<f64>,
     /// The unpowered steel's pull, N, which is not part of `force_n`; told where the design asks
     /// for it.
     #[serde(skip_serializing_if = "Option::is_none")]

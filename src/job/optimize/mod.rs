@@ -12,10 +12,12 @@ pub use written::Document;
 
 use self::written::{Chosen, RatedFacts};
 use super::JobError;
+use super::steel::coupled;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::coil::optimum::alternatives::alternatives;
-use crate::coil::optimum::problem::Regime;
+use crate::coil::optimum::problem::{LimitName, Regime};
+use crate::coil::optimum::task::Surroundings;
 use crate::coil::optimum::{
     BestCoil, Certificate, Fixed, LimitUse, Settings, Status, Window, optimise, optimise_wound,
     task, valley,
@@ -42,6 +44,9 @@ pub enum Dimension {
 pub struct OptimizeRequest {
     /// Whole layers and turns.
     pub wound: bool,
+    /// Whether the neighbours' cores are there too, where the design couples them: force and
+    /// settling are those of the coil nearest to the array's centre.
+    pub neighbours: bool,
     /// Dimensions that keep the design's value.
     pub fixed: Vec<Dimension>,
     /// Local searches for every wire.
@@ -66,6 +71,7 @@ impl Default for OptimizeRequest {
         } = Settings::default();
         Self {
             wound: false,
+            neighbours: false,
             fixed: Vec::new(),
             starts,
             seed,
@@ -156,6 +162,9 @@ pub fn optimize(
         };
         let (written, rated) = written::write(document, &chosen, request.tolerance)?;
         result.take(&search, best, rated);
+        if surroundings(design, request.neighbours) == Surroundings::Neighbours {
+            result.among_neighbours(best);
+        }
         result.design_text = Some(written.text);
         result.notes.extend(too_wide(&written.design));
     }
@@ -237,6 +246,7 @@ impl Optimization {
             },
             gradient_t_per_m_per_a: rated.gradient_t_per_m_per_a,
             height_m: 0.0,
+            alone_force_n: None,
             passive_force_n: rated.passive_n,
         });
         self.accuracy = rated.accuracy;
@@ -250,6 +260,22 @@ impl Optimization {
         );
         self.accuracy_reached = rated.accuracy_reached;
         self.notes = rated.notes;
+    }
+
+    /// Force and settling among the neighbours' cores, which `evaluate` leaves out.
+    fn among_neighbours(&mut self, best: &BestCoil) {
+        if let Some(objective) = &mut self.objective {
+            let alone_n = objective.force_n;
+            objective.alone_force_n = Some(alone_n);
+            objective.force_n = best.force_n.copysign(alone_n);
+        }
+        self.accuracy.remove("optimiser");
+        let settling = LimitName::Settling.key();
+        let found = best.limits.iter().find(|used| used.name.key() == settling);
+        if let (Some(facts), Some(used)) = (self.limits.get_mut(settling), found) {
+            facts.value = used.value;
+            facts.met = used.value <= used.limit * (1.0 + 1e-9);
+        }
     }
 
     /// The design's own coil, where it can be computed.
@@ -312,6 +338,16 @@ fn fixed(design: &Design, dimensions: &[Dimension]) -> Result<Fixed, JobError> {
     Ok(fixed)
 }
 
+/// What stands beside the coil: the neighbours' cores where they are asked for, are coupled and
+/// are there.
+fn surroundings(design: &Design, neighbours: bool) -> Surroundings {
+    if neighbours && coupled(design) {
+        Surroundings::Neighbours
+    } else {
+        Surroundings::Alone
+    }
+}
+
 fn search(
     design: &Design,
     fixed: Fixed,
@@ -320,7 +356,11 @@ fn search(
 ) -> Result<Search, JobError> {
     let refused = |error: task::NoTask| JobError::Input(error.to_string());
     let task = task::of_design(design, fixed).map_err(refused)?;
-    let model = model::coil_model(design, request.tolerance)?;
+    let model = model::coil_model(
+        design,
+        request.tolerance,
+        surroundings(design, request.neighbours),
+    )?;
     let model = model.as_ref();
     let settings = Settings {
         starts: request.starts,

@@ -1,6 +1,7 @@
 //! The physics that the optimiser is given for a design.
 
-use crate::coil::optimum::{CoilModel, task};
+use crate::coil::optimum::CoilModel;
+use crate::coil::optimum::task::{self, Surroundings};
 use crate::design::Design;
 use crate::job::JobError;
 use crate::job::KERNEL_ERROR;
@@ -13,6 +14,7 @@ use crate::job::scene::{MAGNET_FINEST, MAGNET_SHARE, magnet_rule};
 pub(super) fn coil_model(
     design: &Design,
     tolerance: Option<f64>,
+    surroundings: Surroundings,
 ) -> Result<Box<dyn CoilModel>, JobError> {
     let top_m = design
         .core
@@ -26,5 +28,6 @@ pub(super) fn coil_model(
         top_m,
         MAGNET_SHARE * tolerance,
     )?;
-    task::coil_model(design, &magnet).map_err(|error| JobError::Input(error.to_string()))
+    task::coil_model_in(design, &magnet, surroundings)
+        .map_err(|error| JobError::Input(error.to_string()))
 }

@@ -89,7 +89,7 @@ fn found(sheet: &mut Sheet, result: &Optimization, coil: &BestFacts, objective: 
     sheet.line(
         "force",
         &format!(
-            "{} {way} on the magnet, {} above the coil at {}, the {} limit{}",
+            "{} {way} on the magnet, {} above the coil at {}, the {} limit{}{}",
             force(objective.force_n.abs()),
             mm(objective.height_m),
             si(objective.current_a, "A"),
@@ -98,6 +98,12 @@ fn found(sheet: &mut Sheet, result: &Optimization, coil: &BestFacts, objective: 
             } else {
                 "driver's"
             },
+            objective.alone_force_n.map_or_else(String::new, |alone| {
+                format!(
+                    "\namong its neighbours' cores; {} alone, as in the table below",
+                    force(alone.abs())
+                )
+            }),
             objective.passive_force_n.map_or_else(String::new, |pull| {
                 format!("\nbesides, the unpowered steel pulls with {}", force(pull))
             })
@@ -250,7 +256,10 @@ fn beside(coil: &BestFacts, objective: &ObjectiveFacts, given: Option<&GivenFact
     let ours = &coil.circuit;
     let mut rows = vec![vec![String::new(), "best".to_owned()]];
     let lines = [
-        ("force", force(objective.force_n)),
+        (
+            "force",
+            force(objective.alone_force_n.unwrap_or(objective.force_n)),
+        ),
         ("inner diameter", mm(coil.size.inner_diameter_m)),
         ("outer diameter", mm(coil.size.outer_diameter_m)),
         ("length", mm(coil.size.length_m)),
