@@ -361,6 +361,8 @@ fn neighbours_cores_change_the_best_force() {
         (among_n / alone_n - 1.0).abs() > 1e-3,
         "{among_n} {alone_n}"
     );
+    // A coupled solution of the coil found says what the optimiser counted on.
+    assert!(number(&found, "accuracy/optimiser/estimate") < 1e-3);
     let settling = &found["limits"]["settling_s"];
-    assert!(number(settling, "value") <= number(settling, "limit") * (1.0 + 1e-9));
+    assert!(number(settling, "value") <= number(settling, "limit") * (1.0 + 1e-3));
 }

@@ -49,6 +49,12 @@ impl Neighbours {
         })
     }
 
+    /// The coil that is optimised.
+    #[must_use]
+    pub fn drive(&self) -> usize {
+        self.drive
+    }
+
     /// What the neighbours multiply the steel's and winding's force on dipoles (height, moment)
     /// above the coil's own axis by, and its inductance, of which the winding's own is
     /// `air_inductance_h`; `None` where cores touch or the solution fails.
