@@ -9,6 +9,7 @@ pub mod error;
 pub mod fault;
 pub mod format;
 pub mod height;
+pub mod inspect;
 pub mod mesh;
 pub mod obj;
 pub mod placement;
@@ -30,5 +31,6 @@ mod words;
 mod xml;
 
 pub use error::ShapeError;
+pub use inspect::MeshReport;
 pub use points::{ConstraintPoints, Discretized, discretize};
 pub use surface::Surface;
