@@ -78,6 +78,10 @@ pub(super) fn lay_out(bodies: &[Body], roots: &[(usize, Affine)]) -> Result<Vec<
     for (root, place) in roots {
         add(bodies, *root, place, &mut triangles);
     }
+    let mut coordinates = triangles.as_flattened().as_flattened().iter();
+    if coordinates.any(|c| !c.is_finite()) {
+        return Err("a placement moves a body beyond all numbers".into());
+    }
     Ok(triangles)
 }
 

@@ -69,6 +69,8 @@ const LIKELY: [(&str, f64); 4] = [("mm", 1e-3), ("m", 1.0), ("in", 0.0254), ("cm
 /// Sizes that surfaces of haptic displays have, m.
 const USUAL_M: [f64; 2] = [0.01, 0.5];
 
+/// Coordinates beyond this are no lengths in any unit.
+const FARTHEST: f64 = 1e15;
 /// Two programs may round the same vertex to neighbouring numbers.
 const WELD_ROUNDINGS: f64 = 2.0;
 
@@ -80,7 +82,16 @@ impl MeshReport {
     pub fn of_file(path: &Path) -> Result<Self, ShapeError> {
         let format =
             SurfaceFormat::of(path).ok_or_else(|| ShapeError::Format { path: path.into() })?;
-        Ok(Self::new(format, format.read(path, &read_file(path)?)?))
+        let file = format.read(path, &read_file(path)?)?;
+        let coordinates = file.triangles.as_flattened().as_flattened().iter();
+        let largest = coordinates.fold(0.0, |m: f64, c| m.max(c.abs()));
+        if largest > FARTHEST {
+            return Err(ShapeError::Document(format!(
+                "{}: a coordinate is {largest:e}: no unit makes that a length; the file is damaged",
+                path.display()
+            )));
+        }
+        Ok(Self::new(format, file))
     }
 
     /// Looks at what was read.

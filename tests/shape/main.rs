@@ -1,9 +1,11 @@
-//! Surfaces: STL readers, exact heights, primitives, constraint points.
+//! Surfaces: readers, exact heights, primitives, constraint points.
 #![allow(missing_docs)]
 
 mod corpus;
+mod formats;
 mod fuzz;
 mod heights;
 mod points;
+mod samples;
 mod stl;
 mod support;
