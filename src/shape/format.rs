@@ -27,6 +27,9 @@ impl SurfaceFormat {
             Self::Amf => amf::read,
             Self::ThreeDxml => three_dxml::read,
             Self::Sldprt => sldprt::read,
+            #[cfg(feature = "step")]
+            Self::Step => crate::shape::step::read,
+            #[cfg(not(feature = "step"))]
             Self::Step => step,
         };
         let mesh = if bytes.is_empty() {
@@ -43,6 +46,7 @@ impl SurfaceFormat {
     }
 }
 
+#[cfg(not(feature = "step"))]
 fn step(_: &[u8]) -> Result<FileMesh, ReadError> {
     Err(ReadError::file(
         "STEP files are not read by this version: open it in the CAD program and save the body \

@@ -45,6 +45,8 @@ pub struct MeshReport {
     pub degenerate: usize,
     /// Triangles whose three corners another triangle has too.
     pub duplicate: usize,
+    /// V - E + F: 2 for a closed body without a hole through it, 2 less for each such hole.
+    pub euler: i64,
     /// Sum of the triangles' areas.
     pub area: f64,
     /// Enclosed volume, negative if the triangles look inwards; absent unless watertight and
@@ -129,6 +131,7 @@ impl MeshReport {
             inconsistent_edges: edges.inconsistent,
             degenerate: file.triangles.iter().filter(flat).count(),
             duplicate: edges.duplicate,
+            euler: edges.euler,
             area,
             volume: (watertight && edges.inconsistent == 0).then_some(volume),
             warnings: file.warnings,
@@ -205,6 +208,7 @@ struct Edges {
     open: usize,
     crowded: usize,
     inconsistent: usize,
+    euler: i64,
 }
 
 impl Edges {
@@ -228,7 +232,12 @@ impl Edges {
             }
         }
         edges.sort_unstable();
+        let mut met = corners.as_flattened().to_vec();
+        met.sort_unstable();
+        met.dedup();
+        found.euler = met.len() as i64 + corners.len() as i64;
         for group in edges.chunk_by(|a, b| a.0 == b.0) {
+            found.euler -= 1;
             match group {
                 [_] => found.open += 1,
                 [a, b] => found.inconsistent += usize::from(a.1 == b.1),

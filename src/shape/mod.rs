@@ -17,6 +17,8 @@ pub mod ply;
 pub mod points;
 pub mod primitive;
 pub mod sldprt;
+#[cfg(feature = "step")]
+pub mod step;
 pub mod stl;
 pub mod surface;
 pub mod three_dxml;

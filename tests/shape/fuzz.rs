@@ -133,7 +133,7 @@ fn mutated_files_of_every_format_are_read_or_refused() {
         ),
     ];
     let mut random = Random(7);
-    let mut look = |format: SurfaceFormat, bytes: &[u8]| {
+    let look = |format: SurfaceFormat, bytes: &[u8]| {
         let Ok(file) = format.read(Path::new("f"), bytes) else {
             return 0;
         };

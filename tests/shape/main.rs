@@ -7,5 +7,7 @@ mod fuzz;
 mod heights;
 mod points;
 mod samples;
+#[cfg(feature = "step")]
+mod step;
 mod stl;
 mod support;

@@ -48,7 +48,7 @@ pub fn ply_ascii() -> Vec<u8> {
 pub fn ply_binary(big_endian: bool) -> Vec<u8> {
     let name = if big_endian { "big" } else { "little" };
     let mut bytes = ply_header(&format!("binary_{name}_endian")).into_bytes();
-    let mut word = |bytes: &mut Vec<u8>, bits: u32| {
+    let word = |bytes: &mut Vec<u8>, bits: u32| {
         bytes.extend(if big_endian {
             bits.to_be_bytes()
         } else {
