@@ -8,6 +8,7 @@ use std::path::PathBuf;
 
 use crate::numerics::axis::Axis;
 
+pub(in crate::shape) use format::unit_name;
 pub use format::{SurfaceFormat, parse_unit};
 pub use raw::{RawSurface, RawSurfaceError};
 
@@ -29,7 +30,7 @@ pub struct ShapeDocument {
 #[derive(Debug, Clone, PartialEq)]
 pub enum SurfaceSource {
     /// A file, path resolved against the shape file's folder, and metres per file unit
-    /// (`None` where the format itself carries the unit).
+    /// as the user states it; where the format itself carries the unit, `None` will do.
     File {
         /// Path to read.
         path: PathBuf,

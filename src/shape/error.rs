@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use crate::progress::Interrupted;
+use crate::shape::document::SurfaceFormat;
+use crate::shape::fault::ReadError;
 use crate::shape::stl::StlError;
 
 /// A shape that gives no constraint points. Lengths are metres inside, millimetres in messages.
@@ -16,13 +18,15 @@ pub enum ShapeError {
         /// What was found and what to do.
         what: String,
     },
-    /// The name's ending belongs to no surface format that can be read.
-    #[error("{}: {what}", path.display())]
+    /// The name's ending belongs to no surface format.
+    #[error(
+        "{}: not a surface that is read: expected a shape file (.toml) or {}",
+        path.display(),
+        SurfaceFormat::endings()
+    )]
     Format {
         /// Path as given.
         path: PathBuf,
-        /// What was found and what to do.
-        what: String,
     },
     /// The format carries no unit and none was given.
     #[error(
@@ -35,6 +39,28 @@ pub enum ShapeError {
         path: PathBuf,
         /// The format's name.
         format: &'static str,
+    },
+    /// The file states another unit than the user.
+    #[error(
+        "{}: the file itself is in {file}, but `unit` says {stated}; leave the unit out, or \
+         correct the export",
+        path.display()
+    )]
+    UnitDiffers {
+        /// Path as given.
+        path: PathBuf,
+        /// The file's unit.
+        file: String,
+        /// The user's.
+        stated: String,
+    },
+    /// The file is damaged, of another format, or holds no surface.
+    #[error("{}: {source}", path.display())]
+    Content {
+        /// Path as given.
+        path: PathBuf,
+        /// The fault, with its place.
+        source: ReadError,
     },
     /// The STL file is damaged or is none.
     #[error("{}: {source}", path.display())]

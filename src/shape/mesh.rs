@@ -16,6 +16,11 @@ pub struct FileMesh {
     pub triangles: Vec<Triangle>,
     /// How far a coordinate may lie from what was meant, because of the file's number format.
     pub coordinate_rounding: f64,
+    /// Metres per unit of the coordinates, where the file itself says so.
+    pub unit_m: Option<f64>,
+    /// Estimate of how far the triangles may lie from the body they stand for, in the file's
+    /// unit; 0 where the file tells nothing of it.
+    pub deviation: f64,
     /// What a careful reader would mention.
     pub warnings: Vec<String>,
 }
@@ -48,6 +53,9 @@ pub struct MeshFacts {
     pub bounds: Bounds,
     /// How far a coordinate may lie from what was meant, because of the file's number format, m.
     pub coordinate_rounding_m: f64,
+    /// Estimate of how far the triangles may lie from the body they stand for, m; 0 where the
+    /// file tells nothing of it.
+    pub deviation_m: f64,
 }
 
 /// A placed triangle soup, m. No order, orientation or connectivity is assumed.
@@ -103,6 +111,7 @@ impl Mesh {
             degenerate: count - triangles.len(),
             bounds: Bounds { min_m, max_m },
             coordinate_rounding_m: transform.length_m(file.coordinate_rounding),
+            deviation_m: transform.length_m(file.deviation),
         };
         Ok(Self { triangles, facts })
     }

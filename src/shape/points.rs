@@ -138,7 +138,16 @@ pub fn discretize(
     let samples = surface.heights(&grid, progress)?;
     let rounding_m = surface.coordinate_rounding_m();
     let points = collect(&grid, &samples, rounding_m, &bounds)?;
+    let deviation_m = match &surface {
+        Surface::Mesh(mesh) => mesh.facts().deviation_m,
+        Surface::Primitive(_) => 0.0,
+    };
     let (mesh, method) = match &surface {
+        Surface::Mesh(mesh) if deviation_m > rounding_m => (
+            Some(*mesh.facts()),
+            "estimate: how far the file's triangles may lie from the body (exact heights of the \
+             triangles)",
+        ),
         Surface::Mesh(mesh) => (
             Some(*mesh.facts()),
             "a-priori: the file's coordinate rounding (exact heights of its triangles; a slope \
@@ -147,7 +156,7 @@ pub fn discretize(
         Surface::Primitive(_) => (None, "a-priori: a closed formula in double precision"),
     };
     let accuracy = StageAccuracy {
-        estimate: rounding_m,
+        estimate: rounding_m.max(deviation_m),
         relative_to: "1 m".into(),
         method: method.into(),
     };

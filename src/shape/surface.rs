@@ -5,13 +5,15 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use crate::progress::Progress;
-use crate::shape::document::{Placement, ShapeDocument, SurfaceSource};
+use crate::shape::document::{Placement, ShapeDocument, SurfaceFormat, SurfaceSource, unit_name};
 use crate::shape::error::ShapeError;
-use crate::shape::format::Format;
 use crate::shape::height::{self, Grid, Sample};
-use crate::shape::mesh::{Bounds, Mesh, MeshFacts};
+use crate::shape::mesh::{Bounds, FileMesh, Mesh, MeshFacts};
 use crate::shape::placement::Transform;
 use crate::shape::primitive::PlacedPrimitive;
+
+/// Larger files fit no computer's memory together with what is made of them, bytes (8 GiB).
+const LARGEST_FILE: u64 = 8 << 30;
 
 /// A placed surface, m.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,20 +38,7 @@ impl Surface {
             }
             SurfaceSource::File { path, unit_m } => (path, unit_m),
         };
-        let format = Format::of(path)?;
-        format.check(path)?;
-        let Some(unit_m) = *unit_m else {
-            return Err(ShapeError::UnitMissing {
-                path: path.clone(),
-                format: format.name(),
-            });
-        };
-        if !(unit_m > 0.0 && unit_m.is_finite()) {
-            return Err(ShapeError::Document(format!(
-                "the unit is {unit_m} m; it must be positive"
-            )));
-        }
-        let mut file = format.read(path, &read_file(path)?)?;
+        let (mut file, unit_m) = read(path, *unit_m)?;
         let mut warnings = std::mem::take(&mut file.warnings);
         let mesh = Mesh::place(file, &Transform::new(unit_m, &document.placement))?;
         let MeshFacts {
@@ -112,6 +101,40 @@ impl Surface {
     }
 }
 
+/// A surface file's triangles, and the metres of their unit: the file's own, or as stated.
+///
+/// # Errors
+/// [`ShapeError`]: no or another unit, a file that cannot be read.
+pub fn read(path: &Path, stated_m: Option<f64>) -> Result<(FileMesh, f64), ShapeError> {
+    let format = SurfaceFormat::of(path).ok_or_else(|| ShapeError::Format { path: path.into() })?;
+    if stated_m.is_none() && !format.carries_unit() {
+        return Err(ShapeError::UnitMissing {
+            path: path.into(),
+            format: format.name(),
+        });
+    }
+    if let Some(unit_m) = stated_m
+        && !(unit_m > 0.0 && unit_m.is_finite())
+    {
+        return Err(ShapeError::Document(format!(
+            "the unit is {unit_m} m; it must be positive"
+        )));
+    }
+    let file = format.read(path, &read_file(path)?)?;
+    match (file.unit_m, stated_m) {
+        (Some(own), Some(stated)) if own != stated => Err(ShapeError::UnitDiffers {
+            path: path.into(),
+            file: unit_name(own),
+            stated: unit_name(stated),
+        }),
+        (own, stated) => {
+            // The reader of a format that carries its unit gives it.
+            let unit_m = own.or(stated).unwrap_or(1.0);
+            Ok((file, unit_m))
+        }
+    }
+}
+
 fn check_placement(placement: &Placement) -> Result<(), ShapeError> {
     let keys = [
         ("translate_mm", placement.translate_m),
@@ -128,7 +151,7 @@ fn check_placement(placement: &Placement) -> Result<(), ShapeError> {
 }
 
 /// A regular file's bytes.
-fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
+pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
     let unreadable = |what: String| ShapeError::Unreadable {
         path: path.into(),
         what,
@@ -153,6 +176,11 @@ fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
         return Err(unreadable(
             "this is no regular file (a device, a pipe or a socket)".into(),
         ));
+    }
+    if kind.len() > LARGEST_FILE {
+        return Err(unreadable(format!(
+            "the file is larger than {LARGEST_FILE} bytes; export it coarser"
+        )));
     }
     std::fs::read(path).map_err(failed)
 }

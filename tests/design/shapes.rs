@@ -134,7 +134,7 @@ fn a_shape_is_a_surface_or_a_primitive() {
         ),
         (
             "name = \"a\"\nsurface = \"a.dae\"\nunit = \"mm\"\n",
-            "s.toml:2:11: error: surface: expected a file ending in .stl, .obj, .ply, .3mf, .step, .stp, .sldprt, found \"a.dae\" (convert the surface to one of these)",
+            "s.toml:2:11: error: surface: expected a file ending in .stl, .obj, .ply, .3mf, .amf, .3dxml, .step, .stp, .sldprt, found \"a.dae\" (convert the surface to one of these)",
         ),
         (
             "name = \"a\"\nprimitive = \"flat\"\nunit = \"mm\"\n",
@@ -170,16 +170,14 @@ fn a_shape_is_a_surface_or_a_primitive() {
 }
 
 #[test]
-fn a_unit_beside_a_format_that_carries_its_own_is_a_warning() {
+fn a_unit_beside_a_format_that_carries_its_own_is_kept_to_be_compared() {
     let (shape, said) = read(&SURFACE.replace("half.stl", "half.3MF"));
+    let stated = |unit: Option<f64>| unit == Some(1e-3);
     assert!(matches!(
         shape.source,
-        SurfaceSource::File { unit_m: None, .. }
+        SurfaceSource::File { unit_m, .. } if stated(unit_m)
     ));
-    assert_eq!(
-        said,
-        "shapes/s.toml:3:8: warning: unit: this format carries its own unit, which is used instead of this one (leave the key out)"
-    );
+    assert_eq!(said, "");
 }
 
 #[test]
@@ -232,12 +230,15 @@ fn a_raw_surface_takes_its_flags() {
         })
     );
     assert_eq!(shape.placement.translate_m[2], 0.03);
-    // A 3MF says itself what its unit is.
-    let shape = ShapeDocument::raw(&raw("a.3mf", Some("cm"))).unwrap();
-    assert!(matches!(
-        shape.source,
-        SurfaceSource::File { unit_m: None, .. }
-    ));
+    // A 3MF says itself what its unit is; the reader compares.
+    for unit in [None, Some("cm")] {
+        let shape = ShapeDocument::raw(&raw("a.3mf", unit)).unwrap();
+        let stated = unit.and_then(parse_unit);
+        assert!(matches!(
+            shape.source,
+            SurfaceSource::File { unit_m, .. } if unit_m == stated
+        ));
+    }
 }
 
 #[test]
@@ -252,7 +253,7 @@ fn a_raw_surface_names_what_it_lacks() {
     let error = refusal(&raw("a.txt", Some("mm")));
     assert_eq!(
         error.to_string(),
-        "a.txt: not a surface that is read: expected a shape file (.toml) or .stl, .obj, .ply, .3mf, .step, .stp, .sldprt"
+        "a.txt: not a surface that is read: expected a shape file (.toml) or .stl, .obj, .ply, .3mf, .amf, .3dxml, .step, .stp, .sldprt"
     );
     let mut surface = raw("a.stl", Some("mm"));
     surface.y_m = Some([0.7, -0.7]);

@@ -1,14 +1,18 @@
 //! Damaged bytes must give a mesh or a message: never a panic, never a long wait.
 
-use fluxform::shape::document::Placement;
+use std::path::Path;
+
+use fluxform::shape::MeshReport;
+use fluxform::shape::document::{Placement, SurfaceFormat};
 use fluxform::shape::mesh::Mesh;
 use fluxform::shape::placement::Transform;
 use fluxform::shape::stl;
 
+use crate::samples;
 use crate::support::{Random, binary, grid, sample};
 
 fn mutate(bytes: &mut Vec<u8>, random: &mut Random) {
-    const PIECES: [&[u8]; 8] = [
+    const PIECES: [&[u8]; 14] = [
         b"solid",
         b"facet",
         b"\r",
@@ -17,6 +21,12 @@ fn mutate(bytes: &mut Vec<u8>, random: &mut Random) {
         b"endsolid",
         b"\xff\xff\xff\x7f",
         b"\0\0\0\0",
+        b"99999999999",
+        b" -1 ",
+        b"<object id=\"1\">",
+        b"</mesh>",
+        b"nan",
+        b"\xff\"&#0;",
     ];
     for _ in 0..=random.below(6) {
         if bytes.is_empty() {
@@ -83,4 +93,77 @@ fn mutated_files_are_read_or_refused() {
         }
     }
     assert!(read > 2_000 && sampled > 30_000, "{read} {sampled}");
+}
+
+/// Of every format the bytes as they are, and what they pack, mutated.
+#[test]
+fn mutated_files_of_every_format_are_read_or_refused() {
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    type Pack = fn(&[u8]) -> Vec<u8>;
+    let as_it_is: Pack = <[u8]>::to_vec;
+    let [manifest, structure, representation] = samples::three_dxml_parts();
+    let product = |structure: &str, representation: &str| {
+        samples::zipped(&[
+            (manifest.0, &manifest.1),
+            ("P.3dxml", structure),
+            ("R.3DRep", representation),
+        ])
+    };
+    let seeds: [(SurfaceFormat, Vec<u8>, Pack); 9] = [
+        (SurfaceFormat::Obj, samples::obj(), as_it_is),
+        (SurfaceFormat::Ply, samples::ply_ascii(), as_it_is),
+        (SurfaceFormat::Ply, samples::ply_binary(false), as_it_is),
+        (SurfaceFormat::ThreeMf, samples::three_mf("inch"), as_it_is),
+        (
+            SurfaceFormat::ThreeMf,
+            samples::three_mf_model("inch"),
+            |model| samples::three_mf_of(&String::from_utf8_lossy(model)),
+        ),
+        (
+            SurfaceFormat::Amf,
+            samples::amf("mm").into_bytes(),
+            as_it_is,
+        ),
+        (SurfaceFormat::ThreeDxml, samples::three_dxml(), as_it_is),
+        (SurfaceFormat::Sldprt, samples::sldprt(), as_it_is),
+        (
+            SurfaceFormat::Sldprt,
+            samples::display_lists(),
+            samples::sldprt_of,
+        ),
+    ];
+    let mut random = Random(7);
+    let look = |format: SurfaceFormat, bytes: &[u8]| {
+        let Ok(file) = format.read(Path::new("f"), bytes) else {
+            return 0;
+        };
+        assert!(!file.triangles.is_empty() && file.triangles.len() < 10_000);
+        let finite = file.triangles.as_flattened().as_flattened();
+        assert!(finite.iter().all(|c| c.is_finite()), "{format:?}");
+        let report = MeshReport::new(format, file);
+        assert!(report.open_edges <= 3 * report.triangles);
+        1
+    };
+    for (format, seed, pack) in &seeds {
+        let mut read = 0;
+        for _ in 0..3_000 {
+            let mut bytes = seed.clone();
+            mutate(&mut bytes, &mut random);
+            read += look(*format, &pack(&bytes));
+        }
+        assert!(read > 10, "{format:?}: {read}");
+    }
+    let mut read = 0;
+    for round in 0..3_000 {
+        let mut parts = [
+            structure.1.clone().into_bytes(),
+            representation.1.clone().into_bytes(),
+        ];
+        mutate(&mut parts[round % 2], &mut random);
+        read += look(
+            SurfaceFormat::ThreeDxml,
+            &product(&text(&parts[0]), &text(&parts[1])),
+        );
+    }
+    assert!(read > 10, "{read}");
 }

@@ -1,8 +1,13 @@
-//! Surfaces: STL readers, exact heights, primitives, constraint points.
+//! Surfaces: readers, exact heights, primitives, constraint points.
 #![allow(missing_docs)]
 
+mod corpus;
+mod formats;
 mod fuzz;
 mod heights;
 mod points;
+mod samples;
+#[cfg(feature = "step")]
+mod step;
 mod stl;
 mod support;

@@ -69,8 +69,7 @@ pub fn binary(triangles: &[[[f32; 3]; 3]]) -> Vec<u8> {
 pub fn exact(triangles: Vec<Triangle>) -> Mesh {
     let file = FileMesh {
         triangles,
-        coordinate_rounding: 0.0,
-        warnings: Vec::new(),
+        ..FileMesh::default()
     };
     Mesh::place(file, &Transform::new(1.0, &Placement::default())).unwrap()
 }

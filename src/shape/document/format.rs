@@ -13,6 +13,10 @@ pub enum SurfaceFormat {
     Ply,
     /// 3MF; carries its unit.
     ThreeMf,
+    /// AMF; carries its unit.
+    Amf,
+    /// Dassault's 3DXML; always in millimetres.
+    ThreeDxml,
     /// STEP; carries its unit.
     Step,
     /// A SolidWorks part; carries its unit.
@@ -20,11 +24,13 @@ pub enum SurfaceFormat {
 }
 
 /// File endings, lower case.
-const ENDINGS: [(&str, SurfaceFormat); 7] = [
+const ENDINGS: [(&str, SurfaceFormat); 9] = [
     ("stl", SurfaceFormat::Stl),
     ("obj", SurfaceFormat::Obj),
     ("ply", SurfaceFormat::Ply),
     ("3mf", SurfaceFormat::ThreeMf),
+    ("amf", SurfaceFormat::Amf),
+    ("3dxml", SurfaceFormat::ThreeDxml),
     ("step", SurfaceFormat::Step),
     ("stp", SurfaceFormat::Step),
     ("sldprt", SurfaceFormat::Sldprt),
@@ -39,10 +45,25 @@ impl SurfaceFormat {
         Some(known.1)
     }
 
+    /// Its usual name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Stl => "STL",
+            Self::Obj => "OBJ",
+            Self::Ply => "PLY",
+            Self::ThreeMf => "3MF",
+            Self::Amf => "AMF",
+            Self::ThreeDxml => "3DXML",
+            Self::Step => "STEP",
+            Self::Sldprt => "SLDPRT",
+        }
+    }
+
     /// True where the file itself says what its unit is.
     #[must_use]
     pub fn carries_unit(self) -> bool {
-        matches!(self, Self::ThreeMf | Self::Step | Self::Sldprt)
+        !matches!(self, Self::Stl | Self::Obj | Self::Ply)
     }
 
     /// The endings that are read, for a message.
@@ -66,6 +87,13 @@ const UNITS: [(&[&str], f64); 6] = [
 #[must_use]
 pub(super) fn unit_names() -> Vec<&'static str> {
     UNITS.iter().map(|(names, _)| names[0]).collect()
+}
+
+/// The name of the unit of `unit_m` metres, for a message; the metres where it has none.
+#[must_use]
+pub(in crate::shape) fn unit_name(unit_m: f64) -> String {
+    let known = UNITS.iter().find(|(_, metres)| *metres == unit_m);
+    known.map_or_else(|| format!("{unit_m:e} m"), |(names, _)| names[0].to_owned())
 }
 
 /// Metres in the unit `text` (`mm`, `cm`, `m`, `in` or `inch`, `ft`, `um`); `None` if unknown.

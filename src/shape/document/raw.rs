@@ -12,8 +12,8 @@ use crate::numerics::axis::Axis;
 pub struct RawSurface {
     /// The surface file.
     pub path: PathBuf,
-    /// Metres per unit of the file's coordinates (see [`super::parse_unit`]); unused where the
-    /// format carries its own.
+    /// Metres per unit of the file's coordinates (see [`super::parse_unit`]); where the format
+    /// carries its own, it must be the same.
     pub unit_m: Option<f64>,
     /// Rotation, then translation.
     pub placement: Placement,
@@ -81,7 +81,7 @@ impl ShapeDocument {
         let Some(format) = SurfaceFormat::of(&path) else {
             return Err(RawSurfaceError::UnknownFormat { path });
         };
-        let unit_m = surface.unit_m.filter(|_| !format.carries_unit());
+        let unit_m = surface.unit_m;
         if unit_m.is_none() && !format.carries_unit() {
             return Err(RawSurfaceError::UnitNeeded { path });
         }

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::format::{SurfaceFormat, parse_unit, unit_names};
 use super::{AxisRequest, GridRequest, Placement, Primitive, ShapeDocument, SurfaceSource};
-use crate::design::diagnostics::{Fault, Faults, InvalidDocument};
-use crate::design::reader::{Section, Sink, read_document};
+use crate::design::diagnostics::{Faults, InvalidDocument};
+use crate::design::reader::{Section, read_document};
 use crate::design::rule::Rule;
 use crate::design::sections::{BODY_MM, SEED_SIDE_MM, axis_m};
 use crate::design::source;
@@ -47,7 +47,7 @@ impl ShapeDocument {
     /// # Errors
     /// Every fault found. Whether the surface exists is for the reader of surfaces to say.
     pub fn from_toml(text: &str, path: &Path) -> Result<(Self, Faults), InvalidDocument> {
-        read_document(text, path, |root, sink| document(root, path, sink))
+        read_document(text, path, |root, _| document(root, path))
     }
 
     /// The shape in the file `path`, as [`ShapeDocument::from_toml`].
@@ -59,10 +59,10 @@ impl ShapeDocument {
     }
 }
 
-fn document(root: &mut Section<'_>, path: &Path, sink: &Sink) -> Option<ShapeDocument> {
+fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
     let name = root.name();
     let source = match (root.has("surface"), root.has("primitive")) {
-        (true, false) => surface(root, path, sink),
+        (true, false) => surface(root, path),
         (false, true) => primitive(root),
         (given, _) => neither_or_both(root, given),
     };
@@ -99,7 +99,7 @@ fn neither_or_both(root: &mut Section<'_>, both: bool) -> Option<SurfaceSource> 
     None
 }
 
-fn surface(root: &mut Section<'_>, path: &Path, sink: &Sink) -> Option<SurfaceSource> {
+fn surface(root: &mut Section<'_>, path: &Path) -> Option<SurfaceSource> {
     root.ignore(&["primitive"]);
     let file = root.text("surface").map(|text| text.value);
     let unit = root.text("unit");
@@ -114,16 +114,7 @@ fn surface(root: &mut Section<'_>, path: &Path, sink: &Sink) -> Option<SurfaceSo
         root.fault("surface", message, "convert the surface to one of these");
         return None;
     };
-    if format.carries_unit() {
-        if let Some(unit) = unit {
-            let message = "this format carries its own unit, which is used instead of this one";
-            sink.add(
-                Fault::warning("unit", message)
-                    .at(&unit.span)
-                    .help("leave the key out"),
-            );
-        }
-    } else if !root.has("unit") {
+    if !format.carries_unit() && !root.has("unit") {
         let help = format!(
             "add unit = \"mm\" or what it was drawn in ({})",
             unit_names().join(", ")
@@ -132,7 +123,7 @@ fn surface(root: &mut Section<'_>, path: &Path, sink: &Sink) -> Option<SurfaceSo
     }
     Some(SurfaceSource::File {
         path: path.parent().unwrap_or(Path::new("")).join(file),
-        unit_m: unit_m.filter(|_| !format.carries_unit()),
+        unit_m,
     })
 }
 

@@ -1,12 +1,8 @@
 //! ASCII STL: one pass over the words, whatever separates the lines.
 
 use crate::shape::mesh::{FileMesh, Triangle};
+use crate::shape::number::{Numbers, shown};
 use crate::shape::stl::StlError;
-
-/// A text whose numbers all have fewer digits than a printed float wrote them exactly.
-const PRINTED_DIGITS: usize = 6;
-/// A number with more digits may show that it never was a single-precision float.
-const FLOAT_DIGITS: usize = 9;
 
 /// The bytes after a UTF-8 byte-order mark.
 pub(super) fn after_mark(bytes: &[u8]) -> &[u8] {
@@ -40,9 +36,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<FileMesh, StlError> {
     let mut reader = Reader {
         words: Words::new(bytes),
         triangle: 0,
-        digits: 0,
-        largest: 0.0,
-        finer_than_float: false,
+        numbers: Numbers::default(),
     };
     let mut triangles: Vec<Triangle> = Vec::new();
     let mut warnings = Vec::new();
@@ -81,8 +75,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<FileMesh, StlError> {
     }
     Ok(FileMesh {
         triangles,
-        coordinate_rounding: reader.rounding(),
+        coordinate_rounding: reader.numbers.rounding(),
         warnings,
+        ..FileMesh::default()
     })
 }
 
@@ -90,11 +85,7 @@ struct Reader<'a> {
     words: Words<'a>,
     /// Number of the triangle being read, 0 outside one.
     triangle: usize,
-    /// Most significant digits of any coordinate.
-    digits: usize,
-    largest: f64,
-    /// A coordinate lies between two floats by more than its digits leave open.
-    finer_than_float: bool,
+    numbers: Numbers,
 }
 
 impl Reader<'_> {
@@ -145,50 +136,10 @@ impl Reader<'_> {
     }
 
     fn number(&mut self) -> Result<f64, StlError> {
-        let word = self.words.next();
-        let value: Option<f64> = word
-            .and_then(|w| std::str::from_utf8(w).ok())
-            .and_then(|w| w.parse().ok());
-        match (word, value) {
-            (Some(word), Some(value)) if value.is_finite() => {
-                let digits = significant_digits(word);
-                self.digits = self.digits.max(digits);
-                if digits > FLOAT_DIGITS && !self.finer_than_float {
-                    let off = (value - f64::from(value as f32)).abs();
-                    self.finer_than_float = off > value.abs() * 5.0 * 10f64.powf(-(digits as f64));
-                }
-                self.largest = self.largest.max(value.abs());
-                Ok(value)
-            }
-            (Some(word), Some(_)) if word.iter().any(u8::is_ascii_digit) => {
-                Err(self.fault(format!("the coordinate `{}` is too large", shown(word))))
-            }
-            (Some(word), Some(_)) => Err(self.fault(format!(
-                "a coordinate is `{}`, not a finite number; repair the body and export it again",
-                shown(word)
-            ))),
-            (Some(word), None) if word.contains(&b',') => Err(self.fault(format!(
-                "expected a number, found `{}`; numbers are written with a decimal point",
-                shown(word)
-            ))),
-            _ => Err(self.unexpected("a number", word)),
-        }
-    }
-
-    /// Half a unit of the last printed digit at the largest coordinate, and f32's rounding unless
-    /// the digits show something finer: most programs print floats.
-    fn rounding(&self) -> f64 {
-        let epsilon = if self.finer_than_float {
-            f64::EPSILON
-        } else {
-            super::F32_ROUNDING
+        let Some(word) = self.words.next() else {
+            return Err(self.unexpected("a number", None));
         };
-        let stored = self.largest * epsilon;
-        if self.digits < PRINTED_DIGITS || self.largest == 0.0 {
-            return stored;
-        }
-        let decade = self.largest.log10().floor() + 1.0 - self.digits as f64;
-        stored.max(0.5 * 10f64.powf(decade))
+        self.numbers.read(word).map_err(|what| self.fault(what))
     }
 
     fn unexpected(&self, wanted: &str, found: Option<&[u8]>) -> StlError {
@@ -205,20 +156,6 @@ impl Reader<'_> {
             what,
         }
     }
-}
-
-/// Digits from the first that is not 0 to the end of the mantissa.
-fn significant_digits(word: &[u8]) -> usize {
-    word.iter()
-        .take_while(|b| !b.eq_ignore_ascii_case(&b'e'))
-        .filter(|b| b.is_ascii_digit())
-        .skip_while(|b| **b == b'0')
-        .count()
-}
-
-/// A word for a message, at most 40 bytes of it.
-fn shown(word: &[u8]) -> String {
-    word[..word.len().min(40)].escape_ascii().to_string()
 }
 
 fn is(word: Option<&[u8]>, wanted: &str) -> bool {

@@ -1,6 +1,7 @@
 //! Binary STL.
 
 use crate::shape::mesh::{FileMesh, Triangle};
+use crate::shape::number::F32_ROUNDING;
 use crate::shape::stl::StlError;
 
 const HEADER: usize = 84;
@@ -43,8 +44,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<FileMesh, StlError> {
     }
     Ok(FileMesh {
         triangles,
-        coordinate_rounding: f64::from(largest) * super::F32_ROUNDING,
-        warnings: Vec::new(),
+        coordinate_rounding: f64::from(largest) * F32_ROUNDING,
+        ..FileMesh::default()
     })
 }
 

@@ -8,9 +8,6 @@ mod binary;
 
 use crate::shape::mesh::FileMesh;
 
-/// Relative rounding of a coordinate stored as f32.
-const F32_ROUNDING: f64 = 1.0 / 16_777_216.0;
-
 /// Why bytes are no STL mesh, and where.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum StlError {

@@ -1,0 +1,92 @@
+//! ZIP archives of untrusted origin: what is unpacked is bounded by the archive's own length.
+
+use std::borrow::Cow;
+use std::io::{Cursor, Read};
+
+use zip::ZipArchive;
+
+use crate::shape::fault::{Place, ReadError};
+
+/// So many bytes may be unpacked from any archive,
+const LEAST_BUDGET: u64 = 64 << 20;
+/// or so many times its length: XML of meshes shrinks to a tenth, at the most to a fiftieth,
+const MOST_RATIO: u64 = 200;
+/// but never more.
+const MOST_BUDGET: u64 = 4 << 30;
+
+/// An opened archive and how much may yet be unpacked from it.
+pub(super) struct Archive<'a> {
+    zip: ZipArchive<Cursor<&'a [u8]>>,
+    length: u64,
+    left: u64,
+}
+
+impl<'a> Archive<'a> {
+    /// True for bytes that begin as archives do.
+    pub(super) fn is(bytes: &[u8]) -> bool {
+        bytes.starts_with(b"PK\x03\x04")
+    }
+
+    /// Opens a file's bytes.
+    pub(super) fn open(bytes: &'a [u8]) -> Result<Self, ReadError> {
+        let length = bytes.len() as u64;
+        let zip = ZipArchive::new(Cursor::new(bytes)).map_err(|error| {
+            let what = format!("the ZIP archive is damaged or was cut short: {error}");
+            ReadError::file(what)
+        })?;
+        Ok(Self {
+            zip,
+            length,
+            left: (length * MOST_RATIO).clamp(LEAST_BUDGET, MOST_BUDGET),
+        })
+    }
+
+    /// The name under which a part is kept: `wanted` in any case, without a leading slash.
+    pub(super) fn find(&self, wanted: &str) -> Option<String> {
+        let wanted = wanted.trim_start_matches('/');
+        self.names()
+            .find(|name| name.trim_start_matches('/').eq_ignore_ascii_case(wanted))
+    }
+
+    /// The names of all parts that have one.
+    pub(super) fn names(&self) -> impl Iterator<Item = String> {
+        self.zip.file_names().flatten().map(Cow::into_owned)
+    }
+
+    /// Unpacks one part as text in UTF-8.
+    pub(super) fn text(&mut self, name: &str) -> Result<String, ReadError> {
+        let fault = |what: String| ReadError::new(Place::Part(name.to_owned(), 0), what);
+        let part = self
+            .zip
+            .by_name(name)
+            .map_err(|error| fault(format!("it cannot be unpacked: {error}")))?;
+        let mut bytes = Vec::new();
+        let read = part.take(self.left + 1).read_to_end(&mut bytes);
+        read.map_err(|error| fault(format!("it cannot be unpacked: {error}")))?;
+        let used = bytes.len() as u64;
+        if used > self.left {
+            return Err(fault(format!(
+                "the archive unpacks to far more than its {} bytes can stand for: it is refused \
+                 as a decompression bomb",
+                self.length
+            )));
+        }
+        self.left -= used;
+        text_of(bytes).map_err(fault)
+    }
+}
+
+/// XML's bytes as text, without a byte-order mark.
+pub(super) fn text_of(bytes: Vec<u8>) -> Result<String, String> {
+    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
+        return Err("the XML is in UTF-16; save it in UTF-8".into());
+    }
+    let mut text = String::from_utf8(bytes).map_err(|error| {
+        let at = error.utf8_error().valid_up_to();
+        format!("the XML is not in UTF-8 (byte {at}); save it in UTF-8")
+    })?;
+    if text.starts_with('\u{feff}') {
+        text.remove(0);
+    }
+    Ok(text)
+}

@@ -1,0 +1,166 @@
+//! Bodies placed in bodies: an assembly's tree laid out as triangles, bounded.
+
+use crate::shape::mesh::Triangle;
+
+/// More triangles than this in one surface are refused.
+pub(super) const MOST_TRIANGLES: u64 = 100_000_000;
+/// Placements nested deeper than this belong to no part.
+const DEEPEST: usize = 64;
+
+/// x' = a x + shift: the linear part by rows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Affine {
+    pub(super) rows: [[f64; 3]; 3],
+    pub(super) shift: [f64; 3],
+}
+
+impl Affine {
+    pub(super) const IDENTITY: Self = Self {
+        rows: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        shift: [0.0; 3],
+    };
+
+    /// From the images of the three axes and of the origin, twelve numbers: how 3MF and 3DXML
+    /// write it.
+    pub(super) fn from_columns(c: [f64; 12]) -> Self {
+        Self {
+            rows: [0, 1, 2].map(|k| [c[k], c[3 + k], c[6 + k]]),
+            shift: [c[9], c[10], c[11]],
+        }
+    }
+
+    pub(super) fn apply(&self, p: [f64; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|k| {
+            let row = self.rows[k];
+            row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + self.shift[k]
+        })
+    }
+
+    /// First `inner`, then this.
+    pub(super) fn after(&self, inner: &Self) -> Self {
+        let column = |k: usize| [0, 1, 2].map(|i| inner.rows[i][k]);
+        let turned = |p: [f64; 3]| {
+            self.rows
+                .map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2])
+        };
+        let columns = [0, 1, 2].map(|k| turned(column(k)));
+        Self {
+            rows: [0, 1, 2].map(|i| [0, 1, 2].map(|k| columns[k][i])),
+            shift: self.apply(inner.shift),
+        }
+    }
+}
+
+/// A body of an assembly: its own triangles, and bodies placed in it.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Body {
+    pub(super) triangles: Vec<Triangle>,
+    pub(super) children: Vec<(usize, Affine)>,
+}
+
+/// Lays out `roots`: every triangle of the bodies below, placed.
+///
+/// # Errors
+/// A body within itself, too many triangles, bodies nested too deep.
+pub(super) fn lay_out(bodies: &[Body], roots: &[(usize, Affine)]) -> Result<Vec<Triangle>, String> {
+    let mut visits = vec![None; bodies.len()];
+    let mut total = 0u64;
+    for (root, _) in roots {
+        total = total.saturating_add(weight(bodies, *root, &mut visits, 0)?);
+    }
+    if total > MOST_TRIANGLES {
+        return Err(format!(
+            "the placed bodies add up to more than {MOST_TRIANGLES} triangles; export a coarser \
+             mesh"
+        ));
+    }
+    let mut triangles = Vec::new();
+    for (root, place) in roots {
+        add(bodies, *root, place, &mut triangles);
+    }
+    let mut coordinates = triangles.as_flattened().as_flattened().iter();
+    if coordinates.any(|c| !c.is_finite()) {
+        return Err("a placement moves a body beyond all numbers".into());
+    }
+    Ok(triangles)
+}
+
+#[derive(Clone, Copy)]
+enum Visit {
+    Open,
+    Weighs(u64),
+}
+
+/// Triangles and placements below a body, each body computed once.
+fn weight(
+    bodies: &[Body],
+    index: usize,
+    visits: &mut [Option<Visit>],
+    depth: usize,
+) -> Result<u64, String> {
+    match visits[index] {
+        Some(Visit::Weighs(weight)) => return Ok(weight),
+        Some(Visit::Open) => return Err("a body is placed within itself".into()),
+        None if depth > DEEPEST => {
+            return Err(format!("bodies are nested more than {DEEPEST} deep"));
+        }
+        None => visits[index] = Some(Visit::Open),
+    }
+    let mut sum = 1 + bodies[index].triangles.len() as u64;
+    for (child, _) in &bodies[index].children {
+        sum = sum.saturating_add(weight(bodies, *child, visits, depth + 1)?);
+    }
+    visits[index] = Some(Visit::Weighs(sum));
+    Ok(sum)
+}
+
+fn add(bodies: &[Body], index: usize, place: &Affine, triangles: &mut Vec<Triangle>) {
+    let body = &bodies[index];
+    if *place == Affine::IDENTITY {
+        triangles.extend_from_slice(&body.triangles);
+    } else {
+        triangles.extend(body.triangles.iter().map(|t| t.map(|v| place.apply(v))));
+    }
+    for (child, inner) in &body.children {
+        add(bodies, *child, &place.after(inner), triangles);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn placements_compose() {
+        let a = Affine::from_columns([0.0, 1.0, 0.3, -1.0, 0.2, 0.0, 0.0, 0.7, 1.3, 5.0, 6.0, 7.0]);
+        let b = Affine::from_columns([
+            1.1, 0.0, 0.0, 0.4, 0.9, 0.0, 0.0, -0.6, 1.0, -2.0, 0.5, 0.25,
+        ]);
+        let p = [0.7, 1.3, -2.9];
+        let (one, two) = (a.after(&b).apply(p), a.apply(b.apply(p)));
+        for k in 0..3 {
+            assert!((one[k] - two[k]).abs() < 1e-14);
+        }
+        assert_eq!(a.apply([1.0, 0.0, 0.0]), [5.0, 7.0, 7.3]);
+    }
+
+    #[test]
+    fn what_grows_without_end_is_refused() {
+        // Each of forty bodies holds the next twice.
+        let mut bodies: Vec<Body> = (1..40)
+            .map(|next| Body {
+                triangles: Vec::new(),
+                children: vec![(next, Affine::IDENTITY); 2],
+            })
+            .collect();
+        bodies.push(Body::default());
+        let roots = [(0, Affine::IDENTITY)];
+        assert!(lay_out(&bodies, &roots).unwrap_err().contains("more than"));
+        bodies[39].children.push((3, Affine::IDENTITY));
+        assert!(
+            lay_out(&bodies, &roots)
+                .unwrap_err()
+                .contains("within itself")
+        );
+    }
+}

@@ -1,0 +1,292 @@
+//! PLY, ASCII or binary: the elements `vertex` (x, y, z) and `face` (a list of indices).
+//!
+//! The `ply-rs-bw` crate parses; here the header's counts are held against the file's length
+//! before anything is read, and only positions and indices are kept. The file carries no unit.
+
+use std::borrow::Cow;
+use std::io::BufRead;
+
+use ply_rs_bw::parser::{ParseError, Parser, Reader};
+use ply_rs_bw::ply::{
+    ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType,
+    ScalarType,
+};
+
+use crate::shape::fault::ReadError;
+use crate::shape::mesh::FileMesh;
+use crate::shape::number::{F32_ROUNDING, shown};
+use crate::shape::polygon::Cutter;
+
+/// Reads a PLY file's bytes.
+///
+/// # Errors
+/// [`ReadError`]: a header that is none or claims more than the file can hold, coordinates that
+/// are not finite, an index without a vertex, points without a face.
+pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
+    let first = bytes.trim_ascii_start();
+    if !first.starts_with(b"ply") {
+        let what = format!(
+            "this is not a PLY file: it begins with `{}` instead of `ply`",
+            shown(&first[..first.len().min(16)])
+        );
+        return Err(ReadError::file(what));
+    }
+    let bytes = plain_header(bytes);
+    let mut rest: &[u8] = &bytes;
+    let mut reader = Reader::new(&mut rest);
+    let header = Parser::<Skipped>::new()
+        .read_header(&mut reader)
+        .map_err(fault)?;
+    let length = reader.get_mut().fill_buf().map_or(0, <[u8]>::len);
+    check(&header, length)?;
+    let mut vertices: Vec<Vertex> = Vec::new();
+    let mut faces: Option<Vec<Face>> = None;
+    for (name, element) in &header.elements {
+        match name.as_str() {
+            "vertex" => {
+                vertices = Parser::new()
+                    .read_payload_for_element(&mut reader, element, &header)
+                    .map_err(fault)?;
+            }
+            "face" => {
+                let read = Parser::new().read_payload_for_element(&mut reader, element, &header);
+                faces = Some(read.map_err(fault)?);
+            }
+            _ => {
+                Parser::<Skipped>::new()
+                    .read_payload_for_element(&mut reader, element, &header)
+                    .map_err(fault)?;
+            }
+        }
+    }
+    mesh(&header, &vertices, faces.as_deref().unwrap_or_default())
+}
+
+/// The file with every byte of its header in ASCII: comments may be in any encoding, but the
+/// parser takes only UTF-8.
+fn plain_header(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let mark = b"end_header";
+    let end = bytes.windows(mark.len()).position(|w| w == mark);
+    let header = &bytes[..end.unwrap_or(bytes.len())];
+    if header.is_ascii() {
+        return Cow::Borrowed(bytes);
+    }
+    let plain = |b: &u8| if b.is_ascii() { *b } else { b'?' };
+    let mut copy: Vec<u8> = header.iter().map(plain).collect();
+    copy.extend_from_slice(&bytes[header.len()..]);
+    Cow::Owned(copy)
+}
+
+fn fault(error: ParseError) -> ReadError {
+    // The parser shows the whole line and its inner errors, over several lines.
+    let text = error.to_string();
+    let text: Vec<&str> = text.split_whitespace().collect();
+    let mut what = text.join(" ");
+    if let Some((at, _)) = what.char_indices().nth(200) {
+        what.truncate(at);
+        what.push_str("...");
+    }
+    ReadError::file(format!("the PLY file is damaged: {what}"))
+}
+
+/// Holds the header's claims against the bytes that follow it.
+fn check(header: &Header, length: usize) -> Result<(), ReadError> {
+    let mut least = 0u128;
+    for (name, element) in &header.elements {
+        if element.properties.is_empty() && element.count > 0 {
+            let what = format!("the header's element `{name}` has no property");
+            return Err(ReadError::file(what));
+        }
+        let one: u128 = element
+            .properties
+            .iter()
+            .map(
+                |(_, property)| match (&header.encoding, &property.data_type) {
+                    // A digit and what separates it from the next.
+                    (Encoding::Ascii, _) => 2,
+                    (_, PropertyType::Scalar(kind) | PropertyType::List(kind, _)) => size(kind),
+                },
+            )
+            .sum();
+        least += element.count as u128 * one;
+        // The last digit of a text need not be followed by anything.
+        if least > length as u128 + 1 {
+            return Err(ReadError::file(format!(
+                "the PLY header claims {} elements `{name}`; up to them that takes at least \
+                 {least} bytes, but {length} follow the header: the file was cut short or its \
+                 header is wrong",
+                element.count
+            )));
+        }
+    }
+    let property = |element: &str, names: &[&str]| {
+        let found = header.elements.iter().find(|(name, _)| *name == element);
+        found.is_some_and(|(_, element): (_, &ElementDef)| {
+            let known = |wanted: &&str| element.properties.iter().any(|(name, _)| name == wanted);
+            names.iter().any(known)
+        })
+    };
+    if !["x", "y", "z"].iter().all(|k| property("vertex", &[k])) {
+        let what = "the PLY file has no element `vertex` with the properties x, y and z";
+        return Err(ReadError::file(what));
+    }
+    if !property("face", &INDICES) {
+        let what = if property("tristrips", &INDICES) {
+            "the PLY file holds triangle strips, which are not read; export it with faces"
+        } else {
+            "the PLY file has no element `face` with a list `vertex_indices`: there is no \
+             surface, only points; make a mesh of them first"
+        };
+        return Err(ReadError::file(what));
+    }
+    Ok(())
+}
+
+const INDICES: [&str; 2] = ["vertex_indices", "vertex_index"];
+
+fn size(kind: &ScalarType) -> u128 {
+    match kind {
+        ScalarType::Char | ScalarType::UChar => 1,
+        ScalarType::Short | ScalarType::UShort => 2,
+        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
+        ScalarType::Double => 8,
+    }
+}
+
+fn mesh(header: &Header, vertices: &[Vertex], faces: &[Face]) -> Result<FileMesh, ReadError> {
+    if faces.is_empty() {
+        return Err(ReadError::file(format!(
+            "the PLY file holds {} points and no face: there is no surface; make a mesh of them \
+             first",
+            vertices.len()
+        )));
+    }
+    let mut largest = 0.0f64;
+    for (number, Vertex(vertex)) in vertices.iter().enumerate() {
+        if let Some(bad) = vertex.iter().find(|c| !c.is_finite()) {
+            return Err(ReadError::file(format!(
+                "vertex {number} (from 0) has a coordinate that is {bad}, not a finite number; \
+                 repair the mesh and export it again"
+            )));
+        }
+        largest = vertex.iter().fold(largest, |m, c| m.max(c.abs()));
+    }
+    let mut triangles = Vec::with_capacity(faces.len());
+    let mut cutter = Cutter::new();
+    let mut corners = Vec::new();
+    let mut short = 0;
+    for (number, face) in faces.iter().enumerate() {
+        corners.clear();
+        for index in &face.0 {
+            let vertex = usize::try_from(*index).ok().and_then(|i| vertices.get(i));
+            let vertex = vertex.ok_or_else(|| {
+                ReadError::file(format!(
+                    "face {number} (from 0) has the index {index}, but the file has {} vertices \
+                     (indices count from 0)",
+                    vertices.len()
+                ))
+            })?;
+            corners.push(vertex.0);
+        }
+        short += usize::from(corners.len() < 3);
+        cutter.cut(&corners, &mut triangles);
+    }
+    if triangles.is_empty() {
+        let what = "no face of the PLY file has three corners: there is no surface";
+        return Err(ReadError::file(what));
+    }
+    let mut warnings = Vec::new();
+    if short > 0 {
+        warnings.push(format!(
+            "{short} faces with fewer than three corners are left out"
+        ));
+    }
+    // How many digits a text has is not known here; as a rule they were floats.
+    let double = header.encoding != Encoding::Ascii && has_doubles(header);
+    let epsilon = if double { f64::EPSILON } else { F32_ROUNDING };
+    Ok(FileMesh {
+        triangles,
+        coordinate_rounding: largest * epsilon,
+        warnings,
+        ..FileMesh::default()
+    })
+}
+
+fn has_doubles(header: &Header) -> bool {
+    let double = PropertyType::Scalar(ScalarType::Double);
+    header
+        .elements
+        .iter()
+        .filter(|(name, _)| *name == "vertex")
+        .any(|(_, element)| {
+            let mut properties = element.properties.iter();
+            properties.any(|(name, p)| name == "x" && p.data_type == double)
+        })
+}
+
+/// x, y, z.
+struct Vertex([f64; 3]);
+
+impl PropertyAccess for Vertex {
+    fn new() -> Self {
+        Self([0.0; 3])
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        let k = match name {
+            "x" => 0,
+            "y" => 1,
+            "z" => 2,
+            _ => return PropertyAccessResult::Ignored,
+        };
+        self.0[k] = match property {
+            Property::Char(v) => v.into(),
+            Property::UChar(v) => v.into(),
+            Property::Short(v) => v.into(),
+            Property::UShort(v) => v.into(),
+            Property::Int(v) => v.into(),
+            Property::UInt(v) => v.into(),
+            Property::Float(v) => v.into(),
+            Property::Double(v) => v,
+            _ => return PropertyAccessResult::UnsupportedType,
+        };
+        PropertyAccessResult::Set
+    }
+}
+
+/// Indices of a face's corners, as they stand in the file.
+struct Face(Vec<i64>);
+
+impl PropertyAccess for Face {
+    fn new() -> Self {
+        Self(Vec::new())
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        fn all<T: Copy + Into<i64>>(list: &[T]) -> Vec<i64> {
+            list.iter().map(|v| (*v).into()).collect()
+        }
+        if !INDICES.contains(&name) {
+            return PropertyAccessResult::Ignored;
+        }
+        self.0 = match &property {
+            Property::ListChar(v) => all(v),
+            Property::ListUChar(v) => all(v),
+            Property::ListShort(v) => all(v),
+            Property::ListUShort(v) => all(v),
+            Property::ListInt(v) => all(v),
+            Property::ListUInt(v) => all(v),
+            _ => return PropertyAccessResult::UnsupportedType,
+        };
+        PropertyAccessResult::Set
+    }
+}
+
+/// An element of which nothing is kept.
+struct Skipped;
+
+impl PropertyAccess for Skipped {
+    fn new() -> Self {
+        Self
+    }
+}

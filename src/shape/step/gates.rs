@@ -1,0 +1,78 @@
+//! What a body made of STEP must hold before it is believed.
+//!
+//! A wrong body rarely holds all of this: closed, one sense, the topology that the file states,
+//! volume and area that stay when the mesh is made finer, and every vertex of the file in its box.
+
+use crate::shape::document::SurfaceFormat;
+use crate::shape::inspect::MeshReport;
+use crate::shape::mesh::{FileMesh, Triangle};
+
+/// Volume and area of a coarse and a four times finer mesh may differ by so much of the finer's.
+const MOST_CHANGE: f64 = 0.02;
+
+/// What the file itself states of a shell.
+pub(super) struct Stated {
+    pub(super) vertices: Vec<[f64; 3]>,
+    /// V - E + F - (loops - F) of the shell.
+    pub(super) euler: i64,
+}
+
+/// The same shell meshed twice, with the chord tolerances, in the file's unit.
+pub(super) struct Meshed {
+    pub(super) coarse: (f64, Vec<Triangle>),
+    pub(super) fine: (f64, Vec<Triangle>),
+    /// Vertices nearer than this are one.
+    pub(super) weld: f64,
+}
+
+/// Why a shell is not believed; `Ok` if it is.
+pub(super) fn check(stated: &Stated, meshed: &Meshed) -> Result<(), String> {
+    let (coarse_tol, coarse) = &meshed.coarse;
+    let (_, fine) = &meshed.fine;
+    let report = |triangles: &Vec<Triangle>| {
+        let file = FileMesh {
+            triangles: triangles.clone(),
+            coordinate_rounding: 0.5 * meshed.weld,
+            ..FileMesh::default()
+        };
+        MeshReport::new(SurfaceFormat::Step, file)
+    };
+    let (coarse, fine) = (report(coarse), report(fine));
+    for mesh in [&coarse, &fine] {
+        if !mesh.watertight {
+            return Err(format!(
+                "its surface is not closed ({} open edges)",
+                mesh.open_edges + mesh.crowded_edges
+            ));
+        }
+        if mesh.euler != stated.euler {
+            return Err(format!(
+                "its surface has the Euler characteristic {}, but the file states {}",
+                mesh.euler, stated.euler
+            ));
+        }
+    }
+    let (Some(v1), Some(v2)) = (coarse.volume, fine.volume) else {
+        return Err("its triangles do not look to one side".into());
+    };
+    let most = (MOST_CHANGE * v2.abs()).min(2.0 * coarse_tol * fine.area);
+    if (v1 - v2).abs() > most || v2 == 0.0 {
+        return Err(format!("its volume does not settle ({v1} and {v2})"));
+    }
+    if (coarse.area - fine.area).abs() > MOST_CHANGE * fine.area {
+        let areas = (coarse.area, fine.area);
+        return Err(format!(
+            "its area does not settle ({} and {})",
+            areas.0, areas.1
+        ));
+    }
+    let inside = |p: &[f64; 3]| {
+        (0..3).all(|k| {
+            p[k] >= fine.bounds_min[k] - coarse_tol && p[k] <= fine.bounds_max[k] + coarse_tol
+        })
+    };
+    if !stated.vertices.iter().all(inside) {
+        return Err("vertices of the file lie outside its surface's box".into());
+    }
+    Ok(())
+}

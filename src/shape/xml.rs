@@ -1,0 +1,153 @@
+//! XML of untrusted origin, one element after the other, with the line for messages.
+
+use std::borrow::Cow;
+
+use quick_xml::XmlVersion;
+use quick_xml::events::{BytesStart, Event};
+
+use crate::shape::fault::{Place, ReadError};
+
+/// Elements nested deeper than this belong to no surface.
+const DEEPEST: usize = 256;
+
+/// What comes next in a document.
+pub(super) enum Step<'a> {
+    /// An element begins; an empty one ends with the next step.
+    Start(Element<'a>),
+    /// The innermost element ends, with all its own text.
+    End {
+        /// Its local name.
+        name: String,
+        /// Its own text, trimmed.
+        text: String,
+    },
+    /// The document ends.
+    Done,
+}
+
+/// An element's start.
+pub(super) struct Element<'a> {
+    start: BytesStart<'a>,
+}
+
+impl<'a> Element<'a> {
+    /// Its name without a prefix.
+    pub(super) fn name(&self) -> &str {
+        local(self.start.name().into_inner())
+    }
+
+    /// The value of the attribute with this local name.
+    pub(super) fn get(&self, wanted: &str) -> Option<Cow<'_, str>> {
+        self.find(|key| local(key) == wanted)
+    }
+
+    /// The value of the attribute with this full name.
+    pub(super) fn get_exact(&self, wanted: &str) -> Option<Cow<'_, str>> {
+        self.find(|key| key == wanted)
+    }
+
+    fn find(&self, is: impl Fn(&str) -> bool) -> Option<Cow<'_, str>> {
+        // Attributes that are none are no reason to refuse a mesh.
+        let mut attributes = self.start.attributes();
+        let attributes = attributes.with_checks(false);
+        let found = attributes
+            .flatten()
+            .find(|attribute| is(attribute.key.into_inner()))?;
+        found.normalized_value(XmlVersion::Implicit1_0).ok()
+    }
+}
+
+fn local(name: &str) -> &str {
+    name.rsplit_once(':').map_or(name, |(_, local)| local)
+}
+
+/// A document, read once from beginning to end.
+pub(super) struct Document<'a> {
+    part: &'a str,
+    text: &'a str,
+    reader: quick_xml::Reader<&'a [u8]>,
+    /// Own text of every open element, with its name.
+    open: Vec<(String, String)>,
+    /// The empty element that ends with the next step.
+    ends: bool,
+}
+
+impl<'a> Document<'a> {
+    /// A document's text; `part` names it in messages, empty for the file itself.
+    pub(super) fn new(part: &'a str, text: &'a str) -> Self {
+        Self {
+            part,
+            text,
+            reader: quick_xml::Reader::from_str(text),
+            open: Vec::new(),
+            ends: false,
+        }
+    }
+
+    /// What comes next.
+    pub(super) fn step(&mut self) -> Result<Step<'a>, ReadError> {
+        if std::mem::take(&mut self.ends) {
+            return self.end();
+        }
+        loop {
+            match self.reader.read_event() {
+                Ok(Event::Start(start)) => {
+                    self.begin(&start)?;
+                    return Ok(Step::Start(Element { start }));
+                }
+                Ok(Event::Empty(start)) => {
+                    self.begin(&start)?;
+                    self.ends = true;
+                    return Ok(Step::Start(Element { start }));
+                }
+                Ok(Event::End(_)) => return self.end(),
+                Ok(Event::Text(text)) => self.add(&text),
+                Ok(Event::CData(text)) => self.add(&text),
+                Ok(Event::Eof) if self.open.is_empty() => return Ok(Step::Done),
+                Ok(Event::Eof) => return Err(self.fault("the XML ends here: it was cut short")),
+                Ok(_) => {}
+                Err(error) => return Err(self.fault(format!("the XML is damaged: {error}"))),
+            }
+        }
+    }
+
+    fn begin(&mut self, start: &BytesStart<'_>) -> Result<(), ReadError> {
+        if self.open.len() >= DEEPEST {
+            return Err(self.fault(format!("elements are nested more than {DEEPEST} deep")));
+        }
+        let name = local(start.name().into_inner()).to_owned();
+        self.open.push((name, String::new()));
+        Ok(())
+    }
+
+    fn add(&mut self, text: &str) {
+        if let Some((_, own)) = self.open.last_mut()
+            && !(own.is_empty() && text.trim().is_empty())
+        {
+            own.push_str(text);
+        }
+    }
+
+    fn end(&mut self) -> Result<Step<'a>, ReadError> {
+        let Some((name, mut text)) = self.open.pop() else {
+            return Err(self.fault("an element ends that did not begin"));
+        };
+        text.truncate(text.trim_end().len());
+        Ok(Step::End { name, text })
+    }
+
+    /// A fault at the place that was read last.
+    pub(super) fn fault(&self, what: impl Into<String>) -> ReadError {
+        let at = usize::try_from(self.reader.buffer_position()).unwrap_or(usize::MAX);
+        let before = &self.text.as_bytes()[..at.min(self.text.len())];
+        let line = before.iter().filter(|b| **b == b'\n').count() + 1;
+        ReadError::new(
+            if self.part.is_empty() {
+                Place::Line(line)
+            } else {
+                Place::Part(self.part.to_owned(), line)
+            },
+            what,
+        )
+    }
+}

@@ -1,0 +1,336 @@
+//! The readers of OBJ, PLY, 3MF, AMF, 3DXML and native parts, on files made here.
+
+use std::path::Path;
+
+use fluxform::progress::Silent;
+use fluxform::shape::document::{AxisRequest, GridRequest, SurfaceFormat, SurfaceSource};
+use fluxform::shape::mesh::FileMesh;
+use fluxform::shape::{MeshReport, discretize};
+
+use crate::samples::{
+    amf, amf_parts, obj, ply_ascii, ply_binary, sldprt, three_dxml, three_mf, three_mf_of, zipped,
+};
+use crate::support::{file, lifted};
+
+/// The tetrahedron that every sample holds: its volume and the upper corner of its box.
+const VOLUME: f64 = 0.7 * 1.3 * 2.9 / 6.0;
+const CORNER: [f64; 3] = [0.7, 1.3, 2.9];
+
+fn read(format: SurfaceFormat, bytes: &[u8]) -> Result<FileMesh, String> {
+    let read = format.read(Path::new("f"), bytes);
+    read.map_err(|error| error.to_string())
+}
+
+fn refusal(format: SurfaceFormat, bytes: &[u8]) -> String {
+    read(format, bytes).unwrap_err()
+}
+
+#[test]
+fn every_format_gives_the_same_body() {
+    use SurfaceFormat::{Amf, Obj, Ply, Sldprt, ThreeDxml, ThreeMf};
+    let samples: [(SurfaceFormat, Vec<u8>, Option<f64>); 9] = [
+        (Obj, obj(), None),
+        (Ply, ply_ascii(), None),
+        (Ply, ply_binary(false), None),
+        (Ply, ply_binary(true), None),
+        (ThreeMf, three_mf("inch"), Some(0.0254)),
+        (Amf, amf("Inch").into_bytes(), Some(0.0254)),
+        (Amf, zipped(&[("a.AMF", &amf("meter"))]), Some(1.0)),
+        (ThreeDxml, three_dxml(), Some(1e-3)),
+        (Sldprt, sldprt(), Some(1.0)),
+    ];
+    for (format, bytes, unit_m) in samples {
+        let report = MeshReport::new(format, read(format, &bytes).unwrap());
+        assert_eq!((report.triangles, report.unit_m), (4, unit_m), "{format:?}");
+        assert!(
+            report.watertight && report.inconsistent_edges == 0,
+            "{report:?}"
+        );
+        assert!((report.volume.unwrap() - VOLUME).abs() < 1e-6, "{report:?}");
+        for k in 0..3 {
+            assert!(report.bounds_min[k].abs() < 1e-7, "{report:?}");
+            assert!(
+                (report.bounds_max[k] - CORNER[k]).abs() < 1e-6,
+                "{report:?}"
+            );
+        }
+        assert!(report.coordinate_rounding > 0.0 && report.coordinate_rounding < 1e-6);
+    }
+}
+
+#[test]
+fn the_files_unit_is_used_and_another_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("body.3mf");
+    // This is a test's own file.
+    #[allow(clippy::disallowed_methods)]
+    std::fs::write(&path, three_mf("inch")).unwrap();
+    let grid = GridRequest {
+        x: AxisRequest::Extent(3),
+        y: AxisRequest::Extent(3),
+    };
+    let mut document = file(&path, 0.0254, lifted(0.001), grid);
+    let given = discretize(&document, &Silent).unwrap();
+    assert!((given.bounds.max_m[0] - 0.7 * 0.0254).abs() < 1e-12);
+    let mut with_unit = |unit_m| {
+        document.source = SurfaceSource::File {
+            path: path.clone(),
+            unit_m,
+        };
+        discretize(&document, &Silent)
+    };
+    assert_eq!(with_unit(None).unwrap(), given);
+    let said = with_unit(Some(1e-3)).unwrap_err().to_string();
+    assert!(
+        said.contains("the file itself is in in, but `unit` says mm"),
+        "{said}"
+    );
+}
+
+#[test]
+fn obj_faults_have_their_line() {
+    let body = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    let cases = [
+        (
+            "f 1 2 4\n",
+            "line 4: a face has the index 4, but the file has 3 vertices",
+        ),
+        ("f 1 2 0\n", "line 4: a face has the index 0"),
+        (
+            "f 1 2 -4\n",
+            "line 4: a face has the index -4, but only 3 vertices",
+        ),
+        ("f 1 2\n", "line 4: a face has at least three corners"),
+        ("f 1 2 x/3\n", "line 4: expected an index, found `x/3`"),
+        ("f 1 2 99999999999999999999\n", "expected an index"),
+        ("f 1 2 9223372036854775807\n", "9223372036854775807"),
+        ("f 1 2 -9223372036854775808\n", "-9223372036854775808"),
+        ("v 1 2\n", "line 4: a vertex has three coordinates"),
+        ("v 1 2 nan\n", "line 4: a coordinate is `nan`"),
+        (
+            "v 1 2 1e999\n",
+            "line 4: the coordinate `1e999` is too large",
+        ),
+        ("v 1,5 2 3\n", "decimal point"),
+        ("", "3 vertices and no face"),
+        ("surf 0 1 0 1 1 2 3\n", "free-form"),
+    ];
+    for (end, said) in cases {
+        let message = refusal(SurfaceFormat::Obj, format!("{body}{end}").as_bytes());
+        assert!(message.contains(said), "{end}: {message}");
+    }
+    assert!(refusal(SurfaceFormat::Obj, b"\x00\x01 some").contains("not an OBJ file"));
+    assert!(refusal(SurfaceFormat::Obj, b"").contains("0 bytes"));
+}
+
+#[test]
+fn obj_is_read_however_it_is_written() {
+    let wanted = [[[0.0, 0.0, 0.0], [1.5, 0.0, 0.0], [0.0, 1.0, 0.25]]];
+    for text in [
+        &b"v 0 0 0\nv 1.5 0 0\nv 0 1 .25\nf 1 2 3"[..],
+        b"\xef\xbb\xbf# t\xeate\r\nv 0 0 0 1.0\r\nv 15e-1 0 0\r\nv 0 1 2.5e-001\r\nf 1/1 2//7 3/4/5\r\n",
+        b"mtllib \xff.mtl\no t\xeate\nv 0 0 0\nv 1.5 0 0\nv 0 1 0.25\nf -3 -2 -1 # end\n",
+        b"f 1 2 \\\n 3\nv 0 0 0\nv 1.5 \\\n0 0\rv 0 1 0.25",
+    ] {
+        let mesh = read(SurfaceFormat::Obj, text).unwrap();
+        assert_eq!(mesh.triangles, wanted, "{}", text.escape_ascii());
+    }
+    // A notched face is not filled.
+    let notched = b"v 0 0 0\nv 4 0 0\nv 4 4 0\nv 2 1 0\nv 0 4 0\nf 1 2 3 4 5\n";
+    let report = MeshReport::new(
+        SurfaceFormat::Obj,
+        read(SurfaceFormat::Obj, notched).unwrap(),
+    );
+    assert_eq!((report.triangles, report.area), (3, 10.0));
+    assert!(!report.watertight && report.open_edges == 5);
+}
+
+#[test]
+fn a_ply_header_is_held_against_the_file() {
+    let header = |vertices: &str, format: &str| {
+        format!(
+            "ply\nformat {format} 1.0\ncomment t\u{ea}te\nelement vertex {vertices}\n\
+             property float x\nproperty float y\nproperty float z\nelement face 1\n\
+             property list uchar int vertex_indices\nend_header\n"
+        )
+    };
+    for format in ["ascii", "binary_little_endian", "binary_big_endian"] {
+        for count in ["1000000000000", "18446744073709551615", "100"] {
+            let message = refusal(SurfaceFormat::Ply, header(count, format).as_bytes());
+            assert!(
+                message.contains("was cut short or its header is wrong"),
+                "{message}"
+            );
+        }
+    }
+    let text = |face: &str, z: &str| {
+        format!("{}0 0 0\n1 0 0\n0 1 {z}\n{face}\n", header("3", "ascii")).into_bytes()
+    };
+    assert_eq!(
+        read(SurfaceFormat::Ply, &text("3 0 1 2", "1"))
+            .unwrap()
+            .triangles
+            .len(),
+        1
+    );
+    for (face, z, said) in [
+        (
+            "3 0 1 3",
+            "1",
+            "face 0 (from 0) has the index 3, but the file has 3 vertices",
+        ),
+        ("3 0 1 -1", "1", "has the index -1"),
+        ("2 0 1", "1", "no face of the PLY file has three corners"),
+        ("3 0 1 2", "nan", "Line 13"),
+        ("3 0 1 2", "x", "damaged"),
+        ("99 0 1 2", "1", "damaged"),
+        ("", "1", "damaged"),
+    ] {
+        let message = refusal(SurfaceFormat::Ply, &text(face, z));
+        assert!(message.contains(said), "{face} {z}: {message}");
+    }
+    let mut binary = ply_binary(false);
+    let third = binary.len() - 4 * 13 - 2 * 13;
+    binary[third..third + 4].copy_from_slice(&f32::NAN.to_le_bytes());
+    assert!(refusal(SurfaceFormat::Ply, &binary).contains("vertex 2 (from 0)"));
+    assert!(refusal(SurfaceFormat::Ply, b"plx").contains("begins with `plx`"));
+    let empty = "ply\nformat binary_little_endian 1.0\nelement nothing 9999999999\n\
+                 element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+    assert!(refusal(SurfaceFormat::Ply, empty.as_bytes()).contains("has no property"));
+}
+
+#[test]
+fn three_mf_faults_have_part_and_line() {
+    let good = String::from_utf8(crate::samples::three_mf_model("inch")).unwrap();
+    for (from, to, said) in [
+        (
+            "v1=\"0\"",
+            "v1=\"4\"",
+            "line 9: a triangle has the index 4, but its object has 4",
+        ),
+        (
+            "v1=\"0\"",
+            "v1=\"-1\"",
+            "expected a whole number as `v1`, found `-1`",
+        ),
+        ("x=\"0.7\"", "x=\"0,7\"", "decimal point"),
+        ("x=\"0.7\"", "x=\"NaN\"", "not a finite number"),
+        ("x=\"0.7\"", "q=\"0.7\"", "a vertex has no `x`"),
+        ("unit=\"inch\"", "unit=\"ell\"", "the unit `ell` is unknown"),
+        (
+            "<item objectid=\"2\"",
+            "<item objectid=\"7\"",
+            "places object 7",
+        ),
+        (
+            "<item objectid=\"2\"",
+            "<jtem objectid=\"2\"",
+            "builds nothing",
+        ),
+        (
+            "<component objectid=\"1\"",
+            "<component objectid=\"2\"",
+            "within itself",
+        ),
+        ("1 0 0 0 1 0 0 0 1 0 0 0", "1 0 0", "twelve finite numbers"),
+        ("</model>", "", "cut short"),
+        ("</vertices>", "</corners>", "damaged"),
+        (
+            "<model ",
+            "<model xmlns:q=\"http://x/secure/\" requiredextensions=\"q\" ",
+            "extension `q`",
+        ),
+    ] {
+        assert!(good.contains(from), "{from}");
+        let message = refusal(
+            SurfaceFormat::ThreeMf,
+            &three_mf_of(&good.replace(from, to)),
+        );
+        assert!(message.contains(said), "{from} {to}: {message}");
+    }
+    let bytes = three_mf("inch");
+    for length in [1, 30, bytes.len() / 2, bytes.len() - 1] {
+        refusal(SurfaceFormat::ThreeMf, &bytes[..length]);
+    }
+    let message = refusal(SurfaceFormat::ThreeMf, &zipped(&[("a.txt", "text")]));
+    assert!(
+        message.contains("`3D/3dmodel.model` is missing"),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_decompression_bomb_is_stopped() {
+    let bomb = format!("<model>{}</model>", " ".repeat(80 << 20));
+    for (format, name) in [
+        (SurfaceFormat::ThreeMf, "3D/3dmodel.model"),
+        (SurfaceFormat::Amf, "a.amf"),
+    ] {
+        let bytes = zipped(&[(name, &bomb)]);
+        assert!(bytes.len() < 1 << 20);
+        let message = refusal(format, &bytes);
+        assert!(message.contains("decompression bomb"), "{message}");
+    }
+    // Forty objects, each made of the one before twice: 2^40 bodies.
+    let mut objects = String::new();
+    for id in 2..42 {
+        let before = format!("<component objectid=\"{}\"/>", id - 1);
+        objects +=
+            &format!("<object id=\"{id}\"><components>{before}{before}</components></object>");
+    }
+    let model = String::from_utf8(crate::samples::three_mf_model("inch")).unwrap();
+    let start = model.find("<object id=\"2\"").unwrap();
+    let end = model.find("</resources>").unwrap();
+    let model = format!("{}{objects}{}", &model[..start], &model[end..]);
+    let model = model.replace("<item objectid=\"2\"", "<item objectid=\"41\"");
+    let message = refusal(SurfaceFormat::ThreeMf, &three_mf_of(&model));
+    assert!(message.contains("add up to more than"), "{message}");
+    let deep = format!("<amf>{}", "<a>".repeat(1_000_000));
+    assert!(refusal(SurfaceFormat::Amf, deep.as_bytes()).contains("nested more than"));
+}
+
+#[test]
+fn amf_constellations_place_their_objects() {
+    let [start, end] = amf_parts("inch");
+    let placed = format!(
+        "{start}<constellation id=\"9\">\
+         <instance objectid=\"1\"><deltax>5</deltax><rz>90</rz></instance>\
+         <instance objectid=\"1\"><deltaz>-2.5</deltaz></instance></constellation>{end}"
+    );
+    let mesh = read(SurfaceFormat::Amf, placed.as_bytes()).unwrap();
+    let report = MeshReport::new(SurfaceFormat::Amf, mesh);
+    assert_eq!(report.triangles, 8);
+    assert_eq!(report.bounds_min, [0.0, 0.0, -2.5]);
+    assert_eq!(report.bounds_max, [5.0, 1.3, 2.9]);
+    let lost = placed.replace("objectid=\"1\"", "objectid=\"3\"");
+    assert!(refusal(SurfaceFormat::Amf, lost.as_bytes()).contains("places `3`"));
+    let wrong = amf("inch").replace("<v1>0</v1>", "<v1>4</v1>");
+    assert!(refusal(SurfaceFormat::Amf, wrong.as_bytes()).contains("index 4"));
+    assert!(refusal(SurfaceFormat::Amf, b"<html></html>").contains("XML of `html`"));
+    assert!(refusal(SurfaceFormat::Amf, b"\xff\xfe<\0a\0").contains("UTF-16"));
+}
+
+#[test]
+fn a_damaged_native_part_is_refused() {
+    let good = sldprt();
+    for (at, byte, said) in [(4, 1, "its sign is missing"), (8, 1, "no block of data")] {
+        let mut bytes = good.clone();
+        bytes[at] ^= byte;
+        let message = refusal(SurfaceFormat::Sldprt, &bytes);
+        assert!(message.contains(said), "{message}");
+    }
+    // Checksum, then the length unpacked.
+    for at in [18, 26] {
+        let mut bytes = good.clone();
+        bytes[at] ^= 1;
+        let message = refusal(SurfaceFormat::Sldprt, &bytes);
+        assert!(message.contains("that it claims"), "{at}: {message}");
+        bytes[at..at + 4].copy_from_slice(&u32::MAX.to_le_bytes());
+        refusal(SurfaceFormat::Sldprt, &bytes);
+    }
+    let ole = refusal(SurfaceFormat::Sldprt, b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1");
+    assert!(
+        ole.contains("up to 2014") && ole.contains("save the body as STL"),
+        "{ole}"
+    );
+}

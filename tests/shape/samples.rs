@@ -1,0 +1,208 @@
+//! One tetrahedron in every format: corners at the origin, 0.7 on x, 1.3 on y and 2.9 on z.
+
+use std::io::{Cursor, Write};
+
+use flate2::Compression;
+use flate2::write::DeflateEncoder;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipWriter};
+
+pub const VERTICES: [[f32; 3]; 4] = [
+    [0.0, 0.0, 0.0],
+    [0.7, 0.0, 0.0],
+    [0.0, 1.3, 0.0],
+    [0.0, 0.0, 2.9],
+];
+pub const TRIANGLES: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+
+pub fn obj() -> Vec<u8> {
+    let mut text = String::from("# a body\no body\n");
+    for [x, y, z] in VERTICES {
+        text += &format!("v {x} {y} {z}\n");
+    }
+    for [a, b, c] in TRIANGLES {
+        text += &format!("f {}/1 {}//2 -{}\n", a + 1, b + 1, 4 - c);
+    }
+    text.into_bytes()
+}
+
+fn ply_header(format: &str) -> String {
+    format!(
+        "ply\nformat {format} 1.0\ncomment made here\nelement vertex 4\nproperty float x\n\
+         property float y\nproperty uchar red\nproperty float z\nelement face 4\n\
+         property list uchar int vertex_indices\nend_header\n"
+    )
+}
+
+pub fn ply_ascii() -> Vec<u8> {
+    let mut text = ply_header("ascii");
+    for [x, y, z] in VERTICES {
+        text += &format!("{x} {y} 7 {z} \n");
+    }
+    for [a, b, c] in TRIANGLES {
+        text += &format!("3 {a} {b} {c}\n");
+    }
+    text.into_bytes()
+}
+
+pub fn ply_binary(big_endian: bool) -> Vec<u8> {
+    let name = if big_endian { "big" } else { "little" };
+    let mut bytes = ply_header(&format!("binary_{name}_endian")).into_bytes();
+    let word = |bytes: &mut Vec<u8>, bits: u32| {
+        bytes.extend(if big_endian {
+            bits.to_be_bytes()
+        } else {
+            bits.to_le_bytes()
+        });
+    };
+    for [x, y, z] in VERTICES {
+        word(&mut bytes, x.to_bits());
+        word(&mut bytes, y.to_bits());
+        bytes.push(7);
+        word(&mut bytes, z.to_bits());
+    }
+    for triangle in TRIANGLES {
+        bytes.push(3);
+        for index in triangle {
+            word(&mut bytes, index);
+        }
+    }
+    bytes
+}
+
+pub fn zipped(parts: &[(&str, &str)]) -> Vec<u8> {
+    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+    let options = SimpleFileOptions::default().compression_method(CompressionMethod::Deflated);
+    for (name, text) in parts {
+        zip.start_file(*name, options).unwrap();
+        zip.write_all(text.as_bytes()).unwrap();
+    }
+    zip.finish().unwrap().into_inner()
+}
+
+/// An object of four triangles, placed by a second one.
+pub fn three_mf_model(unit: &str) -> Vec<u8> {
+    let mut text = format!(
+        "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<model unit=\"{unit}\" xml:lang=\"en\">\n\
+         <resources><object id=\"1\"><mesh><vertices>\n"
+    );
+    for [x, y, z] in VERTICES {
+        text += &format!("<vertex x=\"{x}\" y=\"{y}\" z=\"{z}\"/>\n");
+    }
+    text += "</vertices><triangles>\n";
+    for [a, b, c] in TRIANGLES {
+        text += &format!("<triangle v1=\"{a}\" v2=\"{b}\" v3=\"{c}\"/>\n");
+    }
+    text += "</triangles></mesh></object>\n<object id=\"2\"><components>\
+             <component objectid=\"1\" transform=\"1 0 0 0 1 0 0 0 1 0 0 0\"/>\
+             </components></object>\n</resources><build><item objectid=\"2\"/></build>\n</model>";
+    text.into_bytes()
+}
+
+pub fn three_mf_of(model: &str) -> Vec<u8> {
+    let relations = "<Relationships><Relationship Target=\"/3D/3DModel.model\" \
+                     Type=\"http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel\"/>\
+                     </Relationships>";
+    zipped(&[("_rels/.rels", relations), ("3D/3dmodel.model", model)])
+}
+
+pub fn three_mf(unit: &str) -> Vec<u8> {
+    three_mf_of(&String::from_utf8(three_mf_model(unit)).unwrap())
+}
+
+/// What comes before and after a constellation.
+pub fn amf_parts(unit: &str) -> [String; 2] {
+    let mut text = format!(
+        "\u{feff}<?xml version=\"1.0\"?>\n<amf unit=\"{unit}\"><object id=\"1\"><mesh><vertices>\n"
+    );
+    for [x, y, z] in VERTICES {
+        text += &format!(
+            "<vertex><coordinates><x>{x}</x><y> {y} </y><z>{z}</z></coordinates></vertex>\n"
+        );
+    }
+    text += "</vertices><volume>\n";
+    for [a, b, c] in TRIANGLES {
+        text += &format!("<triangle><v1>{a}</v1><v2>{b}</v2><v3>{c}</v3></triangle>\n");
+    }
+    [text + "</volume></mesh></object>\n", "</amf>\n".into()]
+}
+
+pub fn amf(unit: &str) -> String {
+    amf_parts(unit).concat()
+}
+
+/// The body turned in its representation and turned back by the instance; strip, fan, triangles.
+pub fn three_dxml_parts() -> [(&'static str, String); 3] {
+    let positions = VERTICES.map(|[x, y, z]| format!("{y} {z} {x}")).join(",");
+    let representation = format!(
+        "<XMLRepresentation><Root xsi:type=\"BagRepType\"><Rep xsi:type=\"PolygonalRepType\">\
+         <PolygonalLOD accuracy=\"5\"><Faces><Face triangles=\"0 1 2\"/></Faces></PolygonalLOD>\
+         <Faces><Face strips=\"0 2 1 3\"/><Face fans=\"0 1 3\" triangles=\"0 3 2\"/></Faces>\
+         <Edges><Polyline vertices=\"0 0 0\"/></Edges>\
+         <VertexBuffer><Positions>{positions}</Positions></VertexBuffer></Rep></Root>\
+         </XMLRepresentation>"
+    );
+    let structure = "<Model_3dxml><ProductStructure root=\"1\">\
+         <Reference3D id=\"1\"/><Reference3D id=\"2\"/>\
+         <Instance3D id=\"3\"><IsAggregatedBy>1</IsAggregatedBy>\
+         <IsInstanceOf>urn:3DXML:Reference:loc:2</IsInstanceOf>\
+         <RelativeMatrix>0 1 0 0 0 1 1 0 0 0 0 0</RelativeMatrix></Instance3D>\
+         <ReferenceRep id=\"5\" format=\"TESSELLATED\" associatedFile=\"urn:3DXML:R.3DRep\"/>\
+         <InstanceRep id=\"4\"><IsAggregatedBy>2</IsAggregatedBy><IsInstanceOf>5</IsInstanceOf>\
+         </InstanceRep></ProductStructure></Model_3dxml>";
+    [
+        (
+            "Manifest.xml",
+            "<Manifest><Root>P.3dxml</Root></Manifest>".into(),
+        ),
+        ("P.3dxml", structure.into()),
+        ("R.3DRep", representation),
+    ]
+}
+
+pub fn three_dxml() -> Vec<u8> {
+    let parts = three_dxml_parts();
+    zipped(&parts.each_ref().map(|(name, text)| (*name, text.as_str())))
+}
+
+/// The display lists of the body: a strip of two triangles and two of one.
+pub fn display_lists() -> Vec<u8> {
+    let mut stream = vec![0xff; 7];
+    for lengths in [&[4u32, 3][..], &[3]] {
+        let corners: &[usize] = if lengths.len() == 2 {
+            &[0, 2, 1, 3, 0, 1, 3]
+        } else {
+            &[0, 3, 2]
+        };
+        let head = [4, 8, 2, lengths.len() as u32];
+        let tail = [12, 100, 2, corners.len() as u32];
+        for word in head.iter().chain(lengths).chain(&tail) {
+            stream.extend(word.to_le_bytes());
+        }
+        for c in corners.iter().flat_map(|k| VERTICES[*k]) {
+            stream.extend(c.to_le_bytes());
+        }
+        stream.extend([1, 2, 3]);
+    }
+    stream
+}
+
+pub fn sldprt_of(stream: &[u8]) -> Vec<u8> {
+    let mut packer = DeflateEncoder::new(Vec::new(), Compression::default());
+    packer.write_all(stream).unwrap();
+    let packed = packer.finish().unwrap();
+    let name = b"Contents/DisplayLists";
+    let mut bytes = vec![0x6b, 0x22, 0x77, 0x37, 0, 0, 0, 4];
+    bytes.extend([0x14, 0, 0x06, 0, 0x08, 0]);
+    let sizes = [packed.len(), stream.len(), name.len()].map(|n| n as u32);
+    for word in [1, crc32fast::hash(stream), sizes[0], sizes[1], sizes[2]] {
+        bytes.extend(word.to_le_bytes());
+    }
+    bytes.extend(name.map(|b| b.rotate_left(4)));
+    bytes.extend(packed);
+    bytes
+}
+
+pub fn sldprt() -> Vec<u8> {
+    sldprt_of(&display_lists())
+}
