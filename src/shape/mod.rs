@@ -3,6 +3,7 @@
 //! A surface file passes `format` (which reader) and `stl` (file units), becomes a placed
 //! [`mesh::Mesh`] in metres, and `height` looks at it from above. `points` is the entry.
 
+pub mod deviation;
 pub mod document;
 pub mod error;
 pub mod format;
@@ -13,6 +14,7 @@ pub mod points;
 pub mod primitive;
 pub mod stl;
 pub mod surface;
+pub mod tessellation;
 
 mod seen;
 

@@ -45,12 +45,7 @@ impl Seen {
         let vertices = ordered(triangle);
         let [a, b, c] = vertices;
         let orientation = side(a, b, [c[0], c[1]]);
-        let longest = [(a, b), (b, c), (a, c)].map(|(p, q)| (p[0] - q[0]).hypot(p[1] - q[1]));
-        let longest = longest[0].max(longest[1]).max(longest[2]);
-        // As wide in plan as the file's rounding can make a wall that was vertical.
-        let wall = orientation == 0.0
-            || (orientation.abs() <= reach * longest
-                && upward_normal(triangle)[2] <= WALL_NORMAL_Z);
+        let wall = is_wall(triangle, reach);
         Self {
             vertices,
             orientation,
@@ -164,6 +159,18 @@ impl Seen {
         let height = z[near] + rise / (weights[0] + weights[1] + weights[2]);
         height.clamp(z[0].min(z[1]).min(z[2]), z[0].max(z[1]).max(z[2]))
     }
+}
+
+/// Whether a triangle stands upright, or as nearly as the file's rounding can make a wall that did.
+pub(super) fn is_wall(triangle: &Triangle, reach: f64) -> bool {
+    let [a, b, c] = ordered(triangle);
+    let orientation = side(a, b, [c[0], c[1]]);
+    if orientation == 0.0 {
+        return true;
+    }
+    let longest = [(a, b), (b, c), (a, c)].map(|(p, q)| (p[0] - q[0]).hypot(p[1] - q[1]));
+    let longest = longest[0].max(longest[1]).max(longest[2]);
+    orientation.abs() <= reach * longest && upward_normal(triangle)[2] <= WALL_NORMAL_Z
 }
 
 /// The unit normal that looks up (n_z >= 0), whatever the vertices' order.

@@ -1,6 +1,7 @@
 //! Surfaces: STL readers, exact heights, primitives, constraint points.
 #![allow(missing_docs)]
 
+mod deviation;
 mod fuzz;
 mod heights;
 mod points;
