@@ -56,7 +56,12 @@ impl Seen {
 
     /// A range of x that holds every point of row `y` that this triangle touches.
     pub(super) fn columns(&self, y: f64) -> [f64; 2] {
-        let (low, high) = (y - self.reach, y + self.reach);
+        self.columns_between(y, y)
+    }
+
+    /// The same for every row between two.
+    pub(super) fn columns_between(&self, from: f64, to: f64) -> [f64; 2] {
+        let (low, high) = (from - self.reach, to + self.reach);
         let mut range = [f64::INFINITY, f64::NEG_INFINITY];
         let [a, b, c] = self.vertices;
         for (p, q) in [(a, b), (b, c), (a, c)] {

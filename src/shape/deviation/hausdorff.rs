@@ -1,8 +1,8 @@
 //! The Hausdorff distance between the surface and the interpolated points, as an interval.
 //!
 //! A vertical difference on a slope overstates how far two surfaces lie apart. Both directed
-//! distances are searched by branch and bound: a piece is bounded by the distance at its centre
-//! plus its radius and by its vertical difference, whichever is less. From the points towards the
+//! distances are searched by branch and bound: a piece lies no farther than the farthest of its
+//! corners from the triangle that is nearest to its centre, nor than its vertical difference. From the points towards the
 //! surface its walls count as well; from the surface only what is seen from above does.
 
 use std::cmp::Ordering;
@@ -18,7 +18,7 @@ use crate::shape::mesh::{Mesh, Triangle};
 /// Relative width at which a search ends.
 const NARROW: f64 = 0.01;
 /// Pieces looked at, at most, in each direction.
-const MOST: usize = 60_000;
+const MOST: usize = 30_000;
 /// Patches are split into so many parts a side, at most, to be compared as triangles.
 const FINEST: f64 = 16.0;
 
@@ -55,16 +55,21 @@ pub fn hausdorff(
         surface: Tree::new(mesh.triangles().to_vec()),
         points: Tree::new(points),
         slop_m,
+        rounding_m: vertical.rounding_m,
         lower_m: 0.0,
         at_m: [0.0; 3],
     };
     progress.begin("distance", 2);
     progress.check()?;
+    // What the cells' centres tell spares most pieces a closer look.
+    for (_, patch) in &patches {
+        search.bound_of_rect(&patch.rect, patch);
+    }
     let from_surface = search.from_surface(lattice, &patches, progress)?;
     progress.advance(1);
     let from_points = search.from_points(lattice, &patches, progress)?;
     progress.end();
-    let upper_m = from_surface.max(from_points).max(search.lower_m);
+    let upper_m = from_surface.max(from_points);
     Ok(Some(Interval {
         lower_m: search.lower_m,
         upper_m: upper_m.min(vertical_bound(lattice, &patches, vertical, upper_m)),
@@ -151,13 +156,14 @@ struct Search<'a> {
     surface: Tree,
     points: Tree,
     slop_m: f64,
+    rounding_m: f64,
     lower_m: f64,
     at_m: [f64; 3],
 }
 
 impl Search<'_> {
     fn enough_m(&self) -> f64 {
-        self.lower_m * (1.0 + NARROW)
+        self.lower_m * (1.0 + NARROW) + self.rounding_m
     }
 
     fn found(&mut self, distance_m: f64, at_m: [f64; 3]) {
@@ -184,12 +190,12 @@ impl Search<'_> {
         let mut looked = 0;
         while let Some(Open { bound_m, part, .. }) = open.pop() {
             if bound_m <= self.enough_m() || looked >= MOST {
-                return Ok(bound_m.max(self.lower_m));
+                return Ok(bound_m.max(self.enough_m()));
             }
             looked += 1;
             let split = {
                 let (x, y) = (part.polygon.range(0), part.polygon.range(1));
-                let k = usize::from(y.1 - y.0 > x.1 - x.0);
+                let k = usize::from(part.face.length(1, y.1 - y.0) > part.face.length(0, x.1 - x.0));
                 let middle = [x, y].map(|(low, high)| 0.5 * (low + high))[k];
                 [
                     part.polygon.cut(|p| middle - p[k]),
@@ -199,12 +205,12 @@ impl Search<'_> {
             for polygon in split {
                 let half = Part { polygon, others: part.others.clone(), ..part };
                 let bound_m = bound_m.min(self.bound(&half));
-                if bound_m > self.lower_m {
+                if bound_m > self.enough_m() {
                     open.push(Open { bound_m, order: looked, part: half });
                 }
             }
         }
-        Ok(self.lower_m)
+        Ok(self.enough_m())
     }
 
     /// Opens the visible pieces of a leaf whose vertical difference exceeds what is known.
@@ -221,7 +227,7 @@ impl Search<'_> {
         for face in others.iter() {
             let polygon = face.within(rect);
             if polygon.width() <= hair.plan_m / 4.0
-                || difference(face, &polygon, patch).value_m <= self.lower_m
+                || difference(face, &polygon, patch).value_m <= self.enough_m()
             {
                 continue;
             }
@@ -234,7 +240,7 @@ impl Search<'_> {
             let bound_m = below.map_or(above, |below| above.or(below)).value_m;
             let part = Part { face: *face, polygon, others: others.clone(), patch: *patch };
             let bound_m = bound_m.min(self.bound(&part));
-            if bound_m > self.lower_m {
+            if bound_m > self.enough_m() {
                 open.push(Open { bound_m, order: open.len(), part });
             }
         }
@@ -250,15 +256,15 @@ impl Search<'_> {
         let centre = [0, 1].map(|k| corners.iter().map(|p| p[k]).sum::<f64>() / count);
         let lifted = |p: Point| [p[0], p[1], part.face.height(p)];
         let at_m = lifted(centre);
-        let distance_m = self.points.distance(at_m);
-        let radius_m = corners.iter().fold(0.0_f64, |m, p| m.max(between(lifted(*p), at_m)));
+        let (distance_m, nearest) = self.points.nearest(at_m);
+        let most_m = self.points.farthest(nearest, corners.iter().map(|p| lifted(*p)));
         let hidden = part.others.iter().any(|other| {
             !other.hides(&part.face, &Polygon::of(&[centre]), self.faces.hair.height_m).corners().is_empty()
         });
         if !hidden {
             self.found(distance_m - self.slop_m, at_m);
         }
-        (distance_m + radius_m + self.slop_m).min(difference(&part.face, &part.polygon, &part.patch).value_m)
+        (most_m + self.slop_m).min(difference(&part.face, &part.polygon, &part.patch).value_m)
     }
 
     /// An upper bound of the distances from the interpolated points to the surface.
@@ -271,52 +277,45 @@ impl Search<'_> {
         let mut open = BinaryHeap::new();
         for (order, (cell, patch)) in patches.iter().enumerate() {
             progress.check()?;
-            let members = lattice.members(*cell).to_vec();
-            let covered = self.faces.covered(&patch.rect, &members);
-            let bound_m = self.bound_of_rect(&patch.rect, &members, patch, covered);
-            if bound_m > self.lower_m {
-                open.push(Open { bound_m, order, part: (patch.rect, members, *patch, covered) });
+            let members = lattice.members(*cell);
+            let covered = self.faces.covered(&patch.rect, members);
+            let mut bound_m = self.bound_of_rect(&patch.rect, patch);
+            if covered && bound_m > self.enough_m() {
+                let known = Extreme { value_m: self.enough_m(), at_m: patch.rect.low_m };
+                let known = Worst { above: known, below: known };
+                let vertical = self.faces.worst(&patch.rect, members, patch, known);
+                bound_m = bound_m.min(vertical.value_m());
+            }
+            if bound_m > self.enough_m() {
+                open.push(Open { bound_m, order, part: (patch.rect, *patch) });
             }
         }
         let mut looked = 0;
         while let Some(Open { bound_m, part, .. }) = open.pop() {
             if bound_m <= self.enough_m() || looked >= MOST {
-                return Ok(bound_m.max(self.lower_m));
+                return Ok(bound_m.max(self.enough_m()));
             }
             looked += 1;
-            let (rect, members, patch, covered) = part;
-            for quarter in rect.quarters() {
-                let members = self.faces.over(&quarter, &members);
-                let covered = covered || self.faces.covered(&quarter, &members);
-                let bound_m = bound_m.min(self.bound_of_rect(&quarter, &members, &patch, covered));
-                if bound_m > self.lower_m {
-                    let part = (quarter, members, patch, covered);
-                    open.push(Open { bound_m, order: looked, part });
+            let (rect, patch) = part;
+            for half in rect.halves(patch.longer(&rect)) {
+                let bound_m = bound_m.min(self.bound_of_rect(&half, &patch));
+                if bound_m > self.enough_m() {
+                    open.push(Open { bound_m, order: looked, part: (half, patch) });
                 }
             }
         }
-        Ok(self.lower_m)
+        Ok(self.enough_m())
     }
 
-    fn bound_of_rect(&mut self, rect: &Rect, members: &[u32], patch: &Patch, covered: bool) -> f64 {
-        let known = Extreme { value_m: self.lower_m, at_m: rect.low_m };
-        let vertical_m = if covered {
-            let known = Worst { above: known, below: known };
-            self.faces.worst(rect, members, patch, known).value_m()
-        } else {
-            f64::INFINITY
-        };
-        if vertical_m <= self.lower_m {
-            return vertical_m;
-        }
+    /// A bound of the distances from part of a patch; its centre may be the farthest known.
+    fn bound_of_rect(&mut self, rect: &Rect, patch: &Patch) -> f64 {
         let lifted = |p: Point| [p[0], p[1], patch.height_m(p)];
         let at_m = lifted(rect.centre());
-        let distance_m = self.surface.distance(at_m);
+        let (distance_m, nearest) = self.surface.nearest(at_m);
         self.found(distance_m, at_m);
         let corners = [rect.low_m, [rect.high_m[0], rect.low_m[1]], rect.high_m, [rect.low_m[0], rect.high_m[1]]];
-        // The farthest point of a bilinear patch from a point is at a corner.
-        let radius_m = corners.iter().fold(0.0_f64, |m, p| m.max(between(lifted(*p), at_m)));
-        vertical_m.min(distance_m + radius_m)
+        // A bilinear patch lies in the hull of its corners.
+        self.surface.farthest(nearest, corners.iter().map(|p| lifted(*p)))
     }
 }
 
@@ -324,8 +323,4 @@ impl Search<'_> {
 fn difference(face: &Face, polygon: &Polygon, patch: &Patch) -> Extreme {
     let above = polygon.supremum(|p| face.height(p) - patch.height_m(p));
     above.or(polygon.supremum(|p| patch.height_m(p) - face.height(p)))
-}
-
-fn between(a: [f64; 3], b: [f64; 3]) -> f64 {
-    (0..3).map(|k| (a[k] - b[k]) * (a[k] - b[k])).sum::<f64>().sqrt()
 }

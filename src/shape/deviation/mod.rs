@@ -31,6 +31,8 @@ const TOGETHER: usize = 10;
 const DEEPEST: u32 = 9;
 /// Places nearer than this times the largest coordinate are not told apart.
 const HAIR: f64 = 1e-12;
+/// Height hairs by which a difference may be off.
+const ROUNDINGS: f64 = 16.0;
 
 /// The vertical difference between the surface and the points, cells of four points.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -146,6 +148,12 @@ impl Faces {
             self.compare(leaf, faces, patch, &mut worst);
         });
         worst
+    }
+
+    /// A bound of the vertical difference over a patch, m.
+    pub(super) fn deviation_m(&self, patch: &Patch, among: &[u32]) -> f64 {
+        let worst = self.worst(&patch.rect, among, patch, Worst::NONE).value_m();
+        worst.max(0.0) + ROUNDINGS * self.hair.height_m
     }
 
     /// Quarters the rectangle until few faces are left in each part.
@@ -355,7 +363,7 @@ pub fn vertical(
     Ok(Vertical {
         above: worst.above,
         below: worst.below,
-        rounding_m: 16.0 * lattice.faces.hair.height_m,
+        rounding_m: ROUNDINGS * lattice.faces.hair.height_m,
         slack_m: 0.0,
         cells,
     })

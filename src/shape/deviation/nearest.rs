@@ -30,23 +30,37 @@ impl Tree {
         Self { triangles, nodes }
     }
 
-    /// Distance to the nearest triangle; infinite without any.
-    pub(super) fn distance(&self, p: [f64; 3]) -> f64 {
-        let mut best = f64::INFINITY;
+    /// Distance to the nearest triangle, and which it is; infinite without any.
+    pub(super) fn nearest(&self, p: [f64; 3]) -> (f64, usize) {
+        let mut best = (f64::INFINITY, 0);
         if !self.nodes.is_empty() {
             self.visit(0, p, &mut best);
         }
-        best.sqrt()
+        (best.0.sqrt(), best.1)
     }
 
-    fn visit(&self, index: usize, p: [f64; 3], best: &mut f64) {
+    /// The largest distance from any of the corners to one triangle.
+    ///
+    /// The distance to a convex set is a convex function: no point of the corners' hull is farther
+    /// from that triangle, hence none from all of them.
+    pub(super) fn farthest(&self, triangle: usize, corners: impl Iterator<Item = [f64; 3]>) -> f64 {
+        let Some(triangle) = self.triangles.get(triangle) else {
+            return f64::INFINITY;
+        };
+        corners.map(|p| square_to_triangle(triangle, p)).fold(0.0, f64::max).sqrt()
+    }
+
+    fn visit(&self, index: usize, p: [f64; 3], best: &mut (f64, usize)) {
         let node = &self.nodes[index];
-        if square_to_box(&node.bounds, p) >= *best {
+        if square_to_box(&node.bounds, p) >= best.0 {
             return;
         }
         if let Some([from, to]) = node.range {
-            for triangle in &self.triangles[from..to] {
-                *best = best.min(square_to_triangle(triangle, p));
+            for index in from..to {
+                let square = square_to_triangle(&self.triangles[index], p);
+                if square < best.0 {
+                    *best = (square, index);
+                }
             }
             return;
         }
@@ -159,7 +173,7 @@ mod tests {
                     }
                 }
             }
-            let found = tree.distance(p);
+            let found = tree.nearest(p).0;
             assert!(found <= nearest + 1e-15 && found > nearest - 0.01, "{found} {nearest}");
         }
     }

@@ -24,8 +24,16 @@ impl Rect {
         [0, 1].map(|k| 0.5 * (self.low_m[k] + self.high_m[k]))
     }
 
-    pub(super) fn sides(&self) -> Point {
+    pub(in crate::shape) fn sides(&self) -> Point {
         [0, 1].map(|k| self.high_m[k] - self.low_m[k])
+    }
+
+    /// The two halves along an axis.
+    pub(super) fn halves(&self, k: usize) -> [Self; 2] {
+        let (mut lower, mut upper) = (*self, *self);
+        lower.high_m[k] = self.centre()[k];
+        upper.low_m[k] = lower.high_m[k];
+        [lower, upper]
     }
 
     /// The four quarters, x fastest.
@@ -62,6 +70,17 @@ impl Patch {
         let [a, b, c, d] = self.corners_m;
         let (low, high) = (a + u * (b - a), c + u * (d - c));
         low + v * (high - low)
+    }
+
+    /// The axis along which part of the patch is longer in space.
+    pub(super) fn longer(&self, part: &Rect) -> usize {
+        let centre = part.centre();
+        let lengths = [0, 1].map(|k| {
+            let (mut low, mut high) = (centre, centre);
+            (low[k], high[k]) = (part.low_m[k], part.high_m[k]);
+            (high[k] - low[k]).hypot(self.height_m(high) - self.height_m(low))
+        });
+        usize::from(lengths[1] > lengths[0])
     }
 
     /// What remains of the corners' heights after the best plane: zero for a flat patch.
@@ -126,6 +145,11 @@ impl Face {
         let rise = self.slope[0] * (p[0] - self.origin[0]) + self.slope[1] * (p[1] - self.origin[1]);
         // A sliver's slope is huge: what rounding adds must not leave the triangle.
         (self.origin[2] + rise).clamp(self.heights[0], self.heights[1])
+    }
+
+    /// Length in space of a step along an axis.
+    pub(super) fn length(&self, k: usize, step: f64) -> f64 {
+        step.hypot(step * self.slope[k])
     }
 
     /// Whether the plan of the triangle may have area in common with the rectangle.

@@ -11,13 +11,13 @@ use crate::shape::height::{Grid, Sample};
 use crate::shape::primitive::PlacedPrimitive;
 
 /// Relative width at which the search ends.
-const NARROW: f64 = 1e-9;
+const NARROW: f64 = 1e-6;
 /// Rectangles looked at, at most, beyond one a cell.
 const MOST: usize = 200_000;
 
 /// The supremum of the vertical difference over all cells of four points.
 ///
-/// Error: `slack_m`, 1e-9 of the supremum unless the rectangles run out.
+/// Error: `slack_m`, 1e-6 of the supremum unless the rectangles run out.
 #[must_use]
 pub fn primitive(shape: &PlacedPrimitive, grid: &Grid, heights: &[Option<f64>]) -> Vertical {
     let (x, y) = (grid.x_m.nodes(), grid.y_m.nodes());

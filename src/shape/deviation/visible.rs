@@ -43,13 +43,13 @@ pub(super) fn supremum_over_visible(
         let step = turn * hair.plan_m / length;
         let offset = [-(b[1] - a[1]) * step, (b[0] - a[0]) * step];
         let beside = [a, b].map(|p| [p[0] + offset[0], p[1] + offset[1]]);
-        let Some(mut open) = crossing(piece, beside) else {
+        let Some(mut open) = crossing(piece, beside, hair.plan_m) else {
             return;
         };
         hidden.clear();
         let slack = 8.0 * hair.plan_m / length;
         for region in &regions {
-            if let Some([from, to]) = crossing(region, beside) {
+            if let Some([from, to]) = crossing(region, beside, hair.plan_m) {
                 hidden.push([from - slack, to + slack]);
             }
         }
@@ -78,9 +78,13 @@ pub(super) fn supremum_over_visible(
 }
 
 /// The part of a segment inside a convex polygon, as fractions of it.
-fn crossing(polygon: &Polygon, [from, to]: [Point; 2]) -> Option<[f64; 2]> {
+fn crossing(polygon: &Polygon, [from, to]: [Point; 2], hair_m: f64) -> Option<[f64; 2]> {
     let (mut first, mut last) = (0.0_f64, 1.0_f64);
     for (a, b) in polygon.sides() {
+        // Two cuts through one corner leave it twice; what lies between has no direction.
+        if (b[0] - a[0]).abs().max((b[1] - a[1]).abs()) < hair_m / 16.0 {
+            continue;
+        }
         let side =
             |p: Point| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
         let (start, end) = (side(from), side(to));
