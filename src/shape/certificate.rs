@@ -87,8 +87,10 @@ pub fn certify(
     if how == Certify::No {
         return Ok(None);
     }
-    let heights: Vec<Option<f64>> =
-        samples.iter().map(|sample| sample.map(|sample| sample.height_m)).collect();
+    let heights: Vec<Option<f64>> = samples
+        .iter()
+        .map(|sample| sample.map(|sample| sample.height_m))
+        .collect();
     let (found, apart, tessellation_m) = match surface {
         Surface::Primitive(shape) => (primitive(shape, grid, &heights), None, 0.0),
         Surface::Mesh(mesh) => {

@@ -55,10 +55,15 @@ pub fn fill(grid: &Grid, samples: &mut [Option<Sample>], holes: &[usize]) {
     let (count, sum) = known.fold((0.0, 0.0), |(n, sum), h| (n + 1.0, sum + h));
     let start = if count > 0.0 { sum / count } else { 0.0 };
     for &index in holes {
-        samples[index] = Some(Sample { height_m: start, normal: [0.0, 0.0, 1.0] });
+        samples[index] = Some(Sample {
+            height_m: start,
+            normal: [0.0, 0.0, 1.0],
+        });
     }
     let height = |samples: &[Option<Sample>], index: Option<usize>| {
-        index.and_then(|k| samples[k]).map_or(start, |sample| sample.height_m)
+        index
+            .and_then(|k| samples[k])
+            .map_or(start, |sample| sample.height_m)
     };
     let longest = grid.x_m.samples.max(grid.y_m.samples).min(holes.len() + 1);
     // Successive over-relaxation with the factor that suits the longest hole there can be.
@@ -67,7 +72,8 @@ pub fn fill(grid: &Grid, samples: &mut [Option<Sample>], holes: &[usize]) {
         let mut change = 0.0_f64;
         for &index in holes {
             let around = neighbours(grid, index).map(|k| height(samples, k));
-            let mean = (weights[0] * (around[0] + around[1]) + weights[1] * (around[2] + around[3]))
+            let mean = (weights[0] * (around[0] + around[1])
+                + weights[1] * (around[2] + around[3]))
                 / (2.0 * (weights[0] + weights[1]));
             if let Some(sample) = &mut samples[index] {
                 let step = factor * (mean - sample.height_m);

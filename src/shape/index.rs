@@ -25,7 +25,11 @@ impl Index {
         let side = ((triangles.len() as f64).sqrt().ceil() as usize).clamp(1, MOST_A_SIDE);
         let per_m = plan.map(|[low, high]| {
             let width = high - low;
-            if width > 0.0 { side as f64 / width } else { 0.0 }
+            if width > 0.0 {
+                side as f64 / width
+            } else {
+                0.0
+            }
         });
         let mut index = Self {
             low_m: plan.map(|[low, _]| low),
@@ -85,7 +89,11 @@ impl Index {
         // A bucket's border rounds: one part in a million more on either side.
         let at = |r: f64| self.low_m[1] + r / self.per_m[1];
         let [from, to] = seen.columns_between(at(row as f64 - 1e-6), at(row as f64 + 1.0 + 1e-6));
-        if from > to { all } else { [from.max(all[0]), to.min(all[1])] }
+        if from > to {
+            all
+        } else {
+            [from.max(all[0]), to.min(all[1])]
+        }
     }
 
     /// Every triangle that may touch the vertical line through `p`, ascending.

@@ -60,11 +60,15 @@ pub(super) fn is_closed(triangles: &[Triangle]) -> bool {
     };
     let point = |p: [f64; 3]| {
         // Adding 0 turns -0 into 0.
-        p.iter().fold(0x9e37_79b9_7f4a_7c15, |h: u64, c| mix(h ^ (c + 0.0).to_bits()))
+        p.iter().fold(0x9e37_79b9_7f4a_7c15, |h: u64, c| {
+            mix(h ^ (c + 0.0).to_bits())
+        })
     };
     let folded = triangles.iter().fold(0, |sum, triangle| {
         let [a, b, c] = triangle.map(point);
-        [[a, b], [b, c], [c, a]].iter().fold(sum, |sum, [p, q]| sum ^ mix(p.wrapping_add(*q)))
+        [[a, b], [b, c], [c, a]]
+            .iter()
+            .fold(sum, |sum, [p, q]| sum ^ mix(p.wrapping_add(*q)))
     });
     folded == 0
 }
@@ -97,7 +101,9 @@ fn of_contacts(
 ) -> Marks {
     let same_m = SAME_HEIGHT * sample.height_m.abs() + 4.0 * rules.reach_m;
     let same = |height: f64| (height - sample.height_m).abs() <= same_m;
-    let wall = contacts.iter().any(|(_, contact)| matches!(contact, Contact::Wall(_)));
+    let wall = contacts
+        .iter()
+        .any(|(_, contact)| matches!(contact, Contact::Wall(_)));
     let mut heights: Vec<f64> = Vec::with_capacity(contacts.len());
     for (_, contact) in contacts {
         if let Contact::Covers(height) = contact {
@@ -105,7 +111,10 @@ fn of_contacts(
         }
     }
     heights.sort_by(f64::total_cmp);
-    let steps = heights.windows(2).filter(|pair| pair[1] - pair[0] > same_m).count() as u32;
+    let steps = heights
+        .windows(2)
+        .filter(|pair| pair[1] - pair[0] > same_m)
+        .count() as u32;
     let layers = if heights.is_empty() { 1 } else { steps + 1 };
     let crease = contacts
         .iter()
@@ -120,7 +129,9 @@ fn of_contacts(
         .filter(|normal| turn(normal, &sample.normal) < CREASE_DEG.to_radians().cos())
         .min_by(|a, b| {
             let key = |n: &[f64; 3]| (turn(n, &sample.normal), *n);
-            key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal)
+            key(a)
+                .partial_cmp(&key(b))
+                .unwrap_or(std::cmp::Ordering::Equal)
         });
     let rim = !surrounded(triangles, contacts, p);
     Marks {
@@ -176,7 +187,16 @@ fn sector(triangle: &Triangle, p: [f64; 2]) -> Option<[f64; 2]> {
     }
     let corners = [a, b, c];
     let angle = |to: [f64; 3], from: [f64; 2]| (to[1] - from[1]).atan2(to[0] - from[0]);
-    let open = |from: f64, to: f64| [from, if to < from { to + std::f64::consts::TAU } else { to }];
+    let open = |from: f64, to: f64| {
+        [
+            from,
+            if to < from {
+                to + std::f64::consts::TAU
+            } else {
+                to
+            },
+        ]
+    };
     for k in 0..3 {
         let [here, next, last] = [0, 1, 2].map(|n| corners[(k + n) % 3]);
         if p == [here[0], here[1]] {

@@ -104,12 +104,10 @@ impl<'a> Probe<'a> {
     #[must_use]
     pub fn at(&self, p: [f64; 2]) -> Option<(Sample, Marks)> {
         match &self.kind {
-            Kind::Mesh { mesh, index, rules, .. } => {
-                marks::at(mesh.triangles(), index.at(p), p, *rules)
-            }
-            Kind::Primitive(primitive) => {
-                Some((primitive.sample(p[0], p[1])?, Marks::PLAIN))
-            }
+            Kind::Mesh {
+                mesh, index, rules, ..
+            } => marks::at(mesh.triangles(), index.at(p), p, *rules),
+            Kind::Primitive(primitive) => Some((primitive.sample(p[0], p[1])?, Marks::PLAIN)),
         }
     }
 

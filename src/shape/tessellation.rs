@@ -32,10 +32,16 @@ pub fn estimated_deviation_m(mesh: &Mesh) -> f64 {
     let mut rises = vec![[0.0_f64; 2]; triangles.len()];
     let mut from = 0;
     while from < sides.len() {
-        let same = sides[from..].iter().take_while(|side| side.0 == sides[from].0).count();
+        let same = sides[from..]
+            .iter()
+            .take_while(|side| side.0 == sides[from].0)
+            .count();
         // Where three or more meet, the edge is no part of a smooth surface.
         if let [(_, first, side), (_, second, other)] = sides[from..from + same] {
-            let (p, q) = (facet(triangles, first, side), facet(triangles, second, other));
+            let (p, q) = (
+                facet(triangles, first, side),
+                facet(triangles, second, other),
+            );
             // Each is given by its direction away from the common edge: opposite ones are level.
             let turn = -dot(p.0, q.0);
             if turn > cosine {
@@ -54,7 +60,9 @@ pub fn estimated_deviation_m(mesh: &Mesh) -> f64 {
         }
         from += same;
     }
-    rises.iter().fold(0.0, |most, rise| most.max(rise[0] + rise[1]))
+    rises
+        .iter()
+        .fold(0.0, |most, rise| most.max(rise[0] + rise[1]))
 }
 
 /// The facet's unit direction away from one of its sides, and its width in that direction.

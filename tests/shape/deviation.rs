@@ -30,7 +30,9 @@ fn heights(mesh: &Mesh, plan: &Grid) -> Vec<Option<f64>> {
 fn roof(knots: &[[f64; 2]], y: [f64; 2]) -> Vec<Triangle> {
     let side = |[x, z]: [f64; 2]| y.map(|y| [x, y, z]);
     let quads = knots.windows(2).map(|k| [side(k[0]), side(k[1])]);
-    quads.flat_map(|[[a, b], [c, d]]| [[a, b, c], [b, d, c]]).collect()
+    quads
+        .flat_map(|[[a, b], [c, d]]| [[a, b, c], [b, d, c]])
+        .collect()
 }
 
 #[test]
@@ -42,7 +44,9 @@ fn a_twisted_cell_differs_by_a_quarter_of_its_twist() {
     ]);
     let (found, apart) = certified(&mesh, &grid((0.0, 1.3, 2), (0.0, 0.7, 2)));
     assert!((found.above.value_m - 0.7 / 4.0).abs() < 1e-15, "{found:?}");
-    assert!((found.above.at_m[0] - 0.65).abs() < 1e-15 && (found.above.at_m[1] - 0.35).abs() < 1e-15);
+    assert!(
+        (found.above.at_m[0] - 0.65).abs() < 1e-15 && (found.above.at_m[1] - 0.35).abs() < 1e-15
+    );
     assert!(found.below.value_m.abs() < 1e-15);
     let apart = apart.unwrap();
     assert!(apart.lower_m > 0.05 && apart.upper_m < 0.7 / 4.0 && apart.lower_m <= apart.upper_m);
@@ -51,16 +55,25 @@ fn a_twisted_cell_differs_by_a_quarter_of_its_twist() {
 #[test]
 fn a_roof_differs_at_its_ridge() {
     // The ridge stands at x = 0.3 of a cell from 0 to 1, over level ground.
-    let mesh = exact(roof(&[[-2.0, 0.5], [0.0, 0.5], [0.3, 0.74], [1.0, 0.5], [3.0, 0.5]], [-1.0, 2.0]));
+    let mesh = exact(roof(
+        &[[-2.0, 0.5], [0.0, 0.5], [0.3, 0.74], [1.0, 0.5], [3.0, 0.5]],
+        [-1.0, 2.0],
+    ));
     let (found, apart) = certified(&mesh, &grid((-2.0, 3.0, 6), (-1.0, 2.0, 4)));
     assert!((found.above.value_m - 0.24).abs() < 1e-15, "{found:?}");
     assert_eq!(found.above.at_m[0], 0.3);
     assert!(found.below.value_m.abs() < 1e-15);
     // The ridge is farthest from the level points: straight down.
     let apart = apart.unwrap();
-    assert!(apart.lower_m > 0.2399 && apart.lower_m <= 0.24 && apart.upper_m < 0.2425, "{apart:?}");
+    assert!(
+        apart.lower_m > 0.2399 && apart.lower_m <= 0.24 && apart.upper_m < 0.2425,
+        "{apart:?}"
+    );
     // A gutter: the points lie above it.
-    let mesh = exact(roof(&[[-2.0, 0.5], [0.0, 0.5], [0.3, 0.26], [1.0, 0.5], [3.0, 0.5]], [-1.0, 2.0]));
+    let mesh = exact(roof(
+        &[[-2.0, 0.5], [0.0, 0.5], [0.3, 0.26], [1.0, 0.5], [3.0, 0.5]],
+        [-1.0, 2.0],
+    ));
     let (found, _) = certified(&mesh, &grid((-2.0, 3.0, 6), (-1.0, 2.0, 4)));
     assert!((found.below.value_m - 0.24).abs() < 1e-15 && found.above.value_m.abs() < 1e-15);
 }
@@ -79,14 +92,20 @@ fn a_tessellated_cylinder_has_the_largest_difference_of_its_knots() {
     triangles.extend(roof(&[[-radius, 1.3], [radius, 1.3]], [-0.5, 0.5]));
     let mesh = exact(triangles);
     let line = |table: &[[f64; 2]], x: f64| {
-        let k = table.partition_point(|p| p[0] < x).clamp(1, table.len() - 1);
+        let k = table
+            .partition_point(|p| p[0] < x)
+            .clamp(1, table.len() - 1);
         let ([a, p], [b, q]) = (table[k - 1], table[k]);
         p + (x - a) / (b - a) * (q - p)
     };
     for samples in [8, 31, 61] {
         let plan = grid((-0.69, 0.68, samples), (-0.4, 0.45, 5));
-        let nodes: Vec<[f64; 2]> =
-            plan.x_m.nodes().iter().map(|x| [*x, line(&knots, *x)]).collect();
+        let nodes: Vec<[f64; 2]> = plan
+            .x_m
+            .nodes()
+            .iter()
+            .map(|x| [*x, line(&knots, *x)])
+            .collect();
         // Both are polylines: the difference is largest at a knot of either.
         let inside = knots.iter().filter(|k| k[0] >= -0.69 && k[0] <= 0.68);
         let wanted = inside.fold([0.0_f64; 2], |[above, below], [x, z]| {
@@ -98,10 +117,19 @@ fn a_tessellated_cylinder_has_the_largest_difference_of_its_knots() {
             [above.max(off), below.max(-off)]
         });
         let (found, apart) = certified(&mesh, &plan);
-        assert!((found.above.value_m - wanted[0]).abs() < 1e-13, "{samples}: {found:?} {wanted:?}");
-        assert!((found.below.value_m - wanted[1]).abs() < 1e-13, "{samples}: {found:?} {wanted:?}");
+        assert!(
+            (found.above.value_m - wanted[0]).abs() < 1e-13,
+            "{samples}: {found:?} {wanted:?}"
+        );
+        assert!(
+            (found.below.value_m - wanted[1]).abs() < 1e-13,
+            "{samples}: {found:?} {wanted:?}"
+        );
         let apart = apart.unwrap();
-        assert!(apart.lower_m <= apart.upper_m && apart.upper_m <= found.bound_m(), "{apart:?}");
+        assert!(
+            apart.lower_m <= apart.upper_m && apart.upper_m <= found.bound_m(),
+            "{apart:?}"
+        );
         assert!(apart.lower_m > 0.95 * apart.upper_m, "{samples}: {apart:?}");
     }
 }
@@ -132,7 +160,10 @@ fn bilinear(heights: &[Option<f64>], plan: &Grid, p: [f64; 2]) -> Option<f64> {
     };
     let ((i, u), (j, v)) = (place(&x, p[0]), place(&y, p[1]));
     let at = |di: usize, dj: usize| heights[(j + dj) * x.len() + i + di];
-    let (low, high) = (at(0, 0)? * (1.0 - u) + at(1, 0)? * u, at(0, 1)? * (1.0 - u) + at(1, 1)? * u);
+    let (low, high) = (
+        at(0, 0)? * (1.0 - u) + at(1, 0)? * u,
+        at(0, 1)? * (1.0 - u) + at(1, 1)? * u,
+    );
     Some(low * (1.0 - v) + high * v)
 }
 
@@ -161,21 +192,27 @@ fn random_soups_match_a_ray_caster() {
         let plan = grid((0.0, 1.0, n), (0.0, 1.0, n + 1));
         let heights = heights(&mesh, &plan);
         let (found, apart) = certified(&mesh, &plan);
-        let off = |p: [f64; 2]| cast(&triangles, p).unwrap() - bilinear(&heights, &plan, p).unwrap();
+        let off =
+            |p: [f64; 2]| cast(&triangles, p).unwrap() - bilinear(&heights, &plan, p).unwrap();
         let mut most = [f64::NEG_INFINITY; 2];
         for _ in 0..20_000 {
             let d = off([random.between(0.0, 1.0), random.between(0.0, 1.0)]);
             most = [most[0].max(d), most[1].max(-d)];
         }
         for (k, extreme) in [found.above, found.below].into_iter().enumerate() {
-            assert!(extreme.value_m >= most[k] - 1e-12, "{case} {k}: {extreme:?} {most:?}");
+            assert!(
+                extreme.value_m >= most[k] - 1e-12,
+                "{case} {k}: {extreme:?} {most:?}"
+            );
             // It is approached beside its place: this is a supremum, not a bound.
             let sign = [1.0, -1.0][k];
             let mut beside = f64::NEG_INFINITY;
             for n in 0..4000 {
                 // A sliver is so steep that only the nearest places tell.
                 let hair = [3e-9, 3e-12, 3e-14][n % 3];
-                let p = extreme.at_m.map(|c| (c + random.between(-hair, hair)).clamp(0.0, 1.0));
+                let p = extreme
+                    .at_m
+                    .map(|c| (c + random.between(-hair, hair)).clamp(0.0, 1.0));
                 beside = beside.max(sign * off(p));
             }
             let gap = extreme.value_m - beside;
@@ -196,7 +233,11 @@ fn shape(name: &str) -> Mesh {
         translate_m: [0.0, 0.0, lift],
         rotate_deg: [0.0; 3],
     };
-    Mesh::place(stl::read(&bytes).unwrap(), &Transform::new(0.001, &placement)).unwrap()
+    Mesh::place(
+        stl::read(&bytes).unwrap(),
+        &Transform::new(0.001, &placement),
+    )
+    .unwrap()
 }
 
 #[test]
@@ -214,8 +255,21 @@ fn plane_bodies_are_met_exactly() {
 #[test]
 fn a_formula_and_its_mesh_agree_up_to_the_tessellation() {
     let cases = [
-        ("half_sphere", Primitive::HalfSphere { radius_m: 0.05, base_m: 0.03 }),
-        ("half_cylinder", Primitive::HalfCylinder { radius_m: 0.05, length_m: 0.1, base_m: 0.03 }),
+        (
+            "half_sphere",
+            Primitive::HalfSphere {
+                radius_m: 0.05,
+                base_m: 0.03,
+            },
+        ),
+        (
+            "half_cylinder",
+            Primitive::HalfCylinder {
+                radius_m: 0.05,
+                length_m: 0.1,
+                base_m: 0.03,
+            },
+        ),
     ];
     for (name, formula) in cases {
         let mesh = shape(name);
@@ -229,13 +283,19 @@ fn a_formula_and_its_mesh_agree_up_to_the_tessellation() {
             .flat_map(|y| x.iter().map(|x| placed.sample(*x, *y).map(|s| s.height_m)))
             .collect();
         let exact = deviation::primitive(&placed, &plan, &heights);
-        assert!(exact.slack_m <= 2e-6 * exact.above.value_m + 1e-15, "{exact:?}");
+        assert!(
+            exact.slack_m <= 2e-6 * exact.above.value_m + 1e-15,
+            "{exact:?}"
+        );
         assert_eq!(exact.below.value_m, 0.0);
         let estimate = estimated_deviation_m(&mesh);
         assert!(estimate > 0.0 && estimate < 30e-6, "{name}: {estimate}");
         // Facets inside the body: heights at nodes and between are both off by at most 3 of them.
         let off = (found.worst().value_m - exact.worst().value_m).abs();
-        assert!(off < 3.0 * estimate, "{name}: {found:?} {exact:?} {estimate}");
+        assert!(
+            off < 3.0 * estimate,
+            "{name}: {found:?} {exact:?} {estimate}"
+        );
     }
 }
 
@@ -252,7 +312,10 @@ fn the_tessellations_estimate_is_the_sagitta() {
         let estimate = estimated_deviation_m(&exact(roof(&knots, [-0.5, 0.5])));
         let half = std::f64::consts::PI / f64::from(facets) / 2.0;
         let sagitta = radius * (1.0 - half.cos());
-        assert!((estimate / sagitta - 1.0).abs() < 0.02, "{facets}: {estimate} {sagitta}");
+        assert!(
+            (estimate / sagitta - 1.0).abs() < 0.02,
+            "{facets}: {estimate} {sagitta}"
+        );
     }
     assert_eq!(estimated_deviation_m(&shape("flat")), 0.0);
 }
@@ -267,7 +330,9 @@ fn fans_t_junctions_and_doubled_faces_change_nothing() {
             [0.5 + 0.8 * angle.cos(), 0.5 + 0.8 * angle.sin(), 0.3]
         })
         .collect();
-    let fan: Vec<Triangle> = (0..300).map(|k| [apex, rim[k], rim[(k + 1) % 300]]).collect();
+    let fan: Vec<Triangle> = (0..300)
+        .map(|k| [apex, rim[k], rim[(k + 1) % 300]])
+        .collect();
     let base: Vec<Triangle> = (1..299).map(|k| [rim[0], rim[k], rim[k + 1]]).collect();
     let plan = grid((0.0, 1.0, 7), (0.0, 1.0, 6));
     let (wanted, _) = certified(&exact(fan.clone()), &plan);
@@ -285,7 +350,10 @@ fn fans_t_junctions_and_doubled_faces_change_nothing() {
     let (found, _) = certified(&exact(closed), &plan);
     assert_eq!(found.above.at_m, wanted.above.at_m);
     assert!((found.above.value_m - wanted.above.value_m).abs() < 1e-15);
-    assert!((found.below.value_m - wanted.below.value_m).abs() < 1e-11, "{found:?} {wanted:?}");
+    assert!(
+        (found.below.value_m - wanted.below.value_m).abs() < 1e-11,
+        "{found:?} {wanted:?}"
+    );
 }
 
 #[test]
@@ -296,7 +364,14 @@ fn cells_say_where_the_surface_ends() {
         [[1.7, 1.7, 0.1], [1.8, 1.7, 0.1], [1.7, 1.8, 0.3]],
     ]);
     let (found, apart) = certified(&mesh, &grid((0.0, 2.0, 5), (0.0, 2.0, 5)));
-    assert_eq!((found.cells.inner, found.cells.silhouette, found.cells.missed), (1, 5, 1));
+    assert_eq!(
+        (
+            found.cells.inner,
+            found.cells.silhouette,
+            found.cells.missed
+        ),
+        (1, 5, 1)
+    );
     assert!(apart.unwrap().upper_m < 1e-10);
     // Without a cell there is nothing to compare.
     let (found, apart) = certified(&mesh, &grid((0.1, 0.1, 1), (0.0, 0.5, 3)));

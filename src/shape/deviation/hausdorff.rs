@@ -87,10 +87,13 @@ fn vertical_bound(
     if otherwise <= vertical.bound_m() {
         return otherwise;
     }
-    let covered = |(cell, patch): &(usize, Patch)| {
-        lattice.faces.covered(&patch.rect, lattice.members(*cell))
-    };
-    if patches.iter().all(covered) { vertical.bound_m() } else { otherwise }
+    let covered =
+        |(cell, patch): &(usize, Patch)| lattice.faces.covered(&patch.rect, lattice.members(*cell));
+    if patches.iter().all(covered) {
+        vertical.bound_m()
+    } else {
+        otherwise
+    }
 }
 
 /// The patches as triangles, and how far these lie from them at most, m.
@@ -99,7 +102,10 @@ fn triangulated(patches: &[(usize, Patch)], wanted_m: f64) -> (Vec<Triangle>, f6
     let mut slop_m = 0.0_f64;
     for (_, patch) in patches {
         let twist_m = patch.twist_m().abs() / 4.0;
-        let parts = (twist_m / wanted_m.max(f64::MIN_POSITIVE)).sqrt().ceil().clamp(1.0, FINEST);
+        let parts = (twist_m / wanted_m.max(f64::MIN_POSITIVE))
+            .sqrt()
+            .ceil()
+            .clamp(1.0, FINEST);
         slop_m = slop_m.max(twist_m / (parts * parts));
         let at = |i: f64, j: f64| {
             let p = [(0, i), (1, j)].map(|(k, n)| {
@@ -110,7 +116,12 @@ fn triangulated(patches: &[(usize, Patch)], wanted_m: f64) -> (Vec<Triangle>, f6
         };
         let parts = parts as usize;
         for (i, j) in (0..parts * parts).map(|n| ((n % parts) as f64, (n / parts) as f64)) {
-            let corners = [at(i, j), at(i + 1.0, j), at(i, j + 1.0), at(i + 1.0, j + 1.0)];
+            let corners = [
+                at(i, j),
+                at(i + 1.0, j),
+                at(i, j + 1.0),
+                at(i + 1.0, j + 1.0),
+            ];
             triangles.push([corners[0], corners[1], corners[3]]);
             triangles.push([corners[0], corners[3], corners[2]]);
         }
@@ -139,7 +150,9 @@ impl<T> PartialOrd for Open<T> {
 }
 impl<T> Ord for Open<T> {
     fn cmp(&self, other: &Self) -> Ordering {
-        self.bound_m.total_cmp(&other.bound_m).then(other.order.cmp(&self.order))
+        self.bound_m
+            .total_cmp(&other.bound_m)
+            .then(other.order.cmp(&self.order))
     }
 }
 
@@ -183,9 +196,14 @@ impl Search<'_> {
         for (cell, patch) in patches {
             progress.check()?;
             let faces = self.faces;
-            faces.leaves(patch.rect, lattice.members(*cell), DEEPEST, &mut |rect, members| {
-                self.begin(rect, members, patch, &mut open);
-            });
+            faces.leaves(
+                patch.rect,
+                lattice.members(*cell),
+                DEEPEST,
+                &mut |rect, members| {
+                    self.begin(rect, members, patch, &mut open);
+                },
+            );
         }
         let mut looked = 0;
         while let Some(Open { bound_m, part, .. }) = open.pop() {
@@ -195,7 +213,8 @@ impl Search<'_> {
             looked += 1;
             let split = {
                 let (x, y) = (part.polygon.range(0), part.polygon.range(1));
-                let k = usize::from(part.face.length(1, y.1 - y.0) > part.face.length(0, x.1 - x.0));
+                let k =
+                    usize::from(part.face.length(1, y.1 - y.0) > part.face.length(0, x.1 - x.0));
                 let middle = [x, y].map(|(low, high)| 0.5 * (low + high))[k];
                 [
                     part.polygon.cut(|p| middle - p[k]),
@@ -203,10 +222,18 @@ impl Search<'_> {
                 ]
             };
             for polygon in split {
-                let half = Part { polygon, others: part.others.clone(), ..part };
+                let half = Part {
+                    polygon,
+                    others: part.others.clone(),
+                    ..part
+                };
                 let bound_m = bound_m.min(self.bound(&half));
                 if bound_m > self.enough_m() {
-                    open.push(Open { bound_m, order: looked, part: half });
+                    open.push(Open {
+                        bound_m,
+                        order: looked,
+                        part: half,
+                    });
                 }
             }
         }
@@ -222,8 +249,10 @@ impl Search<'_> {
         open: &mut BinaryHeap<Open<Part>>,
     ) {
         let hair = self.faces.hair;
-        let others: std::rc::Rc<[Face]> =
-            members.iter().map(|face| self.faces.list[*face as usize]).collect();
+        let others: std::rc::Rc<[Face]> = members
+            .iter()
+            .map(|face| self.faces.list[*face as usize])
+            .collect();
         for face in others.iter() {
             let polygon = face.within(rect);
             if polygon.width() <= hair.plan_m / 4.0
@@ -238,10 +267,19 @@ impl Search<'_> {
             };
             let below = supremum_over_visible(face, &polygon, &others, hair, &below);
             let bound_m = below.map_or(above, |below| above.or(below)).value_m;
-            let part = Part { face: *face, polygon, others: others.clone(), patch: *patch };
+            let part = Part {
+                face: *face,
+                polygon,
+                others: others.clone(),
+                patch: *patch,
+            };
             let bound_m = bound_m.min(self.bound(&part));
             if bound_m > self.enough_m() {
-                open.push(Open { bound_m, order: open.len(), part });
+                open.push(Open {
+                    bound_m,
+                    order: open.len(),
+                    part,
+                });
             }
         }
     }
@@ -257,9 +295,18 @@ impl Search<'_> {
         let lifted = |p: Point| [p[0], p[1], part.face.height(p)];
         let at_m = lifted(centre);
         let (distance_m, nearest) = self.points.nearest(at_m);
-        let most_m = self.points.farthest(nearest, corners.iter().map(|p| lifted(*p)));
+        let most_m = self
+            .points
+            .farthest(nearest, corners.iter().map(|p| lifted(*p)));
         let hidden = part.others.iter().any(|other| {
-            !other.hides(&part.face, &Polygon::of(&[centre]), self.faces.hair.height_m).corners().is_empty()
+            !other
+                .hides(
+                    &part.face,
+                    &Polygon::of(&[centre]),
+                    self.faces.hair.height_m,
+                )
+                .corners()
+                .is_empty()
         });
         if !hidden {
             self.found(distance_m - self.slop_m, at_m);
@@ -281,13 +328,23 @@ impl Search<'_> {
             let covered = self.faces.covered(&patch.rect, members);
             let mut bound_m = self.bound_of_rect(&patch.rect, patch);
             if covered && bound_m > self.enough_m() {
-                let known = Extreme { value_m: self.enough_m(), at_m: patch.rect.low_m };
-                let known = Worst { above: known, below: known };
+                let known = Extreme {
+                    value_m: self.enough_m(),
+                    at_m: patch.rect.low_m,
+                };
+                let known = Worst {
+                    above: known,
+                    below: known,
+                };
                 let vertical = self.faces.worst(&patch.rect, members, patch, known);
                 bound_m = bound_m.min(vertical.value_m());
             }
             if bound_m > self.enough_m() {
-                open.push(Open { bound_m, order, part: (patch.rect, *patch) });
+                open.push(Open {
+                    bound_m,
+                    order,
+                    part: (patch.rect, *patch),
+                });
             }
         }
         let mut looked = 0;
@@ -300,7 +357,11 @@ impl Search<'_> {
             for half in rect.halves(patch.longer(&rect)) {
                 let bound_m = bound_m.min(self.bound_of_rect(&half, &patch));
                 if bound_m > self.enough_m() {
-                    open.push(Open { bound_m, order: looked, part: (half, patch) });
+                    open.push(Open {
+                        bound_m,
+                        order: looked,
+                        part: (half, patch),
+                    });
                 }
             }
         }
@@ -313,9 +374,15 @@ impl Search<'_> {
         let at_m = lifted(rect.centre());
         let (distance_m, nearest) = self.surface.nearest(at_m);
         self.found(distance_m, at_m);
-        let corners = [rect.low_m, [rect.high_m[0], rect.low_m[1]], rect.high_m, [rect.low_m[0], rect.high_m[1]]];
+        let corners = [
+            rect.low_m,
+            [rect.high_m[0], rect.low_m[1]],
+            rect.high_m,
+            [rect.low_m[0], rect.high_m[1]],
+        ];
         // A bilinear patch lies in the hull of its corners.
-        self.surface.farthest(nearest, corners.iter().map(|p| lifted(*p)))
+        self.surface
+            .farthest(nearest, corners.iter().map(|p| lifted(*p)))
     }
 }
 

@@ -112,7 +112,10 @@ impl Faces {
         let reach = reach_m(mesh, grid);
         let bounds = mesh.facts().bounds;
         let largest = |corners: [&[f64]; 2]| {
-            corners.concat().iter().fold(0.0, |m: f64, c| m.max(c.abs()))
+            corners
+                .concat()
+                .iter()
+                .fold(0.0, |m: f64, c| m.max(c.abs()))
         };
         let plan_m = largest([&bounds.min_m[..2], &bounds.max_m[..2]]);
         let height_m = largest([&bounds.min_m[2..], &bounds.max_m[2..]]);
@@ -265,7 +268,9 @@ impl<'a> Lattice<'a> {
         let face = &self.faces.list[index];
         let between = |nodes: &[f64], (low, high): (f64, f64)| {
             let from = nodes.partition_point(|node| *node <= low).saturating_sub(1);
-            from..nodes.partition_point(|node| *node < high).min(nodes.len().saturating_sub(1))
+            from..nodes
+                .partition_point(|node| *node < high)
+                .min(nodes.len().saturating_sub(1))
         };
         let columns = between(&self.x, face.range(0));
         let mut found = Vec::new();
@@ -351,7 +356,9 @@ pub fn vertical(
             let mut worst = start;
             for cell in index * row..((index + 1) * row).min(lattice.len()) {
                 if let Some(patch) = lattice.patch(cell) {
-                    worst = lattice.faces.worst(&patch.rect, lattice.members(cell), &patch, worst);
+                    worst = lattice
+                        .faces
+                        .worst(&patch.rect, lattice.members(cell), &patch, worst);
                 }
             }
             progress.advance(row as u64);
@@ -398,7 +405,10 @@ fn start(
         let at_m = [x[cell % x.len()], y[cell / x.len()]];
         let value_m = sample.height_m - patch.height_m(at_m);
         worst.above = worst.above.or(Extreme { value_m, at_m });
-        worst.below = worst.below.or(Extreme { value_m: -value_m, at_m });
+        worst.below = worst.below.or(Extreme {
+            value_m: -value_m,
+            at_m,
+        });
     }
     Ok(worst)
 }

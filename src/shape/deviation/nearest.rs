@@ -47,7 +47,10 @@ impl Tree {
         let Some(triangle) = self.triangles.get(triangle) else {
             return f64::INFINITY;
         };
-        corners.map(|p| square_to_triangle(triangle, p)).fold(0.0, f64::max).sqrt()
+        corners
+            .map(|p| square_to_triangle(triangle, p))
+            .fold(0.0, f64::max)
+            .sqrt()
     }
 
     fn visit(&self, index: usize, p: [f64; 3], best: &mut (f64, usize)) {
@@ -126,13 +129,20 @@ fn square_to_triangle(&[a, b, c]: &Triangle, p: [f64; 3]) -> f64 {
         return dot(off, off);
     }
     let sides = [(a, b), (b, c), (c, a)];
-    sides.iter().map(|(q, r)| square_to_segment(*q, *r, p)).fold(f64::INFINITY, f64::min)
+    sides
+        .iter()
+        .map(|(q, r)| square_to_segment(*q, *r, p))
+        .fold(f64::INFINITY, f64::min)
 }
 
 fn square_to_segment(a: [f64; 3], b: [f64; 3], p: [f64; 3]) -> f64 {
     let (u, w) = (minus(b, a), minus(p, a));
     let square = dot(u, u);
-    let t = if square > 0.0 { (dot(u, w) / square).clamp(0.0, 1.0) } else { 0.0 };
+    let t = if square > 0.0 {
+        (dot(u, w) / square).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
     let off = [0, 1, 2].map(|k| w[k] - t * u[k]);
     dot(off, off)
 }
@@ -149,7 +159,9 @@ mod tests {
     fn the_tree_finds_what_a_search_through_all_finds() {
         let mut state = 7u64;
         let mut next = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
             (state >> 11) as f64 / (1u64 << 53) as f64
         };
         let triangles: Vec<Triangle> = (0..300)
@@ -174,7 +186,10 @@ mod tests {
                 }
             }
             let found = tree.nearest(p).0;
-            assert!(found <= nearest + 1e-15 && found > nearest - 0.01, "{found} {nearest}");
+            assert!(
+                found <= nearest + 1e-15 && found > nearest - 0.01,
+                "{found} {nearest}"
+            );
         }
     }
 }

@@ -142,7 +142,8 @@ impl Face {
 
     /// Height over a point of the plan that belongs to the triangle.
     pub(super) fn height(&self, p: Point) -> f64 {
-        let rise = self.slope[0] * (p[0] - self.origin[0]) + self.slope[1] * (p[1] - self.origin[1]);
+        let rise =
+            self.slope[0] * (p[0] - self.origin[0]) + self.slope[1] * (p[1] - self.origin[1]);
         // A sliver's slope is huge: what rounding adds must not leave the triangle.
         (self.origin[2] + rise).clamp(self.heights[0], self.heights[1])
     }
@@ -164,7 +165,11 @@ impl Face {
             let (a, b) = (self.corners[k], self.corners[(k + 1) % 3]);
             let inward = [a[1] - b[1], b[0] - a[0]];
             let far = [0, 1].map(|k| {
-                if inward[k] > 0.0 { rect.high_m[k] } else { rect.low_m[k] }
+                if inward[k] > 0.0 {
+                    rect.high_m[k]
+                } else {
+                    rect.low_m[k]
+                }
             });
             inward[0] * (far[0] - a[0]) + inward[1] * (far[1] - a[1]) > 0.0
         })
@@ -280,10 +285,15 @@ impl Polygon {
         let origin = self.corners[0];
         let (mut area, mut perimeter) = (0.0, 0.0);
         for (a, b) in self.sides() {
-            area += (a[0] - origin[0]) * (b[1] - origin[1]) - (a[1] - origin[1]) * (b[0] - origin[0]);
+            area +=
+                (a[0] - origin[0]) * (b[1] - origin[1]) - (a[1] - origin[1]) * (b[0] - origin[0]);
             perimeter += (b[0] - a[0]).hypot(b[1] - a[1]);
         }
-        if perimeter > 0.0 { area / perimeter } else { 0.0 }
+        if perimeter > 0.0 {
+            area / perimeter
+        } else {
+            0.0
+        }
     }
 
     /// The largest value over the polygon of a function that is quadratic along every line and
@@ -312,7 +322,11 @@ impl Extreme {
 
     /// The larger; of equal ones the first.
     pub(super) fn or(self, other: Self) -> Self {
-        if other.value_m > self.value_m { other } else { self }
+        if other.value_m > self.value_m {
+            other
+        } else {
+            self
+        }
     }
 }
 
@@ -324,14 +338,21 @@ pub(super) fn along(a: Point, b: Point, part: [f64; 2], value: &impl Fn(Point) -
     let [first, middle, last] = points.map(value);
     let curvature = 2.0 * (first + last) - 4.0 * middle;
     let slope = last - first - curvature;
-    let ends = Extreme { value_m: first, at_m: points[0] }.or(Extreme {
+    let ends = Extreme {
+        value_m: first,
+        at_m: points[0],
+    }
+    .or(Extreme {
         value_m: last,
         at_m: points[2],
     });
     let stationary = -slope / (2.0 * curvature);
     if curvature < 0.0 && stationary > 0.0 && stationary < 1.0 {
         let peak = at(from + stationary * (to - from));
-        return ends.or(Extreme { value_m: value(peak), at_m: peak });
+        return ends.or(Extreme {
+            value_m: value(peak),
+            at_m: peak,
+        });
     }
     ends
 }

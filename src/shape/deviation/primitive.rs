@@ -41,7 +41,10 @@ pub fn primitive(shape: &PlacedPrimitive, grid: &Grid, heights: &[Option<f64>]) 
             let corners_m = [a, b, c, d];
             largest_m = corners_m.iter().fold(largest_m, |m, h| m.max(h.abs()));
             let patch = Patch { rect, corners_m };
-            best = best.or(Extreme { value_m: 0.0, at_m: rect.low_m });
+            best = best.or(Extreme {
+                value_m: 0.0,
+                at_m: rect.low_m,
+            });
             open.push((look(shape, &rect, &patch, &mut best), rect, patch));
         }
     }
@@ -66,7 +69,10 @@ pub fn primitive(shape: &PlacedPrimitive, grid: &Grid, heights: &[Option<f64>]) 
     }
     Vertical {
         above: best,
-        below: Extreme { value_m: 0.0, at_m: best.at_m },
+        below: Extreme {
+            value_m: 0.0,
+            at_m: best.at_m,
+        },
         rounding_m,
         slack_m: (bound - best.value_m).max(0.0),
         cells,
@@ -79,7 +85,10 @@ fn look(shape: &PlacedPrimitive, rect: &Rect, patch: &Patch, best: &mut Extreme)
     let Some(Sample { height_m, normal }) = shape.sample(centre[0], centre[1]) else {
         return 0.0;
     };
-    *best = best.or(Extreme { value_m: height_m - patch.height_m(centre), at_m: centre });
+    *best = best.or(Extreme {
+        value_m: height_m - patch.height_m(centre),
+        at_m: centre,
+    });
     let tangent = |p: Point| {
         let rise = normal[0] * (p[0] - centre[0]) + normal[1] * (p[1] - centre[1]);
         height_m - rise / normal[2]
@@ -88,5 +97,7 @@ fn look(shape: &PlacedPrimitive, rect: &Rect, patch: &Patch, best: &mut Extreme)
         let pick = |k: usize, upper: bool| if upper { rect.high_m[k] } else { rect.low_m[k] };
         [pick(0, k & 1 == 1), pick(1, k & 2 == 2)]
     });
-    corners.iter().fold(f64::NEG_INFINITY, |most, p| most.max(tangent(*p) - patch.height_m(*p)))
+    corners.iter().fold(f64::NEG_INFINITY, |most, p| {
+        most.max(tangent(*p) - patch.height_m(*p))
+    })
 }

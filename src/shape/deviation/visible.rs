@@ -85,8 +85,7 @@ fn crossing(polygon: &Polygon, [from, to]: [Point; 2], hair_m: f64) -> Option<[f
         if (b[0] - a[0]).abs().max((b[1] - a[1]).abs()) < hair_m / 16.0 {
             continue;
         }
-        let side =
-            |p: Point| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
+        let side = |p: Point| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
         let (start, end) = (side(from), side(to));
         if start < 0.0 && end < 0.0 {
             return None;

@@ -99,7 +99,12 @@ pub fn adaptive(
         }
     }
     progress.end();
-    let Work { nodes, mut result, first, .. } = work;
+    let Work {
+        nodes,
+        mut result,
+        first,
+        ..
+    } = work;
     for ([row, column], node) in nodes {
         if let Some((sample, marks, weight_m2)) = node {
             let p = place(probe, first, [column, row]);
@@ -118,7 +123,11 @@ fn place(probe: &Probe<'_>, first: [u32; 2], node: Node) -> [f64; 2] {
             return probe.plan_m.high_m[k];
         }
         let (a, b) = (probe.plan_m.low_m[k], probe.plan_m.high_m[k]);
-        if n == 0.0 { a } else { ((last - n) * a + n * b) / last }
+        if n == 0.0 {
+            a
+        } else {
+            ((last - n) * a + n * b) / last
+        }
     })
 }
 
@@ -148,8 +157,8 @@ impl Work<'_> {
         }
         let size = 1 << level;
         let rect = self.rect(low, size);
-        let corners = [[0, 0], [size, 0], [0, size], [size, size]]
-            .map(|[x, y]| [low[0] + x, low[1] + y]);
+        let corners =
+            [[0, 0], [size, 0], [0, size], [size, size]].map(|[x, y]| [low[0] + x, low[1] + y]);
         let heights = corners.map(|corner| self.height_m(corner));
         let sides = rect.sides();
         let widest_m = sides[0].max(sides[1]);

@@ -78,7 +78,10 @@ pub fn poisson(
                 let p = probe.plan_m.low_m[k] + (place[k] as f64 + random.unit()) * cell_m;
                 p.min(probe.plan_m.high_m[k])
             });
-            if cells.nearest(p, 2).is_some_and(|(_, square)| square < spacing_m * spacing_m) {
+            if cells
+                .nearest(p, 2)
+                .is_some_and(|(_, square)| square < spacing_m * spacing_m)
+            {
                 continue;
             }
             if let Some((sample, marks)) = probe.at(p) {
@@ -89,7 +92,12 @@ pub fn poisson(
     }
     progress.end();
     let (areas_m2, cover_m) = areas(probe, &cells, spacing_m / COUNTED);
-    let mut found: Vec<_> = cells.darts.iter().zip(areas_m2).filter_map(|(d, a)| Some(((*d)?, a))).collect();
+    let mut found: Vec<_> = cells
+        .darts
+        .iter()
+        .zip(areas_m2)
+        .filter_map(|(d, a)| Some(((*d)?, a)))
+        .collect();
     found.sort_by(|((p, ..), _), ((q, ..), _)| p[1].total_cmp(&q[1]).then(p[0].total_cmp(&q[0])));
     let mut points = Scattered::default();
     for ((p, sample, marks), area_m2) in found {
@@ -107,9 +115,8 @@ fn areas(probe: &Probe<'_>, cells: &Cells, step_m: f64) -> (Vec<f64>, f64) {
     let area_m2 = sides[0] / count[0] as f64 * (sides[1] / count[1] as f64);
     for k in 0..count[0] * count[1] {
         let place = [k % count[0], k / count[0]];
-        let p = [0, 1].map(|k| {
-            probe.plan_m.low_m[k] + (place[k] as f64 + 0.5) * sides[k] / count[k] as f64
-        });
+        let p = [0, 1]
+            .map(|k| probe.plan_m.low_m[k] + (place[k] as f64 + 0.5) * sides[k] / count[k] as f64);
         if probe.at(p).is_none() {
             continue;
         }
@@ -124,12 +131,10 @@ fn areas(probe: &Probe<'_>, cells: &Cells, step_m: f64) -> (Vec<f64>, f64) {
 impl Cells {
     /// The nearest dart among the cells up to `around` away, and its distance squared.
     fn nearest(&self, p: [f64; 2], around: usize) -> Option<(usize, f64)> {
-        let place = [0, 1].map(|k| {
-            (((p[k] - self.low_m[k]) / self.cell_m) as usize).min(self.count[k] - 1)
-        });
-        let [columns, rows] = [0, 1].map(|k| {
-            place[k].saturating_sub(around)..=(place[k] + around).min(self.count[k] - 1)
-        });
+        let place = [0, 1]
+            .map(|k| (((p[k] - self.low_m[k]) / self.cell_m) as usize).min(self.count[k] - 1));
+        let [columns, rows] = [0, 1]
+            .map(|k| place[k].saturating_sub(around)..=(place[k] + around).min(self.count[k] - 1));
         let mut best: Option<(usize, f64)> = None;
         for row in rows {
             for column in columns.clone() {
