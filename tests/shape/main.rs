@@ -4,6 +4,7 @@
 mod deviation;
 mod fuzz;
 mod heights;
+mod marks;
 mod points;
 mod stl;
 mod support;

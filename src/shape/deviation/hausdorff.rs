@@ -61,9 +61,17 @@ pub fn hausdorff(
     };
     progress.begin("distance", 2);
     progress.check()?;
-    // What the cells' centres tell spares most pieces a closer look.
+    // What the cells' centres and the worst places tell spares most pieces a closer look.
     for (_, patch) in &patches {
         search.bound_of_rect(&patch.rect, patch);
+    }
+    for (worst, sign) in [(vertical.above, 1.0), (vertical.below, -1.0)] {
+        let over = |(_, patch): &&(usize, Patch)| patch.rect.holds(worst.at_m);
+        if let Some((_, patch)) = patches.iter().find(over) {
+            let [x, y] = worst.at_m;
+            let at_m = [x, y, patch.height_m(worst.at_m) + sign * worst.value_m];
+            search.found(search.points.nearest(at_m).0 - search.slop_m, at_m);
+        }
     }
     let from_surface = search.from_surface(lattice, &patches, progress)?;
     progress.advance(1);

@@ -28,6 +28,11 @@ impl Rect {
         [0, 1].map(|k| self.high_m[k] - self.low_m[k])
     }
 
+    /// Whether a point lies in it, borders included.
+    pub(super) fn holds(&self, p: Point) -> bool {
+        (0..2).all(|k| self.low_m[k] <= p[k] && p[k] <= self.high_m[k])
+    }
+
     /// The two halves along an axis.
     pub(super) fn halves(&self, k: usize) -> [Self; 2] {
         let (mut lower, mut upper) = (*self, *self);
