@@ -72,7 +72,7 @@ fn facet(triangles: &[[[f64; 3]; 3]], index: u32, side: u8) -> ([f64; 3], f64) {
     let across = minus(corner(2), corner(0));
     let inward = cross(cross(along, across), along);
     let length = dot(inward, inward).sqrt();
-    if !(length > 0.0) {
+    if length == 0.0 {
         return ([0.0; 3], 0.0);
     }
     let unit = inward.map(|c| c / length);

@@ -73,9 +73,9 @@ pub fn hausdorff(
             search.found(search.points.nearest(at_m).0 - search.slop_m, at_m);
         }
     }
-    let from_surface = search.from_surface(lattice, &patches, progress)?;
+    let from_surface = search.surface_to_points(lattice, &patches, progress)?;
     progress.advance(1);
-    let from_points = search.from_points(lattice, &patches, progress)?;
+    let from_points = search.points_to_surface(lattice, &patches, progress)?;
     progress.end();
     let upper_m = from_surface.max(from_points);
     Ok(Some(Interval {
@@ -194,7 +194,7 @@ impl Search<'_> {
     }
 
     /// An upper bound of the distances from the visible surface to the interpolated points.
-    fn from_surface(
+    fn surface_to_points(
         &mut self,
         lattice: &Lattice<'_>,
         patches: &[(usize, Patch)],
@@ -323,7 +323,7 @@ impl Search<'_> {
     }
 
     /// An upper bound of the distances from the interpolated points to the surface.
-    fn from_points(
+    fn points_to_surface(
         &mut self,
         lattice: &Lattice<'_>,
         patches: &[(usize, Patch)],
