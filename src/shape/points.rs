@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::accuracy::StageAccuracy;
 use crate::numerics::axis::Axis;
-use crate::progress::Progress;
+use crate::progress::{Interrupted, Progress};
 use crate::shape::certificate::{Certificate, Certify, certify};
 use crate::shape::document::{AxisRequest, ShapeDocument};
 use crate::shape::error::ShapeError;
@@ -17,6 +17,10 @@ use crate::shape::surface::Surface;
 
 /// More grid points than this are refused: their files and matrices fit no computer.
 const MOST_POINTS: usize = 100_000_000;
+/// Grids of more points than this are not compared with their surface: it would take minutes.
+const MOST_CERTIFIED: usize = 4_000_000;
+/// Points marked between two looks at the progress.
+const MARKED_BETWEEN_LOOKS: usize = 4096;
 
 /// The points of a grid that lie on the surface, m; columns of equal length.
 #[derive(Debug, Clone, PartialEq)]
@@ -208,9 +212,17 @@ pub fn discretize_with(
     let mut points = collect(&grid, &samples, rounding_m, &bounds)?;
     points.holes = found.len();
     if settings.marks {
-        mark(&mut points, &surface, &found);
+        mark(&mut points, &surface, &found, progress)?;
     }
-    let certificate = certify(&surface, &grid, &samples, settings.certify, progress)?;
+    let mut how = settings.certify;
+    if how != Certify::No && grid.len() > MOST_CERTIFIED {
+        how = Certify::No;
+        warnings.push(format!(
+            "the grid has more than {MOST_CERTIFIED} points: how far it departs from the surface \
+             between them is not computed"
+        ));
+    }
+    let certificate = certify(&surface, &grid, &samples, how, progress)?;
     let (mesh, method) = match &surface {
         Surface::Mesh(mesh) => (
             Some(*mesh.facts()),
@@ -235,18 +247,28 @@ pub fn discretize_with(
 }
 
 /// Looks for what each point is besides a height; `filled` holds grid indices, ascending.
-fn mark(points: &mut ConstraintPoints, surface: &Surface, filled: &[usize]) {
+fn mark(
+    points: &mut ConstraintPoints,
+    surface: &Surface,
+    filled: &[usize],
+    progress: &dyn Progress,
+) -> Result<(), ShapeError> {
     let probe = Probe::new(surface, &points.grid);
     let places = (0..points.len()).into_par_iter();
-    points.marks = places
+    let marks: Result<Vec<Marks>, Interrupted> = places
         .map(|row| {
+            if row % MARKED_BETWEEN_LOOKS == 0 {
+                progress.check()?;
+            }
             let found = probe.at([points.x_m[row], points.y_m[row]]);
-            Marks {
+            Ok(Marks {
                 filled: filled.binary_search(&points.grid_index[row]).is_ok(),
                 ..found.map_or(Marks::PLAIN, |(_, marks)| marks)
-            }
+            })
         })
         .collect();
+    points.marks = marks?;
+    Ok(())
 }
 
 /// The requested axis; its nodes ascend.

@@ -45,7 +45,7 @@ impl Seen {
         let vertices = ordered(triangle);
         let [a, b, c] = vertices;
         let orientation = side(a, b, [c[0], c[1]]);
-        let wall = is_wall(triangle, reach);
+        let wall = stands_upright(&vertices, orientation, reach);
         Self {
             vertices,
             orientation,
@@ -168,14 +168,25 @@ impl Seen {
 
 /// Whether a triangle stands upright, or as nearly as the file's rounding can make a wall that did.
 pub(super) fn is_wall(triangle: &Triangle, reach: f64) -> bool {
-    let [a, b, c] = ordered(triangle);
-    let orientation = side(a, b, [c[0], c[1]]);
+    let vertices = ordered(triangle);
+    let [a, b, c] = vertices;
+    stands_upright(&vertices, side(a, b, [c[0], c[1]]), reach)
+}
+
+/// [`is_wall`] of ordered vertices, with twice their area in plan.
+fn stands_upright(vertices: &[Vertex; 3], orientation: f64, reach: f64) -> bool {
     if orientation == 0.0 {
         return true;
     }
+    let [a, b, c] = vertices;
+    let extent = |k: usize| a[k].max(b[k]).max(c[k]) - a[k].min(b[k]).min(c[k]);
+    // No side is longer than this: of most triangles nothing more need be known.
+    if orientation.abs() > reach * (extent(0) + extent(1)) {
+        return false;
+    }
     let longest = [(a, b), (b, c), (a, c)].map(|(p, q)| (p[0] - q[0]).hypot(p[1] - q[1]));
     let longest = longest[0].max(longest[1]).max(longest[2]);
-    orientation.abs() <= reach * longest && upward_normal(triangle)[2] <= WALL_NORMAL_Z
+    orientation.abs() <= reach * longest && upward_normal(vertices)[2] <= WALL_NORMAL_Z
 }
 
 /// The unit normal that looks up (n_z >= 0), whatever the vertices' order.

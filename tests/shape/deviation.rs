@@ -406,3 +406,36 @@ fn the_seed_shapes_differ_less_with_every_finer_grid() {
         }
     }
 }
+
+#[test]
+fn a_turned_body_is_certified_alike_on_any_number_of_threads() {
+    let bytes = std::fs::read(root().join("shapes/half_sphere.stl")).unwrap();
+    let placement = Placement {
+        translate_m: [0.003, -0.002, 0.09],
+        rotate_deg: [17.0, -23.0, 40.0],
+    };
+    let file = stl::read(&bytes).unwrap();
+    let mesh = Mesh::place(file, &Transform::new(0.001, &placement)).unwrap();
+    let plan = grid((-0.03, 0.031, 18), (-0.029, 0.03, 15));
+    let (found, apart) = certified(&mesh, &plan);
+    let heights = heights(&mesh, &plan);
+    let mut random = Random(3);
+    let mut most = [0.0_f64; 2];
+    for _ in 0..400 {
+        let p = [random.between(-0.03, 0.031), random.between(-0.029, 0.03)];
+        let Some(interpolated) = bilinear(&heights, &plan, p) else {
+            continue;
+        };
+        let off = cast(mesh.triangles(), p).unwrap() - interpolated;
+        most = [most[0].max(off), most[1].max(-off)];
+    }
+    assert!(found.above.value_m >= most[0] && found.below.value_m >= most[1] - 1e-15);
+    assert!(found.above.value_m < 1.5 * most[0], "{found:?} {most:?}");
+    for threads in [1, 3] {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        assert_eq!(pool.install(|| certified(&mesh, &plan)), (found, apart));
+    }
+}
