@@ -255,7 +255,7 @@ impl Discretize {
             ),
         );
         if let Some(deviation) = &summary.deviation {
-            sheet.line("between them", &between(deviation));
+            sheet.line("deviation", &between(deviation));
         }
         if let Some(stage) = summary.accuracy.get("points") {
             sheet.line(
