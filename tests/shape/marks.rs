@@ -150,6 +150,7 @@ fn holes_are_told_and_filled_only_when_asked() {
 }
 
 #[test]
+#[allow(clippy::disallowed_methods)]
 fn holes_of_a_file_are_skipped_filled_or_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("ring.stl");
