@@ -386,7 +386,7 @@ fn the_seed_shapes_differ_less_with_every_finer_grid() {
     for name in ["flat", "half_sphere", "half_cylinder", "wedge"] {
         let mesh = shape(name);
         let mut before = f64::INFINITY;
-        for samples in [31, 61, 121, 241] {
+        for samples in [31, 61] {
             let plan = grid((-0.05, 0.05, samples), (-0.05, 0.05, samples));
             let start = std::time::Instant::now();
             let (found, apart) = certified(&mesh, &plan);
