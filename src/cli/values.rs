@@ -173,6 +173,25 @@ pub fn length(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A length, m, of a number with its unit, or of millimetres.
+pub fn length_with_unit(text: &str) -> Result<f64, String> {
+    let digits = text.trim_end_matches(|c: char| c.is_alphabetic());
+    // `1e` of `1em` would be no number; a unit begins after the last digit.
+    let name = &text[digits.len()..];
+    let metres = if name.is_empty() {
+        Some(1e-3)
+    } else {
+        parse_unit(name)
+    };
+    match (number(digits), metres) {
+        (Ok(value), Some(_)) if value > 0.0 && name.is_empty() => Ok(m_from_mm(value)),
+        (Ok(value), Some(metres)) if value > 0.0 => Ok(value * metres),
+        _ => Err(format!(
+            "{text:?} is no length: expected a number above 0 and a unit, like 0.1mm"
+        )),
+    }
+}
+
 /// A number of threads.
 pub fn threads(text: &str) -> Result<usize, String> {
     match text.parse() {

@@ -12,10 +12,16 @@ use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::bundle::atomic::{FileSet, Overwrite, WriteError};
 use crate::bundle::json::to_json;
 use crate::bundle::manifest::{AxisSummary, PointsGrid};
-use crate::bundle::table::{PointRow, write_points};
+use crate::bundle::table::PointRow;
 use crate::progress::Progress;
+use crate::shape::certificate::{Certificate, Certify};
 use crate::shape::document::{ShapeDocument, SurfaceSource};
-use crate::shape::{ConstraintPoints, Discretized, ShapeError, discretize};
+use crate::shape::holes::Holes;
+use crate::shape::marks::Marks;
+use crate::shape::{ConstraintPoints, Discretized, Settings, ShapeError, discretize_with};
+
+pub mod scattered;
+mod table;
 
 /// The points and what is to be told about them.
 #[derive(Debug, Clone)]
@@ -41,6 +47,10 @@ pub struct PointsSummary {
     pub points: usize,
     /// Grid points without surface, skipped.
     pub outside: usize,
+    /// Of the grid points without surface those inside the silhouette, skipped or filled.
+    pub holes: usize,
+    /// How many points lie on a wall, a rim, a crease, or where sheets lie over each other.
+    pub marks: MarkCounts,
     /// Lowest height, m.
     pub min_height_m: f64,
     /// Highest height, m.
@@ -61,10 +71,125 @@ pub struct PointsSummary {
     /// Triangles without area, left out; absent for a primitive.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub degenerate_triangles: Option<usize>,
-    /// The stage's estimated error.
+    /// How far the interpolated points may lie from the surface.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub deviation: Option<DeviationSummary>,
+    /// Each part of the heights' error: `points` (rounding), `grid`, `tessellation`.
     pub accuracy: BTreeMap<&'static str, StageAccuracy>,
     /// What a careful person would mention.
     pub warnings: Vec<String>,
+}
+
+/// How many points are marked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct MarkCounts {
+    /// On a vertical wall.
+    pub wall: usize,
+    /// Where the surface ends.
+    pub rim: usize,
+    /// Where two faces meet at an angle.
+    pub crease: usize,
+    /// Where more sheets lie over each other than the two of a body.
+    pub overhang: usize,
+}
+
+/// How far the bilinear interpolation between the points may lie from the surface; SI. Over the
+/// cells of which all four corners are points.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct DeviationSummary {
+    /// The most by which the surface stands above the interpolation, m.
+    pub above_m: f64,
+    /// Where, x and y, m.
+    pub above_at_m: [f64; 2],
+    /// The most by which it lies below, m.
+    pub below_m: f64,
+    /// Where, x and y, m.
+    pub below_at_m: [f64; 2],
+    /// The Hausdorff distance is at least this, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hausdorff_lower_m: Option<f64>,
+    /// And at most this, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hausdorff_upper_m: Option<f64>,
+    /// Where the lower value was found, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hausdorff_at_m: Option<[f64; 3]>,
+    /// Cells with four points.
+    pub cells: usize,
+    /// Cells through which the silhouette passes; a runtime's force ends there.
+    pub silhouette_cells: usize,
+    /// So far in plan the silhouette is uncertain, m.
+    pub silhouette_m: f64,
+    /// Cells without a point that have surface all the same.
+    pub missed_cells: usize,
+    /// Grid, tessellation and rounding together, m.
+    pub budget_m: f64,
+}
+
+impl MarkCounts {
+    fn of(marks: &[Marks]) -> Self {
+        let count = |kind: fn(&Marks) -> bool| marks.iter().filter(|m| kind(m)).count();
+        Self {
+            wall: count(|m| m.wall),
+            rim: count(|m| m.rim),
+            crease: count(|m| m.crease.is_some()),
+            overhang: count(|m| m.overhang),
+        }
+    }
+}
+
+impl DeviationSummary {
+    fn new(certificate: &Certificate) -> Option<Self> {
+        let found = &certificate.vertical;
+        // Without a cell of four points there is nothing to tell.
+        (found.cells.inner > 0 && found.worst().value_m.is_finite()).then(|| {
+            let apart = certificate.hausdorff;
+            Self {
+                above_m: found.above.value_m.max(0.0),
+                above_at_m: found.above.at_m,
+                below_m: found.below.value_m.max(0.0),
+                below_at_m: found.below.at_m,
+                hausdorff_lower_m: apart.map(|apart| apart.lower_m),
+                hausdorff_upper_m: apart.map(|apart| apart.upper_m),
+                hausdorff_at_m: apart.map(|apart| apart.at_m),
+                cells: found.cells.inner,
+                silhouette_cells: found.cells.silhouette,
+                silhouette_m: certificate.silhouette_m,
+                missed_cells: found.cells.missed,
+                budget_m: certificate.budget_m(),
+            }
+        })
+    }
+}
+
+/// What is asked of a discretisation besides its points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PointsOptions {
+    /// What is done with holes.
+    pub holes: Holes,
+    /// How the points are compared with the surface.
+    pub certify: Certify,
+}
+
+impl Default for PointsOptions {
+    fn default() -> Self {
+        Self {
+            holes: Holes::Skip,
+            certify: Certify::Vertical,
+        }
+    }
+}
+
+/// Discretises `document` as [`run_with`] does by default.
+///
+/// # Errors
+/// As [`run_with`].
+pub fn run(
+    document: &ShapeDocument,
+    inputs: Vec<Input>,
+    progress: &dyn Progress,
+) -> Result<PointsReport, JobError> {
+    run_with(document, inputs, &PointsOptions::default(), progress)
 }
 
 /// Discretises `document`. `inputs` holds the document's own entry, if it is a file; the surface's
@@ -72,20 +197,36 @@ pub struct PointsSummary {
 ///
 /// # Errors
 /// A surface that gives no points; interruption.
-pub fn run(
+pub fn run_with(
     document: &ShapeDocument,
     inputs: Vec<Input>,
+    options: &PointsOptions,
     progress: &dyn Progress,
 ) -> Result<PointsReport, JobError> {
     let inputs = with_surface(document, inputs)?;
-    let discretized = discretize(document, progress).map_err(|source| match source {
-        ShapeError::Interrupted(interrupted) => JobError::from(interrupted),
-        source => JobError::Shape {
-            name: document.name.clone(),
-            source,
-        },
-    })?;
+    let settings = Settings {
+        holes: options.holes,
+        certify: options.certify,
+        marks: true,
+    };
+    let discretized = discretize_with(document, &settings, progress)
+        .map_err(|source| shape_error(document, source))?;
     let facts = discretized.points.facts();
+    let mut accuracy = BTreeMap::from([("points", discretized.accuracy.clone())]);
+    let mut warnings = discretized.warnings.clone();
+    let mut deviation = None;
+    if let Some(certificate) = &discretized.certificate {
+        deviation = DeviationSummary::new(certificate);
+        if deviation.is_some() {
+            accuracy.extend(certificate.stages());
+        }
+        let missed = certificate.vertical.cells.missed;
+        if missed > 0 {
+            warnings.push(format!(
+                "{missed} cells of the grid have surface but no point: take more samples"
+            ));
+        }
+    }
     let summary = PointsSummary {
         schema_version: SCHEMA_VERSION,
         fluxform_version: FLUXFORM_VERSION,
@@ -93,6 +234,8 @@ pub fn run(
         inputs,
         points: facts.points,
         outside: facts.outside,
+        holes: discretized.points.holes,
+        marks: MarkCounts::of(&discretized.points.marks),
         min_height_m: facts.min_height_m,
         max_height_m: facts.max_height_m,
         rms_height_m: facts.rms_height_m,
@@ -102,13 +245,24 @@ pub fn run(
         bounds_max_m: discretized.bounds.max_m,
         triangles: discretized.mesh.as_ref().map(|mesh| mesh.triangles),
         degenerate_triangles: discretized.mesh.as_ref().map(|mesh| mesh.degenerate),
-        accuracy: BTreeMap::from([("points", discretized.accuracy.clone())]),
-        warnings: discretized.warnings.clone(),
+        deviation,
+        accuracy,
+        warnings,
     };
     Ok(PointsReport {
         discretized,
         summary,
     })
+}
+
+fn shape_error(document: &ShapeDocument, source: ShapeError) -> JobError {
+    match source {
+        ShapeError::Interrupted(interrupted) => JobError::from(interrupted),
+        source => JobError::Shape {
+            name: document.name.clone(),
+            source,
+        },
+    }
 }
 
 /// `inputs` and the surface file that `document` names, paths as given.
@@ -155,7 +309,7 @@ impl PointsReport {
     /// # Errors
     /// The writer's.
     pub fn write_csv(&self, out: &mut dyn Write) -> io::Result<()> {
-        write_points(out, &point_rows(&self.discretized.points))
+        table::of_grid(out, &self.discretized.points)
     }
 
     /// Writes the points to `path` and the summary beside them, `points.csv` and `points.json`:
@@ -165,36 +319,50 @@ impl PointsReport {
     /// # Errors
     /// [`JobError::Write`].
     pub fn write(&self, path: &Path, force: bool) -> Result<(), JobError> {
-        let name = path
-            .file_name()
-            .map(|name| name.to_string_lossy().into_owned());
-        let name = name.ok_or_else(|| {
-            JobError::Input(format!(
-                "{}: name a file to write the points to",
-                path.display()
-            ))
-        })?;
-        let summary = Path::new(&name)
-            .with_extension("json")
-            .to_string_lossy()
-            .into_owned();
-        if summary == name {
-            return Err(JobError::Input(format!(
-                "{}: the summary takes the ending .json; name the points otherwise",
-                path.display()
-            )));
-        }
-        let folder = match path.parent() {
-            Some(parent) if parent != Path::new("") => parent,
-            _ => Path::new("."),
-        };
-        let overwrite = Overwrite::new(force, folder.join(&summary), &self.summary.inputs);
-        let mut set = FileSet::begin(folder, overwrite)?;
-        set.write(&name, |out| self.write_csv(out))?;
-        set.write(&summary, |out| {
-            let json = to_json(&self.summary).map_err(io::Error::other)?;
-            out.write_all(&json)
-        })?;
-        set.commit().map_err(|error: WriteError| error.into())
+        let inputs = &self.summary.inputs;
+        write_both(path, force, inputs, &self.summary, |out| {
+            self.write_csv(out)
+        })
     }
+}
+
+/// Writes a table and its summary beside it, both or none.
+fn write_both(
+    path: &Path,
+    force: bool,
+    inputs: &[Input],
+    told: &impl Serialize,
+    csv: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), JobError> {
+    let name = path
+        .file_name()
+        .map(|name| name.to_string_lossy().into_owned());
+    let name = name.ok_or_else(|| {
+        JobError::Input(format!(
+            "{}: name a file to write the points to",
+            path.display()
+        ))
+    })?;
+    let summary = Path::new(&name)
+        .with_extension("json")
+        .to_string_lossy()
+        .into_owned();
+    if summary == name {
+        return Err(JobError::Input(format!(
+            "{}: the summary takes the ending .json; name the points otherwise",
+            path.display()
+        )));
+    }
+    let folder = match path.parent() {
+        Some(parent) if parent != Path::new("") => parent,
+        _ => Path::new("."),
+    };
+    let overwrite = Overwrite::new(force, folder.join(&summary), inputs);
+    let mut set = FileSet::begin(folder, overwrite)?;
+    set.write(&name, |out| csv(out))?;
+    set.write(&summary, |out| {
+        let json = to_json(told).map_err(io::Error::other)?;
+        out.write_all(&json)
+    })?;
+    set.commit().map_err(|error: WriteError| error.into())
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use self::points_effect::Moved;
 use super::discretize::{self, PointsReport};
 use super::scene::{MAGNET_SHARE, Scene};
 use super::single::above_knee;
@@ -16,6 +17,8 @@ use crate::field::steel::inside::peak_depth_m;
 use crate::lambda::{self, Criterion, ForceProblem, Precision, Settings, Solution, Status};
 use crate::progress::Progress;
 use crate::shape::document::ShapeDocument;
+
+mod points_effect;
 
 /// What is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -138,6 +141,20 @@ pub(super) fn solve(
             file.accuracy.insert("working_point".to_owned(), accuracy);
             file.working_point = Some(facts);
         }
+    }
+    file.accuracy.extend(points_effect::stages(&points));
+    if let Some(moved) = points_effect::of_points(
+        &Moved {
+            scene,
+            solved,
+            points: &points,
+            offset_n: offset_n.as_deref(),
+            solution: &solution,
+        },
+        &options.settings,
+        progress,
+    )? {
+        file.accuracy.insert("lambda_of_points".to_owned(), moved);
     }
     if let Some(pull) = &pull {
         file.accuracy

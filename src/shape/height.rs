@@ -228,33 +228,24 @@ impl<'a> Layer<'a> {
             };
             for column in columns {
                 let point = row * nodes.x.nodes.len() + column;
-                let hit = |height| Hit { height, triangle };
-                match seen.contact([nodes.x.nodes[column], y]) {
-                    Contact::None => {}
-                    Contact::Covers(height) => {
-                        let best = self.covering[point];
-                        self.covering[point] = higher(self.triangles, best, hit(height));
-                    }
-                    Contact::Near(height) => {
-                        self.touch(
-                            point,
-                            Touch {
-                                hit: hit(height),
-                                wall: false,
-                            },
-                        );
-                    }
-                    Contact::Wall(height) => {
-                        self.touch(
-                            point,
-                            Touch {
-                                hit: hit(height),
-                                wall: true,
-                            },
-                        );
-                    }
-                }
+                self.meet(point, triangle, seen.contact([nodes.x.nodes[column], y]));
             }
+        }
+    }
+
+    fn meet(&mut self, point: usize, triangle: u32, contact: Contact) {
+        let touch = |height, wall| Touch {
+            hit: Hit { height, triangle },
+            wall,
+        };
+        match contact {
+            Contact::None => {}
+            Contact::Covers(height) => {
+                let hit = Hit { height, triangle };
+                self.covering[point] = higher(self.triangles, self.covering[point], hit);
+            }
+            Contact::Near(height) => self.touch(point, touch(height, false)),
+            Contact::Wall(height) => self.touch(point, touch(height, true)),
         }
     }
 
@@ -300,6 +291,15 @@ impl<'a> Layer<'a> {
             })
             .collect()
     }
+}
+
+/// The surface over one point, from how the triangles touch its vertical line.
+pub(super) fn sample_of(triangles: &[Triangle], contacts: &[(u32, Contact)]) -> Option<Sample> {
+    let mut layer = Layer::new(triangles, 1);
+    for (triangle, contact) in contacts {
+        layer.meet(0, *triangle, *contact);
+    }
+    layer.samples()[0]
 }
 
 /// The higher hit. At equal heights the face seen from above is wanted: any face before a wall,

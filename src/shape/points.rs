@@ -1,16 +1,26 @@
 //! From a shape document to its constraint points (eq. 6): (x_j, y_j, h_j), x fastest, then y.
 
+use rayon::prelude::*;
+
 use crate::accuracy::StageAccuracy;
 use crate::numerics::axis::Axis;
-use crate::progress::Progress;
+use crate::progress::{Interrupted, Progress};
+use crate::shape::certificate::{Certificate, Certify, certify};
 use crate::shape::document::{AxisRequest, ShapeDocument};
 use crate::shape::error::ShapeError;
 use crate::shape::height::{Grid, Sample};
+use crate::shape::holes::{self, Holes};
+use crate::shape::marks::Marks;
 use crate::shape::mesh::{Bounds, MeshFacts};
+use crate::shape::scattered::Probe;
 use crate::shape::surface::Surface;
 
 /// More grid points than this are refused: their files and matrices fit no computer.
 const MOST_POINTS: usize = 100_000_000;
+/// Grids of more points than this are not compared with their surface: it would take minutes.
+const MOST_CERTIFIED: usize = 4_000_000;
+/// Points marked between two looks at the progress.
+const MARKED_BETWEEN_LOOKS: usize = 4096;
 
 /// The points of a grid that lie on the surface, m; columns of equal length.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,8 +37,12 @@ pub struct ConstraintPoints {
     pub normal: Vec<[f64; 3]>,
     /// Each point's place in the grid: row * columns + column; ascending.
     pub grid_index: Vec<usize>,
+    /// What each point is besides a height.
+    pub marks: Vec<Marks>,
     /// Grid points without surface, skipped.
     pub outside: usize,
+    /// Of the grid points without surface those that lie inside the silhouette, skipped or filled.
+    pub holes: usize,
 }
 
 /// Figures that sum the points up.
@@ -107,8 +121,21 @@ pub struct Discretized {
     pub mesh: Option<MeshFacts>,
     /// The stage's error, absolute, m.
     pub accuracy: StageAccuracy,
+    /// How far the interpolated points may lie from the surface, where it was asked for.
+    pub certificate: Option<Certificate>,
     /// What the user should know though it stops nothing.
     pub warnings: Vec<String>,
+}
+
+/// What is done besides sampling.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Settings {
+    /// Grid points without surface inside the silhouette.
+    pub holes: Holes,
+    /// How the points are compared with the surface.
+    pub certify: Certify,
+    /// Whether walls, rims, creases and overhangs are looked for.
+    pub marks: bool,
 }
 
 /// Opens the document's surface, places it and samples it over the requested grid.
@@ -120,9 +147,14 @@ pub fn discretize(
     document: &ShapeDocument,
     progress: &dyn Progress,
 ) -> Result<Discretized, ShapeError> {
-    let (surface, warnings) = Surface::open(document)?;
-    progress.check()?;
-    let bounds = surface.extent();
+    discretize_with(document, &Settings::default(), progress)
+}
+
+/// The region that a document asks for, as a grid.
+///
+/// # Errors
+/// [`ShapeError::Document`] for axes that do not ascend or have too many points.
+pub fn requested_grid(document: &ShapeDocument, bounds: &Bounds) -> Result<Grid, ShapeError> {
     let [x, y] = bounds.plan();
     let grid = Grid {
         x_m: axis("x", document.grid.x, x)?,
@@ -135,9 +167,62 @@ pub fn discretize(
             grid.x_m.samples, grid.y_m.samples
         )));
     }
-    let samples = surface.heights(&grid, progress)?;
+    Ok(grid)
+}
+
+/// [`discretize`] with holes, marks and a certificate as asked for.
+///
+/// # Errors
+/// As [`discretize`]; [`ShapeError::Document`] for holes where they are refused.
+pub fn discretize_with(
+    document: &ShapeDocument,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Discretized, ShapeError> {
+    let (surface, mut warnings) = Surface::open(document)?;
+    progress.check()?;
+    let bounds = surface.extent();
+    let grid = requested_grid(document, &bounds)?;
+    let mut samples = surface.heights(&grid, progress)?;
+    let found = holes::holes(&grid, &samples);
+    if let Some(&first) = found.first() {
+        let [x_mm, y_mm] = [
+            grid.x_m.node(first % grid.x_m.samples) * 1000.0,
+            grid.y_m.node(first / grid.x_m.samples) * 1000.0,
+        ];
+        let what = format!(
+            "{} grid points inside the silhouette have no surface, the first at ({x_mm:.6}, \
+             {y_mm:.6}) mm",
+            found.len()
+        );
+        match settings.holes {
+            Holes::Error => {
+                return Err(ShapeError::Document(format!(
+                    "{what}; mend the surface, or choose --holes skip or --holes fill"
+                )));
+            }
+            Holes::Skip => warnings.push(format!("{what}: they give no points")),
+            Holes::Fill => {
+                holes::fill(&grid, &mut samples, &found);
+                warnings.push(format!("{what}: heights were filled in from around them"));
+            }
+        }
+    }
     let rounding_m = surface.coordinate_rounding_m();
-    let points = collect(&grid, &samples, rounding_m, &bounds)?;
+    let mut points = collect(&grid, &samples, rounding_m, &bounds)?;
+    points.holes = found.len();
+    if settings.marks {
+        mark(&mut points, &surface, &found, progress)?;
+    }
+    let mut how = settings.certify;
+    if how != Certify::No && grid.len() > MOST_CERTIFIED {
+        how = Certify::No;
+        warnings.push(format!(
+            "the grid has more than {MOST_CERTIFIED} points: how far it departs from the surface \
+             between them is not computed"
+        ));
+    }
+    let certificate = certify(&surface, &grid, &samples, how, progress)?;
     let deviation_m = match &surface {
         Surface::Mesh(mesh) => mesh.facts().deviation_m,
         Surface::Primitive(_) => 0.0,
@@ -165,8 +250,34 @@ pub fn discretize(
         bounds,
         mesh,
         accuracy,
+        certificate,
         warnings,
     })
+}
+
+/// Looks for what each point is besides a height; `filled` holds grid indices, ascending.
+fn mark(
+    points: &mut ConstraintPoints,
+    surface: &Surface,
+    filled: &[usize],
+    progress: &dyn Progress,
+) -> Result<(), ShapeError> {
+    let probe = Probe::new(surface, &points.grid);
+    let places = (0..points.len()).into_par_iter();
+    let marks: Result<Vec<Marks>, Interrupted> = places
+        .map(|row| {
+            if row % MARKED_BETWEEN_LOOKS == 0 {
+                progress.check()?;
+            }
+            let found = probe.at([points.x_m[row], points.y_m[row]]);
+            Ok(Marks {
+                filled: filled.binary_search(&points.grid_index[row]).is_ok(),
+                ..found.map_or(Marks::PLAIN, |(_, marks)| marks)
+            })
+        })
+        .collect();
+    points.marks = marks?;
+    Ok(())
 }
 
 /// The requested axis; its nodes ascend.
@@ -242,7 +353,9 @@ fn collect(
         height_m: Vec::with_capacity(found),
         normal: Vec::with_capacity(found),
         grid_index: Vec::with_capacity(found),
+        marks: vec![Marks::PLAIN; found],
         outside: samples.len() - found,
+        holes: 0,
     };
     let (x, y) = (grid.x_m.nodes(), grid.y_m.nodes());
     let (mut below, mut lowest_m) = (0, 0.0f64);

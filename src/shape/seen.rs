@@ -45,12 +45,7 @@ impl Seen {
         let vertices = ordered(triangle);
         let [a, b, c] = vertices;
         let orientation = side(a, b, [c[0], c[1]]);
-        let longest = [(a, b), (b, c), (a, c)].map(|(p, q)| (p[0] - q[0]).hypot(p[1] - q[1]));
-        let longest = longest[0].max(longest[1]).max(longest[2]);
-        // As wide in plan as the file's rounding can make a wall that was vertical.
-        let wall = orientation == 0.0
-            || (orientation.abs() <= reach * longest
-                && upward_normal(triangle)[2] <= WALL_NORMAL_Z);
+        let wall = stands_upright(&vertices, orientation, reach);
         Self {
             vertices,
             orientation,
@@ -61,7 +56,12 @@ impl Seen {
 
     /// A range of x that holds every point of row `y` that this triangle touches.
     pub(super) fn columns(&self, y: f64) -> [f64; 2] {
-        let (low, high) = (y - self.reach, y + self.reach);
+        self.columns_between(y, y)
+    }
+
+    /// The same for every row between two.
+    pub(super) fn columns_between(&self, from: f64, to: f64) -> [f64; 2] {
+        let (low, high) = (from - self.reach, to + self.reach);
         let mut range = [f64::INFINITY, f64::NEG_INFINITY];
         let [a, b, c] = self.vertices;
         for (p, q) in [(a, b), (b, c), (a, c)] {
@@ -164,6 +164,29 @@ impl Seen {
         let height = z[near] + rise / (weights[0] + weights[1] + weights[2]);
         height.clamp(z[0].min(z[1]).min(z[2]), z[0].max(z[1]).max(z[2]))
     }
+}
+
+/// Whether a triangle stands upright, or as nearly as the file's rounding can make a wall that did.
+pub(super) fn is_wall(triangle: &Triangle, reach: f64) -> bool {
+    let vertices = ordered(triangle);
+    let [a, b, c] = vertices;
+    stands_upright(&vertices, side(a, b, [c[0], c[1]]), reach)
+}
+
+/// [`is_wall`] of ordered vertices, with twice their area in plan.
+fn stands_upright(vertices: &[Vertex; 3], orientation: f64, reach: f64) -> bool {
+    if orientation == 0.0 {
+        return true;
+    }
+    let [a, b, c] = vertices;
+    let extent = |k: usize| a[k].max(b[k]).max(c[k]) - a[k].min(b[k]).min(c[k]);
+    // No side is longer than this: of most triangles nothing more need be known.
+    if orientation.abs() > reach * (extent(0) + extent(1)) {
+        return false;
+    }
+    let longest = [(a, b), (b, c), (a, c)].map(|(p, q)| (p[0] - q[0]).hypot(p[1] - q[1]));
+    let longest = longest[0].max(longest[1]).max(longest[2]);
+    orientation.abs() <= reach * longest && upward_normal(vertices)[2] <= WALL_NORMAL_Z
 }
 
 /// The unit normal that looks up (n_z >= 0), whatever the vertices' order.

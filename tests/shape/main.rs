@@ -3,8 +3,10 @@
 
 mod corpus;
 mod formats;
+mod deviation;
 mod fuzz;
 mod heights;
+mod marks;
 mod points;
 mod samples;
 #[cfg(feature = "step")]

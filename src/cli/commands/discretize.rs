@@ -1,6 +1,8 @@
 //! `discretize`: a surface to its constraint points.
 
-use clap::Args;
+use std::path::Path;
+
+use clap::{Args, ValueEnum};
 
 use super::{begin, describe};
 use crate::bundle::atomic::{self, Overwrite};
@@ -11,9 +13,12 @@ use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
 use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{count, length_error, mm, number};
-use crate::cli::values::FileArgument;
+use crate::cli::values::{self, FileArgument};
 use crate::job::JobError;
-use crate::job::discretize::{PointsReport, PointsSummary, run};
+use crate::job::discretize::scattered::{self, Sampling, ScatteredSummary};
+use crate::job::discretize::{DeviationSummary, PointsOptions, PointsSummary, run_with};
+use crate::shape::certificate::Certify;
+use crate::shape::holes::Holes;
 
 /// Turn a surface into constraint points with heights and normals
 ///
@@ -22,6 +27,11 @@ use crate::job::discretize::{PointsReport, PointsSummary, run};
 /// normal, x fastest, then y), their summary to a JSON file beside it. Grid points without surface
 /// are left out and counted. The surface is described by a shape file (TOML) or given directly with
 /// its unit and place.
+///
+/// How far the surface departs from bilinear interpolation between the points is certified. After
+/// the normal the table tells of walls, rims, creases (with the other face's normal) and overhangs.
+/// Instead of the grid's points, --max-deviation chooses as few as a deviation needs, --poisson
+/// points without a pattern; both give each point the area it stands for (weight_m2).
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Writing, &[
     ("fluxform discretize shapes/half_sphere.toml --out points.csv", "a shape file"),
@@ -29,6 +39,8 @@ use crate::job::discretize::{PointsReport, PointsSummary, run};
      "a surface given directly; the table goes to standard output"),
     ("fluxform discretize shapes/flat.stl --unit mm --translate 0,0,50 --x -20,20 --out flat.csv",
      "a part of it"),
+    ("fluxform discretize shapes/half_sphere.toml --max-deviation 0.5mm --out graded.csv",
+     "as many points as the surface needs, and where it needs them"),
 ]))]
 pub struct Discretize {
     /// Shape file (TOML, `-` for standard input) or the surface itself (STL)
@@ -37,10 +49,45 @@ pub struct Discretize {
     /// Where the points go; `-` is standard output, and then there is no JSON file
     #[arg(long, value_name = "FILE", default_value = "points.csv")]
     out: FileArgument,
+    /// Grid points without surface inside the silhouette: leave them out, fill them from around,
+    /// or refuse the surface
+    #[arg(long, value_enum, default_value_t = HolesFlag::Skip)]
+    holes: HolesFlag,
+    /// Compare the points with the surface: vertically, by the Hausdorff distance too, or not
+    #[arg(long, value_enum, default_value_t = CertifyFlag::Vertical)]
+    certify: CertifyFlag,
+    /// Choose points until bilinear patches between them lie this near to the surface (0.1mm)
+    #[arg(long, value_name = "LENGTH", value_parser = values::length_with_unit)]
+    max_deviation: Option<f64>,
+    /// Choose points at random, none nearer to another than this (2mm)
+    #[arg(
+        long,
+        value_name = "SPACING",
+        value_parser = values::length_with_unit,
+        conflicts_with = "max_deviation"
+    )]
+    poisson: Option<f64>,
+    /// Which random points
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "poisson")]
+    seed: u64,
     #[command(flatten)]
     writing: Writing,
     #[command(flatten)]
     surface: SurfaceFlags,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum HolesFlag {
+    Skip,
+    Fill,
+    Error,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum CertifyFlag {
+    No,
+    Vertical,
+    Distance,
 }
 
 impl Discretize {
@@ -53,36 +100,120 @@ impl Discretize {
         let bar = begin(printer);
         for shape in shapes {
             let inputs = shape.input.into_iter().collect();
-            let mut report = run(&shape.document, inputs, &bar)?;
-            for warning in &report.summary.warnings {
-                printer.warning(warning);
+            if let Some(sampling) = self.sampling() {
+                let mut report = scattered::run(&shape.document, inputs, sampling, &bar)?;
+                self.warn(&report.summary.warnings, printer);
+                let place = self.write(
+                    printer,
+                    |out| report.write_csv(out),
+                    |path| report.write(path, self.writing.force),
+                )?;
+                report.summary.warnings = printer.warnings();
+                printer.summary(place, &report.summary, || {
+                    self.told_scattered(&report.summary)
+                })?;
+                continue;
             }
-            let place = self.write(&report, printer)?;
+            let mut report = run_with(&shape.document, inputs, &self.options(), &bar)?;
+            self.warn(&report.summary.warnings, printer);
+            let place = self.write(
+                printer,
+                |out| report.write_csv(out),
+                |path| report.write(path, self.writing.force),
+            )?;
             report.summary.warnings = printer.warnings();
             printer.summary(place, &report.summary, || self.told(&report.summary))?;
         }
         Ok(())
     }
 
-    fn write(&self, report: &PointsReport, printer: &Printer) -> Result<Place, Failure> {
+    fn sampling(&self) -> Option<Sampling> {
+        let graded = self
+            .max_deviation
+            .map(|max_deviation_m| Sampling::Adaptive { max_deviation_m });
+        let seed = self.seed;
+        graded.or(self
+            .poisson
+            .map(|spacing_m| Sampling::Poisson { spacing_m, seed }))
+    }
+
+    fn options(&self) -> PointsOptions {
+        PointsOptions {
+            holes: match self.holes {
+                HolesFlag::Skip => Holes::Skip,
+                HolesFlag::Fill => Holes::Fill,
+                HolesFlag::Error => Holes::Error,
+            },
+            certify: match self.certify {
+                CertifyFlag::No => Certify::No,
+                CertifyFlag::Vertical => Certify::Vertical,
+                CertifyFlag::Distance => Certify::Distance,
+            },
+        }
+    }
+
+    fn warn(&self, warnings: &[String], printer: &Printer) {
+        for warning in warnings {
+            printer.warning(warning);
+        }
+    }
+
+    fn write(
+        &self,
+        printer: &Printer,
+        csv: impl Fn(&mut dyn std::io::Write) -> std::io::Result<()>,
+        both: impl FnOnce(&Path) -> Result<(), JobError>,
+    ) -> Result<Place, Failure> {
         match &self.out {
             FileArgument::Standard => {
-                printer.data(|out| report.write_csv(out))?;
+                printer.data(|out| csv(out))?;
                 Ok(Place::Error)
             }
             // A device or a pipe has nothing beside it.
             FileArgument::Path(path)
                 if path.metadata().is_ok_and(|m| !m.is_file() && !m.is_dir()) =>
             {
-                atomic::write(path, &Overwrite::Force, |out| report.write_csv(out))
-                    .map_err(JobError::from)?;
+                atomic::write(path, &Overwrite::Force, |out| csv(out)).map_err(JobError::from)?;
                 Ok(Place::Output)
             }
             FileArgument::Path(path) => {
-                report.write(path, self.writing.force)?;
+                both(path)?;
                 Ok(Place::Output)
             }
         }
+    }
+
+    fn told_scattered(&self, summary: &ScatteredSummary) -> String {
+        let mut sheet = Sheet::new(&format!(
+            "{}: {}, {}",
+            summary.shape,
+            count(summary.points, "constraint point"),
+            summary.sampling
+        ));
+        sheet.line(
+            "heights",
+            &describe::heights(summary.min_height_m, summary.max_height_m),
+        );
+        sheet.line(
+            "area",
+            &format!("{} mm^2 in plan", number(summary.area_m2 * 1e6)),
+        );
+        if let Some(stage) = summary.accuracy.get("patches") {
+            sheet.line(
+                "deviation",
+                &format!("at most {} vertically", mm(stage.estimate)),
+            );
+        }
+        if let Some(cover_m) = summary.cover_m {
+            sheet.line(
+                "cover",
+                &format!("no place farther than {} from a point", mm(cover_m)),
+            );
+        }
+        if let FileArgument::Path(path) = &self.out {
+            sheet.line("written to", &path.display().to_string());
+        }
+        sheet.finish()
     }
 
     fn told(&self, summary: &PointsSummary) -> String {
@@ -123,6 +254,9 @@ impl Discretize {
                 }
             ),
         );
+        if let Some(deviation) = &summary.deviation {
+            sheet.line("deviation", &between(deviation));
+        }
         if let Some(stage) = summary.accuracy.get("points") {
             sheet.line(
                 "accuracy",
@@ -134,4 +268,21 @@ impl Discretize {
         }
         sheet.finish()
     }
+}
+
+/// How far bilinear interpolation departs from the surface.
+fn between(deviation: &DeviationSummary) -> String {
+    let (most_m, at_m) = if deviation.below_m > deviation.above_m {
+        (deviation.below_m, deviation.below_at_m)
+    } else {
+        (deviation.above_m, deviation.above_at_m)
+    };
+    let [x, y] = at_m.map(|c| number(c * 1000.0));
+    let mut text = format!("within {} vertically, worst at ({x}, {y}) mm", mm(most_m));
+    if let (Some(lower_m), Some(upper_m)) =
+        (deviation.hausdorff_lower_m, deviation.hausdorff_upper_m)
+    {
+        text += &format!("; {} to {} in distance", mm(lower_m), mm(upper_m));
+    }
+    text
 }

@@ -1,0 +1,186 @@
+//! Constraint points on no grid: graded to a deviation, or blue noise.
+
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::{MarkCounts, shape_error, table, with_surface, write_both};
+use crate::accuracy::StageAccuracy;
+use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
+use crate::job::JobError;
+use crate::progress::Progress;
+use crate::shape::document::ShapeDocument;
+use crate::shape::points::requested_grid;
+use crate::shape::scattered::adaptive::adaptive;
+use crate::shape::scattered::poisson::poisson;
+use crate::shape::scattered::{Probe, Scattered};
+use crate::shape::{ShapeError, Surface};
+
+/// How points are chosen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Sampling {
+    /// Until bilinear patches between them lie within a deviation.
+    Adaptive {
+        /// The vertical deviation, m.
+        max_deviation_m: f64,
+    },
+    /// At random, no two nearer than a spacing.
+    Poisson {
+        /// The spacing in plan, m.
+        spacing_m: f64,
+        /// Decides which points are chosen.
+        seed: u64,
+    },
+}
+
+/// The points and what is to be told about them.
+#[derive(Debug, Clone)]
+pub struct ScatteredReport {
+    /// The points.
+    pub points: Scattered,
+    /// Figures, as the JSON summary tells them.
+    pub summary: ScatteredSummary,
+}
+
+/// The JSON summary; SI.
+#[derive(Debug, Clone, Serialize)]
+pub struct ScatteredSummary {
+    /// Layout of the artefact.
+    pub schema_version: &'static str,
+    /// Program that wrote it.
+    pub fluxform_version: &'static str,
+    /// Name of the shape.
+    pub shape: String,
+    /// What went in.
+    pub inputs: Vec<Input>,
+    /// `adaptive` or `poisson`.
+    pub sampling: &'static str,
+    /// Number of points.
+    pub points: usize,
+    /// Sum of the points' weights: the plan area of the surface, m^2.
+    pub area_m2: f64,
+    /// How many points are marked.
+    pub marks: MarkCounts,
+    /// Lowest height, m.
+    pub min_height_m: f64,
+    /// Highest height, m.
+    pub max_height_m: f64,
+    /// Adaptive: bilinear patches within the deviation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub patches: Option<usize>,
+    /// Adaptive: patches at a rim or a jump, no wider than the deviation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub border_patches: Option<usize>,
+    /// Poisson: no place of the surface lies farther from a point in plan, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cover_m: Option<f64>,
+    /// `points` (rounding), and for adaptive points `patches`.
+    pub accuracy: BTreeMap<&'static str, StageAccuracy>,
+    /// What a careful person would mention.
+    pub warnings: Vec<String>,
+}
+
+/// Chooses points on `document`'s surface over the region of its grid. `inputs` holds the
+/// document's own entry, if it is a file; the surface's is added.
+///
+/// # Errors
+/// A surface that gives no points; interruption.
+pub fn run(
+    document: &ShapeDocument,
+    inputs: Vec<Input>,
+    sampling: Sampling,
+    progress: &dyn Progress,
+) -> Result<ScatteredReport, JobError> {
+    let inputs = with_surface(document, inputs)?;
+    let failed = |source: ShapeError| shape_error(document, source);
+    let (surface, warnings) = Surface::open(document).map_err(failed)?;
+    let grid = requested_grid(document, &surface.extent()).map_err(failed)?;
+    let probe = Probe::new(&surface, &grid);
+    let stage = |estimate: f64, method: &str| StageAccuracy {
+        estimate,
+        relative_to: "1 m".to_owned(),
+        method: method.to_owned(),
+    };
+    let rounding_m = surface.coordinate_rounding_m();
+    let mut accuracy = BTreeMap::from([(
+        "points",
+        stage(rounding_m, "a-priori: the file's coordinate rounding"),
+    )]);
+    let (mut patches, mut border_patches, mut cover_m) = (None, None, None);
+    let (mut points, name) = match sampling {
+        Sampling::Adaptive { max_deviation_m } => {
+            let found = adaptive(&probe, max_deviation_m, progress).map_err(failed)?;
+            (patches, border_patches) = (Some(found.leaves), Some(found.borders));
+            let method = "certified: the vertical difference between surface and bilinear patches; \
+                          at rims and jumps patches no wider than the deviation asked for";
+            accuracy.insert("patches", stage(found.vertical_m, method));
+            (found.points, "adaptive")
+        }
+        Sampling::Poisson { spacing_m, seed } => {
+            let found = poisson(&probe, spacing_m, seed, progress).map_err(failed)?;
+            cover_m = Some(found.cover_m);
+            (found.points, "poisson")
+        }
+    };
+    if points.is_empty() {
+        let none = "no point of the surface lies in the region of its grid; change the \
+                    translation, the unit or the grid";
+        return Err(failed(ShapeError::Document(none.to_owned())));
+    }
+    let lowest_m = points
+        .height_m
+        .iter()
+        .copied()
+        .fold(f64::INFINITY, f64::min);
+    if lowest_m < -rounding_m {
+        let below = points.height_m.iter().filter(|h| **h < -rounding_m).count();
+        return Err(failed(ShapeError::BelowZero {
+            below,
+            points: points.len(),
+            lowest_m,
+        }));
+    }
+    // A surface that rests on z = 0 may be rounded below it.
+    points.height_m.iter_mut().for_each(|h| *h = h.max(0.0));
+    let summary = ScatteredSummary {
+        schema_version: SCHEMA_VERSION,
+        fluxform_version: FLUXFORM_VERSION,
+        shape: document.name.clone(),
+        inputs,
+        sampling: name,
+        points: points.len(),
+        area_m2: points.weight_m2.iter().sum(),
+        marks: MarkCounts::of(&points.marks),
+        min_height_m: lowest_m.max(0.0),
+        max_height_m: points.height_m.iter().copied().fold(0.0, f64::max),
+        patches,
+        border_patches,
+        cover_m,
+        accuracy,
+        warnings,
+    };
+    Ok(ScatteredReport { points, summary })
+}
+
+impl ScatteredReport {
+    /// Writes the table of points.
+    ///
+    /// # Errors
+    /// The writer's.
+    pub fn write_csv(&self, out: &mut dyn Write) -> io::Result<()> {
+        table::of_scattered(out, &self.points)
+    }
+
+    /// Writes the points to `path` and the summary beside them, as those of a grid.
+    ///
+    /// # Errors
+    /// [`JobError::Write`].
+    pub fn write(&self, path: &Path, force: bool) -> Result<(), JobError> {
+        let inputs = &self.summary.inputs;
+        write_both(path, force, inputs, &self.summary, |out| {
+            self.write_csv(out)
+        })
+    }
+}

@@ -1,0 +1,414 @@
+//! How far the interpolated points lie from the surface they were taken from.
+//!
+//! Between four points of a cell a runtime interpolates bilinearly. The surface is piecewise
+//! plane, so the vertical difference is a saddle on every piece, and its supremum over the cell is
+//! found in closed form ([`piece`]), once the pieces seen from above are known ([`visible`]).
+//! Cells of which a corner has no surface are counted apart: there a runtime's force ends.
+
+mod hausdorff;
+mod nearest;
+pub(super) mod piece;
+mod primitive;
+mod visible;
+
+use rayon::prelude::*;
+
+use crate::numerics::axis::Axis;
+use crate::progress::{Interrupted, Progress};
+use crate::shape::height::{Grid, heights, reach_m};
+use crate::shape::mesh::Mesh;
+use crate::shape::seen::is_wall;
+
+use self::visible::{Hair, supremum_over_visible};
+
+pub use self::hausdorff::{Interval, hausdorff};
+pub use self::piece::{Extreme, Patch, Rect};
+pub use self::primitive::primitive;
+
+/// Triangles in a rectangle that are compared with each other at once.
+const TOGETHER: usize = 10;
+/// A rectangle is halved so often at most: a fan's apex never comes apart.
+const DEEPEST: u32 = 9;
+/// Places nearer than this times the largest coordinate are not told apart.
+const HAIR: f64 = 1e-12;
+/// Height hairs by which a difference may be off.
+const ROUNDINGS: f64 = 16.0;
+
+/// The vertical difference between the surface and the points, cells of four points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Vertical {
+    /// The most by which the surface stands above the interpolated points, m.
+    pub above: Extreme,
+    /// The most by which it lies below them, m.
+    pub below: Extreme,
+    /// What rounding may add to either, m.
+    pub rounding_m: f64,
+    /// What a bound of limited effort may lack, m; 0 where the supremum is exact.
+    pub slack_m: f64,
+    /// What the cells are.
+    pub cells: Cells,
+}
+
+impl Vertical {
+    /// The larger of the two, with its place.
+    #[must_use]
+    pub fn worst(&self) -> Extreme {
+        self.above.or(self.below)
+    }
+
+    /// A bound of the vertical difference, rounding included, m.
+    #[must_use]
+    pub fn bound_m(&self) -> f64 {
+        self.worst().value_m.max(0.0) + self.rounding_m + self.slack_m
+    }
+}
+
+/// Cells of the grid by what their corners have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Cells {
+    /// Four points: interpolated.
+    pub inner: usize,
+    /// One to three points: the silhouette passes through.
+    pub silhouette: usize,
+    /// No point, and yet surface: a part that the grid misses.
+    pub missed: usize,
+}
+
+/// The faces of a mesh prepared for comparison.
+pub struct Faces {
+    list: Vec<piece::Face>,
+    hair: Hair,
+}
+
+/// The largest differences over a rectangle.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Worst {
+    pub(super) above: Extreme,
+    pub(super) below: Extreme,
+}
+
+impl Worst {
+    pub(super) const NONE: Self = Self {
+        above: Extreme::NONE,
+        below: Extreme::NONE,
+    };
+
+    fn or(self, other: Self) -> Self {
+        Self {
+            above: self.above.or(other.above),
+            below: self.below.or(other.below),
+        }
+    }
+
+    pub(super) fn value_m(&self) -> f64 {
+        self.above.value_m.max(self.below.value_m)
+    }
+}
+
+impl Faces {
+    /// The mesh's triangles but for vertical walls, which have no height of their own.
+    #[must_use]
+    pub fn new(mesh: &Mesh, grid: &Grid) -> Self {
+        let reach = reach_m(mesh, grid);
+        let bounds = mesh.facts().bounds;
+        let largest = |corners: [&[f64]; 2]| {
+            corners
+                .concat()
+                .iter()
+                .fold(0.0, |m: f64, c| m.max(c.abs()))
+        };
+        let plan_m = largest([&bounds.min_m[..2], &bounds.max_m[..2]]);
+        let height_m = largest([&bounds.min_m[2..], &bounds.max_m[2..]]);
+        let faces = mesh.triangles().par_iter();
+        Self {
+            list: faces
+                .filter(|triangle| !is_wall(triangle, reach))
+                .filter_map(piece::Face::new)
+                .collect(),
+            hair: Hair {
+                plan_m: HAIR * plan_m,
+                height_m: HAIR * height_m,
+            },
+        }
+    }
+
+    /// Indices of all faces.
+    pub(super) fn all(&self) -> Vec<u32> {
+        (0..self.list.len() as u32).collect()
+    }
+
+    /// Of `among`, the faces that have plan area in common with the rectangle.
+    pub(super) fn over(&self, rect: &Rect, among: &[u32]) -> Vec<u32> {
+        let overlaps = |face: &&u32| self.list[**face as usize].overlaps(rect);
+        among.iter().filter(overlaps).copied().collect()
+    }
+
+    /// The largest differences from `patch` over `rect`, which lies within it; differences no
+    /// larger than those of `known` are not looked for.
+    pub(super) fn worst(&self, rect: &Rect, among: &[u32], patch: &Patch, known: Worst) -> Worst {
+        let mut worst = known;
+        self.leaves(*rect, among, DEEPEST, &mut |leaf, faces| {
+            self.compare(leaf, faces, patch, &mut worst);
+        });
+        worst
+    }
+
+    /// A bound of the vertical difference over a patch, m.
+    pub(super) fn deviation_m(&self, patch: &Patch, among: &[u32]) -> f64 {
+        let worst = self.worst(&patch.rect, among, patch, Worst::NONE).value_m();
+        worst.max(0.0) + ROUNDINGS * self.hair.height_m
+    }
+
+    /// Quarters the rectangle until few faces are left in each part.
+    fn leaves(&self, rect: Rect, among: &[u32], deep: u32, visit: &mut dyn FnMut(&Rect, &[u32])) {
+        let [width, depth] = rect.sides();
+        if among.len() <= TOGETHER || deep == 0 || width.min(depth) < 256.0 * self.hair.plan_m {
+            visit(&rect, among);
+            return;
+        }
+        for quarter in rect.quarters() {
+            self.leaves(quarter, &self.over(&quarter, among), deep - 1, visit);
+        }
+    }
+
+    /// Whether the faces leave no part of the rectangle open.
+    pub(super) fn covered(&self, rect: &Rect, among: &[u32]) -> bool {
+        let heights = among.iter().map(|face| self.list[*face as usize].heights);
+        let lowest = heights.fold(f64::INFINITY, |m, [low, _]| m.min(low));
+        if among.is_empty() {
+            return false;
+        }
+        // A floor under everything is hidden wherever there is surface.
+        let floor_m = lowest - lowest.abs() - 1.0;
+        let mut open = false;
+        self.leaves(*rect, among, DEEPEST, &mut |leaf, faces| {
+            let others: Vec<_> = faces.iter().map(|face| self.list[*face as usize]).collect();
+            open |= piece::Face::floor(leaf, floor_m).is_none_or(|floor| {
+                let whole = floor.within(leaf);
+                supremum_over_visible(&floor, &whole, &others, self.hair, &|_| 0.0).is_some()
+            });
+        });
+        !open
+    }
+
+    fn compare(&self, rect: &Rect, faces: &[u32], patch: &Patch, worst: &mut Worst) {
+        let mut pieces = Vec::with_capacity(faces.len());
+        for &index in faces {
+            let face = self.list[index as usize];
+            let part = face.within(rect);
+            if part.width() <= self.hair.plan_m / 4.0 {
+                continue;
+            }
+            // A face that is hidden stands lower than the one that hides it: no visibility needed.
+            let above = part.supremum(|p| face.height(p) - patch.height_m(p));
+            worst.above = worst.above.or(above);
+            let below = part.supremum(|p| patch.height_m(p) - face.height(p));
+            pieces.push((face, part, below.value_m));
+        }
+        if pieces.iter().all(|piece| piece.2 <= worst.below.value_m) {
+            return;
+        }
+        let others: Vec<piece::Face> = pieces.iter().map(|piece| piece.0).collect();
+        pieces.sort_by(|p, q| q.2.total_cmp(&p.2));
+        for (face, part, bound) in &pieces {
+            if *bound <= worst.below.value_m {
+                break;
+            }
+            let value = |p: piece::Point| patch.height_m(p) - face.height(p);
+            if let Some(below) = supremum_over_visible(face, part, &others, self.hair, &value) {
+                worst.below = worst.below.or(below);
+            }
+        }
+    }
+}
+
+/// The patches of a grid's cells, and the faces over each.
+pub struct Lattice<'a> {
+    pub(super) faces: &'a Faces,
+    x: Vec<f64>,
+    y: Vec<f64>,
+    heights: &'a [Option<f64>],
+    starts: Vec<usize>,
+    members: Vec<u32>,
+}
+
+impl<'a> Lattice<'a> {
+    /// Sorts the faces into the cells. `heights` holds the points' heights, m, x fastest.
+    #[must_use]
+    pub fn new(faces: &'a Faces, grid: &Grid, heights: &'a [Option<f64>]) -> Self {
+        let (x, y) = (grid.x_m.nodes(), grid.y_m.nodes());
+        let mut lattice = Self {
+            faces,
+            heights,
+            starts: vec![0; x.len().saturating_sub(1) * y.len().saturating_sub(1) + 1],
+            members: Vec::new(),
+            x,
+            y,
+        };
+        let pairs: Vec<(u32, u32)> = (0..faces.list.len())
+            .into_par_iter()
+            .flat_map_iter(|index| lattice.cells_of(index))
+            .collect();
+        for (cell, _) in &pairs {
+            lattice.starts[*cell as usize + 1] += 1;
+        }
+        for cell in 1..lattice.starts.len() {
+            lattice.starts[cell] += lattice.starts[cell - 1];
+        }
+        let mut next = lattice.starts.clone();
+        lattice.members = vec![0; pairs.len()];
+        for (cell, face) in pairs {
+            lattice.members[next[cell as usize]] = face;
+            next[cell as usize] += 1;
+        }
+        lattice
+    }
+
+    fn cells_of(&self, index: usize) -> Vec<(u32, u32)> {
+        let face = &self.faces.list[index];
+        let between = |nodes: &[f64], (low, high): (f64, f64)| {
+            let from = nodes.partition_point(|node| *node <= low).saturating_sub(1);
+            from..nodes
+                .partition_point(|node| *node < high)
+                .min(nodes.len().saturating_sub(1))
+        };
+        let columns = between(&self.x, face.range(0));
+        let mut found = Vec::new();
+        for row in between(&self.y, face.range(1)) {
+            for column in columns.clone() {
+                let cell = row * (self.x.len() - 1) + column;
+                if face.overlaps(&self.rect(cell)) {
+                    found.push((cell as u32, index as u32));
+                }
+            }
+        }
+        found
+    }
+
+    /// Number of cells.
+    pub(super) fn len(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    pub(super) fn members(&self, cell: usize) -> &[u32] {
+        &self.members[self.starts[cell]..self.starts[cell + 1]]
+    }
+
+    pub(super) fn rect(&self, cell: usize) -> Rect {
+        let columns = self.x.len() - 1;
+        let (column, row) = (cell % columns, cell / columns);
+        Rect {
+            low_m: [self.x[column], self.y[row]],
+            high_m: [self.x[column + 1], self.y[row + 1]],
+        }
+    }
+
+    /// Heights at the cell's corners, x fastest.
+    fn corners(&self, cell: usize) -> [Option<f64>; 4] {
+        let columns = self.x.len() - 1;
+        let (column, row) = (cell % columns, cell / columns);
+        let node = row * self.x.len() + column;
+        [0, 1, self.x.len(), self.x.len() + 1].map(|k| self.heights[node + k])
+    }
+
+    pub(super) fn patch(&self, cell: usize) -> Option<Patch> {
+        let [a, b, c, d] = self.corners(cell);
+        Some(Patch {
+            rect: self.rect(cell),
+            corners_m: [a?, b?, c?, d?],
+        })
+    }
+
+    fn cells(&self) -> Cells {
+        let mut cells = Cells::default();
+        for cell in 0..self.len() {
+            match self.corners(cell).iter().flatten().count() {
+                4 => cells.inner += 1,
+                0 if self.members(cell).is_empty() => {}
+                0 => cells.missed += 1,
+                _ => cells.silhouette += 1,
+            }
+        }
+        cells
+    }
+}
+
+/// The exact supremum of the vertical difference over all cells of four points.
+///
+/// Error: what rounding adds, `rounding_m`, about 1e-11 of the size times the steepest slope.
+///
+/// # Errors
+/// [`Interrupted`] when the user asked to stop.
+pub fn vertical(
+    mesh: &Mesh,
+    grid: &Grid,
+    lattice: &Lattice<'_>,
+    progress: &dyn Progress,
+) -> Result<Vertical, Interrupted> {
+    let cells = lattice.cells();
+    let start = start(mesh, grid, lattice, progress)?;
+    let row = grid.x_m.samples.saturating_sub(1).max(1);
+    progress.begin("deviation", lattice.len() as u64);
+    let rows: Result<Vec<Worst>, Interrupted> = (0..lattice.len().div_ceil(row))
+        .into_par_iter()
+        .map(|index| {
+            progress.check()?;
+            let mut worst = start;
+            for cell in index * row..((index + 1) * row).min(lattice.len()) {
+                if let Some(patch) = lattice.patch(cell) {
+                    worst = lattice
+                        .faces
+                        .worst(&patch.rect, lattice.members(cell), &patch, worst);
+                }
+            }
+            progress.advance(row as u64);
+            Ok(worst)
+        })
+        .collect();
+    progress.end();
+    let worst = rows?.into_iter().fold(start, Worst::or);
+    Ok(Vertical {
+        above: worst.above,
+        below: worst.below,
+        rounding_m: ROUNDINGS * lattice.faces.hair.height_m,
+        slack_m: 0.0,
+        cells,
+    })
+}
+
+/// The differences at the cells' centres: with them most pieces need no closer look.
+fn start(
+    mesh: &Mesh,
+    grid: &Grid,
+    lattice: &Lattice<'_>,
+    progress: &dyn Progress,
+) -> Result<Worst, Interrupted> {
+    let mut worst = Worst::NONE;
+    let middle = |axis: &Axis| Axis {
+        from: axis.from + 0.5 * axis.step(),
+        to: axis.to - 0.5 * axis.step(),
+        samples: axis.samples.saturating_sub(1),
+    };
+    let centres = Grid {
+        x_m: middle(&grid.x_m),
+        y_m: middle(&grid.y_m),
+    };
+    if centres.is_empty() {
+        return Ok(worst);
+    }
+    let (x, y) = (centres.x_m.nodes(), centres.y_m.nodes());
+    let found = heights(mesh, &centres, progress)?;
+    for (cell, sample) in found.iter().enumerate() {
+        let (Some(sample), Some(patch)) = (sample, lattice.patch(cell)) else {
+            continue;
+        };
+        let at_m = [x[cell % x.len()], y[cell / x.len()]];
+        let value_m = sample.height_m - patch.height_m(at_m);
+        worst.above = worst.above.or(Extreme { value_m, at_m });
+        worst.below = worst.below.or(Extreme {
+            value_m: -value_m,
+            at_m,
+        });
+    }
+    Ok(worst)
+}

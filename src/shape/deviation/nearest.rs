@@ -1,0 +1,195 @@
+//! The distance from a point to a set of triangles: a tree of boxes, nearest first.
+
+use crate::shape::mesh::{Triangle, minus};
+
+/// Triangles in a leaf.
+const LEAF: usize = 4;
+
+type Box3 = [[f64; 3]; 2];
+
+/// A tree of boxes over triangles.
+pub(super) struct Tree {
+    triangles: Vec<Triangle>,
+    /// Boxes in depth-first order; of an inner node the right child's index, of a leaf the range.
+    nodes: Vec<Node>,
+}
+
+struct Node {
+    bounds: Box3,
+    right: usize,
+    range: Option<[usize; 2]>,
+}
+
+impl Tree {
+    pub(super) fn new(mut triangles: Vec<Triangle>) -> Self {
+        let mut nodes = Vec::new();
+        let count = triangles.len();
+        if count > 0 {
+            build(&mut triangles, 0, &mut nodes);
+        }
+        Self { triangles, nodes }
+    }
+
+    /// Distance to the nearest triangle, and which it is; infinite without any.
+    pub(super) fn nearest(&self, p: [f64; 3]) -> (f64, usize) {
+        let mut best = (f64::INFINITY, 0);
+        if !self.nodes.is_empty() {
+            self.visit(0, p, &mut best);
+        }
+        (best.0.sqrt(), best.1)
+    }
+
+    /// The largest distance from any of the corners to one triangle.
+    ///
+    /// The distance to a convex set is a convex function: no point of the corners' hull is farther
+    /// from that triangle, hence none from all of them.
+    pub(super) fn farthest(&self, triangle: usize, corners: impl Iterator<Item = [f64; 3]>) -> f64 {
+        let Some(triangle) = self.triangles.get(triangle) else {
+            return f64::INFINITY;
+        };
+        corners
+            .map(|p| square_to_triangle(triangle, p))
+            .fold(0.0, f64::max)
+            .sqrt()
+    }
+
+    fn visit(&self, index: usize, p: [f64; 3], best: &mut (f64, usize)) {
+        let node = &self.nodes[index];
+        if square_to_box(&node.bounds, p) >= best.0 {
+            return;
+        }
+        if let Some([from, to]) = node.range {
+            for index in from..to {
+                let square = square_to_triangle(&self.triangles[index], p);
+                if square < best.0 {
+                    *best = (square, index);
+                }
+            }
+            return;
+        }
+        let mut children = [index + 1, node.right];
+        if square_to_box(&self.nodes[children[1]].bounds, p)
+            < square_to_box(&self.nodes[children[0]].bounds, p)
+        {
+            children.swap(0, 1);
+        }
+        for child in children {
+            self.visit(child, p, best);
+        }
+    }
+}
+
+/// Appends the tree of `triangles`, which start at `offset` of the whole.
+fn build(triangles: &mut [Triangle], offset: usize, nodes: &mut Vec<Node>) {
+    let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+    for vertex in triangles.iter().flatten() {
+        for k in 0..3 {
+            bounds[0][k] = bounds[0][k].min(vertex[k]);
+            bounds[1][k] = bounds[1][k].max(vertex[k]);
+        }
+    }
+    let here = nodes.len();
+    let leaf = triangles.len() <= LEAF;
+    nodes.push(Node {
+        bounds,
+        right: 0,
+        range: leaf.then_some([offset, offset + triangles.len()]),
+    });
+    if leaf {
+        return;
+    }
+    let side = |k: usize| bounds[1][k] - bounds[0][k];
+    let longest = (1..3).fold(0, |best, k| if side(k) > side(best) { k } else { best });
+    let middle = triangles.len() / 2;
+    let key = |t: &Triangle| t[0][longest] + t[1][longest] + t[2][longest];
+    triangles.select_nth_unstable_by(middle, |a, b| key(a).total_cmp(&key(b)));
+    let (left, right) = triangles.split_at_mut(middle);
+    build(left, offset, nodes);
+    nodes[here].right = nodes.len();
+    build(right, offset + middle, nodes);
+}
+
+fn square_to_box(bounds: &Box3, p: [f64; 3]) -> f64 {
+    (0..3)
+        .map(|k| (bounds[0][k] - p[k]).max(p[k] - bounds[1][k]).max(0.0))
+        .map(|d| d * d)
+        .sum()
+}
+
+/// Squared distance: to the plane where the foot lies inside, else to the nearest side.
+fn square_to_triangle(&[a, b, c]: &Triangle, p: [f64; 3]) -> f64 {
+    let (u, v, w) = (minus(b, a), minus(c, a), minus(p, a));
+    let (uu, uv, vv) = (dot(u, u), dot(u, v), dot(v, v));
+    let (wu, wv) = (dot(w, u), dot(w, v));
+    let determinant = uu * vv - uv * uv;
+    let (s, t) = (vv * wu - uv * wv, uu * wv - uv * wu);
+    if determinant > 0.0 && s >= 0.0 && t >= 0.0 && s + t <= determinant {
+        let (s, t) = (s / determinant, t / determinant);
+        let off = [0, 1, 2].map(|k| w[k] - s * u[k] - t * v[k]);
+        return dot(off, off);
+    }
+    let sides = [(a, b), (b, c), (c, a)];
+    sides
+        .iter()
+        .map(|(q, r)| square_to_segment(*q, *r, p))
+        .fold(f64::INFINITY, f64::min)
+}
+
+fn square_to_segment(a: [f64; 3], b: [f64; 3], p: [f64; 3]) -> f64 {
+    let (u, w) = (minus(b, a), minus(p, a));
+    let square = dot(u, u);
+    let t = if square > 0.0 {
+        (dot(u, w) / square).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    let off = [0, 1, 2].map(|k| w[k] - t * u[k]);
+    dot(off, off)
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_tree_finds_what_a_search_through_all_finds() {
+        let mut state = 7u64;
+        let mut next = || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let triangles: Vec<Triangle> = (0..300)
+            .map(|_| {
+                let at = [next(), next(), next()];
+                [0; 3].map(|_| at.map(|c| c + 0.2 * next()))
+            })
+            .collect();
+        let tree = Tree::new(triangles.clone());
+        for _ in 0..200 {
+            let p = [next(), next(), next()].map(|c| 1.6 * c - 0.3);
+            // Each triangle sampled finely: never nearer than the distance, hardly farther.
+            let mut nearest = f64::INFINITY;
+            for t in &triangles {
+                for i in 0..=40 {
+                    for j in 0..=40 - i {
+                        let (s, r) = (f64::from(i) / 40.0, f64::from(j) / 40.0);
+                        let q = [0, 1, 2]
+                            .map(|k| t[0][k] + s * (t[1][k] - t[0][k]) + r * (t[2][k] - t[0][k]));
+                        nearest = nearest.min(dot(minus(p, q), minus(p, q)).sqrt());
+                    }
+                }
+            }
+            let found = tree.nearest(p).0;
+            assert!(
+                found <= nearest + 1e-15 && found > nearest - 0.01,
+                "{found} {nearest}"
+            );
+        }
+    }
+}

@@ -1,0 +1,363 @@
+//! Convex pieces of the plan, and the extremes of a plane minus a bilinear patch over them.
+//!
+//! The difference is a saddle: inside a polygon it has no extremum, along an edge it is quadratic.
+//! So its supremum stands at a corner or at the stationary point of an edge, in closed form.
+
+use crate::shape::mesh::Triangle;
+
+/// Corners of a triangle cut by a rectangle, by three lines and by a plane.
+const MOST_CORNERS: usize = 12;
+
+pub(super) type Point = [f64; 2];
+
+/// An axis-aligned rectangle, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rect {
+    /// Lower corner.
+    pub low_m: Point,
+    /// Upper corner.
+    pub high_m: Point,
+}
+
+impl Rect {
+    pub(super) fn centre(&self) -> Point {
+        [0, 1].map(|k| 0.5 * (self.low_m[k] + self.high_m[k]))
+    }
+
+    pub(in crate::shape) fn sides(&self) -> Point {
+        [0, 1].map(|k| self.high_m[k] - self.low_m[k])
+    }
+
+    /// Whether a point lies in it, borders included.
+    pub(super) fn holds(&self, p: Point) -> bool {
+        (0..2).all(|k| self.low_m[k] <= p[k] && p[k] <= self.high_m[k])
+    }
+
+    /// The two halves along an axis.
+    pub(super) fn halves(&self, k: usize) -> [Self; 2] {
+        let (mut lower, mut upper) = (*self, *self);
+        lower.high_m[k] = self.centre()[k];
+        upper.low_m[k] = lower.high_m[k];
+        [lower, upper]
+    }
+
+    /// The four quarters, x fastest.
+    pub(super) fn quarters(&self) -> [Self; 4] {
+        let middle = self.centre();
+        [0, 1, 2, 3].map(|q| {
+            let upper = [q & 1, q >> 1];
+            let pick = |k: usize, from: f64, to: f64| if upper[k] == 1 { to } else { from };
+            Self {
+                low_m: [0, 1].map(|k| pick(k, self.low_m[k], middle[k])),
+                high_m: [0, 1].map(|k| pick(k, middle[k], self.high_m[k])),
+            }
+        })
+    }
+}
+
+/// Heights at a rectangle's corners, bilinear between them, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Patch {
+    /// Where it lies.
+    pub rect: Rect,
+    /// Heights at the corners, x fastest.
+    pub corners_m: [f64; 4],
+}
+
+impl Patch {
+    /// The interpolated height, m.
+    #[must_use]
+    pub fn height_m(&self, p: Point) -> f64 {
+        let [u, v] = [0, 1].map(|k| {
+            let side = self.rect.high_m[k] - self.rect.low_m[k];
+            (p[k] - self.rect.low_m[k]) / side
+        });
+        let [a, b, c, d] = self.corners_m;
+        let (low, high) = (a + u * (b - a), c + u * (d - c));
+        low + v * (high - low)
+    }
+
+    /// The axis along which part of the patch is longer in space.
+    pub(super) fn longer(&self, part: &Rect) -> usize {
+        let centre = part.centre();
+        let lengths = [0, 1].map(|k| {
+            let (mut low, mut high) = (centre, centre);
+            (low[k], high[k]) = (part.low_m[k], part.high_m[k]);
+            (high[k] - low[k]).hypot(self.height_m(high) - self.height_m(low))
+        });
+        usize::from(lengths[1] > lengths[0])
+    }
+
+    /// What remains of the corners' heights after the best plane: zero for a flat patch.
+    pub(super) fn twist_m(&self) -> f64 {
+        let [a, b, c, d] = self.corners_m;
+        (a - b) - (c - d)
+    }
+}
+
+/// A triangle that is no wall, as a plane over its plan; corners counter-clockwise.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Face {
+    pub(super) corners: [Point; 3],
+    origin: [f64; 3],
+    slope: Point,
+    pub(super) heights: [f64; 2],
+}
+
+impl Face {
+    /// `None` for a triangle without area in plan.
+    pub(super) fn new(triangle: &Triangle) -> Option<Self> {
+        let [a, mut b, mut c] = *triangle;
+        let across = |b: [f64; 3], c: [f64; 3]| {
+            (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        };
+        let mut double_area = across(b, c);
+        if double_area < 0.0 {
+            (b, c) = (c, b);
+            double_area = -double_area;
+        }
+        let (u, v) = (
+            [b[0] - a[0], b[1] - a[1], b[2] - a[2]],
+            [c[0] - a[0], c[1] - a[1], c[2] - a[2]],
+        );
+        let slope = [
+            (u[2] * v[1] - v[2] * u[1]) / double_area,
+            (v[2] * u[0] - u[2] * v[0]) / double_area,
+        ];
+        let plan = |p: [f64; 3]| [p[0], p[1]];
+        slope.iter().all(|s| s.is_finite()).then(|| Self {
+            corners: [plan(a), plan(b), plan(c)],
+            origin: a,
+            slope,
+            heights: [a[2].min(b[2]).min(c[2]), a[2].max(b[2]).max(c[2])],
+        })
+    }
+
+    /// A level face whose plan holds the rectangle.
+    pub(super) fn floor(rect: &Rect, height_m: f64) -> Option<Self> {
+        let [width, depth] = rect.sides();
+        let [x, y] = rect.low_m;
+        let corner = |x, y| [x, y, height_m];
+        Self::new(&[
+            corner(x - width, y - depth),
+            corner(x + 4.0 * width, y - depth),
+            corner(x - width, y + 4.0 * depth),
+        ])
+    }
+
+    /// Height over a point of the plan that belongs to the triangle.
+    pub(super) fn height(&self, p: Point) -> f64 {
+        let rise =
+            self.slope[0] * (p[0] - self.origin[0]) + self.slope[1] * (p[1] - self.origin[1]);
+        // A sliver's slope is huge: what rounding adds must not leave the triangle.
+        (self.origin[2] + rise).clamp(self.heights[0], self.heights[1])
+    }
+
+    /// Length in space of a step along an axis.
+    pub(super) fn length(&self, k: usize, step: f64) -> f64 {
+        step.hypot(step * self.slope[k])
+    }
+
+    /// Whether the plan of the triangle may have area in common with the rectangle.
+    pub(super) fn overlaps(&self, rect: &Rect) -> bool {
+        for k in 0..2 {
+            let (low, high) = self.range(k);
+            if high <= rect.low_m[k] || low >= rect.high_m[k] {
+                return false;
+            }
+        }
+        (0..3).all(|k| {
+            let (a, b) = (self.corners[k], self.corners[(k + 1) % 3]);
+            let inward = [a[1] - b[1], b[0] - a[0]];
+            let far = [0, 1].map(|k| {
+                if inward[k] > 0.0 {
+                    rect.high_m[k]
+                } else {
+                    rect.low_m[k]
+                }
+            });
+            inward[0] * (far[0] - a[0]) + inward[1] * (far[1] - a[1]) > 0.0
+        })
+    }
+
+    pub(super) fn range(&self, k: usize) -> (f64, f64) {
+        let [a, b, c] = self.corners.map(|p| p[k]);
+        (a.min(b).min(c), a.max(b).max(c))
+    }
+
+    /// The part of the triangle's plan inside the rectangle.
+    pub(super) fn within(&self, rect: &Rect) -> Polygon {
+        let mut polygon = Polygon::of(&self.corners);
+        for k in 0..2 {
+            polygon = polygon.cut(|p| p[k] - rect.low_m[k]);
+            polygon = polygon.cut(|p| rect.high_m[k] - p[k]);
+        }
+        polygon
+    }
+
+    /// The part of `polygon` over which this triangle stands higher than `other` by more than
+    /// `margin`.
+    pub(super) fn hides(&self, other: &Self, polygon: &Polygon, margin: f64) -> Polygon {
+        if self.heights[1] <= other.heights[0] + margin {
+            return Polygon::of(&[]);
+        }
+        for k in 0..2 {
+            let (low, high) = self.range(k);
+            let (from, to) = polygon.range(k);
+            if high <= from || low >= to {
+                return Polygon::of(&[]);
+            }
+        }
+        let mut part = *polygon;
+        for k in 0..3 {
+            let (a, b) = (self.corners[k], self.corners[(k + 1) % 3]);
+            part = part.cut(|p| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]));
+        }
+        part.cut(|p| self.height(p) - other.height(p) - margin)
+    }
+}
+
+/// A convex polygon, counter-clockwise.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Polygon {
+    corners: [Point; MOST_CORNERS],
+    count: usize,
+}
+
+impl Polygon {
+    pub(super) fn of(corners: &[Point]) -> Self {
+        let mut polygon = Self {
+            corners: [[0.0; 2]; MOST_CORNERS],
+            count: 0,
+        };
+        for corner in corners {
+            polygon.push(*corner);
+        }
+        polygon
+    }
+
+    fn push(&mut self, corner: Point) {
+        // Rounding cannot make a convex polygon gain more than one corner a cut.
+        if self.count < MOST_CORNERS {
+            self.corners[self.count] = corner;
+            self.count += 1;
+        }
+    }
+
+    pub(super) fn corners(&self) -> &[Point] {
+        &self.corners[..self.count]
+    }
+
+    /// Each side as its two ends.
+    pub(super) fn sides(&self) -> impl Iterator<Item = (Point, Point)> + '_ {
+        let corners = self.corners();
+        (0..corners.len()).map(move |k| (corners[k], corners[(k + 1) % corners.len()]))
+    }
+
+    pub(super) fn range(&self, k: usize) -> (f64, f64) {
+        let fold = |(low, high): (f64, f64), p: &Point| (low.min(p[k]), high.max(p[k]));
+        let start = (f64::INFINITY, f64::NEG_INFINITY);
+        self.corners().iter().fold(start, fold)
+    }
+
+    /// The part where the function, linear over the polygon, is not negative.
+    pub(super) fn cut(&self, inside: impl Fn(Point) -> f64) -> Self {
+        let mut kept = Self::of(&[]);
+        if self.count == 0 {
+            return kept;
+        }
+        let mut previous = self.corners[self.count - 1];
+        let mut before = inside(previous);
+        for &corner in self.corners() {
+            let here = inside(corner);
+            if (before < 0.0 && here > 0.0) || (before > 0.0 && here < 0.0) {
+                let t = before / (before - here);
+                kept.push([0, 1].map(|k| previous[k] + t * (corner[k] - previous[k])));
+            }
+            if here >= 0.0 {
+                kept.push(corner);
+            }
+            (previous, before) = (corner, here);
+        }
+        kept
+    }
+
+    /// Area over half the perimeter: about the width of a thin piece.
+    pub(super) fn width(&self) -> f64 {
+        if self.count < 3 {
+            return 0.0;
+        }
+        let origin = self.corners[0];
+        let (mut area, mut perimeter) = (0.0, 0.0);
+        for (a, b) in self.sides() {
+            area +=
+                (a[0] - origin[0]) * (b[1] - origin[1]) - (a[1] - origin[1]) * (b[0] - origin[0]);
+            perimeter += (b[0] - a[0]).hypot(b[1] - a[1]);
+        }
+        if perimeter > 0.0 {
+            area / perimeter
+        } else {
+            0.0
+        }
+    }
+
+    /// The largest value over the polygon of a function that is quadratic along every line and
+    /// has no maximum inside.
+    pub(super) fn supremum(&self, value: impl Fn(Point) -> f64) -> Extreme {
+        self.sides().fold(Extreme::NONE, |best, (a, b)| {
+            best.or(along(a, b, [0.0, 1.0], &value))
+        })
+    }
+}
+
+/// A value and where it stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extreme {
+    /// The value; minus infinity for none.
+    pub value_m: f64,
+    /// Its place in plan, m.
+    pub at_m: Point,
+}
+
+impl Extreme {
+    pub(super) const NONE: Self = Self {
+        value_m: f64::NEG_INFINITY,
+        at_m: [0.0; 2],
+    };
+
+    /// The larger; of equal ones the first.
+    pub(super) fn or(self, other: Self) -> Self {
+        if other.value_m > self.value_m {
+            other
+        } else {
+            self
+        }
+    }
+}
+
+/// The largest value of a quadratic over part of a segment, exactly.
+pub(super) fn along(a: Point, b: Point, part: [f64; 2], value: &impl Fn(Point) -> f64) -> Extreme {
+    let at = |t: f64| [0, 1].map(|k| a[k] + t * (b[k] - a[k]));
+    let [from, to] = part;
+    let points = [at(from), at(0.5 * (from + to)), at(to)];
+    let [first, middle, last] = points.map(value);
+    let curvature = 2.0 * (first + last) - 4.0 * middle;
+    let slope = last - first - curvature;
+    let ends = Extreme {
+        value_m: first,
+        at_m: points[0],
+    }
+    .or(Extreme {
+        value_m: last,
+        at_m: points[2],
+    });
+    let stationary = -slope / (2.0 * curvature);
+    if curvature < 0.0 && stationary > 0.0 && stationary < 1.0 {
+        let peak = at(from + stationary * (to - from));
+        return ends.or(Extreme {
+            value_m: value(peak),
+            at_m: peak,
+        });
+    }
+    ends
+}

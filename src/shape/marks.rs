@@ -1,0 +1,214 @@
+//! What a point is besides a height: on a wall, a rim, a crease, under or over other sheets.
+
+use crate::shape::height::{Sample, sample_of};
+use crate::shape::mesh::{Triangle, minus};
+use crate::shape::seen::{Contact, Seen, WALL_NORMAL_Z, upward_normal};
+
+/// Faces that turn by less are neighbours on a curved surface, degrees.
+pub const CREASE_DEG: f64 = 20.0;
+/// Angles nearer than this are equal, rad.
+const SAME_ANGLE: f64 = 1e-9;
+/// Heights nearer than this times the larger one are the same sheet.
+const SAME_HEIGHT: f64 = 1e-9;
+
+/// What a point is besides a height.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Marks {
+    /// A vertical wall passes through it; the height is the wall's top.
+    pub wall: bool,
+    /// The surface ends there in some direction.
+    pub rim: bool,
+    /// Normal of the other face where two meet at more than [`CREASE_DEG`].
+    pub crease: Option<[f64; 3]>,
+    /// Heights at which the vertical line meets the surface; a closed body has two.
+    pub layers: u32,
+    /// More layers than a body without overhang has.
+    pub overhang: bool,
+    /// There is no surface: the height was filled in from around the hole.
+    pub filled: bool,
+}
+
+impl Marks {
+    /// A point on a single sheet, away from its borders.
+    pub const PLAIN: Self = Self {
+        wall: false,
+        rim: false,
+        crease: None,
+        layers: 1,
+        overhang: false,
+        filled: false,
+    };
+}
+
+/// What does not change from point to point.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rules {
+    /// How far from an edge a point touches it, m.
+    pub(super) reach_m: f64,
+    /// Layers of a point without overhang.
+    pub(super) plain_layers: u32,
+}
+
+/// How often each edge occurs, folded: zero for a closed surface, whatever its orientation.
+///
+/// Vertices must be equal to the bit; a surface with T-junctions counts as open.
+pub(super) fn is_closed(triangles: &[Triangle]) -> bool {
+    let mix = |mut z: u64| {
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    };
+    let point = |p: [f64; 3]| {
+        // Adding 0 turns -0 into 0.
+        p.iter().fold(0x9e37_79b9_7f4a_7c15, |h: u64, c| {
+            mix(h ^ (c + 0.0).to_bits())
+        })
+    };
+    let folded = triangles.iter().fold(0, |sum, triangle| {
+        let [a, b, c] = triangle.map(point);
+        [[a, b], [b, c], [c, a]]
+            .iter()
+            .fold(sum, |sum, [p, q]| sum ^ mix(p.wrapping_add(*q)))
+    });
+    folded == 0
+}
+
+/// Height and marks over `p`, from every triangle that may touch its vertical line.
+pub(super) fn at(
+    triangles: &[Triangle],
+    touching: &[u32],
+    p: [f64; 2],
+    rules: Rules,
+) -> Option<(Sample, Marks)> {
+    let mut contacts = Vec::with_capacity(touching.len());
+    for &index in touching {
+        let seen = Seen::new(&triangles[index as usize], rules.reach_m);
+        match seen.contact(p) {
+            Contact::None => {}
+            contact => contacts.push((index, contact)),
+        }
+    }
+    let sample = sample_of(triangles, &contacts)?;
+    Some((sample, of_contacts(triangles, &contacts, p, &sample, rules)))
+}
+
+fn of_contacts(
+    triangles: &[Triangle],
+    contacts: &[(u32, Contact)],
+    p: [f64; 2],
+    sample: &Sample,
+    rules: Rules,
+) -> Marks {
+    let same_m = SAME_HEIGHT * sample.height_m.abs() + 4.0 * rules.reach_m;
+    let same = |height: f64| (height - sample.height_m).abs() <= same_m;
+    let wall = contacts
+        .iter()
+        .any(|(_, contact)| matches!(contact, Contact::Wall(_)));
+    let mut heights: Vec<f64> = Vec::with_capacity(contacts.len());
+    for (_, contact) in contacts {
+        if let Contact::Covers(height) = contact {
+            heights.push(*height);
+        }
+    }
+    heights.sort_by(f64::total_cmp);
+    let steps = heights
+        .windows(2)
+        .filter(|pair| pair[1] - pair[0] > same_m)
+        .count() as u32;
+    let layers = if heights.is_empty() { 1 } else { steps + 1 };
+    let crease = contacts
+        .iter()
+        .filter_map(|(index, contact)| match contact {
+            Contact::Covers(height) | Contact::Near(height) if same(*height) => {
+                Some(upward_normal(&triangles[*index as usize]))
+            }
+            _ => None,
+        })
+        .filter(|normal| normal[2] > WALL_NORMAL_Z)
+        // A body's underside meets its top at the rim: that is no crease.
+        .filter(|normal| turn(normal, &sample.normal) < CREASE_DEG.to_radians().cos())
+        .min_by(|a, b| {
+            let key = |n: &[f64; 3]| (turn(n, &sample.normal), *n);
+            key(a)
+                .partial_cmp(&key(b))
+                .unwrap_or(std::cmp::Ordering::Equal)
+        });
+    let rim = !surrounded(triangles, contacts, p);
+    Marks {
+        wall,
+        rim,
+        crease: crease.filter(|_| !rim),
+        layers,
+        overhang: layers > rules.plain_layers,
+        filled: false,
+    }
+}
+
+fn turn(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Whether there is surface in every direction from `p`.
+fn surrounded(triangles: &[Triangle], contacts: &[(u32, Contact)], p: [f64; 2]) -> bool {
+    let mut sectors: Vec<[f64; 2]> = Vec::new();
+    for (index, contact) in contacts {
+        if !matches!(contact, Contact::Covers(_)) {
+            continue;
+        }
+        match sector(&triangles[*index as usize], p) {
+            None => return true,
+            Some(sector) => sectors.push(sector),
+        }
+    }
+    sectors.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let Some(first) = sectors.first() else {
+        return false;
+    };
+    let (start, mut end) = (first[0], first[1]);
+    for [from, to] in sectors {
+        if from > end + SAME_ANGLE {
+            return false;
+        }
+        end = end.max(to);
+    }
+    end >= start + std::f64::consts::TAU - SAME_ANGLE
+}
+
+/// The directions from a point of the triangle's border into it, rad; `None` from inside.
+fn sector(triangle: &Triangle, p: [f64; 2]) -> Option<[f64; 2]> {
+    let side = |a: [f64; 3], b: [f64; 3]| {
+        let coord = |x: f64, y: f64| robust::Coord { x, y };
+        robust::orient2d(coord(a[0], a[1]), coord(b[0], b[1]), coord(p[0], p[1]))
+    };
+    let [a, mut b, mut c] = *triangle;
+    let (u, v) = (minus(b, a), minus(c, a));
+    if u[0] * v[1] < u[1] * v[0] {
+        (b, c) = (c, b);
+    }
+    let corners = [a, b, c];
+    let angle = |to: [f64; 3], from: [f64; 2]| (to[1] - from[1]).atan2(to[0] - from[0]);
+    let open = |from: f64, to: f64| {
+        [
+            from,
+            if to < from {
+                to + std::f64::consts::TAU
+            } else {
+                to
+            },
+        ]
+    };
+    for k in 0..3 {
+        let [here, next, last] = [0, 1, 2].map(|n| corners[(k + n) % 3]);
+        if p == [here[0], here[1]] {
+            return Some(open(angle(next, p), angle(last, p)));
+        }
+    }
+    for k in 0..3 {
+        let [from, to] = [0, 1].map(|n| corners[(k + n) % 3]);
+        if side(from, to) == 0.0 {
+            let forward = angle(to, [from[0], from[1]]);
+            return Some([forward, forward + std::f64::consts::PI]);
+        }
+    }
+    None
+}

@@ -1,0 +1,166 @@
+//! Constraint points that lie on no grid: graded to a deviation, or blue noise.
+
+pub mod adaptive;
+pub mod poisson;
+
+use crate::shape::deviation::{Faces, Patch, Rect, primitive};
+use crate::shape::error::ShapeError;
+use crate::shape::height::{Grid, Sample, reach_m};
+use crate::shape::index::Index;
+use crate::shape::marks::{self, Marks, Rules};
+use crate::shape::mesh::Mesh;
+use crate::shape::primitive::PlacedPrimitive;
+use crate::shape::surface::Surface;
+
+/// More points than this are refused.
+const MOST_POINTS: usize = 5_000_000;
+
+/// Points with the area each stands for; columns of equal length, sorted by y, then x.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Scattered {
+    /// x of each point, m.
+    pub x_m: Vec<f64>,
+    /// y of each point, m.
+    pub y_m: Vec<f64>,
+    /// Height of each point, m.
+    pub height_m: Vec<f64>,
+    /// Unit normal of each point, n_z >= 0.
+    pub normal: Vec<[f64; 3]>,
+    /// What each point is besides.
+    pub marks: Vec<Marks>,
+    /// Plan area each point stands for, m^2: its weight in a sum over the surface.
+    pub weight_m2: Vec<f64>,
+}
+
+impl Scattered {
+    /// Number of points.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.x_m.len()
+    }
+
+    /// True without points.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.x_m.is_empty()
+    }
+
+    fn push(&mut self, p: [f64; 2], (sample, marks): (Sample, Marks), weight_m2: f64) {
+        self.x_m.push(p[0]);
+        self.y_m.push(p[1]);
+        self.height_m.push(sample.height_m);
+        self.normal.push(sample.normal);
+        self.marks.push(marks);
+        self.weight_m2.push(weight_m2);
+    }
+}
+
+/// A surface that answers at any point of the plan.
+pub struct Probe<'a> {
+    kind: Kind<'a>,
+    plan_m: Rect,
+}
+
+enum Kind<'a> {
+    Mesh {
+        mesh: &'a Mesh,
+        index: Index,
+        faces: Faces,
+        rules: Rules,
+    },
+    Primitive(&'a PlacedPrimitive),
+}
+
+impl<'a> Probe<'a> {
+    /// Prepares a surface over the region that `grid` spans.
+    #[must_use]
+    pub fn new(surface: &'a Surface, grid: &Grid) -> Self {
+        let plan = grid.plan();
+        let kind = match surface {
+            Surface::Mesh(mesh) => {
+                let reach = reach_m(mesh, grid);
+                Kind::Mesh {
+                    mesh,
+                    index: Index::new(mesh, reach),
+                    faces: Faces::new(mesh, grid),
+                    rules: Rules {
+                        reach_m: reach,
+                        plain_layers: 1 + u32::from(marks::is_closed(mesh.triangles())),
+                    },
+                }
+            }
+            Surface::Primitive(primitive) => Kind::Primitive(primitive),
+        };
+        Self {
+            kind,
+            plan_m: Rect {
+                low_m: plan.map(|[low, _]| low),
+                high_m: plan.map(|[_, high]| high),
+            },
+        }
+    }
+
+    /// Height, normal and marks over a point; `None` where there is no surface.
+    #[must_use]
+    pub fn at(&self, p: [f64; 2]) -> Option<(Sample, Marks)> {
+        match &self.kind {
+            Kind::Mesh {
+                mesh, index, rules, ..
+            } => marks::at(mesh.triangles(), index.at(p), p, *rules),
+            Kind::Primitive(primitive) => Some((primitive.sample(p[0], p[1])?, Marks::PLAIN)),
+        }
+    }
+
+    /// Indices of the faces over the whole region; empty for a formula.
+    fn faces(&self) -> Vec<u32> {
+        match &self.kind {
+            Kind::Mesh { faces, .. } => faces.over(&self.plan_m, &faces.all()),
+            Kind::Primitive(_) => Vec::new(),
+        }
+    }
+
+    /// Of `among`, the faces over a rectangle.
+    fn faces_over(&self, rect: &Rect, among: &[u32]) -> Vec<u32> {
+        match &self.kind {
+            Kind::Mesh { faces, .. } => faces.over(rect, among),
+            Kind::Primitive(_) => Vec::new(),
+        }
+    }
+
+    /// Whether a rectangle without point may still have surface over it.
+    fn may_have_surface(&self, rect: &Rect, among: &[u32]) -> bool {
+        match &self.kind {
+            Kind::Mesh { .. } => !among.is_empty(),
+            Kind::Primitive(_) => (0..25).any(|k| {
+                let [u, v] = [k % 5, k / 5].map(|n| f64::from(n) / 4.0);
+                let at = |k: usize, t: f64| (1.0 - t) * rect.low_m[k] + t * rect.high_m[k];
+                self.at([at(0, u), at(1, v)]).is_some()
+            }),
+        }
+    }
+
+    /// A bound of the vertical difference between surface and patch, m.
+    fn deviation_m(&self, patch: &Patch, among: &[u32]) -> f64 {
+        match &self.kind {
+            Kind::Mesh { faces, .. } => faces.deviation_m(patch, among),
+            Kind::Primitive(shape) => {
+                let axis = |k: usize| crate::numerics::axis::Axis {
+                    from: patch.rect.low_m[k],
+                    to: patch.rect.high_m[k],
+                    samples: 2,
+                };
+                let grid = Grid {
+                    x_m: axis(0),
+                    y_m: axis(1),
+                };
+                primitive(shape, &grid, &patch.corners_m.map(Some)).bound_m()
+            }
+        }
+    }
+}
+
+fn too_many(what: &str) -> ShapeError {
+    ShapeError::Document(format!(
+        "more than {MOST_POINTS} points would be needed; {what}"
+    ))
+}

@@ -1,0 +1,201 @@
+//! Points as dense as a deviation asks for: a quadtree whose leaves are bilinear patches.
+//!
+//! A rectangle is quartered until its patch lies within the deviation everywhere, certified as for
+//! a grid. Where the surface jumps or ends no patch can follow it; there the quartering stops at
+//! rectangles no wider than the deviation, so that the step is known to that in plan.
+
+use std::collections::BTreeMap;
+
+use super::{MOST_POINTS, Probe, Scattered, too_many};
+use crate::progress::Progress;
+use crate::shape::deviation::{Patch, Rect};
+use crate::shape::error::ShapeError;
+use crate::shape::height::Sample;
+use crate::shape::marks::Marks;
+
+/// Rectangles along the longer side to begin with.
+const FIRST: f64 = 4.0;
+/// A rectangle is quartered so often at most.
+const DEEPEST: u32 = 20;
+
+/// Points graded to a deviation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Adaptive {
+    /// The points, weighted by the area of the leaves around them.
+    pub points: Scattered,
+    /// Leaves within the deviation.
+    pub leaves: usize,
+    /// The largest vertical difference in these, m.
+    pub vertical_m: f64,
+    /// Leaves at a rim or a jump, which the surface leaves or which it crosses in a step.
+    pub borders: usize,
+    /// The widest of these, m.
+    pub border_m: f64,
+}
+
+/// A node's place, in steps of the finest rectangle.
+type Node = [u32; 2];
+
+struct Work<'a> {
+    probe: &'a Probe<'a>,
+    progress: &'a dyn Progress,
+    /// Rectangles along each axis before the first quartering.
+    first: [u32; 2],
+    max_deviation_m: f64,
+    /// Ordered by y, then x: the order of the output.
+    nodes: BTreeMap<Node, Option<(Sample, Marks, f64)>>,
+    found: usize,
+    result: Adaptive,
+}
+
+/// Points such that bilinear patches between them lie within `max_deviation_m` of the surface,
+/// vertically, or are no wider than it.
+///
+/// # Errors
+/// [`ShapeError::Document`] for a deviation that is not positive or asks for too many points;
+/// [`ShapeError::Interrupted`].
+pub fn adaptive(
+    probe: &Probe<'_>,
+    max_deviation_m: f64,
+    progress: &dyn Progress,
+) -> Result<Adaptive, ShapeError> {
+    if !(max_deviation_m > 0.0 && max_deviation_m.is_finite()) {
+        return Err(ShapeError::Document(format!(
+            "the deviation is {} mm; it must be positive",
+            max_deviation_m * 1000.0
+        )));
+    }
+    let sides = probe.plan_m.sides();
+    let longer = sides[0].max(sides[1]);
+    if !(sides[0] > 0.0 && sides[1] > 0.0) {
+        return Err(ShapeError::Document(
+            "points to a deviation need a region with area; give two ends along x and y".into(),
+        ));
+    }
+    let first = sides.map(|side| (FIRST * side / longer).ceil() as u32);
+    let mut work = Work {
+        probe,
+        progress,
+        first,
+        max_deviation_m,
+        nodes: BTreeMap::new(),
+        found: 0,
+        result: Adaptive {
+            points: Scattered::default(),
+            leaves: 0,
+            vertical_m: 0.0,
+            borders: 0,
+            border_m: 0.0,
+        },
+    };
+    let all = probe.faces();
+    progress.begin("points", u64::from(first[0] * first[1]));
+    for row in 0..first[1] {
+        for column in 0..first[0] {
+            let low = [column, row].map(|n| n << DEEPEST);
+            let members = probe.faces_over(&work.rect(low, 1 << DEEPEST), &all);
+            work.refine(low, DEEPEST, &members)?;
+            progress.advance(1);
+        }
+    }
+    progress.end();
+    let Work {
+        nodes,
+        mut result,
+        first,
+        ..
+    } = work;
+    for ([row, column], node) in nodes {
+        if let Some((sample, marks, weight_m2)) = node {
+            let p = place(probe, first, [column, row]);
+            result.points.push(p, (sample, marks), weight_m2);
+        }
+    }
+    Ok(result)
+}
+
+/// A node's coordinates, m; both ends exact.
+fn place(probe: &Probe<'_>, first: [u32; 2], node: Node) -> [f64; 2] {
+    [0, 1].map(|k| {
+        let last = f64::from(first[k]) * f64::from(1u32 << DEEPEST);
+        let n = f64::from(node[k]);
+        if n == last {
+            return probe.plan_m.high_m[k];
+        }
+        let (a, b) = (probe.plan_m.low_m[k], probe.plan_m.high_m[k]);
+        if n == 0.0 {
+            a
+        } else {
+            ((last - n) * a + n * b) / last
+        }
+    })
+}
+
+impl Work<'_> {
+    fn rect(&self, low: Node, size: u32) -> Rect {
+        Rect {
+            low_m: place(self.probe, self.first, low),
+            high_m: place(self.probe, self.first, low.map(|n| n + size)),
+        }
+    }
+
+    fn height_m(&mut self, node: Node) -> Option<f64> {
+        let (probe, first) = (self.probe, self.first);
+        let found = &mut self.found;
+        let value = self.nodes.entry([node[1], node[0]]).or_insert_with(|| {
+            let (sample, marks) = probe.at(place(probe, first, node))?;
+            *found += 1;
+            Some((sample, marks, 0.0))
+        });
+        value.map(|(sample, _, _)| sample.height_m)
+    }
+
+    fn refine(&mut self, low: Node, level: u32, members: &[u32]) -> Result<(), ShapeError> {
+        self.progress.check()?;
+        if self.found > MOST_POINTS {
+            return Err(too_many("allow a larger deviation"));
+        }
+        let size = 1 << level;
+        let rect = self.rect(low, size);
+        let corners =
+            [[0, 0], [size, 0], [0, size], [size, size]].map(|[x, y]| [low[0] + x, low[1] + y]);
+        let heights = corners.map(|corner| self.height_m(corner));
+        let sides = rect.sides();
+        let widest_m = sides[0].max(sides[1]);
+        if heights.iter().all(Option::is_none) && !self.probe.may_have_surface(&rect, members) {
+            return Ok(());
+        }
+        if let [Some(a), Some(b), Some(c), Some(d)] = heights {
+            let corners_m = [a, b, c, d];
+            let off_m = self.probe.deviation_m(&Patch { rect, corners_m }, members);
+            if off_m <= self.max_deviation_m {
+                self.result.leaves += 1;
+                self.result.vertical_m = self.result.vertical_m.max(off_m);
+                self.weigh(&corners, sides[0] * sides[1]);
+                return Ok(());
+            }
+        }
+        if widest_m <= self.max_deviation_m || level == 0 {
+            self.result.borders += 1;
+            self.result.border_m = self.result.border_m.max(widest_m);
+            self.weigh(&corners, sides[0] * sides[1]);
+            return Ok(());
+        }
+        let half = size / 2;
+        for [x, y] in [[0, 0], [half, 0], [0, half], [half, half]] {
+            let corner = [low[0] + x, low[1] + y];
+            let members = self.probe.faces_over(&self.rect(corner, half), members);
+            self.refine(corner, level - 1, &members)?;
+        }
+        Ok(())
+    }
+
+    /// Gives a leaf's area to its corners with surface, in equal parts.
+    fn weigh(&mut self, corners: &[Node; 4], area_m2: f64) {
+        for corner in corners {
+            if let Some(Some((_, _, weight_m2))) = self.nodes.get_mut(&[corner[1], corner[0]]) {
+                *weight_m2 += area_m2 / 4.0;
+            }
+        }
+    }
+}

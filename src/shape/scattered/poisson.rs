@@ -1,0 +1,167 @@
+//! Blue noise: points in no order, none nearer to another than a spacing, none missing.
+//!
+//! Darts are thrown into the cells of a grid so fine that each holds one point at most, over and
+//! over in a shuffled order; the stream of numbers depends on the seed alone. A point's weight is
+//! the area nearer to it than to any other, counted on a finer grid.
+
+use super::{MOST_POINTS, Probe, Scattered, too_many};
+use crate::progress::Progress;
+use crate::shape::error::ShapeError;
+use crate::shape::height::Sample;
+use crate::shape::marks::Marks;
+
+/// Darts into every free cell.
+const ROUNDS: u64 = 40;
+/// Places a spacing at which areas are counted.
+const COUNTED: f64 = 4.0;
+
+/// Points at random with a least spacing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Poisson {
+    /// The points, weighted by the area nearest to each.
+    pub points: Scattered,
+    /// No place of the surface, of those counted, lies farther from a point in plan, m.
+    pub cover_m: f64,
+}
+
+struct Cells {
+    low_m: [f64; 2],
+    cell_m: f64,
+    count: [usize; 2],
+    darts: Vec<Option<([f64; 2], Sample, Marks)>>,
+}
+
+/// Points over the probe's region, at least `spacing_m` apart in plan.
+///
+/// # Errors
+/// [`ShapeError::Document`] for a spacing that is not positive or asks for too many points;
+/// [`ShapeError::Interrupted`].
+pub fn poisson(
+    probe: &Probe<'_>,
+    spacing_m: f64,
+    seed: u64,
+    progress: &dyn Progress,
+) -> Result<Poisson, ShapeError> {
+    if !(spacing_m > 0.0 && spacing_m.is_finite()) {
+        return Err(ShapeError::Document(format!(
+            "the spacing is {} mm; it must be positive",
+            spacing_m * 1000.0
+        )));
+    }
+    // A cell's diagonal is a spacing.
+    let cell_m = spacing_m / std::f64::consts::SQRT_2;
+    let sides = probe.plan_m.sides();
+    let count = sides.map(|side| (side / cell_m).ceil().max(1.0) as usize);
+    if count[0].saturating_mul(count[1]) > 2 * MOST_POINTS {
+        return Err(too_many("take a larger spacing"));
+    }
+    let mut cells = Cells {
+        low_m: probe.plan_m.low_m,
+        cell_m,
+        count,
+        darts: vec![None; count[0] * count[1]],
+    };
+    let mut random = Random(seed);
+    let mut order: Vec<usize> = (0..cells.darts.len()).collect();
+    for k in (1..order.len()).rev() {
+        order.swap(k, (random.unit() * (k + 1) as f64) as usize);
+    }
+    progress.begin("points", ROUNDS);
+    for _ in 0..ROUNDS {
+        progress.check()?;
+        for &cell in &order {
+            if cells.darts[cell].is_some() {
+                continue;
+            }
+            let place = [cell % count[0], cell / count[0]];
+            let p = [0, 1].map(|k| {
+                let p = probe.plan_m.low_m[k] + (place[k] as f64 + random.unit()) * cell_m;
+                p.min(probe.plan_m.high_m[k])
+            });
+            if cells
+                .nearest(p, 2)
+                .is_some_and(|(_, square)| square < spacing_m * spacing_m)
+            {
+                continue;
+            }
+            if let Some((sample, marks)) = probe.at(p) {
+                cells.darts[cell] = Some((p, sample, marks));
+            }
+        }
+        progress.advance(1);
+    }
+    progress.end();
+    let (areas_m2, cover_m) = areas(probe, &cells, spacing_m / COUNTED);
+    let mut found: Vec<_> = cells
+        .darts
+        .iter()
+        .zip(areas_m2)
+        .filter_map(|(d, a)| Some(((*d)?, a)))
+        .collect();
+    found.sort_by(|((p, ..), _), ((q, ..), _)| p[1].total_cmp(&q[1]).then(p[0].total_cmp(&q[0])));
+    let mut points = Scattered::default();
+    for ((p, sample, marks), area_m2) in found {
+        points.push(p, (sample, marks), area_m2);
+    }
+    Ok(Poisson { points, cover_m })
+}
+
+/// The area nearest to each dart, and the farthest that any of it lies from its dart.
+fn areas(probe: &Probe<'_>, cells: &Cells, step_m: f64) -> (Vec<f64>, f64) {
+    let mut areas_m2 = vec![0.0; cells.darts.len()];
+    let mut farthest = 0.0_f64;
+    let sides = probe.plan_m.sides();
+    let count = sides.map(|side| (side / step_m).ceil().max(1.0) as usize);
+    let area_m2 = sides[0] / count[0] as f64 * (sides[1] / count[1] as f64);
+    for k in 0..count[0] * count[1] {
+        let place = [k % count[0], k / count[0]];
+        let p = [0, 1]
+            .map(|k| probe.plan_m.low_m[k] + (place[k] as f64 + 0.5) * sides[k] / count[k] as f64);
+        if probe.at(p).is_none() {
+            continue;
+        }
+        if let Some((cell, square)) = cells.nearest(p, 4) {
+            areas_m2[cell] += area_m2;
+            farthest = farthest.max(square);
+        }
+    }
+    (areas_m2, farthest.sqrt())
+}
+
+impl Cells {
+    /// The nearest dart among the cells up to `around` away, and its distance squared.
+    fn nearest(&self, p: [f64; 2], around: usize) -> Option<(usize, f64)> {
+        let place = [0, 1]
+            .map(|k| (((p[k] - self.low_m[k]) / self.cell_m) as usize).min(self.count[k] - 1));
+        let [columns, rows] = [0, 1]
+            .map(|k| place[k].saturating_sub(around)..=(place[k] + around).min(self.count[k] - 1));
+        let mut best: Option<(usize, f64)> = None;
+        for row in rows {
+            for column in columns.clone() {
+                let cell = row * self.count[0] + column;
+                if let Some((q, ..)) = self.darts[cell] {
+                    let [u, v] = [p[0] - q[0], p[1] - q[1]];
+                    let square = u * u + v * v;
+                    if best.is_none_or(|(_, least)| square < least) {
+                        best = Some((cell, square));
+                    }
+                }
+            }
+        }
+        best
+    }
+}
+
+/// A repeatable stream of numbers (splitmix64).
+struct Random(u64);
+
+impl Random {
+    /// From 0 to below 1.
+    fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+}

@@ -1,0 +1,84 @@
+//! How far a mesh may lie from the smooth surface it was cut from: an estimate from its angles.
+//!
+//! Two facets of width w1 and w2 across their common edge that turn by an angle t follow a curve of
+//! radius (w1 + w2) / 2 t, whose arc rises (w1 + w2) t / 16 above either chord. A facet bends both
+//! ways, so its two largest are added. Edges that turn more than [`SHARPEST_DEG`] are taken as meant.
+
+use rayon::prelude::*;
+
+use crate::shape::mesh::{Mesh, cross, minus};
+
+/// Turns beyond this are edges of the body, not of the tessellation, degrees.
+const SHARPEST_DEG: f64 = 20.0;
+
+/// The largest estimated deviation of a facet from the surface meant, m; 0 for a plane body.
+#[must_use]
+pub fn estimated_deviation_m(mesh: &Mesh) -> f64 {
+    type Key = [[u64; 3]; 2];
+    let triangles = mesh.triangles();
+    let bits = |p: [f64; 3]| p.map(|c| (c + 0.0).to_bits());
+    let mut sides: Vec<(Key, u32, u8)> = (0..triangles.len())
+        .into_par_iter()
+        .flat_map_iter(|index| {
+            (0..3u8).map(move |side| {
+                let ends = [0, 1].map(|end| bits(triangles[index][(side as usize + end) % 3]));
+                let [a, b] = ends;
+                (if b < a { [b, a] } else { [a, b] }, index as u32, side)
+            })
+        })
+        .collect();
+    sides.par_sort_unstable();
+    let cosine = SHARPEST_DEG.to_radians().cos();
+    let mut rises = vec![[0.0_f64; 2]; triangles.len()];
+    let mut from = 0;
+    while from < sides.len() {
+        let same = sides[from..]
+            .iter()
+            .take_while(|side| side.0 == sides[from].0)
+            .count();
+        // Where three or more meet, the edge is no part of a smooth surface.
+        if let [(_, first, side), (_, second, other)] = sides[from..from + same] {
+            let (p, q) = (
+                facet(triangles, first, side),
+                facet(triangles, second, other),
+            );
+            // Each is given by its direction away from the common edge: opposite ones are level.
+            let turn = -dot(p.0, q.0);
+            if turn > cosine {
+                let level = [0, 1, 2].map(|k| p.0[k] + q.0[k]);
+                let angle = 2.0 * (0.5 * dot(level, level).sqrt()).asin();
+                let rise = (p.1 + q.1) * angle / 16.0;
+                for index in [first, second] {
+                    let most = &mut rises[index as usize];
+                    if rise > most[0] {
+                        *most = [rise, most[0]];
+                    } else {
+                        most[1] = most[1].max(rise);
+                    }
+                }
+            }
+        }
+        from += same;
+    }
+    rises
+        .iter()
+        .fold(0.0, |most, rise| most.max(rise[0] + rise[1]))
+}
+
+/// The facet's unit direction away from one of its sides, and its width in that direction.
+fn facet(triangles: &[[[f64; 3]; 3]], index: u32, side: u8) -> ([f64; 3], f64) {
+    let corner = |k: u8| triangles[index as usize][(side + k) as usize % 3];
+    let along = minus(corner(1), corner(0));
+    let across = minus(corner(2), corner(0));
+    let inward = cross(cross(along, across), along);
+    let length = dot(inward, inward).sqrt();
+    if length == 0.0 {
+        return ([0.0; 3], 0.0);
+    }
+    let unit = inward.map(|c| c / length);
+    (unit, dot(unit, across))
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}

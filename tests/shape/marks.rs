@@ -1,0 +1,352 @@
+//! What points are besides heights, holes, and points on no grid.
+
+use std::f64::consts::PI;
+
+use fluxform::numerics::axis::Axis;
+use fluxform::progress::Silent;
+use fluxform::shape::certificate::Certify;
+use fluxform::shape::deviation::{Faces, Lattice, vertical};
+use fluxform::shape::document::{
+    AxisRequest, GridRequest, Placement, Primitive, ShapeDocument, SurfaceSource,
+};
+use fluxform::shape::height::Grid;
+use fluxform::shape::holes::{Holes, fill, holes};
+use fluxform::shape::marks::Marks;
+use fluxform::shape::mesh::{Mesh, Triangle};
+use fluxform::shape::placement::Transform;
+use fluxform::shape::primitive::PlacedPrimitive;
+use fluxform::shape::scattered::Probe;
+use fluxform::shape::scattered::adaptive::{Adaptive, adaptive};
+use fluxform::shape::scattered::poisson::poisson;
+use fluxform::shape::{Settings, Surface, discretize_with, stl};
+
+use crate::support::{exact, file, grid, lifted, root, sample, seed_grid};
+
+fn box_of(low: [f64; 3], high: [f64; 3]) -> Vec<Triangle> {
+    let corner = |k: usize| [0, 1, 2].map(|a| if k >> a & 1 == 1 { high[a] } else { low[a] });
+    let sides = [
+        [0, 1, 3, 2],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 3, 7, 6],
+        [0, 2, 6, 4],
+        [1, 3, 7, 5],
+    ];
+    sides
+        .iter()
+        .flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]].map(|t| t.map(corner)))
+        .collect()
+}
+
+fn probe_at(triangles: Vec<Triangle>, points: &[[f64; 2]]) -> Vec<Option<(f64, Marks)>> {
+    let surface = Surface::Mesh(exact(triangles));
+    let probe = Probe::new(&surface, &grid((-3.0, 3.0, 7), (-3.0, 3.0, 7)));
+    let found = points.iter().map(|p| probe.at(*p));
+    found
+        .map(|f| f.map(|(sample, marks)| (sample.height_m, marks)))
+        .collect()
+}
+
+#[test]
+fn a_box_has_walls_and_rims() {
+    let points = [[0.3, 0.2], [1.0, 0.2], [1.0, 1.0], [1.5, 0.0]];
+    let found = probe_at(
+        box_of([-1.0; 3].map(|c| c + 1.5), [2.5, 2.5, 2.0]),
+        &points.map(|p| p.map(|c| c + 1.5)),
+    );
+    let [inside, side, corner, beyond] = found[..] else {
+        panic!()
+    };
+    let (height, marks) = inside.unwrap();
+    assert_eq!(
+        (height, marks.wall, marks.rim, marks.layers, marks.overhang),
+        (2.0, false, false, 2, false)
+    );
+    for marked in [side, corner] {
+        let (height, marks) = marked.unwrap();
+        assert!(
+            height == 2.0 && marks.wall && marks.rim && marks.crease.is_none(),
+            "{marks:?}"
+        );
+    }
+    assert!(beyond.is_none());
+}
+
+#[test]
+fn a_ridge_is_a_crease_with_both_normals() {
+    // A roof of 45 degrees along y, a fold of 10 degrees beside it.
+    let rise = 10f64.to_radians().tan();
+    let knots = [[-2.0, 0.5], [0.0, 2.5], [2.0, 0.5], [3.0, -0.5]];
+    let mut triangles = Vec::new();
+    for pair in knots.windows(2) {
+        let [[a, p], [b, q]] = [pair[0], pair[1]];
+        triangles.push([[a, -1.0, p], [b, -1.0, q], [a, 1.0, p]]);
+        triangles.push([[b, -1.0, q], [a, 1.0, p], [b, 1.0, q]]);
+    }
+    triangles.push([
+        [-3.0, -1.0, 0.5 - 1.0 + rise],
+        [-2.0, -1.0, 0.5],
+        [-2.0, 1.0, 0.5],
+    ]);
+    let found = probe_at(
+        triangles,
+        &[[0.0, 0.3], [0.0, 1.0], [1.0, 0.3], [2.0, 0.0], [-2.0, 0.1]],
+    );
+    let marks: Vec<Marks> = found.iter().map(|f| f.unwrap().1).collect();
+    let half = 0.5f64.sqrt();
+    let other = marks[0].crease.unwrap();
+    assert!((other[0].abs() - half).abs() < 1e-15 && (other[2] - half).abs() < 1e-15);
+    assert!(!marks[0].rim && marks[1].rim, "{marks:?}");
+    assert!(marks[2].crease.is_none() && marks[3].crease.is_none() && marks[4].crease.is_none());
+    assert!(marks.iter().all(|m| m.layers == 1 && !m.overhang));
+}
+
+#[test]
+fn a_table_has_an_overhang() {
+    let mut triangles = box_of([-2.0, -2.0, 1.5], [2.0, 2.0, 1.75]);
+    triangles.extend(box_of([-0.5, -0.5, 0.25], [0.5, 0.5, 1.0]));
+    let found = probe_at(triangles, &[[0.1, 0.2], [1.0, 1.1]]);
+    let marks: Vec<Marks> = found.iter().map(|f| f.unwrap().1).collect();
+    assert!(
+        marks[0].overhang && marks[0].layers == 4 && !marks[1].overhang && marks[1].layers == 2
+    );
+}
+
+#[test]
+fn holes_are_told_and_filled_only_when_asked() {
+    // A tilted plate with a square hole from -0.3 to 0.3.
+    let z = |x: f64, y: f64| 0.5 + 0.2 * x - 0.1 * y;
+    let quad = |[x, p]: [f64; 2], [y, q]: [f64; 2]| {
+        let at = |x, y| [x, y, z(x, y)];
+        [
+            [at(x, y), at(p, y), at(p, q)],
+            [at(x, y), at(p, q), at(x, q)],
+        ]
+    };
+    let plate: Vec<Triangle> = [
+        quad([-1.0, 1.0], [-1.0, -0.3]),
+        quad([-1.0, 1.0], [0.3, 1.0]),
+        quad([-1.0, -0.3], [-0.3, 0.3]),
+        quad([0.3, 1.0], [-0.3, 0.3]),
+    ]
+    .concat();
+    let plan = grid((-1.2, 1.2, 25), (-1.2, 1.2, 25));
+    let mut samples = sample(&exact(plate), &plan);
+    let found = holes(&plan, &samples);
+    // Nodes from -0.2 to 0.2: the hole's border belongs to the plate.
+    assert_eq!(found.len(), 25);
+    fill(&plan, &mut samples, &found);
+    for &k in &found {
+        let filled = samples[k].unwrap();
+        let wanted = z(plan.x_m.node(k % 25), plan.y_m.node(k / 25));
+        // A plane is harmonic.
+        assert!(
+            (filled.height_m - wanted).abs() < 1e-11,
+            "{filled:?} {wanted}"
+        );
+        assert!((filled.normal[0] / filled.normal[2] + 0.2).abs() < 1e-9);
+    }
+    assert!(holes(&plan, &samples).is_empty());
+}
+
+#[test]
+#[allow(clippy::disallowed_methods)]
+fn holes_of_a_file_are_skipped_filled_or_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("ring.stl");
+    // A level ring of 40 facets between 10 and 40 mm.
+    let mut text = String::from("solid ring\n");
+    for k in 0..40 {
+        let corner = |k: i32, r: f64| {
+            let angle = f64::from(k) / 20.0 * PI;
+            format!(" vertex {:.9} {:.9} 30", r * angle.cos(), r * angle.sin())
+        };
+        let [a, b, c, d] = [
+            corner(k, 10.0),
+            corner(k, 40.0),
+            corner(k + 1, 40.0),
+            corner(k + 1, 10.0),
+        ];
+        for [p, q, r] in [[&a, &b, &c], [&a, &c, &d]] {
+            text += &format!("facet normal 0 0 1 outer loop{p}{q}{r} endloop endfacet\n");
+        }
+    }
+    text += "endsolid ring\n";
+    std::fs::write(&path, text).unwrap();
+    let document = file(&path, 0.001, Placement::default(), seed_grid());
+    let run = |holes| {
+        let settings = Settings {
+            holes,
+            certify: Certify::Vertical,
+            marks: true,
+        };
+        discretize_with(&document, &settings, &Silent)
+    };
+    let skipped = run(Holes::Skip).unwrap();
+    let filled = run(Holes::Fill).unwrap();
+    let count = skipped.points.holes;
+    assert!(count > 90 && filled.points.holes == count, "{count}");
+    assert_eq!(filled.points.len(), skipped.points.len() + count);
+    assert_eq!(
+        filled.points.marks.iter().filter(|m| m.filled).count(),
+        count
+    );
+    assert!(
+        filled
+            .points
+            .height_m
+            .iter()
+            .all(|h| (h - 0.03).abs() < 1e-12)
+    );
+    assert!(skipped.warnings.iter().any(|w| w.contains("silhouette")));
+    let refused = run(Holes::Error).unwrap_err().to_string();
+    assert!(refused.contains("--holes"), "{refused}");
+}
+
+fn seed_region() -> Grid {
+    grid((-0.05, 0.05, 61), (-0.05, 0.05, 61))
+}
+
+fn shape(name: &str) -> Surface {
+    let bytes = std::fs::read(root().join(format!("shapes/{name}.stl"))).unwrap();
+    let transform = Transform::new(0.001, &lifted(0.03));
+    Surface::Mesh(Mesh::place(stl::read(&bytes).unwrap(), &transform).unwrap())
+}
+
+#[test]
+#[allow(clippy::print_stdout)]
+fn graded_points_hold_their_deviation_with_fewer_than_a_grid() {
+    let deviation_m = 0.5e-3;
+    for (name, area_m2) in [
+        ("flat", 0.01),
+        ("wedge", 0.01),
+        ("half_cylinder", 0.01),
+        ("half_sphere", PI * 0.0025),
+    ] {
+        let surface = shape(name);
+        let probe = Probe::new(&surface, &seed_region());
+        let found: Adaptive = adaptive(&probe, deviation_m, &Silent).unwrap();
+        println!(
+            "{name}: {} points, {} patches, {} at borders, within {} mm",
+            found.points.len(),
+            found.leaves,
+            found.borders,
+            found.vertical_m * 1e3
+        );
+        assert!(found.vertical_m <= deviation_m && found.border_m <= deviation_m);
+        // The weights are the surface's area in plan.
+        let sum: f64 = found.points.weight_m2.iter().sum();
+        assert!((sum / area_m2 - 1.0).abs() < 0.02, "{name}: {sum}");
+        let points = &found.points;
+        let pairs = (1..points.len()).map(|k| [k - 1, k]);
+        assert!(
+            pairs
+                .into_iter()
+                .all(|[a, b]| { (points.y_m[a], points.x_m[a]) < (points.y_m[b], points.x_m[b]) })
+        );
+        // A grid with as many points differs by more.
+        if name == "half_cylinder" {
+            let Surface::Mesh(mesh) = &surface else {
+                unreachable!()
+            };
+            let side = (points.len() as f64).sqrt() as usize;
+            let plan = grid((-0.05, 0.05, side), (-0.05, 0.05, side));
+            let heights: Vec<Option<f64>> = sample(mesh, &plan)
+                .iter()
+                .map(|s| s.map(|s| s.height_m))
+                .collect();
+            let faces = Faces::new(mesh, &plan);
+            let off =
+                vertical(mesh, &plan, &Lattice::new(&faces, &plan, &heights), &Silent).unwrap();
+            assert!(off.bound_m() > 2.0 * deviation_m, "{off:?}");
+        }
+    }
+}
+
+#[test]
+fn a_formula_is_graded_too() {
+    let formula = Primitive::HalfSphere {
+        radius_m: 0.05,
+        base_m: 0.03,
+    };
+    let surface = Surface::Primitive(PlacedPrimitive::new(formula, &Placement::default()).unwrap());
+    let probe = Probe::new(&surface, &seed_region());
+    let coarse = adaptive(&probe, 2e-3, &Silent).unwrap();
+    let fine = adaptive(&probe, 1e-3, &Silent).unwrap();
+    assert!(fine.points.len() > coarse.points.len() && fine.vertical_m <= 1e-3);
+    for (k, h) in fine.points.height_m.iter().enumerate() {
+        let distance = fine.points.x_m[k].hypot(fine.points.y_m[k]);
+        let off = distance.hypot(h - 0.03) - 0.05;
+        assert!(off.abs() < 1e-12, "{off}");
+    }
+    assert!(
+        adaptive(&probe, 0.0, &Silent).is_err() && adaptive(&probe, f64::NAN, &Silent).is_err()
+    );
+}
+
+#[test]
+fn blue_noise_keeps_its_spacing_and_covers() {
+    let surface = shape("half_sphere");
+    let probe = Probe::new(&surface, &seed_region());
+    let spacing_m = 3e-3;
+    let found = poisson(&probe, spacing_m, 7, &Silent).unwrap();
+    let points = &found.points;
+    assert!(points.len() > 400, "{}", points.len());
+    for i in 0..points.len() {
+        for j in 0..i {
+            let apart = (points.x_m[i] - points.x_m[j]).hypot(points.y_m[i] - points.y_m[j]);
+            assert!(apart >= spacing_m, "{apart}");
+        }
+    }
+    assert!(found.cover_m < 1.5 * spacing_m, "{}", found.cover_m);
+    let sum: f64 = points.weight_m2.iter().sum();
+    assert!((sum / (PI * 0.0025) - 1.0).abs() < 0.01, "{sum}");
+    // The seed decides, and nothing else.
+    assert_eq!(poisson(&probe, spacing_m, 7, &Silent).unwrap(), found);
+    assert_ne!(
+        poisson(&probe, spacing_m, 8, &Silent).unwrap().points.x_m,
+        points.x_m
+    );
+}
+
+#[test]
+fn a_grids_marks_agree_with_its_heights() {
+    let axis = AxisRequest::Given(Axis {
+        from: -0.05,
+        to: 0.05,
+        samples: 41,
+    });
+    let document = ShapeDocument {
+        name: "turned".into(),
+        source: SurfaceSource::File {
+            path: root().join("shapes/half_cylinder.stl"),
+            unit_m: Some(0.001),
+        },
+        placement: Placement {
+            translate_m: [0.0, 0.0, 0.06],
+            rotate_deg: [7.0, 20.0, 33.0],
+        },
+        grid: GridRequest { x: axis, y: axis },
+    };
+    let settings = Settings {
+        marks: true,
+        ..Settings::default()
+    };
+    let found = discretize_with(&document, &settings, &Silent).unwrap();
+    let (surface, _) = Surface::open(&document).unwrap();
+    let probe = Probe::new(&surface, &found.points.grid);
+    for k in 0..found.points.len() {
+        let (sample, marks) = probe
+            .at([found.points.x_m[k], found.points.y_m[k]])
+            .unwrap();
+        assert_eq!(
+            sample.height_m.to_bits(),
+            found.points.height_m[k].to_bits()
+        );
+        assert_eq!(
+            (sample.normal, marks),
+            (found.points.normal[k], found.points.marks[k])
+        );
+        assert!(!marks.overhang && marks.layers == 2, "{marks:?}");
+    }
+}
