@@ -17,5 +17,7 @@ mod steel;
 mod streams;
 #[path = "cli/support.rs"]
 mod support;
+#[path = "cli/surfaces.rs"]
+mod surfaces;
 #[path = "cli/sweep.rs"]
 mod sweep;

@@ -115,6 +115,12 @@ pub struct SurfaceFlags {
     /// Unit of the surface's coordinates: mm, cm, m, in, ft or um; required for STL, OBJ and PLY
     #[arg(long, value_name = "UNIT", value_parser = values::unit)]
     pub unit: Option<f64>,
+    /// Enlarge by a factor, or by factors along x, y and z, before anything else
+    #[arg(long, value_name = "S|X,Y,Z", value_parser = values::scale)]
+    pub scale: Option<values::Scale>,
+    /// Allow factors that differ, which change the surface's form
+    #[arg(long, requires = "scale")]
+    pub stretch: bool,
     /// Rotate about x, then y, then z, in degrees, before translating
     #[arg(long, value_name = "X,Y,Z", value_parser = values::rotation, allow_hyphen_values = true)]
     pub rotate: Option<values::Rotation>,
@@ -138,6 +144,7 @@ impl SurfaceFlags {
     pub fn given(&self) -> Vec<&'static str> {
         let flags = [
             (self.unit.is_some(), "--unit"),
+            (self.scale.is_some(), "--scale"),
             (self.rotate.is_some(), "--rotate"),
             (self.translate.is_some(), "--translate"),
             (self.grid.is_some(), "--grid"),

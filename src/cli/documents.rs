@@ -112,7 +112,9 @@ pub fn plan(file: &FileArgument) -> Result<(PlanFile, Input), Failure> {
 /// Whether `path` is a file that begins with `mark`.
 #[must_use]
 pub fn begins_with(path: &Path, mark: &str) -> bool {
-    std::fs::read(path).is_ok_and(|there| there.starts_with(mark.as_bytes()))
+    let mut head = vec![0; mark.len()];
+    std::fs::File::open(path).is_ok_and(|mut file| file.read_exact(&mut head).is_ok())
+        && head == mark.as_bytes()
 }
 
 /// The bytes of a file or of standard input; `what` was expected.
@@ -187,7 +189,8 @@ fn told(shapes: Vec<ReadShape>, printer: &Printer) -> Vec<ShapeSource> {
 }
 
 /// Whether a shape is described by a document (as opposed to a surface given directly).
-fn is_document(file: &FileArgument) -> bool {
+#[must_use]
+pub fn is_document(file: &FileArgument) -> bool {
     file.is_standard()
         || file
             .as_given()
@@ -238,7 +241,16 @@ fn raw_surface(path: &Path, flags: &SurfaceFlags) -> Result<ShapeSource, Failure
             path.display()
         )));
     }
+    let scale = flags.scale.map_or([1.0; 3], |scale| scale.0);
+    if !flags.stretch && scale.iter().any(|factor| *factor != scale[0]) {
+        return Err(Failure::Usage(
+            "--scale with different factors changes the surface's form; add --stretch if that is \
+             meant"
+                .to_owned(),
+        ));
+    }
     let surface = RawSurface {
+        scale,
         path: path.to_owned(),
         unit_m: flags.unit,
         placement: Placement {

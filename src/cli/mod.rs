@@ -9,6 +9,7 @@ mod failure;
 mod help;
 mod interrupt;
 mod layout;
+mod pictures;
 mod printer;
 mod quantity;
 mod values;

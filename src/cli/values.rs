@@ -55,6 +55,10 @@ pub struct GridSize(pub [usize; 2]);
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Translation(pub [f64; 3]);
 
+/// Three factors, greater than 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale(pub [f64; 3]);
+
 /// Three angles, degrees.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rotation(pub [f64; 3]);
@@ -85,6 +89,22 @@ fn numbers<const N: usize>(text: &str, expected: &str) -> Result<[f64; N], Strin
 /// `X,Y,Z` in millimetres.
 pub fn translation(text: &str) -> Result<Translation, String> {
     numbers(text, "X,Y,Z in millimetres, like 0,0,30").map(|v| Translation(v.map(m_from_mm)))
+}
+
+/// `S` or `X,Y,Z`, positive factors.
+pub fn scale(text: &str) -> Result<Scale, String> {
+    let expected = "one factor like 2, or X,Y,Z like 1,1,2";
+    let factors = if text.contains(',') {
+        numbers(text, expected)?
+    } else {
+        let [factor] = numbers(text, expected)?;
+        [factor; 3]
+    };
+    if factors.iter().all(|factor| *factor > 0.0) {
+        Ok(Scale(factors))
+    } else {
+        Err("factors must be greater than 0".to_owned())
+    }
 }
 
 /// `X,Y,Z` in degrees.

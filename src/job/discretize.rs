@@ -13,15 +13,20 @@ use crate::bundle::atomic::{FileSet, Overwrite, WriteError};
 use crate::bundle::json::to_json;
 use crate::bundle::manifest::{AxisSummary, PointsGrid};
 use crate::bundle::table::PointRow;
+use crate::plot::plane::PlanePlot;
 use crate::progress::Progress;
-use crate::shape::certificate::{Certificate, Certify};
+use crate::shape::certificate::{Certificate, Certify, stated_tessellation};
 use crate::shape::document::{ShapeDocument, SurfaceSource};
 use crate::shape::holes::Holes;
 use crate::shape::marks::Marks;
 use crate::shape::{ConstraintPoints, Discretized, Settings, ShapeError, discretize_with};
 
+pub mod inspect;
+mod picture;
 pub mod scattered;
 mod table;
+
+use picture::{Scale, Seen};
 
 /// The points and what is to be told about them.
 #[derive(Debug, Clone)]
@@ -169,6 +174,8 @@ pub struct PointsOptions {
     pub holes: Holes,
     /// How the points are compared with the surface.
     pub certify: Certify,
+    /// Whether a picture will be drawn.
+    pub picture: bool,
 }
 
 impl Default for PointsOptions {
@@ -176,6 +183,7 @@ impl Default for PointsOptions {
         Self {
             holes: Holes::Skip,
             certify: Certify::Vertical,
+            picture: false,
         }
     }
 }
@@ -208,6 +216,7 @@ pub fn run_with(
         holes: options.holes,
         certify: options.certify,
         marks: true,
+        cells: options.picture,
     };
     let discretized = discretize_with(document, &settings, progress)
         .map_err(|source| shape_error(document, source))?;
@@ -215,6 +224,8 @@ pub fn run_with(
     let mut accuracy = BTreeMap::from([("points", discretized.accuracy.clone())]);
     let mut warnings = discretized.warnings.clone();
     let mut deviation = None;
+    let stated = discretized.mesh.as_ref().and_then(stated_tessellation);
+    accuracy.extend(stated.map(|stage| ("tessellation", stage)));
     if let Some(certificate) = &discretized.certificate {
         deviation = DeviationSummary::new(certificate);
         if deviation.is_some() {
@@ -310,6 +321,26 @@ impl PointsReport {
     /// The writer's.
     pub fn write_csv(&self, out: &mut dyn Write) -> io::Result<()> {
         table::of_grid(out, &self.discretized.points)
+    }
+
+    /// The points' heights, what they are besides, and how far the surface departs between them.
+    #[must_use]
+    pub fn picture(&self) -> PlanePlot {
+        let points = &self.discretized.points;
+        let mut heights = vec![None; points.grid.len()];
+        let mut marks = vec![None; points.grid.len()];
+        for (row, &index) in points.grid_index.iter().enumerate() {
+            heights[index] = Some(points.height_m[row]);
+            marks[index] = Some(points.marks[row]);
+        }
+        picture::picture(&Seen {
+            title: format!("{}: constraint points", self.summary.shape),
+            scale: Scale::MILLIMETRES,
+            grid: &points.grid,
+            heights: &heights,
+            marks: &marks,
+            cells: self.discretized.cells_m.as_deref().unwrap_or(&[]),
+        })
     }
 
     /// Writes the points to `path` and the summary beside them, `points.csv` and `points.json`:

@@ -1,18 +1,15 @@
 //! Gain against three costs, one panel each, with the front that no other point beats.
 
-use std::collections::HashSet;
-
 use kuva::backend::svg::SvgBackend;
 use kuva::plot::{LegendEntry, LegendShape, LinePlot, ScatterPlot};
 use kuva::render::figure::Figure;
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 
+use super::{renumbered, thinned};
+
 /// A panel's size, px.
 const PANEL_PX: [f64; 2] = [400.0, 380.0];
-/// Cells of a panel along x and y: of the points of one kind that fall into a cell only the first
-/// is drawn, so that ten million points are no larger a picture than ten thousand.
-const CELLS: [f64; 2] = [240.0, 180.0];
 /// Colours that stay apart for the colour-blind and in print.
 const MET: &str = "#0072b2";
 const UNMET: &str = "#b5b5b5";
@@ -123,25 +120,6 @@ impl ParetoPlot {
     }
 }
 
-/// The drawing with its clip paths counted from 0: the crate counts on through a process.
-fn renumbered(svg: &str) -> String {
-    const NAME: &str = "kuva-clip-";
-    let mut parts = svg.split(NAME);
-    let mut text = parts.next().unwrap_or("").to_owned();
-    let mut seen: Vec<&str> = Vec::new();
-    for part in parts {
-        let digits = part.bytes().take_while(u8::is_ascii_digit).count();
-        let (number, rest) = part.split_at(digits);
-        let at = seen.iter().position(|one| *one == number);
-        let at = at.unwrap_or_else(|| {
-            seen.push(number);
-            seen.len() - 1
-        });
-        text.push_str(&format!("{NAME}{at}{rest}"));
-    }
-    text
-}
-
 /// The factor and the unit that make the largest value readable.
 fn readable(values: &[f64], unit: &str) -> (f64, String) {
     let size = |most: f64, value: &f64| most.max(value.abs());
@@ -170,18 +148,6 @@ fn extent(values: &[f64]) -> (f64, f64) {
     let below = low - room;
     // Nothing negative is shown where nothing is.
     (if low >= 0.0 { below.max(0.0) } else { below }, high + room)
-}
-
-/// The first point in each cell.
-fn thinned(points: &[(f64, f64)], x: (f64, f64), y: (f64, f64)) -> Vec<(f64, f64)> {
-    let cell = |value: f64, (low, high): (f64, f64), cells: f64| {
-        ((value - low) / (high - low) * cells).floor() as i64
-    };
-    let mut taken = HashSet::new();
-    let first = |point: &&(f64, f64)| {
-        taken.insert((cell(point.0, x, CELLS[0]), cell(point.1, y, CELLS[1])))
-    };
-    points.iter().filter(first).copied().collect()
 }
 
 #[cfg(test)]

@@ -3,10 +3,14 @@
 use std::collections::BTreeMap;
 
 use crate::accuracy::StageAccuracy;
-use crate::progress::Progress;
-use crate::shape::deviation::{Faces, Interval, Lattice, Vertical, hausdorff, primitive, vertical};
+use crate::progress::{Interrupted, Progress};
+use crate::shape::deviation::{
+    Faces, Interval, Lattice, Vertical, hausdorff, primitive, primitive_by_cell, vertical,
+    vertical_by_cell,
+};
 use crate::shape::error::ShapeError;
 use crate::shape::height::{Grid, Sample};
+use crate::shape::mesh::{Mesh, MeshFacts};
 use crate::shape::surface::Surface;
 use crate::shape::tessellation::estimated_deviation_m;
 
@@ -22,6 +26,62 @@ pub enum Certify {
     Distance,
 }
 
+/// How the facets' deviation from the surface meant is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tessellation {
+    /// There are no facets.
+    None,
+    /// A body was cut into facets here, to hold it.
+    Known,
+    /// A program's own facets for the display, by the rule that program follows.
+    Display,
+    /// Estimated from the angles between the facets.
+    Angles,
+}
+
+impl Tessellation {
+    fn of(mesh: &Mesh) -> (Self, f64) {
+        Self::stated(mesh.facts()).unwrap_or_else(|| (Self::Angles, estimated_deviation_m(mesh)))
+    }
+
+    /// What the file itself tells.
+    fn stated(facts: &MeshFacts) -> Option<(Self, f64)> {
+        let from = if facts.deviation_is_known {
+            Self::Known
+        } else {
+            Self::Display
+        };
+        (facts.deviation_m > 0.0).then_some((from, facts.deviation_m))
+    }
+
+    fn stage(self, estimate_m: f64) -> StageAccuracy {
+        StageAccuracy {
+            estimate: estimate_m,
+            relative_to: "1 m".into(),
+            method: self.method().into(),
+        }
+    }
+
+    fn method(self) -> &'static str {
+        match self {
+            Self::None => "exact: the surface is a formula",
+            Self::Known => "known: the chord to which the file's body was cut into facets",
+            Self::Display => {
+                "an estimate: the rule by which display facets are made, from their box"
+            }
+            Self::Angles => {
+                "an estimate: the sagitta of facets that turn smoothly, from their angles"
+            }
+        }
+    }
+}
+
+/// The deviation of the facets that a file itself tells, where points are not compared.
+#[must_use]
+pub fn stated_tessellation(facts: &MeshFacts) -> Option<StageAccuracy> {
+    Tessellation::stated(facts).map(|(from, deviation_m)| from.stage(deviation_m))
+}
+
 /// How far the interpolated points may lie from the surface.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Certificate {
@@ -30,8 +90,10 @@ pub struct Certificate {
     /// The Hausdorff distance over the same cells; `None` where it was not asked for, for a
     /// formula, and without a cell.
     pub hausdorff: Option<Interval>,
-    /// The facets' estimated deviation from the surface meant, m; 0 for a formula.
+    /// The facets' deviation from the surface meant, m; 0 for a formula.
     pub tessellation_m: f64,
+    /// Where that comes from.
+    pub tessellation: Tessellation,
     /// What the file's number format rounds away, m.
     pub rounding_m: f64,
     /// Diagonal of a cell: so far in plan the silhouette is uncertain, m.
@@ -62,13 +124,7 @@ impl Certificate {
         };
         BTreeMap::from([
             ("grid", stage(self.vertical.bound_m(), grid)),
-            (
-                "tessellation",
-                stage(
-                    self.tessellation_m,
-                    "an estimate: the sagitta of facets that turn smoothly, from their angles",
-                ),
-            ),
+            ("tessellation", self.tessellation.stage(self.tessellation_m)),
         ])
     }
 }
@@ -91,8 +147,12 @@ pub fn certify(
         .iter()
         .map(|sample| sample.map(|sample| sample.height_m))
         .collect();
-    let (found, apart, tessellation_m) = match surface {
-        Surface::Primitive(shape) => (primitive(shape, grid, &heights), None, 0.0),
+    let (found, apart, (tessellation, tessellation_m)) = match surface {
+        Surface::Primitive(shape) => (
+            primitive(shape, grid, &heights),
+            None,
+            (Tessellation::None, 0.0),
+        ),
         Surface::Mesh(mesh) => {
             let faces = Faces::new(mesh, grid);
             let lattice = Lattice::new(&faces, grid, &heights);
@@ -102,14 +162,42 @@ pub fn certify(
             } else {
                 None
             };
-            (found, apart, estimated_deviation_m(mesh))
+            (found, apart, Tessellation::of(mesh))
         }
     };
     Ok(Some(Certificate {
         vertical: found,
         hausdorff: apart,
         tessellation_m,
+        tessellation,
         rounding_m: surface.coordinate_rounding_m(),
         silhouette_m: grid.x_m.step().hypot(grid.y_m.step()),
     }))
+}
+
+/// For every cell of the grid, x fastest, a bound of the vertical difference, m; `None` for cells
+/// of which a corner has no surface.
+///
+/// # Errors
+/// [`Interrupted`] when the user asked to stop.
+pub fn by_cell(
+    surface: &Surface,
+    grid: &Grid,
+    samples: &[Option<Sample>],
+    progress: &dyn Progress,
+) -> Result<Vec<Option<f64>>, Interrupted> {
+    let heights: Vec<Option<f64>> = samples
+        .iter()
+        .map(|sample| sample.map(|sample| sample.height_m))
+        .collect();
+    match surface {
+        Surface::Primitive(shape) => {
+            progress.check()?;
+            Ok(primitive_by_cell(shape, grid, &heights))
+        }
+        Surface::Mesh(mesh) => {
+            let faces = Faces::new(mesh, grid);
+            vertical_by_cell(&Lattice::new(&faces, grid, &heights), progress)
+        }
+    }
 }

@@ -8,8 +8,7 @@ use std::path::PathBuf;
 
 use crate::numerics::axis::Axis;
 
-pub(in crate::shape) use format::unit_name;
-pub use format::{SurfaceFormat, parse_unit};
+pub use format::{SurfaceFormat, parse_unit, unit_name};
 pub use raw::{RawSurface, RawSurfaceError};
 
 /// A validated shape document, or a raw surface with its flags.
@@ -19,6 +18,8 @@ pub struct ShapeDocument {
     pub name: String,
     /// Where the surface comes from.
     pub source: SurfaceSource,
+    /// Factors along the file's own x, y and z, before anything else; positive.
+    pub scale: [f64; 3],
     /// Applied to the surface after its unit: rotation about x, then y, then z, then translation.
     pub placement: Placement,
     /// Grid of constraint points: of a document 61 x 61 over [-50, 50] mm unless it says

@@ -3,15 +3,21 @@
 //! Vertices are one when their coordinates agree to what the file's number format can tell apart.
 //! Nothing here changes the surface, and the guessed unit is never used.
 
-use std::collections::HashMap;
 use std::path::Path;
 
+use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::shape::document::SurfaceFormat;
+use crate::numerics::axis::Axis;
+use crate::shape::crossings::crossings;
+use crate::shape::document::{Placement, SurfaceFormat};
+use crate::shape::edges::{Edges, WELD_ROUNDINGS, bodies, weld};
 use crate::shape::error::ShapeError;
-use crate::shape::mesh::{FileMesh, Triangle, cross, minus};
-use crate::shape::surface::read_file;
+use crate::shape::height::Grid;
+use crate::shape::mesh::{FileMesh, Mesh, Triangle, cross, minus};
+use crate::shape::placement::Transform;
+use crate::shape::scattered::Probe;
+use crate::shape::surface::{Surface, read_file};
 
 /// What a surface file holds. Lengths are in the file's unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -45,8 +51,20 @@ pub struct MeshReport {
     pub degenerate: usize,
     /// Triangles whose three corners another triangle has too.
     pub duplicate: usize,
+    /// Parts that share no vertex.
+    pub bodies: usize,
     /// V - E + F: 2 for a closed body without a hole through it, 2 less for each such hole.
     pub euler: i64,
+    /// Pairs of triangles that pass through each other or partly lie on each other.
+    pub self_intersections: usize,
+    /// False where so many triangles lie over each other that not all pairs were looked at.
+    pub self_intersections_complete: bool,
+    /// Two such triangles, counted from 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub self_intersection_first: Option<[usize; 2]>,
+    /// The most sheets that a vertical line meets, over [`LINES`] x [`LINES`] lines; a body has 2.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub layers: Option<u32>,
     /// Sum of the triangles' areas.
     pub area: f64,
     /// Enclosed volume, negative if the triangles look inwards; absent unless watertight and
@@ -66,6 +84,8 @@ pub struct UnitGuess {
     pub size_m: f64,
 }
 
+/// Vertical lines along x, and as many along y.
+const LINES: usize = 101;
 /// Likely units, the most usual first, and their metres.
 const LIKELY: [(&str, f64); 4] = [("mm", 1e-3), ("m", 1.0), ("in", 0.0254), ("cm", 1e-2)];
 /// Sizes that surfaces of haptic displays have, m.
@@ -73,8 +93,6 @@ const USUAL_M: [f64; 2] = [0.01, 0.5];
 
 /// Coordinates beyond this are no lengths in any unit.
 const FARTHEST: f64 = 1e15;
-/// Two programs may round the same vertex to neighbouring numbers.
-const WELD_ROUNDINGS: f64 = 2.0;
 
 impl MeshReport {
     /// Reads the file at `path` and looks at it.
@@ -100,8 +118,11 @@ impl MeshReport {
     #[must_use]
     pub fn new(format: SurfaceFormat, file: FileMesh) -> Self {
         let bounds = bounds(&file.triangles);
-        let edges = Edges::new(&file.triangles, WELD_ROUNDINGS * file.coordinate_rounding);
-        let watertight = !file.triangles.is_empty() && edges.open == 0 && edges.crowded == 0;
+        let reach = WELD_ROUNDINGS * file.coordinate_rounding;
+        let names = weld(&file.triangles, reach);
+        let edges = Edges::new(&names);
+        let crossings = crossings(&file.triangles, &names, reach);
+        let watertight = !file.triangles.is_empty() && edges.closed();
         let flat = |[a, b, c]: &&Triangle| cross(minus(*b, *a), minus(*c, *a)) == [0.0; 3];
         let size = (0..3)
             .map(|k| bounds[1][k] - bounds[0][k])
@@ -131,7 +152,12 @@ impl MeshReport {
             inconsistent_edges: edges.inconsistent,
             degenerate: file.triangles.iter().filter(flat).count(),
             duplicate: edges.duplicate,
+            bodies: bodies(&names),
             euler: edges.euler,
+            self_intersections: crossings.pairs,
+            self_intersections_complete: crossings.complete,
+            self_intersection_first: crossings.first,
+            layers: layers(&file),
             area,
             volume: (watertight && edges.inconsistent == 0).then_some(volume),
             warnings: file.warnings,
@@ -167,6 +193,15 @@ impl MeshReport {
             self.duplicate,
             "triangles lie twice; heights do not depend on that",
         );
+        say(
+            self.self_intersections,
+            "pairs of triangles pass through each other or overlap; the height is that of the \
+             upper one",
+        );
+        if !self.self_intersections_complete {
+            let what = "not all pairs of triangles were looked at: there may be more";
+            self.warnings.push(what.into());
+        }
         if self.volume.is_some_and(|v| v < 0.0) {
             let what = "the triangles look inwards; heights do not depend on that";
             self.warnings.push(what.into());
@@ -201,120 +236,24 @@ fn area_and_volume(triangles: &[Triangle], bounds: [[f64; 3]; 2]) -> (f64, f64) 
     (0.5 * twice_area, six_volumes / 6.0)
 }
 
-/// How triangles meet.
-#[derive(Default)]
-struct Edges {
-    duplicate: usize,
-    open: usize,
-    crowded: usize,
-    inconsistent: usize,
-    euler: i64,
-}
-
-impl Edges {
-    /// Vertices nearer than `reach` in every coordinate are one.
-    fn new(triangles: &[Triangle], reach: f64) -> Self {
-        let mut welder = Welder::new(reach);
-        let mut corners: Vec<[u32; 3]> = triangles
-            .iter()
-            .map(|triangle| triangle.map(|vertex| welder.name(vertex)))
-            // A triangle that welding closes leaves its neighbours joined.
-            .filter(|[a, b, c]| a != b && b != c && c != a)
-            .collect();
-        drop(welder);
-        let mut found = Self::default();
-        // Each edge with whether it runs from the lower to the higher name.
-        let mut edges: Vec<(u64, bool)> = Vec::with_capacity(3 * corners.len());
-        for [a, b, c] in &corners {
-            for (from, to) in [(*a, *b), (*b, *c), (*c, *a)] {
-                let (low, high) = (from.min(to), from.max(to));
-                edges.push((u64::from(low) << 32 | u64::from(high), from < to));
-            }
+/// The most sheets over each other; `None` without area. Looked for along vertical lines over the whole box.
+fn layers(file: &FileMesh) -> Option<u32> {
+    let as_it_is = Transform::new(1.0, &Placement::default());
+    let mesh = Mesh::place(file.clone(), &as_it_is).ok()?;
+    // Lines half a step inside: a body's own sides are no sheets.
+    let [x_m, y_m] = mesh.facts().bounds.plan().map(|[low, high]| {
+        let half = 0.5 * (high - low) / LINES as f64;
+        Axis {
+            from: low + half,
+            to: high - half,
+            samples: LINES,
         }
-        edges.sort_unstable();
-        let mut met = corners.as_flattened().to_vec();
-        met.sort_unstable();
-        met.dedup();
-        found.euler = met.len() as i64 + corners.len() as i64;
-        for group in edges.chunk_by(|a, b| a.0 == b.0) {
-            found.euler -= 1;
-            match group {
-                [_] => found.open += 1,
-                [a, b] => found.inconsistent += usize::from(a.1 == b.1),
-                _ => found.crowded += 1,
-            }
-        }
-        for corner in &mut corners {
-            corner.sort_unstable();
-        }
-        corners.sort_unstable();
-        found.duplicate = corners.windows(2).filter(|pair| pair[0] == pair[1]).count();
-        found
-    }
-}
-
-/// Gives vertices that lie together one name.
-struct Welder {
-    reach: f64,
-    /// Side of the cells in which neighbours are looked for, wide enough that one is the rule.
-    cell: f64,
-    exact: HashMap<[u64; 3], u32>,
-    cells: HashMap<[i64; 3], Vec<u32>>,
-    points: Vec<[f64; 3]>,
-}
-
-impl Welder {
-    fn new(reach: f64) -> Self {
-        Self {
-            reach,
-            cell: 16.0 * reach,
-            exact: HashMap::new(),
-            cells: HashMap::new(),
-            points: Vec::new(),
-        }
-    }
-
-    fn name(&mut self, vertex: [f64; 3]) -> u32 {
-        // Adding 0 turns -0 into 0.
-        let bits = vertex.map(|c| (c + 0.0).to_bits());
-        if let Some(name) = self.exact.get(&bits) {
-            return *name;
-        }
-        let name = self.near(vertex).unwrap_or_else(|| {
-            let next = self.points.len() as u32;
-            self.points.push(vertex);
-            if self.cell > 0.0 {
-                let cell = vertex.map(|c| (c / self.cell).floor() as i64);
-                self.cells.entry(cell).or_default().push(next);
-            }
-            next
-        });
-        self.exact.insert(bits, name);
-        name
-    }
-
-    /// The first named point within reach.
-    fn near(&self, vertex: [f64; 3]) -> Option<u32> {
-        if self.cell <= 0.0 {
-            return None;
-        }
-        // The casts saturate; coordinates over cells are below 2^32.
-        let side = |offset: f64| vertex.map(|c| ((c + offset) / self.cell).floor() as i64);
-        let (from, to) = (side(-self.reach), side(self.reach));
-        let mut found: Option<u32> = None;
-        for x in from[0]..=to[0] {
-            for y in from[1]..=to[1] {
-                for z in from[2]..=to[2] {
-                    for name in self.cells.get(&[x, y, z]).into_iter().flatten() {
-                        let there = self.points[*name as usize];
-                        let close = (0..3).all(|k| (there[k] - vertex[k]).abs() <= self.reach);
-                        if close {
-                            found = Some(found.map_or(*name, |best| best.min(*name)));
-                        }
-                    }
-                }
-            }
-        }
-        found
-    }
+    });
+    let grid = Grid { x_m, y_m };
+    let (x, y) = (grid.x_m.nodes(), grid.y_m.nodes());
+    let surface = Surface::Mesh(mesh);
+    let probe = Probe::new(&surface, &grid);
+    let at = |k: usize| probe.at([x[k % LINES], y[k / LINES]]);
+    let lines = (0..grid.len()).into_par_iter();
+    lines.filter_map(at).map(|(_, marks)| marks.layers).max()
 }

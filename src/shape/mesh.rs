@@ -21,6 +21,8 @@ pub struct FileMesh {
     /// Estimate of how far the triangles may lie from the body they stand for, in the file's
     /// unit; 0 where the file tells nothing of it.
     pub deviation: f64,
+    /// Whether the deviation is known, because the triangles were made here to hold it.
+    pub deviation_is_known: bool,
     /// What a careful reader would mention.
     pub warnings: Vec<String>,
 }
@@ -56,6 +58,8 @@ pub struct MeshFacts {
     /// Estimate of how far the triangles may lie from the body they stand for, m; 0 where the
     /// file tells nothing of it.
     pub deviation_m: f64,
+    /// Whether that is known rather than estimated.
+    pub deviation_is_known: bool,
 }
 
 /// A placed triangle soup, m. No order, orientation or connectivity is assumed.
@@ -112,6 +116,7 @@ impl Mesh {
             bounds: Bounds { min_m, max_m },
             coordinate_rounding_m: transform.length_m(file.coordinate_rounding),
             deviation_m: transform.length_m(file.deviation),
+            deviation_is_known: file.deviation_is_known,
         };
         Ok(Self { triangles, facts })
     }

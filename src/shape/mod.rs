@@ -32,6 +32,9 @@ pub mod three_mf;
 
 mod archive;
 mod assembly;
+mod boxes;
+mod crossings;
+mod edges;
 mod index;
 mod number;
 mod polygon;

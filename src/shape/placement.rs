@@ -9,6 +9,8 @@ use crate::shape::document::Placement;
 pub struct Transform {
     /// A coordinate is multiplied by the first, divided by the second; one of them is 1.
     unit: [f64; 2],
+    /// Factors along the file's axes.
+    scale: [f64; 3],
     /// `None` for the identity.
     rotation: Option<Matrix3<f64>>,
     translate_m: [f64; 3],
@@ -28,24 +30,36 @@ impl Transform {
         let rotation = rotation(placement.rotate_deg);
         Self {
             unit,
+            scale: [1.0; 3],
             rotation: (rotation != Matrix3::identity()).then_some(rotation),
             translate_m: placement.translate_m,
         }
     }
 
+    /// The same with factors along the file's axes, before anything else.
+    #[must_use]
+    pub fn scaled(self, scale: [f64; 3]) -> Self {
+        Self { scale, ..self }
+    }
+
     /// The placed point, m.
     #[must_use]
     pub fn apply(&self, point: [f64; 3]) -> [f64; 3] {
-        let mut p = point.map(|c| self.length_m(c));
+        let mut p = [0, 1, 2].map(|k| self.metres(point[k] * self.scale[k]));
         if let Some(rotation) = &self.rotation {
             p = (rotation * Vector3::from(p)).into();
         }
         [0, 1, 2].map(|k| p[k] + self.translate_m[k])
     }
 
-    /// A length of the file, m.
+    /// A length of the file, m; the longest it may become in any direction.
     #[must_use]
     pub fn length_m(&self, length: f64) -> f64 {
+        let [x, y, z] = self.scale;
+        self.metres(length * x.max(y).max(z))
+    }
+
+    fn metres(&self, length: f64) -> f64 {
         length * self.unit[0] / self.unit[1]
     }
 }

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use crate::accuracy::StageAccuracy;
 use crate::numerics::axis::Axis;
 use crate::progress::{Interrupted, Progress};
-use crate::shape::certificate::{Certificate, Certify, certify};
+use crate::shape::certificate::{Certificate, Certify, by_cell, certify};
 use crate::shape::document::{AxisRequest, ShapeDocument};
 use crate::shape::error::ShapeError;
 use crate::shape::height::{Grid, Sample};
@@ -123,6 +123,9 @@ pub struct Discretized {
     pub accuracy: StageAccuracy,
     /// How far the interpolated points may lie from the surface, where it was asked for.
     pub certificate: Option<Certificate>,
+    /// A bound of the vertical difference for every cell, m, where it was asked for; `None` where
+    /// a corner has no surface.
+    pub cells_m: Option<Vec<Option<f64>>>,
     /// What the user should know though it stops nothing.
     pub warnings: Vec<String>,
 }
@@ -136,6 +139,8 @@ pub struct Settings {
     pub certify: Certify,
     /// Whether walls, rims, creases and overhangs are looked for.
     pub marks: bool,
+    /// Whether the vertical difference is told for every cell.
+    pub cells: bool,
 }
 
 /// Opens the document's surface, places it and samples it over the requested grid.
@@ -223,16 +228,12 @@ pub fn discretize_with(
         ));
     }
     let certificate = certify(&surface, &grid, &samples, how, progress)?;
-    let deviation_m = match &surface {
-        Surface::Mesh(mesh) => mesh.facts().deviation_m,
-        Surface::Primitive(_) => 0.0,
+    let cells_m = if settings.cells && grid.len() <= MOST_CERTIFIED {
+        Some(by_cell(&surface, &grid, &samples, progress)?)
+    } else {
+        None
     };
     let (mesh, method) = match &surface {
-        Surface::Mesh(mesh) if deviation_m > rounding_m => (
-            Some(*mesh.facts()),
-            "estimate: how far the file's triangles may lie from the body (exact heights of the \
-             triangles)",
-        ),
         Surface::Mesh(mesh) => (
             Some(*mesh.facts()),
             "a-priori: the file's coordinate rounding (exact heights of its triangles; a slope \
@@ -241,7 +242,7 @@ pub fn discretize_with(
         Surface::Primitive(_) => (None, "a-priori: a closed formula in double precision"),
     };
     let accuracy = StageAccuracy {
-        estimate: rounding_m.max(deviation_m),
+        estimate: rounding_m,
         relative_to: "1 m".into(),
         method: method.into(),
     };
@@ -251,6 +252,7 @@ pub fn discretize_with(
         mesh,
         accuracy,
         certificate,
+        cells_m,
         warnings,
     })
 }

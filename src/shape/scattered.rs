@@ -4,6 +4,7 @@ pub mod adaptive;
 pub mod poisson;
 
 use crate::shape::deviation::{Faces, Patch, Rect, primitive};
+use crate::shape::edges::{Edges, WELD_ROUNDINGS, weld};
 use crate::shape::error::ShapeError;
 use crate::shape::height::{Grid, Sample, reach_m};
 use crate::shape::index::Index;
@@ -79,13 +80,19 @@ impl<'a> Probe<'a> {
         let kind = match surface {
             Surface::Mesh(mesh) => {
                 let reach = reach_m(mesh, grid);
+                // Most files write a vertex the same way each time: the quick answer first.
+                let closed = marks::is_closed(mesh.triangles()) || {
+                    let rounding_m = mesh.facts().coordinate_rounding_m;
+                    let names = weld(mesh.triangles(), WELD_ROUNDINGS * rounding_m);
+                    Edges::new(&names).closed()
+                };
                 Kind::Mesh {
                     mesh,
                     index: Index::new(mesh, reach),
                     faces: Faces::new(mesh, grid),
                     rules: Rules {
                         reach_m: reach,
-                        plain_layers: 1 + u32::from(marks::is_closed(mesh.triangles())),
+                        plain_layers: 1 + u32::from(closed),
                     },
                 }
             }

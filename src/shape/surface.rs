@@ -40,7 +40,8 @@ impl Surface {
         };
         let (mut file, unit_m) = read(path, *unit_m)?;
         let mut warnings = std::mem::take(&mut file.warnings);
-        let mesh = Mesh::place(file, &Transform::new(unit_m, &document.placement))?;
+        let transform = Transform::new(unit_m, &document.placement).scaled(document.scale);
+        let mesh = Mesh::place(file, &transform)?;
         let MeshFacts {
             triangles,
             degenerate,

@@ -201,6 +201,7 @@ fn raw(path: &str, unit: Option<&str>) -> RawSurface {
     RawSurface {
         path: PathBuf::from(path),
         unit_m: unit.and_then(parse_unit),
+        scale: [1.0; 3],
         placement: Placement {
             translate_m: [0.0, 0.0, 0.03],
             rotate_deg: [0.0; 3],

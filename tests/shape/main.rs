@@ -2,10 +2,11 @@
 #![allow(missing_docs)]
 
 mod corpus;
-mod formats;
 mod deviation;
+mod formats;
 mod fuzz;
 mod heights;
+mod inspect;
 mod marks;
 mod points;
 mod samples;

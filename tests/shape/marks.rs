@@ -179,6 +179,7 @@ fn holes_of_a_file_are_skipped_filled_or_refused() {
             holes,
             certify: Certify::Vertical,
             marks: true,
+            cells: false,
         };
         discretize_with(&document, &settings, &Silent)
     };
@@ -322,6 +323,7 @@ fn a_grids_marks_agree_with_its_heights() {
             path: root().join("shapes/half_cylinder.stl"),
             unit_m: Some(0.001),
         },
+        scale: [1.0; 3],
         placement: Placement {
             translate_m: [0.0, 0.0, 0.06],
             rotate_deg: [7.0, 20.0, 33.0],

@@ -56,6 +56,7 @@ fn exactly(primitive: Primitive, placement: Placement, grid: GridRequest) -> Sha
     ShapeDocument {
         name: "exact".into(),
         source: SurfaceSource::Primitive(primitive),
+        scale: [1.0; 3],
         placement,
         grid,
     }

@@ -102,6 +102,7 @@ pub fn file(path: &Path, unit_m: f64, placement: Placement, grid: GridRequest) -
             path: path.into(),
             unit_m: Some(unit_m),
         },
+        scale: [1.0; 3],
         placement,
         grid,
     }

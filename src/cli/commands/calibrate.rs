@@ -44,7 +44,7 @@ pub struct Calibrate {
     /// Design file (TOML), `-` for standard input
     #[arg(value_name = "DESIGN")]
     design: FileArgument,
-    /// Shape files (TOML) or surfaces (STL); no two of the same name
+    /// Shape files (TOML) or surfaces (STL, OBJ, PLY, 3MF, STEP, ...); no two of the same name
     #[arg(value_name = "SHAPE", required = true)]
     shapes: Vec<FileArgument>,
     /// Folder under which <design>/<shape>/ is written

@@ -4,6 +4,8 @@ use std::path::Path;
 
 use clap::{Args, ValueEnum};
 
+mod inspect;
+
 use super::{begin, describe};
 use crate::bundle::atomic::{self, Overwrite};
 use crate::cli::args::{SurfaceFlags, Writing};
@@ -11,6 +13,7 @@ use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
+use crate::cli::pictures::write_svg;
 use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{count, length_error, mm, number};
 use crate::cli::values::{self, FileArgument};
@@ -32,6 +35,9 @@ use crate::shape::holes::Holes;
 /// the normal the table tells of walls, rims, creases (with the other face's normal) and overhangs.
 /// Instead of the grid's points, --max-deviation chooses as few as a deviation needs, --poisson
 /// points without a pattern; both give each point the area it stands for (weight_m2).
+///
+/// With --inspect nothing is made of the surface: what its file holds is told, in its own unit, with
+/// a guess at that unit, which is never used.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Writing, &[
     ("fluxform discretize shapes/half_sphere.toml --out points.csv", "a shape file"),
@@ -41,9 +47,12 @@ use crate::shape::holes::Holes;
      "a part of it"),
     ("fluxform discretize shapes/half_sphere.toml --max-deviation 0.5mm --out graded.csv",
      "as many points as the surface needs, and where it needs them"),
+    ("fluxform discretize shapes/half_cylinder.stl --inspect --plot from_above.svg",
+     "what a file holds: unit, size, holes, faults; and a picture from above"),
 ]))]
 pub struct Discretize {
-    /// Shape file (TOML, `-` for standard input) or the surface itself (STL)
+    /// Shape file (TOML, `-` for standard input) or the surface itself: STL, OBJ, PLY, 3MF, AMF,
+    /// 3DXML, STEP, SLDPRT
     #[arg(value_name = "SHAPE")]
     shape: FileArgument,
     /// Where the points go; `-` is standard output, and then there is no JSON file
@@ -70,6 +79,15 @@ pub struct Discretize {
     /// Which random points
     #[arg(long, value_name = "N", default_value_t = 0, requires = "poisson")]
     seed: u64,
+    /// Tell what the surface's file holds and make no points
+    #[arg(
+        long,
+        conflicts_with_all = ["holes", "certify", "max_deviation", "poisson", "out"]
+    )]
+    inspect: bool,
+    /// Draw heights, what the points are besides, and the deviation between them (SVG)
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["max_deviation", "poisson"])]
+    plot: Option<FileArgument>,
     #[command(flatten)]
     writing: Writing,
     #[command(flatten)]
@@ -96,6 +114,16 @@ impl Discretize {
     /// # Errors
     /// See [`Failure`].
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
+        let both = self.plot.as_ref().is_some_and(FileArgument::is_standard);
+        if both && self.out.is_standard() {
+            return Err(Failure::Usage(
+                "--out and --plot both go to standard output (-); name a file for one of them"
+                    .to_owned(),
+            ));
+        }
+        if self.inspect {
+            return self.inspected(printer);
+        }
         let shapes = documents::shapes(std::slice::from_ref(&self.shape), &self.surface, printer)?;
         let bar = begin(printer);
         for shape in shapes {
@@ -121,6 +149,14 @@ impl Discretize {
                 |out| report.write_csv(out),
                 |path| report.write(path, self.writing.force),
             )?;
+            let place = match &self.plot {
+                None => place,
+                Some(file) => {
+                    let (inputs, svg) = (&report.summary.inputs, report.picture().svg());
+                    let after = write_svg(file, inputs, &svg, self.writing.force, printer)?;
+                    if after == Place::Error { after } else { place }
+                }
+            };
             report.summary.warnings = printer.warnings();
             printer.summary(place, &report.summary, || self.told(&report.summary))?;
         }
@@ -149,6 +185,7 @@ impl Discretize {
                 CertifyFlag::Vertical => Certify::Vertical,
                 CertifyFlag::Distance => Certify::Distance,
             },
+            picture: self.plot.is_some(),
         }
     }
 
@@ -265,6 +302,9 @@ impl Discretize {
         }
         if let FileArgument::Path(path) = &self.out {
             sheet.line("written to", &path.display().to_string());
+        }
+        if let Some(FileArgument::Path(path)) = &self.plot {
+            sheet.line("drawn in", &path.display().to_string());
         }
         sheet.finish()
     }

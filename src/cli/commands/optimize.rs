@@ -8,11 +8,12 @@ use clap::{Args, ValueEnum};
 
 use super::{accuracy_check, begin};
 use crate::bundle::artefact::sha256_hex;
-use crate::bundle::atomic::{Overwrite, WriteError, write};
+use crate::bundle::atomic::{Overwrite, write};
 use crate::cli::args::{Tolerance, Writing};
 use crate::cli::documents::{self, DesignDocument};
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
+use crate::cli::pictures;
 use crate::cli::printer::{Place, Printer};
 use crate::cli::values::FileArgument;
 use crate::design::Need;
@@ -175,18 +176,8 @@ impl Optimize {
         }
     }
 
-    /// An existing file is replaced with --force, or when it was made of the same design.
     fn check_target(&self, path: &Path, mark: &str) -> Result<(), Failure> {
-        if self.writing.force || !path.is_file() {
-            return Ok(());
-        }
-        if documents::begins_with(path, mark) {
-            return Ok(());
-        }
-        Err(JobError::from(WriteError::OutputExists {
-            path: path.to_owned(),
-            reason: "and was not made of this design".to_owned(),
-        })
-        .into())
+        let reason = "and was not made of this design";
+        pictures::check_target(path, mark, self.writing.force, reason)
     }
 }

@@ -52,8 +52,8 @@ pub fn hausdorff(
     let (points, slop_m) = triangulated(&patches, 0.002 * vertical.worst().value_m);
     let mut search = Search {
         faces: lattice.faces,
-        surface: Tree::new(mesh.triangles().to_vec()),
-        points: Tree::new(points),
+        surface: Tree::new(mesh.triangles()),
+        points: Tree::new(&points),
         slop_m,
         rounding_m: vertical.rounding_m,
         lower_m: 0.0,

@@ -23,10 +23,12 @@ use self::visible::{Hair, supremum_over_visible};
 
 pub use self::hausdorff::{Interval, hausdorff};
 pub use self::piece::{Extreme, Patch, Rect};
-pub use self::primitive::primitive;
+pub use self::primitive::{primitive, primitive_by_cell};
 
 /// Triangles in a rectangle that are compared with each other at once.
 const TOGETHER: usize = 10;
+/// Cells between two looks at the progress.
+const CELLS_BETWEEN_LOOKS: usize = 1024;
 /// A rectangle is halved so often at most: a fan's apex never comes apart.
 const DEEPEST: u32 = 9;
 /// Places nearer than this times the largest coordinate are not told apart.
@@ -374,6 +376,26 @@ pub fn vertical(
         slack_m: 0.0,
         cells,
     })
+}
+
+/// The bound of each cell of four points, `None` for the others; m.
+///
+/// # Errors
+/// [`Interrupted`] when the user asked to stop.
+pub fn vertical_by_cell(
+    lattice: &Lattice<'_>,
+    progress: &dyn Progress,
+) -> Result<Vec<Option<f64>>, Interrupted> {
+    (0..lattice.len())
+        .into_par_iter()
+        .map(|cell| {
+            if cell % CELLS_BETWEEN_LOOKS == 0 {
+                progress.check()?;
+            }
+            let patch = lattice.patch(cell);
+            Ok(patch.map(|patch| lattice.faces.deviation_m(&patch, lattice.members(cell))))
+        })
+        .collect()
 }
 
 /// The differences at the cells' centres: with them most pieces need no closer look.

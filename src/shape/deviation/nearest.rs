@@ -1,39 +1,26 @@
-//! The distance from a point to a set of triangles: a tree of boxes, nearest first.
+//! The distance from a point to a set of triangles: by a tree of boxes, nearest first.
 
+use crate::shape::boxes::{Box3, BoxTree};
 use crate::shape::mesh::{Triangle, minus};
 
-/// Triangles in a leaf.
-const LEAF: usize = 4;
-
-type Box3 = [[f64; 3]; 2];
-
-/// A tree of boxes over triangles.
+/// A tree of boxes over triangles, and the triangles in its order.
 pub(super) struct Tree {
+    boxes: BoxTree,
     triangles: Vec<Triangle>,
-    /// Boxes in depth-first order; of an inner node the right child's index, of a leaf the range.
-    nodes: Vec<Node>,
-}
-
-struct Node {
-    bounds: Box3,
-    right: usize,
-    range: Option<[usize; 2]>,
 }
 
 impl Tree {
-    pub(super) fn new(mut triangles: Vec<Triangle>) -> Self {
-        let mut nodes = Vec::new();
-        let count = triangles.len();
-        if count > 0 {
-            build(&mut triangles, 0, &mut nodes);
-        }
-        Self { triangles, nodes }
+    pub(super) fn new(triangles: &[Triangle]) -> Self {
+        let boxes = BoxTree::new(triangles);
+        let order = boxes.order.iter();
+        let triangles = order.map(|k| triangles[*k as usize]).collect();
+        Self { boxes, triangles }
     }
 
     /// Distance to the nearest triangle, and which it is; infinite without any.
     pub(super) fn nearest(&self, p: [f64; 3]) -> (f64, usize) {
         let mut best = (f64::INFINITY, 0);
-        if !self.nodes.is_empty() {
+        if !self.boxes.nodes.is_empty() {
             self.visit(0, p, &mut best);
         }
         (best.0.sqrt(), best.1)
@@ -54,7 +41,8 @@ impl Tree {
     }
 
     fn visit(&self, index: usize, p: [f64; 3], best: &mut (f64, usize)) {
-        let node = &self.nodes[index];
+        let nodes = &self.boxes.nodes;
+        let node = &nodes[index];
         if square_to_box(&node.bounds, p) >= best.0 {
             return;
         }
@@ -68,8 +56,8 @@ impl Tree {
             return;
         }
         let mut children = [index + 1, node.right];
-        if square_to_box(&self.nodes[children[1]].bounds, p)
-            < square_to_box(&self.nodes[children[0]].bounds, p)
+        if square_to_box(&nodes[children[1]].bounds, p)
+            < square_to_box(&nodes[children[0]].bounds, p)
         {
             children.swap(0, 1);
         }
@@ -77,36 +65,6 @@ impl Tree {
             self.visit(child, p, best);
         }
     }
-}
-
-/// Appends the tree of `triangles`, which start at `offset` of the whole.
-fn build(triangles: &mut [Triangle], offset: usize, nodes: &mut Vec<Node>) {
-    let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    for vertex in triangles.iter().flatten() {
-        for k in 0..3 {
-            bounds[0][k] = bounds[0][k].min(vertex[k]);
-            bounds[1][k] = bounds[1][k].max(vertex[k]);
-        }
-    }
-    let here = nodes.len();
-    let leaf = triangles.len() <= LEAF;
-    nodes.push(Node {
-        bounds,
-        right: 0,
-        range: leaf.then_some([offset, offset + triangles.len()]),
-    });
-    if leaf {
-        return;
-    }
-    let side = |k: usize| bounds[1][k] - bounds[0][k];
-    let longest = (1..3).fold(0, |best, k| if side(k) > side(best) { k } else { best });
-    let middle = triangles.len() / 2;
-    let key = |t: &Triangle| t[0][longest] + t[1][longest] + t[2][longest];
-    triangles.select_nth_unstable_by(middle, |a, b| key(a).total_cmp(&key(b)));
-    let (left, right) = triangles.split_at_mut(middle);
-    build(left, offset, nodes);
-    nodes[here].right = nodes.len();
-    build(right, offset + middle, nodes);
 }
 
 fn square_to_box(bounds: &Box3, p: [f64; 3]) -> f64 {
@@ -170,7 +128,7 @@ mod tests {
                 [0; 3].map(|_| at.map(|c| c + 0.2 * next()))
             })
             .collect();
-        let tree = Tree::new(triangles.clone());
+        let tree = Tree::new(&triangles);
         for _ in 0..200 {
             let p = [next(), next(), next()].map(|c| 1.6 * c - 0.3);
             // Each triangle sampled finely: never nearer than the distance, hardly farther.

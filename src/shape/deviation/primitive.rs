@@ -5,8 +5,11 @@
 //! vanishes: the surface never lies below. How far it stands above is bounded on a rectangle by the
 //! tangent plane at its centre, whose difference from the interpolant is largest at a corner.
 
+use rayon::prelude::*;
+
 use super::piece::{Extreme, Patch, Point, Rect};
 use super::{Cells, Vertical};
+use crate::numerics::axis::Axis;
 use crate::shape::height::{Grid, Sample};
 use crate::shape::primitive::PlacedPrimitive;
 
@@ -14,6 +17,38 @@ use crate::shape::primitive::PlacedPrimitive;
 const NARROW: f64 = 1e-6;
 /// Rectangles looked at, at most, beyond one a cell.
 const MOST: usize = 200_000;
+
+/// [`primitive`] of every cell by itself, x fastest, m; `None` where a corner has no surface.
+#[must_use]
+pub fn primitive_by_cell(
+    shape: &PlacedPrimitive,
+    grid: &Grid,
+    heights: &[Option<f64>],
+) -> Vec<Option<f64>> {
+    let (x, y) = (grid.x_m.nodes(), grid.y_m.nodes());
+    let columns = x.len().saturating_sub(1);
+    let axis = |nodes: &[f64], at: usize| Axis {
+        from: nodes[at],
+        to: nodes[at + 1],
+        samples: 2,
+    };
+    (0..columns * y.len().saturating_sub(1))
+        .into_par_iter()
+        .map(|cell| {
+            let (column, row) = (cell % columns, cell / columns);
+            let node = row * x.len() + column;
+            let corners = [0, 1, x.len(), x.len() + 1].map(|k| heights[node + k]);
+            let cell = Grid {
+                x_m: axis(&x, column),
+                y_m: axis(&y, row),
+            };
+            corners
+                .iter()
+                .all(Option::is_some)
+                .then(|| primitive(shape, &cell, &corners).bound_m())
+        })
+        .collect()
+}
 
 /// The supremum of the vertical difference over all cells of four points.
 ///

@@ -91,7 +91,7 @@ pub(super) fn unit_names() -> Vec<&'static str> {
 
 /// The name of the unit of `unit_m` metres, for a message; the metres where it has none.
 #[must_use]
-pub(in crate::shape) fn unit_name(unit_m: f64) -> String {
+pub fn unit_name(unit_m: f64) -> String {
     let known = UNITS.iter().find(|(_, metres)| *metres == unit_m);
     known.map_or_else(|| format!("{unit_m:e} m"), |(names, _)| names[0].to_owned())
 }

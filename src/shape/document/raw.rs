@@ -15,6 +15,8 @@ pub struct RawSurface {
     /// Metres per unit of the file's coordinates (see [`super::parse_unit`]); where the format
     /// carries its own, it must be the same.
     pub unit_m: Option<f64>,
+    /// Factors along the file's axes; positive.
+    pub scale: [f64; 3],
     /// Rotation, then translation.
     pub placement: Placement,
     /// Samples along x and y.
@@ -100,6 +102,7 @@ impl ShapeDocument {
             name: stem(&path),
             grid: grid(surface)?,
             source: SurfaceSource::File { path, unit_m },
+            scale: surface.scale,
             placement: surface.placement,
         })
     }

@@ -6,9 +6,10 @@ use super::format::{SurfaceFormat, parse_unit, unit_names};
 use super::{AxisRequest, GridRequest, Placement, Primitive, ShapeDocument, SurfaceSource};
 use crate::design::diagnostics::{Faults, InvalidDocument};
 use crate::design::reader::{Section, read_document};
-use crate::design::rule::Rule;
+use crate::design::rule::{Bound, Rule};
 use crate::design::sections::{BODY_MM, SEED_SIDE_MM, axis_m};
 use crate::design::source;
+use crate::design::values::OneOrMany;
 use crate::design::words::{nearest, quoted};
 use crate::units::m_from_mm;
 
@@ -66,6 +67,7 @@ fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
         (false, true) => primitive(root),
         (given, _) => neither_or_both(root, given),
     };
+    let scale = scale(root);
     let placement = Placement {
         translate_m: root
             .tuple("translate_mm", &BODY_MM)
@@ -78,9 +80,44 @@ fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
     Some(ShapeDocument {
         name: name?,
         source: source?,
+        scale: scale?,
         placement,
         grid: grid?,
     })
+}
+
+/// Factors of size; `None` where they are at fault.
+fn scale(root: &mut Section<'_>) -> Option<[f64; 3]> {
+    let rule = Rule::any("").bound(Bound::Positive);
+    let stretch = root.flag_or("stretch", false);
+    let factors = match match root.one_or_many("scale", &rule) {
+        None => OneOrMany::One(1.0),
+        Some(given) => given.value,
+    } {
+        OneOrMany::One(factor) => [factor; 3],
+        OneOrMany::Many(factors) => match <[f64; 3]>::try_from(factors) {
+            Ok(factors) => factors,
+            Err(other) => {
+                // An empty list is at fault already.
+                if !other.is_empty() {
+                    let message = format!("expected one number or 3, found {}", other.len());
+                    root.fault("scale", message, "give factors along x, y and z");
+                }
+                return None;
+            }
+        },
+    };
+    if root.has("primitive") && root.has("scale") {
+        let message = "a primitive has its own sizes";
+        root.fault("scale", message, "change its sizes instead");
+        return None;
+    }
+    if !stretch && factors.iter().any(|factor| *factor != factors[0]) {
+        let message = "different factors change the surface's form";
+        root.fault("scale", message, "add stretch = true if that is meant");
+        return None;
+    }
+    Some(factors)
 }
 
 fn neither_or_both(root: &mut Section<'_>, both: bool) -> Option<SurfaceSource> {

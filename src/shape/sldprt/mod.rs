@@ -63,6 +63,7 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
         coordinate_rounding: largest * F32_ROUNDING,
         unit_m: Some(1.0),
         deviation,
+        deviation_is_known: false,
         warnings,
     })
 }

@@ -91,6 +91,7 @@ fn solids(bytes: &[u8]) -> Result<FileMesh, String> {
         triangles,
         unit_m: Some(unit_m),
         deviation,
+        deviation_is_known: true,
         warnings: vec![format!(
             "reading STEP is experimental: {} bodies passed every check, meshed to a chord \
              of {:.4} mm; compare with another export of the same part",

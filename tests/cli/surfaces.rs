@@ -1,0 +1,146 @@
+//! Surfaces on the command line: looked at, drawn, enlarged, refused.
+
+use crate::support::Place;
+
+#[test]
+fn a_file_is_inspected_without_its_unit_and_the_guess_is_never_used() {
+    let place = Place::new();
+    let args = ["discretize", "shapes/half_sphere.stl", "--inspect"];
+    place.run(&args).ends(0).says(&[]);
+    let told = place
+        .run(&[&args[..], &["--format", "json"]].concat())
+        .json();
+    let surface = &told["surface"];
+    assert_eq!(surface["format"], "STL");
+    assert_eq!(surface["watertight"], true);
+    assert_eq!(surface["self_intersections"], 0);
+    assert_eq!(surface["layers"], 2);
+    assert_eq!(surface["unit_guesses"][0]["unit"], "mm");
+    assert!(surface.get("unit_m").is_none());
+    assert_eq!(told["inputs"][0]["path"], "shapes/half_sphere.stl");
+    assert!(!place.path("points.csv").exists());
+    // What it guesses, discretising still asks for.
+    place
+        .run(&["discretize", "shapes/half_sphere.stl", "--out", "-"])
+        .ends(2)
+        .says(&["--unit"]);
+}
+
+#[test]
+fn a_picture_is_drawn_and_replaced_only_where_it_shows_the_same() {
+    let place = Place::new();
+    let args = ["discretize", "shapes/wedge.toml", "--grid"];
+    place.run(&[&args[..], &["9x9"]].concat()).ends(2);
+    let args = ["discretize", "shapes/wedge.toml", "--plot", "a.svg"];
+    place.run(&args).ends(0);
+    let drawn = place.read("a.svg");
+    let text = String::from_utf8(drawn.clone()).unwrap();
+    assert!(text.contains("height / mm") && text.contains("interpolation / um"));
+    place.run(&args).ends(0);
+    assert!(place.read("a.svg") == drawn, "not the same bytes twice");
+    let other = ["discretize", "shapes/flat.toml", "--plot", "a.svg"];
+    let out = ["--out", "b.csv"];
+    let refused = place.run(&[&other[..], &out].concat()).ends(4);
+    assert!(
+        refused.err.contains("was not drawn of these inputs"),
+        "{refused:?}"
+    );
+    assert!(place.read("a.svg") == drawn);
+    place
+        .run(&[&other[..], &out, &["--force"]].concat())
+        .ends(0);
+    assert!(place.read("a.svg") != drawn);
+    // Standard output holds one thing.
+    let twice = [
+        "discretize",
+        "shapes/flat.toml",
+        "--plot",
+        "-",
+        "--out",
+        "-",
+    ];
+    place.run(&twice).ends(2).says(&["name a file"]);
+    let piped = ["discretize", "shapes/flat.toml", "--inspect", "--plot", "-"];
+    let ran = place.run(&piped).ends(0);
+    assert!(
+        ran.out.contains("<svg") && ran.err.contains("STL"),
+        "{}",
+        ran.err
+    );
+}
+
+#[test]
+fn what_cannot_be_inspected_says_why() {
+    let place = Place::new();
+    place.write(
+        "ball.toml",
+        "name = \"ball\"\nprimitive = \"half-sphere\"\n",
+    );
+    let ran = place.run(&["discretize", "ball.toml", "--inspect"]).ends(2);
+    assert!(ran.err.contains("no file to inspect"), "{ran:?}");
+    let raw = ["discretize", "shapes/flat.stl", "--inspect"];
+    for flags in [&["--translate", "0,0,3"][..], &["--grid", "9x9"]] {
+        let ran = place.run(&[&raw[..], flags].concat()).ends(2);
+        assert!(ran.err.contains("as it is"), "{ran:?}");
+    }
+    place.run(&[&raw[..], &["--out", "a.csv"]].concat()).ends(2);
+    let ran = place.run(&["discretize", "none.obj", "--inspect"]).ends(3);
+    assert!(ran.err.contains("no such file"), "{ran:?}");
+    place.write("model.dae", "<xml/>");
+    let ran = place.run(&["discretize", "model.dae", "--inspect"]).ends(3);
+    assert!(ran.err.contains(".3mf"), "{ran:?}");
+}
+
+#[test]
+fn factors_that_differ_are_refused_unless_they_are_meant() {
+    let place = Place::new();
+    let raw = |flags: &[&str]| {
+        let args = [
+            "discretize",
+            "shapes/wedge.stl",
+            "--unit",
+            "mm",
+            "--out",
+            "-",
+        ];
+        place.run(&[&args[..], flags].concat())
+    };
+    let ran = raw(&["--scale", "1,1,1.3"]).ends(2);
+    assert!(ran.err.contains("--stretch"), "{ran:?}");
+    raw(&["--scale", "0"]).ends(2);
+    raw(&["--scale", "1,2"]).ends(2);
+    let highest = |flags: &[&str]| -> f64 {
+        let ran = raw(flags).ends(0);
+        let rows = ran.out.lines().skip(1).map(|row| {
+            let height = row.split(',').nth(2).unwrap();
+            height.parse::<f64>().unwrap()
+        });
+        rows.fold(0.0, f64::max)
+    };
+    let plain = highest(&[]);
+    let same = |got: f64, factor: f64| (got / plain - factor).abs() < 1e-12;
+    assert!(same(highest(&["--scale", "0.7"]), 0.7));
+    assert!(same(highest(&["--scale", "1,1,1.3", "--stretch"]), 1.3));
+
+    let shape = "name = \"w\"\nsurface = \"shapes/wedge.stl\"\nunit = \"mm\"\n";
+    let with = |keys: &str| {
+        place.write("w.toml", &format!("{shape}{keys}\n"));
+        place.run(&[
+            "discretize",
+            "w.toml",
+            "--out",
+            "w.csv",
+            "--force",
+            "--format",
+            "json",
+        ])
+    };
+    let ran = with("scale = [1, 1, 1.3]").ends(3);
+    assert!(ran.err.contains("stretch = true"), "{ran:?}");
+    let json = with("scale = [1, 1, 1.3]\nstretch = true").ends(0).json();
+    assert!(same(json["max_height_m"].as_f64().unwrap(), 1.3));
+    let json = with("scale = 0.7").ends(0).json();
+    assert!(same(json["max_height_m"].as_f64().unwrap(), 0.7));
+    with("scale = [1, 2]").ends(3);
+    with("scale = -1").ends(3);
+}

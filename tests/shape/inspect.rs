@@ -1,0 +1,111 @@
+//! What is told of a surface's file before anything is made of it.
+
+use fluxform::shape::MeshReport;
+use fluxform::shape::document::SurfaceFormat;
+use fluxform::shape::mesh::{FileMesh, Triangle};
+
+fn report(triangles: Vec<Triangle>) -> MeshReport {
+    let file = FileMesh {
+        triangles,
+        coordinate_rounding: 1e-6,
+        ..FileMesh::default()
+    };
+    MeshReport::new(SurfaceFormat::Stl, file)
+}
+
+/// A closed box between two corners, in order outwards.
+fn block(low: [f64; 3], high: [f64; 3]) -> Vec<Triangle> {
+    let corner = |k: usize| [0, 1, 2].map(|axis| [low, high][k >> axis & 1][axis]);
+    let faces = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    let halves = |[a, b, c, d]: [usize; 4]| [[a, b, c], [a, c, d]];
+    faces
+        .into_iter()
+        .flat_map(halves)
+        .map(|face| face.map(corner))
+        .collect()
+}
+
+#[test]
+fn a_plain_body_has_no_fault() {
+    let found = report(block([-0.7, 1.3, 2.9], [4.1, 3.7, 5.3]));
+    assert!(found.watertight && found.warnings.is_empty(), "{found:?}");
+    assert_eq!((found.bodies, found.euler, found.layers), (1, 2, Some(2)));
+    assert_eq!(found.self_intersections, 0);
+    let volume = 4.8 * 2.4 * 2.4;
+    assert!((found.volume.unwrap() - volume).abs() < 1e-12 * volume);
+}
+
+#[test]
+fn bodies_in_one_another_are_counted_and_cross_where_they_do() {
+    let outer = block([0.0; 3], [7.0; 3]);
+    let apart = [outer.clone(), block([9.1; 3], [11.3; 3])].concat();
+    let found = report(apart);
+    assert_eq!((found.bodies, found.euler), (2, 4));
+    assert_eq!((found.self_intersections, found.layers), (0, Some(2)));
+
+    let inside = [outer.clone(), block([2.3; 3], [4.9; 3])].concat();
+    let found = report(inside);
+    assert_eq!((found.self_intersections, found.layers), (0, Some(4)));
+
+    let through = [outer.clone(), block([2.3, 2.9, 3.1], [11.3, 4.9, 5.3])].concat();
+    let found = report(through);
+    assert!(found.self_intersections > 0 && found.self_intersections_complete);
+    let [first, second] = found.self_intersection_first.unwrap();
+    assert!(first < 12 && second >= 12, "{first} {second}");
+
+    // Two blocks that touch along a face share its plane, not its inside.
+    let beside = [outer.clone(), block([7.0, 0.0, 0.0], [9.1, 7.0, 7.0])].concat();
+    let found = report(beside);
+    assert!(
+        found.duplicate > 0 || found.self_intersections > 0,
+        "{found:?}"
+    );
+    // A smaller block standing on the top lies on it.
+    let upon = [outer, block([2.3, 2.9, 7.0], [3.1, 4.9, 8.3])].concat();
+    assert!(report(upon).self_intersections > 0);
+}
+
+#[test]
+fn triangles_that_only_meet_do_not_cross() {
+    // A corner on a face, an edge along a face's edge, a corner that ends on an edge.
+    let base = [[0.0, 0.0, 0.0], [7.0, 0.0, 0.0], [0.0, 7.0, 0.0]];
+    let meets = [
+        [[1.3, 1.7, 0.0], [2.3, 1.9, 3.1], [1.1, 2.9, 4.7]],
+        [[1.3, 0.0, 0.0], [5.3, 0.0, 0.0], [3.1, -2.9, 1.7]],
+        [[0.0, 3.1, 0.0], [-2.3, 1.9, 0.0], [-1.1, 5.3, 0.0]],
+        [[0.0, 7.0, 0.0], [-2.3, 8.9, 0.7], [-1.1, 9.3, 0.9]],
+        [[7.0, 0.0, 0.0], [0.0, 7.0, 0.0], [7.0, 7.0, 0.0]],
+    ];
+    for other in meets {
+        assert_eq!(report(vec![base, other]).self_intersections, 0, "{other:?}");
+    }
+    let crosses = [
+        [[1.3, 1.7, -0.9], [2.3, 1.9, 3.1], [1.1, 2.9, 4.7]],
+        // In the same plane, partly over each other.
+        [[1.3, 1.7, 0.0], [9.3, 1.9, 0.0], [1.1, 9.9, 0.0]],
+        // Folded back over its neighbour.
+        [[7.0, 0.0, 0.0], [0.0, 7.0, 0.0], [0.9, 0.7, 0.0]],
+    ];
+    for other in crosses {
+        assert_eq!(report(vec![base, other]).self_intersections, 1, "{other:?}");
+    }
+}
+
+#[test]
+fn a_unit_is_guessed_by_size_and_never_where_the_file_has_one() {
+    let guesses = |size: f64| -> Vec<&'static str> {
+        let found = report(block([0.0; 3], [size; 3]));
+        found.unit_guesses.iter().map(|guess| guess.unit).collect()
+    };
+    assert_eq!(guesses(73.0), ["mm"]);
+    assert_eq!(guesses(0.073), ["m"]);
+    assert_eq!(guesses(2.9), ["in", "cm"]);
+    assert!(guesses(7e4).is_empty());
+}
