@@ -93,6 +93,7 @@ pub(super) fn solve(
         forces_n_per_a: &forces,
         height_m: &points.discretized.points.height_m,
         offset_n: offset_n.as_deref(),
+        weights: None,
         lower_a: &scene.lower_a,
         upper_a: &scene.upper_a,
         total_max_a: scene.design.supply.total_current_max_a,
@@ -227,6 +228,7 @@ pub fn criterion_name(criterion: Criterion) -> &'static str {
         Criterion::Jnd => "jnd",
         Criterion::Linear => "linear",
         Criterion::Saturation => "saturation",
+        Criterion::Maxmin => "maxmin",
     }
 }
 

@@ -439,6 +439,7 @@ fn force_constant(
         forces_n_per_a: &forces,
         height_m: &heights,
         offset_n: offset_n.as_deref(),
+        weights: None,
         lower_a: &scene.lower_a,
         upper_a: &scene.upper_a,
         total_max_a: scene.design.supply.total_current_max_a,

@@ -14,6 +14,7 @@ mod power;
 mod problem;
 mod reduce;
 mod solve;
+pub mod worst;
 
 pub use path::{Breakpoint, Event, Path};
 pub use problem::{Criterion, ForceProblem, ProblemError, Settings};
