@@ -10,9 +10,13 @@ use super::working_point::{WorkingPoint, relative_difference, superposition_ends
 use super::{JobError, KERNEL_ERROR, passive, steel};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
-use crate::bundle::lambda_file::{AtLambda, LambdaFile, PathStep, WorkingPointForces};
+use crate::bundle::lambda_file::{
+    ActivePointShare, AtLambda, LambdaFile, PathStep, WorkingPointForces, WorstPointAt,
+    WorstPointFile, WorstPointStep,
+};
 use crate::design::{Design, MagnetModel};
 use crate::field::steel::inside::peak_depth_m;
+use crate::lambda::worst::{WorstSolution, worst_point};
 use crate::lambda::{self, Criterion, ForceProblem, Precision, Settings, Solution, Status};
 use crate::progress::Progress;
 use crate::shape::document::ShapeDocument;
@@ -100,8 +104,16 @@ pub(super) fn solve(
         resistance_ohm: &resistance_ohm,
     };
     let solution = lambda::solve(&problem, &options.settings)?;
+    let worst = worst_point(&problem, &options.settings)?;
     progress.end();
     let mut warnings = warnings(&points, &solution, options);
+    if !worst.complete {
+        warnings.push(
+            "the worst-point path could not be followed to its end: its numbers are not the \
+             minimum; please report this design and shape"
+                .to_owned(),
+        );
+    }
     if let Some(core) = &scene.core {
         warnings.extend(core.warnings.iter().cloned());
     }
@@ -118,6 +130,7 @@ pub(super) fn solve(
         ));
     }
     let mut file = file(scene, solved, &points, &solution, options);
+    add_worst_point(&mut file, &problem, &solution, &worst);
     if let Some(chosen) = &solution.chosen {
         let asked = Asked {
             currents_a: &chosen.currents_a,
@@ -304,6 +317,7 @@ fn file(
         lambda_linear_n_per_m: solution.lambda_linear_n_per_m,
         lambda_jnd_n_per_m: solution.lambda_jnd_n_per_m,
         lambda_saturation_n_per_m: solution.lambda_saturation_n_per_m,
+        lambda_maxmin_n_per_m: solution.lambda_maxmin_n_per_m,
         lambda_floor_n_per_m: solution.lambda_floor_n_per_m,
         lambda_n_per_m: chosen.map(|point| point.lambda_n_per_m),
         criterion: criterion_name(options.settings.criterion).to_owned(),
@@ -330,10 +344,69 @@ fn file(
             currents_a: point.currents_a.clone(),
             rms_error_n: point.rms_error_n,
             worst_error_n: point.worst_error_n,
+            worst_point: None,
         }),
+        worst_point: None,
         working_point: None,
         accuracy,
     }
+}
+
+/// The worst-point form beside the mean square.
+fn add_worst_point(
+    file: &mut LambdaFile,
+    problem: &ForceProblem,
+    solution: &Solution,
+    worst: &WorstSolution,
+) {
+    // Currents that bring no force nearer on average bring none of use at the worst point either.
+    let rendered = |lambda: Option<f64>| {
+        lambda.filter(|_| solution.status != Status::NothingRendered)
+    };
+    let chosen = solution.chosen.as_ref();
+    let point = chosen.map(|chosen| worst.at(problem, chosen.lambda_n_per_m));
+    let point = point.as_ref();
+    file.worst_point = Some(WorstPointFile {
+        lambda_linear_n_per_m: rendered(worst.lambda_linear_n_per_m),
+        lambda_jnd_n_per_m: rendered(worst.lambda_jnd_n_per_m),
+        relative_floor: worst.floor,
+        worst_error_n: point.map(|point| point.worst_error_n),
+        relative_worst_error: point.and_then(|point| point.relative_worst_error),
+        currents_a: point.map(|point| point.currents_a.clone()),
+        gap_n: point.map(|point| point.gap_n),
+        active: point.map(|point| {
+            let shares = point.active.iter().map(|active| ActivePointShare {
+                point: active.point,
+                multiplier: active.multiplier,
+            });
+            shares.collect()
+        }),
+        path: worst
+            .path
+            .turns()
+            .iter()
+            .map(|turn| WorstPointStep {
+                lambda_n_per_m: turn.lambda_n_per_m,
+                worst_error_n: turn.worst_error_n,
+                currents_a: turn.currents_a.clone(),
+                active_points: turn.active.iter().map(|active| active.point).collect(),
+                event: if turn.events.is_empty() {
+                    "other points decide".to_owned()
+                } else {
+                    events(&turn.events)
+                },
+            })
+            .collect(),
+    });
+    if let Some(at) = &mut file.at {
+        let point = worst.at(problem, at.lambda_n_per_m);
+        at.worst_point = Some(WorstPointAt {
+            worst_error_n: point.worst_error_n,
+            currents_a: point.currents_a,
+        });
+    }
+    file.accuracy
+        .insert("worst_point".to_owned(), worst.accuracy.clone());
 }
 
 /// What is known of the forces' error.

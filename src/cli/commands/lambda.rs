@@ -5,7 +5,7 @@ use std::slice::from_ref;
 use clap::{Args, ValueEnum};
 
 use super::{accuracy_check, begin, describe};
-use crate::bundle::lambda_file::WorkingPointForces;
+use crate::bundle::lambda_file::{WorkingPointForces, WorstPointFile};
 use crate::cli::args::{SurfaceFlags, Tolerance};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
@@ -72,36 +72,28 @@ enum Wanted {
     Linear,
     /// The largest at which a coil still moves
     Saturation,
-    /// Not in this version
+    /// The largest with no point too weak; its currents may push too much elsewhere
     Maxmin,
 }
 
 impl CriterionFlags {
     /// The settings that the flags ask for.
-    ///
-    /// # Errors
-    /// Wrong usage: a criterion that is not built.
-    pub fn options(self, tolerance: Option<f64>) -> Result<LambdaOptions, Failure> {
+    #[must_use]
+    pub fn options(self, tolerance: Option<f64>) -> LambdaOptions {
         let criterion = match self.criterion {
             Wanted::Jnd => Criterion::Jnd,
             Wanted::Linear => Criterion::Linear,
             Wanted::Saturation => Criterion::Saturation,
-            Wanted::Maxmin => {
-                return Err(Failure::Usage(
-                    "--criterion maxmin: this version does not have it; choose jnd, linear or \
-                     saturation"
-                        .to_owned(),
-                ));
-            }
+            Wanted::Maxmin => Criterion::Maxmin,
         };
-        Ok(LambdaOptions {
+        LambdaOptions {
             settings: Settings {
                 criterion,
                 jnd_weight: self.jnd,
                 at_n_per_m: self.at,
             },
             tolerance,
-        })
+        }
     }
 }
 
@@ -111,7 +103,7 @@ impl Lambda {
     /// # Errors
     /// See [`Failure`].
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
-        let options = self.criterion.options(self.tolerance.tolerance)?;
+        let options = self.criterion.options(self.tolerance.tolerance);
         let (document, shapes) = documents::design_and_shapes(
             &self.design,
             Need::LAMBDA,
@@ -160,6 +152,7 @@ fn summary(design: &Design, report: &LambdaReport) -> String {
         ("linear", file.lambda_linear_n_per_m),
         ("jnd", file.lambda_jnd_n_per_m),
         ("saturation", file.lambda_saturation_n_per_m),
+        ("maxmin", file.lambda_maxmin_n_per_m),
         ("floor", file.lambda_floor_n_per_m),
     ];
     let constants = constants.map(|(name, lambda)| {
@@ -169,6 +162,9 @@ fn summary(design: &Design, report: &LambdaReport) -> String {
     sheet.line("lambda", &format!("{} N/m", constants.join(", ")));
     sheet.line("chosen by", &describe::criterion(&file.criterion, file.jnd));
     operating_point(&mut sheet, report);
+    if let Some(worst) = &file.worst_point {
+        sheet.line("worst point", &worst_point(worst));
+    }
     if let Some(point) = &file.working_point {
         sheet.line("steel", &along_the_curve(point));
     }
@@ -179,10 +175,14 @@ fn summary(design: &Design, report: &LambdaReport) -> String {
         sheet.line(
             "at",
             &format!(
-                "{} N/m: error rms {}, worst {}",
+                "{} N/m: error rms {}, worst {}{}",
                 number(at.lambda_n_per_m),
                 force(at.rms_error_n),
-                force(at.worst_error_n)
+                force(at.worst_error_n),
+                at.worst_point.as_ref().map_or_else(String::new, |worst| format!(
+                    ", at least {}",
+                    force(worst.worst_error_n)
+                ))
             ),
         );
         sheet.line("", &describe::currents(design, &at.currents_a));
@@ -205,6 +205,22 @@ fn summary(design: &Design, report: &LambdaReport) -> String {
     let stages = stages.map(|(name, stage)| (name.as_str(), stage));
     sheet.line("accuracy", &describe::accuracy(stages));
     sheet.finish()
+}
+
+/// What currents for the worst point would do instead.
+fn worst_point(worst: &WorstPointFile) -> String {
+    let constant = |lambda: Option<f64>| lambda.map_or_else(|| "none".to_owned(), number);
+    let least = worst.worst_error_n.map_or_else(String::new, |least| {
+        let relative = worst.relative_worst_error.map_or_else(String::new, |part| {
+            format!(" ({} of the largest force)", percent(part))
+        });
+        format!("error at least {}{relative}; ", force(least))
+    });
+    format!(
+        "{least}lambda by the worst point: linear {}, jnd {} N/m",
+        constant(worst.lambda_linear_n_per_m),
+        constant(worst.lambda_jnd_n_per_m)
+    )
 }
 
 /// What the steel does at the chosen currents, where it follows a curve.

@@ -10,7 +10,6 @@ use super::points::{Miss, Points, Probe, misses};
 use super::program::{End, Piece, Program};
 use super::scaled::{Form, Scaled};
 use crate::lambda::reduce::times_power;
-use crate::numerics::double_double::DoubleDouble as Num;
 use crate::numerics::real::Real;
 
 /// Points tried first: with more, the rest are only looked at to confirm.

@@ -9,10 +9,10 @@
 //! - `lambda_linear` is where t* leaves t_0,
 //! - `lambda_jnd` is the largest lambda with `t* - t_0 <= w lambda max |h|`: without offset that
 //!   with `t* <= (w_0 + w) lambda max h`,
-//! - `lambda_felt` is the largest lambda at which some currents keep every point's error within
-//!   `t_0 + max(w lambda h_j, 0.8 mN)`: where the surface is low, an error counts from the force
-//!   on that a finger feels at all,
 //! - `lambda_maxmin` is the largest lambda with `G I + offset >= lambda h` at every point.
+//!
+//! Errors are judged by the largest wanted force, not by that of their own point, so a surface
+//! that comes down to `h = 0` needs no exception.
 //!
 //! Where several currents are equally good, a vertex is told: of coils that cannot pull, the one
 //! with the least sum of currents.
@@ -26,8 +26,8 @@ mod program;
 mod proof;
 mod scaled;
 
-pub use maxmin::{Maxmin, maxmin};
 pub(super) use maxmin::largest;
+pub use maxmin::{Maxmin, maxmin};
 pub use path::{ActivePoint, Turn, WorstPath};
 pub use proof::lower_bound_n;
 

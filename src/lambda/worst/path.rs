@@ -55,10 +55,12 @@ impl WorstPath {
         let mut turns: Vec<Turn> = Vec::new();
         let mut slope = f64::NEG_INFINITY;
         let (mut last_slope_m, mut last_rates) = (0.0, vec![0.0; problem.coils()]);
-        for piece in &followed.pieces {
+        for (k, piece) in followed.pieces.iter().enumerate() {
             let last = piece.z.len() - 1;
             let rate = piece.rate[last].to_f64();
-            if !turns.is_empty() && rate - slope <= SAME_SLOPE * top {
+            // The last piece's currents hold without end, so it always counts.
+            let ends = k + 1 == followed.pieces.len();
+            if !turns.is_empty() && !ends && rate - slope <= SAME_SLOPE * top {
                 continue;
             }
             let turn = Turn {

@@ -17,6 +17,8 @@ const MET_AT_ZERO: f64 = 1e-26;
 const STILL: f64 = 1e-18;
 /// Multipliers, and pivots, that differ by less are equal, or none.
 const EQUAL: f64 = 1e-22;
+/// Entries of an inverse above this size amplify rounding.
+const STEEP: f64 = 1e4;
 /// Exchanges after which the inverse is made anew.
 const FRESH: usize = 16;
 
@@ -54,15 +56,6 @@ pub(super) struct Piece {
     pub rate: Vec<Num>,
     /// Active rows with their multipliers.
     pub active: Vec<(usize, Num)>,
-}
-
-impl Piece {
-    /// The variables at `lambda`.
-    pub fn at(&self, lambda: Num) -> Vec<Num> {
-        let step = lambda - self.start;
-        let pairs = self.z.iter().zip(&self.rate);
-        pairs.map(|(&z, &rate)| z + step * rate).collect()
-    }
 }
 
 /// How the following ended.
@@ -157,12 +150,12 @@ impl Program {
         let patience = 40 + 4 * self.width;
         let limit = 4000 + 60 * (self.width + self.rows());
         for _ in 0..limit {
-            vertex.place(self);
+            vertex.place(self, lambda);
             let cautious = exchanges_here > patience;
             let mut entering = self.violated(&vertex, lambda, cautious);
             if entering.is_none() {
                 let piece = vertex.piece(lambda);
-                let step = self.next_event(&vertex, lambda, &piece);
+                let step = self.next_event(lambda, &vertex, cautious);
                 // A piece of no length is none.
                 if pieces.last().is_some_and(|last| last.start == lambda) {
                     pieces.pop();
@@ -185,60 +178,43 @@ impl Program {
                 Exchange::Singular => break,
             }
         }
+       
         (pieces, End::Stalled)
     }
 
-    /// A row that is not met, or will not be as lambda grows: the worst one, or the first.
+    /// A row that is not met: the worst one, or the first.
     fn violated(&self, vertex: &Vertex, lambda: Num, first: bool) -> Option<usize> {
         let size = self.size[0] + lambda.to_f64() * self.size[1];
         let met = MET * size + MET_AT_ZERO;
-        let z = vertex.at(lambda);
-        // Those below their bound come first, then those that will be.
-        let mut worst: Option<(usize, bool, f64)> = None;
-        for r in 0..self.rows() {
-            if vertex.active[r] {
-                continue;
-            }
-            let slack = (self.times(r, &z) - self.constant[r] - lambda * self.slope[r]).to_f64();
-            let found = if slack < -met {
-                (r, true, slack)
-            } else if slack <= met {
-                let rate = (self.times(r, &vertex.rate) - self.slope[r]).to_f64();
-                if rate >= -STILL {
-                    continue;
-                }
-                (r, false, rate)
-            } else {
-                continue;
-            };
-            if first {
-                return Some(r);
-            }
-            if worst.is_none_or(|(_, below, by)| (found.1 && !below) || (found.1 == below && found.2 < by)) {
-                worst = Some(found);
+        let mut worst: Option<(usize, f64)> = None;
+        for r in (0..self.rows()).filter(|&r| !vertex.active[r]) {
+            let slack = (self.times(r, &vertex.z) - self.constant[r] - lambda * self.slope[r]).to_f64();
+            if slack < -met && worst.is_none_or(|(_, least)| slack < least && !first) {
+                worst = Some((r, slack));
             }
         }
-        worst.map(|(r, _, _)| r)
+        worst.map(|(r, _)| r)
     }
 
-    /// The first row to be violated as lambda grows, and how far off.
-    fn next_event(&self, vertex: &Vertex, lambda: Num, piece: &Piece) -> Option<(usize, Num)> {
-        let mut first: Option<(usize, Num)> = None;
-        for r in 0..self.rows() {
-            if vertex.active[r] {
-                continue;
-            }
-            let rate = self.times(r, &piece.rate) - self.slope[r];
+    /// The row that will be violated first as lambda grows, and how far off; of several that
+    /// with the largest rate, or the first.
+    fn next_event(&self, lambda: Num, vertex: &Vertex, first: bool) -> Option<(usize, Num)> {
+        let mut next: Option<(usize, Num, Num)> = None;
+        for r in (0..self.rows()).filter(|&r| !vertex.active[r]) {
+            let rate = self.times(r, &vertex.rate) - self.slope[r];
             if rate.to_f64() >= -STILL {
                 continue;
             }
-            let slack = self.times(r, &piece.z) - self.constant[r] - lambda * self.slope[r];
+            let slack = self.times(r, &vertex.z) - self.constant[r] - lambda * self.slope[r];
             let step = slack.larger(Num::ZERO) / -rate;
-            if first.is_none_or(|(_, least)| step < least) {
-                first = Some((r, step));
+            let sooner = next.is_none_or(|(_, least, steepest)| {
+                step < least || (step == least && rate < steepest && !first)
+            });
+            if sooner {
+                next = Some((r, step, rate));
             }
         }
-        first
+        next.map(|(r, step, _)| (r, step))
     }
 }
 
@@ -250,12 +226,15 @@ enum Exchange {
     Singular,
 }
 
-/// The active rows and the inverse of their matrix, column by column.
+/// The active rows, their matrix row by row, and its inverse column by column.
 struct Vertex {
     basis: Vec<usize>,
     active: Vec<bool>,
+    matrix: Vec<Vec<Num>>,
     inverse: Vec<Vec<Num>>,
-    constant: Vec<Num>,
+    /// Whether solutions need a correction: rows that are nearly dependent.
+    steep: bool,
+    z: Vec<Num>,
     rate: Vec<Num>,
     exchanges: usize,
 }
@@ -266,102 +245,114 @@ impl Vertex {
         for &r in &basis {
             active[r] = true;
         }
-        Some(Self {
-            inverse: inverse(program, &basis)?,
+        let mut vertex = Self {
+            matrix: basis.iter().map(|&r| program.coefficients(r)).collect(),
+            inverse: Vec::new(),
             basis,
             active,
-            constant: Vec::new(),
+            steep: false,
+            z: Vec::new(),
             rate: Vec::new(),
             exchanges: 0,
-        })
+        };
+        vertex.renew().then_some(vertex)
     }
 
-    /// `z = constant + lambda rate` from the active rows.
-    fn place(&mut self, program: &Program) {
-        let combine = |bounds: &[Num]| {
-            let mut sum = vec![Num::ZERO; program.width];
-            for (column, &r) in self.inverse.iter().zip(&self.basis) {
-                if bounds[r] != Num::ZERO {
-                    Num::add_scaled(&mut sum, bounds[r], column);
+    /// Makes the inverse anew; false where the rows depend on each other.
+    fn renew(&mut self) -> bool {
+        let Some(fresh) = inverse(self.matrix.clone()) else {
+            return false;
+        };
+        self.inverse = fresh;
+        self.weigh();
+        true
+    }
+
+    fn weigh(&mut self) {
+        let entries = self.inverse.iter().flatten();
+        self.steep = entries.fold(0.0_f64, |most, v| most.max(v.to_f64().abs())) > STEEP;
+    }
+
+    /// z with `matrix z = right`.
+    fn solve(&self, right: &[Num]) -> Vec<Num> {
+        let mut z = vec![Num::ZERO; right.len()];
+        let add = |z: &mut [Num], right: &[Num]| {
+            for (column, &value) in self.inverse.iter().zip(right) {
+                if value != Num::ZERO {
+                    Num::add_scaled(z, value, column);
                 }
             }
-            sum
         };
-        let (constant, rate) = (combine(&program.constant), combine(&program.slope));
-        self.constant = constant;
-        self.rate = rate;
+        add(&mut z, right);
+        if self.steep {
+            let pairs = self.matrix.iter().zip(right);
+            let rest: Vec<Num> = pairs.map(|(row, &b)| b - Num::dot(row, &z)).collect();
+            add(&mut z, &rest);
+        }
+        z
     }
 
-    fn at(&self, lambda: Num) -> Vec<Num> {
-        let pairs = self.constant.iter().zip(&self.rate);
-        pairs.map(|(&c, &rate)| c + lambda * rate).collect()
+    /// y with `matrix' y = right`.
+    fn solve_transposed(&self, right: &[Num]) -> Vec<Num> {
+        let times = |right: &[Num]| -> Vec<Num> {
+            self.inverse.iter().map(|c| Num::dot(c, right)).collect()
+        };
+        let mut y = times(right);
+        if self.steep {
+            let mut rest = right.to_vec();
+            for (row, &value) in self.matrix.iter().zip(&y) {
+                Num::add_scaled(&mut rest, -value, row);
+            }
+            for (value, more) in y.iter_mut().zip(times(&rest)) {
+                *value += more;
+            }
+        }
+        y
+    }
+
+    /// z at `lambda` and its rate, from the active rows. Solved for at lambda itself: a steep
+    /// rate would cancel against the rest.
+    fn place(&mut self, program: &Program, lambda: Num) {
+        let at = |&r: &usize| program.constant[r] + lambda * program.slope[r];
+        let here: Vec<Num> = self.basis.iter().map(at).collect();
+        let slope: Vec<Num> = self.basis.iter().map(|&r| program.slope[r]).collect();
+        self.z = self.solve(&here);
+        self.rate = self.solve(&slope);
+    }
+
+    fn multipliers(&self) -> Vec<Num> {
+        let mut unit = vec![Num::ZERO; self.basis.len()];
+        if let Some(last) = unit.last_mut() {
+            *last = Num::ONE;
+        }
+        let y = self.solve_transposed(&unit);
+        y.into_iter().map(|y| y.larger(Num::ZERO)).collect()
     }
 
     fn piece(&self, lambda: Num) -> Piece {
-        let last = self.basis.len() - 1;
         Piece {
             start: lambda,
-            z: self.at(lambda),
+            z: self.z.clone(),
             rate: self.rate.clone(),
-            active: self
-                .basis
-                .iter()
-                .zip(&self.inverse)
-                .map(|(&r, column)| (r, column[last].larger(Num::ZERO)))
-                .collect(),
+            active: self.basis.iter().copied().zip(self.multipliers()).collect(),
         }
     }
 
     /// Makes row `entering` active in place of the one whose multiplier vanishes first.
     fn exchange(&mut self, program: &Program, entering: usize, cautious: bool) -> Exchange {
         let row = program.coefficients(entering);
-        let last = program.width - 1;
-        let share: Vec<Num> = self.inverse.iter().map(|c| Num::dot(c, &row)).collect();
-        let equal = Num::of(EQUAL);
-        let mut leaving: Option<(usize, Num, Num)> = None;
-        for (k, &part) in share.iter().enumerate() {
-            if part <= equal {
-                continue;
-            }
-            let column = &self.inverse[k];
-            let first = column[last].larger(Num::ZERO) / part;
-            let second = Num::dot(column, &program.second) / part;
-            let better = match leaving {
-                None => true,
-                Some((l, least, least_second)) => {
-                    let apart = first - least;
-                    // Equal within what rounding leaves of either multiplier.
-                    let grain = equal / part.smaller(share[l]).smaller(Num::ONE);
-                    let apart_second = second - least_second;
-                    if apart.abs() > grain {
-                        apart < Num::ZERO
-                    } else if !cautious && apart_second.abs() > grain {
-                        apart_second < Num::ZERO
-                    } else if cautious {
-                        self.basis[k] < self.basis[l]
-                    } else {
-                        part > share[l]
-                    }
-                }
-            };
-            if better {
-                leaving = Some((k, first, second));
-            }
-        }
-        let Some((k, _, _)) = leaving else {
+        let share = self.solve_transposed(&row);
+        let Some(k) = self.leaving(program, &share, cautious) else {
             return Exchange::Impossible;
         };
         let pivot = share[k];
         self.active[self.basis[k]] = false;
         self.active[entering] = true;
         self.basis[k] = entering;
+        self.matrix[k] = row;
         self.exchanges += 1;
-        if self.exchanges % FRESH == 0 || pivot.to_f64() < 1e-4 {
-            let Some(fresh) = inverse(program, &self.basis) else {
-                return Exchange::Singular;
-            };
-            self.inverse = fresh;
-            return Exchange::Done;
+        if self.exchanges.is_multiple_of(FRESH) || pivot.to_f64() < 1e-4 || self.steep {
+            return if self.renew() { Exchange::Done } else { Exchange::Singular };
         }
         let mut column = std::mem::take(&mut self.inverse[k]);
         for value in &mut column {
@@ -373,17 +364,42 @@ impl Vertex {
             }
         }
         self.inverse[k] = column;
+        self.weigh();
         Exchange::Done
+    }
+
+    /// Place in the basis of the row that gives way to one with the given shares.
+    fn leaving(&self, program: &Program, share: &[Num], cautious: bool) -> Option<usize> {
+        let multipliers = self.multipliers();
+        let second = self.solve_transposed(&program.second);
+        let ratios = |values: &[Num]| -> Vec<Num> {
+            values.iter().zip(share).map(|(&v, &part)| v / part).collect()
+        };
+        let equal = Num::of(EQUAL);
+        let candidates: Vec<usize> = (0..share.len()).filter(|&k| share[k] > equal).collect();
+        // The smallest ratio, then among those equal to it the smallest second one, and so on.
+        let least = |among: Vec<usize>, values: &[Num]| -> Vec<usize> {
+            let ratio = ratios(values);
+            let Some(best) = among.iter().copied().reduce(|a, b| if ratio[b] < ratio[a] { b } else { a }) else {
+                return among;
+            };
+            // Equal within what rounding leaves of the multiplier.
+            let close = |&k: &usize| (ratio[k] - ratio[best]) * share[k] <= equal;
+            among.into_iter().filter(close).collect()
+        };
+        let mut left = least(candidates, &multipliers);
+        if !cautious {
+            left = least(left, &second);
+            return left.into_iter().reduce(|a, b| if share[b] > share[a] { b } else { a });
+        }
+        left.into_iter().min_by_key(|&k| self.basis[k])
     }
 }
 
-/// Columns of the inverse of the matrix whose rows are the program's rows of `basis`, by Gauss
-/// and Jordan with row pivoting; `None` where they depend on each other.
-fn inverse(program: &Program, basis: &[usize]) -> Option<Vec<Vec<Num>>> {
-    let n = basis.len();
-    // Transposed: every column of the inverse solves one system with these rows as columns, so
-    // elimination runs over the rows of [M | 1] and ends with [1 | M^-1].
-    let mut left: Vec<Vec<Num>> = basis.iter().map(|&r| program.coefficients(r)).collect();
+/// Columns of the inverse of a matrix given row by row, by Gauss and Jordan with row pivoting;
+/// `None` where its rows depend on each other.
+fn inverse(mut left: Vec<Vec<Num>>) -> Option<Vec<Vec<Num>>> {
+    let n = left.len();
     let mut right: Vec<Vec<Num>> = (0..n)
         .map(|k| {
             let mut unit = vec![Num::ZERO; n];

@@ -10,6 +10,9 @@ use super::program::Program;
 use crate::lambda::problem::ForceProblem;
 use crate::lambda::reduce::{exponent_of, times_power};
 
+/// What rounding leaves of a scaled current of zero.
+const NOTHING: f64 = 1e-24;
+
 /// Which rows a point contributes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Form {
@@ -37,7 +40,7 @@ pub(super) struct Scaled<'a> {
     pub highest: usize,
     force: i32,
     limits: Limits,
-    /// The coils that have any effect.
+    /// The coils that have any effect, on forces or on what others may carry.
     pub live: Vec<usize>,
 }
 
@@ -51,7 +54,10 @@ impl<'a> Scaled<'a> {
         let coils = problem.coils();
         let reach = |i: usize| problem.upper_a[i].max(-problem.lower_a[i]);
         let moves = |i: usize| limits == Limits::Lower || reach(i) > 0.0;
-        let live: Vec<usize> = (0..coils).filter(|&i| largest[i] > 0.0 && moves(i)).collect();
+        // A coil without force may still carry a negative current and so make room in the sum.
+        let summed = limits == Limits::All && problem.total_max_a.is_some();
+        let counts = |i: usize| largest[i] > 0.0 || (summed && problem.lower_a[i] < 0.0);
+        let live: Vec<usize> = (0..coils).filter(|&i| counts(i) && moves(i)).collect();
         let force = (0..coils)
             .filter(|&i| largest[i] > 0.0 && reach(i) > 0.0)
             .map(|i| exponent_of(reach(i)) + exponent_of(largest[i]))
@@ -84,8 +90,13 @@ impl<'a> Scaled<'a> {
         offset.copied().unwrap_or(0.0)
     }
 
+    /// Exponent of coil i's force per ampere; without force, one that suits its limits.
     fn column(&self, i: usize) -> i32 {
-        exponent_of(self.largest[i])
+        if self.largest[i] > 0.0 {
+            return exponent_of(self.largest[i]);
+        }
+        let reach = self.problem.upper_a[i].max(-self.problem.lower_a[i]);
+        self.force - exponent_of(reach)
     }
 
     fn height(&self) -> i32 {
@@ -111,7 +122,10 @@ impl<'a> Scaled<'a> {
     pub fn amperes(&self, z: &[Num]) -> Vec<f64> {
         let mut amperes = vec![0.0; self.problem.coils()];
         for (&i, x) in self.live.iter().zip(z) {
-            amperes[i] = times_power(x.to_f64(), self.force - self.column(i));
+            let x = x.to_f64();
+            if x.abs() > NOTHING {
+                amperes[i] = times_power(x, self.force - self.column(i));
+            }
         }
         amperes
     }
