@@ -1,15 +1,17 @@
-//! Few points decide: a program over them is followed, the points it misses are added, and so
-//! on until none is missed at any turn of the path.
+//! Few points decide: a program over them is followed, and a point joins it when the path is
+//! about to miss it. Of many points a sample is looked at on the way and the others afterwards;
+//! those that are missed at a turn join the sample, and the path is followed again.
 //!
 //! Along a piece the currents are linear in lambda and the largest error is convex, so a path
 //! that is right at the turns, and in the direction of its last piece, is right everywhere.
 
 use std::collections::BTreeSet;
 
-use super::points::{Miss, Points, Probe, misses};
-use super::program::{End, Piece, Program};
+use super::points::{Course, Points, Probe, first_missed, misses};
+use super::program::{End, Piece, Program, Stand};
 use super::scaled::{Form, Scaled};
 use crate::lambda::reduce::times_power;
+use crate::numerics::double_double::DoubleDouble as Num;
 use crate::numerics::real::Real;
 
 /// Points tried first: with more, the rest are only looked at to confirm.
@@ -34,6 +36,7 @@ pub(super) struct Followed {
 /// A few points, copied side by side.
 struct Pool {
     index: Vec<usize>,
+    known: BTreeSet<usize>,
     forces: Vec<f64>,
     heights: Vec<f64>,
     offsets: Option<Vec<f64>>,
@@ -43,6 +46,7 @@ impl Pool {
     fn new(all: Points, index: Vec<usize>) -> Self {
         let mut pool = Self {
             index: Vec::new(),
+            known: BTreeSet::new(),
             forces: Vec::new(),
             heights: Vec::new(),
             offsets: all.offset_n.map(|_| Vec::new()),
@@ -55,6 +59,7 @@ impl Pool {
 
     fn add(&mut self, all: Points, j: usize) {
         self.index.push(j);
+        self.known.insert(j);
         self.forces
             .extend_from_slice(&all.forces_n_per_a[j * all.coils..(j + 1) * all.coils]);
         self.heights.push(all.height_m[j]);
@@ -92,96 +97,137 @@ pub(super) fn follow(scaled: &Scaled, form: Form) -> Followed {
     if form == Form::Worst {
         working.push((scaled.highest, false));
     }
-    let fixed = working.len();
     for _ in 0..ROUNDS {
-        let (mut followed, first_row) = solve(scaled, form, &working);
+        let near = pool.as_ref().map_or(all, |pool| pool.points(all.coils));
+        let index = pool.as_ref().map(|pool| pool.index.as_slice());
+        let mut followed = solve(scaled, form, &mut working, near, index);
         if followed.end != End::Whole {
             return followed;
         }
         let probes = probes(scaled, form, &mut followed);
-        let missed = match &pool {
-            Some(pool) => {
-                let mut missed = misses(pool.points(all.coils), &probes, form);
-                for miss in &mut missed {
-                    miss.point = pool.index[miss.point];
-                }
-                missed
-            }
-            None => misses(all, &probes, form),
+        let Some(pool) = &mut pool else {
+            return followed;
         };
-        let mut added = worst_of_each(&missed, probes.len());
-        if let (true, Some(pool)) = (added.is_empty(), &mut pool) {
-            let missed = misses(all, &probes, form);
-            added = worst_of_each(&missed, probes.len());
-            let fresh: BTreeSet<usize> = missed.iter().map(|miss| miss.point).collect();
-            for point in fresh {
-                pool.add(all, point);
-            }
-        }
-        if added.is_empty() {
+        let fresh: BTreeSet<usize> = misses(all, &probes, form)
+            .iter()
+            .map(|miss| miss.point)
+            .filter(|point| !pool.known.contains(point))
+            .collect();
+        if fresh.is_empty() {
             return followed;
         }
-        // Rows that no piece rests on decide nothing; the path cannot fall back without them.
-        if working.len() > 8 * (scaled.live.len() + 8) {
-            let used: BTreeSet<usize> = followed
-                .pieces
-                .iter()
-                .flat_map(|piece| piece.active.iter().map(|&(row, _)| row))
-                .collect();
-            let mut at = 0;
-            working.retain(|_| {
-                at += 1;
-                at <= fixed || used.contains(&(first_row + at - 1))
-            });
+        for point in fresh {
+            pool.add(all, point);
         }
-        let before = working.len();
-        for row in added {
+        // The rows that the path rests on are those to begin with.
+        let used: BTreeSet<usize> = followed
+            .pieces
+            .iter()
+            .flat_map(|piece| piece.active.iter().map(|&(row, _)| row))
+            .collect();
+        let keep = used.into_iter().filter_map(|row| followed.rows[row]);
+        for row in keep {
             if !working.contains(&row) {
                 working.push(row);
             }
         }
-        if working.len() == before {
-            // What is missed is in the program: rounding that the tolerance does not cover.
-            return followed;
-        }
     }
-    let (mut followed, _) = solve(scaled, form, &working);
-    followed.end = End::Stalled;
-    followed
+    Followed {
+        pieces: Vec::new(),
+        rows: Vec::new(),
+        end: End::Stalled,
+        doubt: 0.0,
+    }
 }
 
-fn solve(scaled: &Scaled, form: Form, working: &[(usize, bool)]) -> (Followed, usize) {
+/// Follows the program of the `working` rows, and of those of the points `near` that it meets.
+fn solve(
+    scaled: &Scaled,
+    form: Form,
+    working: &mut [(usize, bool)],
+    near: Points,
+    index: Option<&[usize]>,
+) -> Followed {
     let mut program: Program = scaled.bounds();
     let first_row = program.rows();
     let mut rows = vec![None; first_row];
-    for &(j, up) in working {
+    for &mut (j, up) in working.iter_mut() {
         scaled.add_point(&mut program, form, j, up);
         rows.push(Some((j, up)));
     }
+    let mut known: BTreeSet<(usize, bool)> = working.iter().copied().collect();
     let down = (form == Form::Worst).then_some(first_row + 1);
     let basis = scaled.first_basis(form, first_row, down);
-    let (pieces, end) = program.follow(&basis);
-    let followed = Followed {
+    let ask = |program: &mut Program, stand: &Stand| {
+        let course = course(scaled, form, stand);
+        let Some((place, up)) = first_missed(near, &course, form) else {
+            return false;
+        };
+        let row = (index.map_or(place, |index| index[place]), up);
+        // A row that is there already is held as well as rounding allows.
+        if !known.insert(row) {
+            return false;
+        }
+        scaled.add_point(program, form, row.0, row.1);
+        rows.push(Some(row));
+        true
+    };
+    let (pieces, end) = program.follow(&basis, ask);
+    Followed {
         pieces,
         rows,
         end,
         doubt: 0.0,
+    }
+}
+
+/// Where the program stands, in SI units.
+fn course(scaled: &Scaled, form: Form, stand: &Stand) -> Course {
+    let (lambda_unit, force_unit) = (scaled.lambda_unit(), scaled.force_unit());
+    let last = |z: &[Num]| z[z.len() - 1].to_f64();
+    let (lambda, bound) = match form {
+        Form::Worst => (stand.lambda.to_f64(), last(stand.z)),
+        Form::Least => (-last(stand.z), 0.0),
     };
-    (followed, first_row)
+    let currents_a = scaled.amperes(stand.z);
+    let lambda_n_per_m = times_power(lambda, lambda_unit);
+    let pushed = scaled.pushed_n(&currents_a);
+    let wanted = lambda_n_per_m.abs() * scaled.height_m() + scaled.offset_n();
+    let moves = form == Form::Worst;
+    let rates_a: Vec<f64> = scaled
+        .amperes(stand.rate)
+        .iter()
+        .map(|&rate| times_power(rate, -lambda_unit))
+        .collect();
+    let rounding = ROUNDINGS * f64::EPSILON;
+    Course {
+        rounding_n: times_power(NOTHING, force_unit) + rounding * (wanted + pushed),
+        rounding_m: rounding * (scaled.height_m() + scaled.pushed_n(&rates_a)),
+        limit_rate_m: if moves { times_power(last(stand.rate), force_unit - lambda_unit) } else { 0.0 },
+        lambda_rate: if moves { 1.0 } else { 0.0 },
+        step: match stand.step {
+            Some(step) if moves => times_power(step.to_f64(), lambda_unit),
+            _ => f64::INFINITY,
+        },
+        rates_a,
+        at: Probe {
+            lambda_n_per_m,
+            offset_share: 1.0,
+            currents_a,
+            limit_n: times_power(bound, force_unit),
+        },
+    }
 }
 
 /// What the points are asked at every turn, and in the direction of the last piece.
 fn probes(scaled: &Scaled, form: Form, followed: &mut Followed) -> Vec<Probe> {
     let (lambda_unit, force_unit) = (scaled.lambda_unit(), scaled.force_unit());
-    let coils = scaled.problem.coils();
     let mut doubt = 0.0_f64;
     let mut probe = |lambda: f64, offset_share: f64, bound: f64, currents_a: Vec<f64>| {
         let lambda_n_per_m = times_power(lambda, lambda_unit);
         let wanted = lambda_n_per_m.abs() * scaled.height_m() + offset_share * scaled.offset_n();
-        let pushed: f64 = (0..coils)
-            .map(|i| scaled.largest[i] * currents_a[i].abs())
-            .sum();
-        let rounding = ROUNDINGS * f64::EPSILON * (wanted + pushed);
+        let pushed = scaled.pushed_n(&currents_a);
+        let rounding = 2.0 * ROUNDINGS * f64::EPSILON * (wanted + pushed);
         if wanted > 0.0 {
             doubt = doubt.max(rounding / wanted);
         }
@@ -207,17 +253,4 @@ fn probes(scaled: &Scaled, form: Form, followed: &mut Followed) -> Vec<Probe> {
     }
     followed.doubt = doubt;
     all
-}
-
-/// For every probe its worst miss, as rows of the program.
-fn worst_of_each(missed: &[Miss], probes: usize) -> BTreeSet<(usize, bool)> {
-    let mut worst: Vec<Option<&Miss>> = vec![None; probes];
-    for miss in missed {
-        let best = &mut worst[miss.probe];
-        if best.is_none_or(|other| miss.excess_n > other.excess_n) {
-            *best = Some(miss);
-        }
-    }
-    let found = worst.into_iter().flatten();
-    found.map(|miss| (miss.point, miss.up)).collect()
 }

@@ -139,8 +139,14 @@ impl Program {
     }
 
     /// Follows the minimiser from `lambda = 0` on. The rows of `basis` must be independent and
-    /// their multipliers, the second objective's where those are zero, not negative.
-    pub fn follow(&self, basis: &[usize]) -> (Vec<Piece>, End) {
+    /// their multipliers, the second objective's where those are zero, not negative. Before the
+    /// minimiser moves on, `ask` is told where it stands, its rate, and the step to the next turn
+    /// if there is one; it adds a row that ends the step earlier, or returns false.
+    pub fn follow(
+        &mut self,
+        basis: &[usize],
+        mut ask: impl FnMut(&mut Self, &Stand) -> bool,
+    ) -> (Vec<Piece>, End) {
         let mut pieces: Vec<Piece> = Vec::new();
         let Some(mut vertex) = Vertex::new(self, basis.to_vec()) else {
             return (pieces, End::Stalled);
@@ -148,20 +154,32 @@ impl Program {
         let mut lambda = Num::ZERO;
         let mut exchanges_here = 0;
         let patience = 40 + 4 * self.width;
-        let limit = 4000 + 60 * (self.width + self.rows());
+        // Far more than there are turns: it ends what rounding keeps going in circles.
+        let limit = 20_000 + 1000 * self.width;
         for _ in 0..limit {
             vertex.place(self, lambda);
             let cautious = exchanges_here > patience;
-            let mut entering = self.violated(&vertex, lambda, cautious);
+            let (mut entering, mut next) = self.look(&vertex, lambda, cautious);
+            if entering.is_none() {
+                let stand = Stand {
+                    lambda,
+                    z: &vertex.z,
+                    rate: &vertex.rate,
+                    step: next.map(|(_, step)| step),
+                };
+                if ask(self, &stand) {
+                    vertex.active.resize(self.rows(), false);
+                    (entering, next) = self.look(&vertex, lambda, cautious);
+                }
+            }
             if entering.is_none() {
                 let piece = vertex.piece(lambda);
-                let step = self.next_event(lambda, &vertex, cautious);
                 // A piece of no length is none.
                 if pieces.last().is_some_and(|last| last.start == lambda) {
                     pieces.pop();
                 }
                 pieces.push(piece);
-                let Some((row, step)) = step else {
+                let Some((row, step)) = next else {
                     return (pieces, End::Whole);
                 };
                 if step > Num::ZERO {
@@ -178,44 +196,53 @@ impl Program {
                 Exchange::Singular => break,
             }
         }
-       
         (pieces, End::Stalled)
     }
 
-    /// A row that is not met: the worst one, or the first.
-    fn violated(&self, vertex: &Vertex, lambda: Num, first: bool) -> Option<usize> {
+    /// The row that is violated most, and the one that will be first as lambda grows with the
+    /// step till then (of several that with the largest rate); cautiously the first of each.
+    fn look(
+        &self,
+        vertex: &Vertex,
+        lambda: Num,
+        cautious: bool,
+    ) -> (Option<usize>, Option<(usize, Num)>) {
         let size = self.size[0] + lambda.to_f64() * self.size[1];
         let met = MET * size + MET_AT_ZERO;
         let mut worst: Option<(usize, f64)> = None;
-        for r in (0..self.rows()).filter(|&r| !vertex.active[r]) {
-            let slack = (self.times(r, &vertex.z) - self.constant[r] - lambda * self.slope[r]).to_f64();
-            if slack < -met && worst.is_none_or(|(_, least)| slack < least && !first) {
-                worst = Some((r, slack));
-            }
-        }
-        worst.map(|(r, _)| r)
-    }
-
-    /// The row that will be violated first as lambda grows, and how far off; of several that
-    /// with the largest rate, or the first.
-    fn next_event(&self, lambda: Num, vertex: &Vertex, first: bool) -> Option<(usize, Num)> {
         let mut next: Option<(usize, Num, Num)> = None;
         for r in (0..self.rows()).filter(|&r| !vertex.active[r]) {
+            let slack = self.times(r, &vertex.z) - self.constant[r] - lambda * self.slope[r];
+            let below = slack.to_f64();
+            if below < -met && worst.is_none_or(|(_, least)| below < least && !cautious) {
+                worst = Some((r, below));
+            }
+            if worst.is_some() {
+                continue;
+            }
             let rate = self.times(r, &vertex.rate) - self.slope[r];
             if rate.to_f64() >= -STILL {
                 continue;
             }
-            let slack = self.times(r, &vertex.z) - self.constant[r] - lambda * self.slope[r];
             let step = slack.larger(Num::ZERO) / -rate;
             let sooner = next.is_none_or(|(_, least, steepest)| {
-                step < least || (step == least && rate < steepest && !first)
+                step < least || (step == least && rate < steepest && !cautious)
             });
             if sooner {
                 next = Some((r, step, rate));
             }
         }
-        next.map(|(r, step, _)| (r, step))
+        (worst.map(|(r, _)| r), next.map(|(r, step, _)| (r, step)))
     }
+}
+
+/// Where the minimiser stands.
+pub(super) struct Stand<'a> {
+    pub lambda: Num,
+    pub z: &'a [Num],
+    pub rate: &'a [Num],
+    /// The way to the next turn by the rows so far.
+    pub step: Option<Num>,
 }
 
 enum Exchange {

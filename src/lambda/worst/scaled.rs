@@ -118,6 +118,12 @@ impl<'a> Scaled<'a> {
         Num::of(times_power(self.height_m(), -self.height()))
     }
 
+    /// Size of the forces that currents sum up, N, or of their rates.
+    pub fn pushed_n(&self, amperes: &[f64]) -> f64 {
+        let pairs = amperes.iter().zip(self.largest);
+        pairs.map(|(ampere, most)| ampere.abs() * most).sum()
+    }
+
     /// Currents, or their rates per unit of lambda', of all coils.
     pub fn amperes(&self, z: &[Num]) -> Vec<f64> {
         let mut amperes = vec![0.0; self.problem.coils()];
