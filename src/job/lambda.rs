@@ -360,9 +360,8 @@ fn add_worst_point(
     worst: &WorstSolution,
 ) {
     // Currents that bring no force nearer on average bring none of use at the worst point either.
-    let rendered = |lambda: Option<f64>| {
-        lambda.filter(|_| solution.status != Status::NothingRendered)
-    };
+    let rendered =
+        |lambda: Option<f64>| lambda.filter(|_| solution.status != Status::NothingRendered);
     let chosen = solution.chosen.as_ref();
     let point = chosen.map(|chosen| worst.at(problem, chosen.lambda_n_per_m));
     let point = point.as_ref();

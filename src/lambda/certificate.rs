@@ -43,7 +43,9 @@ pub(super) fn check<T: Real>(problem: &ForceProblem, lambda: f64, currents_a: &[
                     residual -= T::of(force) * current;
                 }
                 // The weight counts in the sums, not in the error at the point.
-                let weight = problem.weights.map_or(T::ONE, |w| T::of(w[first + j]) / heaviest);
+                let weight = problem
+                    .weights
+                    .map_or(T::ONE, |w| T::of(w[first + j]) / heaviest);
                 let weighted = weight * residual;
                 square += weighted * residual;
                 worst = worst.max(residual.abs().to_f64());

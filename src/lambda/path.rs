@@ -235,7 +235,9 @@ impl Path {
     pub fn currents_a(&self, lambda_n_per_m: f64) -> Vec<f64> {
         let (index, step) = self.locate(lambda_n_per_m);
         let coils = self.limits.upper_a.len();
-        let within = |i: usize, current: f64| current.clamp(self.limits.lower_a[i], self.limits.upper_a[i]) + 0.0;
+        let within = |i: usize, current: f64| {
+            current.clamp(self.limits.lower_a[i], self.limits.upper_a[i]) + 0.0
+        };
         if let Some(a) = &self.ambiguous {
             let lambda = Num::of(times_power(lambda_n_per_m, -a.lambda_scale));
             let norm = lambda * a.heights;

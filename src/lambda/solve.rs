@@ -334,9 +334,11 @@ fn finish<T: Real>(
         |lambda: f64| given(lambda, path.currents_a(lambda), Some(path.error_n2(lambda)));
     let maxmin = worst::largest(problem, largest).filter(|_| status != Status::NothingRendered);
     let chosen = match &maxmin {
-        Some(maxmin) if settings.criterion == Criterion::Maxmin => {
-            Some(given(maxmin.lambda_n_per_m, maxmin.currents_a.clone(), None))
-        }
+        Some(maxmin) if settings.criterion == Criterion::Maxmin => Some(given(
+            maxmin.lambda_n_per_m,
+            maxmin.currents_a.clone(),
+            None,
+        )),
         _ => chosen.map(evaluate),
     };
     Solution {

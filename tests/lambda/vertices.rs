@@ -35,7 +35,9 @@ impl Vertices {
             }
         }
         if let (true, Some(total)) = (limited, case.total) {
-            let row = (0..=m).map(|i| if i < m { d(-1.0) } else { D::ZERO }).collect();
+            let row = (0..=m)
+                .map(|i| if i < m { d(-1.0) } else { D::ZERO })
+                .collect();
             rows.push((row, d(-total), D::ZERO));
         }
         Self { rows, width: m + 1 }
@@ -43,7 +45,11 @@ impl Vertices {
 
     /// The least t at `lambda`; `scale` is the size of forces.
     pub fn least(&self, lambda: f64, scale: f64) -> f64 {
-        let bounds: Vec<D> = self.rows.iter().map(|(_, c, s)| *c + d(lambda) * *s).collect();
+        let bounds: Vec<D> = self
+            .rows
+            .iter()
+            .map(|(_, c, s)| *c + d(lambda) * *s)
+            .collect();
         let mut best = f64::INFINITY;
         let mut chosen: Vec<usize> = (0..self.width).collect();
         loop {
@@ -58,7 +64,10 @@ impl Vertices {
             }
             // The next combination.
             let n = self.rows.len();
-            let Some(k) = (0..self.width).rev().find(|&k| chosen[k] < n - self.width + k) else {
+            let Some(k) = (0..self.width)
+                .rev()
+                .find(|&k| chosen[k] < n - self.width + k)
+            else {
                 return best;
             };
             chosen[k] += 1;

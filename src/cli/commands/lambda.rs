@@ -179,10 +179,12 @@ fn summary(design: &Design, report: &LambdaReport) -> String {
                 number(at.lambda_n_per_m),
                 force(at.rms_error_n),
                 force(at.worst_error_n),
-                at.worst_point.as_ref().map_or_else(String::new, |worst| format!(
-                    ", at least {}",
-                    force(worst.worst_error_n)
-                ))
+                at.worst_point
+                    .as_ref()
+                    .map_or_else(String::new, |worst| format!(
+                        ", at least {}",
+                        force(worst.worst_error_n)
+                    ))
             ),
         );
         sheet.line("", &describe::currents(design, &at.currents_a));

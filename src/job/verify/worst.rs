@@ -77,5 +77,10 @@ pub(super) fn checks(
 pub(super) fn weakest_point(residual_n: &[f64], wanted_n: f64, allowed: f64) -> Check {
     let lacks = residual_n.iter().copied().fold(0.0, f64::max);
     let how = "the force that the weakest point lacks";
-    check("weakest point", ratio(lacks, wanted_n), allowed, how.to_owned())
+    check(
+        "weakest point",
+        ratio(lacks, wanted_n),
+        allowed,
+        how.to_owned(),
+    )
 }

@@ -66,9 +66,7 @@ impl Comparison<'_> {
         let visible = Num::of(VISIBLE.max(4.0 * self.doubt)) * self.top;
         self.stretches().iter().find_map(|stretch| {
             let leaves = match stretch.end {
-                Some(end) => {
-                    stretch.excess + (end - stretch.start) * stretch.rate > visible * end
-                }
+                Some(end) => stretch.excess + (end - stretch.start) * stretch.rate > visible * end,
                 None => stretch.rate > visible || stretch.excess > visible * stretch.start,
             };
             leaves.then_some(stretch.start)

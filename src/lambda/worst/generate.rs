@@ -203,7 +203,11 @@ fn course(scaled: &Scaled, form: Form, stand: &Stand) -> Course {
     Course {
         rounding_n: times_power(NOTHING, force_unit) + rounding * (wanted + pushed),
         rounding_m: rounding * (scaled.height_m() + scaled.pushed_n(&rates_a)),
-        limit_rate_m: if moves { times_power(last(stand.rate), force_unit - lambda_unit) } else { 0.0 },
+        limit_rate_m: if moves {
+            times_power(last(stand.rate), force_unit - lambda_unit)
+        } else {
+            0.0
+        },
         lambda_rate: if moves { 1.0 } else { 0.0 },
         step: match stand.step {
             Some(step) if moves => times_power(step.to_f64(), lambda_unit),

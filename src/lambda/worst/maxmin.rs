@@ -39,7 +39,11 @@ pub(in crate::lambda) fn largest(problem: &ForceProblem, entries: &[f64]) -> Opt
     let piece = followed.pieces.last()?;
     let lambda = -piece.z[piece.z.len() - 1].to_f64();
     // Rounding may turn zero round.
-    let lambda = if lambda.abs() <= f64::EPSILON { 0.0 } else { lambda };
+    let lambda = if lambda.abs() <= f64::EPSILON {
+        0.0
+    } else {
+        lambda
+    };
     (lambda >= 0.0).then(|| Maxmin {
         lambda_n_per_m: times_power(lambda, scaled.lambda_unit()),
         currents_a: scaled.currents_a(&piece.z),

@@ -116,7 +116,11 @@ pub fn worst_point(
     let first = unlimited.pieces.first();
     let floor = first
         .filter(|_| wanted && scaled.offset_n() == 0.0)
-        .map(|piece| (piece.rate[piece.rate.len() - 1] / scaled.top()).to_f64().max(0.0));
+        .map(|piece| {
+            (piece.rate[piece.rate.len() - 1] / scaled.top())
+                .to_f64()
+                .max(0.0)
+        });
     Ok(WorstSolution {
         lambda_linear_n_per_m: linear.map(si),
         lambda_jnd_n_per_m: jnd.map(si),

@@ -9,7 +9,7 @@ use crate::lambda::reduce::times_power;
 use crate::numerics::real::Real;
 
 /// Slopes of t* that differ by less, relative to max h, are one.
-const SAME_SLOPE: f64 = 1e-12;
+const SAME_SLOPE: f64 = 1e-13;
 /// Multipliers below this share are rounding.
 const NO_MULTIPLIER: f64 = 1e-14;
 
@@ -156,7 +156,10 @@ impl WorstPath {
         let mut before: Vec<Standing> = limits.at_zero();
         for k in 0..self.turns.len() {
             let here = limits.standing(&self.turns[k].currents_a);
-            let next = self.turns.get(k + 1).map(|next| limits.standing(&next.currents_a));
+            let next = self
+                .turns
+                .get(k + 1)
+                .map(|next| limits.standing(&next.currents_a));
             // At rest on a piece is what rests at both of its ends.
             let after: Vec<Standing> = match next {
                 Some(next) => here

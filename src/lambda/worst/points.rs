@@ -50,7 +50,8 @@ pub(super) fn misses(points: Points, probes: &[Probe], form: Form) -> Vec<Miss> 
             let range = first..first + height_m.len();
             let part = Points {
                 coils: points.coils,
-                forces_n_per_a: &points.forces_n_per_a[range.start * points.coils..range.end * points.coils],
+                forces_n_per_a: &points.forces_n_per_a
+                    [range.start * points.coils..range.end * points.coils],
                 height_m,
                 offset_n: points.offset_n.map(|offset| &offset[range]),
             };
@@ -80,7 +81,11 @@ impl Packed {
     fn new(coils: usize, probes: &[Probe]) -> Self {
         let groups = probes.len().div_ceil(LANES);
         let pack = |value: &dyn Fn(&Probe) -> f64, group: usize| {
-            let part: Vec<f64> = probes[group * LANES..].iter().take(LANES).map(value).collect();
+            let part: Vec<f64> = probes[group * LANES..]
+                .iter()
+                .take(LANES)
+                .map(value)
+                .collect();
             Lanes::load(&part)
         };
         let all = |value: &dyn Fn(&Probe) -> f64| (0..groups).map(|g| pack(value, g)).collect();
@@ -122,9 +127,8 @@ impl Kernel for Scan<'_> {
                 for (current, &force) in currents.iter().zip(row) {
                     rest = current.mul_add::<FMA>(Lanes::splat(-force), rest);
                 }
-                let size: [f64; LANES] = std::array::from_fn(|k| {
-                    if both { rest.0[k].abs() } else { rest.0[k] }
-                });
+                let size: [f64; LANES] =
+                    std::array::from_fn(|k| if both { rest.0[k].abs() } else { rest.0[k] });
                 let mut above = false;
                 for (size, bar) in size.iter().zip(&bar[group].0) {
                     above |= size > bar;
@@ -168,7 +172,11 @@ pub(super) struct Course {
 /// The point that a path misses first on its course: where it is missed already the one missed
 /// most, where several are at once the one that is left fastest.
 pub(super) fn first_missed(points: Points, course: &Course, form: Form) -> Option<(usize, bool)> {
-    dispatch::run(First { points, course, form })
+    dispatch::run(First {
+        points,
+        course,
+        form,
+    })
 }
 
 struct First<'a> {
@@ -184,7 +192,11 @@ impl Kernel for First<'_> {
     fn run<const FMA: bool>(self) -> Option<(usize, bool)> {
         let (points, course) = (self.points, self.course);
         let coils = points.coils;
-        let signs: &[f64] = if self.form == Form::Worst { &[1.0, -1.0] } else { &[1.0] };
+        let signs: &[f64] = if self.form == Form::Worst {
+            &[1.0, -1.0]
+        } else {
+            &[1.0]
+        };
         let (mut missed, mut most) = (None, course.rounding_n);
         let (mut first, mut least, mut fastest) = (None, course.step, 0.0);
         for (j, &height) in points.height_m.iter().enumerate() {
@@ -208,7 +220,11 @@ impl Kernel for First<'_> {
                     continue;
                 }
                 // Within rounding of its limit a point is at it.
-                let slack = if over >= -course.rounding_n { 0.0 } else { -over };
+                let slack = if over >= -course.rounding_n {
+                    0.0
+                } else {
+                    -over
+                };
                 let step = slack / speed;
                 if step < least || (step == least && speed > fastest) {
                     (first, least, fastest) = (Some((j, sign > 0.0)), step, speed);

@@ -2,19 +2,20 @@
 //!
 //! `min z_last` over `z = (x, z_last)` with rows `a . z >= constant + lambda slope`. At fixed
 //! active rows z is linear in lambda; the dual simplex method replaces the row that is about to
-//! be violated. Everything is done in double-double on a few hundred rows, so that what doubles
-//! cannot tell apart is still told apart. Ties are decided by a second objective (among equally
+//! be violated. Everything is done in double-double on a few hundred rows, so that nearly
+//! dependent rows cost no digits. Ties are decided by a second objective (among equally
 //! good x those of the least weighted sum), then by the order of the rows (Bland's rule).
 
 use crate::numerics::double_double::DoubleDouble as Num;
 use crate::numerics::real::Real;
 
-/// A row below its bound by less than this share of the bounds' size is met.
-const MET: f64 = 1e-17;
+/// A row below its bound by less than this share of the bounds' size is met: rows of doubles
+/// that ought to be equal differ by about as much, and as active rows would be nearly dependent.
+const MET: f64 = 2e-15;
 /// The same where all bounds are zero.
 const MET_AT_ZERO: f64 = 1e-26;
-/// Rates of a slack up to this are none.
-const STILL: f64 = 1e-18;
+/// Rates of a slack up to this are none, for the same reason.
+const STILL: f64 = 1e-14;
 /// Multipliers, and pivots, that differ by less are equal, or none.
 const EQUAL: f64 = 1e-22;
 /// Entries of an inverse above this size amplify rounding.
@@ -379,7 +380,11 @@ impl Vertex {
         self.matrix[k] = row;
         self.exchanges += 1;
         if self.exchanges.is_multiple_of(FRESH) || pivot.to_f64() < 1e-4 || self.steep {
-            return if self.renew() { Exchange::Done } else { Exchange::Singular };
+            return if self.renew() {
+                Exchange::Done
+            } else {
+                Exchange::Singular
+            };
         }
         let mut column = std::mem::take(&mut self.inverse[k]);
         for value in &mut column {
@@ -400,14 +405,22 @@ impl Vertex {
         let multipliers = self.multipliers();
         let second = self.solve_transposed(&program.second);
         let ratios = |values: &[Num]| -> Vec<Num> {
-            values.iter().zip(share).map(|(&v, &part)| v / part).collect()
+            values
+                .iter()
+                .zip(share)
+                .map(|(&v, &part)| v / part)
+                .collect()
         };
         let equal = Num::of(EQUAL);
         let candidates: Vec<usize> = (0..share.len()).filter(|&k| share[k] > equal).collect();
         // The smallest ratio, then among those equal to it the smallest second one, and so on.
         let least = |among: Vec<usize>, values: &[Num]| -> Vec<usize> {
             let ratio = ratios(values);
-            let Some(best) = among.iter().copied().reduce(|a, b| if ratio[b] < ratio[a] { b } else { a }) else {
+            let Some(best) = among
+                .iter()
+                .copied()
+                .reduce(|a, b| if ratio[b] < ratio[a] { b } else { a })
+            else {
                 return among;
             };
             // Equal within what rounding leaves of the multiplier.
@@ -417,7 +430,9 @@ impl Vertex {
         let mut left = least(candidates, &multipliers);
         if !cautious {
             left = least(left, &second);
-            return left.into_iter().reduce(|a, b| if share[b] > share[a] { b } else { a });
+            return left
+                .into_iter()
+                .reduce(|a, b| if share[b] > share[a] { b } else { a });
         }
         left.into_iter().min_by_key(|&k| self.basis[k])
     }
@@ -435,7 +450,13 @@ fn inverse(mut left: Vec<Vec<Num>>) -> Option<Vec<Vec<Num>>> {
         })
         .collect();
     for k in 0..n {
-        let best = (k..n).reduce(|a, b| if left[b][k].abs() > left[a][k].abs() { b } else { a })?;
+        let best = (k..n).reduce(|a, b| {
+            if left[b][k].abs() > left[a][k].abs() {
+                b
+            } else {
+                a
+            }
+        })?;
         left.swap(k, best);
         right.swap(k, best);
         let pivot = left[k][k];

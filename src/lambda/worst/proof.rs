@@ -46,7 +46,8 @@ pub fn lower_bound_n(problem: &ForceProblem, lambda: f64, active: &[ActivePoint]
             *sum += weight * Num::of(force);
         }
         let offset = problem.offset_n.map_or(0.0, |offset| offset[active.point]);
-        wanted += weight * (Num::of(lambda) * Num::of(problem.height_m[active.point]) - Num::of(offset));
+        wanted +=
+            weight * (Num::of(lambda) * Num::of(problem.height_m[active.point]) - Num::of(offset));
         share += weight.abs();
     }
     if share <= Num::ZERO {
@@ -54,6 +55,9 @@ pub fn lower_bound_n(problem: &ForceProblem, lambda: f64, active: &[ActivePoint]
     }
     let slope: Vec<f64> = slope.iter().map(|s| s.to_f64()).collect();
     let best = best_within_limits(problem, &slope);
-    let pushed = slope.iter().zip(&best).fold(Num::ZERO, |sum, (&s, &i)| sum + Num::of(s) * Num::of(i));
+    let pushed = slope
+        .iter()
+        .zip(&best)
+        .fold(Num::ZERO, |sum, (&s, &i)| sum + Num::of(s) * Num::of(i));
     ((wanted - pushed) / share).to_f64().max(0.0)
 }

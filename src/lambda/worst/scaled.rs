@@ -160,7 +160,13 @@ impl<'a> Scaled<'a> {
         let second = self
             .live
             .iter()
-            .map(|&i| if self.problem.lower_a[i] < 0.0 { Num::ZERO } else { weight(i) })
+            .map(|&i| {
+                if self.problem.lower_a[i] < 0.0 {
+                    Num::ZERO
+                } else {
+                    weight(i)
+                }
+            })
             .collect();
         let offset = times_power(self.offset_n(), -self.force);
         let mut program = Program::new(second, [offset, self.top().to_f64()]);
@@ -216,7 +222,13 @@ impl<'a> Scaled<'a> {
         let all = 0..self.live.len();
         if form == Form::Least {
             // Each coil at the limit that helps this point most.
-            let limit = |k: usize| if force(k) > 0.0 { self.live.len() + k } else { k };
+            let limit = |k: usize| {
+                if force(k) > 0.0 {
+                    self.live.len() + k
+                } else {
+                    k
+                }
+            };
             return all.map(limit).chain([up]).collect();
         }
         // Both rows of the point with one half each, met by the coil that moves it at the least
@@ -232,10 +244,7 @@ impl<'a> Scaled<'a> {
             .filter(|&k| force(k) != 0.0)
             .reduce(|a, b| if cost(b) < cost(a) { b } else { a });
         match (chosen, down) {
-            (Some(chosen), Some(down)) => all
-                .filter(|&k| k != chosen)
-                .chain([up, down])
-                .collect(),
+            (Some(chosen), Some(down)) => all.filter(|&k| k != chosen).chain([up, down]).collect(),
             _ => all.chain([up]).collect(),
         }
     }
