@@ -30,11 +30,7 @@ pub(super) struct Probe {
 /// A point above a probe's limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Miss {
-    pub probe: usize,
     pub point: usize,
-    /// Whether the force is too weak there; otherwise it is too strong.
-    pub up: bool,
-    pub excess_n: f64,
 }
 
 /// For every chunk of points and every probe the point that is furthest above the limit; with
@@ -136,16 +132,12 @@ impl Kernel for Scan<'_> {
                 if !above {
                     continue;
                 }
-                for k in 0..LANES.min(probes.count - group * LANES) {
-                    if size[k] > bar[group].0[k] {
-                        bar[group].0[k] = size[k];
+                let filled = LANES.min(probes.count - group * LANES);
+                for (k, &size) in size.iter().enumerate().take(filled) {
+                    if size > bar[group].0[k] {
+                        bar[group].0[k] = size;
                         let probe = group * LANES + k;
-                        best[probe] = Some(Miss {
-                            probe,
-                            point: j,
-                            up: rest.0[k] > 0.0,
-                            excess_n: size[k] - probes.limit[group].0[k],
-                        });
+                        best[probe] = Some(Miss { point: j });
                     }
                 }
             }
