@@ -9,6 +9,8 @@ mod help;
 mod interrupt;
 #[path = "cli/messages.rs"]
 mod messages;
+#[path = "cli/optimize.rs"]
+mod optimize;
 #[path = "cli/steel.rs"]
 mod steel;
 #[path = "cli/streams.rs"]

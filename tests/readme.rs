@@ -67,6 +67,19 @@ fn the_table_of_numbers_is_what_the_commands_print() {
 }
 
 #[test]
+fn the_best_coil_is_what_the_readme_shows() {
+    let readme = readme();
+    let (_, rest) = readme.split_once("## Find the best coil").unwrap();
+    let (_, rest) = rest.split_once("```sh\n").unwrap();
+    let (command, rest) = rest.split_once("\n```").unwrap();
+    let (_, rest) = rest.split_once("```text\n").unwrap();
+    let (shown, _) = rest.split_once("```").unwrap();
+    let arguments: Vec<&str> = command.split(' ').skip(1).collect();
+    let printed = says(&arguments);
+    assert_eq!(but_the_folder(shown), but_the_folder(&printed));
+}
+
+#[test]
 fn the_sweep_prints_what_the_readme_shows() {
     let readme = readme();
     let (_, rest) = readme.split_once("## Sweep designs").unwrap();

@@ -3,7 +3,7 @@
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::commands::{
-    calibrate, completions, discretize, evaluate, lambda, man, map, probe, sweep, verify,
+    calibrate, completions, discretize, evaluate, lambda, man, map, optimize, probe, sweep, verify,
 };
 use super::{help, values};
 
@@ -82,6 +82,7 @@ pub enum Command {
     Lambda(lambda::Lambda),
     Calibrate(calibrate::Calibrate),
     Verify(verify::Verify),
+    Optimize(optimize::Optimize),
     Sweep(sweep::Sweep),
     Completions(completions::Completions),
     Man(man::Man),

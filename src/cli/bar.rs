@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::interrupt;
+use super::quantity::force;
 use crate::progress::Progress;
 
 /// Stages that end sooner are never drawn.
@@ -36,6 +37,8 @@ struct State {
     seconds: Vec<(String, f64)>,
     drawn: Option<ProgressBar>,
     finished: bool,
+    /// The best force that a search has found, N.
+    best_n: Option<f64>,
 }
 
 #[derive(Debug)]
@@ -100,7 +103,10 @@ impl State {
         let message = if interrupt::asked() {
             format!("{name} (stopping)")
         } else {
-            name.clone()
+            match self.best_n {
+                Some(best_n) => format!("{name} {}", force(best_n)),
+                None => name.clone(),
+            }
         };
         let bar = self.drawn.get_or_insert_with(|| {
             let bar = ProgressBar::hidden();
@@ -176,6 +182,10 @@ impl Progress for Bar {
         if let Some(stage) = self.shared.lock().stages.last_mut() {
             stage.done += items;
         }
+    }
+
+    fn improved(&self, value: f64) {
+        self.shared.lock().best_n = Some(value);
     }
 
     fn end(&self) {

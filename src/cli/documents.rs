@@ -109,6 +109,12 @@ pub fn plan(file: &FileArgument) -> Result<(PlanFile, Input), Failure> {
     Ok((plan, Input::of_bytes(name, &bytes)))
 }
 
+/// Whether `path` is a file that begins with `mark`.
+#[must_use]
+pub fn begins_with(path: &Path, mark: &str) -> bool {
+    std::fs::read(path).is_ok_and(|there| there.starts_with(mark.as_bytes()))
+}
+
 /// The bytes of a file or of standard input; `what` was expected.
 fn bytes_of(file: &FileArgument, what: &str) -> Result<Vec<u8>, Failure> {
     let path = file.as_given();

@@ -62,6 +62,7 @@ fn run(arguments: &Arguments, printer: &Printer) -> Result<(), Failure> {
         Command::Lambda(command) => command.run(printer),
         Command::Calibrate(command) => command.run(printer),
         Command::Verify(command) => command.run(printer),
+        Command::Optimize(command) => command.run(printer),
         Command::Sweep(command) => command.run(printer),
         Command::Completions(command) => command.run(printer),
         Command::Man(command) => command.run(printer),

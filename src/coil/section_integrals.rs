@@ -53,6 +53,8 @@ static FINE_GRID: OnceLock<Vec<Azimuth>> = OnceLock::new();
 static ROUGH_GRID: OnceLock<Vec<Azimuth>> = OnceLock::new();
 /// ln of the shortest winding, over its radius, for which the error is kept.
 const SHORTEST_LN: f64 = -20.0;
+/// Share of the depth that is not worth a panel of its own.
+const ROUNDING: f64 = 1e-12;
 /// Radii closer to the axis than this share of the largest carry nothing.
 const AXIS: f64 = 0.1;
 
@@ -137,7 +139,8 @@ pub fn section_integrals(
         let eta = 0.5 * (1.0 + x);
         add(first * eta * eta * eta, 1.5 * weight * first * eta * eta);
     }
-    if first < depth {
+    // What a rounding leaves beyond is nothing, and has no loops between its two faces.
+    if depth - first > ROUNDING * depth {
         gauss::graded(first, depth, first, tolerance, add);
     }
     total
@@ -205,6 +208,20 @@ mod tests {
         [1.0, 1e-4, 0.7],
         [0.001, 1.3, 1.1],
     ];
+
+    #[test]
+    fn a_square_section_may_be_rounded_either_way() {
+        let (wire, ulp) = (0.7e-3, 1.1e-19);
+        for step in 0..200 {
+            let inner = 0.013 + 1.3e-6 * f64::from(step);
+            for ulps in -5..=5 {
+                let depth = wire + f64::from(ulps) * ulp;
+                let square = section_integrals(inner, wire, wire, &FINE).value;
+                let value = section_integrals(inner, depth, wire, &FINE).value;
+                assert!((value / square - 1.0).abs() < 1e-12, "{inner} {ulps}");
+            }
+        }
+    }
 
     #[test]
     fn agrees_with_the_exact_integral() {

@@ -26,6 +26,20 @@ impl Template {
         Ok(Self { table })
     }
 
+    /// Takes a dotted key out, where it is there.
+    pub fn remove(&mut self, key: &str) {
+        let mut here = &mut self.table;
+        let mut path = key;
+        while let Some((section, rest)) = path.split_once('.') {
+            let Some(Value::Table(inner)) = here.get_mut(section) else {
+                return;
+            };
+            here = inner;
+            path = rest;
+        }
+        here.remove(path);
+    }
+
     /// The document's text with `settings`: dotted keys and their values. Sections that a key
     /// names and the document lacks are added. Comments and order are not kept.
     ///
@@ -75,6 +89,17 @@ mod tests {
         assert_eq!(read["wire"]["diameter_mm"].as_float(), Some(0.55));
         assert_eq!(read["array"]["coupling"].as_str(), Some("none"));
         assert_eq!(read["array"]["rows"].as_integer(), Some(3));
+        assert_eq!(read["name"].as_str(), Some("a"));
+    }
+
+    #[test]
+    fn keys_are_taken_out() {
+        let mut template = template();
+        template.remove("wire.diameter_mm");
+        template.remove("wire.none");
+        template.remove("core.none");
+        let read: Table = template.with([]).unwrap().parse().unwrap();
+        assert!(read["wire"].as_table().unwrap().is_empty());
         assert_eq!(read["name"].as_str(), Some("a"));
     }
 

@@ -8,6 +8,7 @@ pub mod lambda;
 pub mod map;
 pub mod maps;
 pub mod neighbours;
+pub mod optimize;
 pub mod passive;
 pub mod passive_map;
 pub mod probe;

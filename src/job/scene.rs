@@ -21,6 +21,53 @@ const PORTION: usize = 4096;
 pub(super) const MAGNET_SHARE: f64 = 0.3;
 pub(super) const MAGNET_FINEST: f64 = 1e-9;
 
+/// The magnet's moment, A m^2.
+pub(super) fn moment_a_m2(design: &Design) -> [f64; 3] {
+    let magnet = &design.magnet;
+    let moment = dipole::cylinder_moment_a_m2(
+        magnet.diameter_m,
+        magnet.length_m,
+        magnet.magnetization_a_per_m,
+    );
+    let along_z = match magnet.polarity {
+        Polarity::Repel => -moment,
+        Polarity::Attract => moment,
+    };
+    dipole::tilted_moment_a_m2(along_z, magnet.tilt_deg)
+}
+
+/// The dipoles that stand for the magnet at heights from `lowest_m` up, where nothing that
+/// attracts it lies above `top_m`.
+///
+/// # Errors
+/// A magnet that touches what it is attracted by.
+pub(super) fn magnet_rule(
+    design: &Design,
+    lowest_m: f64,
+    top_m: f64,
+    tolerance: f64,
+) -> Result<MagnetRule, JobError> {
+    let magnet = &design.magnet;
+    let moment_a_m2 = moment_a_m2(design);
+    if magnet.model == MagnetModel::Dipole {
+        return Ok(MagnetRule::dipole(moment_a_m2));
+    }
+    let size = Cylinder {
+        diameter_m: magnet.diameter_m,
+        length_m: magnet.length_m,
+    };
+    let sources = Sources::Below {
+        height_m: lowest_m - top_m,
+    };
+    MagnetRule::cylinder(size, moment_a_m2, sources, tolerance).map_err(|fault| {
+        JobError::Input(format!(
+            "[magnet] model = \"cylinder\" with its centre {} mm above the windings' top face: \
+             {fault}; raise the magnet, or use model = \"dipole\"",
+            lowest_m * 1e3
+        ))
+    })
+}
+
 /// A design made ready for computing.
 #[derive(Debug, Clone)]
 pub struct Scene<'a> {
@@ -72,16 +119,6 @@ impl<'a> Scene<'a> {
                 gain: *gain,
             })
             .collect();
-        let magnet = &design.magnet;
-        let moment = dipole::cylinder_moment_a_m2(
-            magnet.diameter_m,
-            magnet.length_m,
-            magnet.magnetization_a_per_m,
-        );
-        let along_z = match magnet.polarity {
-            Polarity::Repel => -moment,
-            Polarity::Attract => moment,
-        };
         let voltage_v = design.supply.voltage_v;
         let rated = |limit: &f64| circuit.rated_current_a(*limit, voltage_v);
         Ok(Self {
@@ -90,7 +127,7 @@ impl<'a> Scene<'a> {
             winding,
             core,
             coils,
-            moment_a_m2: dipole::tilted_moment_a_m2(along_z, magnet.tilt_deg),
+            moment_a_m2: moment_a_m2(design),
             upper_a: design.supply.current_max_a.iter().map(rated).collect(),
             lower_a: design
                 .supply
@@ -125,25 +162,8 @@ impl<'a> Scene<'a> {
     /// # Errors
     /// A magnet that touches what it is attracted by.
     pub fn magnet_rule(&self, lowest_m: f64, tolerance: f64) -> Result<MagnetRule, JobError> {
-        let magnet = &self.design.magnet;
-        if magnet.model == MagnetModel::Dipole {
-            return Ok(MagnetRule::dipole(self.moment_a_m2));
-        }
         let top_m = self.core.as_ref().map_or(0.0, |c| c.shape.top_m.max(0.0));
-        let size = Cylinder {
-            diameter_m: magnet.diameter_m,
-            length_m: magnet.length_m,
-        };
-        let sources = Sources::Below {
-            height_m: lowest_m - top_m,
-        };
-        MagnetRule::cylinder(size, self.moment_a_m2, sources, tolerance).map_err(|fault| {
-            JobError::Input(format!(
-                "[magnet] model = \"cylinder\" with its centre {} mm above the windings' top face: \
-                 {fault}; raise the magnet, or use model = \"dipole\"",
-                lowest_m * 1e3
-            ))
-        })
+        magnet_rule(self.design, lowest_m, top_m, tolerance)
     }
 
     /// Upward force per ampere of every coil at every point, N/A, [point, coil], to the tolerance

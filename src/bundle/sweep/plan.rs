@@ -13,6 +13,9 @@ pub enum Mode {
     Evaluate,
     /// The best coil within the design's limits.
     Optimize,
+    /// The best of those that have whole layers and turns.
+    #[serde(rename = "optimize-wound")]
+    OptimizeWound,
 }
 
 /// A value that a design's key is set to.

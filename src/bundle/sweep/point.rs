@@ -14,6 +14,10 @@ pub enum Status {
     Done,
     /// Computed, but not to the tolerance.
     AccuracyNotReached,
+    /// No coil meets the design's limits; the message says which is nearest to blame.
+    Infeasible,
+    /// The design lacks a limit without which there is no best coil.
+    Unbounded,
     /// The design cannot be computed; the message says why.
     Failed,
 }
@@ -25,8 +29,16 @@ impl Status {
         match self {
             Self::Done => "done",
             Self::AccuracyNotReached => "accuracy_not_reached",
+            Self::Infeasible => "infeasible",
+            Self::Unbounded => "unbounded",
             Self::Failed => "failed",
         }
+    }
+
+    /// Whether there is a coil to tell of.
+    #[must_use]
+    pub fn has_row(self) -> bool {
+        matches!(self, Self::Done | Self::AccuracyNotReached)
     }
 }
 
@@ -57,6 +69,54 @@ pub struct Row {
     pub core_peak_field_t: Option<f64>,
     /// Whether the design's limits are met.
     pub limits_met: bool,
+    /// The best coil's dimensions; absent where the coil is the design's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub optimum: Option<OptimumRow>,
+}
+
+/// What was found for a design.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OptimumRow {
+    /// Inner diameter.
+    pub inner_diameter_m: f64,
+    /// Outer diameter.
+    pub outer_diameter_m: f64,
+    /// Length.
+    pub length_m: f64,
+    /// Diameter of the wire over its insulation.
+    pub wire_diameter_m: f64,
+    /// Whole layers; null where turns need not be whole.
+    pub layers: Option<u64>,
+    /// Whole turns a layer; null where they need not be.
+    pub turns_per_layer: Option<u64>,
+    /// How sure it is that no coil is better.
+    pub certificate: CertificateWord,
+    /// No coil within the limits gives more force; null where nothing is proven.
+    pub upper_bound_n: Option<f64>,
+}
+
+/// How sure it is that no coil is better.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum CertificateWord {
+    /// The best near one starting point.
+    Local,
+    /// The best of several.
+    Multistart,
+    /// Proven.
+    Global,
+}
+
+impl CertificateWord {
+    /// As files tell it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Local => "local",
+            Self::Multistart => "multistart",
+            Self::Global => "global",
+        }
+    }
 }
 
 /// A point's file.
@@ -85,13 +145,28 @@ pub struct PointFile {
 const OPENING: &[u8] = b"{\n  \"schema_version\": \"";
 
 impl PointFile {
-    /// A sealed point.
+    /// A sealed point; of a design that cannot be computed, with the reason.
     #[must_use]
     pub fn new(plan_sha256: &str, index: u64, outcome: Result<(Row, Status), String>) -> Self {
-        let (row, status, message) = match outcome {
-            Ok((row, status)) => (Some(row), status, None),
-            Err(message) => (None, Status::Failed, Some(message)),
-        };
+        match outcome {
+            Ok((row, status)) => Self::sealed(plan_sha256, index, status, Some(row), None),
+            Err(message) => Self::without_row(plan_sha256, index, Status::Failed, message),
+        }
+    }
+
+    /// A sealed point that has no coil; the message says why.
+    #[must_use]
+    pub fn without_row(plan_sha256: &str, index: u64, status: Status, message: String) -> Self {
+        Self::sealed(plan_sha256, index, status, None, Some(message))
+    }
+
+    fn sealed(
+        plan_sha256: &str,
+        index: u64,
+        status: Status,
+        row: Option<Row>,
+        message: Option<String>,
+    ) -> Self {
         let mut point = Self {
             schema_version: SCHEMA_VERSION.to_owned(),
             fluxform_version: FLUXFORM_VERSION.to_owned(),
@@ -119,7 +194,7 @@ impl PointFile {
     pub fn parse(bytes: &[u8]) -> Option<Self> {
         let point: Self = serde_json::from_slice(bytes).ok()?;
         let whole = point.digest() == point.point_sha256;
-        let told = (point.status == Status::Failed) == point.row.is_none();
+        let told = point.status.has_row() == point.row.is_some();
         (whole && told).then_some(point)
     }
 
@@ -158,6 +233,7 @@ mod tests {
             force_n: 0.099_709,
             core_peak_field_t: None,
             limits_met: true,
+            optimum: None,
         };
         PointFile::new("abc", 7, Ok((row, Status::Done)))
     }

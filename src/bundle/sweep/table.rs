@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::{PointFile, Value};
+use super::{Mode, OptimumRow, PointFile, Value};
 use crate::bundle::number::{push_index, push_number};
 
 /// Columns after `index` and the set keys. Cells that do not apply are empty.
@@ -23,30 +23,48 @@ pub const ROW_COLUMNS: [&str; 14] = [
     "message",
 ];
 
+/// Columns after those of a sweep that optimises.
+pub const OPTIMUM_COLUMNS: [&str; 8] = [
+    "best_inner_diameter_m",
+    "best_outer_diameter_m",
+    "best_length_m",
+    "best_wire_diameter_m",
+    "best_layers",
+    "best_turns_per_layer",
+    "certificate",
+    "upper_bound_n",
+];
+
 /// Writes rows as they come.
 pub struct TableWriter<'a> {
     out: &'a mut dyn Write,
+    optimum: bool,
     line: Vec<u8>,
 }
 
 impl<'a> TableWriter<'a> {
-    /// Writes the header; `extra` are columns after all others, given to every row.
+    /// Writes the header, with [`OPTIMUM_COLUMNS`] for a `mode` that optimises; `extra` are columns
+    /// after all others, given to every row.
     ///
     /// # Errors
     /// The writer's.
     pub fn begin<'k>(
         out: &'a mut dyn Write,
+        mode: Mode,
         keys: impl IntoIterator<Item = &'k str>,
         extra: &[&'k str],
     ) -> io::Result<Self> {
         let mut table = Self {
             out,
+            optimum: mode != Mode::Evaluate,
             line: Vec::new(),
         };
+        let found: &[&str] = if table.optimum { &OPTIMUM_COLUMNS } else { &[] };
         table.text("index");
         for key in keys
             .into_iter()
             .chain(ROW_COLUMNS)
+            .chain(found.iter().copied())
             .chain(extra.iter().copied())
         {
             table.text(key);
@@ -99,10 +117,36 @@ impl<'a> TableWriter<'a> {
         }
         self.text(point.status.name());
         self.text(point.message.as_deref().unwrap_or(""));
+        if self.optimum {
+            self.optimum(point.row.as_ref().and_then(|row| row.optimum.as_ref()));
+        }
         for flag in extra {
             self.text(if *flag { "true" } else { "false" });
         }
         self.end()
+    }
+
+    fn optimum(&mut self, found: Option<&OptimumRow>) {
+        let Some(found) = found else {
+            OPTIMUM_COLUMNS.iter().for_each(|_| self.text(""));
+            return;
+        };
+        for length_m in [
+            found.inner_diameter_m,
+            found.outer_diameter_m,
+            found.length_m,
+            found.wire_diameter_m,
+        ] {
+            self.number(length_m);
+        }
+        for whole in [found.layers, found.turns_per_layer] {
+            self.text(&whole.map_or_else(String::new, |whole| whole.to_string()));
+        }
+        self.text(found.certificate.name());
+        match found.upper_bound_n {
+            Some(bound_n) => self.number(bound_n),
+            None => self.text(""),
+        }
     }
 
     fn number(&mut self, value: f64) {
@@ -161,8 +205,13 @@ mod tests {
     #[test]
     fn rows_have_a_cell_for_every_column() {
         let mut text = Vec::new();
-        let mut table =
-            TableWriter::begin(&mut text, ["wire.diameter_mm", "a"], &["front"]).unwrap();
+        let mut table = TableWriter::begin(
+            &mut text,
+            Mode::Evaluate,
+            ["wire.diameter_mm", "a"],
+            &["front"],
+        )
+        .unwrap();
         let list = Value::List(vec![Value::Number(0.7), Value::Number(13.0)]);
         let failed = PointFile::new("abc", 7, Err("no \"coil\", no row".to_owned()));
         table

@@ -7,6 +7,7 @@ pub mod evaluate;
 pub mod lambda;
 pub mod man;
 pub mod map;
+pub mod optimize;
 pub mod probe;
 pub mod sweep;
 pub mod verify;

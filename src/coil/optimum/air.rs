@@ -2,7 +2,7 @@
 
 use super::axis_gradient::{self, axis_gradient};
 use super::model::{CoilModel, NoResponse, Response, Sloped, Window};
-use crate::coil::section_integrals::{FINE, section_integrals};
+use crate::coil::section_integrals::{Accuracy, FINE, section_integrals};
 use crate::field::magnet::MagnetRule;
 use crate::units::MU_0_T_M_PER_A;
 
@@ -15,6 +15,7 @@ pub struct AirCoil {
     /// Height above the winding's top face and vertical moment of the magnet's dipoles.
     dipoles: Vec<(f64, f64)>,
     height_m: f64,
+    accuracy: &'static Accuracy,
 }
 
 /// Why there is no air model.
@@ -60,7 +61,17 @@ impl AirCoil {
         for (_, moment) in &mut dipoles {
             *moment *= total.signum();
         }
-        Ok(Self { dipoles, height_m })
+        Ok(Self {
+            dipoles,
+            height_m,
+            accuracy: &FINE,
+        })
+    }
+
+    /// The same coil, its inductance to another accuracy.
+    #[must_use]
+    pub fn with_accuracy(self, accuracy: &'static Accuracy) -> Self {
+        Self { accuracy, ..self }
     }
 }
 
@@ -89,7 +100,7 @@ impl CoilModel for AirCoil {
                 window.inner_radius_m,
                 window.depth_m,
                 window.length_m,
-                &FINE,
+                self.accuracy,
             );
             inductance_h = Sloped {
                 value: sums.value,
@@ -110,7 +121,9 @@ impl CoilModel for AirCoil {
     }
 
     fn relative_error(&self) -> f64 {
-        FINE.relative_error.max(axis_gradient::RELATIVE_ERROR)
+        self.accuracy
+            .relative_error
+            .max(axis_gradient::RELATIVE_ERROR)
     }
 
     fn air_dipoles(&self) -> Option<&[(f64, f64)]> {

@@ -17,21 +17,34 @@
 //! 4. `wound`: whole layers and turns under the same bounds.
 //!
 //! argmin has no solver for nonlinear limits; it does what is a search in one variable
-//! (`scalar`). A cored coil enters through [`model::CoilModel`]: it is solved alike, its
-//! certificate is of kind `multistart`.
+//! (`scalar`).
+//!
+//! A cored coil enters through the same [`model::CoilModel`]. `cored` tabulates what the steel
+//! adds to force and inductance, coarsely for the search and, about the optimum found, sharply
+//! (`sharpen`). Nothing bounds its force: the continuous optimum's certificate is of kind
+//! `multistart`, that of wound coils, each of which is tried (`exhaustive`), of that name.
 
 pub mod air;
+pub mod alternatives;
 pub mod axis_gradient;
 pub mod branch;
+pub mod cells;
+pub mod cored;
+#[cfg(test)]
+mod cored_tests;
 mod diagnosis;
 pub mod domain;
 pub mod enclosure;
+pub mod exhaustive;
+pub mod listing;
 pub mod model;
+pub mod neighbours;
 pub mod outcome;
 pub mod problem;
 mod scalar;
 pub mod search;
 pub mod sequential;
+mod sharpen;
 pub mod starts;
 pub mod task;
 #[cfg(test)]
@@ -39,8 +52,9 @@ mod tests;
 pub mod valley;
 pub mod wound;
 
+pub use listing::{WoundCoil, WoundOutcome};
 pub use model::{CoilModel, Strand, Window};
 pub use outcome::{BestCoil, Certificate, CertificateKind, LimitUse, Outcome, Status};
 pub use problem::{Fixed, LimitName, Task};
 pub use search::{Settings, optimise};
-pub use wound::{WoundCoil, WoundOutcome, optimise_wound};
+pub use wound::optimise_wound;

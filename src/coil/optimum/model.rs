@@ -183,4 +183,16 @@ pub trait CoilModel: Sync {
 
     /// Rough length on which the response varies, m: starting points spread around it.
     fn length_scale_m(&self) -> f64;
+
+    /// The same coil computed more exactly about `window`, where the model is a coarse one meant
+    /// for the search. Not for use within a parallel loop.
+    fn sharpened(&self, _window: &Window) -> Option<Box<dyn CoilModel>> {
+        None
+    }
+
+    /// The coarse model again, with what was learnt when it was sharpened; `None` where it was
+    /// not.
+    fn blunted(&self) -> Option<Box<dyn CoilModel>> {
+        None
+    }
 }

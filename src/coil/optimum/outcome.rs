@@ -79,6 +79,9 @@ pub struct BestCoil {
 pub enum CertificateKind {
     /// The best of several local searches.
     Multistart,
+    /// Every number of layers and turns a layer was examined, with the best bore found for each;
+    /// nothing is proven about other bores.
+    Exhaustive,
     /// Proven over all coils within the limits.
     Global,
 }
@@ -89,6 +92,7 @@ impl CertificateKind {
     pub fn word(self) -> &'static str {
         match self {
             Self::Multistart => "multistart",
+            Self::Exhaustive => "exhaustive",
             Self::Global => "global",
         }
     }
@@ -103,7 +107,7 @@ pub struct Certificate {
     pub upper_bound_n: Option<f64>,
     /// Upper bound over the force found, less one.
     pub gap: Option<f64>,
-    /// Boxes of coils that were bounded.
+    /// Boxes of coils that were bounded, or coils that were examined.
     pub cells: usize,
 }
 

@@ -12,6 +12,7 @@ use super::outcome::{
 };
 use super::problem::{LimitName, Problem, Task};
 use super::sequential::{self, FEASIBLE, Local};
+use super::sharpen;
 use super::starts;
 use super::valley;
 use crate::progress::{Interrupted, Progress};
@@ -75,6 +76,13 @@ pub fn optimise(
         Ok(problems) => problems,
         Err((status, problems)) => return Ok(without_coil(status, &problems)),
     };
+    let sharp = sharpen::sharpened(model, task, &problems, progress)?;
+    if let Some(sharp) = &sharp {
+        let restated = sharpen::restated(&**sharp, task, &problems);
+        if best_of(&restated).is_some() {
+            problems = restated;
+        }
+    }
     progress.begin("certify", problems.len() as u64);
     let certificate = certify(&mut problems, settings, progress)?;
     progress.end();
@@ -105,6 +113,9 @@ pub fn optimise(
 
 /// Why there is no coil, and the problems that have none.
 type NoCoil<'a> = (Status, Vec<Solved<'a>>);
+
+/// How many times more starts are tried where none found a coil.
+const PATIENCE: usize = 3;
 
 /// Every problem with its best local optimum, or the status that says why there is none.
 pub(super) fn solve_all<'a>(
@@ -140,18 +151,28 @@ pub(super) fn solve_all<'a>(
         1
     };
     let total = problems.iter().filter(|s| open(s)).count() * settings.starts * rounds;
-    progress.begin("optimise", total as u64);
     let mut best_n = 0.0;
-    for solved in problems.iter_mut().filter(|s| open(s)) {
-        multistart(solved, settings, progress)?;
-        if let Some(force_n) = solved.force_n()
-            && force_n > best_n
-        {
-            best_n = force_n;
-            progress.improved(force_n);
+    // That no start finds a coil is no proof: more are tried before it is said.
+    for patience in [1, PATIENCE] {
+        let settings = Settings {
+            starts: patience * settings.starts,
+            ..*settings
+        };
+        progress.begin("optimise", (patience * total) as u64);
+        for solved in problems.iter_mut().filter(|s| open(s)) {
+            multistart(solved, &settings, progress)?;
+            if let Some(force_n) = solved.force_n()
+                && force_n > best_n
+            {
+                best_n = force_n;
+                progress.improved(force_n);
+            }
+        }
+        progress.end();
+        if best_n > 0.0 {
+            break;
         }
     }
-    progress.end();
     if best_n <= 0.0 {
         let status = diagnosis::why_none(&problems, settings, progress)?;
         return Ok(Err((status, problems)));
@@ -409,7 +430,7 @@ fn bound(
 }
 
 /// The winner in SI units, with what its limits cost.
-fn describe(solved: &Solved<'_>) -> Option<BestCoil> {
+pub(super) fn describe(solved: &Solved<'_>) -> Option<BestCoil> {
     let local = solved.best.as_ref()?;
     let problem = &solved.problem;
     let window = diagnosis::snapped(problem, local);

@@ -1,9 +1,11 @@
 //! A design file's coil as a task of the optimiser.
 
 use super::air::{AirCoil, NoAirCoil};
-use super::model::{Strand, Window};
+use super::cored::{CoreRule, CoredModel, NoCoredCoil};
+use super::model::{CoilModel, Strand, Window};
+use super::neighbours::Neighbours;
 use super::problem::{Fixed, Task};
-use crate::design::{Coil, Design};
+use crate::design::{Coil, Core, Design, Steel};
 use crate::field::magnet::MagnetRule;
 
 /// What cannot be optimised.
@@ -18,6 +20,15 @@ pub enum NoTask {
     /// The coil or magnet cannot be modelled.
     #[error(transparent)]
     NoAirCoil(#[from] NoAirCoil),
+    /// Steel whose permeability depends on the field.
+    #[error(
+        "a core with a B-H curve is not optimised: give core.relative_permeability instead of \
+         core.bh_curve, and evaluate the optimum with the curve"
+    )]
+    Curve,
+    /// The coil with its core cannot be modelled.
+    #[error(transparent)]
+    NoCoredCoil(#[from] NoCoredCoil),
 }
 
 /// The task of `design`, its coil's dimensions free but for `fixed`. The rated current is that of
@@ -47,12 +58,75 @@ pub fn of_design(design: &Design, fixed: Fixed) -> Result<Task, NoTask> {
     })
 }
 
+/// What stands beside the coil that is optimised.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Surroundings {
+    /// Nothing: equation 11's coil.
+    #[default]
+    Alone,
+    /// The array's other coils, unpowered, their cores magnetised: the coil nearest to the
+    /// array's centre is optimised, all coils being alike. Nothing changes without cores.
+    Neighbours,
+}
+
+/// The coil of `design`, in air or with its core, alone, under the magnet that `magnet` stands for, at
+/// the design's target.
+///
+/// # Errors
+/// [`NoTask`].
+pub fn coil_model(design: &Design, magnet: &MagnetRule) -> Result<Box<dyn CoilModel>, NoTask> {
+    coil_model_in(design, magnet, Surroundings::Alone)
+}
+
+/// The same in given surroundings.
+///
+/// # Errors
+/// [`NoTask`].
+pub fn coil_model_in(
+    design: &Design,
+    magnet: &MagnetRule,
+    surroundings: Surroundings,
+) -> Result<Box<dyn CoilModel>, NoTask> {
+    let Some(core) = &design.core else {
+        return Ok(Box::new(air_coil(design, magnet)?));
+    };
+    let alone = cored_coil(design, core, magnet)?;
+    Ok(Box::new(match surroundings {
+        Surroundings::Alone => alone,
+        Surroundings::Neighbours => alone.among(Neighbours::new(&design.array.positions_m)),
+    }))
+}
+
 /// The air coil under the magnet that `magnet` stands for, at the design's target.
 ///
 /// # Errors
 /// [`NoTask`].
 pub fn air_coil(design: &Design, magnet: &MagnetRule) -> Result<AirCoil, NoTask> {
     Ok(AirCoil::new(design.target_height_m, magnet)?)
+}
+
+/// The coil with `core`, alone, under the magnet that `magnet` stands for, at the design's
+/// target.
+///
+/// # Errors
+/// [`NoTask`].
+pub fn cored_coil(design: &Design, core: &Core, magnet: &MagnetRule) -> Result<CoredModel, NoTask> {
+    let Steel::Linear(relative_permeability) = core.steel else {
+        return Err(NoTask::Curve);
+    };
+    let rule = CoreRule {
+        clearance_m: core.clearance_m,
+        above_m: core.above_m,
+        below_m: core.below_m,
+        relative_permeability,
+    };
+    let with_peak = design.limits.core_field_max_t.is_some();
+    Ok(CoredModel::new(
+        design.target_height_m,
+        magnet,
+        rule,
+        with_peak,
+    )?)
 }
 
 impl Window {

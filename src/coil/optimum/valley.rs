@@ -85,15 +85,20 @@ fn best_ln_at(problem: &Problem<'_>, near: &Window, inner_m: f64) -> f64 {
             length_m: near.length_m,
         })
     });
+    best_near(&fixed, &starts).map_or(f64::NEG_INFINITY, |local| -local.point.objective)
+}
+
+/// The best coil of `problem` that local searches from `starts` find.
+pub(super) fn best_near(problem: &Problem<'_>, starts: &[[f64; 3]]) -> Option<Local> {
     // The settling time is costly to know and often holds nothing back.
-    if let Some(relaxed) = fixed.without_settling()
-        && let Some(local) = best_from(&relaxed, &starts)
-        && let Some(adopted) = fixed.adopted(&relaxed, &local)
-        && adopted.violation(&fixed) <= FEASIBLE
+    if let Some(relaxed) = problem.without_settling()
+        && let Some(local) = best_from(&relaxed, starts)
+        && let Some(adopted) = problem.adopted(&relaxed, &local)
+        && adopted.violation(problem) <= FEASIBLE
     {
-        return -adopted.point.objective;
+        return Some(adopted);
     }
-    best_from(&fixed, &starts).map_or(f64::NEG_INFINITY, |local| -local.point.objective)
+    best_from(problem, starts)
 }
 
 fn best_from(problem: &Problem<'_>, starts: &[[f64; 3]]) -> Option<Local> {

@@ -183,22 +183,52 @@ impl CoredCoil {
         relative_permeability: f64,
         resolution: &Resolution,
     ) -> Result<Self, OnEdge> {
-        let outline = Generatrix::of_coil(winding, shape, resolution);
-        let excitation = Excitation::new(winding, &outline, resolution.quadrature)?;
+        let mut family = Self::family(&[*winding], shape, relative_permeability, resolution)?;
+        Ok(family.remove(0))
+    }
+
+    /// Solves several windings around one core at one resolution: the outline's operator is set
+    /// up and factorised once.
+    ///
+    /// Domain: windings that differ in outer radius and turns only; at least one.
+    ///
+    /// # Errors
+    /// A node on a winding's edge.
+    pub fn family(
+        windings: &[Winding],
+        shape: CoreShape,
+        relative_permeability: f64,
+        resolution: &Resolution,
+    ) -> Result<Vec<Self>, OnEdge> {
+        let Some(first) = windings.first() else {
+            return Ok(Vec::new());
+        };
+        let outline = Generatrix::of_coil(first, shape, resolution);
+        let excitations: Vec<Excitation> = windings
+            .iter()
+            .map(|winding| Excitation::new(winding, &outline, resolution.quadrature))
+            .collect::<Result<_, _>>()?;
         let w = operators(&outline, 1, resolution.quadrature).remove(0);
-        let density = solve(&outline, w, relative_permeability, &excitation.potential);
-        let added_inductance_h = -outline
-            .areas_m2()
-            .zip(density.iter())
-            .zip(&excitation.normal_field_t_per_a)
-            .map(|((area, v), b)| area * v * b)
-            .sum::<f64>();
-        Ok(Self {
-            winding: *winding,
-            core: MagnetizedCore::new(outline, density.as_slice().to_vec()),
-            added_inductance_h,
-            relative_error: f64::NAN,
-        })
+        let potentials: Vec<DVector<f64>> =
+            excitations.iter().map(|e| e.potential.clone()).collect();
+        let densities = solve(&outline, w, relative_permeability, &potentials);
+        let coils = windings.iter().zip(&excitations).zip(densities);
+        Ok(coils
+            .map(|((winding, excitation), density)| {
+                let added_inductance_h = -outline
+                    .areas_m2()
+                    .zip(density.iter())
+                    .zip(&excitation.normal_field_t_per_a)
+                    .map(|((area, v), b)| area * v * b)
+                    .sum::<f64>();
+                Self {
+                    winding: *winding,
+                    core: MagnetizedCore::new(outline.clone(), density.as_slice().to_vec()),
+                    added_inductance_h,
+                    relative_error: f64::NAN,
+                }
+            })
+            .collect())
     }
 
     /// Field and gradient per ampere.
@@ -210,20 +240,25 @@ impl CoredCoil {
     }
 }
 
-/// v on the nodes, mean zero.
+/// v on the nodes for each potential, mean zero.
 fn solve(
     outline: &Generatrix,
     w: DMatrix<f64>,
     relative_permeability: f64,
-    potential: &DVector<f64>,
-) -> DVector<f64> {
+    potentials: &[DVector<f64>],
+) -> Vec<DVector<f64>> {
     let share = (relative_permeability - 1.0) / relative_permeability;
-    let centred = potential.add_scalar(-mean(outline, potential.iter()));
-    let mut density = system(outline, w, relative_permeability, 0)
-        .lu()
-        .solve(&(centred * share))
-        .expect("eigenvalues of W lie in [0, 1], so those of the matrix are positive");
-    let shift = mean(outline, density.iter());
-    density.add_scalar_mut(-shift);
-    density
+    let factors = system(outline, w, relative_permeability, 0).lu();
+    potentials
+        .iter()
+        .map(|potential| {
+            let centred = potential.add_scalar(-mean(outline, potential.iter()));
+            let mut density = factors
+                .solve(&(centred * share))
+                .expect("eigenvalues of W lie in [0, 1], so those of the matrix are positive");
+            let shift = mean(outline, density.iter());
+            density.add_scalar_mut(-shift);
+            density
+        })
+        .collect()
 }

@@ -137,7 +137,8 @@ pub fn merge(
     let front_name = name("_pareto.csv");
     let written = set.write(&front_name, |out| {
         let keys = plan.axes.iter().map(|axis| axis.key.as_str());
-        let mut table = TableWriter::begin(out, keys, &COSTS.map(|(_, _, column)| column))?;
+        let mut table =
+            TableWriter::begin(out, plan.mode, keys, &COSTS.map(|(_, _, column)| column))?;
         for ((index, flags), point) in best.iter().zip(&points) {
             // What was there a moment ago may be gone.
             let point = point.as_ref().ok_or(io::ErrorKind::NotFound)?;
@@ -188,7 +189,7 @@ fn gather(
 ) -> Result<Gathered, Stop> {
     let mut gathered = Gathered::default();
     let keys = plan.axes.iter().map(|axis| axis.key.as_str());
-    let mut table = TableWriter::begin(out, keys, &[])?;
+    let mut table = TableWriter::begin(out, plan.mode, keys, &[])?;
     progress.begin("merge", plan.points);
     for start in (0..plan.points).step_by(PORTION as usize) {
         progress.check().map_err(|error| Stop::Job(error.into()))?;
@@ -231,7 +232,7 @@ impl Gathered {
         match point.status {
             Status::Done => {}
             Status::AccuracyNotReached => self.inaccurate += 1,
-            Status::Failed => self.failed += 1,
+            Status::Infeasible | Status::Unbounded | Status::Failed => self.failed += 1,
         }
         if let Some(row) = &point.row {
             self.briefs.push(Brief {

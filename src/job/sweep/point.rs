@@ -2,12 +2,16 @@
 
 use std::path::Path;
 
-use crate::bundle::sweep::{Mode, PlanFile, PointFile, Row, Status, Value};
+use crate::bundle::sweep::{
+    CertificateWord, Mode, OptimumRow, PlanFile, PointFile, Row, Status, Value,
+};
 use crate::design::template::Template;
 use crate::design::{Design, InvalidDocument, Need, Severity};
 use crate::job::JobError;
+use crate::job::optimize::{Document, Optimization, OptimizeRequest, optimize};
 use crate::job::rated::Rated;
 use crate::job::scene::Scene;
+use crate::progress::Silent;
 
 /// A plan made ready for computing its points.
 pub(super) struct Sweep<'a> {
@@ -18,12 +22,8 @@ pub(super) struct Sweep<'a> {
 
 impl<'a> Sweep<'a> {
     /// # Errors
-    /// A mode that this version does not know; a text that is no TOML.
+    /// A text that is no TOML.
     pub(super) fn new(plan: &'a PlanFile) -> Result<Self, JobError> {
-        if plan.mode == Mode::Optimize {
-            let message = "the plan's mode is \"optimize\", which this version cannot do";
-            return Err(JobError::NotModelled(message.to_owned()));
-        }
         let path = plan.inputs.first().map_or("", |input| input.path.as_str());
         let path = Path::new(path);
         let template = Template::new(&plan.design_text, path)
@@ -38,7 +38,11 @@ impl<'a> Sweep<'a> {
     /// Point `index`; a design that cannot be computed is a point that failed.
     pub(super) fn point(&self, index: u64) -> PointFile {
         let sha256 = &self.plan.plan_sha256;
-        let point = PointFile::new(sha256, index, self.outcome(index));
+        let point = match self.outcome(index) {
+            Ok(Found::Row(row, status)) => PointFile::new(sha256, index, Ok((row, status))),
+            Ok(Found::NoCoil(status, why)) => PointFile::without_row(sha256, index, status, why),
+            Err(message) => PointFile::new(sha256, index, Err(message)),
+        };
         match point.to_bytes() {
             Ok(_) => point,
             // A number that is none.
@@ -46,7 +50,7 @@ impl<'a> Sweep<'a> {
         }
     }
 
-    fn outcome(&self, index: u64) -> Result<(Row, Status), String> {
+    fn outcome(&self, index: u64) -> Result<Found, String> {
         let values = self.plan.values_at(index);
         let settings = self
             .plan
@@ -55,18 +59,86 @@ impl<'a> Sweep<'a> {
             .zip(values)
             .map(|(axis, value)| (axis.key.as_str(), toml_value(value)));
         let text = self.template.with(settings)?;
-        let (design, _) =
-            Design::from_toml(&text, self.path, Need::EVALUATE).map_err(|e| refusal(&e))?;
-        row(self.plan.mode, &design, self.plan.tolerance).map_err(|error| error.to_string())
+        let need = match self.plan.mode {
+            Mode::Evaluate => Need::EVALUATE,
+            Mode::Optimize | Mode::OptimizeWound => Need::OPTIMIZE,
+        };
+        let (design, _) = Design::from_toml(&text, self.path, need).map_err(|e| refusal(&e))?;
+        let found = match self.plan.mode {
+            Mode::Evaluate => {
+                evaluated(&design, self.plan.tolerance).map(|(row, status)| Found::Row(row, status))
+            }
+            Mode::Optimize | Mode::OptimizeWound => {
+                let document = Document {
+                    design: &design,
+                    text: &text,
+                    path: self.path,
+                };
+                let request = OptimizeRequest {
+                    wound: self.plan.mode == Mode::OptimizeWound,
+                    seed: self.plan.seed_at(index),
+                    around: false,
+                    tolerance: self.plan.tolerance,
+                    ..OptimizeRequest::default()
+                };
+                optimize(&document, Vec::new(), &request, &Silent).map(|result| optimum(&result))
+            }
+        };
+        found.map_err(|error| error.to_string())
     }
 }
 
-/// The row of one design. A mode that draws random numbers begins at [`PlanFile::seed_at`].
-fn row(mode: Mode, design: &Design, tolerance: Option<f64>) -> Result<(Row, Status), JobError> {
-    match mode {
-        Mode::Evaluate => evaluated(design, tolerance),
-        Mode::Optimize => Err(JobError::NotModelled("mode \"optimize\"".to_owned())),
-    }
+/// What was found of one design.
+enum Found {
+    Row(Row, Status),
+    NoCoil(Status, String),
+}
+
+fn optimum(result: &Optimization) -> Found {
+    let (Some(coil), Some(objective)) = (&result.coil, &result.objective) else {
+        let status = if result.status == "unbounded" {
+            Status::Unbounded
+        } else {
+            Status::Infeasible
+        };
+        let why = result.no_coil.as_ref().map(|none| none.message.clone());
+        return Found::NoCoil(status, why.unwrap_or_default());
+    };
+    let circuit = &coil.circuit;
+    let row = Row {
+        turns: coil.turns,
+        resistance_ohm: circuit.resistance_ohm,
+        inductance_h: circuit.inductance_h,
+        settling_s: circuit.settling_s,
+        power_w: circuit.power_w,
+        mass_kg: circuit.mass_kg,
+        wire_length_m: circuit.wire_length_m,
+        current_a: objective.current_a,
+        gradient_t_per_m_per_a: objective.gradient_t_per_m_per_a,
+        force_n: objective.force_n + objective.passive_force_n.unwrap_or(0.0),
+        core_peak_field_t: coil.core_peak_field_t,
+        limits_met: result.limits.values().all(|limit| limit.met),
+        optimum: Some(OptimumRow {
+            inner_diameter_m: coil.size.inner_diameter_m,
+            outer_diameter_m: coil.size.outer_diameter_m,
+            length_m: coil.size.length_m,
+            wire_diameter_m: coil.wire_diameter_m,
+            layers: coil.layers,
+            turns_per_layer: coil.turns_per_layer,
+            certificate: match result.certificate.kind {
+                "global" => CertificateWord::Global,
+                "local" => CertificateWord::Local,
+                _ => CertificateWord::Multistart,
+            },
+            upper_bound_n: result.certificate.upper_bound_n,
+        }),
+    };
+    let status = if result.accuracy_reached {
+        Status::Done
+    } else {
+        Status::AccuracyNotReached
+    };
+    Found::Row(row, status)
 }
 
 fn evaluated(design: &Design, tolerance: Option<f64>) -> Result<(Row, Status), JobError> {
@@ -86,6 +158,7 @@ fn evaluated(design: &Design, tolerance: Option<f64>) -> Result<(Row, Status), J
         force_n: rated.force.force_n[2],
         core_peak_field_t: rated.single.core.as_ref().map(|core| core.peak_field_t),
         limits_met: rated.limits.values().all(|check| check.met),
+        optimum: None,
     };
     let status = if rated.accuracy_reached {
         Status::Done

@@ -114,7 +114,7 @@ pub fn run(
                 Status::AccuracyNotReached => {
                     inaccurate.fetch_add(1, Ordering::Relaxed);
                 }
-                Status::Failed => {
+                Status::Infeasible | Status::Unbounded | Status::Failed => {
                     failed.fetch_add(1, Ordering::Relaxed);
                     let message = point.message.unwrap_or_default();
                     // Nothing under the lock leaves the value half changed.

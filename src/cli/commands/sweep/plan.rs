@@ -34,6 +34,8 @@ use crate::job::sweep::plan::{PlanRequest, plan};
     ("fluxform sweep plan designs/seed_air.toml --set coil.length_mm=50:100:25 \\\n    \
       --set limits.resistance_max_ohm=4,6,8 --out - > limits.json",
      "three lengths, each under three limits"),
+    ("fluxform sweep plan designs/seed_air.toml --optimize --set limits.resistance_max_ohm=3:9:0.5",
+     "the best coil of each resistance"),
 ]))]
 pub struct Plan {
     /// Design file (TOML), `-` for standard input
@@ -45,6 +47,13 @@ pub struct Plan {
     /// Where the plan goes; `-` is standard output
     #[arg(long, value_name = "FILE", default_value = "plan.json")]
     out: FileArgument,
+    /// Find the best coil within each design's limits, as `optimize` does, instead of evaluating
+    /// the coil as given
+    #[arg(long)]
+    optimize: bool,
+    /// With --optimize: whole layers and whole turns a layer
+    #[arg(long, requires = "optimize")]
+    wound: bool,
     /// Where random numbers begin, together with a point's index; evaluating draws none
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -79,7 +88,11 @@ impl Plan {
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
         let request = PlanRequest {
             axes: self.axes.clone(),
-            mode: Mode::Evaluate,
+            mode: match (self.optimize, self.wound) {
+                (false, _) => Mode::Evaluate,
+                (true, false) => Mode::Optimize,
+                (true, true) => Mode::OptimizeWound,
+            },
             seed: self.seed,
             tolerance: self.tolerance.tolerance,
         };

@@ -1,0 +1,262 @@
+//! Smooth functions of three variables, expensive to know, tabulated where they are asked for.
+//!
+//! Space is cut into equal cells; a cell's tensor of Gauss nodes is filled when the first point
+//! falls into it. Values and slopes are those of the interpolating polynomial. Across a cell's
+//! border the value jumps by the interpolation's error.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use rayon::prelude::*;
+
+use crate::numerics::gauss;
+use crate::numerics::lagrange_basis::Basis;
+
+/// Functions tabulated together.
+pub const COUNT: usize = 2;
+/// Their values at one place.
+pub type Values = [f64; COUNT];
+/// Values along the third variable's nodes; `None` where they are not defined.
+pub type Line = Option<Vec<Values>>;
+
+/// The cells' shape.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lattice {
+    /// A cell's lower corner.
+    pub origin: [f64; 3],
+    /// A cell's widths.
+    pub width: [f64; 3],
+    /// Nodes along each axis.
+    pub order: [usize; 3],
+}
+
+/// A value with its slopes by the three variables.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Interpolated {
+    /// Value.
+    pub value: f64,
+    /// Slopes.
+    pub slope: [f64; 3],
+}
+
+/// One cell's values at its nodes, first axis slowest; `None` where the cell cannot be filled.
+type Cell = Option<Vec<Values>>;
+
+/// The table.
+pub struct Cells {
+    lattice: Lattice,
+    axes: [Axis; 3],
+    cells: Mutex<BTreeMap<[i64; 3], Arc<OnceLock<Cell>>>>,
+}
+
+struct Axis {
+    nodes: Vec<f64>,
+    basis: Basis,
+    /// Row i: derivatives of the basis at node i.
+    derivative: Vec<Vec<f64>>,
+}
+
+impl Axis {
+    fn new(order: usize) -> Self {
+        let rule = gauss::rule(order);
+        let basis = Basis::new(rule);
+        Self {
+            nodes: rule.nodes.clone(),
+            derivative: basis.derivative(),
+            basis,
+        }
+    }
+
+    /// Weights of value and derivative at `x` of -1..1.
+    fn weights(&self, x: f64) -> [Vec<f64>; 2] {
+        let mut value = vec![0.0; self.nodes.len()];
+        self.basis.weights(x, &mut value);
+        let mut slope = vec![0.0; self.nodes.len()];
+        for (weight, row) in value.iter().zip(&self.derivative) {
+            for (sum, entry) in slope.iter_mut().zip(row) {
+                *sum += weight * entry;
+            }
+        }
+        [value, slope]
+    }
+}
+
+impl Cells {
+    /// An empty table.
+    #[must_use]
+    pub fn new(lattice: Lattice) -> Self {
+        Self {
+            axes: lattice.order.map(Axis::new),
+            lattice,
+            cells: Mutex::new(BTreeMap::new()),
+        }
+    }
+
+    /// How many cells have been asked for.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.lock().len()
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, BTreeMap<[i64; 3], Arc<OnceLock<Cell>>>> {
+        // A panic elsewhere leaves the map whole: entries are only added.
+        self.cells.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn key(&self, at: [f64; 3]) -> [i64; 3] {
+        std::array::from_fn(|i| {
+            ((at[i] - self.lattice.origin[i]) / self.lattice.width[i]).floor() as i64
+        })
+    }
+
+    /// Fills the cell of `at` on all threads, `line` giving the values for two variables at
+    /// given thirds. Not for use within a parallel loop.
+    pub fn fill(&self, at: [f64; 3], line: impl Fn(f64, f64, &[f64]) -> Line + Sync) {
+        let key = self.key(at);
+        let slot = self.slot(key);
+        if slot.get().is_none() {
+            let thirds = self.nodes(2, key[2]);
+            let lines: Vec<Line> = self
+                .pairs(key)
+                .into_par_iter()
+                .map(|(x, y)| line(x, y, &thirds))
+                .collect();
+            // Another thread cannot have filled it with anything else.
+            let _ = slot.set(joined(lines));
+        }
+    }
+
+    fn slot(&self, key: [i64; 3]) -> Arc<OnceLock<Cell>> {
+        Arc::clone(self.lock().entry(key).or_default())
+    }
+
+    fn nodes(&self, axis: usize, key: i64) -> Vec<f64> {
+        let (origin, width) = (self.lattice.origin[axis], self.lattice.width[axis]);
+        let place = |x: &f64| origin + width * (key as f64 + 0.5 * (1.0 + x));
+        self.axes[axis].nodes.iter().map(place).collect()
+    }
+
+    fn pairs(&self, key: [i64; 3]) -> Vec<(f64, f64)> {
+        let seconds = self.nodes(1, key[1]);
+        let firsts = self.nodes(0, key[0]);
+        let pair = |x: f64| seconds.iter().map(move |&y| (x, y)).collect::<Vec<_>>();
+        firsts.into_iter().flat_map(pair).collect()
+    }
+
+    /// The functions at `at`; `None` where they are not defined throughout its cell.
+    pub fn at(
+        &self,
+        at: [f64; 3],
+        line: impl Fn(f64, f64, &[f64]) -> Line,
+    ) -> Option<[Interpolated; COUNT]> {
+        if at.iter().any(|x| !x.is_finite()) {
+            return None;
+        }
+        let key = self.key(at);
+        let slot = self.slot(key);
+        // One thread fills, alone: nothing in here waits for another.
+        let cell = slot.get_or_init(|| {
+            let thirds = self.nodes(2, key[2]);
+            let pairs = self.pairs(key).into_iter();
+            joined(pairs.map(|(x, y)| line(x, y, &thirds)).collect())
+        });
+        Some(self.interpolate(cell.as_ref()?, key, at))
+    }
+
+    fn interpolate(&self, values: &[Values], key: [i64; 3], at: [f64; 3]) -> [Interpolated; COUNT] {
+        let width = self.lattice.width;
+        let [x, y, z]: [[Vec<f64>; 2]; 3] = std::array::from_fn(|i| {
+            let low = self.lattice.origin[i] + width[i] * key[i] as f64;
+            self.axes[i].weights(2.0 * (at[i] - low) / width[i] - 1.0)
+        });
+        let [nx, ny, nz] = self.lattice.order;
+        // By axes in which the derivative is taken: none, first, second, third.
+        let mut sums = [[0.0; COUNT]; 4];
+        for i in 0..nx {
+            let mut plane = [[0.0; COUNT]; 3];
+            for j in 0..ny {
+                let mut row = [[0.0; COUNT]; 2];
+                for k in 0..nz {
+                    let value = &values[(i * ny + j) * nz + k];
+                    for f in 0..COUNT {
+                        row[0][f] += z[0][k] * value[f];
+                        row[1][f] += z[1][k] * value[f];
+                    }
+                }
+                for f in 0..COUNT {
+                    plane[0][f] += y[0][j] * row[0][f];
+                    plane[1][f] += y[1][j] * row[0][f];
+                    plane[2][f] += y[0][j] * row[1][f];
+                }
+            }
+            for f in 0..COUNT {
+                sums[0][f] += x[0][i] * plane[0][f];
+                sums[1][f] += x[1][i] * plane[0][f];
+                sums[2][f] += x[0][i] * plane[1][f];
+                sums[3][f] += x[0][i] * plane[2][f];
+            }
+        }
+        std::array::from_fn(|f| Interpolated {
+            value: sums[0][f],
+            slope: std::array::from_fn(|i| sums[i + 1][f] * 2.0 / width[i]),
+        })
+    }
+}
+
+fn joined(lines: Vec<Line>) -> Cell {
+    let mut values = Vec::new();
+    for line in lines {
+        values.extend(line?);
+    }
+    Some(values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(x: f64, y: f64, thirds: &[f64]) -> Line {
+        let value = |&z: &f64| {
+            [
+                (0.7 * x - y).sin() * (1.3 * z).exp(),
+                1.0 / (3.0 + x + y * z),
+            ]
+        };
+        (x < 2.0).then(|| thirds.iter().map(value).collect())
+    }
+
+    fn cells() -> Cells {
+        Cells::new(Lattice {
+            origin: [0.1, -0.3, 0.2],
+            width: [0.7, 0.8, 0.6],
+            order: [9, 9, 9],
+        })
+    }
+
+    #[test]
+    fn values_and_slopes_are_the_functions() {
+        let cells = cells();
+        for [x, y, z] in [[0.3, 0.7, 0.25], [1.1, -0.9, 0.81], [-0.5, 0.2, -0.1]] {
+            let [f, g] = cells.at([x, y, z], line).expect("defined");
+            let (s, c) = (0.7 * x - y).sin_cos();
+            let e = (1.3 * z).exp();
+            let wanted = [s * e, 0.7 * c * e, -c * e, 1.3 * s * e];
+            let got = [f.value, f.slope[0], f.slope[1], f.slope[2]];
+            for (a, b) in got.iter().zip(wanted) {
+                assert!((a - b).abs() < 2e-9, "{got:?} {wanted:?}");
+            }
+            assert!((g.value - 1.0 / (3.0 + x + y * z)).abs() < 1e-9);
+        }
+        assert_eq!(cells.count(), 3);
+    }
+
+    #[test]
+    fn a_filled_cell_is_the_one_made_on_demand() {
+        let (early, late) = (cells(), cells());
+        let at = [0.5, 0.1, 0.4];
+        early.fill(at, line);
+        assert_eq!(early.at(at, line), late.at(at, line));
+        assert_eq!(late.at([2.5, 0.1, 0.4], line), None);
+        assert_eq!(late.at([f64::NAN, 0.1, 0.4], line), None);
+    }
+}

@@ -1,0 +1,457 @@
+//! The best cored coil that can be wound: every number of layers and turns a layer, one by one.
+//!
+//! Little is known for certain about coils with cores. The flux function of coaxial loops obeys a
+//! maximum principle, so mutual inductances are positive, and the inductance of windings around
+//! one core grows with every turn added and with every bit of steel; nothing alike is known of
+//! the force, nor that it has one maximum over the bore. So each coil's bore is scanned and its
+//! best refined, on the coarse model; what is within reach of the best is decided on the sharp
+//! one. Lengths whose best continuous coil falls short are dropped whole. The certificate says
+//! `exhaustive`: no pair was left out, but neither bores between the scan's samples nor a second
+//! continuous optimum of such a length are bounded.
+
+use rayon::prelude::*;
+
+use super::domain::Domain;
+use super::listing::{
+    Leaf, SHARE, WoundCoil, WoundOutcome, around_optimum, describe, rounded_status, worth_a_look,
+};
+use super::model::{CoilModel, Window};
+use super::outcome::{Certificate, CertificateKind, Status};
+use super::problem::{Fixed, Problem, Regime, Task};
+use super::scalar;
+use super::search::{self, Settings, Solved};
+use super::sequential::{self, FEASIBLE};
+use super::sharpen;
+use crate::progress::{Interrupted, Progress};
+
+/// Bores at which each coil is tried.
+const SCAN: usize = 9;
+/// Bores narrower than this share of the winding's depth are not looked at, unless the
+/// continuous optimum is as narrow: next to no steel.
+const NARROW: f64 = 0.05;
+/// Slack, in turns, of a dimension that must be a whole number of them.
+const WHOLE: f64 = 1e-9;
+/// Coils whose coarse forces differ by less than this multiple of the coarse error are compared
+/// on the sharp model.
+const DOUBT: f64 = 5.0;
+/// How far, relatively, the sharp model's best bore may be from the coarse one's.
+const NEAR: f64 = 0.02;
+/// Most pairs of layers and turns that are examined.
+const PAIRS: u64 = 400_000;
+
+/// Maximises |force| over the coils that can be wound within `task`, on any model.
+///
+/// # Errors
+/// Interruption.
+pub(super) fn optimise(
+    model: &dyn CoilModel,
+    task: &Task,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<WoundOutcome, Interrupted> {
+    let coarse = match search::solve_all(model, task, settings, progress)? {
+        Ok(problems) => problems,
+        Err((status, problems)) => return Ok(WoundOutcome::none(status, &problems)),
+    };
+    let sharp_model = sharpen::sharpened(model, task, &coarse, progress)?;
+    let restated = sharp_model
+        .as_deref()
+        .map(|sharp| sharpen::restated(sharp, task, &coarse));
+    let sharp = restated.as_ref().unwrap_or(&coarse);
+    // What the search did not know, of neighbours say, is screened for too.
+    let blunt_model = sharp_model.as_deref().and_then(CoilModel::blunted);
+    let screened = blunt_model
+        .as_deref()
+        .map(|blunt| sharpen::restated(blunt, task, sharp));
+    let screen = screened.as_ref().unwrap_or(&coarse);
+    let open: Vec<usize> = (0..screen.len())
+        .filter(|&index| screen[index].contradiction.is_none())
+        .collect();
+    progress.begin("wind", open.len() as u64);
+    let doubt = DOUBT * model.relative_error();
+    let mut found: Vec<(usize, Leaf)> = Vec::new();
+    let mut examined = 0;
+    let mut complete = true;
+    let mut best_ln = f64::NEG_INFINITY;
+    for &index in &open {
+        let mut finite = Domain::of(&screen[index].problem);
+        if !(finite.outer_m[1].is_finite() && finite.length_m[1].is_finite()) {
+            complete = false;
+            match around_optimum(&screen[index]) {
+                Some(around) => finite = around,
+                None => continue,
+            }
+        }
+        let pairs = Pairs::of(&screen[index], finite);
+        if pairs.count() > PAIRS {
+            complete = false;
+        }
+        let leaves = pairs.leaves(best_ln + (-SHARE).ln_1p() - doubt, &screen[index], progress)?;
+        examined += leaves.1;
+        for leaf in leaves.0 {
+            best_ln = best_ln.max(leaf.ln_force);
+            found.push((index, leaf));
+        }
+        progress.advance(1);
+    }
+    progress.end();
+    found.retain(|(_, leaf)| leaf.ln_force >= best_ln + (-SHARE).ln_1p() - doubt);
+    found.sort_by(|a, b| b.1.ln_force.total_cmp(&a.1.ln_force));
+    let list = decided(&found, sharp, progress)?;
+    let Some(best) = list.first().cloned() else {
+        let open: Vec<&Solved<'_>> = open.iter().map(|&index| &screen[index]).collect();
+        return Ok(WoundOutcome::none(rounded_status(&open), sharp));
+    };
+    let enough_n = best.force_n * (1.0 - SHARE);
+    let within: Vec<WoundCoil> = list.into_iter().filter(|c| c.force_n >= enough_n).collect();
+    Ok(WoundOutcome {
+        status: Status::Optimal,
+        alternatives: worth_a_look(&best, &within),
+        best: Some(best),
+        certificate: Certificate {
+            kind: if complete {
+                CertificateKind::Exhaustive
+            } else {
+                CertificateKind::Multistart
+            },
+            upper_bound_n: None,
+            gap: None,
+            cells: examined,
+        },
+        ..WoundOutcome::none(Status::Optimal, sharp)
+    })
+}
+
+/// Most coils that are decided on the sharp model.
+const DECIDED: usize = 2000;
+
+/// The strongest of coarse leaves, sorted by force, with their best bores on the sharp model;
+/// strongest first.
+fn decided(
+    found: &[(usize, Leaf)],
+    sharp: &[Solved<'_>],
+    progress: &dyn Progress,
+) -> Result<Vec<WoundCoil>, Interrupted> {
+    let chosen = &found[..found.len().min(DECIDED)];
+    let coils: Vec<Result<Option<WoundCoil>, Interrupted>> = chosen
+        .par_iter()
+        .map(|(index, leaf)| {
+            progress.check()?;
+            let solved = &sharp[*index];
+            let problem = &solved.problem;
+            let pairs = Pairs::of(solved, Domain::of(problem));
+            let [lo, hi] = pairs.bores(leaf.layers, leaf.turns).unwrap_or([0.0, 0.0]);
+            let outer_m = leaf.window.outer_radius_m();
+            let at = leaf.window.inner_radius_m;
+            let near = [lo.max(at - NEAR * outer_m), hi.min(at + NEAR * outer_m)];
+            let sharp = pairs.best_bore(leaf.layers, leaf.turns, near, f64::NEG_INFINITY);
+            Ok(sharp.and_then(|leaf| describe(problem, &leaf)))
+        })
+        .collect();
+    let mut list = Vec::new();
+    for coil in coils {
+        list.extend(coil?);
+    }
+    list.sort_by(|a: &WoundCoil, b| b.force_n.total_cmp(&a.force_n));
+    Ok(list)
+}
+
+/// The coils of one wire and regime by layers and turns a layer.
+struct Pairs<'a> {
+    problem: &'a Problem<'a>,
+    /// The problem without limits that cost an inductance.
+    screen: Option<Problem<'a>>,
+    domain: Domain,
+    /// Least bore's radius that is looked at over the depth.
+    narrow: f64,
+}
+
+impl<'a> Pairs<'a> {
+    fn of(solved: &'a Solved<'a>, domain: Domain) -> Self {
+        let problem = &solved.problem;
+        let narrow = solved.best.as_ref().map_or(NARROW, |local| {
+            let window = Problem::window(local.x);
+            NARROW.min(0.5 * window.inner_radius_m / window.depth_m)
+        });
+        Self {
+            narrow,
+            problem,
+            screen: problem.without_settling(),
+            domain,
+        }
+    }
+
+    fn most_layers(&self) -> u64 {
+        let wire_m = self.problem.strand.diameter_m;
+        let room_m = self.domain.outer_m[1] - self.domain.inner_m[0];
+        whole(room_m / wire_m)
+    }
+
+    fn turns(&self) -> [u64; 2] {
+        let wire_m = self.problem.strand.diameter_m;
+        let [lo, hi] = self.domain.length_m;
+        [
+            (lo / wire_m - WHOLE).ceil().max(1.0) as u64,
+            whole(hi / wire_m),
+        ]
+    }
+
+    fn count(&self) -> u64 {
+        let [lo, hi] = self.turns();
+        self.most_layers()
+            .saturating_mul((hi + 1).saturating_sub(lo))
+    }
+
+    fn window(&self, layers: u64, turns: u64, inner_radius_m: f64) -> Window {
+        let wire_m = self.problem.strand.diameter_m;
+        Window {
+            inner_radius_m,
+            depth_m: layers as f64 * wire_m,
+            length_m: turns as f64 * wire_m,
+        }
+    }
+
+    /// Inner radii that limits on sizes and wire allow a coil, m.
+    fn bores(&self, layers: u64, turns: u64) -> Option<[f64; 2]> {
+        let Window {
+            depth_m, length_m, ..
+        } = self.window(layers, turns, 0.0);
+        let domain = &self.domain;
+        // (2 a + w) w L is the amount of wire.
+        let inner = |volume_m3: f64| 0.5 * (volume_m3 / (depth_m * length_m) - depth_m);
+        let lo = domain.inner_m[0]
+            .max(domain.outer_m[0] - depth_m)
+            .max(inner(domain.volume_m3[0]))
+            .max(self.narrow * depth_m);
+        let hi = (domain.outer_m[1] - depth_m)
+            .min(inner(domain.volume_m3[1]))
+            .min(domain.inner_m[1]);
+        let slack = 1e-12 * (hi.abs() + depth_m);
+        (hi.is_finite() && lo <= hi + slack).then_some([lo.min(hi), hi])
+    }
+
+    /// Every coil's best bore, where its force's logarithm is at least `enough_ln` or close to
+    /// the best of its portion; and how many pairs were looked at.
+    fn leaves(
+        &self,
+        enough_ln: f64,
+        solved: &Solved<'_>,
+        progress: &dyn Progress,
+    ) -> Result<(Vec<Leaf>, usize), Interrupted> {
+        let [mut first, mut last] = self.turns();
+        let mut layers = [1, self.most_layers()];
+        if self.count() > PAIRS
+            && let Some(local) = &solved.best
+        {
+            // Too many: those about the continuous optimum.
+            let window = Problem::window(local.x);
+            let wire_m = self.problem.strand.diameter_m;
+            let side = (PAIRS as f64).sqrt();
+            let about = |size_m: f64| {
+                let middle = size_m / wire_m;
+                [middle - 0.5 * side, middle + 0.5 * side].map(|v| v.max(1.0) as u64)
+            };
+            let ([n0, n1], [m0, m1]) = (about(window.depth_m), about(window.length_m));
+            layers = [layers[0].max(n0), layers[1].min(n1)];
+            [first, last] = [first.max(m0), last.min(m1)];
+        }
+        // A coil next to the continuous optimum shows what is enough.
+        let mut enough_ln = enough_ln;
+        if let Some(local) = &solved.best {
+            let window = Problem::window(local.x);
+            let wire_m = self.problem.strand.diameter_m;
+            let (n, m) = (
+                whole(window.depth_m / wire_m),
+                whole(window.length_m / wire_m),
+            );
+            let (n, m) = (
+                n.clamp(layers[0], layers[1].max(layers[0])),
+                m.clamp(first, last.max(first)),
+            );
+            if let Some(bores) = self.bores(n, m)
+                && let Some(leaf) = self.best_bore(n, m, bores, f64::NEG_INFINITY)
+            {
+                let doubt = DOUBT * self.problem.model.relative_error();
+                enough_ln = enough_ln.max(leaf.ln_force + (-SHARE).ln_1p() - doubt);
+            }
+        }
+        let rows: Vec<Result<Vec<Leaf>, Interrupted>> = (first..=last)
+            .into_par_iter()
+            .map(|turns| {
+                progress.check()?;
+                if !self.row_reaches(turns, solved, enough_ln) {
+                    return Ok(Vec::new());
+                }
+                let leaf = |n| {
+                    let bores = self.bores(n, turns)?;
+                    self.best_bore(n, turns, bores, enough_ln)
+                };
+                Ok((layers[0]..=layers[1]).filter_map(leaf).collect())
+            })
+            .collect();
+        let mut leaves = Vec::new();
+        for row in rows {
+            leaves.extend(row?);
+        }
+        let rows = (last + 1).saturating_sub(first);
+        let columns = (layers[1] + 1).saturating_sub(layers[0]);
+        Ok((leaves, (rows * columns) as usize))
+    }
+
+    /// Whether the best coil of a length, layers not whole, comes up to `enough_ln`: a local
+    /// search from the continuous optimum. True where it finds nothing.
+    fn row_reaches(&self, turns: u64, solved: &Solved<'_>, enough_ln: f64) -> bool {
+        let (Some(local), None) = (&solved.best, self.problem.task.fixed.length_m) else {
+            return true;
+        };
+        let length_m = turns as f64 * self.problem.strand.diameter_m;
+        let task = Task {
+            fixed: Fixed {
+                length_m: Some(length_m),
+                ..self.problem.task.fixed
+            },
+            ..self.problem.task.clone()
+        };
+        let row = self.problem.with_task(&task);
+        // Without the settling time the force can only be higher.
+        let row = row.without_settling().unwrap_or(row);
+        let best = [1.0, 0.5].into_iter().filter_map(|thinner| {
+            let window = Problem::window(local.x);
+            let start = Problem::coordinates(&Window {
+                length_m,
+                depth_m: window.depth_m * thinner,
+                ..window
+            });
+            let local = sequential::solve(&row, start)?;
+            (local.violation(&row) <= FEASIBLE).then_some(-local.point.objective)
+        });
+        best.reduce(f64::max).is_none_or(|best| best >= enough_ln)
+    }
+
+    /// ln F at a bore, limits that need an inductance apart; -infinity where the model fails.
+    fn ln_force(&self, window: Window) -> f64 {
+        let problem = self.screen.as_ref().unwrap_or(self.problem);
+        let rated = problem.rate(window);
+        rated.map_or(f64::NEG_INFINITY, |rated| rated.force_n.value.ln())
+    }
+
+    /// The worst of all limits at a bore.
+    fn over(&self, window: Window) -> f64 {
+        let Some(rated) = self.problem.rate(window) else {
+            return f64::INFINITY;
+        };
+        let point = self.problem.scaled(&rated);
+        let rows = point.rows.iter().zip(&self.problem.bounds);
+        rows.map(|(&row, bound)| {
+            if bound.name.is_equality() {
+                row.abs()
+            } else {
+                row
+            }
+        })
+        .fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// The best bore of one coil; `None` where no bore meets the limits or its force does not
+    /// reach `enough_ln`.
+    fn best_bore(&self, layers: u64, turns: u64, bores: [f64; 2], enough_ln: f64) -> Option<Leaf> {
+        let window = |a: f64| self.window(layers, turns, a);
+        let ln_force = |a: f64| self.ln_force(window(a));
+        let [lo, hi] = bores;
+        let (mut at, mut value) = summit(ln_force, lo, hi);
+        if value < enough_ln {
+            return None;
+        }
+        // The last rounding is taken off the bore.
+        let depth_m = window(0.0).depth_m;
+        let mut over = self.over(window(at));
+        if over > 0.0 && over <= FEASIBLE && self.problem.regime == Regime::Driver {
+            at = (at - 4.0 * over * (at + depth_m)).max(lo);
+            over = self.over(window(at));
+            value = ln_force(at);
+        }
+        if over > FEASIBLE {
+            (at, value) = self.within(window, [lo, at, hi], enough_ln)?;
+        }
+        (value.is_finite() && value >= enough_ln).then(|| Leaf {
+            layers,
+            turns,
+            window: window(at),
+            ln_force: value,
+        })
+    }
+
+    /// The best bore that meets every limit, beside a best one, the middle of `bores`, that does
+    /// not.
+    fn within(
+        &self,
+        window: impl Fn(f64) -> Window,
+        bores: [f64; 3],
+        enough_ln: f64,
+    ) -> Option<(f64, f64)> {
+        let [lo, at, hi] = bores;
+        let over = |a: f64| self.over(window(a));
+        let ln_force = |a: f64| self.ln_force(window(a));
+        let mut best: Option<(f64, f64)> = None;
+        for end in [lo, hi] {
+            // From the best bore outwards, to the first that meets the limits.
+            let mut outside = at;
+            for step in 1..=4 {
+                let bore = at + (end - at) * f64::from(step * step) / 16.0;
+                if bore == outside || ln_force(bore) < enough_ln {
+                    break;
+                }
+                if over(bore) <= 0.0 {
+                    let tolerance = 1e-13 * (at + window(at).depth_m);
+                    let (low, high) = (bore.min(outside), bore.max(outside));
+                    let root = scalar::root(over, low, high, tolerance).unwrap_or(bore);
+                    // On the side that meets them.
+                    let inwards = (bore - root) * 1e-10;
+                    let edge = if over(root) <= 0.0 {
+                        root
+                    } else {
+                        root + inwards
+                    };
+                    let edge = if over(edge) <= FEASIBLE { edge } else { bore };
+                    let value = ln_force(edge);
+                    if best.is_none_or(|(_, old)| value > old) {
+                        best = Some((edge, value));
+                    }
+                    break;
+                }
+                outside = bore;
+            }
+        }
+        best
+    }
+}
+
+fn whole(ratio: f64) -> u64 {
+    (ratio + WHOLE).floor().clamp(1.0, 1e15) as u64
+}
+
+/// Where `f` is largest: the best of a scan, refined between its neighbours.
+fn summit(f: impl Fn(f64) -> f64, lo: f64, hi: f64) -> (f64, f64) {
+    if hi - lo <= f64::EPSILON * hi {
+        return (hi, f(hi));
+    }
+    let place = |k: usize| match k {
+        0 => lo,
+        k if k == SCAN - 1 => hi,
+        k => lo + (hi - lo) * k as f64 / (SCAN - 1) as f64,
+    };
+    let values: Vec<f64> = (0..SCAN).map(|k| f(place(k))).collect();
+    let best = (0..SCAN)
+        .max_by(|&i, &j| values[i].total_cmp(&values[j]))
+        .unwrap_or(0);
+    let (low, high) = (
+        place(best.saturating_sub(1)),
+        place((best + 1).min(SCAN - 1)),
+    );
+    let refined = scalar::maximum(f, low, high);
+    if refined.1 > values[best] {
+        refined
+    } else {
+        (place(best), values[best])
+    }
+}

@@ -1,0 +1,198 @@
+//! Coils that can be wound: what is told about them, and which are worth telling about.
+
+use std::collections::BTreeMap;
+
+use super::diagnosis;
+use super::domain::Domain;
+use super::model::{Strand, Window};
+use super::outcome::{BestCoil, Certificate, CertificateKind, LimitUse, Status, Violation};
+use super::problem::{LimitName, Problem};
+use super::search::{self, Solved};
+
+/// Share of the best force that a listed coil may lack.
+pub const SHARE: f64 = 0.01;
+/// Most coils listed beside the best.
+const LISTED: usize = 50;
+
+/// A coil that can be wound.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WoundCoil {
+    /// Its wire.
+    pub strand: Strand,
+    /// Layers n.
+    pub layers: u64,
+    /// Turns a layer m.
+    pub turns_per_layer: u64,
+    /// Its section.
+    pub window: Window,
+    /// Rated current, A.
+    pub current_a: f64,
+    /// |force| at the target, N.
+    pub force_n: f64,
+    /// Mass of the wire's metal, kg.
+    pub wire_mass_kg: f64,
+    /// Heat at the rated current, W.
+    pub power_w: f64,
+    /// The limits; sensitivities are the continuous problem's and zero here.
+    pub limits: Vec<LimitUse>,
+}
+
+/// The best coil that can be wound, and others worth a look.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WoundOutcome {
+    /// How it ended.
+    pub status: Status,
+    /// The best; present with [`Status::Optimal`].
+    pub best: Option<WoundCoil>,
+    /// Coils within [`SHARE`] of its force that are shorter, lighter or cooler, none of them
+    /// beaten by another in force, length, mass and heat together; strongest first.
+    pub alternatives: Vec<WoundCoil>,
+    /// What is proven.
+    pub certificate: Certificate,
+    /// Best force of a coil whose turns need not be whole, N.
+    pub continuous_n: Option<f64>,
+    /// That coil, with what its limits cost.
+    pub continuous: Option<BestCoil>,
+    /// Evaluations of a coil by the local searches.
+    pub evaluations: usize,
+    /// Local searches.
+    pub starts: usize,
+}
+
+/// One coil with its best bore.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Leaf {
+    pub layers: u64,
+    pub turns: u64,
+    pub window: Window,
+    pub ln_force: f64,
+}
+
+impl WoundOutcome {
+    /// No coil that can be wound, beside what `problems` found of those that cannot.
+    pub(super) fn none(status: Status, problems: &[Solved<'_>]) -> Self {
+        Self {
+            status,
+            best: None,
+            alternatives: Vec::new(),
+            certificate: Certificate {
+                kind: CertificateKind::Multistart,
+                upper_bound_n: None,
+                gap: None,
+                cells: 0,
+            },
+            continuous_n: search::best_of(problems).and_then(Solved::force_n),
+            continuous: search::best_of(problems).and_then(search::describe),
+            evaluations: problems.iter().map(|s| s.evaluations).sum(),
+            starts: problems.iter().map(|s| s.starts).sum(),
+        }
+    }
+}
+
+/// A finite box about a problem's continuous optimum.
+pub(super) fn around_optimum(solved: &Solved<'_>) -> Option<Domain> {
+    const WIDER: f64 = 3.0;
+    let window = Problem::window(solved.best.as_ref()?.x);
+    let mut domain = Domain::of(&solved.problem);
+    domain.outer_m[1] = domain.outer_m[1].min(WIDER * window.outer_radius_m());
+    domain.length_m[1] = domain.length_m[1].min(WIDER * window.length_m);
+    Some(domain)
+}
+
+/// Why no coil can be wound though coils of any turns exist: what the nearest whole one breaks.
+pub(super) fn rounded_status(open: &[&Solved<'_>]) -> Status {
+    let mut least: Option<(Vec<Violation>, Window)> = None;
+    for solved in open {
+        let Some(local) = &solved.best else { continue };
+        let wire_m = solved.problem.strand.diameter_m;
+        let mut window = Problem::window(local.x);
+        let whole = |length_m: f64| (length_m / wire_m).floor().max(1.0) * wire_m;
+        window.depth_m = whole(window.depth_m);
+        window.length_m = whole(window.length_m);
+        let broken = diagnosis::violations(&solved.problem, window);
+        if least.is_none() {
+            least = Some((broken, window));
+        }
+    }
+    let (violations, least) = least.unwrap_or((
+        Vec::new(),
+        Window {
+            inner_radius_m: 0.0,
+            depth_m: 0.0,
+            length_m: 0.0,
+        },
+    ));
+    Status::Infeasible { violations, least }
+}
+
+/// The best leaf of every coil, in order of layers and turns.
+pub(super) fn once_each(leaves: Vec<Leaf>) -> Vec<Leaf> {
+    let mut best: BTreeMap<(u64, u64), Leaf> = BTreeMap::new();
+    for leaf in leaves {
+        let slot = best.entry((leaf.layers, leaf.turns)).or_insert(leaf);
+        if leaf.ln_force > slot.ln_force {
+            *slot = leaf;
+        }
+    }
+    best.into_values().collect()
+}
+
+/// The coil of a leaf in SI units.
+pub(super) fn describe(problem: &Problem<'_>, leaf: &Leaf) -> Option<WoundCoil> {
+    let rated = problem.rate(leaf.window)?;
+    let point = problem.scaled(&rated);
+    let limits = problem
+        .bounds
+        .iter()
+        .enumerate()
+        .filter(|(_, bound)| {
+            !matches!(
+                bound.name,
+                LimitName::Axis | LimitName::OneLayer | LimitName::OneTurn
+            )
+        })
+        .map(|(row, bound)| LimitUse {
+            name: bound.name,
+            value: rated.values[row].value,
+            limit: bound.limit,
+            active: point.rows[row].abs() <= 1e-9,
+            sensitivity_n_per_unit: 0.0,
+        })
+        .collect();
+    let volume = leaf.window.volume_over_pi_m3().value;
+    let resistance_ohm = volume * problem.strand.resistance_per_volume();
+    Some(WoundCoil {
+        strand: problem.strand,
+        layers: leaf.layers,
+        turns_per_layer: leaf.turns,
+        window: leaf.window,
+        current_a: rated.current_a,
+        force_n: rated.force_n.value,
+        wire_mass_kg: volume * problem.strand.mass_per_volume(),
+        power_w: rated.current_a * rated.current_a * resistance_ohm,
+        limits,
+    })
+}
+
+/// Of coils sorted by force: the strongest [`LISTED`] of those better than `best` in length, mass or heat, and not beaten
+/// by a stronger one in all three.
+pub(super) fn worth_a_look(best: &WoundCoil, sorted: &[WoundCoil]) -> Vec<WoundCoil> {
+    let traits = |coil: &WoundCoil| [coil.window.length_m, coil.wire_mass_kg, coil.power_w];
+    let mut kept: Vec<WoundCoil> = Vec::new();
+    for coil in sorted.iter().skip(1) {
+        // Rounding is no advantage.
+        let beaten = |other: &WoundCoil| {
+            traits(other)
+                .iter()
+                .zip(traits(coil))
+                .all(|(theirs, ours)| *theirs <= ours * (1.0 + 1e-9))
+        };
+        if kept.len() == LISTED {
+            break;
+        }
+        if !beaten(best) && !kept.iter().any(beaten) {
+            kept.push(coil.clone());
+        }
+    }
+    kept
+}

@@ -1,0 +1,368 @@
+//! `optimize` as its users meet it.
+
+use serde_json::Value;
+
+use super::support::{Place, SEED};
+
+/// A steel core would take longer, and nothing here depends on it.
+const LIMITS: &str = "name = \"odd\"\n[wire]\ndiameter_mm = 0.7\n[supply]\ncurrent_max_a = 1.3\n";
+
+fn number(value: &Value, path: &str) -> f64 {
+    let found = path.split('/').fold(value, |value, key| &value[key]);
+    found.as_f64().unwrap_or_else(|| panic!("{path}: {found}"))
+}
+
+fn near(a: f64, b: f64, tolerance: f64) {
+    assert!((a / b - 1.0).abs() <= tolerance, "{a} {b}");
+}
+
+#[test]
+fn the_keys_that_scripts_rely_on_are_there() {
+    let place = Place::new();
+    let result = place
+        .run(&["optimize", SEED, "--format", "json"])
+        .ends(0)
+        .json();
+    for path in [
+        "coil/inner_diameter_m",
+        "coil/outer_diameter_m",
+        "coil/length_m",
+        "coil/turns",
+        "coil/resistance_ohm",
+        "coil/settling_s",
+        "coil/mass_kg",
+        "coil/power_w",
+        "objective/force_n",
+        "objective/current_a",
+        "certificate/upper_bound_n",
+        "certificate/gap",
+        "evaluations",
+        "starts",
+    ] {
+        assert!(number(&result, path).is_finite(), "{path}");
+    }
+    assert_eq!(result["status"], "optimal");
+    assert_eq!(result["certificate"]["kind"], "global");
+    assert_eq!(result["inputs"][0]["path"], SEED);
+    let limits = result["limits"].as_object().unwrap();
+    let names: Vec<&str> = limits.keys().map(String::as_str).collect();
+    assert_eq!(
+        names,
+        [
+            "length_m",
+            "outer_diameter_m",
+            "resistance_ohm",
+            "settling_s"
+        ]
+    );
+    for limit in limits.values() {
+        assert!(number(limit, "value") <= number(limit, "limit"));
+        assert_eq!(limit["met"], true);
+        let held = limit["active"] == true;
+        assert_eq!(held, number(limit, "sensitivity_n_per_unit") != 0.0);
+    }
+    // The seed's own coil is told of, and that it is not within its limits.
+    near(number(&result, "given/force_n"), 0.099709, 1e-4);
+    assert_eq!(result["given"]["limits"]["resistance_ohm"]["met"], false);
+    assert!(number(&result, "objective/force_n") > 0.13);
+    let bores = result["valley"]["inner_diameter_m"].as_array().unwrap();
+    let bore = number(&result, "coil/inner_diameter_m");
+    assert!(bores[0].as_f64().unwrap() <= bore && bore <= bores[1].as_f64().unwrap());
+}
+
+#[test]
+fn evaluate_says_the_same_of_the_design_that_was_written() {
+    let place = Place::new();
+    for (name, options) in [("free.toml", &[][..]), ("wound.toml", &["--wound"])] {
+        let mut args = vec!["optimize", SEED, "--format", "json", "--out", name];
+        args.extend(options);
+        let best = place.run(&args).ends(0).json();
+        let args = ["evaluate", name, "--strict", "--format", "json"];
+        let told = place.run(&args).ends(0).json();
+        for (ours, theirs) in [
+            ("objective/force_n", "target/force_n"),
+            ("objective/current_a", "target/current_a"),
+            (
+                "objective/gradient_t_per_m_per_a",
+                "target/gradient_t_per_m_per_a",
+            ),
+            ("coil/resistance_ohm", "coil/resistance_ohm"),
+            ("coil/inductance_h", "coil/inductance_h"),
+            ("coil/settling_s", "coil/settling_s"),
+            ("coil/mass_kg", "coil/mass_kg"),
+            ("coil/power_w", "coil/power_w"),
+            ("coil/turns", "coil/turns"),
+        ] {
+            assert_eq!(number(&best, ours), number(&told, theirs), "{ours}");
+        }
+        assert!(number(&best, "accuracy/optimiser/estimate") < 1e-12);
+        // The rest of the design is the design's.
+        let read = String::from_utf8(place.read(name)).unwrap();
+        assert!(read.contains("pitch_mm = 50.0") && read.contains("polarity = \"repel\""));
+    }
+}
+
+#[test]
+fn a_wound_coil_has_whole_layers_and_is_no_better_than_a_free_one() {
+    let place = Place::new();
+    let free = place
+        .run(&["optimize", SEED, "--format", "json"])
+        .ends(0)
+        .json();
+    let args = ["optimize", SEED, "--wound", "--format", "json"];
+    let wound = place.run(&args).ends(0).json();
+    let (layers, turns) = (
+        number(&wound, "coil/layers"),
+        number(&wound, "coil/turns_per_layer"),
+    );
+    assert_eq!(number(&wound, "coil/turns"), layers * turns);
+    let wire_m = number(&wound, "coil/wire_diameter_m");
+    let build = number(&wound, "coil/outer_diameter_m") - number(&wound, "coil/inner_diameter_m");
+    near(build, 2.0 * layers * wire_m, 1e-12);
+    near(number(&wound, "coil/length_m"), turns * wire_m, 1e-12);
+    let (ours, best) = (
+        number(&wound, "objective/force_n"),
+        number(&free, "objective/force_n"),
+    );
+    assert!(ours <= best && ours > 0.99 * best, "{ours} {best}");
+    near(number(&wound, "continuous_force_n"), best, 1e-9);
+    for other in wound["alternatives"].as_array().unwrap() {
+        assert!(number(other, "force_n") <= ours && number(other, "force_lost") <= 0.01);
+        assert!(!other["better"].as_array().unwrap().is_empty());
+    }
+}
+
+#[test]
+fn the_same_bytes_with_any_number_of_threads() {
+    let place = Place::new();
+    let design = format!(
+        "{LIMITS}voltage_v = 9.0\n[limits]\npower_max_w = 7.0\nsettling_max_ms = 13.0\n\
+         outer_diameter_max_mm = 41.0\n"
+    );
+    place.write("odd.toml", &design);
+    for options in [&[][..], &["--wound"]] {
+        let run = |threads: &str| {
+            let mut args = vec![
+                "optimize",
+                "odd.toml",
+                "--format",
+                "json",
+                "--threads",
+                threads,
+            ];
+            args.extend(options);
+            place.run(&args).ends(0).out
+        };
+        assert_eq!(run("1"), run("3"));
+    }
+}
+
+#[test]
+fn polarity_decides_the_sign() {
+    let place = Place::new();
+    let seed = place.seed();
+    place.write("attract.toml", &seed.replace("\"repel\"", "\"attract\""));
+    let up = place
+        .run(&["optimize", SEED, "--format", "json"])
+        .ends(0)
+        .json();
+    let args = ["optimize", "attract.toml", "--format", "json"];
+    let down = place.run(&args).ends(0).json();
+    let (up, down) = (
+        number(&up, "objective/force_n"),
+        number(&down, "objective/force_n"),
+    );
+    assert!(up > 0.0);
+    assert_eq!(up, -down);
+}
+
+#[test]
+fn a_sensitivity_is_what_a_little_more_gives() {
+    let place = Place::new();
+    let seed = place.seed();
+    let force = |limit: f64| {
+        let text = seed.replace(
+            "resistance_max_ohm = 6.0",
+            &format!("resistance_max_ohm = {limit}"),
+        );
+        place.write("more.toml", &text);
+        let args = ["optimize", "more.toml", "--format", "json"];
+        let result = place.run(&args).ends(0).json();
+        let slope = number(&result, "limits/resistance_ohm/sensitivity_n_per_unit");
+        (number(&result, "objective/force_n"), slope)
+    };
+    let step = 1e-3;
+    let (low, high) = (force(6.0 - step).0, force(6.0 + step).0);
+    near(force(6.0).1, (high - low) / (2.0 * step), 1e-5);
+}
+
+#[test]
+fn dimensions_can_be_kept() {
+    let place = Place::new();
+    for keys in [
+        &["inner_diameter_mm"][..],
+        &["inner_diameter_mm", "length_mm"],
+    ] {
+        let mut args = vec!["optimize", SEED, "--format", "json", "--fix"];
+        args.extend(keys);
+        let result = place.run(&args).ends(0).json();
+        assert_eq!(number(&result, "coil/inner_diameter_m"), 0.024);
+        if keys.len() > 1 {
+            assert_eq!(number(&result, "coil/length_m"), 0.1);
+        }
+        assert_eq!(number(&result, "fixed/inner_diameter_m/value"), 0.024);
+        assert!(number(&result, "objective/force_n") < 0.1378);
+    }
+    place.write("none.toml", LIMITS);
+    place
+        .run(&["optimize", "none.toml", "--fix", "length_mm"])
+        .ends(3)
+        .says(&["--fix", "[coil]"]);
+    place
+        .run(&["optimize", SEED, "--fix", "turns"])
+        .ends(2)
+        .says(&["turns", "length_mm"]);
+}
+
+#[test]
+fn a_start_outside_the_limits_changes_nothing() {
+    let place = Place::new();
+    let seed = place.seed();
+    place.write(
+        "far.toml",
+        &seed.replace("length_mm = 100.0", "length_mm = 700.0"),
+    );
+    let seed = place
+        .run(&["optimize", SEED, "--format", "json"])
+        .ends(0)
+        .json();
+    let args = ["optimize", "far.toml", "--format", "json"];
+    let far = place.run(&args).ends(0).json();
+    let force = |result: &Value| number(result, "objective/force_n");
+    near(force(&far), force(&seed), 1e-9);
+    place.write(
+        "none.toml",
+        &format!("{LIMITS}[limits]\npower_max_w = 7.0\n"),
+    );
+    let args = ["optimize", "none.toml", "--format", "json"];
+    let none = place.run(&args).ends(0).json();
+    assert!(none.get("given").is_none());
+}
+
+#[test]
+fn without_a_coil_the_limit_to_blame_is_named() {
+    let place = Place::new();
+    let cases = [
+        (
+            "inner_diameter_min_mm = 41.0\nouter_diameter_max_mm = 38.0\n",
+            "infeasible",
+            &["41.000000 mm", "are missing"][..],
+        ),
+        (
+            "inner_diameter_min_mm = 30.0\nouter_diameter_max_mm = 38.0\n\
+             resistance_max_ohm = 0.0007\n",
+            "infeasible",
+            &["limits.resistance_max_ohm", "0.0007"],
+        ),
+        (
+            "inner_diameter_min_mm = 20.0\nouter_diameter_max_mm = 38.0\n\
+             settling_max_ms = 0.013\n",
+            "infeasible",
+            &["limits.settling_max_ms"],
+        ),
+        (
+            "inner_diameter_min_mm = 13.0\n",
+            "unbounded",
+            &["limits.outer_diameter_max_mm"],
+        ),
+    ];
+    for (limits, status, words) in cases {
+        place.write("none.toml", &format!("{LIMITS}[limits]\n{limits}"));
+        let ran = place.run(&["optimize", "none.toml", "--out", "out.toml"]);
+        ran.ends(4).says(words);
+        assert!(!place.path("out.toml").exists());
+        let ran = place
+            .run(&["optimize", "none.toml", "--format", "json"])
+            .ends(4);
+        assert_eq!(ran.json()["status"], status, "{limits}");
+        assert!(ran.json().get("coil").is_none());
+        assert!(ran.error()["error"]["message"].is_string());
+    }
+}
+
+#[test]
+fn another_file_is_not_replaced() {
+    let place = Place::new();
+    place.write("mine.toml", "precious");
+    let args = ["optimize", SEED, "--out", "mine.toml"];
+    place.run(&args).ends(4).says(&["--force"]);
+    assert_eq!(place.read("mine.toml"), b"precious");
+    place.run(&[&args[..], &["--force"]].concat()).ends(0);
+    let first = place.read("mine.toml");
+    // What came of the same design may be.
+    place.run(&args).ends(0);
+    assert_eq!(place.read("mine.toml"), first);
+    let ran = place.run(&["optimize", SEED, "--out", "-"]).ends(0);
+    assert_eq!(ran.out.as_bytes(), first);
+    assert!(ran.err.contains("proven best"), "{}", ran.err);
+}
+
+#[test]
+fn a_sweep_optimises_each_design() {
+    let place = Place::new();
+    let set = "limits.resistance_max_ohm=0.00009,3,6";
+    for (mode, column) in [
+        (&["--optimize"][..], ",,"),
+        (&["--optimize", "--wound"], ",26,85,"),
+    ] {
+        let mut args = vec!["sweep", "plan", SEED, "--set", set, "--force"];
+        args.extend(mode);
+        place.run(&args).ends(0);
+        let run = ["sweep", "run", "plan.json", "--out", "points", "--force"];
+        place.run(&run).ends(4).says(&["limits.resistance_max_ohm"]);
+        let merge = ["sweep", "merge", "plan.json", "points", "--out", "-"];
+        let table = place.run(&merge);
+        let rows: Vec<&str> = table.out.lines().collect();
+        assert!(rows[0].contains("certificate,upper_bound_n"), "{}", rows[0]);
+        assert!(rows[1].contains("infeasible"), "{}", rows[1]);
+        assert!(
+            rows[3].contains(column) && rows[3].contains("global"),
+            "{}",
+            rows[3]
+        );
+    }
+}
+
+/// Two coils, one beside the other: the neighbour's core takes flux away.
+#[test]
+fn neighbours_cores_change_the_best_force() {
+    let place = Place::new();
+    let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/designs/seed.toml"))
+        .expect("the shipped design")
+        .replace("rows = 3", "rows = 1")
+        .replace("columns = 3", "columns = 2");
+    place.write("pair.toml", &text);
+    let found = place
+        .run(&[
+            "optimize",
+            "pair.toml",
+            "--neighbours",
+            "--starts",
+            "2",
+            "--format",
+            "json",
+        ])
+        .ends(0)
+        .json();
+    let among_n = number(&found, "objective/force_n");
+    let alone_n = number(&found, "objective/alone_force_n");
+    assert!(among_n > 0.0 && alone_n > 0.0);
+    assert!(
+        (among_n / alone_n - 1.0).abs() > 1e-3,
+        "{among_n} {alone_n}"
+    );
+    // A coupled solution of the coil found says what the optimiser counted on.
+    assert!(number(&found, "accuracy/optimiser/estimate") < 1e-3);
+    let settling = &found["limits"]["settling_s"];
+    assert!(number(settling, "value") <= number(settling, "limit") * (1.0 + 1e-3));
+}

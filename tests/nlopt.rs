@@ -1,0 +1,230 @@
+//! `optimize` against NLopt and an independent model of the coil (`scripts/nlopt_reference.py`).
+//!
+//! Needs a Python with numpy, scipy and nlopt: `python3`, or what `FLUXFORM_PYTHON` names. Without
+//! one the tests say so and are skipped. `FLUXFORM_NLOPT=all` judges all problems instead of those
+//! marked `ci`, and solves all of them anew.
+#![allow(clippy::print_stderr, clippy::print_stdout)] // a test may tell what it compared
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use fluxform::design::{Design, Need};
+use fluxform::job::evaluate::evaluate;
+use serde_json::{Value, json};
+
+const DESIGNS: usize = 100;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// A Python that has what the script needs; `None` with a word where there is none.
+fn python() -> Option<PathBuf> {
+    let named = std::env::var_os("FLUXFORM_PYTHON").unwrap_or_else(|| "python3".into());
+    let run = Command::new(&named)
+        .args(["-c", "import numpy, scipy, nlopt"])
+        .output();
+    match run {
+        Ok(run) if run.status.success() => Some(named.into()),
+        _ => {
+            eprintln!(
+                "skipped: {} cannot import numpy, scipy and nlopt (pip install -r \
+                 scripts/nlopt_requirements.txt)",
+                Path::new(&named).display()
+            );
+            None
+        }
+    }
+}
+
+fn script(python: &Path, arguments: &[&str]) -> Output {
+    Command::new(python)
+        .arg("scripts/nlopt_reference.py")
+        .args(arguments)
+        .current_dir(root())
+        .output()
+        .unwrap()
+}
+
+/// The script's word; what it finds at fault fails the test.
+#[track_caller]
+fn passes(python: &Path, arguments: &[&str]) -> String {
+    let run = script(python, arguments);
+    let out = String::from_utf8(run.stdout).unwrap();
+    let errors = String::from_utf8(run.stderr).unwrap();
+    assert!(run.status.success(), "{arguments:?}\n{out}\n{errors}");
+    println!("{out}");
+    out
+}
+
+fn all() -> bool {
+    std::env::var("FLUXFORM_NLOPT").is_ok_and(|what| what == "all")
+}
+
+/// Name and design of the problems: those marked `ci`, or all.
+fn problems() -> BTreeMap<String, PathBuf> {
+    let folder = root().join("tests/oracles/nlopt");
+    let text = std::fs::read_to_string(folder.join("problems.json")).unwrap();
+    let list: Value = serde_json::from_str(&text).unwrap();
+    list["problems"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|problem| all() || problem["ci"] == true)
+        .map(|problem| {
+            let word = |key: &str| problem[key].as_str().unwrap().to_owned();
+            (word("name"), folder.join(word("design")))
+        })
+        .collect()
+}
+
+#[allow(clippy::disallowed_methods)] // a test's own file
+fn file_of(folder: &Path, name: &str, content: &Value) -> String {
+    let path = folder.join(name);
+    std::fs::write(&path, content.to_string()).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+/// What `optimize` says of a design, as the script's `--judge` takes it.
+fn claim(design: &Path) -> Value {
+    let run = Command::new(env!("CARGO_BIN_EXE_fluxform"))
+        .args(["optimize", "--format", "json"])
+        .arg(design)
+        .current_dir(root())
+        .output()
+        .unwrap();
+    let code = run.status.code();
+    assert!(
+        code == Some(0) || code == Some(4),
+        "{}: {run:?}",
+        design.display()
+    );
+    let result: Value = serde_json::from_slice(&run.stdout).unwrap();
+    let coil = &result["coil"];
+    if coil.is_null() {
+        return json!({"status": result["status"]});
+    }
+    let sensitivities: BTreeMap<&String, &Value> = result["limits"]
+        .as_object()
+        .unwrap()
+        .iter()
+        .map(|(name, limit)| (name, &limit["sensitivity_n_per_unit"]))
+        .collect();
+    let mut claim = json!({
+        "status": result["status"],
+        "inner_diameter_m": coil["inner_diameter_m"],
+        "outer_diameter_m": coil["outer_diameter_m"],
+        "length_m": coil["length_m"],
+        "wire_diameter_m": coil["wire_diameter_m"],
+        "force_n": result["objective"]["force_n"],
+        "sensitivity_n_per_unit": sensitivities,
+    });
+    if let Some(bound) = result["certificate"]["upper_bound_n"].as_f64() {
+        claim["upper_bound_n"] = json!(bound);
+    }
+    claim
+}
+
+/// Numbers from 0 to 1 that are always the same (a linear congruence by Knuth).
+struct Numbers(u64);
+
+impl Numbers {
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+/// A random design and what `evaluate` says of it; with a core, within the box of the script's
+/// table.
+fn random_design(numbers: &mut Numbers, core: bool) -> Value {
+    let mut mm = |low: f64, high: f64| (numbers.between(low, high) * 1e3).round() / 1e3;
+    let inner = mm(4.5, 39.0);
+    let outer = inner + 2.0 * mm(1.5, 13.5);
+    let length = mm(21.0, 159.0);
+    let wire = mm(0.05, 1.4);
+    let current = mm(0.1, 7.0);
+    let steel = if core {
+        "[core]\nabove_mm = 0.0\nbelow_mm = 10.0\nrelative_permeability = 1000.0\n"
+    } else {
+        ""
+    };
+    let text = format!(
+        "name = \"random\"\n[coil]\ninner_diameter_mm = {inner}\nouter_diameter_mm = {outer}\n\
+         length_mm = {length}\n[wire]\ndiameter_mm = {wire}\n{steel}[supply]\n\
+         current_max_a = {current}\n[target]\nheight_mm = 30.0\n"
+    );
+    let path = Path::new("random.toml");
+    let (design, _) = Design::from_toml(&text, path, Need::EVALUATE).unwrap();
+    let told = evaluate(&design, Vec::new(), None).unwrap();
+    json!({
+        "name": text.replace('\n', " "),
+        "inner_diameter_m": told.coil.inner_diameter_m,
+        "outer_diameter_m": told.coil.outer_diameter_m,
+        "length_m": told.coil.length_m,
+        "wire_diameter_m": design.wire.diameter_m,
+        "current_a": told.target.current_a,
+        "core": core,
+        "force_n": told.target.force_n,
+        "resistance_ohm": told.coil.resistance_ohm,
+        "inductance_h": told.coil.inductance_h,
+    })
+}
+
+#[test]
+fn both_models_agree_on_random_designs() {
+    let Some(python) = python() else { return };
+    let mut numbers = Numbers(7);
+    let designs: Vec<Value> = (0..2 * DESIGNS)
+        .map(|k| random_design(&mut numbers, k >= DESIGNS))
+        .collect();
+    let folder = tempfile::tempdir().unwrap();
+    let models = file_of(folder.path(), "models.json", &json!({"designs": designs}));
+    let said = passes(&python, &["--models", &models]);
+    assert!(
+        said.contains("air force_n") && said.contains("cored inductance_h"),
+        "{said}"
+    );
+    // A model that is a little wrong is not taken.
+    let mut wrong = designs;
+    wrong[0]["force_n"] = json!(wrong[0]["force_n"].as_f64().unwrap() * (1.0 + 1e-9));
+    let models = file_of(folder.path(), "wrong.json", &json!({"designs": wrong}));
+    assert!(!script(&python, &["--models", &models]).status.success());
+}
+
+#[test]
+fn no_problem_has_a_better_coil_and_no_limit_is_missed() {
+    let Some(python) = python() else { return };
+    let claims: BTreeMap<String, Value> = problems()
+        .into_iter()
+        .map(|(name, design)| (name, claim(&design)))
+        .collect();
+    let folder = tempfile::tempdir().unwrap();
+    let file = file_of(folder.path(), "claims.json", &json!({"problems": claims}));
+    let mut arguments = vec!["--judge", &file];
+    if !all() {
+        arguments.extend(["--subset", "ci"]);
+    }
+    passes(&python, &arguments);
+}
+
+#[test]
+fn wrong_models_fail_the_judge() {
+    let Some(python) = python() else { return };
+    passes(&python, &["--mutants"]);
+}
+
+#[test]
+fn the_reference_is_what_its_script_finds() {
+    let Some(python) = python() else { return };
+    let which: &[&str] = if all() {
+        &["--all"]
+    } else {
+        &["--subset", "ci"]
+    };
+    passes(&python, which);
+}
