@@ -7,7 +7,8 @@
 
 use std::collections::BTreeSet;
 
-use super::points::{Course, Points, Probe, first_missed, misses};
+use super::blocks::{Blocks, misses};
+use super::points::{Course, Points, Probe, first_missed};
 use super::program::{End, Piece, Program, Stand};
 use super::scaled::{Form, Scaled};
 use crate::lambda::reduce::times_power;
@@ -78,80 +79,135 @@ impl Pool {
     }
 }
 
-/// Follows the program of all points.
-pub(super) fn follow(scaled: &Scaled, form: Form) -> Followed {
-    let problem = scaled.problem;
-    let all = Points {
-        coils: problem.coils(),
-        forces_n_per_a: problem.forces_n_per_a,
-        height_m: problem.height_m,
-        offset_n: problem.offset_n,
-    };
-    let count = problem.points();
-    let mut pool = (count > 2 * POOL).then(|| {
-        let mut index: BTreeSet<usize> = (0..POOL).map(|k| k * count / POOL).collect();
-        index.insert(scaled.highest);
-        Pool::new(all, index.into_iter().collect())
-    });
-    let mut working: Vec<(usize, bool)> = vec![(scaled.highest, true)];
-    if form == Form::Worst {
-        working.push((scaled.highest, false));
-    }
-    for _ in 0..ROUNDS {
-        let near = pool.as_ref().map_or(all, |pool| pool.points(all.coils));
-        let index = pool.as_ref().map(|pool| pool.index.as_slice());
-        let mut followed = solve(scaled, form, &mut working, near, index);
-        if followed.end != End::Whole {
-            return followed;
-        }
-        let probes = probes(scaled, form, &mut followed);
-        let Some(pool) = &mut pool else {
-            return followed;
+/// The points of one problem, and what has been learnt of them.
+pub(super) struct Search<'a> {
+    form: Form,
+    all: Points<'a>,
+    /// Points looked at on the way; `None` where all of them are.
+    pool: Option<Pool>,
+    /// Bounds of all points, once they are looked at.
+    blocks: Option<Blocks>,
+    /// Rows to begin with.
+    working: Vec<(usize, bool)>,
+}
+
+impl<'a> Search<'a> {
+    /// Nothing is learnt yet of the points of `scaled`.
+    pub fn new(scaled: &Scaled<'a>, form: Form) -> Self {
+        let problem = scaled.problem;
+        let all = Points {
+            coils: problem.coils(),
+            forces_n_per_a: problem.forces_n_per_a,
+            height_m: problem.height_m,
+            offset_n: problem.offset_n,
         };
-        let fresh: BTreeSet<usize> = misses(all, &probes, form)
-            .iter()
-            .map(|miss| miss.point)
-            .filter(|point| !pool.known.contains(point))
-            .collect();
-        if fresh.is_empty() {
-            return followed;
+        let count = problem.points();
+        let pool = (count > 2 * POOL).then(|| {
+            let mut index: BTreeSet<usize> = (0..POOL).map(|k| k * count / POOL).collect();
+            index.insert(scaled.highest);
+            Pool::new(all, index.into_iter().collect())
+        });
+        let mut working = vec![(scaled.highest, true)];
+        if form == Form::Worst {
+            working.push((scaled.highest, false));
         }
-        for point in fresh {
-            pool.add(all, point);
+        Self {
+            form,
+            all,
+            pool,
+            blocks: None,
+            working,
         }
-        // The rows that the path rests on are those to begin with.
-        let used: BTreeSet<usize> = followed
-            .pieces
+    }
+
+    /// Follows the program of all points under the limits of `scaled`.
+    pub fn follow(&mut self, scaled: &Scaled) -> Followed {
+        let form = self.form;
+        let mut working = self.working.clone();
+        for _ in 0..ROUNDS {
+            let near = match &self.pool {
+                Some(pool) => pool.points(self.all.coils),
+                None => self.all,
+            };
+            let index = self.pool.as_ref().map(|pool| pool.index.as_slice());
+            let mut followed = solve(scaled, form, &working, near, index);
+            if followed.end != End::Whole {
+                return followed;
+            }
+            let (path, beyond) = probes(scaled, form, &mut followed);
+            let fresh = self.missed(scaled, &[path, beyond]);
+            if fresh.is_empty() {
+                self.remember(&followed);
+                return followed;
+            }
+            if let Some(pool) = &mut self.pool {
+                for point in fresh {
+                    pool.add(self.all, point);
+                }
+            }
+            // The rows that the path rests on are those to begin with.
+            for row in rows_of(&followed, &followed.pieces) {
+                if !working.contains(&row) {
+                    working.push(row);
+                }
+            }
+        }
+        Followed {
+            pieces: Vec::new(),
+            rows: Vec::new(),
+            end: End::Stalled,
+            doubt: 0.0,
+        }
+    }
+
+    /// Points that the probes miss and the pool lacks.
+    fn missed(&mut self, scaled: &Scaled, probes: &[Vec<Probe>]) -> BTreeSet<usize> {
+        let Some(pool) = &self.pool else {
+            return BTreeSet::new();
+        };
+        let (all, form) = (self.all, self.form);
+        let blocks = self
+            .blocks
+            .get_or_insert_with(|| Blocks::new(all, scaled.largest));
+        let missed = probes
             .iter()
-            .flat_map(|piece| piece.active.iter().map(|&(row, _)| row))
-            .collect();
-        let keep = used.into_iter().filter_map(|row| followed.rows[row]);
-        for row in keep {
-            if !working.contains(&row) {
-                working.push(row);
+            .flat_map(|probes| misses(all, blocks, probes, form));
+        missed.filter(|point| !pool.known.contains(point)).collect()
+    }
+
+    /// Another path over the same points begins with the rows at the start of this one.
+    fn remember(&mut self, followed: &Followed) {
+        for row in rows_of(followed, &followed.pieces[..followed.pieces.len().min(1)]) {
+            if !self.working.contains(&row) {
+                self.working.push(row);
             }
         }
     }
-    Followed {
-        pieces: Vec::new(),
-        rows: Vec::new(),
-        end: End::Stalled,
-        doubt: 0.0,
-    }
+}
+
+/// Points and signs of the rows that pieces rest on.
+fn rows_of(followed: &Followed, pieces: &[Piece]) -> Vec<(usize, bool)> {
+    let used: BTreeSet<usize> = pieces
+        .iter()
+        .flat_map(|piece| piece.active.iter().map(|&(row, _)| row))
+        .collect();
+    used.into_iter()
+        .filter_map(|row| followed.rows[row])
+        .collect()
 }
 
 /// Follows the program of the `working` rows, and of those of the points `near` that it meets.
 fn solve(
     scaled: &Scaled,
     form: Form,
-    working: &mut [(usize, bool)],
+    working: &[(usize, bool)],
     near: Points,
     index: Option<&[usize]>,
 ) -> Followed {
     let mut program: Program = scaled.bounds();
     let first_row = program.rows();
     let mut rows = vec![None; first_row];
-    for &mut (j, up) in working.iter_mut() {
+    for &(j, up) in working {
         scaled.add_point(&mut program, form, j, up);
         rows.push(Some((j, up)));
     }
@@ -224,7 +280,7 @@ fn course(scaled: &Scaled, form: Form, stand: &Stand) -> Course {
 }
 
 /// What the points are asked at every turn, and in the direction of the last piece.
-fn probes(scaled: &Scaled, form: Form, followed: &mut Followed) -> Vec<Probe> {
+fn probes(scaled: &Scaled, form: Form, followed: &mut Followed) -> (Vec<Probe>, Vec<Probe>) {
     let (lambda_unit, force_unit) = (scaled.lambda_unit(), scaled.force_unit());
     let mut doubt = 0.0_f64;
     let mut probe = |lambda: f64, offset_share: f64, bound: f64, currents_a: Vec<f64>| {
@@ -242,7 +298,7 @@ fn probes(scaled: &Scaled, form: Form, followed: &mut Followed) -> Vec<Probe> {
             limit_n: times_power(bound + NOTHING, force_unit) + rounding,
         }
     };
-    let mut all: Vec<Probe> = Vec::new();
+    let (mut all, mut beyond) = (Vec::new(), Vec::new());
     for piece in &followed.pieces {
         let last = piece.z[piece.z.len() - 1].to_f64();
         let (lambda, bound) = match form {
@@ -253,8 +309,8 @@ fn probes(scaled: &Scaled, form: Form, followed: &mut Followed) -> Vec<Probe> {
     }
     if let (Form::Worst, Some(last)) = (form, followed.pieces.last()) {
         let bound = last.rate[last.rate.len() - 1].to_f64();
-        all.push(probe(1.0, 0.0, bound, scaled.amperes(&last.rate)));
+        beyond.push(probe(1.0, 0.0, bound, scaled.amperes(&last.rate)));
     }
     followed.doubt = doubt;
-    all
+    (all, beyond)
 }

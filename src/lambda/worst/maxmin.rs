@@ -1,6 +1,6 @@
 //! The largest force constant with no point too weak.
 
-use super::generate::follow;
+use super::generate::Search;
 use super::program::End;
 use super::scaled::{Form, Limits, Scaled};
 use crate::lambda::problem::{ForceProblem, ProblemError, Settings};
@@ -32,7 +32,7 @@ pub(in crate::lambda) fn largest(problem: &ForceProblem, entries: &[f64]) -> Opt
     if problem.height_m[scaled.highest] <= 0.0 {
         return None;
     }
-    let followed = follow(&scaled, Form::Least);
+    let followed = Search::new(&scaled, Form::Least).follow(&scaled);
     if followed.end != End::Whole {
         return None;
     }

@@ -17,6 +17,7 @@
 //! Where several currents are equally good, a vertex is told: of coils that cannot pull, the one
 //! with the least sum of currents.
 
+mod blocks;
 mod criteria;
 mod generate;
 mod maxmin;
@@ -37,7 +38,7 @@ use crate::numerics::real::Real;
 use super::problem::{ForceProblem, ProblemError, Settings};
 use super::reduce::{largest_entries, times_power};
 use criteria::Comparison;
-use generate::{Followed, follow};
+use generate::{Followed, Search};
 use program::End;
 use scaled::{Form, Limits, Scaled};
 
@@ -90,9 +91,10 @@ pub fn worst_point(
     problem.validate(settings)?;
     let largest = largest_entries(problem);
     let scaled = Scaled::new(problem, &largest, Form::Worst, Limits::All);
-    let limited = follow(&scaled, Form::Worst);
+    let mut search = Search::new(&scaled, Form::Worst);
+    let limited = search.follow(&scaled);
     let free = Scaled::new(problem, &largest, Form::Worst, Limits::Lower);
-    let unlimited = follow(&free, Form::Worst);
+    let unlimited = search.follow(&free);
     let whole = |followed: &Followed| followed.end == End::Whole && !followed.pieces.is_empty();
     let complete = whole(&limited) && whole(&unlimited);
     let doubt = limited.doubt.max(unlimited.doubt);

@@ -41,6 +41,8 @@ pub(super) struct Program {
     width: usize,
     kinds: Vec<Kind>,
     dense: Vec<Num>,
+    /// The same in doubles.
+    rough: Vec<f64>,
     constant: Vec<Num>,
     slope: Vec<Num>,
     /// Weights of the second objective; zero for the last variable.
@@ -80,6 +82,7 @@ impl Program {
             width: second.len(),
             kinds: Vec::new(),
             dense: Vec::new(),
+            rough: Vec::new(),
             constant: Vec::new(),
             slope: Vec::new(),
             second,
@@ -113,6 +116,7 @@ impl Program {
     pub fn dense(&mut self, row: &[Num], constant: Num, slope: Num) -> usize {
         let number = self.dense.len() / self.width;
         self.dense.extend_from_slice(row);
+        self.rough.extend(row.iter().map(|v| v.to_f64()));
         self.push(Kind::Dense(number), constant, slope)
     }
 
@@ -210,22 +214,49 @@ impl Program {
     ) -> (Option<usize>, Option<(usize, Num)>) {
         let size = self.size[0] + lambda.to_f64() * self.size[1];
         let met = MET * size + MET_AT_ZERO;
-        let mut worst: Option<(usize, f64)> = None;
-        let mut next: Option<(usize, Num, Num)> = None;
+        let sum = |z: &[Num]| z.iter().map(|v| v.to_f64().abs()).sum::<f64>();
+        let rough = |z: &[Num]| z.iter().map(|v| v.to_f64()).collect::<Vec<f64>>();
+        // Doubles tell which rows may matter; entries of rows are at most about 2.
+        let rounding = 4.0 * f64::EPSILON * (self.width + 4) as f64;
+        let slack_error = rounding * (sum(&vertex.z) + size);
+        let rate_error = rounding * (sum(&vertex.rate) + self.size[1]);
+        let (z, speed, at) = (rough(&vertex.z), rough(&vertex.rate), lambda.to_f64());
+        let slack = |r: usize| self.times(r, &vertex.z) - self.constant[r] - lambda * self.slope[r];
+        let (mut worst, mut within) = (None::<(usize, f64)>, f64::INFINITY);
+        // Rows that may be first, and the soonest that they can be.
+        let mut candidates: Vec<(usize, f64)> = Vec::new();
         for r in (0..self.rows()).filter(|&r| !vertex.active[r]) {
-            let slack = self.times(r, &vertex.z) - self.constant[r] - lambda * self.slope[r];
-            let below = slack.to_f64();
-            if below < -met && worst.is_none_or(|(_, least)| below < least && !cautious) {
-                worst = Some((r, below));
+            let (value, rate) = self.roughly(r, &z, &speed, at);
+            if value - slack_error < -met {
+                let below = slack(r).to_f64();
+                if below < -met && worst.is_none_or(|(_, least)| below < least && !cautious) {
+                    worst = Some((r, below));
+                }
             }
-            if worst.is_some() {
+            if worst.is_some() || rate - rate_error >= -STILL {
                 continue;
             }
+            let soonest = (value - slack_error).max(0.0) / (rate_error - rate);
+            if soonest <= within {
+                candidates.push((r, soonest));
+            }
+            if rate + rate_error < -STILL {
+                within = within.min((value + slack_error).max(0.0) / -(rate + rate_error));
+            }
+        }
+        if worst.is_some() {
+            return (worst.map(|(r, _)| r), None);
+        }
+        let mut next: Option<(usize, Num, Num)> = None;
+        for (r, _) in candidates
+            .into_iter()
+            .filter(|&(_, soonest)| soonest <= within)
+        {
             let rate = self.times(r, &vertex.rate) - self.slope[r];
             if rate.to_f64() >= -STILL {
                 continue;
             }
-            let step = slack.larger(Num::ZERO) / -rate;
+            let step = slack(r).larger(Num::ZERO) / -rate;
             let sooner = next.is_none_or(|(_, least, steepest)| {
                 step < least || (step == least && rate < steepest && !cautious)
             });
@@ -233,7 +264,24 @@ impl Program {
                 next = Some((r, step, rate));
             }
         }
-        (worst.map(|(r, _)| r), next.map(|(r, step, _)| (r, step)))
+        (None, next.map(|(r, step, _)| (r, step)))
+    }
+
+    /// Slack of row `r` and its rate in doubles.
+    fn roughly(&self, r: usize, z: &[f64], rate: &[f64], lambda: f64) -> (f64, f64) {
+        let (value, speed) = match self.kinds[r] {
+            Kind::Rising(i) => (z[i], rate[i]),
+            Kind::Falling(i) => (-z[i], -rate[i]),
+            Kind::Dense(number) => {
+                let row = &self.rough[number * self.width..(number + 1) * self.width];
+                (f64::dot(row, z), f64::dot(row, rate))
+            }
+        };
+        let slope = self.slope[r].to_f64();
+        (
+            value - self.constant[r].to_f64() - lambda * slope,
+            speed - slope,
+        )
     }
 }
 
