@@ -28,15 +28,19 @@ pub struct LambdaFile {
     pub lambda_jnd_n_per_m: Option<f64>,
     /// The last breakpoint, N/m.
     pub lambda_saturation_n_per_m: Option<f64>,
+    /// The largest at which no point is too weak, N/m.
+    #[serde(default)]
+    pub lambda_maxmin_n_per_m: Option<f64>,
     /// Below it the weakest point is not felt, N/m; null for a surface that touches z = 0.
     pub lambda_floor_n_per_m: Option<f64>,
     /// The one chosen, N/m.
     pub lambda_n_per_m: Option<f64>,
-    /// How it was chosen: `jnd`, `linear` or `saturation`.
+    /// How it was chosen: `jnd`, `linear`, `saturation` or `maxmin`.
     pub criterion: String,
     /// The relative error that `jnd` allows to be added.
     pub jnd: f64,
-    /// Static currents at the chosen lambda, A, one a coil of the array.
+    /// Static currents at the chosen lambda, A, one a coil of the array: those of the least mean
+    /// square error; with `maxmin` currents that leave no point too weak.
     pub currents_a: Option<Vec<f64>>,
     /// Root mean square of the force error at the chosen lambda, N.
     pub rms_error_n: Option<f64>,
@@ -52,15 +56,42 @@ pub struct LambdaFile {
     pub points: usize,
     /// Breakpoints, lambda ascending; between them the currents are linear in lambda.
     pub path: Vec<PathStep>,
+    /// The same by the largest error at any point; absent in files of programs without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub worst_point: Option<WorstPointFile>,
     /// Currents and errors at the lambda asked for with `--at`; absent when none was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at: Option<AtLambda>,
+    /// Where the points are not the grid's: what that changes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sampling: Option<SampledPoints>,
     /// What the steel really does at the chosen currents; with a B-H curve only, along which
     /// forces of several currents do not add up.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub working_point: Option<WorkingPointForces>,
     /// Each stage's estimated error.
     pub accuracy: BTreeMap<String, StageAccuracy>,
+}
+
+/// Points on no grid, weighted by the area each stands for, against those of the grid.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SampledPoints {
+    /// `adaptive` or `poisson`.
+    pub sampling: String,
+    /// Sum of the weights: the plan area of the surface, m^2.
+    pub area_m2: f64,
+    /// Points of the grid.
+    pub grid_points: usize,
+    /// What the grid's points give, N/m.
+    pub grid_lambda_linear_n_per_m: Option<f64>,
+    /// What the grid's points give, N/m.
+    pub grid_lambda_jnd_n_per_m: Option<f64>,
+    /// What the grid's points give, N/m.
+    pub grid_lambda_saturation_n_per_m: Option<f64>,
+    /// The chosen one by the grid's points, N/m.
+    pub grid_lambda_n_per_m: Option<f64>,
+    /// The chosen lambda over that of the grid, less 1.
+    pub relative_change: Option<f64>,
 }
 
 /// Forces along the B-H curve at the chosen currents.
@@ -101,4 +132,66 @@ pub struct AtLambda {
     pub rms_error_n: f64,
     /// N.
     pub worst_error_n: f64,
+    /// The least largest error at this lambda.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub worst_point: Option<WorstPointAt>,
+}
+
+/// The path of t*(lambda), the least largest error at any point, and the constants read off it.
+/// `null` where a limit never binds or nothing can be rendered.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct WorstPointFile {
+    /// Where the first limit binds, N/m.
+    pub lambda_linear_n_per_m: Option<f64>,
+    /// The largest lambda at which limits add less than a just-noticeable difference of the
+    /// largest wanted force to t*, N/m.
+    pub lambda_jnd_n_per_m: Option<f64>,
+    /// t* over lambda times the largest height, as long as no limit binds.
+    pub relative_floor: Option<f64>,
+    /// t* at the chosen lambda, N.
+    pub worst_error_n: Option<f64>,
+    /// The same over lambda times the largest height.
+    pub relative_worst_error: Option<f64>,
+    /// Currents at the chosen lambda, A, one a coil of the array.
+    pub currents_a: Option<Vec<f64>>,
+    /// Bound on the error of `worst_error_n`, N.
+    pub gap_n: Option<f64>,
+    /// The points that decide at the chosen lambda, and their shares of the proof.
+    pub active: Option<Vec<ActivePointShare>>,
+    /// Where t* turns, lambda ascending; between them t* and the currents are linear in lambda.
+    pub path: Vec<WorstPointStep>,
+}
+
+/// A point that decides.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ActivePointShare {
+    /// Its row in `points.csv`, from 0.
+    pub point: usize,
+    /// Positive where the force is too weak, negative where it is too strong; absolute values
+    /// sum to 1.
+    pub multiplier: f64,
+}
+
+/// A turn of t*.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct WorstPointStep {
+    /// N/m.
+    pub lambda_n_per_m: f64,
+    /// t*, N.
+    pub worst_error_n: f64,
+    /// A, one a coil of the array.
+    pub currents_a: Vec<f64>,
+    /// The points that decide from here on, rows of `points.csv` from 0.
+    pub active_points: Vec<usize>,
+    /// What happens here, such as "coil 4 meets its upper limit".
+    pub event: String,
+}
+
+/// The least largest error at a given lambda.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct WorstPointAt {
+    /// N.
+    pub worst_error_n: f64,
+    /// A, one a coil of the array.
+    pub currents_a: Vec<f64>,
 }

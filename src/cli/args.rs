@@ -6,6 +6,7 @@ use super::commands::{
     calibrate, completions, discretize, evaluate, lambda, man, map, optimize, probe, sweep, verify,
 };
 use super::{help, values};
+use crate::job::discretize::scattered::Sampling;
 
 /// Design the coils of a magnetic haptic display, map their field gradients and solve the force
 /// constant of an object.
@@ -136,6 +137,51 @@ pub struct SurfaceFlags {
     /// Extent of the points along y in millimetres [default: the surface's own]
     #[arg(long, value_name = "FROM,TO", value_parser = values::ends, allow_hyphen_values = true)]
     pub y: Option<values::Ends>,
+}
+
+/// Points on no grid.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct SamplingFlags {
+    /// Choose points until bilinear patches between them lie this near to the surface (0.1mm)
+    #[arg(long, value_name = "LENGTH", value_parser = values::length_with_unit)]
+    max_deviation: Option<f64>,
+    /// No patch wider than this [default: for `discretize` no limit, for `lambda` a sixteenth of the
+    /// lowest height, over which forces change little]
+    #[arg(
+        long,
+        value_name = "LENGTH",
+        value_parser = values::length_with_unit,
+        requires = "max_deviation"
+    )]
+    max_width: Option<f64>,
+    /// Choose points at random, none nearer to another than this (2mm)
+    #[arg(
+        long,
+        value_name = "SPACING",
+        value_parser = values::length_with_unit,
+        conflicts_with = "max_deviation"
+    )]
+    poisson: Option<f64>,
+    /// Which random points
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "poisson")]
+    seed: u64,
+}
+
+impl SamplingFlags {
+    /// What is asked for, if it is not the grid's points.
+    #[must_use]
+    pub fn sampling(self) -> Option<Sampling> {
+        let graded = self
+            .max_deviation
+            .map(|max_deviation_m| Sampling::Adaptive {
+                max_deviation_m,
+                widest_m: self.max_width,
+            });
+        let seed = self.seed;
+        graded.or(self
+            .poisson
+            .map(|spacing_m| Sampling::Poisson { spacing_m, seed }))
+    }
 }
 
 impl SurfaceFlags {

@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use self::points::WantedPoints;
 use self::points_effect::Moved;
+use super::discretize::scattered::{self, Sampling, ScatteredSummary};
 use super::discretize::{self, PointsReport};
 use super::scene::{MAGNET_SHARE, Scene};
 use super::single::above_knee;
@@ -11,14 +13,22 @@ use super::working_point::{WorkingPoint, relative_difference, superposition_ends
 use super::{JobError, KERNEL_ERROR, passive, steel};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
-use crate::bundle::lambda_file::{AtLambda, LambdaFile, PathStep, WorkingPointForces};
+use crate::bundle::lambda_file::{
+    ActivePointShare, AtLambda, LambdaFile, PathStep, SampledPoints, WorkingPointForces,
+    WorstPointAt, WorstPointFile, WorstPointStep,
+};
 use crate::design::{Design, MagnetModel};
 use crate::field::steel::inside::peak_depth_m;
+use crate::lambda::worst::{WorstSolution, worst_point};
 use crate::lambda::{self, Criterion, ForceProblem, Precision, Settings, Solution, Status};
 use crate::progress::Progress;
 use crate::shape::document::ShapeDocument;
 
+mod points;
 mod points_effect;
+
+/// Forces change over about the height above the coils: so many patches resolve them.
+const PATCHES_A_HEIGHT: f64 = 16.0;
 
 /// What is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -27,6 +37,8 @@ pub struct LambdaOptions {
     pub settings: Settings,
     /// Tolerance of the forces; `None` for the default.
     pub tolerance: Option<f64>,
+    /// Points on no grid, weighted by area, instead of the grid's; of [`run`] alone.
+    pub sampling: Option<Sampling>,
 }
 
 impl LambdaReport {
@@ -40,7 +52,7 @@ impl LambdaReport {
 /// The force constant and everything told with it.
 #[derive(Debug, Clone)]
 pub struct LambdaReport {
-    /// The points.
+    /// The points of the grid, whether they were used or others.
     pub points: PointsReport,
     /// The JSON result.
     pub file: LambdaFile,
@@ -66,15 +78,97 @@ pub fn run(
     progress: &dyn Progress,
 ) -> Result<LambdaReport, JobError> {
     let scene = Scene::new(design)?;
-    let points = discretize::run(document, inputs, progress)?;
-    let lowest_m = lowest_m(&points);
+    let points = discretize::run(document, inputs.clone(), progress)?;
+    let of_grid = WantedPoints::of_grid(&points);
+    let sampling = options
+        .sampling
+        .map(|how| resolving(how, of_grid.lowest_m()));
+    let sample = |how| scattered::run(document, inputs.clone(), how, progress);
+    let sampled = sampling.map(sample).transpose()?;
+    let chosen = sampled.as_ref().map(WantedPoints::of_scattered);
+    let coarser = sampling.and_then(coarser).map(sample).transpose()?;
+    let coarser = coarser.as_ref().map(WantedPoints::of_scattered);
+    let of_all = [Some(&of_grid), chosen.as_ref(), coarser.as_ref()];
+    let lowest = of_all.into_iter().flatten().map(WantedPoints::lowest_m);
+    let lowest_m = lowest.fold(f64::INFINITY, f64::min);
     progress.begin("steel", 1);
     let solved = steel::solve(&scene, options.tolerance, KERNEL_ERROR, lowest_m)?;
     progress.end();
-    solve(&scene, &solved, points, options, progress)
+    let Some(chosen) = chosen else {
+        return solve(&scene, &solved, points, options, progress);
+    };
+    let grid = solve_at(&scene, &solved, &of_grid, options, progress)?.file;
+    let found = solve_at(&scene, &solved, &chosen, options, progress)?;
+    let mut report = found.with(points);
+    if let Some(coarser) = coarser {
+        let other = solve_at(&scene, &solved, &coarser, options, progress)?.file;
+        let stage = quadrature(&report.file, &other);
+        let stage = stage.map(|stage| ("quadrature".to_owned(), stage));
+        report.file.accuracy.extend(stage);
+    }
+    report.file.sampling =
+        sampled.map(|sampled| against_grid(&sampled.summary, &report.file, &grid));
+    Ok(report)
 }
 
-/// The force constant for points that are known.
+/// Patches of the points over which forces change little, where no width is asked for.
+fn resolving(how: Sampling, lowest_m: f64) -> Sampling {
+    match how {
+        Sampling::Adaptive {
+            max_deviation_m,
+            widest_m: None,
+        } if lowest_m > 0.0 => Sampling::Adaptive {
+            max_deviation_m,
+            widest_m: Some(lowest_m / PATCHES_A_HEIGHT),
+        },
+        asked => asked,
+    }
+}
+
+/// Patches twice as wide, on curved surfaces too; `None` for random points.
+fn coarser(how: Sampling) -> Option<Sampling> {
+    match how {
+        Sampling::Adaptive {
+            max_deviation_m,
+            widest_m: Some(widest_m),
+        } => Some(Sampling::Adaptive {
+            max_deviation_m: 4.0 * max_deviation_m,
+            widest_m: Some(2.0 * widest_m),
+        }),
+        _ => None,
+    }
+}
+
+/// How far lambda is off because forces between the points are not looked at.
+fn quadrature(file: &LambdaFile, coarser: &LambdaFile) -> Option<StageAccuracy> {
+    let (fine, coarse) = file.lambda_n_per_m.zip(coarser.lambda_n_per_m)?;
+    (fine > 0.0).then(|| StageAccuracy {
+        estimate: 1.5 * (coarse / fine - 1.0).abs(),
+        relative_to: "lambda".to_owned(),
+        method: "an estimate: one and a half times the change from patches twice as wide"
+            .to_owned(),
+    })
+}
+
+/// What other points than the grid's change.
+fn against_grid(sampled: &ScatteredSummary, file: &LambdaFile, grid: &LambdaFile) -> SampledPoints {
+    let change = file
+        .lambda_n_per_m
+        .zip(grid.lambda_n_per_m.filter(|lambda| *lambda != 0.0))
+        .map(|(here, there)| here / there - 1.0);
+    SampledPoints {
+        sampling: sampled.sampling.to_owned(),
+        area_m2: sampled.area_m2,
+        grid_points: grid.points,
+        grid_lambda_linear_n_per_m: grid.lambda_linear_n_per_m,
+        grid_lambda_jnd_n_per_m: grid.lambda_jnd_n_per_m,
+        grid_lambda_saturation_n_per_m: grid.lambda_saturation_n_per_m,
+        grid_lambda_n_per_m: grid.lambda_n_per_m,
+        relative_change: change,
+    }
+}
+
+/// The force constant for the points of a grid.
 pub(super) fn solve(
     scene: &Scene,
     solved: &Solved,
@@ -82,28 +176,77 @@ pub(super) fn solve(
     options: &LambdaOptions,
     progress: &dyn Progress,
 ) -> Result<LambdaReport, JobError> {
-    let positions = positions_m(&points);
-    let forces = scene.forces_n_per_a(solved, &positions, progress)?;
+    let found = solve_at(
+        scene,
+        solved,
+        &WantedPoints::of_grid(&points),
+        options,
+        progress,
+    )?;
+    Ok(found.with(points))
+}
+
+/// A report, but for the grid.
+struct Found {
+    file: LambdaFile,
+    status: Status,
+    precision: Precision,
+    warnings: Vec<String>,
+    accuracy_reached: bool,
+}
+
+impl Found {
+    fn with(self, points: PointsReport) -> LambdaReport {
+        LambdaReport {
+            points,
+            file: self.file,
+            status: self.status,
+            precision: self.precision,
+            warnings: self.warnings,
+            accuracy_reached: self.accuracy_reached,
+        }
+    }
+}
+
+/// The force constant for points that are known.
+fn solve_at(
+    scene: &Scene,
+    solved: &Solved,
+    points: &WantedPoints,
+    options: &LambdaOptions,
+    progress: &dyn Progress,
+) -> Result<Found, JobError> {
+    let positions = &points.positions_m;
+    let forces = scene.forces_n_per_a(solved, positions, progress)?;
     let pull = if scene.design.magnet.passive_force {
-        passive::pull(scene, &positions, false)?
+        passive::pull(scene, positions, false)?
     } else {
         None
     };
-    let offset_n = pull.as_ref().map(|pull| pull.forces_z_n(&positions));
+    let offset_n = pull.as_ref().map(|pull| pull.forces_z_n(positions));
     progress.begin("lambda", 1);
     let resistance_ohm = scene.resistances_ohm();
     let problem = ForceProblem {
         forces_n_per_a: &forces,
-        height_m: &points.discretized.points.height_m,
+        height_m: &points.height_m,
         offset_n: offset_n.as_deref(),
+        weights: points.weights.as_deref(),
         lower_a: &scene.lower_a,
         upper_a: &scene.upper_a,
         total_max_a: scene.design.supply.total_current_max_a,
         resistance_ohm: &resistance_ohm,
     };
     let solution = lambda::solve(&problem, &options.settings)?;
+    let worst = worst_point(&problem, &options.settings)?;
     progress.end();
-    let mut warnings = warnings(&points, &solution, options);
+    let mut warnings = warnings(points, &solution, options);
+    if !worst.complete {
+        warnings.push(
+            "the worst-point path could not be followed to its end: its numbers are not the \
+             minimum; please report this design and shape"
+                .to_owned(),
+        );
+    }
     if let Some(core) = &scene.core {
         warnings.extend(core.warnings.iter().cloned());
     }
@@ -119,13 +262,14 @@ pub(super) fn solve(
             "a core of the array at the chosen currents",
         ));
     }
-    let mut file = file(scene, solved, &points, &solution, options);
+    let mut file = file(scene, solved, points, &solution, options);
+    add_worst_point(&mut file, &problem, &solution, &worst);
     if let Some(chosen) = &solution.chosen {
         let asked = Asked {
             currents_a: &chosen.currents_a,
             lambda_n_per_m: chosen.lambda_n_per_m,
-            heights_m: &points.discretized.points.height_m,
-            positions_m: &positions,
+            heights_m: &points.height_m,
+            positions_m: positions,
             forces_n_per_a: &forces,
             offset_n: offset_n.as_deref(),
         };
@@ -142,12 +286,12 @@ pub(super) fn solve(
             file.working_point = Some(facts);
         }
     }
-    file.accuracy.extend(points_effect::stages(&points));
+    file.accuracy.extend(points.stages());
     if let Some(moved) = points_effect::of_points(
         &Moved {
             scene,
             solved,
-            points: &points,
+            points,
             offset_n: offset_n.as_deref(),
             solution: &solution,
         },
@@ -160,13 +304,12 @@ pub(super) fn solve(
         file.accuracy
             .insert("passive_force".to_owned(), passive::accuracy(pull));
     }
-    Ok(LambdaReport {
+    Ok(Found {
         file,
         status: solution.status,
         precision: solution.precision,
         warnings,
         accuracy_reached: solved.tolerance >= KERNEL_ERROR && solved.reached(),
-        points,
     })
 }
 
@@ -223,20 +366,6 @@ fn at_working_point(
     Ok(Some((facts, point.accuracy())))
 }
 
-/// The lowest of the points, m.
-pub(super) fn lowest_m(points: &PointsReport) -> f64 {
-    let heights = &points.discretized.points.height_m;
-    heights.iter().copied().fold(f64::INFINITY, f64::min)
-}
-
-/// Where the magnet's centre is wanted: the constraint points, m.
-pub(super) fn positions_m(points: &PointsReport) -> Vec<[f64; 3]> {
-    let points = &points.discretized.points;
-    (0..points.len())
-        .map(|i| [points.x_m[i], points.y_m[i], points.height_m[i]])
-        .collect()
-}
-
 /// How artefacts and the command line call a criterion.
 #[must_use]
 pub fn criterion_name(criterion: Criterion) -> &'static str {
@@ -244,11 +373,12 @@ pub fn criterion_name(criterion: Criterion) -> &'static str {
         Criterion::Jnd => "jnd",
         Criterion::Linear => "linear",
         Criterion::Saturation => "saturation",
+        Criterion::Maxmin => "maxmin",
     }
 }
 
-fn warnings(points: &PointsReport, solution: &Solution, options: &LambdaOptions) -> Vec<String> {
-    let mut warnings = points.summary.warnings.clone();
+fn warnings(points: &WantedPoints, solution: &Solution, options: &LambdaOptions) -> Vec<String> {
+    let mut warnings = points.warnings.clone();
     match solution.status {
         Status::Solved => {}
         Status::NothingWanted => warnings.push(
@@ -299,14 +429,14 @@ fn warnings(points: &PointsReport, solution: &Solution, options: &LambdaOptions)
 fn file(
     scene: &Scene,
     solved: &Solved,
-    points: &PointsReport,
+    points: &WantedPoints,
     solution: &Solution,
     options: &LambdaOptions,
 ) -> LambdaFile {
     let chosen = solution.chosen.as_ref();
     let forces = forces_accuracy(scene, solved);
     let accuracy = BTreeMap::from([
-        ("points".to_owned(), points.discretized.accuracy.clone()),
+        ("points".to_owned(), points.accuracy["points"].clone()),
         ("forces".to_owned(), forces),
         ("lambda".to_owned(), solution.accuracy.clone()),
     ]);
@@ -314,11 +444,12 @@ fn file(
         schema_version: SCHEMA_VERSION.to_owned(),
         fluxform_version: FLUXFORM_VERSION.to_owned(),
         design: scene.design.name.clone(),
-        shape: points.summary.shape.clone(),
-        inputs: points.summary.inputs.clone(),
+        shape: points.shape.clone(),
+        inputs: points.inputs.clone(),
         lambda_linear_n_per_m: solution.lambda_linear_n_per_m,
         lambda_jnd_n_per_m: solution.lambda_jnd_n_per_m,
         lambda_saturation_n_per_m: solution.lambda_saturation_n_per_m,
+        lambda_maxmin_n_per_m: solution.lambda_maxmin_n_per_m,
         lambda_floor_n_per_m: solution.lambda_floor_n_per_m,
         lambda_n_per_m: chosen.map(|point| point.lambda_n_per_m),
         criterion: criterion_name(options.settings.criterion).to_owned(),
@@ -329,7 +460,7 @@ fn file(
         relative_rms_error: chosen.and_then(|point| point.relative_rms_error),
         duality_gap_n2: chosen.map(|point| point.duality_gap_n2),
         rank: solution.rank,
-        points: points.summary.points,
+        points: points.height_m.len(),
         path: solution
             .path
             .breakpoints()
@@ -345,10 +476,69 @@ fn file(
             currents_a: point.currents_a.clone(),
             rms_error_n: point.rms_error_n,
             worst_error_n: point.worst_error_n,
+            worst_point: None,
         }),
+        worst_point: None,
+        sampling: None,
         working_point: None,
         accuracy,
     }
+}
+
+/// The worst-point form beside the mean square.
+fn add_worst_point(
+    file: &mut LambdaFile,
+    problem: &ForceProblem,
+    solution: &Solution,
+    worst: &WorstSolution,
+) {
+    // Currents that bring no force nearer on average bring none of use at the worst point either.
+    let rendered =
+        |lambda: Option<f64>| lambda.filter(|_| solution.status != Status::NothingRendered);
+    let chosen = solution.chosen.as_ref();
+    let point = chosen.map(|chosen| worst.at(problem, chosen.lambda_n_per_m));
+    let point = point.as_ref();
+    file.worst_point = Some(WorstPointFile {
+        lambda_linear_n_per_m: rendered(worst.lambda_linear_n_per_m),
+        lambda_jnd_n_per_m: rendered(worst.lambda_jnd_n_per_m),
+        relative_floor: worst.floor,
+        worst_error_n: point.map(|point| point.worst_error_n),
+        relative_worst_error: point.and_then(|point| point.relative_worst_error),
+        currents_a: point.map(|point| point.currents_a.clone()),
+        gap_n: point.map(|point| point.gap_n),
+        active: point.map(|point| {
+            let shares = point.active.iter().map(|active| ActivePointShare {
+                point: active.point,
+                multiplier: active.multiplier,
+            });
+            shares.collect()
+        }),
+        path: worst
+            .path
+            .turns()
+            .iter()
+            .map(|turn| WorstPointStep {
+                lambda_n_per_m: turn.lambda_n_per_m,
+                worst_error_n: turn.worst_error_n,
+                currents_a: turn.currents_a.clone(),
+                active_points: turn.active.iter().map(|active| active.point).collect(),
+                event: if turn.events.is_empty() {
+                    "other points decide".to_owned()
+                } else {
+                    events(&turn.events)
+                },
+            })
+            .collect(),
+    });
+    if let Some(at) = &mut file.at {
+        let point = worst.at(problem, at.lambda_n_per_m);
+        at.worst_point = Some(WorstPointAt {
+            worst_error_n: point.worst_error_n,
+            currents_a: point.currents_a,
+        });
+    }
+    file.accuracy
+        .insert("worst_point".to_owned(), worst.accuracy.clone());
 }
 
 /// What is known of the forces' error.

@@ -5,6 +5,8 @@
 //! directly at the point. The optimality of the currents is judged by the duality gap, which
 //! does not trust the solver.
 
+mod worst;
+
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -439,6 +441,7 @@ fn force_constant(
         forces_n_per_a: &forces,
         height_m: &heights,
         offset_n: offset_n.as_deref(),
+        weights: None,
         lower_a: &scene.lower_a,
         upper_a: &scene.upper_a,
         total_max_a: scene.design.supply.total_current_max_a,
@@ -447,6 +450,7 @@ fn force_constant(
     let criterion = match stored.criterion.as_str() {
         "linear" => Criterion::Linear,
         "saturation" => Criterion::Saturation,
+        "maxmin" => Criterion::Maxmin,
         _ => Criterion::Jnd,
     };
     let settings = Settings {
@@ -462,6 +466,7 @@ fn force_constant(
             stored.lambda_saturation_n_per_m,
             again.lambda_saturation_n_per_m,
         ),
+        (stored.lambda_maxmin_n_per_m, again.lambda_maxmin_n_per_m),
         (stored.lambda_floor_n_per_m, again.lambda_floor_n_per_m),
         (
             stored.lambda_n_per_m,
@@ -475,6 +480,10 @@ fn force_constant(
     let how = "all force constants solved for again";
     checks.push(check("lambda", worst, agrees, how.to_owned()));
 
+    if let Some(told) = &stored.worst_point {
+        let lambda = stored.lambda_n_per_m;
+        checks.extend(worst::checks(&problem, &settings, told, lambda, agrees)?);
+    }
     let (Some(lambda), Some(currents)) = (stored.lambda_n_per_m, &stored.currents_a) else {
         return Ok(checks);
     };
@@ -511,6 +520,11 @@ fn force_constant(
         agrees,
         how.to_owned(),
     ));
+    if criterion == Criterion::Maxmin {
+        // These currents are for the weakest point, not for the mean square.
+        checks.push(worst::weakest_point(&residual, wanted.sqrt(), agrees));
+        return Ok(checks);
+    }
     let gap = ratio(duality_gap(&problem, &residual, currents), wanted);
     let how = "proof of optimality: no currents within the limits are better by more";
     checks.push(check(

@@ -23,6 +23,7 @@ pub(super) struct Check {
 /// Evaluates currents at `lambda` over all points, in the precision `T`.
 pub(super) fn check<T: Real>(problem: &ForceProblem, lambda: f64, currents_a: &[f64]) -> Check {
     let coils = problem.coils();
+    let heaviest = T::of(problem.heaviest());
     let currents: Vec<T> = currents_a.iter().map(|&v| T::of(v)).collect();
     let parts: Vec<(T, f64, Vec<T>)> = problem
         .height_m
@@ -41,10 +42,15 @@ pub(super) fn check<T: Real>(problem: &ForceProblem, lambda: f64, currents_a: &[
                 for (&force, &current) in row.iter().zip(&currents) {
                     residual -= T::of(force) * current;
                 }
-                square += residual * residual;
+                // The weight counts in the sums, not in the error at the point.
+                let weight = problem
+                    .weights
+                    .map_or(T::ONE, |w| T::of(w[first + j]) / heaviest);
+                let weighted = weight * residual;
+                square += weighted * residual;
                 worst = worst.max(residual.abs().to_f64());
                 for (sum, &force) in gradient.iter_mut().zip(row) {
-                    *sum += T::of(force) * residual;
+                    *sum += T::of(force) * weighted;
                 }
             }
             (square, worst, gradient)
@@ -57,7 +63,12 @@ pub(super) fn check<T: Real>(problem: &ForceProblem, lambda: f64, currents_a: &[
         worst = worst.max(most);
         T::add_scaled(&mut gradient, T::ONE, &sums);
     }
-    let points = T::of(problem.points() as f64);
+    let points = match problem.weights {
+        None => T::of(problem.points() as f64),
+        Some(weights) => weights
+            .iter()
+            .fold(T::ZERO, |sum, &w| sum + T::of(w) / heaviest),
+    };
     let gradient: Vec<f64> = gradient.iter().map(|&g| (g / points).to_f64()).collect();
     Check {
         mean_square_n2: (square / points).to_f64(),
@@ -67,9 +78,18 @@ pub(super) fn check<T: Real>(problem: &ForceProblem, lambda: f64, currents_a: &[
 }
 
 /// `2 max over z within the limits of gradient . (z - currents)`: the error cannot fall by
-/// more, since it is convex. The maximum is a fractional knapsack: from the lower limits,
-/// the coil with the steepest gradient is raised first, until the sum is used up.
+/// more, since it is convex.
 fn gap(problem: &ForceProblem, gradient: &[f64], currents_a: &[f64]) -> f64 {
+    let best = best_within_limits(problem, gradient);
+    let gain: f64 = (0..best.len())
+        .map(|i| gradient[i] * (best[i] - currents_a[i]))
+        .sum();
+    2.0 * gain.max(0.0)
+}
+
+/// The currents within the limits that maximise `gradient . z`, a fractional knapsack: from the
+/// lower limits, the coil with the steepest gradient is raised first, until the sum is used up.
+pub(super) fn best_within_limits(problem: &ForceProblem, gradient: &[f64]) -> Vec<f64> {
     let mut best = problem.lower_a.to_vec();
     let mut left = problem
         .total_max_a
@@ -86,10 +106,7 @@ fn gap(problem: &ForceProblem, gradient: &[f64], currents_a: &[f64]) -> f64 {
         };
         left = left.map(|left| left - step);
     }
-    let gain: f64 = (0..best.len())
-        .map(|i| gradient[i] * (best[i] - currents_a[i]))
-        .sum();
-    2.0 * gain.max(0.0)
+    best
 }
 
 #[cfg(test)]
@@ -104,6 +121,7 @@ mod tests {
             forces_n_per_a: &[0.7, 0.2, 0.3, 1.1],
             height_m: &[1.3, 0.9],
             offset_n: None,
+            weights: None,
             lower_a: &[-0.4, 0.0],
             upper_a: &[1.5, 2.0],
             total_max_a: Some(1.2),

@@ -63,10 +63,18 @@ const TIE: f64 = 1e-14;
 
 /// Where a coil or the sum stands between two breakpoints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Standing {
+pub(super) enum Standing {
     Lower,
     Upper,
     Between,
+}
+
+/// The limits in SI units, and what changes at them.
+#[derive(Debug, Clone)]
+pub(super) struct Limits {
+    pub lower_a: Vec<f64>,
+    pub upper_a: Vec<f64>,
+    pub total_max_a: Option<f64>,
 }
 
 /// One piece in SI units.
@@ -99,9 +107,7 @@ struct Ambiguous {
 pub struct Path {
     pieces: Vec<SiPiece>,
     ambiguous: Option<Box<Ambiguous>>,
-    lower_a: Vec<f64>,
-    upper_a: Vec<f64>,
-    total_max_a: Option<f64>,
+    limits: Limits,
     current_scale: Vec<i32>,
     /// First pieces after each breakpoint.
     turns: Vec<usize>,
@@ -159,9 +165,11 @@ impl Path {
         let mut path = Self {
             pieces,
             ambiguous: None,
-            lower_a: problem.lower_a.to_vec(),
-            upper_a: problem.upper_a.to_vec(),
-            total_max_a: problem.total_max_a,
+            limits: Limits {
+                lower_a: problem.lower_a.to_vec(),
+                upper_a: problem.upper_a.to_vec(),
+                total_max_a: problem.total_max_a,
+            },
             current_scale,
             turns: Vec::new(),
         };
@@ -226,8 +234,10 @@ impl Path {
     #[must_use]
     pub fn currents_a(&self, lambda_n_per_m: f64) -> Vec<f64> {
         let (index, step) = self.locate(lambda_n_per_m);
-        let coils = self.upper_a.len();
-        let within = |i: usize, current: f64| current.clamp(self.lower_a[i], self.upper_a[i]) + 0.0;
+        let coils = self.limits.upper_a.len();
+        let within = |i: usize, current: f64| {
+            current.clamp(self.limits.lower_a[i], self.limits.upper_a[i]) + 0.0
+        };
         if let Some(a) = &self.ambiguous {
             let lambda = Num::of(times_power(lambda_n_per_m, -a.lambda_scale));
             let norm = lambda * a.heights;
@@ -269,7 +279,7 @@ impl Path {
     /// All force constants at which the path turns, from 0 on, with currents and events.
     #[must_use]
     pub fn breakpoints(&self) -> Vec<Breakpoint> {
-        let mut before = self.standing_at_zero();
+        let mut before = self.limits.at_zero();
         let mut all = Vec::with_capacity(self.turns.len());
         for (k, &turn) in self.turns.iter().enumerate() {
             let start = self.pieces[turn].start;
@@ -277,7 +287,7 @@ impl Path {
             let after = self.standing(turn, end);
             let mut events = Vec::new();
             for i in 0..after.len() {
-                self.changes(i, before[i], after[i], &mut events);
+                self.limits.changes(i, before[i], after[i], &mut events);
             }
             if k == 0 {
                 self.first_moves(&after, end, &mut events);
@@ -326,7 +336,31 @@ impl Path {
         fit || (self.ambiguous.is_none() && before.standing != after.standing)
     }
 
-    fn standing_at_zero(&self) -> Vec<Standing> {
+    /// Standing on the piece `turn`, which lasts until `end`.
+    fn standing(&self, turn: usize, end: Option<f64>) -> Vec<Standing> {
+        if self.ambiguous.is_none() {
+            return self.pieces[turn].standing.clone();
+        }
+        let start = self.pieces[turn].start;
+        let currents = self.currents_a(end.map_or(2.0 * start + 1.0, |end| 0.5 * (start + end)));
+        self.limits.standing(&currents)
+    }
+
+    /// Coils that may go both ways leave zero without leaving a limit.
+    fn first_moves(&self, after: &[Standing], end: Option<f64>, events: &mut Vec<Event>) {
+        let currents = self.currents_a(end.map_or(1.0, |end| 0.5 * end));
+        for (i, current) in currents.iter().enumerate() {
+            let both_ways = self.limits.lower_a[i] < 0.0 && self.limits.upper_a[i] > 0.0;
+            if both_ways && after[i] == Standing::Between && *current != 0.0 {
+                events.push(Event::LeavesZero(i));
+            }
+        }
+    }
+}
+
+impl Limits {
+    /// Standing of every coil, and of the sum if it is limited, without currents.
+    pub fn at_zero(&self) -> Vec<Standing> {
         let of_coil = |i: usize| match (self.lower_a[i] < 0.0, self.upper_a[i] > 0.0) {
             (true, true) => Standing::Between,
             (true, false) => Standing::Upper,
@@ -337,13 +371,8 @@ impl Path {
         standing
     }
 
-    /// Standing on the piece `turn`, which lasts until `end`.
-    fn standing(&self, turn: usize, end: Option<f64>) -> Vec<Standing> {
-        if self.ambiguous.is_none() {
-            return self.pieces[turn].standing.clone();
-        }
-        let start = self.pieces[turn].start;
-        let currents = self.currents_a(end.map_or(2.0 * start + 1.0, |end| 0.5 * (start + end)));
+    /// The same at given currents.
+    pub fn standing(&self, currents: &[f64]) -> Vec<Standing> {
         let near = |a: f64, b: f64, range: f64| (a - b).abs() <= 1e-13 * range;
         let mut standing: Vec<Standing> = (0..currents.len())
             .map(|i| {
@@ -368,7 +397,8 @@ impl Path {
         standing
     }
 
-    fn changes(&self, i: usize, before: Standing, after: Standing, events: &mut Vec<Event>) {
+    /// What brings entry `i` from one standing to the other.
+    pub fn changes(&self, i: usize, before: Standing, after: Standing, events: &mut Vec<Event>) {
         if before == after {
             return;
         }
@@ -396,17 +426,6 @@ impl Path {
             Standing::Lower => events.push(Event::MeetsLower(i)),
             Standing::Upper => events.push(Event::MeetsUpper(i)),
             Standing::Between => {}
-        }
-    }
-
-    /// Coils that may go both ways leave zero without leaving a limit.
-    fn first_moves(&self, after: &[Standing], end: Option<f64>, events: &mut Vec<Event>) {
-        let currents = self.currents_a(end.map_or(1.0, |end| 0.5 * end));
-        for (i, current) in currents.iter().enumerate() {
-            let both_ways = self.lower_a[i] < 0.0 && self.upper_a[i] > 0.0;
-            if both_ways && after[i] == Standing::Between && *current != 0.0 {
-                events.push(Event::LeavesZero(i));
-            }
         }
     }
 }

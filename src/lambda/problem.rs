@@ -11,6 +11,9 @@ pub struct ForceProblem<'a> {
     pub height_m: &'a [f64],
     /// Force at each point without any current, N; `None`: none.
     pub offset_n: Option<&'a [f64]>,
+    /// Weight of each point in the mean square error, such as the area it stands for (> 0, any
+    /// unit); `None`: all alike. The worst-point form does not depend on it.
+    pub weights: Option<&'a [f64]>,
     /// Lower current limit of each coil, A (<= 0).
     pub lower_a: &'a [f64],
     /// Upper current limit of each coil, A (>= 0).
@@ -31,6 +34,8 @@ pub enum Criterion {
     Linear,
     /// Where the last coil stops following.
     Saturation,
+    /// The largest with no point too weak.
+    Maxmin,
 }
 
 /// How the problem is solved.
@@ -152,6 +157,12 @@ impl ForceProblem<'_> {
         self.upper_a.len()
     }
 
+    /// The largest weight; 1 without weights.
+    pub(super) fn heaviest(&self) -> f64 {
+        let weights = self.weights.unwrap_or(&[1.0]);
+        weights.iter().copied().fold(0.0, f64::max)
+    }
+
     /// Checks shapes, finiteness and signs.
     ///
     /// # Errors
@@ -173,6 +184,7 @@ impl ForceProblem<'_> {
                 self.offset_n.map_or(points, <[f64]>::len),
                 points,
             ),
+            ("weights", self.weights.map_or(points, <[f64]>::len), points),
         ];
         for (name, found, expected) in lengths {
             if found != expected {
@@ -186,6 +198,12 @@ impl ForceProblem<'_> {
         finite("forces_n_per_a", self.forces_n_per_a)?;
         finite("height_m", self.height_m)?;
         finite("offset_n", self.offset_n.unwrap_or(&[]))?;
+        signed(
+            "weights",
+            self.weights.unwrap_or(&[]),
+            "a weight above zero",
+            |v| v > 0.0,
+        )?;
         signed("lower_a", self.lower_a, "a limit of zero or below", |v| {
             v <= 0.0
         })?;

@@ -1,8 +1,8 @@
 //! From points and coils to a small scaled least-squares problem.
 //!
 //! The columns of forces, the heights and the offset go through one QR of
-//! `[G, h, -offset] / sqrt(n)`; what remains has as many rows as columns. All scales
-//! are powers of two: with `2^k_i` near the norm of coil i's column,
+//! `[G, h, -offset] / sqrt(n)`, its rows scaled by the roots of the points' weights; what
+//! remains has as many rows as columns. All scales are powers of two: with `2^k_i` near the norm of coil i's column,
 //! `x_i = I_i 2^(k_i - f)` and `lambda' = lambda 2^(k_h - f)`, where `2^f` newtons is
 //! the largest force within the limits. Every column then has a norm between 1 and 2.
 
@@ -95,6 +95,7 @@ impl Reduced {
     pub fn new<T: Real>(problem: &ForceProblem, largest: &[f64]) -> Self {
         let (points, coils) = (problem.points(), problem.coils());
         let entry_scale: Vec<i32> = largest.iter().map(|&v| exponent_of(v)).collect();
+        let heaviest = T::of(problem.heaviest());
         // Two factors: the scale of a column of tiny entries alone would overflow.
         let factors = |k: i32| (power_of_two(-k / 2), power_of_two(-k - -k / 2));
         let triangle: Triangle<T> =
@@ -117,9 +118,22 @@ impl Reduced {
                             copy(column, offset.iter().map(|v| -scaled(v)));
                         }
                     }
+                    if let Some(weights) = problem.weights {
+                        for (entry, &weight) in column.iter_mut().zip(&weights[range.clone()]) {
+                            *entry = *entry * (T::of(weight) / heaviest).sqrt();
+                        }
+                    }
                 }
             });
-        let root = Num::ONE / Num::of(points as f64).sqrt();
+        let total = match problem.weights {
+            None => Num::of(points as f64),
+            Some(weights) => {
+                let heaviest = Num::of(problem.heaviest());
+                let sum = |sum: Num, &w: &f64| sum + Num::of(w) / heaviest;
+                weights.iter().fold(Num::ZERO, sum)
+            }
+        };
+        let root = Num::ONE / total.sqrt();
         let mut scale = Vec::with_capacity(largest.len());
         let mut columns = Vec::with_capacity(largest.len());
         for (j, k) in entry_scale.into_iter().enumerate() {

@@ -12,6 +12,7 @@ use super::model::Model;
 use super::path::Path;
 use super::problem::{Criterion, ForceProblem, ProblemError, Settings};
 use super::reduce::{Reduced, largest_entries, times_power};
+use super::worst;
 
 /// Above this condition number of the coils' columns doubles do not decide.
 const PLAIN_CONDITION: f64 = 1e3;
@@ -68,6 +69,8 @@ pub struct Solution {
     pub lambda_jnd_n_per_m: Option<f64>,
     /// The last breakpoint, N/m, beyond which no coil follows; `None` where nothing ever binds.
     pub lambda_saturation_n_per_m: Option<f64>,
+    /// The largest with no point too weak, N/m; `None`: none, or nothing can be rendered.
+    pub lambda_maxmin_n_per_m: Option<f64>,
     /// Below it the lowest point is not felt, N/m; `None` where that height is not positive.
     pub lambda_floor_n_per_m: Option<f64>,
     /// The force constant that the criterion chooses, with its currents.
@@ -204,6 +207,7 @@ pub fn solve(problem: &ForceProblem, settings: &Settings) -> Result<Solution, Pr
         let rank = problem.coils();
         return Ok(finish::<f64>(
             problem,
+            &largest,
             settings,
             &plain,
             path,
@@ -219,6 +223,7 @@ pub fn solve(problem: &ForceProblem, settings: &Settings) -> Result<Solution, Pr
     }
     Ok(finish::<Num>(
         problem,
+        &largest,
         settings,
         &solved,
         path,
@@ -258,6 +263,7 @@ fn solve_finely(problem: &ForceProblem, largest: &[f64]) -> Solved {
 /// Reads the force constants off the path and evaluates currents in the precision `T`.
 fn finish<T: Real>(
     problem: &ForceProblem,
+    largest: &[f64],
     settings: &Settings,
     solved: &Solved,
     path: Path,
@@ -290,6 +296,7 @@ fn finish<T: Real>(
         Criterion::Linear => linear,
         Criterion::Jnd => jnd,
         Criterion::Saturation => saturation,
+        Criterion::Maxmin => None,
     };
     let unmoved = |trace: &Trace| {
         let all = |piece: &Piece| piece.x.iter().chain(&piece.x_rate).all(|&x| x == Num::ZERO);
@@ -310,10 +317,9 @@ fn finish<T: Real>(
         .copied()
         .fold(f64::INFINITY, f64::min);
     let rms_height_m = comparison.mean_square.sqrt().to_f64() * solved.reduced.height_unit_m();
-    let evaluate = |lambda: f64| {
-        let currents_a = path.currents_a(lambda);
+    let given = |lambda: f64, currents_a: Vec<f64>, error_n2: Option<f64>| {
         let check = certificate::check::<T>(problem, lambda, &currents_a);
-        let rms_error_n = path.error_n2(lambda).sqrt();
+        let rms_error_n = error_n2.unwrap_or(check.mean_square_n2).sqrt();
         let scale = lambda * rms_height_m;
         OperatingPoint {
             lambda_n_per_m: lambda,
@@ -324,12 +330,24 @@ fn finish<T: Real>(
             duality_gap_n2: check.gap_n2,
         }
     };
+    let evaluate =
+        |lambda: f64| given(lambda, path.currents_a(lambda), Some(path.error_n2(lambda)));
+    let maxmin = worst::largest(problem, largest).filter(|_| status != Status::NothingRendered);
+    let chosen = match &maxmin {
+        Some(maxmin) if settings.criterion == Criterion::Maxmin => Some(given(
+            maxmin.lambda_n_per_m,
+            maxmin.currents_a.clone(),
+            None,
+        )),
+        _ => chosen.map(evaluate),
+    };
     Solution {
         lambda_linear_n_per_m: linear,
         lambda_jnd_n_per_m: jnd,
         lambda_saturation_n_per_m: saturation,
+        lambda_maxmin_n_per_m: maxmin.map(|maxmin| maxmin.lambda_n_per_m),
         lambda_floor_n_per_m: (lowest > 0.0).then(|| DETECTION_THRESHOLD_N / lowest),
-        chosen: chosen.map(evaluate),
+        chosen,
         at: settings.at_n_per_m.map(evaluate),
         rank,
         status,

@@ -21,7 +21,7 @@ use fluxform::shape::height::{Grid, heights};
 use fluxform::shape::mesh::{FileMesh, Mesh};
 use fluxform::shape::placement::Transform;
 use fluxform::shape::scattered::Probe;
-use fluxform::shape::scattered::adaptive::adaptive;
+use fluxform::shape::scattered::adaptive::{Grading, adaptive};
 use fluxform::shape::{Surface, stl};
 
 type Failure = Box<dyn Error + Send + Sync>;
@@ -125,7 +125,10 @@ fn main() -> Result<(), Failure> {
             let (graded, third_s) = timed(|| {
                 adaptive(
                     &Probe::new(&surface, &plan),
-                    off.bound_m().max(1e-7),
+                    Grading {
+                        max_deviation_m: off.bound_m().max(1e-7),
+                        widest_m: f64::INFINITY,
+                    },
                     &Silent,
                 )
             });

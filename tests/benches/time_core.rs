@@ -168,6 +168,7 @@ fn measure(design: &Design) -> Result<(), Failure> {
             forces_n_per_a: &forces,
             height_m: &heights,
             offset_n: None,
+            weights: None,
             lower_a: &scene.lower_a,
             upper_a: &scene.upper_a,
             total_max_a: design.supply.total_current_max_a,

@@ -132,6 +132,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
         lambda_linear_n_per_m: Some(4.9429),
         lambda_jnd_n_per_m: Some(6.007),
         lambda_saturation_n_per_m: Some(5.9878),
+        lambda_maxmin_n_per_m: Some(6.1),
         lambda_floor_n_per_m: None,
         lambda_n_per_m: Some(5.9878),
         criterion: "saturation".to_owned(),
@@ -153,7 +154,10 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
             currents_a: vec![0.7; 4],
             rms_error_n: 0.0013,
             worst_error_n: 0.0017,
+            worst_point: None,
         }),
+        worst_point: None,
+        sampling: None,
         working_point: None,
         accuracy: accuracy.clone(),
     };

@@ -144,3 +144,71 @@ fn factors_that_differ_are_refused_unless_they_are_meant() {
     with("scale = [1, 2]").ends(3);
     with("scale = -1").ends(3);
 }
+
+#[test]
+fn a_force_constant_of_weighted_points_is_held_against_the_grids() {
+    let place = Place::new();
+    let design = place
+        .seed()
+        .replace("pitch_mm = 50.0", "pitch_mm = 50.0\ncoupling = \"none\"");
+    place.write("design.toml", &design);
+    let lambda = |flags: &[&str]| {
+        let args = [
+            "lambda",
+            "design.toml",
+            "shapes/half_sphere.toml",
+            "--format",
+            "json",
+        ];
+        place.run(&[&args[..], flags].concat()).ends(0).json()
+    };
+    let number = |value: &serde_json::Value| value.as_f64().unwrap();
+    let grid = lambda(&[]);
+    assert!(grid.get("sampling").is_none());
+    let [coarse, fine, noise] = [
+        lambda(&["--max-deviation", "1mm"]),
+        lambda(&["--max-deviation", "0.2mm"]),
+        lambda(&["--poisson", "1.3mm", "--seed", "5"]),
+    ];
+    let constant = |told: &serde_json::Value| number(&told["lambda_n_per_m"]);
+    for told in [&coarse, &fine, &noise] {
+        let sampling = &told["sampling"];
+        assert_eq!(sampling["grid_lambda_n_per_m"], grid["lambda_n_per_m"]);
+        let change = constant(told) / constant(&grid) - 1.0;
+        assert!((number(&sampling["relative_change"]) - change).abs() < 1e-12);
+    }
+    assert_eq!(fine["sampling"]["sampling"], "adaptive");
+    assert_eq!(noise["sampling"]["sampling"], "poisson");
+    // Weighted by area, all ways of choosing points go to one limit; a grid's rim does not.
+    let apart =
+        |a: &serde_json::Value, b: &serde_json::Value| (constant(a) / constant(b) - 1.0).abs();
+    assert!(
+        apart(&fine, &noise) < 4e-3,
+        "{} {}",
+        constant(&fine),
+        constant(&noise)
+    );
+    assert!(coarse["points"].as_u64() < fine["points"].as_u64());
+    assert!(fine["accuracy"]["lambda_of_points"]["estimate"].is_number());
+    assert!(number(&fine["accuracy"]["quadrature"]["estimate"]) < 5e-3);
+    // A plane needs few points, its forces more: what wide patches miss is told.
+    let plane = |flags: &[&str]| {
+        let args = [
+            "lambda",
+            "design.toml",
+            "shapes/flat.toml",
+            "--format",
+            "json",
+        ];
+        let flags = [flags, &["--max-deviation", "1mm"]].concat();
+        place.run(&[&args[..], &flags].concat()).ends(0).json()
+    };
+    let (resolved, wide) = (plane(&[]), plane(&["--max-width", "25mm"]));
+    let off = apart(&wide, &resolved);
+    let stated = number(&wide["accuracy"]["quadrature"]["estimate"]);
+    assert!(
+        off > 0.01 && off < stated && stated < 20.0 * off,
+        "{off} {stated}"
+    );
+    assert!(number(&resolved["accuracy"]["quadrature"]["estimate"]) < 2e-3);
+}

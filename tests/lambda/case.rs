@@ -54,6 +54,7 @@ impl Case {
             forces_n_per_a: &self.forces,
             height_m: &self.heights,
             offset_n: self.offset.as_deref(),
+            weights: None,
             lower_a: &self.lower,
             upper_a: &self.upper,
             total_max_a: self.total,

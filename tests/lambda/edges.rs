@@ -95,7 +95,12 @@ fn one_point_and_one_coil_have_closed_forms() {
 #[test]
 fn the_criterion_chooses() {
     let case = plain_case();
-    for criterion in [Criterion::Jnd, Criterion::Linear, Criterion::Saturation] {
+    for criterion in [
+        Criterion::Jnd,
+        Criterion::Linear,
+        Criterion::Saturation,
+        Criterion::Maxmin,
+    ] {
         let settings = Settings {
             criterion,
             jnd_weight: 0.11,
@@ -108,6 +113,7 @@ fn the_criterion_chooses() {
             Criterion::Jnd => jnd,
             Criterion::Linear => linear,
             Criterion::Saturation => saturation,
+            Criterion::Maxmin => solution.lambda_maxmin_n_per_m,
         };
         assert_eq!(Some(chosen.lambda_n_per_m), expected);
         let at = solution.at.expect("asked for");

@@ -8,3 +8,5 @@ mod exhaustive;
 mod oracle;
 mod power;
 mod search;
+mod vertices;
+mod worst;

@@ -16,11 +16,19 @@ use fluxform::shape::mesh::{Mesh, Triangle};
 use fluxform::shape::placement::Transform;
 use fluxform::shape::primitive::PlacedPrimitive;
 use fluxform::shape::scattered::Probe;
-use fluxform::shape::scattered::adaptive::{Adaptive, adaptive};
+use fluxform::shape::scattered::adaptive::{Adaptive, Grading, adaptive};
 use fluxform::shape::scattered::poisson::poisson;
 use fluxform::shape::{Settings, Surface, discretize_with, stl};
 
 use crate::support::{exact, file, grid, lifted, root, sample, seed_grid};
+
+/// Patches as wide as the deviation allows.
+fn to(max_deviation_m: f64) -> Grading {
+    Grading {
+        max_deviation_m,
+        widest_m: f64::INFINITY,
+    }
+}
 
 fn box_of(low: [f64; 3], high: [f64; 3]) -> Vec<Triangle> {
     let corner = |k: usize| [0, 1, 2].map(|a| if k >> a & 1 == 1 { high[a] } else { low[a] });
@@ -226,7 +234,7 @@ fn graded_points_hold_their_deviation_with_fewer_than_a_grid() {
     ] {
         let surface = shape(name);
         let probe = Probe::new(&surface, &seed_region());
-        let found: Adaptive = adaptive(&probe, deviation_m, &Silent).unwrap();
+        let found: Adaptive = adaptive(&probe, to(deviation_m), &Silent).unwrap();
         println!(
             "{name}: {} points, {} patches, {} at borders, within {} mm",
             found.points.len(),
@@ -272,8 +280,8 @@ fn a_formula_is_graded_too() {
     };
     let surface = Surface::Primitive(PlacedPrimitive::new(formula, &Placement::default()).unwrap());
     let probe = Probe::new(&surface, &seed_region());
-    let coarse = adaptive(&probe, 2e-3, &Silent).unwrap();
-    let fine = adaptive(&probe, 1e-3, &Silent).unwrap();
+    let coarse = adaptive(&probe, to(2e-3), &Silent).unwrap();
+    let fine = adaptive(&probe, to(1e-3), &Silent).unwrap();
     assert!(fine.points.len() > coarse.points.len() && fine.vertical_m <= 1e-3);
     for (k, h) in fine.points.height_m.iter().enumerate() {
         let distance = fine.points.x_m[k].hypot(fine.points.y_m[k]);
@@ -281,7 +289,8 @@ fn a_formula_is_graded_too() {
         assert!(off.abs() < 1e-12, "{off}");
     }
     assert!(
-        adaptive(&probe, 0.0, &Silent).is_err() && adaptive(&probe, f64::NAN, &Silent).is_err()
+        adaptive(&probe, to(0.0), &Silent).is_err()
+            && adaptive(&probe, to(f64::NAN), &Silent).is_err()
     );
 }
 

@@ -101,7 +101,7 @@ impl Calibrate {
     /// See [`Failure`].
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
         let out = folder(&self.out)?;
-        let lambda = self.criterion.options(self.tolerance.tolerance)?;
+        let lambda = self.criterion.options(self.tolerance.tolerance);
         let (document, shapes) = documents::design_and_shapes(
             &self.design,
             Need::CALIBRATE,

@@ -8,7 +8,7 @@ mod inspect;
 
 use super::{begin, describe};
 use crate::bundle::atomic::{self, Overwrite};
-use crate::cli::args::{SurfaceFlags, Writing};
+use crate::cli::args::{SamplingFlags, SurfaceFlags, Writing};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
@@ -16,9 +16,9 @@ use crate::cli::layout::Sheet;
 use crate::cli::pictures::write_svg;
 use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{count, length_error, mm, number};
-use crate::cli::values::{self, FileArgument};
+use crate::cli::values::FileArgument;
 use crate::job::JobError;
-use crate::job::discretize::scattered::{self, Sampling, ScatteredSummary};
+use crate::job::discretize::scattered::{self, ScatteredSummary};
 use crate::job::discretize::{DeviationSummary, PointsOptions, PointsSummary, run_with};
 use crate::shape::certificate::Certify;
 use crate::shape::holes::Holes;
@@ -65,20 +65,8 @@ pub struct Discretize {
     /// Compare the points with the surface: vertically, by the Hausdorff distance too, or not
     #[arg(long, value_enum, default_value_t = CertifyFlag::Vertical)]
     certify: CertifyFlag,
-    /// Choose points until bilinear patches between them lie this near to the surface (0.1mm)
-    #[arg(long, value_name = "LENGTH", value_parser = values::length_with_unit)]
-    max_deviation: Option<f64>,
-    /// Choose points at random, none nearer to another than this (2mm)
-    #[arg(
-        long,
-        value_name = "SPACING",
-        value_parser = values::length_with_unit,
-        conflicts_with = "max_deviation"
-    )]
-    poisson: Option<f64>,
-    /// Which random points
-    #[arg(long, value_name = "N", default_value_t = 0, requires = "poisson")]
-    seed: u64,
+    #[command(flatten)]
+    sampling: SamplingFlags,
     /// Tell what the surface's file holds and make no points
     #[arg(
         long,
@@ -128,7 +116,7 @@ impl Discretize {
         let bar = begin(printer);
         for shape in shapes {
             let inputs = shape.input.into_iter().collect();
-            if let Some(sampling) = self.sampling() {
+            if let Some(sampling) = self.sampling.sampling() {
                 let mut report = scattered::run(&shape.document, inputs, sampling, &bar)?;
                 self.warn(&report.summary.warnings, printer);
                 let place = self.write(
@@ -161,16 +149,6 @@ impl Discretize {
             printer.summary(place, &report.summary, || self.told(&report.summary))?;
         }
         Ok(())
-    }
-
-    fn sampling(&self) -> Option<Sampling> {
-        let graded = self
-            .max_deviation
-            .map(|max_deviation_m| Sampling::Adaptive { max_deviation_m });
-        let seed = self.seed;
-        graded.or(self
-            .poisson
-            .map(|spacing_m| Sampling::Poisson { spacing_m, seed }))
     }
 
     fn options(&self) -> PointsOptions {

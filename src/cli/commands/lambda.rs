@@ -5,8 +5,8 @@ use std::slice::from_ref;
 use clap::{Args, ValueEnum};
 
 use super::{accuracy_check, begin, describe};
-use crate::bundle::lambda_file::WorkingPointForces;
-use crate::cli::args::{SurfaceFlags, Tolerance};
+use crate::bundle::lambda_file::{WorkingPointForces, WorstPointFile};
+use crate::cli::args::{SamplingFlags, SurfaceFlags, Tolerance};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
@@ -30,6 +30,8 @@ use crate::lambda::{Criterion, Precision, Settings};
     ("fluxform lambda designs/seed.toml shapes/half_sphere.toml", "the seed's half-sphere"),
     ("fluxform lambda designs/seed.toml shapes/wedge.toml --criterion linear --at 2.0",
      "the constant at which the first limit binds, and what 2 N/m would give"),
+    ("fluxform lambda designs/seed.toml shapes/half_sphere.toml --max-deviation 0.5mm",
+     "points where the surface bends, weighted by area, and what they change"),
     ("fluxform lambda designs/seed.toml shapes/flat.stl --unit mm --translate 0,0,50",
      "a surface given directly"),
 ]))]
@@ -44,6 +46,8 @@ pub struct Lambda {
     criterion: CriterionFlags,
     #[command(flatten)]
     tolerance: Tolerance,
+    #[command(flatten)]
+    sampling: SamplingFlags,
     #[command(flatten)]
     surface: SurfaceFlags,
 }
@@ -72,36 +76,29 @@ enum Wanted {
     Linear,
     /// The largest at which a coil still moves
     Saturation,
-    /// Not in this version
+    /// The largest with no point too weak; its currents may push too much elsewhere
     Maxmin,
 }
 
 impl CriterionFlags {
     /// The settings that the flags ask for.
-    ///
-    /// # Errors
-    /// Wrong usage: a criterion that is not built.
-    pub fn options(self, tolerance: Option<f64>) -> Result<LambdaOptions, Failure> {
+    #[must_use]
+    pub fn options(self, tolerance: Option<f64>) -> LambdaOptions {
         let criterion = match self.criterion {
             Wanted::Jnd => Criterion::Jnd,
             Wanted::Linear => Criterion::Linear,
             Wanted::Saturation => Criterion::Saturation,
-            Wanted::Maxmin => {
-                return Err(Failure::Usage(
-                    "--criterion maxmin: this version does not have it; choose jnd, linear or \
-                     saturation"
-                        .to_owned(),
-                ));
-            }
+            Wanted::Maxmin => Criterion::Maxmin,
         };
-        Ok(LambdaOptions {
+        LambdaOptions {
             settings: Settings {
                 criterion,
                 jnd_weight: self.jnd,
                 at_n_per_m: self.at,
             },
             tolerance,
-        })
+            sampling: None,
+        }
     }
 }
 
@@ -111,7 +108,10 @@ impl Lambda {
     /// # Errors
     /// See [`Failure`].
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
-        let options = self.criterion.options(self.tolerance.tolerance)?;
+        let options = LambdaOptions {
+            sampling: self.sampling.sampling(),
+            ..self.criterion.options(self.tolerance.tolerance)
+        };
         let (document, shapes) = documents::design_and_shapes(
             &self.design,
             Need::LAMBDA,
@@ -160,6 +160,7 @@ fn summary(design: &Design, report: &LambdaReport) -> String {
         ("linear", file.lambda_linear_n_per_m),
         ("jnd", file.lambda_jnd_n_per_m),
         ("saturation", file.lambda_saturation_n_per_m),
+        ("maxmin", file.lambda_maxmin_n_per_m),
         ("floor", file.lambda_floor_n_per_m),
     ];
     let constants = constants.map(|(name, lambda)| {
@@ -169,6 +170,9 @@ fn summary(design: &Design, report: &LambdaReport) -> String {
     sheet.line("lambda", &format!("{} N/m", constants.join(", ")));
     sheet.line("chosen by", &describe::criterion(&file.criterion, file.jnd));
     operating_point(&mut sheet, report);
+    if let Some(worst) = &file.worst_point {
+        sheet.line("worst point", &worst_point(worst));
+    }
     if let Some(point) = &file.working_point {
         sheet.line("steel", &along_the_curve(point));
     }
@@ -179,10 +183,16 @@ fn summary(design: &Design, report: &LambdaReport) -> String {
         sheet.line(
             "at",
             &format!(
-                "{} N/m: error rms {}, worst {}",
+                "{} N/m: error rms {}, worst {}{}",
                 number(at.lambda_n_per_m),
                 force(at.rms_error_n),
-                force(at.worst_error_n)
+                force(at.worst_error_n),
+                at.worst_point
+                    .as_ref()
+                    .map_or_else(String::new, |worst| format!(
+                        ", at least {}",
+                        force(worst.worst_error_n)
+                    ))
             ),
         );
         sheet.line("", &describe::currents(design, &at.currents_a));
@@ -205,6 +215,22 @@ fn summary(design: &Design, report: &LambdaReport) -> String {
     let stages = stages.map(|(name, stage)| (name.as_str(), stage));
     sheet.line("accuracy", &describe::accuracy(stages));
     sheet.finish()
+}
+
+/// What currents for the worst point would do instead.
+fn worst_point(worst: &WorstPointFile) -> String {
+    let constant = |lambda: Option<f64>| lambda.map_or_else(|| "none".to_owned(), number);
+    let least = worst.worst_error_n.map_or_else(String::new, |least| {
+        let relative = worst.relative_worst_error.map_or_else(String::new, |part| {
+            format!(" ({} of the largest force)", percent(part))
+        });
+        format!("error at least {}{relative}; ", force(least))
+    });
+    format!(
+        "{least}lambda by the worst point: linear {}, jnd {} N/m",
+        constant(worst.lambda_linear_n_per_m),
+        constant(worst.lambda_jnd_n_per_m)
+    )
 }
 
 /// What the steel does at the chosen currents, where it follows a curve.
@@ -248,6 +274,16 @@ fn operating_point(sheet: &mut Sheet, report: &LambdaReport) {
 /// How many points there are, how high, and what was left out.
 fn points(report: &LambdaReport) -> String {
     let points = &report.points.summary;
+    if let Some(sampled) = &report.file.sampling {
+        let change = sampled.relative_change.map_or_else(String::new, |change| {
+            let sign = if change < 0.0 { "-" } else { "+" };
+            format!("; lambda {sign}{} against those", percent(change.abs()))
+        });
+        return format!(
+            "{} {}, weighted by area, instead of the grid's {}{change}",
+            report.file.points, sampled.sampling, sampled.grid_points
+        );
+    }
     let outside = if points.outside > 0 {
         let outside = count(points.outside, "grid point");
         format!("; {outside} without surface left out")

@@ -13,7 +13,7 @@ use crate::job::JobError;
 use crate::progress::Progress;
 use crate::shape::document::ShapeDocument;
 use crate::shape::points::requested_grid;
-use crate::shape::scattered::adaptive::adaptive;
+use crate::shape::scattered::adaptive::{Grading, adaptive};
 use crate::shape::scattered::poisson::poisson;
 use crate::shape::scattered::{Probe, Scattered};
 use crate::shape::{ShapeError, Surface};
@@ -25,6 +25,8 @@ pub enum Sampling {
     Adaptive {
         /// The vertical deviation, m.
         max_deviation_m: f64,
+        /// No patch is wider than this, m; `None`: what the purpose needs.
+        widest_m: Option<f64>,
     },
     /// At random, no two nearer than a spacing.
     Poisson {
@@ -110,8 +112,15 @@ pub fn run(
     )]);
     let (mut patches, mut border_patches, mut cover_m) = (None, None, None);
     let (mut points, name) = match sampling {
-        Sampling::Adaptive { max_deviation_m } => {
-            let found = adaptive(&probe, max_deviation_m, progress).map_err(failed)?;
+        Sampling::Adaptive {
+            max_deviation_m,
+            widest_m,
+        } => {
+            let grading = Grading {
+                max_deviation_m,
+                widest_m: widest_m.unwrap_or(f64::INFINITY),
+            };
+            let found = adaptive(&probe, grading, progress).map_err(failed)?;
             (patches, border_patches) = (Some(found.leaves), Some(found.borders));
             let method = "certified: the vertical difference between surface and bilinear patches; \
                           at rims and jumps patches no wider than the deviation asked for";

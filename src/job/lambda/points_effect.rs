@@ -4,13 +4,10 @@
 //! by it and the problem is solved again with the forces there: a first-order estimate of how far
 //! lambda may move, not a bound, because the errors of single points need not agree.
 
-use std::collections::BTreeMap;
-
 use super::super::JobError;
-use super::super::discretize::PointsReport;
 use super::super::scene::Scene;
 use super::super::steel::Solved;
-use super::positions_m;
+use super::points::WantedPoints;
 use crate::accuracy::StageAccuracy;
 use crate::lambda::{self, ForceProblem, Settings, Solution};
 use crate::progress::Progress;
@@ -22,18 +19,9 @@ const MOST_OF_HEIGHT: f64 = 0.02;
 pub(super) struct Moved<'a> {
     pub(super) scene: &'a Scene<'a>,
     pub(super) solved: &'a Solved,
-    pub(super) points: &'a PointsReport,
+    pub(super) points: &'a WantedPoints,
     pub(super) offset_n: Option<&'a [f64]>,
     pub(super) solution: &'a Solution,
-}
-
-/// The points' own stages, named as in a manifest.
-pub(super) fn stages(points: &PointsReport) -> BTreeMap<String, StageAccuracy> {
-    let stages = points.summary.accuracy.iter();
-    stages
-        .filter(|(name, _)| **name != "points")
-        .map(|(name, stage)| (format!("points_{name}"), stage.clone()))
-        .collect()
 }
 
 /// How far lambda moves with the points' error budget; `None` without a lambda or a budget.
@@ -45,13 +33,10 @@ pub(super) fn of_points(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Option<StageAccuracy>, JobError> {
-    let (Some(deviation), Some(chosen)) = (&moved.points.summary.deviation, &moved.solution.chosen)
-    else {
+    let (Some(budget_m), Some(chosen)) = (moved.points.budget_m, &moved.solution.chosen) else {
         return Ok(None);
     };
-    let heights = &moved.points.discretized.points.height_m;
-    let lowest_m = heights.iter().copied().fold(f64::INFINITY, f64::min);
-    let step_m = deviation.budget_m.min(MOST_OF_HEIGHT * lowest_m);
+    let step_m = budget_m.min(MOST_OF_HEIGHT * moved.points.lowest_m());
     if !(step_m > 0.0 && chosen.lambda_n_per_m > 0.0) {
         return Ok(None);
     }
@@ -61,7 +46,7 @@ pub(super) fn of_points(
     };
     let shift = (there / chosen.lambda_n_per_m - 1.0).abs();
     Ok(Some(StageAccuracy {
-        estimate: shift * (deviation.budget_m / step_m),
+        estimate: shift * (budget_m / step_m),
         relative_to: "lambda".to_owned(),
         method: "an estimate: all points lifted by their error budget (grid, \
                  tessellation, rounding), forces and lambda computed again, to first order"
@@ -76,7 +61,7 @@ fn lambda_at(
     progress: &dyn Progress,
 ) -> Result<Option<f64>, JobError> {
     let scene = moved.scene;
-    let mut positions = positions_m(moved.points);
+    let mut positions = moved.points.positions_m.clone();
     positions.iter_mut().for_each(|p| p[2] += lift_m);
     let forces = scene.forces_n_per_a(moved.solved, &positions, progress)?;
     let heights: Vec<f64> = positions.iter().map(|p| p[2]).collect();
@@ -85,6 +70,7 @@ fn lambda_at(
         forces_n_per_a: &forces,
         height_m: &heights,
         offset_n: moved.offset_n,
+        weights: moved.points.weights.as_deref(),
         lower_a: &scene.lower_a,
         upper_a: &scene.upper_a,
         total_max_a: scene.design.supply.total_current_max_a,

@@ -33,6 +33,15 @@ pub struct Adaptive {
     pub border_m: f64,
 }
 
+/// What patches hold.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grading {
+    /// How far, vertically, a patch may lie from the surface, m.
+    pub max_deviation_m: f64,
+    /// No patch is wider than this, m; infinite: as wide as the deviation allows.
+    pub widest_m: f64,
+}
+
 /// A node's place, in steps of the finest rectangle.
 type Node = [u32; 2];
 
@@ -41,28 +50,35 @@ struct Work<'a> {
     progress: &'a dyn Progress,
     /// Rectangles along each axis before the first quartering.
     first: [u32; 2],
-    max_deviation_m: f64,
+    grading: Grading,
     /// Ordered by y, then x: the order of the output.
     nodes: BTreeMap<Node, Option<(Sample, Marks, f64)>>,
     found: usize,
     result: Adaptive,
 }
 
-/// Points such that bilinear patches between them lie within `max_deviation_m` of the surface,
+/// Points such that bilinear patches between them lie within the deviation of the surface,
 /// vertically, or are no wider than it.
 ///
 /// # Errors
-/// [`ShapeError::Document`] for a deviation that is not positive or asks for too many points;
+/// [`ShapeError::Document`] for a deviation or a width that is not positive or asks for too many points;
 /// [`ShapeError::Interrupted`].
 pub fn adaptive(
     probe: &Probe<'_>,
-    max_deviation_m: f64,
+    grading: Grading,
     progress: &dyn Progress,
 ) -> Result<Adaptive, ShapeError> {
+    let max_deviation_m = grading.max_deviation_m;
     if !(max_deviation_m > 0.0 && max_deviation_m.is_finite()) {
         return Err(ShapeError::Document(format!(
             "the deviation is {} mm; it must be positive",
             max_deviation_m * 1000.0
+        )));
+    }
+    if grading.widest_m.is_nan() || grading.widest_m <= 0.0 {
+        return Err(ShapeError::Document(format!(
+            "the widest patch is {} mm; it must be positive",
+            grading.widest_m * 1000.0
         )));
     }
     let sides = probe.plan_m.sides();
@@ -77,7 +93,7 @@ pub fn adaptive(
         probe,
         progress,
         first,
-        max_deviation_m,
+        grading,
         nodes: BTreeMap::new(),
         found: 0,
         result: Adaptive {
@@ -165,17 +181,19 @@ impl Work<'_> {
         if heights.iter().all(Option::is_none) && !self.probe.may_have_surface(&rect, members) {
             return Ok(());
         }
-        if let [Some(a), Some(b), Some(c), Some(d)] = heights {
+        if let [Some(a), Some(b), Some(c), Some(d)] = heights
+            && (widest_m <= self.grading.widest_m || level == 0)
+        {
             let corners_m = [a, b, c, d];
             let off_m = self.probe.deviation_m(&Patch { rect, corners_m }, members);
-            if off_m <= self.max_deviation_m {
+            if off_m <= self.grading.max_deviation_m {
                 self.result.leaves += 1;
                 self.result.vertical_m = self.result.vertical_m.max(off_m);
                 self.weigh(&corners, sides[0] * sides[1]);
                 return Ok(());
             }
         }
-        if widest_m <= self.max_deviation_m || level == 0 {
+        if widest_m <= self.grading.max_deviation_m || level == 0 {
             self.result.borders += 1;
             self.result.border_m = self.result.border_m.max(widest_m);
             self.weigh(&corners, sides[0] * sides[1]);

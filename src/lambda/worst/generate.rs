@@ -1,0 +1,316 @@
+//! Few points decide: a program over them is followed, and a point joins it when the path is
+//! about to miss it. Of many points a sample is looked at on the way and the others afterwards;
+//! those that are missed at a turn join the sample, and the path is followed again.
+//!
+//! Along a piece the currents are linear in lambda and the largest error is convex, so a path
+//! that is right at the turns, and in the direction of its last piece, is right everywhere.
+
+use std::collections::BTreeSet;
+
+use super::blocks::{Blocks, misses};
+use super::points::{Course, Points, Probe, first_missed};
+use super::program::{End, Piece, Program, Stand};
+use super::scaled::{Form, Scaled};
+use crate::lambda::reduce::times_power;
+use crate::numerics::double_double::DoubleDouble as Num;
+use crate::numerics::real::Real;
+
+/// Points tried first: with more, the rest are only looked at to confirm.
+const POOL: usize = 4096;
+/// Rounding of a force summed in doubles, in units of the terms' sizes.
+const ROUNDINGS: f64 = 8.0;
+/// A force that is none, in scaled units: what rounding leaves at lambda = 0.
+const NOTHING: f64 = 1e-25;
+/// More rounds than any problem needs.
+const ROUNDS: usize = 200;
+
+/// The followed path over all points.
+pub(super) struct Followed {
+    pub pieces: Vec<Piece>,
+    /// Points and signs of the rows of `pieces[..].active`; `None` for limits.
+    pub rows: Vec<Option<(usize, bool)>>,
+    pub end: End,
+    /// Largest error that may hide at a point, relative to lambda max h plus the offset.
+    pub doubt: f64,
+}
+
+/// A few points, copied side by side.
+struct Pool {
+    index: Vec<usize>,
+    known: BTreeSet<usize>,
+    forces: Vec<f64>,
+    heights: Vec<f64>,
+    offsets: Option<Vec<f64>>,
+}
+
+impl Pool {
+    fn new(all: Points, index: Vec<usize>) -> Self {
+        let mut pool = Self {
+            index: Vec::new(),
+            known: BTreeSet::new(),
+            forces: Vec::new(),
+            heights: Vec::new(),
+            offsets: all.offset_n.map(|_| Vec::new()),
+        };
+        for j in index {
+            pool.add(all, j);
+        }
+        pool
+    }
+
+    fn add(&mut self, all: Points, j: usize) {
+        self.index.push(j);
+        self.known.insert(j);
+        self.forces
+            .extend_from_slice(&all.forces_n_per_a[j * all.coils..(j + 1) * all.coils]);
+        self.heights.push(all.height_m[j]);
+        if let (Some(offsets), Some(offset)) = (&mut self.offsets, all.offset_n) {
+            offsets.push(offset[j]);
+        }
+    }
+
+    fn points(&self, coils: usize) -> Points<'_> {
+        Points {
+            coils,
+            forces_n_per_a: &self.forces,
+            height_m: &self.heights,
+            offset_n: self.offsets.as_deref(),
+        }
+    }
+}
+
+/// The points of one problem, and what has been learnt of them.
+pub(super) struct Search<'a> {
+    form: Form,
+    all: Points<'a>,
+    /// Points looked at on the way; `None` where all of them are.
+    pool: Option<Pool>,
+    /// Bounds of all points, once they are looked at.
+    blocks: Option<Blocks>,
+    /// Rows to begin with.
+    working: Vec<(usize, bool)>,
+}
+
+impl<'a> Search<'a> {
+    /// Nothing is learnt yet of the points of `scaled`.
+    pub fn new(scaled: &Scaled<'a>, form: Form) -> Self {
+        let problem = scaled.problem;
+        let all = Points {
+            coils: problem.coils(),
+            forces_n_per_a: problem.forces_n_per_a,
+            height_m: problem.height_m,
+            offset_n: problem.offset_n,
+        };
+        let count = problem.points();
+        let pool = (count > 2 * POOL).then(|| {
+            let mut index: BTreeSet<usize> = (0..POOL).map(|k| k * count / POOL).collect();
+            index.insert(scaled.highest);
+            Pool::new(all, index.into_iter().collect())
+        });
+        let mut working = vec![(scaled.highest, true)];
+        if form == Form::Worst {
+            working.push((scaled.highest, false));
+        }
+        Self {
+            form,
+            all,
+            pool,
+            blocks: None,
+            working,
+        }
+    }
+
+    /// Follows the program of all points under the limits of `scaled`.
+    pub fn follow(&mut self, scaled: &Scaled) -> Followed {
+        let form = self.form;
+        let mut working = self.working.clone();
+        for _ in 0..ROUNDS {
+            let near = match &self.pool {
+                Some(pool) => pool.points(self.all.coils),
+                None => self.all,
+            };
+            let index = self.pool.as_ref().map(|pool| pool.index.as_slice());
+            let mut followed = solve(scaled, form, &working, near, index);
+            if followed.end != End::Whole {
+                return followed;
+            }
+            let (path, beyond) = probes(scaled, form, &mut followed);
+            let fresh = self.missed(scaled, &[path, beyond]);
+            if fresh.is_empty() {
+                self.remember(&followed);
+                return followed;
+            }
+            if let Some(pool) = &mut self.pool {
+                for point in fresh {
+                    pool.add(self.all, point);
+                }
+            }
+            // The rows that the path rests on are those to begin with.
+            for row in rows_of(&followed, &followed.pieces) {
+                if !working.contains(&row) {
+                    working.push(row);
+                }
+            }
+        }
+        Followed {
+            pieces: Vec::new(),
+            rows: Vec::new(),
+            end: End::Stalled,
+            doubt: 0.0,
+        }
+    }
+
+    /// Points that the probes miss and the pool lacks.
+    fn missed(&mut self, scaled: &Scaled, probes: &[Vec<Probe>]) -> BTreeSet<usize> {
+        let Some(pool) = &self.pool else {
+            return BTreeSet::new();
+        };
+        let (all, form) = (self.all, self.form);
+        let blocks = self
+            .blocks
+            .get_or_insert_with(|| Blocks::new(all, scaled.largest));
+        let missed = probes
+            .iter()
+            .flat_map(|probes| misses(all, blocks, probes, form));
+        missed.filter(|point| !pool.known.contains(point)).collect()
+    }
+
+    /// Another path over the same points begins with the rows at the start of this one.
+    fn remember(&mut self, followed: &Followed) {
+        for row in rows_of(followed, &followed.pieces[..followed.pieces.len().min(1)]) {
+            if !self.working.contains(&row) {
+                self.working.push(row);
+            }
+        }
+    }
+}
+
+/// Points and signs of the rows that pieces rest on.
+fn rows_of(followed: &Followed, pieces: &[Piece]) -> Vec<(usize, bool)> {
+    let used: BTreeSet<usize> = pieces
+        .iter()
+        .flat_map(|piece| piece.active.iter().map(|&(row, _)| row))
+        .collect();
+    used.into_iter()
+        .filter_map(|row| followed.rows[row])
+        .collect()
+}
+
+/// Follows the program of the `working` rows, and of those of the points `near` that it meets.
+fn solve(
+    scaled: &Scaled,
+    form: Form,
+    working: &[(usize, bool)],
+    near: Points,
+    index: Option<&[usize]>,
+) -> Followed {
+    let mut program: Program = scaled.bounds();
+    let first_row = program.rows();
+    let mut rows = vec![None; first_row];
+    for &(j, up) in working {
+        scaled.add_point(&mut program, form, j, up);
+        rows.push(Some((j, up)));
+    }
+    let mut known: BTreeSet<(usize, bool)> = working.iter().copied().collect();
+    let down = (form == Form::Worst).then_some(first_row + 1);
+    let basis = scaled.first_basis(form, first_row, down);
+    let ask = |program: &mut Program, stand: &Stand| {
+        let course = course(scaled, form, stand);
+        let Some((place, up)) = first_missed(near, &course, form) else {
+            return false;
+        };
+        let row = (index.map_or(place, |index| index[place]), up);
+        // A row that is there already is held as well as rounding allows.
+        if !known.insert(row) {
+            return false;
+        }
+        scaled.add_point(program, form, row.0, row.1);
+        rows.push(Some(row));
+        true
+    };
+    let (pieces, end) = program.follow(&basis, ask);
+    Followed {
+        pieces,
+        rows,
+        end,
+        doubt: 0.0,
+    }
+}
+
+/// Where the program stands, in SI units.
+fn course(scaled: &Scaled, form: Form, stand: &Stand) -> Course {
+    let (lambda_unit, force_unit) = (scaled.lambda_unit(), scaled.force_unit());
+    let last = |z: &[Num]| z[z.len() - 1].to_f64();
+    let (lambda, bound) = match form {
+        Form::Worst => (stand.lambda.to_f64(), last(stand.z)),
+        Form::Least => (-last(stand.z), 0.0),
+    };
+    let currents_a = scaled.amperes(stand.z);
+    let lambda_n_per_m = times_power(lambda, lambda_unit);
+    let pushed = scaled.pushed_n(&currents_a);
+    let wanted = lambda_n_per_m.abs() * scaled.height_m() + scaled.offset_n();
+    let moves = form == Form::Worst;
+    let rates_a: Vec<f64> = scaled
+        .amperes(stand.rate)
+        .iter()
+        .map(|&rate| times_power(rate, -lambda_unit))
+        .collect();
+    let rounding = ROUNDINGS * f64::EPSILON;
+    Course {
+        rounding_n: times_power(NOTHING, force_unit) + rounding * (wanted + pushed),
+        rounding_m: rounding * (scaled.height_m() + scaled.pushed_n(&rates_a)),
+        limit_rate_m: if moves {
+            times_power(last(stand.rate), force_unit - lambda_unit)
+        } else {
+            0.0
+        },
+        lambda_rate: if moves { 1.0 } else { 0.0 },
+        step: match stand.step {
+            Some(step) if moves => times_power(step.to_f64(), lambda_unit),
+            _ => f64::INFINITY,
+        },
+        rates_a,
+        at: Probe {
+            lambda_n_per_m,
+            offset_share: 1.0,
+            currents_a,
+            limit_n: times_power(bound, force_unit),
+        },
+    }
+}
+
+/// What the points are asked at every turn, and in the direction of the last piece.
+fn probes(scaled: &Scaled, form: Form, followed: &mut Followed) -> (Vec<Probe>, Vec<Probe>) {
+    let (lambda_unit, force_unit) = (scaled.lambda_unit(), scaled.force_unit());
+    let mut doubt = 0.0_f64;
+    let mut probe = |lambda: f64, offset_share: f64, bound: f64, currents_a: Vec<f64>| {
+        let lambda_n_per_m = times_power(lambda, lambda_unit);
+        let wanted = lambda_n_per_m.abs() * scaled.height_m() + offset_share * scaled.offset_n();
+        let pushed = scaled.pushed_n(&currents_a);
+        let rounding = 2.0 * ROUNDINGS * f64::EPSILON * (wanted + pushed);
+        if wanted > 0.0 {
+            doubt = doubt.max(rounding / wanted);
+        }
+        Probe {
+            lambda_n_per_m,
+            offset_share,
+            currents_a,
+            limit_n: times_power(bound + NOTHING, force_unit) + rounding,
+        }
+    };
+    let (mut all, mut beyond) = (Vec::new(), Vec::new());
+    for piece in &followed.pieces {
+        let last = piece.z[piece.z.len() - 1].to_f64();
+        let (lambda, bound) = match form {
+            Form::Worst => (piece.start.to_f64(), last),
+            Form::Least => (-last, 0.0),
+        };
+        all.push(probe(lambda, 1.0, bound, scaled.currents_a(&piece.z)));
+    }
+    if let (Form::Worst, Some(last)) = (form, followed.pieces.last()) {
+        let bound = last.rate[last.rate.len() - 1].to_f64();
+        beyond.push(probe(1.0, 0.0, bound, scaled.amperes(&last.rate)));
+    }
+    followed.doubt = doubt;
+    (all, beyond)
+}

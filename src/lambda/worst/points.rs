@@ -1,0 +1,104 @@
+//! Points, what they are asked, and which of a few a path misses first.
+
+use super::scaled::Form;
+use crate::numerics::dispatch::{self, Kernel, mul_add};
+
+/// Forces, heights and offsets of some points.
+#[derive(Clone, Copy)]
+pub(super) struct Points<'a> {
+    pub coils: usize,
+    pub forces_n_per_a: &'a [f64],
+    pub height_m: &'a [f64],
+    pub offset_n: Option<&'a [f64]>,
+}
+
+/// What is asked of the points: `lambda h - share offset - G I` at most `limit`.
+#[derive(Debug, Clone)]
+pub(super) struct Probe {
+    pub lambda_n_per_m: f64,
+    /// 1, or 0 for the direction in which a path without end goes on.
+    pub offset_share: f64,
+    pub currents_a: Vec<f64>,
+    pub limit_n: f64,
+}
+
+/// Where a path stands, in SI units, and how it goes on per unit of lambda.
+pub(super) struct Course {
+    pub at: Probe,
+    /// Errors that rounding explains are no misses.
+    pub rounding_n: f64,
+    pub rates_a: Vec<f64>,
+    pub limit_rate_m: f64,
+    /// 1 where lambda moves, 0 where it does not.
+    pub lambda_rate: f64,
+    /// Rates that rounding explains, m.
+    pub rounding_m: f64,
+    /// Nothing beyond this step matters.
+    pub step: f64,
+}
+
+/// The point that a path misses first on its course: where it is missed already the one missed
+/// most, where several are at once the one that is left fastest.
+pub(super) fn first_missed(points: Points, course: &Course, form: Form) -> Option<(usize, bool)> {
+    dispatch::run(First {
+        points,
+        course,
+        form,
+    })
+}
+
+struct First<'a> {
+    points: Points<'a>,
+    course: &'a Course,
+    form: Form,
+}
+
+impl Kernel for First<'_> {
+    type Output = Option<(usize, bool)>;
+
+    #[inline(always)]
+    fn run<const FMA: bool>(self) -> Option<(usize, bool)> {
+        let (points, course) = (self.points, self.course);
+        let coils = points.coils;
+        let signs: &[f64] = if self.form == Form::Worst {
+            &[1.0, -1.0]
+        } else {
+            &[1.0]
+        };
+        let (mut missed, mut most) = (None, course.rounding_n);
+        let (mut first, mut least, mut fastest) = (None, course.step, 0.0);
+        for (j, &height) in points.height_m.iter().enumerate() {
+            let row = &points.forces_n_per_a[j * coils..(j + 1) * coils];
+            let offset = points.offset_n.map_or(0.0, |offset| offset[j]);
+            let mut rest = course.at.lambda_n_per_m * height - offset;
+            let mut rate = course.lambda_rate * height;
+            for ((&force, &current), &speed) in
+                row.iter().zip(&course.at.currents_a).zip(&course.rates_a)
+            {
+                rest = mul_add::<FMA>(-force, current, rest);
+                rate = mul_add::<FMA>(-force, speed, rate);
+            }
+            for &sign in signs {
+                let over = sign * rest - course.at.limit_n;
+                if over > most {
+                    (missed, most) = (Some((j, sign > 0.0)), over);
+                }
+                let speed = sign * rate - course.limit_rate_m;
+                if speed <= course.rounding_m {
+                    continue;
+                }
+                // Within rounding of its limit a point is at it.
+                let slack = if over >= -course.rounding_n {
+                    0.0
+                } else {
+                    -over
+                };
+                let step = slack / speed;
+                if step < least || (step == least && speed > fastest) {
+                    (first, least, fastest) = (Some((j, sign > 0.0)), step, speed);
+                }
+            }
+        }
+        missed.or(first)
+    }
+}

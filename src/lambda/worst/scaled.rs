@@ -1,0 +1,251 @@
+//! Currents, forces and limits in units of order one, all of them powers of two.
+//!
+//! With `2^k_i` near the largest force per ampere of coil i and `2^f` near the largest force
+//! within the limits, `x_i = I_i 2^(k_i - f)`, `t' = t 2^-f` and `lambda' = lambda 2^(k_h - f)`.
+
+use crate::numerics::double_double::DoubleDouble as Num;
+use crate::numerics::real::Real;
+
+use super::program::Program;
+use crate::lambda::problem::ForceProblem;
+use crate::lambda::reduce::{exponent_of, times_power};
+
+/// What rounding leaves of a scaled current of zero.
+const NOTHING: f64 = 1e-24;
+
+/// Which rows a point contributes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Form {
+    /// `|lambda h - offset - G I| <= t`, least t.
+    Worst,
+    /// `G I + offset >= lambda h`, largest lambda.
+    Least,
+}
+
+/// Limits that apply.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Limits {
+    /// All.
+    All,
+    /// Only the lower ones.
+    Lower,
+}
+
+/// The scales of one problem.
+pub(super) struct Scaled<'a> {
+    pub problem: &'a ForceProblem<'a>,
+    /// Largest force per ampere of every coil, largest height, largest offset, all absolute.
+    pub largest: &'a [f64],
+    /// The point of the largest height, absolute in the worst-point form.
+    pub highest: usize,
+    force: i32,
+    limits: Limits,
+    /// The coils that have any effect, on forces or on what others may carry.
+    pub live: Vec<usize>,
+}
+
+impl<'a> Scaled<'a> {
+    pub fn new(
+        problem: &'a ForceProblem<'a>,
+        largest: &'a [f64],
+        form: Form,
+        limits: Limits,
+    ) -> Self {
+        let coils = problem.coils();
+        let reach = |i: usize| problem.upper_a[i].max(-problem.lower_a[i]);
+        let moves = |i: usize| limits == Limits::Lower || reach(i) > 0.0;
+        // A coil without force may still carry a negative current and so make room in the sum.
+        let summed = limits == Limits::All && problem.total_max_a.is_some();
+        let counts = |i: usize| largest[i] > 0.0 || (summed && problem.lower_a[i] < 0.0);
+        let live: Vec<usize> = (0..coils).filter(|&i| counts(i) && moves(i)).collect();
+        let force = (0..coils)
+            .filter(|&i| largest[i] > 0.0 && reach(i) > 0.0)
+            .map(|i| exponent_of(reach(i)) + exponent_of(largest[i]))
+            .max()
+            .unwrap_or_else(|| exponent_of(largest[coils]));
+        let size = |j: usize| match form {
+            Form::Worst => problem.height_m[j].abs(),
+            Form::Least => problem.height_m[j],
+        };
+        let points = 1..problem.points();
+        let highest = points.fold(0, |best, j| if size(j) > size(best) { j } else { best });
+        Self {
+            problem,
+            largest,
+            highest,
+            force,
+            limits,
+            live,
+        }
+    }
+
+    /// Largest |height|, m.
+    pub fn height_m(&self) -> f64 {
+        self.largest[self.problem.coils()]
+    }
+
+    /// Largest |offset|, N.
+    pub fn offset_n(&self) -> f64 {
+        let offset = self.largest.get(self.problem.coils() + 1);
+        offset.copied().unwrap_or(0.0)
+    }
+
+    /// Exponent of coil i's force per ampere; without force, one that suits its limits.
+    fn column(&self, i: usize) -> i32 {
+        if self.largest[i] > 0.0 {
+            return exponent_of(self.largest[i]);
+        }
+        let reach = self.problem.upper_a[i].max(-self.problem.lower_a[i]);
+        self.force - exponent_of(reach)
+    }
+
+    fn height(&self) -> i32 {
+        exponent_of(self.height_m())
+    }
+
+    /// One unit of lambda', N/m.
+    pub fn lambda_unit(&self) -> i32 {
+        self.force - self.height()
+    }
+
+    /// One unit of force, N.
+    pub fn force_unit(&self) -> i32 {
+        self.force
+    }
+
+    /// Largest scaled height: 0, or between 1 and 2.
+    pub fn top(&self) -> Num {
+        Num::of(times_power(self.height_m(), -self.height()))
+    }
+
+    /// Size of the forces that currents sum up, N, or of their rates.
+    pub fn pushed_n(&self, amperes: &[f64]) -> f64 {
+        let pairs = amperes.iter().zip(self.largest);
+        pairs.map(|(ampere, most)| ampere.abs() * most).sum()
+    }
+
+    /// Currents, or their rates per unit of lambda', of all coils.
+    pub fn amperes(&self, z: &[Num]) -> Vec<f64> {
+        let mut amperes = vec![0.0; self.problem.coils()];
+        for (&i, x) in self.live.iter().zip(z) {
+            let x = x.to_f64();
+            if x.abs() > NOTHING {
+                amperes[i] = times_power(x, self.force - self.column(i));
+            }
+        }
+        amperes
+    }
+
+    /// Currents of all coils, A, within their limits after rounding too.
+    pub fn currents_a(&self, z: &[Num]) -> Vec<f64> {
+        let mut currents = self.amperes(z);
+        for (i, current) in currents.iter_mut().enumerate() {
+            *current = current.max(self.problem.lower_a[i]);
+            if self.limits == Limits::All {
+                *current = current.min(self.problem.upper_a[i]);
+            }
+        }
+        currents
+    }
+
+    /// The program with its bounds, before any point. Coil `live[k]` has the row `k` of its
+    /// lower limit; with all limits, its upper one is row `live + k`.
+    pub fn bounds(&self) -> Program {
+        let scaled = |i: usize, v: f64| Num::of(times_power(v, self.column(i) - self.force));
+        // The second objective: the sum of the currents of coils that cannot pull, in units of
+        // the coil with the largest of them.
+        let ampere = |i: usize| self.force - self.column(i);
+        let most = self.live.iter().map(|&i| ampere(i)).max().unwrap_or(0);
+        let weight = |i: usize| Num::of(times_power(1.0, ampere(i) - most));
+        let second = self
+            .live
+            .iter()
+            .map(|&i| {
+                if self.problem.lower_a[i] < 0.0 {
+                    Num::ZERO
+                } else {
+                    weight(i)
+                }
+            })
+            .collect();
+        let offset = times_power(self.offset_n(), -self.force);
+        let mut program = Program::new(second, [offset, self.top().to_f64()]);
+        for (k, &i) in self.live.iter().enumerate() {
+            program.at_least(k, scaled(i, self.problem.lower_a[i]));
+        }
+        if self.limits == Limits::Lower {
+            return program;
+        }
+        for (k, &i) in self.live.iter().enumerate() {
+            program.at_most(k, scaled(i, self.problem.upper_a[i]));
+        }
+        if let Some(total_a) = self.problem.total_max_a {
+            let upper = self.live.iter().map(|&i| Num::of(self.problem.upper_a[i]));
+            let all = upper.fold(Num::ZERO, |sum, u| sum + u);
+            if all > Num::of(total_a) {
+                let mut row: Vec<Num> = self.live.iter().map(|&i| -weight(i)).collect();
+                row.push(Num::ZERO);
+                program.dense(&row, -Num::of(times_power(total_a, -most)), Num::ZERO);
+            }
+        }
+        program
+    }
+
+    /// Adds the row of point `j`: the force too weak (`up`), or too strong.
+    pub fn add_point(&self, program: &mut Program, form: Form, j: usize, up: bool) -> usize {
+        let coils = self.problem.coils();
+        let sign = if up { Num::ONE } else { -Num::ONE };
+        let forces = &self.problem.forces_n_per_a[j * coils..(j + 1) * coils];
+        let force = |&i: &usize| sign * Num::of(times_power(forces[i], -self.column(i)));
+        let mut row: Vec<Num> = self.live.iter().map(force).collect();
+        let height = Num::of(times_power(self.problem.height_m[j], -self.height()));
+        let offset = self.problem.offset_n.map_or(0.0, |offset| offset[j]);
+        let constant = -(sign * Num::of(times_power(offset, -self.force)));
+        match form {
+            Form::Worst => {
+                row.push(Num::ONE);
+                program.dense(&row, constant, sign * height)
+            }
+            Form::Least => {
+                row.push(height);
+                program.dense(&row, constant, Num::ZERO)
+            }
+        }
+    }
+
+    /// A first set of active rows whose multipliers are not negative, for a program that has the
+    /// rows `up` and `down` of the highest point.
+    pub fn first_basis(&self, form: Form, up: usize, down: Option<usize>) -> Vec<usize> {
+        let coils = self.problem.coils();
+        let j = self.highest;
+        let force = |k: usize| self.problem.forces_n_per_a[j * coils + self.live[k]];
+        let all = 0..self.live.len();
+        if form == Form::Least {
+            // Each coil at the limit that helps this point most.
+            let limit = |k: usize| {
+                if force(k) > 0.0 {
+                    self.live.len() + k
+                } else {
+                    k
+                }
+            };
+            return all.map(limit).chain([up]).collect();
+        }
+        // Both rows of the point with one half each, met by the coil that moves it at the least
+        // of the second objective; the others rest at their lower limits.
+        let cost = |k: usize| {
+            let pull = self.problem.lower_a[self.live[k]] < 0.0;
+            let size = times_power(force(k).abs(), -self.column(self.live[k]));
+            let ampere = times_power(1.0, -self.column(self.live[k]));
+            if pull { 0.0 } else { ampere / size }
+        };
+        let chosen = all
+            .clone()
+            .filter(|&k| force(k) != 0.0)
+            .reduce(|a, b| if cost(b) < cost(a) { b } else { a });
+        match (chosen, down) {
+            (Some(chosen), Some(down)) => all.filter(|&k| k != chosen).chain([up, down]).collect(),
+            _ => all.chain([up]).collect(),
+        }
+    }
+}

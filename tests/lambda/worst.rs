@@ -1,0 +1,411 @@
+//! The worst-point form against every vertex of small problems, and on degenerate ones.
+
+use fluxform::lambda::worst::{WorstSolution, maxmin, worst_point};
+use fluxform::lambda::{Settings, solve};
+
+use crate::case::{Case, Numbers, small_case};
+use crate::vertices::Vertices;
+
+fn solved(case: &Case) -> WorstSolution {
+    worst_point(&case.problem(), &Settings::default()).expect("a well-formed problem")
+}
+
+fn top(case: &Case) -> f64 {
+    case.heights
+        .iter()
+        .fold(0.0, |most: f64, h| most.max(h.abs()))
+}
+
+/// Force constants at, between and beyond the turns.
+fn telling(solution: &WorstSolution) -> Vec<f64> {
+    let turns: Vec<f64> = solution
+        .path
+        .turns()
+        .iter()
+        .map(|t| t.lambda_n_per_m)
+        .collect();
+    let mut all = vec![0.0];
+    for pair in turns.windows(2) {
+        all.extend([0.5 * (pair[0] + pair[1]), pair[1]]);
+    }
+    let last = turns[turns.len() - 1];
+    all.extend([last * 1.3 + 0.7, last * 17.0 + 0.3]);
+    all
+}
+
+fn assert_within_limits(case: &Case, currents: &[f64], what: &str) {
+    for (i, &current) in currents.iter().enumerate() {
+        let (low, high) = (case.lower[i], case.upper[i]);
+        let grain = 4.0 * f64::EPSILON * (high - low);
+        assert!(
+            (low - grain..=high + grain).contains(&current),
+            "{what}: coil {i} {current}"
+        );
+    }
+    if let Some(total) = case.total {
+        let sum: f64 = currents.iter().sum();
+        let size: f64 = currents.iter().map(|v| v.abs()).sum();
+        assert!(sum <= total + 1e-14 * size, "{what}: {sum} above {total}");
+    }
+}
+
+/// Everything that holds at any force constant; the oracle where it is affordable.
+fn check(case: &Case, what: &str) -> WorstSolution {
+    let solution = solved(case);
+    assert!(solution.complete, "{what}: stalled, {case:?}");
+    let most_offset = case
+        .offset
+        .iter()
+        .flatten()
+        .fold(0.0_f64, |most, o| most.max(o.abs()));
+    let vertices = (case.coils() < 4).then(|| Vertices::new(case, true));
+    for lambda in telling(&solution) {
+        let scale = lambda * top(case) + most_offset;
+        let point = solution.at(&case.problem(), lambda);
+        assert_within_limits(case, &point.currents_a, what);
+        let told = solution.path.worst_error_n(lambda);
+        let sum = |amperes: &dyn Fn(usize) -> f64| -> f64 {
+            let column = |i: usize| case.forces.iter().skip(i).step_by(case.coils());
+            let most = |i: usize| column(i).fold(0.0_f64, |m, g| m.max(g.abs()));
+            (0..case.coils()).map(|i| most(i) * amperes(i)).sum()
+        };
+        let rounding = 1e-13 * scale + 1e-14 * sum(&|i| point.currents_a[i].abs()) + 1e-25;
+        // Rounded multipliers leave forces times what the limits allow.
+        let proof = rounding + 1e-15 * sum(&|i| case.upper[i] - case.lower[i]);
+        assert!(
+            (point.worst_error_n - told).abs() <= rounding,
+            "{what} at {lambda}: currents give {:e}, path {told:e}; {case:?}",
+            point.worst_error_n
+        );
+        assert!(
+            point.gap_n <= proof,
+            "{what} at {lambda}: gap {:e} of {proof:e}; {case:?}",
+            point.gap_n
+        );
+        if let (Some(vertices), true) = (&vertices, scale > 0.0) {
+            let exact = vertices.least(lambda, scale);
+            assert!(
+                (exact - told).abs() <= rounding,
+                "{what} at {lambda}: {told:e} not {exact:e}; {case:?}"
+            );
+        }
+    }
+    solution
+}
+
+#[test]
+fn small_problems_match_every_vertex() {
+    for seed in 0..600 {
+        check(&small_case(seed), &format!("{seed}"));
+    }
+}
+
+#[test]
+fn an_offset_is_part_of_it() {
+    for seed in 0..300 {
+        let mut case = small_case(seed);
+        let mut n = Numbers(seed + 4711);
+        let strength = [0.01, 0.3, 5.0][n.below(3)];
+        case.offset = Some(case.heights.iter().map(|_| strength * n.normal()).collect());
+        check(&case, &format!("offset {seed}"));
+    }
+}
+
+/// t*, its constants and its proof do not depend on how the problem is written.
+#[test]
+fn scales_copies_and_order_do_not_matter() {
+    for seed in 0..150 {
+        let base = small_case(seed);
+        let mut scaled = base.clone();
+        let (force, height, current) = (3e-7, 2e5, 7e9);
+        scaled.forces.iter_mut().for_each(|v| *v *= force);
+        scaled.heights.iter_mut().for_each(|v| *v *= height);
+        let amperes = scaled.upper.iter_mut().chain(&mut scaled.lower);
+        amperes.chain(&mut scaled.total).for_each(|v| *v *= current);
+        let mut twice = base.clone();
+        twice.forces.extend_from_within(..);
+        twice.heights.extend_from_within(..);
+        let mut turned = base.clone();
+        let m = base.coils();
+        turned.heights.reverse();
+        turned.forces = base.forces.chunks(m).rev().flatten().copied().collect();
+        let told = solved(&base);
+        for (case, factor, size) in [
+            (scaled, force * current / height, force * current),
+            (twice, 1.0, 1.0),
+            (turned, 1.0, 1.0),
+        ] {
+            let other = solved(&case);
+            assert!(other.complete);
+            let part = 4e-12 + 4.0 * told.accuracy.estimate;
+            let pairs = [
+                (told.lambda_linear_n_per_m, other.lambda_linear_n_per_m),
+                (told.lambda_jnd_n_per_m, other.lambda_jnd_n_per_m),
+            ];
+            for (a, b) in pairs {
+                assert_eq!(a.is_some(), b.is_some(), "{seed}: {base:?}");
+                let (a, b) = (a.unwrap_or(0.0) * factor, b.unwrap_or(0.0));
+                assert!(
+                    (a - b).abs() <= 250.0 * part * a.abs(),
+                    "{seed}: {a} {b} {base:?}"
+                );
+            }
+            for lambda in telling(&told) {
+                let (a, b) = (
+                    told.path.worst_error_n(lambda) * size,
+                    other.path.worst_error_n(lambda * factor),
+                );
+                let scale = lambda * top(&base) * size;
+                assert!(
+                    (a - b).abs() <= part * scale,
+                    "{seed} at {lambda}: {a:e} {b:e} {scale:e}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_path_is_convex_and_its_constants_are_where_they_are_defined() {
+    for seed in 0..400 {
+        let case = small_case(seed);
+        if case.coils() > 3 || top(&case) == 0.0 {
+            continue;
+        }
+        let solution = solved(&case);
+        let turns = solution.path.turns();
+        let slope = |k: usize| {
+            let (a, b) = (&turns[k], &turns[k + 1]);
+            (b.worst_error_n - a.worst_error_n) / (b.lambda_n_per_m - a.lambda_n_per_m)
+        };
+        for k in 2..turns.len() {
+            let step = turns[k].lambda_n_per_m - turns[k - 1].lambda_n_per_m;
+            let grain = 1e-12 * top(&case) * (1.0 + turns[k].lambda_n_per_m / step);
+            assert!(slope(k - 1) >= slope(k - 2) - grain, "{seed}: {turns:?}");
+        }
+        let (limited, free) = (Vertices::new(&case, true), Vertices::new(&case, false));
+        // The part of lambda max h by which limits add to the error.
+        let excess = |lambda: f64| {
+            let scale = lambda * top(&case);
+            (limited.least(lambda, scale) - free.least(lambda, scale)) / scale
+        };
+        // Currents that nearly cancel leave rounding in forces, which the estimate tells.
+        if solution.accuracy.estimate > 1e-12 {
+            continue;
+        }
+        let far = (turns[turns.len() - 1].lambda_n_per_m + 0.1) * 1e3;
+        match solution.lambda_linear_n_per_m {
+            None => assert!(excess(far) < 1e-9, "{seed}: {case:?}"),
+            Some(linear) => {
+                assert!(
+                    linear == 0.0 || excess(linear * (1.0 - 1e-9)) < 1e-11,
+                    "{seed}: {case:?}"
+                );
+                let near = if linear == 0.0 {
+                    far * 1e-9
+                } else {
+                    linear * 1.01
+                };
+                assert!(excess(near) > 1e-12, "{seed}: {linear} {case:?}");
+            }
+        }
+        match solution.lambda_jnd_n_per_m {
+            None => assert!(excess(far) <= 0.07 + 1e-9, "{seed}: {case:?}"),
+            Some(jnd) => {
+                if jnd > 0.0 {
+                    assert!((excess(jnd) - 0.07).abs() < 1e-10, "{seed}: {jnd} {case:?}");
+                }
+                for factor in [1.001, 1.1, 3.0, 1e3] {
+                    let beyond = jnd * factor + if jnd == 0.0 { far } else { 0.0 };
+                    assert!(excess(beyond) > 0.07, "{seed}: {jnd} {case:?}");
+                }
+            }
+        }
+        if case.lower.iter().all(|&low| low == 0.0) {
+            let floor = solution.floor.expect("something is wanted");
+            assert!((floor - free.least(1.3, top(&case)) / (1.3 * top(&case))).abs() < 1e-12);
+        }
+    }
+}
+
+/// The most by vertices: `min -lambda` is the worst-point program with heights in place of ones.
+#[test]
+fn maxmin_leaves_no_point_too_weak_and_nothing_better_is_found() {
+    for seed in 0..300 {
+        let mut case = small_case(seed);
+        let mut n = Numbers(seed + 99);
+        if n.below(3) == 0 {
+            case.offset = Some(case.heights.iter().map(|_| 0.1 * n.unit()).collect());
+        }
+        let Some(found) = maxmin(&case.problem()).expect("well formed") else {
+            assert_eq!(top(&case), 0.0, "{seed}: {case:?}");
+            continue;
+        };
+        assert_within_limits(&case, &found.currents_a, "maxmin");
+        let m = case.coils();
+        let lambda = found.lambda_n_per_m;
+        let offset = |j: usize| case.offset.as_ref().map_or(0.0, |o| o[j]);
+        let least = |currents: &[f64], lambda: f64| {
+            let spare = |j: usize| {
+                let row = &case.forces[j * m..(j + 1) * m];
+                let pushed: f64 = row.iter().zip(currents).map(|(g, i)| g * i).sum();
+                pushed + offset(j) - lambda * case.heights[j]
+            };
+            (0..case.heights.len())
+                .map(spare)
+                .fold(f64::INFINITY, f64::min)
+        };
+        let size = lambda * top(&case) + 1e-3;
+        assert!(
+            least(&found.currents_a, lambda) >= -1e-13 * size,
+            "{seed}: {case:?}"
+        );
+        // With an offset of -lambda h and no height, t* tells whether a lambda can be held.
+        let beyond = lambda * (1.0 + 1e-9) + 1e-9;
+        let reachable = |lambda: f64| {
+            // |t - (G I + offset - lambda h)| <= t for large t: one-sided by a shift.
+            let shift = 10.0
+                * (1.0
+                    + size
+                    + case
+                        .forces
+                        .iter()
+                        .zip(case.upper.iter().cycle())
+                        .map(|(g, u)| (g * u).abs())
+                        .sum::<f64>());
+            let mut sided = case.clone();
+            sided.offset = Some(
+                (0..case.heights.len())
+                    .map(|j| shift + offset(j) - lambda * case.heights[j])
+                    .collect(),
+            );
+            sided.heights = vec![0.0; case.heights.len()];
+            // The upper rows: least of max (shift + spare) is not asked; negate to get the least.
+            sided.forces.iter_mut().for_each(|g| *g = -*g);
+            sided
+                .offset
+                .iter_mut()
+                .flatten()
+                .for_each(|o| *o = 2.0 * shift - *o);
+            shift - solved(&sided).path.worst_error_n(0.0)
+        };
+        if case.heights.iter().all(|&h| h > 0.0) {
+            assert!(
+                reachable(lambda) >= -1e-12 * size,
+                "{seed}: {} {case:?}",
+                reachable(lambda)
+            );
+            assert!(
+                reachable(beyond) < 0.0,
+                "{seed}: {} {case:?}",
+                reachable(beyond)
+            );
+        }
+    }
+}
+
+#[test]
+fn degenerate_problems_have_their_closed_answers() {
+    let one = Case {
+        forces: vec![0.7, 0.4],
+        heights: vec![0.05],
+        offset: None,
+        lower: vec![0.0; 2],
+        upper: vec![1.3, 0.9],
+        total: None,
+        ohm: vec![6.0; 2],
+    };
+    let most = 0.7 * 1.3 + 0.4 * 0.9;
+    let close = |a: Option<f64>, b: f64| (a.expect("binds") / b - 1.0).abs() < 1e-14;
+    let mut many = one.clone();
+    many.forces = one.forces.repeat(50);
+    many.heights = one.heights.repeat(50);
+    for case in [&one, &many] {
+        let solution = solved(case);
+        assert!(close(solution.lambda_linear_n_per_m, most / 0.05));
+        assert!(close(solution.lambda_jnd_n_per_m, most / 0.05 / 0.93));
+        assert!(close(
+            maxmin(&case.problem())
+                .expect("well formed")
+                .map(|m| m.lambda_n_per_m),
+            most / 0.05
+        ));
+        assert_eq!(solution.floor, Some(0.0));
+    }
+    let mut flat = one.clone();
+    flat.heights = vec![0.0];
+    let solution = solved(&flat);
+    assert_eq!(
+        (solution.lambda_linear_n_per_m, solution.floor),
+        (None, None)
+    );
+    assert_eq!(solution.path.worst_error_n(3.0), 0.0);
+    assert_eq!(maxmin(&flat.problem()).expect("well formed"), None);
+    let mut attract = one.clone();
+    attract.forces.iter_mut().for_each(|g| *g = -*g);
+    let solution = solved(&attract);
+    assert_eq!(
+        (solution.lambda_linear_n_per_m, solution.lambda_jnd_n_per_m),
+        (None, None)
+    );
+    assert_eq!(solution.floor, Some(1.0));
+    let mut broken = one.clone();
+    broken.upper = vec![0.0; 2];
+    let solution = solved(&broken);
+    assert_eq!(solution.lambda_linear_n_per_m, Some(0.0));
+    assert_eq!(solution.lambda_jnd_n_per_m, Some(0.0));
+    assert_eq!(solution.path.currents_a(2.0), [0.0, 0.0]);
+    assert!((solution.path.worst_error_n(2.0) - 0.1).abs() < 1e-16);
+}
+
+#[test]
+fn weights_count_points_as_often_as_they_say() {
+    for seed in 0..200 {
+        let case = small_case(seed);
+        let mut n = Numbers(seed + 31);
+        let times: Vec<usize> = case.heights.iter().map(|_| 1 + n.below(4)).collect();
+        let m = case.coils();
+        let mut repeated = case.clone();
+        repeated.forces.clear();
+        repeated.heights.clear();
+        for (j, &count) in times.iter().enumerate() {
+            for _ in 0..count {
+                repeated
+                    .forces
+                    .extend_from_slice(&case.forces[j * m..(j + 1) * m]);
+                repeated.heights.push(case.heights[j]);
+            }
+        }
+        let weights: Vec<f64> = times.iter().map(|&count| 0.013 * count as f64).collect();
+        let mut problem = case.problem();
+        problem.weights = Some(&weights);
+        let settings = Settings {
+            at_n_per_m: Some(1.7),
+            ..Settings::default()
+        };
+        let weighted = solve(&problem, &settings).expect("well formed");
+        let plain = solve(&repeated.problem(), &settings).expect("well formed");
+        let scale = 1.7 * 1.7 * repeated.mean_square();
+        let (a, b) = (
+            weighted.at.expect("asked for"),
+            plain.at.expect("asked for"),
+        );
+        assert!(
+            (a.rms_error_n.powi(2) - b.rms_error_n.powi(2)).abs() <= 1e-13 * scale,
+            "{seed}: {case:?}"
+        );
+        assert!(
+            a.duality_gap_n2 <= b.duality_gap_n2 + 1e-12 * scale + 1e-15,
+            "{seed}"
+        );
+        let pairs = [
+            (weighted.lambda_linear_n_per_m, plain.lambda_linear_n_per_m),
+            (weighted.lambda_jnd_n_per_m, plain.lambda_jnd_n_per_m),
+        ];
+        for (a, b) in pairs {
+            assert_eq!(a.is_some(), b.is_some(), "{seed}: {case:?}");
+            let (a, b) = (a.unwrap_or(0.0), b.unwrap_or(0.0));
+            assert!((a - b).abs() <= 1e-9 * b, "{seed}: {a} {b} {case:?}");
+        }
+    }
+}
