@@ -19,6 +19,7 @@
 
 mod blocks;
 mod criteria;
+mod felt;
 mod generate;
 mod maxmin;
 mod path;
@@ -27,6 +28,7 @@ mod program;
 mod proof;
 mod scaled;
 
+pub use felt::{Felt, felt};
 pub(super) use maxmin::largest;
 pub use maxmin::{Maxmin, maxmin};
 pub use path::{ActivePoint, Turn, WorstPath};
