@@ -178,7 +178,13 @@ fn solved(
             .zip(base)
             .filter(|&(_, base)| base > 0.0)
             .map(|(lambda, base)| lambda / base - 1.0)
-            .map(|change| if change.abs() < NO_CHANGE { 0.0 } else { change }),
+            .map(|change| {
+                if change.abs() < NO_CHANGE {
+                    0.0
+                } else {
+                    change
+                }
+            }),
         rms_error_n: chosen.map(|chosen| chosen.rms_error_n),
         relative_rms_error: chosen.and_then(|chosen| chosen.relative_rms_error),
         worst_error_n: chosen.map(|chosen| chosen.worst_error_n),
