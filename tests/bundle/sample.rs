@@ -157,6 +157,9 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
             worst_point: None,
         }),
         worst_point: None,
+        tolerance: None,
+        wiring: None,
+        variants: None,
         working_point: None,
         accuracy: accuracy.clone(),
     };
