@@ -105,7 +105,7 @@ fn nothing_to_render_is_told_not_computed() {
         .iter()
         .find(|v| v["name"] == "push and pull")
         .unwrap();
-    assert!(both["lambda_n_per_m"].as_f64().unwrap() > 0.0);
+    assert!(both["lambda_saturation_n_per_m"].as_f64().unwrap() > 0.0);
     // No current at all.
     let line = air
         .lines()

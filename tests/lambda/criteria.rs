@@ -1,6 +1,9 @@
 //! Every criterion of thousands of small problems against a second exact method: all vertices,
 //! or proofs from both sides that share no code with the path.
 
+// The largest errors found are told with --nocapture.
+#![allow(clippy::print_stdout)]
+
 use fluxform::lambda::worst::{felt, maxmin, worst_point};
 use fluxform::lambda::{Settings, Status, Wiring, solve};
 use fluxform::units::DETECTION_THRESHOLD_N;
