@@ -59,6 +59,16 @@ pub struct LambdaFile {
     /// The same by the largest error at any point; absent in files of programs without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub worst_point: Option<WorstPointFile>,
+    /// The largest lambda whose errors are not felt at any point; absent in files of programs
+    /// without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<TolerancePoint>,
+    /// Coils broken or in series on request; absent when none are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wiring: Option<WiringFile>,
+    /// The same object with one change at a time, the first as given; absent when not asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub variants: Option<Vec<LambdaVariant>>,
     /// Currents and errors at the lambda asked for with `--at`; absent when none was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at: Option<AtLambda>,
@@ -92,6 +102,72 @@ pub struct SampledPoints {
     pub grid_lambda_n_per_m: Option<f64>,
     /// The chosen lambda over that of the grid, less 1.
     pub relative_change: Option<f64>,
+}
+
+/// The largest lambda up to which every point's error can be kept within
+/// `max(share lambda h, threshold)`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TolerancePoint {
+    /// N/m; null where no force is wanted, where any is tolerated, or where none can be kept.
+    pub lambda_n_per_m: Option<f64>,
+    /// The part of the wanted force that is not felt: `jnd`.
+    pub share: f64,
+    /// The force that is not felt at all, N.
+    pub threshold_n: f64,
+    /// The point whose error takes up most of its tolerance, a row of `points.csv` from 0.
+    pub point: Option<usize>,
+    /// That part of its tolerance.
+    pub part: Option<f64>,
+    /// Currents that keep it, A, one a coil of the array.
+    pub currents_a: Option<Vec<f64>>,
+}
+
+/// Coils that do not carry a current of their own.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct WiringFile {
+    /// Coils without current.
+    pub broken: Vec<usize>,
+    /// Pairs with one current, which counts once in the sum that the supply limits.
+    pub series: Vec<[usize; 2]>,
+}
+
+/// The force constants with one change.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LambdaVariant {
+    /// What is changed.
+    pub name: String,
+    /// Coils without current.
+    pub broken: Vec<usize>,
+    /// Pairs in series.
+    pub series: Vec<[usize; 2]>,
+    /// Whether the force without currents counts.
+    pub passive_force: bool,
+    /// Whether any coil may carry a negative current.
+    pub pulls: bool,
+    /// N/m.
+    pub lambda_linear_n_per_m: Option<f64>,
+    /// N/m.
+    pub lambda_jnd_n_per_m: Option<f64>,
+    /// N/m.
+    pub lambda_saturation_n_per_m: Option<f64>,
+    /// N/m.
+    pub lambda_maxmin_n_per_m: Option<f64>,
+    /// N/m.
+    pub worst_point_lambda_jnd_n_per_m: Option<f64>,
+    /// The one chosen, N/m.
+    pub lambda_n_per_m: Option<f64>,
+    /// Its change relative to the chosen one as given.
+    pub relative_change: Option<f64>,
+    /// At the chosen lambda, A, one a coil of the array.
+    pub currents_a: Option<Vec<f64>>,
+    /// N.
+    pub rms_error_n: Option<f64>,
+    /// RMS error over lambda times the RMS height.
+    pub relative_rms_error: Option<f64>,
+    /// N.
+    pub worst_error_n: Option<f64>,
+    /// Power in the coils at the chosen lambda, W.
+    pub power_w: Option<f64>,
 }
 
 /// Forces along the B-H curve at the chosen currents.

@@ -181,6 +181,14 @@ pub fn force_constant(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Two coils, like `0+8`.
+pub fn pair(text: &str) -> Result<[usize; 2], String> {
+    let coil = |text: &str| text.trim().parse::<usize>().ok();
+    let coils = text.split_once('+');
+    let found = coils.and_then(|(a, b)| Some([coil(a)?, coil(b)?]));
+    found.ok_or_else(|| format!("{text:?} is no pair of coils: expected two numbers, like 0+8"))
+}
+
 /// A length in millimetres, 0 or more; m.
 pub fn length(text: &str) -> Result<f64, String> {
     let value = number(text)?;

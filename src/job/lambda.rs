@@ -1,5 +1,7 @@
 //! `lambda`: the force constant of one object, from forces computed at its points.
 
+mod variants;
+
 use std::collections::BTreeMap;
 
 use self::points::WantedPoints;
@@ -20,7 +22,7 @@ use crate::bundle::lambda_file::{
 use crate::design::{Design, MagnetModel};
 use crate::field::steel::inside::peak_depth_m;
 use crate::lambda::worst::{WorstSolution, worst_point};
-use crate::lambda::{self, Criterion, ForceProblem, Precision, Settings, Solution, Status};
+use crate::lambda::{self, Criterion, ForceProblem, Precision, Settings, Solution, Status, Wiring};
 use crate::progress::Progress;
 use crate::shape::document::ShapeDocument;
 
@@ -31,7 +33,7 @@ mod points_effect;
 const PATCHES_A_HEIGHT: f64 = 16.0;
 
 /// What is asked.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct LambdaOptions {
     /// Criterion, its weight, and a force constant of interest.
     pub settings: Settings,
@@ -39,6 +41,10 @@ pub struct LambdaOptions {
     pub tolerance: Option<f64>,
     /// Points on no grid, weighted by area, instead of the grid's; of [`run`] alone.
     pub sampling: Option<Sampling>,
+    /// Coils broken or in series.
+    pub wiring: Wiring,
+    /// Whether single changes are tried besides.
+    pub variants: bool,
 }
 
 impl LambdaReport {
@@ -218,15 +224,24 @@ fn solve_at(
 ) -> Result<Found, JobError> {
     let positions = &points.positions_m;
     let forces = scene.forces_n_per_a(solved, positions, progress)?;
-    let pull = if scene.design.magnet.passive_force {
+    let counts = scene.design.magnet.passive_force;
+    let pull = if counts || options.variants {
         passive::pull(scene, positions, false)?
     } else {
         None
     };
-    let offset_n = pull.as_ref().map(|pull| pull.forces_z_n(positions));
+    let passive_n = pull.as_ref().map(|pull| pull.forces_z_n(positions));
+    let (pull, offset_n) = (
+        pull.filter(|_| counts),
+        passive_n.clone().filter(|_| counts),
+    );
     progress.begin("lambda", 1);
     let resistance_ohm = scene.resistances_ohm();
-    let problem = ForceProblem {
+    options
+        .wiring
+        .validate(scene.coils.len())
+        .map_err(|wrong| JobError::Input(wrong.to_string()))?;
+    let given = ForceProblem {
         forces_n_per_a: &forces,
         height_m: &points.height_m,
         offset_n: offset_n.as_deref(),
@@ -236,8 +251,13 @@ fn solve_at(
         total_max_a: scene.design.supply.total_current_max_a,
         resistance_ohm: &resistance_ohm,
     };
-    let solution = lambda::solve(&problem, &options.settings)?;
+    let rewired = (!options.wiring.is_plain()).then(|| options.wiring.apply(&given));
+    let problem = rewired.as_ref().map_or(given, |r| r.problem(&given));
+    let mut solution = lambda::solve(&problem, &options.settings)?;
     let worst = worst_point(&problem, &options.settings)?;
+    for point in solution.chosen.iter_mut().chain(&mut solution.at) {
+        options.wiring.spread(&mut point.currents_a);
+    }
     progress.end();
     let mut warnings = warnings(points, &solution, options);
     if !worst.complete {
@@ -264,6 +284,14 @@ fn solve_at(
     }
     let mut file = file(scene, solved, points, &solution, options);
     add_worst_point(&mut file, &problem, &solution, &worst);
+    let (settings, wiring) = (&options.settings, &options.wiring);
+    file.tolerance = Some(variants::tolerance(&problem, settings.jnd_weight, wiring)?);
+    variants::tell_wiring(&mut file, wiring);
+    if options.variants {
+        let pairs = variants::opposite_pairs(&scene.design.array.positions_m);
+        let passive_n = passive_n.as_deref();
+        file.variants = Some(variants::all(&given, passive_n, settings, wiring, &pairs)?);
+    }
     if let Some(chosen) = &solution.chosen {
         let asked = Asked {
             currents_a: &chosen.currents_a,
@@ -480,6 +508,9 @@ fn file(
         }),
         worst_point: None,
         sampling: None,
+        tolerance: None,
+        wiring: None,
+        variants: None,
         working_point: None,
         accuracy,
     }

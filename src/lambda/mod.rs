@@ -15,9 +15,11 @@ mod power;
 mod problem;
 mod reduce;
 mod solve;
+mod wiring;
 pub mod worst;
 
 pub use allocate::{Allocation, Allocator, AllocatorError, Reach};
 pub use path::{Breakpoint, Event, Path};
 pub use problem::{Criterion, ForceProblem, ProblemError, Settings};
 pub use solve::{OperatingPoint, Precision, Solution, Status, solve};
+pub use wiring::{Rewired, Wiring, WiringError};

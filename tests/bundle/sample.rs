@@ -158,6 +158,9 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
         }),
         worst_point: None,
         sampling: None,
+        tolerance: None,
+        wiring: None,
+        variants: None,
         working_point: None,
         accuracy: accuracy.clone(),
     };

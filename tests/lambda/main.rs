@@ -3,6 +3,7 @@
 
 mod arrays;
 mod case;
+mod criteria;
 mod edges;
 mod exhaustive;
 mod oracle;

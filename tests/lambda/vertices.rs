@@ -4,9 +4,44 @@ use fluxform::numerics::real::Real;
 
 use crate::case::{Case, D, d};
 
+/// `a . (x, t) >= constant + lambda slope`.
+type Row = (Vec<D>, D, D);
+
+/// `sign G I + offset >= lambda height` at a point.
+pub struct Demand {
+    pub point: usize,
+    pub sign: f64,
+    pub height: f64,
+    pub offset: f64,
+}
+
+/// The rows of a case's limits.
+fn limits(case: &Case, limited: bool) -> Vec<Row> {
+    let m = case.coils();
+    let mut rows = Vec::new();
+    let unit = |i: usize, v: f64| {
+        let mut row = vec![D::ZERO; m + 1];
+        row[i] = d(v);
+        row
+    };
+    for i in 0..m {
+        rows.push((unit(i, 1.0), d(case.lower[i]), D::ZERO));
+        if limited {
+            rows.push((unit(i, -1.0), d(-case.upper[i]), D::ZERO));
+        }
+    }
+    if let (true, Some(total)) = (limited, case.total) {
+        let row = (0..=m)
+            .map(|i| if i < m { d(-1.0) } else { D::ZERO })
+            .collect();
+        rows.push((row, d(-total), D::ZERO));
+    }
+    rows
+}
+
 /// Rows `a . (x, t) >= constant + lambda slope` of the worst-point program.
 pub struct Vertices {
-    rows: Vec<(Vec<D>, D, D)>,
+    rows: Vec<Row>,
     width: usize,
 }
 
@@ -23,24 +58,24 @@ impl Vertices {
                 rows.push((row, d(-sign * offset), d(sign * h)));
             }
         }
-        let unit = |i: usize, v: f64| {
-            let mut row = vec![D::ZERO; m + 1];
-            row[i] = d(v);
-            row
-        };
-        for i in 0..m {
-            rows.push((unit(i, 1.0), d(case.lower[i]), D::ZERO));
-            if limited {
-                rows.push((unit(i, -1.0), d(-case.upper[i]), D::ZERO));
-            }
-        }
-        if let (true, Some(total)) = (limited, case.total) {
-            let row = (0..=m)
-                .map(|i| if i < m { d(-1.0) } else { D::ZERO })
-                .collect();
-            rows.push((row, d(-total), D::ZERO));
-        }
+        rows.extend(limits(case, limited));
         Self { rows, width: m + 1 }
+    }
+
+    /// The largest lambda that meets all demands within the limits; `scale` is the size of forces.
+    pub fn largest(case: &Case, demands: &[Demand], scale: f64) -> f64 {
+        let m = case.coils();
+        let mut rows: Vec<Row> = demands
+            .iter()
+            .map(|demand| {
+                let force = |i: usize| d(demand.sign * case.forces[demand.point * m + i]);
+                let row = (0..m).map(force).chain([d(demand.height)]).collect();
+                (row, d(-demand.offset), D::ZERO)
+            })
+            .collect();
+        rows.extend(limits(case, true));
+        let width = m + 1;
+        -Self { rows, width }.least(0.0, scale)
     }
 
     /// The least t at `lambda`; `scale` is the size of forces.

@@ -5,18 +5,20 @@ use std::slice::from_ref;
 use clap::{Args, ValueEnum};
 
 use super::{accuracy_check, begin, describe};
-use crate::bundle::lambda_file::{WorkingPointForces, WorstPointFile};
+use crate::bundle::lambda_file::{
+    LambdaVariant, TolerancePoint, WiringFile, WorkingPointForces, WorstPointFile,
+};
 use crate::cli::args::{SamplingFlags, SurfaceFlags, Tolerance};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
-use crate::cli::layout::Sheet;
+use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{count, force, mm, number, number_to, percent};
 use crate::cli::values::{self, FileArgument};
 use crate::design::{Design, Need};
 use crate::job::lambda::{LambdaOptions, LambdaReport, run};
-use crate::lambda::{Criterion, Precision, Settings};
+use crate::lambda::{Criterion, Precision, Settings, Wiring};
 
 /// The largest force constant of one object, and its currents
 ///
@@ -32,6 +34,8 @@ use crate::lambda::{Criterion, Precision, Settings};
      "the constant at which the first limit binds, and what 2 N/m would give"),
     ("fluxform lambda designs/seed.toml shapes/half_sphere.toml --max-deviation 0.5mm",
      "points where the surface bends, weighted by area, and what they change"),
+    ("fluxform lambda designs/seed.toml shapes/wedge.toml --variants",
+     "what a broken coil, pairs in series and currents of both signs would change"),
     ("fluxform lambda designs/seed.toml shapes/flat.stl --unit mm --translate 0,0,50",
      "a surface given directly"),
 ]))]
@@ -45,11 +49,28 @@ pub struct Lambda {
     #[command(flatten)]
     criterion: CriterionFlags,
     #[command(flatten)]
+    wiring: WiringFlags,
+    #[command(flatten)]
     tolerance: Tolerance,
     #[command(flatten)]
     sampling: SamplingFlags,
     #[command(flatten)]
     surface: SurfaceFlags,
+}
+
+/// Coils that are broken or wired together.
+#[derive(Debug, Clone, Args)]
+struct WiringFlags {
+    /// Coils that carry no current, like 3,5
+    #[arg(long, value_name = "COILS", value_delimiter = ',')]
+    broken: Vec<usize>,
+    /// Pairs of coils that carry one current, like 0+8,2+6
+    #[arg(long, value_name = "PAIRS", value_delimiter = ',', value_parser = values::pair)]
+    series: Vec<[usize; 2]>,
+    /// Also solve with one change at a time: passive force, push and pull, pairs in series (those
+    /// opposite each other), broken coils
+    #[arg(long)]
+    variants: bool,
 }
 
 /// How the force constant is chosen.
@@ -97,7 +118,7 @@ impl CriterionFlags {
                 at_n_per_m: self.at,
             },
             tolerance,
-            sampling: None,
+            ..LambdaOptions::default()
         }
     }
 }
@@ -110,6 +131,11 @@ impl Lambda {
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
         let options = LambdaOptions {
             sampling: self.sampling.sampling(),
+            wiring: Wiring {
+                broken: self.wiring.broken.clone(),
+                series: self.wiring.series.clone(),
+            },
+            variants: self.wiring.variants,
             ..self.criterion.options(self.tolerance.tolerance)
         };
         let (document, shapes) = documents::design_and_shapes(
@@ -173,6 +199,12 @@ fn summary(design: &Design, report: &LambdaReport) -> String {
     if let Some(worst) = &file.worst_point {
         sheet.line("worst point", &worst_point(worst));
     }
+    if let Some(wiring) = &file.wiring {
+        sheet.line("wiring", &wired(wiring));
+    }
+    if let Some(told) = &file.tolerance {
+        sheet.line("not felt", &not_felt(told));
+    }
     if let Some(point) = &file.working_point {
         sheet.line("steel", &along_the_curve(point));
     }
@@ -214,7 +246,72 @@ fn summary(design: &Design, report: &LambdaReport) -> String {
     let stages = file.accuracy.iter();
     let stages = stages.map(|(name, stage)| (name.as_str(), stage));
     sheet.line("accuracy", &describe::accuracy(stages));
+    if let Some(variants) = &file.variants {
+        sheet.gap();
+        sheet.raw(&table_of(variants));
+    }
     sheet.finish()
+}
+
+fn wired(wiring: &WiringFile) -> String {
+    let broken = wiring.broken.iter().map(|coil| format!("{coil} broken"));
+    let series = wiring.series.iter();
+    let series = series.map(|[a, b]| format!("{a}+{b} in series"));
+    broken.chain(series).collect::<Vec<_>>().join(", ")
+}
+
+/// Up to where errors stay below what is felt.
+fn not_felt(told: &TolerancePoint) -> String {
+    let limit = format!(
+        "the larger of {} of its force and {}",
+        percent(told.share),
+        force(told.threshold_n)
+    );
+    match (told.lambda_n_per_m, told.point) {
+        (Some(lambda), Some(point)) => format!(
+            "up to {} N/m currents keep every error within {limit}; point {point} decides",
+            number(lambda)
+        ),
+        _ => format!("no largest lambda keeps every error within {limit}"),
+    }
+}
+
+/// One line a variant.
+fn table_of(variants: &[LambdaVariant]) -> String {
+    let head = [
+        "N/m, W",
+        "lambda",
+        "change",
+        "linear",
+        "jnd",
+        "saturation",
+        "maxmin",
+        "worst-point jnd",
+        "rms error",
+        "worst error",
+        "power",
+    ];
+    let told = |value: Option<f64>| value.map_or_else(|| "none".to_owned(), |v| number_to(v, 4));
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    rows.extend(variants.iter().map(|v| {
+        vec![
+            v.name.clone(),
+            told(v.lambda_n_per_m),
+            v.relative_change.map_or_else(|| "none".to_owned(), percent),
+            told(v.lambda_linear_n_per_m),
+            told(v.lambda_jnd_n_per_m),
+            told(v.lambda_saturation_n_per_m),
+            told(v.lambda_maxmin_n_per_m),
+            told(v.worst_point_lambda_jnd_n_per_m),
+            v.relative_rms_error
+                .map_or_else(|| "none".to_owned(), percent),
+            v.worst_error_n.map_or_else(|| "none".to_owned(), force),
+            told(v.power_w),
+        ]
+    }));
+    let mut sides = [Side::Right; 11];
+    sides[0] = Side::Left;
+    table(&sides, &rows)
 }
 
 /// What currents for the worst point would do instead.

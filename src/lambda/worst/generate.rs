@@ -257,7 +257,9 @@ fn course(scaled: &Scaled, form: Form, stand: &Stand) -> Course {
         .collect();
     let rounding = ROUNDINGS * f64::EPSILON;
     Course {
-        rounding_n: times_power(NOTHING, force_unit) + rounding * (wanted + pushed),
+        rounding_n: times_power(NOTHING, force_unit)
+            + rounding * (wanted + pushed)
+            + scaled.leeway * wanted,
         rounding_m: rounding * (scaled.height_m() + scaled.pushed_n(&rates_a)),
         limit_rate_m: if moves {
             times_power(last(stand.rate), force_unit - lambda_unit)
@@ -287,7 +289,8 @@ fn probes(scaled: &Scaled, form: Form, followed: &mut Followed) -> (Vec<Probe>, 
         let lambda_n_per_m = times_power(lambda, lambda_unit);
         let wanted = lambda_n_per_m.abs() * scaled.height_m() + offset_share * scaled.offset_n();
         let pushed = scaled.pushed_n(&currents_a);
-        let rounding = 2.0 * ROUNDINGS * f64::EPSILON * (wanted + pushed);
+        let rounding =
+            2.0 * (ROUNDINGS * f64::EPSILON * (wanted + pushed) + scaled.leeway * wanted);
         if wanted > 0.0 {
             doubt = doubt.max(rounding / wanted);
         }

@@ -19,6 +19,7 @@
 
 mod blocks;
 mod criteria;
+mod felt;
 mod generate;
 mod maxmin;
 mod path;
@@ -27,6 +28,7 @@ mod program;
 mod proof;
 mod scaled;
 
+pub use felt::{Felt, felt};
 pub(super) use maxmin::largest;
 pub use maxmin::{Maxmin, maxmin};
 pub use path::{ActivePoint, Turn, WorstPath};
@@ -41,6 +43,10 @@ use criteria::Comparison;
 use generate::{Followed, Search};
 use program::End;
 use scaled::{Form, Limits, Scaled};
+
+/// Shares of lambda max h by which points may be missed where rounding leads a path astray that
+/// misses none; the estimated error tells it.
+const LEEWAYS: [f64; 2] = [1e-12, 1e-10];
 
 /// Currents at one force constant by the worst-point form.
 #[derive(Debug, Clone, PartialEq)]
@@ -90,13 +96,24 @@ pub fn worst_point(
 ) -> Result<WorstSolution, ProblemError> {
     problem.validate(settings)?;
     let largest = largest_entries(problem);
-    let scaled = Scaled::new(problem, &largest, Form::Worst, Limits::All);
-    let mut search = Search::new(&scaled, Form::Worst);
-    let limited = search.follow(&scaled);
-    let free = Scaled::new(problem, &largest, Form::Worst, Limits::Lower);
-    let unlimited = search.follow(&free);
+    let mut scaled = Scaled::new(problem, &largest, Form::Worst, Limits::All);
+    let mut free = Scaled::new(problem, &largest, Form::Worst, Limits::Lower);
     let whole = |followed: &Followed| followed.end == End::Whole && !followed.pieces.is_empty();
-    let complete = whole(&limited) && whole(&unlimited);
+    let mut follow = |leeway: f64| {
+        scaled.leeway = leeway;
+        free.leeway = leeway;
+        let mut search = Search::new(&scaled, Form::Worst);
+        let limited = search.follow(&scaled);
+        let unlimited = search.follow(&free);
+        let complete = whole(&limited) && whole(&unlimited);
+        (limited, unlimited, complete)
+    };
+    let (mut limited, mut unlimited, mut complete) = follow(0.0);
+    for leeway in LEEWAYS {
+        if !complete {
+            (limited, unlimited, complete) = follow(leeway);
+        }
+    }
     let doubt = limited.doubt.max(unlimited.doubt);
     let comparison = Comparison {
         limited: &limited.pieces,

@@ -49,6 +49,8 @@ pub(super) struct Program {
     second: Vec<Num>,
     /// Sizes of the bounds: of constants that may be small beside the parameter's, and of slopes.
     size: [f64; 2],
+    /// A row below its bound by less than this share of the bounds' size is met.
+    met: f64,
 }
 
 /// A vertex that is optimal from `start` on, as far as the next piece.
@@ -74,8 +76,9 @@ pub(super) enum End {
 
 impl Program {
     /// A program without rows; `second` has one weight a variable but the last, `size` the
-    /// largest constant and slope that its rows may have.
-    pub fn new(second: Vec<Num>, size: [f64; 2]) -> Self {
+    /// largest constant and slope that its rows may have, `leeway` the share of them by which rows
+    /// may be missed.
+    pub fn new(second: Vec<Num>, size: [f64; 2], leeway: f64) -> Self {
         let mut second = second;
         second.push(Num::ZERO);
         Self {
@@ -87,6 +90,7 @@ impl Program {
             slope: Vec::new(),
             second,
             size,
+            met: MET.max(leeway),
         }
     }
 
@@ -194,6 +198,9 @@ impl Program {
                 entering = Some(row);
             }
             exchanges_here += 1;
+            if exchanges_here > 50 * patience {
+                break;
+            }
             let Some(row) = entering else { break };
             match vertex.exchange(self, row, cautious) {
                 Exchange::Done => {}
@@ -213,7 +220,7 @@ impl Program {
         cautious: bool,
     ) -> (Option<usize>, Option<(usize, Num)>) {
         let size = self.size[0] + lambda.to_f64() * self.size[1];
-        let met = MET * size + MET_AT_ZERO;
+        let met = self.met * size + MET_AT_ZERO;
         let sum = |z: &[Num]| z.iter().map(|v| v.to_f64().abs()).sum::<f64>();
         let rough = |z: &[Num]| z.iter().map(|v| v.to_f64()).collect::<Vec<f64>>();
         // Doubles tell which rows may matter; entries of rows are at most about 2.

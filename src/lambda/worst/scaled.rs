@@ -40,6 +40,8 @@ pub(super) struct Scaled<'a> {
     pub highest: usize,
     force: i32,
     limits: Limits,
+    /// Share of lambda max h plus the offset by which points may be missed.
+    pub leeway: f64,
     /// The coils that have any effect, on forces or on what others may carry.
     pub live: Vec<usize>,
 }
@@ -75,6 +77,7 @@ impl<'a> Scaled<'a> {
             highest,
             force,
             limits,
+            leeway: 0.0,
             live,
         }
     }
@@ -169,7 +172,7 @@ impl<'a> Scaled<'a> {
             })
             .collect();
         let offset = times_power(self.offset_n(), -self.force);
-        let mut program = Program::new(second, [offset, self.top().to_f64()]);
+        let mut program = Program::new(second, [offset, self.top().to_f64()], self.leeway);
         for (k, &i) in self.live.iter().enumerate() {
             program.at_least(k, scaled(i, self.problem.lower_a[i]));
         }
