@@ -2,12 +2,13 @@
 //! the heights are right.
 //!
 //! ```text
-//! cargo bench --locked --bench surface_speed -- [TRIANGLES | FILE.stl] [THREADS]
+//! cargo bench --locked --bench surface_speed -- [TRIANGLES | FILE.stl] [THREADS] [HEIGHTS]
 //! ```
 //!
 //! Default: a closed wavy body of 1e6 triangles with vertical walls, whose plan is that of the
 //! grid of 1001 x 1001 heights, so that the border rows stand on the walls. A file is taken in
-//! millimetres and its heights are not checked. Seconds are the least of five runs, of one where
+//! millimetres and its heights are not checked; they can be written as doubles, not a number where
+//! there is none. Seconds are the least of five runs, of one where
 //! the file is large. The peak (Linux) is that of the process up to the line.
 
 // A measurement: it reads the clock and prints.
@@ -22,11 +23,10 @@ use std::time::Instant;
 use cpu_time::ProcessTime;
 use fluxform::numerics::axis::Axis;
 use fluxform::progress::Silent;
-use fluxform::shape::document::Placement;
-use fluxform::shape::height::{Grid, heights};
+use fluxform::shape::document::{Placement, SurfaceFormat};
+use fluxform::shape::height::{Grid, Sample, heights};
 use fluxform::shape::mesh::Mesh;
 use fluxform::shape::placement::Transform;
-use fluxform::shape::surface;
 
 type Failure = Box<dyn Error + Send + Sync>;
 
@@ -164,20 +164,31 @@ fn peak_mib() -> f64 {
     kib.unwrap_or(0.0) / 1024.0
 }
 
-fn measure(path: &Path, body: Option<&Body>, runs: usize) -> Result<(), Failure> {
+fn measure(
+    path: &Path,
+    body: Option<&Body>,
+    runs: usize,
+    out: Option<&str>,
+) -> Result<(), Failure> {
     let side = Axis {
         from: -HALF_MM / 1000.0,
         to: HALF_MM / 1000.0,
         samples: SAMPLES,
     };
-    let grid = Grid { x_m: side, y_m: side };
+    let grid = Grid {
+        x_m: side,
+        y_m: side,
+    };
     let print = |what: &str, [cpu, clock]: [f64; 2]| {
         println!("| {what} | {cpu:.4} | {clock:.4} | {:.0} |", peak_mib());
     };
     println!("| step | CPU s | s | peak MiB |\n|---|---|---|---|");
     let (mesh, seconds) = timed(runs, || {
-        let (file, unit_m) = surface::read(path, Some(0.001))?;
-        Ok(Mesh::place(file, &Transform::new(unit_m, &Placement::default()))?)
+        let file = SurfaceFormat::Stl.open(path)?;
+        Ok(Mesh::place(
+            file,
+            &Transform::new(0.001, &Placement::default()),
+        )?)
     })?;
     let triangles = mesh.triangles().len();
     print(&format!("read and place {triangles} triangles"), seconds);
@@ -185,6 +196,11 @@ fn measure(path: &Path, body: Option<&Body>, runs: usize) -> Result<(), Failure>
         heights(&mesh, &grid, &Silent).map_err(|error| error.to_string().into())
     })?;
     print(&format!("{SAMPLES} x {SAMPLES} heights"), seconds);
+    if let Some(out) = out {
+        let height = |sample: &Option<Sample>| sample.map_or(f64::NAN, |sample| sample.height_m);
+        let bytes: Vec<u8> = found.iter().flat_map(|s| height(s).to_le_bytes()).collect();
+        std::fs::write(out, bytes)?;
+    }
     let missing = found.iter().filter(|sample| sample.is_none()).count();
     print!("\n{missing} points missing");
     if let Some(body) = body {
@@ -209,13 +225,15 @@ fn main() -> Result<(), Failure> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build_global()?;
+    let out = arguments.next();
+    let out = out.as_deref();
     let folder = tempfile::tempdir()?;
     if let Ok(triangles) = what.parse() {
         let body = Body::of(triangles);
         let path = folder.path().join("body.stl");
         let count = body.write(&path)?;
-        measure(&path, Some(&body), if count > SMALL { 1 } else { 5 })
+        measure(&path, Some(&body), if count > SMALL { 1 } else { 5 }, out)
     } else {
-        measure(Path::new(&what), None, 5)
+        measure(Path::new(&what), None, 5, out)
     }
 }
