@@ -53,6 +53,19 @@ fn real_bodies_are_those_of_another_reader() {
 }
 
 #[test]
+fn a_box_is_a_box() {
+    let read = SurfaceFormat::Step.read(Path::new("f.step"), &crate::samples::step());
+    let report = MeshReport::new(SurfaceFormat::Step, read.unwrap());
+    assert_eq!((report.unit_m, report.watertight), (Some(1e-3), true));
+    assert_eq!(report.triangles, 12);
+    let volume = report.volume.unwrap();
+    assert!((volume - 0.7 * 1.3 * 2.9).abs() < 1e-12, "{volume}");
+    for (got, wanted) in report.bounds_max.iter().zip([0.7, 1.3, 2.9]) {
+        assert!((got - wanted).abs() < 1e-12, "{got}");
+    }
+}
+
+#[test]
 fn an_assembly_is_refused_with_advice() {
     let Some(folder) = corpus() else { return };
     let result = MeshReport::of_file(&folder.join("trimesh__box_sides.STEP"));
