@@ -41,15 +41,29 @@ fn stl() -> Vec<Hostile> {
                  endloop\nendfacet\n";
     vec![
         ("an enormous count", binary),
-        ("solids without end", "solid\nendsolid\n".repeat(100_000).into_bytes()),
-        ("facets and a cut", format!("solid\n{}facet", facet.repeat(12_000)).into_bytes()),
-        ("one long word", [b"solid x\n".to_vec(), vec![b'9'; 2 << 20]].concat()),
-        ("line ends", [b"solid x".to_vec(), vec![b'\n'; 2 << 20]].concat()),
+        (
+            "solids without end",
+            "solid\nendsolid\n".repeat(100_000).into_bytes(),
+        ),
+        (
+            "facets and a cut",
+            format!("solid\n{}facet", facet.repeat(12_000)).into_bytes(),
+        ),
+        (
+            "one long word",
+            [b"solid x\n".to_vec(), vec![b'9'; 2 << 20]].concat(),
+        ),
+        (
+            "line ends",
+            [b"solid x".to_vec(), vec![b'\n'; 2 << 20]].concat(),
+        ),
     ]
 }
 
 fn obj() -> Vec<Hostile> {
-    let points: String = (0..4000).map(|k| format!("v {k} {} 0\n", (k % 2) * k)).collect();
+    let points: String = (0..4000)
+        .map(|k| format!("v {k} {} 0\n", (k % 2) * k))
+        .collect();
     let ring: String = (1..=4000).map(|k| format!(" {k}")).collect();
     let corners = |n: usize| format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nf{}\n", " 1 2 3".repeat(n));
     let spiral: String = (0..20_000)
@@ -63,10 +77,19 @@ fn obj() -> Vec<Hostile> {
         ("one face of many corners", corners(150_000).into_bytes()),
         ("a comb", format!("{points}f{ring}\n").into_bytes()),
         ("a spiral", format!("{spiral}f{around}\n").into_bytes()),
-        ("smallest faces", format!("v 0 0 0\n{}", "f 1 1 1\n".repeat(200_000)).into_bytes()),
-        ("lines continued", format!("v 0 0 0\nf \\\n{}", "1 \\\n".repeat(200_000)).into_bytes()),
+        (
+            "smallest faces",
+            format!("v 0 0 0\n{}", "f 1 1 1\n".repeat(200_000)).into_bytes(),
+        ),
+        (
+            "lines continued",
+            format!("v 0 0 0\nf \\\n{}", "1 \\\n".repeat(200_000)).into_bytes(),
+        ),
         ("only continuations", "\\\n".repeat(500_000).into_bytes()),
-        ("far indices", "v 0 0 0\nf 9223372036854775807 -9223372036854775808 1\n".into()),
+        (
+            "far indices",
+            "v 0 0 0\nf 9223372036854775807 -9223372036854775808 1\n".into(),
+        ),
     ]
 }
 
@@ -87,16 +110,49 @@ fn ply() -> Vec<Hostile> {
         "ply\nformat ascii 1.0\nelement vertex 1\n{}end_header\n",
         "property float q\n".repeat(60_000)
     );
-    let elements: String = (0..40_000).map(|k| format!("element e{k} 0\nproperty float x\n")).collect();
+    let elements: String = (0..40_000)
+        .map(|k| format!("element e{k} 0\nproperty float x\n"))
+        .collect();
     vec![
-        ("counts beyond the file", head(little, u64::MAX / 2, u64::MAX / 2, "uchar int")),
-        ("smallest faces", [head(little, 3, 250_000, "uchar uchar"), three.clone(), faces].concat()),
-        ("empty faces", [head(little, 3, 1_000_000, "uchar uchar"), three.clone(), vec![0; 1_000_000]].concat()),
-        ("an enormous list", [head(little, 3, 1, "uint int"), three.clone(), huge.clone()].concat()),
-        ("a negative list", [head(little, 3, 1, "int int"), three, huge].concat()),
+        (
+            "counts beyond the file",
+            head(little, u64::MAX / 2, u64::MAX / 2, "uchar int"),
+        ),
+        (
+            "smallest faces",
+            [
+                head(little, 3, 250_000, "uchar uchar"),
+                three.clone(),
+                faces,
+            ]
+            .concat(),
+        ),
+        (
+            "empty faces",
+            [
+                head(little, 3, 1_000_000, "uchar uchar"),
+                three.clone(),
+                vec![0; 1_000_000],
+            ]
+            .concat(),
+        ),
+        (
+            "an enormous list",
+            [head(little, 3, 1, "uint int"), three.clone(), huge.clone()].concat(),
+        ),
+        (
+            "a negative list",
+            [head(little, 3, 1, "int int"), three, huge].concat(),
+        ),
         ("many properties", properties.into_bytes()),
-        ("many elements", format!("ply\nformat ascii 1.0\n{elements}end_header\n").into_bytes()),
-        ("an endless header", format!("ply\nformat ascii 1.0\n{}", "comment a\n".repeat(200_000)).into_bytes()),
+        (
+            "many elements",
+            format!("ply\nformat ascii 1.0\n{elements}end_header\n").into_bytes(),
+        ),
+        (
+            "an endless header",
+            format!("ply\nformat ascii 1.0\n{}", "comment a\n".repeat(200_000)).into_bytes(),
+        ),
     ]
 }
 
@@ -112,17 +168,46 @@ fn xml(good: &str, root: &str) -> Vec<(&'static str, String)> {
     let rest = &after[open.len().min(after.len())..];
     let attributes: String = (0..60_000).map(|k| format!(" a{k}=\"\"")).collect();
     let required: String = (0..30_000).map(|k| format!("p{k} ")).collect();
-    let spaces: String = (0..30_000).map(|k| format!(" xmlns:p{k}=\"/core/\"")).collect();
+    let spaces: String = (0..30_000)
+        .map(|k| format!(" xmlns:p{k}=\"/core/\""))
+        .collect();
     vec![
-        ("entities", format!("{before}{LAUGHS}<{root}{rest}").replace("\"1\"", "\"&f;\"")),
-        ("entities as text", format!("{before}{LAUGHS}<{root}>{}", "&f;".repeat(1000))),
-        ("deep nesting", format!("{before}<{root}>{}", "<a>".repeat(300_000))),
-        ("many attributes", format!("{before}<{root}{attributes}{rest}")),
-        ("extensions", format!("{before}<{root}{spaces} requiredextensions=\"{required}\"{rest}")),
-        ("empty elements", format!("{before}<{root}>{}</{root}>", "<a/>".repeat(300_000))),
-        ("an open comment", format!("{before}<{root}><!--{}", "-".repeat(1 << 20))),
-        ("text in pieces", format!("{before}<{root}>{}</{root}>", "a<!---->".repeat(200_000))),
-        ("a long name", format!("{before}<{root}><{}/>", "n".repeat(1 << 20))),
+        (
+            "entities",
+            format!("{before}{LAUGHS}<{root}{rest}").replace("\"1\"", "\"&f;\""),
+        ),
+        (
+            "entities as text",
+            format!("{before}{LAUGHS}<{root}>{}", "&f;".repeat(1000)),
+        ),
+        (
+            "deep nesting",
+            format!("{before}<{root}>{}", "<a>".repeat(300_000)),
+        ),
+        (
+            "many attributes",
+            format!("{before}<{root}{attributes}{rest}"),
+        ),
+        (
+            "extensions",
+            format!("{before}<{root}{spaces} requiredextensions=\"{required}\"{rest}"),
+        ),
+        (
+            "empty elements",
+            format!("{before}<{root}>{}</{root}>", "<a/>".repeat(300_000)),
+        ),
+        (
+            "an open comment",
+            format!("{before}<{root}><!--{}", "-".repeat(1 << 20)),
+        ),
+        (
+            "text in pieces",
+            format!("{before}<{root}>{}</{root}>", "a<!---->".repeat(200_000)),
+        ),
+        (
+            "a long name",
+            format!("{before}<{root}><{}/>", "n".repeat(1 << 20)),
+        ),
     ]
 }
 
@@ -131,7 +216,10 @@ fn bomb(names: &[&str], content: &str) -> Vec<Hostile> {
     let blank = format!("{content}{}", " ".repeat(100 << 20));
     let tags = format!("{content}{}", "<a/>".repeat(20 << 20));
     let parts = |text: &str| -> Vec<(String, Vec<u8>)> {
-        names.iter().map(|name| ((*name).to_owned(), text.as_bytes().to_vec())).collect()
+        names
+            .iter()
+            .map(|name| ((*name).to_owned(), text.as_bytes().to_vec()))
+            .collect()
     };
     let honest = zipped(&parts(&blank));
     // The same with another length claimed in both headers.
@@ -159,9 +247,7 @@ fn three_mf() -> Vec<Hostile> {
         .collect();
     found.extend(bomb(&["3D/3dmodel.model"], "<model>"));
     found.extend(bomb(&["_rels/.rels"], "<Relationships>"));
-    let components = |n: usize, path: &str| {
-        format!("<component objectid=\"1\"{path}/>").repeat(n)
-    };
+    let components = |n: usize, path: &str| format!("<component objectid=\"1\"{path}/>").repeat(n);
     let with = |components: &str| {
         good.replace(
             "<component objectid=\"1\" transform=\"1 0 0 0 1 0 0 0 1 0 0 0\"/>",
@@ -170,7 +256,12 @@ fn three_mf() -> Vec<Hostile> {
     };
     let root = with(&components(100_000, ""));
     let mut parts: Vec<(String, Vec<u8>)> = (0..8000)
-        .map(|k| (format!("Metadata/a_rather_long_name_of_a_part_{k}.xml"), Vec::new()))
+        .map(|k| {
+            (
+                format!("Metadata/a_rather_long_name_of_a_part_{k}.xml"),
+                Vec::new(),
+            )
+        })
         .collect();
     parts.push(("3D/3dmodel.model".into(), root.clone().into_bytes()));
     found.push(("many parts, many components", zipped(&parts)));
@@ -182,7 +273,9 @@ fn three_mf() -> Vec<Hostile> {
     let faces = "<triangle v1=\"0\" v2=\"1\" v3=\"2\"/>".repeat(60_000);
     let many = good.replace("</triangles>", &format!("{faces}</triangles>"));
     found.push(("many faces, well packed", samples::three_mf_of(&many)));
-    let objects: String = (3..20_000).map(|k| format!("<object id=\"{k}\"/>")).collect();
+    let objects: String = (3..20_000)
+        .map(|k| format!("<object id=\"{k}\"/>"))
+        .collect();
     let many = good.replace("</resources>", &format!("{objects}</resources>"));
     found.push(("many objects", samples::three_mf_of(&many)));
     found
@@ -203,10 +296,17 @@ fn amf() -> Vec<Hostile> {
     found.push(("many instances", many.into_bytes()));
     let deep: String = (2..60_000)
         .map(|k| {
-            format!("<constellation id=\"{k}\"><instance objectid=\"{}\"/></constellation>", k - 1)
+            format!(
+                "<constellation id=\"{k}\"><instance objectid=\"{}\"/></constellation>",
+                k - 1
+            )
         })
         .collect();
-    found.push(("a deep tree", good.replace("</amf>", &format!("{deep}</amf>")).into_bytes()));
+    found.push((
+        "a deep tree",
+        good.replace("</amf>", &format!("{deep}</amf>"))
+            .into_bytes(),
+    ));
     found
 }
 
@@ -238,12 +338,16 @@ fn three_dxml() -> Vec<Hostile> {
             )
         })
         .collect();
-    let many = structure.1.replace("<InstanceRep", &format!("{reps}<InstanceRep"));
+    let many = structure
+        .1
+        .replace("<InstanceRep", &format!("{reps}<InstanceRep"));
     found.push(("one part many times", product(&many, &representation.1)));
     let instances = "<Instance3D><IsAggregatedBy>1</IsAggregatedBy><IsInstanceOf>2</IsInstanceOf>\
                      </Instance3D>"
         .repeat(30_000);
-    let many = structure.1.replace("<InstanceRep", &format!("{instances}<InstanceRep"));
+    let many = structure
+        .1
+        .replace("<InstanceRep", &format!("{instances}<InstanceRep"));
     found.push(("many instances", product(&many, &representation.1)));
     found
 }
@@ -252,19 +356,44 @@ fn step() -> Vec<Hostile> {
     let good = String::from_utf8(samples::step()).expect("made of text");
     let with = |statements: &str| good.replace("DATA;\n", &format!("DATA;\n{statements}"));
     let mut found = vec![
-        ("deep brackets", with(&format!("#900=X({});\n", "(".repeat(500_000))).into_bytes()),
+        (
+            "deep brackets",
+            with(&format!("#900=X({});\n", "(".repeat(500_000))).into_bytes(),
+        ),
         (
             "deep brackets, closed",
-            with(&format!("#900=X({}{});\n", "(".repeat(100_000), ")".repeat(100_000))).into_bytes(),
+            with(&format!(
+                "#900=X({}{});\n",
+                "(".repeat(100_000),
+                ")".repeat(100_000)
+            ))
+            .into_bytes(),
         ),
         (
             "deep types",
-            with(&format!("#900=X({}1{});\n", "A(".repeat(100_000), ")".repeat(100_000))).into_bytes(),
+            with(&format!(
+                "#900=X({}1{});\n",
+                "A(".repeat(100_000),
+                ")".repeat(100_000)
+            ))
+            .into_bytes(),
         ),
-        ("an open string", with(&format!("#900=X('{}", "a".repeat(1 << 20))).into_bytes()),
-        ("many statements", with(&"#900=X();\n".repeat(100_000)).into_bytes()),
-        ("many numbers", with(&format!("#900=X(({}));\n", "1.,".repeat(300_000))).into_bytes()),
-        ("enormous numbers", with("#99999999999999999999999=X(1);\n").into_bytes()),
+        (
+            "an open string",
+            with(&format!("#900=X('{}", "a".repeat(1 << 20))).into_bytes(),
+        ),
+        (
+            "many statements",
+            with(&"#900=X();\n".repeat(100_000)).into_bytes(),
+        ),
+        (
+            "many numbers",
+            with(&format!("#900=X(({}));\n", "1.,".repeat(300_000))).into_bytes(),
+        ),
+        (
+            "enormous numbers",
+            with("#99999999999999999999999=X(1);\n").into_bytes(),
+        ),
         (
             "a unit of itself",
             good.replace(
@@ -273,10 +402,16 @@ fn step() -> Vec<Hostile> {
             )
             .into_bytes(),
         ),
-        ("an enormous box", good.replace("0.700", "7E300").into_bytes()),
+        (
+            "an enormous box",
+            good.replace("0.700", "7E300").into_bytes(),
+        ),
         ("a long box", good.replace("0.700", "7E9").into_bytes()),
         ("a flat box", good.replace("0.700", "0.000").into_bytes()),
-        ("a box that is not a number", good.replace("0.700", "NAN").into_bytes()),
+        (
+            "a box that is not a number",
+            good.replace("0.700", "NAN").into_bytes(),
+        ),
     ];
     // Every reference in turn to its own statement.
     let mut loops: BTreeMap<&str, String> = BTreeMap::new();
@@ -294,7 +429,11 @@ fn step() -> Vec<Hostile> {
             loops.insert(kind, good.replace(line, &looped));
         }
     }
-    found.extend(loops.into_values().map(|text| ("a reference to itself", text.into_bytes())));
+    found.extend(
+        loops
+            .into_values()
+            .map(|text| ("a reference to itself", text.into_bytes())),
+    );
     found
 }
 
@@ -307,7 +446,11 @@ fn sldprt() -> Vec<Hostile> {
     let mut named = samples::sldprt();
     named[30..34].copy_from_slice(&u32::MAX.to_le_bytes());
     let table = |strips: u32, rest: &[u32]| -> Vec<u8> {
-        [4, 8, 2, strips].iter().chain(rest).flat_map(|w| w.to_le_bytes()).collect()
+        [4, 8, 2, strips]
+            .iter()
+            .chain(rest)
+            .flat_map(|w| w.to_le_bytes())
+            .collect()
     };
     let threes = vec![3u32; 100_000];
     vec![
@@ -315,8 +458,23 @@ fn sldprt() -> Vec<Hostile> {
         ("an enormous block", claims),
         ("an enormous name", named),
         ("a bomb", samples::sldprt_of(&vec![0; 100 << 20])),
-        ("tables that never end", samples::sldprt_of(&table(u32::MAX, &threes))),
-        ("tables in tables", samples::sldprt_of(&table(100_000, &[]).repeat(40_000))),
-        ("a long strip", samples::sldprt_of(&[table(1, &[100_000, 12, 100, 2, 100_000]), vec![0; 1_200_000]].concat())),
+        (
+            "tables that never end",
+            samples::sldprt_of(&table(u32::MAX, &threes)),
+        ),
+        (
+            "tables in tables",
+            samples::sldprt_of(&table(100_000, &[]).repeat(40_000)),
+        ),
+        (
+            "a long strip",
+            samples::sldprt_of(
+                &[
+                    table(1, &[100_000, 12, 100, 2, 100_000]),
+                    vec![0; 1_200_000],
+                ]
+                .concat(),
+            ),
+        ),
     ]
 }

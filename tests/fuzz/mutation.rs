@@ -35,7 +35,9 @@ impl Seed {
             };
             let mut content = Vec::new();
             if part.read_to_end(&mut content).is_ok() {
-                let name = part.name().map_or_else(|_| "?".into(), |name| name.into_owned());
+                let name = part
+                    .name()
+                    .map_or_else(|_| "?".into(), |name| name.into_owned());
                 parts.push((name, content));
             }
         }
@@ -55,7 +57,10 @@ impl Seed {
     pub fn content(&self) -> usize {
         match self {
             Self::Plain(bytes) | Self::Display(bytes) => bytes.len(),
-            Self::Zip(parts) => parts.iter().map(|(name, part)| name.len() + part.len()).sum(),
+            Self::Zip(parts) => parts
+                .iter()
+                .map(|(name, part)| name.len() + part.len())
+                .sum(),
         }
     }
 
@@ -228,10 +233,33 @@ fn damage_lines(bytes: &mut Vec<u8>, random: &mut Random) {
 /// Replaces a word or number by another of the file, or by one that no program expects.
 fn damage_words(bytes: &mut Vec<u8>, random: &mut Random) {
     const WORDS: [&[u8]; 27] = [
-        b"0", b"-1", b"1", b"2147483648", b"4294967295", b"18446744073709551615",
-        b"99999999999999999999999", b"1e308", b"-1e308", b"1e309", b"1e-320", b"nan", b"inf",
-        b"1E+002", b"0.1.2", b"1,5", b"#1", b"#0", b"$", b"*", b"()", b"\xff\xfe", b"&#0;",
-        b"&lol;", b"\"", b"''", b"<!DOCTYPE a [<!ENTITY lol \"&lol;&lol;\">]>",
+        b"0",
+        b"-1",
+        b"1",
+        b"2147483648",
+        b"4294967295",
+        b"18446744073709551615",
+        b"99999999999999999999999",
+        b"1e308",
+        b"-1e308",
+        b"1e309",
+        b"1e-320",
+        b"nan",
+        b"inf",
+        b"1E+002",
+        b"0.1.2",
+        b"1,5",
+        b"#1",
+        b"#0",
+        b"$",
+        b"*",
+        b"()",
+        b"\xff\xfe",
+        b"&#0;",
+        b"&lol;",
+        b"\"",
+        b"''",
+        b"<!DOCTYPE a [<!ENTITY lol \"&lol;&lol;\">]>",
     ];
     let is_word = |b: &u8| b.is_ascii_alphanumeric() || b"_.+-#".contains(b);
     let word = |random: &mut Random| {
@@ -239,7 +267,10 @@ fn damage_words(bytes: &mut Vec<u8>, random: &mut Random) {
             return 0..0;
         }
         let from = random.below(bytes.len());
-        let start = bytes[from..].iter().position(is_word).map_or(from, |k| from + k);
+        let start = bytes[from..]
+            .iter()
+            .position(is_word)
+            .map_or(from, |k| from + k);
         let length = bytes[start..].iter().position(|b| !is_word(b));
         start..length.map_or(bytes.len(), |k| start + k)
     };

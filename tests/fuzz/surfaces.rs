@@ -120,7 +120,14 @@ struct Tally {
 
 impl Tally {
     /// Gives the reader one input and looks at what it did. `content`: bytes of it, unpacked.
-    fn give(&mut self, name: &str, format: SurfaceFormat, what: &str, bytes: &[u8], content: usize) {
+    fn give(
+        &mut self,
+        name: &str,
+        format: SurfaceFormat,
+        what: &str,
+        bytes: &[u8],
+        content: usize,
+    ) {
         std::fs::write(last(name), bytes).unwrap_or_default();
         MEMORY.reset_peak_usage();
         let held = MEMORY.current_usage();
@@ -133,7 +140,9 @@ impl Tally {
         self.inputs += 1;
         let size = content.max(bytes.len()) as f64;
         self.slowest = self.slowest.max(seconds / (size / 1e6).max(1.0));
-        self.largest = self.largest.max(memory / size.max(LEAST_MEMORY / MEMORY_RATIO));
+        self.largest = self
+            .largest
+            .max(memory / size.max(LEAST_MEMORY / MEMORY_RATIO));
         let mut faults: Vec<&str> = Vec::new();
         match &result {
             Err(_) => faults.push("panic"),
@@ -244,12 +253,16 @@ fn main() {
         let at = words.iter().position(|word| word == name)?;
         words.get(at + 1).cloned()
     };
-    let seconds = option("--seconds").and_then(|s| s.parse().ok()).unwrap_or(10.0);
+    let seconds = option("--seconds")
+        .and_then(|s| s.parse().ok())
+        .unwrap_or(10.0);
     let seed = option("--seed").and_then(|s| s.parse().ok()).unwrap_or(1);
     let wanted = option("--format");
     std::panic::set_hook(Box::new(|_| {}));
     watch();
-    println!("| format | inputs | s | read | refused | worst s a MB (at least 1) | worst memory / size (at least 1 MiB) | faults |");
+    println!(
+        "| format | inputs | s | read | refused | worst s a MB (at least 1) | worst memory / size (at least 1 MiB) | faults |"
+    );
     println!("|---|---|---|---|---|---|---|---|");
     let mut well = true;
     for (name, format) in FORMATS {
