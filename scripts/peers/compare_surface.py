@@ -28,12 +28,14 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
 REPEATS = 3
+# A peer that takes longer is given up, s.
+PATIENCE = 150
 SAMPLES = 1001
 HALF_MM = 50.0
 WRONG_MM = 1e-3
 CELLS = 705
 # Which part of the rays each peer gets.
-STRIDES = {"trimesh": 1, "open3d": 1, "vtk-static": 7, "vtk-obb": 47}
+STRIDES = {"trimesh": 1, "open3d": 1, "vtk-static": 7, "vtk-obb": 997}
 # An environment of the script's own, which has numpy.
 INSIDE = "FLUXFORM_COMPARE_SURFACE_INSIDE"
 
@@ -139,9 +141,13 @@ def peer(python, name, path, folder, samples=SAMPLES):
     words = [name, str(path), str(out), str(samples), str(HALF_MM), str(stride)]
     best = None
     for _ in range(REPEATS if samples else 1):
-        result = subprocess.run(
-            [python, HERE / "surface_peer.py", *words], capture_output=True, text=True
-        )
+        try:
+            result = subprocess.run(
+                [python, HERE / "surface_peer.py", *words],
+                capture_output=True, text=True, timeout=PATIENCE,
+            )
+        except subprocess.TimeoutExpired:
+            return None, f"given up after {PATIENCE} s"
         if result.returncode != 0:
             return None, last_line(result.stderr)
         figures = json.loads(result.stdout.strip().splitlines()[-1])

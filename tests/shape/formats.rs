@@ -334,3 +334,241 @@ fn a_damaged_native_part_is_refused() {
         "{ole}"
     );
 }
+
+#[test]
+fn what_an_archive_claims_to_unpack_to_is_held_against_its_length() {
+    let honest = zipped(&[(
+        "3D/3dmodel.model",
+        &format!("<model>{}", " ".repeat(20 << 20)),
+    )]);
+    let message = refusal(SurfaceFormat::ThreeMf, &honest);
+    assert!(message.contains("decompression bomb"), "{message}");
+    // The same, claiming a thousand bytes in both headers.
+    let claimed = ((20u32 << 20) + 7).to_le_bytes();
+    let mut lying = honest;
+    let mut changed = 0;
+    for at in 0..lying.len() - 4 {
+        if lying[at..at + 4] == claimed {
+            lying[at..at + 4].copy_from_slice(&1000u32.to_le_bytes());
+            changed += 1;
+        }
+    }
+    assert_eq!(changed, 2);
+    let message = refusal(SurfaceFormat::ThreeMf, &lying);
+    assert!(message.contains("larger than its declared"), "{message}");
+    let part = crate::samples::sldprt_of(&vec![0; 20 << 20]);
+    let message = refusal(SurfaceFormat::Sldprt, &part);
+    assert!(message.contains("more than its data can hold"), "{message}");
+}
+
+#[test]
+fn names_of_parts_lead_nowhere_outside_the_archive() {
+    let model = String::from_utf8(crate::samples::three_mf_model("inch")).unwrap();
+    for name in ["../../3D/3dmodel.model", "C:\\3D\\3dmodel.model"] {
+        let message = refusal(SurfaceFormat::ThreeMf, &zipped(&[(name, &model)]));
+        assert!(
+            message.contains("`3D/3dmodel.model` is missing"),
+            "{message}"
+        );
+    }
+    let elsewhere = model.replace(
+        "objectid=\"1\"",
+        "p:path=\"/../../etc/passwd\" objectid=\"1\"",
+    );
+    let message = refusal(SurfaceFormat::ThreeMf, &three_mf_of(&elsewhere));
+    assert!(
+        message.contains("`/../../etc/passwd`, which is missing"),
+        "{message}"
+    );
+}
+
+#[test]
+fn entities_of_xml_are_not_replaced() {
+    let laughs = "<!DOCTYPE amf [<!ENTITY a \"0\"><!ENTITY b \"&a;&a;&a;&a;&a;&a;&a;&a;\">]><amf";
+    let bomb = amf("mm").replacen("<amf", laughs, 1);
+    let text = bomb.replace("<v1>0</v1>", "<v1>&b;</v1>");
+    refusal(SurfaceFormat::Amf, text.as_bytes());
+    let model = String::from_utf8(crate::samples::three_mf_model("inch")).unwrap();
+    let model = model.replacen("<model", &laughs.replace("amf", "model"), 1);
+    let text = model.replace("v1=\"0\"", "v1=\"&b;\"");
+    refusal(SurfaceFormat::ThreeMf, &three_mf_of(&text));
+}
+
+#[test]
+fn extensions_without_end_are_refused() {
+    let spaces: String = (0..20_000)
+        .map(|k| format!(" xmlns:p{k}=\"/core/\""))
+        .collect();
+    let required: String = (0..20_000).map(|k| format!("p{k} ")).collect();
+    let model = String::from_utf8(crate::samples::three_mf_model("inch")).unwrap();
+    let open = format!("<model{spaces} requiredextensions=\"{required}\" ");
+    let message = refusal(
+        SurfaceFormat::ThreeMf,
+        &three_mf_of(&model.replacen("<model ", &open, 1)),
+    );
+    assert!(message.contains("more than 64 extensions"), "{message}");
+}
+
+#[test]
+fn a_small_file_does_not_unfold_into_a_large_one() {
+    // Twenty-two objects, each made of the one before twice: sixteen million triangles.
+    let mut objects = String::new();
+    for id in 2..24 {
+        let before = format!("<component objectid=\"{}\"/>", id - 1);
+        objects +=
+            &format!("<object id=\"{id}\"><components>{before}{before}</components></object>");
+    }
+    let model = String::from_utf8(crate::samples::three_mf_model("inch")).unwrap();
+    let start = model.find("<object id=\"2\"").unwrap();
+    let end = model.find("</resources>").unwrap();
+    let model = format!("{}{objects}{}", &model[..start], &model[end..]);
+    let model = model.replace("<item objectid=\"2\"", "<item objectid=\"23\"");
+    let message = refusal(SurfaceFormat::ThreeMf, &three_mf_of(&model));
+    assert!(message.contains("the file's 4 triangles"), "{message}");
+}
+
+#[test]
+fn a_face_of_very_many_corners_is_refused() {
+    let obj = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nf{}\n", " 1 2 3".repeat(20_000));
+    let message = refusal(SurfaceFormat::Obj, obj.as_bytes());
+    assert!(
+        message.contains("line 4") && message.contains("50000 corners"),
+        "{message}"
+    );
+    let ply = format!(
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+         property float z\nelement face 1\nproperty list uint int vertex_index\nend_header\n\
+         0 0 0\n1 0 0\n0 1 0\n60000{}\n",
+        " 0 1 2".repeat(20_000)
+    );
+    let message = refusal(SurfaceFormat::Ply, ply.as_bytes());
+    assert!(
+        message.contains("face 0") && message.contains("50000 corners"),
+        "{message}"
+    );
+}
+
+#[test]
+fn more_elements_than_are_made_at_once_are_all_read() {
+    // A fan of ten thousand triangles, in both kinds of PLY and in OBJ.
+    const N: usize = 10_000;
+    let rim = |k: usize| {
+        let turn = k as f32 * 6.0e-4;
+        [turn.cos(), turn.sin(), 0.5]
+    };
+    let header = |format: &str| {
+        format!(
+            "ply\nformat {format} 1.0\nelement vertex {}\nproperty float x\nproperty float y\n\
+             property float z\nelement face {N}\nproperty list uchar int vertex_indices\n\
+             end_header\n",
+            N + 2
+        )
+    };
+    let (mut text, mut bytes) = (header("ascii"), header("binary_little_endian").into_bytes());
+    let mut obj = String::new();
+    let vertices = std::iter::once([0.0, 0.0, 0.7]).chain((0..=N).map(rim));
+    for [x, y, z] in vertices {
+        text += &format!("{x} {y} {z}\n");
+        obj += &format!("v {x} {y} {z}\n");
+        bytes.extend([x, y, z].map(f32::to_le_bytes).as_flattened());
+    }
+    for k in 1..=N as i32 {
+        text += &format!("3 0 {k} {}\n", k + 1);
+        obj += &format!("f 1 {} {}\n", k + 1, k + 2);
+        bytes.push(3);
+        bytes.extend([0, k, k + 1].map(i32::to_le_bytes).as_flattened());
+    }
+    let meshes = [
+        read(SurfaceFormat::Ply, text.as_bytes()).unwrap(),
+        read(SurfaceFormat::Ply, &bytes).unwrap(),
+        read(SurfaceFormat::Obj, obj.as_bytes()).unwrap(),
+    ];
+    for mesh in &meshes {
+        assert_eq!(mesh.triangles.len(), N);
+        let last = mesh.triangles[N - 1].map(|v| v.map(|c| c as f32));
+        assert_eq!(last, [[0.0, 0.0, 0.7], rim(N - 1), rim(N)]);
+    }
+}
+
+/// What Blender, MeshLab, CAD programs and scanners write around the same tetrahedron.
+#[test]
+fn the_oddities_of_writers_change_nothing() {
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    let (plain, ply) = (text(obj()), text(ply_ascii()));
+    let vertex = |line: &str| line.starts_with("v ");
+    let with = |change: &dyn Fn(&str) -> String| -> String {
+        plain.lines().map(|line| change(line) + "\n").collect()
+    };
+    let objs = [
+        plain.replace('\n', "\r\n"),
+        plain.replace('\n', "\r"),
+        format!("\u{feff}{plain}"),
+        plain.replace(' ', "\t"),
+        with(&|line| format!("  {line} \t ")),
+        // MeshLab's colours, a weight, numbers as some printf writes them.
+        with(&|line| {
+            if vertex(line) {
+                format!("{line} 0.5 0.25 1.0")
+            } else {
+                line.into()
+            }
+        }),
+        with(&|line| {
+            if vertex(line) {
+                format!("{line} 1.0")
+            } else {
+                line.into()
+            }
+        }),
+        plain
+            .replace("1.3", "1.3E+000")
+            .replace("2.9", "0.29e1")
+            .replace("0.7", "+.7"),
+        // Blender's and CAD programs' other lines.
+        format!(
+            "# Blender 4.2\nmtllib a b.mtl\no Cube.001\ng\ng a b\ns off\nusemtl None\n{plain}\
+             l 1 2\np 1\nvn 0 0 1\nvt 0 0\nvp 0\ncstype bezier\n"
+        ),
+        plain.replace("f ", "fo "),
+        plain.replace("-1", "\\\n-1"),
+    ];
+    let plys = [
+        ply.replace('\n', "\r\n"),
+        ply.replace(
+            "comment made here",
+            "comment VCGLIB generated\nobj_info num_cols 512",
+        ),
+        ply.replace("float ", "float32 ")
+            .replace("uchar", "uint8")
+            .replace("list uint8 int", "list uint8 int32"),
+        ply.replace("vertex_indices", "vertex_index"),
+        ply.replace("2.9", "2.9e+00").replace("1.3", "1.30000"),
+    ];
+    let samples = objs.iter().map(|text| (SurfaceFormat::Obj, text));
+    for (format, text) in samples.chain(plys.iter().map(|text| (SurfaceFormat::Ply, text))) {
+        let report = MeshReport::new(format, read(format, text.as_bytes()).expect(text));
+        assert_eq!((report.triangles, report.watertight), (4, true), "{text}");
+        assert!((report.volume.unwrap() - VOLUME).abs() < 1e-6, "{text}");
+    }
+    // 3MF: prefixes, another place of the model, apostrophes, numbers with exponents and blanks.
+    let model = text(crate::samples::three_mf_model("inch"));
+    let prefixed = model
+        .replace("</", "</m:")
+        .replace('<', "<m:")
+        .replace("<m:/m:", "</m:")
+        .replace("<m:?", "<?");
+    let models = [
+        prefixed,
+        model.replace('"', "'"),
+        model.replace("2.9", " 2.9E+0 ").replace('\n', "\r\n"),
+        format!("\u{feff}{model}"),
+        model.replace(
+            "<resources>",
+            "<metadata name=\"Title\">&lt;a&gt; &#x41;</metadata><resources>",
+        ),
+    ];
+    for model in models {
+        let read = read(SurfaceFormat::ThreeMf, &three_mf_of(&model)).expect(&model);
+        assert_eq!(read.triangles.len(), 4, "{model}");
+    }
+}
