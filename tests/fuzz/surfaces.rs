@@ -6,9 +6,10 @@
 //!
 //! Samples made by the tests, and the real files in `../shared/corpus` where it is there, are
 //! damaged inside their containers and packed again; before them come inputs made to exhaust a
-//! reader. No input may panic, take more than a second (and than a second a megabyte), or make
-//! the reader hold more than 16 MiB (and than 16 times the content of the file). One that does is
-//! kept in the folder for temporary files and named; the run goes on and fails in the end.
+//! reader. No input may panic, take more than a second (and than a second a megabyte) of CPU, or
+//! make the reader hold more than 16 MiB (and than 16 times the content of the file, and than two
+//! copies of the triangles that it returns; STEP, which is meshed: 128 MiB and 64 times). One that
+//! does is kept in the folder for temporary files and named; the run goes on and fails in the end.
 
 // A measurement: it reads the clock, prints and ends a run that hangs.
 #![allow(clippy::print_stdout, clippy::disallowed_methods, clippy::exit)]
@@ -28,18 +29,22 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
+use cpu_time::ProcessTime;
 use fluxform::shape::document::SurfaceFormat;
 use mutation::Seed;
 use peak_alloc::PeakAlloc;
 use support::Random;
 
 #[global_allocator]
-static MEMORY: PeakAlloc = PeakAlloc;
+static HEAP: PeakAlloc = PeakAlloc;
 
 const SECONDS_PER_MB: f64 = 1.0;
 const LEAST_SECONDS: f64 = 1.0;
-const MEMORY_RATIO: f64 = 16.0;
-const LEAST_MEMORY: f64 = (16 << 20) as f64;
+/// How much more memory than content a reader may hold, and what any may.
+const MEMORY: (f64, f64) = (16.0, (16 << 20) as f64);
+const MEMORY_STEP: (f64, f64) = (64.0, (128 << 20) as f64);
+/// Bytes of a triangle read.
+const TRIANGLE: f64 = 72.0;
 /// A reader that takes so long is not waited for.
 const HANGS: Duration = Duration::from_secs(60);
 /// Larger real files leave time for few rounds.
@@ -129,25 +134,30 @@ impl Tally {
         content: usize,
     ) {
         std::fs::write(last(name), bytes).unwrap_or_default();
-        MEMORY.reset_peak_usage();
-        let held = MEMORY.current_usage();
-        let began = Instant::now();
+        HEAP.reset_peak_usage();
+        let held = HEAP.current_usage();
+        let began = ProcessTime::now();
         BEGAN.store(millis().max(1), Ordering::Relaxed);
         let result = catch_unwind(AssertUnwindSafe(|| format.read(Path::new("f"), bytes)));
         BEGAN.store(0, Ordering::Relaxed);
         let seconds = began.elapsed().as_secs_f64();
-        let memory = MEMORY.peak_usage().saturating_sub(held) as f64;
+        let memory = HEAP.peak_usage().saturating_sub(held) as f64;
         self.inputs += 1;
         let size = content.max(bytes.len()) as f64;
         self.slowest = self.slowest.max(seconds / (size / 1e6).max(1.0));
-        self.largest = self
-            .largest
-            .max(memory / size.max(LEAST_MEMORY / MEMORY_RATIO));
+        let (ratio, least) = match format {
+            SurfaceFormat::Step => MEMORY_STEP,
+            _ => MEMORY,
+        };
+        self.largest = self.largest.max(memory / size.max(1048576.0));
+        let mut allowed = least.max(ratio * size);
         let mut faults: Vec<&str> = Vec::new();
         match &result {
             Err(_) => faults.push("panic"),
             Ok(Ok(mesh)) => {
                 self.read += 1;
+                let triangles = TRIANGLE * mesh.triangles.len() as f64;
+                allowed = allowed.max(2.0 * triangles + 4.0 * size);
                 let numbers = mesh.triangles.as_flattened().as_flattened();
                 if numbers.is_empty() || !numbers.iter().all(|c| c.is_finite()) {
                     faults.push("empty or not finite");
@@ -162,7 +172,7 @@ impl Tally {
         if seconds > LEAST_SECONDS.max(SECONDS_PER_MB * size / 1e6) {
             faults.push("slow");
         }
-        if memory > LEAST_MEMORY.max(MEMORY_RATIO * size) {
+        if memory > allowed {
             faults.push("memory");
         }
         for fault in faults {
