@@ -6,6 +6,7 @@ mod deviation;
 mod formats;
 mod fuzz;
 mod heights;
+mod hostile;
 mod marks;
 mod points;
 mod samples;
