@@ -29,7 +29,7 @@ ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
 REPEATS = 3
 # A peer that takes longer is given up, s.
-PATIENCE = 150
+PATIENCE = 60
 SAMPLES = 1001
 HALF_MM = 50.0
 WRONG_MM = 1e-3

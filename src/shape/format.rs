@@ -6,29 +6,9 @@ use crate::shape::document::SurfaceFormat;
 use crate::shape::error::ShapeError;
 use crate::shape::fault::ReadError;
 use crate::shape::mesh::FileMesh;
-use crate::shape::surface::read_file;
 use crate::shape::{amf, obj, ply, sldprt, stl, three_dxml, three_mf};
 
 impl SurfaceFormat {
-    /// The triangles of the file at `path`, in the file's unit. Of a binary STL file the bytes
-    /// are not held beside the triangles.
-    ///
-    /// # Errors
-    /// [`ShapeError::Unreadable`], and as [`SurfaceFormat::read`].
-    pub fn open(self, path: &Path) -> Result<FileMesh, ShapeError> {
-        let streamed = match self {
-            Self::Stl => stl::stream(path),
-            _ => None,
-        };
-        match streamed {
-            Some(result) => result.map_err(|source| ShapeError::Stl {
-                path: path.into(),
-                source,
-            }),
-            None => self.read(path, &read_file(path)?),
-        }
-    }
-
     /// The triangles of a file's bytes, in the file's unit; `path` names it in messages.
     ///
     /// # Errors

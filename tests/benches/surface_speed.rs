@@ -23,10 +23,11 @@ use std::time::Instant;
 use cpu_time::ProcessTime;
 use fluxform::numerics::axis::Axis;
 use fluxform::progress::Silent;
-use fluxform::shape::document::{Placement, SurfaceFormat};
+use fluxform::shape::document::Placement;
 use fluxform::shape::height::{Grid, Sample, heights};
 use fluxform::shape::mesh::Mesh;
 use fluxform::shape::placement::Transform;
+use fluxform::shape::stl;
 
 type Failure = Box<dyn Error + Send + Sync>;
 
@@ -184,7 +185,12 @@ fn measure(
     };
     println!("| step | CPU s | s | peak MiB |\n|---|---|---|---|");
     let (mesh, seconds) = timed(runs, || {
-        let file = SurfaceFormat::Stl.open(path)?;
+        let source = File::open(path)?;
+        let length = source.metadata()?.len();
+        let file = match stl::stream(source, length)? {
+            Some(mesh) => mesh?,
+            None => stl::read(&std::fs::read(path)?)?,
+        };
         Ok(Mesh::place(
             file,
             &Transform::new(0.001, &Placement::default()),

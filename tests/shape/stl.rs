@@ -1,9 +1,9 @@
 //! The STL readers: real files, damaged files, and the messages.
 
-use fluxform::shape::document::{AxisRequest, GridRequest, Placement, SurfaceFormat};
+use fluxform::shape::document::{AxisRequest, GridRequest, Placement};
 use fluxform::shape::mesh::Mesh;
 use fluxform::shape::placement::Transform;
-use fluxform::shape::stl::{StlError, read};
+use fluxform::shape::stl::{StlError, read, stream};
 
 use crate::support::{binary, corpus};
 
@@ -412,46 +412,30 @@ fn the_degenerate_triangle_is_left_out_and_said() {
 
 #[test]
 fn a_file_read_in_pieces_is_the_same_mesh() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("a.stl");
-    let open = |bytes: &[u8]| {
-        std::fs::write(&path, bytes).unwrap();
-        SurfaceFormat::Stl
-            .open(&path)
-            .map_err(|error| error.to_string())
-    };
-    let whole = |bytes: &[u8]| {
-        SurfaceFormat::Stl
-            .read(&path, bytes)
-            .map_err(|e| e.to_string())
-    };
+    let in_pieces = |bytes: &[u8]| stream(bytes, bytes.len() as u64).unwrap();
     // No piece, a part of one, whole ones, and some more.
     for count in [0usize, 1, 8191, 8192, 8193, 20_000] {
         let triangles: Vec<_> = (0..count)
             .map(|k| ONE.map(|v| v.map(|c| c + k as f32)))
             .collect();
         let mut bytes = binary(&triangles);
-        assert_eq!(open(&bytes), whole(&bytes), "{count}");
+        assert_eq!(in_pieces(&bytes), Some(read(&bytes)), "{count}");
         if count > 1 {
             let last = bytes.len() - 6;
             bytes[last..last + 4].copy_from_slice(&f32::NEG_INFINITY.to_le_bytes());
-            assert_eq!(open(&bytes), whole(&bytes));
-            assert!(
-                open(&bytes)
-                    .unwrap_err()
-                    .contains(&format!("triangle {count} "))
-            );
+            assert_eq!(in_pieces(&bytes), Some(read(&bytes)));
+            let message = read(&bytes).unwrap_err().to_string();
+            assert!(message.contains(&format!("triangle {count} ")), "{message}");
             bytes.pop();
-            assert_eq!(open(&bytes), whole(&bytes));
+            assert_eq!(in_pieces(&bytes), None);
+            // A file that shrinks while it is read.
+            assert!(stream(bytes.as_slice(), bytes.len() as u64 + 1).is_err());
         }
     }
     let text = ascii("vertex 0.7 -1.3 2.9\nvertex 10.1 .3 3.1\nvertex -4.7 +8.3 2.3");
     for bytes in [text.as_bytes(), b"", b"solid"] {
-        assert_eq!(open(bytes), whole(bytes));
+        assert_eq!(in_pieces(bytes), None);
     }
-    let missing = SurfaceFormat::Stl.open(&folder.path().join("b.stl"));
-    assert!(missing.unwrap_err().to_string().contains("no such file"));
-    assert!(SurfaceFormat::Stl.open(folder.path()).is_err());
 }
 
 /// Headers and attributes of Materialise, VisCAM, CATIA and others: 80 bytes and two a triangle.

@@ -6,13 +6,9 @@
 mod ascii;
 mod binary;
 
-use std::fs::File;
-use std::path::Path;
+use std::io::{self, Read};
 
 use crate::shape::mesh::FileMesh;
-
-/// Files beyond this are left to who reads files, bytes (8 GiB).
-const LARGEST_STREAMED: u64 = 8 << 30;
 
 /// Why bytes are no STL mesh, and where.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -132,21 +128,15 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, StlError> {
     not_empty(mesh)
 }
 
-/// Reads a whole binary STL file without holding its bytes: the same mesh as [`read`] gives.
-/// `None` for anything else, faults of the file system included.
-#[must_use]
-pub fn stream(path: &Path) -> Option<Result<FileMesh, StlError>> {
-    // Not to wait for a pipe, it must be known before it is opened.
-    if !std::fs::metadata(path).ok()?.is_file() {
-        return None;
-    }
-    let file = File::open(path).ok()?;
-    let length = file.metadata().ok()?.len();
-    if length > LARGEST_STREAMED {
-        return None;
-    }
-    let result = binary::read_from(file, length).ok()??;
-    Some(result.and_then(not_empty))
+/// Reads the `length` bytes of a binary STL file without holding them: the mesh or the fault is
+/// that of [`read`]. `None` where the length is not that of the header's count; then `read` is to
+/// see the file from its beginning.
+///
+/// # Errors
+/// The source's own.
+pub fn stream(source: impl Read, length: u64) -> io::Result<Option<Result<FileMesh, StlError>>> {
+    let result = binary::read_from(source, length)?;
+    Ok(result.map(|mesh| mesh.and_then(not_empty)))
 }
 
 fn not_empty(mesh: FileMesh) -> Result<FileMesh, StlError> {
