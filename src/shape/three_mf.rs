@@ -51,10 +51,11 @@ fn root_part(archive: &mut Archive<'_>) -> Result<String, ReadError> {
         let mut document = Document::new(&name, &text);
         loop {
             match document.step()? {
-                Step::Start(e) if e.name() == "Relationship" => {
-                    if e.get("Type").is_some_and(|t| t.ends_with("/3dmodel")) {
-                        target = target.or(e.get("Target").map(String::from));
-                    }
+                Step::Start(e)
+                    if e.name() == "Relationship"
+                        && e.get("Type").is_some_and(|t| t.ends_with("/3dmodel")) =>
+                {
+                    target = target.or(e.get("Target").map(String::from));
                 }
                 Step::Done => break,
                 _ => {}

@@ -47,12 +47,9 @@ fn every_format_gives_the_same_body() {
             "{report:?}"
         );
         assert!((report.volume.unwrap() - VOLUME).abs() < 1e-6, "{report:?}");
-        for k in 0..3 {
+        for (k, corner) in CORNER.iter().enumerate() {
             assert!(report.bounds_min[k].abs() < 1e-7, "{report:?}");
-            assert!(
-                (report.bounds_max[k] - CORNER[k]).abs() < 1e-6,
-                "{report:?}"
-            );
+            assert!((report.bounds_max[k] - corner).abs() < 1e-6, "{report:?}");
         }
         assert!(report.coordinate_rounding > 0.0 && report.coordinate_rounding < 1e-6);
     }
