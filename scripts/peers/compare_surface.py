@@ -130,7 +130,8 @@ def judged(heights, wanted, stride):
 
 
 def last_line(error):
-    lines = [line for line in error.strip().splitlines() if line.strip()]
+    plain = re.sub(r"\x1b\[[0-9;]*m", "", error)
+    lines = [line for line in plain.splitlines() if line.strip()]
     return lines[-1].strip()[:160] if lines else "no message"
 
 
