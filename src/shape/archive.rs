@@ -1,6 +1,7 @@
 //! ZIP archives of untrusted origin: what is unpacked is bounded by the archive's own length.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::io::{Cursor, Read};
 
 use zip::ZipArchive;
@@ -8,15 +9,19 @@ use zip::ZipArchive;
 use crate::shape::fault::{Place, ReadError};
 
 /// So many bytes may be unpacked from any archive,
-const LEAST_BUDGET: u64 = 64 << 20;
+const LEAST_BUDGET: u64 = 8 << 20;
 /// or so many times its length: XML of meshes shrinks to a tenth, at the most to a fiftieth,
-const MOST_RATIO: u64 = 200;
+const MOST_RATIO: u64 = 100;
 /// but never more.
 const MOST_BUDGET: u64 = 4 << 30;
+/// So many times the archive's length is reserved on the word of its directory.
+const RESERVED_RATIO: u64 = 8;
 
 /// An opened archive and how much may yet be unpacked from it.
 pub(super) struct Archive<'a> {
     zip: ZipArchive<Cursor<&'a [u8]>>,
+    /// The parts' own names by those under which they are looked for.
+    names: HashMap<String, String>,
     length: u64,
     left: u64,
 }
@@ -34,8 +39,13 @@ impl<'a> Archive<'a> {
             let what = format!("the ZIP archive is damaged or was cut short: {error}");
             ReadError::file(what)
         })?;
+        let mut names = HashMap::new();
+        for name in zip.file_names().flatten().map(Cow::into_owned) {
+            names.entry(sought(&name)).or_insert(name);
+        }
         Ok(Self {
             zip,
+            names,
             length,
             left: (length * MOST_RATIO).clamp(LEAST_BUDGET, MOST_BUDGET),
         })
@@ -43,9 +53,7 @@ impl<'a> Archive<'a> {
 
     /// The name under which a part is kept: `wanted` in any case, without a leading slash.
     pub(super) fn find(&self, wanted: &str) -> Option<String> {
-        let wanted = wanted.trim_start_matches('/');
-        self.names()
-            .find(|name| name.trim_start_matches('/').eq_ignore_ascii_case(wanted))
+        self.names.get(&sought(wanted)).cloned()
     }
 
     /// The names of all parts that have one.
@@ -56,24 +64,31 @@ impl<'a> Archive<'a> {
     /// Unpacks one part as text in UTF-8.
     pub(super) fn text(&mut self, name: &str) -> Result<String, ReadError> {
         let fault = |what: String| ReadError::new(Place::Part(name.to_owned(), 0), what);
-        let part = self
+        let mut part = self
             .zip
             .by_name(name)
             .map_err(|error| fault(format!("it cannot be unpacked: {error}")))?;
-        let mut bytes = Vec::new();
-        let read = part.take(self.left + 1).read_to_end(&mut bytes);
-        read.map_err(|error| fault(format!("it cannot be unpacked: {error}")))?;
-        let used = bytes.len() as u64;
-        if used > self.left {
+        let claimed = part.size();
+        if claimed > self.left {
             return Err(fault(format!(
                 "the archive unpacks to far more than its {} bytes can stand for: it is refused \
                  as a decompression bomb",
                 self.length
             )));
         }
-        self.left -= used;
+        let reserved = claimed.min(RESERVED_RATIO * self.length);
+        let mut bytes = Vec::with_capacity(usize::try_from(reserved).unwrap_or(0));
+        // What goes on beyond its claim is refused by the unpacker.
+        let read = part.read_to_end(&mut bytes);
+        read.map_err(|error| fault(format!("it cannot be unpacked: {error}")))?;
+        self.left -= claimed;
         text_of(bytes).map_err(fault)
     }
+}
+
+/// How a part's name is looked for.
+fn sought(name: &str) -> String {
+    name.trim_start_matches('/').to_ascii_lowercase()
 }
 
 /// XML's bytes as text, without a byte-order mark.

@@ -2,8 +2,10 @@
 
 use crate::shape::mesh::Triangle;
 
-/// More triangles than this in one surface are refused.
-pub(super) const MOST_TRIANGLES: u64 = 100_000_000;
+/// Placing bodies several times may add so many triangles to those of the file,
+const MOST_ADDED: u64 = 10_000_000;
+/// by so many placements: a small file must not fill a computer.
+const MOST_PLACEMENTS: u64 = 1_000_000;
 /// Placements nested deeper than this belong to no part.
 const DEEPEST: usize = 64;
 
@@ -64,17 +66,18 @@ pub(super) struct Body {
 /// A body within itself, too many triangles, bodies nested too deep.
 pub(super) fn lay_out(bodies: &[Body], roots: &[(usize, Affine)]) -> Result<Vec<Triangle>, String> {
     let mut visits = vec![None; bodies.len()];
-    let mut total = 0u64;
+    let mut total = Weight::default();
     for (root, _) in roots {
-        total = total.saturating_add(weight(bodies, *root, &mut visits, 0)?);
+        total.add(weight(bodies, *root, &mut visits, 0)?);
     }
-    if total > MOST_TRIANGLES {
+    let own: u64 = bodies.iter().map(|body| body.triangles.len() as u64).sum();
+    if total.triangles > own + MOST_ADDED || total.placements > MOST_PLACEMENTS {
         return Err(format!(
-            "the placed bodies add up to more than {MOST_TRIANGLES} triangles; export a coarser \
-             mesh"
+            "the placed bodies add up to more than the file's {own} triangles and {MOST_ADDED} \
+             copies of them, or {MOST_PLACEMENTS} placements; export fewer bodies or a coarser mesh"
         ));
     }
-    let mut triangles = Vec::new();
+    let mut triangles = Vec::with_capacity(usize::try_from(total.triangles).unwrap_or(0));
     for (root, place) in roots {
         add(bodies, *root, place, &mut triangles);
     }
@@ -85,10 +88,24 @@ pub(super) fn lay_out(bodies: &[Body], roots: &[(usize, Affine)]) -> Result<Vec<
     Ok(triangles)
 }
 
+/// What is laid out below a body.
+#[derive(Clone, Copy, Default)]
+struct Weight {
+    triangles: u64,
+    placements: u64,
+}
+
+impl Weight {
+    fn add(&mut self, other: Self) {
+        self.triangles = self.triangles.saturating_add(other.triangles);
+        self.placements = self.placements.saturating_add(other.placements);
+    }
+}
+
 #[derive(Clone, Copy)]
 enum Visit {
     Open,
-    Weighs(u64),
+    Weighs(Weight),
 }
 
 /// Triangles and placements below a body, each body computed once.
@@ -97,7 +114,7 @@ fn weight(
     index: usize,
     visits: &mut [Option<Visit>],
     depth: usize,
-) -> Result<u64, String> {
+) -> Result<Weight, String> {
     match visits[index] {
         Some(Visit::Weighs(weight)) => return Ok(weight),
         Some(Visit::Open) => return Err("a body is placed within itself".into()),
@@ -106,9 +123,12 @@ fn weight(
         }
         None => visits[index] = Some(Visit::Open),
     }
-    let mut sum = 1 + bodies[index].triangles.len() as u64;
+    let mut sum = Weight {
+        triangles: bodies[index].triangles.len() as u64,
+        placements: 1,
+    };
     for (child, _) in &bodies[index].children {
-        sum = sum.saturating_add(weight(bodies, *child, visits, depth + 1)?);
+        sum.add(weight(bodies, *child, visits, depth + 1)?);
     }
     visits[index] = Some(Visit::Weighs(sum));
     Ok(sum)

@@ -2,6 +2,9 @@
 
 use std::fmt;
 
+/// Characters of either end of a message that are kept.
+const LONGEST_HALF: usize = 400;
+
 /// Where in a file a fault lies.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
@@ -27,9 +30,13 @@ pub struct ReadError {
 impl ReadError {
     /// A fault at `place`.
     pub(super) fn new(place: Place, what: impl Into<String>) -> Self {
+        let place = match place {
+            Place::Part(name, line) => Place::Part(shortened(name), line),
+            other => other,
+        };
         Self {
             place,
-            what: what.into(),
+            what: shortened(what.into()),
         }
     }
 
@@ -37,6 +44,18 @@ impl ReadError {
     pub(super) fn file(what: impl Into<String>) -> Self {
         Self::new(Place::File, what)
     }
+}
+
+/// A message may quote names of any length from the file: the middle of a long one is left out,
+/// the advice at its end is kept.
+fn shortened(text: String) -> String {
+    let chars = text.chars().count();
+    if chars <= 2 * LONGEST_HALF {
+        return text;
+    }
+    let start: String = text.chars().take(LONGEST_HALF).collect();
+    let end: String = text.chars().skip(chars - LONGEST_HALF).collect();
+    format!("{start} ... {end}")
 }
 
 impl fmt::Display for ReadError {

@@ -146,8 +146,8 @@ impl Line {
 
     /// Index of the first node that is not below `value`.
     fn first_from(&self, value: f64) -> usize {
-        // The cast saturates; a guess is off by one at most, by rounding.
-        let guess = ((value - self.from) * self.per_step).ceil() as usize;
+        // The cast saturates and cuts off; the guess is off by one or two at most.
+        let guess = ((value - self.from) * self.per_step) as usize;
         let mut index = guess.min(self.nodes.len());
         while index > 0 && self.nodes[index - 1] >= value {
             index -= 1;
@@ -228,7 +228,9 @@ impl<'a> Layer<'a> {
             };
             for column in columns {
                 let point = row * nodes.x.nodes.len() + column;
-                self.meet(point, triangle, seen.contact([nodes.x.nodes[column], y]));
+                if !seen.is_hidden_below(self.covering[point].height) {
+                    self.meet(point, triangle, seen.contact([nodes.x.nodes[column], y]));
+                }
             }
         }
     }

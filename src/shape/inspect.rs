@@ -17,7 +17,7 @@ use crate::shape::height::Grid;
 use crate::shape::mesh::{FileMesh, Mesh, Triangle, cross, minus};
 use crate::shape::placement::Transform;
 use crate::shape::scattered::Probe;
-use crate::shape::surface::{Surface, read_file};
+use crate::shape::surface::{Surface, read_mesh};
 
 /// What a surface file holds. Lengths are in the file's unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -102,7 +102,7 @@ impl MeshReport {
     pub fn of_file(path: &Path) -> Result<Self, ShapeError> {
         let format =
             SurfaceFormat::of(path).ok_or_else(|| ShapeError::Format { path: path.into() })?;
-        let file = format.read(path, &read_file(path)?)?;
+        let file = read_mesh(format, path)?;
         let coordinates = file.triangles.as_flattened().as_flattened().iter();
         let largest = coordinates.fold(0.0, |m: f64, c| m.max(c.abs()));
         if largest > FARTHEST {

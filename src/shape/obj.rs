@@ -6,7 +6,7 @@
 use crate::shape::fault::{Place, ReadError};
 use crate::shape::mesh::FileMesh;
 use crate::shape::number::{Numbers, shown};
-use crate::shape::polygon::Cutter;
+use crate::shape::polygon::{Cutter, MOST_CORNERS};
 use crate::shape::words::Lines;
 
 /// Reads an OBJ file's bytes; names may be in any encoding.
@@ -29,10 +29,10 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
     reader.mesh()
 }
 
-/// A face: its line, and where its indices end.
+/// A face: its line, and how many corners it has.
 struct Face {
-    line: usize,
-    end: usize,
+    line: u32,
+    corners: u32,
 }
 
 #[derive(Default)]
@@ -40,7 +40,7 @@ struct Reader {
     numbers: Numbers,
     vertices: Vec<[f64; 3]>,
     /// Indices of all faces, from 0.
-    indices: Vec<usize>,
+    indices: Vec<u32>,
     faces: Vec<Face>,
     free_form: usize,
 }
@@ -64,31 +64,43 @@ impl Reader {
     ) -> Result<(), String> {
         let start = self.indices.len();
         for word in words {
+            if self.indices.len() - start == MOST_CORNERS {
+                return Err(format!("a face has more than {MOST_CORNERS} corners"));
+            }
             let first = word.split(|b| *b == b'/').next().unwrap_or_default();
             let index = std::str::from_utf8(first)
                 .ok()
                 .and_then(|w| w.parse::<i64>().ok());
             let so_far = self.vertices.len();
-            self.indices.push(match index {
+            let index = match index {
                 None => return Err(format!("expected an index, found `{}`", shown(word))),
                 Some(0) => return Err("a face has the index 0; indices count from 1".into()),
-                Some(index @ 1..) => usize::try_from(index - 1).unwrap_or(usize::MAX),
+                Some(index @ 1..) => u32::try_from(index - 1).map_err(|_| {
+                    format!("a face has the index {index}: no file has so many vertices")
+                })?,
                 Some(back) => {
                     let back = usize::try_from(back.unsigned_abs()).unwrap_or(usize::MAX);
-                    so_far.checked_sub(back).ok_or(format!(
-                        "a face has the index -{back}, but only {so_far} vertices come before it"
-                    ))?
+                    let index = so_far.checked_sub(back).ok_or_else(|| {
+                        format!(
+                            "a face has the index -{back}, but only {so_far} vertices come \
+                             before it"
+                        )
+                    })?;
+                    u32::try_from(index).map_err(|_| "the file has too many vertices")?
                 }
-            });
+            };
+            self.indices.push(index);
         }
-        let end = self.indices.len();
-        if end - start < 3 {
+        let corners = self.indices.len() - start;
+        if corners < 3 {
             return Err(format!(
-                "a face has at least three corners; here are {}",
-                end - start
+                "a face has at least three corners; here are {corners}"
             ));
         }
-        self.faces.push(Face { line, end });
+        self.faces.push(Face {
+            line: u32::try_from(line).unwrap_or(u32::MAX),
+            corners: corners as u32,
+        });
         Ok(())
     }
 
@@ -99,25 +111,26 @@ impl Reader {
                 self.vertices.len(),
             )));
         }
-        let mut triangles = Vec::new();
+        let mut triangles = Vec::with_capacity(self.indices.len() - 2 * self.faces.len());
         let mut cutter = Cutter::new();
         let mut corners = Vec::new();
-        let mut start = 0;
-        for Face { line, end } in self.faces {
+        let mut rest = self.indices.as_slice();
+        for face in self.faces {
+            let (indices, after) = rest.split_at(face.corners as usize);
+            rest = after;
             corners.clear();
-            for index in &self.indices[start..end] {
-                let vertex = self.vertices.get(*index).ok_or_else(|| {
+            for index in indices {
+                let vertex = self.vertices.get(*index as usize).ok_or_else(|| {
                     let what = format!(
                         "a face has the index {}, but the file has {} vertices",
-                        index.saturating_add(1),
+                        u64::from(*index) + 1,
                         self.vertices.len()
                     );
-                    ReadError::new(Place::Line(line), what)
+                    ReadError::new(Place::Line(face.line as usize), what)
                 })?;
                 corners.push(*vertex);
             }
             cutter.cut(&corners, &mut triangles);
-            start = end;
         }
         let mut warnings = Vec::new();
         if self.free_form > 0 {

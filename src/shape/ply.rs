@@ -15,7 +15,10 @@ use ply_rs_bw::ply::{
 use crate::shape::fault::ReadError;
 use crate::shape::mesh::FileMesh;
 use crate::shape::number::{F32_ROUNDING, shown};
-use crate::shape::polygon::Cutter;
+use crate::shape::polygon::{Cutter, MOST_CORNERS};
+
+/// Elements that the parser makes at once: it allocates for each.
+const AT_ONCE: usize = 1 << 12;
 
 /// Reads a PLY file's bytes.
 ///
@@ -40,26 +43,75 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
     let length = reader.get_mut().fill_buf().map_or(0, <[u8]>::len);
     check(&header, length)?;
     let mut vertices: Vec<Vertex> = Vec::new();
-    let mut faces: Option<Vec<Face>> = None;
+    let mut faces = Faces::default();
     for (name, element) in &header.elements {
         match name.as_str() {
             "vertex" => {
-                vertices = Parser::new()
-                    .read_payload_for_element(&mut reader, element, &header)
-                    .map_err(fault)?;
+                // The count was held against the file's length.
+                vertices.reserve_exact(element.count);
+                each(&mut reader, element, &header, |vertex| {
+                    vertices.push(vertex);
+                    Ok(())
+                })?;
             }
-            "face" => {
-                let read = Parser::new().read_payload_for_element(&mut reader, element, &header);
-                faces = Some(read.map_err(fault)?);
-            }
-            _ => {
-                Parser::<Skipped>::new()
-                    .read_payload_for_element(&mut reader, element, &header)
-                    .map_err(fault)?;
-            }
+            "face" => each(&mut reader, element, &header, |face: Face| faces.add(&face))?,
+            _ => each(&mut reader, element, &header, |_: Skipped| Ok(()))?,
         }
     }
-    mesh(&header, &vertices, faces.as_deref().unwrap_or_default())
+    mesh(&header, &vertices, &faces)
+}
+
+/// Reads an element's entries, some at a time.
+fn each<E: PropertyAccess>(
+    reader: &mut Reader<&mut &[u8]>,
+    element: &ElementDef,
+    header: &Header,
+    mut take: impl FnMut(E) -> Result<(), ReadError>,
+) -> Result<(), ReadError> {
+    let mut some = element.clone();
+    let mut left = element.count;
+    while left > 0 {
+        some.count = left.min(AT_ONCE);
+        left -= some.count;
+        let read = Parser::new().read_payload_for_element(reader, &some, header);
+        for entry in read.map_err(fault)? {
+            take(entry)?;
+        }
+    }
+    Ok(())
+}
+
+/// Faces one after the other.
+#[derive(Default)]
+struct Faces {
+    /// How many corners each has.
+    corners: Vec<u32>,
+    /// Indices of all corners.
+    indices: Vec<u32>,
+    /// The first face with an index that no vertex can have, and that.
+    astray: Option<(usize, i64)>,
+}
+
+impl Faces {
+    fn add(&mut self, face: &Face) -> Result<(), ReadError> {
+        let number = self.corners.len();
+        if face.0.len() > MOST_CORNERS {
+            return Err(ReadError::file(format!(
+                "face {number} (from 0) has more than {MOST_CORNERS} corners"
+            )));
+        }
+        for index in &face.0 {
+            match u32::try_from(*index) {
+                Ok(index) => self.indices.push(index),
+                Err(_) => {
+                    self.astray.get_or_insert((number, *index));
+                    self.indices.push(u32::MAX);
+                }
+            }
+        }
+        self.corners.push(face.0.len() as u32);
+        Ok(())
+    }
 }
 
 /// The file with every byte of its header in ASCII: comments may be in any encoding, but the
@@ -153,8 +205,8 @@ fn size(kind: &ScalarType) -> u128 {
     }
 }
 
-fn mesh(header: &Header, vertices: &[Vertex], faces: &[Face]) -> Result<FileMesh, ReadError> {
-    if faces.is_empty() {
+fn mesh(header: &Header, vertices: &[Vertex], faces: &Faces) -> Result<FileMesh, ReadError> {
+    if faces.corners.is_empty() {
         return Err(ReadError::file(format!(
             "the PLY file holds {} points and no face: there is no surface; make a mesh of them \
              first",
@@ -171,21 +223,29 @@ fn mesh(header: &Header, vertices: &[Vertex], faces: &[Face]) -> Result<FileMesh
         }
         largest = vertex.iter().fold(largest, |m, c| m.max(c.abs()));
     }
-    let mut triangles = Vec::with_capacity(faces.len());
+    let without_vertex = |number: usize, index: i64| {
+        ReadError::file(format!(
+            "face {number} (from 0) has the index {index}, but the file has {} vertices (indices \
+             count from 0)",
+            vertices.len()
+        ))
+    };
+    if let Some((number, index)) = faces.astray {
+        return Err(without_vertex(number, index));
+    }
+    let wanted = faces.corners.iter().map(|n| n.saturating_sub(2) as usize);
+    let mut triangles = Vec::with_capacity(wanted.sum());
     let mut cutter = Cutter::new();
     let mut corners = Vec::new();
     let mut short = 0;
-    for (number, face) in faces.iter().enumerate() {
+    let mut rest = faces.indices.as_slice();
+    for (number, count) in faces.corners.iter().enumerate() {
+        let (indices, after) = rest.split_at(*count as usize);
+        rest = after;
         corners.clear();
-        for index in &face.0 {
-            let vertex = usize::try_from(*index).ok().and_then(|i| vertices.get(i));
-            let vertex = vertex.ok_or_else(|| {
-                ReadError::file(format!(
-                    "face {number} (from 0) has the index {index}, but the file has {} vertices \
-                     (indices count from 0)",
-                    vertices.len()
-                ))
-            })?;
+        for index in indices {
+            let vertex = vertices.get(*index as usize);
+            let vertex = vertex.ok_or_else(|| without_vertex(number, i64::from(*index)))?;
             corners.push(vertex.0);
         }
         short += usize::from(corners.len() < 3);

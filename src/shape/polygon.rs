@@ -4,6 +4,9 @@ use earcut::Earcut;
 
 use crate::shape::mesh::{Triangle, cross, minus};
 
+/// A face with more corners was not written by a program that draws faces, and to cut it could
+/// take minutes.
+pub(super) const MOST_CORNERS: usize = 50_000;
 /// Turns smaller than this, against the polygon's area, are rounding and no notch.
 const FLAT_TURN: f64 = 1e-9;
 

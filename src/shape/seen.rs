@@ -37,6 +37,8 @@ pub(super) struct Seen {
     orientation: f64,
     wall: bool,
     reach: f64,
+    /// The highest vertex.
+    top: f64,
 }
 
 impl Seen {
@@ -51,7 +53,14 @@ impl Seen {
             orientation,
             wall,
             reach,
+            top: a[2].max(b[2]).max(c[2]),
         }
+    }
+
+    /// True where nothing of this triangle counts at a point that is covered at `height`. A wall
+    /// always counts: where one stands, what is merely near counts too.
+    pub(super) fn is_hidden_below(&self, height: f64) -> bool {
+        self.top < height && !self.wall
     }
 
     /// A range of x that holds every point of row `y` that this triangle touches.
@@ -101,7 +110,21 @@ impl Seen {
         if weights.iter().all(|w| *w >= 0.0) {
             return Contact::Covers(self.inside(weights, p));
         }
+        if self.is_far(weights) {
+            return Contact::None;
+        }
         self.near(p).map_or(Contact::None, Contact::Near)
+    }
+
+    /// True where the point lies so far beyond one side that `near` need not be asked: twice the
+    /// reach, which leaves room for all rounding on the way.
+    fn is_far(&self, weights: [f64; 3]) -> bool {
+        let [a, b, c] = self.vertices;
+        // No side is longer than the sum of its two extents.
+        let beyond = |weight: f64, (p, q): (Vertex, Vertex)| {
+            weight < -2.0 * self.reach * ((p[0] - q[0]).abs() + (p[1] - q[1]).abs())
+        };
+        beyond(weights[0], (b, c)) || beyond(weights[1], (c, a)) || beyond(weights[2], (a, b))
     }
 
     fn edges(&self) -> [(Vertex, Vertex); 3] {
@@ -136,6 +159,9 @@ impl Seen {
     /// Height at a covered point; the vertices' own heights are met exactly.
     fn inside(&self, weights: [f64; 3], p: Point) -> f64 {
         let [a, b, c] = self.vertices;
+        if a[2] == b[2] && b[2] == c[2] {
+            return a[2];
+        }
         // On an edge both neighbours must give the same number: only its two ends matter.
         match weights.map(|w| w == 0.0) {
             [true, _, _] => return edge_height(b, c, p),

@@ -1,5 +1,6 @@
 //! A surface in metres, whether it is a mesh or a formula.
 
+use std::fs::File;
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -11,6 +12,7 @@ use crate::shape::height::{self, Grid, Sample};
 use crate::shape::mesh::{Bounds, FileMesh, Mesh, MeshFacts};
 use crate::shape::placement::Transform;
 use crate::shape::primitive::PlacedPrimitive;
+use crate::shape::stl::{self, StlError};
 
 /// Larger files fit no computer's memory together with what is made of them, bytes (8 GiB).
 const LARGEST_FILE: u64 = 8 << 30;
@@ -121,7 +123,7 @@ pub fn read(path: &Path, stated_m: Option<f64>) -> Result<(FileMesh, f64), Shape
             "the unit is {unit_m} m; it must be positive"
         )));
     }
-    let file = format.read(path, &read_file(path)?)?;
+    let file = read_mesh(format, path)?;
     match (file.unit_m, stated_m) {
         (Some(own), Some(stated)) if own != stated => Err(ShapeError::UnitDiffers {
             path: path.into(),
@@ -134,6 +136,34 @@ pub fn read(path: &Path, stated_m: Option<f64>) -> Result<(FileMesh, f64), Shape
             Ok((file, unit_m))
         }
     }
+}
+
+/// The triangles of the file at `path`; of a binary STL the bytes are not held beside them.
+pub(super) fn read_mesh(format: SurfaceFormat, path: &Path) -> Result<FileMesh, ShapeError> {
+    if format == SurfaceFormat::Stl
+        && let Some(result) = streamed(path)
+    {
+        return result.map_err(|source| ShapeError::Stl {
+            path: path.into(),
+            source,
+        });
+    }
+    format.read(path, &read_file(path)?)
+}
+
+/// `None` for what is no whole binary STL file, and where the file system fails: reading it
+/// otherwise tells why.
+fn streamed(path: &Path) -> Option<Result<FileMesh, StlError>> {
+    // Not to wait for a pipe, it must be known before it is opened.
+    if !std::fs::metadata(path).ok()?.is_file() {
+        return None;
+    }
+    let file = File::open(path).ok()?;
+    let length = file.metadata().ok()?.len();
+    if length > LARGEST_FILE {
+        return None;
+    }
+    stl::stream(file, length).ok()?
 }
 
 fn check_placement(placement: &Placement) -> Result<(), ShapeError> {
@@ -152,7 +182,7 @@ fn check_placement(placement: &Placement) -> Result<(), ShapeError> {
 }
 
 /// A regular file's bytes.
-pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
+fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
     let unreadable = |what: String| ShapeError::Unreadable {
         path: path.into(),
         what,

@@ -11,20 +11,35 @@ use crate::shape::mesh::{Mesh, cross, minus};
 /// Turns beyond this are edges of the body, not of the tessellation, degrees.
 const SHARPEST_DEG: f64 = 20.0;
 
+/// A side of a triangle: its ends' name, the triangle, which of the three.
+type Side = (u64, u32, u8);
+
+/// One number for two ends; sides that share it are compared besides.
+fn name(ends: &[[u64; 3]; 2]) -> u64 {
+    ends.as_flattened()
+        .iter()
+        .fold(0x9e37_79b9_7f4a_7c15, |h, bits| {
+            let mixed = (h ^ bits).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            mixed ^ (mixed >> 29)
+        })
+}
+
 /// The largest estimated deviation of a facet from the surface meant, m; 0 for a plane body.
 #[must_use]
 pub fn estimated_deviation_m(mesh: &Mesh) -> f64 {
-    type Key = [[u64; 3]; 2];
     let triangles = mesh.triangles();
-    let bits = |p: [f64; 3]| p.map(|c| (c + 0.0).to_bits());
-    let mut sides: Vec<(Key, u32, u8)> = (0..triangles.len())
+    let side = |(_, index, side): &Side| {
+        let corners = &triangles[*index as usize];
+        let ends =
+            [0, 1].map(|end| corners[(*side as usize + end) % 3].map(|c| (c + 0.0).to_bits()));
+        let [a, b] = ends;
+        if b < a { [b, a] } else { [a, b] }
+    };
+    let mut sides: Vec<Side> = (0..3 * triangles.len())
         .into_par_iter()
-        .flat_map_iter(|index| {
-            (0..3u8).map(move |side| {
-                let ends = [0, 1].map(|end| bits(triangles[index][(side as usize + end) % 3]));
-                let [a, b] = ends;
-                (if b < a { [b, a] } else { [a, b] }, index as u32, side)
-            })
+        .map(|k| {
+            let unnamed = (0, (k / 3) as u32, (k % 3) as u8);
+            (name(&side(&unnamed)), unnamed.1, unnamed.2)
         })
         .collect();
     sides.par_sort_unstable();
@@ -37,7 +52,10 @@ pub fn estimated_deviation_m(mesh: &Mesh) -> f64 {
             .take_while(|side| side.0 == sides[from].0)
             .count();
         // Where three or more meet, the edge is no part of a smooth surface.
-        if let [(_, first, side), (_, second, other)] = sides[from..from + same] {
+        if let [one, two] = &sides[from..from + same]
+            && side(one) == side(two)
+        {
+            let ((_, first, side), (_, second, other)) = (*one, *two);
             let (p, q) = (
                 facet(triangles, first, side),
                 facet(triangles, second, other),

@@ -182,7 +182,7 @@ fn representation(e: &Element<'_>) -> Result<String, String> {
 struct Rep {
     positions: Option<Vec<[f64; 3]>>,
     /// Indices of triangles, three by three.
-    corners: Vec<usize>,
+    corners: Vec<u32>,
 }
 
 fn representation_mesh(
@@ -242,7 +242,7 @@ fn words(text: &str) -> impl Iterator<Item = &str> {
 
 /// Triangles one by one, strips and fans; commas separate strips and fans.
 fn face(e: &Element<'_>, rep: &mut Rep) -> Result<(), String> {
-    let indices = |text: &str| -> Result<Vec<usize>, String> {
+    let indices = |text: &str| -> Result<Vec<u32>, String> {
         words(text)
             .map(|word| {
                 word.parse()
@@ -277,10 +277,11 @@ fn face(e: &Element<'_>, rep: &mut Rep) -> Result<(), String> {
 fn add(rep: &Rep, triangles: &mut Vec<Triangle>) -> Result<(), String> {
     let points = rep.positions.as_deref().unwrap_or_default();
     let (corners, _) = rep.corners.as_chunks::<3>();
+    triangles.reserve(corners.len());
     for corner in corners {
         let mut triangle = [[0.0; 3]; 3];
         for (vertex, index) in triangle.iter_mut().zip(corner) {
-            *vertex = *points.get(*index).ok_or_else(|| {
+            *vertex = *points.get(*index as usize).ok_or_else(|| {
                 format!(
                     "a face has the index {index}, but its body has {} points (indices count \
                      from 0)",

@@ -4,7 +4,7 @@
 //! parts. Materials, slices and properties change no surface and are passed over; an extension
 //! that the file requires and that is not known is refused, since it may change the surface.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use crate::shape::archive::Archive;
 use crate::shape::assembly::{Affine, Body, lay_out};
@@ -16,6 +16,8 @@ use crate::shape::xml::{Document, Element, Step};
 
 /// More model parts than this belong to no surface.
 const MOST_PARTS: usize = 1000;
+/// A file that requires more extensions than this is none that a program wrote.
+const MOST_EXTENSIONS: usize = 64;
 /// Parts of the names of extensions that change no triangle.
 const HARMLESS: [&str; 5] = [
     "/core/",
@@ -83,7 +85,7 @@ struct Model {
     items: Vec<(Key, Affine)>,
     supports: usize,
     numbers: Numbers,
-    parts: Vec<String>,
+    parts: HashSet<String>,
 }
 
 /// What is being read of one object.
@@ -103,7 +105,7 @@ impl Model {
             let what = format!("the file has more than {MOST_PARTS} model parts");
             return Err(ReadError::file(what));
         }
-        self.parts.push(name.to_owned());
+        self.parts.insert(name.to_owned());
         let text = archive.text(name)?;
         let mut document = Document::new(name, &text);
         let mut open: Option<Open> = None;
@@ -157,6 +159,11 @@ impl Model {
             ));
         }
         let required = model.get("requiredextensions").unwrap_or_default();
+        if required.split_whitespace().count() > MOST_EXTENSIONS {
+            return Err(format!(
+                "the file requires more than {MOST_EXTENSIONS} extensions; export it as a plain mesh"
+            ));
+        }
         for prefix in required.split_whitespace() {
             let space = model
                 .get_exact(&format!("xmlns:{prefix}"))

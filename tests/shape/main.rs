@@ -6,6 +6,7 @@ mod deviation;
 mod formats;
 mod fuzz;
 mod heights;
+mod hostile;
 mod inspect;
 mod marks;
 mod points;

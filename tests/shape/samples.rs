@@ -206,3 +206,98 @@ pub fn sldprt_of(stream: &[u8]) -> Vec<u8> {
 pub fn sldprt() -> Vec<u8> {
     sldprt_of(&display_lists())
 }
+
+/// A part in STEP: a box of 0.7 x 1.3 x 2.9 mm, its six faces planes.
+pub fn step() -> Vec<u8> {
+    let mut lines: Vec<String> = Vec::new();
+    let mut add = |text: String| {
+        lines.push(text);
+        lines.len()
+    };
+    let corner = |k: usize| {
+        [0, 1, 2].map(|axis| {
+            if k >> axis & 1 == 1 {
+                VERTICES[axis + 1][axis]
+            } else {
+                0.0
+            }
+        })
+    };
+    let (mut point, mut vertex) = ([0; 8], [0; 8]);
+    for k in 0..8 {
+        let [x, y, z] = corner(k);
+        point[k] = add(format!("CARTESIAN_POINT('',({x:.3},{y:.3},{z:.3}))"));
+        vertex[k] = add(format!("VERTEX_POINT('',#{})", point[k]));
+    }
+    let direction = |[x, y, z]: [i32; 3]| format!("DIRECTION('',({x}.,{y}.,{z}.))");
+    let along = |axis: usize, sign: i32| {
+        let mut unit = [0; 3];
+        unit[axis] = sign;
+        unit
+    };
+    // Edges run along their axis from the corner without that bit.
+    let mut edge = std::collections::BTreeMap::new();
+    for axis in 0..3 {
+        for from in (0..8).filter(|k| k >> axis & 1 == 0) {
+            let to = from | 1 << axis;
+            let d = add(direction(along(axis, 1)));
+            let v = add(format!("VECTOR('',#{d},1.)"));
+            let line = add(format!("LINE('',#{},#{v})", point[from]));
+            let curve = add(format!(
+                "EDGE_CURVE('',#{},#{},#{line},.T.)",
+                vertex[from], vertex[to]
+            ));
+            edge.insert((from, to), curve);
+        }
+    }
+    let mut faces = Vec::new();
+    for axis in 0..3 {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        for side in [0, 1] {
+            let base = side << axis;
+            // Counterclockwise as seen from outside.
+            let mut turn = [base, base | 1 << u, base | 1 << u | 1 << v, base | 1 << v];
+            if side == 0 {
+                turn.reverse();
+            }
+            let mut oriented = Vec::new();
+            for k in 0..4 {
+                let (from, to) = (turn[k], turn[(k + 1) % 4]);
+                let (low, high) = (from.min(to), from.max(to));
+                let sense = if from < to { ".T." } else { ".F." };
+                let curve = edge[&(low, high)];
+                let e = add(format!("ORIENTED_EDGE('',*,*,#{curve},{sense})"));
+                oriented.push(format!("#{e}"));
+            }
+            let edges = add(format!("EDGE_LOOP('',({}))", oriented.join(",")));
+            let bound = add(format!("FACE_OUTER_BOUND('',#{edges},.T.)"));
+            let normal = add(direction(along(axis, 2 * side as i32 - 1)));
+            let across = add(direction(along(u, 1)));
+            let at = point[base];
+            let placed = add(format!("AXIS2_PLACEMENT_3D('',#{at},#{normal},#{across})"));
+            let plane = add(format!("PLANE('',#{placed})"));
+            let face = add(format!("ADVANCED_FACE('',(#{bound}),#{plane},.T.)"));
+            faces.push(format!("#{face}"));
+        }
+    }
+    let shell = add(format!("CLOSED_SHELL('',({}))", faces.join(",")));
+    let solid = add(format!("MANIFOLD_SOLID_BREP('box',#{shell})"));
+    let length = add("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))".into());
+    let angle = add("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))".into());
+    let context = add(format!(
+        "(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#{length},#{angle}))\
+         REPRESENTATION_CONTEXT('',''))"
+    ));
+    add(format!(
+        "ADVANCED_BREP_SHAPE_REPRESENTATION('',(#{solid}),#{context})"
+    ));
+    let mut text = String::from(
+        "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\n\
+         FILE_NAME('box','2024-01-01T00:00:00',(''),(''),'','','');\n\
+         FILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n",
+    );
+    for (k, line) in lines.iter().enumerate() {
+        text += &format!("#{}={line};\n", k + 1);
+    }
+    (text + "ENDSEC;\nEND-ISO-10303-21;\n").into_bytes()
+}

@@ -53,6 +53,19 @@ fn real_bodies_are_those_of_another_reader() {
 }
 
 #[test]
+fn a_box_is_a_box() {
+    let read = SurfaceFormat::Step.read(Path::new("f.step"), &crate::samples::step());
+    let report = MeshReport::new(SurfaceFormat::Step, read.unwrap());
+    assert_eq!((report.unit_m, report.watertight), (Some(1e-3), true));
+    assert_eq!(report.triangles, 12);
+    let volume = report.volume.unwrap();
+    assert!((volume - 0.7 * 1.3 * 2.9).abs() < 1e-12, "{volume}");
+    for (got, wanted) in report.bounds_max.iter().zip([0.7, 1.3, 2.9]) {
+        assert!((got - wanted).abs() < 1e-12, "{got}");
+    }
+}
+
+#[test]
 fn an_assembly_is_refused_with_advice() {
     let Some(folder) = corpus() else { return };
     let result = MeshReport::of_file(&folder.join("trimesh__box_sides.STEP"));
@@ -78,4 +91,25 @@ fn what_is_no_body_is_refused_with_advice() {
     );
     let lost = empty.replace("DATA;", "DATA;\n#1 = MANIFOLD_SOLID_BREP('', #2);");
     assert!(refusal(&lost).contains("no unit of length"));
+}
+
+/// The reader behind recurses: these would end the process, not the reading.
+#[test]
+fn what_leads_the_reader_down_without_end_is_refused() {
+    let good = String::from_utf8(crate::samples::step()).unwrap();
+    let refusal = |text: &str| {
+        let read = SurfaceFormat::Step.read(Path::new("f.step"), text.as_bytes());
+        read.unwrap_err().to_string()
+    };
+    let brackets = format!("DATA;\n#9000=X({});\n", "(".repeat(500_000));
+    let said = refusal(&good.replace("DATA;\n", &brackets));
+    assert!(said.contains("nested more than 32 deep"), "{said}");
+    let itself = "DATA;\n#9000=TRIMMED_CURVE('',#9000,(),(),.T.,.CARTESIAN.);\n";
+    let said = refusal(&good.replace("DATA;\n", itself));
+    assert!(said.contains("statement #9000 refers to itself"), "{said}");
+    let chain: String = (9000..90_000)
+        .map(|k| format!("#{k}=TRIMMED_CURVE('',#{},(),(),.T.,.CARTESIAN.);\n", k + 1))
+        .collect();
+    let said = refusal(&good.replace("DATA;\n", &format!("DATA;\n{chain}")));
+    assert!(said.contains("longer than 200"), "{said}");
 }

@@ -3,7 +3,7 @@
 use fluxform::shape::document::{AxisRequest, GridRequest, Placement};
 use fluxform::shape::mesh::Mesh;
 use fluxform::shape::placement::Transform;
-use fluxform::shape::stl::{StlError, read};
+use fluxform::shape::stl::{StlError, read, stream};
 
 use crate::support::{binary, corpus};
 
@@ -408,4 +408,56 @@ fn the_degenerate_triangle_is_left_out_and_said() {
             .any(|w| w.contains("1 of 12 triangles have no area"))
     );
     assert_eq!(result.points.len(), 49);
+}
+
+#[test]
+fn a_file_read_in_pieces_is_the_same_mesh() {
+    let in_pieces = |bytes: &[u8]| stream(bytes, bytes.len() as u64).unwrap();
+    // No piece, a part of one, whole ones, and some more.
+    for count in [0usize, 1, 8191, 8192, 8193, 20_000] {
+        let triangles: Vec<_> = (0..count)
+            .map(|k| ONE.map(|v| v.map(|c| c + k as f32)))
+            .collect();
+        let mut bytes = binary(&triangles);
+        assert_eq!(in_pieces(&bytes), Some(read(&bytes)), "{count}");
+        if count > 1 {
+            let last = bytes.len() - 6;
+            bytes[last..last + 4].copy_from_slice(&f32::NEG_INFINITY.to_le_bytes());
+            assert_eq!(in_pieces(&bytes), Some(read(&bytes)));
+            let message = read(&bytes).unwrap_err().to_string();
+            assert!(message.contains(&format!("triangle {count} ")), "{message}");
+            bytes.pop();
+            assert_eq!(in_pieces(&bytes), None);
+            // A file that shrinks while it is read.
+            assert!(stream(bytes.as_slice(), bytes.len() as u64 + 1).is_err());
+        }
+    }
+    let text = ascii("vertex 0.7 -1.3 2.9\nvertex 10.1 .3 3.1\nvertex -4.7 +8.3 2.3");
+    for bytes in [text.as_bytes(), b"", b"solid"] {
+        assert_eq!(in_pieces(bytes), None);
+    }
+}
+
+/// Headers and attributes of Materialise, VisCAM, CATIA and others: 80 bytes and two a triangle.
+#[test]
+fn headers_and_colours_of_binary_files_are_passed_over() {
+    let plain = binary(&[ONE, ONE]);
+    let headers: [&[u8]; 6] = [
+        b"COLOR=\xff\x80\x40\xff,MATERIAL=\0\0\0\0\xff\xff\xff\xff\0\0\0\0",
+        b"CATIA V5 STL",
+        b"solid MATRIX 3.0 exported",
+        b"STLB ATF 12.9.0 COLOR=    ",
+        b"Exported from Blender-4.2.0",
+        b"numpy-stl\tSolidWorks\r\n",
+    ];
+    for header in headers {
+        for attribute in [0u16, 0x8000, 0x7fff, 0xffff] {
+            let mut bytes = plain.clone();
+            bytes[..header.len()].copy_from_slice(header);
+            for record in bytes[84..].chunks_exact_mut(50) {
+                record[48..].copy_from_slice(&attribute.to_le_bytes());
+            }
+            assert_eq!(read(&bytes), read(&plain));
+        }
+    }
 }

@@ -15,8 +15,12 @@ const SIGN: [u8; 4] = [0, 0, 0, 4];
 const MARKER: [u8; 6] = [0x14, 0, 0x06, 0, 0x08, 0];
 const HEADER: usize = MARKER.len() + 20;
 const LONGEST_NAME: usize = 1024;
-/// DEFLATE shrinks at most to about 1/1032.
-const MOST_RATIO: u64 = 1100;
+/// So many bytes may be unpacked from any block,
+const LEAST_BUDGET: u64 = 4 << 20;
+/// or so many times its length: coordinates hardly shrink to a tenth.
+const MOST_RATIO: u64 = 200;
+/// So many times its length is reserved on the word of its header.
+const RESERVED_RATIO: u64 = 8;
 /// Larger display data belong to no part.
 const MOST_BYTES: u64 = 2 << 30;
 
@@ -108,11 +112,13 @@ impl Block {
             Err(ReadError::new(Place::Byte(self.at), what))
         };
         let claimed = u64::from(self.unpacked);
-        if claimed > MOST_BYTES || claimed > MOST_RATIO * self.packed as u64 {
+        let length = self.packed as u64;
+        if claimed > MOST_BYTES.min(LEAST_BUDGET.max(MOST_RATIO * length)) {
             return fault("claims to unpack to more than its data can hold");
         }
         let packed = &bytes[self.start..self.start + self.packed];
-        let mut data = Vec::new();
+        let reserved = claimed.min(RESERVED_RATIO * length);
+        let mut data = Vec::with_capacity(usize::try_from(reserved).unwrap_or(0));
         let decoder = DeflateDecoder::new(packed);
         if decoder.take(claimed + 1).read_to_end(&mut data).is_err() {
             return fault("cannot be unpacked");

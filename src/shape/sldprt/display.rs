@@ -76,31 +76,29 @@ fn word(stream: &[u8], at: usize) -> Option<u32> {
     Some(u32::from_le_bytes(*stream.get(at..)?.first_chunk()?))
 }
 
+fn vertex(point: &[u8; 12]) -> [f64; 3] {
+    let (words, _) = point.as_chunks::<4>();
+    [0, 1, 2].map(|k| f64::from(f32::from_le_bytes(words[k])))
+}
+
 impl Table {
     fn read(&self, stream: &[u8], triangles: &mut Vec<Triangle>) -> Result<(), ReadError> {
-        let mut points = Vec::new();
-        for point in stream[self.points..self.end].as_chunks::<12>().0 {
-            let (words, _) = point.as_chunks::<4>();
-            let mut vertex = [0.0; 3];
-            for (c, word) in vertex.iter_mut().zip(words) {
-                *c = f64::from(f32::from_le_bytes(*word));
-            }
-            if vertex.iter().any(|c| !c.is_finite()) {
-                let what = format!(
-                    "a point of the display data is not finite; repair the body, or {ADVICE}"
-                );
-                return Err(ReadError::new(Place::Byte(self.points), what));
-            }
-            points.push(vertex);
+        let (points, _) = stream[self.points..self.end].as_chunks::<12>();
+        let finite = |point: &[u8; 12]| vertex(point).iter().all(|c| c.is_finite());
+        if !points.iter().all(finite) {
+            let what =
+                format!("a point of the display data is not finite; repair the body, or {ADVICE}");
+            return Err(ReadError::new(Place::Byte(self.points), what));
         }
-        let mut rest = points.as_slice();
+        triangles.reserve(points.len().saturating_sub(2 * self.strips));
+        let mut rest = points;
         for k in 0..self.strips {
             let length = word(stream, self.lengths + 4 * k).unwrap_or_default() as usize;
             let (strip, after) = rest.split_at(length.min(rest.len()));
             rest = after;
             for (k, w) in strip.windows(3).enumerate() {
                 // Every other triangle of a strip runs the other way.
-                triangles.push([w[k % 2], w[1 - k % 2], w[2]]);
+                triangles.push([&w[k % 2], &w[1 - k % 2], &w[2]].map(vertex));
             }
         }
         Ok(())

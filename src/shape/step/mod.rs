@@ -5,6 +5,7 @@
 //! refused: nothing is believed because it was returned.
 
 mod gates;
+mod references;
 mod units;
 
 use std::collections::BTreeMap;
@@ -54,6 +55,7 @@ fn solids(bytes: &[u8]) -> Result<FileMesh, String> {
     if stated.placed {
         return Err("it is an assembly, whose placements are not read".into());
     }
+    references::check(&text)?;
     let unit_m = stated.unit_m()?;
     let table = Table::from_step_bytes(bytes).map_err(|error| error.to_string())?;
     let mut ids: BTreeMap<u64, usize> = BTreeMap::new();

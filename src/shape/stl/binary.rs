@@ -1,5 +1,7 @@
 //! Binary STL.
 
+use std::io::{self, Read};
+
 use crate::shape::mesh::{FileMesh, Triangle};
 use crate::shape::number::F32_ROUNDING;
 use crate::shape::stl::StlError;
@@ -8,6 +10,9 @@ const HEADER: usize = 84;
 const RECORD: usize = 50;
 /// The normal comes first and is not trusted.
 const NORMAL: usize = 12;
+/// Records read at once from a file.
+const PIECE: usize = 1 << 13;
+const SIGN: u32 = 1 << 31;
 
 /// True when the length is what the header's count asks for.
 pub(super) fn length_fits(bytes: &[u8]) -> bool {
@@ -25,28 +30,81 @@ fn wanted(count: u32) -> u64 {
 /// Reads bytes whose length fits.
 pub(super) fn read(bytes: &[u8]) -> Result<FileMesh, StlError> {
     let records = &bytes[HEADER..];
-    let mut triangles: Vec<Triangle> = Vec::with_capacity(records.len() / RECORD);
-    let mut largest = 0.0f32;
-    let mut finite = true;
-    for record in records.chunks_exact(RECORD) {
-        let mut triangle = [[0.0; 3]; 3];
-        let vertices = record[NORMAL..NORMAL + 36].chunks_exact(4);
-        for (slot, four) in triangle.as_flattened_mut().iter_mut().zip(vertices) {
-            let value = f32::from_le_bytes([four[0], four[1], four[2], four[3]]);
-            finite &= value.is_finite();
-            largest = largest.max(value.abs());
-            *slot = f64::from(value);
+    let mut found = Records::with_capacity(records.len() / RECORD);
+    found.add(records);
+    found.mesh()
+}
+
+/// Reads a file of `length` bytes piece by piece; `None` where the length does not fit.
+pub(super) fn read_from(
+    mut source: impl Read,
+    length: u64,
+) -> io::Result<Option<Result<FileMesh, StlError>>> {
+    let mut header = [0; HEADER];
+    if length < HEADER as u64 {
+        return Ok(None);
+    }
+    source.read_exact(&mut header)?;
+    let Some(claimed) = count(&header).filter(|n| wanted(*n) == length) else {
+        return Ok(None);
+    };
+    let mut left = claimed as usize;
+    let mut found = Records::with_capacity(left);
+    let mut piece = vec![0; RECORD * left.min(PIECE)];
+    while left > 0 {
+        let records = left.min(PIECE);
+        let piece = &mut piece[..RECORD * records];
+        source.read_exact(piece)?;
+        found.add(piece);
+        left -= records;
+    }
+    Ok(Some(found.mesh()))
+}
+
+/// Triangles read so far.
+struct Records {
+    triangles: Vec<Triangle>,
+    /// The bits of the largest magnitude: they are ordered as the numbers are, infinity and what
+    /// is no number above all.
+    largest: i32,
+}
+
+impl Records {
+    fn with_capacity(triangles: usize) -> Self {
+        Self {
+            triangles: Vec::with_capacity(triangles),
+            largest: 0,
         }
-        triangles.push(triangle);
     }
-    if !finite {
-        return Err(not_finite(&triangles));
+
+    /// Adds whole records.
+    fn add(&mut self, records: &[u8]) {
+        let (records, _) = records.as_chunks::<RECORD>();
+        let mut largest = self.largest;
+        self.triangles.extend(records.iter().map(|record| {
+            let (words, _) = record[NORMAL..].as_chunks::<4>();
+            let mut triangle = [[0.0; 3]; 3];
+            for (slot, word) in triangle.as_flattened_mut().iter_mut().zip(words) {
+                let value = f32::from_le_bytes(*word);
+                largest = largest.max((value.to_bits() & !SIGN) as i32);
+                *slot = f64::from(value);
+            }
+            triangle
+        }));
+        self.largest = largest;
     }
-    Ok(FileMesh {
-        triangles,
-        coordinate_rounding: f64::from(largest) * F32_ROUNDING,
-        ..FileMesh::default()
-    })
+
+    fn mesh(self) -> Result<FileMesh, StlError> {
+        let largest = f32::from_bits(self.largest as u32);
+        if !largest.is_finite() {
+            return Err(not_finite(&self.triangles));
+        }
+        Ok(FileMesh {
+            triangles: self.triangles,
+            coordinate_rounding: f64::from(largest) * F32_ROUNDING,
+            ..FileMesh::default()
+        })
+    }
 }
 
 /// Names the first coordinate that is not finite.

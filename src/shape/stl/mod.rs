@@ -6,6 +6,8 @@
 mod ascii;
 mod binary;
 
+use std::io::{self, Read};
+
 use crate::shape::mesh::FileMesh;
 
 /// Why bytes are no STL mesh, and where.
@@ -123,6 +125,21 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, StlError> {
     } else {
         return Err(binary::fault(bytes));
     };
+    not_empty(mesh)
+}
+
+/// Reads the `length` bytes of a binary STL file without holding them: the mesh or the fault is
+/// that of [`read`]. `None` where the length is not that of the header's count; then `read` is to
+/// see the file from its beginning.
+///
+/// # Errors
+/// The source's own.
+pub fn stream(source: impl Read, length: u64) -> io::Result<Option<Result<FileMesh, StlError>>> {
+    let result = binary::read_from(source, length)?;
+    Ok(result.map(|mesh| mesh.and_then(not_empty)))
+}
+
+fn not_empty(mesh: FileMesh) -> Result<FileMesh, StlError> {
     if mesh.triangles.is_empty() {
         Err(StlError::NoTriangle)
     } else {
