@@ -4,6 +4,7 @@
 //! `e*(lambda)` is the least mean square error within the current limits. It is piecewise
 //! quadratic and is followed exactly, from `lambda = 0` to where no coil moves any more.
 
+mod allocate;
 mod certificate;
 mod cone;
 mod criteria;
@@ -15,6 +16,7 @@ mod problem;
 mod reduce;
 mod solve;
 
+pub use allocate::{Allocation, Allocator, AllocatorError, Reach};
 pub use path::{Breakpoint, Event, Path};
 pub use problem::{Criterion, ForceProblem, ProblemError, Settings};
 pub use solve::{OperatingPoint, Precision, Solution, Status, solve};
