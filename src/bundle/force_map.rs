@@ -130,7 +130,10 @@ impl ForceMap {
         let nodes = &self.axes_m[2];
         let above = nodes.partition_point(|&node| node <= z_m);
         let around = above.saturating_sub(1)..(above + 1).min(nodes.len());
-        self.largest_n_per_a[around].iter().copied().fold(0.0, f64::max)
+        self.largest_n_per_a[around]
+            .iter()
+            .copied()
+            .fold(0.0, f64::max)
     }
 }
 

@@ -198,7 +198,10 @@ impl MapArrays<'_> {
                 return Err(bad(name, "holds a number that is not finite"));
             }
         }
-        runtime.rendering.as_ref().map_or(Ok(()), |rendering| rendering.validate(coils))
+        runtime
+            .rendering
+            .as_ref()
+            .map_or(Ok(()), |rendering| rendering.validate(coils))
     }
 }
 
@@ -551,7 +554,11 @@ mod tests {
             || map.passive_force_n.is_none()
             || map.working_point_gz_t_per_m.is_none()
             || map.runtime.total_current_max_a.is_none()
-            || map.runtime.rendering.as_ref().is_none_or(|r| r.voltage_v.is_none())
+            || map
+                .runtime
+                .rendering
+                .as_ref()
+                .is_none_or(|r| r.voltage_v.is_none())
     }
 
     #[test]

@@ -59,7 +59,11 @@ impl Rendering {
                 return Err(bad(name, "holds a number that is not finite"));
             }
         }
-        if !heights.has_height.iter().all(|&has| has == 0.0 || has == 1.0) {
+        if !heights
+            .has_height
+            .iter()
+            .all(|&has| has == 0.0 || has == 1.0)
+        {
             return Err(bad(HAS_HEIGHT, "must hold 0 or 1"));
         }
         Ok(())
@@ -94,7 +98,10 @@ impl HeightGrid {
             x_m: grid.x_m.axis().nodes(),
             y_m: grid.y_m.axis().nodes(),
             height_m,
-            has_height: flags.iter().map(|flag| f64::from(u8::from(*flag))).collect(),
+            has_height: flags
+                .iter()
+                .map(|flag| f64::from(u8::from(*flag)))
+                .collect(),
         })
     }
 
@@ -148,7 +155,9 @@ mod tests {
     fn grid() -> HeightGrid {
         let (x_m, y_m) = (vec![-0.03, 0.01, 0.02, 0.07], vec![0.1, 0.14, 0.21]);
         let saddle = |x: f64, y: f64| 0.05 + 0.3 * x - 0.7 * y + 1.3 * x * y;
-        let heights = y_m.iter().flat_map(|&y| x_m.iter().map(move |&x| saddle(x, y)));
+        let heights = y_m
+            .iter()
+            .flat_map(|&y| x_m.iter().map(move |&x| saddle(x, y)));
         HeightGrid {
             height_m: heights.collect(),
             has_height: vec![1.0; 12],
@@ -164,9 +173,17 @@ mod tests {
             let x = (-0.03 + 0.1 * f64::from(step) / 70.0).min(0.07);
             let y = (0.1 + 0.11 * f64::from((step * 13) % 71) / 70.0).min(0.21);
             let want = 0.05 + 0.3 * x - 0.7 * y + 1.3 * x * y;
-            assert!((grid.height_m(x, y).unwrap() - want).abs() < 1e-15, "{x} {y}");
+            assert!(
+                (grid.height_m(x, y).unwrap() - want).abs() < 1e-15,
+                "{x} {y}"
+            );
         }
-        for (x, y) in [(-0.0301, 0.12), (0.0, 0.2101), (f64::NAN, 0.12), (0.0, 0.09)] {
+        for (x, y) in [
+            (-0.0301, 0.12),
+            (0.0, 0.2101),
+            (f64::NAN, 0.12),
+            (0.0, 0.09),
+        ] {
             assert_eq!(grid.height_m(x, y), None);
         }
     }
@@ -187,11 +204,7 @@ mod tests {
     #[test]
     fn single_nodes_and_flags_are_read_in_their_order() {
         let axis = |from, to, samples| Axis { from, to, samples };
-        let grid = PointsGrid::new(
-            axis(0.0, 0.2, 3),
-            axis(0.7, 0.7, 1),
-            &[true, false, true],
-        );
+        let grid = PointsGrid::new(axis(0.0, 0.2, 3), axis(0.7, 0.7, 1), &[true, false, true]);
         let point = |x_m, height_m| PointRow {
             x_m,
             y_m: 0.7,

@@ -161,7 +161,8 @@ mod tests {
         };
         let text = |rows: &ReplayRows| {
             let mut text = Vec::new();
-            rows.write(&mut text).map(|()| String::from_utf8(text).unwrap())
+            rows.write(&mut text)
+                .map(|()| String::from_utf8(text).unwrap())
         };
         assert_eq!(
             text(&rows).unwrap(),

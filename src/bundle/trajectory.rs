@@ -102,7 +102,8 @@ mod tests {
 
     #[test]
     fn what_was_written_is_read_back() {
-        let text = "note,t_s,x_m,y_m,z_m\na,0.7,0.01,-0.02,0.05\n\nb,0.7,0,0,0.06\nc,1.3,0.1,0.2,0.3\n";
+        let text =
+            "note,t_s,x_m,y_m,z_m\na,0.7,0.01,-0.02,0.05\n\nb,0.7,0,0,0.06\nc,1.3,0.1,0.2,0.3\n";
         let found = read(text).unwrap();
         assert_eq!((found.len(), found.position_m[1]), (3, [0.0, 0.0, 0.06]));
         assert_eq!(found.held_s(), [0.0, 1.3 - 0.7, 1.3 - 0.7]);
@@ -117,7 +118,10 @@ mod tests {
     fn faults_are_told_with_their_line() {
         for (text, words) in [
             ("", "finger.csv:1: column t_s is missing"),
-            ("t_s,x_m,y_m\n0,0,0\n", "finger.csv:1: column z_m is missing"),
+            (
+                "t_s,x_m,y_m\n0,0,0\n",
+                "finger.csv:1: column z_m is missing",
+            ),
             ("t_s,x_m,y_m,z_m\n", "holds no position"),
             (
                 "t_s,x_m,y_m,z_m\n0,0,0,0.05\n0.02,nan,0,0.05\n",

@@ -28,7 +28,9 @@ pub enum DriveError {
         coil: usize,
     },
     /// The inductance matrix.
-    #[error("the inductance matrix is not that of coils: it must be symmetric and give every current an energy above 0")]
+    #[error(
+        "the inductance matrix is not that of coils: it must be symmetric and give every current an energy above 0"
+    )]
     Inductance,
 }
 
@@ -69,7 +71,9 @@ impl Drive {
         if let Some(coil) = resistance_ohm.iter().position(|r| !sound(r)) {
             return Err(DriveError::Resistance { coil });
         }
-        let largest = inductance_h.iter().fold(0.0_f64, |most, l| most.max(l.abs()));
+        let largest = inductance_h
+            .iter()
+            .fold(0.0_f64, |most, l| most.max(l.abs()));
         let entry = |i: usize, j: usize| inductance_h[i * coils + j];
         let symmetric = (0..coils)
             .all(|i| (0..i).all(|j| (entry(i, j) - entry(j, i)).abs() <= SYMMETRIC * largest));
@@ -143,7 +147,11 @@ impl Drive {
     /// The modes' amplitudes in the end.
     fn aim(&mut self, command_a: &[f64]) {
         let coils = self.root_ohm.len();
-        for (goal, mode) in self.goal.iter_mut().zip(self.modes.chunks_exact(coils.max(1))) {
+        for (goal, mode) in self
+            .goal
+            .iter_mut()
+            .zip(self.modes.chunks_exact(coils.max(1)))
+        {
             *goal = (0..coils)
                 .map(|i| {
                     let held = command_a[i].clamp(-self.most_a[i], self.most_a[i]);
@@ -201,7 +209,10 @@ mod tests {
             let flux: f64 = (0..3)
                 .map(|j| L[3 * i + j] * (after[j] - before[j]) / (2.0 * step))
                 .sum();
-            assert!((flux + R[i] * (at[i] - command[i])).abs() < 1e-7, "{i}: {flux}");
+            assert!(
+                (flux + R[i] * (at[i] - command[i])).abs() < 1e-7,
+                "{i}: {flux}"
+            );
         }
         once.hold(&command, 0.091);
         for _ in 0..13 {

@@ -7,19 +7,19 @@ use serde::Serialize;
 
 use super::discretize::{self, point_rows, points_grid};
 use super::lambda::{LambdaOptions, LambdaReport, solve};
-use super::neighbours;
 use super::map::{MAP_TOLERANCE, arrays, runtime, summary, workspace_grid};
 use super::maps::{Felt, SceneMap};
+use super::neighbours;
 use super::passive::PASSIVE_TOLERANCE;
 use super::passive_map::PassiveMap;
 use super::scene::{MAGNET_SHARE, Scene};
 use super::steel::{Solved, Steel};
 use super::{JobError, KERNEL_ERROR, steel};
+use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
 use crate::bundle::manifest::{
     AxisSummary, CircuitSummary, Interpolation, LambdaSummary, LeftOut, Manifest, PassiveForce,
 };
-use crate::accuracy::StageAccuracy;
 use crate::bundle::npz::PASSIVE;
 use crate::bundle::rendering::{HeightGrid, Rendering};
 use crate::bundle::table::CurrentRow;

@@ -422,7 +422,11 @@ impl Allocator {
             terms.map(|(i, g)| g * self.current(i, at)).sum()
         };
         let above = self.order.partition_point(|&(mu, _)| force(mu) < target);
-        let to = self.order.get(above).or(self.order.last()).map_or(0.0, |p| p.0);
+        let to = self
+            .order
+            .get(above)
+            .or(self.order.last())
+            .map_or(0.0, |p| p.0);
         let from = if above == 0 {
             to
         } else {

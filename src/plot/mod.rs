@@ -3,3 +3,4 @@
 //! The same numbers give the same bytes.
 
 pub mod pareto;
+pub mod replay;

@@ -124,7 +124,7 @@ impl ParetoPlot {
 }
 
 /// The drawing with its clip paths counted from 0: the crate counts on through a process.
-fn renumbered(svg: &str) -> String {
+pub(super) fn renumbered(svg: &str) -> String {
     const NAME: &str = "kuva-clip-";
     let mut parts = svg.split(NAME);
     let mut text = parts.next().unwrap_or("").to_owned();

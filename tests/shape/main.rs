@@ -2,8 +2,8 @@
 #![allow(missing_docs)]
 
 mod corpus;
-mod formats;
 mod deviation;
+mod formats;
 mod fuzz;
 mod heights;
 mod marks;

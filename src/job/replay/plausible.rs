@@ -89,11 +89,17 @@ mod tests {
         assert!(!in_millimetres(&trajectory(&even, 1e2), &BOX));
         assert!(warnings(&trajectory(&even, 1.0), &BOX).is_empty());
         let outside = warnings(&trajectory(&even, 1e2), &BOX);
-        assert!(outside[0].contains("no position lies inside the map"), "{outside:?}");
+        assert!(
+            outside[0].contains("no position lies inside the map"),
+            "{outside:?}"
+        );
         let mut late = even.clone();
         late[30..].iter_mut().for_each(|t| *t += 0.19);
         let told = warnings(&trajectory(&late, 1.0), &BOX);
-        assert!(told.len() == 1 && told[0].contains("no position from 0.58 s to 0.79"), "{told:?}");
+        assert!(
+            told.len() == 1 && told[0].contains("no position from 0.58 s to 0.79"),
+            "{told:?}"
+        );
         let slow: Vec<f64> = even.iter().map(|t| t * 1e3).collect();
         assert!(warnings(&trajectory(&slow, 1.0), &BOX)[0].contains("milliseconds"));
         assert!(warnings(&trajectory(&[0.7], 1.0), &BOX).is_empty());

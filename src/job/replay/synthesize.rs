@@ -75,7 +75,11 @@ impl Synthesis {
             .map(|t| {
                 let place = (t / whole * LINES).min(LINES * (1.0 - 1e-12));
                 let (line, along) = (place.floor(), place.fract());
-                let forward = if line % 2.0 == 0.0 { along } else { 1.0 - along };
+                let forward = if line % 2.0 == 0.0 {
+                    along
+                } else {
+                    1.0 - along
+                };
                 surface.on([2.0 * forward - 1.0, 2.0 * line / (LINES - 1.0) - 1.0])
             })
             .collect()
@@ -102,10 +106,8 @@ impl Synthesis {
         t_s.iter()
             .zip(&away)
             .map(|(&t, away)| {
-                let [mut px, py, _] = surface.on([
-                    sum(&x, t, &[0.65, 0.3]),
-                    sum(&y, t, &[0.65, 0.3]),
-                ]);
+                let [mut px, py, _] =
+                    surface.on([sum(&x, t, &[0.65, 0.3]), sum(&y, t, &[0.65, 0.3])]);
                 // Around six tenths of the time the finger leaves to the right and comes back.
                 let since = (t / self.duration_s.max(1e-9) - 0.6) / 0.08;
                 let out = if since.abs() < 1.0 {
