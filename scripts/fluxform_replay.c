@@ -1,7 +1,7 @@
 /* A program on top of fluxform_bundle.h.
  *
  * `program map.npz` reads lines "x y z" (m) and prints for each the force per ampere [N/A] of every
- * coil, the unpowered steel's pull [N], the surface's height [m], the answer (0 ok, 1 saturated,
+ * coil, the unpowered steel's pull [N], the surface's height [m] (0 outside the map), the answer (0 ok, 1 saturated,
  * 2 outside, -1 unable), the force given [N] and the current [A] of every coil.
  * `program map.npz REPEATS` reads the same lines and prints the nanoseconds that a step takes:
  *   cc -std=c99 -O2 fluxform_replay.c fluxform_bundle.c fluxform_currents.c -o replay -lm
@@ -14,7 +14,7 @@
 
 static int tell(fluxform_bundle *bundle, double *force, double *current)
 {
-    double x, y, z, pull, height;
+    double x, y, z, pull;
     fluxform_step step;
     while (scanf("%lf %lf %lf", &x, &y, &z) == 3) {
         int answer;
@@ -22,9 +22,8 @@ static int tell(fluxform_bundle *bundle, double *force, double *current)
         for (size_t i = 0; i < bundle->coil_count; i++)
             printf("%.17g ", force[i]);
         fluxform_passive_force(bundle, x, y, z, &pull);
-        fluxform_height(bundle, x, y, &height);
         answer = fluxform_currents(bundle, x, y, z, current, &step);
-        printf("%.17g %.17g %d %.17g", pull, height, answer, step.force_n);
+        printf("%.17g %.17g %d %.17g", pull, step.height_m, answer, step.force_n);
         for (size_t i = 0; i < bundle->coil_count; i++)
             printf(" %.17g", current[i]);
         printf("\n");

@@ -115,7 +115,13 @@ fn the_replay_prints_what_the_readme_shows() {
     let folder = tempfile::tempdir().unwrap();
     let inside = |name: &str| folder.path().join(name).display().to_string();
     let out = inside("results");
-    says(&["calibrate", "designs/seed.toml", "shapes/flat.toml", "--out", &out]);
+    says(&[
+        "calibrate",
+        "designs/seed.toml",
+        "shapes/flat.toml",
+        "--out",
+        &out,
+    ]);
     let command = format!("{command} --out {}", inside("replay.csv"));
     let arguments: Vec<String> = command
         .split(' ')

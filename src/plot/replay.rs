@@ -2,8 +2,7 @@
 
 use kuva::backend::svg::SvgBackend;
 use kuva::plot::annotations::ShadedRegion;
-use kuva::plot::legend::LegendPosition;
-use kuva::plot::{LinePlot, ScatterPlot};
+use kuva::plot::{LegendEntry, LegendShape, LinePlot, ScatterPlot};
 use kuva::render::figure::Figure;
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
@@ -65,41 +64,61 @@ impl ReplayPlot<'_> {
             .with_title(self.title.clone())
             .with_cell_size(PANEL_PX[0], PANEL_PX[1])
             .with_plots(cells)
-            .with_layouts(layouts);
+            .with_layouts(layouts)
+            .with_shared_legend_bottom()
+            .with_shared_legend_entries(self.legend());
         renumbered(&SvgBackend::default().render_scene(&figure.render()))
+    }
+
+    fn legend(&self) -> Vec<LegendEntry> {
+        let entry = |label: &str, colour: &str, shape| LegendEntry {
+            label: label.to_owned(),
+            color: colour.to_owned(),
+            shape,
+            dasharray: None,
+        };
+        let mut entries = vec![
+            entry("finger", FINGER, LegendShape::Circle),
+            entry("outside the map", FIXED, LegendShape::Circle),
+            entry("surface below it", SURFACE, LegendShape::Line),
+            entry("force wanted", WANTED, LegendShape::Line),
+            entry("force with feedback", GIVEN, LegendShape::Line),
+            entry("force with fixed currents", FIXED, LegendShape::Line),
+        ];
+        if self.coils <= NAMED {
+            entries.extend((0..self.coils).map(|coil| {
+                let colour = COILS[coil % COILS.len()];
+                entry(&format!("coil {coil}"), colour, LegendShape::Line)
+            }));
+        }
+        entries
     }
 
     /// The finger seen from above.
     fn plan(&self) -> (Vec<Plot>, Layout) {
         let mm = |k: usize| -> Vec<f64> { self.position_m.iter().map(|p| p[k] * 1e3).collect() };
         let (x, y) = (mm(0), mm(1));
-        let part = |inside: bool, label: &str, colour: &str| {
+        let part = |inside: bool, colour: &str| {
             let rows = (0..x.len()).filter(|row| self.inside[*row] == inside);
             let every = x.len().div_ceil(4 * PARTS).max(1);
             let points: Vec<(f64, f64)> = rows.step_by(every).map(|row| (x[row], y[row])).collect();
-            let dots = ScatterPlot::new()
-                .with_color(colour)
-                .with_size(1.6)
-                .with_legend(label);
+            let dots = ScatterPlot::new().with_color(colour).with_size(1.6);
             Plot::Scatter(dots.with_data(points))
         };
-        let mut plots = vec![part(true, "finger", FINGER)];
-        if self.inside.contains(&false) {
-            plots.push(part(false, "outside the map", FIXED));
-        }
+        let plots = vec![part(true, FINGER), part(false, FIXED)];
         let layout = Layout::new(extent(x.iter().copied()), extent(y.iter().copied()))
             .with_title("seen from above")
             .with_x_label("x / mm")
             .with_y_label("y / mm");
-        (plots, legend(layout))
+        (plots, layout)
     }
 
     fn heights(&self) -> (Vec<Plot>, Layout) {
         let finger: Vec<f64> = self.position_m.iter().map(|p| p[2] * 1e3).collect();
         let surface: Vec<f64> = self.surface_m.iter().map(|h| h * 1e3).collect();
         let felt: Vec<bool> = self.surface_m.iter().map(|h| *h != 0.0).collect();
-        let mut plots = self.lines(&surface, &felt, SURFACE, THICK, "surface below it");
-        plots.extend(self.lines(&finger, &self.all(), FINGER, THIN, "finger"));
+        let mut plots = self.lines(&surface, &felt, SURFACE, THICK);
+        plots.extend(self.lines(&finger, &self.all(), FINGER, THIN));
         let shown = surface.iter().zip(&felt).filter(|(_, felt)| **felt);
         let values = finger.iter().copied().chain(shown.map(|(h, _)| *h));
         let layout = self.over_time(extent(values), "height", "z / mm");
@@ -110,9 +129,9 @@ impl ReplayPlot<'_> {
         let mn = |values: &[f64]| -> Vec<f64> { values.iter().map(|f| f * 1e3).collect() };
         let (wanted, given, fixed) = (mn(self.wanted_n), mn(self.given_n), mn(self.static_n));
         let all = self.all();
-        let mut plots = self.lines(&wanted, &all, WANTED, 2.0 * THICK, "wanted");
-        plots.extend(self.lines(&fixed, &self.inside, FIXED, THIN, "fixed currents"));
-        plots.extend(self.lines(&given, &all, GIVEN, THIN, "with feedback"));
+        let mut plots = self.lines(&wanted, &all, WANTED, 2.0 * THICK);
+        plots.extend(self.lines(&fixed, &self.inside, FIXED, THIN));
+        plots.extend(self.lines(&given, &all, GIVEN, THIN));
         let values = wanted.iter().chain(&given).chain(&fixed).copied();
         (
             plots,
@@ -130,13 +149,8 @@ impl ReplayPlot<'_> {
                 .step_by(self.coils)
                 .copied()
                 .collect();
-            let name = if self.coils <= NAMED {
-                format!("coil {coil}")
-            } else {
-                String::new()
-            };
             let colour = COILS[coil % COILS.len()];
-            plots.extend(self.lines(&current, &self.all(), colour, THIN, &name));
+            plots.extend(self.lines(&current, &self.all(), colour, THIN));
         }
         let layout = self.over_time(extent(self.current_a.iter().copied()), "currents", "I / A");
         (plots, layout)
@@ -146,15 +160,8 @@ impl ReplayPlot<'_> {
         vec![true; self.t_s.len()]
     }
 
-    /// A curve over time, broken where nothing is shown; the first piece carries the name.
-    fn lines(
-        &self,
-        values: &[f64],
-        shown: &[bool],
-        colour: &str,
-        width: f64,
-        name: &str,
-    ) -> Vec<Plot> {
+    /// A curve over time, broken where nothing is shown.
+    fn lines(&self, values: &[f64], shown: &[bool], colour: &str, width: f64) -> Vec<Plot> {
         let mut pieces: Vec<Vec<(f64, f64)>> = Vec::new();
         let mut joined = false;
         for row in 0..values.len() {
@@ -168,18 +175,11 @@ impl ReplayPlot<'_> {
             }
             joined = shown[row];
         }
-        let line = |(k, piece): (usize, Vec<(f64, f64)>)| {
-            let line = LinePlot::new()
-                .with_data(thinned(piece))
-                .with_color(colour)
-                .with_stroke_width(width);
-            Plot::Line(if k == 0 && !name.is_empty() {
-                line.with_legend(name)
-            } else {
-                line
-            })
+        let line = |piece: Vec<(f64, f64)>| {
+            let line = LinePlot::new().with_data(thinned(piece));
+            Plot::Line(line.with_color(colour).with_stroke_width(width))
         };
-        pieces.into_iter().enumerate().map(line).collect()
+        pieces.into_iter().map(line).collect()
     }
 
     /// Axes over time, with the times outside the map shaded.
@@ -202,12 +202,8 @@ impl ReplayPlot<'_> {
             }
             row = end;
         }
-        legend(layout)
+        layout
     }
-}
-
-fn legend(layout: Layout) -> Layout {
-    layout.with_legend_position(LegendPosition::OutsideRightTop)
 }
 
 /// The range of an axis, with room at both ends; 0 is always room enough below nothing.

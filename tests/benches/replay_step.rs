@@ -20,7 +20,9 @@ use std::time::Instant;
 use fluxform::bundle::artefact::Input;
 use fluxform::bundle::replay::Answer;
 use fluxform::design::{Design, Need};
-use fluxform::job::calibrate::{self, CalibrateOptions, DEFAULT_REACH_M, DesignSource, ShapeSource};
+use fluxform::job::calibrate::{
+    self, CalibrateOptions, DEFAULT_REACH_M, DesignSource, ShapeSource,
+};
 use fluxform::job::lambda::LambdaOptions;
 use fluxform::job::replay::Opened;
 use fluxform::job::replay::synthesize::{Kind, Synthesis};
@@ -37,15 +39,22 @@ const REPEATS: usize = 20;
 fn bundle(folder: &Path, side: usize, pitch_mm: f64, total_a: f64) -> Result<Opened, Failure> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(root.join("designs/seed_air.toml"))?
-        .replace("rows = 3\ncolumns = 3", &format!("rows = {side}\ncolumns = {side}"))
+        .replace(
+            "rows = 3\ncolumns = 3",
+            &format!("rows = {side}\ncolumns = {side}"),
+        )
         .replace("pitch_mm = 50.0", &format!("pitch_mm = {pitch_mm:?}"))
         .replace(
             "total_current_max_a = 18.0",
             &format!("total_current_max_a = {total_a:?}"),
         )
-        .replace("name = \"seed_air\"", &format!("name = \"air_{side}_{total_a}\""));
+        .replace(
+            "name = \"seed_air\"",
+            &format!("name = \"air_{side}_{total_a}\""),
+        );
     let path = root.join("designs/seed_air.toml");
-    let (design, _) = Design::from_toml(&text, &path, Need::CALIBRATE).map_err(|e| e.to_string())?;
+    let (design, _) =
+        Design::from_toml(&text, &path, Need::CALIBRATE).map_err(|e| e.to_string())?;
     let (document, _) =
         ShapeDocument::read(&root.join("shapes/flat.toml")).map_err(|e| e.to_string())?;
     let options = CalibrateOptions {
@@ -74,10 +83,14 @@ fn c_program(folder: &Path) -> Option<std::path::PathBuf> {
     let built = Command::new("cc")
         .args(["-std=c99", "-O2", "-o"])
         .arg(&program)
-        .args(["replay", "bundle", "currents"].map(|part| scripts.join(format!("fluxform_{part}.c"))))
+        .args(
+            ["replay", "bundle", "currents"].map(|part| scripts.join(format!("fluxform_{part}.c"))),
+        )
         .arg("-lm")
         .status();
-    built.is_ok_and(|status| status.success()).then_some(program)
+    built
+        .is_ok_and(|status| status.success())
+        .then_some(program)
 }
 
 /// Nanoseconds of a step in C.
@@ -92,7 +105,11 @@ fn in_c(program: &Path, bundle: &Path, positions: &[[f64; 3]]) -> Result<f64, Fa
         .iter()
         .map(|p| format!("{} {} {}\n", p[0], p[1], p[2]))
         .collect();
-    child.stdin.take().ok_or("no input")?.write_all(text.as_bytes())?;
+    child
+        .stdin
+        .take()
+        .ok_or("no input")?
+        .write_all(text.as_bytes())?;
     let output = child.wait_with_output()?;
     let told = String::from_utf8(output.stdout)?;
     Ok(told.split_whitespace().next().ok_or("no time")?.parse()?)
@@ -110,7 +127,9 @@ fn least(items: usize, mut work: impl FnMut()) -> f64 {
 }
 
 fn main() -> Result<(), Failure> {
-    let numbers = std::env::args().skip(1).filter(|word| !word.starts_with('-'));
+    let numbers = std::env::args()
+        .skip(1)
+        .filter(|word| !word.starts_with('-'));
     let count: usize = numbers.last().map_or(Ok(20_000), |word| word.parse())?;
     let folder = tempfile::tempdir()?;
     let program = c_program(folder.path());

@@ -136,7 +136,8 @@ fn compare(loader: &str, found: &[Vec<f64>], want: &[Vec<f64>]) {
     }
     eprintln!(
         "{loader}: largest differences of forces per ampere, heights, answers, forces and \
-         currents, relative to the largest at the point: {worst:.1e?}"
+         currents, relative to the largest at the point: {}",
+        worst.map(|w| format!("{w:.1e}")).join(" ")
     );
 }
 

@@ -60,16 +60,21 @@ pub struct Replay {
     #[arg(long, value_enum, value_name = "KIND")]
     synthesize: Option<KindFlag>,
     /// Which random movements are made up
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "synthesize")]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1,
+        conflicts_with = "trajectory"
+    )]
     seed: u64,
     /// How long the trajectory made up lasts, seconds
-    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = positive, requires = "synthesize", allow_hyphen_values = true)]
+    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = positive, conflicts_with = "trajectory", allow_hyphen_values = true)]
     duration: f64,
     /// Positions a second of the trajectory made up
-    #[arg(long, value_name = "HZ", default_value_t = 50.0, value_parser = positive, requires = "synthesize", allow_hyphen_values = true)]
+    #[arg(long, value_name = "HZ", default_value_t = 50.0, value_parser = positive, conflicts_with = "trajectory", allow_hyphen_values = true)]
     rate: f64,
     /// Write the trajectory made up to this file too
-    #[arg(long, value_name = "FILE", requires = "synthesize")]
+    #[arg(long, value_name = "FILE", conflicts_with = "trajectory")]
     trajectory_out: Option<PathBuf>,
     /// Let every current follow its command through the coils' resistances and inductances, under
     /// the supply's voltage
@@ -263,7 +268,7 @@ impl Replay {
                 ),
             );
         }
-        if let Some(stage) = summary.accuracy.get("force") {
+        if let Some(stage) = summary.accuracy.get("force").filter(|s| s.estimate > 0.0) {
             sheet.line(
                 "accuracy",
                 &format!(

@@ -35,7 +35,10 @@ pub fn in_millimetres(trajectory: &Trajectory, ends_m: &[[f64; 2]; 3]) -> bool {
 pub fn warnings(trajectory: &Trajectory, ends_m: &[[f64; 2]; 3]) -> Vec<String> {
     let mut told = Vec::new();
     if share(trajectory, ends_m, 1.0) == 0.0 {
-        let mm = ends_m.map(|[from, to]| format!("{} to {}", from * 1e3, to * 1e3));
+        let micrometre = |m: f64| (m * 1e6).round() / 1e3;
+        let mm = ends_m
+            .map(|ends| ends.map(micrometre))
+            .map(|[from, to]| format!("{from} to {to}"));
         told.push(format!(
             "no position lies inside the map, which reaches from {} mm in x, {} mm in y and {} mm \
              in z: nothing is rendered",
@@ -43,9 +46,10 @@ pub fn warnings(trajectory: &Trajectory, ends_m: &[[f64; 2]; 3]) -> Vec<String> 
         ));
     }
     let median_s = trajectory.median_step_s();
+    let median = (median_s * 1e6).round() / 1e6;
     if median_s > SLOW_S {
         told.push(format!(
-            "the median time between positions is {median_s} s: t_s must be in seconds, not in \
+            "the median time between positions is {median} s: t_s must be in seconds, not in \
              milliseconds"
         ));
     }
@@ -55,7 +59,7 @@ pub fn warnings(trajectory: &Trajectory, ends_m: &[[f64; 2]; 3]) -> Vec<String> 
         .collect();
     for &row in gaps.iter().take(GAPS_TOLD) {
         told.push(format!(
-            "no position from {} s to {} s, more than {GAP} times the median {median_s} s: the \
+            "no position from {} s to {} s, more than {GAP} times the median {median} s: the \
              last currents are held meanwhile",
             times[row - 1],
             times[row]
