@@ -37,11 +37,12 @@ const MOST_POSITIONS: f64 = 1e8;
 /// --dynamics what is told is the end of that time.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Writing, &[
-    ("fluxform calibrate designs/seed.toml shapes/flat.toml", "make a bundle"),
-    ("fluxform replay results/seed/flat finger.csv --out replay.csv", "replay a measured trajectory"),
-    ("fluxform replay results/seed/flat --synthesize explore --seed 7 --plot replay.svg",
-     "an exploring finger made up, with a picture"),
-    ("fluxform replay results/seed/flat finger.csv --dynamics --out - -q",
+    ("fluxform calibrate designs/seed_air.toml shapes/flat.toml", "make a bundle"),
+    ("fluxform replay results/seed_air/flat --synthesize explore --trajectory-out finger.csv",
+     "an exploring finger made up"),
+    ("fluxform replay results/seed_air/flat finger.csv --out felt.csv --plot felt.svg",
+     "replay a recorded trajectory, with a picture"),
+    ("fluxform replay results/seed_air/flat finger.csv --dynamics --out - -q",
      "let the currents lag as the coils' circuit does; the table to standard output"),
 ]))]
 pub struct Replay {
