@@ -128,8 +128,8 @@ mod tests {
                 "finger.csv:3: column x_m: expected a finite number, found \"nan\"",
             ),
             (
-                "t_s,x_m,y_m,z_m\n0.7,0,0,0.05\n\n\n0.6,0,0,0.05\n",
-                "finger.csv:5: column t_s: time runs backwards, from 0.7 to 0.6",
+                "t_s,x_m,y_m,z_m\n0.7,0,0,0.05\n0.7,0,0,0.05\n0.6,0,0,0.05\n",
+                "finger.csv:4: column t_s: time runs backwards, from 0.7 to 0.6",
             ),
         ] {
             let fault = read(text).unwrap_err();

@@ -84,15 +84,23 @@ impl Drive {
         let matrix = DMatrix::from_fn(coils, coils, |i, j| {
             0.5 * (entry(i, j) + entry(j, i)) / (root_ohm[i] * root_ohm[j])
         });
-        let eigen = SymmetricEigen::new(matrix);
-        if !eigen.eigenvalues.iter().all(|tau| *tau > 0.0) {
+        let (time_constant_s, modes) = if coils == 0 {
+            (Vec::new(), Vec::new())
+        } else {
+            let eigen = SymmetricEigen::new(matrix);
+            (
+                eigen.eigenvalues.as_slice().to_vec(),
+                eigen.eigenvectors.as_slice().to_vec(),
+            )
+        };
+        if !time_constant_s.iter().all(|tau| *tau > 0.0) {
             return Err(DriveError::Inductance);
         }
         let most = |r: &f64| voltage_v.map_or(f64::INFINITY, |voltage| voltage.abs() / r);
         Ok(Self {
             most_a: resistance_ohm.iter().map(most).collect(),
-            time_constant_s: eigen.eigenvalues.iter().copied().collect(),
-            modes: eigen.eigenvectors.iter().copied().collect(),
+            time_constant_s,
+            modes,
             root_ohm,
             now: vec![0.0; coils],
             goal: vec![0.0; coils],
