@@ -65,7 +65,7 @@ impl ReplayPlot<'_> {
             .with_cell_size(PANEL_PX[0], PANEL_PX[1])
             .with_plots(cells)
             .with_layouts(layouts)
-            .with_shared_legend_bottom()
+            .with_shared_legend()
             .with_shared_legend_entries(self.legend());
         renumbered(&SvgBackend::default().render_scene(&figure.render()))
     }
