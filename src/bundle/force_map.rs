@@ -1,11 +1,17 @@
 //! A bundle's map arranged for a control loop: all coils at one position in one pass.
 //!
-//! `[z, y, x, coil]`, already multiplied by the magnet's moment, so the 64 nodes that take part at
-//! a position are 64 runs of neighbouring numbers. Values are those of
+//! `[z, y, x, coil]`, already multiplied by the magnet's moment, the coils in groups of four: the
+//! 64 nodes that take part at a position are 64 runs of neighbouring numbers, and a group's sums
+//! stay in registers. Values are those of
 //! [`Bundle::force_per_ampere`] up to rounding. Nothing is allocated after [`ForceMap::new`].
 
 use super::load::Bundle;
-use crate::numerics::lagrange::{Stencil, stencil};
+use crate::numerics::lagrange::{ORDER_NODES, stencil};
+
+/// Coils summed together.
+const GROUP: usize = 4;
+/// The most nodes that take part at a position.
+const MOST_NODES: usize = ORDER_NODES * ORDER_NODES * ORDER_NODES;
 
 /// Upward force per ampere of every coil of an array, over a box.
 #[derive(Debug, Clone)]
@@ -14,14 +20,12 @@ pub struct ForceMap {
     coils: usize,
     /// Coils with a map, by index in the array.
     kept: Vec<usize>,
-    /// `[z, y, x, kept coil]`, N/A.
-    force_n_per_a: Vec<f64>,
+    /// `[z, y, x, group of kept coils]`, N/A; beyond the last coil zero.
+    force_n_per_a: Vec<[f64; GROUP]>,
     /// `[z, y, x]`, N.
     passive_n: Option<Vec<f64>>,
     /// The largest |force per ampere| of any coil on every plane of nodes, N/A.
     largest_n_per_a: Vec<f64>,
-    /// Room for the kept coils' forces.
-    sums: Vec<f64>,
 }
 
 impl ForceMap {
@@ -36,17 +40,18 @@ impl ForceMap {
             .gradient_t_per_m_per_a
             .as_deref()
             .filter(|_| m_x != 0.0 || m_y != 0.0);
-        let mut force_n_per_a = vec![0.0; nodes * kept];
+        let groups = kept.div_ceil(GROUP);
+        let mut force_n_per_a = vec![[0.0; GROUP]; nodes * groups];
         for coil in 0..kept {
             for node in 0..nodes {
                 let at = coil * nodes + node;
-                force_n_per_a[node * kept + coil] = match gradient {
+                force_n_per_a[node * groups + coil / GROUP][coil % GROUP] = match gradient {
                     Some(g) => m_x * g[9 * at + 2] + m_y * g[9 * at + 5] + m_z * g[9 * at + 8],
                     None => m_z * map.gz_t_per_m_per_a[at],
                 };
             }
         }
-        let plane = (ny * nx * kept).max(1);
+        let plane = (ny * nx * groups).max(1);
         let size = |most: f64, value: &f64| most.max(value.abs());
         Self {
             axes_m: [&map.x_m, &map.y_m, &map.z_m].map(|axis| axis.to_vec()),
@@ -54,11 +59,10 @@ impl ForceMap {
             kept: map.coil.iter().map(|&coil| coil as usize).collect(),
             largest_n_per_a: force_n_per_a
                 .chunks(plane)
-                .map(|values| values.iter().fold(0.0, size))
+                .map(|values| values.as_flattened().iter().fold(0.0, size))
                 .collect(),
             force_n_per_a,
             passive_n: map.passive_force_n.as_deref().map(<[f64]>::to_vec),
-            sums: vec![0.0; kept],
         }
     }
 
@@ -85,42 +89,46 @@ impl ForceMap {
     ///
     /// # Panics
     /// When `force_n_per_a` is shorter than the array.
-    pub fn at(&mut self, position_m: [f64; 3], force_n_per_a: &mut [f64]) -> Option<f64> {
+    pub fn at(&self, position_m: [f64; 3], force_n_per_a: &mut [f64]) -> Option<f64> {
         let [x, y, z] = &self.axes_m;
         let (row, rows) = (x.len(), y.len());
         let x = stencil(x, position_m[0])?;
         let y = stencil(y, position_m[1])?;
         let z = stencil(z, position_m[2])?;
-        let kept = self.kept.len();
-        self.sums.fill(0.0);
-        let mut pull = 0.0;
-        for (k, wz) in weights(&z) {
-            for (j, wy) in weights(&y) {
-                let first = (k * rows + j) * row + x.start;
-                let line = &self.force_n_per_a[first * kept..(first + x.count) * kept];
-                let share = wz * wy;
-                for (values, wx) in line.chunks_exact(kept.max(1)).zip(&x.weights) {
-                    let weight = share * wx;
-                    for (sum, value) in self.sums.iter_mut().zip(values) {
-                        *sum += weight * value;
-                    }
-                }
-                if let Some(passive) = &self.passive_n {
-                    let near = &passive[first..first + x.count];
-                    let along: f64 = near.iter().zip(&x.weights).map(|(p, w)| p * w).sum();
-                    pull += share * along;
+        let mut nodes = [(0, 0.0); MOST_NODES];
+        let mut count = 0;
+        for k in 0..z.count {
+            for j in 0..y.count {
+                let share = z.weights[k] * y.weights[j];
+                let first = ((z.start + k) * rows + y.start + j) * row + x.start;
+                for i in 0..x.count {
+                    nodes[count] = (first + i, share * x.weights[i]);
+                    count += 1;
                 }
             }
         }
+        let nodes = &nodes[..count];
         let force = &mut force_n_per_a[..self.coils];
-        if kept == self.coils {
-            force.copy_from_slice(&self.sums);
-        } else {
+        if self.kept.len() < self.coils {
             force.fill(0.0);
-            for (&coil, sum) in self.kept.iter().zip(&self.sums) {
-                force[coil] = *sum;
+        }
+        let groups = self.kept.len().div_ceil(GROUP);
+        for (group, coils) in self.kept.chunks(GROUP).enumerate() {
+            let mut sums = [0.0; GROUP];
+            for &(node, weight) in nodes {
+                let values = &self.force_n_per_a[node * groups + group];
+                for (sum, value) in sums.iter_mut().zip(values) {
+                    *sum += weight * value;
+                }
+            }
+            for (&coil, sum) in coils.iter().zip(sums) {
+                force[coil] = sum;
             }
         }
+        let pull = self.passive_n.as_ref().map_or(0.0, |passive| {
+            let terms = nodes.iter().map(|&(node, weight)| weight * passive[node]);
+            terms.sum()
+        });
         Some(pull)
     }
 
@@ -135,11 +143,4 @@ impl ForceMap {
             .copied()
             .fold(0.0, f64::max)
     }
-}
-
-/// Nodes that take part along an axis, with their weights.
-fn weights(stencil: &Stencil) -> impl Iterator<Item = (usize, f64)> {
-    let start = stencil.start;
-    let weights = stencil.weights;
-    (0..stencil.count).map(move |k| (start + k, weights[k]))
 }

@@ -130,7 +130,9 @@ fn main() -> Result<(), Failure> {
     let numbers = std::env::args()
         .skip(1)
         .filter(|word| !word.starts_with('-'));
-    let count: usize = numbers.last().map_or(Ok(20_000), |word| word.parse())?;
+    let count: usize = numbers
+        .next_back()
+        .map_or(Ok(20_000), |word| word.parse())?;
     let folder = tempfile::tempdir()?;
     let program = c_program(folder.path());
     println!("| coils | positions | saturated | allocation ns | step ns | step in C ns |");
