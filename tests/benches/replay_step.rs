@@ -127,7 +127,7 @@ fn least(items: usize, mut work: impl FnMut()) -> f64 {
 }
 
 fn main() -> Result<(), Failure> {
-    let numbers = std::env::args()
+    let mut numbers = std::env::args()
         .skip(1)
         .filter(|word| !word.starts_with('-'));
     let count: usize = numbers
