@@ -1,9 +1,4 @@
-/* Loads the map of a fluxform bundle and interpolates it; see fluxform_bundle.h.
- *
- * Built with -DFLUXFORM_BUNDLE_MAIN it is a program: `program map.npz` reads lines "x y z" (m) and
- * prints for each the force per ampere [N/A] of every coil and the unpowered steel's pull [N]:
- *   cc -std=c99 -O2 -DFLUXFORM_BUNDLE_MAIN fluxform_bundle.c -o forces
- */
+/* Loads a fluxform bundle and interpolates its map; see fluxform_bundle.h. */
 #include "fluxform_bundle.h"
 
 #include <limits.h>
@@ -327,6 +322,38 @@ static int load_passive(fluxform_bundle *b, const archive *a)
     return (b->passive_force_n = copy(a, name, &from)) ? 0 : -1;
 }
 
+/* An array of the given shape; `rows` is 0 for arrays of one dimension. */
+static int load_grid(const archive *a, const char *name, size_t rows, size_t columns, double **values)
+{
+    array from;
+    if (need(a, name, "<f8", rows ? 2 : 1, &from))
+        return -1;
+    if (from.shape[rows ? 1 : 0] != columns || (rows && from.shape[0] != rows))
+        return fail(a, name, "does not have the expected shape");
+    return (*values = copy(a, name, &from)) ? 0 : -1;
+}
+
+static int load_rendering(fluxform_bundle *b, const archive *a)
+{
+    array from;
+    int found = find_array(a, "height_x_m", "<f8", 1, &from);
+    if (found <= 0)
+        return found;
+    if (load_axis(a, "height_x_m", &b->height_x_m, &b->height_nx) ||
+        load_axis(a, "height_y_m", &b->height_y_m, &b->height_ny) ||
+        load_grid(a, "height_m", b->height_ny, b->height_nx, &b->height_m) ||
+        load_grid(a, "has_height", b->height_ny, b->height_nx, &b->has_height) ||
+        load_grid(a, "static_current_a", 0, b->coil_count, &b->static_current_a))
+        return -1;
+    for (size_t i = 0; i < b->coil_count; i++)
+        if (!(b->resistance_ohm[i] > 0 && b->current_min_a[i] <= 0 && b->current_max_a[i] >= 0))
+            return fail(a, "current_max_a", "limits must enclose 0, and resistances be above 0");
+    if (!(b->scratch = calloc(b->coil_count + 1, 8 * sizeof(double)))) /* see fluxform_currents.c */
+        return fail(a, "", "no memory");
+    b->has_rendering = 1;
+    return 0;
+}
+
 static int load_all(fluxform_bundle *b, const archive *a)
 {
     array from;
@@ -353,6 +380,8 @@ static int load_all(fluxform_bundle *b, const archive *a)
     if (tilted && load_map(b, a, "gradient_t_per_m_per_a", 6, &b->gradient_t_per_m_per_a))
         return -1;
     if (load_passive(b, a))
+        return -1;
+    if (load_rendering(b, a))
         return -1;
     b->has_total_current_max = load_scalar(a, "total_current_max_a", &b->total_current_max_a);
     b->has_lambda = load_scalar(a, "lambda_n_per_m", &b->lambda_n_per_m);
@@ -387,6 +416,12 @@ void fluxform_bundle_close(fluxform_bundle *bundle)
     free(bundle->current_min_a);
     free(bundle->current_max_a);
     free(bundle->resistance_ohm);
+    free(bundle->height_x_m);
+    free(bundle->height_y_m);
+    free(bundle->height_m);
+    free(bundle->has_height);
+    free(bundle->static_current_a);
+    free(bundle->scratch);
     memset(bundle, 0, sizeof *bundle);
 }
 
@@ -502,34 +537,3 @@ int fluxform_passive_force(const fluxform_bundle *b, double x, double y, double 
         *force = interpolate(b, &c, b->passive_force_n, 1);
     return 1;
 }
-
-#ifdef FLUXFORM_BUNDLE_MAIN
-int main(int argc, char **argv)
-{
-    fluxform_bundle bundle;
-    char message[256];
-    double x, y, z, pull, *force;
-    if (argc != 2) {
-        fprintf(stderr, "usage: %s map.npz < points\n", argv[0]);
-        return 2;
-    }
-    if (fluxform_bundle_open(&bundle, argv[1], message, sizeof message)) {
-        fprintf(stderr, "%s\n", message);
-        return 3;
-    }
-    if (!(force = malloc(bundle.coil_count ? bundle.coil_count * sizeof *force : 1))) {
-        fluxform_bundle_close(&bundle);
-        return 3;
-    }
-    while (scanf("%lf %lf %lf", &x, &y, &z) == 3) {
-        fluxform_force_per_ampere(&bundle, x, y, z, force);
-        for (size_t i = 0; i < bundle.coil_count; i++)
-            printf("%.17g ", force[i]);
-        fluxform_passive_force(&bundle, x, y, z, &pull);
-        printf("%.17g\n", pull);
-    }
-    free(force);
-    fluxform_bundle_close(&bundle);
-    return 0;
-}
-#endif

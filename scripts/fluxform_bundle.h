@@ -1,4 +1,5 @@
-/* Load the map of a fluxform bundle. C99, libc only; no allocation after loading.
+/* Load a fluxform bundle and follow a finger with it. C99, libc only; no allocation after loading.
+ * Compile fluxform_bundle.c and fluxform_currents.c with your program; fluxform_replay.c is one.
  *
  *   fluxform_bundle bundle;
  *   char message[256];
@@ -6,12 +7,14 @@
  *       fprintf(stderr, "%s\n", message);
  *       return 3;
  *   }
- *   double force[64];                                  // at least bundle.coil_count
- *   fluxform_force_per_ampere(&bundle, x_m, y_m, z_m, force);
+ *   double current[64];                                // at least bundle.coil_count
+ *   fluxform_step step;
+ *   fluxform_currents(&bundle, x_m, y_m, z_m, current, &step);   // at every measured position
  *   fluxform_bundle_close(&bundle);
  *
  * The file is treated as untrusted: every offset and size is checked, and so is the CRC of every
- * array used. All it needs is in map.npz; manifest.json need not be read.
+ * array used. All it needs is in map.npz; manifest.json need not be read. A bundle holds room to
+ * work in: fluxform_currents and fluxform_allocate serve one thread at a time.
  */
 #ifndef FLUXFORM_BUNDLE_H
 #define FLUXFORM_BUNDLE_H
@@ -39,7 +42,31 @@ typedef struct fluxform_bundle {
     double total_current_max_a;
     int has_lambda;               /* whether a force constant was found */
     double lambda_n_per_m;
+    /* What following a finger needs; absent (has_rendering 0) from bundles before schema 1.2. */
+    int has_rendering;
+    size_t height_nx, height_ny;  /* nodes of the surface's grid */
+    double *height_x_m, *height_y_m;
+    double *height_m;             /* [y][x] */
+    double *has_height;           /* [y][x]: 1 where there is a surface, else 0 */
+    double *static_current_a;     /* the bundle's fixed currents, one a coil of the array */
+    double *scratch;              /* for the functions below that change the bundle */
 } fluxform_bundle;
+
+/* How a position was answered. */
+enum {
+    FLUXFORM_OK = 0,        /* the currents give the wanted force */
+    FLUXFORM_SATURATED = 1, /* their limits allow only the nearest force */
+    FLUXFORM_OUTSIDE = 2,   /* outside the map: no currents */
+    FLUXFORM_UNABLE = -1    /* no force constant, or a bundle before schema 1.2 */
+};
+
+/* What fluxform_currents found. */
+typedef struct fluxform_step {
+    double height_m;  /* of the surface; 0 where there is none */
+    double wanted_n;  /* lambda times that height */
+    double force_n;   /* given by the currents, the unpowered steel's pull included */
+    double passive_n; /* that pull */
+} fluxform_step;
 
 /* Loads map.npz. Returns 0, or -1 with a message; then nothing needs closing. */
 int fluxform_bundle_open(fluxform_bundle *bundle, const char *path, char *message, size_t message_size);
@@ -57,6 +84,20 @@ int fluxform_force_per_ampere(const fluxform_bundle *bundle, double x_m, double 
 /* What the unpowered steel adds to that force whatever the currents [N], up positive: zero for
  * bundles without it. Returns 1; outside the map 0, with zero. */
 int fluxform_passive_force(const fluxform_bundle *bundle, double x_m, double y_m, double z_m, double *force);
+
+/* Height of the surface [m], bilinear between the bundle's points. Returns 1; where there is no
+ * surface 0, with 0. */
+int fluxform_height(const fluxform_bundle *bundle, double x_m, double y_m, double *height);
+
+/* The currents [A] of least power that give wanted_n for the forces per ampere given, within the
+ * limits of every current and of their sum (equation 8), or the nearest force. Returns FLUXFORM_OK
+ * or FLUXFORM_SATURATED. */
+int fluxform_allocate(fluxform_bundle *bundle, const double *force_per_ampere, double wanted_n, double *currents);
+
+/* The currents [A] to command at a position in m, coil_count numbers; `step` may be NULL. Returns
+ * one of the answers above; but for the first two all currents are zero. */
+int fluxform_currents(fluxform_bundle *bundle, double x_m, double y_m, double z_m, double *currents,
+                      fluxform_step *step);
 
 #ifdef __cplusplus
 }

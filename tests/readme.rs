@@ -105,6 +105,46 @@ fn the_sweep_prints_what_the_readme_shows() {
 }
 
 #[test]
+fn the_replay_prints_what_the_readme_shows() {
+    let readme = readme();
+    let (_, rest) = readme.split_once("## Follow a finger").unwrap();
+    let (_, rest) = rest.split_once("```sh\n").unwrap();
+    let (command, rest) = rest.split_once("\n```").unwrap();
+    let (_, rest) = rest.split_once("```text\n").unwrap();
+    let (shown, _) = rest.split_once("```").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let inside = |name: &str| folder.path().join(name).display().to_string();
+    let out = inside("results");
+    says(&[
+        "calibrate",
+        "designs/seed.toml",
+        "shapes/flat.toml",
+        "--out",
+        &out,
+    ]);
+    let command = format!("{command} --out {}", inside("replay.csv"));
+    let arguments: Vec<String> = command
+        .split(' ')
+        .skip(1)
+        .map(|argument| match argument {
+            "results/seed/flat" | "replay.svg" => inside(argument),
+            other => other.to_owned(),
+        })
+        .collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let printed = says(&arguments);
+    // How long a step takes depends on the machine.
+    let timeless = |text: &str| -> Vec<String> {
+        let lines = but_the_folder(text).into_iter();
+        lines
+            .filter(|line| !line.starts_with("  step "))
+            .map(str::to_owned)
+            .collect()
+    };
+    assert_eq!(timeless(shown), timeless(&printed));
+}
+
+#[test]
 fn the_table_of_force_constants_is_what_its_script_prints() {
     let run = Command::new("python3")
         .args(["scripts/seed_table.py", env!("CARGO_BIN_EXE_fluxform")])

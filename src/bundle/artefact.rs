@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// Version of the artefacts' layout, `major.minor.patch`. A reader refuses another major; a new
 /// minor only adds keys, arrays or files.
-pub const SCHEMA_VERSION: &str = "1.1.0";
+pub const SCHEMA_VERSION: &str = "1.2.0";
 
 /// Version of the program that wrote an artefact.
 pub const FLUXFORM_VERSION: &str = env!("CARGO_PKG_VERSION");

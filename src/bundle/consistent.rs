@@ -3,6 +3,7 @@
 use super::lambda_file::LambdaFile;
 use super::manifest::{AxisSummary, INTERPOLATION, Manifest};
 use super::npz::{MapArrays, PASSIVE};
+use super::rendering::HeightGrid;
 use super::table::{CurrentRow, PointRow};
 
 /// Points and axes' ends may differ by this from what the manifest says, relative to the largest
@@ -45,7 +46,41 @@ pub(super) fn check(
         let found: Vec<f64> = currents.iter().map(|row| row.current_a).collect();
         same("currents.csv and lambda.json agree", &found, want)?;
     }
-    Ok(())
+    check_rendering(manifest, map, points, currents)
+}
+
+/// What `map.npz` repeats for runtimes that read nothing else.
+fn check_rendering(
+    manifest: &Manifest,
+    map: &MapArrays,
+    points: &[PointRow],
+    currents: &[CurrentRow],
+) -> Result<(), String> {
+    let Some(rendering) = &map.runtime.rendering else {
+        return Ok(());
+    };
+    same(
+        "map.npz and points.csv agree on the heights",
+        Some(&rendering.heights),
+        HeightGrid::of_points(&manifest.points, points).as_ref(),
+    )?;
+    let fixed: Vec<f64> = currents.iter().map(|row| row.current_a).collect();
+    same(
+        "map.npz and currents.csv agree",
+        &rendering.static_current_a,
+        &fixed,
+    )?;
+    let circuit = manifest.circuit.as_ref();
+    same(
+        "map.npz and the manifest agree on inductance_h",
+        Some(rendering.inductance_h.as_slice()),
+        circuit.map(|c| c.inductance_h.concat()).as_deref(),
+    )?;
+    same(
+        "map.npz and the manifest agree on voltage_v",
+        rendering.voltage_v,
+        circuit.and_then(|c| c.voltage_v),
+    )
 }
 
 fn check_coils(manifest: &Manifest, map: &MapArrays) -> Result<(), String> {

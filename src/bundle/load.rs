@@ -91,6 +91,8 @@ pub struct Bundle {
     pub currents: Vec<CurrentRow>,
     /// `lambda.json`.
     pub lambda: LambdaFile,
+    /// Digest of `manifest.json`, which holds those of all other files.
+    pub manifest_sha256: String,
 }
 
 impl Bundle {
@@ -104,7 +106,7 @@ impl Bundle {
             _ => path,
         };
         let manifest_path = folder.join("manifest.json");
-        let manifest = read_manifest(folder, &manifest_path)?;
+        let (manifest, manifest_sha256) = read_manifest(folder, &manifest_path)?;
         let mut files = Vec::new();
         for entry in &manifest.files {
             let listed = |message: &str| BundleError::Listed {
@@ -146,6 +148,7 @@ impl Bundle {
             lambda: serde_json::from_slice(part(lambda)?)
                 .map_err(|error| content(lambda, error.to_string()))?,
             manifest,
+            manifest_sha256,
         };
         consistent::check(
             &bundle.manifest,
@@ -236,7 +239,7 @@ impl Bundle {
 /// What every bundle has.
 const REQUIRED: [&str; 4] = ["map.npz", "points.csv", "currents.csv", "lambda.json"];
 
-fn read_manifest(folder: &Path, path: &Path) -> Result<Manifest, BundleError> {
+fn read_manifest(folder: &Path, path: &Path) -> Result<(Manifest, String), BundleError> {
     /// Of a newer manifest only this is understood.
     #[derive(Deserialize)]
     struct Version {
@@ -270,7 +273,8 @@ fn read_manifest(folder: &Path, path: &Path) -> Result<Manifest, BundleError> {
         path: path.to_path_buf(),
         message,
     })?;
-    serde_json::from_slice(&text).map_err(content)
+    let manifest = serde_json::from_slice(&text).map_err(content)?;
+    Ok((manifest, sha256_hex(&text)))
 }
 
 /// The bytes of a listed file, after checking place, size and digest.

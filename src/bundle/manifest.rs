@@ -33,6 +33,9 @@ pub struct Manifest {
     pub limits: CurrentLimits,
     /// Resistance of every coil, ohm: the weights of least power.
     pub resistance_ohm: Vec<f64>,
+    /// The coils' circuit; absent from bundles of schema 1.1 and before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub circuit: Option<CircuitSummary>,
     /// The magnet.
     pub magnet: MagnetSummary,
     /// The force constant.
@@ -94,6 +97,15 @@ pub struct CurrentLimits {
     pub current_max_a: Vec<f64>,
     /// A; null without such a limit.
     pub total_current_max_a: Option<f64>,
+}
+
+/// How the coils' currents follow their voltages.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CircuitSummary {
+    /// `[i][j]`: flux through coil i for one ampere in coil j, H.
+    pub inductance_h: Vec<Vec<f64>>,
+    /// The supply's voltage, V; null where the design names none.
+    pub voltage_v: Option<f64>,
 }
 
 /// The magnet.

@@ -6,7 +6,8 @@
 //! of the array: `current_min_a`, `current_max_a`, `resistance_ohm`; where there are such,
 //! `total_current_max_a` and `lambda_n_per_m` (no dimension). `coil` holds the indices of the
 //! coils whose maps were kept; the others give no force. `passive_force_n`, where it is there, is
-//! what the unpowered steel adds to the force.
+//! what the unpowered steel adds to the force. What a bundle's runtime needs besides to follow a
+//! finger is told in [`super::rendering`].
 
 use std::borrow::Cow;
 use std::io::{self, Cursor, Read, Write};
@@ -17,6 +18,10 @@ use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 use super::artefact::{SCHEMA_VERSION, check_version, parse_version};
 use super::npy;
+use super::rendering::{
+    HAS_HEIGHT, HEIGHT, HEIGHT_X, HEIGHT_Y, HeightGrid, INDUCTANCE, Rendering, STATIC_CURRENT,
+    VOLTAGE,
+};
 
 #[cfg(target_endian = "big")]
 compile_error!("arrays are written as they lie in memory, which must be little-endian");
@@ -61,6 +66,8 @@ pub struct Runtime {
     pub total_current_max_a: Option<f64>,
     /// The chosen force constant, N/m.
     pub lambda_n_per_m: Option<f64>,
+    /// What position feedback needs; `None` for maps without an object and for older bundles.
+    pub rendering: Option<Rendering>,
 }
 
 /// What is wrong with a `map.npz`.
@@ -82,7 +89,7 @@ pub enum NpzError {
     },
 }
 
-fn bad(name: &'static str, message: impl Into<String>) -> NpzError {
+pub(super) fn bad(name: &'static str, message: impl Into<String>) -> NpzError {
     NpzError::Array {
         name,
         message: message.into(),
@@ -191,7 +198,10 @@ impl MapArrays<'_> {
                 return Err(bad(name, "holds a number that is not finite"));
             }
         }
-        Ok(())
+        runtime
+            .rendering
+            .as_ref()
+            .map_or(Ok(()), |rendering| rendering.validate(coils))
     }
 }
 
@@ -270,7 +280,25 @@ impl Archive {
                 self.put(name, &[], &[value])?;
             }
         }
-        Ok(())
+        runtime
+            .rendering
+            .as_ref()
+            .map_or(Ok(()), |rendering| self.put_rendering(rendering))
+    }
+
+    fn put_rendering(&mut self, rendering: &Rendering) -> io::Result<()> {
+        let heights = &rendering.heights;
+        let (nx, ny) = (heights.x_m.len(), heights.y_m.len());
+        let coils = rendering.static_current_a.len();
+        self.put(HEIGHT_X, &[nx], &heights.x_m)?;
+        self.put(HEIGHT_Y, &[ny], &heights.y_m)?;
+        self.put(HEIGHT, &[ny, nx], &heights.height_m)?;
+        self.put(HAS_HEIGHT, &[ny, nx], &heights.has_height)?;
+        self.put(STATIC_CURRENT, &[coils], &rendering.static_current_a)?;
+        self.put(INDUCTANCE, &[coils, coils], &rendering.inductance_h)?;
+        rendering
+            .voltage_v
+            .map_or(Ok(()), |voltage| self.put(VOLTAGE, &[], &[voltage]))
     }
 
     fn put(&mut self, name: &str, shape: &[usize], values: &[f64]) -> io::Result<()> {
@@ -347,6 +375,7 @@ pub fn from_npz(bytes: &[u8]) -> Result<MapArrays<'static>, NpzError> {
             current_max_a,
             total_current_max_a: arrays.scalar(TOTAL)?,
             lambda_n_per_m: arrays.scalar(LAMBDA)?,
+            rendering: arrays.rendering(coils)?,
         },
     };
     map.validate()?;
@@ -378,6 +407,26 @@ impl Arrays<'_> {
         shape: &[Option<usize>],
     ) -> Result<Vec<T>, NpzError> {
         self.get(name, shape)?.ok_or(NpzError::Missing(name))
+    }
+
+    /// All or nothing of what position feedback needs.
+    fn rendering(&mut self, coils: Option<usize>) -> Result<Option<Rendering>, NpzError> {
+        let Some(x_m) = self.get::<f64>(HEIGHT_X, &[None])? else {
+            return Ok(None);
+        };
+        let y_m: Vec<f64> = self.need(HEIGHT_Y, &[None])?;
+        let grid = [Some(y_m.len()), Some(x_m.len())];
+        Ok(Some(Rendering {
+            heights: HeightGrid {
+                height_m: self.need(HEIGHT, &grid)?,
+                has_height: self.need(HAS_HEIGHT, &grid)?,
+                x_m,
+                y_m,
+            },
+            static_current_a: self.need(STATIC_CURRENT, &[coils])?,
+            inductance_h: self.need(INDUCTANCE, &[coils, coils])?,
+            voltage_v: self.scalar(VOLTAGE)?,
+        }))
     }
 
     fn scalar(&mut self, name: &'static str) -> Result<Option<f64>, NpzError> {
@@ -454,6 +503,17 @@ mod tests {
                 resistance_ohm: vec![6.07, 6.08, 6.09],
                 total_current_max_a: Some(3.1),
                 lambda_n_per_m: None,
+                rendering: Some(Rendering {
+                    heights: HeightGrid {
+                        x_m: vec![0.1, 0.2, 0.4],
+                        y_m: vec![-0.1, 0.3],
+                        height_m: values(6, 0.9),
+                        has_height: vec![1.0, 1.0, 0.0, 1.0, 0.0, 1.0],
+                    },
+                    static_current_a: vec![0.7, 0.0, 0.3],
+                    inductance_h: values(9, 2.3),
+                    voltage_v: Some(36.0),
+                }),
             },
         }
     }
@@ -494,6 +554,11 @@ mod tests {
             || map.passive_force_n.is_none()
             || map.working_point_gz_t_per_m.is_none()
             || map.runtime.total_current_max_a.is_none()
+            || map
+                .runtime
+                .rendering
+                .as_ref()
+                .is_none_or(|r| r.voltage_v.is_none())
     }
 
     #[test]
@@ -511,6 +576,20 @@ mod tests {
         refuse(
             |m| m.passive_force_n = Some(vec![-0.7; 23].into()),
             "passive_force_n must hold 24 numbers, holds 23",
+        );
+        refuse(
+            |m| {
+                let rendering = m.runtime.rendering.as_mut().unwrap();
+                rendering.heights.has_height[1] = 0.5;
+            },
+            "has_height must hold 0 or 1",
+        );
+        refuse(
+            |m| {
+                let rendering = m.runtime.rendering.as_mut().unwrap();
+                rendering.inductance_h.pop();
+            },
+            "inductance_h must hold 9 numbers, holds 8",
         );
         refuse(|m| m.x_m.to_mut()[2] = 0.01, "x_m must increase");
         refuse(|m| m.z_m.to_mut()[3] = f64::INFINITY, "z_m holds");

@@ -18,7 +18,7 @@ pub struct TableError {
 }
 
 impl TableError {
-    fn one(fault: String) -> Self {
+    pub(super) fn one(fault: String) -> Self {
         Self {
             faults: vec![fault],
         }
@@ -35,6 +35,18 @@ pub fn read_columns(
     source: impl Read,
     wanted: &[&str],
 ) -> Result<Vec<Vec<f64>>, TableError> {
+    read_numbered(name, source, wanted).map(|(columns, _)| columns)
+}
+
+/// As [`read_columns`]; besides the line of every row, for messages about what the numbers mean.
+///
+/// # Errors
+/// As [`read_columns`].
+pub fn read_numbered(
+    name: &str,
+    source: impl Read,
+    wanted: &[&str],
+) -> Result<(Vec<Vec<f64>>, Vec<u64>), TableError> {
     let mut reader = ReaderBuilder::new()
         .trim(Trim::All)
         .flexible(true)
@@ -47,6 +59,7 @@ pub fn read_columns(
         .collect();
     let places = find_columns(name, &header, wanted)?;
     let mut columns = vec![Vec::new(); wanted.len()];
+    let mut lines = Vec::new();
     let mut faults = Vec::new();
     let mut more = 0usize;
     let mut record = ByteRecord::new();
@@ -75,6 +88,7 @@ pub fn read_columns(
             ));
             continue;
         }
+        lines.push(line);
         for ((column, &place), wanted) in columns.iter_mut().zip(&places).zip(wanted) {
             let cell = std::str::from_utf8(&record[place]).unwrap_or("(not UTF-8)");
             match cell.parse::<f64>() {
@@ -92,7 +106,7 @@ pub fn read_columns(
         faults.push(format!("{name}: and {more} faults more"));
     }
     if faults.is_empty() {
-        Ok(columns)
+        Ok((columns, lines))
     } else {
         Err(TableError { faults })
     }

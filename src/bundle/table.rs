@@ -356,6 +356,7 @@ mod tests {
                 resistance_ohm: vec![],
                 total_current_max_a: None,
                 lambda_n_per_m: None,
+                rendering: None,
             },
         };
         let mut text = Vec::new();

@@ -3,7 +3,8 @@
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::commands::{
-    calibrate, completions, discretize, evaluate, lambda, man, map, optimize, probe, sweep, verify,
+    calibrate, completions, discretize, evaluate, lambda, man, map, optimize, probe, replay, sweep,
+    verify,
 };
 use super::{help, values};
 use crate::job::discretize::scattered::Sampling;
@@ -85,6 +86,7 @@ pub enum Command {
     Verify(verify::Verify),
     Optimize(optimize::Optimize),
     Sweep(sweep::Sweep),
+    Replay(replay::Replay),
     Completions(completions::Completions),
     Man(man::Man),
 }

@@ -10,6 +10,7 @@ use super::values::{FileArgument, GridSize};
 use crate::bundle::artefact::Input;
 use crate::bundle::read_table::read_columns;
 use crate::bundle::sweep::PlanFile;
+use crate::bundle::trajectory::Trajectory;
 use crate::design::{Design, Faults, InvalidDocument, Need, source};
 use crate::job::calibrate::ShapeSource;
 use crate::shape::document::{Placement, RawSurface, RawSurfaceError, ShapeDocument};
@@ -96,6 +97,17 @@ pub fn points(file: &FileArgument) -> Result<(Vec<[f64; 3]>, Input), Failure> {
         .map(|row| [columns[0][row], columns[1][row], columns[2][row]])
         .collect();
     Ok((points, Input::of_bytes(name, &bytes)))
+}
+
+/// A trajectory, and its entry among the inputs.
+///
+/// # Errors
+/// Every cell that is no number; time that runs backwards; a file that cannot be read.
+pub fn trajectory(file: &FileArgument) -> Result<(Trajectory, Input), Failure> {
+    let name = file.as_given().display().to_string();
+    let bytes = bytes_of(file, "a CSV table with columns t_s,x_m,y_m,z_m")?;
+    let trajectory = Trajectory::read(&name, bytes.as_slice())?;
+    Ok((trajectory, Input::of_bytes(name, &bytes)))
 }
 
 /// The plan of a sweep, and its entry among the inputs.

@@ -1,6 +1,7 @@
 //! A coil's geometry, circuit and limits.
 
 pub mod circuit;
+pub mod drive;
 pub mod inductance;
 pub mod limits;
 pub mod mutual;

@@ -9,16 +9,19 @@ use super::discretize::{self, point_rows, points_grid};
 use super::lambda::{LambdaOptions, LambdaReport, solve};
 use super::map::{MAP_TOLERANCE, arrays, runtime, summary, workspace_grid};
 use super::maps::{Felt, SceneMap};
+use super::neighbours;
 use super::passive::PASSIVE_TOLERANCE;
 use super::passive_map::PassiveMap;
 use super::scene::{MAGNET_SHARE, Scene};
 use super::steel::{Solved, Steel};
 use super::{JobError, KERNEL_ERROR, steel};
+use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
 use crate::bundle::manifest::{
-    AxisSummary, Interpolation, LambdaSummary, LeftOut, Manifest, PassiveForce,
+    AxisSummary, CircuitSummary, Interpolation, LambdaSummary, LeftOut, Manifest, PassiveForce,
 };
 use crate::bundle::npz::PASSIVE;
+use crate::bundle::rendering::{HeightGrid, Rendering};
 use crate::bundle::table::CurrentRow;
 use crate::bundle::write::{BundleContent, check_bundle_target, write_bundle};
 use crate::design::{Design, Steel as Described, source};
@@ -123,6 +126,7 @@ pub fn run(
     }
     let scene = Scene::new(source.design)?;
     let solved = BothSolved::new(&scene, options.lambda.tolerance, progress)?;
+    let circuit = Inductances::new(&scene, &solved.map, progress);
     let curve = curve_table(source.design)?;
     let bundles = shapes
         .iter()
@@ -130,6 +134,7 @@ pub fn run(
             let kept = Kept {
                 source,
                 curve: curve.as_ref(),
+                circuit: &circuit,
             };
             calibrate_one(&scene, &solved, kept, shape, options, progress)
         })
@@ -152,6 +157,29 @@ fn curve_table(design: &Design) -> Result<Option<(Input, String)>, JobError> {
 struct Kept<'a> {
     source: DesignSource<'a>,
     curve: Option<&'a (Input, String)>,
+    circuit: &'a Inductances,
+}
+
+/// How the coils' currents follow their voltages; the same for every shape.
+struct Inductances {
+    circuit: CircuitSummary,
+    accuracy: StageAccuracy,
+}
+
+impl Inductances {
+    fn new(scene: &Scene, solved: &Solved, progress: &dyn Progress) -> Self {
+        progress.begin("inductances", 1);
+        let in_air = neighbours::in_air(scene);
+        let (inductance_h, accuracy) = neighbours::inductances(scene, solved, in_air);
+        progress.end();
+        Self {
+            circuit: CircuitSummary {
+                inductance_h,
+                voltage_v: scene.design.supply.voltage_v,
+            },
+            accuracy,
+        }
+    }
 }
 
 /// The sources as forces and as maps ask for them: of steel one solution serves both.
@@ -188,7 +216,11 @@ struct StageSeconds {
 fn calibrate_one(
     scene: &Scene,
     solved: &BothSolved,
-    Kept { source, curve }: Kept,
+    Kept {
+        source,
+        curve,
+        circuit,
+    }: Kept,
     shape: &ShapeSource,
     options: &CalibrateOptions,
     progress: &dyn Progress,
@@ -208,11 +240,21 @@ fn calibrate_one(
     let mut lambda = solve(scene, &solved.forces, points, &options.lambda, progress)?;
     let needed = NeededMap::new(scene, &solved.map, &lambda, options.reach_m, progress)?;
     let passive = passive_map(scene, &needed.made.map, progress)?;
-    let manifest = manifest(scene, &lambda, &needed, passive.as_ref());
+    let mut manifest = manifest(scene, &lambda, &needed, passive.as_ref());
+    manifest.circuit = Some(circuit.circuit.clone());
+    let stage = circuit.accuracy.clone();
+    manifest.accuracy.insert("inductances".to_owned(), stage);
     lambda.warnings.extend(outside_warning(&manifest, &lambda));
     let currents = current_rows(scene, &lambda);
     let rows = point_rows(&lambda.points.discretized.points);
-    let mut map = arrays(&needed.made.map, runtime(scene, lambda.file.lambda_n_per_m));
+    let mut runtime = runtime(scene, lambda.file.lambda_n_per_m);
+    runtime.rendering = HeightGrid::of_points(&manifest.points, &rows).map(|heights| Rendering {
+        heights,
+        static_current_a: currents.iter().map(|row| row.current_a).collect(),
+        inductance_h: circuit.circuit.inductance_h.concat(),
+        voltage_v: circuit.circuit.voltage_v,
+    });
+    let mut map = arrays(&needed.made.map, runtime);
     map.passive_force_n = passive.as_ref().map(|p| Cow::Borrowed(&*p.force_z_n));
     let mut extra = vec![(DESIGN_FILE, source.text.as_bytes())];
     extra.extend(curve.map(|(_, text)| (CURVE_FILE, text.as_bytes())));
@@ -457,6 +499,7 @@ fn manifest(
         array: scene.array_geometry(),
         limits: scene.current_limits(),
         resistance_ohm: scene.resistances_ohm(),
+        circuit: None,
         magnet: scene.magnet_summary(),
         lambda: LambdaSummary {
             lambda_n_per_m: file.lambda_n_per_m,

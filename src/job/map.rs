@@ -226,6 +226,7 @@ pub(super) fn runtime(scene: &Scene, lambda_n_per_m: Option<f64>) -> Runtime {
         resistance_ohm: scene.resistances_ohm(),
         total_current_max_a: scene.design.supply.total_current_max_a,
         lambda_n_per_m,
+        rendering: None,
     }
 }
 

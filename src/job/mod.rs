@@ -13,6 +13,7 @@ pub mod passive;
 pub mod passive_map;
 pub mod probe;
 mod rated;
+pub mod replay;
 pub mod scene;
 pub mod single;
 pub mod steel;
@@ -63,6 +64,9 @@ pub enum JobError {
     /// A bundle cannot be used.
     #[error(transparent)]
     Bundle(#[from] BundleError),
+    /// There is a result, but not one to go on with.
+    #[error("{0}")]
+    Unmet(String),
     /// The user asked to stop.
     #[error(transparent)]
     Interrupted(#[from] Interrupted),
@@ -84,7 +88,7 @@ impl JobError {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Interrupted(_) => 130,
-            Self::Write(_) | Self::Sweep(_) => 4,
+            Self::Write(_) | Self::Sweep(_) | Self::Unmet(_) => 4,
             Self::Bundle(BundleError::NoBundle { .. } | BundleError::Schema { .. }) => 3,
             Self::Bundle(_) => 5,
             _ => 3,

@@ -76,69 +76,34 @@ pub(super) fn array(
         return Ok(None);
     }
     let axes = &scene.design.array.positions_m;
-    let inductance_h = scene.circuit.inductance_h;
-    let mut matrix = mutual::inductance_matrix_h(&scene.winding, inductance_h, axes);
-    let gap_m = closest_m(axes) - 2.0 * scene.winding.outer_radius_m;
-    let mut estimate = if gap_m >= 0.1 * scene.winding.outer_radius_m {
-        mutual::RELATIVE_ERROR
-    } else {
-        mutual::RELATIVE_ERROR_TOUCHING
-    };
-    let mut method = "a-priori quadrature bound for the narrowest gap between windings";
-    let mut relative_to = "each mutual inductance";
     let lowest_m = scene.design.target_height_m;
     let solved = steel::solve(scene, None, KERNEL_ERROR, lowest_m)?;
+    let air = in_air(scene);
+    let (matrix, stage) = inductances(scene, &solved, air.clone());
+    accuracy.insert("mutual_inductance", stage);
     let (mut peak_t, mut mean_t) = (Vec::new(), Vec::new());
     let working_point = match WorkingPoint::new(scene, &solved, &scene.upper_a, None, lowest_m)? {
         Some(point) => {
             accuracy.insert("working_point", point.accuracy());
             peak_t.clone_from(&point.peak_field_t);
             mean_t.clone_from(&point.mean_field_t);
-            Some(working_point_facts(scene, &solved, &point, &matrix)?)
+            Some(working_point_facts(scene, &solved, &point, &air)?)
         }
         None => None,
     };
-    match &solved.steel {
-        Steel::None => {}
-        Steel::Alone(coil) => {
-            for (i, row) in matrix.iter_mut().enumerate() {
-                row[i] += coil.added_inductance_h;
-            }
-            method = "neighbours' cores left out (coupling = \"none\"): mutual inductances are \
-                      those of the windings in air";
-        }
-        Steel::Coupled(array) => {
-            for (i, row) in matrix.iter_mut().enumerate() {
-                for (j, value) in row.iter_mut().enumerate() {
-                    *value += array.added_inductance_h[(i, j)];
-                }
-            }
-            estimate = estimate.max(array.relative_error);
-            relative_to = "the largest self inductance";
-            method = "coupled cores by two resolutions";
-            if working_point.is_none() {
-                let depth_m = peak_depth_m(array.response.outline.shape);
-                let inside = array.core_fields(&scene.upper_a, depth_m)?;
-                peak_t = inside.iter().map(|field| field.peak_t).collect();
-                mean_t = inside.iter().map(|field| field.mean_t).collect();
-                let most_t = peak_t.iter().copied().fold(0.0, f64::max);
-                let knee_t = scene.core.as_ref().map_or(f64::INFINITY, |c| c.knee_t);
-                notes.extend(above_knee(
-                    most_t,
-                    knee_t,
-                    "a core of the array with all coils at their rated currents",
-                ));
-            }
-        }
+    if let (Steel::Coupled(array), None) = (&solved.steel, &working_point) {
+        let depth_m = peak_depth_m(array.response.outline.shape);
+        let inside = array.core_fields(&scene.upper_a, depth_m)?;
+        peak_t = inside.iter().map(|field| field.peak_t).collect();
+        mean_t = inside.iter().map(|field| field.mean_t).collect();
+        let most_t = peak_t.iter().copied().fold(0.0, f64::max);
+        let knee_t = scene.core.as_ref().map_or(f64::INFINITY, |c| c.knee_t);
+        notes.extend(above_knee(
+            most_t,
+            knee_t,
+            "a core of the array with all coils at their rated currents",
+        ));
     }
-    accuracy.insert(
-        "mutual_inductance",
-        StageAccuracy {
-            estimate,
-            relative_to: relative_to.to_owned(),
-            method: method.to_owned(),
-        },
-    );
     let coils = axes
         .iter()
         .enumerate()
@@ -160,6 +125,55 @@ pub(super) fn array(
             .then_some(solved.relative_permeability),
         working_point,
     }))
+}
+
+/// The windings' inductance matrix without steel, H.
+pub(super) fn in_air(scene: &Scene) -> Vec<Vec<f64>> {
+    let axes = &scene.design.array.positions_m;
+    mutual::inductance_matrix_h(&scene.winding, scene.circuit.inductance_h, axes)
+}
+
+/// The array's inductance matrix, H, from that of its windings `in_air` and its steel's solution.
+pub(super) fn inductances(
+    scene: &Scene,
+    solved: &Solved,
+    in_air: Vec<Vec<f64>>,
+) -> (Vec<Vec<f64>>, StageAccuracy) {
+    let mut matrix = in_air;
+    let gap_m = closest_m(&scene.design.array.positions_m) - 2.0 * scene.winding.outer_radius_m;
+    let mut estimate = if gap_m >= 0.1 * scene.winding.outer_radius_m {
+        mutual::RELATIVE_ERROR
+    } else {
+        mutual::RELATIVE_ERROR_TOUCHING
+    };
+    let mut method = "a-priori quadrature bound for the narrowest gap between windings";
+    let mut relative_to = "each mutual inductance";
+    match &solved.steel {
+        Steel::None => {}
+        Steel::Alone(coil) => {
+            for (i, row) in matrix.iter_mut().enumerate() {
+                row[i] += coil.added_inductance_h;
+            }
+            method = "neighbours' cores left out (coupling = \"none\"): mutual inductances are \
+                      those of the windings in air";
+        }
+        Steel::Coupled(array) => {
+            for (i, row) in matrix.iter_mut().enumerate() {
+                for (j, value) in row.iter_mut().enumerate() {
+                    *value += array.added_inductance_h[(i, j)];
+                }
+            }
+            estimate = estimate.max(array.relative_error);
+            relative_to = "the largest self inductance";
+            method = "coupled cores by two resolutions";
+        }
+    }
+    let stage = StageAccuracy {
+        estimate,
+        relative_to: relative_to.to_owned(),
+        method: method.to_owned(),
+    };
+    (matrix, stage)
 }
 
 /// What the cores do at a working point, beside the linear solution.

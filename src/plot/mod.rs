@@ -4,6 +4,7 @@
 
 pub mod pareto;
 pub mod plane;
+pub mod replay;
 
 use std::collections::HashSet;
 

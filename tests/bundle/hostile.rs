@@ -136,6 +136,23 @@ fn another_minor_version_is_read() {
         manifest["a_key_of_the_future"] = json!({ "x": 1 });
     });
     Bundle::open(&target).unwrap();
+    // Bundles before 1.2 hold no heights, static currents or inductances in map.npz.
+    let older = folder.path().join("older");
+    sample(false, [4, 4, 4])
+        .without_rendering()
+        .write(&older, false)
+        .unwrap();
+    edit_manifest(&older, |manifest| {
+        manifest["schema_version"] = json!("1.0.0");
+    });
+    assert!(
+        Bundle::open(&older)
+            .unwrap()
+            .map
+            .runtime
+            .rendering
+            .is_none()
+    );
     let error = Bundle::open(&folder.path().join("nowhere")).unwrap_err();
     assert!(matches!(error, BundleError::NoBundle { .. }));
 }

@@ -1,4 +1,4 @@
-//! The loaders in Rust, Python and C on the same bundle.
+//! The loaders in Rust, Python and C on the same bundle: forces, heights and currents.
 
 use std::fs;
 use std::io::Write as _;
@@ -7,6 +7,8 @@ use std::process::{Command, Stdio};
 
 use fluxform::bundle::load::Bundle;
 use fluxform::bundle::npz::MapArrays;
+use fluxform::bundle::replay::Answer;
+use fluxform::job::replay::renderer::Renderer;
 
 use crate::sample::*;
 
@@ -70,13 +72,16 @@ sys.path.insert(0, sys.argv[1])
 from load_bundle import Bundle
 points = np.loadtxt(sys.stdin, ndmin=2)
 bundle = Bundle(sys.argv[2])
-for row, pull in zip(bundle.force_per_ampere(points), bundle.passive_force(points)):
-    print(*map(repr, map(float, [*row, pull])))
+found = zip(bundle.force_per_ampere(points), bundle.passive_force(points), bundle.height(points), *bundle.currents(points))
+for row, pull, height, currents, force, answer in found:
+    code = 'ok saturated outside'.split().index(answer)
+    height = 0 if np.isnan(height) or code == 2 else height
+    print(*map(repr, map(float, [*row, pull, height, code, force, *currents])))
 ";
 
 /// The C loader as a program; `None` without a C compiler.
 fn c_loader(folder: &Path, flags: &[&str]) -> Option<PathBuf> {
-    let program = folder.join("forces");
+    let program = folder.join("replay");
     let built = Command::new("cc")
         .args([
             "-std=c99",
@@ -87,8 +92,14 @@ fn c_loader(folder: &Path, flags: &[&str]) -> Option<PathBuf> {
             "-O2",
         ])
         .args(flags)
-        .arg("-DFLUXFORM_BUNDLE_MAIN")
-        .arg(scripts().join("fluxform_bundle.c"))
+        .args(
+            [
+                "fluxform_replay.c",
+                "fluxform_bundle.c",
+                "fluxform_currents.c",
+            ]
+            .map(|name| scripts().join(name)),
+        )
         .arg("-o")
         .arg(&program)
         .arg("-lm")
@@ -102,20 +113,39 @@ fn c_loader(folder: &Path, flags: &[&str]) -> Option<PathBuf> {
     built.success().then_some(program)
 }
 
+/// Where in a line forces per ampere and pull, height, answer, force, and currents begin.
+const PARTS: [usize; 6] = [0, COILS + 1, COILS + 2, COILS + 3, COILS + 4, 2 * COILS + 4];
+const COILS: usize = 4;
+const FORCE: usize = 3;
+
 fn compare(loader: &str, found: &[Vec<f64>], want: &[Vec<f64>]) {
     assert_eq!(found.len(), want.len(), "{loader}");
-    let mut worst = 0.0f64;
+    let mut worst = [0.0f64; 5];
     for (found, want) in found.iter().zip(want) {
         assert_eq!(found.len(), want.len(), "{loader}");
-        let scale = want.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-        for (f, w) in found.iter().zip(want) {
-            assert!((f - w).abs() <= 1e-12 * scale, "{loader}: {f} and {w}");
-            if scale > 0.0 {
-                worst = worst.max((f - w).abs() / scale);
+        for (part, ends) in PARTS.windows(2).enumerate() {
+            // A force that cancels the pull is compared with the pull.
+            let least = if part == FORCE {
+                want[COILS].abs()
+            } else {
+                0.0
+            };
+            let (found, want) = (&found[ends[0]..ends[1]], &want[ends[0]..ends[1]]);
+            let scale = want.iter().fold(least, |m, v| m.max(v.abs()));
+            for (f, w) in found.iter().zip(want) {
+                let apart = (f - w).abs();
+                assert!(apart <= 1e-12 * scale, "{loader}, part {part}: {f} and {w}");
+                if scale > 0.0 {
+                    worst[part] = worst[part].max(apart / scale);
+                }
             }
         }
     }
-    eprintln!("{loader}: largest difference {worst:.1e} of the largest force at the point");
+    eprintln!(
+        "{loader}: largest differences of forces per ampere, heights, answers, forces and \
+         currents, relative to the largest at the point: {}",
+        worst.map(|w| format!("{w:.1e}")).join(" ")
+    );
 }
 
 #[test]
@@ -136,6 +166,8 @@ fn rust_python_and_c_give_the_same_forces() {
         let bundle = Bundle::open(&target).unwrap();
         let at = positions(&bundle.map);
         let mut outside = 0;
+        let mut renderer = Renderer::new(&bundle).unwrap();
+        let mut answers = [0; 3];
         let want: Vec<Vec<f64>> = at
             .iter()
             .map(|&p| {
@@ -145,10 +177,25 @@ fn rust_python_and_c_give_the_same_forces() {
                 assert_eq!(pull.is_some(), inside);
                 outside += usize::from(!inside);
                 force.push(pull.unwrap_or(0.0));
+                let mut currents = vec![f64::NAN; COILS];
+                let step = renderer.step(p, &mut currents);
+                let answer = [Answer::Ok, Answer::Saturated, Answer::Outside]
+                    .iter()
+                    .position(|answer| *answer == step.answer)
+                    .unwrap();
+                assert!(renderer.certificate(&step, &currents) < 1e-12);
+                answers[answer] += 1;
+                force.extend([step.height_m, answer as f64, step.force_n]);
+                force.extend(currents);
                 force
             })
             .collect();
         assert!((20..120).contains(&outside), "{outside} outside");
+        eprintln!("{name}: {answers:?} positions ok, saturated, outside");
+        assert!(
+            samples[2] == 1 || answers.iter().all(|n| *n > 20),
+            "{answers:?}"
+        );
         // The interpolation itself: against the analytic field.
         if samples[2] > 4 {
             for (p, force) in at.iter().zip(&want).filter(|(_, force)| force[0] != 0.0) {
@@ -158,7 +205,7 @@ fn rust_python_and_c_give_the_same_forces() {
                 assert!((force[0] - exact).abs() < 2e-2, "{force:?} {exact}");
                 assert_eq!(force[2], 0.0);
                 let pull = if pulled { pull_n(*p) } else { 0.0 };
-                let found = force[bundle.coil_count()];
+                let found = force[COILS];
                 assert!((found - pull).abs() <= 1e-2 * pull.abs(), "{found} {pull}");
             }
         }
@@ -209,14 +256,14 @@ fn the_c_loader_survives_damaged_files() {
     let bytes = fs::read(target.join("map.npz")).unwrap();
     let mut seed = 3;
     let damaged = folder.path().join("damaged.npz");
-    let directory = bytes.len() - 1400; // names, offsets and sizes of the central directory
+    let directory = bytes.len() - 1900; // names, offsets and sizes of the central directory
     for round in 0..150 {
         let mut edited = bytes.clone();
         match round % 3 {
             0 => edited.truncate((random(&mut seed) * bytes.len() as f64) as usize),
             1 => edited[(random(&mut seed) * bytes.len() as f64) as usize] ^= 1 << (round % 8),
             _ => {
-                let at = directory + (random(&mut seed) * 1390.0) as usize;
+                let at = directory + (random(&mut seed) * 1890.0) as usize;
                 edited[at..at + 4].fill((random(&mut seed) * 256.0) as u8);
             }
         }

@@ -10,6 +10,7 @@ use fluxform::bundle::atomic::WriteError;
 use fluxform::bundle::lambda_file::{AtLambda, LambdaFile, PathStep};
 use fluxform::bundle::manifest::*;
 use fluxform::bundle::npz::{MapArrays, Runtime};
+use fluxform::bundle::rendering::{HeightGrid, Rendering};
 use fluxform::bundle::table::{CurrentRow, PointRow};
 use fluxform::bundle::write::{BundleContent, write_bundle};
 use fluxform::numerics::axis::Axis;
@@ -73,7 +74,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
     let (current_min_a, current_max_a) = (vec![0.0, -0.7, 0.0, 0.0], vec![2.0, 2.0, 1.3, 2.0]);
     let resistance_ohm = vec![6.07, 6.08, 6.09, 6.11];
     let currents_a = vec![1.3, -0.7, 0.0, 0.9];
-    let map = MapArrays {
+    let mut map = MapArrays {
         x_m: x.nodes().into(),
         y_m: y.nodes().into(),
         z_m: z.nodes().into(),
@@ -90,6 +91,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
             resistance_ohm: resistance_ohm.clone(),
             total_current_max_a: Some(5.3),
             lambda_n_per_m: Some(5.9878),
+            rendering: None,
         },
     };
     let grid = axis(-0.04, 0.04, 5);
@@ -103,6 +105,19 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
             normal: [0.0, 0.6, 0.8],
         })
         .collect();
+    let points_grid = PointsGrid::new(grid, grid, &present);
+    let inductance_h = vec![
+        vec![0.21, -0.02, -0.02, -0.01],
+        vec![-0.02, 0.22, -0.01, -0.02],
+        vec![-0.02, -0.01, 0.19, -0.02],
+        vec![-0.01, -0.02, -0.02, 0.2],
+    ];
+    map.runtime.rendering = Some(Rendering {
+        heights: HeightGrid::of_points(&points_grid, &points).unwrap(),
+        static_current_a: currents_a.clone(),
+        inductance_h: inductance_h.concat(),
+        voltage_v: Some(36.0),
+    });
     let accuracy = BTreeMap::from([(
         "map".to_owned(),
         StageAccuracy {
@@ -182,6 +197,10 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
             total_current_max_a: Some(5.3),
         },
         resistance_ohm,
+        circuit: Some(CircuitSummary {
+            inductance_h,
+            voltage_v: Some(36.0),
+        }),
         magnet: MagnetSummary {
             moment_a_m2,
             model: "dipole".to_owned(),
@@ -193,7 +212,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
             lambda_n_per_m: Some(5.9878),
             criterion: "saturation".to_owned(),
         },
-        points: PointsGrid::new(grid, grid, &present),
+        points: points_grid,
         map: MapSummary {
             x_m: x.into(),
             y_m: y.into(),
@@ -240,6 +259,13 @@ impl Sample {
             interpolation: Interpolation::tricubic(1.7e-4, "sampled"),
         });
         self.map.passive_force_n = Some(pull.into());
+        self
+    }
+
+    /// The sample of a bundle of schema 1.1: without what position feedback needs.
+    pub fn without_rendering(mut self) -> Self {
+        self.map.runtime.rendering = None;
+        self.manifest.circuit = None;
         self
     }
 

@@ -117,6 +117,15 @@ fn contradictions_and_bad_numbers_are_not_written() {
         "a number is not finite",
     );
     refuse(|s| s.points[3].x_m += 1e-6, "row 3 of points.csv");
+    refuse(|s| s.points[3].height_m += 1e-6, "agree on the heights");
+    refuse(
+        |s| s.manifest.circuit.as_mut().unwrap().inductance_h[1][2] = 0.1,
+        "agree on inductance_h",
+    );
+    refuse(
+        |s| s.map.runtime.rendering.as_mut().unwrap().static_current_a[0] = 0.1,
+        "map.npz and currents.csv agree",
+    );
     refuse(
         |s| s.currents[1].current_a = 0.1,
         "currents.csv and lambda.json agree",
@@ -213,6 +222,7 @@ fn figures() {
     let nodes = 61 * 61 * 29;
     sample.map.coil = (0..9).collect::<Vec<i64>>().into();
     let runtime = &mut sample.map.runtime;
+    runtime.rendering = None;
     runtime.current_max_a = vec![2.0; 9];
     runtime.current_min_a = vec![0.0; 9];
     runtime.resistance_ohm = vec![6.07; 9];

@@ -2,7 +2,7 @@
 
 use crate::support::Place;
 
-const COMMANDS: [&str; 10] = [
+const COMMANDS: [&str; 11] = [
     "evaluate",
     "probe",
     "map",
@@ -10,6 +10,7 @@ const COMMANDS: [&str; 10] = [
     "lambda",
     "calibrate",
     "verify",
+    "replay",
     "sweep",
     "completions",
     "man",

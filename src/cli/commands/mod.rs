@@ -9,6 +9,7 @@ pub mod man;
 pub mod map;
 pub mod optimize;
 pub mod probe;
+pub mod replay;
 pub mod sweep;
 pub mod verify;
 

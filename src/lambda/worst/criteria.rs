@@ -4,7 +4,7 @@ use super::program::Piece;
 use crate::numerics::double_double::DoubleDouble as Num;
 use crate::numerics::real::Real;
 
-/// Above this share of lambda max h (or above what rounding may hide) t* has left t_0.
+/// Above this share of lambda max h and of the error without currents (or above what rounding may hide) t* has left t_0.
 const VISIBLE: f64 = 1e-12;
 
 /// t* and the error t_0 without upper limits, both as functions of lambda.
@@ -63,11 +63,14 @@ impl Comparison<'_> {
 
     /// Where t* leaves t_0.
     pub fn linear(&self) -> Option<Num> {
-        let visible = Num::of(VISIBLE.max(4.0 * self.doubt)) * self.top;
+        let share = Num::of(VISIBLE.max(4.0 * self.doubt));
+        // Where a force without currents is there, errors are small against that too.
+        let without = error_at(&self.limited[0], Num::ZERO);
+        let visible = |lambda: Num| share * (self.top * lambda + without);
         self.stretches().iter().find_map(|stretch| {
             let leaves = match stretch.end {
-                Some(end) => stretch.excess + (end - stretch.start) * stretch.rate > visible * end,
-                None => stretch.rate > visible || stretch.excess > visible * stretch.start,
+                Some(end) => stretch.excess + (end - stretch.start) * stretch.rate > visible(end),
+                None => stretch.rate > share * self.top || stretch.excess > visible(stretch.start),
             };
             leaves.then_some(stretch.start)
         })

@@ -8,7 +8,7 @@
 use std::collections::BTreeSet;
 
 use super::blocks::{Blocks, misses};
-use super::points::{Course, Points, Probe, first_missed};
+use super::points::{Course, Held, Points, Probe, bit, first_missed};
 use super::program::{End, Piece, Program, Stand};
 use super::scaled::{Form, Scaled};
 use crate::lambda::reduce::times_power;
@@ -211,19 +211,26 @@ fn solve(
         scaled.add_point(&mut program, form, j, up);
         rows.push(Some((j, up)));
     }
-    let mut known: BTreeSet<(usize, bool)> = working.iter().copied().collect();
+    let count = near.height_m.len();
+    let point = |place: usize| index.map_or(place, |index| index[place]);
+    let known: BTreeSet<(usize, bool)> = working.iter().copied().collect();
+    let mut held: Vec<Held> = vec![0; count];
+    for (place, held) in held.iter_mut().enumerate() {
+        for up in [true, false] {
+            if known.contains(&(point(place), up)) {
+                *held |= bit(up);
+            }
+        }
+    }
     let down = (form == Form::Worst).then_some(first_row + 1);
     let basis = scaled.first_basis(form, first_row, down);
     let ask = |program: &mut Program, stand: &Stand| {
         let course = course(scaled, form, stand);
-        let Some((place, up)) = first_missed(near, &course, form) else {
+        let Some((place, up)) = first_missed(near, &held, &course, form) else {
             return false;
         };
-        let row = (index.map_or(place, |index| index[place]), up);
-        // A row that is there already is held as well as rounding allows.
-        if !known.insert(row) {
-            return false;
-        }
+        held[place] |= bit(up);
+        let row = (point(place), up);
         scaled.add_point(program, form, row.0, row.1);
         rows.push(Some(row));
         true

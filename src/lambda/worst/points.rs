@@ -37,11 +37,26 @@ pub(super) struct Course {
     pub step: f64,
 }
 
+/// Which rows a program has of each point: the bit of each sign.
+pub(super) type Held = u8;
+
+/// The bit of a row with that sign.
+pub(super) fn bit(up: bool) -> Held {
+    if up { 1 } else { 2 }
+}
+
 /// The point that a path misses first on its course: where it is missed already the one missed
-/// most, where several are at once the one that is left fastest.
-pub(super) fn first_missed(points: Points, course: &Course, form: Form) -> Option<(usize, bool)> {
+/// most, where several are at once the one that is left fastest. Rows that are `held` are not
+/// asked: those that the path rests on seem to be missed by what rounding leaves of their rates.
+pub(super) fn first_missed(
+    points: Points,
+    held: &[Held],
+    course: &Course,
+    form: Form,
+) -> Option<(usize, bool)> {
     dispatch::run(First {
         points,
+        held,
         course,
         form,
     })
@@ -49,6 +64,7 @@ pub(super) fn first_missed(points: Points, course: &Course, form: Form) -> Optio
 
 struct First<'a> {
     points: Points<'a>,
+    held: &'a [Held],
     course: &'a Course,
     form: Form,
 }
@@ -80,7 +96,8 @@ impl Kernel for First<'_> {
             }
             for &sign in signs {
                 let over = sign * rest - course.at.limit_n;
-                if over > most {
+                let asked = || self.held[j] & bit(sign > 0.0) == 0;
+                if over > most && asked() {
                     (missed, most) = (Some((j, sign > 0.0)), over);
                 }
                 let speed = sign * rate - course.limit_rate_m;
@@ -94,7 +111,8 @@ impl Kernel for First<'_> {
                     -over
                 };
                 let step = slack / speed;
-                if step < least || (step == least && speed > fastest) {
+                let sooner = step < least || (step == least && speed > fastest);
+                if sooner && asked() {
                     (first, least, fastest) = (Some((j, sign > 0.0)), step, speed);
                 }
             }

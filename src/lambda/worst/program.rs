@@ -150,7 +150,7 @@ impl Program {
     /// Follows the minimiser from `lambda = 0` on. The rows of `basis` must be independent and
     /// their multipliers, the second objective's where those are zero, not negative. Before the
     /// minimiser moves on, `ask` is told where it stands, its rate, and the step to the next turn
-    /// if there is one; it adds a row that ends the step earlier, or returns false.
+    /// if there is one; it adds a row that seems to end the step earlier, or returns false.
     pub fn follow(
         &mut self,
         basis: &[usize],
@@ -169,17 +169,19 @@ impl Program {
             vertex.place(self, lambda);
             let cautious = exchanges_here > patience;
             let (mut entering, mut next) = self.look(&vertex, lambda, cautious);
-            if entering.is_none() {
+            // A row may turn out not to end the step: then another may.
+            while entering.is_none() {
                 let stand = Stand {
                     lambda,
                     z: &vertex.z,
                     rate: &vertex.rate,
                     step: next.map(|(_, step)| step),
                 };
-                if ask(self, &stand) {
-                    vertex.active.resize(self.rows(), false);
-                    (entering, next) = self.look(&vertex, lambda, cautious);
+                if !ask(self, &stand) {
+                    break;
                 }
+                vertex.active.resize(self.rows(), false);
+                (entering, next) = self.look(&vertex, lambda, cautious);
             }
             if entering.is_none() {
                 let piece = vertex.piece(lambda);

@@ -1,0 +1,89 @@
+/* A program on top of fluxform_bundle.h.
+ *
+ * `program map.npz` reads lines "x y z" (m) and prints for each the force per ampere [N/A] of every
+ * coil, the unpowered steel's pull [N], the surface's height [m] (0 outside the map), the answer (0 ok, 1 saturated,
+ * 2 outside, -1 unable), the force given [N] and the current [A] of every coil.
+ * `program map.npz REPEATS` reads the same lines and prints the nanoseconds that a step takes:
+ *   cc -std=c99 -O2 fluxform_replay.c fluxform_bundle.c fluxform_currents.c -o replay -lm
+ */
+#include "fluxform_bundle.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+
+static int tell(fluxform_bundle *bundle, double *force, double *current)
+{
+    double x, y, z, pull;
+    fluxform_step step;
+    while (scanf("%lf %lf %lf", &x, &y, &z) == 3) {
+        int answer;
+        fluxform_force_per_ampere(bundle, x, y, z, force);
+        for (size_t i = 0; i < bundle->coil_count; i++)
+            printf("%.17g ", force[i]);
+        fluxform_passive_force(bundle, x, y, z, &pull);
+        answer = fluxform_currents(bundle, x, y, z, current, &step);
+        printf("%.17g %.17g %d %.17g", pull, step.height_m, answer, step.force_n);
+        for (size_t i = 0; i < bundle->coil_count; i++)
+            printf(" %.17g", current[i]);
+        printf("\n");
+    }
+    return 0;
+}
+
+static int measure(fluxform_bundle *bundle, double *current, long repeats)
+{
+    size_t count = 0, room = 0;
+    double *at = NULL, p[3], sum = 0, best = 1e300;
+    while (scanf("%lf %lf %lf", &p[0], &p[1], &p[2]) == 3) {
+        if (count == room) {
+            double *more = realloc(at, (room = 2 * room + 1024) * 3 * sizeof *at);
+            if (!more) {
+                free(at);
+                return 3;
+            }
+            at = more;
+        }
+        for (size_t k = 0; k < 3; k++)
+            at[3 * count + k] = p[k];
+        count++;
+    }
+    for (long run = 0; run < repeats && count; run++) {
+        clock_t start = clock();
+        double each;
+        for (size_t i = 0; i < count; i++) {
+            fluxform_currents(bundle, at[3 * i], at[3 * i + 1], at[3 * i + 2], current, NULL);
+            sum += current[0];
+        }
+        each = (double)(clock() - start) / CLOCKS_PER_SEC / (double)count * 1e9;
+        best = each < best ? each : best;
+    }
+    free(at);
+    printf("%.1f %.17g\n", best, sum);
+    return 0;
+}
+
+int main(int argc, char **argv)
+{
+    fluxform_bundle bundle;
+    char message[256];
+    double *force;
+    int outcome;
+    if (argc != 2 && argc != 3) {
+        fprintf(stderr, "usage: %s map.npz [REPEATS] < points\n", argv[0]);
+        return 2;
+    }
+    if (fluxform_bundle_open(&bundle, argv[1], message, sizeof message)) {
+        fprintf(stderr, "%s\n", message);
+        return 3;
+    }
+    if (!(force = calloc(2 * bundle.coil_count + 1, sizeof *force))) {
+        fluxform_bundle_close(&bundle);
+        return 3;
+    }
+    outcome = argc == 2 ? tell(&bundle, force, force + bundle.coil_count)
+                        : measure(&bundle, force, strtol(argv[2], NULL, 10));
+    free(force);
+    fluxform_bundle_close(&bundle);
+    return outcome;
+}

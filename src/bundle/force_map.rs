@@ -1,0 +1,146 @@
+//! A bundle's map arranged for a control loop: all coils at one position in one pass.
+//!
+//! `[z, y, x, coil]`, already multiplied by the magnet's moment, the coils in groups of four: the
+//! 64 nodes that take part at a position are 64 runs of neighbouring numbers, and a group's sums
+//! stay in registers. Values are those of
+//! [`Bundle::force_per_ampere`] up to rounding. Nothing is allocated after [`ForceMap::new`].
+
+use super::load::Bundle;
+use crate::numerics::lagrange::{ORDER_NODES, stencil};
+
+/// Coils summed together.
+const GROUP: usize = 4;
+/// The most nodes that take part at a position.
+const MOST_NODES: usize = ORDER_NODES * ORDER_NODES * ORDER_NODES;
+
+/// Upward force per ampere of every coil of an array, over a box.
+#[derive(Debug, Clone)]
+pub struct ForceMap {
+    axes_m: [Vec<f64>; 3],
+    coils: usize,
+    /// Coils with a map, by index in the array.
+    kept: Vec<usize>,
+    /// `[z, y, x, group of kept coils]`, N/A; beyond the last coil zero.
+    force_n_per_a: Vec<[f64; GROUP]>,
+    /// `[z, y, x]`, N.
+    passive_n: Option<Vec<f64>>,
+    /// The largest |force per ampere| of any coil on every plane of nodes, N/A.
+    largest_n_per_a: Vec<f64>,
+}
+
+impl ForceMap {
+    /// Arranges the map of `bundle`.
+    #[must_use]
+    pub fn new(bundle: &Bundle) -> Self {
+        let map = &bundle.map;
+        let [kept, nz, ny, nx] = map.shape();
+        let nodes = nz * ny * nx;
+        let [m_x, m_y, m_z] = map.runtime.moment_a_m2;
+        let gradient = map
+            .gradient_t_per_m_per_a
+            .as_deref()
+            .filter(|_| m_x != 0.0 || m_y != 0.0);
+        let groups = kept.div_ceil(GROUP);
+        let mut force_n_per_a = vec![[0.0; GROUP]; nodes * groups];
+        for coil in 0..kept {
+            for node in 0..nodes {
+                let at = coil * nodes + node;
+                force_n_per_a[node * groups + coil / GROUP][coil % GROUP] = match gradient {
+                    Some(g) => m_x * g[9 * at + 2] + m_y * g[9 * at + 5] + m_z * g[9 * at + 8],
+                    None => m_z * map.gz_t_per_m_per_a[at],
+                };
+            }
+        }
+        let plane = (ny * nx * groups).max(1);
+        let size = |most: f64, value: &f64| most.max(value.abs());
+        Self {
+            axes_m: [&map.x_m, &map.y_m, &map.z_m].map(|axis| axis.to_vec()),
+            coils: bundle.coil_count(),
+            kept: map.coil.iter().map(|&coil| coil as usize).collect(),
+            largest_n_per_a: force_n_per_a
+                .chunks(plane)
+                .map(|values| values.as_flattened().iter().fold(0.0, size))
+                .collect(),
+            force_n_per_a,
+            passive_n: map.passive_force_n.as_deref().map(<[f64]>::to_vec),
+        }
+    }
+
+    /// Coils of the array, those without a map included.
+    #[must_use]
+    pub fn coils(&self) -> usize {
+        self.coils
+    }
+
+    /// The ends of the box along x, y and z, m.
+    #[must_use]
+    pub fn ends_m(&self) -> [[f64; 2]; 3] {
+        let ends = |axis: &Vec<f64>| [axis[0], axis[axis.len() - 1]];
+        [
+            ends(&self.axes_m[0]),
+            ends(&self.axes_m[1]),
+            ends(&self.axes_m[2]),
+        ]
+    }
+
+    /// Writes the upward force per ampere of every coil at (x, y, z) m, N/A, zero for coils
+    /// without a map, and returns what the unpowered steel adds, N. Outside the map `None`, and
+    /// nothing is written.
+    ///
+    /// # Panics
+    /// When `force_n_per_a` is shorter than the array.
+    pub fn at(&self, position_m: [f64; 3], force_n_per_a: &mut [f64]) -> Option<f64> {
+        let [x, y, z] = &self.axes_m;
+        let (row, rows) = (x.len(), y.len());
+        let x = stencil(x, position_m[0])?;
+        let y = stencil(y, position_m[1])?;
+        let z = stencil(z, position_m[2])?;
+        let mut nodes = [(0, 0.0); MOST_NODES];
+        let mut count = 0;
+        for k in 0..z.count {
+            for j in 0..y.count {
+                let share = z.weights[k] * y.weights[j];
+                let first = ((z.start + k) * rows + y.start + j) * row + x.start;
+                for i in 0..x.count {
+                    nodes[count] = (first + i, share * x.weights[i]);
+                    count += 1;
+                }
+            }
+        }
+        let nodes = &nodes[..count];
+        let force = &mut force_n_per_a[..self.coils];
+        if self.kept.len() < self.coils {
+            force.fill(0.0);
+        }
+        let groups = self.kept.len().div_ceil(GROUP);
+        for (group, coils) in self.kept.chunks(GROUP).enumerate() {
+            let mut sums = [0.0; GROUP];
+            for &(node, weight) in nodes {
+                let values = &self.force_n_per_a[node * groups + group];
+                for (sum, value) in sums.iter_mut().zip(values) {
+                    *sum += weight * value;
+                }
+            }
+            for (&coil, sum) in coils.iter().zip(sums) {
+                force[coil] = sum;
+            }
+        }
+        let pull = self.passive_n.as_ref().map_or(0.0, |passive| {
+            let terms = nodes.iter().map(|&(node, weight)| weight * passive[node]);
+            terms.sum()
+        });
+        Some(pull)
+    }
+
+    /// The largest |force per ampere| of any coil on the planes of nodes around a height, N/A.
+    #[must_use]
+    pub fn largest_near_n_per_a(&self, z_m: f64) -> f64 {
+        let nodes = &self.axes_m[2];
+        let above = nodes.partition_point(|&node| node <= z_m);
+        let around = above.saturating_sub(1)..(above + 1).min(nodes.len());
+        self.largest_n_per_a[around]
+            .iter()
+            .copied()
+            .fold(0.0, f64::max)
+    }
+}

@@ -1,0 +1,221 @@
+//! What rendering with position feedback needs besides the map, as arrays of `map.npz`: the
+//! heights on their grid, the static currents, and the coils' circuit.
+//!
+//! `height_x_m`, `height_y_m`, `height_m` `[y, x]` and `has_height` `[y, x]` (1 where there is a
+//! surface, 0 where not, and there the height is 0), `static_current_a` (one a coil),
+//! `inductance_h` `[coil, coil]`, and `voltage_v` (no dimension) where the supply's is known. All
+//! are f64, the flags too, so that loaders of older bundles pass over them. New in schema 1.2.
+
+use super::manifest::PointsGrid;
+use super::npz::{NpzError, bad};
+use super::table::PointRow;
+
+pub(super) const HEIGHT_X: &str = "height_x_m";
+pub(super) const HEIGHT_Y: &str = "height_y_m";
+pub(super) const HEIGHT: &str = "height_m";
+pub(super) const HAS_HEIGHT: &str = "has_height";
+pub(super) const STATIC_CURRENT: &str = "static_current_a";
+pub(super) const INDUCTANCE: &str = "inductance_h";
+pub(super) const VOLTAGE: &str = "voltage_v";
+
+/// Heights, static currents and circuit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rendering {
+    /// The object's surface.
+    pub heights: HeightGrid,
+    /// The bundle's fixed currents, A, one a coil of the array.
+    pub static_current_a: Vec<f64>,
+    /// `[i][j]`: flux through coil i for one ampere in coil j, H, row by row.
+    pub inductance_h: Vec<f64>,
+    /// The supply's, V.
+    pub voltage_v: Option<f64>,
+}
+
+impl Rendering {
+    /// Lengths, finite numbers and order, for an array of `coils`.
+    pub(super) fn validate(&self, coils: usize) -> Result<(), NpzError> {
+        let heights = &self.heights;
+        let (nx, ny) = (heights.x_m.len(), heights.y_m.len());
+        for (name, nodes) in [(HEIGHT_X, &heights.x_m), (HEIGHT_Y, &heights.y_m)] {
+            if nodes.is_empty() || !nodes.is_sorted_by(|a, b| a < b) {
+                return Err(bad(name, "must increase from node to node"));
+            }
+        }
+        let voltage = self.voltage_v.as_slice();
+        for (name, values, count) in [
+            (HEIGHT_X, &heights.x_m[..], nx),
+            (HEIGHT_Y, &heights.y_m, ny),
+            (HEIGHT, &heights.height_m, nx.saturating_mul(ny)),
+            (HAS_HEIGHT, &heights.has_height, nx.saturating_mul(ny)),
+            (STATIC_CURRENT, &self.static_current_a, coils),
+            (INDUCTANCE, &self.inductance_h, coils.saturating_mul(coils)),
+            (VOLTAGE, voltage, voltage.len()),
+        ] {
+            if values.len() != count {
+                let message = format!("must hold {count} numbers, holds {}", values.len());
+                return Err(bad(name, message));
+            }
+            if !values.iter().all(|value| value.is_finite()) {
+                return Err(bad(name, "holds a number that is not finite"));
+            }
+        }
+        if !heights
+            .has_height
+            .iter()
+            .all(|&has| has == 0.0 || has == 1.0)
+        {
+            return Err(bad(HAS_HEIGHT, "must hold 0 or 1"));
+        }
+        Ok(())
+    }
+}
+
+/// A surface's heights on a grid; not everywhere is a surface.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeightGrid {
+    /// Nodes along x, m, strictly increasing.
+    pub x_m: Vec<f64>,
+    /// Nodes along y, m, strictly increasing.
+    pub y_m: Vec<f64>,
+    /// `[y, x]`, m; 0 where there is no surface.
+    pub height_m: Vec<f64>,
+    /// `[y, x]`: 1 where there is a surface, else 0.
+    pub has_height: Vec<f64>,
+}
+
+impl HeightGrid {
+    /// The heights of a bundle's points, in the order of their grid's flags; `None` where the two
+    /// do not fit each other.
+    #[must_use]
+    pub fn of_points(grid: &PointsGrid, points: &[PointRow]) -> Option<Self> {
+        let flags = grid.flags()?;
+        let mut rows = points.iter();
+        let mut height_m = vec![0.0; flags.len()];
+        for (height, _) in height_m.iter_mut().zip(&flags).filter(|(_, flag)| **flag) {
+            *height = rows.next()?.height_m;
+        }
+        Some(Self {
+            x_m: grid.x_m.axis().nodes(),
+            y_m: grid.y_m.axis().nodes(),
+            height_m,
+            has_height: flags
+                .iter()
+                .map(|flag| f64::from(u8::from(*flag)))
+                .collect(),
+        })
+    }
+
+    /// The height at (x, y), m, bilinear between the four nodes around it; `None` off the grid and
+    /// where a node that takes part has no surface. An axis of one node has a value on it alone.
+    #[must_use]
+    pub fn height_m(&self, x_m: f64, y_m: f64) -> Option<f64> {
+        let (column, s) = between(&self.x_m, x_m)?;
+        let (row, t) = between(&self.y_m, y_m)?;
+        let stride = self.x_m.len();
+        let at = row * stride + column;
+        // A node of no weight is not asked: it may lie beyond the grid.
+        let right = usize::from(s > 0.0);
+        let above = if t > 0.0 { stride } else { 0 };
+        let nodes = [at, at + right, at + above, at + above + right];
+        let weights = [1.0 - s, s, 1.0 - t, t];
+        for (k, &node) in nodes.iter().enumerate() {
+            let weight = weights[k & 1] * weights[2 + (k >> 1)];
+            if weight > 0.0 && self.has_height[node] == 0.0 {
+                return None;
+            }
+        }
+        let h = nodes.map(|node| self.height_m[node]);
+        let low = (1.0 - s) * h[0] + s * h[1];
+        let high = (1.0 - s) * h[2] + s * h[3];
+        Some((1.0 - t) * low + t * high)
+    }
+}
+
+/// The cell that holds a position, and the position's share of its width; `None` outside.
+fn between(nodes: &[f64], position: f64) -> Option<(usize, f64)> {
+    let (&first, &last) = (nodes.first()?, nodes.last()?);
+    if !(first <= position && position <= last) {
+        return None;
+    }
+    if nodes.len() == 1 {
+        return Some((0, 0.0));
+    }
+    let above = nodes.partition_point(|&node| node <= position);
+    let cell = above.saturating_sub(1).min(nodes.len() - 2);
+    let (from, to) = (nodes[cell], nodes[cell + 1]);
+    Some((cell, (position - from) / (to - from)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::axis::Axis;
+
+    /// A saddle on uneven nodes: bilinear in every cell.
+    fn grid() -> HeightGrid {
+        let (x_m, y_m) = (vec![-0.03, 0.01, 0.02, 0.07], vec![0.1, 0.14, 0.21]);
+        let saddle = |x: f64, y: f64| 0.05 + 0.3 * x - 0.7 * y + 1.3 * x * y;
+        let heights = y_m
+            .iter()
+            .flat_map(|&y| x_m.iter().map(move |&x| saddle(x, y)));
+        HeightGrid {
+            height_m: heights.collect(),
+            has_height: vec![1.0; 12],
+            x_m,
+            y_m,
+        }
+    }
+
+    #[test]
+    fn a_saddle_is_met_everywhere_and_nothing_beyond() {
+        let grid = grid();
+        for step in 0..=70 {
+            let x = (-0.03 + 0.1 * f64::from(step) / 70.0).min(0.07);
+            let y = (0.1 + 0.11 * f64::from((step * 13) % 71) / 70.0).min(0.21);
+            let want = 0.05 + 0.3 * x - 0.7 * y + 1.3 * x * y;
+            assert!(
+                (grid.height_m(x, y).unwrap() - want).abs() < 1e-15,
+                "{x} {y}"
+            );
+        }
+        for (x, y) in [
+            (-0.0301, 0.12),
+            (0.0, 0.2101),
+            (f64::NAN, 0.12),
+            (0.0, 0.09),
+        ] {
+            assert_eq!(grid.height_m(x, y), None);
+        }
+    }
+
+    #[test]
+    fn there_is_no_surface_in_a_cell_with_a_missing_corner_but_on_its_other_sides() {
+        let mut grid = grid();
+        grid.has_height[5] = 0.0; // (0.01, 0.14)
+        grid.height_m[5] = 0.0;
+        assert_eq!(grid.height_m(0.0, 0.13), None);
+        assert_eq!(grid.height_m(0.01, 0.14), None);
+        assert_eq!(grid.height_m(0.015, 0.2), None);
+        assert!(grid.height_m(0.0, 0.1).is_some(), "the lower side");
+        assert!(grid.height_m(0.02, 0.14).is_some(), "a corner with surface");
+        assert!(grid.height_m(0.03, 0.2).is_some(), "another cell");
+    }
+
+    #[test]
+    fn single_nodes_and_flags_are_read_in_their_order() {
+        let axis = |from, to, samples| Axis { from, to, samples };
+        let grid = PointsGrid::new(axis(0.0, 0.2, 3), axis(0.7, 0.7, 1), &[true, false, true]);
+        let point = |x_m, height_m| PointRow {
+            x_m,
+            y_m: 0.7,
+            height_m,
+            normal: [0.0, 0.0, 1.0],
+        };
+        let points = [point(0.0, 0.03), point(0.2, 0.05)];
+        let heights = HeightGrid::of_points(&grid, &points).unwrap();
+        assert_eq!(heights.height_m(0.2, 0.7), Some(0.05));
+        assert_eq!(heights.height_m(0.2, 0.700_001), None);
+        assert_eq!(heights.height_m(0.05, 0.7), None);
+        assert_eq!(HeightGrid::of_points(&grid, &points[..1]), None);
+    }
+}

@@ -1,0 +1,139 @@
+//! Trajectories: measured positions over time, as CSV.
+
+use std::io::{self, Read, Write};
+
+use super::read_table::{TableError, read_numbered};
+use super::table::{Column, write_columns};
+
+/// Columns of a trajectory.
+pub const TRAJECTORY_COLUMNS: [&str; 4] = ["t_s", "x_m", "y_m", "z_m"];
+
+/// Positions of the magnet's centre over time; times never decrease.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Trajectory {
+    /// Time of each position, s.
+    pub t_s: Vec<f64>,
+    /// x, y, z, m.
+    pub position_m: Vec<[f64; 3]>,
+}
+
+impl Trajectory {
+    /// Number of positions.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.t_s.len()
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.t_s.is_empty()
+    }
+
+    /// The median of the times between positions, s; 0 for a single one.
+    #[must_use]
+    pub fn median_step_s(&self) -> f64 {
+        let mut steps: Vec<f64> = self.t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        steps.sort_by(f64::total_cmp);
+        steps.get(steps.len() / 2).copied().unwrap_or(0.0)
+    }
+
+    /// How long each position is held: until the next one, the last for the median step, s.
+    #[must_use]
+    pub fn held_s(&self) -> Vec<f64> {
+        let mut held: Vec<f64> = self.t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        if !self.is_empty() {
+            held.push(self.median_step_s());
+        }
+        held
+    }
+
+    /// Reads a table with the columns `t_s,x_m,y_m,z_m`.
+    ///
+    /// # Errors
+    /// As [`super::read_table::read_columns`]; no rows; the first time that is smaller than the one
+    /// before it.
+    pub fn read(name: &str, source: impl Read) -> Result<Self, TableError> {
+        let (columns, lines) = read_numbered(name, source, &TRAJECTORY_COLUMNS)?;
+        let t_s = &columns[0];
+        if t_s.is_empty() {
+            let fault = format!("{name}: holds no position; expected a row a measured position");
+            return Err(TableError::one(fault));
+        }
+        if let Some(row) = (1..t_s.len()).find(|&row| t_s[row] < t_s[row - 1]) {
+            return Err(TableError::one(format!(
+                "{name}:{}: column t_s: time runs backwards, from {} to {}; sort the rows by time",
+                lines[row],
+                t_s[row - 1],
+                t_s[row]
+            )));
+        }
+        Ok(Self {
+            position_m: (0..t_s.len())
+                .map(|row| [columns[1][row], columns[2][row], columns[3][row]])
+                .collect(),
+            t_s: t_s.clone(),
+        })
+    }
+
+    /// Writes such a table.
+    ///
+    /// # Errors
+    /// The writer's.
+    pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
+        let axis = |k: usize| -> Vec<f64> { self.position_m.iter().map(|p| p[k]).collect() };
+        let axes = [axis(0), axis(1), axis(2)];
+        let values = std::iter::once(&self.t_s).chain(&axes);
+        let columns: Vec<(&str, Column)> = TRAJECTORY_COLUMNS
+            .into_iter()
+            .zip(values.map(|values| Column::Number(values)))
+            .collect();
+        write_columns(out, &columns)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Trajectory;
+
+    fn read(text: &str) -> Result<Trajectory, String> {
+        Trajectory::read("finger.csv", text.as_bytes()).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn what_was_written_is_read_back() {
+        let text =
+            "note,t_s,x_m,y_m,z_m\na,0.7,0.01,-0.02,0.05\n\nb,0.7,0,0,0.06\nc,1.3,0.1,0.2,0.3\n";
+        let found = read(text).unwrap();
+        assert_eq!((found.len(), found.position_m[1]), (3, [0.0, 0.0, 0.06]));
+        assert_eq!(found.held_s(), [0.0, 1.3 - 0.7, 1.3 - 0.7]);
+        let mut written = Vec::new();
+        found.write(&mut written).unwrap();
+        assert_eq!(read(std::str::from_utf8(&written).unwrap()).unwrap(), found);
+        let single = read("t_s,x_m,y_m,z_m\n3,0,0,0.05\n").unwrap();
+        assert_eq!((single.median_step_s(), single.held_s()), (0.0, vec![0.0]));
+    }
+
+    #[test]
+    fn faults_are_told_with_their_line() {
+        for (text, words) in [
+            ("", "finger.csv:1: column t_s is missing"),
+            (
+                "t_s,x_m,y_m\n0,0,0\n",
+                "finger.csv:1: column z_m is missing",
+            ),
+            ("t_s,x_m,y_m,z_m\n", "holds no position"),
+            (
+                "t_s,x_m,y_m,z_m\n0,0,0,0.05\n0.02,nan,0,0.05\n",
+                "finger.csv:3: column x_m: expected a finite number, found \"nan\"",
+            ),
+            (
+                "t_s,x_m,y_m,z_m\n0.7,0,0,0.05\n0.7,0,0,0.05\n0.6,0,0,0.05\n",
+                "finger.csv:4: column t_s: time runs backwards, from 0.7 to 0.6",
+            ),
+        ] {
+            let fault = read(text).unwrap_err();
+            assert!(fault.contains(words), "{fault}");
+        }
+    }
+}

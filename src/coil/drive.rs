@@ -1,0 +1,254 @@
+//! Currents of coupled coils after voltages that are held for a while.
+//!
+//! `L dI/dt + R I = v`, with a voltage driver that answers a commanded current I_c by
+//! `v_i = R_i I_c,i`, no larger than the supply's. With `x = sqrt(R) I` the equation is symmetric,
+//! `T dx/dt + x = v / sqrt(R)`, `T = L / sqrt(R_i R_j)`; the eigenvectors of T are currents that
+//! decay without mixing, its eigenvalues their time constants. Every step is the exact solution for
+//! held voltages, so a step may be longer than any time constant, and two steps give what one of
+//! their length does. Eddy currents are left out; `coil::transient` estimates them.
+
+use nalgebra::{DMatrix, SymmetricEigen};
+
+/// The inductance matrix may be unsymmetric by this share of its largest entry: its error.
+const SYMMETRIC: f64 = 1e-2;
+
+/// Why the currents of an array cannot be followed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DriveError {
+    /// Lists of different lengths.
+    #[error("expected {coils} resistances and {coils} x {coils} inductances")]
+    Lengths {
+        /// Number of coils.
+        coils: usize,
+    },
+    /// A resistance.
+    #[error("coil {coil}: expected a resistance above 0")]
+    Resistance {
+        /// Its index.
+        coil: usize,
+    },
+    /// The inductance matrix.
+    #[error(
+        "the inductance matrix is not that of coils: it must be symmetric and give every current an energy above 0"
+    )]
+    Inductance,
+}
+
+/// The circuit of an array, and the currents that flow.
+#[derive(Debug, Clone)]
+pub struct Drive {
+    root_ohm: Vec<f64>,
+    /// Largest current that the voltage holds up, A.
+    most_a: Vec<f64>,
+    /// s, one a mode.
+    time_constant_s: Vec<f64>,
+    /// `[mode][coil]`.
+    modes: Vec<f64>,
+    /// Amplitudes of the modes.
+    now: Vec<f64>,
+    goal: Vec<f64>,
+    left: Vec<f64>,
+    /// The step that `left` is for, s.
+    step_s: f64,
+}
+
+impl Drive {
+    /// An array without current. `inductance_h` is its matrix, row by row; `voltage_v` the
+    /// supply's, if it bounds anything.
+    ///
+    /// # Errors
+    /// Domain: resistances above 0, a symmetric positive definite matrix.
+    pub fn new(
+        inductance_h: &[f64],
+        resistance_ohm: &[f64],
+        voltage_v: Option<f64>,
+    ) -> Result<Self, DriveError> {
+        let coils = resistance_ohm.len();
+        if inductance_h.len() != coils * coils {
+            return Err(DriveError::Lengths { coils });
+        }
+        let sound = |r: &f64| *r > 0.0 && r.is_finite();
+        if let Some(coil) = resistance_ohm.iter().position(|r| !sound(r)) {
+            return Err(DriveError::Resistance { coil });
+        }
+        let largest = inductance_h
+            .iter()
+            .fold(0.0_f64, |most, l| most.max(l.abs()));
+        let entry = |i: usize, j: usize| inductance_h[i * coils + j];
+        let symmetric = (0..coils)
+            .all(|i| (0..i).all(|j| (entry(i, j) - entry(j, i)).abs() <= SYMMETRIC * largest));
+        if !symmetric || !largest.is_finite() {
+            return Err(DriveError::Inductance);
+        }
+        let root_ohm: Vec<f64> = resistance_ohm.iter().map(|r| r.sqrt()).collect();
+        let matrix = DMatrix::from_fn(coils, coils, |i, j| {
+            0.5 * (entry(i, j) + entry(j, i)) / (root_ohm[i] * root_ohm[j])
+        });
+        let (time_constant_s, modes) = if coils == 0 {
+            (Vec::new(), Vec::new())
+        } else {
+            let eigen = SymmetricEigen::new(matrix);
+            (
+                eigen.eigenvalues.as_slice().to_vec(),
+                eigen.eigenvectors.as_slice().to_vec(),
+            )
+        };
+        if !time_constant_s.iter().all(|tau| *tau > 0.0) {
+            return Err(DriveError::Inductance);
+        }
+        let most = |r: &f64| voltage_v.map_or(f64::INFINITY, |voltage| voltage.abs() / r);
+        Ok(Self {
+            most_a: resistance_ohm.iter().map(most).collect(),
+            time_constant_s,
+            modes,
+            root_ohm,
+            now: vec![0.0; coils],
+            goal: vec![0.0; coils],
+            left: vec![1.0; coils],
+            step_s: 0.0,
+        })
+    }
+
+    /// The shortest and the longest time constant, s; `None` without coils.
+    #[must_use]
+    pub fn time_constants_s(&self) -> Option<[f64; 2]> {
+        let shortest = self.time_constant_s.iter().copied().reduce(f64::min)?;
+        let longest = self.time_constant_s.iter().copied().reduce(f64::max)?;
+        Some([shortest, longest])
+    }
+
+    /// Lets the commanded currents (A) flow at once.
+    pub fn settle(&mut self, command_a: &[f64]) {
+        self.aim(command_a);
+        self.now.copy_from_slice(&self.goal);
+    }
+
+    /// Holds the voltages of the commanded currents (A) for `step_s`, 0 or more.
+    pub fn hold(&mut self, command_a: &[f64], step_s: f64) {
+        self.aim(command_a);
+        if step_s != self.step_s {
+            for (left, tau) in self.left.iter_mut().zip(&self.time_constant_s) {
+                *left = (-step_s / tau).exp();
+            }
+            self.step_s = step_s;
+        }
+        for ((now, goal), left) in self.now.iter_mut().zip(&self.goal).zip(&self.left) {
+            *now = goal + (*now - goal) * left;
+        }
+    }
+
+    /// Writes the currents that flow, A.
+    pub fn currents(&self, currents_a: &mut [f64]) {
+        let coils = self.root_ohm.len();
+        let currents = &mut currents_a[..coils];
+        currents.fill(0.0);
+        for (mode, now) in self.modes.chunks_exact(coils.max(1)).zip(&self.now) {
+            for (current, share) in currents.iter_mut().zip(mode) {
+                *current += share * now;
+            }
+        }
+        for (current, root) in currents.iter_mut().zip(&self.root_ohm) {
+            *current /= root;
+        }
+    }
+
+    /// The modes' amplitudes in the end.
+    fn aim(&mut self, command_a: &[f64]) {
+        let coils = self.root_ohm.len();
+        for (goal, mode) in self
+            .goal
+            .iter_mut()
+            .zip(self.modes.chunks_exact(coils.max(1)))
+        {
+            *goal = (0..coils)
+                .map(|i| {
+                    let held = command_a[i].clamp(-self.most_a[i], self.most_a[i]);
+                    mode[i] * self.root_ohm[i] * held
+                })
+                .sum();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const R: [f64; 3] = [6.07, 5.3, 7.1];
+    const L: [f64; 9] = [0.21, -0.02, 0.013, -0.02, 0.19, -0.03, 0.013, -0.03, 0.24];
+
+    fn currents(drive: &Drive) -> [f64; 3] {
+        let mut now = [f64::NAN; 3];
+        drive.currents(&mut now);
+        now
+    }
+
+    #[test]
+    fn one_coil_reaches_its_share_after_one_and_five_time_constants() {
+        let mut drive = Drive::new(&[0.184], &[6.0753], Some(36.0)).unwrap();
+        let tau = 0.184 / 6.0753;
+        let mut now = [0.0];
+        drive.hold(&[1.3], tau);
+        drive.currents(&mut now);
+        assert!((now[0] / 1.3 - (1.0 - (-1.0_f64).exp())).abs() < 1e-14);
+        drive.hold(&[1.3], 4.0 * tau);
+        drive.currents(&mut now);
+        assert!((now[0] / 1.3 - (1.0 - (-5.0_f64).exp())).abs() < 1e-14);
+        // The supply holds up 36 V / R and no more.
+        drive.hold(&[9.0], 1e3);
+        drive.currents(&mut now);
+        assert!((now[0] - 36.0 / 6.0753).abs() < 1e-13);
+    }
+
+    #[test]
+    fn coupled_coils_obey_their_equation_whatever_the_step() {
+        let command = [1.3, 0.0, -0.7];
+        let mut once = Drive::new(&L, &R, None).unwrap();
+        once.hold(&[0.2, 0.9, 0.4], 0.01);
+        let mut often = once.clone();
+        // L dI/dt + R I = R I_c by central differences.
+        let step = 1e-6;
+        let mut around = [-step, 0.0, step].map(|_| once.clone());
+        for (drive, after) in around.iter_mut().zip([0.007 - step, 0.007, 0.007 + step]) {
+            drive.hold(&command, after);
+        }
+        let [before, at, after] = around.each_ref().map(currents);
+        for i in 0..3 {
+            let flux: f64 = (0..3)
+                .map(|j| L[3 * i + j] * (after[j] - before[j]) / (2.0 * step))
+                .sum();
+            assert!(
+                (flux + R[i] * (at[i] - command[i])).abs() < 1e-7,
+                "{i}: {flux}"
+            );
+        }
+        once.hold(&command, 0.091);
+        for _ in 0..13 {
+            often.hold(&command, 0.007);
+        }
+        for (a, b) in currents(&once).iter().zip(currents(&often)) {
+            assert!((a - b).abs() < 1e-13, "{a} {b}");
+        }
+        once.hold(&command, 1e6);
+        for (a, b) in currents(&once).iter().zip(command) {
+            assert!((a - b).abs() < 1e-14, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_array_is_refused() {
+        assert_eq!(
+            Drive::new(&L, &R[..2], None).unwrap_err(),
+            DriveError::Lengths { coils: 2 }
+        );
+        assert_eq!(
+            Drive::new(&[0.1], &[0.0], None).unwrap_err(),
+            DriveError::Resistance { coil: 0 }
+        );
+        for bad in [[0.1, 0.3, 0.3, 0.1], [0.1, 0.05, 0.0, 0.1], [0.0; 4]] {
+            let refused = Drive::new(&bad, &[1.0, 1.3], None).unwrap_err();
+            assert_eq!(refused, DriveError::Inductance);
+        }
+        assert_eq!(Drive::new(&[], &[], None).unwrap().time_constants_s(), None);
+    }
+}

@@ -1,0 +1,111 @@
+//! What a careful person would say of a trajectory before believing a replay of it.
+
+use crate::bundle::trajectory::Trajectory;
+
+/// A time between positions longer than so many median ones is a gap.
+const GAP: f64 = 10.0;
+/// A median time between positions longer than this betrays milliseconds, s.
+const SLOW_S: f64 = 1.0;
+/// Gaps told one by one.
+const GAPS_TOLD: usize = 3;
+/// Millimetres taken for metres.
+const MILLI: f64 = 1e-3;
+
+fn inside(ends_m: &[[f64; 2]; 3], position: [f64; 3]) -> bool {
+    let mut axes = ends_m.iter().zip(position);
+    axes.all(|([from, to], value)| *from <= value && value <= *to)
+}
+
+fn share(trajectory: &Trajectory, ends_m: &[[f64; 2]; 3], factor: f64) -> f64 {
+    let positions = trajectory.position_m.iter();
+    let count = positions
+        .filter(|p| inside(ends_m, p.map(|v| v * factor)))
+        .count();
+    count as f64 / trajectory.len().max(1) as f64
+}
+
+/// Whether no position lies within `ends_m` (x, y, z, m) but most would in millimetres.
+#[must_use]
+pub fn in_millimetres(trajectory: &Trajectory, ends_m: &[[f64; 2]; 3]) -> bool {
+    share(trajectory, ends_m, 1.0) == 0.0 && share(trajectory, ends_m, MILLI) > 0.5
+}
+
+/// What is worth a warning.
+#[must_use]
+pub fn warnings(trajectory: &Trajectory, ends_m: &[[f64; 2]; 3]) -> Vec<String> {
+    let mut told = Vec::new();
+    if share(trajectory, ends_m, 1.0) == 0.0 {
+        let micrometre = |m: f64| (m * 1e6).round() / 1e3;
+        let mm = ends_m
+            .map(|ends| ends.map(micrometre))
+            .map(|[from, to]| format!("{from} to {to}"));
+        told.push(format!(
+            "no position lies inside the map, which reaches from {} mm in x, {} mm in y and {} mm \
+             in z: nothing is rendered",
+            mm[0], mm[1], mm[2]
+        ));
+    }
+    let median_s = trajectory.median_step_s();
+    let median = (median_s * 1e6).round() / 1e6;
+    if median_s > SLOW_S {
+        told.push(format!(
+            "the median time between positions is {median} s: t_s must be in seconds, not in \
+             milliseconds"
+        ));
+    }
+    let times = &trajectory.t_s;
+    let gaps: Vec<usize> = (1..times.len())
+        .filter(|&row| times[row] - times[row - 1] > GAP * median_s && median_s > 0.0)
+        .collect();
+    for &row in gaps.iter().take(GAPS_TOLD) {
+        told.push(format!(
+            "no position from {} s to {} s, more than {GAP} times the median {median} s: the \
+             last currents are held meanwhile",
+            times[row - 1],
+            times[row]
+        ));
+    }
+    if gaps.len() > GAPS_TOLD {
+        told.push(format!("and {} such gaps more", gaps.len() - GAPS_TOLD));
+    }
+    told
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BOX: [[f64; 2]; 3] = [[-0.05, 0.05], [-0.05, 0.05], [0.03, 0.07]];
+
+    fn trajectory(t_s: &[f64], factor: f64) -> Trajectory {
+        let position = |t: &f64| [0.03 * t.sin(), -0.02, 0.05].map(|v| v * factor);
+        Trajectory {
+            t_s: t_s.to_vec(),
+            position_m: t_s.iter().map(position).collect(),
+        }
+    }
+
+    #[test]
+    fn millimetres_gaps_and_milliseconds_are_seen() {
+        let even: Vec<f64> = (0..40).map(|k| 0.02 * f64::from(k)).collect();
+        assert!(!in_millimetres(&trajectory(&even, 1.0), &BOX));
+        assert!(in_millimetres(&trajectory(&even, 1e3), &BOX));
+        assert!(!in_millimetres(&trajectory(&even, 1e2), &BOX));
+        assert!(warnings(&trajectory(&even, 1.0), &BOX).is_empty());
+        let outside = warnings(&trajectory(&even, 1e2), &BOX);
+        assert!(
+            outside[0].contains("no position lies inside the map"),
+            "{outside:?}"
+        );
+        let mut late = even.clone();
+        late[30..].iter_mut().for_each(|t| *t += 0.19);
+        let told = warnings(&trajectory(&late, 1.0), &BOX);
+        assert!(
+            told.len() == 1 && told[0].contains("no position from 0.58 s to 0.79"),
+            "{told:?}"
+        );
+        let slow: Vec<f64> = even.iter().map(|t| t * 1e3).collect();
+        assert!(warnings(&trajectory(&slow, 1.0), &BOX)[0].contains("milliseconds"));
+        assert!(warnings(&trajectory(&[0.7], 1.0), &BOX).is_empty());
+    }
+}

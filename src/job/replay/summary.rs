@@ -1,0 +1,359 @@
+//! What a replay tells besides its table.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::Opened;
+use crate::accuracy::StageAccuracy;
+use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
+use crate::bundle::load::Bundle;
+use crate::bundle::replay::{Answer, ReplayRows};
+use crate::bundle::trajectory::Trajectory;
+use crate::coil::drive::Drive;
+
+/// Where a trajectory is from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Told {
+    /// The file as given, or what was made up.
+    pub source: String,
+    /// The file's entry among the inputs.
+    pub input: Option<Input>,
+}
+
+/// The facts of a replay.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ReplaySummary {
+    /// Layout, `major.minor.patch`.
+    pub schema_version: &'static str,
+    /// Program that wrote it.
+    pub fluxform_version: &'static str,
+    /// Name of the design.
+    pub design: String,
+    /// Name of the shape.
+    pub shape: String,
+    /// The bundle's manifest and the trajectory.
+    pub inputs: Vec<Input>,
+    /// The bundle's force constant, N/m.
+    pub lambda_n_per_m: f64,
+    /// The trajectory.
+    pub trajectory: TrajectoryFacts,
+    /// Forces with position feedback (Case I) and with fixed currents (Case II).
+    pub force: ForceFacts,
+    /// Currents that flow.
+    pub currents: CurrentFacts,
+    /// Heat in the coils.
+    pub power: PowerFacts,
+    /// Part of the time during which the limits allow only the nearest force.
+    pub saturated_time_fraction: f64,
+    /// Part of the time outside the map.
+    pub outside_time_fraction: f64,
+    /// How fast the currents follow; null where they are taken to follow at once.
+    pub dynamics: Option<DynamicsFacts>,
+    /// Each stage's estimated error.
+    pub accuracy: BTreeMap<&'static str, StageAccuracy>,
+    /// What a careful person would mention.
+    pub warnings: Vec<String>,
+}
+
+/// A trajectory.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TrajectoryFacts {
+    /// The file as given, or what was made up.
+    pub source: String,
+    /// How many positions.
+    pub positions: usize,
+    /// From the first to the last, s.
+    pub duration_s: f64,
+    /// Median time between two, s.
+    pub median_step_s: f64,
+}
+
+/// Forces along a trajectory.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ForceFacts {
+    /// The largest force wanted, N.
+    pub wanted_max_n: f64,
+    /// With position feedback.
+    pub feedback: ErrorFacts,
+    /// With the bundle's fixed currents.
+    #[serde(rename = "static")]
+    pub fixed: ErrorFacts,
+}
+
+/// Differences from the wanted force, over the positions inside the map.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ErrorFacts {
+    /// Root mean square, N.
+    pub rms_error_n: f64,
+    /// The same over the wanted force's root mean square; null where none is wanted.
+    pub relative_rms_error: Option<f64>,
+    /// Largest size, N.
+    pub worst_error_n: f64,
+    /// Where and when; null where no position is inside the map.
+    pub worst_at: Option<PlaceFacts>,
+}
+
+/// A place at a time.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PlaceFacts {
+    /// s.
+    pub t_s: f64,
+    /// m.
+    pub x_m: f64,
+    /// m.
+    pub y_m: f64,
+    /// m.
+    pub z_m: f64,
+}
+
+/// Currents along a trajectory.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CurrentFacts {
+    /// Largest size in every coil, A.
+    pub max_a: Vec<f64>,
+    /// Root mean square over time in every coil, A.
+    pub rms_a: Vec<f64>,
+    /// Largest sum over the coils, A.
+    pub max_sum_a: f64,
+}
+
+/// Heat along a trajectory.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PowerFacts {
+    /// Mean over time, W.
+    pub mean_w: f64,
+    /// Largest, W.
+    pub max_w: f64,
+    /// With the bundle's fixed currents, W.
+    pub static_w: f64,
+}
+
+/// The coils' circuit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DynamicsFacts {
+    /// The fastest pattern of currents, s.
+    pub time_constant_min_s: f64,
+    /// The slowest, s.
+    pub time_constant_max_s: f64,
+    /// What bounds the coils' voltages, V; null where nothing does.
+    pub voltage_v: Option<f64>,
+}
+
+impl DynamicsFacts {
+    pub(super) fn of(drive: &Drive, bundle: &Bundle) -> Self {
+        let [shortest, longest] = drive.time_constants_s().unwrap_or_default();
+        let rendering = bundle.map.runtime.rendering.as_ref();
+        Self {
+            time_constant_min_s: shortest,
+            time_constant_max_s: longest,
+            voltage_v: rendering.and_then(|rendering| rendering.voltage_v),
+        }
+    }
+}
+
+/// Error bounds, gathered along a trajectory.
+#[derive(Debug, Clone)]
+pub(super) struct Bounds {
+    /// Of the force per ampere, relative to the largest at the height.
+    relative: f64,
+    /// Of the unpowered steel's pull, N.
+    passive_n: f64,
+    /// The largest of the force, N.
+    force_n: f64,
+    /// The largest of the allocation's certificates.
+    certificate: f64,
+}
+
+impl Bounds {
+    pub(super) fn of(bundle: &Bundle) -> Self {
+        let manifest = &bundle.manifest;
+        let stated = manifest
+            .accuracy
+            .get("map")
+            .map_or(0.0, |stage| stage.estimate);
+        let passive = manifest.map.passive_force.as_ref();
+        Self {
+            relative: manifest.map.interpolation.largest_error + stated,
+            passive_n: passive.map_or(0.0, |p| p.interpolation.largest_error * p.largest_n.abs()),
+            force_n: 0.0,
+            certificate: 0.0,
+        }
+    }
+
+    /// A position with its currents, where `largest_n_per_a` is the largest force per ampere.
+    pub(super) fn add(&mut self, certificate: f64, largest_n_per_a: f64, currents_a: &[f64]) {
+        let sum: f64 = currents_a.iter().map(|current| current.abs()).sum();
+        let bound = self.relative * largest_n_per_a * sum + self.passive_n;
+        self.force_n = self.force_n.max(bound);
+        self.certificate = self.certificate.max(certificate);
+    }
+
+    fn stages(&self, bundle: &Bundle, dynamics: bool) -> BTreeMap<&'static str, StageAccuracy> {
+        let stage = |estimate, relative_to: &str, method: &str| StageAccuracy {
+            estimate,
+            relative_to: relative_to.to_owned(),
+            method: method.to_owned(),
+        };
+        let mut stages = BTreeMap::from([
+            (
+                "force",
+                stage(
+                    self.force_n,
+                    "absolute, N: the largest over the positions",
+                    "the map's stated errors, at and between its nodes, times the largest force \
+                     per ampere at the height and the sum of the currents' sizes",
+                ),
+            ),
+            (
+                "allocation",
+                stage(
+                    self.certificate,
+                    "the sizes of the terms of every optimality condition",
+                    "residuals of the optimality conditions at every position",
+                ),
+            ),
+        ]);
+        let inductances = bundle.manifest.accuracy.get("inductances");
+        if let (true, Some(inductances)) = (dynamics, inductances) {
+            stages.insert("inductances", inductances.clone());
+        }
+        stages
+    }
+}
+
+impl ReplaySummary {
+    pub(super) fn new(
+        opened: &Opened,
+        told: Told,
+        rows: &ReplayRows,
+        dynamics: Option<DynamicsFacts>,
+        bounds: &Bounds,
+        warnings: Vec<String>,
+    ) -> Self {
+        let bundle = &opened.bundle;
+        let trajectory = Trajectory {
+            t_s: rows.t_s.clone(),
+            position_m: rows.position_m.clone(),
+        };
+        let times = Times::new(&trajectory);
+        let size = |most: f64, value: f64| most.max(value.abs());
+        let resistance_ohm = &bundle.map.runtime.resistance_ohm;
+        let heat = |currents: &[f64]| -> f64 {
+            let terms = currents.iter().zip(resistance_ohm);
+            terms.map(|(i, r)| r * i * i).sum()
+        };
+        let heats: Vec<f64> = (0..rows.len()).map(|k| heat(rows.currents_a(k))).collect();
+        let coil = |coil: usize| (0..rows.len()).map(move |k| rows.currents_a(k)[coil]);
+        let fixed: Vec<f64> = bundle.currents.iter().map(|row| row.current_a).collect();
+        let sums = (0..rows.len()).map(|k| rows.currents_a(k).iter().sum::<f64>());
+        Self {
+            schema_version: SCHEMA_VERSION,
+            fluxform_version: FLUXFORM_VERSION,
+            design: bundle.manifest.design.clone(),
+            shape: bundle.manifest.shape.clone(),
+            inputs: std::iter::once(opened.input.clone())
+                .chain(told.input)
+                .collect(),
+            lambda_n_per_m: opened.renderer.lambda_n_per_m(),
+            trajectory: TrajectoryFacts {
+                source: told.source,
+                positions: rows.len(),
+                duration_s: rows
+                    .t_s
+                    .last()
+                    .zip(rows.t_s.first())
+                    .map_or(0.0, |(b, a)| b - a),
+                median_step_s: trajectory.median_step_s(),
+            },
+            force: ForceFacts {
+                wanted_max_n: rows.wanted_force_n.iter().copied().fold(0.0, size),
+                feedback: errors(rows, |row| rows.error_n(row)),
+                fixed: errors(rows, |row| rows.static_error_n(row)),
+            },
+            currents: CurrentFacts {
+                max_a: (0..rows.coils).map(|i| coil(i).fold(0.0, size)).collect(),
+                rms_a: (0..rows.coils)
+                    .map(|i| times.mean(coil(i).map(|current| current * current)).sqrt())
+                    .collect(),
+                max_sum_a: sums.reduce(f64::max).unwrap_or(0.0),
+            },
+            power: PowerFacts {
+                mean_w: times.mean(heats.iter().copied()),
+                max_w: heats.iter().copied().fold(0.0, f64::max),
+                static_w: heat(&fixed),
+            },
+            saturated_time_fraction: times.part(rows, Answer::Saturated),
+            outside_time_fraction: times.part(rows, Answer::Outside),
+            accuracy: bounds.stages(bundle, dynamics.is_some()),
+            dynamics,
+            warnings,
+        }
+    }
+}
+
+/// How long positions are held.
+struct Times {
+    weights: Vec<f64>,
+    total: f64,
+}
+
+impl Times {
+    fn new(trajectory: &Trajectory) -> Self {
+        let mut weights = trajectory.held_s();
+        if weights.iter().sum::<f64>() == 0.0 {
+            // All at one time: each counts alike.
+            weights.fill(1.0);
+        }
+        Self {
+            total: weights.iter().sum(),
+            weights,
+        }
+    }
+
+    fn mean(&self, values: impl Iterator<Item = f64>) -> f64 {
+        let sum: f64 = values.zip(&self.weights).map(|(v, w)| v * w).sum();
+        sum / self.total
+    }
+
+    fn part(&self, rows: &ReplayRows, answer: Answer) -> f64 {
+        let is = rows
+            .answer
+            .iter()
+            .map(|a| f64::from(u8::from(*a == answer)));
+        self.mean(is)
+    }
+}
+
+/// Errors over the positions inside the map.
+fn errors(rows: &ReplayRows, error: impl Fn(usize) -> f64) -> ErrorFacts {
+    let inside: Vec<usize> = (0..rows.len())
+        .filter(|&row| rows.answer[row] != Answer::Outside)
+        .collect();
+    let rms = |value: &dyn Fn(usize) -> f64| -> f64 {
+        let sum: f64 = inside.iter().map(|&row| value(row) * value(row)).sum();
+        (sum / inside.len().max(1) as f64).sqrt()
+    };
+    let (rms_error_n, wanted_n) = (rms(&error), rms(&|row| rows.wanted_force_n[row]));
+    let worst = inside.iter().copied().reduce(|a, b| {
+        if error(b).abs() > error(a).abs() {
+            b
+        } else {
+            a
+        }
+    });
+    ErrorFacts {
+        rms_error_n,
+        relative_rms_error: (wanted_n > 0.0).then(|| rms_error_n / wanted_n),
+        worst_error_n: worst.map_or(0.0, |row| error(row).abs()),
+        worst_at: worst.map(|row| {
+            let [x_m, y_m, z_m] = rows.position_m[row];
+            PlaceFacts {
+                t_s: rows.t_s[row],
+                x_m,
+                y_m,
+                z_m,
+            }
+        }),
+    }
+}

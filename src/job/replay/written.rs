@@ -1,0 +1,175 @@
+//! The files of a replay: its table, the facts beside it, the seconds, the picture.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::ReplayReport;
+use crate::bundle::atomic::{self, FileSet, Overwrite};
+use crate::bundle::json::to_json;
+use crate::bundle::replay::Answer;
+use crate::bundle::trajectory::Trajectory;
+use crate::job::JobError;
+use crate::plot::replay::ReplayPlot;
+
+/// `timing_*.json`.
+#[derive(Serialize)]
+struct Timing<'a> {
+    positions: usize,
+    seconds_per_step: Option<f64>,
+    stages: Vec<StageSeconds<'a>>,
+}
+
+#[derive(Serialize)]
+struct StageSeconds<'a> {
+    stage: &'a str,
+    seconds: f64,
+}
+
+/// Names of the files that go with a table.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ReplayFiles {
+    folder: PathBuf,
+    table: String,
+    facts: String,
+    timing: String,
+}
+
+impl ReplayFiles {
+    /// Those of the table at `path`: `replay.csv`, `replay.json` and `timing_replay.json`.
+    ///
+    /// # Errors
+    /// A name that is none, or that ends as the facts' file does.
+    pub fn new(path: &Path) -> Result<Self, JobError> {
+        let name = path
+            .file_name()
+            .map(|name| name.to_string_lossy().into_owned());
+        let stem = path
+            .file_stem()
+            .map(|stem| stem.to_string_lossy().into_owned());
+        let (Some(table), Some(stem)) = (name, stem) else {
+            let message = format!(
+                "--out {}: name a file to write the table to",
+                path.display()
+            );
+            return Err(JobError::Input(message));
+        };
+        let facts = format!("{stem}.json");
+        if facts == table {
+            return Err(JobError::Input(format!(
+                "--out {}: the facts beside the table take the ending .json; name it otherwise",
+                path.display()
+            )));
+        }
+        let folder = match path.parent() {
+            Some(parent) if parent != Path::new("") => parent,
+            _ => Path::new("."),
+        };
+        Ok(Self {
+            folder: folder.to_path_buf(),
+            table,
+            facts,
+            timing: format!("timing_{stem}.json"),
+        })
+    }
+
+    /// The file that tells what the others were made from.
+    #[must_use]
+    pub fn record(&self) -> PathBuf {
+        self.folder.join(&self.facts)
+    }
+
+    /// What is written, for people.
+    #[must_use]
+    pub fn names(&self) -> [&str; 3] {
+        [&self.table, &self.facts, &self.timing]
+    }
+
+    /// Their folder.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Refuses early when one of them must not be replaced.
+    ///
+    /// # Errors
+    /// [`JobError::Write`].
+    pub fn check(&self, overwrite: &Overwrite) -> Result<(), JobError> {
+        for name in self.names() {
+            overwrite.check(&self.folder.join(name))?;
+        }
+        Ok(())
+    }
+}
+
+impl ReplayReport {
+    /// Writes table, facts and seconds, all or none.
+    ///
+    /// # Errors
+    /// [`JobError::Write`].
+    pub fn write(&self, files: &ReplayFiles, overwrite: &Overwrite) -> Result<(), JobError> {
+        let timing = Timing {
+            positions: self.rows.len(),
+            seconds_per_step: self.step_s,
+            stages: self
+                .seconds
+                .iter()
+                .map(|(stage, seconds)| StageSeconds {
+                    stage,
+                    seconds: *seconds,
+                })
+                .collect(),
+        };
+        let mut set = FileSet::begin(&files.folder, overwrite.clone())?;
+        set.write(&files.table, |out| self.rows.write(out))?;
+        set.write(&files.timing, |out| out.write_all(&json(&timing)?))?;
+        set.write(&files.facts, |out| out.write_all(&json(&self.summary)?))?;
+        Ok(set.commit()?)
+    }
+
+    /// Writes the picture.
+    ///
+    /// # Errors
+    /// [`JobError::Write`].
+    pub fn write_plot(&self, path: &Path, overwrite: &Overwrite) -> Result<(), JobError> {
+        let svg = self.plot().svg();
+        atomic::write(path, overwrite, |out| out.write_all(svg.as_bytes()))?;
+        Ok(())
+    }
+
+    fn plot(&self) -> ReplayPlot<'_> {
+        let rows = &self.rows;
+        let summary = &self.summary;
+        ReplayPlot {
+            title: format!("{} on {}", summary.shape, summary.design),
+            t_s: &rows.t_s,
+            position_m: &rows.position_m,
+            surface_m: &rows.height_m,
+            inside: rows.answer.iter().map(|a| *a != Answer::Outside).collect(),
+            wanted_n: &rows.wanted_force_n,
+            given_n: &rows.force_n,
+            static_n: &rows.static_force_n,
+            coils: rows.coils,
+            current_a: &rows.current_a,
+        }
+    }
+}
+
+fn json<T: Serialize>(value: &T) -> io::Result<Vec<u8>> {
+    to_json(value).map_err(io::Error::other)
+}
+
+/// Writes a trajectory.
+///
+/// # Errors
+/// [`JobError::Write`].
+pub fn write_trajectory(
+    trajectory: &Trajectory,
+    path: &Path,
+    overwrite: &Overwrite,
+) -> Result<(), JobError> {
+    atomic::write(path, overwrite, |out| trajectory.write(out))?;
+    Ok(())
+}

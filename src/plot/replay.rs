@@ -1,0 +1,304 @@
+//! A replay over time: where the finger is, the forces with and without feedback, the currents.
+
+use kuva::backend::svg::SvgBackend;
+use kuva::plot::annotations::ShadedRegion;
+use kuva::plot::{LegendEntry, LegendShape, LinePlot, ScatterPlot};
+use kuva::render::figure::Figure;
+use kuva::render::layout::Layout;
+use kuva::render::plots::Plot;
+
+use super::renumbered;
+
+/// A panel's size, px.
+const PANEL_PX: [f64; 2] = [620.0, 330.0];
+/// Of more positions only the extremes of so many equal parts of the time are drawn.
+const PARTS: usize = 800;
+/// Most coils named in the legend.
+const NAMED: usize = 12;
+/// Line widths, px.
+const THIN: f64 = 1.2;
+const THICK: f64 = 2.4;
+/// Colours that stay apart for the colour-blind and in print.
+const FINGER: &str = "#0072b2";
+const SURFACE: &str = "#7f7f7f";
+const WANTED: &str = "#b5b5b5";
+const GIVEN: &str = "#0072b2";
+const FIXED: &str = "#d55e00";
+const COILS: [&str; 9] = [
+    "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#8c510a",
+    "#762a83",
+];
+
+/// What is drawn; one entry a position.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReplayPlot<'a> {
+    /// Above all panels.
+    pub title: String,
+    /// s.
+    pub t_s: &'a [f64],
+    /// m.
+    pub position_m: &'a [[f64; 3]],
+    /// Height of the surface there, m; 0 where there is none.
+    pub surface_m: &'a [f64],
+    /// Whether the position lies inside the map.
+    pub inside: Vec<bool>,
+    /// N.
+    pub wanted_n: &'a [f64],
+    /// With feedback, N.
+    pub given_n: &'a [f64],
+    /// With fixed currents, N.
+    pub static_n: &'a [f64],
+    /// Number of coils.
+    pub coils: usize,
+    /// Coil by coil within a position, A.
+    pub current_a: &'a [f64],
+}
+
+impl ReplayPlot<'_> {
+    /// The drawing.
+    #[must_use]
+    pub fn svg(&self) -> String {
+        let panels = [self.plan(), self.heights(), self.forces(), self.currents()];
+        let (cells, layouts): (Vec<_>, Vec<_>) = panels.into_iter().unzip();
+        let figure = Figure::new(2, 2)
+            .with_title(self.title.clone())
+            .with_cell_size(PANEL_PX[0], PANEL_PX[1])
+            .with_plots(cells)
+            .with_layouts(layouts)
+            .with_shared_legend()
+            .with_shared_legend_entries(self.legend());
+        renumbered(&SvgBackend::default().render_scene(&figure.render()))
+    }
+
+    fn legend(&self) -> Vec<LegendEntry> {
+        let entry = |label: &str, colour: &str, shape| LegendEntry {
+            label: label.to_owned(),
+            color: colour.to_owned(),
+            shape,
+            dasharray: None,
+        };
+        let mut entries = vec![
+            entry("finger", FINGER, LegendShape::Circle),
+            entry("outside the map", FIXED, LegendShape::Circle),
+            entry("surface below it", SURFACE, LegendShape::Line),
+            entry("force wanted", WANTED, LegendShape::Line),
+            entry("force with feedback", GIVEN, LegendShape::Line),
+            entry("force with fixed currents", FIXED, LegendShape::Line),
+        ];
+        if self.coils <= NAMED {
+            entries.extend((0..self.coils).map(|coil| {
+                let colour = COILS[coil % COILS.len()];
+                entry(&format!("coil {coil}"), colour, LegendShape::Line)
+            }));
+        }
+        entries
+    }
+
+    /// The finger seen from above.
+    fn plan(&self) -> (Vec<Plot>, Layout) {
+        let mm = |k: usize| -> Vec<f64> { self.position_m.iter().map(|p| p[k] * 1e3).collect() };
+        let (x, y) = (mm(0), mm(1));
+        let part = |inside: bool, colour: &str| {
+            let rows = (0..x.len()).filter(|row| self.inside[*row] == inside);
+            let every = x.len().div_ceil(4 * PARTS).max(1);
+            let points: Vec<(f64, f64)> = rows.step_by(every).map(|row| (x[row], y[row])).collect();
+            let dots = ScatterPlot::new().with_color(colour).with_size(1.6);
+            Plot::Scatter(dots.with_data(points))
+        };
+        let plots = vec![part(true, FINGER), part(false, FIXED)];
+        let layout = Layout::new(extent(x.iter().copied()), extent(y.iter().copied()))
+            .with_title("seen from above")
+            .with_x_label("x / mm")
+            .with_y_label("y / mm");
+        (plots, layout)
+    }
+
+    fn heights(&self) -> (Vec<Plot>, Layout) {
+        let finger: Vec<f64> = self.position_m.iter().map(|p| p[2] * 1e3).collect();
+        let surface: Vec<f64> = self.surface_m.iter().map(|h| h * 1e3).collect();
+        let felt: Vec<bool> = self.surface_m.iter().map(|h| *h != 0.0).collect();
+        let mut plots = self.lines(&surface, &felt, SURFACE, THICK);
+        plots.extend(self.lines(&finger, &self.all(), FINGER, THIN));
+        let shown = surface.iter().zip(&felt).filter(|(_, felt)| **felt);
+        let values = finger.iter().copied().chain(shown.map(|(h, _)| *h));
+        let layout = self.over_time(extent(values), "height", "z / mm");
+        (plots, layout)
+    }
+
+    fn forces(&self) -> (Vec<Plot>, Layout) {
+        let mn = |values: &[f64]| -> Vec<f64> { values.iter().map(|f| f * 1e3).collect() };
+        let (wanted, given, fixed) = (mn(self.wanted_n), mn(self.given_n), mn(self.static_n));
+        let all = self.all();
+        let mut plots = self.lines(&wanted, &all, WANTED, 2.0 * THICK);
+        plots.extend(self.lines(&fixed, &self.inside, FIXED, THIN));
+        plots.extend(self.lines(&given, &all, GIVEN, THIN));
+        let values = wanted.iter().chain(&given).chain(&fixed).copied();
+        (
+            plots,
+            self.over_time(extent(values), "upward force", "F / mN"),
+        )
+    }
+
+    fn currents(&self) -> (Vec<Plot>, Layout) {
+        let mut plots = Vec::new();
+        for coil in 0..self.coils {
+            let current: Vec<f64> = self
+                .current_a
+                .iter()
+                .skip(coil)
+                .step_by(self.coils)
+                .copied()
+                .collect();
+            let colour = COILS[coil % COILS.len()];
+            plots.extend(self.lines(&current, &self.all(), colour, THIN));
+        }
+        let layout = self.over_time(extent(self.current_a.iter().copied()), "currents", "I / A");
+        (plots, layout)
+    }
+
+    fn all(&self) -> Vec<bool> {
+        vec![true; self.t_s.len()]
+    }
+
+    /// A curve over time, broken where nothing is shown.
+    fn lines(&self, values: &[f64], shown: &[bool], colour: &str, width: f64) -> Vec<Plot> {
+        let mut pieces: Vec<Vec<(f64, f64)>> = Vec::new();
+        let mut joined = false;
+        for row in 0..values.len() {
+            if shown[row] {
+                if !joined {
+                    pieces.push(Vec::new());
+                }
+                if let Some(piece) = pieces.last_mut() {
+                    piece.push((self.t_s[row], values[row]));
+                }
+            }
+            joined = shown[row];
+        }
+        let line = |piece: Vec<(f64, f64)>| {
+            let line = LinePlot::new().with_data(thinned(piece));
+            Plot::Line(line.with_color(colour).with_stroke_width(width))
+        };
+        pieces.into_iter().map(line).collect()
+    }
+
+    /// Axes over time, with the times outside the map shaded.
+    fn over_time(&self, values: (f64, f64), title: &str, label: &str) -> Layout {
+        let from = self.t_s.first().copied().unwrap_or(0.0);
+        let to = self.t_s.last().copied().unwrap_or(1.0).max(from + 1e-9);
+        let mut layout = Layout::new((from, to), values)
+            .with_title(title)
+            .with_x_label("t / s")
+            .with_y_label(label);
+        let mut row = 0;
+        while row < self.inside.len() {
+            let end = (row..self.inside.len())
+                .find(|k| self.inside[*k] != self.inside[row])
+                .unwrap_or(self.inside.len());
+            if !self.inside[row] {
+                let until = self.t_s.get(end).copied().unwrap_or(to);
+                let shade = ShadedRegion::vertical(self.t_s[row], until);
+                layout = layout.with_shaded_region(shade.with_color(SURFACE));
+            }
+            row = end;
+        }
+        layout
+    }
+}
+
+/// The range of an axis, with room at both ends; 0 is always room enough below nothing.
+fn extent(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let ends = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+        (low.min(value), high.max(value))
+    });
+    if ends.0 > ends.1 {
+        return (0.0, 1.0);
+    }
+    let room = (0.05 * (ends.1 - ends.0)).max(1e-3 * ends.0.abs().max(ends.1.abs()).max(1e-9));
+    (ends.0 - room, ends.1 + room)
+}
+
+/// Of many points the lowest and the highest of every part, in order.
+fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    if points.len() <= 2 * PARTS {
+        return points;
+    }
+    let size = points.len().div_ceil(PARTS);
+    let mut kept = Vec::with_capacity(2 * PARTS);
+    for part in points.chunks(size) {
+        let at = |better: fn(f64, f64) -> bool| {
+            (1..part.len()).fold(0, |best, k| {
+                if better(part[k].1, part[best].1) {
+                    k
+                } else {
+                    best
+                }
+            })
+        };
+        let (low, high) = (at(|a, b| a < b), at(|a, b| a > b));
+        kept.push(part[low.min(high)]);
+        if low != high {
+            kept.push(part[low.max(high)]);
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn drawn(count: usize) -> String {
+        let t_s: Vec<f64> = (0..count).map(|k| 0.02 * k as f64).collect();
+        let wave = |hz: f64| -> Vec<f64> { t_s.iter().map(|t| 0.3 * (hz * t).sin()).collect() };
+        let (wanted, given, fixed) = (wave(0.7), wave(1.3), wave(2.1));
+        let position_m: Vec<[f64; 3]> = t_s.iter().map(|t| [0.01 * t, 0.0, 0.05]).collect();
+        let plot = ReplayPlot {
+            title: "flat on a".to_owned(),
+            t_s: &t_s,
+            position_m: &position_m,
+            surface_m: &vec![0.05; count],
+            inside: (0..count).map(|k| k % 50 < 40).collect(),
+            wanted_n: &wanted,
+            given_n: &given,
+            static_n: &fixed,
+            coils: 2,
+            current_a: &vec![0.7; 2 * count],
+        };
+        plot.svg()
+    }
+
+    #[test]
+    fn few_positions_and_many_are_drawn() {
+        for count in [0, 1, 2, 300] {
+            let svg = drawn(count);
+            assert!(
+                svg.ends_with("</svg>") && !svg.contains("NaN"),
+                "{count}: {svg}"
+            );
+        }
+        let svg = drawn(300);
+        for label in [
+            "t / s",
+            "F / mN",
+            "I / A",
+            "coil 1",
+            "with feedback",
+            "outside the map",
+        ] {
+            assert!(svg.contains(label), "{label}");
+        }
+        assert!(svg == drawn(300), "not the same bytes twice");
+        let many = drawn(100_000).len();
+        assert!(many < 3_000_000, "{many} bytes");
+    }
+
+    #[test]
+    fn thinning_keeps_extremes_and_order() {
+        let mut points: Vec<(f64, f64)> = (0..10_000).map(|k| (f64::from(k), 0.0)).collect();
+        (points[4_321].1, points[4_322].1) = (-7.0, 13.0);
+        let kept = thinned(points);
+        assert!(kept.len() <= 2 * PARTS && kept.is_sorted_by(|a, b| a.0 < b.0));
+        assert!(kept.contains(&(4_321.0, -7.0)) && kept.contains(&(4_322.0, 13.0)));
+    }
+}

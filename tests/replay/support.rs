@@ -1,0 +1,121 @@
+//! A small bundle, and random numbers.
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use fluxform::bundle::artefact::Input;
+use fluxform::design::{Design, Need};
+use fluxform::job::calibrate::{
+    self, CalibrateOptions, DEFAULT_REACH_M, DesignSource, ShapeSource,
+};
+use fluxform::job::lambda::LambdaOptions;
+use fluxform::job::replay::Opened;
+use fluxform::progress::Silent;
+use fluxform::shape::document::ShapeDocument;
+use tempfile::TempDir;
+
+pub struct Random(pub u64);
+
+impl Random {
+    /// From 0 to 1.
+    pub fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    pub fn below(&mut self, n: usize) -> usize {
+        (self.next() * n as f64) as usize
+    }
+}
+
+fn here(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+/// Bundles of a design, with every (from, to) in its text replaced.
+pub struct Bundles {
+    folder: TempDir,
+    design: String,
+}
+
+impl Bundles {
+    fn new(design: &str, changes: &[(&str, &str)], shapes: &[&str]) -> Self {
+        let path = here(design);
+        let shipped = std::fs::read_to_string(&path).expect("shipped design");
+        let text = changes.iter().fold(shipped, |text, (from, to)| {
+            assert!(text.contains(from), "{from} is not in {design}");
+            text.replace(from, to)
+        });
+        let (parsed, _) = Design::from_toml(&text, &path, Need::CALIBRATE).expect("valid");
+        let input = Input::of_bytes(design, text.as_bytes());
+        let shapes: Vec<ShapeSource> = shapes
+            .iter()
+            .map(|shape| {
+                let text = std::fs::read_to_string(here(&format!("shapes/{shape}.toml")))
+                    .expect("shipped shape")
+                    .replace("61]", "21]");
+                let path = here(&format!("shapes/{shape}.toml"));
+                let (document, _) = ShapeDocument::from_toml(&text, &path).expect("valid");
+                let input = Some(Input::of_bytes(*shape, text.as_bytes()));
+                ShapeSource { document, input }
+            })
+            .collect();
+        let folder = TempDir::new().expect("a temporary folder");
+        let options = CalibrateOptions {
+            out: folder.path().to_path_buf(),
+            force: false,
+            lambda: LambdaOptions::default(),
+            reach_m: DEFAULT_REACH_M,
+        };
+        let source = DesignSource {
+            design: &parsed,
+            text: &text,
+            input: &input,
+        };
+        calibrate::run(source, &shapes, &options, &Silent).expect("calibrates");
+        Self {
+            folder,
+            design: parsed.name,
+        }
+    }
+
+    pub fn folder(&self, shape: &str) -> PathBuf {
+        self.folder.path().join(&self.design).join(shape)
+    }
+
+    pub fn open(&self, shape: &str) -> Opened {
+        Opened::new(&self.folder(shape)).expect("a bundle")
+    }
+}
+
+const COARSE: [(&str, &str); 3] = [
+    ("x_mm = [-50.0, 50.0, 61]", "x_mm = [-50.0, 50.0, 41]"),
+    ("y_mm = [-50.0, 50.0, 61]", "y_mm = [-50.0, 50.0, 41]"),
+    ("z_mm = [10.0, 80.0, 29]", "z_mm = [16.0, 80.0, 33]"),
+];
+
+/// Flat surface and half-sphere over the array in air.
+pub fn in_air() -> &'static Bundles {
+    static MADE: OnceLock<Bundles> = OnceLock::new();
+    MADE.get_or_init(|| Bundles::new("designs/seed_air.toml", &COARSE, &["flat", "half_sphere"]))
+}
+
+/// Two coupled cored coils with the steel's own pull.
+pub fn coupled() -> &'static Bundles {
+    static MADE: OnceLock<Bundles> = OnceLock::new();
+    MADE.get_or_init(|| {
+        let mut changes = COARSE.to_vec();
+        changes.extend([
+            ("rows = 3\ncolumns = 3", "rows = 1\ncolumns = 2"),
+            (
+                "model = \"dipole\"",
+                "model = \"dipole\"\npassive_force = true",
+            ),
+            ("total_current_max_a = 18.0", "total_current_max_a = 3.1"),
+        ]);
+        Bundles::new("designs/seed.toml", &changes, &["flat"])
+    })
+}
