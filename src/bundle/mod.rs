@@ -8,6 +8,7 @@ mod consistent;
 pub mod json;
 pub mod lambda_file;
 pub mod load;
+pub mod mag_manip;
 pub mod manifest;
 mod npy;
 pub mod npz;
