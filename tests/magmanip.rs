@@ -17,7 +17,7 @@ fn root() -> &'static Path {
 
 fn fluxform(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_fluxform"))
-        .args(["--quiet", "--format", "json"])
+        .arg("--quiet")
         .args(arguments)
         .current_dir(root())
         .output()
@@ -61,7 +61,7 @@ impl Made {
         let path = |name: &str| folder.path().join(name).display().to_string();
         let (out, nodes, mpem) = (path("map"), path("map/nodes.yaml"), path("mpem.yaml"));
         let mut words = vec![
-            "map", &design, "--out", &out, "--vfield", &nodes, "--mpem", &mpem,
+            "--format", "json", "map", &design, "--out", &out, "--vfield", &nodes, "--mpem", &mpem,
         ];
         words.extend(more);
         let run = fluxform(&words);
@@ -222,7 +222,7 @@ fn nodes_hold_what_probe_says_x_slowest() {
             dx[2] - dz[0],
             dy[2] - dz[1],
         ] {
-            assert!(zero.abs() < 0.06 * size, "{zero:e} of {size:e}");
+            assert!(zero.abs() < 0.15 * size, "{zero:e} of {size:e}");
         }
     }
 }
@@ -451,7 +451,12 @@ fn mag_manip_reads_what_is_stated() {
         let run = Command::new(&python)
             .arg("scripts/peers/compare_magmanip.py")
             .arg(coarse(design, folder.path()))
-            .args(["--fluxform", env!("CARGO_BIN_EXE_fluxform")])
+            .args([
+                "--points",
+                "300",
+                "--fluxform",
+                env!("CARGO_BIN_EXE_fluxform"),
+            ])
             .current_dir(root())
             .output()
             .unwrap();

@@ -141,7 +141,7 @@ mod tests {
         ] {
             let place = Place {
                 cell: x as usize,
-                part: x.fract(),
+                part: f64::fract(x),
             };
             assert!((along(7, place, |x| x * x)[0] - square).abs() < 1e-5);
             assert!((along(7, place, |x| x * x * x)[0] - cube).abs() < 1e-5);
