@@ -3,6 +3,7 @@
 //! The latter needs a Python with the package mag-manip: what `FLUXFORM_MAGMANIP_PYTHON` names, or
 //! `python3.11` or `python3`. Without one that test says so and is skipped.
 #![allow(clippy::print_stderr, clippy::print_stdout)] // a test may tell what it compared
+#![allow(clippy::disallowed_methods)] // a test writes where it likes
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
