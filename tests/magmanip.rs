@@ -454,7 +454,7 @@ fn mag_manip_reads_what_is_stated() {
             .arg(coarse(design, folder.path()))
             .args([
                 "--points",
-                "300",
+                "200",
                 "--fluxform",
                 env!("CARGO_BIN_EXE_fluxform"),
             ])

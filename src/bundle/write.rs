@@ -103,6 +103,9 @@ pub struct MapFormats {
     pub vtk: bool,
 }
 
+/// Every file that a map may have in its folder.
+pub const MAP_FILES: [&str; 4] = ["map.npz", "map.json", "map.csv", "map.vti"];
+
 /// A file for another program that is written together with a map.
 #[derive(Debug, Clone, Copy)]
 pub struct Beside<'a> {
@@ -132,6 +135,14 @@ pub fn check_beside(
     force: bool,
     inputs: &[Input],
 ) -> Result<(), WriteError> {
+    if let Some(name) = name_in(folder, path)
+        && MAP_FILES.contains(&name.as_str())
+    {
+        return Err(WriteError::Content {
+            path: path.to_path_buf(),
+            message: "the map itself has a file of that name; choose another".to_owned(),
+        });
+    }
     check_ours(path, force)?;
     Overwrite::new(force, folder.join("map.json"), inputs).check(path)
 }

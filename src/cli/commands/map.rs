@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::{accuracy_check, begin, describe, folder};
 use crate::bundle::manifest::MapSidecar;
-use crate::bundle::write::MapFormats;
+use crate::bundle::write::{MAP_FILES, MapFormats};
 use crate::cli::args::{Tolerance, Writing};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
@@ -284,10 +284,7 @@ impl Map {
 
     /// What is asked for mag_manip, its files told apart from the map's own in `out`.
     fn mag_manip(&self, out: &Path) -> Result<MagManipRequest, Failure> {
-        let mut taken: Vec<PathBuf> = ["map.npz", "map.json", "map.csv", "map.vti"]
-            .iter()
-            .map(|name| out.join(name))
-            .collect();
+        let mut taken: Vec<PathBuf> = MAP_FILES.iter().map(|name| out.join(name)).collect();
         let mut path = |flag: &str, file: &Option<FileArgument>| match file {
             None => Ok(None),
             Some(FileArgument::Standard) => Err(Failure::Usage(format!(

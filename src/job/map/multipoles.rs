@@ -29,7 +29,7 @@ const LOW: f64 = 0.1;
 /// How far they are spread beyond the workspace, whose faces take those that fall outside.
 const STRETCH: f64 = 1.15;
 /// A layout with more terms than this is tried only where it is the first.
-const MOST_TERMS: usize = 2000;
+const MOST_TERMS: usize = 2500;
 
 /// Fits the sources; where no layout meets the tolerance, the best one is given.
 ///
