@@ -9,6 +9,7 @@ pub mod force_map;
 pub mod json;
 pub mod lambda_file;
 pub mod load;
+pub mod mag_manip;
 pub mod manifest;
 mod npy;
 pub mod npz;

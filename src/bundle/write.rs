@@ -10,6 +10,7 @@ use super::atomic::{FileSet, FolderDraft, Overwrite, WriteError, Written, write}
 use super::consistent;
 use super::json::to_json;
 use super::lambda_file::LambdaFile;
+use super::mag_manip::{Multipoles, VectorField, check_ours, write_multipoles, write_vector_field};
 use super::manifest::{Manifest, MapSidecar};
 use super::npz::{MapArrays, to_npz};
 use super::table::{CurrentRow, PointRow, write_currents, write_map, write_points};
@@ -102,6 +103,66 @@ pub struct MapFormats {
     pub vtk: bool,
 }
 
+/// Every file that a map may have in its folder.
+pub const MAP_FILES: [&str; 4] = ["map.npz", "map.json", "map.csv", "map.vti"];
+
+/// A file for another program that is written together with a map.
+#[derive(Debug, Clone, Copy)]
+pub struct Beside<'a> {
+    /// Where; outside the map's folder too.
+    pub path: &'a Path,
+    /// What.
+    pub content: BesideContent<'a>,
+}
+
+/// What such a file holds.
+#[derive(Debug, Clone, Copy)]
+pub enum BesideContent<'a> {
+    /// The field on nodes.
+    VectorField(&'a VectorField<'a>),
+    /// Multipole sources.
+    Multipoles(&'a Multipoles<'a>),
+}
+
+/// Refuses early when a file for another program must not be replaced: what is there must be ours
+/// and the record in `folder` tell the same inputs.
+///
+/// # Errors
+/// [`WriteError`].
+pub fn check_beside(
+    path: &Path,
+    folder: &Path,
+    force: bool,
+    inputs: &[Input],
+) -> Result<(), WriteError> {
+    if let Some(name) = name_in(folder, path)
+        && MAP_FILES.contains(&name.as_str())
+    {
+        return Err(WriteError::Content {
+            path: path.to_path_buf(),
+            message: "the map itself has a file of that name; choose another".to_owned(),
+        });
+    }
+    check_ours(path, force)?;
+    Overwrite::new(force, folder.join("map.json"), inputs).check(path)
+}
+
+/// The plain name of `path` where it lies in `folder`.
+fn name_in(folder: &Path, path: &Path) -> Option<String> {
+    let parent = match path.parent()? {
+        bare if bare.as_os_str().is_empty() => Path::new("."),
+        parent => parent,
+    };
+    let same = parent == folder
+        || match (parent.canonicalize(), folder.canonicalize()) {
+            (Ok(parent), Ok(folder)) => parent == folder,
+            _ => false,
+        };
+    same.then(|| path.file_name())
+        .flatten()
+        .map(|name| name.to_string_lossy().into_owned())
+}
+
 /// Writes `map.npz`, the other formats wanted, and `map.json` into `folder`. Returns the sidecar as
 /// written, its `files` filled in.
 ///
@@ -113,6 +174,21 @@ pub fn write_map_files(
     sidecar: &MapSidecar,
     map: &MapArrays,
     formats: MapFormats,
+) -> Result<MapSidecar, WriteError> {
+    write_map_and(folder, force, sidecar, map, formats, &[])
+}
+
+/// [`write_map_files`] and files for other programs; `files` lists those that lie in `folder`.
+///
+/// # Errors
+/// [`WriteError`].
+pub fn write_map_and(
+    folder: &Path,
+    force: bool,
+    sidecar: &MapSidecar,
+    map: &MapArrays,
+    formats: MapFormats,
+    besides: &[Beside],
 ) -> Result<MapSidecar, WriteError> {
     let mut sidecar = sidecar.clone();
     let overwrite = Overwrite::new(force, folder.join("map.json"), &sidecar.inputs);
@@ -130,6 +206,16 @@ pub fn write_map_files(
     }
     if formats.vtk {
         put(&mut set, "map.vti", &|out| write_vti(out, map))?;
+    }
+    for beside in besides {
+        check_beside(beside.path, folder, force, &sidecar.inputs)?;
+        let written = set.write_at(beside.path, |out| match beside.content {
+            BesideContent::VectorField(field) => write_vector_field(out, field),
+            BesideContent::Multipoles(model) => write_multipoles(out, model),
+        })?;
+        if let Some(name) = name_in(folder, beside.path) {
+            sidecar.files.push(entry(&name, written));
+        }
     }
     set.write("map.json", |out| {
         out.write_all(&to_json(&sidecar).map_err(invalid)?)

@@ -1,9 +1,14 @@
 //! `map`: gradient maps over the workspace, and the map's files.
 
+pub mod mag_manip;
+mod multipoles;
+mod vector_field;
+
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use self::mag_manip::{MULTIPOLE_TOLERANCE, MagManipRequest, MultipolesMade, VectorFieldMade};
 use super::maps::{Felt, SceneMap};
 use super::scene::Scene;
 use super::working_point::{WorkingPoint, relative_difference, superposition_ends};
@@ -14,7 +19,7 @@ use crate::bundle::manifest::{
     AxisSummary, Interpolation, MapSidecar, MapSummary, WorkingPointMap,
 };
 use crate::bundle::npz::{MapArrays, Runtime, WORKING_POINT};
-use crate::bundle::write::{MapFormats, write_map_files};
+use crate::bundle::write::{Beside, BesideContent, MapFormats, check_beside, write_map_and};
 use crate::design::Design;
 use crate::map::sampled::TableReport;
 use crate::map::tabulate::Grid;
@@ -38,6 +43,8 @@ pub struct MapRequest {
     pub out: PathBuf,
     /// Formats beside `map.npz`.
     pub formats: MapFormats,
+    /// Files for mag_manip.
+    pub mag_manip: MagManipRequest,
     /// Replace what is there, whatever it is.
     pub force: bool,
 }
@@ -57,6 +64,10 @@ pub struct MapReport {
     pub tabulated: bool,
     /// The compact form of a coupled array's steel, where there is one.
     pub table: Option<TableReport>,
+    /// The field on nodes for mag_manip, where asked for.
+    pub vector_field: Option<VectorFieldMade>,
+    /// The multipole sources for mag_manip, where asked for.
+    pub multipoles: Option<MultipolesMade>,
     /// What a careful person would mention.
     pub warnings: Vec<String>,
     /// Whether the tolerance asked for was reached.
@@ -96,8 +107,19 @@ pub fn run(
     let scene = Scene::new(design)?;
     Overwrite::new(request.force, request.out.join("map.json"), &inputs)
         .check(&request.out.join("map.npz"))?;
+    let asked = &request.mag_manip;
+    for path in [&asked.vector_field, &asked.multipoles]
+        .into_iter()
+        .flatten()
+    {
+        check_beside(path, &request.out, request.force, &inputs)?;
+    }
+    let nodes = (asked.vector_field.as_ref())
+        .map(|path| Ok::<_, JobError>((path, vector_field::nodes(&scene, asked.nodes)?)))
+        .transpose()?;
     let grid = workspace_grid(design);
     let lowest_m = grid.z_m.first().copied().unwrap_or(0.0);
+    let lowest_m = (nodes.as_ref()).map_or(lowest_m, |(_, [_, _, z])| lowest_m.min(z.from));
     progress.begin("steel", 1);
     let solved = steel::solve(&scene, request.tolerance, MAP_TOLERANCE, lowest_m)?;
     progress.end();
@@ -142,6 +164,39 @@ pub fn run(
     }
     progress.end();
     progress.check()?;
+    let vector_field = nodes
+        .map(|(path, axes)| vector_field::make(&scene, &solved, path.clone(), axes, progress))
+        .transpose()?;
+    let multipoles = (asked.multipoles.as_ref())
+        .map(|path| {
+            let tolerance = asked.tolerance.unwrap_or(MULTIPOLE_TOLERANCE);
+            let own_error = made.accuracy.estimate;
+            multipoles::make(
+                &scene,
+                &solved,
+                path.clone(),
+                tolerance,
+                own_error,
+                progress,
+            )
+        })
+        .transpose()?;
+    let stages = [
+        (
+            ["vfield", "vfield_gradient"],
+            vector_field.as_ref().map(|v| &v.accuracy),
+        ),
+        (
+            ["mpem", "mpem_gradient"],
+            multipoles.as_ref().map(|m| &m.accuracy),
+        ),
+    ];
+    for (names, stages) in stages {
+        for (name, stage) in names.iter().zip(stages.into_iter().flatten()) {
+            accuracy.insert((*name).to_owned(), stage.clone());
+        }
+    }
+    progress.check()?;
     let sidecar = MapSidecar {
         schema_version: SCHEMA_VERSION.to_owned(),
         fluxform_version: FLUXFORM_VERSION.to_owned(),
@@ -158,12 +213,28 @@ pub fn run(
     let mut arrays = arrays(map, runtime);
     arrays.working_point_gz_t_per_m = whole.map(Cow::Owned);
     progress.begin("write", 1);
-    let sidecar = write_map_files(
+    let nodes = vector_field
+        .as_ref()
+        .map(|v| (&v.path, v.content(&design.name)));
+    let sources = multipoles
+        .as_ref()
+        .map(|m| (&m.path, m.content(&design.name)));
+    let mut besides = Vec::new();
+    besides.extend(nodes.as_ref().map(|(path, content)| Beside {
+        path,
+        content: BesideContent::VectorField(content),
+    }));
+    besides.extend(sources.as_ref().map(|(path, content)| Beside {
+        path,
+        content: BesideContent::Multipoles(content),
+    }));
+    let sidecar = write_map_and(
         &request.out,
         request.force,
         &sidecar,
         &arrays,
         request.formats,
+        &besides,
     )?;
     progress.end();
     Ok(MapReport {
@@ -173,6 +244,8 @@ pub fn run(
         distinct_radii: map.distinct_radii,
         tabulated: map.tabulated,
         table: made.table,
+        vector_field,
+        multipoles,
         warnings,
         accuracy_reached: solved.tolerance >= KERNEL_ERROR && solved.reached(),
     })

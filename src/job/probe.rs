@@ -83,11 +83,7 @@ pub fn probe(
         let [x, y, z] = node.offset_m;
         reach.max(x.hypot(y).hypot(z))
     });
-    let places = Places {
-        scene: &scene,
-        solved: &solved,
-        sources: solved.sources(&scene, &points_m, reach_m)?,
-    };
+    let places = Places::new(&scene, &solved, &points_m, reach_m)?;
     progress.begin("probe", points_m.len() as u64);
     let portions = points_m
         .par_chunks(PORTION)
@@ -125,16 +121,40 @@ pub fn probe(
 }
 
 /// What gives the field at any place.
-struct Places<'a> {
+pub(super) struct Places<'a> {
     scene: &'a Scene<'a>,
     solved: &'a Solved,
     sources: Option<ArraySources>,
 }
 
-impl Places<'_> {
+impl<'a> Places<'a> {
+    /// For places within `reach_m` of `points_m`.
+    ///
+    /// # Errors
+    /// A point on the steel's surface or hardly off it.
+    pub(super) fn new(
+        scene: &'a Scene<'a>,
+        solved: &'a Solved,
+        points_m: &[[f64; 3]],
+        reach_m: f64,
+    ) -> Result<Self, JobError> {
+        Ok(Self {
+            scene,
+            solved,
+            sources: solved.sources(scene, points_m, reach_m)?,
+        })
+    }
+
     /// Field and gradient per ampere, [point, coil]; the first of `points_m` is told as number
     /// `first`.
-    fn fields(&self, points_m: &[[f64; 3]], first: usize) -> Result<Vec<CartesianField>, JobError> {
+    ///
+    /// # Errors
+    /// A point on a winding's edge.
+    pub(super) fn fields(
+        &self,
+        points_m: &[[f64; 3]],
+        first: usize,
+    ) -> Result<Vec<CartesianField>, JobError> {
         let scene = self.scene;
         let count = points_m.len();
         let added = self.sources.as_ref().map_or_else(Vec::new, |sources| {

@@ -60,6 +60,7 @@ fn stages(design: &Design) -> Result<(), Failure> {
             currents_a: None,
             out: folder.path().join("map"),
             formats: MapFormats::default(),
+            mag_manip: Default::default(),
             force: false,
         };
         let measured = Stages::default();

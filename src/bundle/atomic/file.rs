@@ -90,6 +90,26 @@ impl FileSet {
         self.write_path(self.folder.join(name), content)
     }
 
+    /// Stages a file of any path; its folder is made where needed.
+    ///
+    /// # Errors
+    /// [`WriteError`]; nothing is left of it.
+    pub fn write_at(
+        &mut self,
+        target: &Path,
+        content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<Written, WriteError> {
+        // A bare name stands in the working directory, not in the set's folder.
+        let parent = target.parent().filter(|p| !p.as_os_str().is_empty());
+        let parent = parent.unwrap_or(Path::new("."));
+        let name = target.file_name().ok_or_else(|| WriteError::IsFolder {
+            path: target.to_path_buf(),
+        })?;
+        make_folder(parent)?;
+        clean_leftovers(parent);
+        self.write_path(parent.join(name), content)
+    }
+
     fn write_path(
         &mut self,
         target: PathBuf,

@@ -1,13 +1,13 @@
 //! `map`: gradient maps over the workspace.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::{accuracy_check, begin, describe, folder};
 use crate::bundle::manifest::MapSidecar;
-use crate::bundle::write::MapFormats;
+use crate::bundle::write::{MAP_FILES, MapFormats};
 use crate::cli::args::{Tolerance, Writing};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
@@ -15,8 +15,9 @@ use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
 use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{bytes, count, error, mm, percent};
-use crate::cli::values::FileArgument;
+use crate::cli::values::{self, FileArgument};
 use crate::design::{Design, Need, Steel};
+use crate::job::map::mag_manip::{FEWEST_NODES, MagManipRequest, MultipolesMade, VectorFieldMade};
 use crate::job::map::{MapReport, MapRequest, run};
 use crate::map::Components;
 use crate::map::sampled::TableReport;
@@ -28,11 +29,18 @@ use crate::map::sampled::TableReport;
 /// on request also map.csv and map.vti, which ParaView opens. The error at the nodes and the error
 /// of interpolating between them are told; of arrays with coupled steel cores also the compact form
 /// that stood for the steel, and how far it was seen to be off.
+///
+/// --vfield and --mpem write calibration files of mag_manip, ETH Zurich's runtime for magnetic
+/// manipulation: the field on nodes that span the workspace and one step more, whose error between
+/// the nodes is told, and sources on the coils' axes, whose error at places that the fit did not
+/// see is told; the latter ends with code 4 where it exceeds --mpem-tolerance.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Writing, &[
     ("fluxform map designs/seed.toml --out maps", "dBz/dz of all coils"),
     ("fluxform map designs/seed_air.toml --out maps_vtk --vtk --tolerance 1e-6",
      "for ParaView, less accurate"),
+    ("fluxform map designs/seed.toml --out maps_mm --vfield maps_mm/nodes.yaml --mpem maps_mm/mpem.yaml",
+     "for mag_manip"),
     ("fluxform tabulate designs/seed.toml --out maps --format json --force",
      "replace what is there, and tell a program"),
 ]))]
@@ -61,6 +69,20 @@ pub struct Map {
     /// Write map.vti too
     #[arg(long)]
     vtk: bool,
+    /// Write the field per ampere on nodes for mag_manip's ForwardModelLinearVField too
+    #[arg(long, value_name = "FILE.yaml")]
+    vfield: Option<FileArgument>,
+    /// Nodes of --vfield along each axis, 6 or more; mag_manip needs as many along all three
+    /// [default: the most that the workspace has along one, but no more than 31]
+    #[arg(long, value_name = "N", requires = "vfield", value_parser = vfield_nodes)]
+    vfield_nodes: Option<usize>,
+    /// Write multipole sources fitted to the field for mag_manip's ForwardModelMPEM too
+    #[arg(long, value_name = "FILE.yaml")]
+    mpem: Option<FileArgument>,
+    /// Allowed error of --mpem, of field and gradient relative to the largest at each height,
+    /// 1e-15 to 1e-1: fewer sources do for a larger one [default: 1e-3]
+    #[arg(long, value_name = "T", requires = "mpem", value_parser = values::tolerance)]
+    mpem_tolerance: Option<f64>,
     #[command(flatten)]
     writing: Writing,
     #[command(flatten)]
@@ -88,6 +110,103 @@ struct MapSummary<'a> {
     /// The compact form of a coupled array's steel.
     #[serde(skip_serializing_if = "Option::is_none")]
     table: Option<TableSummary>,
+    /// The field on nodes for mag_manip.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    vfield: Option<VectorFieldSummary>,
+    /// The multipole sources for mag_manip.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mpem: Option<MultipolesSummary>,
+}
+
+/// The field on nodes that mag_manip reads.
+#[derive(Serialize)]
+struct VectorFieldSummary {
+    file: String,
+    nodes: usize,
+    step_m: [f64; 3],
+    checks: usize,
+    field_error: f64,
+    gradient_error: f64,
+}
+
+impl VectorFieldSummary {
+    fn of(made: &VectorFieldMade) -> Self {
+        Self {
+            file: made.path.display().to_string(),
+            nodes: made.nodes,
+            step_m: made.steps_m,
+            checks: made.checks,
+            field_error: made.accuracy[0].estimate,
+            gradient_error: made.accuracy[1].estimate,
+        }
+    }
+
+    fn told(&self) -> String {
+        let steps: Vec<String> = self.step_m.iter().map(|step| mm(*step)).collect();
+        format!(
+            "{}: {n} x {n} x {n} nodes {} apart, one step beyond the workspace",
+            self.file,
+            steps.join(", "),
+            n = self.nodes,
+        )
+    }
+}
+
+/// The multipole sources that mag_manip reads.
+#[derive(Serialize)]
+struct MultipolesSummary {
+    file: String,
+    /// Of one coil.
+    sources: usize,
+    /// Of one coil.
+    coefficients: usize,
+    condition: f64,
+    points: usize,
+    checks: usize,
+    field_error: f64,
+    gradient_error: f64,
+    tolerance: f64,
+    tolerance_met: bool,
+}
+
+impl MultipolesSummary {
+    fn of(made: &MultipolesMade) -> Self {
+        Self {
+            file: made.path.display().to_string(),
+            sources: made.sources(),
+            coefficients: made.coefficients(),
+            condition: made.condition(),
+            points: made.points,
+            checks: made.checks,
+            field_error: made.accuracy[0].estimate,
+            gradient_error: made.accuracy[1].estimate,
+            tolerance: made.tolerance,
+            tolerance_met: made.reached(),
+        }
+    }
+
+    fn told(&self) -> String {
+        format!(
+            "{}: {} with {} a coil, fitted at {} (condition {:.0e}), {} {}",
+            self.file,
+            count(self.sources, "source"),
+            count(self.coefficients, "coefficient"),
+            count(self.points, "point"),
+            self.condition,
+            if self.tolerance_met {
+                "within"
+            } else {
+                "NOT within"
+            },
+            error(self.tolerance)
+        )
+    }
+}
+
+/// Nodes along each axis.
+fn vfield_nodes(text: &str) -> Result<usize, String> {
+    let nodes = text.parse().ok().filter(|n| *n >= FEWEST_NODES);
+    nodes.ok_or_else(|| format!("expected a whole number, {FEWEST_NODES} or more"))
 }
 
 /// The compact form that stood for the steel of a coupled array.
@@ -163,6 +282,31 @@ impl Map {
         }
     }
 
+    /// What is asked for mag_manip, its files told apart from the map's own in `out`.
+    fn mag_manip(&self, out: &Path) -> Result<MagManipRequest, Failure> {
+        let mut taken: Vec<PathBuf> = MAP_FILES.iter().map(|name| out.join(name)).collect();
+        let mut path = |flag: &str, file: &Option<FileArgument>| match file {
+            None => Ok(None),
+            Some(FileArgument::Standard) => Err(Failure::Usage(format!(
+                "{flag} names a file, which standard output (-) is not"
+            ))),
+            Some(FileArgument::Path(path)) if taken.contains(path) => Err(Failure::Usage(format!(
+                "{flag}: another file of this command has the name {}; choose another",
+                path.display()
+            ))),
+            Some(FileArgument::Path(path)) => {
+                taken.push(path.clone());
+                Ok(Some(path.clone()))
+            }
+        };
+        Ok(MagManipRequest {
+            vector_field: path("--vfield", &self.vfield)?,
+            nodes: self.vfield_nodes,
+            multipoles: path("--mpem", &self.mpem)?,
+            tolerance: self.mpem_tolerance,
+        })
+    }
+
     /// Runs the command.
     ///
     /// # Errors
@@ -171,7 +315,9 @@ impl Map {
         let out = self.out.as_ref().map(folder).transpose()?;
         let document = documents::design(&self.design, Need::MAP, printer)?;
         let design = &document.design;
+        let out = out.unwrap_or_else(|| Path::new("results").join(&design.name));
         let request = MapRequest {
+            mag_manip: self.mag_manip(&out)?,
             components: match self.components {
                 Wanted::Gz => Components::Gz,
                 Wanted::Gradient => Components::Gradient,
@@ -179,7 +325,7 @@ impl Map {
             },
             tolerance: self.tolerance.tolerance,
             currents_a: self.currents_a(design)?,
-            out: out.unwrap_or_else(|| Path::new("results").join(&design.name)),
+            out,
             formats: MapFormats {
                 csv: self.csv,
                 vtk: self.vtk,
@@ -199,10 +345,25 @@ impl Map {
             distinct_radii: report.distinct_radii,
             tabulated: report.tabulated,
             table: report.table.as_ref().map(TableSummary::of),
+            vfield: report.vector_field.as_ref().map(VectorFieldSummary::of),
+            mpem: report.multipoles.as_ref().map(MultipolesSummary::of),
         };
         let json = printer.with_warnings(&json);
         printer.summary(Place::Output, &json, || summary(design, &report))?;
-        accuracy_check(report.accuracy_reached)
+        accuracy_check(report.accuracy_reached)?;
+        if report
+            .multipoles
+            .as_ref()
+            .is_some_and(|made| !made.reached())
+        {
+            return Err(Failure::Unmet(
+                "the accuracy asked for with --mpem-tolerance was not reached: see the accuracy of \
+                 mpem and mpem_gradient; the files are written. A workspace that begins higher \
+                 above the coils, or a larger tolerance, helps"
+                    .to_owned(),
+            ));
+        }
+        Ok(())
     }
 }
 
@@ -248,6 +409,12 @@ fn summary(design: &Design, report: &MapReport) -> String {
             ),
         );
         sheet.line("at", &describe::currents(design, &point.currents_a));
+    }
+    if let Some(made) = &report.vector_field {
+        sheet.line("vfield", &VectorFieldSummary::of(made).told());
+    }
+    if let Some(made) = &report.multipoles {
+        sheet.line("mpem", &MultipolesSummary::of(made).told());
     }
     let stages = report.sidecar.accuracy.iter();
     let stages = stages.map(|(name, stage)| (name.as_str(), stage));
