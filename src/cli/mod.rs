@@ -27,7 +27,11 @@ use printer::{Printer, say};
 
 /// Runs the command line and returns the process's exit code.
 pub fn main(args: impl Iterator<Item = OsString>) -> ExitCode {
-    std::panic::set_hook(Box::new(|panic| say(&panic_message(panic))));
+    std::panic::set_hook(Box::new(|panic| {
+        if !caught() {
+            say(&panic_message(panic));
+        }
+    }));
     let args: Vec<OsString> = args.collect();
     let parsed = Arguments::command()
         .color(colour_of(&args))
@@ -46,6 +50,14 @@ pub fn main(args: impl Iterator<Item = OsString>) -> ExitCode {
             failure.exit().into()
         }
     }
+}
+
+/// Whether a panic is caught where it happens and told as what it means.
+fn caught() -> bool {
+    #[cfg(feature = "step")]
+    return crate::shape::step::guards_panics();
+    #[cfg(not(feature = "step"))]
+    false
 }
 
 fn run(arguments: &Arguments, printer: &Printer) -> Result<(), Failure> {

@@ -11,8 +11,9 @@ use crate::shape::mesh::{Triangle, cross, minus};
 
 /// Parts into which the search is cut, about.
 const PARTS: usize = 256;
-/// Pairs that are looked at in one part, at most: bodies that lie over each other many times.
-const MOST_PAIRS: usize = 20_000_000;
+/// Pairs that are looked at in one part, at most, and more for every triangle: bodies may lie over
+/// each other many times.
+const MOST_PAIRS: [usize; 2] = [20_000, 8];
 
 /// What was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -129,7 +130,7 @@ impl Search<'_> {
                     }
                 }
             }
-            if looked > MOST_PAIRS {
+            if looked > MOST_PAIRS[0] + MOST_PAIRS[1] * self.triangles.len() {
                 found.complete = false;
                 break;
             }

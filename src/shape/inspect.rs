@@ -116,12 +116,31 @@ impl MeshReport {
 
     /// Looks at what was read.
     #[must_use]
-    pub fn new(format: SurfaceFormat, file: FileMesh) -> Self {
+    pub fn new(format: SurfaceFormat, mut file: FileMesh) -> Self {
+        let warnings = std::mem::take(&mut file.warnings);
+        let (mut report, names) = Self::with_names(format, &file);
+        let reach = WELD_ROUNDINGS * file.coordinate_rounding;
+        let crossings = crossings(&file.triangles, &names, reach);
+        report.self_intersections = crossings.pairs;
+        report.self_intersections_complete = crossings.complete;
+        report.self_intersection_first = crossings.first;
+        report.layers = layers(file);
+        report.warnings = warnings;
+        report.warn();
+        report
+    }
+
+    /// The same without self-intersections, layers and warnings.
+    #[must_use]
+    pub(super) fn of_edges(format: SurfaceFormat, file: &FileMesh) -> Self {
+        Self::with_names(format, file).0
+    }
+
+    fn with_names(format: SurfaceFormat, file: &FileMesh) -> (Self, Vec<[u32; 3]>) {
         let bounds = bounds(&file.triangles);
         let reach = WELD_ROUNDINGS * file.coordinate_rounding;
         let names = weld(&file.triangles, reach);
         let edges = Edges::new(&names);
-        let crossings = crossings(&file.triangles, &names, reach);
         let watertight = !file.triangles.is_empty() && edges.closed();
         let flat = |[a, b, c]: &&Triangle| cross(minus(*b, *a), minus(*c, *a)) == [0.0; 3];
         let size = (0..3)
@@ -134,7 +153,7 @@ impl MeshReport {
         };
         let usual = |guess: &UnitGuess| (USUAL_M[0]..=USUAL_M[1]).contains(&guess.size_m);
         let guesses = LIKELY.map(guess).into_iter().filter(usual);
-        let mut report = Self {
+        let report = Self {
             format: format.name(),
             triangles: file.triangles.len(),
             bounds_min: bounds[0],
@@ -154,16 +173,15 @@ impl MeshReport {
             duplicate: edges.duplicate,
             bodies: bodies(&names),
             euler: edges.euler,
-            self_intersections: crossings.pairs,
-            self_intersections_complete: crossings.complete,
-            self_intersection_first: crossings.first,
-            layers: layers(&file),
+            self_intersections: 0,
+            self_intersections_complete: false,
+            self_intersection_first: None,
+            layers: None,
             area,
             volume: (watertight && edges.inconsistent == 0).then_some(volume),
-            warnings: file.warnings,
+            warnings: Vec::new(),
         };
-        report.warn();
-        report
+        (report, names)
     }
 
     fn warn(&mut self) {
@@ -237,9 +255,9 @@ fn area_and_volume(triangles: &[Triangle], bounds: [[f64; 3]; 2]) -> (f64, f64) 
 }
 
 /// The most sheets over each other; `None` without area. Looked for along vertical lines over the whole box.
-fn layers(file: &FileMesh) -> Option<u32> {
+fn layers(file: FileMesh) -> Option<u32> {
     let as_it_is = Transform::new(1.0, &Placement::default());
-    let mesh = Mesh::place(file.clone(), &as_it_is).ok()?;
+    let mesh = Mesh::place(file, &as_it_is).ok()?;
     // Lines half a step inside: a body's own sides are no sheets.
     let [x_m, y_m] = mesh.facts().bounds.plan().map(|[low, high]| {
         let half = 0.5 * (high - low) / LINES as f64;

@@ -35,7 +35,7 @@ pub(super) fn check(stated: &Stated, meshed: &Meshed) -> Result<(), String> {
             coordinate_rounding: 0.5 * meshed.weld,
             ..FileMesh::default()
         };
-        MeshReport::new(SurfaceFormat::Step, file)
+        MeshReport::of_edges(SurfaceFormat::Step, &file)
     };
     let (coarse, fine) = (report(coarse), report(fine));
     for mesh in [&coarse, &fine] {

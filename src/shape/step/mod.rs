@@ -10,6 +10,7 @@ mod units;
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use monstertruck_io::step::load::Table;
 use monstertruck_meshing::prelude::*;
@@ -17,6 +18,15 @@ use monstertruck_meshing::prelude::*;
 use crate::shape::assembly::{Affine, Body, lay_out};
 use crate::shape::fault::ReadError;
 use crate::shape::mesh::{FileMesh, Triangle};
+
+/// Readings under way whose panics are caught and told as faults of the file.
+static GUARDED: AtomicUsize = AtomicUsize::new(0);
+
+/// True while a panic would be caught: nothing need be said of it.
+#[must_use]
+pub fn guards_panics() -> bool {
+    GUARDED.load(Ordering::SeqCst) > 0
+}
 
 /// Chord tolerance of the coarse mesh against the body's size; the fine one's is a quarter.
 const CHORD: f64 = 1e-3;
@@ -36,8 +46,12 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
         return Err(ReadError::file(what));
     }
     // The crates state no freedom from panics on damaged files.
+    GUARDED.fetch_add(1, Ordering::SeqCst);
     let caught = catch_unwind(AssertUnwindSafe(|| solids(bytes)));
-    let result = caught.unwrap_or_else(|_| Err("its reader stopped on a damaged entity".into()));
+    GUARDED.fetch_sub(1, Ordering::SeqCst);
+    let result = caught.unwrap_or_else(|_| {
+        Err("its reader stopped on an entity that is damaged or beyond it".into())
+    });
     result.map_err(|what| {
         ReadError::file(format!(
             "the STEP file cannot be read safely: {what}; {ADVICE}"
@@ -89,7 +103,7 @@ fn solids(bytes: &[u8]) -> Result<FileMesh, String> {
     let coordinates = triangles.as_flattened().as_flattened().iter();
     let largest = coordinates.fold(0.0, |m: f64, c| m.max(c.abs()));
     Ok(FileMesh {
-        coordinate_rounding: largest * f64::EPSILON,
+        coordinate_rounding: 0.5 * WELD * largest.max(longest_side(&triangles)),
         triangles,
         unit_m: Some(unit_m),
         deviation,
@@ -101,6 +115,18 @@ fn solids(bytes: &[u8]) -> Result<FileMesh, String> {
             deviation * unit_m * 1000.0
         )],
     })
+}
+
+/// The longest side of the box around the triangles.
+fn longest_side(triangles: &[Triangle]) -> f64 {
+    let side = |k: usize| {
+        let values = triangles.iter().flatten().map(|vertex| vertex[k]);
+        let ends = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], c| {
+            [low.min(c), high.max(c)]
+        });
+        ends[1] - ends[0]
+    };
+    (0..3).map(side).fold(0.0, f64::max)
 }
 
 /// The triangles of one solid, gated, and their chord tolerance.

@@ -22,6 +22,7 @@ impl Statements {
             placed: false,
             angles: false,
         };
+        let text = without_comments(text);
         let mut quoted = false;
         for statement in text.split(|c: char| {
             quoted ^= c == '\'';
@@ -88,9 +89,13 @@ impl Statements {
             let measure = measure
                 .and_then(|id| self.units.get(&id))
                 .ok_or_else(unknown)?;
-            let (_, value) = measure.split_once("LENGTH_MEASURE(").ok_or_else(unknown)?;
-            let (value, unit) = value.split_once("),").ok_or_else(unknown)?;
-            let value: f64 = value.parse().map_err(|_| unknown())?;
+            // Some write the number alone, some `LENGTH_MEASURE(25.4)`.
+            let (_, told) = measure
+                .rsplit_once("MEASURE_WITH_UNIT(")
+                .ok_or_else(unknown)?;
+            let (value, unit) = told.split_once(',').ok_or_else(unknown)?;
+            let value = value.rsplit('(').next().unwrap_or(value);
+            let value: f64 = value.trim_end_matches(')').parse().map_err(|_| unknown())?;
             let unit = reference(unit).ok_or_else(unknown)?;
             let unit_m = value * self.length_m(unit, depth + 1)?;
             // Exporters write 25.4 with the digits of its double, and more.
@@ -107,6 +112,25 @@ impl Statements {
             _ => Err(unknown()),
         }
     }
+}
+
+/// The text but for comments, in which quotes mean nothing.
+fn without_comments(text: &str) -> String {
+    let mut kept = String::with_capacity(text.len());
+    let (mut rest, mut quoted) = (text, false);
+    while let Some(at) = rest.find(['\'', '/']) {
+        let (before, after) = rest.split_at(at);
+        kept.push_str(before);
+        if !quoted && after.starts_with("/*") {
+            rest = after[2..].split_once("*/").map_or("", |(_, after)| after);
+            continue;
+        }
+        quoted ^= after.starts_with('\'');
+        kept.push_str(&after[..1]);
+        rest = &after[1..];
+    }
+    kept.push_str(rest);
+    kept
 }
 
 /// The number after `#` in `#123`, whatever brackets follow.
@@ -141,7 +165,27 @@ mod tests {
         assert_eq!(unit_m(mm, degree, ""), Ok(0.001));
         let cone = "#8 = CONICAL_SURFACE ( '', #1, 1., 45. );";
         assert!(unit_m(mm, degree, cone).unwrap_err().contains("degrees"));
+        // As OpenCASCADE writes an inch.
+        let bare = "( CONVERSION_BASED_UNIT ( 'INCH', #11 ) LENGTH_UNIT ( ) )";
+        let value = "#11 = LENGTH_MEASURE_WITH_UNIT(25.4,#12);\n\
+                     #12 = ( LENGTH_UNIT() NAMED_UNIT(*) SI_UNIT(.MILLI.,.METRE.) );";
+        assert_eq!(unit_m(bare, radian, value), Ok(0.0254));
+        let parts = "#11 = ( LENGTH_MEASURE_WITH_UNIT() MEASURE_WITH_UNIT( \
+                     LENGTH_MEASURE(25.4),#12) );\n\
+                     #12 = ( LENGTH_UNIT() NAMED_UNIT(*) SI_UNIT(.MILLI.,.METRE.) );";
+        assert_eq!(unit_m(bare, radian, parts), Ok(0.0254));
         let second = "#10 = ( GLOBAL_UNIT_ASSIGNED_CONTEXT ( ( #6 ) ) );";
         assert!(unit_m(mm, radian, second).unwrap_err().contains("several"));
+    }
+
+    #[test]
+    fn an_apostrophe_in_a_comment_opens_no_text() {
+        let mm = "( LENGTH_UNIT ( ) NAMED_UNIT ( * ) SI_UNIT ( .MILLI., .METRE. ) )";
+        let radian = "( PLANE_ANGLE_UNIT ( ) SI_UNIT ( $, .RADIAN. ) ) /* it's one; */";
+        assert_eq!(
+            unit_m(mm, radian, "/* Bob's */ #7 = X('/* no comment');"),
+            Ok(0.001)
+        );
+        assert_eq!(super::without_comments("a'/*'b/*c'd*/e/f"), "a'/*'be/f");
     }
 }
