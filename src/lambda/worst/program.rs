@@ -20,6 +20,8 @@ const STILL: f64 = 1e-14;
 const EQUAL: f64 = 1e-22;
 /// Entries of an inverse above this size amplify rounding.
 const STEEP: f64 = 1e4;
+/// Rows that are asked for before a step, at most.
+const TWINS: usize = 4;
 /// Exchanges after which the inverse is made anew.
 const FRESH: usize = 16;
 
@@ -169,8 +171,11 @@ impl Program {
             vertex.place(self, lambda);
             let cautious = exchanges_here > patience;
             let (mut entering, mut next) = self.look(&vertex, lambda, cautious);
-            // A row may turn out not to end the step: then another may.
-            while entering.is_none() {
+            // A row may turn out not to end the step, a twin of an active one: then another may.
+            for _ in 0..TWINS {
+                if entering.is_some() {
+                    break;
+                }
                 let stand = Stand {
                     lambda,
                     z: &vertex.z,
