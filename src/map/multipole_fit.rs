@@ -101,7 +101,7 @@ pub fn terms(sources: &[Source]) -> usize {
 pub struct Samples {
     /// m.
     pub points_m: Vec<[f64; 3]>,
-    /// [coil][point]
+    /// Parts per coil, then per point.
     pub parts: Vec<Vec<[f64; PARTS]>>,
     /// What an error of field and gradient is relative to at each point, T/A and T/m/A.
     pub sizes: Vec<[f64; 2]>,
@@ -112,7 +112,7 @@ pub struct Samples {
 pub struct Model {
     /// The sources, common to the coils.
     pub sources: Vec<Source>,
-    /// [coil][term], terms source by source.
+    /// Terms per coil, source by source.
     pub coefficients: Vec<Vec<f64>>,
     /// Largest over least diagonal entry of the triangular factor that was solved with.
     pub condition: f64,

@@ -62,7 +62,7 @@ pub struct MeshReport {
     /// Two such triangles, counted from 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub self_intersection_first: Option<[usize; 2]>,
-    /// The most sheets that a vertical line meets, over [`LINES`] x [`LINES`] lines; a body has 2.
+    /// The most sheets that a vertical line meets, over `LINES` x `LINES` lines; a body has 2.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub layers: Option<u32>,
     /// Sum of the triangles' areas.

@@ -2,7 +2,7 @@
 //!
 //! Two facets of width w1 and w2 across their common edge that turn by an angle t follow a curve of
 //! radius (w1 + w2) / 2 t, whose arc rises (w1 + w2) t / 16 above either chord. A facet bends both
-//! ways, so its two largest are added. Edges that turn more than [`SHARPEST_DEG`] are taken as meant.
+//! ways, so its two largest are added. Edges that turn more than `SHARPEST_DEG` are taken as meant.
 
 use rayon::prelude::*;
 

@@ -2,7 +2,7 @@
 //!
 //! Between four points of a cell a runtime interpolates bilinearly. The surface is piecewise
 //! plane, so the vertical difference is a saddle on every piece, and its supremum over the cell is
-//! found in closed form ([`piece`]), once the pieces seen from above are known ([`visible`]).
+//! found in closed form (`piece`), once the pieces seen from above are known (`visible`).
 //! Cells of which a corner has no surface are counted apart: there a runtime's force ends.
 
 mod hausdorff;
