@@ -23,10 +23,11 @@ const BREAKPOINT: &str = "#000000";
 const FIXED: &str = "#d55e00";
 const FOLLOWING: &str = "#0072b2";
 const DIAGONAL: &str = "#7f7f7f";
-/// For the constants, in their order.
-const CONSTANTS: [&str; 6] = [
-    "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#8c510a",
-];
+/// For the constants, in their order; the chosen one lies broad behind them.
+const CONSTANTS: [&str; 5] = ["#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c510a"];
+const CHOSEN: &str = "#d0d0d0";
+const CHOSEN_PX: f64 = 6.0;
+const DASHES: &str = "6 4";
 
 /// A force constant with a name.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -128,6 +129,10 @@ impl LambdaPlot {
             entry("relative error", RELATIVE, LegendShape::Line),
             entry("breakpoint", BREAKPOINT, LegendShape::Circle),
         ];
+        entries.extend(self.chosen.iter().map(|chosen| {
+            let text = format!("chosen {:.4} N/m", chosen.lambda_n_per_m);
+            entry(&text, CHOSEN, LegendShape::Rect)
+        }));
         entries.extend(self.constants.iter().zip(CONSTANTS).map(|(one, colour)| {
             let beyond = if one.lambda_n_per_m > self.end_n_per_m {
                 " (not shown)"
@@ -135,9 +140,12 @@ impl LambdaPlot {
                 ""
             };
             let text = format!("{} {:.4} N/m{beyond}", one.name, one.lambda_n_per_m);
-            entry(&text, colour, LegendShape::Line)
+            LegendEntry {
+                dasharray: Some(DASHES.to_owned()),
+                ..entry(&text, colour, LegendShape::Line)
+            }
         }));
-        let coils = self.currents_a.first().map_or(0, Vec::len);
+        let coils = self.coils();
         if coils <= NAMED {
             entries.extend((0..coils).map(|coil| {
                 let colour = COILS[coil % COILS.len()];
@@ -166,7 +174,7 @@ impl LambdaPlot {
         let most = |values: &[(f64, f64)]| values.iter().map(|p| p.1).fold(0.0, f64::max);
         let above = |most: f64| if most > 0.0 { 1.05 * most } else { 1.0 };
         let layout = self
-            .over_lambda((0.0, above(most(&curve))), true)
+            .over_lambda((0.0, above(most(&curve))))
             .with_title("least rms error of static currents")
             .with_y_label("rms error / mN")
             .with_y2_range(0.0, above(most(&part)))
@@ -180,7 +188,7 @@ impl LambdaPlot {
     }
 
     fn currents(&self) -> (Vec<Plot>, Layout) {
-        let coils = self.currents_a.first().map_or(0, Vec::len);
+        let coils = self.coils();
         let line = |coil: usize| {
             let values = self.currents_a.iter().map(|currents| currents[coil]);
             let line = LinePlot::new().with_data(self.over(values).collect::<Vec<_>>());
@@ -191,7 +199,7 @@ impl LambdaPlot {
         };
         let values: Vec<f64> = self.currents_a.iter().flatten().copied().collect();
         let layout = self
-            .over_lambda(extent(&values), false)
+            .over_lambda(extent(&values))
             .with_title("static currents")
             .with_y_label("I / A");
         ((0..coils).map(line).collect(), layout)
@@ -234,7 +242,11 @@ impl LambdaPlot {
                     .with_data(points_mm.clone())
                     .with_colors(errors_mn.iter().map(colour))
                     .with_size(2.0);
-                let range = format!(", {low:.3} (dark) to {high:.3} (bright)");
+                let range = if errors_mn.is_empty() {
+                    String::new()
+                } else {
+                    format!(", {low:.3} (dark) to {high:.3} (bright)")
+                };
                 let (x, y) = (extent_any(&of(0)), extent_any(&of(1)));
                 (Plot::Scatter(dots), x, y, title(&range), false)
             }
@@ -280,6 +292,10 @@ impl LambdaPlot {
         (plots, layout)
     }
 
+    fn coils(&self) -> usize {
+        self.currents_a.first().map_or(0, Vec::len)
+    }
+
     fn over<'a>(
         &'a self,
         values: impl Iterator<Item = f64> + 'a,
@@ -288,19 +304,20 @@ impl LambdaPlot {
     }
 
     /// Axes over lambda, with the constants marked.
-    fn over_lambda(&self, values: (f64, f64), named: bool) -> Layout {
-        let layout = Layout::new((0.0, self.end_n_per_m), values).with_x_label("lambda / N/m");
-        let shown = self.constants.iter().zip(CONSTANTS);
-        let shown = shown.filter(|(one, _)| one.lambda_n_per_m <= self.end_n_per_m);
-        shown.fold(layout, |layout, (one, colour)| {
-            let line = ReferenceLine::vertical(one.lambda_n_per_m).with_color(colour);
-            let line = if named {
-                line.with_label(one.name)
-            } else {
-                line
-            };
-            layout.with_reference_line(line)
-        })
+    fn over_lambda(&self, values: (f64, f64)) -> Layout {
+        let mut layout = Layout::new((0.0, self.end_n_per_m), values).with_x_label("lambda / N/m");
+        if let Some(chosen) = &self.chosen {
+            let line = ReferenceLine::vertical(chosen.lambda_n_per_m).with_color(CHOSEN);
+            let line = line.with_stroke_width(CHOSEN_PX).with_dasharray("none");
+            layout = layout.with_reference_line(line);
+        }
+        for (one, colour) in self.constants.iter().zip(CONSTANTS) {
+            if one.lambda_n_per_m <= self.end_n_per_m {
+                let line = ReferenceLine::vertical(one.lambda_n_per_m).with_color(colour);
+                layout = layout.with_reference_line(line.with_dasharray(DASHES));
+            }
+        }
+        layout
     }
 }
 
@@ -316,4 +333,86 @@ fn extent_any(values: &[f64]) -> (f64, f64) {
     let low = values.iter().copied().fold(f64::INFINITY, f64::min);
     let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     wide([low.min(high), high.max(low)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plot::plane::Together;
+
+    fn drawing(points: usize) -> LambdaPlot {
+        let lambda: Vec<f64> = (0..40).map(|k| 0.1 * f64::from(k)).collect();
+        let errors: Vec<f64> = (0..points).map(|k| (0.7 * k as f64).sin()).collect();
+        LambdaPlot {
+            title: "a on b".to_owned(),
+            end_n_per_m: 3.9,
+            rms_error_n: lambda.iter().map(|l| 1.3e-3 * l * l).collect(),
+            relative_error: lambda
+                .iter()
+                .map(|l| (*l > 0.0).then_some(0.07 * l))
+                .collect(),
+            currents_a: lambda.iter().map(|l| vec![0.7 * l, 1.3]).collect(),
+            breakpoint: (0..40).map(|k| k % 13 == 7).collect(),
+            lambda_n_per_m: lambda,
+            constants: vec![
+                Constant {
+                    name: "linear",
+                    lambda_n_per_m: 1.3,
+                },
+                Constant {
+                    name: "saturation",
+                    lambda_n_per_m: 7.7,
+                },
+            ],
+            chosen: Some(ChosenForces {
+                lambda_n_per_m: 1.9,
+                wanted_n: (0..points).map(|k| 0.1 + 1e-4 * k as f64).collect(),
+                static_n: errors.iter().map(|e| 0.1 + 0.01 * e).collect(),
+                feedback_n: Vec::new(),
+                map: ErrorMap::Grid {
+                    x_mm: [-50.0, 50.0],
+                    y_mm: [-30.0, 70.0],
+                    cells: Cells {
+                        columns: 7,
+                        values: errors.into_iter().map(Some).collect(),
+                        together: Together::Largest,
+                    },
+                },
+            }),
+        }
+    }
+
+    #[test]
+    fn panels_say_what_they_show_and_are_the_same_twice() {
+        let svg = drawing(49).svg();
+        for words in [
+            "chosen 1.9000 N/m",
+            "linear 1.3000 N/m",
+            "saturation 7.7000 N/m (not shown)",
+            "relative to the rms force / %",
+            "given - wanted / mN",
+            "coil 1",
+        ] {
+            assert!(svg.contains(words), "{words}");
+        }
+        assert!(!svg.contains("with feedback") && !svg.contains("NaN"));
+        assert!(svg == drawing(49).svg(), "not the same bytes twice");
+    }
+
+    #[test]
+    fn one_point_and_none_are_drawn() {
+        for points in [0, 1] {
+            let mut drawn = drawing(points);
+            assert!(drawn.svg().ends_with("</svg>") && !drawn.svg().contains("NaN"));
+            if let Some(chosen) = &mut drawn.chosen {
+                chosen.map = ErrorMap::Scattered {
+                    points_mm: vec![(0.7, 1.3); points],
+                    errors_mn: vec![-0.3; points],
+                };
+            }
+            assert!(!drawn.svg().contains("NaN") && !drawn.svg().contains("inf"));
+            drawn.chosen = None;
+            assert!(drawn.svg().contains("no lambda is chosen"));
+        }
+    }
 }

@@ -305,7 +305,7 @@ fn feedback(told: &FeedbackFile) -> String {
     lines.extend(told.at_chosen.iter().map(rendering));
     lines.extend(told.without.iter().map(|fixed| {
         format!(
-            "without, at {} N/m: error rms {}, worst {}; currents up to {} A; {} W",
+            "without, at {} N/m: error rms {}, worst {}\n  currents up to {} A; {} W",
             number(fixed.lambda_n_per_m),
             force(fixed.rms_error_n),
             force(fixed.worst_error_n),
@@ -337,7 +337,7 @@ fn rendering(found: &FeedbackRendering) -> String {
         some => format!(" ({} out of reach)", count(some, "point")),
     };
     format!(
-        "at {} N/m: error rms {}, worst {}{unreached}; currents up to {} A; {} W on average, \
+        "at {} N/m: error rms {}, worst {}{unreached}\n  currents up to {} A; {} W on average, \
          up to {} W; {} coils active on average, {} to {}",
         number(found.lambda_n_per_m),
         force(found.rms_error_n),

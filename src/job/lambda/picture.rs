@@ -36,7 +36,6 @@ pub(super) fn picture(seen: Seen<'_>) -> LambdaPlot {
         ("jnd", file.lambda_jnd_n_per_m),
         ("saturation", file.lambda_saturation_n_per_m),
         ("maxmin", file.lambda_maxmin_n_per_m),
-        ("chosen", file.lambda_n_per_m),
         (
             "feedback",
             file.feedback.as_ref().and_then(|told| told.lambda_n_per_m),
