@@ -23,10 +23,10 @@ const BREAKPOINT: &str = "#000000";
 const FIXED: &str = "#d55e00";
 const FOLLOWING: &str = "#0072b2";
 const DIAGONAL: &str = "#7f7f7f";
-/// For the constants, in their order; the chosen one lies broad behind them.
+/// For the constants, in their order; the chosen one is a whole line behind them.
 const CONSTANTS: [&str; 5] = ["#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c510a"];
-const CHOSEN: &str = "#d0d0d0";
-const CHOSEN_PX: f64 = 6.0;
+const CHOSEN: &str = "#9a9a9a";
+const CHOSEN_PX: f64 = 2.0;
 const DASHES: &str = "6 4";
 
 /// A force constant with a name.
@@ -131,7 +131,7 @@ impl LambdaPlot {
         ];
         entries.extend(self.chosen.iter().map(|chosen| {
             let text = format!("chosen {:.4} N/m", chosen.lambda_n_per_m);
-            entry(&text, CHOSEN, LegendShape::Rect)
+            entry(&text, CHOSEN, LegendShape::Line)
         }));
         entries.extend(self.constants.iter().zip(CONSTANTS).map(|(one, colour)| {
             let beyond = if one.lambda_n_per_m > self.end_n_per_m {
@@ -209,10 +209,7 @@ impl LambdaPlot {
         let Some(chosen) = &self.chosen else {
             return empty("no lambda is chosen: no errors");
         };
-        let title = |what: &str| {
-            let lambda = chosen.lambda_n_per_m;
-            format!("static: given - wanted{what} / mN, at {lambda:.4} N/m")
-        };
+        let title = |range: &str| format!("static: given - wanted{range} / mN");
         let (plot, x, y, title, bar) = match &chosen.map {
             ErrorMap::Grid { x_mm, y_mm, cells } => {
                 let (x, y) = (wide(*x_mm), wide(*y_mm));

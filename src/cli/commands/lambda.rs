@@ -249,6 +249,11 @@ fn summary(design: &Design, report: &LambdaReport) -> String {
     }
     if let Some(told) = &file.feedback {
         sheet.line("feedback", &feedback(told));
+        if let Some(found) = told.at_chosen.as_ref().or(told.at_largest.as_ref()) {
+            let shares: Vec<f64> = found.active_share.iter().map(|s| s * 100.0).collect();
+            let unit = format!("% of the points, at {} N/m", number(found.lambda_n_per_m));
+            sheet.line("active", &describe::per_coil(design, &unit, &shares, 1));
+        }
         if let Some(shell) = &told.shell {
             sheet.line("shell", &shell_of(shell));
         }
