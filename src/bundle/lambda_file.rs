@@ -69,6 +69,10 @@ pub struct LambdaFile {
     /// The same object with one change at a time, the first as given; absent when not asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variants: Option<Vec<LambdaVariant>>,
+    /// The same object with position feedback, currents of their own at every point; absent when
+    /// not asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub feedback: Option<FeedbackFile>,
     /// Currents and errors at the lambda asked for with `--at`; absent when none was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at: Option<AtLambda>,
@@ -102,6 +106,112 @@ pub struct SampledPoints {
     pub grid_lambda_n_per_m: Option<f64>,
     /// The chosen lambda over that of the grid, less 1.
     pub relative_change: Option<f64>,
+}
+
+/// Rendering with position feedback: at every point the currents of least power that give the
+/// wanted force there. A pair in series counts as one coil.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FeedbackFile {
+    /// The largest that every point can be given, N/m; null where there is none above zero.
+    pub lambda_n_per_m: Option<f64>,
+    /// Why there is none; null where there is one.
+    pub reason: Option<String>,
+    /// The smallest that every point can be given, N/m: above zero only where a force without
+    /// currents is too strong.
+    pub smallest_lambda_n_per_m: f64,
+    /// Where the largest is decided.
+    pub decided_at: Option<FeedbackPlace>,
+    /// The static currents at the chosen lambda; null without one.
+    pub without: Option<StaticRendering>,
+    /// With feedback at the same lambda; null without one.
+    pub at_chosen: Option<FeedbackRendering>,
+    /// With feedback at its own largest lambda; null without one.
+    pub at_largest: Option<FeedbackRendering>,
+    /// The same demand above and below the surface; absent when not asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shell: Option<FeedbackShell>,
+}
+
+/// A place that decides.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FeedbackPlace {
+    /// The point, a row of `points.csv` from 0.
+    pub point: usize,
+    /// Where the magnet's centre is, m.
+    pub position_m: [f64; 3],
+}
+
+/// Static currents at the chosen lambda.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct StaticRendering {
+    /// N/m.
+    pub lambda_n_per_m: f64,
+    /// N.
+    pub rms_error_n: f64,
+    /// N.
+    pub worst_error_n: f64,
+    /// Largest |current| of any coil, A.
+    pub largest_current_a: f64,
+    /// Power in the coils, W.
+    pub power_w: f64,
+}
+
+/// A surface with the currents of least power at every point; means by the points' weights.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FeedbackRendering {
+    /// N/m.
+    pub lambda_n_per_m: f64,
+    /// N; 0 where every force is within reach.
+    pub rms_error_n: f64,
+    /// N.
+    pub worst_error_n: f64,
+    /// Points whose force is beyond reach.
+    pub points_unreached: usize,
+    /// Mean power in the coils, W.
+    pub mean_power_w: f64,
+    /// Largest power at any point, W.
+    pub max_power_w: f64,
+    /// Largest |current| of any coil, A.
+    pub largest_current_a: f64,
+    /// Largest |current| of each coil, A.
+    pub current_max_a: Vec<f64>,
+    /// Root mean square current of each coil, A.
+    pub current_rms_a: Vec<f64>,
+    /// Share of the points at which each coil carries more than 1e-6 of its limit.
+    pub active_share: Vec<f64>,
+    /// Mean number of such coils.
+    pub active_mean: f64,
+    /// Fewest at any point.
+    pub active_min: usize,
+    /// Most at any point.
+    pub active_max: usize,
+}
+
+/// The demand lambda h(x, y) at places above and below the surface.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FeedbackShell {
+    /// How far it reaches up and down, m.
+    pub reach_m: f64,
+    /// Layers, the surface in the middle.
+    pub layers: usize,
+    /// Distance of two layers, m.
+    pub spacing_m: f64,
+    /// No place is lower, m: the workspace's lowest, or the surface's.
+    pub floor_m: f64,
+    /// Places below that, looked at there instead.
+    pub clipped: usize,
+    /// Places in all.
+    pub places: usize,
+    /// The largest that every place can be given, N/m; null where there is none above zero.
+    pub lambda_n_per_m: Option<f64>,
+    /// Why there is none; null where there is one.
+    pub reason: Option<String>,
+    /// The smallest that every place can be given, N/m.
+    pub smallest_lambda_n_per_m: f64,
+    /// The largest by every second layer, N/m.
+    pub every_second_lambda_n_per_m: Option<f64>,
+    /// Where the largest is decided.
+    pub decided_at: Option<FeedbackPlace>,
 }
 
 /// The largest lambda up to which every point's error can be kept within

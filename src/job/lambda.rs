@@ -1,9 +1,12 @@
 //! `lambda`: the force constant of one object, from forces computed at its points.
 
+pub mod feedback;
 mod variants;
 
 use std::collections::BTreeMap;
 
+use self::feedback::{FeedbackOptions, Rendering};
+use self::picture::Seen;
 use self::points::WantedPoints;
 use self::points_effect::Moved;
 use super::discretize::scattered::{self, Sampling, ScatteredSummary};
@@ -23,9 +26,11 @@ use crate::design::{Design, MagnetModel};
 use crate::field::steel::inside::peak_depth_m;
 use crate::lambda::worst::{WorstSolution, worst_point};
 use crate::lambda::{self, Criterion, ForceProblem, Precision, Settings, Solution, Status, Wiring};
+use crate::plot::lambda::LambdaPlot;
 use crate::progress::Progress;
 use crate::shape::document::ShapeDocument;
 
+mod picture;
 mod points;
 mod points_effect;
 
@@ -45,6 +50,10 @@ pub struct LambdaOptions {
     pub wiring: Wiring,
     /// Whether single changes are tried besides.
     pub variants: bool,
+    /// Whether every point is given currents of its own besides, and what of that.
+    pub feedback: Option<FeedbackOptions>,
+    /// Whether a picture is wanted.
+    pub picture: bool,
 }
 
 impl LambdaReport {
@@ -62,6 +71,8 @@ pub struct LambdaReport {
     pub points: PointsReport,
     /// The JSON result.
     pub file: LambdaFile,
+    /// The drawing, if one was asked for.
+    pub picture: Option<LambdaPlot>,
     /// How far the solution goes.
     pub status: Status,
     /// The arithmetic that was needed.
@@ -97,17 +108,26 @@ pub fn run(
     let of_all = [Some(&of_grid), chosen.as_ref(), coarser.as_ref()];
     let lowest = of_all.into_iter().flatten().map(WantedPoints::lowest_m);
     let lowest_m = lowest.fold(f64::INFINITY, f64::min);
+    let lowest_m = options
+        .feedback
+        .map_or(lowest_m, |asked| asked.lowest_m(&scene, lowest_m));
     progress.begin("steel", 1);
     let solved = steel::solve(&scene, options.tolerance, KERNEL_ERROR, lowest_m)?;
     progress.end();
     let Some(chosen) = chosen else {
         return solve(&scene, &solved, points, options, progress);
     };
-    let grid = solve_at(&scene, &solved, &of_grid, options, progress)?.file;
+    // What is asked besides is asked of the chosen points alone.
+    let plain = LambdaOptions {
+        feedback: None,
+        picture: false,
+        ..options.clone()
+    };
+    let grid = solve_at(&scene, &solved, &of_grid, &plain, progress)?.file;
     let found = solve_at(&scene, &solved, &chosen, options, progress)?;
     let mut report = found.with(points);
     if let Some(coarser) = coarser {
-        let other = solve_at(&scene, &solved, &coarser, options, progress)?.file;
+        let other = solve_at(&scene, &solved, &coarser, &plain, progress)?.file;
         let stage = quadrature(&report.file, &other);
         let stage = stage.map(|stage| ("quadrature".to_owned(), stage));
         report.file.accuracy.extend(stage);
@@ -195,6 +215,7 @@ pub(super) fn solve(
 /// A report, but for the grid.
 struct Found {
     file: LambdaFile,
+    picture: Option<LambdaPlot>,
     status: Status,
     precision: Precision,
     warnings: Vec<String>,
@@ -206,6 +227,7 @@ impl Found {
         LambdaReport {
             points,
             file: self.file,
+            picture: self.picture,
             status: self.status,
             precision: self.precision,
             warnings: self.warnings,
@@ -292,6 +314,34 @@ fn solve_at(
         let passive_n = passive_n.as_deref();
         file.variants = Some(variants::all(&given, passive_n, settings, wiring, &pairs)?);
     }
+    let mut feedback_n = Vec::new();
+    if let Some(asked) = &options.feedback {
+        let rendered = Rendering {
+            scene,
+            solved,
+            points,
+            given: &given,
+            problem: &problem,
+            wiring,
+            chosen: solution.chosen.as_ref(),
+        };
+        let told = rendered.told(asked, progress)?;
+        file.feedback = Some(told.file);
+        let stage = told.between_layers;
+        file.accuracy
+            .extend(stage.map(|stage| ("feedback_shell".to_owned(), stage)));
+        feedback_n = told.forces_n;
+    }
+    let picture = options.picture.then(|| {
+        picture::picture(Seen {
+            file: &file,
+            points,
+            problem: &problem,
+            solution: &solution,
+            feedback_n,
+            spread: &|currents| wiring.spread(currents),
+        })
+    });
     if let Some(chosen) = &solution.chosen {
         let asked = Asked {
             currents_a: &chosen.currents_a,
@@ -334,6 +384,7 @@ fn solve_at(
     }
     Ok(Found {
         file,
+        picture,
         status: solution.status,
         precision: solution.precision,
         warnings,
@@ -511,6 +562,7 @@ fn file(
         tolerance: None,
         wiring: None,
         variants: None,
+        feedback: None,
         working_point: None,
         accuracy,
     }

@@ -8,6 +8,7 @@ mod allocate;
 mod certificate;
 mod cone;
 mod criteria;
+pub mod feedback;
 mod follow;
 mod model;
 mod path;

@@ -134,7 +134,7 @@ fn readable(values: &[f64], unit: &str) -> (f64, String) {
 }
 
 /// The range of an axis, with room at both ends.
-fn extent(values: &[f64]) -> (f64, f64) {
+pub(super) fn extent(values: &[f64]) -> (f64, f64) {
     let low = values.iter().copied().fold(f64::INFINITY, f64::min);
     let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if low > high {

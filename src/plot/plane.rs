@@ -150,7 +150,7 @@ impl PlanePlot {
 }
 
 /// A range with some width.
-fn wide([low, high]: [f64; 2]) -> (f64, f64) {
+pub(super) fn wide([low, high]: [f64; 2]) -> (f64, f64) {
     if high > low {
         (low, high)
     } else {
@@ -160,7 +160,7 @@ fn wide([low, high]: [f64; 2]) -> (f64, f64) {
 }
 
 /// At most [`MOST_CELLS`] a side.
-fn rows(cells: &Cells) -> Vec<Vec<f64>> {
+pub(super) fn rows(cells: &Cells) -> Vec<Vec<f64>> {
     let columns = cells.columns.max(1);
     let rows = cells.values.len() / columns;
     let step = [columns, rows].map(|count| count.div_ceil(MOST_CELLS).max(1));
@@ -184,7 +184,7 @@ fn rows(cells: &Cells) -> Vec<Vec<f64>> {
 }
 
 /// Viridis, and white where there is nothing.
-fn colours() -> ColorMap {
+pub(super) fn colours() -> ColorMap {
     ColorMap::Custom(Arc::new(|value: f64| {
         if value.is_nan() {
             NOTHING.to_owned()

@@ -24,7 +24,7 @@ const SURFACE: &str = "#7f7f7f";
 const WANTED: &str = "#b5b5b5";
 const GIVEN: &str = "#0072b2";
 const FIXED: &str = "#d55e00";
-const COILS: [&str; 9] = [
+pub(super) const COILS: [&str; 9] = [
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#8c510a",
     "#762a83",
 ];

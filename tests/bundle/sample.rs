@@ -176,6 +176,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
         tolerance: None,
         wiring: None,
         variants: None,
+        feedback: None,
         working_point: None,
         accuracy: accuracy.clone(),
     };

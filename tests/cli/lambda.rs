@@ -4,6 +4,7 @@ use crate::support::Place;
 
 const AIR: &str = "designs/seed_air.toml";
 const WEDGE: &str = "shapes/wedge.toml";
+const FEW: &str = "few.toml";
 
 #[test]
 fn variants_are_told_beside_the_design_as_given() {
@@ -114,4 +115,159 @@ fn nothing_to_render_is_told_not_computed() {
     place.write("none.toml", &air.replace(line, "current_max_a = 0.0"));
     let ran = place.run(&["lambda", "none.toml", WEDGE]);
     assert!(ran.code.is_some_and(|code| code != 101), "{ran:?}");
+}
+
+/// The wedge by few points.
+fn few_points() -> Place {
+    let place = Place::new();
+    let wedge = String::from_utf8(place.read(WEDGE)).unwrap();
+    let wedge = wedge.replace("wedge.stl", "shapes/wedge.stl");
+    place.write("few.toml", &wedge.replace(", 61]", ", 13]"));
+    place
+}
+
+#[test]
+fn feedback_is_told_beside_static_currents() {
+    let place = few_points();
+    let base = ["lambda", AIR, FEW, "--format", "json"];
+    let told = |more: &[&str]| place.run(&[&base[..], more].concat()).ends(0).json();
+    let plain = told(&[]);
+    assert!(plain["feedback"].is_null());
+    let with = told(&["--feedback"]);
+    assert_eq!(with["lambda_n_per_m"], plain["lambda_n_per_m"]);
+    let feedback = &with["feedback"];
+    let number = |value: &serde_json::Value| value.as_f64().unwrap();
+    let largest = number(&feedback["lambda_n_per_m"]);
+    assert!(largest >= number(&with["lambda_maxmin_n_per_m"]));
+    assert!(feedback["reason"].is_null() && feedback["shell"].is_null());
+    for (here, there) in [
+        ("rms_error_n", "rms_error_n"),
+        ("worst_error_n", "worst_error_n"),
+        ("lambda_n_per_m", "lambda_n_per_m"),
+    ] {
+        assert_eq!(feedback["without"][here], with[there], "{here}");
+    }
+    let own = &feedback["at_largest"];
+    assert_eq!(
+        (
+            number(&own["rms_error_n"]),
+            number(&own["points_unreached"])
+        ),
+        (0.0, 0.0)
+    );
+    // A shell holds the surface, and a wider one the narrower: lambda only falls.
+    let mut before = largest;
+    for (length, layers) in [("1mm", 5), ("6mm", 9), ("14mm", 17)] {
+        let told = told(&["--feedback", "--shell", length]);
+        let shell = &told["feedback"]["shell"];
+        assert_eq!(number(&told["feedback"]["lambda_n_per_m"]), largest);
+        assert_eq!(shell["layers"], layers);
+        let here = number(&shell["lambda_n_per_m"]);
+        assert!(here > 0.0 && here <= before, "{length}: {here}");
+        let error = number(&told["accuracy"]["feedback_shell"]["estimate"]);
+        assert!((0.0..0.05).contains(&error), "{length}: {error}");
+        assert_eq!(shell["clipped"], 0);
+        before = here;
+    }
+    // A broken coil costs no less with feedback.
+    let broken = told(&["--feedback", "--broken", "4"]);
+    let broken = &broken["feedback"];
+    assert!(number(&broken["lambda_n_per_m"]) < largest);
+    assert_eq!(broken["at_largest"]["current_max_a"][4], 0.0);
+    // Below the workspace nothing is looked at.
+    let deep = told(&["--feedback", "--shell", "60mm"]);
+    assert!(number(&deep["feedback"]["shell"]["clipped"]) > 0.0);
+    assert_eq!(deep["feedback"]["shell"]["floor_m"], 0.01);
+    let shown = place
+        .run(&["lambda", AIR, FEW, "--feedback", "--shell", "6mm"])
+        .ends(0);
+    for words in [
+        "feedback",
+        "without, at",
+        "within 6 mm of the surface, 9 layers",
+    ] {
+        assert!(shown.out.contains(words), "{}", shown.out);
+    }
+}
+
+#[test]
+fn shells_that_cannot_be_are_refused() {
+    let place = few_points();
+    let run = |flags: &[&str]| place.run(&[&["lambda", AIR, FEW], flags].concat());
+    run(&["--feedback", "--shell", "-3mm"])
+        .ends(2)
+        .says(&["\"-3mm\" is no length", "like 0.1mm"]);
+    run(&["--feedback", "--shell", "0"])
+        .ends(2)
+        .says(&["is no length"]);
+    run(&["--shell", "14mm"]).ends(2).says(&["--feedback"]);
+    run(&["--feedback", "--shell", "3m"])
+        .ends(3)
+        .says(&["--shell 3000 mm is more than 1000 mm"]);
+}
+
+#[test]
+fn a_picture_shows_the_path_and_is_not_written_over_a_stranger() {
+    let place = few_points();
+    let plot = |shape, file, more: &[&str]| {
+        place.run(&[&["lambda", AIR, shape, "--plot", file], more].concat())
+    };
+    plot(FEW, "wedge.svg", &["--feedback"]).ends(0);
+    let svg = String::from_utf8(place.read("wedge.svg")).unwrap();
+    for words in [
+        "lambda / N/m",
+        "rms error / mN",
+        "relative to the rms force / %",
+        "I / A",
+        "coil 8",
+        "given - wanted / mN",
+        "wanted / mN",
+        "with feedback",
+        "maxmin",
+    ] {
+        assert!(svg.contains(words), "{words}");
+    }
+    assert!(svg.ends_with("</svg>") && !svg.contains("NaN"));
+    // The same inputs draw the same again; others do not replace it.
+    let few = String::from_utf8(place.read(FEW)).unwrap();
+    place.write("lifted.toml", &few.replace("30.0]", "37.0]"));
+    plot(FEW, "wedge.svg", &["--feedback"]).ends(0);
+    assert!(svg.as_bytes() == place.read("wedge.svg"));
+    plot("lifted.toml", "wedge.svg", &[])
+        .ends(4)
+        .says(&["wedge.svg", "--force"]);
+    plot("lifted.toml", "wedge.svg", &["--force"]).ends(0);
+    // On standard output the drawing stands alone.
+    let alone = plot(FEW, "-", &[]).ends(0);
+    assert!(alone.out.ends_with("</svg>") && !alone.out.contains("with feedback"));
+    // Points on no grid, and nothing to draw at all.
+    plot(FEW, "points.svg", &["--poisson", "5mm"]).ends(0);
+    let svg = String::from_utf8(place.read("points.svg")).unwrap();
+    assert!(svg.contains("(dark) to") && !svg.contains("NaN"));
+    let air = String::from_utf8(place.read(AIR)).unwrap();
+    place.write("pull.toml", &air.replace("\"repel\"", "\"attract\""));
+    let args = [
+        "lambda",
+        "pull.toml",
+        FEW,
+        "--feedback",
+        "--shell",
+        "5mm",
+        "--plot",
+        "none.svg",
+        "--format",
+        "json",
+    ];
+    let told = place.run(&args).ends(4).json();
+    // Static currents push nothing up on average; beside a coil that pulls, feedback still does.
+    let feedback = &told["feedback"];
+    assert!(feedback["without"].is_null() && feedback["at_chosen"].is_null());
+    assert!(feedback["lambda_n_per_m"].as_f64().unwrap() > 0.0);
+    let reason = feedback["shell"]["reason"].as_str().unwrap();
+    assert!(
+        reason.contains("no force in the wanted direction"),
+        "{reason}"
+    );
+    let svg = String::from_utf8(place.read("none.svg")).unwrap();
+    assert!(svg.contains("no lambda is chosen") && !svg.contains("NaN"));
 }

@@ -6,6 +6,7 @@ mod case;
 mod criteria;
 mod edges;
 mod exhaustive;
+mod feedback;
 mod oracle;
 mod power;
 mod search;

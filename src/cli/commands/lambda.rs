@@ -6,17 +6,20 @@ use clap::{Args, ValueEnum};
 
 use super::{accuracy_check, begin, describe};
 use crate::bundle::lambda_file::{
-    LambdaVariant, TolerancePoint, WiringFile, WorkingPointForces, WorstPointFile,
+    FeedbackFile, FeedbackPlace, FeedbackRendering, FeedbackShell, LambdaVariant, TolerancePoint,
+    WiringFile, WorkingPointForces, WorstPointFile,
 };
-use crate::cli::args::{SamplingFlags, SurfaceFlags, Tolerance};
+use crate::cli::args::{SamplingFlags, SurfaceFlags, Tolerance, Writing};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
+use crate::cli::pictures::write_svg;
 use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{count, force, mm, number, number_to, percent};
 use crate::cli::values::{self, FileArgument};
 use crate::design::{Design, Need};
+use crate::job::lambda::feedback::FeedbackOptions;
 use crate::job::lambda::{LambdaOptions, LambdaReport, run};
 use crate::lambda::{Criterion, Precision, Settings, Wiring};
 
@@ -36,6 +39,10 @@ use crate::lambda::{Criterion, Precision, Settings, Wiring};
      "points where the surface bends, weighted by area, and what they change"),
     ("fluxform lambda designs/seed.toml shapes/wedge.toml --variants",
      "what a broken coil, pairs in series and currents of both signs would change"),
+    ("fluxform lambda designs/seed.toml shapes/flat.toml --feedback --shell 14mm",
+     "with the finger's position known: currents of their own at every point, and 14 mm off"),
+    ("fluxform lambda designs/seed.toml shapes/wedge.toml --plot wedge.svg",
+     "error and currents over lambda, and where on the surface forces are wrong"),
     ("fluxform lambda designs/seed.toml shapes/flat.stl --unit mm --translate 0,0,50",
      "a surface given directly"),
 ]))]
@@ -50,6 +57,14 @@ pub struct Lambda {
     criterion: CriterionFlags,
     #[command(flatten)]
     wiring: WiringFlags,
+    #[command(flatten)]
+    feedback: FeedbackFlags,
+    /// Draw error and currents over lambda, the errors over the surface and force against wanted
+    /// force (SVG); `-` for standard output
+    #[arg(long, value_name = "FILE")]
+    plot: Option<FileArgument>,
+    #[command(flatten)]
+    writing: Writing,
     #[command(flatten)]
     tolerance: Tolerance,
     #[command(flatten)]
@@ -71,6 +86,19 @@ struct WiringFlags {
     /// opposite each other), broken coils
     #[arg(long)]
     variants: bool,
+}
+
+/// Currents that follow the magnet.
+#[derive(Debug, Clone, Copy, Args)]
+struct FeedbackFlags {
+    /// Also render with position feedback: at every point the currents of least power that give
+    /// its force, the largest lambda that all points can be given, and what static currents lose
+    #[arg(long)]
+    feedback: bool,
+    /// With --feedback: meet the same demand as far above and below the surface, like 14mm
+    #[arg(long, value_name = "LENGTH", requires = "feedback",
+          value_parser = values::length_with_unit, allow_hyphen_values = true)]
+    shell: Option<f64>,
 }
 
 /// How the force constant is chosen.
@@ -136,6 +164,10 @@ impl Lambda {
                 series: self.wiring.series.clone(),
             },
             variants: self.wiring.variants,
+            feedback: self.feedback.feedback.then_some(FeedbackOptions {
+                shell_m: self.feedback.shell,
+            }),
+            picture: self.plot.is_some(),
             ..self.criterion.options(self.tolerance.tolerance)
         };
         let (document, shapes) = documents::design_and_shapes(
@@ -155,8 +187,15 @@ impl Lambda {
             for warning in &report.warnings {
                 printer.warning(warning);
             }
+            let place = match (&self.plot, &report.picture) {
+                (Some(file), Some(picture)) => {
+                    let inputs = &report.file.inputs;
+                    write_svg(file, inputs, &picture.svg(), self.writing.force, printer)?
+                }
+                _ => Place::Output,
+            };
             let json = printer.with_warnings(&report.file);
-            printer.summary(Place::Output, &json, || summary(design, &report))?;
+            printer.summary(place, &json, || summary(design, &report))?;
             accuracy_check(report.accuracy_reached)?;
             if report.file.lambda_n_per_m.is_none() {
                 return Err(no_constant(&[report.file.shape.as_str()]));
@@ -208,6 +247,17 @@ fn summary(design: &Design, report: &LambdaReport) -> String {
     if let Some(point) = &file.working_point {
         sheet.line("steel", &along_the_curve(point));
     }
+    if let Some(told) = &file.feedback {
+        sheet.line("feedback", &feedback(told));
+        if let Some(found) = told.at_chosen.as_ref().or(told.at_largest.as_ref()) {
+            let shares: Vec<f64> = found.active_share.iter().map(|s| s * 100.0).collect();
+            let unit = format!("% of the points, at {} N/m", number(found.lambda_n_per_m));
+            sheet.line("active", &describe::per_coil(design, &unit, &shares, 1));
+        }
+        if let Some(shell) = &told.shell {
+            sheet.line("shell", &shell_of(shell));
+        }
+    }
     if let Some(currents) = &file.currents_a {
         sheet.line("currents", &describe::currents(design, currents));
     }
@@ -251,6 +301,82 @@ fn summary(design: &Design, report: &LambdaReport) -> String {
         sheet.raw(&table_of(variants));
     }
     sheet.finish()
+}
+
+/// What currents of their own at every point give, and static ones do not.
+fn feedback(told: &FeedbackFile) -> String {
+    let constant = largest(told.lambda_n_per_m, told.reason.as_deref(), told.decided_at);
+    let mut lines = vec![format!("lambda {constant}")];
+    lines.extend(told.at_chosen.iter().map(rendering));
+    lines.extend(told.without.iter().map(|fixed| {
+        format!(
+            "without, at {} N/m: error rms {}, worst {}\n  currents up to {} A; {} W",
+            number(fixed.lambda_n_per_m),
+            force(fixed.rms_error_n),
+            force(fixed.worst_error_n),
+            number_to(fixed.largest_current_a, 4),
+            number_to(fixed.power_w, 4)
+        )
+    }));
+    lines.extend(told.at_largest.iter().map(rendering));
+    lines.join("\n")
+}
+
+fn largest(lambda: Option<f64>, reason: Option<&str>, place: Option<FeedbackPlace>) -> String {
+    match (lambda, place) {
+        (Some(lambda), Some(place)) => {
+            let [x, y, z] = place.position_m.map(|v| number(v * 1e3));
+            format!(
+                "up to {} N/m at every place; point {} decides, at x {x}, y {y}, z {z} mm",
+                number(lambda),
+                place.point
+            )
+        }
+        _ => format!("none: {}", reason.unwrap_or("no force is wanted")),
+    }
+}
+
+fn rendering(found: &FeedbackRendering) -> String {
+    let unreached = match found.points_unreached {
+        0 => String::new(),
+        some => format!(" ({} out of reach)", count(some, "point")),
+    };
+    format!(
+        "at {} N/m: error rms {}, worst {}{unreached}\n  currents up to {} A; {} W on average, \
+         up to {} W; {} coils active on average, {} to {}",
+        number(found.lambda_n_per_m),
+        force(found.rms_error_n),
+        force(found.worst_error_n),
+        number_to(found.largest_current_a, 4),
+        number_to(found.mean_power_w, 4),
+        number_to(found.max_power_w, 4),
+        number_to(found.active_mean, 3),
+        found.active_min,
+        found.active_max
+    )
+}
+
+/// The demand above and below the surface.
+fn shell_of(shell: &FeedbackShell) -> String {
+    let clipped = match shell.clipped {
+        0 => String::new(),
+        some => format!(
+            "; {} of {} places below {} looked at there",
+            some,
+            shell.places,
+            mm(shell.floor_m)
+        ),
+    };
+    format!(
+        "within {} of the surface, {}: lambda {}{clipped}",
+        mm(shell.reach_m),
+        count(shell.layers, "layer"),
+        largest(
+            shell.lambda_n_per_m,
+            shell.reason.as_deref(),
+            shell.decided_at
+        )
+    )
 }
 
 fn wired(wiring: &WiringFile) -> String {

@@ -24,8 +24,23 @@ pub(crate) struct WantedPoints {
     pub(crate) accuracy: BTreeMap<&'static str, StageAccuracy>,
     /// All parts together, m; `None` where the surface between the points was not looked at.
     pub(crate) budget_m: Option<f64>,
+    /// Where the points lie in their grid, if they are those of one.
+    pub(super) grid: Option<GridPlaces>,
     /// What a careful person would mention.
     pub(crate) warnings: Vec<String>,
+}
+
+/// Points as places of a grid.
+#[derive(Debug, Clone)]
+pub(super) struct GridPlaces {
+    /// Grid points along x.
+    pub(super) columns: usize,
+    /// Grid points along y.
+    pub(super) rows: usize,
+    /// The ends along x and y, m.
+    pub(super) plan_m: [[f64; 2]; 2],
+    /// row * columns + column of each point.
+    pub(super) index: Vec<usize>,
 }
 
 impl WantedPoints {
@@ -40,6 +55,12 @@ impl WantedPoints {
             inputs: summary.inputs.clone(),
             accuracy: summary.accuracy.clone(),
             budget_m: summary.deviation.map(|deviation| deviation.budget_m),
+            grid: Some(GridPlaces {
+                columns: points.grid.x_m.samples,
+                rows: points.grid.y_m.samples,
+                plan_m: points.grid.plan(),
+                index: points.grid_index.clone(),
+            }),
             warnings: summary.warnings.clone(),
         }
     }
@@ -57,6 +78,7 @@ impl WantedPoints {
             inputs: summary.inputs.clone(),
             accuracy: summary.accuracy.clone(),
             budget_m: patches.then_some(budget_m),
+            grid: None,
             warnings: summary.warnings.clone(),
         }
     }
