@@ -2,6 +2,7 @@
 //!
 //! The same numbers give the same bytes.
 
+pub mod matrix;
 pub mod pareto;
 pub mod plane;
 pub mod replay;
