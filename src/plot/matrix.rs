@@ -1,5 +1,7 @@
 //! What every two of a few things have to do with each other, as coloured squares with numbers.
 
+use std::sync::Arc;
+
 use kuva::backend::svg::SvgBackend;
 use kuva::plot::{ColorMap, Heatmap};
 use kuva::render::figure::Figure;
@@ -12,6 +14,11 @@ use super::renumbered;
 const PANEL_PX: [f64; 2] = [460.0, 400.0];
 /// Height of a panel's title, px.
 const TITLE_PX: u32 = 14;
+
+/// Where there is no value.
+const NOTHING: &str = "#b5b5b5";
+/// Red, green and blue of the largest value.
+const MOST: [f64; 3] = [230.0, 120.0, 20.0];
 
 /// One matrix.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,15 +67,28 @@ impl MatrixPlot {
         let plots = vec![Plot::Heatmap(
             Heatmap::new()
                 .with_data(rows)
-                .with_color_map(ColorMap::Viridis)
-                .with_labels(self.names.clone(), self.names.clone())
+                .with_color_map(colours())
                 .with_values(),
         )];
         let layout = Layout::auto_from_plots(&plots)
             .with_title(panel.title.clone())
-            .with_title_size(TITLE_PX);
+            .with_title_size(TITLE_PX)
+            .with_x_categories(self.names.clone())
+            .with_y_categories(self.names.clone());
         (plots, layout)
     }
+}
+
+/// From white to orange, on which black numbers are read; grey where there is nothing.
+fn colours() -> ColorMap {
+    ColorMap::Custom(Arc::new(|value: f64| {
+        if value.is_nan() {
+            return NOTHING.to_owned();
+        }
+        let share = value.clamp(0.0, 1.0);
+        let mixed = MOST.map(|most| (255.0 + share * (most - 255.0)).round() as u8);
+        format!("#{:02x}{:02x}{:02x}", mixed[0], mixed[1], mixed[2])
+    }))
 }
 
 /// Two decimals: what fits into a square.
