@@ -5,9 +5,10 @@
 //! above the coils, and with position feedback, lambda h(x, y) by the currents of least power as in
 //! `replay`, zero beside the object, the nearest force where the limits bind.
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 use serde::Serialize;
-use std::collections::BTreeMap;
 
 use super::calibrate::ShapeSource;
 use super::discretize::{self, PointsReport, point_rows, points_grid};
