@@ -17,9 +17,9 @@ both as stated, in amperes with G'G, and scaled by hand: x = I/u, and for the me
 replaced by the triangular factor of a QR decomposition. The objective is always divided by its
 value at I = 0. One lambda begins at I = 0, the curve of 41 at the solution before. Tolerances are
 1e-12. What a solver returns is clipped to the limits; its error is the excess over the least one,
-relative to that, in extended precision. fluxform's own error along
-the curve is its duality gap or proof, a bound. `failed`: an exception, no claim of success, or no answer within
-the patience, which the whole curve has too; `false`: success claimed with an error above 1e-4.
+relative to that, in extended precision. fluxform's own error along the curve is its duality gap or
+proof, a bound. `failed`: an exception, no claim of success, or no answer within the patience, which
+the whole curve has too; `false`: success claimed with an error above 1e-4.
 Prints Markdown tables. One thread.
 """
 
