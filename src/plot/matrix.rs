@@ -54,7 +54,9 @@ impl MatrixPlot {
             .with_cell_size(PANEL_PX[0], PANEL_PX[1])
             .with_plots(plots)
             .with_layouts(layouts);
-        renumbered(&SvgBackend::default().render_scene(&figure.render()))
+        let svg = renumbered(&SvgBackend::default().render_scene(&figure.render()));
+        // A square without a value has no number.
+        svg.replace(">NaN<", ">-<")
     }
 
     fn panel(&self, panel: &Panel) -> (Vec<Plot>, Layout) {
