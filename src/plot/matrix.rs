@@ -76,6 +76,7 @@ impl MatrixPlot {
             .with_title(panel.title.clone())
             .with_title_size(TITLE_PX)
             .with_x_categories(self.names.clone())
+            .with_x_tick_rotate(-30.0)
             .with_y_categories(self.names.clone());
         (plots, layout)
     }
