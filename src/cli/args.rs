@@ -3,8 +3,8 @@
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::commands::{
-    calibrate, completions, discretize, evaluate, lambda, man, map, optimize, probe, replay, sweep,
-    verify,
+    calibrate, compare, completions, discretize, evaluate, lambda, man, map, optimize, probe,
+    replay, sweep, verify,
 };
 use super::{help, values};
 use crate::job::discretize::scattered::Sampling;
@@ -83,6 +83,7 @@ pub enum Command {
     Discretize(discretize::Discretize),
     Lambda(lambda::Lambda),
     Calibrate(calibrate::Calibrate),
+    Compare(compare::Compare),
     Verify(verify::Verify),
     Optimize(optimize::Optimize),
     Sweep(sweep::Sweep),

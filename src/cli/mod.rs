@@ -74,6 +74,7 @@ fn run(arguments: &Arguments, printer: &Printer) -> Result<(), Failure> {
         Command::Discretize(command) => command.run(printer),
         Command::Lambda(command) => command.run(printer),
         Command::Calibrate(command) => command.run(printer),
+        Command::Compare(command) => command.run(printer),
         Command::Verify(command) => command.run(printer),
         Command::Optimize(command) => command.run(printer),
         Command::Sweep(command) => command.run(printer),

@@ -2,6 +2,7 @@
 
 pub mod at_current;
 pub mod calibrate;
+pub mod compare;
 pub mod discretize;
 pub mod evaluate;
 pub mod lambda;

@@ -3,6 +3,7 @@
 //! The same numbers give the same bytes.
 
 pub mod lambda;
+pub mod matrix;
 pub mod pareto;
 pub mod plane;
 pub mod replay;

@@ -2,13 +2,14 @@
 
 use crate::support::Place;
 
-const COMMANDS: [&str; 11] = [
+const COMMANDS: [&str; 12] = [
     "evaluate",
     "probe",
     "map",
     "discretize",
     "lambda",
     "calibrate",
+    "compare",
     "verify",
     "replay",
     "sweep",

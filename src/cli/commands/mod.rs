@@ -1,6 +1,7 @@
 //! One file a command: its arguments, and its summary for people.
 
 pub mod calibrate;
+pub mod compare;
 pub mod completions;
 pub mod discretize;
 pub mod evaluate;

@@ -1,0 +1,287 @@
+//! `compare`: differences that are known in closed form, symmetry, limits, the command itself.
+#![allow(clippy::disallowed_methods)] // tests write their own files
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use fluxform::bundle::artefact::Input;
+use fluxform::design::{Design, Need};
+use fluxform::job::calibrate::ShapeSource;
+use fluxform::job::compare::{CompareFile, CompareOptions, Pair, run};
+use fluxform::progress::Silent;
+use fluxform::shape::document::ShapeDocument;
+use serde_json::Value;
+
+const JND: f64 = 0.07;
+const OWN: CompareOptions = CompareOptions {
+    lambda_n_per_m: None,
+    jnd: JND,
+    tolerance: None,
+};
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn design(changes: &[(&str, &str)]) -> Design {
+    let path = root().join("designs/seed_air.toml");
+    let mut text = std::fs::read_to_string(&path).unwrap();
+    for (from, to) in changes {
+        assert!(text.contains(from), "{from}");
+        text = text.replace(from, to);
+    }
+    Design::from_toml(&text, &path, Need::LAMBDA).unwrap().0
+}
+
+fn shape(name: &str, lines: &str) -> ShapeSource {
+    let grid = "[points]\nx_mm = [-50.0, 50.0, 21]\ny_mm = [-50.0, 50.0, 17]\n";
+    let text = format!("name = \"{name}\"\n{lines}\n{grid}");
+    ShapeSource {
+        document: ShapeDocument::from_toml(&text, Path::new("s.toml"))
+            .unwrap()
+            .0,
+        input: None,
+    }
+}
+
+fn flat(name: &str, height_mm: f64) -> ShapeSource {
+    let lines = format!("primitive = \"flat\"\nside_mm = 100.0\nheight_mm = {height_mm:?}");
+    shape(name, &lines)
+}
+
+fn wedge(name: &str) -> ShapeSource {
+    shape(name, "primitive = \"wedge\"")
+}
+
+fn dome(name: &str) -> ShapeSource {
+    shape(
+        name,
+        "primitive = \"half-sphere\"\nradius_mm = 37.0\nbase_mm = 30.0",
+    )
+}
+
+fn compared(design: &Design, shapes: &[ShapeSource], options: &CompareOptions) -> CompareFile {
+    let input = Input::of_bytes("design.toml", b"");
+    run(design, shapes, &input, options, &Silent).unwrap().file
+}
+
+fn numbers(pair: &Pair) -> [f64; 6] {
+    [
+        pair.static_jnd,
+        pair.feedback_jnd,
+        pair.static_rms_jnd,
+        pair.feedback_rms_jnd,
+        pair.static_felt_share,
+        pair.feedback_felt_share,
+    ]
+    .map(Option::unwrap)
+}
+
+#[test]
+fn an_object_does_not_differ_from_itself() {
+    let file = compared(&design(&[]), &[wedge("one"), wedge("other")], &OWN);
+    assert_eq!(numbers(&file.pairs[0]), [0.0; 6]);
+}
+
+#[test]
+fn the_order_does_not_matter() {
+    let design = design(&[]);
+    let ab = compared(&design, &[wedge("a"), dome("b"), flat("c", 50.0)], &OWN);
+    let ba = compared(&design, &[flat("c", 50.0), dome("b"), wedge("a")], &OWN);
+    let names: Vec<_> = ab.pairs.iter().map(|p| (&*p.a, &*p.b)).collect();
+    assert_eq!(names, [("a", "b"), ("a", "c"), ("b", "c")]);
+    for pair in &ab.pairs {
+        let same = |p: &&Pair| p.a == pair.b && p.b == pair.a;
+        let turned = ba.pairs.iter().find(same).unwrap();
+        // Sums over the two surfaces are taken in another order.
+        for (one, other) in numbers(pair).into_iter().zip(numbers(turned)) {
+            assert!((one - other).abs() <= 1e-14 * one, "{one} {other}");
+        }
+        let (here, there) = (pair.static_at.as_ref(), turned.static_at.as_ref());
+        let largest = |(a, b): (f64, f64)| (a - b).abs();
+        let of = |at: Option<&fluxform::job::compare::Place>| {
+            at.map(|at| largest((at.a_force_n, at.b_force_n))).unwrap()
+        };
+        assert!((of(here) / of(there) - 1.0).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn a_lifted_surface_is_apart_by_its_height_with_feedback() {
+    let shapes = [flat("low", 50.0), flat("high", 54.0)];
+    // 4 mm of 54 mm: where the relative difference decides.
+    let strong = CompareOptions {
+        lambda_n_per_m: Some(0.3),
+        ..OWN
+    };
+    let file = compared(&design(&[]), &shapes, &strong);
+    let expected = (54.0 - 50.0) / 54.0 / JND;
+    let pair = &file.pairs[0];
+    for found in [pair.feedback_jnd, pair.feedback_rms_jnd] {
+        assert!((found.unwrap() / expected - 1.0).abs() < 1e-12, "{pair:?}");
+    }
+    assert_eq!(pair.feedback_felt_share, Some(1.0));
+    assert!(file.shapes.iter().all(|s| s.saturated_share == Some(0.0)));
+    assert_eq!(file.criterion, "given");
+    // 4 mm at 0.13 N/m, below the smallest force that is felt: in units of that.
+    let weak = CompareOptions {
+        lambda_n_per_m: Some(0.13),
+        ..OWN
+    };
+    let file = compared(&design(&[]), &shapes, &weak);
+    let found = file.pairs[0].feedback_jnd.unwrap();
+    assert!((found / (0.13 * 4e-3 / 0.8e-3) - 1.0).abs() < 1e-12);
+    // Static currents differ too, but by what they can do, not by what is wanted.
+    let fixed = file.pairs[0].static_jnd.unwrap();
+    assert!(fixed > 0.0 && (fixed / found - 1.0).abs() > 1e-3);
+}
+
+#[test]
+fn beside_an_object_there_is_no_force_with_feedback() {
+    let file = compared(&design(&[]), &[flat("flat", 50.0), dome("dome")], &OWN);
+    let pair = &file.pairs[0];
+    assert!((pair.feedback_jnd.unwrap() * JND - 1.0).abs() < 1e-12);
+    let at = pair.feedback_at.as_ref().unwrap();
+    assert!(at.on == "flat" && at.x_m.hypot(at.y_m) > 0.037);
+    assert!(at.a_force_n > 0.0 && at.b_force_n == 0.0);
+}
+
+#[test]
+fn stronger_currents_only_lift_weak_forces_over_the_threshold() {
+    let shapes = [flat("flat", 50.0), wedge("wedge"), dome("dome")];
+    let with = |current_a: f64| {
+        let current = format!("current_max_a = {current_a:?}");
+        let total = format!("total_current_max_a = {:?}", 9.0 * current_a);
+        let design = design(&[
+            ("current_max_a = 2.0", &current),
+            ("total_current_max_a = 18.0", &total),
+            ("voltage_v = 36.0", "voltage_v = 1e9"),
+        ]);
+        compared(&design, &shapes, &OWN)
+    };
+    let [weakest, weak, usual, strong, stronger] = [1e-3, 2e-3, 2.0, 2e4, 4e4].map(with);
+    for k in 0..weak.pairs.len() {
+        let of = |file: &CompareFile| numbers(&file.pairs[k]);
+        for what in 0..4 {
+            let [weakest, weak, usual, strong, stronger] =
+                [&weakest, &weak, &usual, &strong, &stronger].map(|file| of(file)[what]);
+            // All below the threshold: proportional; all above it: no change.
+            assert!((weak / weakest / 2.0 - 1.0).abs() < 1e-9, "{k} {what}");
+            assert!((stronger / strong - 1.0).abs() < 1e-3, "{k} {what}");
+            assert!(
+                weak <= usual && usual <= strong * (1.0 + 1e-12),
+                "{k} {what}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_unpowered_steel_pulls_on_both_alike() {
+    let text = std::fs::read_to_string(root().join("designs/seed.toml")).unwrap();
+    let text = text.replace("pitch_mm = 50.0", "pitch_mm = 50.0\ncoupling = \"none\"");
+    let of = |passive: bool| {
+        let text = text.replace("[magnet]", &format!("[magnet]\npassive_force = {passive}"));
+        let design = Design::from_toml(&text, Path::new("d.toml"), Need::LAMBDA)
+            .unwrap()
+            .0;
+        let options = CompareOptions {
+            lambda_n_per_m: Some(0.7),
+            ..OWN
+        };
+        compared(&design, &[flat("low", 50.0), flat("high", 56.0)], &options)
+    };
+    let (with, without) = (of(true), of(false));
+    // What is wanted includes the pull, so feedback does not differ; static currents leave some.
+    let felt = |file: &CompareFile| file.pairs[0].feedback_jnd.unwrap();
+    assert!((felt(&with) / felt(&without) - 1.0).abs() < 1e-9);
+    let fixed = |file: &CompareFile| file.pairs[0].static_rms_jnd.unwrap();
+    assert!((fixed(&with) / fixed(&without) - 1.0).abs() > 1e-4);
+}
+
+#[test]
+fn where_nothing_can_be_rendered_nothing_is_compared() {
+    let design = design(&[("\"repel\"", "\"attract\"")]);
+    let file = compared(&design, &[wedge("a"), dome("b")], &OWN);
+    assert_eq!(file.without_constant(), ["a", "b"]);
+    assert_eq!(file.pairs[0].static_jnd, None);
+    assert_eq!(file.pairs[0].feedback_at, None);
+    assert!(!file.picture().svg().contains("NaN"));
+}
+
+#[test]
+fn the_bytes_do_not_depend_on_threads() {
+    let in_threads = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let work = || compared(&design(&[]), &[wedge("a"), dome("b")], &OWN);
+        pool.build().unwrap().install(work)
+    };
+    assert_eq!(in_threads(1), in_threads(3));
+}
+
+fn fluxform(arguments: &[&str]) -> (Option<i32>, String, String) {
+    let run = Command::new(env!("CARGO_BIN_EXE_fluxform"))
+        .args(arguments)
+        .current_dir(root())
+        .output()
+        .unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    (run.status.code(), text(run.stdout), text(run.stderr))
+}
+
+#[test]
+fn the_command_tells_draws_and_refuses() {
+    let folder = tempfile::tempdir().unwrap();
+    let svg: PathBuf = folder.path().join("apart.svg");
+    let air = "designs/seed_air.toml";
+    let two = ["shapes/flat.toml", "shapes/wedge.toml"];
+    let plot = ["--plot", svg.to_str().unwrap(), "--format", "json"];
+    let told = [&["compare", air], &two[..], &plot[..]].concat();
+    let (code, out, err) = fluxform(&told);
+    assert_eq!(code, Some(0), "{err}");
+    let json: Value = serde_json::from_str(&out).unwrap();
+    let pair = &json["pairs"][0];
+    assert_eq!((&pair["a"], &pair["b"]), (&"flat".into(), &"wedge".into()));
+    let jnd = pair["static_jnd"].as_f64().unwrap();
+    assert!(jnd > 1.0 && jnd <= 1.0 / JND);
+    let drawn = std::fs::read_to_string(&svg).unwrap();
+    assert!(drawn.contains("wedge") && drawn.contains(&format!("{jnd:.2}")));
+    // The lambdas are those of `lambda`.
+    let (_, alone, _) = fluxform(&["lambda", air, two[1], "--format", "json"]);
+    let alone: Value = serde_json::from_str(&alone).unwrap();
+    let lambda = |value: &Value| value.as_f64().unwrap();
+    let here = lambda(&json["shapes"][1]["lambda_n_per_m"]);
+    assert!((here / lambda(&alone["lambda_n_per_m"]) - 1.0).abs() < 1e-9);
+
+    let (code, ..) = fluxform(&["compare", air, two[0]]);
+    assert_eq!(code, Some(2), "one shape alone");
+    let (code, _, err) = fluxform(&["compare", air, two[0], two[0]]);
+    assert_eq!(code, Some(3));
+    assert!(err.contains("two shapes are called"), "{err}");
+    std::fs::write(&svg, "mine").unwrap();
+    assert_eq!(fluxform(&told).0, Some(4), "a file that is not ours");
+}
+
+#[test]
+fn the_confusions_are_what_the_readme_shows() {
+    let run = Command::new("python3")
+        .args(["scripts/confusion.py", env!("CARGO_BIN_EXE_fluxform")])
+        .current_dir(root())
+        .output();
+    let Ok(run) = run else {
+        #[allow(clippy::print_stderr)] // a test may tell that it was skipped
+        {
+            eprintln!("skipped: no python3");
+        }
+        return;
+    };
+    let errors = String::from_utf8(run.stderr).unwrap();
+    assert!(run.status.success(), "{errors}");
+    let readme = std::fs::read_to_string(root().join("README.md")).unwrap();
+    for part in String::from_utf8(run.stdout).unwrap().split("\n\n") {
+        assert!(
+            readme.contains(part.trim_end()),
+            "not in README.md:\n{part}"
+        );
+    }
+}
