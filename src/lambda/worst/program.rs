@@ -20,7 +20,7 @@ const STILL: f64 = 1e-14;
 const EQUAL: f64 = 1e-22;
 /// Entries of an inverse above this size amplify rounding.
 const STEEP: f64 = 1e4;
-/// Rows that are asked for before a step, at most.
+/// Rows that are asked for before a step, at most: where one more ends it, the step is taken back.
 const TWINS: usize = 4;
 /// Exchanges after which the inverse is made anew.
 const FRESH: usize = 16;
@@ -164,6 +164,7 @@ impl Program {
         };
         let mut lambda = Num::ZERO;
         let mut exchanges_here = 0;
+        let mut hasty: Option<Hasty> = None;
         let patience = 40 + 4 * self.width;
         // Far more than there are turns: it ends what rounding keeps going in circles.
         let limit = 20_000 + 1000 * self.width;
@@ -172,10 +173,9 @@ impl Program {
             let cautious = exchanges_here > patience;
             let (mut entering, mut next) = self.look(&vertex, lambda, cautious);
             // A row may turn out not to end the step, a twin of an active one: then another may.
-            for _ in 0..TWINS {
-                if entering.is_some() {
-                    break;
-                }
+            // A step without end is never taken before the last of them.
+            let mut asked = 0;
+            while entering.is_none() && (asked < TWINS || next.is_none()) {
                 let stand = Stand {
                     lambda,
                     z: &vertex.z,
@@ -185,8 +185,20 @@ impl Program {
                 if !ask(self, &stand) {
                     break;
                 }
+                asked += 1;
                 vertex.active.resize(self.rows(), false);
                 (entering, next) = self.look(&vertex, lambda, cautious);
+            }
+            // A row that the last step did not know and that is violated where it led ended it
+            // earlier.
+            if let Some(before) = hasty.take_if(|h| entering.is_some_and(|row| row >= h.rows)) {
+                (vertex, lambda) = (before.vertex, before.lambda);
+                exchanges_here = before.exchanges_here;
+                while pieces.last().is_some_and(|last| last.start > lambda) {
+                    pieces.pop();
+                }
+                vertex.active.resize(self.rows(), false);
+                continue;
             }
             if entering.is_none() {
                 let piece = vertex.piece(lambda);
@@ -199,6 +211,12 @@ impl Program {
                     return (pieces, End::Whole);
                 };
                 if step > Num::ZERO {
+                    hasty = (asked >= TWINS).then(|| Hasty {
+                        vertex: vertex.clone(),
+                        lambda,
+                        exchanges_here,
+                        rows: self.rows(),
+                    });
                     lambda += step;
                     exchanges_here = 0;
                 }
@@ -316,7 +334,17 @@ enum Exchange {
     Singular,
 }
 
+/// Where a step began before which more rows might have been asked for.
+struct Hasty {
+    vertex: Vertex,
+    lambda: Num,
+    exchanges_here: usize,
+    /// Rows that were known.
+    rows: usize,
+}
+
 /// The active rows, their matrix row by row, and its inverse column by column.
+#[derive(Clone)]
 struct Vertex {
     basis: Vec<usize>,
     active: Vec<bool>,
