@@ -410,6 +410,59 @@ fn weights_count_points_as_often_as_they_say() {
     }
 }
 
+/// Limits of a coil that is of no use made what the others can do look like rounding.
+#[test]
+fn a_useless_coil_of_wide_limits_does_not_hide_what_others_hold() {
+    for wide in [1.0, 1e10, 1e19] {
+        let case = Case {
+            forces: vec![-1.0, 0.9, -0.8, 0.7],
+            heights: vec![0.05, 0.04],
+            offset: None,
+            lower: vec![0.0; 2],
+            upper: vec![wide, 1.3],
+            total: None,
+            ohm: vec![6.0; 2],
+        };
+        let found = maxmin(&case.problem()).expect("well formed");
+        let lambda = found.expect("zero is possible").lambda_n_per_m;
+        let want = 0.7 * 1.3 / 0.04;
+        assert!((lambda / want - 1.0).abs() < 1e-13, "{wide:e}: {lambda}");
+    }
+}
+
+/// Among more points than are looked at on the way, those that are missed are found where a coil's
+/// forces are smaller than any number's inverse.
+#[test]
+fn forces_without_an_inverse_do_not_hide_missed_points() {
+    let mut numbers = Numbers(7);
+    let points = 10_000;
+    let mut forces = Vec::new();
+    for j in 0..points {
+        // A dip that the sample steps over.
+        let force = if j == 7000 {
+            0.4
+        } else {
+            0.7 + 0.01 * numbers.unit()
+        };
+        forces.extend([force, 1e-310 * numbers.unit()]);
+    }
+    let case = Case {
+        forces,
+        heights: vec![0.05; points],
+        offset: None,
+        lower: vec![0.0; 2],
+        upper: vec![1.3, 0.9],
+        total: None,
+        ohm: vec![6.0; 2],
+    };
+    let solution = solved(&case);
+    assert!(solution.complete);
+    let point = solution.at(&case.problem(), 3.0);
+    let told = solution.path.worst_error_n(3.0);
+    assert!((point.worst_error_n - told).abs() < 1e-14, "{told}");
+    assert!(point.active.iter().any(|active| active.point == 7000));
+}
+
 /// A 3 x 3 array under a surface that rises with x, symmetric in y up to rounding; every point as
 /// often as `copies` says, the same up to rounding.
 fn twins(numbers: &mut Numbers, size: f64, copies: usize) -> Case {

@@ -11,7 +11,7 @@ use crate::lambda::problem::ForceProblem;
 use crate::lambda::reduce::{exponent_of, times_power};
 
 /// What rounding leaves of a scaled current, or force per ampere, of zero.
-const NOTHING: f64 = 1e-24;
+pub(super) const NOTHING: f64 = 1e-24;
 
 /// Which rows a point contributes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
