@@ -436,7 +436,7 @@ fn a_useless_coil_of_wide_limits_does_not_hide_what_others_hold() {
 fn forces_without_an_inverse_do_not_hide_missed_points() {
     let mut numbers = Numbers(7);
     let points = 10_000;
-    let mut forces = Vec::new();
+    let (mut forces, mut offset) = (Vec::new(), Vec::new());
     for j in 0..points {
         // A dip that the sample steps over.
         let force = if j == 7000 {
@@ -445,11 +445,12 @@ fn forces_without_an_inverse_do_not_hide_missed_points() {
             0.7 + 0.01 * numbers.unit()
         };
         forces.extend([force, 1e-310 * numbers.unit()]);
+        offset.push(-0.1 - 0.02 * numbers.unit());
     }
     let case = Case {
         forces,
         heights: vec![0.05; points],
-        offset: None,
+        offset: Some(offset),
         lower: vec![0.0; 2],
         upper: vec![1.3, 0.9],
         total: None,
