@@ -538,6 +538,44 @@ fn more_twins_than_are_asked_for_do_not_hide_the_one_missed_next() {
     }
 }
 
+/// Points of an exactly symmetric array make rows that depend on each other but for rounding: the
+/// path must not end where one of them gives way to another.
+#[test]
+fn a_symmetric_array_is_followed_past_rows_that_depend_on_each_other() {
+    let mut numbers = Numbers(17);
+    for round in 0..60 {
+        let pitch = numbers.between(0.03, 0.06);
+        let bump = 0.02 * numbers.unit();
+        let half = 1.6 * pitch;
+        let (mut forces, mut heights, mut offset) = (Vec::new(), Vec::new(), Vec::new());
+        for (i, j) in (0..361).map(|k| (k % 19, k / 19)) {
+            let [x, y] = [i, j].map(|i| half * (f64::from(i) / 9.0 - 1.0));
+            let z = 0.03 + bump * (-(x * x + y * y) / (half * half)).exp();
+            let mut pull = 0.0;
+            for coil in 0..16 {
+                let dx = x - pitch * (f64::from(coil % 4) - 1.5);
+                let dy = y - pitch * (f64::from(coil / 4) - 1.5);
+                let away = dx * dx + dy * dy + z * z;
+                let force = (2.0 * z * z - 3.0 * (dx * dx + dy * dy)) * z / away.powf(3.5);
+                forces.push(force * 2e-6);
+                pull += force.abs() * 1e-8;
+            }
+            heights.push(z);
+            offset.push(-pull);
+        }
+        let case = Case {
+            forces,
+            heights,
+            offset: Some(offset),
+            lower: vec![0.0; 16],
+            upper: vec![2.0; 16],
+            total: None,
+            ohm: vec![6.0; 16],
+        };
+        assert_whole(&case, 2, &format!("{round}"));
+    }
+}
+
 /// A coil that may pull costs nothing, but cannot meet the highest point if it has next to no force
 /// there: the path could not begin, and asking it anything panicked.
 #[test]

@@ -18,6 +18,8 @@ const MET_AT_ZERO: f64 = 1e-26;
 const STILL: f64 = 1e-14;
 /// Multipliers, and pivots, that differ by less are equal, or none.
 const EQUAL: f64 = 1e-22;
+/// Pivots that are taken where a smaller one leaves rows that depend on each other.
+const SOUND: f64 = 1e-12;
 /// Entries of an inverse above this size amplify rounding.
 const STEEP: f64 = 1e4;
 /// Rows that are asked for before a step, at most: where one more ends it, the step is taken back.
@@ -460,21 +462,37 @@ impl Vertex {
     fn exchange(&mut self, program: &Program, entering: usize, cautious: bool) -> Exchange {
         let row = program.coefficients(entering);
         let share = self.solve_transposed(&row);
-        let Some(k) = self.leaving(program, &share, cautious) else {
-            return Exchange::Impossible;
-        };
+        for least in [EQUAL, SOUND] {
+            match self.leaving(program, &share, least, cautious) {
+                Some(k) if self.replace(k, entering, &row, &share) => return Exchange::Done,
+                None if least == EQUAL => return Exchange::Impossible,
+                _ => {}
+            }
+        }
+        Exchange::Singular
+    }
+
+    /// Makes row `entering` active in place `k`; false, with nothing changed, where the rows then
+    /// depend on each other.
+    fn replace(&mut self, k: usize, entering: usize, row: &[Num], share: &[Num]) -> bool {
         let pivot = share[k];
-        self.active[self.basis[k]] = false;
+        let (leaving, old) = (
+            self.basis[k],
+            std::mem::replace(&mut self.matrix[k], row.to_vec()),
+        );
+        self.active[leaving] = false;
         self.active[entering] = true;
         self.basis[k] = entering;
-        self.matrix[k] = row;
         self.exchanges += 1;
         if self.exchanges.is_multiple_of(FRESH) || pivot.to_f64() < 1e-4 || self.steep {
-            return if self.renew() {
-                Exchange::Done
-            } else {
-                Exchange::Singular
-            };
+            if self.renew() {
+                return true;
+            }
+            self.active[entering] = false;
+            self.active[leaving] = true;
+            self.basis[k] = leaving;
+            self.matrix[k] = old;
+            return false;
         }
         let mut column = std::mem::take(&mut self.inverse[k]);
         for value in &mut column {
@@ -487,11 +505,18 @@ impl Vertex {
         }
         self.inverse[k] = column;
         self.weigh();
-        Exchange::Done
+        true
     }
 
-    /// Place in the basis of the row that gives way to one with the given shares.
-    fn leaving(&self, program: &Program, share: &[Num], cautious: bool) -> Option<usize> {
+    /// Place in the basis of the row that gives way to one with the given shares, of those above
+    /// `least`.
+    fn leaving(
+        &self,
+        program: &Program,
+        share: &[Num],
+        least: f64,
+        cautious: bool,
+    ) -> Option<usize> {
         let multipliers = self.multipliers();
         let second = self.solve_transposed(&program.second);
         let ratios = |values: &[Num]| -> Vec<Num> {
@@ -502,9 +527,11 @@ impl Vertex {
                 .collect()
         };
         let equal = Num::of(EQUAL);
-        let candidates: Vec<usize> = (0..share.len()).filter(|&k| share[k] > equal).collect();
+        let candidates: Vec<usize> = (0..share.len())
+            .filter(|&k| share[k] > Num::of(least))
+            .collect();
         // The smallest ratio, then among those equal to it the smallest second one, and so on.
-        let least = |among: Vec<usize>, values: &[Num]| -> Vec<usize> {
+        let smallest = |among: Vec<usize>, values: &[Num]| -> Vec<usize> {
             let ratio = ratios(values);
             let Some(best) = among
                 .iter()
@@ -517,9 +544,9 @@ impl Vertex {
             let close = |&k: &usize| (ratio[k] - ratio[best]) * share[k] <= equal;
             among.into_iter().filter(close).collect()
         };
-        let mut left = least(candidates, &multipliers);
+        let mut left = smallest(candidates, &multipliers);
         if !cautious {
-            left = least(left, &second);
+            left = smallest(left, &second);
             return left
                 .into_iter()
                 .reduce(|a, b| if share[b] > share[a] { b } else { a });
