@@ -384,6 +384,8 @@ static int load_all(fluxform_bundle *b, const archive *a)
     if (load_rendering(b, a))
         return -1;
     b->has_total_current_max = load_scalar(a, "total_current_max_a", &b->total_current_max_a);
+    if (b->has_total_current_max > 0 && b->total_current_max_a < 0)
+        return fail(a, "total_current_max_a", "must be 0 or more");
     b->has_lambda = load_scalar(a, "lambda_n_per_m", &b->lambda_n_per_m);
     return b->has_total_current_max < 0 || b->has_lambda < 0 ? -1 : 0;
 }

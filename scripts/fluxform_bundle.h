@@ -90,8 +90,8 @@ int fluxform_passive_force(const fluxform_bundle *bundle, double x_m, double y_m
 int fluxform_height(const fluxform_bundle *bundle, double x_m, double y_m, double *height);
 
 /* The currents [A] of least power that give wanted_n for the forces per ampere given, within the
- * limits of every current and of their sum (equation 8), or the nearest force. Returns FLUXFORM_OK
- * or FLUXFORM_SATURATED. */
+ * limits of every current and of their sum (equation 8), or the nearest force; none for a force that
+ * is no number. Returns FLUXFORM_OK or FLUXFORM_SATURATED. */
 int fluxform_allocate(fluxform_bundle *bundle, const double *force_per_ampere, double wanted_n, double *currents);
 
 /* The currents [A] to command at a position in m, coil_count numbers; `step` may be NULL. Returns

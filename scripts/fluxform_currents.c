@@ -333,7 +333,7 @@ int fluxform_allocate(fluxform_bundle *b, const double *force_per_ampere, double
         currents[i] = 0;
         scale = fabs(force_per_ampere[i]) > scale ? fabs(force_per_ampere[i]) : scale;
     }
-    if (wanted == 0 || !b->scratch || !isfinite(1 / scale))
+    if (wanted == 0 || isnan(wanted) || !b->scratch || !isfinite(1 / scale))
         return wanted == 0 ? FLUXFORM_OK : FLUXFORM_SATURATED;
     if (wanted < 0)
         scale = -scale;

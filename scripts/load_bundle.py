@@ -314,7 +314,7 @@ def _largest(row, r, lower, upper, total):
 
 def _allocate(force_per_ampere, wanted, r, lower, upper, total):
     scale = np.max(np.abs(force_per_ampere), initial=0.0)
-    if wanted == 0 or scale == 0 or not np.isfinite(1 / scale):
+    if wanted == 0 or np.isnan(wanted) or scale == 0 or not np.isfinite(1 / scale):
         return np.zeros(len(r)), wanted == 0
     scale = -scale if wanted < 0 else scale
     row = force_per_ampere / scale

@@ -130,7 +130,8 @@ impl Allocator {
     }
 
     /// Writes the currents (A) of least power whose force is `wanted_n`, or the nearest within the
-    /// limits, for the forces per ampere given (N/A, finite).
+    /// limits, for the forces per ampere given (N/A, finite). What is no number is beyond reach, and
+    /// no current flows.
     ///
     /// Error: the force is met and the sum kept within 1e-14 of the sums of their terms' sizes;
     /// [`Allocator::certificate`] measures it.
@@ -148,7 +149,7 @@ impl Allocator {
         let largest = given.iter().fold(0.0_f64, |most, g| most.max(g.abs()));
         let scale = if wanted_n < 0.0 { -largest } else { largest };
         let inverse = 1.0 / scale;
-        if wanted_n == 0.0 || !inverse.is_finite() {
+        if wanted_n == 0.0 || wanted_n.is_nan() || !inverse.is_finite() {
             currents.fill(0.0);
             let reach = if wanted_n == 0.0 {
                 Reach::Reached

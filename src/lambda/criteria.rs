@@ -19,6 +19,39 @@ pub(super) struct Comparison<'a> {
     pub mean_square: Num,
 }
 
+/// A stretch on which neither of two paths turns: its ends, and the piece of each path.
+pub(super) struct Overlap {
+    pub start: Num,
+    /// `None`: there is no end.
+    pub end: Option<Num>,
+    pub pieces: [usize; 2],
+}
+
+/// The stretches between the starts of the pieces of either path; both begin at zero.
+pub(super) fn overlaps<P>(a: &[P], b: &[P], start_of: impl Fn(&P) -> Num) -> Vec<Overlap> {
+    let (mut i, mut k) = (0, 0);
+    let mut start = Num::ZERO;
+    let mut all = Vec::new();
+    loop {
+        let (next_a, next_b) = (a.get(i + 1).map(&start_of), b.get(k + 1).map(&start_of));
+        let end = match (next_a, next_b) {
+            (Some(x), Some(y)) => Some(x.smaller(y)),
+            (x, y) => x.or(y),
+        };
+        all.push(Overlap {
+            start,
+            end,
+            pieces: [i, k],
+        });
+        let Some(end) = end else {
+            return all;
+        };
+        i += usize::from(next_a == Some(end));
+        k += usize::from(next_b == Some(end));
+        start = end;
+    }
+}
+
 /// On one stretch between breakpoints of either path.
 struct Stretch<'a> {
     start: Num,
@@ -50,29 +83,15 @@ impl Stretch<'_> {
 
 impl<'a> Comparison<'a> {
     fn stretches(&self) -> Vec<Stretch<'a>> {
-        let (mut i, mut k) = (0, 0);
         let (a, b) = (&self.limited.pieces, &self.unlimited.pieces);
-        let mut start = Num::ZERO;
-        let mut all = Vec::new();
-        loop {
-            let (next_a, next_b) = (a.get(i + 1).map(|p| p.start), b.get(k + 1).map(|p| p.start));
-            let end = match (next_a, next_b) {
-                (Some(x), Some(y)) => Some(x.smaller(y)),
-                (x, y) => x.or(y),
-            };
-            all.push(Stretch {
-                start,
-                end,
-                limited: &a[i],
-                unlimited: &b[k],
-            });
-            let Some(end) = end else {
-                return all;
-            };
-            i += usize::from(next_a == Some(end));
-            k += usize::from(next_b == Some(end));
-            start = end;
-        }
+        let stretch = |overlap: Overlap| Stretch {
+            start: overlap.start,
+            end: overlap.end,
+            limited: &a[overlap.pieces[0]],
+            unlimited: &b[overlap.pieces[1]],
+        };
+        let all = overlaps(a, b, |piece: &Piece| piece.start);
+        all.into_iter().map(stretch).collect()
     }
 
     /// Where the first limit binds, if the unlimited currents are unique: the first lambda at

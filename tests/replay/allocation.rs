@@ -372,6 +372,20 @@ fn the_answer_scales_with_units_and_turns_with_the_sign() {
 }
 
 #[test]
+fn a_force_that_is_no_number_is_not_reached() {
+    let problem = Problem {
+        force_n_per_a: vec![0.13, -0.02],
+        resistance_ohm: vec![6.07, 7.1],
+        lower_a: vec![-0.3; 2],
+        upper_a: vec![2.0; 2],
+        total_a: Some(2.6),
+        wanted_n: f64::NAN,
+    };
+    let (currents, found, _) = problem.solve();
+    assert_eq!((found.reach, currents), (Reach::Saturated, vec![0.0; 2]));
+}
+
+#[test]
 fn limits_that_no_array_has_are_refused() {
     let refused = |r: &[f64], l: &[f64], u: &[f64], total| {
         Allocator::new(r, l, u, total).expect_err("outside the domain")

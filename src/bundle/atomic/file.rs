@@ -121,6 +121,17 @@ impl FileSet {
         self.overwrite.check(&target)?;
         // A link is followed: the file it leads to is replaced, not the link.
         let target = target.canonicalize().unwrap_or(target);
+        let place = place(&target);
+        if self
+            .staged
+            .iter()
+            .any(|(_, other)| self::place(other) == place)
+        {
+            return Err(WriteError::Content {
+                path: target,
+                message: "another file of this command has that name; choose another".to_owned(),
+            });
+        }
         let beside = beside(&target, &self.folder);
         let fail = |error| WriteError::from_io("write", &target, error);
         let mut file = temporary_file(beside).map_err(fail)?;
@@ -149,6 +160,15 @@ impl FileSet {
             sync_folder(&folder).map_err(|error| WriteError::from_io("write", &folder, error))?;
         }
         Ok(())
+    }
+}
+
+/// Where `target` is, however it is spelt.
+fn place(target: &Path) -> PathBuf {
+    let folder = beside(target, Path::new(".")).canonicalize();
+    match (folder, target.file_name()) {
+        (Ok(folder), Some(name)) => folder.join(name),
+        _ => target.to_path_buf(),
     }
 }
 
@@ -244,4 +264,33 @@ pub(super) fn sync_folder(folder: &Path) -> io::Result<()> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_file_spelt_in_two_ways_is_not_written_twice() {
+        let folder = tempfile::tempdir().unwrap();
+        let inner = folder.path().join("inner");
+        let overwrite = Overwrite::new(false, folder.path().join("map.json"), &[]);
+        let mut set = FileSet::begin(&inner, overwrite).unwrap();
+        set.write_at(&inner.join("a.yaml"), |out| out.write_all(b"nodes"))
+            .unwrap();
+        let again = folder.path().join("inner/../inner/a.yaml");
+        let refused = set.write_at(&again, |out| out.write_all(b"sources"));
+        let told = refused.unwrap_err().to_string();
+        assert!(told.contains("another file of this command"), "{told}");
+        set.write_at(&folder.path().join("a.yaml"), |out| {
+            out.write_all(b"sources")
+        })
+        .unwrap();
+        set.commit().unwrap();
+        assert_eq!(std::fs::read(inner.join("a.yaml")).unwrap(), b"nodes");
+        assert_eq!(
+            std::fs::read(folder.path().join("a.yaml")).unwrap(),
+            b"sources"
+        );
+    }
 }

@@ -16,25 +16,37 @@ fn inside(ends_m: &[[f64; 2]; 3], position: [f64; 3]) -> bool {
     axes.all(|([from, to], value)| *from <= value && value <= *to)
 }
 
-fn share(trajectory: &Trajectory, ends_m: &[[f64; 2]; 3], factor: f64) -> f64 {
-    let positions = trajectory.position_m.iter();
-    let count = positions
-        .filter(|p| inside(ends_m, p.map(|v| v * factor)))
-        .count();
-    count as f64 / trajectory.len().max(1) as f64
+/// The number of positions for which that holds.
+fn count(trajectory: &Trajectory, holds: impl Fn([f64; 3]) -> bool) -> usize {
+    trajectory.position_m.iter().filter(|p| holds(**p)).count()
+}
+
+/// Whether a position is metres away, and inside if it is in millimetres.
+fn milli(ends_m: &[[f64; 2]; 3], position: [f64; 3]) -> bool {
+    let far = position.iter().any(|value| value.abs() > 1.0);
+    far && inside(ends_m, position.map(|value| value * MILLI))
 }
 
 /// Whether no position lies within `ends_m` (x, y, z, m) but most would in millimetres.
 #[must_use]
 pub fn in_millimetres(trajectory: &Trajectory, ends_m: &[[f64; 2]; 3]) -> bool {
-    share(trajectory, ends_m, 1.0) == 0.0 && share(trajectory, ends_m, MILLI) > 0.5
+    let none = count(trajectory, |p| inside(ends_m, p)) == 0;
+    none && 2 * count(trajectory, |p| milli(ends_m, p)) > trajectory.len()
 }
 
 /// What is worth a warning.
 #[must_use]
 pub fn warnings(trajectory: &Trajectory, ends_m: &[[f64; 2]; 3]) -> Vec<String> {
     let mut told = Vec::new();
-    if share(trajectory, ends_m, 1.0) == 0.0 {
+    let milli = count(trajectory, |p| milli(ends_m, p));
+    if milli > 0 {
+        told.push(format!(
+            "{milli} of {} positions lie metres away, but inside the map if they are in millimetres: \
+             x_m, y_m and z_m must be in metres",
+            trajectory.len()
+        ));
+    }
+    if count(trajectory, |p| inside(ends_m, p)) == 0 {
         let micrometre = |m: f64| (m * 1e6).round() / 1e3;
         let mm = ends_m
             .map(|ends| ends.map(micrometre))
@@ -97,6 +109,20 @@ mod tests {
             outside[0].contains("no position lies inside the map"),
             "{outside:?}"
         );
+        // Some rows alone.
+        let mut mixed = trajectory(&even, 1.0);
+        mixed.position_m[7] = [12.0, -20.0, 50.0];
+        assert!(!in_millimetres(&mixed, &BOX));
+        let told = warnings(&mixed, &BOX);
+        assert!(
+            told.len() == 1 && told[0].starts_with("1 of 40 positions lie metres away"),
+            "{told:?}"
+        );
+        // Beside a map that reaches down to z = 0, a thousandth of anything near lies inside.
+        let low = [BOX[0], BOX[1], [0.0, 0.07]];
+        let mut beside = trajectory(&even, 1.0);
+        beside.position_m.iter_mut().for_each(|p| p[0] = 0.3);
+        assert!(!in_millimetres(&beside, &low));
         let mut late = even.clone();
         late[30..].iter_mut().for_each(|t| *t += 0.19);
         let told = warnings(&trajectory(&late, 1.0), &BOX);

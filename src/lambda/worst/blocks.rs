@@ -74,8 +74,8 @@ impl Kernel for Enclose<'_> {
         let points = self.points;
         let n = points.coils + 1 + usize::from(points.offset_n.is_some());
         let size = |d: usize| {
-            let largest = self.largest[d];
-            if largest > 0.0 { 1.0 / largest } else { 0.0 }
+            let inverse = 1.0 / self.largest[d];
+            if inverse.is_finite() { inverse } else { 0.0 }
         };
         let mut row = vec![0.0; n];
         let mut towards = vec![0.0; n];

@@ -1,6 +1,7 @@
 //! The worst-point force constants on two followed paths, in scaled units.
 
 use super::program::Piece;
+use crate::lambda::criteria::{Overlap, overlaps};
 use crate::numerics::double_double::DoubleDouble as Num;
 use crate::numerics::real::Real;
 
@@ -30,35 +31,24 @@ fn last(z: &[Num]) -> Num {
 }
 
 /// Error of a path's piece at `lambda`.
-pub(super) fn error_at(piece: &Piece, lambda: Num) -> Num {
+fn error_at(piece: &Piece, lambda: Num) -> Num {
     last(&piece.z) + (lambda - piece.start) * last(&piece.rate)
 }
 
 impl Comparison<'_> {
     fn stretches(&self) -> Vec<Stretch> {
         let (a, b) = (self.limited, self.unlimited);
-        let (mut i, mut k) = (0, 0);
-        let mut start = Num::ZERO;
-        let mut all = Vec::new();
-        loop {
-            let (next_a, next_b) = (a.get(i + 1).map(|p| p.start), b.get(k + 1).map(|p| p.start));
-            let end = match (next_a, next_b) {
-                (Some(x), Some(y)) => Some(x.smaller(y)),
-                (x, y) => x.or(y),
-            };
-            all.push(Stretch {
+        let stretch = |overlap: Overlap| {
+            let ([i, k], start) = (overlap.pieces, overlap.start);
+            Stretch {
                 start,
-                end,
+                end: overlap.end,
                 excess: error_at(&a[i], start) - error_at(&b[k], start),
                 rate: last(&a[i].rate) - last(&b[k].rate),
-            });
-            let Some(end) = end else {
-                return all;
-            };
-            i += usize::from(next_a == Some(end));
-            k += usize::from(next_b == Some(end));
-            start = end;
-        }
+            }
+        };
+        let all = overlaps(a, b, |piece: &Piece| piece.start);
+        all.into_iter().map(stretch).collect()
     }
 
     /// Where t* leaves t_0.

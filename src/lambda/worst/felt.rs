@@ -6,8 +6,8 @@
 //! its solution keeps within it too, and it is not below `lambda_k`. The terms chosen at the
 //! solution give the next program; where they no longer raise lambda, nothing just above it is
 //! within the tolerances. There are as many programs as lambdas at which a choice changes, at
-//! most. All lambdas from zero to the result are within the tolerances; without an offset no
-//! lambda above it is.
+//! most. Where lambda = 0 is within the tolerances, as it is without an offset, all lambdas from
+//! there to the result are; without an offset no lambda above it is.
 
 use super::maxmin::{Maxmin, largest};
 use crate::lambda::problem::{ForceProblem, ProblemError, Settings};
@@ -33,7 +33,7 @@ pub struct Felt {
 
 /// The largest lambda up to which currents within the limits keep every point's error within
 /// `max(share lambda h, threshold_n)`. `None` where there is no largest one (`share >= 1`, or no
-/// height above zero), and where not even `lambda = 0` is within the tolerances.
+/// height above zero), and where errors cannot all be kept within `threshold_n` at any lambda.
 ///
 /// # Errors
 /// Where the problem is malformed.

@@ -2,7 +2,7 @@
 
 use super::generate::Search;
 use super::program::End;
-use super::scaled::{Form, Limits, Scaled};
+use super::scaled::{Form, Limits, NOTHING, Scaled};
 use crate::lambda::problem::{ForceProblem, ProblemError, Settings};
 use crate::lambda::reduce::{largest_entries, times_power};
 use crate::numerics::real::Real;
@@ -37,9 +37,11 @@ pub(in crate::lambda) fn largest(problem: &ForceProblem, entries: &[f64]) -> Opt
         return None;
     }
     let piece = followed.pieces.last()?;
-    let lambda = -piece.z[piece.z.len() - 1].to_f64();
-    // Rounding may turn zero round.
-    let lambda = if lambda.abs() <= f64::EPSILON {
+    let (currents, last) = piece.z.split_at(piece.z.len() - 1);
+    let lambda = -last[0].to_f64();
+    // Rounding of the forces that flow may turn zero round.
+    let flowing: f64 = currents.iter().map(|x| x.to_f64().abs()).sum();
+    let lambda = if lambda.abs() <= f64::EPSILON * flowing + NOTHING {
         0.0
     } else {
         lambda

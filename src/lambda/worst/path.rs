@@ -85,6 +85,17 @@ impl WorstPath {
                 .map(|&r| times_power(r, -scaled.lambda_unit()))
                 .collect();
         }
+        if turns.is_empty() {
+            // Nothing could be followed: without currents errors are no larger than this.
+            last_slope_m = scaled.height_m();
+            turns.push(Turn {
+                lambda_n_per_m: 0.0,
+                worst_error_n: scaled.offset_n(),
+                currents_a: vec![0.0; problem.coils()],
+                active: Vec::new(),
+                events: Vec::new(),
+            });
+        }
         let mut path = Self {
             turns,
             last_slope_m,

@@ -18,9 +18,11 @@ const MET_AT_ZERO: f64 = 1e-26;
 const STILL: f64 = 1e-14;
 /// Multipliers, and pivots, that differ by less are equal, or none.
 const EQUAL: f64 = 1e-22;
+/// Pivots that are taken where a smaller one leaves rows that depend on each other.
+const SOUND: f64 = 1e-12;
 /// Entries of an inverse above this size amplify rounding.
 const STEEP: f64 = 1e4;
-/// Rows that are asked for before a step, at most.
+/// Rows that are asked for before a step, at most: where one more ends it, the step is taken back.
 const TWINS: usize = 4;
 /// Exchanges after which the inverse is made anew.
 const FRESH: usize = 16;
@@ -164,6 +166,7 @@ impl Program {
         };
         let mut lambda = Num::ZERO;
         let mut exchanges_here = 0;
+        let mut hasty: Option<Hasty> = None;
         let patience = 40 + 4 * self.width;
         // Far more than there are turns: it ends what rounding keeps going in circles.
         let limit = 20_000 + 1000 * self.width;
@@ -172,10 +175,9 @@ impl Program {
             let cautious = exchanges_here > patience;
             let (mut entering, mut next) = self.look(&vertex, lambda, cautious);
             // A row may turn out not to end the step, a twin of an active one: then another may.
-            for _ in 0..TWINS {
-                if entering.is_some() {
-                    break;
-                }
+            // A step without end is never taken before the last of them.
+            let mut asked = 0;
+            while entering.is_none() && (asked < TWINS || next.is_none()) {
                 let stand = Stand {
                     lambda,
                     z: &vertex.z,
@@ -185,8 +187,20 @@ impl Program {
                 if !ask(self, &stand) {
                     break;
                 }
+                asked += 1;
                 vertex.active.resize(self.rows(), false);
                 (entering, next) = self.look(&vertex, lambda, cautious);
+            }
+            // A row that the last step did not know and that is violated where it led ended it
+            // earlier.
+            if let Some(before) = hasty.take_if(|h| entering.is_some_and(|row| row >= h.rows)) {
+                (vertex, lambda) = (before.vertex, before.lambda);
+                exchanges_here = before.exchanges_here;
+                while pieces.last().is_some_and(|last| last.start > lambda) {
+                    pieces.pop();
+                }
+                vertex.active.resize(self.rows(), false);
+                continue;
             }
             if entering.is_none() {
                 let piece = vertex.piece(lambda);
@@ -199,6 +213,12 @@ impl Program {
                     return (pieces, End::Whole);
                 };
                 if step > Num::ZERO {
+                    hasty = (asked >= TWINS).then(|| Hasty {
+                        vertex: vertex.clone(),
+                        lambda,
+                        exchanges_here,
+                        rows: self.rows(),
+                    });
                     lambda += step;
                     exchanges_here = 0;
                 }
@@ -316,7 +336,17 @@ enum Exchange {
     Singular,
 }
 
+/// Where a step began before which more rows might have been asked for.
+struct Hasty {
+    vertex: Vertex,
+    lambda: Num,
+    exchanges_here: usize,
+    /// Rows that were known.
+    rows: usize,
+}
+
 /// The active rows, their matrix row by row, and its inverse column by column.
+#[derive(Clone)]
 struct Vertex {
     basis: Vec<usize>,
     active: Vec<bool>,
@@ -432,21 +462,37 @@ impl Vertex {
     fn exchange(&mut self, program: &Program, entering: usize, cautious: bool) -> Exchange {
         let row = program.coefficients(entering);
         let share = self.solve_transposed(&row);
-        let Some(k) = self.leaving(program, &share, cautious) else {
-            return Exchange::Impossible;
-        };
+        for least in [EQUAL, SOUND] {
+            match self.leaving(program, &share, least, cautious) {
+                Some(k) if self.replace(k, entering, &row, &share) => return Exchange::Done,
+                None if least == EQUAL => return Exchange::Impossible,
+                _ => {}
+            }
+        }
+        Exchange::Singular
+    }
+
+    /// Makes row `entering` active in place `k`; false, with nothing changed, where the rows then
+    /// depend on each other.
+    fn replace(&mut self, k: usize, entering: usize, row: &[Num], share: &[Num]) -> bool {
         let pivot = share[k];
-        self.active[self.basis[k]] = false;
+        let (leaving, old) = (
+            self.basis[k],
+            std::mem::replace(&mut self.matrix[k], row.to_vec()),
+        );
+        self.active[leaving] = false;
         self.active[entering] = true;
         self.basis[k] = entering;
-        self.matrix[k] = row;
         self.exchanges += 1;
         if self.exchanges.is_multiple_of(FRESH) || pivot.to_f64() < 1e-4 || self.steep {
-            return if self.renew() {
-                Exchange::Done
-            } else {
-                Exchange::Singular
-            };
+            if self.renew() {
+                return true;
+            }
+            self.active[entering] = false;
+            self.active[leaving] = true;
+            self.basis[k] = leaving;
+            self.matrix[k] = old;
+            return false;
         }
         let mut column = std::mem::take(&mut self.inverse[k]);
         for value in &mut column {
@@ -459,11 +505,18 @@ impl Vertex {
         }
         self.inverse[k] = column;
         self.weigh();
-        Exchange::Done
+        true
     }
 
-    /// Place in the basis of the row that gives way to one with the given shares.
-    fn leaving(&self, program: &Program, share: &[Num], cautious: bool) -> Option<usize> {
+    /// Place in the basis of the row that gives way to one with the given shares, of those above
+    /// `least`.
+    fn leaving(
+        &self,
+        program: &Program,
+        share: &[Num],
+        least: f64,
+        cautious: bool,
+    ) -> Option<usize> {
         let multipliers = self.multipliers();
         let second = self.solve_transposed(&program.second);
         let ratios = |values: &[Num]| -> Vec<Num> {
@@ -474,9 +527,11 @@ impl Vertex {
                 .collect()
         };
         let equal = Num::of(EQUAL);
-        let candidates: Vec<usize> = (0..share.len()).filter(|&k| share[k] > equal).collect();
+        let candidates: Vec<usize> = (0..share.len())
+            .filter(|&k| share[k] > Num::of(least))
+            .collect();
         // The smallest ratio, then among those equal to it the smallest second one, and so on.
-        let least = |among: Vec<usize>, values: &[Num]| -> Vec<usize> {
+        let smallest = |among: Vec<usize>, values: &[Num]| -> Vec<usize> {
             let ratio = ratios(values);
             let Some(best) = among
                 .iter()
@@ -489,9 +544,9 @@ impl Vertex {
             let close = |&k: &usize| (ratio[k] - ratio[best]) * share[k] <= equal;
             among.into_iter().filter(close).collect()
         };
-        let mut left = least(candidates, &multipliers);
+        let mut left = smallest(candidates, &multipliers);
         if !cautious {
-            left = least(left, &second);
+            left = smallest(left, &second);
             return left
                 .into_iter()
                 .reduce(|a, b| if share[b] > share[a] { b } else { a });

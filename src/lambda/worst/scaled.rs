@@ -10,8 +10,8 @@ use super::program::Program;
 use crate::lambda::problem::ForceProblem;
 use crate::lambda::reduce::{exponent_of, times_power};
 
-/// What rounding leaves of a scaled current of zero.
-const NOTHING: f64 = 1e-24;
+/// What rounding leaves of a scaled current, or force per ampere, of zero.
+pub(super) const NOTHING: f64 = 1e-24;
 
 /// Which rows a point contributes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -235,17 +235,19 @@ impl<'a> Scaled<'a> {
             return all.map(limit).chain([up]).collect();
         }
         // Both rows of the point with one half each, met by the coil that moves it at the least
-        // of the second objective; the others rest at their lower limits.
+        // of the second objective, of several the strongest; the others rest at their lower limits.
+        let size = |k: usize| times_power(force(k).abs(), -self.column(self.live[k]));
         let cost = |k: usize| {
             let pull = self.problem.lower_a[self.live[k]] < 0.0;
-            let size = times_power(force(k).abs(), -self.column(self.live[k]));
             let ampere = times_power(1.0, -self.column(self.live[k]));
-            if pull { 0.0 } else { ampere / size }
+            if pull { 0.0 } else { ampere / size(k) }
         };
+        let before =
+            |a: usize, b: usize| cost(b) < cost(a) || (cost(b) == cost(a) && size(b) > size(a));
         let chosen = all
             .clone()
-            .filter(|&k| force(k) != 0.0)
-            .reduce(|a, b| if cost(b) < cost(a) { b } else { a });
+            .filter(|&k| size(k) > NOTHING)
+            .reduce(|a, b| if before(a, b) { b } else { a });
         match (chosen, down) {
             (Some(chosen), Some(down)) => all.filter(|&k| k != chosen).chain([up, down]).collect(),
             _ => all.chain([up]).collect(),
