@@ -19,6 +19,7 @@ use crate::shape::certificate::{Certificate, Certify, stated_tessellation};
 use crate::shape::document::{ShapeDocument, SurfaceSource};
 use crate::shape::holes::Holes;
 use crate::shape::marks::Marks;
+use crate::shape::surface::read_file;
 use crate::shape::{ConstraintPoints, Discretized, Settings, ShapeError, discretize_with};
 
 pub mod inspect;
@@ -211,7 +212,7 @@ pub fn run_with(
     options: &PointsOptions,
     progress: &dyn Progress,
 ) -> Result<PointsReport, JobError> {
-    let inputs = with_surface(document, inputs)?;
+    let inputs = with_surface(document, inputs);
     let settings = Settings {
         holes: options.holes,
         certify: options.certify,
@@ -277,17 +278,17 @@ fn shape_error(document: &ShapeDocument, source: ShapeError) -> JobError {
 }
 
 /// `inputs` and the surface file that `document` names, paths as given.
-fn with_surface(document: &ShapeDocument, mut inputs: Vec<Input>) -> Result<Vec<Input>, JobError> {
+fn with_surface(document: &ShapeDocument, mut inputs: Vec<Input>) -> Vec<Input> {
     if let SurfaceSource::File { path, .. } = &document.source {
         // What cannot be read is told, with the reason, by the reader that comes next.
-        if let Ok(bytes) = std::fs::read(path) {
+        if let Ok(bytes) = read_file(path) {
             let input = Input::of_bytes(path.display().to_string(), &bytes);
             if !inputs.iter().any(|known| known.path == input.path) {
                 inputs.push(input);
             }
         }
     }
-    Ok(inputs)
+    inputs
 }
 
 /// The rows of `points.csv`.

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::shape::archive::{Archive, text_of};
-use crate::shape::assembly::{Affine, Body, lay_out};
+use crate::shape::assembly::{Affine, Body, corner, lay_out};
 use crate::shape::document::parse_unit;
 use crate::shape::fault::ReadError;
 use crate::shape::mesh::FileMesh;
@@ -149,14 +149,8 @@ impl Reader {
             return Err("a triangle lacks one of v1, v2 and v3".into());
         };
         let mut corners = [[0.0; 3]; 3];
-        for (corner, index) in corners.iter_mut().zip([a, b, c]) {
-            *corner = *self.vertices.get(index).ok_or_else(|| {
-                format!(
-                    "a triangle has the index {index}, but its object has {} vertices (indices \
-                     count from 0)",
-                    self.vertices.len()
-                )
-            })?;
+        for (slot, index) in corners.iter_mut().zip([a, b, c]) {
+            *slot = corner(&self.vertices, index)?;
         }
         if let (false, Some(body)) = (self.support, self.bodies.last_mut()) {
             body.triangles.push(corners);
@@ -181,9 +175,6 @@ impl Reader {
             .filter(|k| !is_child[*k])
             .map(|k| (k, Affine::IDENTITY))
             .collect();
-        if roots.is_empty() && !self.bodies.is_empty() {
-            return Err("a constellation is placed within itself".into());
-        }
         let triangles = lay_out(&self.bodies, &roots)?;
         if triangles.is_empty() {
             return Err("the AMF file holds no triangle: export a body".into());

@@ -60,12 +60,30 @@ pub(super) struct Body {
     pub(super) children: Vec<(usize, Affine)>,
 }
 
+/// The vertex of a triangle's index.
+///
+/// # Errors
+/// An index without a vertex.
+pub(super) fn corner(vertices: &[[f64; 3]], index: usize) -> Result<[f64; 3], String> {
+    vertices.get(index).copied().ok_or_else(|| {
+        format!(
+            "a triangle has the index {index}, but its object has {} vertices (indices count from \
+             0)",
+            vertices.len()
+        )
+    })
+}
+
 /// Lays out `roots`: every triangle of the bodies below, placed.
 ///
 /// # Errors
 /// A body within itself, too many triangles, bodies nested too deep.
 pub(super) fn lay_out(bodies: &[Body], roots: &[(usize, Affine)]) -> Result<Vec<Triangle>, String> {
     let mut visits = vec![None; bodies.len()];
+    // Bodies within themselves are a fault of the file also where nothing places them.
+    for body in 0..bodies.len() {
+        weight(bodies, body, &mut visits, 0)?;
+    }
     let mut total = Weight::default();
     for (root, _) in roots {
         total.add(weight(bodies, *root, &mut visits, 0)?);
@@ -93,12 +111,15 @@ pub(super) fn lay_out(bodies: &[Body], roots: &[(usize, Affine)]) -> Result<Vec<
 struct Weight {
     triangles: u64,
     placements: u64,
+    /// Bodies in one another, this one not counted.
+    depth: usize,
 }
 
 impl Weight {
     fn add(&mut self, other: Self) {
         self.triangles = self.triangles.saturating_add(other.triangles);
         self.placements = self.placements.saturating_add(other.placements);
+        self.depth = self.depth.max(other.depth + 1);
     }
 }
 
@@ -115,20 +136,24 @@ fn weight(
     visits: &mut [Option<Visit>],
     depth: usize,
 ) -> Result<Weight, String> {
+    let too_deep = || Err(format!("bodies are nested more than {DEEPEST} deep"));
     match visits[index] {
         Some(Visit::Weighs(weight)) => return Ok(weight),
         Some(Visit::Open) => return Err("a body is placed within itself".into()),
-        None if depth > DEEPEST => {
-            return Err(format!("bodies are nested more than {DEEPEST} deep"));
-        }
+        None if depth > DEEPEST => return too_deep(),
         None => visits[index] = Some(Visit::Open),
     }
     let mut sum = Weight {
         triangles: bodies[index].triangles.len() as u64,
         placements: 1,
+        depth: 0,
     };
     for (child, _) in &bodies[index].children {
         sum.add(weight(bodies, *child, visits, depth + 1)?);
+    }
+    // A body whose weight is known was not gone into.
+    if sum.depth > DEEPEST {
+        return too_deep();
     }
     visits[index] = Some(Visit::Weighs(sum));
     Ok(sum)
@@ -162,6 +187,27 @@ mod tests {
             assert!((one[k] - two[k]).abs() < 1e-14);
         }
         assert_eq!(a.apply([1.0, 0.0, 0.0]), [5.0, 7.0, 7.3]);
+    }
+
+    /// Each body was gone into once, so a chain met from its end on was never found to be deep.
+    #[test]
+    fn a_chain_is_as_deep_from_either_end() {
+        let chain = |length: usize, next: &dyn Fn(usize) -> Option<usize>| -> Vec<Body> {
+            (0..length)
+                .map(|k| Body {
+                    triangles: vec![[[0.0; 3]; 3]],
+                    children: next(k).map(|k| (k, Affine::IDENTITY)).into_iter().collect(),
+                })
+                .collect()
+        };
+        for (length, whole) in [(DEEPEST + 1, true), (DEEPEST + 2, false)] {
+            let down = chain(length, &|k| (k + 1 < length).then_some(k + 1));
+            let up = chain(length, &|k| k.checked_sub(1));
+            for (bodies, root) in [(down, 0), (up, length - 1)] {
+                let found = lay_out(&bodies, &[(root, Affine::IDENTITY)]);
+                assert_eq!(found.is_ok(), whole, "{length}");
+            }
+        }
     }
 
     #[test]

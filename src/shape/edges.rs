@@ -132,7 +132,7 @@ impl Welder {
         if self.cell <= 0.0 {
             return None;
         }
-        // The casts saturate; coordinates over cells are below 2^32.
+        // The casts saturate.
         let side = |offset: f64| vertex.map(|c| ((c + offset) / self.cell).floor() as i64);
         let (from, to) = (side(-self.reach), side(self.reach));
         let mut found: Option<u32> = None;

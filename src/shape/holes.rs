@@ -16,7 +16,7 @@ pub enum Holes {
 
 /// Sweeps over a hole, at most, for each of its points along the longer side.
 const SWEEPS: usize = 40;
-/// Relative change at which the membrane is at rest.
+/// Change, against the largest height, at which the membrane is at rest.
 const AT_REST: f64 = 1e-13;
 
 /// Indices of the grid points without surface from which no way over such points, along rows and
@@ -52,7 +52,9 @@ pub fn fill(grid: &Grid, samples: &mut [Option<Sample>], holes: &[usize]) {
     let steps = [grid.x_m.step(), grid.y_m.step()];
     let weights = steps.map(|step| 1.0 / (step * step));
     let known = samples.iter().flatten().map(|sample| sample.height_m);
-    let (count, sum) = known.fold((0.0, 0.0), |(n, sum), h| (n + 1.0, sum + h));
+    let (count, sum, largest) = known.fold((0.0, 0.0, 0.0_f64), |(n, sum, most), h| {
+        (n + 1.0, sum + h, most.max(h.abs()))
+    });
     let start = if count > 0.0 { sum / count } else { 0.0 };
     for &index in holes {
         samples[index] = Some(Sample {
@@ -81,7 +83,7 @@ pub fn fill(grid: &Grid, samples: &mut [Option<Sample>], holes: &[usize]) {
                 change = change.max(step.abs());
             }
         }
-        if change <= AT_REST * start.abs() {
+        if change <= AT_REST * largest {
             break;
         }
     }

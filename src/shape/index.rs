@@ -1,28 +1,105 @@
 //! Which triangles may touch a point of the plan: a grid of buckets.
 
+use std::ops::RangeInclusive;
+
 use rayon::prelude::*;
 
-use crate::shape::mesh::Mesh;
+use crate::shape::mesh::{Mesh, Triangle};
 use crate::shape::seen::Seen;
 
 /// Buckets a side, at most.
 const MOST_A_SIDE: usize = 2048;
+/// So many entries a triangle, on average, are kept at most: what is long, or lies over much
+/// else, gets wider buckets,
+const MOST_EACH: usize = 64;
+/// unless they are so few altogether.
+const FEW: usize = 1 << 20;
+
+/// Numbers sorted into buckets, in each of them in the order given.
+pub(super) struct Buckets {
+    starts: Vec<usize>,
+    members: Vec<u32>,
+}
+
+impl Buckets {
+    /// `pairs`: a bucket, below `count`, and what belongs to it.
+    pub(super) fn new(count: usize, pairs: &[(u32, u32)]) -> Self {
+        let mut starts = vec![0; count + 1];
+        for (bucket, _) in pairs {
+            starts[*bucket as usize + 1] += 1;
+        }
+        for bucket in 1..starts.len() {
+            starts[bucket] += starts[bucket - 1];
+        }
+        let mut next = starts.clone();
+        let mut members = vec![0; pairs.len()];
+        for (bucket, member) in pairs {
+            members[next[*bucket as usize]] = *member;
+            next[*bucket as usize] += 1;
+        }
+        Self { starts, members }
+    }
+
+    /// How many buckets there are.
+    pub(super) fn count(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// What belongs to a bucket.
+    pub(super) fn of(&self, bucket: usize) -> &[u32] {
+        &self.members[self.starts[bucket]..self.starts[bucket + 1]]
+    }
+}
 
 /// Triangles by the buckets of the plan that they touch.
 pub(super) struct Index {
-    low_m: [f64; 2],
-    per_m: [f64; 2],
-    side: usize,
-    starts: Vec<usize>,
-    members: Vec<u32>,
+    raster: Raster,
+    buckets: Buckets,
 }
 
 impl Index {
     /// `reach_m`: how far outside an edge a point still touches it.
     pub(super) fn new(mesh: &Mesh, reach_m: f64) -> Self {
-        let plan = mesh.facts().bounds.plan();
         let triangles = mesh.triangles();
-        let side = ((triangles.len() as f64).sqrt().ceil() as usize).clamp(1, MOST_A_SIDE);
+        let plan = mesh.facts().bounds.plan();
+        let finest = ((triangles.len() as f64).sqrt().ceil() as usize).clamp(1, MOST_A_SIDE);
+        let mut raster = Raster::new(plan, finest, reach_m);
+        let most = FEW.max(MOST_EACH * triangles.len());
+        while raster.side > 1 && raster.entries(triangles) > most {
+            raster = Raster::new(plan, raster.side / 2, reach_m);
+        }
+        let pairs: Vec<(u32, u32)> = (0..triangles.len())
+            .into_par_iter()
+            .flat_map_iter(|k| {
+                let mut found = Vec::new();
+                raster.touched(&triangles[k], &mut |row, columns| {
+                    let bucket = |column| (row * raster.side + column) as u32;
+                    found.extend(columns.map(|column| (bucket(column), k as u32)));
+                });
+                found
+            })
+            .collect();
+        let buckets = Buckets::new(raster.side * raster.side, &pairs);
+        Self { raster, buckets }
+    }
+
+    /// Every triangle that may touch the vertical line through `p`, ascending.
+    pub(super) fn at(&self, p: [f64; 2]) -> &[u32] {
+        let [column, row] = [0, 1].map(|axis| self.raster.place(axis, p[axis]));
+        self.buckets.of(row * self.raster.side + column)
+    }
+}
+
+/// How the plan is cut into buckets.
+struct Raster {
+    low_m: [f64; 2],
+    per_m: [f64; 2],
+    side: usize,
+    reach_m: f64,
+}
+
+impl Raster {
+    fn new(plan: [[f64; 2]; 2], side: usize, reach_m: f64) -> Self {
         let per_m = plan.map(|[low, high]| {
             let width = high - low;
             if width > 0.0 {
@@ -31,48 +108,40 @@ impl Index {
                 0.0
             }
         });
-        let mut index = Self {
+        Self {
             low_m: plan.map(|[low, _]| low),
             per_m,
             side,
-            starts: vec![0; side * side + 1],
-            members: Vec::new(),
+            reach_m,
+        }
+    }
+
+    /// How many buckets all triangles touch together.
+    fn entries(&self, triangles: &[Triangle]) -> usize {
+        let touched = |triangle: &Triangle| {
+            let mut count = 0;
+            self.touched(triangle, &mut |_, columns| {
+                count += (columns.end() + 1).saturating_sub(*columns.start());
+            });
+            count
         };
-        let pairs: Vec<(u32, u32)> = (0..triangles.len())
-            .into_par_iter()
-            .flat_map_iter(|k| {
-                let seen = Seen::new(&triangles[k], reach_m);
-                let ends = |axis: usize| {
-                    let values = triangles[k].map(|v| v[axis]);
-                    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-                    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-                    [low - reach_m, high + reach_m]
-                };
-                let (x, y) = (ends(0), ends(1));
-                let rows = index.place(1, y[0])..=index.place(1, y[1]);
-                let mut found = Vec::new();
-                for row in rows {
-                    let [from, to] = index.columns(&seen, row, x);
-                    for column in index.place(0, from)..=index.place(0, to) {
-                        found.push(((row * side + column) as u32, k as u32));
-                    }
-                }
-                found
-            })
-            .collect();
-        for (bucket, _) in &pairs {
-            index.starts[*bucket as usize + 1] += 1;
+        triangles.par_iter().map(touched).sum()
+    }
+
+    /// Gives the buckets that a triangle touches, row by row.
+    fn touched(&self, triangle: &Triangle, give: &mut dyn FnMut(usize, RangeInclusive<usize>)) {
+        let seen = Seen::new(triangle, self.reach_m);
+        let ends = |axis: usize| {
+            let values = triangle.map(|v| v[axis]);
+            let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            [low - self.reach_m, high + self.reach_m]
+        };
+        let (x, y) = (ends(0), ends(1));
+        for row in self.place(1, y[0])..=self.place(1, y[1]) {
+            let [from, to] = self.columns(&seen, row, x);
+            give(row, self.place(0, from)..=self.place(0, to));
         }
-        for bucket in 1..index.starts.len() {
-            index.starts[bucket] += index.starts[bucket - 1];
-        }
-        let mut next = index.starts.clone();
-        index.members = vec![0; pairs.len()];
-        for (bucket, k) in pairs {
-            index.members[next[bucket as usize]] = k;
-            next[bucket as usize] += 1;
-        }
-        index
     }
 
     /// The bucket along one axis; what lies outside belongs to the outermost.
@@ -95,10 +164,67 @@ impl Index {
             [from.max(all[0]), to.min(all[1])]
         }
     }
+}
 
-    /// Every triangle that may touch the vertical line through `p`, ascending.
-    pub(super) fn at(&self, p: [f64; 2]) -> &[u32] {
-        let bucket = self.place(1, p[1]) * self.side + self.place(0, p[0]);
-        &self.members[self.starts[bucket]..self.starts[bucket + 1]]
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::document::Placement;
+    use crate::shape::mesh::FileMesh;
+    use crate::shape::placement::Transform;
+    use crate::shape::seen::Contact;
+
+    fn index(triangles: Vec<Triangle>) -> (Mesh, Index) {
+        let file = FileMesh {
+            triangles,
+            ..FileMesh::default()
+        };
+        let still = Transform::new(1.0, &Placement::default());
+        let mesh = Mesh::place(file, &still).unwrap();
+        let index = Index::new(&mesh, 1e-9);
+        (mesh, index)
+    }
+
+    fn finds_what_touches(mesh: &Mesh, index: &Index) {
+        for k in 0..40 {
+            let p = [0.7, 1.3].map(|c| (c * f64::from(k)).fract());
+            let found = index.at(p);
+            assert!(found.is_sorted());
+            for (k, triangle) in mesh.triangles().iter().enumerate() {
+                if Seen::new(triangle, 1e-9).contact(p) != Contact::None {
+                    assert!(found.contains(&(k as u32)), "{k}");
+                }
+            }
+        }
+    }
+
+    /// Each touches a bucket of every row: a million of them would have taken 20 GB.
+    #[test]
+    fn slivers_across_the_whole_plan_get_wider_buckets() {
+        let n = 30_000;
+        let at = |k: usize| k as f64 / n as f64;
+        let sliver = |k: usize| {
+            [
+                [at(k), 0.0, 0.2],
+                [at(k + 1), 0.0, 0.2],
+                [at(n - k), 1.0, 0.7],
+            ]
+        };
+        let (mesh, index) = index((0..n).map(sliver).collect());
+        assert!(index.buckets.members.len() <= MOST_EACH * n);
+        assert!(index.raster.side > 8, "{}", index.raster.side);
+        finds_what_touches(&mesh, &index);
+    }
+
+    #[test]
+    fn small_triangles_get_a_bucket_each() {
+        let at = |k: usize| [(k % 90) as f64 / 90.0, (k / 90) as f64 / 90.0];
+        let small = |k: usize| {
+            let [x, y] = at(k);
+            [[x, y, 0.2], [x + 0.013, y, 0.3], [x, y + 0.007, 0.1]]
+        };
+        let (mesh, index) = index((0..8100).map(small).collect());
+        assert_eq!(index.raster.side, 90);
+        finds_what_touches(&mesh, &index);
     }
 }

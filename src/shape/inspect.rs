@@ -254,7 +254,8 @@ fn area_and_volume(triangles: &[Triangle], bounds: [[f64; 3]; 2]) -> (f64, f64) 
     (0.5 * twice_area, six_volumes / 6.0)
 }
 
-/// The most sheets over each other; `None` without area. Looked for along vertical lines over the whole box.
+/// The most sheets over each other, looked for along vertical lines over the whole box; `None`
+/// without area, and for coordinates that no surface may have.
 fn layers(file: FileMesh) -> Option<u32> {
     let as_it_is = Transform::new(1.0, &Placement::default());
     let mesh = Mesh::place(file, &as_it_is).ok()?;

@@ -1,7 +1,7 @@
 //! What a point is besides a height: on a wall, a rim, a crease, under or over other sheets.
 
 use crate::shape::height::{Sample, sample_of};
-use crate::shape::mesh::{Triangle, minus};
+use crate::shape::mesh::{Triangle, dot, minus};
 use crate::shape::seen::{Contact, Seen, WALL_NORMAL_Z, upward_normal};
 
 /// Faces that turn by less are neighbours on a curved surface, degrees.
@@ -126,9 +126,9 @@ fn of_contacts(
         })
         .filter(|normal| normal[2] > WALL_NORMAL_Z)
         // A body's underside meets its top at the rim: that is no crease.
-        .filter(|normal| turn(normal, &sample.normal) < CREASE_DEG.to_radians().cos())
+        .filter(|normal| dot(*normal, sample.normal) < CREASE_DEG.to_radians().cos())
         .min_by(|a, b| {
-            let key = |n: &[f64; 3]| (turn(n, &sample.normal), *n);
+            let key = |n: &[f64; 3]| (dot(*n, sample.normal), *n);
             key(a)
                 .partial_cmp(&key(b))
                 .unwrap_or(std::cmp::Ordering::Equal)
@@ -142,10 +142,6 @@ fn of_contacts(
         overhang: layers > rules.plain_layers,
         filled: false,
     }
-}
-
-fn turn(a: &[f64; 3], b: &[f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Whether there is surface in every direction from `p`.

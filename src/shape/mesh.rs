@@ -144,6 +144,12 @@ pub(super) fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
+/// a . b.
+#[must_use]
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
 /// a x b.
 #[must_use]
 pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

@@ -67,6 +67,8 @@ impl Transform {
 /// Sine and cosine of an angle in degrees, exact at multiples of 90.
 #[must_use]
 pub fn sin_cos_deg(angle_deg: f64) -> (f64, f64) {
+    // Whole turns leave without rounding, however many.
+    let angle_deg = angle_deg % 360.0;
     let quarter = (angle_deg / 90.0).round();
     let (sin, cos) = (angle_deg - quarter * 90.0).to_radians().sin_cos();
     match quarter.rem_euclid(4.0) as u8 {
@@ -138,6 +140,15 @@ mod tests {
                 "{by_steps:?} {at_once:?}"
             );
         }
+    }
+
+    #[test]
+    fn very_many_turns_are_no_turn() {
+        for turns in [1e15, -1e15, 2f64.powi(300)] {
+            assert_eq!(sin_cos_deg(turns * 360.0), (0.0, 1.0), "{turns}");
+        }
+        // 1e17 degrees are 280 more than whole turns.
+        assert_eq!(sin_cos_deg(1e17), sin_cos_deg(280.0));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use earcut::Earcut;
 
-use crate::shape::mesh::{Triangle, cross, minus};
+use crate::shape::mesh::{Triangle, cross, dot, minus};
 
 /// A face with more corners was not written by a program that draws faces, and to cut it could
 /// take minutes.
@@ -89,7 +89,6 @@ fn area_vector(polygon: &[[f64; 3]]) -> [f64; 3] {
 /// True where no corner turns against the polygon's sense.
 fn is_convex(polygon: &[[f64; 3]], normal: [f64; 3]) -> bool {
     let n = polygon.len();
-    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let least = -FLAT_TURN * dot(normal, normal);
     (0..n).all(|i| {
         let [a, b, c] = [i, i + 1, i + 2].map(|k| polygon[k % n]);

@@ -90,12 +90,34 @@ impl PlacedPrimitive {
         }
     }
 
+    /// Distance in plan to the shape, 0 over it, m.
+    #[must_use]
+    pub(super) fn distance_in_plan_m(&self, [x_m, y_m]: [f64; 2]) -> f64 {
+        let [u, v] = self.own(x_m, y_m);
+        let beyond = |c: f64, half: f64| (c.abs() - half).max(0.0);
+        match self.primitive {
+            Primitive::Flat { side_m, .. } | Primitive::Wedge { side_m, .. } => {
+                beyond(u, side_m / 2.0).hypot(beyond(v, side_m / 2.0))
+            }
+            Primitive::HalfSphere { radius_m, .. } => beyond(u.hypot(v), radius_m),
+            Primitive::HalfCylinder {
+                radius_m, length_m, ..
+            } => beyond(u, radius_m).hypot(beyond(v, length_m / 2.0)),
+        }
+    }
+
+    /// A place of the plan in the shape's own axes, m.
+    fn own(&self, x_m: f64, y_m: f64) -> [f64; 2] {
+        let [sin, cos] = self.turn;
+        let [dx, dy] = [x_m - self.translate_m[0], y_m - self.translate_m[1]];
+        [cos * dx + sin * dy, cos * dy - sin * dx]
+    }
+
     /// The surface over (x, y), m; `None` outside its border.
     #[must_use]
     pub fn sample(&self, x_m: f64, y_m: f64) -> Option<Sample> {
         let [sin, cos] = self.turn;
-        let [dx, dy] = [x_m - self.translate_m[0], y_m - self.translate_m[1]];
-        let (u, v) = (cos * dx + sin * dy, cos * dy - sin * dx);
+        let [u, v] = self.own(x_m, y_m);
         // A decimal border has no exact double: a few roundings off it is on it.
         let largest = [x_m, y_m, self.translate_m[0], self.translate_m[1]]
             .iter()

@@ -138,11 +138,10 @@ impl<'a> Probe<'a> {
     fn may_have_surface(&self, rect: &Rect, among: &[u32]) -> bool {
         match &self.kind {
             Kind::Mesh { .. } => !among.is_empty(),
-            Kind::Primitive(_) => (0..25).any(|k| {
-                let [u, v] = [k % 5, k / 5].map(|n| f64::from(n) / 4.0);
-                let at = |k: usize, t: f64| (1.0 - t) * rect.low_m[k] + t * rect.high_m[k];
-                self.at([at(0, u), at(1, v)]).is_some()
-            }),
+            Kind::Primitive(primitive) => {
+                let [width, depth] = rect.sides();
+                primitive.distance_in_plan_m(rect.centre()) <= 0.5 * width.hypot(depth)
+            }
         }
     }
 

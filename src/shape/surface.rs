@@ -182,7 +182,7 @@ fn check_placement(placement: &Placement) -> Result<(), ShapeError> {
 }
 
 /// A regular file's bytes.
-fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
+pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
     let unreadable = |what: String| ShapeError::Unreadable {
         path: path.into(),
         what,

@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use crate::shape::mesh::{Mesh, cross, minus};
+use crate::shape::mesh::{Mesh, cross, dot, minus};
 
 /// Turns beyond this are edges of the body, not of the tessellation, degrees.
 const SHARPEST_DEG: f64 = 20.0;
@@ -95,8 +95,4 @@ fn facet(triangles: &[[[f64; 3]; 3]], index: u32, side: u8) -> ([f64; 3], f64) {
     }
     let unit = inward.map(|c| c / length);
     (unit, dot(unit, across))
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

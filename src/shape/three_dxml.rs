@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 
 use crate::shape::archive::Archive;
-use crate::shape::assembly::{Affine, Body, lay_out};
+use crate::shape::assembly::{Affine, Body, corner, lay_out};
 use crate::shape::fault::{Place, ReadError};
 use crate::shape::mesh::{FileMesh, Triangle};
 use crate::shape::number::Numbers;
@@ -106,8 +106,11 @@ impl Structure {
         let mut numbers = Numbers::default();
         let mut bodies = vec![Body::default(); self.references.len()];
         let mut index: HashMap<u64, usize> = HashMap::new();
+        let twice = |id: &u64| fault(format!("two objects have the id {id}"));
         for (body, id) in self.references.iter().enumerate() {
-            index.insert(*id, body);
+            if index.insert(*id, body).is_some() {
+                return Err(twice(id));
+            }
         }
         let mut names: Vec<(&u64, &Result<String, String>)> = self.representations.iter().collect();
         names.sort_by_key(|(id, _)| **id);
@@ -117,7 +120,9 @@ impl Structure {
                 .find(name)
                 .ok_or_else(|| fault(format!("it names the part `{name}`, which is missing")))?;
             let text = archive.text(&found)?;
-            index.insert(*id, bodies.len());
+            if index.insert(*id, bodies.len()).is_some() {
+                return Err(twice(id));
+            }
             bodies.push(Body {
                 triangles: representation_mesh(&found, &text, &mut numbers)?,
                 children: Vec::new(),
@@ -278,16 +283,10 @@ fn add(rep: &Rep, triangles: &mut Vec<Triangle>) -> Result<(), String> {
     let points = rep.positions.as_deref().unwrap_or_default();
     let (corners, _) = rep.corners.as_chunks::<3>();
     triangles.reserve(corners.len());
-    for corner in corners {
+    for indices in corners {
         let mut triangle = [[0.0; 3]; 3];
-        for (vertex, index) in triangle.iter_mut().zip(corner) {
-            *vertex = *points.get(*index as usize).ok_or_else(|| {
-                format!(
-                    "a face has the index {index}, but its body has {} points (indices count \
-                     from 0)",
-                    points.len()
-                )
-            })?;
+        for (slot, index) in triangle.iter_mut().zip(indices) {
+            *slot = corner(points, *index as usize)?;
         }
         triangles.push(triangle);
     }

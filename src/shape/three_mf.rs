@@ -7,7 +7,7 @@
 use std::collections::{HashMap, HashSet};
 
 use crate::shape::archive::Archive;
-use crate::shape::assembly::{Affine, Body, lay_out};
+use crate::shape::assembly::{Affine, Body, corner, lay_out};
 use crate::shape::document::parse_unit;
 use crate::shape::fault::{Place, ReadError};
 use crate::shape::mesh::FileMesh;
@@ -79,7 +79,7 @@ struct Model {
     /// Name of every object, and where it stands among the bodies.
     objects: HashMap<Key, usize>,
     bodies: Vec<Body>,
-    /// Components of every body, yet by name,.
+    /// Components of every body, yet by name.
     components: Vec<Vec<(Key, Affine)>>,
     /// What the root part builds.
     items: Vec<(Key, Affine)>,
@@ -297,16 +297,8 @@ fn object(e: &Element<'_>) -> Result<Open, String> {
 
 fn triangle(e: &Element<'_>, object: &mut Open) -> Result<(), String> {
     let mut corners = [[0.0; 3]; 3];
-    for (corner, name) in corners.iter_mut().zip(["v1", "v2", "v3"]) {
-        let index = whole(e, name)?;
-        let known = &object.vertices;
-        *corner = *known.get(index as usize).ok_or_else(|| {
-            format!(
-                "a triangle has the index {index}, but its object has {} vertices (indices \
-                 count from 0)",
-                known.len()
-            )
-        })?;
+    for (slot, name) in corners.iter_mut().zip(["v1", "v2", "v3"]) {
+        *slot = corner(&object.vertices, whole(e, name)? as usize)?;
     }
     object.body.triangles.push(corners);
     Ok(())

@@ -35,7 +35,9 @@ impl<'a> Line<'a> {
     /// True where the next line belongs to this one.
     fn goes_on(&self) -> bool {
         let end = self.bytes.trim_ascii_end();
-        end == b"\\" || end.ends_with(b" \\") || end.ends_with(b"\t\\")
+        let marked = end == b"\\" || end.ends_with(b" \\") || end.ends_with(b"\t\\");
+        // A comment ends with its line.
+        marked && !end.split(|b| *b <= b' ').any(|word| word.starts_with(b"#"))
     }
 }
 

@@ -3,7 +3,8 @@
 use std::borrow::Cow;
 
 use quick_xml::XmlVersion;
-use quick_xml::events::{BytesStart, Event};
+use quick_xml::escape::resolve_predefined_entity;
+use quick_xml::events::{BytesRef, BytesStart, Event};
 
 use crate::shape::fault::{Place, ReadError};
 
@@ -47,13 +48,14 @@ impl<'a> Element<'a> {
     }
 
     fn find(&self, is: impl Fn(&str) -> bool) -> Option<Cow<'_, str>> {
-        // Attributes that are none are no reason to refuse a mesh.
         let mut attributes = self.start.attributes();
         let attributes = attributes.with_checks(false);
         let found = attributes
             .flatten()
             .find(|attribute| is(attribute.key.into_inner()))?;
-        found.normalized_value(XmlVersion::Implicit1_0).ok()
+        // With an entity that is not replaced it is shown as it stands.
+        let value = found.normalized_value(XmlVersion::Implicit1_0);
+        Some(value.unwrap_or_else(|_| found.value.clone()))
     }
 }
 
@@ -103,6 +105,7 @@ impl<'a> Document<'a> {
                 Ok(Event::End(_)) => return self.end(),
                 Ok(Event::Text(text)) => self.add(&text),
                 Ok(Event::CData(text)) => self.add(&text),
+                Ok(Event::GeneralRef(name)) => self.add_reference(&name),
                 Ok(Event::Eof) if self.open.is_empty() => return Ok(Step::Done),
                 Ok(Event::Eof) => return Err(self.fault("the XML ends here: it was cut short")),
                 Ok(_) => {}
@@ -115,9 +118,23 @@ impl<'a> Document<'a> {
         if self.open.len() >= DEEPEST {
             return Err(self.fault(format!("elements are nested more than {DEEPEST} deep")));
         }
+        // Passed over, a damaged one would be taken for one that is not there.
+        if let Some(error) = start.attributes().with_checks(false).find_map(Result::err) {
+            return Err(self.fault(format!("the XML is damaged: {error}")));
+        }
         let name = local(start.name().into_inner()).to_owned();
         self.open.push((name, String::new()));
         Ok(())
+    }
+
+    /// A character by its number or by one of XML's five names. Others are not replaced, but what
+    /// stands around them must not become a number without them.
+    fn add_reference(&mut self, name: &BytesRef<'_>) {
+        match (name.resolve_char_ref(), resolve_predefined_entity(name)) {
+            (Ok(Some(letter)), _) => self.add(letter.encode_utf8(&mut [0; 4])),
+            (_, Some(text)) => self.add(text),
+            _ => self.add("\u{fffd}"),
+        }
     }
 
     fn add(&mut self, text: &str) {

@@ -91,6 +91,19 @@ fn what_cannot_be_inspected_says_why() {
     assert!(ran.err.contains(".3mf"), "{ran:?}");
 }
 
+/// Its hash was taken of whatever has its name: of a pipe the program waited for the other end.
+#[test]
+#[cfg(unix)]
+fn a_pipe_is_refused_and_not_waited_for() {
+    let place = Place::new();
+    let made = std::process::Command::new("mkfifo")
+        .arg(place.path("pipe.stl"))
+        .status();
+    assert!(made.unwrap().success());
+    let args = ["discretize", "pipe.stl", "--unit", "mm", "--out", "-"];
+    place.run(&args).ends(3).says(&["no regular file"]);
+}
+
 #[test]
 fn factors_that_differ_are_refused_unless_they_are_meant() {
     let place = Place::new();

@@ -378,6 +378,48 @@ fn cells_say_where_the_surface_ends() {
     assert_eq!((found.cells.inner, apart), (0, None));
 }
 
+/// Quartering a rectangle does not part what lies over itself: it took hours.
+#[test]
+fn sheets_over_each_other_take_no_longer_than_the_highest() {
+    let sheet = |z: [f64; 3]| {
+        let [a, b, c] = [0, 1, 2].map(|k| z[k]);
+        let corners = [[-1.0, -1.0, a], [2.0, -1.0, b], [-1.0, 2.0, c]];
+        let far = [2.0, 2.0, b + c - a];
+        [corners, [corners[1], far, corners[2]]]
+    };
+    let ridge = roof(&[[-1.0, 0.9], [0.31, 1.7], [2.0, 0.9]], [-1.0, 2.0]);
+    let plan = grid((0.0, 1.0, 16), (0.0, 1.0, 14));
+    let (wanted, _) = certified(&exact(ridge.clone()), &plan);
+    assert!(wanted.above.value_m > 1e-3, "{wanted:?}");
+    let below = |k: usize| 0.01 * k as f64 - 2.0;
+    let stacks: [Vec<Triangle>; 4] = [
+        // Level, steep, crossing each other, and one sheet many times.
+        (0..40).flat_map(|k| sheet([below(k); 3])).collect(),
+        (0..40)
+            .flat_map(|k| sheet([-19.0, -10.0, -10.0].map(|z| z + below(k))))
+            .collect(),
+        (0..40)
+            .flat_map(|k| sheet([below(k), below(40 - k), below(k * 7 % 40)]))
+            .collect(),
+        (0..40).flat_map(|_| sheet([0.5; 3])).collect(),
+    ];
+    for (case, stack) in stacks.into_iter().enumerate() {
+        let (found, apart) = certified(&exact([stack.clone(), ridge.clone()].concat()), &plan);
+        for (got, wanted) in [(found.above, wanted.above), (found.below, wanted.below)] {
+            assert!(
+                (got.value_m - wanted.value_m).abs() < 1e-11,
+                "{case}: {found:?} {wanted:?}"
+            );
+        }
+        assert!(apart.unwrap().lower_m <= found.bound_m(), "{case}");
+        // By themselves they are seen.
+        let (found, _) = certified(&exact(stack), &plan);
+        assert_eq!(found.cells.inner, 15 * 13, "{case}");
+        let plane = case != 2;
+        assert_eq!(found.bound_m() < 1e-9, plane, "{case}: {found:?}");
+    }
+}
+
 /// The seed's shapes: `cargo test --test shape -- the_seed_shapes --nocapture`.
 #[test]
 #[allow(clippy::print_stdout, clippy::disallowed_methods)]

@@ -128,6 +128,8 @@ fn obj_is_read_however_it_is_written() {
         b"\xef\xbb\xbf# t\xeate\r\nv 0 0 0 1.0\r\nv 15e-1 0 0\r\nv 0 1 2.5e-001\r\nf 1/1 2//7 3/4/5\r\n",
         b"mtllib \xff.mtl\no t\xeate\nv 0 0 0\nv 1.5 0 0\nv 0 1 0.25\nf -3 -2 -1 # end\n",
         b"f 1 2 \\\n 3\nv 0 0 0\nv 1.5 \\\n0 0\rv 0 1 0.25",
+        // A comment does not go on, whatever it ends with.
+        b"# made in C: \\\nv 0 0 0\nv 1.5 0 0 # a \\\nv 0 1 0.25\nf 1 2 3\n",
     ] {
         let mesh = read(SurfaceFormat::Obj, text).unwrap();
         assert_eq!(mesh.triangles, wanted, "{}", text.escape_ascii());
@@ -275,6 +277,70 @@ fn amf_constellations_place_their_objects() {
     assert!(refusal(SurfaceFormat::Amf, wrong.as_bytes()).contains("index 4"));
     assert!(refusal(SurfaceFormat::Amf, b"<html></html>").contains("XML of `html`"));
     assert!(refusal(SurfaceFormat::Amf, b"\xff\xfe<\0a\0").contains("UTF-16"));
+}
+
+/// Constellations within each other were left out where another object stood beside them.
+#[test]
+fn an_amf_constellation_within_itself_is_refused() {
+    let [start, end] = amf_parts("inch");
+    let within = |id: u32, other: u32| {
+        format!("<constellation id=\"{id}\"><instance objectid=\"{other}\"/></constellation>")
+    };
+    let round = format!("{start}{}{}{end}", within(8, 9), within(9, 8));
+    let message = refusal(SurfaceFormat::Amf, round.as_bytes());
+    assert!(message.contains("within itself"), "{message}");
+}
+
+/// They were passed over: `1&#46;5` was 15, and a unit without quotes millimetres.
+#[test]
+fn references_and_damaged_attributes_of_xml_are_not_passed_over() {
+    let amf_with = |x: &str| amf("inch").replace("<x>0.7</x>", &format!("<x>{x}</x>"));
+    for x in ["0&#46;7", "&#x30;.7", "0<!-- -->.7"] {
+        let mesh = read(SurfaceFormat::Amf, amf_with(x).as_bytes()).unwrap();
+        let report = MeshReport::new(SurfaceFormat::Amf, mesh);
+        assert!((report.bounds_max[0] - 0.7).abs() < 1e-12, "{x}");
+    }
+    for x in ["0&dot;7", "0.7&nbsp;", "7&lt;"] {
+        let message = refusal(SurfaceFormat::Amf, amf_with(x).as_bytes());
+        assert!(message.contains("expected a number"), "{x}: {message}");
+    }
+    let model = String::from_utf8(crate::samples::three_mf_model("inch")).unwrap();
+    for (from, to, said) in [
+        ("unit=\"inch\"", "unit=inch", "the XML is damaged"),
+        ("unit=\"inch\"", "unit=\"&in;\"", "unit `&in;` is unknown"),
+        (
+            "transform=\"1",
+            "transform=\"&one;",
+            "twelve finite numbers",
+        ),
+    ] {
+        assert!(model.contains(from), "{from}");
+        let bytes = three_mf_of(&model.replace(from, to));
+        let message = refusal(SurfaceFormat::ThreeMf, &bytes);
+        assert!(message.contains(said), "{to}: {message}");
+    }
+}
+
+#[test]
+fn two_objects_of_one_id_are_refused_in_3dxml() {
+    let [manifest, structure, representation] = crate::samples::three_dxml_parts();
+    for (from, to) in [
+        ("Rep id=\"5\"", "Rep id=\"2\""),
+        ("3D id=\"2\"", "3D id=\"1\""),
+    ] {
+        assert!(structure.1.contains(from), "{from}");
+        let structure = structure.1.replacen(from, to, 1);
+        let bytes = zipped(&[
+            (manifest.0, &manifest.1),
+            ("P.3dxml", &structure),
+            ("R.3DRep", &representation.1),
+        ]);
+        let message = refusal(SurfaceFormat::ThreeDxml, &bytes);
+        assert!(
+            message.contains("two objects have the id"),
+            "{to}: {message}"
+        );
+    }
 }
 
 #[test]

@@ -6,7 +6,7 @@ use fluxform::shape::mesh::{FileMesh, Mesh, Triangle};
 use fluxform::shape::placement::Transform;
 use fluxform::shape::stl;
 
-use crate::support::{Random, binary, corpus, exact, grid, root, sample};
+use crate::support::{Random, binary, box_of, corpus, exact, grid, root, sample};
 
 /// Height over an integer point by whole-number arithmetic: (numerator, denominator > 0).
 fn brute_force(triangles: &[[[i64; 3]; 3]], x: i64, y: i64) -> Option<(i128, i128)> {
@@ -315,26 +315,14 @@ fn neighbours_leave_no_crack_in_any_position() {
 
 /// A box in mm as float triangles; its bottom is wider by `lean` on every side.
 fn leaning_box(lean: f32) -> Vec<[[f32; 3]; 3]> {
-    let corner = |k: usize| {
+    box_of(|k| {
         let wide = if k & 4 == 0 { 20.0 + lean } else { 20.0 };
         [
             if k & 1 == 0 { -wide } else { wide },
             if k & 2 == 0 { -wide } else { wide },
             if k & 4 == 0 { 0.0 } else { 15.0 },
         ]
-    };
-    let faces = [
-        [0, 1, 3, 2],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 3, 7, 6],
-        [0, 2, 6, 4],
-        [1, 3, 7, 5],
-    ];
-    faces
-        .iter()
-        .flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]].map(|t| t.map(corner)))
-        .collect()
+    })
 }
 
 #[test]

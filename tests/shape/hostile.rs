@@ -5,6 +5,23 @@ use fluxform::shape::document::SurfaceFormat;
 use crate::formats::refusal;
 use crate::samples::{amf, three_mf_of, zipped};
 
+/// A 3MF file that builds its object `last`; from the second on each is made of the one before
+/// twice.
+fn doubled(last: usize) -> Vec<u8> {
+    let mut objects = String::new();
+    for id in 2..=last {
+        let before = format!("<component objectid=\"{}\"/>", id - 1);
+        objects +=
+            &format!("<object id=\"{id}\"><components>{before}{before}</components></object>");
+    }
+    let model = String::from_utf8(crate::samples::three_mf_model("inch")).unwrap();
+    let start = model.find("<object id=\"2\"").unwrap();
+    let end = model.find("</resources>").unwrap();
+    let model = format!("{}{objects}{}", &model[..start], &model[end..]);
+    let item = format!("<item objectid=\"{last}\"");
+    three_mf_of(&model.replace("<item objectid=\"2\"", &item))
+}
+
 #[test]
 fn a_decompression_bomb_is_stopped() {
     let bomb = format!("<model>{}</model>", " ".repeat(80 << 20));
@@ -18,18 +35,7 @@ fn a_decompression_bomb_is_stopped() {
         assert!(message.contains("decompression bomb"), "{message}");
     }
     // Forty objects, each made of the one before twice: 2^40 bodies.
-    let mut objects = String::new();
-    for id in 2..42 {
-        let before = format!("<component objectid=\"{}\"/>", id - 1);
-        objects +=
-            &format!("<object id=\"{id}\"><components>{before}{before}</components></object>");
-    }
-    let model = String::from_utf8(crate::samples::three_mf_model("inch")).unwrap();
-    let start = model.find("<object id=\"2\"").unwrap();
-    let end = model.find("</resources>").unwrap();
-    let model = format!("{}{objects}{}", &model[..start], &model[end..]);
-    let model = model.replace("<item objectid=\"2\"", "<item objectid=\"41\"");
-    let message = refusal(SurfaceFormat::ThreeMf, &three_mf_of(&model));
+    let message = refusal(SurfaceFormat::ThreeMf, &doubled(41));
     assert!(message.contains("add up to more than"), "{message}");
     let deep = format!("<amf>{}", "<a>".repeat(1_000_000));
     assert!(refusal(SurfaceFormat::Amf, deep.as_bytes()).contains("nested more than"));
@@ -112,19 +118,35 @@ fn extensions_without_end_are_refused() {
 #[test]
 fn a_small_file_does_not_unfold_into_a_large_one() {
     // Twenty-two objects, each made of the one before twice: sixteen million triangles.
-    let mut objects = String::new();
-    for id in 2..24 {
-        let before = format!("<component objectid=\"{}\"/>", id - 1);
-        objects +=
-            &format!("<object id=\"{id}\"><components>{before}{before}</components></object>");
-    }
-    let model = String::from_utf8(crate::samples::three_mf_model("inch")).unwrap();
-    let start = model.find("<object id=\"2\"").unwrap();
-    let end = model.find("</resources>").unwrap();
-    let model = format!("{}{objects}{}", &model[..start], &model[end..]);
-    let model = model.replace("<item objectid=\"2\"", "<item objectid=\"23\"");
-    let message = refusal(SurfaceFormat::ThreeMf, &three_mf_of(&model));
+    let message = refusal(SurfaceFormat::ThreeMf, &doubled(23));
     assert!(message.contains("the file's 4 triangles"), "{message}");
+}
+
+/// Ten thousand objects, each in the next, built from the innermost on: the outer ones were never
+/// found to be deep, and laying them out went as deep as they lay.
+#[test]
+fn a_chain_of_bodies_is_refused_from_whichever_end_it_is_met() {
+    let model = String::from_utf8(crate::samples::three_mf_model("inch")).unwrap();
+    let (objects, items): (String, String) = (3..10_000)
+        .map(|id| {
+            let before = id - 1;
+            let object = format!(
+                "<object id=\"{id}\"><components><component objectid=\"{before}\"/></components>\
+                 </object>"
+            );
+            let item = if id % 60 == 0 {
+                format!("<item objectid=\"{id}\"/>")
+            } else {
+                String::new()
+            };
+            (object, item)
+        })
+        .unzip();
+    let model = model
+        .replace("</resources>", &format!("{objects}</resources>"))
+        .replace("</build>", &format!("{items}</build>"));
+    let message = refusal(SurfaceFormat::ThreeMf, &three_mf_of(&model));
+    assert!(message.contains("nested more than 64 deep"), "{message}");
 }
 
 #[test]

@@ -4,6 +4,8 @@ use fluxform::shape::MeshReport;
 use fluxform::shape::document::SurfaceFormat;
 use fluxform::shape::mesh::{FileMesh, Triangle};
 
+use crate::support::block;
+
 fn report(triangles: Vec<Triangle>) -> MeshReport {
     let file = FileMesh {
         triangles,
@@ -11,25 +13,6 @@ fn report(triangles: Vec<Triangle>) -> MeshReport {
         ..FileMesh::default()
     };
     MeshReport::new(SurfaceFormat::Stl, file)
-}
-
-/// A closed box between two corners, in order outwards.
-fn block(low: [f64; 3], high: [f64; 3]) -> Vec<Triangle> {
-    let corner = |k: usize| [0, 1, 2].map(|axis| [low, high][k >> axis & 1][axis]);
-    let faces = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    let halves = |[a, b, c, d]: [usize; 4]| [[a, b, c], [a, c, d]];
-    faces
-        .into_iter()
-        .flat_map(halves)
-        .map(|face| face.map(corner))
-        .collect()
 }
 
 #[test]

@@ -37,13 +37,11 @@ fn real_bodies_are_those_of_another_reader() {
             report.bounds_max.map(|c| c * mm),
             report.watertight
         );
-        if let Some(volume) = report.volume {
-            let got = volume * mm.powi(3);
-            assert!(
-                (got - volume_mm3).abs() < 2e-3 * volume_mm3,
-                "{name}: {got}"
-            );
-        }
+        let got = report.volume.unwrap() * mm.powi(3);
+        assert!(
+            (got - volume_mm3).abs() < 2e-3 * volume_mm3,
+            "{name}: {got}"
+        );
         for (k, wanted) in bounds_mm.iter().enumerate() {
             let got = [report.bounds_min, report.bounds_max][k / 3][k % 3] * mm;
             let most = report.deviation * mm + 0.05;
@@ -91,6 +89,18 @@ fn what_is_no_body_is_refused_with_advice() {
     );
     let lost = empty.replace("DATA;", "DATA;\n#1 = MANIFOLD_SOLID_BREP('', #2);");
     assert!(refusal(&lost).contains("no unit of length"));
+}
+
+/// They would be left out without a word.
+#[test]
+fn surfaces_beside_the_bodies_are_refused() {
+    let good = String::from_utf8(crate::samples::step()).unwrap();
+    for kind in ["SHELL_BASED_SURFACE_MODEL", "FACETED_BREP"] {
+        let text = good.replace("DATA;\n", &format!("DATA;\n#900 = {kind} ('',#1);\n"));
+        let read = SurfaceFormat::Step.read(Path::new("f.step"), text.as_bytes());
+        let said = read.unwrap_err().to_string();
+        assert!(said.contains("beside solid bodies"), "{said}");
+    }
 }
 
 /// The reader behind recurses: these would end the process, not the reading.

@@ -45,7 +45,7 @@ pub fn inspect(path: &Path, inputs: Vec<Input>) -> Result<Inspection, JobError> 
     Ok(Inspection {
         schema_version: SCHEMA_VERSION,
         fluxform_version: FLUXFORM_VERSION,
-        inputs: with_surface(&document, inputs)?,
+        inputs: with_surface(&document, inputs),
         surface,
     })
 }

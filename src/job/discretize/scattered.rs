@@ -95,7 +95,7 @@ pub fn run(
     sampling: Sampling,
     progress: &dyn Progress,
 ) -> Result<ScatteredReport, JobError> {
-    let inputs = with_surface(document, inputs)?;
+    let inputs = with_surface(document, inputs);
     let failed = |source: ShapeError| shape_error(document, source);
     let (surface, warnings) = Surface::open(document).map_err(failed)?;
     let grid = requested_grid(document, &surface.extent()).map_err(failed)?;

@@ -2,8 +2,9 @@
 //!
 //! A vertical difference on a slope overstates how far two surfaces lie apart. Both directed
 //! distances are searched by branch and bound: a piece lies no farther than the farthest of its
-//! corners from the triangle that is nearest to its centre, nor than its vertical difference. From the points towards the
-//! surface its walls count as well; from the surface only what is seen from above does.
+//! corners from the triangle that is nearest to its centre, nor than its vertical difference. From
+//! the points towards the surface its walls count as well; from the surface only what is seen from
+//! above does.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -382,15 +383,9 @@ impl Search<'_> {
         let at_m = lifted(rect.centre());
         let (distance_m, nearest) = self.surface.nearest(at_m);
         self.found(distance_m, at_m);
-        let corners = [
-            rect.low_m,
-            [rect.high_m[0], rect.low_m[1]],
-            rect.high_m,
-            [rect.low_m[0], rect.high_m[1]],
-        ];
         // A bilinear patch lies in the hull of its corners.
         self.surface
-            .farthest(nearest, corners.iter().map(|p| lifted(*p)))
+            .farthest(nearest, rect.corners().into_iter().map(lifted))
     }
 }
 

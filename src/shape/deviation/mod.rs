@@ -16,10 +16,11 @@ use rayon::prelude::*;
 use crate::numerics::axis::Axis;
 use crate::progress::{Interrupted, Progress};
 use crate::shape::height::{Grid, heights, reach_m};
+use crate::shape::index::Buckets;
 use crate::shape::mesh::Mesh;
 use crate::shape::seen::is_wall;
 
-use self::visible::{Hair, supremum_over_visible};
+use self::visible::{HIGHEST, Hair, supremum_over_visible};
 
 pub use self::hausdorff::{Interval, hausdorff};
 pub use self::piece::{Extreme, Patch, Rect};
@@ -31,6 +32,9 @@ const TOGETHER: usize = 10;
 const CELLS_BETWEEN_LOOKS: usize = 1024;
 /// A rectangle is halved so often at most: a fan's apex never comes apart.
 const DEEPEST: u32 = 9;
+/// Quarters over which all faces lie count as so many halvings: sheets over each other, or the same
+/// one many times, would else be looked at in every smallest part.
+const NO_NEARER: u32 = 5;
 /// Places nearer than this times the largest coordinate are not told apart.
 const HAIR: f64 = 1e-12;
 /// Height hairs by which a difference may be off.
@@ -161,16 +165,49 @@ impl Faces {
         worst.max(0.0) + ROUNDINGS * self.hair.height_m
     }
 
-    /// Quarters the rectangle until few faces are left in each part.
+    /// Quarters the rectangle until few faces are left in each part; what a single other face
+    /// hides there is left out.
     fn leaves(&self, rect: Rect, among: &[u32], deep: u32, visit: &mut dyn FnMut(&Rect, &[u32])) {
-        let [width, depth] = rect.sides();
-        if among.len() <= TOGETHER || deep == 0 || width.min(depth) < 256.0 * self.hair.plan_m {
+        if among.len() <= TOGETHER {
             visit(&rect, among);
             return;
         }
-        for quarter in rect.quarters() {
-            self.leaves(quarter, &self.over(&quarter, among), deep - 1, visit);
+        let kept = self.not_hidden(&rect, among);
+        let [width, depth] = rect.sides();
+        let smallest = width.min(depth) < 256.0 * self.hair.plan_m;
+        if kept.len() <= TOGETHER || deep == 0 || smallest {
+            visit(&rect, &kept);
+            return;
         }
+        let quarters = rect.quarters();
+        let quarters = quarters.map(|quarter| (quarter, self.over(&quarter, &kept)));
+        let apart = quarters.iter().any(|(_, faces)| faces.len() < kept.len());
+        let deep = deep.saturating_sub(if apart { 1 } else { NO_NEARER });
+        for (quarter, faces) in &quarters {
+            self.leaves(*quarter, faces, deep, visit);
+        }
+    }
+
+    /// Of `among`, the faces of which the part in the rectangle is not hidden by a single one of the
+    /// highest; the highest first.
+    fn not_hidden(&self, rect: &Rect, among: &[u32]) -> Vec<u32> {
+        let face = |index: &u32| &self.list[*index as usize];
+        let mut order = among.to_vec();
+        order.sort_by(|a, b| face(b).heights[1].total_cmp(&face(a).heights[1]));
+        let mut kept: Vec<u32> = Vec::with_capacity(order.len());
+        for index in order {
+            let part = face(&index).within(rect);
+            // A difference of planes is least at a corner.
+            let over = |other: &piece::Face, p: &piece::Point| {
+                other.holds(*p, self.hair.plan_m / 4.0)
+                    && other.at_most(*p) - face(&index).at_least(*p) > self.hair.height_m
+            };
+            let hides = |other: &u32| part.corners().iter().all(|p| over(face(other), p));
+            if !kept.iter().take(HIGHEST).any(hides) {
+                kept.push(index);
+            }
+        }
+        kept
     }
 
     /// Whether the faces leave no part of the rectangle open.
@@ -230,8 +267,7 @@ pub struct Lattice<'a> {
     x: Vec<f64>,
     y: Vec<f64>,
     heights: &'a [Option<f64>],
-    starts: Vec<usize>,
-    members: Vec<u32>,
+    buckets: Buckets,
 }
 
 impl<'a> Lattice<'a> {
@@ -239,70 +275,31 @@ impl<'a> Lattice<'a> {
     #[must_use]
     pub fn new(faces: &'a Faces, grid: &Grid, heights: &'a [Option<f64>]) -> Self {
         let (x, y) = (grid.x_m.nodes(), grid.y_m.nodes());
-        let mut lattice = Self {
-            faces,
-            heights,
-            starts: vec![0; x.len().saturating_sub(1) * y.len().saturating_sub(1) + 1],
-            members: Vec::new(),
-            x,
-            y,
-        };
         let pairs: Vec<(u32, u32)> = (0..faces.list.len())
             .into_par_iter()
-            .flat_map_iter(|index| lattice.cells_of(index))
+            .flat_map_iter(|index| cells_of(&faces.list[index], index, &x, &y))
             .collect();
-        for (cell, _) in &pairs {
-            lattice.starts[*cell as usize + 1] += 1;
+        let cells = x.len().saturating_sub(1) * y.len().saturating_sub(1);
+        Self {
+            faces,
+            heights,
+            buckets: Buckets::new(cells, &pairs),
+            x,
+            y,
         }
-        for cell in 1..lattice.starts.len() {
-            lattice.starts[cell] += lattice.starts[cell - 1];
-        }
-        let mut next = lattice.starts.clone();
-        lattice.members = vec![0; pairs.len()];
-        for (cell, face) in pairs {
-            lattice.members[next[cell as usize]] = face;
-            next[cell as usize] += 1;
-        }
-        lattice
-    }
-
-    fn cells_of(&self, index: usize) -> Vec<(u32, u32)> {
-        let face = &self.faces.list[index];
-        let between = |nodes: &[f64], (low, high): (f64, f64)| {
-            let from = nodes.partition_point(|node| *node <= low).saturating_sub(1);
-            from..nodes
-                .partition_point(|node| *node < high)
-                .min(nodes.len().saturating_sub(1))
-        };
-        let columns = between(&self.x, face.range(0));
-        let mut found = Vec::new();
-        for row in between(&self.y, face.range(1)) {
-            for column in columns.clone() {
-                let cell = row * (self.x.len() - 1) + column;
-                if face.overlaps(&self.rect(cell)) {
-                    found.push((cell as u32, index as u32));
-                }
-            }
-        }
-        found
     }
 
     /// Number of cells.
     pub(super) fn len(&self) -> usize {
-        self.starts.len() - 1
+        self.buckets.count()
     }
 
     pub(super) fn members(&self, cell: usize) -> &[u32] {
-        &self.members[self.starts[cell]..self.starts[cell + 1]]
+        self.buckets.of(cell)
     }
 
     pub(super) fn rect(&self, cell: usize) -> Rect {
-        let columns = self.x.len() - 1;
-        let (column, row) = (cell % columns, cell / columns);
-        Rect {
-            low_m: [self.x[column], self.y[row]],
-            high_m: [self.x[column + 1], self.y[row + 1]],
-        }
+        rect(&self.x, &self.y, cell)
     }
 
     /// Heights at the cell's corners, x fastest.
@@ -333,6 +330,37 @@ impl<'a> Lattice<'a> {
         }
         cells
     }
+}
+
+/// A cell between the nodes.
+fn rect(x: &[f64], y: &[f64], cell: usize) -> Rect {
+    let columns = x.len() - 1;
+    let (column, row) = (cell % columns, cell / columns);
+    Rect {
+        low_m: [x[column], y[row]],
+        high_m: [x[column + 1], y[row + 1]],
+    }
+}
+
+/// The cells over which a face lies, each with the face's index.
+fn cells_of(face: &piece::Face, index: usize, x: &[f64], y: &[f64]) -> Vec<(u32, u32)> {
+    let between = |nodes: &[f64], (low, high): (f64, f64)| {
+        let from = nodes.partition_point(|node| *node <= low).saturating_sub(1);
+        from..nodes
+            .partition_point(|node| *node < high)
+            .min(nodes.len().saturating_sub(1))
+    };
+    let columns = between(x, face.range(0));
+    let mut found = Vec::new();
+    for row in between(y, face.range(1)) {
+        for column in columns.clone() {
+            let cell = row * (x.len() - 1) + column;
+            if face.overlaps(&rect(x, y, cell)) {
+                found.push((cell as u32, index as u32));
+            }
+        }
+    }
+    found
 }
 
 /// The exact supremum of the vertical difference over all cells of four points.

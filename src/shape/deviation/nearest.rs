@@ -1,7 +1,7 @@
 //! The distance from a point to a set of triangles: by a tree of boxes, nearest first.
 
 use crate::shape::boxes::{Box3, BoxTree};
-use crate::shape::mesh::{Triangle, minus};
+use crate::shape::mesh::{Triangle, dot, minus};
 
 /// A tree of boxes over triangles, and the triangles in its order.
 pub(super) struct Tree {
@@ -103,10 +103,6 @@ fn square_to_segment(a: [f64; 3], b: [f64; 3], p: [f64; 3]) -> f64 {
     };
     let off = [0, 1, 2].map(|k| w[k] - t * u[k]);
     dot(off, off)
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[cfg(test)]

@@ -20,7 +20,7 @@ pub struct Rect {
 }
 
 impl Rect {
-    pub(super) fn centre(&self) -> Point {
+    pub(in crate::shape) fn centre(&self) -> Point {
         [0, 1].map(|k| 0.5 * (self.low_m[k] + self.high_m[k]))
     }
 
@@ -31,6 +31,12 @@ impl Rect {
     /// Whether a point lies in it, borders included.
     pub(super) fn holds(&self, p: Point) -> bool {
         (0..2).all(|k| self.low_m[k] <= p[k] && p[k] <= self.high_m[k])
+    }
+
+    /// Its four corners, in turn.
+    pub(super) fn corners(&self) -> [Point; 4] {
+        let ([x, y], [u, v]) = (self.low_m, self.high_m);
+        [[x, y], [u, y], [u, v], [x, v]]
     }
 
     /// The two halves along an axis.
@@ -147,10 +153,33 @@ impl Face {
 
     /// Height over a point of the plan that belongs to the triangle.
     pub(super) fn height(&self, p: Point) -> f64 {
+        // A sliver's slope is huge: what rounding adds must not leave the triangle.
+        self.plane(p).clamp(self.heights[0], self.heights[1])
+    }
+
+    /// The height of its plane at any point, and not below its corners.
+    pub(super) fn at_least(&self, p: Point) -> f64 {
+        self.plane(p).max(self.heights[0])
+    }
+
+    /// The height of its plane at any point, and not above its corners.
+    pub(super) fn at_most(&self, p: Point) -> f64 {
+        self.plane(p).min(self.heights[1])
+    }
+
+    fn plane(&self, p: Point) -> f64 {
         let rise =
             self.slope[0] * (p[0] - self.origin[0]) + self.slope[1] * (p[1] - self.origin[1]);
-        // A sliver's slope is huge: what rounding adds must not leave the triangle.
-        (self.origin[2] + rise).clamp(self.heights[0], self.heights[1])
+        self.origin[2] + rise
+    }
+
+    /// Whether a point of the plan lies in the triangle or no farther than `slack_m` beyond a side.
+    pub(super) fn holds(&self, p: Point, slack_m: f64) -> bool {
+        (0..3).all(|k| {
+            let (a, b) = (self.corners[k], self.corners[(k + 1) % 3]);
+            let (u, v) = (b[0] - a[0], b[1] - a[1]);
+            u * (p[1] - a[1]) - v * (p[0] - a[0]) >= -slack_m * u.hypot(v)
+        })
     }
 
     /// Length in space of a step along an axis.

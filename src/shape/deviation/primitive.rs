@@ -128,11 +128,7 @@ fn look(shape: &PlacedPrimitive, rect: &Rect, patch: &Patch, best: &mut Extreme)
         let rise = normal[0] * (p[0] - centre[0]) + normal[1] * (p[1] - centre[1]);
         height_m - rise / normal[2]
     };
-    let corners = [0, 1, 2, 3].map(|k| {
-        let pick = |k: usize, upper: bool| if upper { rect.high_m[k] } else { rect.low_m[k] };
-        [pick(0, k & 1 == 1), pick(1, k & 2 == 2)]
-    });
-    corners.iter().fold(f64::NEG_INFINITY, |most, p| {
+    rect.corners().iter().fold(f64::NEG_INFINITY, |most, p| {
         most.max(tangent(*p) - patch.height_m(*p))
     })
 }

@@ -16,7 +16,11 @@ pub(super) struct Hair {
     pub(super) height_m: f64,
 }
 
+/// So many of the others are looked at first: what they hide needs no more.
+pub(super) const HIGHEST: usize = 16;
+
 /// The largest value over the visible part of `piece`, a part of `face`; `None` when it is hidden.
+/// Among many `others` the highest should come first.
 pub(super) fn supremum_over_visible(
     face: &Face,
     piece: &Polygon,
@@ -24,6 +28,11 @@ pub(super) fn supremum_over_visible(
     hair: Hair,
     value: &impl Fn(Point) -> f64,
 ) -> Option<Extreme> {
+    if others.len() > HIGHEST
+        && supremum_over_visible(face, piece, &others[..HIGHEST], hair, value).is_none()
+    {
+        return None;
+    }
     let regions: Vec<Polygon> = others
         .iter()
         .map(|other| other.hides(face, piece, hair.height_m))

@@ -2,7 +2,8 @@
 //!
 //! Darts are thrown into the cells of a grid so fine that each holds one point at most, over and
 //! over in a shuffled order; the stream of numbers depends on the seed alone. A point's weight is
-//! the area nearer to it than to any other, counted on a finer grid.
+//! the area nearer to it than to any other, counted on a finer grid; a place counted there that is
+//! a spacing or more from all points becomes one.
 
 use super::{MOST_POINTS, Probe, Scattered, too_many};
 use crate::progress::Progress;
@@ -91,11 +92,21 @@ pub fn poisson(
         progress.advance(1);
     }
     progress.end();
-    let (areas_m2, cover_m) = areas(probe, &cells, spacing_m / COUNTED);
+    let mut counted = count_areas(probe, &cells, spacing_m, progress)?;
+    if !counted.missed.is_empty() {
+        for p in std::mem::take(&mut counted.missed) {
+            let free = |(_, square)| square >= spacing_m * spacing_m;
+            let cell = cells.of(p);
+            if cells.darts[cell].is_none() && cells.nearest(p, 2).is_none_or(free) {
+                cells.darts[cell] = probe.at(p).map(|(sample, marks)| (p, sample, marks));
+            }
+        }
+        counted = count_areas(probe, &cells, spacing_m, progress)?;
+    }
     let mut found: Vec<_> = cells
         .darts
         .iter()
-        .zip(areas_m2)
+        .zip(counted.areas_m2)
         .filter_map(|(d, a)| Some(((*d)?, a)))
         .collect();
     found.sort_by(|((p, ..), _), ((q, ..), _)| p[1].total_cmp(&q[1]).then(p[0].total_cmp(&q[0])));
@@ -103,36 +114,75 @@ pub fn poisson(
     for ((p, sample, marks), area_m2) in found {
         points.push(p, (sample, marks), area_m2);
     }
-    Ok(Poisson { points, cover_m })
+    Ok(Poisson {
+        points,
+        cover_m: counted.cover_m,
+    })
 }
 
-/// The area nearest to each dart, and the farthest that any of it lies from its dart.
-fn areas(probe: &Probe<'_>, cells: &Cells, step_m: f64) -> (Vec<f64>, f64) {
+/// What the counted places of the surface tell.
+struct Counted {
+    /// The area nearest to each dart, by its cell.
+    areas_m2: Vec<f64>,
+    /// The farthest that any place lies from its dart, m.
+    cover_m: f64,
+    /// Places at least a spacing from every dart: narrow parts that none has hit.
+    missed: Vec<[f64; 2]>,
+}
+
+fn count_areas(
+    probe: &Probe<'_>,
+    cells: &Cells,
+    spacing_m: f64,
+    progress: &dyn Progress,
+) -> Result<Counted, ShapeError> {
     let mut areas_m2 = vec![0.0; cells.darts.len()];
+    let mut missed = Vec::new();
     let mut farthest = 0.0_f64;
+    let step_m = spacing_m / COUNTED;
     let sides = probe.plan_m.sides();
     let count = sides.map(|side| (side / step_m).ceil().max(1.0) as usize);
     let area_m2 = sides[0] / count[0] as f64 * (sides[1] / count[1] as f64);
     for k in 0..count[0] * count[1] {
         let place = [k % count[0], k / count[0]];
+        if place[0] == 0 {
+            progress.check()?;
+        }
         let p = [0, 1]
             .map(|k| probe.plan_m.low_m[k] + (place[k] as f64 + 0.5) * sides[k] / count[k] as f64);
         if probe.at(p).is_none() {
             continue;
         }
-        if let Some((cell, square)) = cells.nearest(p, 4) {
+        let nearest = cells.nearest(p, 2);
+        if let Some((cell, square)) = nearest {
             areas_m2[cell] += area_m2;
             farthest = farthest.max(square);
         }
+        if nearest.is_none_or(|(_, square)| square >= spacing_m * spacing_m) {
+            missed.push(p);
+        }
     }
-    (areas_m2, farthest.sqrt())
+    Ok(Counted {
+        areas_m2,
+        cover_m: farthest.sqrt(),
+        missed,
+    })
 }
 
 impl Cells {
+    fn place(&self, p: [f64; 2]) -> [usize; 2] {
+        [0, 1].map(|k| (((p[k] - self.low_m[k]) / self.cell_m) as usize).min(self.count[k] - 1))
+    }
+
+    /// The cell of a place.
+    fn of(&self, p: [f64; 2]) -> usize {
+        let [column, row] = self.place(p);
+        row * self.count[0] + column
+    }
+
     /// The nearest dart among the cells up to `around` away, and its distance squared.
     fn nearest(&self, p: [f64; 2], around: usize) -> Option<(usize, f64)> {
-        let place = [0, 1]
-            .map(|k| (((p[k] - self.low_m[k]) / self.cell_m) as usize).min(self.count[k] - 1));
+        let place = self.place(p);
         let [columns, rows] = [0, 1]
             .map(|k| place[k].saturating_sub(around)..=(place[k] + around).min(self.count[k] - 1));
         let mut best: Option<(usize, f64)> = None;

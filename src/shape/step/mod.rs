@@ -69,6 +69,9 @@ fn solids(bytes: &[u8]) -> Result<FileMesh, String> {
     if stated.placed {
         return Err("it is an assembly, whose placements are not read".into());
     }
+    if stated.others > 0 {
+        return Err("beside solid bodies it holds others, which are not read".into());
+    }
     references::check(&text)?;
     let unit_m = stated.unit_m()?;
     let table = Table::from_step_bytes(bytes).map_err(|error| error.to_string())?;

@@ -8,6 +8,8 @@ pub(super) struct Statements {
     units: HashMap<u64, String>,
     /// Solid bodies.
     pub(super) solids: usize,
+    /// Bodies of facets, and surfaces that are no bodies.
+    pub(super) others: usize,
     /// True where bodies are placed in others.
     pub(super) placed: bool,
     /// True where the geometry holds angles.
@@ -19,6 +21,7 @@ impl Statements {
         let mut found = Self {
             units: HashMap::new(),
             solids: 0,
+            others: 0,
             placed: false,
             angles: false,
         };
@@ -40,6 +43,12 @@ impl Statements {
                 is("MANIFOLD_SOLID_BREP(")
                     || is("BREP_WITH_VOIDS(")
                     || body.contains(")BREP_WITH_VOIDS("),
+            );
+            found.others += usize::from(
+                is("FACETED_BREP(")
+                    || body.contains(")FACETED_BREP(")
+                    || is("SHELL_BASED_SURFACE_MODEL(")
+                    || is("FACE_BASED_SURFACE_MODEL("),
             );
             found.placed |= is("NEXT_ASSEMBLY_USAGE_OCCURRENCE(") || is("MAPPED_ITEM(");
             found.angles |= is("CONICAL_SURFACE(") || is("TRIMMED_CURVE(");

@@ -87,7 +87,9 @@ impl Discretize {
             "layers",
             &match found.layers {
                 Some(most) => format!("at most {most} over each other"),
-                None => "not looked for: nothing in it has an area".to_owned(),
+                None => {
+                    "not looked for: nothing in it has an area, or it lies too far out".to_owned()
+                }
             },
         );
         let volume = found.volume.map_or(String::new(), |volume| {
