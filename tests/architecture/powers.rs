@@ -87,7 +87,6 @@ const POWERS: &[Power] = &[
             "bundle/",
             "cli/documents.rs",
             "design/source.rs",
-            "job/discretize.rs",
             "job/verify.rs",
             "shape/surface.rs",
         ],
