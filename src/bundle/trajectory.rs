@@ -52,7 +52,7 @@ impl Trajectory {
     ///
     /// # Errors
     /// As [`super::read_table::read_columns`]; no rows; the first time that is smaller than the one
-    /// before it.
+    /// before it; a duration beyond the numbers.
     pub fn read(name: &str, source: impl Read) -> Result<Self, TableError> {
         let (columns, lines) = read_numbered(name, source, &TRAJECTORY_COLUMNS)?;
         let t_s = &columns[0];
@@ -66,6 +66,12 @@ impl Trajectory {
                 lines[row],
                 t_s[row - 1],
                 t_s[row]
+            )));
+        }
+        let (first, last) = (t_s[0], t_s[t_s.len() - 1]);
+        if !(last - first).is_finite() {
+            return Err(TableError::one(format!(
+                "{name}: column t_s: from {first} to {last} is no time in seconds"
             )));
         }
         Ok(Self {
@@ -130,6 +136,10 @@ mod tests {
             (
                 "t_s,x_m,y_m,z_m\n0.7,0,0,0.05\n0.7,0,0,0.05\n0.6,0,0,0.05\n",
                 "finger.csv:4: column t_s: time runs backwards, from 0.7 to 0.6",
+            ),
+            (
+                "t_s,x_m,y_m,z_m\n-1e308,0,0,0.05\n1e308,0,0,0.05\n",
+                "is no time in seconds",
             ),
         ] {
             let fault = read(text).unwrap_err();
