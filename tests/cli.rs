@@ -7,6 +7,8 @@ mod files;
 mod help;
 #[path = "cli/interrupt.rs"]
 mod interrupt;
+#[path = "cli/kept.rs"]
+mod kept;
 #[path = "cli/lambda.rs"]
 mod lambda;
 #[path = "cli/messages.rs"]

@@ -43,6 +43,7 @@ fn calibrate_text(text: &str, shapes: &[&str], out: &Path) -> Result<CalibrateRe
         force: false,
         lambda: LambdaOptions::default(),
         reach_m: DEFAULT_REACH_M,
+        keep: false,
     };
     let source = DesignSource {
         design: &design,

@@ -18,6 +18,7 @@ pub mod read_table;
 pub mod rendering;
 pub mod replay;
 pub mod schema;
+pub mod store;
 pub mod sweep;
 pub mod table;
 pub mod trajectory;

@@ -16,6 +16,8 @@
 //! Where the winding is short against the distance the differences would lose digits: there the
 //! loops' own derivatives are integrated along z.
 
+use serde::{Deserialize, Serialize};
+
 use std::f64::consts::PI;
 
 use ellip::cel;
@@ -26,7 +28,7 @@ use crate::numerics::gauss;
 use crate::units::MU_0_T_M_PER_A;
 
 /// A winding of rectangular section, top face at z = 0.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Winding {
     /// Inner radius a1, m; 0 <= a1 < a2.
     pub inner_radius_m: f64,

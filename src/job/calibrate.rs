@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::discretize::{self, point_rows, points_grid};
+use super::kept::{FieldStore, STORE_FOLDER, ShapeField};
 use super::lambda::{LambdaOptions, LambdaReport, solve};
 use super::map::{MAP_TOLERANCE, arrays, runtime, summary, workspace_grid};
 use super::maps::{Felt, SceneMap};
@@ -22,6 +23,7 @@ use crate::bundle::manifest::{
 };
 use crate::bundle::npz::PASSIVE;
 use crate::bundle::rendering::{HeightGrid, Rendering};
+use crate::bundle::store::Store;
 use crate::bundle::table::CurrentRow;
 use crate::bundle::write::{BundleContent, check_bundle_target, write_bundle};
 use crate::design::{Design, Steel as Described, source};
@@ -29,6 +31,7 @@ use crate::map::tabulate::{Grid, PlacedCoil};
 use crate::map::{Components, FieldMap};
 use crate::progress::Progress;
 use crate::shape::document::ShapeDocument;
+use crate::shape::points::ConstraintPoints;
 
 /// The name under which a bundle keeps the design it was made from.
 pub const DESIGN_FILE: &str = "design.toml";
@@ -54,6 +57,8 @@ pub struct CalibrateOptions {
     pub lambda: LambdaOptions,
     /// The map reaches this far from the object's points, within the workspace, m.
     pub reach_m: f64,
+    /// Keep the design's field for the next run, and use what an earlier one kept.
+    pub keep: bool,
 }
 
 /// The design, its text and its entry among the inputs.
@@ -125,9 +130,10 @@ pub fn run(
         }
     }
     let scene = Scene::new(source.design)?;
-    let solved = BothSolved::new(&scene, options.lambda.tolerance, progress)?;
-    let circuit = Inductances::new(&scene, &solved.map, progress);
     let curve = curve_table(source.design)?;
+    let field = field_store(&scene, curve.as_ref(), options);
+    let solved = BothSolved::new(&scene, &field, options.lambda.tolerance, progress)?;
+    let circuit = Inductances::new(&scene, &solved.map, progress);
     let bundles = shapes
         .iter()
         .map(|shape| {
@@ -135,6 +141,7 @@ pub fn run(
                 source,
                 curve: curve.as_ref(),
                 circuit: &circuit,
+                field: field.of_shape(&shape.document.name),
             };
             calibrate_one(&scene, &solved, kept, shape, options, progress)
         })
@@ -142,8 +149,24 @@ pub fn run(
     Ok(CalibrateReport { bundles })
 }
 
+/// What earlier runs kept of the field, as far as that is wanted.
+pub(super) fn field_store(
+    scene: &Scene,
+    curve: Option<&(Input, String)>,
+    options: &CalibrateOptions,
+) -> FieldStore {
+    let folder = options.out.join(&scene.design.name).join(STORE_FOLDER);
+    let mut store = Store::in_folder(folder);
+    if !options.keep {
+        store.clear();
+        store = Store::none();
+    }
+    let table = curve.map(|(_, text)| text.as_str());
+    FieldStore::new(scene, options.lambda.tolerance, table, store)
+}
+
 /// The table of the design's magnetisation curve: its entry among the inputs and its text.
-fn curve_table(design: &Design) -> Result<Option<(Input, String)>, JobError> {
+pub(super) fn curve_table(design: &Design) -> Result<Option<(Input, String)>, JobError> {
     let Some(Described::Curve(path)) = design.core.as_ref().map(|core| &core.steel) else {
         return Ok(None);
     };
@@ -158,6 +181,7 @@ struct Kept<'a> {
     source: DesignSource<'a>,
     curve: Option<&'a (Input, String)>,
     circuit: &'a Inductances,
+    field: ShapeField<'a>,
 }
 
 /// How the coils' currents follow their voltages; the same for every shape.
@@ -191,12 +215,13 @@ struct BothSolved {
 impl BothSolved {
     fn new(
         scene: &Scene,
+        field: &FieldStore,
         tolerance: Option<f64>,
         progress: &dyn Progress,
     ) -> Result<Self, JobError> {
         let lowest_m = scene.design.workspace.z_m.from;
         progress.begin("steel", 1);
-        let map = steel::solve(scene, tolerance, MAP_TOLERANCE, lowest_m)?;
+        let map = field.steel(scene, tolerance, MAP_TOLERANCE)?;
         let forces = match map.steel {
             Steel::None => steel::solve(scene, tolerance, KERNEL_ERROR, lowest_m)?,
             Steel::Alone(_) | Steel::Coupled(_) => map.clone(),
@@ -220,6 +245,7 @@ fn calibrate_one(
         source,
         curve,
         circuit,
+        field,
     }: Kept,
     shape: &ShapeSource,
     options: &CalibrateOptions,
@@ -235,10 +261,24 @@ fn calibrate_one(
         .chain(&shape.input)
         .cloned()
         .collect();
-    let points = discretize::run(&shape.document, inputs, progress)?;
+    let points = discretize::run_kept(&shape.document, inputs, field, progress)?;
     check_bundle_target(&folder, options.force, &points.summary.inputs)?;
-    let mut lambda = solve(scene, &solved.forces, points, &options.lambda, progress)?;
-    let needed = NeededMap::new(scene, &solved.map, &lambda, options.reach_m, progress)?;
+    let mut lambda = solve(
+        scene,
+        &solved.forces,
+        field,
+        points,
+        &options.lambda,
+        progress,
+    )?;
+    let needed = NeededMap::new(
+        scene,
+        &solved.map,
+        field,
+        &lambda,
+        options.reach_m,
+        progress,
+    )?;
     let passive = passive_map(scene, &needed.made.map, progress)?;
     let mut manifest = manifest(scene, &lambda, &needed, passive.as_ref());
     manifest.circuit = Some(circuit.circuit.clone());
@@ -313,6 +353,7 @@ impl NeededMap {
     fn new(
         scene: &Scene,
         solved: &Solved,
+        field: ShapeField,
         lambda: &LambdaReport,
         reach_m: f64,
         progress: &dyn Progress,
@@ -329,12 +370,7 @@ impl NeededMap {
             });
             Components::Gz
         };
-        let driven: Vec<PlacedCoil> = scene
-            .coils
-            .iter()
-            .filter(|coil| largest_current_a(scene, coil.number) > 0.0)
-            .copied()
-            .collect();
+        let driven = needed_coils(scene);
         if driven.len() < scene.coils.len() {
             left_out.push(LeftOut {
                 what: format!("{} coils", scene.coils.len() - driven.len()),
@@ -343,7 +379,7 @@ impl NeededMap {
             });
         }
         let felt = Felt::by_magnet(scene, &grid.z_m, MAGNET_SHARE * solved.tolerance)?;
-        let mut made = SceneMap::new(scene, solved, &driven, &grid, components, &felt, progress)?;
+        let mut made = field.map(scene, solved, &driven, &grid, components, &felt, progress)?;
         drop_weak_coils(
             scene,
             &mut made.map,
@@ -357,6 +393,15 @@ impl NeededMap {
             left_out,
         })
     }
+}
+
+/// The coils that may carry current.
+pub(super) fn needed_coils(scene: &Scene) -> Vec<PlacedCoil> {
+    let coils = scene.coils.iter();
+    coils
+        .filter(|coil| largest_current_a(scene, coil.number) > 0.0)
+        .copied()
+        .collect()
 }
 
 fn largest_current_a(scene: &Scene, coil: usize) -> f64 {
@@ -425,13 +470,7 @@ fn drop_weak_coils(
 }
 
 /// The nodes of the workspace within reach of the object's points, one cell beyond.
-fn needed_grid(
-    design: &Design,
-    lambda: &LambdaReport,
-    reach_m: f64,
-    left_out: &mut Vec<LeftOut>,
-) -> Grid {
-    let points = &lambda.points.discretized.points;
+pub(super) fn needed_nodes(design: &Design, points: &ConstraintPoints, reach_m: f64) -> Grid {
     let whole = workspace_grid(design);
     let part = |nodes: &[f64], values: &[f64]| -> Vec<f64> {
         let lowest = values.iter().copied().fold(f64::INFINITY, f64::min) - reach_m;
@@ -448,11 +487,21 @@ fn needed_grid(
         }
         nodes[start..end].to_vec()
     };
-    let grid = Grid {
+    Grid {
         x_m: part(&whole.x_m, &points.x_m),
         y_m: part(&whole.y_m, &points.y_m),
         z_m: part(&whole.z_m, &points.height_m),
-    };
+    }
+}
+
+fn needed_grid(
+    design: &Design,
+    lambda: &LambdaReport,
+    reach_m: f64,
+    left_out: &mut Vec<LeftOut>,
+) -> Grid {
+    let whole = workspace_grid(design);
+    let grid = needed_nodes(design, &lambda.points.discretized.points, reach_m);
     let count = |grid: &Grid| grid.x_m.len() * grid.y_m.len() * grid.z_m.len();
     if count(&grid) < count(&whole) {
         left_out.push(LeftOut {

@@ -7,6 +7,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::JobError;
+use super::kept::ShapeField;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::bundle::atomic::{FileSet, Overwrite, WriteError};
@@ -213,9 +214,42 @@ pub fn run_with(
     progress: &dyn Progress,
 ) -> Result<PointsReport, JobError> {
     let inputs = with_surface(document, inputs);
+    discretized_as(document, inputs, options, None, progress)
+}
+
+/// As [`run`], with what an earlier run found of these points and this surface.
+///
+/// # Errors
+/// As [`run_with`].
+pub(super) fn run_kept(
+    document: &ShapeDocument,
+    inputs: Vec<Input>,
+    field: ShapeField,
+    progress: &dyn Progress,
+) -> Result<PointsReport, JobError> {
+    let inputs = with_surface(document, inputs);
+    let kept = field.certificate(document, &inputs);
+    let known = kept.known();
+    let new = known.is_none();
+    let options = PointsOptions::default();
+    let report = discretized_as(document, inputs, &options, known, progress)?;
+    if let (true, Some(found)) = (new, &report.discretized.certificate) {
+        kept.keep(found);
+    }
+    Ok(report)
+}
+
+fn discretized_as(
+    document: &ShapeDocument,
+    inputs: Vec<Input>,
+    options: &PointsOptions,
+    known: Option<Certificate>,
+    progress: &dyn Progress,
+) -> Result<PointsReport, JobError> {
     let settings = Settings {
         holes: options.holes,
         certify: options.certify,
+        known,
         marks: true,
         cells: options.picture,
     };

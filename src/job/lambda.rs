@@ -11,6 +11,7 @@ use self::points::WantedPoints;
 use self::points_effect::Moved;
 use super::discretize::scattered::{self, Sampling, ScatteredSummary};
 use super::discretize::{self, PointsReport};
+use super::kept::ShapeField;
 use super::scene::{MAGNET_SHARE, Scene};
 use super::single::above_knee;
 use super::steel::{EVALUATION_SHARE, Material, Solved, Steel};
@@ -115,7 +116,8 @@ pub fn run(
     let solved = steel::solve(&scene, options.tolerance, KERNEL_ERROR, lowest_m)?;
     progress.end();
     let Some(chosen) = chosen else {
-        return solve(&scene, &solved, points, options, progress);
+        let field = ShapeField::default();
+        return solve(&scene, &solved, field, points, options, progress);
     };
     // What is asked besides is asked of the chosen points alone.
     let plain = LambdaOptions {
@@ -123,11 +125,12 @@ pub fn run(
         picture: false,
         ..options.clone()
     };
-    let grid = solve_at(&scene, &solved, &of_grid, &plain, progress)?.file;
-    let found = solve_at(&scene, &solved, &chosen, options, progress)?;
+    let none = ShapeField::default();
+    let grid = solve_at(&scene, &solved, none, &of_grid, &plain, progress)?.file;
+    let found = solve_at(&scene, &solved, none, &chosen, options, progress)?;
     let mut report = found.with(points);
     if let Some(coarser) = coarser {
-        let other = solve_at(&scene, &solved, &coarser, &plain, progress)?.file;
+        let other = solve_at(&scene, &solved, none, &coarser, &plain, progress)?.file;
         let stage = quadrature(&report.file, &other);
         let stage = stage.map(|stage| ("quadrature".to_owned(), stage));
         report.file.accuracy.extend(stage);
@@ -198,6 +201,7 @@ fn against_grid(sampled: &ScatteredSummary, file: &LambdaFile, grid: &LambdaFile
 pub(super) fn solve(
     scene: &Scene,
     solved: &Solved,
+    field: ShapeField,
     points: PointsReport,
     options: &LambdaOptions,
     progress: &dyn Progress,
@@ -205,6 +209,7 @@ pub(super) fn solve(
     let found = solve_at(
         scene,
         solved,
+        field,
         &WantedPoints::of_grid(&points),
         options,
         progress,
@@ -240,12 +245,13 @@ impl Found {
 fn solve_at(
     scene: &Scene,
     solved: &Solved,
+    field: ShapeField,
     points: &WantedPoints,
     options: &LambdaOptions,
     progress: &dyn Progress,
 ) -> Result<Found, JobError> {
     let positions = &points.positions_m;
-    let forces = scene.forces_n_per_a(solved, positions, progress)?;
+    let forces = field.forces_n_per_a("forces", scene, solved, positions, progress)?;
     let counts = scene.design.magnet.passive_force;
     let pull = if counts || options.variants {
         passive::pull(scene, positions, false)?
@@ -369,6 +375,7 @@ fn solve_at(
         &Moved {
             scene,
             solved,
+            field,
             points,
             offset_n: offset_n.as_deref(),
             solution: &solution,

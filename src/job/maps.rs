@@ -1,5 +1,7 @@
 //! Maps of a scene over a grid, whatever its sources, and their interpolation's error.
 
+use serde::{Deserialize, Serialize};
+
 use super::JobError;
 use super::scene::Scene;
 use super::steel::{Solved, Steel};
@@ -16,7 +18,7 @@ use crate::map::{
 use crate::progress::{Progress, Silent};
 
 /// A map and what is known of it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SceneMap {
     /// The map.
     pub map: FieldMap,

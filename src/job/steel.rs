@@ -1,5 +1,7 @@
 //! The steel of a design: its material, its solution, and the field it adds.
 
+use serde::{Deserialize, Serialize};
+
 use super::JobError;
 use super::at_current::{AtCurrent, SATURATED_TOLERANCE};
 use super::scene::Scene;
@@ -91,7 +93,7 @@ impl SceneCore {
 }
 
 /// The solved steel of a scene.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub enum Steel {
     /// There is none.
     None,
@@ -102,7 +104,7 @@ pub enum Steel {
 }
 
 /// A core that answers to its own winding alone.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct AloneCore {
     /// Its layer per ampere.
     pub layer: MagnetizedCore,
@@ -111,7 +113,7 @@ pub struct AloneCore {
 }
 
 /// A scene's field sources, ready to be evaluated.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Solved {
     /// The steel.
     pub steel: Steel,

@@ -1,5 +1,7 @@
 //! The error of interpolating a map between its nodes.
 
+use serde::{Deserialize, Serialize};
+
 use super::tabulate::{Components, FieldMap, Grid, MapError, PlacedCoil, tabulate};
 use crate::field::source::AxialSource;
 use crate::numerics::lagrange;
@@ -7,7 +9,7 @@ use crate::progress::Silent;
 
 /// The largest error found, relative to the largest |dB_z/dz| at its height, and at how many
 /// places it was looked for.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct InterpolationError {
     /// Relative error.
     pub largest: f64,

@@ -1,5 +1,7 @@
 //! Maps of an array without symmetry: planes sampled directly, or through a harmonic table.
 
+use serde::{Deserialize, Serialize};
+
 use rayon::prelude::*;
 
 use super::harmonic::{Extent, Table, kind};
@@ -19,7 +21,7 @@ pub struct SampledField<'a> {
 }
 
 /// What a table cost and how well it does.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct TableReport {
     /// Lowest height of the table, m; below it planes are sampled. `None` without a table.
     pub from_m: Option<f64>,

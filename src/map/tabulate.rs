@@ -4,6 +4,8 @@
 //! repeat are computed once; where few repeat, a Chebyshev table over the distance replaces
 //! the direct sums once it is the cheaper of the two.
 
+use serde::{Deserialize, Serialize};
+
 use rayon::prelude::*;
 
 use super::radii::Radii;
@@ -27,7 +29,7 @@ pub enum Components {
 }
 
 /// Maps per ampere of every coil over a grid, C order.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct FieldMap {
     /// Nodes along x, m.
     pub x_m: Vec<f64>,

@@ -1,9 +1,11 @@
 //! Lagrange polynomials on Gauss nodes: values anywhere, derivatives and integrals at the nodes.
 
+use serde::{Deserialize, Serialize};
+
 use super::gauss::Rule;
 
 /// The Lagrange basis on the nodes of a rule over [-1, 1].
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Basis {
     nodes: Vec<f64>,
     /// Barycentric weights.

@@ -1,5 +1,6 @@
 //! How good the points of a grid are: every part of the error, bounded or estimated.
 
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 use crate::accuracy::StageAccuracy;
@@ -27,7 +28,7 @@ pub enum Certify {
 }
 
 /// How the facets' deviation from the surface meant is known.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Tessellation {
     /// There are no facets.
     None,
@@ -83,7 +84,7 @@ pub fn stated_tessellation(facts: &MeshFacts) -> Option<StageAccuracy> {
 }
 
 /// How far the interpolated points may lie from the surface.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Certificate {
     /// The vertical difference over the cells of four points.
     pub vertical: Vertical,

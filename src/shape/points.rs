@@ -131,12 +131,14 @@ pub struct Discretized {
 }
 
 /// What is done besides sampling.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Settings {
     /// Grid points without surface inside the silhouette.
     pub holes: Holes,
     /// How the points are compared with the surface.
     pub certify: Certify,
+    /// What an earlier comparison of these points with this surface found; it is not done again.
+    pub known: Option<Certificate>,
     /// Whether walls, rims, creases and overhangs are looked for.
     pub marks: bool,
     /// Whether the vertical difference is told for every cell.
@@ -227,7 +229,10 @@ pub fn discretize_with(
              between them is not computed"
         ));
     }
-    let certificate = certify(&surface, &grid, &samples, how, progress)?;
+    let certificate = match &settings.known {
+        Some(known) if how != Certify::No => Some(known.clone()),
+        _ => certify(&surface, &grid, &samples, how, progress)?,
+    };
     let cells_m = if settings.cells && grid.len() <= MOST_CERTIFIED {
         Some(by_cell(&surface, &grid, &samples, progress)?)
     } else {

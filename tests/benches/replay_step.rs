@@ -62,6 +62,7 @@ fn bundle(folder: &Path, side: usize, pitch_mm: f64, total_a: f64) -> Result<Ope
         force: false,
         lambda: LambdaOptions::default(),
         reach_m: DEFAULT_REACH_M,
+        keep: false,
     };
     let source = DesignSource {
         design: &design,

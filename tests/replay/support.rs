@@ -69,6 +69,7 @@ impl Bundles {
             force: false,
             lambda: LambdaOptions::default(),
             reach_m: DEFAULT_REACH_M,
+            keep: false,
         };
         let source = DesignSource {
             design: &parsed,

@@ -172,6 +172,7 @@ fn holes_of_a_file_are_skipped_filled_or_refused() {
             certify: Certify::Vertical,
             marks: true,
             cells: false,
+            known: None,
         };
         discretize_with(&document, &settings, &Silent)
     };

@@ -1,7 +1,7 @@
 //! Temporary names, their locks, and what killed runs left behind.
 
 use std::fs::{File, TryLockError};
-use std::io;
+use std::io::{self, Read};
 use std::path::Path;
 
 use tempfile::{Builder, NamedTempFile, TempDir};
@@ -34,6 +34,23 @@ pub(super) fn temporary_folder(folder: &Path) -> io::Result<(TempDir, Option<Fil
             return Ok((draft, Some(handle)));
         }
     }
+}
+
+/// Removes the files in `folder` that begin with `magic`, and the folder if nothing else is in it.
+pub fn remove_files_beginning_with(folder: &Path, magic: &[u8]) {
+    let Ok(entries) = folder.read_dir() else {
+        return;
+    };
+    for entry in entries.flatten() {
+        let mut start = vec![0; magic.len()];
+        let ours = entry.file_type().is_ok_and(|kind| kind.is_file())
+            && File::open(entry.path()).is_ok_and(|mut file| file.read_exact(&mut start).is_ok())
+            && start == magic;
+        if ours {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+    let _ = std::fs::remove_dir(folder);
 }
 
 /// Removes temporary files and folders in `folder` that no living run holds. Best effort: where

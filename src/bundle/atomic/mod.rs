@@ -22,7 +22,7 @@ pub(crate) use file::hex;
 pub use file::{FileSet, write};
 pub use folder::FolderDraft;
 pub(crate) use folder::check_name;
-pub use leftovers::clean_leftovers;
+pub use leftovers::{clean_leftovers, remove_files_beginning_with};
 pub use overwrite::{Overwrite, Record};
 pub use unforced::write_unforced;
 

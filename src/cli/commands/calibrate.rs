@@ -17,12 +17,15 @@ use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::printer::{Place, Printer};
-use crate::cli::quantity::{bytes, count, error, length_error, number, number_to, percent};
+use crate::cli::quantity::{
+    bytes, count, error, force, length_error, mm, number, number_to, percent,
+};
 use crate::cli::values::{self, FileArgument};
 use crate::design::{Design, Need};
 use crate::job::calibrate::{
     BundleReport, CalibrateOptions, CalibrateReport, DEFAULT_REACH_M, DesignSource, run,
 };
+use crate::job::plan::{Cost, Done, Plan, plan};
 
 /// The main job: maps, points, force constant and currents, one bundle a shape
 ///
@@ -37,6 +40,8 @@ use crate::job::calibrate::{
      "two objects; the bundles go to results/seed/"),
     ("fluxform calibrate designs/seed.toml shapes/wedge.stl --unit mm --translate 0,0,30",
      "a surface given directly; its bundle is called wedge"),
+    ("fluxform calibrate designs/seed_air.toml shapes/flat.toml --explain",
+     "tell first what will be computed, what left out, and what that costs"),
     ("fluxform calibrate designs/seed.toml shapes/flat.toml --criterion linear --force",
      "another criterion, replacing what is there"),
 ]))]
@@ -54,6 +59,13 @@ pub struct Calibrate {
     /// [default: 20]
     #[arg(long, value_name = "MM", value_parser = values::length, allow_hyphen_values = true)]
     reach: Option<f64>,
+    /// Compute the field of coils and steel anew, and remove what earlier runs kept of it in
+    /// OUT/<design>/.fluxform-kept
+    #[arg(long)]
+    no_cache: bool,
+    /// Tell first what will be computed and what left out, why, and what leaving it out costs
+    #[arg(long)]
+    explain: bool,
     #[command(flatten)]
     criterion: CriterionFlags,
     #[command(flatten)]
@@ -70,6 +82,8 @@ struct CalibrateSummary<'a> {
     schema_version: &'static str,
     fluxform_version: &'static str,
     design: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    plan: Option<Plan>,
     bundles: Vec<BundleSummary<'a>>,
 }
 
@@ -119,8 +133,18 @@ impl Calibrate {
             out,
             force: self.writing.force,
             lambda,
+            keep: !self.no_cache,
             reach_m: self.reach.unwrap_or(DEFAULT_REACH_M),
         };
+        let bar = begin(printer);
+        let plan = self
+            .explain
+            .then(|| plan(source, &shapes, &options, &bar))
+            .transpose()?;
+        drop(bar);
+        if let Some(plan) = plan.as_ref().filter(|_| !printer.json()) {
+            printer.summary(Place::Output, plan, || explained(plan))?;
+        }
         let bar = begin(printer);
         let report = run(source, &shapes, &options, &bar)?;
         drop(bar);
@@ -129,6 +153,7 @@ impl Calibrate {
             schema_version: SCHEMA_VERSION,
             fluxform_version: FLUXFORM_VERSION,
             design: &design.name,
+            plan,
             bundles: report.bundles.iter().map(bundle_summary).collect(),
         };
         let json = printer.with_warnings(&json);
@@ -147,6 +172,46 @@ impl Calibrate {
             Err(no_constant(&without))
         }
     }
+}
+
+fn explained(plan: &Plan) -> String {
+    let mut sheet = Sheet::new("plan");
+    for term in &plan.terms {
+        let (does, without) = match term.done {
+            Done::Computed => ("computed", "without it up to"),
+            Done::Kept => ("kept", ""),
+            Done::LeftOut => ("left out", "costs up to"),
+        };
+        let cost = match term.cost {
+            None if term.done == Done::LeftOut => "; what that costs is not known".to_owned(),
+            None => String::new(),
+            Some(Cost::OfTheForce(0.0)) => "; costs nothing".to_owned(),
+            Some(Cost::OfTheForce(part)) => format!(
+                "; {without} {} of the largest coil's force, where the tolerance is {}",
+                percent(part),
+                error(plan.tolerance)
+            ),
+            Some(Cost::ForceN(n)) => format!("; {without} {}", force(n)),
+        };
+        sheet.line(does, &format!("{}: {}{cost}", term.what, term.why));
+    }
+    for shape in &plan.shapes {
+        let nodes = |n: [usize; 3]| format!("{} x {} x {}", n[0], n[1], n[2]);
+        sheet.line(
+            "map",
+            &format!(
+                "{}: {} of {} nodes, z {} to {}, for {}",
+                shape.shape,
+                nodes(shape.nodes),
+                nodes(shape.workspace_nodes),
+                mm(shape.z_m[0]),
+                mm(shape.z_m[1]),
+                count(shape.points, "point")
+            ),
+        );
+    }
+    sheet.gap();
+    sheet.finish()
 }
 
 fn warn(report: &CalibrateReport, printer: &Printer) {

@@ -10,6 +10,8 @@
 //! q_own being the driven coil's own core under its own winding, solved on the fine outline.
 //! Plain iteration stalls (the array's cores return each other's flux); GMRES needs a dozen steps.
 
+use serde::{Deserialize, Serialize};
+
 use nalgebra::{DMatrix, DVector};
 
 use super::CoreShape;
@@ -128,7 +130,7 @@ impl ArrayResolution {
 }
 
 /// The solved array, per ampere in each coil.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct CoupledArray {
     /// Axes, m.
     pub positions_m: Vec<[f64; 2]>,

@@ -6,9 +6,10 @@
 use super::CoreShape;
 use crate::field::winding::Winding;
 use crate::numerics::gauss;
+use serde::{Deserialize, Serialize};
 
 /// The three faces of the cylinder.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Face {
     /// z = bottom, normal down.
     Bottom,
@@ -19,7 +20,7 @@ pub enum Face {
 }
 
 /// A straight piece of one face. The coordinate is r on the end faces and z on the side.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Panel {
     /// The face it lies on.
     pub face: Face,
@@ -44,7 +45,7 @@ impl Panel {
 }
 
 /// A quadrature node of the outline.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Node {
     /// Radius, m.
     pub r_m: f64,
@@ -100,7 +101,7 @@ impl Resolution {
 }
 
 /// The outline of a core with its panels and nodes.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Generatrix {
     /// The core.
     pub shape: CoreShape,

@@ -4,6 +4,8 @@
 //! outline: what the magnetisation M = -grad v bounds. Its loops give mu_0 (H + M) everywhere,
 //! outside and inside, with no difference of large terms.
 
+use serde::{Deserialize, Serialize};
+
 use super::generatrix::{Face, Generatrix};
 use crate::field::ring::{RingPoint, ring_field};
 use crate::field::winding::AxialField;
@@ -20,7 +22,7 @@ const PIECE_ORDER: usize = 12;
 const MAX_HALVINGS: usize = 50;
 
 /// A core's outline with its double-layer density.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct MagnetizedCore {
     outline: Generatrix,
     density_a: Vec<f64>,

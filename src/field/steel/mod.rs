@@ -24,8 +24,10 @@ pub mod sources;
 pub mod symmetry;
 pub mod trace;
 
+use serde::{Deserialize, Serialize};
+
 /// A cylindrical core on the coil's axis.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CoreShape {
     /// Radius, m; > 0.
     pub radius_m: f64,

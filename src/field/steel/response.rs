@@ -5,6 +5,8 @@
 //! potential sent is sampled there, and the layer is felt as moments there, whatever its shape
 //! at the edges. The azimuth is a regular grid of angles, in which one core is block-circulant.
 
+use serde::{Deserialize, Serialize};
+
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 
@@ -14,7 +16,7 @@ use crate::numerics::gauss;
 use crate::numerics::lagrange_basis::Basis;
 
 /// A ring of the exchange grid.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Ring {
     /// Radius, m.
     pub r_m: f64,
@@ -25,7 +27,7 @@ pub struct Ring {
 }
 
 /// Rings on a core's outline and the interpolation from them to the outline's nodes.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Rings {
     /// The rings.
     pub rings: Vec<Ring>,
@@ -153,7 +155,7 @@ impl Rings {
 }
 
 /// One core's response: potentials on the exchange grid to layers and to moments.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Response {
     /// The outline on which the layers live.
     pub outline: Generatrix,

@@ -5,6 +5,7 @@
 //! lambda may move, not a bound, because the errors of single points need not agree.
 
 use super::super::JobError;
+use super::super::kept::ShapeField;
 use super::super::scene::Scene;
 use super::super::steel::Solved;
 use super::points::WantedPoints;
@@ -19,6 +20,7 @@ const MOST_OF_HEIGHT: f64 = 0.02;
 pub(super) struct Moved<'a> {
     pub(super) scene: &'a Scene<'a>,
     pub(super) solved: &'a Solved,
+    pub(super) field: ShapeField<'a>,
     pub(super) points: &'a WantedPoints,
     pub(super) offset_n: Option<&'a [f64]>,
     pub(super) solution: &'a Solution,
@@ -63,7 +65,8 @@ fn lambda_at(
     let scene = moved.scene;
     let mut positions = moved.points.positions_m.clone();
     positions.iter_mut().for_each(|p| p[2] += lift_m);
-    let forces = scene.forces_n_per_a(moved.solved, &positions, progress)?;
+    let forces =
+        (moved.field).forces_n_per_a("lifted", scene, moved.solved, &positions, progress)?;
     let heights: Vec<f64> = positions.iter().map(|p| p[2]).collect();
     let resistance_ohm = scene.resistances_ohm();
     let problem = ForceProblem {

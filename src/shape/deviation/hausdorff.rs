@@ -6,6 +6,7 @@
 //! the points towards the surface its walls count as well; from the surface only what is seen from
 //! above does.
 
+use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
@@ -24,7 +25,7 @@ const MOST: usize = 30_000;
 const FINEST: f64 = 16.0;
 
 /// A value that is known to lie between two others, m.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
     /// It is at least this, m.
     pub lower_m: f64,

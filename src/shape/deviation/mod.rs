@@ -12,6 +12,7 @@ mod primitive;
 mod visible;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::numerics::axis::Axis;
 use crate::progress::{Interrupted, Progress};
@@ -41,7 +42,7 @@ const HAIR: f64 = 1e-12;
 const ROUNDINGS: f64 = 16.0;
 
 /// The vertical difference between the surface and the points, cells of four points.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Vertical {
     /// The most by which the surface stands above the interpolated points, m.
     pub above: Extreme,
@@ -70,7 +71,7 @@ impl Vertical {
 }
 
 /// Cells of the grid by what their corners have.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Cells {
     /// Four points: interpolated.
     pub inner: usize,

@@ -4,6 +4,7 @@
 //! So its supremum stands at a corner or at the stationary point of an edge, in closed form.
 
 use crate::shape::mesh::Triangle;
+use serde::{Deserialize, Serialize};
 
 /// Corners of a triangle cut by a rectangle, by three lines and by a plane.
 const MOST_CORNERS: usize = 12;
@@ -340,7 +341,7 @@ impl Polygon {
 }
 
 /// A value and where it stands.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Extreme {
     /// The value; minus infinity for none.
     pub value_m: f64,

@@ -1,0 +1,163 @@
+//! Results of earlier runs, kept so that what has not changed is not computed again.
+//!
+//! An entry is one file: the digest of all that its value was computed from, that of the value, and
+//! the value. An entry of other origin, of another build of this program, or damaged is not used, and
+//! is overwritten. A store that cannot be read or written is none: results are the same without it.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use sha2::{Digest, Sha256};
+
+use super::atomic::{self, Overwrite};
+
+/// First bytes of every entry.
+const MAGIC: &[u8; 8] = b"fluxkept";
+const DIGEST: usize = 32;
+/// Digest of the sources of this build.
+const BUILD: &str = env!("FLUXFORM_BUILD");
+
+/// What a value is computed from, as a digest.
+#[derive(Debug, Clone)]
+pub struct Origin(Sha256);
+
+impl Default for Origin {
+    fn default() -> Self {
+        Self(Sha256::new()).and(BUILD.as_bytes())
+    }
+}
+
+impl Origin {
+    /// With `part` besides; the order counts.
+    #[must_use]
+    pub fn and(mut self, part: &[u8]) -> Self {
+        self.0.update((part.len() as u64).to_le_bytes());
+        self.0.update(part);
+        self
+    }
+
+    /// With numbers besides.
+    #[must_use]
+    pub fn and_numbers(mut self, numbers: impl IntoIterator<Item = f64>) -> Self {
+        let mut count = 0_u64;
+        for number in numbers {
+            self.0.update(number.to_bits().to_le_bytes());
+            count += 1;
+        }
+        self.0.update(count.to_le_bytes());
+        self
+    }
+
+    fn digest(&self) -> [u8; DIGEST] {
+        self.0.clone().finalize().into()
+    }
+}
+
+/// Entries in one folder, or none.
+#[derive(Debug, Clone, Default)]
+pub struct Store {
+    folder: Option<PathBuf>,
+}
+
+impl Store {
+    /// A store that keeps nothing.
+    #[must_use]
+    pub fn none() -> Self {
+        Self::default()
+    }
+
+    /// The store in `folder`, which is made when something is kept.
+    #[must_use]
+    pub fn in_folder(folder: PathBuf) -> Self {
+        Self {
+            folder: Some(folder),
+        }
+    }
+
+    /// The value of entry `name` if it is of this `origin`, or what `compute` gives, which is kept.
+    ///
+    /// # Errors
+    /// Those of `compute`.
+    pub fn remember<T: Serialize + DeserializeOwned, E>(
+        &self,
+        name: &str,
+        origin: &Origin,
+        compute: impl FnOnce() -> Result<T, E>,
+    ) -> Result<T, E> {
+        if let Some(value) = self.recall(name, origin) {
+            return Ok(value);
+        }
+        let value = compute()?;
+        self.keep(name, origin, &value);
+        Ok(value)
+    }
+
+    /// The value of entry `name` if it is of this `origin`.
+    #[must_use]
+    pub fn recall<T: DeserializeOwned>(&self, name: &str, origin: &Origin) -> Option<T> {
+        let folder = self.folder.as_ref()?;
+        postcard::from_bytes(&payload(&folder.join(name), &origin.digest())?).ok()
+    }
+
+    /// Keeps `value` as entry `name`. What cannot be kept is computed again next time.
+    pub fn keep<T: Serialize>(&self, name: &str, origin: &Origin, value: &T) {
+        if let Some(folder) = &self.folder {
+            write(&folder.join(name), &origin.digest(), value);
+        }
+    }
+
+    /// Removes all entries.
+    pub fn clear(&self) {
+        if let Some(folder) = &self.folder {
+            atomic::remove_files_beginning_with(folder, MAGIC);
+        }
+    }
+
+    /// Whether entry `name` of this `origin` can be read.
+    #[must_use]
+    pub fn holds(&self, name: &str, origin: &Origin) -> bool {
+        self.folder
+            .as_ref()
+            .is_some_and(|folder| payload(&folder.join(name), &origin.digest()).is_some())
+    }
+}
+
+fn payload(path: &Path, origin: &[u8; DIGEST]) -> Option<Vec<u8>> {
+    let mut bytes = std::fs::read(path).ok()?;
+    let start = MAGIC.len() + 2 * DIGEST;
+    let head = bytes.get(..start)?;
+    let (magic, digests) = head.split_at(MAGIC.len());
+    let (of_origin, of_value) = digests.split_at(DIGEST);
+    if magic != MAGIC || of_origin != origin || of_value != &Sha256::digest(&bytes[start..])[..] {
+        return None;
+    }
+    bytes.drain(..start);
+    Some(bytes)
+}
+
+fn may_replace(path: &Path) -> bool {
+    let mut magic = [0; MAGIC.len()];
+    match File::open(path) {
+        Ok(mut file) => file.read_exact(&mut magic).is_ok() && magic == *MAGIC,
+        Err(error) => error.kind() == io::ErrorKind::NotFound,
+    }
+}
+
+fn write<T: Serialize>(path: &Path, origin: &[u8; DIGEST], value: &T) {
+    let Ok(bytes) = postcard::to_stdvec(value) else {
+        return;
+    };
+    // What lies there and is not an entry is left alone.
+    if !may_replace(path) {
+        return;
+    }
+    let _ = atomic::write(path, &Overwrite::Force, |out| {
+        out.write_all(MAGIC)?;
+        out.write_all(origin)?;
+        out.write_all(&Sha256::digest(&bytes))?;
+        out.write_all(&bytes)
+    });
+}
