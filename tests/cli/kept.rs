@@ -100,6 +100,8 @@ fn another_field_is_computed_anew() {
     assert!(computed(&place), "another tolerance");
 }
 
+type Damage<'a> = &'a dyn Fn(&mut Vec<u8>);
+
 /// Overwrites the file with what `damage` makes of its bytes.
 #[allow(clippy::disallowed_methods)] // a test's own damage
 fn spoil(path: &Path, damage: impl Fn(&mut Vec<u8>)) {
@@ -119,7 +121,7 @@ fn damaged_entries_are_not_used_and_foreign_files_stay() {
         "bump.map",
         "bump.points",
     ];
-    let damages: [&dyn Fn(&mut Vec<u8>); 3] = [
+    let damages: [Damage; 3] = [
         &|bytes| bytes.truncate(bytes.len() / 2),
         &|bytes| {
             let middle = bytes.len() / 2;
