@@ -11,6 +11,8 @@ use super::steel::{self, Solved};
 use crate::bundle::artefact::Input;
 use crate::bundle::store::{Origin, Store};
 use crate::design::Steel as Described;
+use crate::field::steel::array::CoupledArray;
+use crate::field::winding::OnEdge;
 use crate::map::Components;
 use crate::map::tabulate::{Grid, PlacedCoil};
 use crate::progress::Progress;
@@ -128,6 +130,29 @@ impl<'a> ShapeField<'a> {
             .clone()
             .and_numbers(points_m.iter().flatten().copied());
         store.remember(&format!("{shape}.{what}"), &origin, compute)
+    }
+
+    /// The largest |B| in any core of `array` at these currents, T, as
+    /// [`CoupledArray::core_fields`] has it.
+    ///
+    /// # Errors
+    /// As [`CoupledArray::core_fields`].
+    pub fn peak_t(
+        self,
+        array: &CoupledArray,
+        currents_a: &[f64],
+        depth_m: f64,
+    ) -> Result<f64, OnEdge> {
+        let compute = || {
+            let fields = array.core_fields(currents_a, depth_m)?;
+            Ok(fields.iter().fold(0.0_f64, |most, f| most.max(f.peak_t)))
+        };
+        let Some((FieldStore { store, field, .. }, shape)) = self.kept else {
+            return compute();
+        };
+        let numbers = currents_a.iter().copied().chain([depth_m]);
+        let origin = field.clone().and_numbers(numbers);
+        store.remember(&format!("{shape}.peak"), &origin, compute)
     }
 
     /// The entry of what is found of the points of `document`, read from `inputs`.

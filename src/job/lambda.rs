@@ -302,8 +302,7 @@ fn solve_at(
         (&solution.chosen, &solved.steel, &scene.core)
         && matches!(core.material, Material::Linear(_))
     {
-        let fields = array.core_fields(&chosen.currents_a, peak_depth_m(core.shape))?;
-        let peak_t = fields.iter().fold(0.0_f64, |most, f| most.max(f.peak_t));
+        let peak_t = field.peak_t(array, &chosen.currents_a, peak_depth_m(core.shape))?;
         warnings.extend(above_knee(
             peak_t,
             core.knee_t,
