@@ -3,8 +3,8 @@
 //!
 //! The rooms, in the direction of their imports:
 //! `numerics` < `design` < `field` < `coil` < `map`; `shape` beside them;
-//! `lambda` on numbers alone; `bundle` writes and reads artefacts, `plot` draws; `job` joins
-//! them into what a command does; `cli` is the only room that talks.
+//! `lambda` on numbers alone; `bundle` writes and reads artefacts, `plot` draws,
+//! `report` makes pages; `job` joins them into what a command does; `cli` is the only room that talks.
 
 pub mod accuracy;
 pub mod progress;
@@ -25,6 +25,7 @@ pub mod lambda;
 
 pub mod bundle;
 pub mod plot;
+pub mod report;
 
 pub mod job;
 

@@ -44,6 +44,7 @@ fn calibrate_text(text: &str, shapes: &[&str], out: &Path) -> Result<CalibrateRe
         lambda: LambdaOptions::default(),
         reach_m: DEFAULT_REACH_M,
         keep: false,
+        page: false,
     };
     let source = DesignSource {
         design: &design,

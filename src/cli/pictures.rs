@@ -1,4 +1,4 @@
-//! Files that carry in their first line what they were made of: pictures and designs.
+//! Files that carry in their first line what they were made of: pictures, pages and designs.
 
 use std::path::Path;
 
@@ -22,11 +22,35 @@ pub fn write_svg(
     force: bool,
     printer: &Printer,
 ) -> Result<Place, Failure> {
+    write_marked(file, inputs, svg, force, printer)
+}
+
+/// Writes a page, as [`write_svg`] writes a drawing.
+///
+/// # Errors
+/// See [`Failure`].
+pub fn write_page(
+    file: &FileArgument,
+    inputs: &[Input],
+    html: &str,
+    force: bool,
+    printer: &Printer,
+) -> Result<Place, Failure> {
+    write_marked(file, inputs, html, force, printer)
+}
+
+fn write_marked(
+    file: &FileArgument,
+    inputs: &[Input],
+    text: &str,
+    force: bool,
+    printer: &Printer,
+) -> Result<Place, Failure> {
     let digests: Vec<&str> = inputs.iter().map(|input| input.sha256.as_str()).collect();
     let mark = format!("<!-- fluxform, drawn of {} -->\n", digests.join(" "));
     let path = match file {
         FileArgument::Standard => {
-            printer.data(|out| out.write_all(svg.as_bytes()))?;
+            printer.data(|out| out.write_all(text.as_bytes()))?;
             return Ok(Place::Error);
         }
         FileArgument::Path(path) => path,
@@ -34,7 +58,7 @@ pub fn write_svg(
     check_target(path, &mark, force, "and was not drawn of these inputs")?;
     write(path, &Overwrite::Force, |out| {
         out.write_all(mark.as_bytes())?;
-        out.write_all(svg.as_bytes())
+        out.write_all(text.as_bytes())
     })
     .map_err(JobError::from)?;
     Ok(Place::Output)

@@ -18,6 +18,7 @@ use super::steel::{Solved, Steel};
 use super::{JobError, KERNEL_ERROR, steel};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
+use crate::bundle::atomic::WriteError;
 use crate::bundle::manifest::{
     AxisSummary, CircuitSummary, Interpolation, LambdaSummary, LeftOut, Manifest, PassiveForce,
 };
@@ -32,6 +33,10 @@ use crate::map::{Components, FieldMap};
 use crate::progress::Progress;
 use crate::shape::document::ShapeDocument;
 use crate::shape::points::ConstraintPoints;
+
+mod page;
+
+pub use page::PAGE_FILE;
 
 /// The name under which a bundle keeps the design it was made from.
 pub const DESIGN_FILE: &str = "design.toml";
@@ -59,6 +64,8 @@ pub struct CalibrateOptions {
     pub reach_m: f64,
     /// Keep the design's field for the next run, and use what an earlier one kept.
     pub keep: bool,
+    /// Whether a page and plots for people are written besides.
+    pub page: bool,
 }
 
 /// The design, its text and its entry among the inputs.
@@ -263,14 +270,11 @@ fn calibrate_one(
         .collect();
     let points = discretize::run_kept(&shape.document, inputs, field, progress)?;
     check_bundle_target(&folder, options.force, &points.summary.inputs)?;
-    let mut lambda = solve(
-        scene,
-        &solved.forces,
-        field,
-        points,
-        &options.lambda,
-        progress,
-    )?;
+    let asked = LambdaOptions {
+        picture: options.page,
+        ..options.lambda.clone()
+    };
+    let mut lambda = solve(scene, &solved.forces, field, points, &asked, progress)?;
     let needed = NeededMap::new(
         scene,
         &solved.map,
@@ -298,6 +302,22 @@ fn calibrate_one(
     map.passive_force_n = passive.as_ref().map(|p| Cow::Borrowed(&*p.force_z_n));
     let mut extra = vec![(DESIGN_FILE, source.text.as_bytes())];
     extra.extend(curve.map(|(_, text)| (CURVE_FILE, text.as_bytes())));
+    let mut pages = Vec::new();
+    if let Some(picture) = &lambda.picture {
+        progress.begin("report", 1);
+        let seen = page::Seen {
+            scene,
+            lambda: &lambda,
+            picture,
+            needed: &needed,
+            manifest: &manifest,
+        };
+        let others: Vec<&str> = extra.iter().map(|(name, _)| *name).collect();
+        pages = page::files(&seen, &others)
+            .map_err(|error| WriteError::from_io("write", &folder.join(PAGE_FILE), error))?;
+        progress.end();
+    }
+    extra.extend(pages.iter().map(|(name, bytes)| (*name, bytes.as_slice())));
     let timing: Vec<StageSeconds> = progress
         .take_seconds()
         .into_iter()

@@ -29,11 +29,12 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("lambda", &["units", "progress", "accuracy", "numerics"]),
     ("bundle", &["units", "accuracy", "numerics"]),
     ("plot", &[]),
+    ("report", &["units", "plot"]),
     (
         "job",
         &[
             "units", "progress", "accuracy", "numerics", "design", "field", "coil", "map", "shape",
-            "lambda", "bundle", "plot",
+            "lambda", "bundle", "plot", "report",
         ],
     ),
     (

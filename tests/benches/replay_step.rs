@@ -63,6 +63,7 @@ fn bundle(folder: &Path, side: usize, pitch_mm: f64, total_a: f64) -> Result<Ope
         lambda: LambdaOptions::default(),
         reach_m: DEFAULT_REACH_M,
         keep: false,
+        page: false,
     };
     let source = DesignSource {
         design: &design,

@@ -70,6 +70,7 @@ impl Bundles {
             lambda: LambdaOptions::default(),
             reach_m: DEFAULT_REACH_M,
             keep: false,
+            page: false,
         };
         let source = DesignSource {
             design: &parsed,

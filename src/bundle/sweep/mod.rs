@@ -10,4 +10,4 @@ pub use plan::{Axis, Mode, PlanFile, Value};
 pub use point::{CertificateWord, OptimumRow, PointFile, Row, Status};
 pub use store::{Found, PointStore};
 pub use summary::MergeSummary;
-pub use table::{OPTIMUM_COLUMNS, ROW_COLUMNS, TableWriter};
+pub use table::{OPTIMUM_COLUMNS, ROW_COLUMNS, TableWriter, value_text};

@@ -157,7 +157,7 @@ impl<'a> TableWriter<'a> {
     fn value(&mut self, value: &Value) {
         match value {
             Value::Number(value) => self.number(*value),
-            other => self.text(&cell(other)),
+            other => self.text(&value_text(other)),
         }
     }
 
@@ -182,7 +182,8 @@ impl<'a> TableWriter<'a> {
 }
 
 /// A value as a cell's text.
-fn cell(value: &Value) -> String {
+#[must_use]
+pub fn value_text(value: &Value) -> String {
     match value {
         Value::Flag(flag) => flag.to_string(),
         Value::Number(number) => {
@@ -192,7 +193,7 @@ fn cell(value: &Value) -> String {
         }
         Value::Text(text) => text.clone(),
         Value::List(values) => {
-            let cells: Vec<String> = values.iter().map(cell).collect();
+            let cells: Vec<String> = values.iter().map(value_text).collect();
             format!("[{}]", cells.join(","))
         }
     }

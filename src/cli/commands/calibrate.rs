@@ -66,6 +66,9 @@ pub struct Calibrate {
     /// Tell first what will be computed and what left out, why, and what leaving it out costs
     #[arg(long)]
     explain: bool,
+    /// Leave out report.html and the folder plots
+    #[arg(long)]
+    no_report: bool,
     #[command(flatten)]
     criterion: CriterionFlags,
     #[command(flatten)]
@@ -135,6 +138,7 @@ impl Calibrate {
             lambda,
             keep: !self.no_cache,
             reach_m: self.reach.unwrap_or(DEFAULT_REACH_M),
+            page: !self.no_report,
         };
         let bar = begin(printer);
         let plan = self

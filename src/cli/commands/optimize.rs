@@ -13,12 +13,12 @@ use crate::cli::args::{Tolerance, Writing};
 use crate::cli::documents::{self, DesignDocument};
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
-use crate::cli::pictures;
+use crate::cli::pictures::{self, write_page};
 use crate::cli::printer::{Place, Printer};
 use crate::cli::values::FileArgument;
 use crate::design::Need;
 use crate::job::JobError;
-use crate::job::optimize::{Dimension, Document, Optimization, OptimizeRequest, optimize};
+use crate::job::optimize::{Dimension, Document, Optimization, OptimizeRequest, optimize, page};
 
 /// Find the best coil within a design's limits
 ///
@@ -63,6 +63,9 @@ pub struct Optimize {
     /// Write the design with the best coil here (TOML); `-` is standard output
     #[arg(long, value_name = "FILE")]
     out: Option<FileArgument>,
+    /// Write a page with the result here (HTML); `-` is standard output
+    #[arg(long, value_name = "FILE")]
+    report: Option<FileArgument>,
     #[command(flatten)]
     writing: Writing,
     #[command(flatten)]
@@ -101,6 +104,12 @@ impl Optimize {
         if let Some(FileArgument::Path(path)) = &self.out {
             self.check_target(path, &mark)?;
         }
+        if self.out == Some(FileArgument::Standard) && self.report == self.out {
+            return Err(Failure::Usage(
+                "--out and --report cannot both go to standard output; give one of them a file"
+                    .to_owned(),
+            ));
+        }
         let bar = begin(printer);
         let source = Document {
             design: &document.design,
@@ -113,7 +122,14 @@ impl Optimize {
         for note in &result.notes {
             printer.warning(note);
         }
-        let place = self.write(&result, &mark, printer)?;
+        let mut place = self.write(&result, &mark, printer)?;
+        if let Some(file) = &self.report {
+            let html = page::html(&result);
+            let after = write_page(file, &result.inputs, &html, self.writing.force, printer)?;
+            if after == Place::Error {
+                place = after;
+            }
+        }
         let json = printer.with_warnings(&result);
         printer.summary(place, &json, || told::summary(&result, self.out.as_ref()))?;
         if let Some(none) = &result.no_coil {

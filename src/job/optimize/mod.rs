@@ -2,6 +2,7 @@
 
 mod facts;
 mod model;
+pub mod page;
 mod told;
 mod written;
 

@@ -15,6 +15,8 @@ use crate::job::JobError;
 use crate::plot::pareto::{Panel, ParetoPlot};
 use crate::progress::Progress;
 
+mod page;
+
 /// Points read at a time.
 const PORTION: u64 = 4096;
 /// Ranges of missing points that are named.
@@ -33,6 +35,8 @@ pub struct MergeRequest {
     pub folders: Vec<PathBuf>,
     /// Merge what there is, even if points are missing.
     pub partial: bool,
+    /// Whether a page is wanted.
+    pub page: bool,
 }
 
 /// Where the files go.
@@ -51,6 +55,8 @@ pub struct MergeReport {
     pub summary: MergeSummary,
     /// Which points are missing, as text; empty where none is.
     pub missing: String,
+    /// The page, if one was asked for.
+    pub page: Option<String>,
 }
 
 /// The few numbers of a point that are kept: index, force, costs, whether limits are met.
@@ -155,7 +161,10 @@ pub fn merge(
         out.write_all(&bytes)
     })?;
     set.commit()?;
-    Ok(report(summary, &gathered))
+    let page = request
+        .page
+        .then(|| page::html(plan, &summary, &plot, &gathered.briefs, &best));
+    Ok(report(summary, &gathered, page))
 }
 
 /// Merges into a table alone; the summary lists no files.
@@ -174,10 +183,14 @@ pub fn merge_table(
         Stop::Output(error) => WriteError::from_io("write", Path::new("-"), error).into(),
     })?;
     let (fronts, among_met) = fronts(&gathered.briefs);
-    let best = rows_on(&gathered.briefs, &fronts).len() as u64;
+    let best = rows_on(&gathered.briefs, &fronts);
     let mut summary = summary(plan, plan_input);
-    tell(&mut summary, &gathered, best, among_met);
-    Ok((table, report(summary, &gathered)))
+    tell(&mut summary, &gathered, best.len() as u64, among_met);
+    let page = request.page.then(|| {
+        let plot = plot(plan, &gathered.briefs, &fronts, among_met);
+        page::html(plan, &summary, &plot, &gathered.briefs, &best)
+    });
+    Ok((table, report(summary, &gathered, page)))
 }
 
 /// Writes the table's rows in the points' order and keeps what the fronts need.
@@ -381,9 +394,10 @@ fn tell(summary: &mut MergeSummary, gathered: &Gathered, front: u64, among_met: 
     summary.largest_force_n = gathered.briefs.iter().map(|b| b.force_n).reduce(f64::max);
 }
 
-fn report(summary: MergeSummary, gathered: &Gathered) -> MergeReport {
+fn report(summary: MergeSummary, gathered: &Gathered, page: Option<String>) -> MergeReport {
     MergeReport {
         summary,
+        page,
         missing: named(&gathered.missing),
     }
 }

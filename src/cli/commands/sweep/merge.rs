@@ -10,6 +10,7 @@ use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
+use crate::cli::pictures::write_page;
 use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{bytes, count, force};
 use crate::cli::values::FileArgument;
@@ -42,6 +43,9 @@ pub struct Merge {
     /// Merge what there is, even if points are missing
     #[arg(long)]
     partial: bool,
+    /// Write a page with the result here (HTML)
+    #[arg(long, value_name = "FILE")]
+    report: Option<FileArgument>,
     #[command(flatten)]
     writing: Writing,
 }
@@ -62,9 +66,16 @@ impl Merge {
         let request = MergeRequest {
             folders: self.folders.iter().map(folder).collect::<Result<_, _>>()?,
             partial: self.partial,
+            page: self.report.is_some(),
         };
+        if self.out == FileArgument::Standard && self.report.as_ref() == Some(&self.out) {
+            return Err(Failure::Usage(
+                "--out and --report cannot both go to standard output; give one of them a file"
+                    .to_owned(),
+            ));
+        }
         let (plan, input) = documents::plan(&self.plan)?;
-        let (report, place) = match &self.out {
+        let (report, mut place) = match &self.out {
             FileArgument::Standard => {
                 let bar = begin(printer);
                 let (table, report) = merge_table(&plan, input, &request, &bar)?;
@@ -96,6 +107,13 @@ impl Merge {
                 "{} of {} points are missing: {}",
                 report.summary.missing, report.summary.points, report.missing
             ));
+        }
+        if let (Some(file), Some(html)) = (&self.report, &report.page) {
+            let inputs = &report.summary.inputs;
+            let after = write_page(file, inputs, html, self.writing.force, printer)?;
+            if after == Place::Error {
+                place = after;
+            }
         }
         let json = Told {
             summary: &report.summary,

@@ -1,0 +1,105 @@
+//! The page of an optimisation.
+
+use super::facts::Optimization;
+use crate::report::optimum::{ActiveLimit, Alternative, OptimumFacts, page};
+
+/// What `optimize` tells as one HTML page.
+#[must_use]
+pub fn html(result: &Optimization) -> String {
+    page(&OptimumFacts {
+        design: &result.design,
+        version: result.fluxform_version,
+        inputs: result
+            .inputs
+            .iter()
+            .map(|input| (input.path.as_str(), input.sha256.as_str()))
+            .collect(),
+        none: result.no_coil.as_ref().map(|none| none.message.as_str()),
+        found: result
+            .objective
+            .map(|best| (best.force_n, best.current_a, best.height_m)),
+        coil: properties(result),
+        limits: result
+            .limits
+            .iter()
+            .chain(&result.bounds)
+            .map(|(name, limit)| ActiveLimit {
+                name,
+                value: limit.value,
+                limit: limit.limit,
+                active: limit.active,
+                sensitivity_n_per_unit: limit.sensitivity_n_per_unit,
+            })
+            .collect(),
+        certificate: (
+            result.certificate.kind,
+            result.certificate.upper_bound_n,
+            result.certificate.gap,
+        ),
+        searched: [result.starts, result.evaluations, result.certificate.cells],
+        alternatives: result
+            .alternatives
+            .iter()
+            .map(|one| Alternative {
+                size_m: [
+                    one.size.inner_diameter_m,
+                    one.size.outer_diameter_m,
+                    one.size.length_m,
+                ],
+                force_n: one.force_n,
+                lost: one.force_lost,
+                wire_mass_kg: one.wire_mass_kg,
+                power_w: one.power_w,
+                better: one.better.clone(),
+            })
+            .collect(),
+        notes: &result.notes,
+    })
+}
+
+/// The best coil's numbers beside those of the design's own.
+fn properties(result: &Optimization) -> Vec<(&'static str, f64, Option<f64>)> {
+    let (Some(coil), Some(best)) = (&result.coil, &result.objective) else {
+        return Vec::new();
+    };
+    let given = result.given.as_ref();
+    let force_n = given.map(|given| given.force_n);
+    let mut rows = vec![("force_n", best.force_n, force_n)];
+    let (size, own) = (coil.size, given.map(|given| given.size));
+    rows.extend([
+        (
+            "inner_diameter_m",
+            size.inner_diameter_m,
+            own.map(|own| own.inner_diameter_m),
+        ),
+        (
+            "outer_diameter_m",
+            size.outer_diameter_m,
+            own.map(|own| own.outer_diameter_m),
+        ),
+        ("length_m", size.length_m, own.map(|own| own.length_m)),
+        ("turns", coil.turns, given.map(|given| given.turns)),
+        ("wire_diameter_m", coil.wire_diameter_m, None),
+    ]);
+    let (circuit, own) = (coil.circuit, given.map(|given| given.circuit));
+    rows.extend([
+        (
+            "resistance_ohm",
+            circuit.resistance_ohm,
+            own.map(|own| own.resistance_ohm),
+        ),
+        (
+            "settling_s",
+            circuit.settling_s,
+            own.map(|own| own.settling_s),
+        ),
+        ("power_w", circuit.power_w, own.map(|own| own.power_w)),
+        ("mass_kg", circuit.mass_kg, own.map(|own| own.mass_kg)),
+        (
+            "wire_length_m",
+            circuit.wire_length_m,
+            own.map(|own| own.wire_length_m),
+        ),
+    ]);
+    rows
+}

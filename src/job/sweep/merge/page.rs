@@ -1,0 +1,54 @@
+//! The page of a merged sweep.
+
+use super::Brief;
+use crate::bundle::sweep::{MergeSummary, PlanFile, value_text};
+use crate::plot::pareto::ParetoPlot;
+use crate::report::sweep::{BestDesign, SweepFacts, page};
+
+/// The page; `best` are the designs on the fronts and on which ones each is.
+pub(super) fn html(
+    plan: &PlanFile,
+    summary: &MergeSummary,
+    plot: &ParetoPlot,
+    briefs: &[Brief],
+    best: &[(u64, [bool; 3])],
+) -> String {
+    let mut told = Vec::new();
+    for (index, on) in best {
+        // Briefs stand in the plan's order.
+        let Ok(at) = briefs.binary_search_by_key(index, |brief| brief.index) else {
+            continue;
+        };
+        let brief = &briefs[at];
+        told.push(BestDesign {
+            index: *index,
+            values: plan.values_at(*index).into_iter().map(value_text).collect(),
+            force_n: brief.force_n,
+            costs: brief.costs,
+            on: *on,
+            met: brief.met,
+        });
+    }
+    page(&SweepFacts {
+        design: &summary.design,
+        version: &summary.fluxform_version,
+        inputs: summary
+            .inputs
+            .iter()
+            .map(|input| (input.path.as_str(), input.sha256.as_str()))
+            .collect(),
+        counts: [
+            summary.points,
+            summary.rows,
+            summary.missing,
+            summary.failed,
+            summary.inaccurate,
+            summary.limits_met,
+        ],
+        among_met: summary.front_meets_limits,
+        largest_force_n: summary.largest_force_n,
+        keys: plan.axes.iter().map(|axis| axis.key.as_str()).collect(),
+        best: told,
+        plot,
+    })
+}

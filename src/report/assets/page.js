@@ -1,0 +1,143 @@
+// Which drawings a page has, and when they are drawn again.
+
+const drawings = [];
+
+function own(id, make) {
+  const place = box(`draw-${id}`);
+  if (place) drawings.push(make(place));
+}
+
+own("path", (place) => {
+  const p = data.path;
+  const lambda = numbers(p.lambda);
+  return chart(place, {
+    xName: "lambda", xUnit: "N/m", xLabel: "lambda / N/m", yLabel: "error / mN", rightLabel: "relative / %",
+    xRange: [0, p.end], start: p.chosen ?? undefined, marks: marks(p),
+    series: [
+      { name: "rms error", unit: "mN", x: lambda, y: numbers(p.rms), colour: "--c0", width: 2.4, dots: p.turns },
+      { name: "least worst error", unit: "mN", x: numbers(p.worst.lambda), y: numbers(p.worst.error), colour: "--c2", dash: DASHES[3] },
+      { name: "rms error over rms force", unit: "%", x: lambda, y: numbers(p.relative), colour: "--c1", dash: DASHES[1], right: true },
+    ],
+  });
+});
+
+own("currents", (place) => {
+  const p = data.path;
+  const lambda = numbers(p.lambda);
+  return chart(place, {
+    xName: "lambda", xUnit: "N/m", xLabel: "lambda / N/m", yLabel: "I / A",
+    xRange: [0, p.end], start: p.chosen ?? undefined, marks: marks(p),
+    series: p.currents.map((one, k) => ({
+      name: `coil ${k}`, unit: "A", x: lambda, y: numbers(one), colour: `--c${k % 9}`,
+      // Coils that carry the same lie on each other: the later ones are thinner.
+      width: 1.4 + 2.2 * (1 - k / p.currents.length), dash: DASHES[Math.floor(k / 3) % 4],
+    })),
+  });
+});
+
+function marks(p) {
+  const all = p.marks.filter((one) => one.lambda <= p.end).map((one) => ({
+    x: one.lambda, name: one.lambda === p.chosen ? `${one.name} (chosen)` : one.name, chosen: one.lambda === p.chosen,
+  }));
+  if (p.chosen !== null && !all.some((one) => one.chosen)) all.push({ x: p.chosen, name: "chosen", chosen: true });
+  return all.sort((a, b) => a.x - b.x);
+}
+
+// A range of cells about a range of nodes.
+function around([from, to], count) {
+  const half = count > 1 ? (to - from) / (count - 1) / 2 : 0.5;
+  return [from - half, to + half];
+}
+
+own("turn", turn);
+
+own("errors", (place) => {
+  const s = data.surface;
+  const [error, height] = [numbers(s.error), numbers(s.height)];
+  const drawn = {
+    x: around(s.x, s.columns), y: around(s.y, s.rows), nodesX: s.x, nodesY: s.y,
+    columns: s.columns, rows: s.rows, values: error, unit: "mN", name: "given - wanted", zero: true,
+    circles: data.coils, more: (v, k) => [`height: ${say(height[k])} mm`],
+  };
+  return heat(place, place, () => drawn);
+});
+
+own("field", (place) => {
+  const f = data.field;
+  const layers = f.layers.map((one) => ({ ...one, planes: one.planes.map(numbers) }));
+  const control = add(place, "div", { class: "control" });
+  const which = add(add(control, "label", {}, "show"), "select");
+  layers.forEach((one, k) => add(which, "option", { value: k }, one.name));
+  const label = add(control, "label", {}, "height");
+  const slider = add(label, "input", { type: "range", min: 0, step: 1 });
+  const told = add(control, "output");
+  const holder = add(place, "div");
+  let layer = layers[0];
+  const spec = () => {
+    const values = layer.planes[slider.value];
+    const rows = values.length / layer.columns;
+    return {
+      x: around(f.x, layer.columns), y: around(f.y, rows), nodesX: f.x, nodesY: f.y,
+      columns: layer.columns, rows, values, unit: layer.unit, name: "dBz/dz", zero: false, circles: data.coils,
+      more: (v) => (layer.unit === "T/m" && f.force !== null ? [`force: ${say(v * f.force * 1e3)} mN`] : []),
+    };
+  };
+  const draw = heat(place, holder, spec);
+  const at = () => {
+    told.textContent = `${say(layer.heights[slider.value])} mm`;
+    slider.setAttribute("aria-valuetext", told.textContent);
+    draw();
+  };
+  const to = (height) => {
+    const off = (k) => Math.abs(layer.heights[k] - height);
+    slider.max = layer.heights.length - 1;
+    slider.value = layer.heights.reduce((best, _, k) => (off(k) < off(best) ? k : best), 0);
+    at();
+  };
+  which.addEventListener("change", () => {
+    const before = layer.heights[slider.value];
+    layer = layers[which.value];
+    to(before);
+  });
+  slider.addEventListener("input", at);
+  to(f.first);
+  return draw;
+});
+
+own("cost", (place) => {
+  const c = data.cost;
+  const rows = Array.from(numbers(c.seconds), (s, k) => [s, numbers(c.error)[k]]).filter((r) => r[0] > 0 && r[1] > 0).sort((a, b) => a[0] - b[0]);
+  const [x, y] = [rows.map((r) => r[0]), rows.map((r) => r[1])];
+  return chart(place, {
+    xName: "CPU time", xUnit: "s", xLabel: "CPU time / s", yLabel: "error", log: true,
+    series: [
+      { name: c.stage, unit: "", x, y, colour: "--c0", width: 2.2, dots: x.map((_, k) => k) },
+      { name: "this run's tolerance", unit: "", x: [x[0], x[x.length - 1]], y: [c.tolerance, c.tolerance], colour: "--c1", dash: DASHES[1] },
+    ],
+  });
+});
+
+function drawAll() {
+  for (const draw of drawings) draw();
+}
+
+let width = innerWidth;
+addEventListener("resize", () => {
+  if (innerWidth === width) return;
+  width = innerWidth;
+  drawAll();
+});
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAll);
+addEventListener("beforeprint", () => {
+  document.documentElement.classList.add("paper");
+  for (const one of document.querySelectorAll("details")) one.open = true;
+  hideTip();
+  drawAll();
+});
+addEventListener("afterprint", () => {
+  document.documentElement.classList.remove("paper");
+  drawAll();
+});
+addEventListener("scroll", hideTip, { passive: true });
+drawAll();
+document.documentElement.dataset.drawn = drawings.length;

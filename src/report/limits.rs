@@ -1,0 +1,235 @@
+//! What limits a result: coils, points, the design's own limits.
+
+use super::data::{BundleFacts, CoilFacts, LimitFacts};
+use super::frame::Section;
+use super::good::worst;
+use super::html::{Cell, Html, Table};
+use super::number::{count, figures, force, mm, percent, si};
+
+/// Points that decide, told at most.
+const TOLD: usize = 5;
+
+pub(super) fn section(facts: &BundleFacts) -> Section {
+    let mut body = Html::default();
+    body.raw("<ul class=\"said\">");
+    body.element("li", &coils(facts));
+    if let Some(text) = worst(facts) {
+        body.element("li", &text);
+    }
+    if let Some(text) = deciding(facts) {
+        body.element("li", &text);
+    }
+    if let Some(text) = unmet(&facts.limits) {
+        body.element("li", &text);
+    }
+    for warning in facts.warnings {
+        body.raw("<li><strong>Note:</strong> ")
+            .text(warning)
+            .raw("</li>");
+    }
+    body.raw("</ul>");
+    if !facts.limits.is_empty() {
+        body.table(&table(&facts.limits));
+        let mut note =
+            "One coil at its rated current, its inductance among its neighbours.".to_owned();
+        if !facts.unchecked.is_empty() {
+            note += &format!(
+                " Not looked at here: {}; `fluxform evaluate` tells it.",
+                facts.unchecked.join(", ")
+            );
+        }
+        body.element("p class=\"note\"", &note);
+    }
+    Section {
+        id: "limits",
+        title: "What limits it",
+        body,
+    }
+}
+
+/// Which coils carry all they may.
+fn coils(facts: &BundleFacts) -> String {
+    if facts.chosen.is_none() {
+        return "No lambda is chosen, so no coil carries a current.".to_owned();
+    }
+    let bound: Vec<String> = (0..facts.coils.len())
+        .filter(|coil| facts.coils[*coil].at_limit())
+        .map(|coil| coil.to_string())
+        .collect();
+    let of = count(facts.coils.len(), "coil");
+    let mut text = if bound.is_empty() {
+        format!("None of {of} is at its limit.")
+    } else {
+        format!(
+            "{} of {of} at the limit: {}.",
+            bound.len(),
+            bound.join(", ")
+        )
+    };
+    let sum: f64 = facts.coils.iter().map(|coil| coil.current_a).sum();
+    if let Some(most) = facts.total_max_a {
+        text += &format!(
+            " Their sum is {} A of {} A.",
+            figures(sum, 4),
+            figures(most, 4)
+        );
+    }
+    text
+}
+
+fn deciding(facts: &BundleFacts) -> Option<String> {
+    let mut points = facts.deciding.clone();
+    points.sort_by(|a, b| b.share.abs().total_cmp(&a.share.abs()));
+    let told: Vec<String> = points
+        .iter()
+        .take(TOLD)
+        .map(|point| {
+            let [x, y, z] = point.position_m.map(mm);
+            let way = if point.share > 0.0 { "weak" } else { "strong" };
+            format!(
+                "({x}, {y}, {z}) mm too {way} {}",
+                percent(point.share.abs())
+            )
+        })
+        .collect();
+    let more = match points.len().saturating_sub(TOLD) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    (!told.is_empty()).then(|| {
+        format!(
+            "If the largest error is to be least instead, these points decide, by their share: \
+             {}{more}.",
+            told.join("; ")
+        )
+    })
+}
+
+pub(super) fn unmet(limits: &[LimitFacts]) -> Option<String> {
+    let missed: Vec<String> = limits
+        .iter()
+        .filter(|limit| !limit.met)
+        .map(|limit| words(limit.name).0)
+        .collect();
+    if limits.is_empty() {
+        None
+    } else if missed.is_empty() {
+        Some(format!(
+            "The coil meets all {} limits that are looked at.",
+            limits.len()
+        ))
+    } else {
+        Some(format!(
+            "The coil misses its limit of {}.",
+            missed.join(", ")
+        ))
+    }
+}
+
+/// A limit's name in words, and its unit.
+pub(super) fn words(name: &str) -> (String, &'static str) {
+    let units = [
+        ("_ohm", "\u{3a9}"),
+        ("_kg", "kg"),
+        ("_s", "s"),
+        ("_m", "m"),
+        ("_w", "W"),
+        ("_t", "T"),
+        ("_a", "A"),
+        ("_v", "V"),
+        ("_n", "N"),
+    ];
+    let found = units
+        .into_iter()
+        .find_map(|(end, unit)| name.strip_suffix(end).map(|stem| (stem, unit)));
+    let (stem, unit) = found.unwrap_or((name, ""));
+    (stem.replace('_', " "), unit)
+}
+
+/// A value in its unit.
+pub(super) fn in_unit(value: f64, unit: &str) -> String {
+    match unit {
+        "" => figures(value, 6),
+        "N" => force(value),
+        // Coils are drawn in millimetres, wire is bought by the metre.
+        "m" if value.abs() < 1.0 => format!("{} mm", mm(value)),
+        _ => si(value, unit),
+    }
+}
+
+pub(super) fn table(limits: &[LimitFacts]) -> Table {
+    let row = |limit: &LimitFacts| -> Vec<Cell> {
+        let (name, unit) = words(limit.name);
+        let verdict = if limit.met {
+            "<span class=\"met\">met</span>"
+        } else {
+            "<span class=\"unmet\">not met</span>"
+        };
+        vec![
+            name.into(),
+            in_unit(limit.value, unit).into(),
+            in_unit(limit.limit, unit).into(),
+            Cell::Markup(verdict.to_owned()),
+        ]
+    };
+    Table {
+        caption: "The design's limits".to_owned(),
+        head: vec![
+            ("limit", false),
+            ("value", true),
+            ("limit", true),
+            ("verdict", false),
+        ],
+        rows: limits.iter().map(row).collect(),
+        prose: false,
+    }
+}
+
+/// The currents as bars against their limits.
+pub(super) fn currents(coils: &[CoilFacts]) -> Table {
+    let low = coils.iter().map(|coil| coil.min_a).fold(0.0, f64::min);
+    let high = coils.iter().map(|coil| coil.max_a).fold(0.0, f64::max);
+    let span = if high > low { high - low } else { 1.0 };
+    let place = |current: f64| ((current - low) / span * 100.0).clamp(0.0, 100.0);
+    let row = |(number, coil): (usize, &CoilFacts)| -> Vec<Cell> {
+        let (from, to) = (
+            place(coil.current_a.min(0.0)),
+            place(coil.current_a.max(0.0)),
+        );
+        let class = if coil.at_limit() { "full" } else { "some" };
+        let bar = format!(
+            "<svg class=\"bar\" aria-hidden=\"true\"><rect class=\"range\" x=\"{:.2}%\" \
+             width=\"{:.2}%\" y=\"15%\" height=\"70%\"/><rect class=\"{class}\" x=\"{from:.2}%\" \
+             width=\"{:.2}%\" y=\"15%\" height=\"70%\"/></svg>",
+            place(coil.min_a),
+            place(coil.max_a) - place(coil.min_a),
+            to - from
+        );
+        vec![
+            number.to_string().into(),
+            format!("{}, {}", mm(coil.axis_m[0]), mm(coil.axis_m[1])).into(),
+            Cell::Markup(bar),
+            format!(
+                "{}{}",
+                if coil.at_limit() { "\u{25b2} " } else { "" },
+                figures(coil.current_a, 4)
+            )
+            .into(),
+            format!("{} to {}", figures(coil.min_a, 4), figures(coil.max_a, 4)).into(),
+        ]
+    };
+    Table {
+        caption:
+            "Static currents at the chosen lambda against their limits (\u{25b2} at its limit)"
+                .to_owned(),
+        head: vec![
+            ("coil", false),
+            ("x, y / mm", true),
+            ("within its range", false),
+            ("I / A", true),
+            ("range / A", true),
+        ],
+        rows: coils.iter().enumerate().map(row).collect(),
+        prose: false,
+    }
+}

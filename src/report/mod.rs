@@ -1,0 +1,19 @@
+//! Pages that people look at: plain data in, one self-contained HTML text out.
+//!
+//! A page loads nothing and sends nothing: style, script and numbers stand in it, and its content
+//! security policy names both by their digests. Every text that comes from an input is escaped
+//! ([`html`]). The same data give the same bytes.
+
+pub mod bundle;
+pub mod data;
+pub mod field;
+pub mod frame;
+mod good;
+pub mod html;
+mod limits;
+mod number;
+pub mod optimum;
+pub mod pack;
+mod path;
+pub mod surface;
+pub mod sweep;

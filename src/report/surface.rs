@@ -1,0 +1,195 @@
+//! The constraint points as a surface: heights and force errors, few enough to draw.
+
+use serde_json::{Value, json};
+
+use super::data::BundleFacts;
+use super::frame::{Section, figure};
+use super::html::{Cell, Html, Table};
+use super::number::{count, figures, force};
+use super::pack::f32s;
+
+/// Points along either side, at most: of more the one most in error stands for its neighbours.
+const MOST: usize = 81;
+
+/// Points of a grid, x fastest; `None` where there is no surface.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Surface {
+    /// The grid's ends along x, m.
+    pub x_m: [f64; 2],
+    /// The grid's ends along y, m.
+    pub y_m: [f64; 2],
+    /// Points along x.
+    pub columns: usize,
+    /// Heights, m.
+    pub height_m: Vec<Option<f64>>,
+    /// Given minus wanted, N; empty without a force constant.
+    pub error_n: Vec<Option<f64>>,
+}
+
+impl Surface {
+    fn rows(&self) -> usize {
+        self.height_m.len() / self.columns.max(1)
+    }
+
+    /// Every how many points one is drawn.
+    fn step(&self) -> usize {
+        self.columns.max(self.rows()).div_ceil(MOST).max(1)
+    }
+
+    /// Where the one that stands for a block lies.
+    fn thinned(&self) -> Vec<Option<usize>> {
+        let (columns, rows, step) = (self.columns.max(1), self.rows(), self.step());
+        let size = |at: &usize| {
+            let error = self.error_n.get(*at).copied().flatten();
+            error.map_or(0.0, f64::abs)
+        };
+        let block = |row: usize, column: usize| {
+            let all = (row..(row + step).min(rows)).flat_map(|row| {
+                (column..(column + step).min(columns)).map(move |column| row * columns + column)
+            });
+            // The first of equals.
+            all.filter(|at| self.height_m[*at].is_some())
+                .reduce(|a, b| if size(&b) > size(&a) { b } else { a })
+        };
+        (0..rows)
+            .step_by(step)
+            .flat_map(|row| (0..columns).step_by(step).map(move |c| (row, c)))
+            .map(|(row, column)| block(row, column))
+            .collect()
+    }
+
+    fn json(&self) -> Value {
+        let (columns, rows, step) = (self.columns.max(1), self.rows(), self.step());
+        let kept = self.thinned();
+        let of = |values: &[Option<f64>], factor: f64| {
+            let value = |at: &Option<usize>| {
+                let at = (*at)?;
+                values.get(at).copied().flatten()
+            };
+            f32s(
+                kept.iter()
+                    .map(|at| value(at).map_or(f64::NAN, |v| v * factor)),
+            )
+        };
+        let mm = |[from, to]: [f64; 2], samples: usize| {
+            // The first point of every block stands where the grid's ends tell.
+            let last = samples.div_ceil(step).max(1) - 1;
+            let share = (last * step) as f64 / (samples.max(2) - 1) as f64;
+            [from * 1e3, (from + (to - from) * share) * 1e3]
+        };
+        json!({
+            "x": mm(self.x_m, columns),
+            "y": mm(self.y_m, rows),
+            "columns": columns.div_ceil(step),
+            "rows": rows.div_ceil(step),
+            "step": step,
+            "height": of(&self.height_m, 1e3),
+            "error": of(&self.error_n, 1e3),
+        })
+    }
+}
+
+pub(super) fn section(facts: &BundleFacts, data: &mut serde_json::Map<String, Value>) -> Section {
+    let surface = &facts.surface;
+    let mut body = Html::default();
+    let step = surface.step();
+    let thinned = if step > 1 {
+        format!(" Of every {step} x {step} points the one most in error is drawn.")
+    } else {
+        String::new()
+    };
+    body.raw("<div class=\"pair\">");
+    figure(
+        &mut body,
+        "turn",
+        "The surface with its constraint points above the coils, in three dimensions",
+        &format!(
+            "The surface that the finger's magnet follows, its {} and the coils below; \
+             the ring is where the force is most wrong. Drag, use the arrow keys or the buttons \
+             to turn it.{thinned}",
+            count(facts.points, "constraint point")
+        ),
+    );
+    if facts.chosen.is_some() {
+        figure(
+            &mut body,
+            "errors",
+            "Map of the force error over the surface, seen from above",
+            "Force given by the static currents minus force wanted, seen from above. Bright: too \
+             strong; dark: too weak; the line is where it is right.",
+        );
+        data.insert("errors".to_owned(), json!(true));
+    }
+    body.raw("</div>");
+    if let Some(table) = shares(surface) {
+        body.folded_table(&table);
+    }
+    data.insert("surface".to_owned(), surface.json());
+    Section {
+        id: "surface",
+        title: "Surface",
+        body,
+    }
+}
+
+/// How the errors are spread, for those who cannot see the map.
+fn shares(surface: &Surface) -> Option<Table> {
+    let mut errors: Vec<f64> = surface.error_n.iter().flatten().copied().collect();
+    errors.sort_by(f64::total_cmp);
+    let last = errors.len().checked_sub(1)?;
+    let at = |part: f64| errors[(part * last as f64).round() as usize];
+    let parts = [
+        ("smallest (most too weak)", 0.0),
+        ("a twentieth is below", 0.05),
+        ("a quarter is below", 0.25),
+        ("half is below", 0.5),
+        ("three quarters are below", 0.75),
+        ("nineteen twentieths are below", 0.95),
+        ("largest (most too strong)", 1.0),
+    ];
+    let row = |(name, part): (&str, f64)| vec![Cell::from(name), force(at(part)).into()];
+    let mut rows: Vec<Vec<Cell>> = parts.into_iter().map(row).collect();
+    let heights: Vec<f64> = surface.height_m.iter().flatten().copied().collect();
+    let low = heights.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    rows.push(vec![
+        "heights of the points".into(),
+        format!("{} to {} mm", figures(low * 1e3, 4), figures(high * 1e3, 4)).into(),
+    ]);
+    Some(Table {
+        caption: "Force error over the points, as numbers".to_owned(),
+        head: vec![("part of the points", false), ("given - wanted", true)],
+        rows,
+        prose: false,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_many_points_the_worst_of_each_block_is_kept() {
+        let columns = 200;
+        let count = columns * 170;
+        let mut error_n: Vec<Option<f64>> = (0..count).map(|_| Some(0.0)).collect();
+        error_n[3 * columns + 7] = Some(-0.7);
+        let surface = Surface {
+            x_m: [-0.05, 0.149],
+            y_m: [0.0, 0.169],
+            columns,
+            height_m: (0..count)
+                .map(|at| (at % 13 != 5).then_some(0.03 + 1e-6 * at as f64))
+                .collect(),
+            error_n,
+        };
+        let json = surface.json();
+        assert_eq!(
+            (&json["columns"], &json["rows"], &json["step"]),
+            (&json!(67), &json!(57), &json!(3))
+        );
+        // Columns 0, 3, ... 198 at 1 mm.
+        assert!((json["x"][1].as_f64().unwrap() - 148.0).abs() < 1e-9);
+        assert_eq!(surface.thinned()[67 + 2], Some(3 * columns + 7));
+    }
+}

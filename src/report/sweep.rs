@@ -1,0 +1,168 @@
+//! The page of a merged sweep: the designs that no other one beats.
+
+use serde_json::{Map, Value};
+
+use super::frame::{Page, Section};
+use super::html::Html;
+use super::number::{force, si};
+use super::optimum::sources;
+use super::pack::base64;
+use crate::plot::pareto::ParetoPlot;
+
+/// Designs that are listed; the table beside has all.
+const LISTED: usize = 200;
+
+/// What the page is told, SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SweepFacts<'a> {
+    /// Name of the design.
+    pub design: &'a str,
+    /// Program that made it.
+    pub version: &'a str,
+    /// Path and digest of what went in.
+    pub inputs: Vec<(&'a str, &'a str)>,
+    /// Designs of the plan, rows, missing, failed, inaccurate, within their limits.
+    pub counts: [u64; 6],
+    /// Whether the best are among those within their limits alone.
+    pub among_met: bool,
+    /// N.
+    pub largest_force_n: Option<f64>,
+    /// The keys that vary.
+    pub keys: Vec<&'a str>,
+    /// The best designs.
+    pub best: Vec<BestDesign>,
+    /// Force against the costs.
+    pub plot: &'a ParetoPlot,
+}
+
+/// A design on a front.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BestDesign {
+    /// Its number in the plan.
+    pub index: u64,
+    /// Its values of the keys that vary, as text.
+    pub values: Vec<String>,
+    /// N.
+    pub force_n: f64,
+    /// ohm, kg, s.
+    pub costs: [f64; 3],
+    /// On which fronts it stands.
+    pub on: [bool; 3],
+    /// Whether it is within its limits.
+    pub met: bool,
+}
+
+/// The page.
+#[must_use]
+pub fn page(facts: &SweepFacts) -> String {
+    let [points, rows, missing, failed, inaccurate, met] = facts.counts;
+    let mut lead = Html::default();
+    let largest = facts.largest_force_n.map_or_else(String::new, |f| {
+        format!(" The largest force of all is {}.", force(f))
+    });
+    let text = format!(
+        "{rows} of {points} designs, {met} of them within their limits; {} cannot be beaten in \
+         force and one of resistance, mass and settling time at once.{largest}",
+        facts.best.len()
+    );
+    lead.element("p class=\"lead\"", &text);
+    let mut limits = Html::default();
+    limits.raw("<ul class=\"said\">");
+    let among = if facts.among_met {
+        "The best are chosen among the designs within their limits."
+    } else {
+        "No design is within its limits: the best are chosen among all."
+    };
+    limits.element("li", among);
+    for (number, what) in [
+        (missing, "designs are missing"),
+        (failed, "cannot be computed or have no coil"),
+        (inaccurate, "miss the accuracy asked for"),
+    ] {
+        if number > 0 {
+            limits.element("li", &format!("{number} {what}."));
+        }
+    }
+    limits.raw("</ul>");
+    Page {
+        kind: "Sweep",
+        title: format!("A sweep of {}", facts.design),
+        lead,
+        sections: vec![
+            answer(facts),
+            Section {
+                id: "limits",
+                title: "What limits it",
+                body: limits,
+            },
+            sources(&facts.inputs),
+        ],
+        data: Value::Object(Map::new()),
+        foot: format!(
+            "fluxform {}. This page needs nothing but itself.",
+            facts.version
+        ),
+    }
+    .html()
+}
+
+fn answer(facts: &SweepFacts) -> Section {
+    let mut body = Html::default();
+    body.raw("<figure><img class=\"picture\" alt=\"")
+        .text("Force against resistance, mass and settling time, one dot a design; the table holds the best.")
+        .raw("\" src=\"data:image/svg+xml;base64,")
+        .raw(&base64(facts.plot.svg().as_bytes()))
+        .raw("\">")
+        .element(
+            "figcaption",
+            "Every design as a dot; the line joins those that none beats in force and that cost.",
+        )
+        .raw("</figure>");
+    body.raw("<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"The best designs\">")
+        .raw("<table><caption>The best designs</caption><thead><tr><th scope=\"col\">design</th>");
+    for key in &facts.keys {
+        body.element("th scope=\"col\" class=\"n\"", key);
+    }
+    for head in ["force", "resistance", "mass", "settling"] {
+        body.element("th scope=\"col\" class=\"n\"", head);
+    }
+    body.raw("<th scope=\"col\">best in force and</th></tr></thead><tbody>");
+    for one in facts.best.iter().take(LISTED) {
+        row(&mut body, one);
+    }
+    body.raw("</tbody></table></div>");
+    if facts.best.len() > LISTED {
+        let text = format!("The first {LISTED}; the table beside the sweep has all.");
+        body.element("p class=\"note\"", &text);
+    }
+    Section {
+        id: "answer",
+        title: "The answer",
+        body,
+    }
+}
+
+fn row(body: &mut Html, one: &BestDesign) {
+    body.raw("<tr>")
+        .element("th scope=\"row\"", &one.index.to_string());
+    for value in &one.values {
+        body.element("td class=\"n\"", value);
+    }
+    let [resistance, mass, settling] = one.costs;
+    for text in [
+        force(one.force_n),
+        si(resistance, "\u{3a9}"),
+        si(mass, "kg"),
+        si(settling, "s"),
+    ] {
+        body.element("td class=\"n\"", &text);
+    }
+    let on: Vec<&str> = ["resistance", "mass", "settling"]
+        .into_iter()
+        .zip(one.on)
+        .filter_map(|(name, on)| on.then_some(name))
+        .collect();
+    let met = if one.met { "" } else { " (limits not met)" };
+    body.element("td", &format!("{}{met}", on.join(", ")))
+        .raw("</tr>");
+}
