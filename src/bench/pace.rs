@@ -79,15 +79,20 @@ pub struct Found {
 }
 
 impl Found {
-    /// The row, with its seconds.
+    /// The row, with its seconds. An error that is no number counts as the largest there is.
     #[must_use]
     pub fn timed(self, timing: &Timing) -> Row {
+        let error = if self.error.is_finite() {
+            self.error
+        } else {
+            f64::MAX
+        };
         Row {
             knob: self.knob,
             default: self.default,
             items: self.items as u64,
-            error: self.error,
-            stated_error: self.stated,
+            error,
+            stated_error: self.stated.filter(|stated| stated.is_finite()),
             seconds: timing.seconds,
             seconds_low: timing.low_s,
             seconds_high: timing.high_s,

@@ -73,12 +73,23 @@ mod tests {
             length_m: 0.097,
             turns: 1317.0,
         };
-        for (r_m, z_m) in [(0.0, 0.0301), (0.0137, 0.0103), (0.0511, 0.0207), (0.09, 0.08)] {
+        for (r_m, z_m) in [
+            (0.0, 0.0301),
+            (0.0137, 0.0103),
+            (0.0511, 0.0207),
+            (0.09, 0.08),
+        ] {
             let field = winding.field(r_m, z_m).unwrap();
             let [dbz_dz, dbr_dz] = axial_gradient(&winding, r_m, z_m);
             let size = field.gradient_norm();
-            assert!((dbz_dz - field.dbz_dz).abs() < AXIAL_ERROR * size, "{r_m} {z_m}");
-            assert!((dbr_dz - field.dbr_dz).abs() < AXIAL_ERROR * size, "{r_m} {z_m}");
+            assert!(
+                (dbz_dz - field.dbz_dz).abs() < AXIAL_ERROR * size,
+                "{r_m} {z_m}"
+            );
+            assert!(
+                (dbr_dz - field.dbr_dz).abs() < AXIAL_ERROR * size,
+                "{r_m} {z_m}"
+            );
         }
     }
 }

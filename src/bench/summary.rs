@@ -41,7 +41,12 @@ fn overview(file: &BenchFile) -> String {
     for (stage, curve) in curves(file) {
         let cell = |row: Option<&Row>| {
             row.map_or_else(String::new, |row| {
-                format!("{}: {}, {}", knob(row), error(row.error), seconds(row.seconds))
+                format!(
+                    "{}: {}, {}",
+                    knob(row),
+                    error(row.error),
+                    seconds(row.seconds)
+                )
             })
         };
         let _ = writeln!(

@@ -152,7 +152,12 @@ mod tests {
     fn labels_are_there_and_bytes_are_the_same_twice() {
         let plot = drawing(&[(1e-3, 1e-2), (2e-3, 1e-4), (7e-3, 1e-9)]);
         let svg = plot.svg();
-        for label in ["processor time / s", "relative to |grad B|", "default", "cored-coil"] {
+        for label in [
+            "processor time / s",
+            "relative to |grad B|",
+            "default",
+            "cored-coil",
+        ] {
             assert!(svg.contains(label), "{label}");
         }
         assert!(svg == plot.svg());
@@ -167,7 +172,10 @@ mod tests {
             &[(1.0, 1.0)],
         ] {
             let svg = drawing(points).svg();
-            assert!(svg.ends_with("</svg>") && !svg.contains("NaN"), "{points:?}");
+            assert!(
+                svg.ends_with("</svg>") && !svg.contains("NaN"),
+                "{points:?}"
+            );
         }
         assert_eq!(decades([3e-5, 0.7].into_iter()), (1e-5, 1.0));
         assert_eq!(decades([1.0].into_iter()), (1.0, 10.0));

@@ -71,7 +71,12 @@ pub fn line(points: &[(f64, f64)]) -> Fit {
 ///
 /// # Errors
 /// A stage that is not known; those of the stage.
-pub fn size_row(stage: &str, axis: &str, setting: usize, threads: usize) -> Result<SizeRow, JobError> {
+pub fn size_row(
+    stage: &str,
+    axis: &str,
+    setting: usize,
+    threads: usize,
+) -> Result<SizeRow, JobError> {
     if stage == IDLE {
         return Ok(row(0.0, threads, &NOTHING));
     }
@@ -82,7 +87,11 @@ pub fn size_row(stage: &str, axis: &str, setting: usize, threads: usize) -> Resu
         .build()
         .map_err(|error| JobError::Input(format!("{threads} threads: {error}")))?;
     let (size, timing) = pool.install(|| (spec.run)(setting, &EFFORT))?;
-    let size = if axis == THREADS { threads as f64 } else { size };
+    let size = if axis == THREADS {
+        threads as f64
+    } else {
+        size
+    };
     Ok(row(size, threads, &timing))
 }
 
@@ -131,9 +140,8 @@ pub fn laws(quick: bool, progress: &dyn Progress) -> Result<Vec<Law>, JobError> 
 
 /// Runs this program once more for one row.
 fn child(stage: &str, axis: &str, setting: usize, threads: usize) -> Result<SizeRow, JobError> {
-    let failed = |what: String| {
-        JobError::Unmet(format!("{stage} against {axis} at {setting}: {what}"))
-    };
+    let failed =
+        |what: String| JobError::Unmet(format!("{stage} against {axis} at {setting}: {what}"));
     let program = std::env::current_exe().map_err(|error| failed(error.to_string()))?;
     let row = format!("{stage}:{axis}:{setting}:{threads}");
     let output = Command::new(program)
@@ -167,15 +175,11 @@ pub fn law(spec: &Spec, sizes: Vec<SizeRow>, idle_bytes: u64) -> Law {
     let time = of(&|row| if threads { row.elapsed_s } else { row.seconds });
     let beyond = |row: &SizeRow| row.peak_bytes.saturating_sub(idle_bytes).max(1) as f64;
     let memory = of(&beyond);
-    let at = |fit: &Fit, factor: f64| {
-        (fit.intercept + fit.slope * (factor * spec.seed_size).ln()).exp()
-    };
+    let at =
+        |fit: &Fit, factor: f64| (fit.intercept + fit.slope * (factor * spec.seed_size).ln()).exp();
     let outlook = FACTORS.iter().filter(|_| !threads).map(|&factor| {
         let (seconds, bytes) = (at(&time, factor), at(&memory, factor) + idle_bytes as f64);
-        let over = [
-            (seconds / HOUR_S, "time"),
-            (bytes / MEMORY_BYTES, "memory"),
-        ];
+        let over = [(seconds / HOUR_S, "time"), (bytes / MEMORY_BYTES, "memory")];
         let worst = over.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
         let breaks = worst.filter(|(share, _)| *share > 1.0);
         Outlook {
@@ -204,7 +208,9 @@ mod tests {
 
     #[test]
     fn a_line_is_found_with_its_spread() {
-        let exact: Vec<(f64, f64)> = (0..5).map(|k| (f64::from(k), 1.3 * f64::from(k) - 0.7)).collect();
+        let exact: Vec<(f64, f64)> = (0..5)
+            .map(|k| (f64::from(k), 1.3 * f64::from(k) - 0.7))
+            .collect();
         let fit = line(&exact);
         assert!((fit.slope - 1.3).abs() < 1e-14 && (fit.intercept + 0.7).abs() < 1e-14);
         assert!(fit.slope_error < 1e-14);
@@ -212,7 +218,10 @@ mod tests {
         let rough: Vec<(f64, f64)> = [(0.0, 0.1), (1.0, 0.9), (2.0, 2.1), (3.0, 2.9)].to_vec();
         let fit = line(&rough);
         assert!((fit.slope - 0.96).abs() < 1e-12, "{fit:?}");
-        assert!((fit.slope_error - 0.069_282_032_302_755_1).abs() < 1e-9, "{fit:?}");
+        assert!(
+            (fit.slope_error - 0.069_282_032_302_755_1).abs() < 1e-9,
+            "{fit:?}"
+        );
     }
 
     #[test]

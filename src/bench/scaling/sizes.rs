@@ -17,8 +17,8 @@ use crate::job::scene::Scene;
 use crate::job::steel::{self, COUPLED_TOLERANCE};
 use crate::lambda::worst::worst_point;
 use crate::lambda::{self, Allocator, Settings};
-use crate::map::tabulate::{Grid, tabulate};
 use crate::map::Components;
+use crate::map::tabulate::{Grid, tabulate};
 use crate::numerics::axis::Axis;
 use crate::progress::Silent;
 use crate::shape::deviation::{Faces, Lattice, vertical};
@@ -66,7 +66,7 @@ const COILS: f64 = 9.0;
 const POINTS: f64 = 3721.0;
 const NODES: f64 = 107_909.0;
 /// Of the seed's half-sphere.
-const TRIANGLES: f64 = 3240.0;
+const TRIANGLES: f64 = 13_478.0;
 /// Points along either axis of a plan, the seed's.
 const SAMPLES: usize = 61;
 
@@ -81,7 +81,11 @@ const fn spec(
         stage,
         axis,
         seed_size,
-        quick: if settings.len() < 3 { settings.len() } else { 3 },
+        quick: if settings.len() < 3 {
+            settings.len()
+        } else {
+            3
+        },
         settings,
         run,
     }
@@ -89,22 +93,100 @@ const fn spec(
 
 /// Every law.
 pub const LAWS: [Spec; 20] = [
-    spec("map-table", "coils", COILS, &[1, 2, 3, 4, 6, 8, 12], map_coils),
-    spec("map-table", "nodes", NODES, &[16, 31, 61, 91, 121, 181], map_nodes),
+    spec(
+        "map-table",
+        "coils",
+        COILS,
+        &[1, 2, 3, 4, 6, 8, 12],
+        map_coils,
+    ),
+    spec(
+        "map-table",
+        "nodes",
+        NODES,
+        &[16, 31, 61, 91, 121, 181],
+        map_nodes,
+    ),
     spec("inductance", "coils", COILS, &[2, 3, 5, 8, 12], matrix),
-    spec("coupled-array", "coils", COILS, &[1, 2, 3, 4, 5, 6], coupled),
-    spec("forces", "points", POINTS, &[31, 61, 121, 241, 481], force_points),
-    spec("forces, coupled", "points", POINTS, &[31, 61, 121, 241], coupled_points),
-    spec("lambda-path", "points", POINTS, &[31, 61, 121, 241, 481, 961], path_points),
-    spec("lambda-path", "coils", COILS, &[1, 2, 3, 4, 5, 6, 8], path_coils),
-    spec("worst-point", "points", POINTS, &[11, 21, 31, 61, 121], worst_points),
+    spec(
+        "coupled-array",
+        "coils",
+        COILS,
+        &[1, 2, 3, 4, 5, 6],
+        coupled,
+    ),
+    spec(
+        "forces",
+        "points",
+        POINTS,
+        &[31, 61, 121, 241, 481],
+        force_points,
+    ),
+    spec(
+        "forces, coupled",
+        "points",
+        POINTS,
+        &[31, 61, 121, 241],
+        coupled_points,
+    ),
+    spec(
+        "lambda-path",
+        "points",
+        POINTS,
+        &[31, 61, 121, 241, 481, 961],
+        path_points,
+    ),
+    spec(
+        "lambda-path",
+        "coils",
+        COILS,
+        &[1, 2, 3, 4, 5, 6, 8],
+        path_coils,
+    ),
+    spec(
+        "worst-point",
+        "points",
+        POINTS,
+        &[11, 21, 31, 61, 121],
+        worst_points,
+    ),
     spec("worst-point", "coils", COILS, &[1, 2, 3, 4], worst_coils),
-    spec("height-map", "triangles", TRIANGLES, &[64, 128, 256, 512, 1024, 1448], map_triangles),
-    spec("height-map", "points", POINTS, &[61, 121, 241, 481, 961, 1921], map_points),
-    spec("points-against-surface", "points", POINTS, &[31, 61, 121, 241, 481], deviation_points),
-    spec("points-against-surface", "triangles", TRIANGLES, &[32, 64, 128, 256, 512], deviation_triangles),
+    spec(
+        "height-map",
+        "triangles",
+        TRIANGLES,
+        &[64, 128, 256, 512, 1024, 1448],
+        map_triangles,
+    ),
+    spec(
+        "height-map",
+        "points",
+        POINTS,
+        &[61, 121, 241, 481, 961, 1921],
+        map_points,
+    ),
+    spec(
+        "points-against-surface",
+        "points",
+        POINTS,
+        &[31, 61, 121, 241, 481],
+        deviation_points,
+    ),
+    spec(
+        "points-against-surface",
+        "triangles",
+        TRIANGLES,
+        &[32, 64, 128, 256, 512],
+        deviation_triangles,
+    ),
     spec("coil-optimum", "wires", 1.0, &[1, 2, 4, 8, 16], wires),
-    spec("replay, currents", "coils", COILS, &[3, 4, 6, 8, 12, 16], allocate),
+    spec(
+        "replay, currents",
+        "coils",
+        COILS,
+        &[3, 4, 6, 8, 12, 16],
+        allocate,
+    ),
     spec("map-table", THREADS, 1.0, &[121], map_nodes),
     spec("coupled-array", THREADS, 1.0, &[3], coupled),
     spec("forces, coupled", THREADS, 1.0, &[121], coupled_points),
@@ -126,7 +208,14 @@ fn map(side: usize, grid: &Grid, effort: &Effort) -> Result<Timing, JobError> {
     let scene = Scene::new(&design)?;
     let work = || {
         let (winding, coils) = (&scene.winding, &scene.coils);
-        Ok::<_, JobError>(tabulate(winding, coils, grid, Components::Gz, 1e-9, &Silent)?)
+        Ok::<_, JobError>(tabulate(
+            winding,
+            coils,
+            grid,
+            Components::Gz,
+            1e-9,
+            &Silent,
+        )?)
     };
     Ok(measure(effort, work)?.1)
 }

@@ -5,7 +5,7 @@
 
 use serde::Deserialize;
 
-use super::{curve, inputs};
+use super::curve;
 use crate::bench::built_in::{AIR_COIL, SEED};
 use crate::bench::pace::{Found, Numbers, Pace};
 use crate::bench::reference::{AXIAL_ERROR, axial_gradient};
@@ -115,15 +115,12 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
             timed: "all gradient components of one winding at the points".to_owned(),
             error_of: "largest |grad B| at the point's height (kernel: |grad B| at the point)"
                 .to_owned(),
-            default: "maps: the vectorised rule at 1e-9; probe and evaluate: the kernel, which has \
+            default:
+                "maps: the vectorised rule at 1e-9; probe and evaluate: the kernel, which has \
                       no knob"
-                .to_owned(),
-            curves: vec![
-                batch(&winding, pace, progress)?,
-                kernel(pace, progress)?,
-            ],
+                    .to_owned(),
+            curves: vec![batch(&winding, pace, progress)?, kernel(pace, progress)?],
         },
-        inputs: inputs(&[SEED, AIR_COIL]),
         accuracy: super::stage(
             DEFAULT,
             "the largest |grad B| at each height",
@@ -147,8 +144,8 @@ fn batch(winding: &Winding, pace: &Pace, progress: &dyn Progress) -> Result<Curv
     for (r, z) in r_m.iter().zip(&z_m).step_by(8) {
         exact.push(axial_gradient(winding, *r, *z));
         // At one height |grad B| is largest over the winding.
-        let above = [0.0, 0.5, 0.9, 1.2]
-            .map(|part| winding.field(part * winding.outer_radius_m, *z));
+        let above =
+            [0.0, 0.5, 0.9, 1.2].map(|part| winding.field(part * winding.outer_radius_m, *z));
         let mut size = 0.0_f64;
         for field in above {
             size = size.max(field?.gradient_norm());

@@ -2,10 +2,11 @@
 
 use serde::Deserialize;
 
-use super::{Measured, curve, inputs, stage};
+use super::{Measured, curve, stage};
 use crate::bench::built_in::{CORES, SEED};
 use crate::bench::pace::{Found, Pace};
 use crate::bundle::bench::{Curve, StageCurves};
+use crate::coil::inductance::self_inductance_h;
 use crate::design::Need;
 use crate::field::steel::CoreShape;
 use crate::field::steel::cored_coil::CoredCoil;
@@ -73,7 +74,6 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
             default: format!("tolerance {CORED_TOLERANCE:e}"),
             curves: vec![seed(pace, progress)?, generic(pace, progress)?],
         },
-        inputs: inputs(&[SEED, CORES]),
         accuracy: stage(
             CORED_TOLERANCE,
             "the largest |grad B| at each height",
@@ -117,6 +117,37 @@ fn seed(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
     ))
 }
 
+/// The seed's coil for other programs: gradients on its axis relative to |grad B| there, and the
+/// inductance.
+pub(super) fn problem() -> Result<serde_json::Value, JobError> {
+    let design = SEED.design(Need::CALIBRATE)?;
+    let scene = Scene::new(&design)?;
+    let core = scene.core.as_ref().ok_or_else(super::no_core)?;
+    let resolution = Resolution::for_tolerance(FINEST[0]);
+    let mu_r = core.relative_permeability();
+    let coil = CoredCoil::at_resolution(&scene.winding, core.shape, mu_r, &resolution)?;
+    let mut on_axis = Vec::new();
+    for [_, z_m] in PLACES.iter().filter(|[r, _]| *r == 0.0) {
+        let field = coil.field(0.0, *z_m)?;
+        on_axis.push(serde_json::json!({
+            "z_m": z_m,
+            "dbz_dz_t_per_m_per_a": field.dbz_dz,
+            "gradient_norm_t_per_m_per_a": field.gradient_norm(),
+        }));
+    }
+    Ok(serde_json::json!({
+        "winding": super::problem::section(&scene.winding),
+        "core": {
+            "radius_m": core.shape.radius_m,
+            "bottom_m": core.shape.bottom_m,
+            "top_m": core.shape.top_m,
+            "relative_permeability": mu_r,
+        },
+        "on_axis": on_axis,
+        "inductance_h": self_inductance_h(&scene.winding) + coil.added_inductance_h,
+    }))
+}
+
 /// Largest difference of two solutions.
 fn apart(a: &CoredCoil, b: &CoredCoil) -> Result<f64, JobError> {
     let mut most = (a.added_inductance_h / b.added_inductance_h - 1.0).abs();
@@ -128,9 +159,7 @@ fn apart(a: &CoredCoil, b: &CoredCoil) -> Result<f64, JobError> {
             size = size.max(field.gradient_norm());
         }
         let (a, b) = (a.field(r_m, z_m)?, b.field(r_m, z_m)?);
-        let off = (a.dbz_dz - b.dbz_dz)
-            .abs()
-            .max((a.dbr_dz - b.dbr_dz).abs());
+        let off = (a.dbz_dz - b.dbz_dz).abs().max((a.dbr_dz - b.dbr_dz).abs());
         most = most.max(off / size);
     }
     Ok(most)
@@ -152,7 +181,9 @@ fn generic(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
             top_m: case.core_top_m,
         };
         let lowest_m = case.points.iter().fold(f64::INFINITY, |m, p| m.min(p.z_m));
-        Ok(CoredCoil::new(&winding, shape, case.mu_r, tolerance, lowest_m)?)
+        Ok(CoredCoil::new(
+            &winding, shape, case.mu_r, tolerance, lowest_m,
+        )?)
     };
     let mut rows = Vec::new();
     for &tolerance in pace.settings(&TOLERANCES, TOLERANCES.len()) {
@@ -181,7 +212,10 @@ fn generic(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
         };
         rows.push(found.timed(&timing));
     }
-    let own = oracle.cases.iter().fold(0.0_f64, |most, c| most.max(c.error));
+    let own = oracle
+        .cases
+        .iter()
+        .fold(0.0_f64, |most, c| most.max(c.error));
     Ok(curve(
         "seven generic coils, mu_r 0.31 to 5300",
         "tolerance",

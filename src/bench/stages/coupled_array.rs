@@ -1,6 +1,6 @@
 //! Nine cored coils whose cores answer to each other.
 
-use super::{Measured, curve, inputs, stage};
+use super::{Measured, curve, stage};
 use crate::bench::built_in::SEED;
 use crate::bench::pace::{Found, Pace};
 use crate::bundle::bench::{Curve, StageCurves};
@@ -50,7 +50,6 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
             default: format!("tolerance {COUPLED_TOLERANCE:e}"),
             curves: vec![seed(pace, progress)?],
         },
-        inputs: inputs(&[SEED]),
         accuracy: stage(
             COUPLED_TOLERANCE,
             "the largest |grad B| at each height",
@@ -87,7 +86,10 @@ fn apart(a: &Values, b: &Values, air: &[f64]) -> f64 {
         };
         let (a, b) = (at(a), at(b));
         let size = b.iter().fold(0.0_f64, |m, v| m.max(v.abs())) + air[height];
-        let off = a.iter().zip(&b).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+        let off = a
+            .iter()
+            .zip(&b)
+            .fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
         worst = worst.max(off / size);
     }
     let largest = |values: &[f64]| values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
@@ -113,7 +115,12 @@ fn seed(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
     for &tolerance in settings {
         let (array, timing) = pace.time(progress, || {
             Ok(CoupledArray::new(
-                winding, shape, mu_r, positions_m, tolerance, LOWEST_M,
+                winding,
+                shape,
+                mu_r,
+                positions_m,
+                tolerance,
+                LOWEST_M,
             )?)
         })?;
         let found = Found {

@@ -38,7 +38,6 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
             default: "no knob: exact for the triangles given; 61 x 61 points".to_owned(),
             curves: vec![facets(pace, progress)?, exactness(pace, progress)?],
         },
-        inputs: Vec::new(),
         accuracy: stage(
             ROUNDING_M,
             "1 m",
@@ -91,9 +90,9 @@ fn exactness(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
             let k = ((numbers.unit() * found.len() as f64) as usize).min(found.len() - 1);
             let exact = highest_m(&mesh, [x[k % samples], y[k / samples]]);
             error = error.max(match (found[k], exact) {
-                (Some(sample), Some(exact)) => (Num::exactly(sample.height_m) - exact)
-                    .nearest()
-                    .abs(),
+                (Some(sample), Some(exact)) => {
+                    (Num::exactly(sample.height_m) - exact).nearest().abs()
+                }
                 (None, None) => 0.0,
                 _ => f64::INFINITY,
             });
@@ -114,6 +113,27 @@ fn exactness(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
         1e-30,
         rows,
     ))
+}
+
+/// The facets for other programs, and their heights at the points of the default grid.
+pub(super) fn problem() -> Result<serde_json::Value, JobError> {
+    let mesh = mesh(SIDE)?;
+    let plan = grid(DEFAULT);
+    let (x, y) = (plan.x_m.nodes(), plan.y_m.nodes());
+    let mut numbers = Numbers(17);
+    let at = |unit: f64| ((unit * plan.len() as f64) as usize).min(plan.len() - 1);
+    let looked: Vec<usize> = (0..COMPARED).map(|_| at(numbers.unit())).collect();
+    let exact = looked.iter().map(|k| {
+        let found = highest_m(&mesh, [x[k % DEFAULT], y[k / DEFAULT]]);
+        found.map_or(f64::NAN, Num::nearest)
+    });
+    Ok(serde_json::json!({
+        "triangles_m": mesh.triangles(),
+        "x_m": x,
+        "y_m": y,
+        "looked_at": looked,
+        "height_m": exact.collect::<Vec<f64>>(),
+    }))
 }
 
 /// The highest intersection of a vertical line with any triangle, borders inclusive.

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use super::air_field::{Section, number};
-use super::{Measured, curve, inputs, stage};
+use super::{Measured, curve, stage};
 use crate::bench::built_in::{AIR_COIL, SEED};
 use crate::bench::pace::{Found, Pace};
 use crate::bundle::bench::{Curve, StageCurves};
@@ -45,12 +45,12 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
             stage: "inductance".to_owned(),
             timed: "six windings from a thin disc to a long tube; mutual: two windings".to_owned(),
             error_of: "the inductance".to_owned(),
-            default: "evaluate: Neumann's integral, to 1e-12; optimize: FINE for the result, ROUGH \
+            default:
+                "evaluate: Neumann's integral, to 1e-12; optimize: FINE for the result, ROUGH \
                       on the way"
-                .to_owned(),
+                    .to_owned(),
             curves: vec![own(pace, progress)?, between(pace, progress)?],
         },
-        inputs: inputs(&[SEED, AIR_COIL]),
         accuracy: stage(
             RELATIVE_ERROR,
             "the inductance",
@@ -59,14 +59,20 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
     })
 }
 
-fn own(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
+/// Windings with their inductances, H.
+pub(super) fn cases() -> Result<Vec<(Winding, f64)>, JobError> {
     let oracle: Oracle = AIR_COIL.values()?;
-    let mut cases: Vec<(Winding, f64)> = Vec::new();
+    let mut cases = Vec::new();
     for exact in &oracle.inductances {
         if let Some(section) = oracle.windings.get(&exact.winding) {
             cases.push((section.winding()?, number(&exact.inductance_h)?));
         }
     }
+    Ok(cases)
+}
+
+fn own(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
+    let cases = cases()?;
     let fast = |accuracy| {
         move |w: &Winding| {
             let depth = w.outer_radius_m - w.inner_radius_m;
@@ -115,7 +121,10 @@ fn between(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
     let exact = flux_h(&winding, distance_m, 16)?;
     let coarser = flux_h(&winding, distance_m, 12)?;
     let (found, timing) = pace.time(progress, || {
-        Ok(mutual_inductance_h(&winding, std::hint::black_box(distance_m)))
+        Ok(mutual_inductance_h(
+            &winding,
+            std::hint::black_box(distance_m),
+        ))
     })?;
     let found = Found {
         knob: mutual::RELATIVE_ERROR,
@@ -152,10 +161,9 @@ fn flux_h(winding: &Winding, distance_m: f64, order: usize) -> Result<f64, JobEr
             let rho = 0.5 * b * (1.0 + xr);
             for step in 0..steps {
                 let angle = std::f64::consts::TAU * (step as f64 + 0.5) / steps as f64;
-                let r = (distance_m * distance_m
-                    + rho * rho
-                    + 2.0 * distance_m * rho * angle.cos())
-                .sqrt();
+                let r =
+                    (distance_m * distance_m + rho * rho + 2.0 * distance_m * rho * angle.cos())
+                        .sqrt();
                 let area = 0.5 * b * wr * rho * std::f64::consts::TAU / steps as f64;
                 for (xz, wz) in axial.nodes.iter().zip(&axial.weights) {
                     let z = half_length * (xz - 1.0);

@@ -3,7 +3,7 @@
 
 use serde::Deserialize;
 
-use super::{Measured, curve, inputs, stage};
+use super::{Measured, curve, stage};
 use crate::bench::built_in::{LAMBDA, SEED_AIR};
 use crate::bench::force::{Forces, forces};
 use crate::bench::pace::{Found, Pace};
@@ -57,7 +57,6 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
             default: "no knob: exact; doubles or double-double as the problem asks".to_owned(),
             curves: vec![sizes, conditions(pace, progress)?],
         },
-        inputs: inputs(&[SEED_AIR, LAMBDA]),
         accuracy: stage(
             stated,
             "lambda^2 mean(h^2)",
@@ -122,13 +121,18 @@ fn conditions(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
                 };
                 Ok(lambda::solve(&problem, &Settings::default())?)
             };
-            cases.iter().map(solve).collect::<Result<Vec<_>, JobError>>()
+            cases
+                .iter()
+                .map(solve)
+                .collect::<Result<Vec<_>, JobError>>()
         })?;
         let pairs = found.iter().zip(&cases);
         let error = pairs.fold(0.0_f64, |most, (found, case)| {
             most.max(error_of(case, found))
         });
-        let stated = found.iter().fold(0.0_f64, |m, s| m.max(s.accuracy.estimate));
+        let stated = found
+            .iter()
+            .fold(0.0_f64, |m, s| m.max(s.accuracy.estimate));
         let found = Found {
             knob: condition,
             default: false,
@@ -157,8 +161,8 @@ fn sizes(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
             Ok(lambda::solve(&problem, &Settings::default())?)
         })?;
         let gap = solution.chosen.as_ref().map_or(f64::NAN, |chosen| {
-            let mean = given.height_m.iter().map(|h| h * h).sum::<f64>()
-                / given.height_m.len() as f64;
+            let mean =
+                given.height_m.iter().map(|h| h * h).sum::<f64>() / given.height_m.len() as f64;
             chosen.duality_gap_n2 / (chosen.lambda_n_per_m.powi(2) * mean)
         });
         let found = Found {

@@ -1,6 +1,6 @@
 //! Maps over the workspace: the error of their nodes, and the error between them.
 
-use super::{Measured, curve, inputs, stage};
+use super::{Measured, curve, stage};
 use crate::bench::built_in::{SEED, SEED_AIR};
 use crate::bench::pace::{Found, Numbers, Pace};
 use crate::bench::reference::{AXIAL_ERROR, axial_gradient};
@@ -54,7 +54,6 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
                 between(&air, pace, progress)?,
             ],
         },
-        inputs: inputs(&[SEED, SEED_AIR]),
         accuracy: stage(
             MAP_TOLERANCE,
             "the largest |grad B| at each height",
@@ -83,7 +82,12 @@ fn looked_at(grid: &Grid, coils: usize) -> Vec<[usize; 4]> {
     (0..COMPARED)
         .map(|k| {
             let z = below(grid.z_m.len());
-            let place = [below(coils), z, below(grid.y_m.len()), below(grid.x_m.len())];
+            let place = [
+                below(coils),
+                z,
+                below(grid.y_m.len()),
+                below(grid.x_m.len()),
+            ];
             if k % 3 == 0 {
                 [place[0], 0, place[2], place[3]]
             } else {
@@ -98,22 +102,49 @@ fn node(map: &FieldMap, [coil, z, y, x]: [usize; 4]) -> f64 {
     map.gz_t_per_m_per_a[((coil * map.z_m.len() + z) * rows + y) * row + x]
 }
 
-fn windings(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
-    let scene = Scene::new(design)?;
-    let grid = grid(design, None);
+/// The array in air for other programs: axes, coils, and values at the nodes looked at.
+pub(super) fn problem() -> Result<serde_json::Value, JobError> {
+    let design = SEED_AIR.design(Need::CALIBRATE)?;
+    let scene = Scene::new(&design)?;
+    let grid = grid(&design, None);
     let looked = looked_at(&grid, scene.coils.len());
+    let exact = in_air(&scene, &grid, &looked)?;
+    Ok(serde_json::json!({
+        "winding": super::problem::section(&scene.winding),
+        "positions_m": design.array.positions_m,
+        "x_m": grid.x_m,
+        "y_m": grid.y_m,
+        "z_m": grid.z_m,
+        "coil_z_y_x": looked,
+        "gz_t_per_m_per_a": exact.iter().map(|(gz, _)| *gz).collect::<Vec<f64>>(),
+        "size_t_per_m_per_a": exact.iter().map(|(_, size)| *size).collect::<Vec<f64>>(),
+    }))
+}
+
+/// dB_z/dz at the nodes, and the largest |grad B| at their heights.
+fn in_air(scene: &Scene, grid: &Grid, looked: &[[usize; 4]]) -> Result<Vec<(f64, f64)>, JobError> {
     let mut exact = Vec::with_capacity(looked.len());
-    for &[coil, z, y, x] in &looked {
+    for &[coil, z, y, x] in looked {
         let [ax, ay] = scene.coils[coil].axis_m;
         let (r_m, z_m) = ((grid.x_m[x] - ax).hypot(grid.y_m[y] - ay), grid.z_m[z]);
         let [gz, _] = axial_gradient(&scene.winding, r_m, z_m);
         let mut size = 0.0_f64;
         for part in [0.0, 0.5, 0.9, 1.2] {
-            let field = scene.winding.field(part * scene.winding.outer_radius_m, z_m)?;
+            let field = scene
+                .winding
+                .field(part * scene.winding.outer_radius_m, z_m)?;
             size = size.max(field.gradient_norm());
         }
         exact.push((gz, size));
     }
+    Ok(exact)
+}
+
+fn windings(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
+    let scene = Scene::new(design)?;
+    let grid = grid(design, None);
+    let looked = looked_at(&grid, scene.coils.len());
+    let exact = in_air(&scene, &grid, &looked)?;
     let nodes = scene.coils.len() * grid.x_m.len() * grid.y_m.len() * grid.z_m.len();
     let mut rows = Vec::new();
     for &tolerance in pace.settings(&AIR, AIR.len()) {
@@ -127,9 +158,12 @@ fn windings(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Cur
                 &Silent,
             )?)
         })?;
-        let error = looked.iter().zip(&exact).fold(0.0_f64, |most, (at, (gz, size))| {
-            most.max((node(&map, *at) - gz).abs() / size)
-        });
+        let error = looked
+            .iter()
+            .zip(&exact)
+            .fold(0.0_f64, |most, (at, (gz, size))| {
+                most.max((node(&map, *at) - gz).abs() / size)
+            });
         let found = Found {
             knob: tolerance,
             default: tolerance == MAP_TOLERANCE,
@@ -228,7 +262,9 @@ fn between(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curv
         let field = scene.winding.field(x.hypot(y), z)?;
         let mut size = 0.0_f64;
         for part in [0.0, 0.3, 0.6] {
-            let above = scene.winding.field(part * scene.winding.outer_radius_m, z)?;
+            let above = scene
+                .winding
+                .field(part * scene.winding.outer_radius_m, z)?;
             size = size.max(above.dbz_dz.abs());
         }
         exact.push((field.dbz_dz, size));
@@ -252,13 +288,16 @@ fn between(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curv
         let map = &made.map;
         let count = grid.x_m.len() * grid.y_m.len() * grid.z_m.len();
         let values = &map.gz_t_per_m_per_a[centre * count..(centre + 1) * count];
-        let error = places.iter().zip(&exact).fold(0.0_f64, |most, (place, (gz, size))| {
-            let [x, y, z] = *place;
-            let cell = locate([&grid.x_m, &grid.y_m, &grid.z_m], [x, y, z]);
-            cell.map_or(f64::INFINITY, |cell| {
-                most.max((cell.value(values) - gz).abs() / size)
-            })
-        });
+        let error = places
+            .iter()
+            .zip(&exact)
+            .fold(0.0_f64, |most, (place, (gz, size))| {
+                let [x, y, z] = *place;
+                let cell = locate([&grid.x_m, &grid.y_m, &grid.z_m], [x, y, z]);
+                cell.map_or(f64::INFINITY, |cell| {
+                    most.max((cell.value(values) - gz).abs() / size)
+                })
+            });
         let found = Found {
             knob: nodes as f64,
             default: nodes == DEFAULT_NODES,

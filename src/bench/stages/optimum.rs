@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
-use super::{Measured, curve, inputs, stage};
+use super::{Measured, curve, stage};
 use crate::bench::built_in::{AIR_ALL_LIMITS, BuiltIn, NLOPT, OPTIMUM_AIR, OPTIMUM_CORED};
 use crate::bench::pace::{Found, Pace};
 use crate::bundle::bench::{Curve, StageCurves};
@@ -57,7 +57,6 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
                 certificate(pace, progress)?,
             ],
         },
-        inputs: inputs(&[OPTIMUM_AIR, AIR_ALL_LIMITS, OPTIMUM_CORED, NLOPT]),
         accuracy: stage(GAP, "the force", "branch and bound over boxes of coils"),
     })
 }
@@ -73,9 +72,7 @@ fn nlopt(name: &str) -> Result<[f64; 2], JobError> {
 }
 
 /// A design as a task for the optimiser, the magnet a dipole.
-pub fn posed(
-    design: &BuiltIn,
-) -> Result<(Task, Box<dyn CoilModel>), JobError> {
+pub fn posed(design: &BuiltIn) -> Result<(Task, Box<dyn CoilModel>), JobError> {
     let design = design.design(Need::OPTIMIZE)?;
     let refused = |error: task::NoTask| JobError::Input(error.to_string());
     let magnet = MagnetRule::dipole(crate::job::scene::moment_a_m2(&design));

@@ -37,9 +37,11 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
                 .to_owned(),
             error_of: "m, vertically".to_owned(),
             default: "61 x 61 points, with their certificate".to_owned(),
-            curves: vec![on_grid(&surface, pace, progress)?, graded(&surface, pace, progress)?],
+            curves: vec![
+                on_grid(&surface, pace, progress)?,
+                graded(&surface, pace, progress)?,
+            ],
         },
-        inputs: Vec::new(),
         accuracy: stage(
             1e-12,
             "1 m",

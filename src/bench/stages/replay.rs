@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Measured, curve, inputs, stage};
+use super::{Measured, curve, stage};
 use crate::bench::built_in::{FLAT, SEED_AIR};
 use crate::bench::pace::{Found, Pace};
 use crate::bundle::artefact::Input;
@@ -45,7 +45,6 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
             default: "the design's own grid, 61 x 61 x 29, within 20 mm of the object".to_owned(),
             curves: vec![map, currents],
         },
-        inputs: inputs(&[SEED_AIR, FLAT]),
         accuracy: stage(
             stated,
             "the largest |dB_z/dz| at each height",
@@ -55,17 +54,13 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
 }
 
 /// A bundle of the seed's array in air under its flat surface, with so many nodes.
-fn bundle(
-    scratch: &Scratch,
-    text: &str,
-    name: &str,
-) -> Result<Opened, JobError> {
+fn bundle(scratch: &Scratch, text: &str, name: &str) -> Result<Opened, JobError> {
     let out = scratch.path().join(name);
     let fault = |error: &dyn std::fmt::Display| JobError::Input(error.to_string());
     let (design, _) = Design::from_toml(text, Path::new(SEED_AIR.path), Need::CALIBRATE)
         .map_err(|error| fault(&error))?;
-    let (document, _) = ShapeDocument::from_toml(FLAT.text, Path::new(FLAT.path))
-        .map_err(|error| fault(&error))?;
+    let (document, _) =
+        ShapeDocument::from_toml(FLAT.text, Path::new(FLAT.path)).map_err(|error| fault(&error))?;
     let options = CalibrateOptions {
         out,
         force: false,

@@ -1,6 +1,6 @@
 //! The least largest error over lambda. Exact, without a knob: what is swept is its size.
 
-use super::{Measured, curve, inputs, stage};
+use super::{Measured, curve, stage};
 use crate::bench::built_in::SEED_AIR;
 use crate::bench::force::forces;
 use crate::bench::pace::{Found, Pace};
@@ -32,7 +32,6 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
             default: "no knob: exact, in double-double over the points that decide".to_owned(),
             curves: vec![sizes],
         },
-        inputs: inputs(&[SEED_AIR]),
         accuracy: stage(
             stated,
             "lambda max h",
