@@ -4,7 +4,8 @@
 //! The rooms, in the direction of their imports:
 //! `numerics` < `design` < `field` < `coil` < `map`; `shape` beside them;
 //! `lambda` on numbers alone; `bundle` writes and reads artefacts, `plot` draws; `job` joins
-//! them into what a command does; `cli` is the only room that talks.
+//! them into what a command does; `bench` measures error against time; `cli` is the only room that
+//! talks.
 
 pub mod accuracy;
 pub mod progress;

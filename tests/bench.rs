@@ -1,0 +1,7 @@
+//! The measurements themselves: rows fall along their knobs, tables and JSON are as promised, and
+//! what stages claim of their errors holds on scenes that nobody chose.
+
+#[path = "bench/coverage.rs"]
+mod coverage;
+#[path = "bench/rows.rs"]
+mod rows;
