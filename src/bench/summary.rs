@@ -116,33 +116,43 @@ fn stage_table(stage: &StageCurves) -> String {
     text + &ratios(stage)
 }
 
-/// Each peer's time over this program's where both are as exact as the peer at its best.
+/// Each peer's time over this program's, both where they are first as exact as the peer at its best
+/// or, where that is coarser, as the reference.
 fn ratios(stage: &StageCurves) -> String {
     let mut text = String::new();
     for curve in stage.curves.iter().filter(|c| c.program != "fluxform") {
-        let best = curve.rows.iter().filter(|row| row.error.is_finite());
-        let Some(best) = best.min_by(|a, b| a.error.total_cmp(&b.error)) else {
+        let least = curve.rows.iter().map(|row| row.error);
+        let least = least.fold(f64::INFINITY, f64::min);
+        let enough = least.max(curve.reference_error).max(1e-15);
+        let first = |curve: &Curve, items: Option<u64>| {
+            let exact = curve.rows.iter().filter(|row| {
+                row.error <= enough && items.is_none_or(|items| row.items == items)
+            });
+            exact
+                .min_by(|a, b| a.seconds.total_cmp(&b.seconds))
+                .cloned()
+        };
+        let Some(theirs) = first(curve, None) else {
             continue;
         };
         // Of the curve of the same name: problem and amount of work are the same.
-        let ours = stage
-            .curves
-            .iter()
-            .filter(|c| c.program == "fluxform" && c.name == curve.name)
-            .flat_map(|c| c.rows.iter())
-            .filter(|row| row.items == best.items && row.error <= best.error.max(1e-15))
-            .min_by(|a, b| a.seconds.total_cmp(&b.seconds));
-        if let Some(ours) = ours {
+        let same = |c: &&Curve| c.program == "fluxform" && c.name == curve.name;
+        let ours = stage.curves.iter().find(same);
+        if let Some(ours) = ours.and_then(|ours| first(ours, Some(theirs.items))) {
             let _ = writeln!(
                 text,
-                "\n{} at its best (error {}) takes {} times as long ({} to {} by the quartiles) as \
-                 fluxform does for an error of {}.",
+                "\n{}, {} {}: error {} in {}; fluxform: error {} in {}. Ratio of times {} ({} to {} \
+                 by the quartiles).",
                 curve.program,
-                error(best.error),
-                factor(best.seconds / ours.seconds),
-                factor(best.seconds_low / ours.seconds_high),
-                factor(best.seconds_high / ours.seconds_low),
-                error(ours.error)
+                curve.knob,
+                knob(&theirs),
+                error(theirs.error),
+                seconds(theirs.seconds),
+                error(ours.error),
+                seconds(ours.seconds),
+                factor(theirs.seconds / ours.seconds),
+                factor(theirs.seconds_low / ours.seconds_high),
+                factor(theirs.seconds_high / ours.seconds_low),
             );
         }
     }

@@ -112,7 +112,7 @@ fn starts(
         let row = Found {
             knob: starts as f64,
             default: starts == default,
-            items: found.evaluations,
+            items: 1,
             error: (force_n(&found) / best_n - 1.0).abs(),
             stated: None,
         };
