@@ -125,9 +125,10 @@ fn ratios(stage: &StageCurves) -> String {
         let least = least.fold(f64::INFINITY, f64::min);
         let enough = least.max(curve.reference_error).max(1e-15);
         let first = |curve: &Curve, items: Option<u64>| {
-            let exact = curve.rows.iter().filter(|row| {
-                row.error <= enough && items.is_none_or(|items| row.items == items)
-            });
+            let exact = curve
+                .rows
+                .iter()
+                .filter(|row| row.error <= enough && items.is_none_or(|items| row.items == items));
             exact
                 .min_by(|a, b| a.seconds.total_cmp(&b.seconds))
                 .cloned()

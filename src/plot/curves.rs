@@ -1,9 +1,11 @@
 //! Error against seconds: curves in a doubly logarithmic plane, the defaults marked.
 
+use std::sync::Arc;
+
 use kuva::backend::svg::SvgBackend;
 use kuva::plot::{LegendEntry, LegendShape, LinePlot, ScatterPlot};
 use kuva::render::figure::Figure;
-use kuva::render::layout::Layout;
+use kuva::render::layout::{Layout, TickFormat};
 use kuva::render::plots::Plot;
 
 use super::renumbered;
@@ -16,6 +18,8 @@ const FLOOR: f64 = 1e-17;
 /// Marks, px.
 const DOT_PX: f64 = 3.5;
 const DEFAULT_PX: f64 = 8.0;
+/// Most ticks of an axis.
+const MOST_TICKS: f64 = 9.0;
 const DEFAULT: &str = "#000000";
 
 /// One curve.
@@ -67,10 +71,14 @@ impl CurvesPlot {
                 .with_size(DOT_PX);
             plots.push(Plot::Scatter(dots));
         }
-        let layout = Layout::new(x, y)
-            .with_log_scale()
+        // The crate's own logarithmic axes have no ticks below 1e-10.
+        let mut layout = Layout::new(x, y)
             .with_x_label(self.across.clone())
             .with_y_label(self.up.clone());
+        layout.x_tick_step = Some(step(x));
+        layout.y_tick_step = Some(step(y));
+        layout.x_tick_format = TickFormat::Custom(Arc::new(power));
+        layout.y_tick_format = TickFormat::Custom(Arc::new(power));
         let figure = Figure::new(1, 1)
             .with_title(self.title.clone())
             .with_cell_size(PANEL_PX[0], PANEL_PX[1])
@@ -99,7 +107,7 @@ impl CurvesPlot {
 }
 
 impl Line {
-    /// The points that a logarithmic plane can show; errors too small for it at its floor.
+    /// Decimal logarithms of the points that have any; errors too small are drawn at the floor.
     fn drawable(&self) -> Self {
         let (mut points, mut defaults) = (Vec::new(), Vec::new());
         for (at, (x, y)) in self.points.iter().enumerate() {
@@ -107,7 +115,7 @@ impl Line {
                 if self.defaults.contains(&at) {
                     defaults.push(points.len());
                 }
-                points.push((*x, y.max(FLOOR)));
+                points.push((x.log10(), y.max(FLOOR).log10()));
             }
         }
         Self {
@@ -118,17 +126,31 @@ impl Line {
     }
 }
 
-/// Whole decades around the values.
+/// Whole decades around logarithms.
 fn decades(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(low, high), value| {
+    let ends = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
         (low.min(value), high.max(value))
     });
-    if low > high {
-        return (0.1, 1.0);
+    if ends.0 > ends.1 {
+        return (-1.0, 0.0);
     }
-    let (below, above) = (low.log10().floor(), high.log10().ceil());
-    let above = if above > below { above } else { below + 1.0 };
-    (10.0_f64.powf(below), 10.0_f64.powf(above))
+    let (low, high) = (ends.0.floor(), ends.1.ceil());
+    (low, if high > low { high } else { low + 1.0 })
+}
+
+/// Decades between two ticks.
+fn step((low, high): (f64, f64)) -> f64 {
+    ((high - low) / MOST_TICKS).ceil().max(1.0)
+}
+
+/// A tick's label.
+fn power(exponent: f64) -> String {
+    let whole = exponent.round();
+    if (exponent - whole).abs() < 1e-6 {
+        format!("1e{whole}")
+    } else {
+        String::new()
+    }
 }
 
 #[cfg(test)]
@@ -177,7 +199,9 @@ mod tests {
                 "{points:?}"
             );
         }
-        assert_eq!(decades([3e-5, 0.7].into_iter()), (1e-5, 1.0));
-        assert_eq!(decades([1.0].into_iter()), (1.0, 10.0));
+        assert_eq!(decades([-4.6, -0.2].into_iter()), (-5.0, 0.0));
+        assert_eq!(decades([2.0].into_iter()), (2.0, 3.0));
+        assert_eq!((step((-17.0, 0.0)), step((-5.0, 0.0))), (2.0, 1.0));
+        assert_eq!(power(-7.0), "1e-7");
     }
 }

@@ -24,14 +24,8 @@ use fluxform::shape::Surface;
 use fluxform::shape::document::ShapeDocument;
 use fluxform::shape::height::Grid as Plan;
 
-#[path = "../lambda/case.rs"]
-#[allow(dead_code)]
-mod case;
-#[path = "../lambda/search.rs"]
-#[allow(dead_code)]
-mod search;
-
-use case::Case;
+use crate::case::Case;
+use crate::search;
 
 const SCENES: u64 = 100;
 /// A true error below this is the reference's own rounding and counts as so much.
@@ -277,13 +271,13 @@ fn lambda_claims(scene: &Scene, exact: &Solved, document: &ShapeDocument) -> Vec
     let options = LambdaOptions::default();
     let report = run(scene.design, document, Vec::new(), &options, &Silent).unwrap();
     let claimed = |stage: &str| report.file.accuracy[stage].estimate;
-    let points = &report.points.points;
+    let points = &report.points.discretized.points;
     let plan = points.grid;
     let rows = points.row_of_grid_point();
     let height = |k: usize| rows[k].map(|row| points.height_m[row]);
     let mut claims = vec![Claim {
         stage: "grid",
-        claimed: claimed("grid"),
+        claimed: claimed("points_grid"),
         found: deviation_m(document, &plan, height),
     }];
     // The forces that lambda is solved from.

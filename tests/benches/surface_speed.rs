@@ -173,7 +173,10 @@ fn measure(
         y_m: side,
     };
     let print = |what: &str, [cpu, clock]: [f64; 2]| {
-        println!("| {what} | {cpu:.4} | {clock:.4} | {:.0} |", peak_bytes() as f64 / f64::from(1 << 20));
+        println!(
+            "| {what} | {cpu:.4} | {clock:.4} | {:.0} |",
+            peak_bytes() as f64 / f64::from(1 << 20)
+        );
     };
     println!("| step | CPU s | s | peak MiB |\n|---|---|---|---|");
     let (mesh, seconds) = timed(runs, || {

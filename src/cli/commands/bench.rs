@@ -29,7 +29,7 @@ use crate::cli::values::FileArgument;
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Pages, &[
     ("fluxform bench --quick --stage air-field --out air", "one stage, in a second"),
-    ("fluxform bench --quick --stage lambda-path --stage cored-coil --out two --format json",
+    ("fluxform bench --quick --stage air-field --stage inductance --out two --format json",
      "two stages, for a program"),
 ]))]
 pub struct Bench {
