@@ -91,7 +91,8 @@ fn unit_of(error_of: &str) -> String {
     match absolute {
         Some(rest) => format!("error / m{rest}"),
         None => {
-            let first = error_of.split(['(', ';']).next().unwrap_or(error_of).trim();
+            let first = error_of.split(" (").next().unwrap_or(error_of);
+            let first = first.split(';').next().unwrap_or(first);
             format!("error, relative to {first}")
         }
     }

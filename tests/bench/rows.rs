@@ -45,7 +45,7 @@ fn sound(curve: &Curve) {
         );
         // The reference's own error adds to what is found.
         if let Some(stated) = row.stated_error {
-            let allowed = stated + 2.0 * curve.reference_error + 1e-15;
+            let allowed = stated * (1.0 + 1e-9) + 2.0 * curve.reference_error + 1e-15;
             assert!(row.error <= allowed, "{}: {row:?}", curve.name);
         }
     }
@@ -167,7 +167,7 @@ fn errors_do_not_change_from_run_to_run() {
         }
         to_json(&file).unwrap()
     };
-    for stage in ["air-field", "points-against-surface", "coil-optimum"] {
+    for stage in ["air-field", "points-against-surface", "inductance"] {
         assert!(
             errors(&measured(stage, 2)) == errors(&measured(stage, 2)),
             "{stage}"
