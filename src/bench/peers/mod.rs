@@ -169,7 +169,11 @@ fn ask(
                         all.curves.push(curve);
                     }
                 }
+                let whole = answer.missing.is_empty();
                 all.missing.extend(answer.missing);
+                if whole {
+                    break;
+                }
             }
             _ => {
                 let said = String::from_utf8_lossy(&output.stderr);
