@@ -1,6 +1,9 @@
 //! The measurements themselves: rows fall along their knobs, tables and JSON are as promised, and
 //! what stages claim of their errors holds on scenes that nobody chose.
 
+// Figures are printed, and a script is put where the command looks for one.
+#![allow(clippy::print_stdout, clippy::disallowed_methods)]
+
 #[path = "bench/command.rs"]
 mod command;
 #[path = "bench/coverage.rs"]

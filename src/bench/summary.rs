@@ -281,7 +281,7 @@ pub(super) fn seconds(value: f64) -> String {
 }
 
 fn factor(value: f64) -> String {
-    if value.is_finite() && (value >= 1e4 || value < 1e-3) {
+    if value.is_finite() && !(1e-3..1e4).contains(&value) {
         format!("{value:.0e}")
     } else {
         three(value)

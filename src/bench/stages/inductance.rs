@@ -23,6 +23,9 @@ use crate::numerics::gauss;
 use crate::progress::Progress;
 use crate::units::MU_0_T_M_PER_A;
 
+/// From a winding to its inductance, H.
+type Route<'a> = &'a dyn Fn(&Winding) -> f64;
+
 #[derive(Deserialize)]
 struct Oracle {
     windings: BTreeMap<String, Section>,
@@ -80,7 +83,7 @@ fn own(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
             MU_0_T_M_PER_A * w.current_density_per_m2().powi(2) * integrals.value
         }
     };
-    let routes: [(f64, &dyn Fn(&Winding) -> f64); 3] = [
+    let routes: [(f64, Route); 3] = [
         (ROUGH.relative_error, &fast(&ROUGH)),
         (FINE.relative_error, &fast(&FINE)),
         (RELATIVE_ERROR, &self_inductance_h),
