@@ -4,7 +4,8 @@
 //! The rooms, in the direction of their imports:
 //! `numerics` < `design` < `field` < `coil` < `map`; `shape` beside them;
 //! `lambda` on numbers alone; `bundle` writes and reads artefacts, `plot` draws,
-//! `report` makes pages; `job` joins them into what a command does; `cli` is the only room that talks.
+//! `report` makes pages; `job` joins them into what a command does; `bench` measures error against
+//! time; `cli` is the only room that talks.
 
 pub mod accuracy;
 pub mod progress;
@@ -28,5 +29,7 @@ pub mod plot;
 pub mod report;
 
 pub mod job;
+
+pub mod bench;
 
 pub mod cli;

@@ -2,11 +2,15 @@
 """One coil with its linear steel core by axisymmetric finite elements of high order (NGSolve).
 
     python3 scripts/peers/core_ngsolve.py DESIGN
+    python3 scripts/peers/core_ngsolve.py --rows PROBLEM.json       # see rows.py
 
 Solves for w = A_phi / r (smooth on the axis, where B_z = 2 w) in a half-disc of radius BALL_M
 whose rim carries the dipole's condition dw/dn = -3 w / BALL_M; the mesh is refined in proportion
 towards the core's edges. One thread. Prints one JSON object: the gradient at the target, the
 inductance, the unknowns, and the CPU seconds of meshing, solving and evaluating together.
+
+With --rows the elements' order is swept; the error is the largest of the gradients' on the axis
+and of the inductance's.
 
 compare_core.py calls this; scripts/peers/requirements.txt lists what it needs.
 """
@@ -21,12 +25,17 @@ import tomllib
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[variable] = "1"
 
-import ngsolve
-from netgen.occ import Circle, Glue, MoveTo, OCCGeometry
-from ngsolve import H1, BilinearForm, CoefficientFunction, GridFunction, InnerProduct
-from ngsolve import LinearForm, Mesh, ds, dx, grad, x
+import rows
+
+LACKS = rows.lacks("NGSolve", "ngsolve", "netgen")
+if not LACKS:
+    import ngsolve
+    from netgen.occ import Circle, Glue, MoveTo, OCCGeometry
+    from ngsolve import H1, BilinearForm, CoefficientFunction, GridFunction, InnerProduct
+    from ngsolve import LinearForm, Mesh, ds, dx, grad, x
 
 ORDER = 8
+SWEPT_ORDERS = (2, 3, 4, 5, 6, 7, 8)
 EDGE_LEVELS = 16  # refinements towards the core's edges, each by EDGE_RATIO
 EDGE_RATIO = 0.15
 BALL_M = 3.0
@@ -48,7 +57,7 @@ def half_disc(radius_m, z_m):
     return face
 
 
-def mesh_of(coil, core):
+def mesh_of(coil, core, order):
     """Regions core, coil and air; the rim is called `outer`."""
     core_r, bottom, top = core
     middle = (bottom + top) / 2
@@ -66,15 +75,15 @@ def mesh_of(coil, core):
         r, z = edge.center.x, edge.center.y
         edge.name = "outer" if r > 1e-9 and math.hypot(r, z - middle) > 0.5 * BALL_M else "inner"
     mesh = Mesh(OCCGeometry(shape, dim=2).GenerateMesh(maxh=BALL_M / 3, grading=0.4))
-    mesh.Curve(ORDER)
+    mesh.Curve(order)
     mesh.RefineHP(EDGE_LEVELS, EDGE_RATIO)
     return mesh
 
 
-def solve(coil, core, turns, permeability, height_m):
-    """dB_z/dz per ampere on the axis at height_m, inductance, number of unknowns."""
-    mesh = mesh_of(coil, core)
-    space = H1(mesh, order=ORDER)
+def solve(coil, core, turns, permeability, heights_m, order=ORDER):
+    """dB_z/dz per ampere on the axis at the heights, inductance, number of unknowns."""
+    mesh = mesh_of(coil, core, order)
+    space = H1(mesh, order=order)
     w, v = space.TnT()
 
     def flux(u):
@@ -93,10 +102,41 @@ def solve(coil, core, turns, permeability, height_m):
     inverse = form.mat.Inverse(space.FreeDofs(), "sparsecholesky")
     solution.vec.data = inverse * source.vec
     inductance_h = 2 * math.pi * InnerProduct(source.vec, solution.vec)
-    return 2 * grad(solution)[1](mesh(0, height_m)), inductance_h, space.ndof
+    slope = grad(solution)[1]
+    return [2 * slope(mesh(0, height_m)) for height_m in heights_m], inductance_h, space.ndof
+
+
+def swept(asked):
+    """Rows over the elements' order."""
+    winding, steel = asked["winding"], asked["core"]
+    coil = (winding["inner_radius_m"], winding["outer_radius_m"], -winding["length_m"], 0)
+    core = (steel["radius_m"], steel["bottom_m"], steel["top_m"])
+    heights_m = [place["z_m"] for place in asked["on_axis"]]
+    told = []
+    for order in SWEPT_ORDERS[: 4 if asked["quick"] else None]:
+        def work(order=order):
+            return solve(coil, core, winding["turns"], steel["relative_permeability"], heights_m, order)
+
+        (gradients, inductance_h, _), spread = rows.timed(work)
+        errors = [abs(inductance_h / asked["inductance_h"] - 1)]
+        for found, place in zip(gradients, asked["on_axis"]):
+            off = abs(found - place["dbz_dz_t_per_m_per_a"])
+            errors.append(off / place["gradient_norm_t_per_m_per_a"])
+        told.append(rows.row(order, 1, max(errors), spread))
+    return told
 
 
 def main():
+    asked = rows.problem()
+    if asked and LACKS:
+        rows.answer([], [LACKS])
+        return
+    if asked:
+        ngsolve.SetNumThreads(1)
+        ngsolve.ngsglobals.msg_level = 0
+        knob = "order of the elements"
+        rows.answer([rows.curve(asked, "NGSolve", ngsolve.__version__, knob, swept(asked))])
+        return
     with open(sys.argv[1], "rb") as file:
         design = tomllib.load(file)
     coil, core = design["coil"], design["core"]
@@ -110,12 +150,12 @@ def main():
     ngsolve.SetNumThreads(1)
     ngsolve.ngsglobals.msg_level = 0
     start = time.process_time()
-    gradient, inductance_h, unknowns = solve(
+    [gradient], inductance_h, unknowns = solve(
         (inner_m, outer_m, -length_m, 0),
         core_m,
         coil["turns"],
         core["relative_permeability"],
-        design.get("target", {}).get("height_mm", 30.0) / 1000,
+        [design.get("target", {}).get("height_mm", 30.0) / 1000],
     )
     result = {
         "gradient_t_per_m_per_a": gradient,

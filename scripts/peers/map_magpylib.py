@@ -2,12 +2,15 @@
 """Map an air-cored design with magpylib, time it, and compare maps with a reference.
 
     python3 scripts/peers/map_magpylib.py DESIGN REFERENCE.npz OURS.npz
+    python3 scripts/peers/map_magpylib.py --rows PROBLEM.json       # see rows.py
 
 A winding is six cylindrical current sheets at the Gauss-Legendre nodes of its radius. magpylib
 has no such sheet, but an axially magnetised cylinder gives the same field outside itself, and
 the same dB_z/dz on its axis: `Cylinder`, magnetisation = turns per metre. dB_z/dz is the central
 difference of B_z over 2 STEP_M. One thread. REFERENCE.npz must hold the whole gradient: errors
 are relative to the largest |grad B| of all coils at each height. Prints one JSON object.
+
+With --rows the number of sheets is swept, and the error is that at the problem's nodes.
 
 compare_map.py calls this; scripts/peers/requirements.txt lists what it needs.
 """
@@ -23,10 +26,15 @@ import sys
 import time
 import tomllib
 
-import magpylib
-import numpy as np
+import rows
+
+LACKS = rows.lacks("magpylib", "magpylib", "numpy")
+if not LACKS:
+    import magpylib
+    import numpy as np
 
 SHELLS = 6
+SWEPT_SHELLS = (1, 2, 4, 6, 8)
 STEP_M = 1e-6  # the difference's own error and B's rounding balance here
 HEIGHTS_AT_ONCE = 4  # keeps the arrays in cache: the fastest of 1, 4, 8
 
@@ -36,12 +44,15 @@ def coil(design):
     section = design["coil"]
     inner_m = section["inner_diameter_mm"] / 2000
     outer_m = section["outer_diameter_mm"] / 2000
-    length_m = section["length_mm"] / 1000
-    nodes, weights = np.polynomial.legendre.leggauss(SHELLS)
+    return cylinders(inner_m, outer_m, section["length_mm"] / 1000, section["turns"], SHELLS)
+
+
+def cylinders(inner_m, outer_m, length_m, turns, shells):
+    nodes, weights = np.polynomial.legendre.leggauss(shells)
     radii_m = (inner_m + outer_m) / 2 + (outer_m - inner_m) / 2 * nodes
     return [
         magpylib.magnet.Cylinder(
-            magnetization=(0, 0, section["turns"] / length_m * weight / 2),
+            magnetization=(0, 0, turns / length_m * weight / 2),
             dimension=(2 * radius_m, length_m),
             position=(0, 0, -length_m / 2),
         )
@@ -89,7 +100,33 @@ def largest_error(maps, reference):
     return float((error / norm).max())
 
 
+def swept(asked):
+    """Rows over the number of sheets."""
+    winding = asked["winding"]
+    section = [winding[key] for key in ("inner_radius_m", "outer_radius_m", "length_m", "turns")]
+    x_m, y_m, z_m = (np.array(asked[axis]) for axis in ("x_m", "y_m", "z_m"))
+    at = tuple(np.array(asked["coil_z_y_x"]).T)
+    exact, size = np.array(asked["gz_t_per_m_per_a"]), np.array(asked["size_t_per_m_per_a"])
+    told = []
+    for shells in SWEPT_SHELLS[: 3 if asked["quick"] else None]:
+        coils = [
+            magpylib.Collection(*cylinders(*section, shells)).move((x, y, 0))
+            for x, y in asked["positions_m"]
+        ]
+        maps, spread = rows.timed(lambda coils=coils: gradient_map(coils, x_m, y_m, z_m))
+        told.append(rows.row(shells, maps.size, (abs(maps[at] - exact) / size).max(), spread))
+    return told
+
+
 def main():
+    asked = rows.problem()
+    if asked and LACKS:
+        rows.answer([], [LACKS])
+        return
+    if asked:
+        knob = "cylindrical sheets a winding"
+        rows.answer([rows.curve(asked, "magpylib", magpylib.__version__, knob, swept(asked))])
+        return
     design_path, reference_path, ours_path = sys.argv[1:]
     with open(design_path, "rb") as file:
         design = tomllib.load(file)

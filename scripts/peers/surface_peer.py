@@ -1,11 +1,13 @@
 """One peer on one STL file, in a process of its own; prints JSON. Started by compare_surface.py.
 
     python surface_peer.py PEER FILE.stl HEIGHTS.npy SAMPLES HALF_MM STRIDE
+    python surface_peer.py --rows PROBLEM.json                      # see rows.py
 
 Reads the file, then sends a vertical ray from above through every STRIDE-th point of a grid of
 SAMPLES x SAMPLES points from -HALF_MM to HALF_MM and keeps the first hit, as each program's
 documentation has it; building the search tree counts as sampling. CPU time is that of all
-threads. With SAMPLES 0 only reads, and tells what came of it.
+threads. With SAMPLES 0 only reads, and tells what came of it. With --rows trimesh and Open3D get
+the problem's triangles in memory, in millimetres as ever, and what is timed is tree and rays.
 """
 
 import json
@@ -13,9 +15,13 @@ import resource
 import sys
 import time
 
-import numpy as np
+import rows
+
+if rows.lacks("numpy", "numpy") is None:
+    import numpy as np
 
 ABOVE_MM = 1000.0
+MM = 1000.0
 
 
 def trimesh_peer():
@@ -114,7 +120,52 @@ def peak_mib():
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
+def trimesh_of(triangles_mm):
+    import trimesh
+
+    corners = triangles_mm.reshape(-1, 3)
+    faces = np.arange(len(corners)).reshape(-1, 3)
+    return trimesh.Trimesh(corners, faces, process=False)
+
+
+def open3d_of(triangles_mm):
+    import open3d as o3d
+
+    corners = triangles_mm.reshape(-1, 3)
+    faces = np.arange(len(corners)).reshape(-1, 3)
+    return o3d.geometry.TriangleMesh(
+        o3d.utility.Vector3dVector(corners), o3d.utility.Vector3iVector(faces)
+    )
+
+
+def rows_of(asked):
+    """A row a peer: the rays of the whole grid."""
+    curves, missing = [], []
+    known = (
+        ("trimesh", ("trimesh", "embreex"), trimesh_peer, trimesh_of),
+        ("Open3D", ("open3d",), open3d_peer, open3d_of),
+    )
+    for name, modules, peer, mesh_of in known:
+        lacks = rows.lacks(name, "numpy", *modules)
+        if lacks:
+            missing.append(lacks)
+            continue
+        mesh = mesh_of(MM * np.array(asked["triangles_m"]))
+        points = MM * np.array(np.meshgrid(asked["x_m"], asked["y_m"])).reshape(2, -1).T
+        *_, sample = peer()
+        heights, spread = rows.timed(lambda: sample(mesh, points))
+        off = abs(heights[asked["looked_at"]] / MM - np.array(asked["height_m"]))
+        told = [rows.row(len(asked["x_m"]), len(points), np.max(off), spread)]
+        version = rows.version(modules[0])
+        curves.append(rows.curve(asked, name, version, "points along x and y", told))
+    rows.answer(curves, missing)
+
+
 def main():
+    asked = rows.problem()
+    if asked:
+        rows_of(asked)
+        return
     peer, path, out = sys.argv[1:4]
     samples, half_mm, stride = int(sys.argv[4]), float(sys.argv[5]), int(sys.argv[6])
     name, read, count, sample = PEERS[peer]()

@@ -2,12 +2,13 @@
 
 use schemars::{JsonSchema, schema_for};
 
+use super::bench::BenchFile;
 use super::lambda_file::LambdaFile;
 use super::manifest::{Manifest, MapSidecar};
 use super::sweep::{MergeSummary, PlanFile, PointFile};
 
 /// The committed schemas: file name and text.
-pub const SCHEMAS: [(&str, &str); 6] = [
+pub const SCHEMAS: [(&str, &str); 7] = [
     (
         "manifest.schema.json",
         include_str!("schema/manifest.schema.json"),
@@ -29,11 +30,15 @@ pub const SCHEMAS: [(&str, &str); 6] = [
         "sweep_merge.schema.json",
         include_str!("schema/sweep_merge.schema.json"),
     ),
+    (
+        "bench.schema.json",
+        include_str!("schema/bench.schema.json"),
+    ),
 ];
 
 /// The schemas as the structs have them now, in the order of [`SCHEMAS`].
 #[must_use]
-pub fn generated() -> [String; 6] {
+pub fn generated() -> [String; 7] {
     [
         text::<Manifest>(),
         text::<MapSidecar>(),
@@ -41,6 +46,7 @@ pub fn generated() -> [String; 6] {
         text::<PlanFile>(),
         text::<PointFile>(),
         text::<MergeSummary>(),
+        text::<BenchFile>(),
     ]
 }
 

@@ -3,8 +3,8 @@
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::commands::{
-    calibrate, compare, completions, discretize, evaluate, lambda, man, map, optimize, probe,
-    replay, sweep, verify,
+    bench, calibrate, compare, completions, discretize, evaluate, lambda, man, map, optimize,
+    probe, replay, sweep, verify,
 };
 use super::{help, values};
 use crate::job::discretize::scattered::Sampling;
@@ -88,6 +88,7 @@ pub enum Command {
     Optimize(optimize::Optimize),
     Sweep(sweep::Sweep),
     Replay(replay::Replay),
+    Bench(bench::Bench),
     Completions(completions::Completions),
     Man(man::Man),
 }

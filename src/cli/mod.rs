@@ -79,6 +79,7 @@ fn run(arguments: &Arguments, printer: &Printer) -> Result<(), Failure> {
         Command::Optimize(command) => command.run(printer),
         Command::Sweep(command) => command.run(printer),
         Command::Replay(command) => command.run(printer),
+        Command::Bench(command) => command.run(printer),
         Command::Completions(command) => command.run(printer),
         Command::Man(command) => command.run(printer),
     }

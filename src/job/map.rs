@@ -269,7 +269,7 @@ pub(super) fn summary(
 ) -> MapSummary {
     let definition = format!(
         "of dB_z/dz, relative to the largest |dB_z/dz| at that height: 1.25 times the largest \
-         difference from direct values at {} places in the middles of cells and edges, in the four \
+         difference from direct values at {} places in the middles of cells, faces and edges, in the four \
          lowest layers and the highest, where it is largest, of the innermost and the outermost coil",
         between.samples
     );

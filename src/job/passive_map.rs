@@ -118,7 +118,7 @@ impl PassiveMap {
     pub fn definition(&self) -> String {
         format!(
             "of the pull, relative to the largest pull at that height: {SAFETY} times the largest \
-             difference from its table at {} places in the middles of cells and edges, in the four \
+             difference from its table at {} places in the middles of cells, faces and edges, in the four \
              lowest layers and the highest, where it is largest",
             self.samples
         )

@@ -47,7 +47,7 @@ pub fn interpolation_error(
 }
 
 /// Compares the interpolated dB_z/dz ([coil, z, y, x] on `grid`) with direct values in the
-/// middle of cells, and of edges along each axis, in the four lowest layers and the highest, for
+/// middle of cells, faces and edges, in the four lowest layers and the highest, for
 /// the innermost and the outermost coil.
 ///
 /// # Errors
@@ -80,6 +80,10 @@ pub fn interpolation_error_by(
     };
     let staggered = [
         (middles(x), middles(y), middles(z)),
+        // Where the errors along two axes have the sign that the third's has not.
+        (x.clone(), middles(y), middles(z)),
+        (middles(x), y.clone(), middles(z)),
+        (middles(x), middles(y), z.clone()),
         (middles(x), y.clone(), z.clone()),
         (x.clone(), middles(y), z.clone()),
         (x.clone(), y.clone(), middles(z)),

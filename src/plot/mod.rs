@@ -2,6 +2,7 @@
 //!
 //! The same numbers give the same bytes.
 
+pub mod curves;
 pub mod lambda;
 pub mod matrix;
 pub mod pareto;

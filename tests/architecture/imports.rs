@@ -38,9 +38,17 @@ const ROOMS: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "bench",
+        &[
+            "units", "progress", "accuracy", "numerics", "design", "field", "coil", "map", "shape",
+            "lambda", "bundle", "plot", "job",
+        ],
+    ),
+    (
         "cli",
         &[
             "units", "progress", "accuracy", "numerics", "design", "shape", "bundle", "job",
+            "bench",
         ],
     ),
     ("main", &["cli"]),

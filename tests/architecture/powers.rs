@@ -44,7 +44,7 @@ const POWERS: &[Power] = &[
     Power {
         name: "lifting the lint on writing and clocks",
         marks: &["disallowed_methods"],
-        holders: &["bundle/mod.rs", "cli/bar.rs"],
+        holders: &["bench/clock.rs", "bundle/mod.rs", "cli/bar.rs"],
     },
     Power {
         name: "unsafe code",
@@ -67,8 +67,8 @@ const POWERS: &[Power] = &[
     },
     Power {
         name: "reading a clock",
-        marks: &["Instant", "SystemTime"],
-        holders: &["cli/bar.rs"],
+        marks: &["Instant", "SystemTime", "ProcessTime"],
+        holders: &["bench/clock.rs", "cli/bar.rs"],
     },
     Power {
         name: "ending the process",
@@ -78,12 +78,18 @@ const POWERS: &[Power] = &[
     Power {
         name: "reading the environment",
         marks: &["env ::"],
-        holders: &["cli/printer.rs", "main.rs"],
+        holders: &[
+            "bench/peers/mod.rs",
+            "bench/scaling/mod.rs",
+            "cli/printer.rs",
+            "main.rs",
+        ],
     },
     Power {
         name: "reading files",
         marks: &["fs ::", "File ::", "stdin ("],
         holders: &[
+            "bench/memory.rs",
             "bundle/",
             "cli/documents.rs",
             "design/source.rs",

@@ -8,13 +8,13 @@
 //! `-- --json` prints the problems with both instead, for `scripts/peers/compare_lambda.py`, which
 //! gives them to other solvers. One thread.
 
-// A measurement: it reads the clock and prints.
-#![allow(clippy::print_stdout, clippy::disallowed_methods, dead_code)]
+// A measurement: it prints.
+#![allow(clippy::print_stdout, dead_code)]
 
 use std::error::Error;
 use std::path::Path;
-use std::time::Instant;
 
+use fluxform::bench::clock::{Effort, measure as repeated};
 use fluxform::design::{Design, Need};
 use fluxform::job::scene::Scene;
 use fluxform::job::steel;
@@ -38,9 +38,12 @@ type Failure = Box<dyn Error + Send + Sync>;
 const CURVE: usize = 41;
 /// Which of them is the one: a little beyond lambda_jnd, where limits bind.
 const ONE: usize = 22;
-const REPEATS: usize = 7;
-/// After so many seconds a run is not repeated.
-const ENOUGH_S: f64 = 2.0;
+/// After two seconds a run is not repeated.
+const EFFORT: Effort = Effort {
+    sample_s: 0.0,
+    enough_s: 2.0,
+    samples: 7,
+};
 /// Points up to which every set of coils is tried.
 const MOST_SEARCHED: usize = 1000;
 /// Shifts two coils by these, m.
@@ -106,20 +109,10 @@ fn cases() -> Result<Vec<(&'static str, Case)>, Failure> {
     Ok(all)
 }
 
-/// The result, and the median of the seconds of a few runs.
-fn time<T>(mut work: impl FnMut() -> Result<T, Failure>) -> Result<(T, f64), Failure> {
-    let mut seconds = Vec::new();
-    let mut last = None;
-    for _ in 0..REPEATS {
-        let start = Instant::now();
-        last = Some(work()?);
-        seconds.push(start.elapsed().as_secs_f64());
-        if seconds.iter().sum::<f64>() > ENOUGH_S {
-            break;
-        }
-    }
-    seconds.sort_unstable_by(f64::total_cmp);
-    Ok((last.ok_or("no run")?, seconds[seconds.len() / 2]))
+/// The result, and the median of the processor seconds of a few runs.
+fn time<T>(work: impl FnMut() -> Result<T, Failure>) -> Result<(T, f64), Failure> {
+    let (last, timing) = repeated(&EFFORT, work)?;
+    Ok((last, timing.seconds))
 }
 
 /// Largest relative excess over `least`, at one place of the curve and along all of it.

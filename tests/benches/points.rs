@@ -6,13 +6,13 @@
 //!
 //! Default: `shapes`. Seconds are the least of three runs, on all threads.
 
-// A measurement: it reads the clock and prints.
-#![allow(clippy::print_stdout, clippy::disallowed_methods)]
+// A measurement: it prints.
+#![allow(clippy::print_stdout)]
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
+use fluxform::bench::clock::Watch;
 use fluxform::numerics::axis::Axis;
 use fluxform::progress::Silent;
 use fluxform::shape::deviation::{Faces, Lattice, hausdorff, vertical};
@@ -29,9 +29,9 @@ type Failure = Box<dyn Error + Send + Sync>;
 /// The value and the least seconds of three runs.
 fn timed<T>(mut run: impl FnMut() -> T) -> (T, f64) {
     let mut once = || {
-        let start = Instant::now();
+        let watch = Watch::start();
         let value = run();
-        (value, start.elapsed().as_secs_f64())
+        (value, watch.elapsed_s())
     };
     let (mut value, mut least) = once();
     for _ in 0..2 {

@@ -8,15 +8,15 @@
 //! positions at random. C is measured where there is a compiler called `cc`. The least of the
 //! repeats is told: on a machine with other work it is the better measure.
 
-// A measurement: it reads the clock and prints.
-#![allow(clippy::print_stdout, clippy::disallowed_methods)]
+// A measurement: it prints.
+#![allow(clippy::print_stdout)]
 
 use std::error::Error;
 use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::time::Instant;
 
+use fluxform::bench::clock::Watch;
 use fluxform::bundle::artefact::Input;
 use fluxform::bundle::replay::Answer;
 use fluxform::design::{Design, Need};
@@ -121,9 +121,9 @@ fn in_c(program: &Path, bundle: &Path, positions: &[[f64; 3]]) -> Result<f64, Fa
 fn least(items: usize, mut work: impl FnMut()) -> f64 {
     let mut best = f64::INFINITY;
     for _ in 0..REPEATS {
-        let start = Instant::now();
+        let watch = Watch::start();
         work();
-        best = best.min(start.elapsed().as_secs_f64() / items as f64 * 1e9);
+        best = best.min(watch.processor_s() / items as f64 * 1e9);
     }
     best
 }

@@ -18,9 +18,9 @@ use std::error::Error;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
-use std::time::Instant;
 
-use cpu_time::ProcessTime;
+use fluxform::bench::clock::Watch;
+use fluxform::bench::memory::peak_bytes;
 use fluxform::numerics::axis::Axis;
 use fluxform::progress::Silent;
 use fluxform::shape::document::Placement;
@@ -149,20 +149,12 @@ fn timed<T>(
     for _ in 0..runs {
         // The value of the run before is not held beside the new one.
         drop(last.take());
-        let (cpu, clock) = (ProcessTime::now(), Instant::now());
+        let watch = Watch::start();
         last = Some(run()?);
-        let took = [cpu.elapsed().as_secs_f64(), clock.elapsed().as_secs_f64()];
+        let took = [watch.processor_s(), watch.elapsed_s()];
         least = [0, 1].map(|k| least[k].min(took[k]));
     }
     Ok((last.ok_or("no run")?, least))
-}
-
-/// Most memory that the process held so far, MiB; 0 where the system does not tell.
-fn peak_mib() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-    let kib = line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok());
-    kib.unwrap_or(0.0) / 1024.0
 }
 
 fn measure(
@@ -181,7 +173,10 @@ fn measure(
         y_m: side,
     };
     let print = |what: &str, [cpu, clock]: [f64; 2]| {
-        println!("| {what} | {cpu:.4} | {clock:.4} | {:.0} |", peak_mib());
+        println!(
+            "| {what} | {cpu:.4} | {clock:.4} | {:.0} |",
+            peak_bytes() as f64 / f64::from(1 << 20)
+        );
     };
     println!("| step | CPU s | s | peak MiB |\n|---|---|---|---|");
     let (mesh, seconds) = timed(runs, || {

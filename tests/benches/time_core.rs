@@ -7,14 +7,14 @@
 //! Default: `designs/seed.toml`, one thread. The least and the median of the repeats stand
 //! beside each other: on a machine with other work the least is the better measure.
 
-// A measurement: it reads the clock and prints.
-#![allow(clippy::print_stdout, clippy::disallowed_methods)]
+// A measurement: it prints.
+#![allow(clippy::print_stdout)]
 
 use std::error::Error;
 use std::path::Path;
 use std::sync::Mutex;
-use std::time::Instant;
 
+use fluxform::bench::clock::{Watch, quartiles};
 use fluxform::bundle::write::MapFormats;
 use fluxform::design::{Design, Need};
 use fluxform::job::map::{self, MapRequest};
@@ -34,16 +34,16 @@ const HEIGHT_M: f64 = 0.05;
 
 /// Measures the stages of a job.
 #[derive(Default)]
-struct Stages(Mutex<Vec<(String, Instant, f64)>>);
+struct Stages(Mutex<Vec<(String, Watch, f64)>>);
 
 impl Progress for Stages {
     fn begin(&self, stage: &str, _total: u64) {
         let mut stages = self.0.lock().expect("no holder panics");
-        stages.push((stage.to_owned(), Instant::now(), 0.0));
+        stages.push((stage.to_owned(), Watch::start(), 0.0));
     }
     fn end(&self) {
         if let Some((_, start, seconds)) = self.0.lock().expect("no holder panics").last_mut() {
-            *seconds = start.elapsed().as_secs_f64();
+            *seconds = start.elapsed_s();
         }
     }
 }
@@ -88,12 +88,12 @@ fn time<T>(
     let mut seconds = Vec::new();
     let mut result = work()?; // warms caches and threads up
     for _ in 0..repeats {
-        let start = Instant::now();
+        let watch = Watch::start();
         result = work()?;
-        seconds.push(start.elapsed().as_secs_f64());
+        seconds.push(watch.elapsed_s());
     }
-    seconds.sort_by(f64::total_cmp);
-    let (least, median) = (seconds[0], seconds[repeats / 2]);
+    let [_, median, _] = quartiles(&mut seconds);
+    let least = seconds[0];
     let each = least / items as f64 * 1e9;
     println!("| {what} | {items} | {least:.6} | {median:.6} | {each:.1} |");
     Ok(result)

@@ -14,8 +14,9 @@
 use std::error::Error;
 use std::path::Path;
 use std::process::Command;
-use std::time::Instant;
 
+use fluxform::bench::clock::Watch;
+use fluxform::bench::memory::peak_bytes;
 use fluxform::design::{Design, Need};
 use fluxform::job::scene::Scene;
 use fluxform::job::steel;
@@ -54,16 +55,6 @@ fn status_kb(field: &str) -> u64 {
     number.and_then(|n| n.parse().ok()).unwrap_or(0)
 }
 
-/// Seconds of processor time of all threads; other work on the machine does not count.
-fn processor_s() -> Option<f64> {
-    let mut ns = 0.0;
-    for task in std::fs::read_dir("/proc/self/task").ok()? {
-        let text = std::fs::read_to_string(task.ok()?.path().join("schedstat")).ok()?;
-        ns += text.split_whitespace().next()?.parse::<f64>().ok()?;
-    }
-    Some(ns * 1e-9)
-}
-
 /// Runs `work` a few times: least seconds, peak memory above what was there before, MB.
 fn time<T>(
     repeats: usize,
@@ -75,15 +66,11 @@ fn time<T>(
     let mut least = f64::INFINITY;
     let mut result = None;
     for _ in 0..repeats {
-        let (start, before) = (Instant::now(), processor_s());
+        let watch = Watch::start();
         result = Some(work()?);
-        let elapsed_s = start.elapsed().as_secs_f64();
-        let seconds = before
-            .zip(processor_s())
-            .map_or(elapsed_s, |(before, after)| after - before);
-        least = least.min(seconds);
+        least = least.min(watch.processor_s());
     }
-    let peak = status_kb("VmHWM").saturating_sub(before) as f64 / 1e3;
+    let peak = (peak_bytes() / 1024).saturating_sub(before) as f64 / 1e3;
     Ok((result.ok_or("no run")?, least, peak))
 }
 

@@ -2,7 +2,7 @@
 
 use crate::support::Place;
 
-const COMMANDS: [&str; 12] = [
+const COMMANDS: [&str; 13] = [
     "evaluate",
     "probe",
     "map",
@@ -13,6 +13,7 @@ const COMMANDS: [&str; 12] = [
     "verify",
     "replay",
     "sweep",
+    "bench",
     "completions",
     "man",
 ];

@@ -13,6 +13,7 @@ mod file;
 mod folder;
 mod leftovers;
 mod overwrite;
+mod scratch;
 mod unforced;
 
 use std::io;
@@ -24,6 +25,7 @@ pub use folder::FolderDraft;
 pub(crate) use folder::check_name;
 pub use leftovers::{clean_leftovers, remove_files_beginning_with};
 pub use overwrite::{Overwrite, Record};
+pub use scratch::Scratch;
 pub use unforced::write_unforced;
 
 /// What was written: size and digest of the bytes.

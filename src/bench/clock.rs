@@ -1,0 +1,229 @@
+//! Processor time, measured: warm-up, repeats, median and quartiles.
+//!
+//! Processor time counts what this process worked, so that other work on the machine hardly
+//! shows; with one thread it is the time that an idle machine would take by the clock.
+#![allow(clippy::disallowed_methods)] // what this room is for
+
+use std::time::Instant;
+
+use cpu_time::ProcessTime;
+
+/// How long a measurement may take.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Effort {
+    /// Calls are repeated within a sample until it lasts this long, s: the clock's own steps and
+    /// cost do not show then.
+    pub sample_s: f64,
+    /// No further sample once all took this long together, s.
+    pub enough_s: f64,
+    /// Most samples.
+    pub samples: usize,
+}
+
+impl Effort {
+    /// For figures to keep.
+    pub const FULL: Self = Self {
+        sample_s: 2e-3,
+        enough_s: 2.0,
+        samples: 21,
+    };
+    /// For a glance.
+    pub const QUICK: Self = Self {
+        sample_s: 1e-3,
+        enough_s: 0.25,
+        samples: 7,
+    };
+    /// One sample after the warm-up: for tests.
+    pub const ONCE: Self = Self {
+        sample_s: 0.0,
+        enough_s: 0.0,
+        samples: 1,
+    };
+}
+
+/// Seconds of one call.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Timing {
+    /// Processor time of all threads, the median, s.
+    pub seconds: f64,
+    /// Lower quartile, s.
+    pub low_s: f64,
+    /// Upper quartile, s.
+    pub high_s: f64,
+    /// Time by the clock, the least, s.
+    pub elapsed_s: f64,
+    /// Samples.
+    pub samples: usize,
+}
+
+/// A stopwatch for processor time and time by the clock.
+#[derive(Debug, Clone, Copy)]
+pub struct Watch {
+    processor: ProcessTime,
+    clock: Instant,
+}
+
+impl Watch {
+    /// Starts.
+    #[must_use]
+    pub fn start() -> Self {
+        Self {
+            processor: ProcessTime::now(),
+            clock: Instant::now(),
+        }
+    }
+
+    /// Processor time of all threads since the start, s.
+    #[must_use]
+    pub fn processor_s(&self) -> f64 {
+        self.processor.elapsed().as_secs_f64()
+    }
+
+    /// Time by the clock since the start, s.
+    #[must_use]
+    pub fn elapsed_s(&self) -> f64 {
+        self.clock.elapsed().as_secs_f64()
+    }
+}
+
+/// Runs `work` once to warm up caches and tables, then as often as `effort` says; the last result
+/// and the seconds of one call. Work that alone takes longer than is enough is not repeated: its
+/// first run counts.
+///
+/// # Errors
+/// Those of `work`.
+pub fn measure<T, E>(
+    effort: &Effort,
+    mut work: impl FnMut() -> Result<T, E>,
+) -> Result<(T, Timing), E> {
+    let watch = Watch::start();
+    let mut result = work()?;
+    let (first_s, first_elapsed_s) = (watch.processor_s(), watch.elapsed_s());
+    let calls = (effort.sample_s / first_s.max(1e-9)).ceil().max(1.0) as usize;
+    let (mut seconds, mut least_s, mut spent_s) = (Vec::new(), f64::INFINITY, first_s);
+    while seconds.is_empty() || (seconds.len() < effort.samples && spent_s < effort.enough_s) {
+        if seconds.is_empty() && first_s > effort.enough_s && effort.enough_s > 0.0 {
+            seconds.push(first_s);
+            least_s = first_elapsed_s;
+            break;
+        }
+        let watch = Watch::start();
+        for _ in 0..calls {
+            // The value of the call before is not held beside the new one.
+            result = {
+                drop(result);
+                work()?
+            };
+        }
+        let took_s = watch.processor_s();
+        least_s = least_s.min(watch.elapsed_s() / calls as f64);
+        spent_s += took_s;
+        seconds.push(took_s / calls as f64);
+    }
+    let [low_s, median_s, high_s] = quartiles(&mut seconds);
+    let timing = Timing {
+        seconds: median_s,
+        low_s,
+        high_s,
+        elapsed_s: least_s,
+        samples: seconds.len(),
+    };
+    Ok((result, timing))
+}
+
+/// Lower quartile, median and upper quartile of `values`, which are sorted: between the order
+/// statistics at (n - 1) p, linearly; NaN without values.
+#[must_use]
+pub fn quartiles(values: &mut [f64]) -> [f64; 3] {
+    values.sort_unstable_by(f64::total_cmp);
+    [0.25, 0.5, 0.75].map(|part| {
+        let Some(last) = values.len().checked_sub(1) else {
+            return f64::NAN;
+        };
+        let at = part * last as f64;
+        let below = at.floor() as usize;
+        let above = (below + 1).min(last);
+        values[below] + (at - below as f64) * (values[above] - values[below])
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::convert::Infallible;
+
+    use super::*;
+
+    /// Work whose amount is known: so many dependent multiplications.
+    fn spin(steps: u64) -> Result<f64, Infallible> {
+        let mut x = 1.3_f64;
+        for _ in 0..steps {
+            x = std::hint::black_box(x * 0.999_999_9 + 1e-7);
+        }
+        Ok(x)
+    }
+
+    #[test]
+    fn ten_times_the_work_takes_ten_times_as_long() {
+        let effort = Effort {
+            sample_s: 2e-3,
+            enough_s: 0.2,
+            samples: 15,
+        };
+        let (_, one) = measure(&effort, || spin(200_000)).unwrap();
+        let (_, ten) = measure(&effort, || spin(2_000_000)).unwrap();
+        let ratio = ten.seconds / one.seconds;
+        assert!((6.0..16.0).contains(&ratio), "{ratio}: {one:?} {ten:?}");
+        for timing in [one, ten] {
+            assert!(timing.low_s <= timing.seconds && timing.seconds <= timing.high_s);
+            assert!(timing.samples > 1);
+        }
+    }
+
+    #[test]
+    fn short_work_is_gathered_into_samples_and_long_work_is_not_repeated() {
+        let mut calls = 0;
+        let effort = Effort {
+            sample_s: 5e-4,
+            enough_s: 0.05,
+            samples: 3,
+        };
+        let (_, timing) = measure(&effort, || {
+            calls += 1;
+            spin(100)
+        })
+        .unwrap();
+        assert!(calls > 30 && timing.seconds < 1e-4, "{calls} {timing:?}");
+        let mut calls = 0;
+        let short = Effort {
+            enough_s: 1e-5,
+            ..effort
+        };
+        measure(&short, || {
+            calls += 1;
+            spin(2_000_000)
+        })
+        .unwrap();
+        assert_eq!(calls, 1);
+        let mut calls = 0;
+        measure(&Effort::ONCE, || {
+            calls += 1;
+            spin(1)
+        })
+        .unwrap();
+        assert_eq!(calls, 2, "a warm-up and one sample");
+    }
+
+    #[test]
+    fn an_error_ends_the_measurement() {
+        let failed: Result<((), Timing), &str> = measure(&Effort::FULL, || Err("no"));
+        assert_eq!(failed.unwrap_err(), "no");
+    }
+
+    #[test]
+    fn quartiles_interpolate_between_order_statistics() {
+        assert_eq!(quartiles(&mut [7.0, 1.0, 3.0, 5.0, 9.0]), [3.0, 5.0, 7.0]);
+        assert_eq!(quartiles(&mut [2.0, 1.0]), [1.25, 1.5, 1.75]);
+        assert_eq!(quartiles(&mut [1.3]), [1.3, 1.3, 1.3]);
+        assert!(quartiles(&mut []).iter().all(|q| q.is_nan()));
+    }
+}

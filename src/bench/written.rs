@@ -1,0 +1,99 @@
+//! The files of a run: table, plots, summary, and the JSON that tells of all.
+
+use std::path::Path;
+
+use crate::bundle::artefact::{FileEntry, Input};
+use crate::bundle::atomic::{FileSet, Overwrite, Written};
+use crate::bundle::bench::{BenchFile, StageCurves, write_laws, write_rows};
+use crate::bundle::json::to_json;
+use crate::job::JobError;
+use crate::plot::curves::{CurvesPlot, Line};
+
+use super::summary::markdown;
+
+/// Name of the JSON file.
+pub const JSON: &str = "bench.json";
+
+/// When files of an earlier run may be replaced.
+fn overwrite(inputs: &[Input], folder: &Path, force: bool) -> Overwrite {
+    Overwrite::new(force, folder.join(JSON), inputs)
+}
+
+/// Refuses before a long run when its files must not replace those in `folder`.
+///
+/// # Errors
+/// An output of something else.
+pub fn check(inputs: &[Input], folder: &Path, force: bool) -> Result<(), JobError> {
+    Ok(overwrite(inputs, folder, force).check(&folder.join(JSON))?)
+}
+
+/// Writes all files; `files` lists them but for the JSON itself.
+///
+/// # Errors
+/// Files that cannot be written or must not be replaced.
+pub fn write(file: &mut BenchFile, folder: &Path, force: bool) -> Result<(), JobError> {
+    let overwrite = overwrite(&file.inputs, folder, force);
+    let mut set = FileSet::begin(folder, overwrite)?;
+    let mut entries = Vec::new();
+    let entry = |name: &str, written: Written| FileEntry {
+        path: name.to_owned(),
+        bytes: written.bytes,
+        sha256: written.sha256,
+    };
+    let table = set.write("bench.csv", |out| write_rows(out, &file.stages))?;
+    entries.push(entry("bench.csv", table));
+    if !file.scaling.is_empty() {
+        let table = set.write("scaling.csv", |out| write_laws(out, &file.scaling))?;
+        entries.push(entry("scaling.csv", table));
+    }
+    for stage in &file.stages {
+        let name = format!("{}.svg", stage.stage);
+        let svg = picture(stage).svg();
+        let drawn = set.write(&name, |out| out.write_all(svg.as_bytes()))?;
+        entries.push(entry(&name, drawn));
+    }
+    let text = markdown(file);
+    let told = set.write("summary.md", |out| out.write_all(text.as_bytes()))?;
+    entries.push(entry("summary.md", told));
+    file.files = entries;
+    let json = to_json(file).map_err(|fault| JobError::Input(fault.to_string()))?;
+    set.write(JSON, |out| out.write_all(&json))?;
+    Ok(set.commit()?)
+}
+
+/// One stage's curves in one plane.
+#[must_use]
+pub fn picture(stage: &StageCurves) -> CurvesPlot {
+    let line = |curve: &crate::bundle::bench::Curve| Line {
+        name: format!("{}: {} ({})", curve.program, curve.name, curve.knob),
+        points: curve
+            .rows
+            .iter()
+            .map(|row| (row.seconds, row.error))
+            .collect(),
+        defaults: (0..curve.rows.len())
+            .filter(|k| curve.rows[*k].default)
+            .collect(),
+    };
+    CurvesPlot {
+        title: format!("{}: error against processor time", stage.stage),
+        across: "processor time / s".to_owned(),
+        up: unit_of(&stage.error_of),
+        lines: stage.curves.iter().map(line).collect(),
+    }
+}
+
+/// The label of the errors' axis.
+fn unit_of(error_of: &str) -> String {
+    let absolute = error_of
+        .strip_prefix('m')
+        .filter(|rest| rest.is_empty() || rest.starts_with(','));
+    match absolute {
+        Some(rest) => format!("error / m{rest}"),
+        None => {
+            let first = error_of.split(" (").next().unwrap_or(error_of);
+            let first = first.split(';').next().unwrap_or(first);
+            format!("error, relative to {first}")
+        }
+    }
+}

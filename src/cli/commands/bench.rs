@@ -1,0 +1,164 @@
+//! Arguments and summary of `bench`.
+
+use clap::Args;
+use clap::builder::PossibleValuesParser;
+
+use super::{begin, folder};
+use crate::bench::pace::Pace;
+use crate::bench::stages::STAGES;
+use crate::bench::{BenchRequest, run, scaling};
+use crate::bundle::bench::{BenchFile, Row};
+use crate::bundle::json::to_json;
+use crate::cli::args::Writing;
+use crate::cli::failure::Failure;
+use crate::cli::help::{Codes, page};
+use crate::cli::layout::{Sheet, Side, table};
+use crate::cli::printer::{Place, Printer};
+use crate::cli::quantity::{bytes, number_to, si};
+use crate::cli::values::FileArgument;
+
+/// Error against run time of every numerical stage
+///
+/// Sweeps the knob of every stage from coarse to fine (where a stage is exact: the size or the
+/// hardness of its problem) and measures the error against a reference of another kind and the
+/// processor time on one thread: a warm-up, repeats, their median and quartiles. Nothing is read:
+/// designs and reference values are part of the program. Writes bench.csv, bench.json, a picture
+/// a stage and summary.md. --peers measures other programs on the same problems, run by the Python
+/// that FLUXFORM_PYTHON names (several as in PATH), from the repository's root. --scaling measures
+/// time and memory against size, and says where a stage would break.
+#[derive(Debug, Args)]
+#[command(after_help = page(Codes::Pages, &[
+    ("fluxform bench --quick --stage air-field --out air", "one stage, in a second"),
+    ("fluxform bench --quick --stage air-field --stage inductance --out two --format json",
+     "two stages, for a program"),
+]))]
+pub struct Bench {
+    /// Leave out the slowest rows: all stages in less than a minute on one core
+    #[arg(long)]
+    quick: bool,
+    /// Measure this stage alone; may be repeated
+    #[arg(long, value_name = "NAME", value_parser = stage_names())]
+    stage: Vec<String>,
+    /// Measure other programs too, where their Python packages are installed
+    #[arg(long)]
+    peers: bool,
+    /// Measure time and memory against numbers of coils, points, triangles, nodes and threads
+    #[arg(long)]
+    scaling: bool,
+    /// Folder of the results
+    #[arg(long, value_name = "DIR", default_value = "results/bench")]
+    out: FileArgument,
+    #[command(flatten)]
+    writing: Writing,
+    /// One row of --scaling, as STAGE:AXIS:SETTING:THREADS, in this process
+    #[arg(long, hide = true, value_name = "ROW", value_parser = size_row)]
+    size_row: Option<SizeRowArgument>,
+}
+
+/// What a process of its own measures.
+#[derive(Debug, Clone)]
+struct SizeRowArgument {
+    stage: String,
+    axis: String,
+    setting: usize,
+    threads: usize,
+}
+
+fn size_row(text: &str) -> Result<SizeRowArgument, String> {
+    let parts: Vec<&str> = text.split(':').collect();
+    let whole = |text: &str| {
+        text.parse()
+            .map_err(|_| format!("{text:?} is no whole number"))
+    };
+    match parts[..] {
+        [stage, axis, setting, threads] => Ok(SizeRowArgument {
+            stage: stage.to_owned(),
+            axis: axis.to_owned(),
+            setting: whole(setting)?,
+            threads: whole(threads)?.max(1),
+        }),
+        _ => Err("expected STAGE:AXIS:SETTING:THREADS".to_owned()),
+    }
+}
+
+fn stage_names() -> PossibleValuesParser {
+    PossibleValuesParser::new(STAGES.map(|stage| stage.name))
+}
+
+impl Bench {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
+        if let Some(asked) = &self.size_row {
+            let row = scaling::size_row(&asked.stage, &asked.axis, asked.setting, asked.threads)?;
+            let json = to_json(&row)?;
+            return printer.data(|out| out.write_all(&json));
+        }
+        let request = BenchRequest {
+            pace: if self.quick { Pace::QUICK } else { Pace::FULL },
+            stages: self.stage.clone(),
+            peers: self.peers,
+            scaling: self.scaling,
+            out: folder(&self.out)?,
+            force: self.writing.force,
+        };
+        let bar = begin(printer);
+        let file = run(&request, &bar)?;
+        drop(bar);
+        for missing in &file.peers_missing {
+            printer.warning(&format!("peer not measured: {missing}"));
+        }
+        let folder = request.out.display().to_string();
+        printer.summary(Place::Output, &printer.with_warnings(&file), || {
+            summary(&file, &folder)
+        })
+    }
+}
+
+fn summary(file: &BenchFile, folder: &str) -> String {
+    let mut sheet = Sheet::new("error against processor time, one thread");
+    let mut rows = vec![
+        [
+            "stage", "curve", "knob", "coarsest", "", "default", "", "finest", "",
+        ]
+        .map(str::to_owned)
+        .to_vec(),
+    ];
+    for stage in &file.stages {
+        for curve in &stage.curves {
+            let default = curve.rows.iter().find(|row| row.default);
+            let mut cells = vec![
+                stage.stage.clone(),
+                format!("{}: {}", curve.program, curve.name),
+                curve.knob.clone(),
+            ];
+            for row in [curve.rows.first(), default, curve.rows.last()] {
+                cells.extend(told(row));
+            }
+            rows.push(cells);
+        }
+    }
+    let mut sides = [Side::Right; 9];
+    sides[..3].fill(Side::Left);
+    sheet.raw(&table(&sides, &rows));
+    sheet.gap();
+    let files: Vec<String> = file
+        .files
+        .iter()
+        .map(|entry| format!("{} ({})", entry.path, bytes(entry.bytes)))
+        .collect();
+    sheet.line(
+        "written to",
+        &format!("{folder}: {}, bench.json", files.join(", ")),
+    );
+    sheet.finish()
+}
+
+/// Error and time of a row.
+fn told(row: Option<&Row>) -> [String; 2] {
+    row.map_or_else(<[String; 2]>::default, |row| {
+        [number_to(row.error, 2), si(row.seconds, "s")]
+    })
+}

@@ -1,0 +1,19 @@
+//! The measurements themselves: rows fall along their knobs, tables and JSON are as promised, and
+//! what stages claim of their errors holds on scenes that nobody chose.
+
+// Figures are printed, and a script is put where the command looks for one.
+#![allow(clippy::print_stdout, clippy::disallowed_methods)]
+
+#[path = "bench/command.rs"]
+mod command;
+#[path = "bench/coverage.rs"]
+mod coverage;
+#[path = "bench/rows.rs"]
+mod rows;
+
+#[path = "lambda/case.rs"]
+#[allow(dead_code)]
+mod case;
+#[path = "lambda/search.rs"]
+#[allow(dead_code)]
+mod search;
