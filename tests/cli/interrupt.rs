@@ -1,5 +1,7 @@
 //! Ctrl-C half way.
 
+use std::collections::BTreeSet;
+use std::fs::DirEntry;
 use std::io::Read;
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
@@ -61,13 +63,20 @@ fn a_long_job_stops_and_leaves_nothing_half_written() {
     assert_eq!(code, Some(130), "{said}");
     assert!(said.contains("interrupted"), "{said}");
     assert!(said.contains("\"code\": 130"), "{said}");
-    let left: Vec<_> = place
-        .path("results/seed_air")
-        .read_dir()
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name())
-        .collect();
-    assert_eq!(left, ["flat"], "what was finished is kept, nothing else");
+    let files = |folder: &str| -> BTreeSet<String> {
+        let entries = place.path(folder).read_dir().unwrap();
+        let name = |entry: DirEntry| entry.file_name().into_string().unwrap();
+        entries.map(|entry| name(entry.unwrap())).collect()
+    };
+    let left = files("results/seed_air");
+    let finished = [".fluxform-kept", "flat"].map(str::to_owned);
+    assert_eq!(
+        left,
+        finished.into(),
+        "what was finished is kept, nothing else"
+    );
+    let kept = files("results/seed_air/.fluxform-kept");
+    assert_eq!(kept, ["flat.points".to_owned()].into());
 }
 
 #[test]
