@@ -76,7 +76,10 @@ fn a_long_job_stops_and_leaves_nothing_half_written() {
         "what was finished is kept, nothing else"
     );
     let kept = files("results/seed_air/.fluxform-kept");
-    assert_eq!(kept, ["flat.points".to_owned()].into());
+    assert!(
+        kept.iter().all(|name| name.ends_with(".points")),
+        "{kept:?}"
+    );
 }
 
 #[test]
