@@ -7,7 +7,7 @@
 mod problems;
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use serde::Deserialize;
 
@@ -151,7 +151,6 @@ fn ask(
             .arg("--rows")
             .arg(problem)
             .envs(["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"].map(|n| (n, "1")))
-            .stdin(Stdio::null())
             .output();
         let output = match output {
             Ok(output) => output,
