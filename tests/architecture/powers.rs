@@ -90,7 +90,6 @@ const POWERS: &[Power] = &[
         marks: &["fs ::", "File ::", "stdin ("],
         holders: &[
             "bench/memory.rs",
-            "bench/peers/mod.rs",
             "bundle/",
             "cli/documents.rs",
             "design/source.rs",
