@@ -28,4 +28,6 @@ pub mod plot;
 
 pub mod job;
 
+pub mod bench;
+
 pub mod cli;
