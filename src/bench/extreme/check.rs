@@ -82,6 +82,14 @@ pub fn worst(errors: impl IntoIterator<Item = f64>, what: &str) -> Outcome {
     measured(most, format!("{what}: {most:.2e} at most in {count}"))
 }
 
+/// The largest difference of two lists.
+pub fn apart(a: &[f64], b: &[f64]) -> f64 {
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max)
+}
+
 /// A statement that holds or does not.
 pub fn holds(is_so: bool, what: impl Into<String>) -> Outcome {
     measured(if is_so { 0.0 } else { f64::INFINITY }, what)

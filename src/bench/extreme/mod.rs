@@ -9,10 +9,14 @@
 
 mod arrays;
 mod check;
+mod edges;
 mod geometry;
 mod lambda;
 mod limits;
 mod materials;
+mod meshes;
+mod penalties;
+mod positions;
 mod shapes;
 mod stiffness;
 mod units;
@@ -124,13 +128,17 @@ fn finite_or_null<S: Serializer>(error: &f64, to: S) -> Result<S::Ok, S::Error> 
 pub fn cases() -> Vec<Case> {
     [
         geometry::cases(),
+        edges::cases(),
         materials::cases(),
         arrays::cases(),
         wires::cases(),
         limits::cases(),
         stiffness::cases(),
+        penalties::cases(),
         shapes::cases(),
+        meshes::cases(),
         lambda::cases(),
+        positions::cases(),
         units::cases(),
     ]
     .concat()
