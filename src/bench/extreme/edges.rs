@@ -242,7 +242,8 @@ fn jump(outside: (f64, f64), inside: (f64, f64), of_face: bool) -> Outcome {
     worst(
         [
             off(found, whole),
-            off(within.b_z, out.b_z),
+            // The field changes by its slope times 2 nm: 1e-7 of slope times radius.
+            (within.b_z - out.b_z).abs() / (whole * SEED.outer_radius_m),
             (within.dbz_dz - out.dbz_dz).abs() / whole,
         ],
         &format!("jump of {found:.9e} T/m/A, mu_0 J = {whole:.9e}"),

@@ -20,27 +20,34 @@ pub fn cases() -> Vec<Case> {
     [on_the_axis(), against_the_oracle()].concat()
 }
 
-/// F with B_z = mu_0 J / 2 [F(z + L) - F(z)] on the axis, and its first two derivatives.
+/// F with B_z = mu_0 J / 2 [F(z + L) - F(z)] on the axis, and its first two derivatives, with
+/// s = hypot(a, u): F = u ln((a2 + s2) / (a1 + s1)), F' = ln + a1 / s1 - a2 / s2.
 fn axis_terms(w: &Winding, u: f64) -> [f64; 3] {
-    let of = |a: f64| {
-        let s = a.hypot(u);
-        let first = u * u / (s * (a + s));
-        let second =
-            3.0 * u / (s * (a + s)) - u.powi(3) * (a + 2.0 * s) / (s * (a + s)).powi(2) / s;
-        [(a + s).ln(), first, second]
-    };
-    let (outer, inner) = (of(w.outer_radius_m), of(w.inner_radius_m));
-    let ln = outer[0] - inner[0];
-    [u * ln, ln + outer[1] - inner[1], outer[2] - inner[2]]
+    let (a1, a2) = (w.inner_radius_m, w.outer_radius_m);
+    let (s1, s2) = (a1.hypot(u), a2.hypot(u));
+    let wider = (a2 - a1) * (1.0 + (a1 + a2) / (s1 + s2));
+    let ln = (wider / (a1 + s1)).ln_1p();
+    let second = |a: f64, s: f64| u / (s * (a + s)) + a * u / s.powi(3);
+    [
+        u * ln,
+        ln + a1 / s1 - a2 / s2,
+        second(a2, s2) - second(a1, s1),
+    ]
 }
 
-/// Closed form of B_z and dB_z/dz on the axis.
+/// Closed form of B_z and dB_z/dz on the axis. Where the winding is short against its bore, the
+/// differences are integrals of the slopes, which lose no digits.
 fn axis_closed(w: &Winding, z_m: f64) -> [f64; 2] {
     let half = 0.5 * MU_0_T_M_PER_A * w.current_density_per_m2();
-    // For a leaf the difference is the middle's slope, to (L / z)^2 / 24.
-    if w.length_m < 1e-6 * z_m.abs() {
-        let [_, first, second] = axis_terms(w, z_m + 0.5 * w.length_m);
-        return [first, second].map(|f| half * w.length_m * f);
+    if w.length_m < 0.1 * w.inner_radius_m {
+        let mut sums = [0.0; 2];
+        let rule = gauss::rule(20);
+        for (x, weight) in rule.nodes.iter().zip(&rule.weights) {
+            let [_, first, second] = axis_terms(w, z_m + 0.5 * w.length_m * (1.0 + x));
+            sums[0] += 0.5 * w.length_m * weight * first;
+            sums[1] += 0.5 * w.length_m * weight * second;
+        }
+        return sums.map(|sum| half * sum);
     }
     let (bottom, top) = (axis_terms(w, z_m + w.length_m), axis_terms(w, z_m));
     [0, 1].map(|k| half * (bottom[k] - top[k]))
@@ -49,11 +56,10 @@ fn axis_closed(w: &Winding, z_m: f64) -> [f64; 2] {
 fn axis(w: &Winding, z_m: f64) -> Outcome {
     let found = w.field(0.0, z_m).map_err(told)?;
     let [b, g] = axis_closed(w, z_m);
+    // In a winding's middle the gradient vanishes: there the field over the radius is its size.
+    let size = found.gradient_norm().max(b.abs() / w.outer_radius_m);
     worst(
-        [
-            off(found.b_z, b),
-            (found.dbz_dz - g).abs() / found.gradient_norm(),
-        ],
+        [off(found.b_z, b), (found.dbz_dz - g).abs() / size],
         &format!(
             "B_z {:.9e} T/A, dB_z/dz {:.9e} T/m/A",
             found.b_z, found.dbz_dz

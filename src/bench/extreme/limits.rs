@@ -369,23 +369,20 @@ fn impossible() -> Vec<Case> {
         ),
         case(
             "limits: a bore a micrometre narrower than the coil",
-            "the coil's wall is less than a wire: its best force is that of the wall, N",
-            1e-3,
+            "no room for one layer of wire: a contradiction of the two diameters is named",
+            0.0,
             || {
-                // A thin wall's force is in proportion to its depth.
-                let of = |gap: f64| {
-                    best(Limits {
-                        inner_diameter_min_m: Some(0.038 - gap),
-                        resistance_max_ohm: None,
-                        settling_max_s: None,
-                        ..SEED
-                    })
+                let limits = Limits {
+                    inner_diameter_min_m: Some(0.037_999),
+                    ..SEED
                 };
-                let (thin, thicker) = (of(1e-6)?.force_n, of(1e-5)?.force_n);
-                measured(
-                    off(10.0 * thin, thicker),
-                    format!("{thin:.6e} and {thicker:.6e} N"),
-                )
+                match found(limits, 0.03, 7e-4)?.status {
+                    Status::Contradictory(c) => holds(
+                        c.message.contains("one layer of 0.700000 mm wire"),
+                        c.message,
+                    ),
+                    other => Err(format!("{other:?}")),
+                }
             },
         ),
     ]

@@ -507,6 +507,7 @@ fn saturated() -> Vec<Case> {
                     format!("{flux:?} Wb"),
                 )
             },
-        ),
+        )
+        .not_in_ci(),
     ]
 }

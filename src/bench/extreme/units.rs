@@ -22,13 +22,15 @@ fn text(k: f64, magnetization: &str) -> String {
     let mm = |length: f64| format!("{:?}", length * k);
     format!(
         "name = \"units\"\n[coil]\ninner_diameter_mm = {}\nouter_diameter_mm = {}\nlength_mm = {}\n\
-         turns = 1429\n[wire]\ndiameter_mm = {}\n[magnet]\ndiameter_mm = 10.0\nlength_mm = 10.0\n\
+         turns = 1429\n[wire]\ndiameter_mm = {}\n[magnet]\ndiameter_mm = {}\nlength_mm = {}\n\
          magnetization_a_per_m = {magnetization}\n[supply]\ncurrent_max_a = 2.0\n[target]\n\
          height_mm = {}\n",
         mm(24.0),
         mm(38.0),
         mm(100.0),
         mm(0.7),
+        mm(10.0),
+        mm(10.0),
         mm(30.0)
     )
 }
@@ -43,7 +45,7 @@ fn evaluated(k: f64, magnetization: &str) -> Result<Evaluation, String> {
     evaluate(&design(&text(k, magnetization))?.0, vec![], None).map_err(told)
 }
 
-/// R ~ 1/k, L ~ k, gradient ~ 1/k^2, field ~ 1/k at the same current.
+/// R ~ 1/k, L ~ k, gradient ~ 1/k^2, field ~ 1/k at the same current; the moment ~ k^3.
 fn of_size(k: f64) -> Outcome {
     let (one, other) = (evaluated(1.0, "1.1579e6")?, evaluated(k, "1.1579e6")?);
     worst(
@@ -55,7 +57,7 @@ fn of_size(k: f64) -> Outcome {
                 other.target.gradient_t_per_m_per_a * k * k,
                 one.target.gradient_t_per_m_per_a,
             ),
-            off(other.target.force_n * k * k, one.target.force_n),
+            off(other.target.force_n / k, one.target.force_n),
         ],
         &format!("force {:.6e} N", other.target.force_n),
     )
@@ -106,8 +108,8 @@ fn lengths() -> Vec<Case> {
         ),
         case(
             "units: millimetres to metres",
-            "the nearest doubles, 1e-300 to 1e300 mm",
-            0.0,
+            "38 and 0.7 exactly, 1e-300 and 1e300 mm to one rounding",
+            f64::EPSILON,
             || {
                 let exact =
                     m_from_mm(38.0) == 0.038 && m_from_mm(0.7) == 7e-4 && m_from_mm(1e300) == 1e297;
@@ -121,7 +123,7 @@ fn lengths() -> Vec<Case> {
 }
 
 fn designs() -> Vec<Case> {
-    let words = "R ~ 1/size, L ~ size, field ~ 1/size, gradient and force ~ 1/size^2";
+    let words = "R ~ 1/size, L ~ size, field ~ 1/size, gradient ~ 1/size^2, force on the magnet's size^3 ~ size";
     vec![
         case("units: a coil of micrometres", words, 1e-11, || {
             of_size(1e-3)
@@ -220,7 +222,10 @@ fn back(value: f64) -> Outcome {
     let read: Vec<f64> = serde_json::from_slice(&json).map_err(told)?;
     holds(
         read == [value],
-        format!("{value:e} as {}", String::from_utf8_lossy(&json).trim()),
+        format!(
+            "{value:e} as {}",
+            String::from_utf8_lossy(&json).replace(['[', ']', '\n', ' '], "")
+        ),
     )
 }
 
