@@ -181,7 +181,8 @@ fn row(case: &Case) -> Row {
         expected: case.expected.clone(),
         // False for a not-a-number.
         pass: got.error <= case.bound && seconds <= case.seconds,
-        got: got.value,
+        // One line a row: some messages have several.
+        got: got.value.replace('\n', "; "),
         error: got.error,
         bound: case.bound,
         seconds,
