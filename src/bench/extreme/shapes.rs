@@ -357,7 +357,7 @@ fn sphere(radius_m: f64) -> Outcome {
 
 fn high_and_low() -> Vec<Case> {
     vec![
-        case("shapes: a plane 1 nm high", "1 nm", 0.0, || {
+        case("shapes: a plane 1 nm high", "1 nm, exactly", 0.0, || {
             close(
                 height_of(
                     Primitive::Flat {

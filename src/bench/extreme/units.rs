@@ -83,7 +83,7 @@ fn lengths() -> Vec<Case> {
         case("units: inches", words, 1e-15, || unit("in", 0.0254)),
         case("units: feet", words, 1e-15, || unit("ft", 0.3048)),
         case("units: metres", words, 0.0, || unit("m", 1.0)),
-        case("units: furlongs", "unknown", 0.0, || {
+        case("units: furlongs", "unknown, not guessed", 0.0, || {
             holds(parse_unit("furlong").is_none(), "none")
         }),
         case("units: MM in capitals", "unknown, not guessed", 0.0, || {

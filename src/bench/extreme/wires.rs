@@ -128,9 +128,12 @@ fn circuits() -> Vec<Case> {
                 )
             },
         ),
-        case("wires: AWG 57", "no gauge", 0.0, || {
-            holds(awg_mm("AWG 57").is_none(), "none")
-        }),
+        case(
+            "wires: AWG 57",
+            "no gauge: the scale ends at 56",
+            0.0,
+            || holds(awg_mm("AWG 57").is_none(), "none"),
+        ),
     ]
 }
 
@@ -204,7 +207,7 @@ fn windings() -> Vec<Case> {
         ),
         case(
             "wires: a conductor thicker than its insulation",
-            "refused",
+            "refused: which is thicker is told",
             0.0,
             || {
                 refused(
