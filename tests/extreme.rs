@@ -52,9 +52,11 @@ fn every_fast_case_passes() {
     assert!(failed.is_empty(), "{}", failed.join("\n"));
 }
 
-/// `cargo test --test extreme -- --ignored --nocapture` prints the whole table.
+/// `cargo test --test extreme -- --ignored --nocapture` prints the whole table. One row fails: a
+/// curve of endless initial permeability stalls at weak fields.
 #[test]
 #[ignore = "minutes: the whole catalogue, as `bench --extreme` runs it"]
+#[allow(clippy::print_stdout)]
 fn the_whole_table() {
     let only = std::env::var("ONLY").unwrap_or_default();
     let mut all = cases();
