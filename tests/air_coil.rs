@@ -287,3 +287,47 @@ fn the_edges_are_refused_and_the_faces_are_not() {
         assert!((on.dbr_dz - beside.dbr_dz).abs() < 1e-6 * on.gradient_norm());
     }
 }
+
+/// Regression: from 1e15 m on the winding's length was lost against the distance, and the field
+/// was not a number.
+#[test]
+fn a_point_beyond_all_measure_has_a_field() {
+    let seed = Winding {
+        inner_radius_m: 0.012,
+        outer_radius_m: 0.019,
+        length_m: 0.1,
+        turns: 1429.0,
+    };
+    // Both sides of where the dipole takes over: B falls with the cube, its slope with the fourth.
+    let at = |d: f64| seed.field(0.6 * d, 0.8 * d - 0.05).expect("off the edges");
+    let near = at(1e6);
+    for d in [1e7, 1.1e8, 1.3e8, 1e12, 1e15, 1e20, 1e60] {
+        let (far, k) = (at(d), 1e6 / d);
+        let size = near.b_z.hypot(near.b_r) * k * k * k;
+        for (found, wanted) in [(far.b_z, near.b_z), (far.b_r, near.b_r)] {
+            assert!(
+                (found - wanted * k * k * k).abs() < 1e-12 * size,
+                "{d:e}: {found:e}"
+            );
+        }
+        let size = near.gradient_norm() * k.powi(4);
+        for (found, wanted) in [
+            (far.dbz_dz, near.dbz_dz),
+            (far.dbr_dz, near.dbr_dz),
+            (far.dbr_dr, near.dbr_dr),
+            (far.br_over_r, near.br_over_r),
+        ] {
+            assert!(
+                (found - wanted * k.powi(4)).abs() < 1e-12 * size,
+                "{d:e}: {found:e}"
+            );
+        }
+    }
+    for d in [1e77, 1e120, 1e308, f64::MAX, f64::INFINITY] {
+        let far = seed.field(0.01, d).expect("off the edges");
+        assert!(
+            far.b_z.abs() < 1e-200 && far.gradient_norm() < 1e-200,
+            "{d:e}: {far:?}"
+        );
+    }
+}

@@ -5,6 +5,7 @@
 //! measured.
 
 pub mod clock;
+pub mod extreme;
 pub mod memory;
 pub mod pace;
 pub mod peers;

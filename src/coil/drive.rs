@@ -47,8 +47,9 @@ pub struct Drive {
     /// Amplitudes of the modes.
     now: Vec<f64>,
     goal: Vec<f64>,
-    left: Vec<f64>,
-    /// The step that `left` is for, s.
+    /// What is gone and what is left of a difference after the step, 1 together.
+    shares: Vec<[f64; 2]>,
+    /// The step that `shares` are for, s.
     step_s: f64,
 }
 
@@ -104,7 +105,7 @@ impl Drive {
             root_ohm,
             now: vec![0.0; coils],
             goal: vec![0.0; coils],
-            left: vec![1.0; coils],
+            shares: vec![[0.0, 1.0]; coils],
             step_s: 0.0,
         })
     }
@@ -127,13 +128,19 @@ impl Drive {
     pub fn hold(&mut self, command_a: &[f64], step_s: f64) {
         self.aim(command_a);
         if step_s != self.step_s {
-            for (left, tau) in self.left.iter_mut().zip(&self.time_constant_s) {
-                *left = (-step_s / tau).exp();
+            for (share, tau) in self.shares.iter_mut().zip(&self.time_constant_s) {
+                let decay = -step_s / tau;
+                *share = [-decay.exp_m1(), decay.exp()];
             }
             self.step_s = step_s;
         }
-        for ((now, goal), left) in self.now.iter_mut().zip(&self.goal).zip(&self.left) {
-            *now = goal + (*now - goal) * left;
+        for ((now, goal), [gone, left]) in self.now.iter_mut().zip(&self.goal).zip(&self.shares) {
+            // From the nearer end: a short step changes little, a long one ends at the goal.
+            *now = if gone < left {
+                *now + (goal - *now) * gone
+            } else {
+                goal + (*now - goal) * left
+            };
         }
     }
 
@@ -181,6 +188,19 @@ mod tests {
         let mut now = [f64::NAN; 3];
         drive.currents(&mut now);
         now
+    }
+
+    /// Regression: after a millionth of the time constant ten digits of the current were left.
+    #[test]
+    fn a_step_far_shorter_than_the_time_constant_keeps_its_digits() {
+        let mut drive = Drive::new(&[0.7], &[1.3], None).unwrap();
+        let mut now = [0.0];
+        for (steps, part) in [(1.0, 1e-6), (3.0, 2e-6)] {
+            drive.hold(&[1.7], part * 0.7 / 1.3);
+            drive.currents(&mut now);
+            let wanted = -1.7 * (-steps * 1e-6_f64).exp_m1();
+            assert!((now[0] / wanted - 1.0).abs() < 1e-14, "{now:?} {wanted}");
+        }
     }
 
     #[test]

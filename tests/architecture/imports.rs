@@ -45,6 +45,13 @@ const ROOMS: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "bench",
+        &[
+            "units", "progress", "accuracy", "numerics", "design", "field", "coil", "map", "shape",
+            "lambda", "bundle", "plot", "job",
+        ],
+    ),
+    (
         "cli",
         &[
             "units", "progress", "accuracy", "numerics", "design", "shape", "bundle", "job",

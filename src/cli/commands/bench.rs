@@ -4,6 +4,7 @@ use clap::Args;
 use clap::builder::PossibleValuesParser;
 
 use super::{begin, folder};
+use crate::bench::extreme::{self, Case, Catalogue};
 use crate::bench::pace::Pace;
 use crate::bench::stages::STAGES;
 use crate::bench::{BenchRequest, run, scaling};
@@ -14,8 +15,10 @@ use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::printer::{Place, Printer};
-use crate::cli::quantity::{bytes, number_to, si};
+use crate::cli::quantity::{bytes, count, error, number_to, si};
 use crate::cli::values::FileArgument;
+use crate::job::JobError;
+use crate::progress::Progress;
 
 /// Error against run time of every numerical stage
 ///
@@ -26,11 +29,15 @@ use crate::cli::values::FileArgument;
 /// a stage and summary.md. --peers measures other programs on the same problems, run by the Python
 /// that FLUXFORM_PYTHON names (several as in PATH), from the repository's root. --scaling measures
 /// time and memory against size, and says where a stage would break.
+///
+/// --extreme runs the stability catalogue instead: named cases at the limits of what may be asked,
+/// each with what must come out and a bound. Code 5 if one fails.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Pages, &[
     ("fluxform bench --quick --stage air-field --out air", "one stage, in a second"),
     ("fluxform bench --quick --stage air-field --stage inductance --out two --format json",
      "two stages, for a program"),
+    ("fluxform bench --extreme --case wires", "the catalogue's cases about wires"),
 ]))]
 pub struct Bench {
     /// Leave out the slowest rows: all stages in less than a minute on one core
@@ -45,6 +52,12 @@ pub struct Bench {
     /// Measure time and memory against numbers of coils, points, triangles, nodes and threads
     #[arg(long)]
     scaling: bool,
+    /// Run the stability catalogue; with --quick the part of it that every change runs
+    #[arg(long, conflicts_with_all = ["stage", "peers", "scaling", "out"])]
+    extreme: bool,
+    /// Of the catalogue only cases whose name holds this
+    #[arg(long, value_name = "TEXT", requires = "extreme")]
+    case: Option<String>,
     /// Folder of the results
     #[arg(long, value_name = "DIR", default_value = "results/bench")]
     out: FileArgument,
@@ -96,6 +109,9 @@ impl Bench {
             let json = to_json(&row)?;
             return printer.data(|out| out.write_all(&json));
         }
+        if self.extreme {
+            return self.catalogue(printer);
+        }
         let request = BenchRequest {
             pace: if self.quick { Pace::QUICK } else { Pace::FULL },
             stages: self.stage.clone(),
@@ -115,6 +131,79 @@ impl Bench {
             summary(&file, &folder)
         })
     }
+}
+
+impl Bench {
+    fn catalogue(&self, printer: &Printer) -> Result<(), Failure> {
+        let named = |name: &str| self.case.as_ref().is_none_or(|text| name.contains(text));
+        let cases: Vec<Case> = extreme::cases()
+            .into_iter()
+            .filter(|case| named(case.name) && (case.in_ci || !self.quick))
+            .collect();
+        if cases.is_empty() {
+            let text = self.case.as_deref().unwrap_or_default();
+            return Err(Failure::Usage(format!(
+                "no case of the catalogue is called {text:?}; without --case all are run"
+            )));
+        }
+        let bar = begin(printer);
+        let rows = extreme::run(&cases, &bar);
+        bar.check().map_err(JobError::from)?;
+        drop(bar);
+        let table = Catalogue { cases: rows };
+        printer.summary(Place::Output, &table, || told_cases(&table.cases))?;
+        let failed: Vec<&str> = (table.cases.iter())
+            .filter(|row| !row.pass)
+            .map(|row| row.name.as_str())
+            .collect();
+        if failed.is_empty() {
+            return Ok(());
+        }
+        Err(Failure::Verification(format!(
+            "{} of {} failed: {}",
+            failed.len(),
+            count(cases.len(), "case"),
+            failed.join(", ")
+        )))
+    }
+}
+
+/// Every case in a line, what was expected and what came out where they differ.
+fn told_cases(rows: &[extreme::Row]) -> String {
+    let passed = rows.iter().filter(|row| row.pass).count();
+    let mut sheet = Sheet::new(&format!(
+        "the stability catalogue: {passed} of {} as expected",
+        count(rows.len(), "case")
+    ));
+    let mut lines = vec![
+        ["verdict", "case", "error", "bound", "s"]
+            .map(str::to_owned)
+            .to_vec(),
+    ];
+    lines.extend(rows.iter().map(|row| {
+        vec![
+            if row.pass { "ok" } else { "FAILED" }.to_owned(),
+            row.name.clone(),
+            error(row.error),
+            error(row.bound),
+            number_to(row.seconds, 2),
+        ]
+    }));
+    let sides = [
+        Side::Left,
+        Side::Left,
+        Side::Right,
+        Side::Right,
+        Side::Right,
+    ];
+    sheet.raw(&table(&sides, &lines));
+    for row in rows.iter().filter(|row| !row.pass) {
+        sheet.gap();
+        sheet.line("failed", &row.name);
+        sheet.line("expected", &row.expected);
+        sheet.line("got", &row.got);
+    }
+    sheet.finish()
 }
 
 fn summary(file: &BenchFile, folder: &str) -> String {
