@@ -203,11 +203,25 @@ fn parallel() -> Vec<Case> {
             },
         ),
         case(
-            "stiffness: two limits exactly parallel, one a hair tighter",
-            "the projection onto the tighter one, to the solver's slack of 1e-10 times 1 + |x| + limit",
-            4e-10,
+            "stiffness: two limits exactly parallel, one 1e-8 tighter",
+            "the projection onto the tighter one",
+            1e-12,
             || {
                 let tight = 1.0 - 1e-8;
+                let found = nearest(
+                    [2.0, 0.3, 0.0],
+                    &[([1.0, 0.0, 0.0], 1.0), ([1.0, 0.0, 0.0], tight)],
+                )?;
+                measured(apart(&found, &[tight, 0.3, 0.0]), format!("{found:?}"))
+            },
+        ),
+        // 1e-10 (1 + |x| + limit) is what a limit may be exceeded by.
+        case(
+            "stiffness: two limits exactly parallel, one a hair tighter",
+            "the projection onto the tighter one, to the solver's slack of 3e-10",
+            3.1e-10,
+            || {
+                let tight = 1.0 - 1e-10;
                 let found = nearest(
                     [2.0, 0.3, 0.0],
                     &[([1.0, 0.0, 0.0], 1.0), ([1.0, 0.0, 0.0], tight)],
