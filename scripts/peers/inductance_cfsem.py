@@ -5,7 +5,7 @@
 
 A winding is cut into rectangular filaments, as near to squares as their number allows, that see
 each other as circles and themselves by Lyle's series. The knob is the root of their number; the
-error is the largest of all windings of the problem, from a thin disc to a long tube. See rows.py.
+error is the largest of all windings of the problem. See rows.py.
 """
 
 import math

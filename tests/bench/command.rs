@@ -70,7 +70,7 @@ fn a_missing_peer_is_told_and_no_error() {
     let told = json(&bench(folder.path(), &asked));
     let missing = told["peers_missing"][0].as_str().unwrap();
     assert!(missing.starts_with("inductance_cfsem.py: "), "{missing}");
-    assert_eq!(told["stages"][0]["curves"].as_array().unwrap().len(), 2);
+    assert_eq!(told["stages"][0]["curves"].as_array().unwrap().len(), 3);
 }
 
 #[test]

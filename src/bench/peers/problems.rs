@@ -24,7 +24,7 @@ pub struct Posed {
 /// Stage, its curve's number, script, and the numbers of the problem.
 type Maker = fn() -> Result<Value, JobError>;
 const MAKERS: [(&str, usize, &str, Maker); 6] = [
-    ("inductance", 0, "inductance_cfsem.py", problem::inductance),
+    ("inductance", 1, "inductance_cfsem.py", problem::inductance),
     ("cored-coil", 0, "core_ngsolve.py", problem::cored_coil),
     ("map-table", 0, "map_magpylib.py", problem::map_table),
     ("height-map", 1, "surface_peer.py", problem::height_map),
@@ -49,7 +49,14 @@ pub fn problems(measured: &[Measured], quick: bool) -> Result<Vec<Posed>, JobErr
                 stage,
                 script,
                 content,
-                reference: curve.reference.clone(),
+                // An exact path is the peers' reference itself.
+                reference: match stage {
+                    "lambda-path" | "worst-point" => {
+                        "the least error by fluxform, proven by its gap"
+                    }
+                    _ => &curve.reference,
+                }
+                .to_owned(),
                 reference_error: curve.reference_error,
             });
         }

@@ -46,13 +46,22 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
     Ok(Measured {
         curves: StageCurves {
             stage: "inductance".to_owned(),
-            timed: "six windings from a thin disc to a long tube; mutual: two windings".to_owned(),
+            timed: "the inductance of each winding; mutual: of two windings".to_owned(),
             error_of: "the inductance".to_owned(),
             default:
                 "evaluate: Neumann's integral, to 1e-12; optimize: FINE for the result, ROUGH \
                       on the way"
                     .to_owned(),
-            curves: vec![own(pace, progress)?, between(pace, progress)?],
+            curves: vec![
+                own(
+                    "six windings from a thin disc to a long tube",
+                    &cases()?,
+                    pace,
+                    progress,
+                )?,
+                own("the seed's winding", &seed()?, pace, progress)?,
+                between(pace, progress)?,
+            ],
         },
         accuracy: stage(
             RELATIVE_ERROR,
@@ -74,8 +83,21 @@ pub(super) fn cases() -> Result<Vec<(Winding, f64)>, JobError> {
     Ok(cases)
 }
 
-fn own(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
-    let cases = cases()?;
+/// The seed's alone.
+pub(super) fn seed() -> Result<Vec<(Winding, f64)>, JobError> {
+    let design = SEED.design(Need::CALIBRATE)?;
+    let winding = Scene::new(&design)?.winding;
+    let all = cases()?.into_iter();
+    Ok(all.filter(|(other, _)| *other == winding).collect())
+}
+
+/// Self inductances by section integrals, rough and fine, and by Neumann's integral.
+fn own(
+    name: &str,
+    cases: &[(Winding, f64)],
+    pace: &Pace,
+    progress: &dyn Progress,
+) -> Result<Curve, JobError> {
     let fast = |accuracy| {
         move |w: &Winding| {
             let depth = w.outer_radius_m - w.inner_radius_m;
@@ -95,7 +117,7 @@ fn own(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
         })?;
         let error = found
             .iter()
-            .zip(&cases)
+            .zip(cases)
             .fold(0.0_f64, |most, (found, (_, exact))| {
                 most.max((found / exact - 1.0).abs())
             });
@@ -109,8 +131,8 @@ fn own(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
         rows.push(found.timed(&timing));
     }
     Ok(curve(
-        "self inductance: section integrals, rough and fine; Neumann's integral",
-        "stated error of the route",
+        name,
+        "stated error of the route: section integrals, rough and fine; Neumann's integral",
         "40-digit Neumann integral over azimuth and radii, air_coil.py",
         1e-18,
         rows,

@@ -24,12 +24,12 @@ pub(super) fn section(winding: &Winding) -> Value {
     })
 }
 
-/// Windings and their inductances.
+/// The seed's winding and its inductance: longer windings are beyond the peer's series.
 ///
 /// # Errors
 /// Built-in values that cannot be read.
 pub fn inductance() -> Result<Value, JobError> {
-    let cases = own_inductance::cases()?;
+    let cases = own_inductance::seed()?;
     let cases = cases.iter().map(|(winding, inductance_h)| {
         json!({"winding": section(winding), "inductance_h": inductance_h})
     });
