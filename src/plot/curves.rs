@@ -90,12 +90,7 @@ impl CurvesPlot {
     }
 
     fn legend(&self) -> Vec<LegendEntry> {
-        let entry = |label: &str, colour: &str| LegendEntry {
-            label: label.to_owned(),
-            color: colour.to_owned(),
-            shape: LegendShape::Circle,
-            dasharray: None,
-        };
+        let entry = |label: &str, colour: &str| super::entry(label, colour, LegendShape::Circle);
         let mut entries: Vec<LegendEntry> = (self.lines.iter().enumerate())
             .map(|(k, line)| entry(&line.name, COLOURS[k % COLOURS.len()]))
             .collect();

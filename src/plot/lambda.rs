@@ -10,7 +10,7 @@ use kuva::render::plots::Plot;
 use super::pareto::extent;
 use super::plane::{Cells, colours, rows, wide};
 use super::replay::COILS;
-use super::{renumbered, thinned};
+use super::{entry, renumbered, thinned};
 
 /// A panel's size, px.
 const PANEL_PX: [f64; 2] = [600.0, 400.0];
@@ -118,12 +118,6 @@ impl LambdaPlot {
     }
 
     fn legend(&self) -> Vec<LegendEntry> {
-        let entry = |label: &str, colour: &str, shape| LegendEntry {
-            label: label.to_owned(),
-            color: colour.to_owned(),
-            shape,
-            dasharray: None,
-        };
         let mut entries = vec![
             entry("rms error", RMS, LegendShape::Line),
             entry("relative error", RELATIVE, LegendShape::Line),

@@ -11,9 +11,21 @@ pub mod replay;
 
 use std::collections::HashSet;
 
+use kuva::plot::{LegendEntry, LegendShape};
+
 /// Cells of a panel along x and y: of the points of one kind that fall into a cell only the first
 /// is drawn, so that ten million points are no larger a picture than ten thousand.
 const CELLS: [f64; 2] = [240.0, 180.0];
+
+/// A line of a legend.
+fn entry(label: &str, colour: &str, shape: LegendShape) -> LegendEntry {
+    LegendEntry {
+        label: label.to_owned(),
+        color: colour.to_owned(),
+        shape,
+        dasharray: None,
+    }
+}
 
 /// The drawing with its clip paths counted from 0: the crate counts on through a process.
 fn renumbered(svg: &str) -> String {

@@ -106,12 +106,7 @@ impl ParetoPlot {
     }
 
     fn legend(&self) -> Vec<LegendEntry> {
-        let entry = |label: &str, colour: &str| LegendEntry {
-            label: label.to_owned(),
-            color: colour.to_owned(),
-            shape: LegendShape::Circle,
-            dasharray: None,
-        };
+        let entry = |label: &str, colour: &str| super::entry(label, colour, LegendShape::Circle);
         vec![
             entry("meets its limits", MET),
             entry("does not", UNMET),

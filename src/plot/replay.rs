@@ -7,7 +7,7 @@ use kuva::render::figure::Figure;
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 
-use super::renumbered;
+use super::{entry, renumbered};
 
 /// A panel's size, px.
 const PANEL_PX: [f64; 2] = [620.0, 330.0];
@@ -71,12 +71,6 @@ impl ReplayPlot<'_> {
     }
 
     fn legend(&self) -> Vec<LegendEntry> {
-        let entry = |label: &str, colour: &str, shape| LegendEntry {
-            label: label.to_owned(),
-            color: colour.to_owned(),
-            shape,
-            dasharray: None,
-        };
         let mut entries = vec![
             entry("finger", FINGER, LegendShape::Circle),
             entry("outside the map", FIXED, LegendShape::Circle),

@@ -44,12 +44,7 @@ const POWERS: &[Power] = &[
     Power {
         name: "lifting the lint on writing and clocks",
         marks: &["disallowed_methods"],
-        holders: &[
-            "bench/clock.rs",
-            "bench/extreme/mod.rs",
-            "bundle/mod.rs",
-            "cli/bar.rs",
-        ],
+        holders: &["bench/clock.rs", "bundle/mod.rs", "cli/bar.rs"],
     },
     Power {
         name: "unsafe code",
@@ -73,7 +68,7 @@ const POWERS: &[Power] = &[
     Power {
         name: "reading a clock",
         marks: &["Instant", "SystemTime", "ProcessTime"],
-        holders: &["bench/clock.rs", "bench/extreme/mod.rs", "cli/bar.rs"],
+        holders: &["bench/clock.rs", "cli/bar.rs"],
     },
     Power {
         name: "ending the process",

@@ -107,23 +107,17 @@ pub fn refused<T>(result: Result<T, impl Display>, parts: &[&str]) -> Outcome {
     }
 }
 
-/// Deterministic generic numbers (splitmix64).
-pub struct Numbers(pub u64);
-
-impl Numbers {
-    /// Uniform in (0, 1).
-    pub fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64 + 1e-17
-    }
-
-    /// Uniform in (`low`, `high`).
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
+/// The winding of that name among the committed values of air coils, which come with it.
+pub fn known_winding(name: &str) -> Result<(Value, Winding), String> {
+    let table = oracle(include_str!("../../../tests/oracles/air_coil.json"))?;
+    let w = &table["windings"][name];
+    let winding = Winding {
+        inner_radius_m: number(&w["inner_radius_m"])?,
+        outer_radius_m: number(&w["outer_radius_m"])?,
+        length_m: number(&w["length_m"])?,
+        turns: number(&w["turns"])?,
+    };
+    Ok((table, winding))
 }
 
 /// A committed table of reference values.

@@ -3,7 +3,8 @@
 use std::f64::consts::PI;
 
 use super::check::{
-    Outcome, SEED, close, holds, measured, number, off, oracle, refused, told, winding, worst,
+    Outcome, SEED, close, holds, known_winding, measured, number, off, refused, told, winding,
+    worst,
 };
 use super::geometry::{DISC, FILM, LEAF, NEEDLE, SOLID};
 use super::{Case, case};
@@ -294,14 +295,7 @@ fn cut_along(gap_m: f64) -> Outcome {
 
 /// A winding of the committed 20-digit inductances.
 fn exact_inductance(name: &str) -> Outcome {
-    let table = oracle(include_str!("../../../tests/oracles/air_coil.json"))?;
-    let w = &table["windings"][name];
-    let w = winding(
-        number(&w["inner_radius_m"])?,
-        number(&w["outer_radius_m"])?,
-        number(&w["length_m"])?,
-        number(&w["turns"])?,
-    );
+    let (table, w) = known_winding(name)?;
     let list = table["inductances"].as_array().ok_or("no inductances")?;
     let entry = list
         .iter()

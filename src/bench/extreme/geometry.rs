@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::check::{Outcome, SEED, number, off, oracle, told, winding, worst};
+use super::check::{Outcome, SEED, known_winding, number, off, told, winding, worst};
 use super::{Case, case};
 use crate::field::winding::{AxialField, Winding};
 use crate::numerics::gauss;
@@ -192,14 +192,7 @@ fn scaled(k: f64) -> Outcome {
 
 /// A point of the committed 40-digit values.
 fn exact(name: &str, r: &str, z: &str) -> Outcome {
-    let table = oracle(include_str!("../../../tests/oracles/air_coil.json"))?;
-    let w = &table["windings"][name];
-    let w = winding(
-        number(&w["inner_radius_m"])?,
-        number(&w["outer_radius_m"])?,
-        number(&w["length_m"])?,
-        number(&w["turns"])?,
-    );
+    let (table, w) = known_winding(name)?;
     let points = table["points"].as_array().ok_or("no points")?;
     let point = points
         .iter()

@@ -3,10 +3,9 @@
 
 use serde_json::Value;
 
-use super::check::{
-    Numbers, Outcome, close, holds, measured, number, numbers, off, oracle, told, worst,
-};
+use super::check::{Outcome, close, holds, measured, number, numbers, off, oracle, told, worst};
 use super::{Case, case};
+use crate::bench::pace::Numbers;
 use crate::lambda::{ForceProblem, Settings, Solution, Status, solve};
 
 pub fn cases() -> Vec<Case> {

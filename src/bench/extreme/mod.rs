@@ -5,7 +5,6 @@
 //! route or a committed oracle; the bound comes from that expectation (its own error, the stated
 //! accuracy of the stage, rounding) and is written down before the result is known. Where the
 //! right answer is a refusal, the message is what is expected.
-#![allow(clippy::disallowed_methods)] // a case has a time bound
 
 mod arrays;
 mod check;
@@ -23,10 +22,10 @@ mod units;
 mod wires;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::time::Instant;
 
 use serde::{Serialize, Serializer};
 
+use crate::bench::clock::Watch;
 use crate::progress::Progress;
 
 /// Seconds a case may take unless it says otherwise; unoptimised builds on busy machines included.
@@ -162,9 +161,9 @@ pub fn run(cases: &[Case], progress: &dyn Progress) -> Vec<Row> {
 }
 
 fn row(case: &Case) -> Row {
-    let started = Instant::now();
+    let watch = Watch::start();
     let outcome = catch_unwind(AssertUnwindSafe(case.run));
-    let seconds = started.elapsed().as_secs_f64();
+    let seconds = watch.elapsed_s();
     let got = match outcome {
         Ok(Ok(got)) => got,
         Ok(Err(message)) => Got {

@@ -1,9 +1,8 @@
 //! Eddy diffusion against L/R, limits that are nearly parallel, errors weighed like penalties.
 
-use super::check::{
-    Numbers, Outcome, apart, holds, measured, number, off, oracle, refused, told, worst,
-};
+use super::check::{Outcome, apart, holds, measured, number, off, oracle, refused, told, worst};
 use super::{Case, case};
+use crate::bench::pace::Numbers;
 use crate::coil::transient::VoltageStep;
 use crate::lambda::{ForceProblem, Settings, solve};
 use crate::numerics::small_quadratic::{Row, minimise};
