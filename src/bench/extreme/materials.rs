@@ -507,7 +507,6 @@ fn saturated() -> Vec<Case> {
                     format!("{flux:?} Wb"),
                 )
             },
-        )
-        .not_in_ci(),
+        ),
     ]
 }

@@ -53,7 +53,7 @@ const SKIN_M: f64 = 1e-3;
 /// How the iteration ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
-    /// The corrections fell below the tolerance.
+    /// The corrections fell below the tolerance, or to the rounding of the potential.
     Converged,
     /// They did not, within the allowed number, or the equations could not be solved (input or
     /// law not finite, a law that does not grow).
@@ -170,7 +170,8 @@ impl SaturatedCore {
             u,
             v,
         };
-        let mut steps = Vec::new();
+        let source = self.interior.laplace_schur_m() * &phi;
+        let mut steps: Vec<Step> = Vec::new();
         let mut secant = SECANT.0;
         let mut status = Status::Stalled;
         while status == Status::Stalled && steps.len() < MAX_STEPS {
@@ -180,7 +181,13 @@ impl SaturatedCore {
             let energy = state.u.dot(&state.flux);
             // A slope upwards is rounding: the correction is then as small as can be had.
             let correction = ((-slope).max(0.0) / energy).sqrt();
-            let done = energy == 0.0 || correction <= TOLERANCE;
+            // Where the permeability is very large u is the small difference of phi and W v, and
+            // its rounding may stand above the tolerance, though far below the source's work.
+            let settled = -slope <= TOLERANCE * TOLERANCE * state.v.dot(&source).abs()
+                && steps
+                    .last()
+                    .is_some_and(|before| correction > 0.5 * before.correction);
+            let done = energy == 0.0 || correction <= TOLERANCE || settled;
             let (length, next) = if done {
                 (1.0, self.moved(&state, &change, 1.0, law))
             } else {

@@ -51,7 +51,10 @@ impl SaturatedCore {
             chi = (lo * hi).sqrt();
             (u, found) = solve(chi);
         }
-        u * chi
+        // A constant in v has no effect but that of its rounding, which at large chi is great.
+        let v = u * chi;
+        let mean = v.mean();
+        v.add_scalar(-mean)
     }
 
     /// Newton's correction, and the energy's slope along it; `None` when there is none.

@@ -256,3 +256,44 @@ fn what_has_no_solution_ends_as_stalled() {
         Status::Stalled
     );
 }
+
+/// What the core adds to the inductance is that of an infinite permeability less a part of 1 / mu.
+/// At 1e8 rounding once took 8e-5 of it.
+#[test]
+fn any_constant_permeability() {
+    let case = case(1e-5);
+    let added_h = |relative: f64| {
+        let found = case.core.solve(&case.phi, &Constant { relative }, None);
+        assert_eq!(found.status, Status::Converged, "{relative:e}");
+        case.core.flux_linkage_wb(&found, &case.phi)
+    };
+    let most_h = added_h(1.3e11);
+    let lost_h = |relative: f64| (most_h - added_h(relative)) / (1.0 / relative - 1.0 / 1.3e11);
+    let wanted = lost_h(1.7e6);
+    for (relative, allowed) in [(1.7e5, 1e-4), (1.7e7, 1e-4), (1.7e8, 1e-3), (1.7e9, 0.02)] {
+        let off = lost_h(relative) / wanted - 1.0;
+        assert!(off.abs() < allowed, "{relative:e}: {off:e}");
+    }
+}
+
+/// Its permeability grows without bound towards no current: u is then far below phi, and its
+/// rounding stands above the tolerance.
+#[test]
+fn a_curve_that_starts_level() {
+    let case = case(1e-5);
+    let law = BhCurve::new(&[0.0, 0.9, 1.1, 1.9], &[0.0, 130.0, 700.0, 90e3]).expect("a curve");
+    let added_h: Vec<f64> = (-10..=1)
+        .map(|exponent| {
+            let current_a = 1.3 * 10f64.powi(exponent);
+            let found = case.core.solve(&(&case.phi * current_a), &law, None);
+            assert_eq!(found.status, Status::Converged, "{current_a} A");
+            case.core.flux_linkage_wb(&found, &case.phi) / current_a
+        })
+        .collect();
+    assert!(
+        added_h.windows(2).all(|h| h[1] < h[0] * (1.0 + 1e-9)),
+        "{added_h:?}"
+    );
+    assert!(added_h[0] - added_h[5] < 1e-6 * added_h[0], "{added_h:?}");
+    assert!(added_h[0] - added_h[11] > 0.01 * added_h[0], "{added_h:?}");
+}
