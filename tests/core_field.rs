@@ -4,7 +4,7 @@ use fluxform::field::steel::CoreShape;
 use fluxform::field::steel::array::{ArrayResolution, CoupledArray};
 use fluxform::field::steel::cored_coil::CoredCoil;
 use fluxform::field::steel::generatrix::Face;
-use fluxform::field::steel::inside::{CoreField, peak_depth_m};
+use fluxform::field::steel::inside::{CoreField, Inspection, peak_depth_m};
 use fluxform::field::winding::{AxialField, Winding};
 use fluxform::numerics::gauss;
 use fluxform::numerics::lagrange_basis::Basis;
@@ -372,6 +372,11 @@ fn coupled_cores_have_the_field_of_all_layers_and_windings() {
     for relative_permeability in [900.0, 3.0, 1.0] {
         let array = array(relative_permeability, 1e-4, &positions);
         let fields = array.core_fields(&currents, depth_m).expect("inside");
+        let inspection = Inspection::new(&array, depth_m).expect("inside");
+        let peaks_t = inspection.peaks_t(&array, &currents).expect("inside");
+        for (field, peak_t) in fields.iter().zip(peaks_t) {
+            assert_close(peak_t, field.peak_t, 1e-12, "peaks alone");
+        }
         for (core, found) in fields.iter().enumerate() {
             let strength = |at_m: [f64; 3]| {
                 let [x, y, z] = field_by_brute_force(&array, &currents, at_m);

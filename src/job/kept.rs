@@ -4,6 +4,8 @@
 //! just-noticeable difference: as long as those alone change, steel, forces and maps are read and
 //! not computed. What is read is what was computed, to the bit.
 
+use std::sync::OnceLock;
+
 use super::JobError;
 use super::maps::{Felt, SceneMap};
 use super::scene::Scene;
@@ -12,6 +14,7 @@ use crate::bundle::artefact::Input;
 use crate::bundle::store::{Origin, Store};
 use crate::design::Steel as Described;
 use crate::field::steel::array::CoupledArray;
+use crate::field::steel::inside::{Inspection, peak_depth_m};
 use crate::field::winding::OnEdge;
 use crate::map::Components;
 use crate::map::tabulate::{Grid, PlacedCoil};
@@ -31,6 +34,8 @@ pub struct FieldStore {
     /// The same, for what does not depend on the design: kept without steel too.
     shapes: Store,
     field: Origin,
+    /// Of the design's array, once a shape has asked for it.
+    inspection: OnceLock<Inspection>,
 }
 
 impl FieldStore {
@@ -69,6 +74,7 @@ impl FieldStore {
             store,
             shapes,
             field,
+            inspection: OnceLock::new(),
         }
     }
 
@@ -132,27 +138,30 @@ impl<'a> ShapeField<'a> {
         store.remember(&format!("{shape}.{what}"), &origin, compute)
     }
 
-    /// The largest |B| in any core of `array` at these currents, T, as
+    /// The largest |B| in any core of the design's `array` at these currents, T, as
     /// [`CoupledArray::core_fields`] has it.
     ///
     /// # Errors
     /// As [`CoupledArray::core_fields`].
-    pub fn peak_t(
-        self,
-        array: &CoupledArray,
-        currents_a: &[f64],
-        depth_m: f64,
-    ) -> Result<f64, OnEdge> {
-        let compute = || {
-            let fields = array.core_fields(currents_a, depth_m)?;
-            Ok(fields.iter().fold(0.0_f64, |most, f| most.max(f.peak_t)))
-        };
-        let Some((FieldStore { store, field, .. }, shape)) = self.kept else {
-            return compute();
+    pub fn peak_t(self, array: &CoupledArray, currents_a: &[f64]) -> Result<f64, OnEdge> {
+        let depth_m = peak_depth_m(array.response.outline.shape);
+        let most = |peaks: Vec<f64>| peaks.into_iter().fold(0.0, f64::max);
+        let Some((kept, shape)) = self.kept else {
+            let inspection = Inspection::new(array, depth_m)?;
+            return inspection.peaks_t(array, currents_a).map(most);
         };
         let numbers = currents_a.iter().copied().chain([depth_m]);
-        let origin = field.clone().and_numbers(numbers);
-        store.remember(&format!("{shape}.peak"), &origin, compute)
+        let origin = kept.field.clone().and_numbers(numbers);
+        kept.store.remember(&format!("{shape}.peak"), &origin, || {
+            let inspection = match kept.inspection.get() {
+                Some(inspection) => inspection,
+                None => {
+                    let made = Inspection::new(array, depth_m)?;
+                    kept.inspection.get_or_init(|| made)
+                }
+            };
+            inspection.peaks_t(array, currents_a).map(most)
+        })
     }
 
     /// The entry of what is found of the points of `document`, read from `inputs`.

@@ -24,7 +24,6 @@ use crate::bundle::lambda_file::{
     WorstPointAt, WorstPointFile, WorstPointStep,
 };
 use crate::design::{Design, MagnetModel};
-use crate::field::steel::inside::peak_depth_m;
 use crate::lambda::worst::{WorstSolution, worst_point};
 use crate::lambda::{self, Criterion, ForceProblem, Precision, Settings, Solution, Status, Wiring};
 use crate::plot::lambda::LambdaPlot;
@@ -302,7 +301,7 @@ fn solve_at(
         (&solution.chosen, &solved.steel, &scene.core)
         && matches!(core.material, Material::Linear(_))
     {
-        let peak_t = field.peak_t(array, &chosen.currents_a, peak_depth_m(core.shape))?;
+        let peak_t = field.peak_t(array, &chosen.currents_a)?;
         warnings.extend(above_knee(
             peak_t,
             core.knee_t,
@@ -376,8 +375,8 @@ fn solve_at(
             solved,
             field,
             points,
-            offset_n: offset_n.as_deref(),
-            solution: &solution,
+            given: &given,
+            wiring: &options.wiring,
         },
         &options.settings,
         progress,

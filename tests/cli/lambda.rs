@@ -64,6 +64,22 @@ fn variants_are_told_beside_the_design_as_given() {
     assert_eq!(pair["wiring"]["series"][0][1], 8);
 }
 
+/// Lifted points were once solved with all coils, and compared with a lambda without some.
+#[test]
+fn the_effect_of_the_points_is_that_of_the_wired_coils() {
+    let place = Place::new();
+    let estimate = |flags: &[&str]| {
+        let command = [&["lambda", AIR, WEDGE, "--format", "json"], flags].concat();
+        let told = place.run(&command).ends(0).json();
+        told["accuracy"]["lambda_of_points"]["estimate"]
+            .as_f64()
+            .expect("a number")
+    };
+    let (all, some) = (estimate(&[]), estimate(&["--broken", "1,4,7"]));
+    assert!(all > 0.0 && some > 0.0, "{all} {some}");
+    assert!(some < 10.0 * all, "{all} {some}");
+}
+
 #[test]
 fn wiring_that_cannot_be_is_refused() {
     let place = Place::new();

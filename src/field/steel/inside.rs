@@ -11,7 +11,7 @@
 //! so v + w says everything, for any permeability down to 1. |grad u|^2 of a harmonic u is
 //! subharmonic: |B| is largest on the surface of the region looked at, and only that is scanned.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Dyn, LU};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
@@ -120,7 +120,8 @@ impl CoupledArray {
     /// # Errors
     /// A point on the winding's edge: the cores are not in the bores.
     pub fn core_fields(&self, currents_a: &[f64], depth_m: f64) -> Result<Vec<CoreField>, OnEdge> {
-        self.core_fields_of(currents_a, depth_m, false)
+        let cores = self.cores(&Incident::new(self), currents_a);
+        core_fields(&self.response.outline, &self.winding, &cores, depth_m)
     }
 
     /// What all other modes add to the largest |B| of the axisymmetric one in every core, T.
@@ -128,40 +129,36 @@ impl CoupledArray {
     /// # Errors
     /// As [`CoupledArray::core_fields`].
     pub fn transverse_peaks_t(&self, currents_a: &[f64], depth_m: f64) -> Result<Vec<f64>, OnEdge> {
-        let all = self.core_fields_of(currents_a, depth_m, false)?;
-        let axial = self.core_fields_of(currents_a, depth_m, true)?;
+        let inspection = Inspection::new(self, depth_m)?;
+        let mut cores = self.cores(&inspection.incident, currents_a);
+        let all = inspection.peaks_of(self, &cores)?;
+        for core in &mut cores {
+            let columns = core.layers.ncols();
+            core.layers.columns_mut(1, columns - 1).fill(0.0);
+        }
+        let axial = inspection.peaks_of(self, &cores)?;
         Ok(all
             .iter()
             .zip(&axial)
-            .map(|(all, axial)| (all.peak_t - axial.peak_t).max(0.0))
+            .map(|(all, axial)| (all - axial).max(0.0))
             .collect())
     }
 
-    fn core_fields_of(
-        &self,
-        currents_a: &[f64],
-        depth_m: f64,
-        axial_only: bool,
-    ) -> Result<Vec<CoreField>, OnEdge> {
-        let outline = &self.response.outline;
+    fn cores(&self, incident: &Incident, currents_a: &[f64]) -> Vec<Core> {
         let count = self.positions_m.len();
-        let mut modes: Vec<DMatrix<f64>> = Vec::with_capacity(count);
-        for core in 0..count {
-            let mut potential = vec![0.0; self.response.size()];
-            for (drive, current) in self.potentials.iter().zip(currents_a) {
-                for (sum, value) in potential.iter_mut().zip(&drive[core]) {
-                    *sum += current * value;
+        let modes: Vec<DMatrix<f64>> = (0..count)
+            .map(|core| {
+                let mut potential = vec![0.0; self.response.size()];
+                for (drive, current) in self.potentials.iter().zip(currents_a) {
+                    for (sum, value) in potential.iter_mut().zip(&drive[core]) {
+                        *sum += current * value;
+                    }
                 }
-            }
-            let mut of_core = self.response.modes_of(&potential);
-            if axial_only {
-                let columns = of_core.ncols();
-                of_core.columns_mut(1, columns - 1).fill(0.0);
-            }
-            modes.push(of_core);
-        }
-        let sent = incident_layers(outline, &self.response.exchange.to_nodes, &modes);
-        let cores: Vec<Core> = modes
+                self.response.modes_of(&potential)
+            })
+            .collect();
+        let sent = incident.layers(&self.response.exchange.to_nodes, &modes);
+        modes
             .iter()
             .zip(sent)
             .enumerate()
@@ -175,42 +172,113 @@ impl CoupledArray {
                     position_m: self.positions_m[core],
                 }
             })
-            .collect();
-        core_fields(outline, &self.winding, &cores, depth_m)
+            .collect()
     }
 }
 
-/// The layers w with (1 - W) w = phi of potentials on the exchange rings, [core][node, column].
-fn incident_layers(
-    outline: &Generatrix,
-    to_nodes: &DMatrix<f64>,
-    potentials: &[DMatrix<f64>],
-) -> Vec<DMatrix<f64>> {
-    let nodes = outline.nodes.len();
-    let columns = potentials.first().map_or(1, DMatrix::ncols);
-    let mut out = vec![DMatrix::zeros(nodes, columns); potentials.len()];
-    // A core alone hears nothing.
-    if potentials.iter().all(|p| p.iter().all(|v| *v == 0.0)) {
-        return out;
+/// What looking into the cores of one array takes, whatever the currents.
+#[derive(Debug)]
+pub struct Inspection {
+    incident: Incident,
+    curve: Generatrix,
+    at_curve: Targets,
+}
+
+impl Inspection {
+    /// Prepares for [`Inspection::peaks_t`] at `depth_m` below the cores' surfaces.
+    ///
+    /// # Errors
+    /// As [`CoupledArray::core_fields`].
+    pub fn new(array: &CoupledArray, depth_m: f64) -> Result<Self, OnEdge> {
+        let outline = &array.response.outline;
+        let (winding, shape) = (&array.winding, outline.shape);
+        let incident = Incident::new(array);
+        let curve = scan_curve(winding, shape, allowed_depth_m(shape, depth_m));
+        let at_curve = Targets::new(outline, winding, places(&curve), incident.modes())?;
+        Ok(Self {
+            incident,
+            curve,
+            at_curve,
+        })
     }
-    for (mode, w) in operators(outline, columns.div_ceil(2), QUADRATURE)
-        .into_iter()
-        .enumerate()
-    {
-        let mine: Vec<usize> = (0..columns).filter(|c| c.div_ceil(2) == mode).collect();
-        let rings = DMatrix::from_fn(to_nodes.ncols(), mine.len() * out.len(), |ring, place| {
-            potentials[place / mine.len()][(ring, mine[place % mine.len()])]
-        });
-        let system = DMatrix::identity(nodes, nodes) - w;
-        let solved = system
-            .lu()
-            .solve(&(to_nodes * rings))
-            .expect("eigenvalues of W lie in [0, 1), so those of the matrix are positive");
-        for (place, column) in solved.column_iter().enumerate() {
-            out[place / mine.len()].set_column(mine[place % mine.len()], &column);
+
+    /// The largest |B| in every core of the array that this was made for, T, as
+    /// [`CoupledArray::core_fields`] tells it, without mean and error.
+    ///
+    /// # Errors
+    /// As [`CoupledArray::core_fields`].
+    pub fn peaks_t(&self, array: &CoupledArray, currents_a: &[f64]) -> Result<Vec<f64>, OnEdge> {
+        self.peaks_of(array, &array.cores(&self.incident, currents_a))
+    }
+
+    fn peaks_of(&self, array: &CoupledArray, cores: &[Core]) -> Result<Vec<f64>, OnEdge> {
+        let outline = &array.response.outline;
+        let layers: Vec<&DMatrix<f64>> = cores.iter().map(|c| &c.layers).collect();
+        let currents: Vec<f64> = cores.iter().map(|c| c.current_a).collect();
+        let fields = self.at_curve.fields(&layers, &currents);
+        let peaks = scans(&self.curve, &fields, AXIS * outline.shape.radius_m);
+        let there = Targets::new(
+            outline,
+            &array.winding,
+            peaks.iter().map(|peak| peak.place_m).collect(),
+            self.incident.modes(),
+        )?;
+        let fields = there.fields(&layers, &currents);
+        Ok(fields
+            .iter()
+            .zip(&peaks)
+            .enumerate()
+            .map(|(core, (field, peak))| norm(field.at(core, &turns(peak.angle, field.modes()))))
+            .collect())
+    }
+}
+
+/// 1 - W on an outline, factorised, one system a mode.
+#[derive(Debug)]
+struct Incident {
+    systems: Vec<LU<f64, Dyn, Dyn>>,
+}
+
+impl Incident {
+    fn new(array: &CoupledArray) -> Self {
+        let outline = &array.response.outline;
+        let nodes = outline.nodes.len();
+        let modes = operators(outline, array.response.layers.len(), QUADRATURE);
+        let systems = modes
+            .into_iter()
+            .map(|w| (DMatrix::identity(nodes, nodes) - w).lu())
+            .collect();
+        Self { systems }
+    }
+
+    fn modes(&self) -> usize {
+        self.systems.len()
+    }
+
+    /// The layers w with (1 - W) w = phi of potentials on the exchange rings, [core][node, column].
+    fn layers(&self, to_nodes: &DMatrix<f64>, potentials: &[DMatrix<f64>]) -> Vec<DMatrix<f64>> {
+        let nodes = to_nodes.nrows();
+        let columns = columns_of(self.modes() - 1).end;
+        let mut out = vec![DMatrix::zeros(nodes, columns); potentials.len()];
+        // A core alone hears nothing.
+        if potentials.iter().all(|p| p.iter().all(|v| *v == 0.0)) {
+            return out;
         }
+        for (mode, system) in self.systems.iter().enumerate() {
+            let mine = columns_of(mode);
+            let width = mine.len();
+            let rings = DMatrix::from_fn(to_nodes.ncols(), width * out.len(), |ring, place| {
+                potentials[place / width][(ring, mine.start + place % width)]
+            });
+            let solved = system
+                .solve(&(to_nodes * rings))
+                .expect("eigenvalues of W lie in [0, 1), so those of the matrix are positive");
+            for (place, column) in solved.column_iter().enumerate() {
+                out[place / width].set_column(mine.start + place % width, &column);
+            }
+        }
+        out
     }
-    out
 }
 
 /// One core to be looked into.
@@ -237,29 +305,32 @@ fn core_fields(
         .flat_map(|_| cores.iter().map(|c| c.current_a))
         .collect();
 
+    let modes = full.first().map_or(1, |l| l.ncols().div_ceil(2));
     let curve = scan_curve(winding, shape, depth_m);
     let fine = Volume::new(winding, shape, VOLUME.order);
     let coarse = Volume::new(winding, shape, VOLUME.order - 1);
-    let mut targets: Vec<(f64, f64)> = curve.nodes.iter().map(|n| (n.r_m, n.z_m)).collect();
+    let mut targets = places(&curve);
     let first_fine = targets.len();
     targets.extend(&fine.points);
     let first_coarse = targets.len();
     targets.extend(&coarse.points);
-    let fields = fields_at(outline, winding, &targets, &layers, &currents)?;
+    let fields = Targets::new(outline, winding, targets, modes)?.fields(&layers, &currents);
 
-    let peaks: Vec<(f64, f64, f64, f64)> = fields[..cores.len()]
-        .par_iter()
-        .map(|field| scan(&curve, field, AXIS * shape.radius_m))
-        .collect();
-    let targets: Vec<(f64, f64)> = peaks.iter().map(|(_, r, z, _)| (*r, *z)).collect();
-    let there = fields_at(outline, winding, &targets, &layers, &currents)?;
+    let peaks = scans(&curve, &fields[..cores.len()], AXIS * shape.radius_m);
+    let targets = peaks.iter().map(|peak| peak.place_m).collect();
+    let there = Targets::new(outline, winding, targets, modes)?.fields(&layers, &currents);
 
     Ok(cores
         .iter()
         .enumerate()
         .map(|(index, core)| {
-            let (scanned, r_m, z_m, angle) = peaks[index];
-            let at = |field: &Field| field.at(index, angle);
+            let Peak {
+                scanned_t,
+                place_m: (r_m, z_m),
+                angle,
+            } = peaks[index];
+            let turned = turns(angle, modes);
+            let at = |field: &Field| field.at(index, &turned);
             let (b, without) = (at(&there[index]), at(&there[index + cores.len()]));
             let peak_t = norm(b);
             let lost = norm([b[0] - without[0], b[1] - without[1], b[2] - without[2]]);
@@ -267,7 +338,7 @@ fn core_fields(
             let less = fine.mean(&fields[index + cores.len()], first_fine);
             let coarser = coarse.mean(&fields[index], first_coarse);
             let share = |error: f64, of: f64| if of > 0.0 { error / of } else { 0.0 };
-            let relative_error = share(lost + (scanned - peak_t).abs(), peak_t).max(share(
+            let relative_error = share(lost + (scanned_t - peak_t).abs(), peak_t).max(share(
                 (less - mean_t).abs() + (coarser - mean_t).abs(),
                 mean_t,
             ));
@@ -354,23 +425,37 @@ struct Field {
 }
 
 impl Field {
-    /// (B_r, B_theta, B_z) at a target and an angle.
-    fn at(&self, target: usize, angle: f64) -> [f64; 3] {
-        let rows = target * COMPONENTS..(target + 1) * COMPONENTS;
-        combine(
-            angle,
-            |component, column| self.values[(rows.start + component, column)],
-            self.values.ncols(),
-        )
+    /// (B_r, B_theta, B_z) at a target and an angle, given as [`turns`].
+    fn at(&self, target: usize, turns: &[(f64, f64)]) -> [f64; 3] {
+        let row = target * COMPONENTS;
+        combine(turns, |component, column| {
+            self.values[(row + component, column)]
+        })
+    }
+
+    fn modes(&self) -> usize {
+        self.values.ncols().div_ceil(2)
     }
 }
 
-/// (B_r, B_theta, B_z) at an angle from the components' modes.
-fn combine(angle: f64, value: impl Fn(usize, usize) -> f64, columns: usize) -> [f64; 3] {
+/// (sin, cos) of an angle's multiples, from 1 to `modes` - 1.
+fn turns(angle: f64, modes: usize) -> Vec<(f64, f64)> {
+    (1..modes).map(|m| (m as f64 * angle).sin_cos()).collect()
+}
+
+/// The same of angles all around, some for every mode; of one alone without transverse modes.
+fn turns_around(modes: usize) -> Vec<Vec<(f64, f64)>> {
+    let count = if modes == 1 { 1 } else { ANGLES * modes };
+    (0..count)
+        .map(|k| turns(TAU * k as f64 / count as f64, modes))
+        .collect()
+}
+
+/// (B_r, B_theta, B_z) at an angle, given as [`turns`], from the components' modes.
+fn combine(turns: &[(f64, f64)], value: impl Fn(usize, usize) -> f64) -> [f64; 3] {
     let mut b = [value(0, 0), 0.0, value(1, 0)];
-    for cosine in (1..columns).step_by(2) {
-        let sine = cosine + 1;
-        let (s, c) = (sine as f64 * 0.5 * angle).sin_cos();
+    for (mode, (s, c)) in turns.iter().enumerate() {
+        let (cosine, sine) = (2 * mode + 1, 2 * mode + 2);
         b[0] += c * value(0, cosine) + s * value(0, sine);
         b[1] += c * value(2, sine) - s * value(2, cosine);
         b[2] += c * value(1, cosine) + s * value(1, sine);
@@ -378,53 +463,71 @@ fn combine(angle: f64, value: impl Fn(usize, usize) -> f64, columns: usize) -> [
     b
 }
 
-/// The fields of all `layers` with their own windings' currents.
-fn fields_at(
-    outline: &Generatrix,
-    winding: &Winding,
-    targets: &[(f64, f64)],
-    layers: &[&DMatrix<f64>],
-    currents_a: &[f64],
-) -> Result<Vec<Field>, OnEdge> {
-    let columns = layers.first().map_or(1, |l| l.ncols());
-    let modes = columns.div_ceil(2);
-    let own = targets
-        .par_iter()
-        .map(|(r_m, z_m)| bore_field(winding, *r_m, *z_m, QUADRATURE))
-        .collect::<Result<Vec<_>, _>>()?;
-    let operators = gradient_operators(outline, targets, modes, QUADRATURE);
-    let products: Vec<DMatrix<f64>> = operators
-        .par_iter()
-        .enumerate()
-        .map(|(mode, operator)| {
-            let mine = columns_of(mode);
-            let width = mine.len();
-            let side_by_side =
-                DMatrix::from_fn(outline.nodes.len(), width * layers.len(), |node, place| {
-                    MU_0_T_M_PER_A * layers[place / width][(node, mine.start + place % width)]
-                });
-            operator.tr_mul(&side_by_side)
-        })
-        .collect();
-    Ok(currents_a
-        .iter()
-        .enumerate()
-        .map(|(index, current_a)| {
-            let mut values = DMatrix::zeros(COMPONENTS * targets.len(), columns);
-            for (mode, product) in products.iter().enumerate() {
+/// Places in a core, with what a layer and the own winding give there.
+#[derive(Debug)]
+struct Targets {
+    /// The own winding's (B_r, B_z), T/A.
+    own: Vec<(f64, f64)>,
+    /// Of every mode.
+    operators: Vec<DMatrix<f64>>,
+}
+
+impl Targets {
+    fn new(
+        outline: &Generatrix,
+        winding: &Winding,
+        places_m: Vec<(f64, f64)>,
+        modes: usize,
+    ) -> Result<Self, OnEdge> {
+        let own = places_m
+            .par_iter()
+            .map(|(r_m, z_m)| bore_field(winding, *r_m, *z_m, QUADRATURE))
+            .collect::<Result<_, _>>()?;
+        let operators = gradient_operators(outline, &places_m, modes, QUADRATURE);
+        Ok(Self { own, operators })
+    }
+
+    /// The fields of all `layers` with their own windings' currents.
+    fn fields(&self, layers: &[&DMatrix<f64>], currents_a: &[f64]) -> Vec<Field> {
+        let columns = columns_of(self.operators.len() - 1).end;
+        let products: Vec<DMatrix<f64>> = self
+            .operators
+            .par_iter()
+            .enumerate()
+            .map(|(mode, operator)| {
                 let mine = columns_of(mode);
                 let width = mine.len();
-                values
-                    .columns_mut(mine.start, width)
-                    .copy_from(&product.columns(index * width, width));
-            }
-            for (target, (b_r, b_z)) in own.iter().enumerate() {
-                values[(COMPONENTS * target, 0)] += current_a * b_r;
-                values[(COMPONENTS * target + 1, 0)] += current_a * b_z;
-            }
-            Field { values }
-        })
-        .collect())
+                let side_by_side =
+                    DMatrix::from_fn(operator.nrows(), width * layers.len(), |node, place| {
+                        MU_0_T_M_PER_A * layers[place / width][(node, mine.start + place % width)]
+                    });
+                operator.tr_mul(&side_by_side)
+            })
+            .collect();
+        currents_a
+            .iter()
+            .enumerate()
+            .map(|(index, current_a)| {
+                let mut values = DMatrix::zeros(COMPONENTS * self.own.len(), columns);
+                for (mode, product) in products.iter().enumerate() {
+                    let mine = columns_of(mode);
+                    let width = mine.len();
+                    values
+                        .columns_mut(mine.start, width)
+                        .copy_from(&product.columns(index * width, width));
+                }
+                for (target, (b_r, b_z)) in self.own.iter().enumerate() {
+                    values[(COMPONENTS * target, 0)] += current_a * b_r;
+                    values[(COMPONENTS * target + 1, 0)] += current_a * b_z;
+                }
+                Field { values }
+            })
+            .collect()
+    }
+}
+
+fn places(curve: &Generatrix) -> Vec<(f64, f64)> {
+    curve.nodes.iter().map(|n| (n.r_m, n.z_m)).collect()
 }
 
 /// A mode's columns in a core's layers.
@@ -451,8 +554,23 @@ fn scan_curve(winding: &Winding, shape: CoreShape, depth_m: f64) -> Generatrix {
     )
 }
 
-/// Largest |B| on the curve, and where: (|B|, r, z, angle).
-fn scan(curve: &Generatrix, field: &Field, nearest_m: f64) -> (f64, f64, f64, f64) {
+/// Largest |B| on the curve, from the nodes' fields.
+#[derive(Debug, Clone, Copy)]
+struct Peak {
+    scanned_t: f64,
+    /// Radius and height.
+    place_m: (f64, f64),
+    angle: f64,
+}
+
+fn scans(curve: &Generatrix, fields: &[Field], nearest_m: f64) -> Vec<Peak> {
+    fields
+        .par_iter()
+        .map(|field| scan(curve, field, nearest_m))
+        .collect()
+}
+
+fn scan(curve: &Generatrix, field: &Field, nearest_m: f64) -> Peak {
     let order = curve.order;
     let basis = Basis::new(gauss::rule(order));
     let columns = field.values.ncols();
@@ -471,49 +589,41 @@ fn scan(curve: &Generatrix, field: &Field, nearest_m: f64) -> (f64, f64, f64, f6
         }
         modes
     };
-    let size = |modes: &[[f64; COMPONENTS]], angle: f64| {
-        norm(combine(
-            angle,
-            |component, column| modes[column][component],
-            columns,
-        ))
+    let size = |modes: &[[f64; COMPONENTS]], turns: &[(f64, f64)]| {
+        norm(combine(turns, |component, column| modes[column][component]))
     };
-    let angles = if columns == 1 {
-        1
-    } else {
-        ANGLES * columns.div_ceil(2)
-    };
+    let around = turns_around(field.modes());
     let samples = SAMPLES * order;
-    let mut best = (f64::NEG_INFINITY, 0, 0.0, 0.0);
+    let mut best = (f64::NEG_INFINITY, 0, 0.0, 0);
     for panel in 0..curve.panels.len() {
         for sample in 0..=samples {
             let x = 2.0 * sample as f64 / samples as f64 - 1.0;
             let modes = modes_at(panel, x);
-            for k in 0..angles {
-                let angle = TAU * k as f64 / angles as f64;
-                let value = size(&modes, angle);
+            for (k, turns) in around.iter().enumerate() {
+                let value = size(&modes, turns);
                 if value > best.0 {
-                    best = (value, panel, x, angle);
+                    best = (value, panel, x, k);
                 }
             }
         }
     }
     // Steps to the four sides that shrink where none of them leads higher.
-    let (mut value, panel, mut x, mut angle) = best;
-    let (mut step, mut turn) = (
-        2.0 / samples as f64,
-        if columns == 1 {
-            0.0
-        } else {
-            TAU / angles as f64
-        },
-    );
+    let (mut value, panel, mut x, nearest) = best;
+    let between = TAU / around.len() as f64;
+    let mut angle = nearest as f64 * between;
+    let (mut step, mut turn) = (2.0 / samples as f64, between);
+    if columns == 1 {
+        turn = 0.0;
+    }
     while step > 1e-5 {
         let moves = [(step, 0.0), (-step, 0.0), (0.0, turn), (0.0, -turn)];
         let next = moves
             .into_iter()
             .map(|(dx, dt)| ((x + dx).clamp(-1.0, 1.0), angle + dt))
-            .map(|(x, angle)| (size(&modes_at(panel, x), angle), x, angle))
+            .map(|(x, angle)| {
+                let turned = turns(angle, field.modes());
+                (size(&modes_at(panel, x), &turned), x, angle)
+            })
             .fold((value, x, angle), |a, b| if b.0 > a.0 { b } else { a });
         if next.0 > value {
             (value, x, angle) = next;
@@ -525,7 +635,11 @@ fn scan(curve: &Generatrix, field: &Field, nearest_m: f64) -> (f64, f64, f64, f6
     let panel = curve.panels[panel];
     let coordinate = panel.from_m + 0.5 * (panel.to_m - panel.from_m) * (1.0 + x);
     let (r_m, z_m, _) = curve.shape.on(panel.face, coordinate);
-    (value, r_m.max(nearest_m), z_m, angle)
+    Peak {
+        scanned_t: value,
+        place_m: (r_m.max(nearest_m), z_m),
+        angle,
+    }
 }
 
 /// A rule over the core's half plane.
@@ -555,18 +669,14 @@ impl Volume {
 
     /// Mean of |B| of a field whose targets from `first` on are the points.
     fn mean(&self, field: &Field, first: usize) -> f64 {
-        let columns = field.values.ncols();
-        let angles = if columns == 1 {
-            1
-        } else {
-            ANGLES * columns.div_ceil(2)
-        };
+        let around = turns_around(field.modes());
         let mut sum = 0.0;
         for (place, weight) in self.weights.iter().enumerate() {
-            let ring: f64 = (0..angles)
-                .map(|k| norm(field.at(first + place, TAU * k as f64 / angles as f64)))
+            let ring: f64 = around
+                .iter()
+                .map(|turns| norm(field.at(first + place, turns)))
                 .sum();
-            sum += weight * ring / angles as f64;
+            sum += weight * ring / around.len() as f64;
         }
         sum
     }
