@@ -12,14 +12,14 @@ use serde::Serialize;
 
 use super::calibrate::ShapeSource;
 use super::discretize::{self, PointsReport, point_rows, points_grid};
-use super::lambda::criterion_name;
-use super::scene::{MAGNET_SHARE, Scene};
-use super::steel::{EVALUATION_SHARE, Material, Solved, Steel};
+use super::lambda::{criterion_name, proven_accuracy};
+use super::scene::Scene;
+use super::steel::{Material, Solved};
 use super::{JobError, KERNEL_ERROR, passive, steel};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::bundle::rendering::HeightGrid;
-use crate::design::{Design, MagnetModel};
+use crate::design::Design;
 use crate::lambda::{self, Allocator, Criterion, ForceProblem, Reach, Settings, Solution, Status};
 use crate::plot::matrix::{MatrixPlot, Panel};
 use crate::progress::Progress;
@@ -211,7 +211,7 @@ pub fn run(
         }
     }
     let fields = fields(&scene, &objects, progress)?;
-    let stage = forces_accuracy(&scene, &solved);
+    let stage = proven_accuracy(&scene, &solved);
     let (pairs, error) = pairs(&objects, &fields, options.jnd, stage.estimate);
     let told = objects.iter().enumerate().map(|(k, object)| {
         let rendered = object.rendered.as_ref();
@@ -456,26 +456,6 @@ fn pairs(objects: &[Object], fields: &[Vec<Field>], jnd: f64, part: f64) -> (Vec
         }
     }
     (pairs, error)
-}
-
-/// What is known of the forces' error.
-fn forces_accuracy(scene: &Scene, solved: &Solved) -> StageAccuracy {
-    let rules = solved.tolerance.max(KERNEL_ERROR);
-    let magnet = match scene.design.magnet.model {
-        MagnetModel::Dipole => 0.0,
-        MagnetModel::Cylinder => MAGNET_SHARE * rules,
-    };
-    let coils = match solved.steel {
-        Steel::None => rules,
-        Steel::Alone(_) | Steel::Coupled(_) => EVALUATION_SHARE * rules + solved.steel_error,
-    };
-    StageAccuracy {
-        estimate: coils + magnet,
-        relative_to: "the largest |grad B| at the point's height".to_owned(),
-        method: "a-priori quadrature bound, steel by two resolutions, evaluated at the points \
-                 directly"
-            .to_owned(),
-    }
 }
 
 impl CompareFile {

@@ -9,6 +9,7 @@ use self::feedback::{FeedbackOptions, Rendering};
 use self::picture::Seen;
 use self::points::WantedPoints;
 use self::points_effect::Moved;
+use super::air_sample::{self, PLACES, Sample, spread};
 use super::discretize::scattered::{self, Sampling, ScatteredSummary};
 use super::discretize::{self, PointsReport};
 use super::kept::ShapeField;
@@ -308,7 +309,7 @@ fn solve_at(
             "a core of the array at the chosen currents",
         ));
     }
-    let mut file = file(scene, solved, points, &solution, options);
+    let mut file = file(scene, solved, points, &solution, options, &forces);
     add_worst_point(&mut file, &problem, &solution, &worst);
     let (settings, wiring) = (&options.settings, &options.wiring);
     file.tolerance = Some(variants::tolerance(&problem, settings.jnd_weight, wiring)?);
@@ -516,9 +517,10 @@ fn file(
     points: &WantedPoints,
     solution: &Solution,
     options: &LambdaOptions,
+    forces_n_per_a: &[f64],
 ) -> LambdaFile {
     let chosen = solution.chosen.as_ref();
-    let forces = forces_accuracy(scene, solved);
+    let forces = forces_accuracy(scene, solved, &points.positions_m, forces_n_per_a);
     let accuracy = BTreeMap::from([
         ("points".to_owned(), points.accuracy["points"].clone()),
         ("forces".to_owned(), forces),
@@ -629,8 +631,35 @@ fn add_worst_point(
         .insert("worst_point".to_owned(), worst.accuracy.clone());
 }
 
-/// What is known of the forces' error.
-fn forces_accuracy(scene: &Scene, solved: &Solved) -> StageAccuracy {
+/// What is known of the error of forces at some points.
+fn forces_accuracy(
+    scene: &Scene,
+    solved: &Solved,
+    points_m: &[[f64; 3]],
+    forces_n_per_a: &[f64],
+) -> StageAccuracy {
+    let proven = proven_accuracy(scene, solved);
+    let [m_x, m_y, m_z] = scene.moment_a_m2;
+    let dipole = scene.design.magnet.model == MagnetModel::Dipole;
+    if !matches!(solved.steel, Steel::None) || !dipole || m_x != 0.0 || m_y != 0.0 || m_z == 0.0 {
+        return proven;
+    }
+    let coils = scene.coils.len();
+    let samples = spread(forces_n_per_a.len(), PLACES)
+        .into_iter()
+        .filter_map(|index| {
+            let (coil, [x_m, y_m, z_m]) = (&scene.coils[index % coils], points_m[index / coils]);
+            (coil.gain != 0.0).then(|| Sample {
+                r_m: (x_m - coil.axis_m[0]).hypot(y_m - coil.axis_m[1]),
+                z_m,
+                gz: forces_n_per_a[index] / (coil.gain * m_z),
+            })
+        });
+    air_sample::sharper(&scene.winding, samples, proven)
+}
+
+/// What is proven of the forces' error, or told by two resolutions of the steel.
+pub(super) fn proven_accuracy(scene: &Scene, solved: &Solved) -> StageAccuracy {
     let rules = solved.tolerance.max(KERNEL_ERROR);
     let magnet = match scene.design.magnet.model {
         MagnetModel::Dipole => 0.0,
@@ -648,7 +677,7 @@ fn forces_accuracy(scene: &Scene, solved: &Solved) -> StageAccuracy {
     };
     let estimate = match solved.steel {
         Steel::None => rules,
-        Steel::Alone(_) | Steel::Coupled(_) => EVALUATION_SHARE * rules + solved.steel_error,
+        Steel::Alone(_) | Steel::Coupled(_) => EVALUATION_SHARE * rules + solved.steel_estimate(),
     };
     StageAccuracy {
         estimate: estimate + magnet,

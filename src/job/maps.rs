@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::JobError;
+use super::air_sample::{self, PLACES, Sample, spread};
 use super::scene::Scene;
 use super::steel::{Solved, Steel};
 use crate::accuracy::StageAccuracy;
@@ -111,7 +112,10 @@ impl SceneMap {
             }
         };
         progress.end();
-        let accuracy = accuracy(&map, solved, felt.bound);
+        let mut accuracy = accuracy(&map, solved, felt.bound);
+        if matches!(solved.steel, Steel::None) && felt.is_field() {
+            accuracy = air_sample::sharper(&scene.winding, samples(&map, coils), accuracy);
+        }
         Ok(Self {
             map,
             between,
@@ -401,6 +405,28 @@ pub(super) fn lowest_plane(grid: &Grid) -> Vec<[f64; 3]> {
         .collect()
 }
 
+/// Nodes of a map to be compared: every second one of the lowest plane.
+fn samples(map: &FieldMap, coils: &[PlacedCoil]) -> Vec<Sample> {
+    let (nx, ny) = (map.x_m.len(), map.y_m.len());
+    let plane = nx * ny;
+    spread(map.gz_t_per_m_per_a.len(), PLACES)
+        .into_iter()
+        .enumerate()
+        .filter_map(|(sample, index)| {
+            let whole = plane * map.z_m.len();
+            let (coil, at) = (index / whole, index % whole);
+            let at = if sample % 2 == 0 { at % plane } else { at };
+            let (x_m, y_m) = (map.x_m[at % nx], map.y_m[at / nx % ny]);
+            let PlacedCoil { axis_m, gain, .. } = coils[coil];
+            (gain != 0.0).then(|| Sample {
+                r_m: (x_m - axis_m[0]).hypot(y_m - axis_m[1]),
+                z_m: map.z_m[at / plane],
+                gz: map.gz_t_per_m_per_a[coil * whole + at] / gain,
+            })
+        })
+        .collect()
+}
+
 /// The map's own error at its nodes.
 fn accuracy(map: &FieldMap, solved: &Solved, magnet: f64) -> StageAccuracy {
     let rules = match solved.steel {
@@ -420,7 +446,7 @@ fn accuracy(map: &FieldMap, solved: &Solved, magnet: f64) -> StageAccuracy {
         ),
     };
     StageAccuracy {
-        estimate: rules + solved.steel_error + magnet,
+        estimate: rules + solved.steel_estimate() + magnet,
         relative_to: "the largest |grad B| at the node's height".to_owned(),
         method,
     }

@@ -1,5 +1,6 @@
 //! What a command does, from documents to results and artefacts. No screens, no clocks.
 
+mod air_sample;
 pub mod at_current;
 pub mod calibrate;
 pub mod compare;

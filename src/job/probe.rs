@@ -104,7 +104,7 @@ pub fn probe(
     let relative_error = match solved.steel {
         Steel::None => KERNEL_ERROR,
         Steel::Alone(_) | Steel::Coupled(_) => {
-            solved.steel_error + EVALUATION_SHARE * solved.tolerance
+            solved.steel_estimate() + EVALUATION_SHARE * solved.tolerance
         }
     };
     Ok(ProbeTable {

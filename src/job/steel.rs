@@ -119,7 +119,9 @@ pub struct Solved {
     pub steel: Steel,
     /// The tolerance asked for, relative to the largest |grad B| at a height.
     pub tolerance: f64,
-    /// Estimated error of the steel's solution, relative to the same; 0 without steel.
+    /// Difference of the steel's solution from that of the next coarser resolution, relative to
+    /// the same; 0 without steel. An estimate of its error that is too large as a rule, and by
+    /// chance a little too small: see [`Solved::steel_estimate`].
     pub steel_error: f64,
     /// Permeability of the linear solution. With a B-H curve the cores of coils that are not
     /// coupled follow the curve at the rated current; those that are coupled are linear, of the
@@ -127,7 +129,17 @@ pub struct Solved {
     pub relative_permeability: f64,
 }
 
+/// Twice what two resolutions differ by covers those that lie close to each other by chance.
+const CHANCE: f64 = 2.0;
+
 impl Solved {
+    /// The error that is claimed of the steel's solution, relative to the largest |grad B| at a
+    /// height.
+    #[must_use]
+    pub fn steel_estimate(&self) -> f64 {
+        CHANCE * self.steel_error
+    }
+
     /// Whether the solution is as good as asked for.
     #[must_use]
     pub fn reached(&self) -> bool {

@@ -12,6 +12,7 @@ use std::path::Path;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::air_sample::spread;
 use super::calibrate::{CURVE_FILE, DESIGN_FILE, PASSIVE_STAGE};
 use super::passive::{self, PASSIVE_TOLERANCE};
 use super::passive_map::PassiveMap;
@@ -191,15 +192,6 @@ fn scene_agrees(bundle: &Bundle, scene: &Scene) -> Check {
     .fold(0.0, f64::max);
     let how = "positions, gains, limits, resistance and moment against design.toml";
     check("scene", worst, 1e-14, how.to_owned())
-}
-
-/// Indices spread evenly and irregularly over 0..count: multiples of the golden ratio.
-fn spread(count: usize, samples: usize) -> Vec<usize> {
-    const GOLDEN: f64 = 0.618_033_988_749_894_9;
-    let samples = samples.min(count);
-    (0..samples)
-        .map(|i| (((i as f64 * GOLDEN).fract() * count as f64) as usize).min(count - 1))
-        .collect()
 }
 
 /// Fields by another route than the bundle's: the winding's derivative integrated over its
