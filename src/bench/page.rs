@@ -50,7 +50,12 @@ fn stage(stage: &StageCurves) -> StageFacts<'_> {
         name: &stage.stage,
         timed: &stage.timed,
         error_of: &stage.error_of,
-        label: unit_of(&stage.error_of),
+        // What it is relative to stands below the drawing.
+        label: if unit_of(&stage.error_of).starts_with("error / m") {
+            "error / m"
+        } else {
+            "relative error"
+        },
         default: &stage.default,
         curves: stage.curves.iter().map(curve).collect(),
         ratios: ratios(stage),

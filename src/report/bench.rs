@@ -37,8 +37,8 @@ pub struct StageFacts<'a> {
     pub timed: &'a str,
     /// What the errors are relative to, or their unit.
     pub error_of: &'a str,
-    /// The name of the errors' axis.
-    pub label: String,
+    /// The short name of the errors' axis.
+    pub label: &'static str,
     /// What the program does by default, and why.
     pub default: &'a str,
     /// The curves and what each is held against, with that reference's own error.
@@ -154,8 +154,8 @@ fn told(all: &[Standing]) -> String {
         format!("{} do not keep it", stating - kept)
     };
     format!(
-        "At its default {} of the measured computations state their error. {verdict}; closest to its \
-         promise is {} with {} of what it states.",
+        "{} of the measured computations state the error of their default. {verdict}; closest to its \
+         promise is {}: it uses {} of what it states.",
         stating,
         worst.name(),
         percent(worst.used().unwrap_or(0.0))
@@ -306,7 +306,10 @@ fn curves(facts: &BenchFacts) -> Section {
                 "Error against processor time of {}, both axes logarithmic",
                 stage.name
             ),
-            &format!("Timed: {}. Default: {}.", stage.timed, stage.default),
+            &format!(
+                "Timed: {}. Error of: {}. Default: {}.",
+                stage.timed, stage.error_of, stage.default
+            ),
         );
         if !stage.ratios.is_empty() {
             body.raw("<details><summary>Times of other programs at the same error</summary><ul class=\"said\">");
@@ -352,7 +355,7 @@ fn numbers(stage: &StageFacts) -> Table {
         }
     }
     Table {
-        caption: format!("Every row of {}; error of: {}", stage.name, stage.error_of),
+        caption: format!("Every row of {}", stage.name),
         head: vec![
             ("curve", false),
             ("knob", true),

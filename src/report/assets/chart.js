@@ -14,7 +14,7 @@ function chart(place, spec) {
     const width = Math.max(280, place.clientWidth);
     const height = Math.round(Math.min(340, Math.max(250, width * 0.6)));
     const right = spec.series.some((one) => one.right);
-    const pad = { left: 52, right: right ? 50 : 14, top: 10 + marksRoom(width), bottom: 40 };
+    const pad = { left: spec.log ? 62 : 52, right: right ? 50 : 14, top: 10 + marksRoom(width), bottom: 40 };
     const inner = { w: width - pad.left - pad.right, h: height - pad.top - pad.bottom };
     const log = spec.log === true;
     const of = (v) => (log ? Math.log10(v) : v);
@@ -132,10 +132,14 @@ function chart(place, spec) {
   }
 
   function marks(svg, px, pad, inner) {
-    for (const { one, x, row, middle } of rowsOfMarks(px, pad.left + inner.w + pad.right)) {
-      const y = pad.top - 7 - 15 * row;
-      add(svg, "line", { class: one.chosen ? "mark chosen" : "mark", x1: x, x2: x, y1: y + 3, y2: pad.top + inner.h });
-      add(svg, "text", { class: one.chosen ? "name" : "", x: middle, y, "text-anchor": "middle" }, one.name);
+    const all = rowsOfMarks(px, pad.left + inner.w + pad.right);
+    for (const { one, x, row } of all) {
+      const y = pad.top - 4 - 15 * row;
+      add(svg, "line", { class: one.chosen ? "mark chosen" : "mark", x1: x, x2: x, y1: y, y2: pad.top + inner.h });
+    }
+    // Names last, each on ground of its own: a line to a higher name may pass behind it.
+    for (const { one, row, middle } of all) {
+      add(svg, "text", { class: one.chosen ? "name over" : "over", x: middle, y: pad.top - 7 - 15 * row, "text-anchor": "middle" }, one.name);
     }
   }
 

@@ -130,7 +130,7 @@ own("cost", (place) => {
   const curve = measured(c.curve, "--c0", { width: 2.2 });
   const [from, to] = range(curve.x);
   return chart(place, {
-    xLabel: "CPU time / s", yLabel: `error, ${c.curve.unit}`, log: true,
+    xLabel: "CPU time / s", yLabel: "relative error", log: true,
     series: [
       curve,
       { name: "this run's tolerance", unit: "", x: [from, to], y: [c.tolerance, c.tolerance], colour: "--c1", dash: DASHES[1] },
