@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 """Copies the tables of results/bench into README.md and src/DESIGN.md.
 
-    fluxform bench --peers
+    fluxform bench --peers --out results/bench
+    FLUXFORM_COVERAGE=results/bench/coverage.md cargo test --locked --test bench a_hundred
     fluxform bench --stage inductance --scaling --out results/bench/scaling
     python3 scripts/bench_pages.py
 
 Between the lines `<!-- bench: NAME -->` and `<!-- bench: end -->` of a page stands what the summary
-says: `curves` (a line a curve of fluxform's own), `peers` (the ratios of times), `scaling`, `defaults`.
+says: `curves` (a line a curve of fluxform's own), `peers` (the ratios of times), `scaling`, `defaults`,
+and `coverage` (what the stages claim of their errors against the truth).
 """
 
 import pathlib
@@ -15,6 +17,7 @@ import re
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 SUMMARY = ROOT / "results" / "bench" / "summary.md"
 SCALING = ROOT / "results" / "bench" / "scaling" / "summary.md"
+COVERAGE = ROOT / "results" / "bench" / "coverage.md"
 PAGES = [ROOT / "README.md", ROOT / "src" / "DESIGN.md"]
 
 
@@ -44,6 +47,7 @@ def parts(text):
 def main():
     told = parts(SUMMARY.read_text(encoding="utf-8"))
     told["scaling"] = section(SCALING.read_text(encoding="utf-8"), "Time and memory against size")
+    told["coverage"] = COVERAGE.read_text(encoding="utf-8").strip()
     for page in PAGES:
         text = page.read_text(encoding="utf-8")
         for name, content in told.items():

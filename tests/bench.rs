@@ -8,6 +8,8 @@
 mod command;
 #[path = "bench/coverage.rs"]
 mod coverage;
+#[path = "bench/page.rs"]
+mod page;
 #[path = "bench/rows.rs"]
 mod rows;
 

@@ -8,6 +8,7 @@ pub mod clock;
 pub mod extreme;
 pub mod memory;
 pub mod pace;
+pub mod page;
 pub mod peers;
 pub mod scaling;
 pub mod stages;

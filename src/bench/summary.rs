@@ -113,13 +113,17 @@ fn stage_table(stage: &StageCurves) -> String {
             );
         }
     }
-    text + &ratios(stage)
+    for ratio in ratios(stage) {
+        let _ = writeln!(text, "\n{ratio}");
+    }
+    text
 }
 
 /// Each peer's time over this program's, both where they are first as exact as the peer at its best
-/// or, where that is coarser, as the reference.
-fn ratios(stage: &StageCurves) -> String {
-    let mut text = String::new();
+/// or, where that is coarser, as the reference; a sentence a peer.
+#[must_use]
+pub fn ratios(stage: &StageCurves) -> Vec<String> {
+    let mut told = Vec::new();
     for curve in stage.curves.iter().filter(|c| c.program != "fluxform") {
         let least = curve.rows.iter().map(|row| row.error);
         let least = least.fold(f64::INFINITY, f64::min);
@@ -140,9 +144,8 @@ fn ratios(stage: &StageCurves) -> String {
         let same = |c: &&Curve| c.program == "fluxform" && c.name == curve.name;
         let ours = stage.curves.iter().find(same);
         if let Some(ours) = ours.and_then(|ours| first(ours, Some(theirs.items))) {
-            let _ = writeln!(
-                text,
-                "\n{}, {} {}: error {} in {}; fluxform: error {} in {}. Ratio of times {} ({} to {} \
+            told.push(format!(
+                "{}, {} {}: error {} in {}; fluxform: error {} in {}. Ratio of times {} ({} to {} \
                  by the quartiles).",
                 curve.program,
                 curve.knob,
@@ -154,10 +157,10 @@ fn ratios(stage: &StageCurves) -> String {
                 factor(theirs.seconds / ours.seconds),
                 factor(theirs.seconds_low / ours.seconds_high),
                 factor(theirs.seconds_high / ours.seconds_low),
-            );
+            ));
         }
     }
-    text
+    told
 }
 
 /// The exponent of the error against the knob over the rows that are above the reference's own

@@ -1,22 +1,27 @@
 //! The files of a run: table, plots, summary, and the JSON that tells of all.
 
+use std::io::{self, Write};
 use std::path::Path;
 
-use crate::bundle::artefact::{FileEntry, Input};
+use serde::Serialize;
+
+use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION, UNITS};
 use crate::bundle::atomic::{FileSet, Overwrite, Written};
-use crate::bundle::bench::{BenchFile, StageCurves, write_laws, write_rows};
+use crate::bundle::bench::{BenchFile, StageCurves, push_cell, push_text, write_laws, write_rows};
 use crate::bundle::json::to_json;
 use crate::job::JobError;
 use crate::plot::curves::{CurvesPlot, Line};
 
+use super::extreme::Row;
+use super::page::{self, PAGE};
 use super::summary::markdown;
 
 /// Name of the JSON file.
 pub const JSON: &str = "bench.json";
 
 /// When files of an earlier run may be replaced.
-fn overwrite(inputs: &[Input], folder: &Path, force: bool) -> Overwrite {
-    Overwrite::new(force, folder.join(JSON), inputs)
+fn overwrite(inputs: &[Input], folder: &Path, record: &str, force: bool) -> Overwrite {
+    Overwrite::new(force, folder.join(record), inputs)
 }
 
 /// Refuses before a long run when its files must not replace those in `folder`.
@@ -24,7 +29,7 @@ fn overwrite(inputs: &[Input], folder: &Path, force: bool) -> Overwrite {
 /// # Errors
 /// An output of something else.
 pub fn check(inputs: &[Input], folder: &Path, force: bool) -> Result<(), JobError> {
-    Ok(overwrite(inputs, folder, force).check(&folder.join(JSON))?)
+    Ok(overwrite(inputs, folder, JSON, force).check(&folder.join(JSON))?)
 }
 
 /// Writes all files; `files` lists them but for the JSON itself.
@@ -32,7 +37,7 @@ pub fn check(inputs: &[Input], folder: &Path, force: bool) -> Result<(), JobErro
 /// # Errors
 /// Files that cannot be written or must not be replaced.
 pub fn write(file: &mut BenchFile, folder: &Path, force: bool) -> Result<(), JobError> {
-    let overwrite = overwrite(&file.inputs, folder, force);
+    let overwrite = overwrite(&file.inputs, folder, JSON, force);
     let mut set = FileSet::begin(folder, overwrite)?;
     let mut entries = Vec::new();
     let entry = |name: &str, written: Written| FileEntry {
@@ -55,10 +60,75 @@ pub fn write(file: &mut BenchFile, folder: &Path, force: bool) -> Result<(), Job
     let text = markdown(file);
     let told = set.write("summary.md", |out| out.write_all(text.as_bytes()))?;
     entries.push(entry("summary.md", told));
+    let html = page::html(file);
+    let shown = set.write(PAGE, |out| out.write_all(html.as_bytes()))?;
+    entries.push(entry(PAGE, shown));
     file.files = entries;
     let json = to_json(file).map_err(|fault| JobError::Input(fault.to_string()))?;
     set.write(JSON, |out| out.write_all(&json))?;
     Ok(set.commit()?)
+}
+
+/// Name of the catalogue's JSON file.
+pub const CATALOGUE: &str = "extreme.json";
+
+/// Writes the stability catalogue: its JSON, its table and its page.
+///
+/// # Errors
+/// Files that cannot be written or must not be replaced.
+pub fn write_catalogue(cases: &[Row], folder: &Path, force: bool) -> Result<(), JobError> {
+    let mut set = FileSet::begin(folder, overwrite(&[], folder, CATALOGUE, force))?;
+    set.write("extreme.csv", |out| write_cases(out, cases))?;
+    let html = page::catalogue(cases);
+    set.write(PAGE, |out| out.write_all(html.as_bytes()))?;
+    let file = CatalogueFile {
+        schema_version: SCHEMA_VERSION,
+        fluxform_version: FLUXFORM_VERSION,
+        inputs: &[],
+        units: UNITS,
+        cases,
+    };
+    let json = to_json(&file).map_err(|fault| JobError::Input(fault.to_string()))?;
+    set.write(CATALOGUE, |out| out.write_all(&json))?;
+    Ok(set.commit()?)
+}
+
+/// `extreme.json`.
+#[derive(Serialize)]
+struct CatalogueFile<'a> {
+    schema_version: &'a str,
+    fluxform_version: &'a str,
+    /// None: the cases are part of the program.
+    inputs: &'a [Input],
+    units: &'a str,
+    cases: &'a [Row],
+}
+
+/// Refuses as [`check`] does, for the catalogue.
+///
+/// # Errors
+/// An output of something else.
+pub fn check_catalogue(folder: &Path, force: bool) -> Result<(), JobError> {
+    Ok(overwrite(&[], folder, CATALOGUE, force).check(&folder.join(CATALOGUE))?)
+}
+
+fn write_cases(out: &mut dyn Write, cases: &[Row]) -> io::Result<()> {
+    writeln!(out, "case,verdict,error,bound,seconds,expected,got")?;
+    for case in cases {
+        let mut line = Vec::new();
+        push_text(&mut line, &case.name);
+        push_text(&mut line, if case.pass { "pass" } else { "fail" });
+        for value in [case.error, case.bound, case.seconds] {
+            push_cell(&mut line, value);
+        }
+        push_text(&mut line, &case.expected);
+        push_text(&mut line, &case.got);
+        // The last cell has no comma behind it.
+        line.pop();
+        line.push(b'\n');
+        out.write_all(&line)?;
+    }
+    Ok(())
 }
 
 /// One stage's curves in one plane.
@@ -84,7 +154,7 @@ pub fn picture(stage: &StageCurves) -> CurvesPlot {
 }
 
 /// The label of the errors' axis.
-fn unit_of(error_of: &str) -> String {
+pub(super) fn unit_of(error_of: &str) -> String {
     let absolute = error_of
         .strip_prefix('m')
         .filter(|rest| rest.is_empty() || rest.starts_with(','));

@@ -230,12 +230,14 @@ pub fn write_laws(out: &mut dyn Write, laws: &[Law]) -> io::Result<()> {
     Ok(())
 }
 
-fn push_cell(line: &mut Vec<u8>, value: f64) {
+/// Appends a number and a comma.
+pub(crate) fn push_cell(line: &mut Vec<u8>, value: f64) {
     push_number(line, value);
     line.push(b',');
 }
 
-fn push_text(line: &mut Vec<u8>, text: &str) {
+/// Appends a text, quoted where it must be, and a comma.
+pub(crate) fn push_text(line: &mut Vec<u8>, text: &str) {
     if text.contains([',', '"', '\n', '\r']) {
         let quoted = text.replace('"', "\"\"");
         line.extend_from_slice(format!("\"{quoted}\"").as_bytes());

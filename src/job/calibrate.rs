@@ -35,6 +35,7 @@ use crate::shape::document::ShapeDocument;
 use crate::shape::points::ConstraintPoints;
 
 mod page;
+mod recorded;
 
 pub use page::PAGE_FILE;
 
@@ -311,6 +312,7 @@ fn calibrate_one(
             picture,
             needed: &needed,
             manifest: &manifest,
+            tolerance: solved.map.tolerance,
         };
         let others: Vec<&str> = extra.iter().map(|(name, _)| *name).collect();
         pages = page::files(&seen, &others)

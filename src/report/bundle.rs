@@ -141,7 +141,7 @@ fn sources(facts: &BundleFacts) -> Section {
     let input =
         |(path, sha256): &(&str, &str)| -> Vec<Cell> { vec![(*path).into(), (*sha256).into()] };
     body.table(&Table {
-        caption: "What went in".to_owned(),
+        caption: "Files and their digests".to_owned(),
         head: vec![("file", false), ("sha256", false)],
         rows: facts.inputs.iter().map(input).collect(),
         prose: true,

@@ -3,6 +3,7 @@
 use crate::plot::lambda::LambdaPlot;
 
 use super::field::Field;
+use super::measured::MeasuredCurve;
 use super::surface::Surface;
 
 /// A calibrated object.
@@ -180,12 +181,19 @@ pub struct Breakpoint<'a> {
 }
 
 /// Error against run time, from a table that is shipped.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ErrorTime<'a> {
-    /// Whose it is.
-    pub stage: &'a str,
-    /// Error and CPU seconds.
-    pub rows: &'a [(f64, f64)],
+    /// The curve of the computation that this run's accuracy costs most in; the row at this run's
+    /// tolerance is marked.
+    pub curve: MeasuredCurve<'a>,
+    /// What is timed.
+    pub timed: &'a str,
+    /// What the errors are relative to.
+    pub error_of: &'a str,
     /// The tolerance of this run.
     pub tolerance: f64,
+    /// Program that was measured.
+    pub version: &'a str,
+    /// What it was measured on.
+    pub machine: &'a str,
 }

@@ -3,8 +3,8 @@
 use super::data::{BudgetPart, BundleFacts, ErrorTime};
 use super::frame::{Section, figure};
 use super::html::{Cell, Html, Table};
-use super::number::{figures, force, percent};
-use super::pack::f32s;
+use super::measured::MeasuredRow;
+use super::number::{figures, force, percent, si};
 use serde_json::{Map, Value, json};
 
 /// The axis of the budget: from ten to this power up to the whole force.
@@ -148,37 +148,48 @@ fn stages(facts: &BundleFacts) -> Table {
     }
 }
 
-fn error_time(body: &mut Html, curve: &ErrorTime, data: &mut Map<String, Value>) {
+fn error_time(body: &mut Html, shipped: &ErrorTime, data: &mut Map<String, Value>) {
+    let curve = &shipped.curve;
     body.element("h3", "What accuracy costs");
     figure(
         body,
         "cost",
-        "Error against run time, both axes logarithmic",
-        "Error against CPU time of the computation as measured for this version, not in this run; \
-         the line is this run's tolerance.",
+        "Error against processor time, both axes logarithmic",
+        &format!(
+            "Not measured in this run: error against CPU time of {} ({}), as recorded for fluxform \
+             {} on {}. The dashed line is this run's tolerance, {}; the ring is the curve's point \
+             at that tolerance, where there is one.",
+            shipped.timed,
+            curve.name,
+            shipped.version,
+            shipped.machine,
+            figures(shipped.tolerance, 3)
+        ),
     );
+    let row = |row: &MeasuredRow| -> Vec<Cell> {
+        vec![
+            figures(row.knob, 4).into(),
+            figures(row.error, 3).into(),
+            si(row.seconds, "s").into(),
+        ]
+    };
     body.folded_table(&Table {
-        caption: format!("Error against run time: {}", curve.stage),
-        head: vec![("error", true), ("CPU time", true)],
-        rows: curve
-            .rows
-            .iter()
-            .map(|(error, seconds)| {
-                vec![
-                    figures(*error, 3).into(),
-                    super::number::si(*seconds, "s").into(),
-                ]
-            })
-            .collect(),
+        caption: format!(
+            "Error against CPU time, as recorded; errors relative to the {}",
+            shipped.error_of
+        ),
+        head: vec![("tolerance", true), ("error", true), ("CPU time", true)],
+        rows: curve.rows.iter().map(row).collect(),
         prose: false,
     });
     data.insert(
         "cost".to_owned(),
         json!({
-            "stage": curve.stage,
-            "tolerance": curve.tolerance,
-            "error": f32s(curve.rows.iter().map(|row| row.0)),
-            "seconds": f32s(curve.rows.iter().map(|row| row.1)),
+            "tolerance": shipped.tolerance,
+            "curve": curve.json(
+                &format!("relative to the {}", shipped.error_of),
+                "this run's tolerance",
+            ),
         }),
     );
 }

@@ -50,6 +50,8 @@ impl Html {
             self.element(open, head);
         }
         self.raw("</tr></thead><tbody>");
+        // Where several numbers stand in a row, each needs its name once the head is gone.
+        let named = table.prose && table.head.iter().filter(|(_, numeric)| *numeric).count() > 1;
         for row in &table.rows {
             self.raw("<tr>");
             for (at, cell) in row.iter().enumerate() {
@@ -57,6 +59,13 @@ impl Html {
                 match (cell, numeric) {
                     (Cell::Markup(markup), _) => {
                         self.raw("<td class=\"m\">").raw(markup).raw("</td>");
+                    }
+                    (Cell::Text(text), true) if named => {
+                        self.raw("<td class=\"n\" data-head=\"")
+                            .text(table.head[at].0)
+                            .raw("\">")
+                            .text(text)
+                            .raw("</td>");
                     }
                     (Cell::Text(text), true) => {
                         self.element("td class=\"n\"", text);

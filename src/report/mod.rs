@@ -4,13 +4,16 @@
 //! security policy names both by their digests. Every text that comes from an input is escaped
 //! ([`html`]). The same data give the same bytes.
 
+pub mod bench;
 pub mod bundle;
+pub mod catalogue;
 pub mod data;
 pub mod field;
 pub mod frame;
 mod good;
 pub mod html;
 mod limits;
+pub mod measured;
 mod number;
 pub mod optimum;
 pub mod pack;

@@ -258,7 +258,7 @@ pub(super) fn sources(inputs: &[(&str, &str)]) -> Section {
     let row =
         |(path, sha256): &(&str, &str)| -> Vec<Cell> { vec![(*path).into(), (*sha256).into()] };
     body.table(&Table {
-        caption: "What went in".to_owned(),
+        caption: "Files and their digests".to_owned(),
         head: vec![("file", false), ("sha256", false)],
         rows: inputs.iter().map(row).collect(),
         prose: true,

@@ -41,14 +41,7 @@ const ROOMS: &[(&str, &[&str])] = &[
         "bench",
         &[
             "units", "progress", "accuracy", "numerics", "design", "field", "coil", "map", "shape",
-            "lambda", "bundle", "plot", "job",
-        ],
-    ),
-    (
-        "bench",
-        &[
-            "units", "progress", "accuracy", "numerics", "design", "field", "coil", "map", "shape",
-            "lambda", "bundle", "plot", "job",
+            "lambda", "bundle", "plot", "report", "job",
         ],
     ),
     (

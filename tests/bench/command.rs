@@ -30,20 +30,81 @@ fn a_stage_is_measured_and_told_as_json() {
     assert_eq!(told["stages"][0]["stage"], "inductance");
     let rows = &told["stages"][0]["curves"][0]["rows"];
     assert_eq!(rows.as_array().unwrap().len(), 3);
-    // The default folder holds the same, warnings aside.
-    let written = std::fs::read(folder.path().join("results/bench/bench.json")).unwrap();
+    // A part of the curves leaves the tables of a whole run alone; the same is written, warnings aside.
+    assert!(!folder.path().join("results/bench").exists());
+    let written = std::fs::read(folder.path().join("results/bench-part/bench.json")).unwrap();
     let written: serde_json::Value = serde_json::from_slice(&written).unwrap();
     assert_eq!(written["stages"], told["stages"]);
     let human = bench(folder.path(), &[&stage[..], &["--out", "b"]].concat());
     let said = String::from_utf8(human.stdout).unwrap();
     assert!(
-        said.contains("mutual inductance") && said.contains("summary.md"),
+        said.contains("mutual inductance") && said.contains("report.html"),
         "{said}"
     );
     assert_eq!(
         bench(folder.path(), &["--stage", "moons"]).status.code(),
         Some(2)
     );
+}
+
+#[test]
+fn only_a_whole_run_goes_where_its_tables_are_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    // What is there already and is no output of ours stops a run before it measures anything.
+    let kept = ["results/bench", "results/bench-part"].map(|at| folder.path().join(at));
+    for at in &kept {
+        std::fs::create_dir_all(at).unwrap();
+        std::fs::write(at.join("bench.json"), "mine").unwrap();
+    }
+    let refused = |arguments: &[&str]| {
+        let output = bench(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(4), "{arguments:?} {output:?}");
+        let said = String::from_utf8_lossy(&output.stderr).replace(['\n', ' '], "");
+        (
+            said.contains("results/bench/bench.json"),
+            said.contains("results/bench-part/bench.json"),
+        )
+    };
+    assert_eq!(refused(&[]), (true, false));
+    for part in [
+        &["--quick"][..],
+        &["--peers"],
+        &["--scaling"],
+        &["--stage", "replay"],
+    ] {
+        assert_eq!(refused(part), (false, true), "{part:?}");
+    }
+    assert_eq!(
+        refused(&["--quick", "--out", "results/bench"]),
+        (true, false)
+    );
+    for at in &kept {
+        assert_eq!(std::fs::read(at.join("bench.json")).unwrap(), b"mine");
+    }
+}
+
+#[test]
+fn the_catalogue_is_written_where_asked_and_nowhere_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let asked = ["--extreme", "--case", "wires: wound of 0.7 mm"];
+    let without = bench(folder.path(), &asked);
+    assert!(without.status.success(), "{without:?}");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    let with = [&asked[..], &["--out", "c"]].concat();
+    for _ in 0..2 {
+        let run = bench(folder.path(), &with);
+        assert!(run.status.success(), "{run:?}");
+    }
+    let read = |name: &str| std::fs::read_to_string(folder.path().join("c").join(name)).unwrap();
+    let told: serde_json::Value = serde_json::from_str(&read("extreme.json")).unwrap();
+    assert_eq!(told["cases"].as_array().unwrap().len(), 1);
+    assert_eq!(read("extreme.csv").lines().count(), 2);
+    assert!(read("report.html").contains("1 of 1 case at the limits"));
+    // Another's page is not replaced.
+    std::fs::create_dir(folder.path().join("d")).unwrap();
+    std::fs::write(folder.path().join("d/report.html"), "mine").unwrap();
+    let other = bench(folder.path(), &[&asked[..], &["--out", "d"]].concat());
+    assert_eq!(other.status.code(), Some(4), "{other:?}");
 }
 
 #[test]

@@ -134,7 +134,8 @@ fn the_files_tell_the_same_and_fit_their_schema() {
         );
         assert!(file.accuracy.contains_key(stage));
     }
-    assert_eq!(file.files.len(), 2 + stages.len());
+    assert_eq!(file.files.len(), 3 + stages.len());
+    assert!(read("report.html").contains("Error against processor time"));
     let text = read("summary.md");
     assert!(text.contains(&defaults(&file)) && text == markdown(&file));
     assert!(defaults(&file).contains("| air-field: vectorised rule"));

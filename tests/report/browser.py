@@ -181,7 +181,7 @@ def check(page):
         )
         expect(f"{width}: the pictures hold many colours", painted)
     browser.open(page)
-    for selector, unit in [("#draw-path svg[role]", "mN"), ("#draw-currents svg[role]", " A"), ("#draw-errors canvas", "mN"), ("#draw-field canvas", "T/m"), ("#draw-turn canvas", "mm")]:
+    for selector, unit in [("#draw-path svg[role]", "mN"), ("#draw-currents svg[role]", " A"), ("#draw-errors canvas", "mN"), ("#draw-field canvas", "T/m"), ("#draw-turn canvas", "mm"), ("#draw-cost svg[role]", "CPU time: "), ("#draw-stage-0 svg[role]", "CPU time: "), ("#draw-stage-4 svg[role]", "quartiles: ")]:
         if not browser.value(f"!!document.querySelector({selector!r})"):
             continue
         browser.mouse("mouseMoved", *browser.middle(selector))
@@ -198,6 +198,14 @@ def check(page):
         first = browser.tip()
         browser.key("ArrowRight")
         expect("arrow keys read the path", "N/m" in first and browser.tip() not in ("", first))
+    for place in ["cost", "stage-0"]:
+        if browser.value(f"!!document.querySelector('#draw-{place}')"):
+            browser.value(f"document.querySelector('#draw-{place} svg[role]').focus()")
+            browser.settle()
+            browser.key("Home")
+            first = browser.tip()
+            browser.key("ArrowRight")
+            expect(f"arrow keys go from point to point of {place}", "error: " in first and browser.tip() not in ("", first))
     if browser.value("!!document.querySelector('#draw-turn')"):
         turns(browser, expect)
     if browser.value("!!document.querySelector('#draw-field')"):

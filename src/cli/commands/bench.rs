@@ -1,5 +1,7 @@
 //! Arguments and summary of `bench`.
 
+use std::path::PathBuf;
+
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 
@@ -7,6 +9,7 @@ use super::{begin, folder};
 use crate::bench::extreme::{self, Case, Catalogue};
 use crate::bench::pace::Pace;
 use crate::bench::stages::STAGES;
+use crate::bench::written::{check_catalogue, write_catalogue};
 use crate::bench::{BenchRequest, run, scaling};
 use crate::bundle::bench::{BenchFile, Row};
 use crate::bundle::json::to_json;
@@ -26,12 +29,13 @@ use crate::progress::Progress;
 /// hardness of its problem) and measures the error against a reference of another kind and the
 /// processor time on one thread: a warm-up, repeats, their median and quartiles. Nothing is read:
 /// designs and reference values are part of the program. Writes bench.csv, bench.json, a picture
-/// a stage and summary.md. --peers measures other programs on the same problems, run by the Python
+/// a stage, summary.md and report.html, a page to look at. --peers measures other programs on the same problems, run by the Python
 /// that FLUXFORM_PYTHON names (several as in PATH), from the repository's root. --scaling measures
 /// time and memory against size, and says where a stage would break.
 ///
 /// --extreme runs the stability catalogue instead: named cases at the limits of what may be asked,
-/// each with what must come out and a bound. Code 5 if one fails.
+/// each with what must come out and a bound; --out writes extreme.csv, extreme.json and
+/// report.html. Code 5 if one fails.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Pages, &[
     ("fluxform bench --quick --stage air-field --out air", "one stage, in a second"),
@@ -53,20 +57,25 @@ pub struct Bench {
     #[arg(long)]
     scaling: bool,
     /// Run the stability catalogue; with --quick the part of it that every change runs
-    #[arg(long, conflicts_with_all = ["stage", "peers", "scaling", "out"])]
+    #[arg(long, conflicts_with_all = ["stage", "peers", "scaling"])]
     extreme: bool,
     /// Of the catalogue only cases whose name holds this
     #[arg(long, value_name = "TEXT", requires = "extreme")]
     case: Option<String>,
-    /// Folder of the results
-    #[arg(long, value_name = "DIR", default_value = "results/bench")]
-    out: FileArgument,
+    /// Folder of the results; without it results/bench for a whole run, results/bench-part for
+    /// one with --quick, --stage, --peers or --scaling, and none with --extreme
+    #[arg(long, value_name = "DIR")]
+    out: Option<FileArgument>,
     #[command(flatten)]
     writing: Writing,
     /// One row of --scaling, as STAGE:AXIS:SETTING:THREADS, in this process
     #[arg(long, hide = true, value_name = "ROW", value_parser = size_row)]
     size_row: Option<SizeRowArgument>,
 }
+
+/// Where a whole run goes without `--out`, and any other.
+const WHOLE: &str = "results/bench";
+const PART: &str = "results/bench-part";
 
 /// What a process of its own measures.
 #[derive(Debug, Clone)]
@@ -117,7 +126,7 @@ impl Bench {
             stages: self.stage.clone(),
             peers: self.peers,
             scaling: self.scaling,
-            out: folder(&self.out)?,
+            out: self.folder()?,
             force: self.writing.force,
         };
         let bar = begin(printer);
@@ -134,6 +143,16 @@ impl Bench {
 }
 
 impl Bench {
+    /// Tables of a whole run are kept and compared: what measures less, or more, goes elsewhere
+    /// unless `--out` says where.
+    fn folder(&self) -> Result<PathBuf, Failure> {
+        let whole = !(self.quick || self.peers || self.scaling) && self.stage.is_empty();
+        match &self.out {
+            Some(out) => folder(out),
+            None => Ok(PathBuf::from(if whole { WHOLE } else { PART })),
+        }
+    }
+
     fn catalogue(&self, printer: &Printer) -> Result<(), Failure> {
         let named = |name: &str| self.case.as_ref().is_none_or(|text| name.contains(text));
         let cases: Vec<Case> = extreme::cases()
@@ -146,10 +165,17 @@ impl Bench {
                 "no case of the catalogue is called {text:?}; without --case all are run"
             )));
         }
+        let out = self.out.as_ref().map(folder).transpose()?;
+        if let Some(out) = &out {
+            check_catalogue(out, self.writing.force)?;
+        }
         let bar = begin(printer);
         let rows = extreme::run(&cases, &bar);
         bar.check().map_err(JobError::from)?;
         drop(bar);
+        if let Some(out) = &out {
+            write_catalogue(&rows, out, self.writing.force)?;
+        }
         let table = Catalogue { cases: rows };
         printer.summary(Place::Output, &table, || told_cases(&table.cases))?;
         let failed: Vec<&str> = (table.cases.iter())

@@ -2,7 +2,7 @@
 
 use std::io;
 
-use super::NeededMap;
+use super::{NeededMap, recorded};
 use crate::bundle::lambda_file::LambdaFile;
 use crate::bundle::manifest::Manifest;
 use crate::bundle::table::{Column, write_columns};
@@ -47,6 +47,8 @@ pub(super) struct Seen<'a> {
     pub(super) picture: &'a LambdaPlot,
     pub(super) needed: &'a NeededMap,
     pub(super) manifest: &'a Manifest,
+    /// That of the field.
+    pub(super) tolerance: f64,
 }
 
 /// Names and contents of the page and the plots, in the order of the manifest.
@@ -131,8 +133,7 @@ fn facts<'a>(seen: &'a Seen, files: Vec<&'a str>) -> BundleFacts<'a> {
         field: field(seen),
         warnings: &seen.lambda.warnings,
         files,
-        // Measured tables are not part of a bundle's inputs.
-        error_time: None,
+        error_time: recorded::curve(scene, seen.tolerance),
     }
 }
 

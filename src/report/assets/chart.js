@@ -2,7 +2,8 @@
 
 const DASHES = ["", "6 3", "2 3", "8 3 2 3"];
 
-// series: {name, unit, x, y, colour, dash, width, right}; marks: {x, name, chosen}.
+// series: {name, unit, x, y, colour, dash, width, right, dots, rings, tell}; marks: {x, name, chosen}.
+// Where series tell(k) lines of their points, the cursor goes from point to point.
 function chart(place, spec) {
   const shown = place.dataset.what;
   let at = null;
@@ -13,16 +14,16 @@ function chart(place, spec) {
     const width = Math.max(280, place.clientWidth);
     const height = Math.round(Math.min(340, Math.max(250, width * 0.6)));
     const right = spec.series.some((one) => one.right);
-    const pad = { left: 52, right: right ? 50 : 14, top: 10 + marksRoom(width), bottom: 40 };
+    const pad = { left: spec.log ? 62 : 52, right: right ? 50 : 14, top: 10 + marksRoom(width), bottom: 40 };
     const inner = { w: width - pad.left - pad.right, h: height - pad.top - pad.bottom };
     const log = spec.log === true;
     const of = (v) => (log ? Math.log10(v) : v);
-    const [x0, x1] = spec.xRange || widened(range(spec.series.flatMap((s) => Array.from(s.x, of))));
+    const [x0, x1] = spec.xRange || (log ? decades : widened)(range(spec.series.flatMap((s) => Array.from(s.x, of))));
     const ends = [false, true].map((side) => {
       const all = spec.series.filter((one) => Boolean(one.right) === side);
       const values = all.flatMap((one) => Array.from(one.y, of).filter(Number.isFinite));
       const [lo, hi] = range(values);
-      return log ? widened([lo, hi]) : [Math.min(0, lo * 1.05), hi > 0 ? hi * 1.06 : 1];
+      return log ? decades([lo, hi]) : [Math.min(0, lo * 1.05), hi > 0 ? hi * 1.06 : 1];
     });
     const px = (v) => pad.left + ((of(v) - x0) / (x1 - x0)) * inner.w;
     const py = (v, side) => {
@@ -73,9 +74,23 @@ function chart(place, spec) {
       for (const k of one.dots || []) {
         add(lines, "circle", { class: "dot", cx: px(one.x[k]), cy: py(one.y[k], one.right), r: 3, stroke: `var(${one.colour})` });
       }
+      for (const k of one.rings || []) {
+        add(lines, "circle", { class: "ring", cx: px(one.x[k]), cy: py(one.y[k], one.right), r: 7 });
+      }
     }
     const cursor = add(svg, "line", { class: "cursor", y1: pad.top, y2: pad.top + inner.h, visibility: "hidden" });
-    listen(svg, cursor, px, pad, inner, [x0, x1], unlog);
+    if (spec.series.some((one) => one.tell)) {
+      const spot = add(svg, "circle", { class: "spot", r: 5, visibility: "hidden" });
+      pointwise(svg, spot, px, py, pad.left + inner.w + pad.right);
+    } else {
+      listen(svg, cursor, px, pad, inner, [x0, x1], unlog);
+    }
+  }
+
+  // Whole powers of ten around logarithms, so that every axis has two ticks at least.
+  function decades([lo, hi]) {
+    const [from, to] = [Math.floor(lo), Math.ceil(hi)];
+    return [from, to > from ? to : from + 1];
   }
 
   function widened([lo, hi]) {
@@ -117,10 +132,14 @@ function chart(place, spec) {
   }
 
   function marks(svg, px, pad, inner) {
-    for (const { one, x, row, middle } of rowsOfMarks(px, pad.left + inner.w + pad.right)) {
-      const y = pad.top - 7 - 15 * row;
-      add(svg, "line", { class: one.chosen ? "mark chosen" : "mark", x1: x, x2: x, y1: y + 3, y2: pad.top + inner.h });
-      add(svg, "text", { class: one.chosen ? "name" : "", x: middle, y, "text-anchor": "middle" }, one.name);
+    const all = rowsOfMarks(px, pad.left + inner.w + pad.right);
+    for (const { one, x, row } of all) {
+      const y = pad.top - 4 - 15 * row;
+      add(svg, "line", { class: one.chosen ? "mark chosen" : "mark", x1: x, x2: x, y1: y, y2: pad.top + inner.h });
+    }
+    // Names last, each on ground of its own: a line to a higher name may pass behind it.
+    for (const { one, row, middle } of all) {
+      add(svg, "text", { class: one.chosen ? "name over" : "over", x: middle, y: pad.top - 7 - 15 * row, "text-anchor": "middle" }, one.name);
     }
   }
 
@@ -163,6 +182,43 @@ function chart(place, spec) {
       if (steps[event.key] === undefined) return;
       event.preventDefault();
       show((at ?? near(px(spec.start ?? unlog((x0 + x1) / 2)))) + steps[event.key], undefined, true);
+    });
+  }
+
+  // The point nearest to the pointer, of all series that tell theirs; keys go through them in order.
+  function pointwise(svg, spot, px, py, width) {
+    const all = spec.series.flatMap((one) => (one.tell ? Array.from(one.x, (v, k) => ({ one, k, x: px(v), y: py(one.y[k], one.right) })) : []));
+    const show = (k, aloud) => {
+      at = Math.max(0, Math.min(all.length - 1, k));
+      const { one, k: row, x, y } = all[at];
+      spot.setAttribute("cx", x);
+      spot.setAttribute("cy", y);
+      spot.setAttribute("visibility", "visible");
+      const frame = svg.getBoundingClientRect();
+      const scale = frame.width / width;
+      showTip([one.name, ...one.tell(row)], frame.left + x * scale, frame.top + y * scale, aloud);
+    };
+    const hide = () => {
+      spot.setAttribute("visibility", "hidden");
+      hideTip();
+    };
+    const move = (event) => {
+      const frame = svg.getBoundingClientRect();
+      const scale = width / frame.width;
+      const [x, y] = [(event.clientX - frame.left) * scale, (event.clientY - frame.top) * scale];
+      const off = (p) => Math.hypot(p.x - x, p.y - y);
+      if (all.length) show(all.reduce((best, p, k) => (off(p) < off(all[best]) ? k : best), 0), false);
+    };
+    svg.addEventListener("pointermove", move);
+    svg.addEventListener("pointerdown", move);
+    svg.addEventListener("pointerleave", hide);
+    svg.addEventListener("blur", hide);
+    svg.addEventListener("keydown", (event) => {
+      const steps = { ArrowLeft: -1, ArrowRight: 1, PageUp: -20, PageDown: 20, Home: -1e9, End: 1e9 };
+      if (event.key === "Escape") hide();
+      if (steps[event.key] === undefined || !all.length) return;
+      event.preventDefault();
+      show((at ?? -1) + steps[event.key], true);
     });
   }
 

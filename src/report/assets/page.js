@@ -104,18 +104,44 @@ own("field", (place) => {
   return draw;
 });
 
+function seconds(value) {
+  const [unit, factor] = [["s", 1], ["ms", 1e3], ["\u00b5s", 1e6], ["ns", 1e9]].find(([, f]) => value * f >= 1) || ["ns", 1e9];
+  return `${say(value * factor, 3)} ${unit}`;
+}
+
+// A measured curve; an error that is no more than rounding is drawn at 1e-17.
+function measured(one, colour, more) {
+  const [error, time, low, high] = [one.error, one.seconds, one.low, one.high].map((packed) => packed && numbers(packed));
+  const name = one.unit ? `, ${one.unit}` : "";
+  return {
+    name: one.name, unit: "", x: time, y: error.map((e) => Math.max(e, 1e-17)), colour, rings: one.rings,
+    dots: Array.from(error, (_, k) => k), ...more,
+    tell: (k) => [
+      `${one.knobName}: ${say(one.knob[k], 6)}${one.rings.includes(k) ? ` (${one.ringed})` : ""}`,
+      `error: ${say(error[k], 3)}${name}`,
+      `CPU time: ${seconds(time[k])}`,
+      ...(low ? [`quartiles: ${seconds(low[k])} to ${seconds(high[k])}`] : []),
+    ],
+  };
+}
+
 own("cost", (place) => {
   const c = data.cost;
-  const rows = Array.from(numbers(c.seconds), (s, k) => [s, numbers(c.error)[k]]).filter((r) => r[0] > 0 && r[1] > 0).sort((a, b) => a[0] - b[0]);
-  const [x, y] = [rows.map((r) => r[0]), rows.map((r) => r[1])];
+  const curve = measured(c.curve, "--c0", { width: 2.2 });
+  const [from, to] = range(curve.x);
   return chart(place, {
-    xName: "CPU time", xUnit: "s", xLabel: "CPU time / s", yLabel: "error", log: true,
+    xLabel: "CPU time / s", yLabel: "relative error", log: true,
     series: [
-      { name: c.stage, unit: "", x, y, colour: "--c0", width: 2.2, dots: x.map((_, k) => k) },
-      { name: "this run's tolerance", unit: "", x: [x[0], x[x.length - 1]], y: [c.tolerance, c.tolerance], colour: "--c1", dash: DASHES[1] },
+      curve,
+      { name: "this run's tolerance", unit: "", x: [from, to], y: [c.tolerance, c.tolerance], colour: "--c1", dash: DASHES[1] },
     ],
   });
 });
+
+(data.stages || []).forEach((stage, number) => own(`stage-${number}`, (place) => chart(place, {
+  xLabel: "CPU time / s", yLabel: stage.label, log: true,
+  series: stage.curves.map((one, k) => measured(one, `--c${k % 9}`, { dash: one.peer ? DASHES[1] : "", width: one.peer ? 1.6 : 2.2 })),
+})));
 
 function drawAll() {
   for (const draw of drawings) draw();

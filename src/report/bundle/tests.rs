@@ -7,6 +7,7 @@ use crate::report::data::{
     LimitFacts, StageFacts, WorstPlace,
 };
 use crate::report::field::{Field, Layer};
+use crate::report::measured::{MeasuredCurve, MeasuredRow};
 use crate::report::surface::Surface;
 
 const HOSTILE: &str = "</script><img src=x onerror=alert(1)>\u{202e}\u{0}\"'&<!--";
@@ -25,7 +26,18 @@ fn plot() -> LambdaPlot {
     }
 }
 
-fn facts<'a>(plot: &'a LambdaPlot, rows: &'a [(f64, f64)], notes: &'a [String]) -> BundleFacts<'a> {
+fn measured((error, seconds): &(f64, f64)) -> MeasuredRow {
+    MeasuredRow {
+        knob: *error,
+        marked: *error < 1e-4,
+        error: *error,
+        stated: None,
+        seconds: *seconds,
+        quartiles_s: [*seconds, *seconds],
+    }
+}
+
+fn facts<'a>(plot: &'a LambdaPlot, rows: &[(f64, f64)], notes: &'a [String]) -> BundleFacts<'a> {
     let coil = |x: f64, current_a: f64| CoilFacts {
         axis_m: [x, 0.0],
         radius_m: 0.019,
@@ -113,9 +125,17 @@ fn facts<'a>(plot: &'a LambdaPlot, rows: &'a [(f64, f64)], notes: &'a [String]) 
         warnings: notes,
         files: vec![HOSTILE],
         error_time: Some(ErrorTime {
-            stage: HOSTILE,
-            rows,
+            curve: MeasuredCurve {
+                name: HOSTILE.to_owned(),
+                knob: HOSTILE,
+                peer: false,
+                rows: rows.iter().map(measured).collect(),
+            },
+            timed: HOSTILE,
+            error_of: HOSTILE,
             tolerance: 1e-4,
+            version: HOSTILE,
+            machine: HOSTILE,
         }),
     }
 }
