@@ -1,0 +1,1 @@
+//! What broke, each by its name.
