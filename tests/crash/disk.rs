@@ -82,7 +82,10 @@ pub fn small_disk(prepared: &Prepared, steps: usize, dice: &mut Dice) -> Result<
         fs::rename(place.path().join("first"), place.out()).unwrap();
         let found = prepared.survived_as_it_is(&place)?;
         if found.temporary + found.put_aside + found.empty_folders > 0 {
-            return Err(format!("{found:?} left on a disk of {size} pages: {}", ran.said));
+            return Err(format!(
+                "{found:?} left on a disk of {size} pages: {}",
+                ran.said
+            ));
         }
         let again = Ran {
             code: text("code_again").trim().parse().ok(),
@@ -211,7 +214,10 @@ impl Somebody {
             open(&place.out());
             ran.ends(if run == 1 { &[4] } else { &[0, 4] })?;
             if ran.code == Some(4) && !ran.said.contains("read-only or belongs to someone else") {
-                return Err(format!("does not tell that the folder is closed: {}", ran.said));
+                return Err(format!(
+                    "does not tell that the folder is closed: {}",
+                    ran.said
+                ));
             }
             row.struck += usize::from(ran.code == Some(4));
             let found = prepared.survived_as_it_is(&place)?;

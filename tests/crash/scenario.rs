@@ -16,11 +16,25 @@ pub struct Scenario {
     pub args: &'static [&'static str],
 }
 
-const CALIBRATE: &[&str] = &["calibrate", "two.toml", "bump.toml", "ramp.toml", "--out", "out"];
+const CALIBRATE: &[&str] = &[
+    "calibrate",
+    "two.toml",
+    "bump.toml",
+    "ramp.toml",
+    "--out",
+    "out",
+];
 const MAP: &[&str] = &["map", "air.toml", "--csv", "--vtk", "--out", "out"];
 const PLAN: &[&str] = &[
-    "sweep", "plan", "air.toml", "--set", "wire.diameter_mm=0.5:0.8:0.05", "--set",
-    "coil.outer_diameter_mm=26:38:2", "--out", "plan.json",
+    "sweep",
+    "plan",
+    "air.toml",
+    "--set",
+    "wire.diameter_mm=0.5:0.8:0.05",
+    "--set",
+    "coil.outer_diameter_mm=26:38:2",
+    "--out",
+    "plan.json",
 ];
 const SWEEP: &[&str] = &["sweep", "run", "plan.json", "--out", "out"];
 
@@ -34,7 +48,14 @@ pub const MAIN: &[Scenario] = &[
     Scenario {
         name: "calibrate over older bundles",
         before: &[&[
-            "calibrate", "two.toml", "bump.toml", "ramp.toml", "--out", "out", "--criterion", "linear",
+            "calibrate",
+            "two.toml",
+            "bump.toml",
+            "ramp.toml",
+            "--out",
+            "out",
+            "--criterion",
+            "linear",
         ]],
         args: CALIBRATE,
     },
@@ -50,7 +71,15 @@ pub const MAIN: &[Scenario] = &[
     },
     Scenario {
         name: "map over an older one",
-        before: &[&["map", "air.toml", "--csv", "--out", "out", "--components", "all"]],
+        before: &[&[
+            "map",
+            "air.toml",
+            "--csv",
+            "--out",
+            "out",
+            "--components",
+            "all",
+        ]],
         args: MAP,
     },
 ];
@@ -70,16 +99,32 @@ pub const MORE: &[Scenario] = &[
     Scenario {
         name: "replay --out",
         before: &[&[
-            "calibrate", "air.toml", "bump.toml", "--out", "bundles", "--no-report",
+            "calibrate",
+            "air.toml",
+            "bump.toml",
+            "--out",
+            "bundles",
+            "--no-report",
         ]],
         args: &[
-            "replay", "bundles/air/bump", "finger.csv", "--out", "out/replay.csv",
+            "replay",
+            "bundles/air/bump",
+            "finger.csv",
+            "--out",
+            "out/replay.csv",
         ],
     },
     Scenario {
         name: "sweep merge",
         before: &[PLAN, &["sweep", "run", "plan.json", "--out", "points"]],
-        args: &["sweep", "merge", "plan.json", "points", "--out", "out/sweep.csv"],
+        args: &[
+            "sweep",
+            "merge",
+            "plan.json",
+            "points",
+            "--out",
+            "out/sweep.csv",
+        ],
     },
 ];
 
@@ -94,6 +139,7 @@ core = { below_mm = 7.0, relative_permeability = 1300.0 }
 array = { rows = 1, columns = 2, pitch_mm = 43.0 }
 magnet = { diameter_mm = 10.0, length_mm = 10.0, magnetization_a_per_m = 1.1579e6 }
 supply = { current_max_a = 1.3, voltage_v = 36.0 }
+target = { height_mm = 30.0 }
 [workspace]
 x_mm = [-40.0, 40.0, 9]
 y_mm = [-30.0, 30.0, 9]
@@ -141,7 +187,10 @@ pub fn inputs() -> Place {
     place.write("air.toml", AIR);
     // The same name and so the same folder, other numbers.
     place.write("other.toml", &TWO.replace("1300.0", "700.0"));
-    place.write("other_air.toml", &AIR.replace("length_mm = 70.0", "length_mm = 77.0"));
+    place.write(
+        "other_air.toml",
+        &AIR.replace("length_mm = 70.0", "length_mm = 77.0"),
+    );
     place.write("bump.toml", BUMP);
     place.write("ramp.toml", RAMP);
     let path = (0..700).map(|i| {
@@ -149,7 +198,10 @@ pub fn inputs() -> Place {
         let (x, y) = (0.009 * (7.0 * t).cos(), 0.009 * (9.1 * t).sin());
         format!("{t},{x},{y},0.047\n")
     });
-    place.write("finger.csv", &format!("t_s,x_m,y_m,z_m\n{}", path.collect::<String>()));
+    place.write(
+        "finger.csv",
+        &format!("t_s,x_m,y_m,z_m\n{}", path.collect::<String>()),
+    );
     place
 }
 
@@ -245,7 +297,11 @@ impl Prepared {
                 }
                 let there = now.get(path);
                 let timing = file_name(path).starts_with("timing");
-                let same = if timing { there.is_some() } else { there == Some(bytes) };
+                let same = if timing {
+                    there.is_some()
+                } else {
+                    there == Some(bytes)
+                };
                 if !same && file_name(path) != NOTES {
                     return Err(format!("{manifest} is there, but {path} is not"));
                 }
@@ -345,7 +401,9 @@ pub fn same(now: &Tree, wanted: &Tree) -> Result<(), String> {
 fn bundles(tree: &Tree) -> Vec<String> {
     let ours = |path: &&String| {
         file_name(path) == "manifest.json"
-            && !path.split('/').any(|part| is_temporary(part) || part.ends_with(".fluxform-old"))
+            && !path
+                .split('/')
+                .any(|part| is_temporary(part) || part.ends_with(".fluxform-old"))
     };
     tree.keys().filter(ours).cloned().collect()
 }
@@ -361,7 +419,9 @@ fn file_name(path: &str) -> &str {
 /// The path a file had before its folder was put aside.
 fn put_back(path: &str) -> String {
     let back = |part: &str| {
-        let inner = part.strip_prefix('.').and_then(|rest| rest.strip_suffix(".fluxform-old"));
+        let inner = part
+            .strip_prefix('.')
+            .and_then(|rest| rest.strip_suffix(".fluxform-old"));
         inner.unwrap_or(part).to_owned()
     };
     path.split('/').map(back).collect::<Vec<_>>().join("/")

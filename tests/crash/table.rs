@@ -10,6 +10,8 @@ pub struct Row {
     pub runs: usize,
     /// Runs that did not come to their end.
     pub struck: usize,
+    /// Runs after which the same command, undisturbed, ended well and left what it always leaves.
+    pub again: usize,
     /// What lay there afterwards.
     pub found: Found,
 }
@@ -21,6 +23,7 @@ impl Row {
             disturbance: disturbance.to_owned(),
             runs: 0,
             struck: 0,
+            again: 0,
             found: Found::default(),
         }
     }
@@ -28,32 +31,53 @@ impl Row {
     /// A run after which all was as it must be.
     pub fn add(&mut self, found: Found) {
         self.runs += 1;
+        self.again += 1;
         self.found += found;
     }
 }
 
-/// The rows in Markdown.
+/// The rows in Markdown, one for each way of disturbing: commands are added up.
 pub fn markdown(rows: &[Row]) -> String {
-    let mut text = "| command | disturbed by | runs | cut short | files whole | temporary left, cleared | \
-                    bundles verified | rerun equal |\n|---|---|---|---|---|---|---|---|\n"
-        .to_owned();
+    let mut text =
+        "| disturbed by | runs | cut short | files, all whole | temporary, all cleared | \
+                    bundles, all verify | reruns, all equal |\n|---|---|---|---|---|---|---|\n"
+            .to_owned();
+    let mut ways: Vec<Row> = Vec::new();
     for row in rows {
-        let Found {
-            whole,
-            temporary,
-            put_aside,
-            bundles,
-            ..
-        } = row.found;
-        text += &format!(
-            "| `{}` | {} | {} | {} | {whole} of {whole} | {} | {bundles} | {} |\n",
-            row.command,
-            row.disturbance,
-            row.runs,
-            row.struck,
-            temporary + put_aside,
-            row.runs
-        );
+        let known = ways
+            .iter()
+            .position(|way| way.disturbance == row.disturbance);
+        let at = known.unwrap_or_else(|| {
+            ways.push(Row::new("", &row.disturbance));
+            ways.len() - 1
+        });
+        ways[at].runs += row.runs;
+        ways[at].struck += row.struck;
+        ways[at].again += row.again;
+        ways[at].found += row.found;
+    }
+    for way in &ways {
+        text += &format!("| {} | {}\n", way.disturbance, figures(way));
     }
     text
+}
+
+/// One row, its command first.
+pub fn line(row: &Row) -> String {
+    format!("| {}: {} | {}", row.command, row.disturbance, figures(row))
+}
+
+fn figures(row: &Row) -> String {
+    let Found {
+        whole,
+        temporary,
+        put_aside,
+        bundles,
+        ..
+    } = row.found;
+    let left = temporary + put_aside;
+    format!(
+        "{} | {} | {whole} | {left} | {bundles} | {} |",
+        row.runs, row.struck, row.again
+    )
 }

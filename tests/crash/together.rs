@@ -6,7 +6,7 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use crate::place::{Dice, Place, Ran, Tree, after_changes, changes};
-use crate::scenario::{Prepared, Scenario, inputs, same};
+use crate::scenario::{Prepared, inputs, same};
 use crate::table::Row;
 
 /// The same command twice at once: both end well.
@@ -15,7 +15,9 @@ pub fn same_inputs(prepared: &Prepared, runs: usize, dice: &mut Dice) -> Result<
     for _ in 0..runs {
         let place = prepared.fresh();
         let one = place.command(prepared.scenario.args).spawn().unwrap();
-        sleep(Duration::from_secs_f64(0.3 * prepared.seconds * dice.part()));
+        sleep(Duration::from_secs_f64(
+            0.3 * prepared.seconds * dice.part(),
+        ));
         let two = place.run(prepared.scenario.args);
         let one = Ran::of(one.wait_with_output().unwrap());
         one.ends(&[0])?;
@@ -39,8 +41,24 @@ pub struct Rivals {
 pub const RIVALS: &[Rivals] = &[
     Rivals {
         name: "calibrate",
-        one: &["calibrate", "two.toml", "bump.toml", "ramp.toml", "--out", "out", "--no-report"],
-        two: &["calibrate", "other.toml", "bump.toml", "ramp.toml", "--out", "out", "--no-report"],
+        one: &[
+            "calibrate",
+            "two.toml",
+            "bump.toml",
+            "ramp.toml",
+            "--out",
+            "out",
+            "--no-report",
+        ],
+        two: &[
+            "calibrate",
+            "other.toml",
+            "bump.toml",
+            "ramp.toml",
+            "--out",
+            "out",
+            "--no-report",
+        ],
         units: &["two/bump/", "two/ramp/"],
     },
     Rivals {
@@ -66,7 +84,12 @@ pub const RIVALS: &[Rivals] = &[
 fn rival_inputs() -> Result<Place, String> {
     let place = inputs();
     for (design, plan) in [("air.toml", "plan.json"), ("other_air.toml", "other.json")] {
-        let set = ["--set", "wire.diameter_mm=0.5:0.8:0.05", "--set", "coil.outer_diameter_mm=26:38:2"];
+        let set = [
+            "--set",
+            "wire.diameter_mm=0.5:0.8:0.05",
+            "--set",
+            "coil.outer_diameter_mm=26:38:2",
+        ];
         let args = [&["sweep", "plan", design][..], &set, &["--out", plan]].concat();
         place.run(&args).ends(&[0])?;
     }
@@ -107,7 +130,10 @@ pub fn other_inputs(rivals: &Rivals, runs: usize, dice: &mut Dice) -> Result<Row
         if !(forced && rivals.name == "sweep run") {
             unmixed(&now, &alone, rivals.units)?;
         }
-        row.struck += [&one, &two].iter().filter(|ran| ran.code == Some(4)).count();
+        row.struck += [&one, &two]
+            .iter()
+            .filter(|ran| ran.code == Some(4))
+            .count();
         row.runs += 1;
         row.found.whole += now.len();
     }
@@ -136,7 +162,10 @@ fn unmixed(now: &Tree, alone: &[Tree], units: &[&str]) -> Result<(), String> {
 
 /// SIGINT and SIGTERM at random moments: what was finished is kept, nothing else is left.
 pub fn asked_to_stop(prepared: &Prepared, runs: usize, dice: &mut Dice) -> Result<Row, String> {
-    let mut row = Row::new(prepared.scenario.name, "SIGINT or SIGTERM at a random moment");
+    let mut row = Row::new(
+        prepared.scenario.name,
+        "SIGINT or SIGTERM at a random moment",
+    );
     let changed = {
         let place = prepared.fresh();
         let mut child = place.command(prepared.scenario.args).spawn().unwrap();
@@ -154,7 +183,9 @@ pub fn asked_to_stop(prepared: &Prepared, runs: usize, dice: &mut Dice) -> Resul
         }
         let signal = ["-INT", "-TERM"][run % 2];
         // A program that has ended takes no signal.
-        let _ = Command::new("kill").args([signal, &child.id().to_string()]).output();
+        let _ = Command::new("kill")
+            .args([signal, &child.id().to_string()])
+            .output();
         let output = child.wait_with_output().unwrap();
         let by_signal = output.status.signal();
         let ran = Ran::of(output);
@@ -167,9 +198,4 @@ pub fn asked_to_stop(prepared: &Prepared, runs: usize, dice: &mut Dice) -> Resul
         row.add(prepared.survived_tidily(&place, &ran)?);
     }
     Ok(row)
-}
-
-/// For the table: what a scenario is called.
-pub fn named<'a>(all: &'a [Scenario], name: &str) -> &'a Scenario {
-    all.iter().find(|scenario| scenario.name == name).unwrap()
 }
