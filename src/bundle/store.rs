@@ -181,7 +181,10 @@ mod tests {
     #[test]
     fn any_changed_or_missing_byte_is_noticed_and_mended() {
         let origin = Origin::default().and_numbers([0.7]);
-        let (_folder, store, file) = kept(&origin);
+        let (folder, store, file) = kept(&origin);
+        let damage = |bytes: &[u8]| {
+            atomic::write_unforced(folder.path(), "steel", bytes).unwrap();
+        };
         let recall = || store.recall::<Vec<f64>>("steel", &origin);
         let whole = std::fs::read(&file).unwrap();
         assert_eq!(recall(), Some(vec![0.7, 1.3]));
@@ -189,13 +192,13 @@ mod tests {
             for bit in 0..8 {
                 let mut bytes = whole.clone();
                 bytes[at] ^= 1 << bit;
-                std::fs::write(&file, bytes).unwrap();
+                damage(&bytes);
                 assert!(recall().is_none() && !store.holds("steel", &origin));
             }
-            std::fs::write(&file, &whole[..at]).unwrap();
+            damage(&whole[..at]);
             assert!(recall().is_none(), "cut at {at}");
         }
-        std::fs::write(&file, [&whole[..], b"x"].concat()).unwrap();
+        damage(&[&whole[..], b"x"].concat());
         assert!(recall().is_none());
         let computed = store.remember::<_, ()>("steel", &origin, || Ok(vec![1.7]));
         assert_eq!(computed, Ok(vec![1.7]));
@@ -226,7 +229,7 @@ mod tests {
     fn what_killed_runs_left_is_cleared_with_the_entries() {
         let (folder, store, _file) = kept(&Origin::default());
         // Killed before the first byte was written: nothing tells whose it was but its name.
-        std::fs::write(folder.path().join(".fluxform-7Xq.tmp"), b"").unwrap();
+        atomic::write_unforced(folder.path(), ".fluxform-7Xq.tmp", b"").unwrap();
         store.clear();
         assert!(!folder.path().exists());
     }
