@@ -78,7 +78,7 @@ pub fn small_disk(prepared: &Prepared, steps: usize, dice: &mut Dice) -> Result<
             return Err(format!("does not tell that the disk is full: {}", ran.said));
         }
         row.struck += usize::from(ran.code == Some(4));
-        fs::remove_dir(place.out()).unwrap();
+        fs::remove_dir_all(place.out()).unwrap();
         fs::rename(place.path().join("first"), place.out()).unwrap();
         let found = prepared.survived_as_it_is(&place)?;
         if found.temporary + found.put_aside + found.empty_folders > 0 {
