@@ -173,9 +173,11 @@ impl Strike {
                 return Err(format!("does not say {words:?}: {}", ran.said));
             }
         }
-        match how {
-            How::Full => prepared.survived_tidily(place, ran),
-            _ => prepared.survived(place),
+        let found = prepared.survived(place)?;
+        // An older folder stays put aside where not even its way back is free.
+        if how == How::Full && found.temporary + found.empty_folders > 0 {
+            return Err(format!("left temporary files: {ran:?}"));
         }
+        Ok(found)
     }
 }
