@@ -1,8 +1,8 @@
 //! Results of earlier runs, kept so that what has not changed is not computed again.
 //!
 //! An entry is one file: the digest of all that its value was computed from, that of the value, and
-//! the value. An entry of other origin, of another build of this program, or damaged is not used, and
-//! is overwritten. A store that cannot be read or written is none: results are the same without it.
+//! the value. An entry of other origin, of another build of this program, made with other vector
+//! instructions (on another machine that shares the folder), or damaged is not used, and is overwritten. A store that cannot be read or written is none: results are the same without it.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -13,6 +13,7 @@ use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 
 use super::atomic::{self, Overwrite};
+use crate::numerics::dispatch;
 
 /// First bytes of every entry.
 const MAGIC: &[u8; 8] = b"fluxkept";
@@ -26,7 +27,9 @@ pub struct Origin(Sha256);
 
 impl Default for Origin {
     fn default() -> Self {
-        Self(Sha256::new()).and(BUILD.as_bytes())
+        Self(Sha256::new())
+            .and(BUILD.as_bytes())
+            .and(dispatch::instructions().as_bytes())
     }
 }
 
@@ -160,4 +163,74 @@ fn write<T: Serialize>(path: &Path, origin: &[u8; DIGEST], value: &T) {
         out.write_all(&Sha256::digest(&bytes))?;
         out.write_all(&bytes)
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A store in a folder of its own with one entry, and that entry's file.
+    fn kept(origin: &Origin) -> (tempfile::TempDir, Store, PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::in_folder(folder.path().to_path_buf());
+        store.keep("steel", origin, &vec![0.7, 1.3]);
+        let file = folder.path().join("steel");
+        (folder, store, file)
+    }
+
+    #[test]
+    fn any_changed_or_missing_byte_is_noticed_and_mended() {
+        let origin = Origin::default().and_numbers([0.7]);
+        let (folder, store, file) = kept(&origin);
+        let damage = |bytes: &[u8]| {
+            atomic::write_unforced(folder.path(), "steel", bytes).unwrap();
+        };
+        let recall = || store.recall::<Vec<f64>>("steel", &origin);
+        let whole = std::fs::read(&file).unwrap();
+        assert_eq!(recall(), Some(vec![0.7, 1.3]));
+        for at in 0..whole.len() {
+            for bit in 0..8 {
+                let mut bytes = whole.clone();
+                bytes[at] ^= 1 << bit;
+                damage(&bytes);
+                assert!(recall().is_none() && !store.holds("steel", &origin));
+            }
+            damage(&whole[..at]);
+            assert!(recall().is_none(), "cut at {at}");
+        }
+        damage(&[&whole[..], b"x"].concat());
+        assert!(recall().is_none());
+        let computed = store.remember::<_, ()>("steel", &origin, || Ok(vec![1.7]));
+        assert_eq!(computed, Ok(vec![1.7]));
+        assert_eq!(recall(), Some(vec![1.7]), "overwritten");
+    }
+
+    #[test]
+    fn another_origin_or_build_is_not_used() {
+        let origin = Origin::default().and_numbers([0.7]);
+        let (_folder, store, _file) = kept(&origin);
+        for other in [
+            Origin::default(),
+            Origin::default().and_numbers([0.7, 0.7]),
+            Origin::default().and_numbers([0.70001]),
+            Origin(Sha256::new())
+                .and(b"another build")
+                .and_numbers([0.7]),
+            Origin(Sha256::new())
+                .and(BUILD.as_bytes())
+                .and(b"other instructions")
+                .and_numbers([0.7]),
+        ] {
+            assert!(store.recall::<Vec<f64>>("steel", &other).is_none());
+        }
+    }
+
+    #[test]
+    fn what_killed_runs_left_is_cleared_with_the_entries() {
+        let (folder, store, _file) = kept(&Origin::default());
+        // Killed before the first byte was written: nothing tells whose it was but its name.
+        atomic::write_unforced(folder.path(), ".fluxform-7Xq.tmp", b"").unwrap();
+        store.clear();
+        assert!(!folder.path().exists());
+    }
 }

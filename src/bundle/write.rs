@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::artefact::{FileEntry, Input};
-use super::atomic::{FileSet, FolderDraft, Overwrite, WriteError, Written, write};
+use super::atomic::{FileSet, FolderDraft, Overwrite, WriteError, Written, listed_files, write};
 use super::consistent;
 use super::json::to_json;
 use super::lambda_file::LambdaFile;
@@ -191,7 +191,9 @@ pub fn write_map_and(
     besides: &[Beside],
 ) -> Result<MapSidecar, WriteError> {
     let mut sidecar = sidecar.clone();
-    let overwrite = Overwrite::new(force, folder.join("map.json"), &sidecar.inputs);
+    let record = folder.join("map.json");
+    let earlier = listed_files(&record);
+    let overwrite = Overwrite::new(force, record, &sidecar.inputs);
     let mut set = FileSet::begin(folder, overwrite)?;
     let mut put =
         |set: &mut FileSet, name: &str, content: &dyn Fn(&mut dyn io::Write) -> io::Result<()>| {
@@ -215,6 +217,13 @@ pub fn write_map_and(
         })?;
         if let Some(name) = name_in(folder, beside.path) {
             sidecar.files.push(entry(&name, written));
+        }
+    }
+    // Of an earlier map no other format may stay beside this one.
+    for name in MAP_FILES {
+        let made = name == "map.json" || sidecar.files.iter().any(|file| file.path == name);
+        if !made && earlier.contains(Path::new(name)) {
+            set.outdate(name)?;
         }
     }
     set.write("map.json", |out| {

@@ -17,12 +17,28 @@ pub trait Kernel {
 #[inline]
 pub fn run<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+    if has_avx2() {
         // SAFETY: both features were found on this processor.
         #[allow(unsafe_code)]
         return unsafe { run_avx2(kernel) };
     }
     kernel.run::<false>()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[inline]
+fn has_avx2() -> bool {
+    is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
+}
+
+/// Which instructions kernels run on here: with others the last bits of their results differ.
+#[must_use]
+pub fn instructions() -> &'static str {
+    #[cfg(target_arch = "x86_64")]
+    if has_avx2() {
+        return "avx2 fma";
+    }
+    "baseline"
 }
 
 #[cfg(target_arch = "x86_64")]

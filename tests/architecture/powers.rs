@@ -72,7 +72,7 @@ const POWERS: &[Power] = &[
     },
     Power {
         name: "ending the process",
-        marks: &["process :: exit", "process :: abort", "ctrlc"],
+        marks: &["process :: exit", "process :: abort", "signal_hook"],
         holders: &["cli/interrupt.rs"],
     },
     Power {

@@ -8,6 +8,7 @@ use sha2::{Digest, Sha256};
 use tempfile::NamedTempFile;
 
 use super::leftovers::{clean_leftovers, temporary_file};
+use super::made::{MadeFolders, made_in};
 use super::{Overwrite, WriteError, Written};
 
 /// Writes of at least this size pass through unbuffered.
@@ -49,12 +50,17 @@ pub fn write(
 ///
 /// All are written first, then renamed in reverse order: the sidecar, staged last because it lists
 /// the digests of the others, is in place first. After a kill between two renames the sidecar
-/// therefore tells that what lies there is ours, and the same command replaces it.
+/// therefore tells that what lies there is ours, and the same command replaces it. Renames are made
+/// under a lock on the folder, so that the files of two runs do not mix.
 #[derive(Debug)]
 pub struct FileSet {
     folder: PathBuf,
     overwrite: Overwrite,
     staged: Vec<(NamedTempFile, PathBuf)>,
+    /// What an earlier set had and this one has not.
+    outdated: Vec<PathBuf>,
+    /// Dropped last: what is still empty then goes again.
+    made: Vec<MadeFolders>,
 }
 
 impl FileSet {
@@ -68,12 +74,16 @@ impl FileSet {
         } else {
             folder
         };
-        make_folder(folder)?;
+        let made = made_in(folder, |_| Ok(()))
+            .map_err(|error| error.of("make the folder", folder))?
+            .1;
         clean_leftovers(folder);
         Ok(Self {
             folder: folder.to_path_buf(),
             overwrite,
             staged: Vec::new(),
+            outdated: Vec::new(),
+            made: vec![made],
         })
     }
 
@@ -105,9 +115,23 @@ impl FileSet {
         let name = target.file_name().ok_or_else(|| WriteError::IsFolder {
             path: target.to_path_buf(),
         })?;
-        make_folder(parent)?;
+        let made = made_in(parent, |_| Ok(()))
+            .map_err(|error| error.of("make the folder", parent))?
+            .1;
+        self.made.push(made);
         clean_leftovers(parent);
         self.write_path(parent.join(name), content)
+    }
+
+    /// Removes the file of the given plain name, if there is one, when the others are put in place: an
+    /// earlier set had it, this one has not.
+    ///
+    /// # Errors
+    /// A name that is none.
+    pub fn outdate(&mut self, name: &str) -> Result<(), WriteError> {
+        super::folder::check_name(name)?;
+        self.outdated.push(self.folder.join(name));
+        Ok(())
     }
 
     fn write_path(
@@ -134,7 +158,9 @@ impl FileSet {
         }
         let beside = beside(&target, &self.folder);
         let fail = |error| WriteError::from_io("write", &target, error);
-        let mut file = temporary_file(beside).map_err(fail)?;
+        let (mut file, made) =
+            made_in(beside, temporary_file).map_err(|error| error.of("write", &target))?;
+        self.made.push(made);
         let written = fill(file.as_file_mut(), content)
             .and_then(|written| file.as_file().sync_all().map(|()| written))
             .map_err(fail)?;
@@ -147,6 +173,19 @@ impl FileSet {
     /// # Errors
     /// [`WriteError`]; files not yet in place are removed.
     pub fn commit(self) -> Result<(), WriteError> {
+        let _lock = lock_folder(&self.folder);
+        // Another run may have been faster.
+        for (_, target) in &self.staged {
+            self.overwrite.check(target)?;
+        }
+        for path in &self.outdated {
+            match std::fs::remove_file(path) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                    return Err(WriteError::from_io("remove", path, error));
+                }
+                _ => {}
+            }
+        }
         let mut folders = Vec::new();
         for (file, target) in self.staged.into_iter().rev() {
             file.persist(&target)
@@ -239,20 +278,12 @@ impl Write for Hashing<'_> {
     }
 }
 
-/// Makes a folder and its parents; the error names the path that stands in the way.
-pub(super) fn make_folder(folder: &Path) -> Result<(), WriteError> {
-    if folder.is_dir() {
-        return Ok(());
-    }
-    for part in folder.ancestors() {
-        if part.is_file() {
-            return Err(WriteError::NotFolder {
-                path: part.to_path_buf(),
-            });
-        }
-    }
-    std::fs::create_dir_all(folder)
-        .map_err(|error| WriteError::from_io("make the folder", folder, error))
+/// Serialises the renames of runs that write into the same folder. Where folders cannot be locked
+/// the renames go ahead without.
+pub(super) fn lock_folder(folder: &Path) -> Option<File> {
+    let handle = File::open(folder).ok()?;
+    handle.lock().ok()?;
+    Some(handle)
 }
 
 /// Makes renames in `folder` durable, where the system knows how.
@@ -269,6 +300,64 @@ pub(super) fn sync_folder(folder: &Path) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bundle::artefact::Input;
+
+    #[test]
+    fn a_faster_run_of_other_inputs_is_not_overwritten() {
+        let folder = tempfile::tempdir().unwrap();
+        let input = |text: &str| Input::of_bytes(format!("{text}.toml"), text.as_bytes());
+        let begun = |text: &str| {
+            let overwrite = Overwrite::new(false, folder.path().join("map.json"), &[input(text)]);
+            let mut set = FileSet::begin(folder.path(), overwrite).unwrap();
+            let told = serde_json::json!({ "inputs": [input(text)] }).to_string();
+            set.write("map.npz", |out| out.write_all(text.as_bytes()))
+                .unwrap();
+            set.write("map.json", |out| out.write_all(told.as_bytes()))
+                .unwrap();
+            set
+        };
+        let (slow, fast) = (begun("slow"), begun("fast"));
+        fast.commit().unwrap();
+        let refused = slow.commit().unwrap_err();
+        assert!(matches!(refused, WriteError::OutputExists { .. }));
+        assert_eq!(
+            std::fs::read(folder.path().join("map.npz")).unwrap(),
+            b"fast"
+        );
+        assert_eq!(folder.path().read_dir().unwrap().count(), 2);
+        begun("fast").commit().unwrap();
+    }
+
+    #[test]
+    fn a_file_that_came_first_is_not_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let begun = |text: &str| {
+            let mut set = FileSet::begin(folder.path(), Overwrite::Never).unwrap();
+            set.write("plan.json", |out| out.write_all(text.as_bytes()))
+                .unwrap();
+            set
+        };
+        let (slow, fast) = (begun("slow"), begun("fast"));
+        fast.commit().unwrap();
+        let refused = slow.commit().unwrap_err();
+        assert!(refused.to_string().contains("exists already"), "{refused}");
+        let kept = std::fs::read(folder.path().join("plan.json")).unwrap();
+        assert_eq!(kept, b"fast");
+    }
+
+    #[test]
+    fn folders_made_for_nothing_go_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let deep = folder.path().join("new/newer");
+        drop(FileSet::begin(&deep, Overwrite::Force).unwrap());
+        assert!(!folder.path().join("new").exists());
+        let mut set = FileSet::begin(&deep, Overwrite::Force).unwrap();
+        // Another run takes the empty folder away.
+        std::fs::remove_dir_all(folder.path().join("new")).unwrap();
+        set.write("a", |out| out.write_all(b"a")).unwrap();
+        set.commit().unwrap();
+        assert_eq!(std::fs::read(deep.join("a")).unwrap(), b"a");
+    }
 
     #[test]
     fn one_file_spelt_in_two_ways_is_not_written_twice() {

@@ -19,13 +19,17 @@ use std::path::{Component, Path, PathBuf};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::file::{fill, make_folder, sync_folder};
-use super::leftovers::{clean_leftovers, temporary_folder};
+use super::file::{fill, lock_folder, sync_folder};
+use super::leftovers::{clean_leftovers, is_temporary, temporary_folder};
+use super::made::{MadeFolders, made_in};
 use super::{Overwrite, WriteError};
 use crate::bundle::artefact::FileEntry;
 
 /// The file whose presence makes a folder a bundle.
 const MANIFEST: &str = "manifest.json";
+
+/// What the name of a folder that is put aside ends with.
+const OLD: &str = ".fluxform-old";
 
 /// A folder in the making; dropped without [`FolderDraft::commit`] it leaves nothing.
 #[derive(Debug)]
@@ -34,6 +38,8 @@ pub struct FolderDraft {
     overwrite: Overwrite,
     draft: TempDir,
     lock: Option<File>,
+    /// Dropped after the draft: what is still empty then goes again.
+    _made: MadeFolders,
 }
 
 impl FolderDraft {
@@ -49,20 +55,23 @@ impl FolderDraft {
             target.to_path_buf()
         };
         let parent = parent_of(&target);
-        make_folder(parent)?;
+        check_not_our_own(&target)?;
+        let ((draft, lock), made) =
+            made_in(parent, temporary_folder).map_err(|error| error.of("write", &target))?;
+        // Dropped in the reverse order: the draft goes before the folder that was made for it.
+        let (made, lock, draft) = (made, lock, draft);
         clean_leftovers(parent);
         {
-            let _lock = lock_parent(parent);
+            let _lock = lock_folder(parent);
             recover(&target).map_err(|error| WriteError::from_io("recover", &target, error))?;
         }
         check_target(&target, &overwrite)?;
-        let (draft, lock) = temporary_folder(parent)
-            .map_err(|error| WriteError::from_io("write", &target, error))?;
         Ok(Self {
             target,
             overwrite,
             draft,
             lock,
+            _made: made,
         })
     }
 
@@ -102,7 +111,7 @@ impl FolderDraft {
         let parent = parent_of(target);
         let fail = |error| WriteError::from_io("write", target, error);
         sync_tree(self.draft.path()).map_err(fail)?;
-        let _lock = lock_parent(parent);
+        let _lock = lock_folder(parent);
         recover(target).map_err(fail)?;
         // Another run may have been faster.
         check_target(target, &self.overwrite)?;
@@ -154,15 +163,25 @@ fn parent_of(path: &Path) -> &Path {
 
 fn old_name(target: &Path) -> PathBuf {
     let name = target.file_name().unwrap_or_default().to_string_lossy();
-    target.with_file_name(format!(".{name}.fluxform-old"))
+    target.with_file_name(format!(".{name}{OLD}"))
 }
 
-/// Serialises the renames of runs that write into the same parent. Where folders cannot be locked
-/// the renames go ahead without.
-fn lock_parent(parent: &Path) -> Option<File> {
-    let handle = File::open(parent).ok()?;
-    handle.lock().ok()?;
-    Some(handle)
+/// A folder named like our temporary ones would be taken for a killed run's and removed.
+fn check_not_our_own(target: &Path) -> Result<(), WriteError> {
+    let own = |name: &str| is_temporary(name) || (name.starts_with('.') && name.ends_with(OLD));
+    let named = |path: &Path| {
+        path.file_name()
+            .is_some_and(|name| own(&name.to_string_lossy()))
+    };
+    if named(target) || named(parent_of(target)) {
+        return Err(WriteError::Content {
+            path: target.to_path_buf(),
+            message: "folders of that name are temporary ones, which the next run clears; choose \
+                      another name"
+                .to_owned(),
+        });
+    }
+    Ok(())
 }
 
 fn check_target(target: &Path, overwrite: &Overwrite) -> Result<(), WriteError> {
@@ -242,7 +261,8 @@ fn absorb_folder(
     Ok(())
 }
 
-fn listed_files(manifest: &Path) -> BTreeSet<PathBuf> {
+/// The files that a manifest or sidecar lists; none where it is not there or tells of none.
+pub(crate) fn listed_files(manifest: &Path) -> BTreeSet<PathBuf> {
     let value: Value = fs::read(manifest)
         .ok()
         .and_then(|text| serde_json::from_slice(&text).ok())
@@ -265,4 +285,39 @@ fn sync_tree(folder: &Path) -> io::Result<()> {
         }
     }
     sync_folder(folder)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bundle_named_like_a_temporary_folder_is_refused_not_lost() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in [
+            ".fluxform-7.tmp",
+            ".bump.fluxform-old",
+            ".fluxform-7.tmp/bump",
+        ] {
+            let target = folder.path().join(name);
+            let refused = FolderDraft::begin(&target, Overwrite::Force).unwrap_err();
+            assert!(refused.to_string().contains("temporary"), "{refused}");
+            assert_eq!(folder.path().read_dir().unwrap().count(), 0);
+        }
+    }
+
+    #[test]
+    fn folders_made_for_nothing_go_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("design/bump");
+        drop(FolderDraft::begin(&target, Overwrite::Force).unwrap());
+        assert_eq!(folder.path().read_dir().unwrap().count(), 0);
+        FolderDraft::begin(&target, Overwrite::Force)
+            .and_then(|mut draft| {
+                draft.write("a", |out| out.write_all(b"a"))?;
+                draft.commit()
+            })
+            .unwrap();
+        assert!(target.join("a").is_file());
+    }
 }

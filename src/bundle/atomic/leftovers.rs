@@ -9,6 +9,11 @@ use tempfile::{Builder, NamedTempFile, TempDir};
 const PREFIX: &str = ".fluxform-";
 const SUFFIX: &str = ".tmp";
 
+/// Whether a name is one of a temporary file or folder.
+pub(super) fn is_temporary(name: &str) -> bool {
+    name.starts_with(PREFIX) && name.ends_with(SUFFIX)
+}
+
 /// A new locked file under a temporary name; removed when dropped.
 pub(super) fn temporary_file(folder: &Path) -> io::Result<NamedTempFile> {
     loop {
@@ -36,8 +41,10 @@ pub(super) fn temporary_folder(folder: &Path) -> io::Result<(TempDir, Option<Fil
     }
 }
 
-/// Removes the files in `folder` that begin with `magic`, and the folder if nothing else is in it.
+/// Removes the files in `folder` that begin with `magic`, what killed runs left there, and the folder
+/// if nothing else is in it.
 pub fn remove_files_beginning_with(folder: &Path, magic: &[u8]) {
+    clean_leftovers(folder);
     let Ok(entries) = folder.read_dir() else {
         return;
     };
@@ -62,7 +69,7 @@ pub fn clean_leftovers(folder: &Path) {
     for entry in entries.flatten() {
         let name = entry.file_name();
         let Some(name) = name.to_str() else { continue };
-        if !(name.starts_with(PREFIX) && name.ends_with(SUFFIX)) {
+        if !is_temporary(name) {
             continue;
         }
         let path = entry.path();

@@ -12,6 +12,7 @@
 mod file;
 mod folder;
 mod leftovers;
+mod made;
 mod overwrite;
 mod scratch;
 mod unforced;
@@ -22,7 +23,7 @@ use std::path::{Path, PathBuf};
 pub(crate) use file::hex;
 pub use file::{FileSet, write};
 pub use folder::FolderDraft;
-pub(crate) use folder::check_name;
+pub(crate) use folder::{check_name, listed_files};
 pub use leftovers::{clean_leftovers, remove_files_beginning_with};
 pub use overwrite::{Overwrite, Record};
 pub use scratch::Scratch;

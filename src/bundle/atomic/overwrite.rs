@@ -19,6 +19,8 @@ pub enum Overwrite {
     Force,
     /// Replace what comes from the same inputs, refuse the rest.
     SameInputs(Record),
+    /// Replace nothing.
+    Never,
 }
 
 /// What an existing output is compared with: the inputs of this run, and the JSON file that
@@ -50,15 +52,20 @@ impl Overwrite {
     /// # Errors
     /// [`WriteError::OutputExists`].
     pub fn check(&self, target: &Path) -> Result<(), WriteError> {
-        let Self::SameInputs(record) = self else {
+        if matches!(self, Self::Force) {
             return Ok(());
-        };
+        }
         match target.symlink_metadata() {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
             Err(error) => return Err(WriteError::from_io("look at", target, error)),
             Ok(_) => {}
         }
-        record.confirm().map_err(|reason| WriteError::OutputExists {
+        let confirmed = match self {
+            Self::Force => Ok(()),
+            Self::SameInputs(record) => record.confirm(),
+            Self::Never => Err("already".to_owned()),
+        };
+        confirmed.map_err(|reason| WriteError::OutputExists {
             path: target.to_path_buf(),
             reason,
         })

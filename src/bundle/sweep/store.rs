@@ -65,19 +65,17 @@ impl PointStore {
         indices: std::ops::Range<u64>,
     ) -> Result<(), WriteError> {
         let path = self.folder.join("plan.json");
-        let found = std::fs::read(&path).ok();
-        let ours = found
-            .as_deref()
-            .and_then(|bytes| PlanFile::parse("", bytes).ok())
-            .is_some_and(|found| found.plan_sha256 == plan.plan_sha256);
-        if found.is_some() && !ours && !force {
-            return Err(WriteError::OutputExists {
-                path,
-                reason: "and is another plan: the folder holds another sweep".to_owned(),
-            });
-        }
-        if !ours {
-            write_json(&path, &Overwrite::Force, plan)?;
+        if !belongs_to(&path, plan, force)? {
+            let overwrite = if force {
+                Overwrite::Force
+            } else {
+                Overwrite::Never
+            };
+            match write_json(&path, &overwrite, plan) {
+                // Another run was faster: whose is the folder now?
+                Err(WriteError::OutputExists { .. }) if belongs_to(&path, plan, force)? => {}
+                outcome => drop(outcome?),
+            }
         }
         if !indices.is_empty() {
             for folder in indices.start / FOLDER..=(indices.end - 1) / FOLDER {
@@ -125,6 +123,23 @@ impl PointStore {
             }
         })?;
         write_unforced(&self.subfolder(point.index), &name(point.index), &bytes)
+    }
+}
+
+/// Whether the plan at `path` is this one; false where there is none, and where `force` replaces it.
+fn belongs_to(path: &Path, plan: &PlanFile, force: bool) -> Result<bool, WriteError> {
+    let bytes = match std::fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
+        Err(error) => return Err(WriteError::from_io("read", path, error)),
+    };
+    match PlanFile::parse("", &bytes) {
+        Ok(found) if found.plan_sha256 == plan.plan_sha256 => Ok(true),
+        _ if force => Ok(false),
+        _ => Err(WriteError::OutputExists {
+            path: path.to_path_buf(),
+            reason: "and is another plan: the folder holds another sweep".to_owned(),
+        }),
     }
 }
 

@@ -1,0 +1,183 @@
+//! SIGKILL at random moments, and right before each call that changes files.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use crate::place::{Dice, Place, Ran, after_changes, changes};
+use crate::scenario::{Found, Prepared};
+use crate::table::Row;
+
+/// Kills until `wanted` runs were killed; half of the moments are spread evenly over the run, half lie
+/// close behind a change in its folder.
+pub fn at_random(prepared: &Prepared, wanted: usize, dice: &mut Dice) -> Result<Row, String> {
+    let mut row = Row::new(prepared.scenario.name, "SIGKILL at a random moment");
+    let changed = {
+        let place = prepared.fresh();
+        let mut child = place.command(prepared.scenario.args).spawn().unwrap();
+        let changed = changes(&place.out(), &mut child);
+        child.wait().unwrap();
+        changed.max(1)
+    };
+    for attempt in 0..3 * wanted {
+        if row.struck == wanted {
+            break;
+        }
+        let place = prepared.fresh();
+        let began = Instant::now();
+        let mut child = place.command(prepared.scenario.args).spawn().unwrap();
+        if attempt % 2 == 0 {
+            let moment = Duration::from_secs_f64(dice.part() * prepared.seconds);
+            sleep(moment.saturating_sub(began.elapsed()));
+        } else {
+            after_changes(&place.out(), &mut child, 1 + dice.below(changed));
+            sleep(Duration::from_secs_f64(0.002 * dice.part()));
+        }
+        child.kill().unwrap();
+        let ran = Ran::of(child.wait_with_output().unwrap());
+        row.struck += usize::from(ran.code.is_none());
+        row.add(prepared.survived(&place)?);
+    }
+    Ok(row)
+}
+
+/// A program that runs another and strikes at its n-th call that changes files.
+pub struct Strike {
+    program: PathBuf,
+    _folder: Place,
+}
+
+/// Where to strike.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum How {
+    /// SIGKILL.
+    Kill,
+    /// From here on the disk is full.
+    Full,
+    /// From here on the folder may not be changed.
+    Denied,
+    /// This one call fails with an I/O error.
+    Broken,
+}
+
+impl How {
+    fn mode(self) -> &'static str {
+        match self {
+            Self::Kill => "kill",
+            Self::Full => "full",
+            Self::Denied => "denied",
+            Self::Broken => "broken",
+        }
+    }
+
+    fn told(self) -> &'static str {
+        match self {
+            Self::Kill => "SIGKILL before the n-th call that changes files",
+            Self::Full => "disk full from the n-th call on",
+            Self::Denied => "folder closed from the n-th call on",
+            Self::Broken => "I/O error in the n-th call",
+        }
+    }
+}
+
+impl Strike {
+    /// Compiles it; the reason where that cannot be done or tracing is not allowed.
+    pub fn new() -> Result<Self, String> {
+        if !cfg!(all(target_os = "linux", target_arch = "x86_64")) {
+            return Err("calls are traced on Linux on x86-64 only".to_owned());
+        }
+        let folder = Place::empty();
+        let program = folder.path().join("strike");
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/crash/strike.c");
+        let made = Command::new("cc")
+            .args(["-O1", "-o"])
+            .arg(&program)
+            .arg(source)
+            .status();
+        match made {
+            Ok(status) if status.success() => {}
+            Ok(_) => return Err("cc cannot compile tests/crash/strike.c here".to_owned()),
+            Err(_) => return Err("no C compiler (cc)".to_owned()),
+        }
+        let strike = Self {
+            program,
+            _folder: folder,
+        };
+        let (ran, calls) = strike.run(&Place::empty(), "count", 0, &["--version"]);
+        match (ran.code, calls) {
+            (Some(0), Some(_)) => Ok(strike),
+            _ => Err("the system does not allow tracing another process".to_owned()),
+        }
+    }
+
+    fn run(&self, place: &Place, mode: &str, at: usize, args: &[&str]) -> (Ran, Option<usize>) {
+        let log = place.path().join("calls");
+        let mut command = Command::new(&self.program);
+        command
+            .arg(&log)
+            .args([mode, &at.to_string(), crate::place::PROGRAM])
+            .args(args);
+        place.at_home(&mut command);
+        let ran = Ran::of(command.output().unwrap());
+        let calls = std::fs::read_to_string(log).ok();
+        (ran, calls.and_then(|text| text.trim().parse().ok()))
+    }
+
+    /// How many calls of `prepared` change files.
+    pub fn calls(&self, prepared: &Prepared) -> Result<usize, String> {
+        let (ran, calls) = self.run(&prepared.fresh(), "count", 0, prepared.scenario.args);
+        ran.ends(&[0])?;
+        calls.ok_or_else(|| "nobody counted the calls".to_owned())
+    }
+
+    /// Strikes at every `every`-th call, the first at a random one.
+    pub fn at_every(
+        &self,
+        prepared: &Prepared,
+        how: How,
+        every: usize,
+        dice: &mut Dice,
+    ) -> Result<Row, String> {
+        let mut row = Row::new(prepared.scenario.name, how.told());
+        for at in (1 + dice.below(every)..=self.calls(prepared)?).step_by(every) {
+            let place = prepared.fresh();
+            let (ran, _) = self.run(&place, how.mode(), at, prepared.scenario.args);
+            let found = self.judged(prepared, how, &place, &ran);
+            row.struck += usize::from(ran.code != Some(0));
+            row.add(found.map_err(|told| format!("call {at}, {}: {told}", how.mode()))?);
+        }
+        Ok(row)
+    }
+
+    fn judged(
+        &self,
+        prepared: &Prepared,
+        how: How,
+        place: &Place,
+        ran: &Ran,
+    ) -> Result<Found, String> {
+        match how {
+            // Threads may have done a little more, or all of it.
+            How::Kill => ran.ends(&[137, 0])?,
+            // What is kept for the next run may go unkept without a word.
+            How::Full | How::Denied | How::Broken => ran.ends(&[4, 0])?,
+        }
+        if ran.code == Some(4) {
+            let words = match how {
+                How::Full => "disk is full",
+                How::Denied => "read-only",
+                _ => "cannot",
+            };
+            if !ran.said.contains(words) {
+                return Err(format!("does not say {words:?}: {}", ran.said));
+            }
+        }
+        let found = prepared.survived(place)?;
+        // An older folder stays put aside where not even its way back is free.
+        if how == How::Full && found.temporary + found.empty_folders > 0 {
+            return Err(format!("left temporary files: {ran:?}"));
+        }
+        Ok(found)
+    }
+}

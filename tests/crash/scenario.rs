@@ -1,0 +1,428 @@
+//! What is disturbed, and what must be true of its files afterwards.
+
+use std::collections::BTreeSet;
+use std::time::Instant;
+
+use serde_json::Value;
+
+use crate::place::{Place, Ran, Tree};
+
+/// A command and what lies there before it.
+pub struct Scenario {
+    pub name: &'static str,
+    /// Commands that make what lies there.
+    pub before: &'static [&'static [&'static str]],
+    /// The command.
+    pub args: &'static [&'static str],
+}
+
+const CALIBRATE: &[&str] = &[
+    "calibrate",
+    "two.toml",
+    "bump.toml",
+    "ramp.toml",
+    "--out",
+    "out",
+];
+const MAP: &[&str] = &["map", "air.toml", "--csv", "--vtk", "--out", "out"];
+const PLAN: &[&str] = &[
+    "sweep",
+    "plan",
+    "air.toml",
+    "--set",
+    "wire.diameter_mm=0.5:0.8:0.05",
+    "--set",
+    "coil.outer_diameter_mm=26:38:2",
+    "--out",
+    "plan.json",
+];
+const SWEEP: &[&str] = &["sweep", "run", "plan.json", "--out", "out"];
+
+/// Those that the brunt falls on.
+pub const MAIN: &[Scenario] = &[
+    Scenario {
+        name: "calibrate",
+        before: &[],
+        args: CALIBRATE,
+    },
+    Scenario {
+        name: "calibrate over older bundles",
+        before: &[&[
+            "calibrate",
+            "two.toml",
+            "bump.toml",
+            "ramp.toml",
+            "--out",
+            "out",
+            "--criterion",
+            "linear",
+        ]],
+        args: CALIBRATE,
+    },
+    Scenario {
+        name: "sweep run",
+        before: &[PLAN],
+        args: SWEEP,
+    },
+    Scenario {
+        name: "map",
+        before: &[],
+        args: MAP,
+    },
+    Scenario {
+        name: "map over an older one",
+        before: &[&[
+            "map",
+            "air.toml",
+            "--csv",
+            "--out",
+            "out",
+            "--components",
+            "all",
+        ]],
+        args: MAP,
+    },
+];
+
+/// The others that write.
+pub const MORE: &[Scenario] = &[
+    Scenario {
+        name: "optimize --out",
+        before: &[],
+        args: &["optimize", "air.toml", "--out", "out/best.toml"],
+    },
+    Scenario {
+        name: "discretize --out",
+        before: &[],
+        args: &["discretize", "bump.toml", "--out", "out/points.csv"],
+    },
+    Scenario {
+        name: "replay --out",
+        before: &[&[
+            "calibrate",
+            "air.toml",
+            "bump.toml",
+            "--out",
+            "bundles",
+            "--no-report",
+        ]],
+        args: &[
+            "replay",
+            "bundles/air/bump",
+            "finger.csv",
+            "--out",
+            "out/replay.csv",
+        ],
+    },
+    Scenario {
+        name: "sweep merge",
+        before: &[PLAN, &["sweep", "run", "plan.json", "--out", "points"]],
+        args: &[
+            "sweep",
+            "merge",
+            "plan.json",
+            "points",
+            "--out",
+            "out/sweep.csv",
+        ],
+    },
+];
+
+/// A file that the user laid into the folder of an older bundle.
+const NOTES: &str = "notes.txt";
+
+/// Two cored coils that magnetise each other.
+const TWO: &str = r#"name = "two"
+coil = { inner_diameter_mm = 24.0, outer_diameter_mm = 38.0, length_mm = 100.0 }
+wire = { diameter_mm = 0.7 }
+core = { below_mm = 7.0, relative_permeability = 1300.0 }
+array = { rows = 1, columns = 2, pitch_mm = 43.0 }
+magnet = { diameter_mm = 10.0, length_mm = 10.0, magnetization_a_per_m = 1.1579e6 }
+supply = { current_max_a = 1.3, voltage_v = 36.0 }
+target = { height_mm = 30.0 }
+[workspace]
+x_mm = [-40.0, 40.0, 9]
+y_mm = [-30.0, 30.0, 9]
+z_mm = [30.0, 70.0, 9]
+"#;
+
+/// Four coils without steel.
+const AIR: &str = r#"name = "air"
+coil = { inner_diameter_mm = 24.0, outer_diameter_mm = 38.0, length_mm = 70.0 }
+wire = { diameter_mm = 0.7 }
+array = { rows = 2, columns = 2, pitch_mm = 43.0 }
+magnet = { diameter_mm = 10.0, length_mm = 10.0, magnetization_a_per_m = 1.1579e6 }
+supply = { current_max_a = 1.3, voltage_v = 36.0 }
+limits = { resistance_max_ohm = 6.0, settling_max_ms = 100.0, outer_diameter_max_mm = 38.0, length_max_mm = 100.0 }
+target = { height_mm = 30.0 }
+[workspace]
+x_mm = [-40.0, 40.0, 21]
+y_mm = [-30.0, 30.0, 21]
+z_mm = [30.0, 70.0, 21]
+"#;
+
+const BUMP: &str = r#"name = "bump"
+primitive = "half-sphere"
+radius_mm = 13
+base_mm = 37
+[points]
+x_mm = [-13.0, 13.0, 9]
+y_mm = [-13.0, 13.0, 9]
+"#;
+
+const RAMP: &str = r#"name = "ramp"
+primitive = "wedge"
+side_mm = 26
+low_mm = 37
+high_mm = 47
+[points]
+x_mm = [-13.0, 13.0, 7]
+y_mm = [-13.0, 13.0, 7]
+"#;
+
+/// Lays the inputs of all scenarios.
+pub fn inputs() -> Place {
+    let place = Place::empty();
+    place.write("two.toml", TWO);
+    place.write("air.toml", AIR);
+    // The same name and so the same folder, other numbers.
+    place.write("other.toml", &TWO.replace("1300.0", "700.0"));
+    place.write(
+        "other_air.toml",
+        &AIR.replace("length_mm = 70.0", "length_mm = 77.0"),
+    );
+    place.write("bump.toml", BUMP);
+    place.write("ramp.toml", RAMP);
+    let path = (0..700).map(|i| {
+        let t = f64::from(i) * 1e-3;
+        let (x, y) = (0.009 * (7.0 * t).cos(), 0.009 * (9.1 * t).sin());
+        format!("{t},{x},{y},0.047\n")
+    });
+    place.write(
+        "finger.csv",
+        &format!("t_s,x_m,y_m,z_m\n{}", path.collect::<String>()),
+    );
+    place
+}
+
+/// A scenario with what it leaves when nobody disturbs it.
+pub struct Prepared {
+    pub scenario: &'static Scenario,
+    place: Place,
+    pub before: Tree,
+    pub after: Tree,
+    /// How long it takes.
+    pub seconds: f64,
+}
+
+impl Prepared {
+    pub fn new(scenario: &'static Scenario) -> Result<Self, String> {
+        let place = inputs();
+        for args in scenario.before {
+            place.run(args).ends(&[0])?;
+        }
+        if place.out().join("two/bump").is_dir() {
+            place.write("out/two/bump/notes.txt", "remember\n");
+        }
+        let before = place.tree();
+        let whole = place.copy();
+        let began = Instant::now();
+        whole.run(scenario.args).ends(&[0])?;
+        let seconds = began.elapsed().as_secs_f64();
+        let after = whole.tree();
+        let prepared = Self {
+            scenario,
+            place,
+            before,
+            after,
+            seconds,
+        };
+        prepared.agrees(&whole)?;
+        Ok(prepared)
+    }
+
+    /// A place of its own for one disturbed run.
+    pub fn fresh(&self) -> Place {
+        self.place.copy()
+    }
+
+    /// Every file is what it was before, what it is afterwards, or a temporary one.
+    pub fn whole_or_absent(&self, place: &Place) -> Result<Found, String> {
+        let now = place.tree();
+        let mut found = Found::default();
+        for (path, bytes) in &now {
+            if path.split('/').any(is_temporary) {
+                found.temporary += 1;
+                continue;
+            }
+            if path.ends_with('/') {
+                found.empty_folders += 1;
+                continue;
+            }
+            let put_aside = path.split('/').any(|part| part.ends_with(".fluxform-old"));
+            let name = put_back(path);
+            found.put_aside += usize::from(put_aside);
+            let timing = file_name(&name).starts_with("timing");
+            let is = |tree: &Tree| tree.get(&name) == Some(bytes);
+            let whole = if timing {
+                serde_json::from_slice::<Value>(bytes).is_ok()
+            } else {
+                is(&self.before) || (is(&self.after) && !put_aside)
+            };
+            if !whole {
+                return Err(format!("{path} is neither what it was nor what it becomes"));
+            }
+            found.whole += 1;
+        }
+        self.bundles_whole(&now)?;
+        let notes = |tree: &Tree| tree.keys().any(|path| path.ends_with(NOTES));
+        if notes(&self.before) && !notes(&now) {
+            return Err("the user's own file is gone".to_owned());
+        }
+        found.bundles = bundles(&now).len();
+        Ok(found)
+    }
+
+    /// A folder with a manifest has every file of that manifest.
+    fn bundles_whole(&self, now: &Tree) -> Result<(), String> {
+        for manifest in bundles(now) {
+            let of = [&self.after, &self.before]
+                .into_iter()
+                .find(|tree| tree.get(&manifest) == now.get(&manifest));
+            let Some(of) = of else { continue };
+            let folder = manifest.trim_end_matches("manifest.json");
+            for (path, bytes) in of.range(folder.to_owned()..) {
+                if !path.starts_with(folder) {
+                    break;
+                }
+                let there = now.get(path);
+                let timing = file_name(path).starts_with("timing");
+                let same = if timing {
+                    there.is_some()
+                } else {
+                    there == Some(bytes)
+                };
+                if !same && file_name(path) != NOTES {
+                    return Err(format!("{manifest} is there, but {path} is not"));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// What `verify` says of every bundle.
+    pub fn verified(&self, place: &Place) -> Result<usize, String> {
+        let bundles = bundles(&place.tree());
+        for manifest in &bundles {
+            let folder = format!("out/{}", manifest.trim_end_matches("/manifest.json"));
+            place.run(&["verify", &folder]).ends(&[0])?;
+        }
+        Ok(bundles.len())
+    }
+
+    /// The same command again, not told to replace anything, ends well and leaves what an undisturbed
+    /// run leaves, to the byte and to the last file.
+    pub fn runs_again(&self, place: &Place) -> Result<(), String> {
+        let ran = place.run(self.scenario.args);
+        ran.ends(&[0]).map_err(|told| format!("again: {told}"))?;
+        self.agrees(place)
+    }
+
+    /// What lies there is what an undisturbed run leaves.
+    pub fn agrees(&self, place: &Place) -> Result<(), String> {
+        same(&place.tree(), &self.after)
+    }
+
+    /// All of it, after a run that was disturbed.
+    pub fn survived(&self, place: &Place) -> Result<Found, String> {
+        let found = self.whole_or_absent(place)?;
+        self.verified(place)?;
+        self.runs_again(place)?;
+        Ok(found)
+    }
+
+    /// As [`Self::survived`], of a run that could tidy up after itself.
+    pub fn survived_tidily(&self, place: &Place, ran: &Ran) -> Result<Found, String> {
+        let found = self.survived_as_it_is(place)?;
+        if found.temporary + found.put_aside > 0 {
+            return Err(format!("left temporary files: {ran:?}"));
+        }
+        if found.empty_folders > 0 {
+            return Err(format!("left an empty folder: {ran:?}"));
+        }
+        self.runs_again(place)?;
+        Ok(found)
+    }
+
+    /// What lies there is in order; nothing is run again.
+    pub fn survived_as_it_is(&self, place: &Place) -> Result<Found, String> {
+        let found = self.whole_or_absent(place)?;
+        self.verified(place)?;
+        Ok(found)
+    }
+}
+
+/// What lay there after a run was disturbed.
+#[derive(Debug, Default, Clone, Copy)]
+pub struct Found {
+    pub whole: usize,
+    pub temporary: usize,
+    pub put_aside: usize,
+    pub empty_folders: usize,
+    pub bundles: usize,
+}
+
+impl std::ops::AddAssign for Found {
+    fn add_assign(&mut self, other: Self) {
+        self.whole += other.whole;
+        self.temporary += other.temporary;
+        self.put_aside += other.put_aside;
+        self.empty_folders += other.empty_folders;
+        self.bundles += other.bundles;
+    }
+}
+
+/// Two trees are the same but for the seconds.
+pub fn same(now: &Tree, wanted: &Tree) -> Result<(), String> {
+    let names: BTreeSet<&String> = now.keys().chain(wanted.keys()).collect();
+    for name in names {
+        match (now.get(name), wanted.get(name)) {
+            (Some(_), None) => return Err(format!("{name} is left over")),
+            (None, _) => return Err(format!("{name} is missing")),
+            (Some(a), Some(b)) if a != b && !file_name(name).starts_with("timing") => {
+                return Err(format!("{name} differs"));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+fn bundles(tree: &Tree) -> Vec<String> {
+    let ours = |path: &&String| {
+        file_name(path) == "manifest.json"
+            && !path
+                .split('/')
+                .any(|part| is_temporary(part) || part.ends_with(".fluxform-old"))
+    };
+    tree.keys().filter(ours).cloned().collect()
+}
+
+fn is_temporary(part: &str) -> bool {
+    part.starts_with(".fluxform-") && part.ends_with(".tmp")
+}
+
+fn file_name(path: &str) -> &str {
+    path.rsplit('/').next().unwrap_or(path)
+}
+
+/// The path a file had before its folder was put aside.
+fn put_back(path: &str) -> String {
+    let back = |part: &str| {
+        let inner = part
+            .strip_prefix('.')
+            .and_then(|rest| rest.strip_suffix(".fluxform-old"));
+        inner.unwrap_or(part).to_owned()
+    };
+    path.split('/').map(back).collect::<Vec<_>>().join("/")
+}
