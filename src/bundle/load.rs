@@ -25,6 +25,7 @@ const MANIFEST_MAX_BYTES: u64 = 64 << 20;
 
 /// Why a bundle cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum BundleError {
     /// There is no manifest: not a bundle.
     #[error("{path} is not a bundle: it has no manifest.json")]

@@ -1,5 +1,20 @@
 //! The only writer and reader of artefacts. It takes plain data and knows nothing of how the
 //! numbers were made.
+//!
+//! [`load::Bundle`] is how a Rust program reads a bundle that `calibrate` wrote;
+//! `scripts/load_bundle.py`, `scripts/load_bundle.m` and `scripts/fluxform_bundle.h` are its
+//! sisters for Python, Octave or MATLAB, and C. The crate's first page has an example. A bundle
+//! is not trusted: a folder that is none, another schema or a changed byte is an error.
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! use fluxform::bundle::load::{Bundle, BundleError};
+//!
+//! let refused = Bundle::open(Path::new("no/such/folder")).unwrap_err();
+//! assert!(matches!(refused, BundleError::NoBundle { .. }));
+//! assert!(refused.to_string().contains("it has no manifest.json"));
+//! ```
 
 pub mod artefact;
 #[allow(clippy::disallowed_methods)] // the one place that writes files

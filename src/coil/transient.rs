@@ -91,6 +91,7 @@ pub struct Settling {
 
 /// Why there is no settling time.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TransientError {
     /// An input outside its domain.
     #[error("{name}: expected {expected}, found {found:?}")]

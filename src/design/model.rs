@@ -60,6 +60,7 @@ pub struct Wire {
 
 /// How the core's steel is described.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Steel {
     /// Linear, homogeneous: mu_r.
     Linear(f64),
@@ -87,6 +88,7 @@ pub struct Core {
 
 /// How the neighbours' cores are treated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Coupling {
     /// All cores respond to each driven coil.
     Full,
@@ -129,6 +131,7 @@ pub enum Polarity {
 
 /// How the magnet's force is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum MagnetModel {
     /// A point dipole at the magnet's centre (eq. 5).
     Dipole,

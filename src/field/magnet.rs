@@ -91,6 +91,7 @@ impl Sources {
 
 /// Why there is no rule.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[non_exhaustive]
 pub enum NoRule {
     /// A size, distance or tolerance that is not a positive number, or a moment that is not finite.
     #[error("the magnet's size, its distance and the tolerance must be positive numbers")]

@@ -69,6 +69,20 @@ pub struct CalibrateOptions {
     pub page: bool,
 }
 
+impl CalibrateOptions {
+    /// What the command does by default, under the folder `out`.
+    pub fn new(out: impl Into<PathBuf>) -> Self {
+        Self {
+            out: out.into(),
+            force: false,
+            lambda: LambdaOptions::default(),
+            reach_m: DEFAULT_REACH_M,
+            keep: true,
+            page: true,
+        }
+    }
+}
+
 /// The design, its text and its entry among the inputs.
 #[derive(Debug, Clone, Copy)]
 pub struct DesignSource<'a> {
@@ -91,6 +105,7 @@ pub struct ShapeSource {
 
 /// What was made.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct CalibrateReport {
     /// One entry a shape, in the order given.
     pub bundles: Vec<BundleReport>,
@@ -98,6 +113,7 @@ pub struct CalibrateReport {
 
 /// One bundle.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct BundleReport {
     /// Its folder.
     pub folder: PathBuf,

@@ -32,6 +32,7 @@ use picture::{Scale, Seen};
 
 /// The points and what is to be told about them.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct PointsReport {
     /// The points.
     pub discretized: Discretized,
@@ -41,6 +42,7 @@ pub struct PointsReport {
 
 /// The JSON summary of `discretize`; SI.
 #[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct PointsSummary {
     /// Layout of the artefact.
     pub schema_version: &'static str,

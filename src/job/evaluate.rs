@@ -17,6 +17,7 @@ use crate::design::Design;
 
 /// What `evaluate` tells; all SI.
 #[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct Evaluation {
     /// Layout of the artefact.
     pub schema_version: &'static str,
@@ -52,6 +53,7 @@ pub struct Evaluation {
 
 /// The coil and its circuit.
 #[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct CoilFacts {
     /// Inner diameter, m.
     pub inner_diameter_m: f64,
@@ -82,6 +84,7 @@ pub struct CoilFacts {
 
 /// Field and force at the target.
 #[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct TargetFacts {
     /// Height of the magnet's centre, m.
     pub height_m: f64,
@@ -105,6 +108,7 @@ pub struct TargetFacts {
 
 /// The steel of the coil.
 #[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct CoreFacts {
     /// Radius, m.
     pub radius_m: f64,
@@ -131,6 +135,7 @@ pub struct CoreFacts {
 
 /// After a voltage step, with eddy currents in the solid core.
 #[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct TransientFacts {
     /// Time until the current reaches 95 % of its final value, s.
     pub current_95_s: f64,

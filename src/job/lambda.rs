@@ -67,6 +67,7 @@ impl LambdaReport {
 
 /// The force constant and everything told with it.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct LambdaReport {
     /// The points of the grid, whether they were used or others.
     pub points: PointsReport,

@@ -51,6 +51,7 @@ pub struct MapRequest {
 
 /// What was made.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct MapReport {
     /// `map.json` as written.
     pub sidecar: MapSidecar,

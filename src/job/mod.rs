@@ -38,6 +38,7 @@ pub const KERNEL_ERROR: f64 = 1e-12;
 
 /// Why a job gave no result. Messages say what to do.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum JobError {
     /// The design asks for physics that this version does not model.
     #[error("{0}")]

@@ -16,6 +16,7 @@ use crate::progress::Progress;
 
 /// What is asked at the points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ProbeComponents {
     /// Field and gradient tensor.
     All,
@@ -54,6 +55,17 @@ pub struct ProbeRequest {
     pub force: bool,
     /// Tolerance; `None` for the default.
     pub tolerance: Option<f64>,
+}
+
+impl Default for ProbeRequest {
+    /// Field and gradient, to the default tolerance, without the force.
+    fn default() -> Self {
+        Self {
+            components: ProbeComponents::All,
+            force: false,
+            tolerance: None,
+        }
+    }
 }
 
 /// Points between two looks at the interruption flag.
@@ -242,6 +254,16 @@ impl ProbeTable {
     #[must_use]
     pub fn rows(&self) -> usize {
         self.fields.len()
+    }
+
+    /// Field and gradient per ampere of one coil at one point, both counted from 0.
+    ///
+    /// # Panics
+    /// For a point or a coil that there is not.
+    #[must_use]
+    pub fn field(&self, point: usize, coil: usize) -> &CartesianField {
+        assert!(coil < self.coils, "coil {coil} of {}", self.coils);
+        &self.fields[point * self.coils + coil]
     }
 
     /// Writes the CSV table.

@@ -70,6 +70,7 @@ pub(super) fn magnet_rule(
 
 /// A design made ready for computing.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Scene<'a> {
     /// The design.
     pub design: &'a Design,

@@ -41,6 +41,7 @@ pub struct SceneCore {
 
 /// How the steel magnetises.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub enum Material {
     /// A constant relative permeability.
     Linear(f64),
@@ -94,6 +95,7 @@ impl SceneCore {
 
 /// The solved steel of a scene.
 #[derive(Debug, Clone, Serialize, Deserialize)]
+#[non_exhaustive]
 pub enum Steel {
     /// There is none.
     None,

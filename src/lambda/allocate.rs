@@ -53,6 +53,7 @@ pub enum Reach {
 
 /// What an allocation says of itself: `I_i = clamp(mu (G_i - center) / R_i + nu / R_i)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Allocation {
     /// Whether the wanted force was within reach.
     pub reach: Reach,
@@ -68,6 +69,7 @@ pub struct Allocation {
 
 /// Why an allocator cannot be made.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum AllocatorError {
     /// Lists of different lengths.
     #[error("resistances and both limits must have one entry a coil")]

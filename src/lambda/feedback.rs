@@ -35,6 +35,7 @@ pub struct Reachable {
 
 /// Why a problem cannot be rendered with feedback.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FeedbackError {
     /// Not a force problem.
     #[error(transparent)]
@@ -85,6 +86,7 @@ pub struct Decided {
 
 /// Why no force constant above zero can be given to every point.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum NoLambda {
     /// All heights are zero.
     #[error("no force is wanted at any point")]

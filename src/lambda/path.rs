@@ -13,6 +13,7 @@ use super::reduce::{Reduced, power_of_two, times_power};
 
 /// What changes at a breakpoint. Coils are numbered from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Event {
     /// A coil begins to carry current.
     LeavesZero(usize),
@@ -49,6 +50,7 @@ impl fmt::Display for Event {
 
 /// A force constant at which the path turns.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Breakpoint {
     /// Force constant, N/m.
     pub lambda_n_per_m: f64,

@@ -26,6 +26,7 @@ pub struct ForceProblem<'a> {
 
 /// Which force constant is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Criterion {
     /// The largest whose error, added by the limits, stays below the just-noticeable difference.
     #[default]
@@ -61,6 +62,7 @@ impl Default for Settings {
 
 /// Why a problem cannot be stated. Each names the entry at fault.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ProblemError {
     /// No points.
     #[error("no constraint points: at least one height is needed")]

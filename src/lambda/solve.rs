@@ -23,6 +23,7 @@ const FLAW: f64 = 1e-8;
 
 /// How far a solution may be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Status {
     /// The path is exact.
     Solved,
@@ -45,6 +46,7 @@ pub enum Precision {
 
 /// Currents at one force constant and what they are worth.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct OperatingPoint {
     /// Force constant, N/m.
     pub lambda_n_per_m: f64,
@@ -62,6 +64,7 @@ pub struct OperatingPoint {
 
 /// The path, the force constants and the currents of one object.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Solution {
     /// Where the first limit binds, N/m; `None`: none ever does.
     pub lambda_linear_n_per_m: Option<f64>,

@@ -10,6 +10,7 @@ use crate::progress::Silent;
 /// The largest error found, relative to the largest |dB_z/dz| at its height, and at how many
 /// places it was looked for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct InterpolationError {
     /// Relative error.
     pub largest: f64,

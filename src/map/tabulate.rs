@@ -19,6 +19,7 @@ use crate::progress::{Interrupted, Progress};
 
 /// What a map holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Components {
     /// dB_z/dz.
     Gz,
@@ -56,6 +57,7 @@ pub struct FieldMap {
 
 /// Why a map could not be made.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MapError {
     /// A node lies on an edge of a source.
     #[error(transparent)]

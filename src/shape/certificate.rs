@@ -17,6 +17,7 @@ use crate::shape::tessellation::estimated_deviation_m;
 
 /// How much is looked into.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Certify {
     /// Heights alone.
     #[default]

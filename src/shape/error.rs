@@ -9,6 +9,7 @@ use crate::shape::stl::StlError;
 
 /// A shape that gives no constraint points. Lengths are metres inside, millimetres in messages.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ShapeError {
     /// The surface's path cannot be read as a file.
     #[error("{}: {what}", path.display())]

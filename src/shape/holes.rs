@@ -4,6 +4,7 @@ use crate::shape::height::{Grid, Sample};
 
 /// What is done with holes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Holes {
     /// They give no points, like what lies outside.
     #[default]

@@ -2,6 +2,34 @@
 //!
 //! A surface file passes `format` (which reader) and that reader (file units), becomes a placed
 //! [`mesh::Mesh`] in metres, and `height` looks at it from above. `points` is the entry.
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! use fluxform::progress::Silent;
+//! use fluxform::shape::{discretize, document::ShapeDocument};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let text = "
+//!     name = 'dome'
+//!     primitive = 'half-sphere'
+//!     radius_mm = 20.0
+//!     base_mm = 15.0
+//!     points = { x_mm = [-20.0, 20.0, 17], y_mm = [-20.0, 20.0, 17] }
+//! ";
+//! let (document, _warnings) = ShapeDocument::from_toml(text, Path::new("dome.toml"))?;
+//! let points = discretize(&document, &Silent)?.points;
+//! for j in 0..points.len() {
+//!     let r_m = points.x_m[j].hypot(points.y_m[j]);
+//!     let height = 0.015 + (0.02_f64.powi(2) - r_m * r_m).max(0.0).sqrt();
+//!     assert!((points.height_m[j] - height).abs() < 1e-9);
+//! }
+//! // The corners of the grid lie beside the dome and give no points.
+//! assert_eq!(points.len() + points.outside, 17 * 17);
+//! assert!(points.outside > 50);
+//! # Ok(())
+//! # }
+//! ```
 
 pub mod amf;
 pub mod certificate;

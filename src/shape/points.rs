@@ -24,6 +24,7 @@ const MARKED_BETWEEN_LOOKS: usize = 4096;
 
 /// The points of a grid that lie on the surface, m; columns of equal length.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct ConstraintPoints {
     /// The grid they were taken from.
     pub grid: Grid,
@@ -47,6 +48,7 @@ pub struct ConstraintPoints {
 
 /// Figures that sum the points up.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct PointFacts {
     /// Number of points.
     pub points: usize,
@@ -112,6 +114,7 @@ impl ConstraintPoints {
 
 /// What discretising a document gives.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Discretized {
     /// The constraint points.
     pub points: ConstraintPoints,

@@ -40,6 +40,7 @@ pub struct Written {
 
 /// Why an output was not written. Nothing is left half written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum WriteError {
     /// The target exists and is not known to come from the same inputs.
     #[error("{path} exists {reason}; use --force to replace it, or choose another --out")]

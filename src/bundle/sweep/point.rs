@@ -9,6 +9,7 @@ use crate::bundle::json::{JsonError, to_json};
 /// How a point ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Status {
     /// Computed to the tolerance.
     Done,

@@ -20,6 +20,7 @@ pub struct AirCoil {
 
 /// Why there is no air model.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum NoAirCoil {
     /// A dipole at or below the winding's top face.
     #[error("the magnet must be above the winding's top face: raise the target")]

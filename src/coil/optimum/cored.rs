@@ -53,6 +53,7 @@ impl CoreRule {
 
 /// Why there is no cored model.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum NoCoredCoil {
     /// As for air.
     #[error(transparent)]

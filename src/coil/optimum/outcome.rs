@@ -6,6 +6,7 @@ use super::problem::{LimitName, Regime};
 
 /// How an optimisation ended.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Status {
     /// The best coil within the limits.
     Optimal,
@@ -76,6 +77,7 @@ pub struct BestCoil {
 
 /// How sure it is that no coil is better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum CertificateKind {
     /// The best of several local searches.
     Multistart,

@@ -38,6 +38,7 @@ pub struct Task {
 
 /// What bounds a coil. The first nine are the design file's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
 pub enum LimitName {
     /// R, ohm.
     Resistance,

@@ -10,6 +10,7 @@ use crate::field::magnet::MagnetRule;
 
 /// What cannot be optimised.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum NoTask {
     /// The drivers give no current.
     #[error("supply.current_max_a is zero: without current no coil exerts a force")]

@@ -29,6 +29,7 @@ use crate::numerics::gauss;
 
 /// A mesh that cannot be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MeshError {
     /// Breakpoints must be finite, strictly increasing, at least two; radii begin at 0.
     #[error("the core's breakpoints in {axis} must be finite and increasing")]

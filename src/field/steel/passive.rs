@@ -39,6 +39,7 @@ pub struct Region {
 
 /// Why there is no pull.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[non_exhaustive]
 pub enum NoPull {
     /// A size, place or tolerance that is not a number in its range.
     #[error(

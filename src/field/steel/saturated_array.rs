@@ -51,6 +51,7 @@ const PLACES: [[f64; 2]; 4] = [[0.0, 0.0], [0.7, 0.2], [-0.4, 1.1], [1.5, -1.2]]
 
 /// Why an array cannot be solved.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SaturatedArrayError {
     /// A node of the outline lies on the winding's edge.
     #[error(transparent)]

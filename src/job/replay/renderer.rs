@@ -19,6 +19,7 @@ pub struct Renderer {
 
 /// What a step found.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Step {
     /// How the position was answered.
     pub answer: Answer,
@@ -36,6 +37,7 @@ pub struct Step {
 
 /// Why a bundle cannot be rendered with position feedback.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RendererError {
     /// Its lambda is null.
     #[error("has no force constant (lambda is null): nothing can be rendered")]

@@ -29,6 +29,7 @@ pub struct RawSurface {
 
 /// Why a surface on the command line cannot be taken as it stands: wrong usage.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RawSurfaceError {
     /// The format carries no unit and none was given.
     #[error("{}: this format carries no unit of length: add --unit ({})", path.display(), unit_names().join(", "))]

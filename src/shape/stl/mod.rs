@@ -12,6 +12,7 @@ use crate::shape::mesh::FileMesh;
 
 /// Why bytes are no STL mesh, and where.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum StlError {
     /// No byte at all.
     #[error("the file is empty (0 bytes): the export or the download failed")]

@@ -1,0 +1,243 @@
+//! GNU Octave reads a bundle: with its own functions, and with `scripts/load_bundle.m`, whose
+//! forces and heights are Rust's. The same file serves MATLAB, which is not tried here.
+#![allow(clippy::disallowed_methods, clippy::print_stderr)]
+
+#[allow(dead_code)] // the other tests of bundles use the rest
+#[path = "bundle/sample.rs"]
+mod sample;
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use fluxform::bundle::load::Bundle;
+use fluxform::job::replay::renderer::Renderer;
+
+use sample::*;
+
+/// Octave on a script in a folder; `None`, with a reason, where there is none of version 7.
+fn octave(folder: &Path, script: &str) -> Option<Output> {
+    let run = |text: &str| {
+        Command::new("octave-cli")
+            .args(["--norc", "--quiet", "--eval", text])
+            .env("FLUXFORM_SCRIPTS", scripts())
+            .current_dir(folder)
+            .output()
+    };
+    let version = run("printf('%d', compare_versions(version, '7.0.0', '>='))");
+    if !version.is_ok_and(|output| output.stdout == b"1") {
+        eprintln!("skipped: no octave-cli of version 7 or newer (Debian: octave)");
+        return None;
+    }
+    Some(run(script).unwrap())
+}
+
+/// What Octave prints, as rows of numbers.
+fn rows(output: &Output) -> Vec<Vec<f64>> {
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    let text = String::from_utf8(output.stdout.clone()).unwrap();
+    let number = |word: &str| {
+        word.parse()
+            .unwrap_or_else(|_| panic!("{word:?}: {errors}"))
+    };
+    text.lines()
+        .map(|line| line.split_whitespace().map(number).collect())
+        .collect()
+}
+
+/// Positions inside the map, on its nodes and borders, and outside.
+fn positions(bundle: &Bundle) -> Vec<[f64; 3]> {
+    let mut seed = 11;
+    let map = &bundle.map;
+    (0..200)
+        .map(|i| {
+            [&map.x_m, &map.y_m, &map.z_m].map(|axis| {
+                let t = random(&mut seed);
+                let (from, to) = (axis[0], axis[axis.len() - 1]);
+                match i % 5 {
+                    0 => axis[(t * axis.len() as f64) as usize],
+                    1 if axis.len() > 1 => from + (to - from) * (1.2 * t - 0.1),
+                    _ => from + (to - from) * t,
+                }
+            })
+        })
+        .collect()
+}
+
+const FORCES: &str = "\
+addpath(getenv('FLUXFORM_SCRIPTS'));
+bundle = load_bundle('bundle');
+points = csvread('positions.csv');
+found = [bundle.force_per_ampere(points), bundle.passive_force(points), bundle.height(points)];
+found(isnan(found)) = 0;
+format = [repmat('%.17g ', 1, columns(found)), '\\n'];
+printf(format, found.');
+";
+
+#[test]
+fn octave_and_rust_give_the_same_forces_and_heights() {
+    for (name, tilted, pulled, samples) in [
+        ("upright", false, false, [13, 17, 11]),
+        ("tilted with pull", true, true, [13, 9, 11]),
+        ("short axes", false, true, [2, 3, 1]),
+    ] {
+        let folder = temporary();
+        let mut sample = sample(tilted, samples);
+        if pulled {
+            sample = sample.with_pull();
+        }
+        let target = folder.path().join("bundle");
+        sample.write(&target, false).unwrap();
+        let bundle = Bundle::open(&target).unwrap();
+        let renderer = Renderer::new(&bundle).unwrap();
+        let at = positions(&bundle);
+        let table: String = at
+            .iter()
+            .map(|[x, y, z]| format!("{x},{y},{z}\n"))
+            .collect();
+        fs::write(folder.path().join("positions.csv"), table).unwrap();
+        let Some(output) = octave(folder.path(), FORCES) else {
+            return;
+        };
+        let found = rows(&output);
+        assert_eq!(found.len(), at.len(), "{name}");
+        let mut worst = [0.0_f64; 3];
+        let mut outside = 0;
+        for (position, found) in at.iter().zip(&found) {
+            let coils = bundle.coil_count();
+            let mut want = vec![f64::NAN; coils];
+            outside += usize::from(!bundle.force_per_ampere(*position, &mut want));
+            want.push(bundle.passive_force_n(*position).unwrap_or(0.0));
+            let [x, y, _] = *position;
+            want.push(renderer.heights().height_m(x, y).unwrap_or(0.0));
+            assert_eq!(found.len(), want.len(), "{name}");
+            for (part, ends) in [(0, coils), (coils, coils + 1), (coils + 1, coils + 2)]
+                .into_iter()
+                .enumerate()
+            {
+                let scale = want[ends.0..ends.1]
+                    .iter()
+                    .fold(0.0_f64, |m, v| m.max(v.abs()));
+                for (f, w) in found[ends.0..ends.1].iter().zip(&want[ends.0..ends.1]) {
+                    assert!((f - w).abs() <= 1e-12 * scale, "{name}: {f} and {w}");
+                    worst[part] = worst[part].max(if scale > 0.0 {
+                        (f - w).abs() / scale
+                    } else {
+                        0.0
+                    });
+                }
+            }
+        }
+        assert!(outside > 5 && outside < at.len() / 2, "{outside} outside");
+        let worst = worst.map(|w| format!("{w:.1e}")).join(" ");
+        eprintln!("{name}: forces, pull and heights differ by at most {worst} of the largest");
+    }
+}
+
+/// What Octave brings along is enough for the tables and the JSON files.
+const TABLES: &str = "\
+manifest = jsondecode(fileread('bundle/manifest.json'));
+lambda = jsondecode(fileread('bundle/lambda.json'));
+points = csvread('bundle/points.csv', 1, 0);
+currents = csvread('bundle/currents.csv', 1, 0);
+printf('%.17g ', size(points), points(:, 1:3).');
+printf('\\n');
+printf('%.17g ', currents(:, end));
+printf('\\n');
+printf('%.17g ', lambda.lambda_n_per_m, lambda.currents_a, manifest.lambda.lambda_n_per_m);
+printf('\\n');
+printf('%d ', strcmp(manifest.map.interpolation.name, 'tricubic-lagrange'), numel(manifest.files));
+printf('\\n');
+";
+
+#[test]
+fn octave_reads_the_tables_and_the_json_files_by_its_own_functions() {
+    let folder = temporary();
+    let target = folder.path().join("bundle");
+    sample(false, [4, 3, 2]).write(&target, false).unwrap();
+    let bundle = Bundle::open(&target).unwrap();
+    let Some(output) = octave(folder.path(), TABLES) else {
+        return;
+    };
+    let found = rows(&output);
+    let points = bundle
+        .points
+        .iter()
+        .flat_map(|p| [p.x_m, p.y_m, p.height_m]);
+    let mut want = vec![bundle.points.len() as f64, 6.0];
+    want.extend(points);
+    assert_eq!(found[0], want);
+    let currents: Vec<f64> = bundle.currents.iter().map(|row| row.current_a).collect();
+    assert_eq!(found[1], currents);
+    let lambda = bundle.lambda.lambda_n_per_m.unwrap();
+    let mut told = vec![lambda];
+    told.extend(&currents);
+    told.push(lambda);
+    // Its reader of JSON may lose the last digit.
+    for (found, want) in found[2].iter().zip(&told) {
+        assert!(
+            (found - want).abs() <= 4.0 * f64::EPSILON * want.abs(),
+            "{found} and {want}"
+        );
+    }
+    assert_eq!(found[2].len(), told.len());
+    assert_eq!(found[3], [1.0, bundle.manifest.files.len() as f64]);
+}
+
+/// `save` of the arrays gives a MAT file that holds them.
+const KEPT: &str = "\
+addpath(getenv('FLUXFORM_SCRIPTS'));
+bundle = load_bundle('bundle');
+map = bundle.map;
+save('-v7', 'map.mat', '-struct', 'map');
+again = load('map.mat');
+printf('%d\\n', isequal(again, map));
+printf('%d ', size(again.gz_t_per_m_per_a));
+";
+
+#[test]
+fn a_loaded_map_goes_into_a_mat_file() {
+    let folder = temporary();
+    let target = folder.path().join("bundle");
+    sample(false, [5, 4, 3]).write(&target, false).unwrap();
+    let Some(output) = octave(folder.path(), KEPT) else {
+        return;
+    };
+    assert_eq!(rows(&output), [vec![1.0], vec![3.0, 3.0, 4.0, 5.0]]);
+}
+
+#[test]
+fn a_changed_file_is_refused() {
+    let folder = temporary();
+    let target = folder.path().join("bundle");
+    for (file, from, to) in [
+        ("currents.csv", "1.3", "1.4"),
+        ("map.npz", "repel", "repel"),
+        ("lambda.json", "4.9429", "4.94290"),
+    ] {
+        sample(false, [4, 3, 2]).write(&target, true).unwrap();
+        let path = target.join(file);
+        let mut bytes = fs::read(&path).unwrap();
+        if from == to {
+            let middle = bytes.len() / 2;
+            bytes[middle] ^= 4;
+        } else {
+            bytes = String::from_utf8(bytes)
+                .unwrap()
+                .replacen(from, to, 1)
+                .into_bytes();
+        }
+        fs::write(&path, bytes).unwrap();
+        let script = "addpath(getenv('FLUXFORM_SCRIPTS')); load_bundle('bundle');";
+        let Some(output) = octave(folder.path(), script) else {
+            return;
+        };
+        let words = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!output.status.success(), "{file} was read");
+        assert!(
+            words.contains(file) && words.contains("changed or damaged"),
+            "{words}"
+        );
+    }
+}
