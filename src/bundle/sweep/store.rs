@@ -7,14 +7,18 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::plan::PLAN_MAX_BYTES;
 use super::{PlanFile, PointFile};
 use crate::bundle::artefact::FLUXFORM_VERSION;
 use crate::bundle::atomic::{Overwrite, WriteError, clean_leftovers, write_unforced};
 use crate::bundle::json::JsonError;
+use crate::bundle::plain::read_plain;
 use crate::bundle::write::write_json;
 
 /// Points in one folder.
 const FOLDER: u64 = 1000;
+/// Larger files are no point of a sweep.
+const POINT_MAX_BYTES: u64 = 1 << 20;
 
 /// A sweep's folder.
 #[derive(Debug, Clone)]
@@ -65,7 +69,7 @@ impl PointStore {
         indices: std::ops::Range<u64>,
     ) -> Result<(), WriteError> {
         let path = self.folder.join("plan.json");
-        let found = std::fs::read(&path).ok();
+        let found = read_plain(&path, PLAN_MAX_BYTES).ok();
         let ours = found
             .as_deref()
             .and_then(|bytes| PlanFile::parse("", bytes).ok())
@@ -93,7 +97,7 @@ impl PointStore {
     /// A file that is there and cannot be read.
     pub fn find(&self, plan_sha256: &str, index: u64) -> Result<Found, WriteError> {
         let path = self.path(index);
-        let bytes = match std::fs::read(&path) {
+        let bytes = match read_plain(&path, POINT_MAX_BYTES) {
             Ok(bytes) => bytes,
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Found::Nothing),
             Err(error) => return Err(WriteError::from_io("read", &path, error)),
