@@ -9,6 +9,8 @@ use super::table::{CurrentRow, PointRow};
 /// Points and axes' ends may differ by this from what the manifest says, relative to the largest
 /// coordinate: the files hold the numbers themselves.
 const ON_GRID: f64 = 1e-9;
+/// Longer names are none.
+const NAME_BYTES: usize = 4096;
 
 /// Checks a bundle's parts against each other.
 ///
@@ -21,6 +23,7 @@ pub(super) fn check(
     currents: &[CurrentRow],
     lambda: &LambdaFile,
 ) -> Result<(), String> {
+    check_names(manifest)?;
     check_coils(manifest, map)?;
     check_map(manifest, map)?;
     check_points(manifest, points)?;
@@ -83,6 +86,27 @@ fn check_rendering(
     )
 }
 
+/// Names are told to people and to terminals.
+fn check_names(manifest: &Manifest) -> Result<(), String> {
+    let names = [
+        ("design", &manifest.design),
+        ("shape", &manifest.shape),
+        ("lambda.criterion", &manifest.lambda.criterion),
+        ("fluxform_version", &manifest.fluxform_version),
+    ];
+    let paths = manifest.inputs.iter().map(|input| ("inputs", &input.path));
+    for (key, name) in names.into_iter().chain(paths) {
+        if name.len() > NAME_BYTES || name.chars().any(char::is_control) {
+            let shown: String = name.chars().take(40).collect();
+            return Err(format!(
+                "{key} must be a name of at most {NAME_BYTES} bytes without control characters, \
+                 found {shown:?}"
+            ));
+        }
+    }
+    Ok(())
+}
+
 fn check_coils(manifest: &Manifest, map: &MapArrays) -> Result<(), String> {
     let coils = manifest.array.positions_m.len();
     let limits = &manifest.limits;
@@ -123,6 +147,21 @@ fn check_coils(manifest: &Manifest, map: &MapArrays) -> Result<(), String> {
         runtime.lambda_n_per_m,
         manifest.lambda.lambda_n_per_m,
     )?;
+    if let Some(circuit) = &manifest.circuit {
+        let square = circuit.inductance_h.iter().all(|row| row.len() == coils);
+        same(
+            "circuit.inductance_h has a row and a column a coil",
+            (circuit.inductance_h.len(), square),
+            (coils, true),
+        )?;
+    }
+    if let Some(point) = &manifest.map.working_point {
+        same(
+            "map.working_point has one current a coil",
+            point.currents_a.len(),
+            coils,
+        )?;
+    }
     let tilted = runtime.moment_a_m2[..2].iter().any(|&part| part != 0.0);
     if tilted && map.gradient_t_per_m_per_a.is_none() {
         return Err("a tilted magnet needs gradient_t_per_m_per_a in map.npz".to_owned());
