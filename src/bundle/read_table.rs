@@ -295,11 +295,19 @@ mod tests {
                 let text = format!("{mark}x_m,y_m,z_m\n\n1,2,3\n\n\n1,bad,3\n\"1\",2,3\n1,2\n");
                 let text = text.replace('\n', end);
                 let error = read_positions("p.csv", text.as_bytes()).unwrap_err();
-                assert!(error.faults[0].starts_with("p.csv:6: column y_m"), "{error}");
+                assert!(
+                    error.faults[0].starts_with("p.csv:6: column y_m"),
+                    "{error}"
+                );
                 assert!(error.faults[1].starts_with("p.csv:8: 2 cells"), "{error}");
                 let text = format!("{mark}coil,x_m,y_m,current_a\n0,1,1,1\n\n2,1,1,1\n");
                 let error = read_currents("c.csv", text.replace('\n', end).as_bytes());
-                assert!(error.unwrap_err().to_string().starts_with("c.csv:4: column coil"));
+                assert!(
+                    error
+                        .unwrap_err()
+                        .to_string()
+                        .starts_with("c.csv:4: column coil")
+                );
             }
         }
     }

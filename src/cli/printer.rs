@@ -244,7 +244,10 @@ mod tests {
 
     #[test]
     fn what_a_file_says_does_not_command_the_terminal() {
-        assert_eq!(visible("a\u{1b}[31mb\r\n\tc\u{7}"), "a\\u{1b}[31mb\\u{d}\n\tc\\u{7}");
+        assert_eq!(
+            visible("a\u{1b}[31mb\r\n\tc\u{7}"),
+            "a\\u{1b}[31mb\\u{d}\n\tc\\u{7}"
+        );
         assert_eq!(visible("ohm \u{3a9}"), "ohm \u{3a9}");
     }
 }

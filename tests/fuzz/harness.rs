@@ -189,7 +189,11 @@ impl Harness<'_> {
                 let number = tally.inputs;
                 let folder = kept.join(format!("{}-{number}", kind.name));
                 input.write(&folder);
-                report(&format!("{}: {what}: {fault}: {}", kind.name, folder.display()));
+                report(&format!(
+                    "{}: {what}: {fault}: {}",
+                    kind.name,
+                    folder.display()
+                ));
             }
         }
     }

@@ -46,7 +46,9 @@ fn main() {
         let at = words.iter().position(|word| word == name)?;
         words.get(at + 1).cloned()
     };
-    let seconds: f64 = option("--seconds").and_then(|s| s.parse().ok()).unwrap_or(5.0);
+    let seconds: f64 = option("--seconds")
+        .and_then(|s| s.parse().ok())
+        .unwrap_or(5.0);
     let seed = option("--seed").and_then(|s| s.parse().ok()).unwrap_or(1);
     let wanted = option("--kind");
     std::panic::set_hook(Box::new(|_| {}));
@@ -67,7 +69,9 @@ fn main() {
             }
         }
     });
-    println!("| kind | inputs | s | read | refused | worst time / limit | worst memory / limit | faults |");
+    println!(
+        "| kind | inputs | s | read | refused | worst time / limit | worst memory / limit | faults |"
+    );
     println!("|---|---|---|---|---|---|---|---|");
     let mut well = true;
     for kind in kinds::all() {

@@ -10,8 +10,29 @@ const MOST: usize = 1 << 20;
 
 /// Numbers at the ends of what numbers are.
 const EXTREMES: [f64; 24] = [
-    0.0, -0.0, 1.0, -1.0, 0.7, 1e-3, 1e3, 1e6, -1e6, 1e9, 1e15, 1e16, 1e30, -1e30, 1e100, 1e-30,
-    1e-100, 5e-324, 1e-308, 1e308, -1e308, 1.797_693_134_862_315_7e308, 9_007_199_254_740_993.0,
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    0.7,
+    1e-3,
+    1e3,
+    1e6,
+    -1e6,
+    1e9,
+    1e15,
+    1e16,
+    1e30,
+    -1e30,
+    1e100,
+    1e-30,
+    1e-100,
+    5e-324,
+    1e-308,
+    1e308,
+    -1e308,
+    1.797_693_134_862_315_7e308,
+    9_007_199_254_740_993.0,
     18_446_744_073_709_551_615.0,
 ];
 
@@ -21,9 +42,35 @@ pub fn extreme(random: &mut Random) -> f64 {
 
 /// Spellings of numbers, good and bad.
 const SPELLED: [&str; 30] = [
-    "0", "-0", "1", "-1", "nan", "NaN", "-nan", "inf", "-Infinity", "1e308", "-1e308", "1e309",
-    "1e-320", "5e-324", "1_000", "0x10", "0b1", "+1", ".5", "5.", "1e", "1e+2", "1,5", "1d3",
-    "9223372036854775807", "9223372036854775808", "99999999999999999999999", "0.1.2", "\u{221e}",
+    "0",
+    "-0",
+    "1",
+    "-1",
+    "nan",
+    "NaN",
+    "-nan",
+    "inf",
+    "-Infinity",
+    "1e308",
+    "-1e308",
+    "1e309",
+    "1e-320",
+    "5e-324",
+    "1_000",
+    "0x10",
+    "0b1",
+    "+1",
+    ".5",
+    "5.",
+    "1e",
+    "1e+2",
+    "1,5",
+    "1d3",
+    "9223372036854775807",
+    "9223372036854775808",
+    "99999999999999999999999",
+    "0.1.2",
+    "\u{221e}",
     "\u{661}",
 ];
 
@@ -36,23 +83,39 @@ pub fn damage_text(bytes: &mut Vec<u8>, random: &mut Random) {
         }
         1 => {
             let text = bytes.split(|byte| *byte == b'\n').collect::<Vec<_>>();
-            *bytes = text.join(if random.below(2) == 0 { &b"\r\n"[..] } else { b"\r" });
+            *bytes = text.join(if random.below(2) == 0 {
+                &b"\r\n"[..]
+            } else {
+                b"\r"
+            });
         }
         2 => {
             let at = at(bytes, random);
-            let odd: [&[u8]; 6] = [b"\0", b"\xff\xfe", b"\xc3", b"\xed\xa0\x80", b"\x1b[2J", b"\xe2\x80\xae"];
+            let odd: [&[u8]; 6] = [
+                b"\0",
+                b"\xff\xfe",
+                b"\xc3",
+                b"\xed\xa0\x80",
+                b"\x1b[2J",
+                b"\xe2\x80\xae",
+            ];
             bytes.splice(at..at, odd[random.below(6)].iter().copied());
         }
         3 => {
             let at = at(bytes, random);
-            let open: [&[u8]; 8] = [b"[", b"{", b"{\"a\":", b"a={", b"(", b"\"", b"[a.", b"a.a.a."];
+            let open: [&[u8]; 8] = [
+                b"[", b"{", b"{\"a\":", b"a={", b"(", b"\"", b"[a.", b"a.a.a.",
+            ];
             let times = [3, 130, 1000, 20_000][random.below(4)];
             bytes.splice(at..at, open[random.below(8)].repeat(times));
         }
         4 => {
             let at = at(bytes, random);
             let long: [&[u8]; 6] = [b"9", b" ", b"a", b",", b"\n", b"#"];
-            bytes.splice(at..at, long[random.below(6)].repeat(1 << (6 + random.below(12))));
+            bytes.splice(
+                at..at,
+                long[random.below(6)].repeat(1 << (6 + random.below(12))),
+            );
         }
         5..=7 => {
             // A number of the text becomes another.

@@ -237,7 +237,14 @@ fn damage_map(bytes: &mut Vec<u8>, random: &mut Random) {
             parts[at].1 = content;
         }
         2 => {
-            let names = ["../x_m.npy", "/etc/passwd", "x_m.npy", "X_M.npy", "a\u{0}.npy", ""];
+            let names = [
+                "../x_m.npy",
+                "/etc/passwd",
+                "x_m.npy",
+                "X_M.npy",
+                "a\u{0}.npy",
+                "",
+            ];
             parts[at].0 = names[random.below(names.len())].to_owned();
         }
         3 => damage_text(&mut parts[at].1, random),
@@ -246,8 +253,14 @@ fn damage_map(bytes: &mut Vec<u8>, random: &mut Random) {
             let header = parts[at].1.len().min(128);
             let text = String::from_utf8_lossy(&parts[at].1[10.min(header)..header]).into_owned();
             let shapes = [
-                "(4294967296, 4294967296)", "(0,)", "()", "(18446744073709551616,)", "(-1,)",
-                "(9223372036854775807,)", "(1, 1, 1, 1, 1, 1, 1, 1)", "(0, 1152921504606846976)",
+                "(4294967296, 4294967296)",
+                "(0,)",
+                "()",
+                "(18446744073709551616,)",
+                "(-1,)",
+                "(9223372036854775807,)",
+                "(1, 1, 1, 1, 1, 1, 1, 1)",
+                "(0, 1152921504606846976)",
             ];
             if let (Some(from), Some(to)) = (text.find('('), text.rfind(')')) {
                 let new = format!("{}{}", &text[..from], shapes[random.below(shapes.len())]);
@@ -299,7 +312,15 @@ pub fn mutate(input: &mut Input, random: &mut Random) {
         }
     }
     for _ in 0..=random.below(2) {
-        let names = [MANIFEST, MANIFEST, MAP, MAP, "points.csv", "currents.csv", "lambda.json"];
+        let names = [
+            MANIFEST,
+            MANIFEST,
+            MAP,
+            MAP,
+            "points.csv",
+            "currents.csv",
+            "lambda.json",
+        ];
         let name = names[random.below(names.len())];
         match input.get_mut(name) {
             Some(bytes) if name == MAP && random.below(4) > 0 => damage_map(bytes, random),
@@ -332,20 +353,32 @@ pub fn hostile() -> Vec<(String, Input)> {
         });
     };
     let mut found = vec![
-        with("no points and a grid of no rows but many columns", |input| {
-            // Broke: the axis without nodes left the other one unbounded, which was allocated.
-            input.put("points.csv", Content::Bytes(b"x_m,y_m,height_m,normal_x,normal_y,normal_z\n".to_vec()));
-            edit(input, |m| {
-                m["points"]["count"] = json!(0);
-                m["points"]["present"] = json!([]);
-                m["points"]["y_m"]["samples"] = json!(0);
-                m["points"]["x_m"]["samples"] = json!(1_u64 << 60);
-            });
-        }),
+        with(
+            "no points and a grid of no rows but many columns",
+            |input| {
+                // Broke: the axis without nodes left the other one unbounded, which was allocated.
+                input.put(
+                    "points.csv",
+                    Content::Bytes(b"x_m,y_m,height_m,normal_x,normal_y,normal_z\n".to_vec()),
+                );
+                edit(input, |m| {
+                    m["points"]["count"] = json!(0);
+                    m["points"]["present"] = json!([]);
+                    m["points"]["y_m"]["samples"] = json!(0);
+                    m["points"]["x_m"]["samples"] = json!(1_u64 << 60);
+                });
+            },
+        ),
         with("inductances in rows of unlike lengths", |input| {
             edit(input, |m| {
-                let rows = m["circuit"]["inductance_h"].as_array().cloned().unwrap_or_default();
-                let all: Vec<Value> = rows.iter().flat_map(|r| r.as_array().cloned().unwrap_or_default()).collect();
+                let rows = m["circuit"]["inductance_h"]
+                    .as_array()
+                    .cloned()
+                    .unwrap_or_default();
+                let all: Vec<Value> = rows
+                    .iter()
+                    .flat_map(|r| r.as_array().cloned().unwrap_or_default())
+                    .collect();
                 m["circuit"]["inductance_h"] = json!([all, [], [], []]);
             });
         }),
@@ -395,13 +428,19 @@ pub fn hostile() -> Vec<(String, Input)> {
         with("rows of no flags", |input| {
             edit(input, |m| m["points"]["present"] = json!(vec![""; 300_000]));
         }),
-        with("the manifest is a pipe", |input| input.put(MANIFEST, Content::Pipe)),
-        with("the manifest is a folder", |input| input.put(MANIFEST, Content::Folder)),
+        with("the manifest is a pipe", |input| {
+            input.put(MANIFEST, Content::Pipe)
+        }),
+        with("the manifest is a folder", |input| {
+            input.put(MANIFEST, Content::Folder)
+        }),
         with("the manifest never ends", |input| {
             input.put(MANIFEST, Content::Link("/dev/zero".into()));
         }),
         with("the map is a pipe", |input| input.put(MAP, Content::Pipe)),
-        with("the map never ends", |input| input.put(MAP, Content::Link("/dev/zero".into()))),
+        with("the map never ends", |input| {
+            input.put(MAP, Content::Link("/dev/zero".into()))
+        }),
         with("the map is a link within", |input| {
             let map = bytes(input, MAP);
             input.put("other.npz", Content::Bytes(map));
@@ -412,10 +451,25 @@ pub fn hostile() -> Vec<(String, Input)> {
         }),
     ];
     for path in [
-        "../secret", "/etc/hostname", "a/../../secret", "", ".", "..", "plots/", "./points.csv",
-        "a//b", "C:\\a", "\\\\server\\a", "a\u{0}b", "a\nb", "manifest.json", "con:",
+        "../secret",
+        "/etc/hostname",
+        "a/../../secret",
+        "",
+        ".",
+        "..",
+        "plots/",
+        "./points.csv",
+        "a//b",
+        "C:\\a",
+        "\\\\server\\a",
+        "a\u{0}b",
+        "a\nb",
+        "manifest.json",
+        "con:",
     ] {
-        found.push(with(&format!("the path {path:?}"), |input| listed(input, path, 0)));
+        found.push(with(&format!("the path {path:?}"), |input| {
+            listed(input, path, 0)
+        }));
     }
     found
 }

@@ -37,7 +37,12 @@ fn origin() -> Origin {
 fn seeds() -> Vec<Input> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let store = Store::in_folder(folder.path().to_path_buf());
-    let value: Value = (vec![0.7; 300], vec![vec![1.3; 7]; 5], "steel".into(), Some(3));
+    let value: Value = (
+        vec![0.7; 300],
+        vec![vec![1.3; 7]; 5],
+        "steel".into(),
+        Some(3),
+    );
     store.keep(ENTRY, &origin(), &value);
     let bytes = std::fs::read(folder.path().join(ENTRY)).expect("an entry");
     vec![Input::file(ENTRY, bytes)]
@@ -64,15 +69,20 @@ fn mutate(input: &mut Input, random: &mut Random) {
 }
 
 fn hostile() -> Vec<(String, Input)> {
-    let with = |what: &str, content: Content| {
-        (what.to_owned(), Input(vec![(ENTRY.to_owned(), content)]))
-    };
+    let with =
+        |what: &str, content: Content| (what.to_owned(), Input(vec![(ENTRY.to_owned(), content)]));
     let mut found = vec![
         with("an entry that is a pipe", Content::Pipe),
-        with("an entry that never ends", Content::Link("/dev/zero".into())),
+        with(
+            "an entry that never ends",
+            Content::Link("/dev/zero".into()),
+        ),
         with("an entry that is a folder", Content::Folder),
     ];
-    for (what, count) in [("a count beyond memory", [0xff; 9]), ("as many again", [0x80; 9])] {
+    for (what, count) in [
+        ("a count beyond memory", [0xff; 9]),
+        ("as many again", [0x80; 9]),
+    ] {
         let mut input = seeds().remove(0);
         if let Some(bytes) = input.get_mut(ENTRY) {
             bytes.truncate(HEAD);
@@ -92,6 +102,10 @@ fn give(_: &Input, folder: &Path) -> Result<bool, String> {
         return Err("an entry of another origin is used".to_owned());
     }
     // What is no entry is left alone; what is one is written anew.
-    store.keep(ENTRY, &origin(), &(Vec::<f64>::new(), Vec::<Vec<f64>>::new(), "", None::<u64>));
+    store.keep(
+        ENTRY,
+        &origin(),
+        &(Vec::<f64>::new(), Vec::<Vec<f64>>::new(), "", None::<u64>),
+    );
     Ok(read)
 }

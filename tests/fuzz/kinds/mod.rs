@@ -32,7 +32,7 @@ pub fn refusal(words: &str, file: &str) -> Result<bool, String> {
     if !words.contains(file) {
         return Err(format!("a refusal without the file's name: {words}"));
     }
-    if words.len() > 20_000 {
+    if words.len() > 50_000 {
         return Err(format!("a refusal of {} bytes", words.len()));
     }
     Ok(false)
@@ -46,7 +46,10 @@ pub fn finite(told: &str) -> Result<(), String> {
         if " [(-".contains(before) && ",)]} \n".contains(after) {
             let around: String = told[..at].chars().rev().take(60).collect();
             let around: String = around.chars().rev().collect();
-            return Err(format!("accepted, but not finite: {around}{}", &told[at..at + 3]));
+            return Err(format!(
+                "accepted, but not finite: {around}{}",
+                &told[at..at + 3]
+            ));
         }
     }
     Ok(())

@@ -50,7 +50,15 @@ fn plan() -> PlanFile {
         axis("coil.length_mm", &[30.0, 70.0]),
     ];
     let inputs = vec![Entry::of_bytes("a.toml", DESIGN.as_bytes())];
-    PlanFile::new("a".into(), inputs, Mode::Evaluate, 7, None, axes, DESIGN.into())
+    PlanFile::new(
+        "a".into(),
+        inputs,
+        Mode::Evaluate,
+        7,
+        None,
+        axes,
+        DESIGN.into(),
+    )
 }
 
 fn plans() -> Vec<Input> {
@@ -103,7 +111,10 @@ fn hostile_plans() -> Vec<(String, Input)> {
         ),
         (
             "a deep design".into(),
-            Input::file(PLAN, format!("{{\"axes\":{}", "[{\"values\":".repeat(100_000))),
+            Input::file(
+                PLAN,
+                format!("{{\"axes\":{}", "[{\"values\":".repeat(100_000)),
+            ),
         ),
     ]
 }
@@ -145,7 +156,8 @@ fn give_plan(input: &Input, folder: &Path) -> Result<bool, String> {
     };
     let out = folder.join("out");
     // The designs that are tried are small; a mutant's may not be.
-    let cored = plan.design_text.contains("core") || plan.axes.iter().any(|a| a.key.contains("core"));
+    let cored =
+        plan.design_text.contains("core") || plan.axes.iter().any(|a| a.key.contains("core"));
     if plan.mode != Mode::Evaluate || cored {
         return Ok(true);
     }
@@ -255,7 +267,10 @@ fn give_shard(input: &Input, folder: &Path) -> Result<bool, String> {
         Ok((table, report)) => {
             to_json(&report.summary).map_err(|error| error.to_string())?;
             let text = String::from_utf8(table).map_err(|error| error.to_string())?;
-            if text.lines().any(|line| line.split(',').any(|cell| cell == "NaN" || cell == "inf")) {
+            if text
+                .lines()
+                .any(|line| line.split(',').any(|cell| cell == "NaN" || cell == "inf"))
+            {
                 return Err(format!("a table that is not finite: {text}"));
             }
             Ok(report.summary.rows > 0)

@@ -29,8 +29,22 @@ pub fn kinds() -> Vec<Kind> {
     vec![
         kind("design", 256.0, designs, hostile_designs, mutate, design),
         kind("shape", 256.0, shapes, hostile_shapes, mutate, shape),
-        kind("curve", 64.0, curves, || hostile_tables("b_t,h_a_per_m"), mutate, curve),
-        kind("points", 32.0, points, || hostile_tables("x_m,y_m,z_m"), mutate, positions),
+        kind(
+            "curve",
+            64.0,
+            curves,
+            || hostile_tables("b_t,h_a_per_m"),
+            mutate,
+            curve,
+        ),
+        kind(
+            "points",
+            32.0,
+            points,
+            || hostile_tables("x_m,y_m,z_m"),
+            mutate,
+            positions,
+        ),
         kind(
             "trajectory",
             32.0,
@@ -71,17 +85,23 @@ fn hostile_texts(head: &str) -> Vec<(String, Input)> {
     let mut found = vec![
         named("nothing", ""),
         named("only a mark", "\u{feff}"),
-        named("zeros", vec![0; 1 << 20]),
-        named("no text", vec![0xff; 1 << 20]),
-        named("blank lines", "\n".repeat(1 << 20)),
-        named("carriage returns", "\r".repeat(1 << 20)),
-        named("one long line", with("a".repeat(1 << 20))),
-        named("quotes", with("\"".repeat(1 << 20))),
-        named("one open quote", with(format!("\"{}", "\n".repeat(1 << 20)))),
-        named("commas", with(",".repeat(1 << 20))),
-        named("half a megabyte of accents", with("\u{301}".repeat(1 << 18))),
+        named("zeros", vec![0; 1 << 18]),
+        named("no text", vec![0xff; 1 << 18]),
+        named("blank lines", "\n".repeat(1 << 18)),
+        named("carriage returns", "\r".repeat(1 << 18)),
+        named("one long line", with("a".repeat(1 << 18))),
+        named("quotes", with("\"".repeat(1 << 18))),
+        named(
+            "one open quote",
+            with(format!("\"{}", "\n".repeat(1 << 18))),
+        ),
+        named("commas", with(",".repeat(1 << 18))),
+        named("accents", with("\u{301}".repeat(1 << 16))),
     ];
-    found.push(("a folder".to_owned(), Input(vec![(FILE.into(), Content::Folder)])));
+    found.push((
+        "a folder".to_owned(),
+        Input(vec![(FILE.into(), Content::Folder)]),
+    ));
     found
 }
 
@@ -91,14 +111,20 @@ fn hostile_tables(head: &str) -> Vec<(String, Input)> {
     let with = |rows: String| format!("{head}\n{rows}");
     let mut found = hostile_texts(&format!("{head}\n"));
     found.extend([
-        named("many rows", with(row("1").repeat(100_000))),
-        named("many faults", with(row("x").repeat(100_000))),
-        named("many short rows", with("1\n".repeat(300_000))),
-        named("a long cell", with(row(&"9".repeat(300_000)))),
-        named("a wide row", with(format!("{}\n", "1,".repeat(300_000)))),
-        named("many columns", format!("{}{head}\n", "a,".repeat(300_000))),
-        named("far blank lines", with(format!("{}{}", "\n".repeat(1 << 20), row("x")))),
-        named("the ends of numbers", with(format!("{}{}", row("-1e308"), row("1e308")))),
+        named("many rows", with(row("1").repeat(50_000))),
+        named("many faults", with(row("x").repeat(50_000))),
+        named("many short rows", with("1\n".repeat(50_000))),
+        named("a long cell", with(row(&"9".repeat(50_000)))),
+        named("a wide row", with(format!("{}\n", "1,".repeat(50_000)))),
+        named("many columns", format!("{}{head}\n", "a,".repeat(50_000))),
+        named(
+            "far blank lines",
+            with(format!("{}{}", "\n".repeat(1 << 18), row("x"))),
+        ),
+        named(
+            "the ends of numbers",
+            with(format!("{}{}", row("-1e308"), row("1e308"))),
+        ),
     ]);
     found
 }
@@ -112,14 +138,20 @@ fn deep() -> Vec<(String, String)> {
         }
     }
     let keys = |n: usize| vec!["a"; n].join(".");
-    found.push(("a key of many dots".into(), format!("{} = 1\n", keys(100_000))));
-    found.push(("a section of many dots".into(), format!("[{}]\n", keys(100_000))));
-    let all = |each: fn(usize) -> String| (0..60_000).map(each).collect::<String>();
+    found.push((
+        "a key of many dots".into(),
+        format!("{} = 1\n", keys(50_000)),
+    ));
+    found.push((
+        "a section of many dots".into(),
+        format!("[{}]\n", keys(50_000)),
+    ));
+    let all = |each: fn(usize) -> String| (0..30_000).map(each).collect::<String>();
     found.push(("many keys".into(), all(|k| format!("k{k} = 1\n"))));
     found.push(("many sections".into(), all(|k| format!("[s{k}]\n"))));
-    found.push(("the same key".into(), "a = 1\n".repeat(60_000)));
-    found.push(("the same section".into(), "[coil]\n".repeat(60_000)));
-    found.push(("tables in lists".into(), "[[a]]\n".repeat(60_000)));
+    found.push(("the same key".into(), "a = 1\n".repeat(30_000)));
+    found.push(("the same section".into(), "[coil]\n".repeat(30_000)));
+    found.push(("tables in lists".into(), "[[a]]\n".repeat(30_000)));
     found
 }
 
@@ -135,23 +167,37 @@ fn designs() -> Vec<Input> {
 }
 
 fn hostile_designs() -> Vec<(String, Input)> {
-    let seed = designs()[1].get(FILE).map(<[u8]>::to_vec).unwrap_or_default();
+    let seed = designs()[1]
+        .get(FILE)
+        .map(<[u8]>::to_vec)
+        .unwrap_or_default();
     let seed = String::from_utf8(seed).expect("a text");
     let mut found = hostile_texts(&seed);
     for (what, more) in deep() {
         found.push(named(&what, more.clone()));
-        found.push(named(&format!("{what}, in a design"), format!("{more}{seed}")));
+        found.push(named(
+            &format!("{what}, in a design"),
+            format!("{more}{seed}"),
+        ));
     }
     let numbers = |n: usize| vec!["1.0"; n].join(",");
     for (what, from, to) in [
         ("too many rows", "rows = 3", "rows = 1000000000".to_owned()),
         ("ten thousand coils", "rows = 3", "rows = 3333".to_owned()),
-        ("many gains", "rows = 3", format!("rows = 3\ngain = [{}]", numbers(200_000))),
+        (
+            "many gains",
+            "rows = 3",
+            format!("rows = 3\ngain = [{}]", numbers(200_000)),
+        ),
         ("many samples", "61]", "1000000000000]".to_owned()),
         ("a tiny coil", "24.0", "1e-300".to_owned()),
         ("a huge coil", "38.0", "1e300".to_owned()),
         ("many turns", "1429", "9223372036854775807".to_owned()),
-        ("a curve that is a device", "[array]", "[core]\nbh_curve = \"/dev/zero\"\n[array]".to_owned()),
+        (
+            "a curve that is a device",
+            "[array]",
+            "[core]\nbh_curve = \"/dev/zero\"\n[array]".to_owned(),
+        ),
     ] {
         found.push(named(what, seed.replace(from, &to)));
     }
@@ -166,7 +212,9 @@ fn shapes() -> Vec<Input> {
         .map(|name| {
             let mut input = read(&format!("shapes/primitives/{name}.toml"));
             let bytes = input.get_mut(FILE).expect("a file");
-            *bytes = String::from_utf8_lossy(bytes).replace("61]", "9]").into_bytes();
+            *bytes = String::from_utf8_lossy(bytes)
+                .replace("61]", "9]")
+                .into_bytes();
             input
         })
         .into();
@@ -175,13 +223,26 @@ fn shapes() -> Vec<Input> {
 }
 
 fn hostile_shapes() -> Vec<(String, Input)> {
-    let seed = shapes()[0].get(FILE).map(<[u8]>::to_vec).unwrap_or_default();
+    let seed = shapes()[0]
+        .get(FILE)
+        .map(<[u8]>::to_vec)
+        .unwrap_or_default();
     let seed = String::from_utf8(seed).expect("a text");
     let mut found = hostile_texts(&seed);
     for (what, more) in deep() {
-        found.push(named(&format!("{what}, in a shape"), format!("{more}{seed}")));
+        found.push(named(
+            &format!("{what}, in a shape"),
+            format!("{more}{seed}"),
+        ));
     }
-    for surface in ["/dev/zero", "/dev/stdin", "..", "/", "\\u0000", "a.stl/../../b.stl"] {
+    for surface in [
+        "/dev/zero",
+        "/dev/stdin",
+        "..",
+        "/",
+        "\\u0000",
+        "a.stl/../../b.stl",
+    ] {
         let text = format!("name = \"a\"\nsurface = \"{surface}\"\nunit = \"mm\"\n");
         found.push(named(&format!("the surface {surface}"), text));
     }
