@@ -140,6 +140,7 @@ static int find_entry(const archive *a, const char *name, const unsigned char **
 {
     const size_t end_size = 22, head_size = 46, local_size = 30;
     size_t end, at, entries;
+    int found = 0;
     char wanted[64];
     snprintf(wanted, sizeof wanted, "%s.npy", name);
     if (a->size < end_size)
@@ -176,11 +177,13 @@ static int find_entry(const archive *a, const char *name, const unsigned char **
             *size = stored;
             if (crc32_of(*data, *size) != u32(head + 16))
                 return fail(a, name, "is damaged (CRC)");
-            return 1;
+            /* Of two entries of one name, other programs may read the other one. */
+            if (found++)
+                return fail(a, name, "stands there twice");
         }
         at += step;
     }
-    return 0;
+    return found;
 }
 
 /* Compares header text with what numpy writes, blanks aside; moves on. */
