@@ -2,7 +2,7 @@
 
 use super::lambda_file::LambdaFile;
 use super::manifest::{AxisSummary, INTERPOLATION, Manifest};
-use super::npz::{MapArrays, PASSIVE};
+use super::npz::{LARGEST, MapArrays, PASSIVE};
 use super::rendering::HeightGrid;
 use super::table::{CurrentRow, PointRow};
 
@@ -24,6 +24,7 @@ pub(super) fn check(
     lambda: &LambdaFile,
 ) -> Result<(), String> {
     check_names(manifest)?;
+    check_errors(manifest)?;
     check_coils(manifest, map)?;
     check_map(manifest, map)?;
     check_points(manifest, points)?;
@@ -84,6 +85,25 @@ fn check_rendering(
         rendering.voltage_v,
         circuit.and_then(|c| c.voltage_v),
     )
+}
+
+/// Stated errors are multiplied with forces and currents.
+fn check_errors(manifest: &Manifest) -> Result<(), String> {
+    let map = &manifest.map;
+    let stages = manifest.accuracy.values().map(|stage| stage.estimate);
+    let passive = map.passive_force.as_ref();
+    let passive = passive.map(|p| [p.interpolation.largest_error, p.largest_n]);
+    let stated = stages
+        .chain([map.interpolation.largest_error])
+        .chain(passive.into_iter().flatten());
+    for number in stated {
+        if number.abs() > LARGEST {
+            return Err(format!(
+                "errors in accuracy and map must be below {LARGEST:e}, found {number:e}"
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// Names are told to people and to terminals.

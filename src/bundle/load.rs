@@ -25,6 +25,10 @@ use crate::numerics::lagrange::{Cell, locate};
 /// Manifests larger than this are refused unread.
 const MANIFEST_MAX_BYTES: u64 = 64 << 20;
 
+/// Longer names are none of a bundle's files; of them so much is told.
+const NAME_BYTES: usize = 1024;
+const NAME_SHOWN: usize = 100;
+
 /// Why a bundle cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum BundleError {
@@ -114,10 +118,11 @@ impl Bundle {
         for entry in &manifest.files {
             let listed = |message: &str| BundleError::Listed {
                 path: manifest_path.clone(),
-                name: entry.path.clone(),
+                name: entry.path.chars().take(NAME_SHOWN).collect(),
                 message: message.to_owned(),
             };
-            if check_name(&entry.path).is_err() || entry.path == "manifest.json" {
+            let named = entry.path.len() <= NAME_BYTES && check_name(&entry.path).is_ok();
+            if !named || entry.path == "manifest.json" {
                 return Err(listed("is not the name of a file inside the bundle"));
             }
             if !names.insert(entry.path.as_str()) {

@@ -36,13 +36,13 @@ static HEAP: PeakAlloc = PeakAlloc;
 /// Memory is measured for the whole process: one test at a time.
 static ALONE: Mutex<()> = Mutex::new(());
 
-pub fn alone() -> MutexGuard<'static, ()> {
+pub(crate) fn alone() -> MutexGuard<'static, ()> {
     ALONE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// How long mutants are given, all kinds together or a loader: a moment, or what
 /// `FLUXFORM_HOSTILE_SECONDS` says.
-pub fn seconds() -> f64 {
+pub(crate) fn seconds() -> f64 {
     let told = std::env::var("FLUXFORM_HOSTILE_SECONDS").ok();
     told.and_then(|s| s.parse().ok()).unwrap_or(4.0)
 }

@@ -412,6 +412,17 @@ pub fn hostile() -> Vec<(String, Input)> {
                 break;
             }
         }),
+        with("a name as long as a book", |input| {
+            // Broke: the refusal was as long.
+            listed(input, &"{a=".repeat(20_000), 0);
+        }),
+        with("errors beyond the numbers", |input| {
+            // Broke: a replay's error, their product with the forces, was no number.
+            edit(input, |m| {
+                m["map"]["interpolation"]["largest_error"] = json!(1e308);
+                m["accuracy"]["map"]["estimate"] = json!(1.7e308);
+            });
+        }),
         with("deep brackets", |input| {
             input.put("lambda.json", Content::Bytes(b"[".repeat(1 << 20)));
         }),

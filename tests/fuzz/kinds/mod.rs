@@ -9,7 +9,7 @@ use crate::harness::{Kind, Limits};
 
 const MIB: f64 = 1_048_576.0;
 
-/// The limits of all kinds. The README's table of limits repeats them.
+/// The limits of all kinds. CONTRIBUTING's table repeats them.
 pub const fn limits(bytes_per_byte: f64, mib: f64) -> Limits {
     Limits {
         seconds_per_mb: 2.0,

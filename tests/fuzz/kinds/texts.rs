@@ -192,6 +192,18 @@ fn hostile_designs() -> Vec<(String, Input)> {
         ("many samples", "61]", "1000000000000]".to_owned()),
         ("a tiny coil", "24.0", "1e-300".to_owned()),
         ("a huge coil", "38.0", "1e300".to_owned()),
+        // Broke: what was computed of these was no number, and so could not be told.
+        (
+            "the thinnest wire",
+            "diameter_mm = 0.7",
+            "diameter_mm = 1e-200".to_owned(),
+        ),
+        ("the largest magnet", "1.1579e6", "1e300".to_owned()),
+        (
+            "the farthest target",
+            "height_mm = 30.0",
+            "height_mm = 1e300".to_owned(),
+        ),
         ("many turns", "1429", "9223372036854775807".to_owned()),
         (
             "a curve that is a device",
