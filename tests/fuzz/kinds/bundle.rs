@@ -405,12 +405,9 @@ pub fn hostile() -> Vec<(String, Input)> {
             }
             list(input);
         }),
-        with("one file listed often", |input| {
-            for _ in 0..10_000 {
-                let size = bytes(input, MAP).len() as u64;
-                listed(input, MAP, size);
-                break;
-            }
+        with("one file listed twice", |input| {
+            let size = bytes(input, MAP).len() as u64;
+            listed(input, MAP, size);
         }),
         with("a name as long as a book", |input| {
             // Broke: the refusal was as long.
@@ -487,7 +484,7 @@ pub fn hostile() -> Vec<(String, Input)> {
 
 /// Whether the harness should run the slow independent check: on every hostile input, and on some.
 fn verified(input: &Input) -> bool {
-    input.size() % 16 == 0 || input.0.len() != 6
+    input.size().is_multiple_of(16) || input.0.len() != 6
 }
 
 fn give(input: &Input, folder: &Path) -> Result<bool, String> {
