@@ -66,7 +66,7 @@ pub struct Slip {
 }
 
 /// Larger numbers, in their keys' units, are no part of a display.
-const LARGEST: f64 = 1e15;
+const LARGEST: f64 = 1e16;
 
 /// A number's unit, range and likely slips.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -153,7 +153,7 @@ impl Rule {
             return None;
         }
         let message = format!(
-            "expected a size between 1e-15 and {}, found {}",
+            "expected a size between 1e-16 and {}, found {}",
             quantity(LARGEST, self.unit),
             quantity(value, self.unit)
         );
