@@ -1,4 +1,11 @@
 /* Loads a fluxform bundle and interpolates its map; see fluxform_bundle.h. */
+#if defined(__unix__) || defined(__APPLE__)
+#ifndef _POSIX_C_SOURCE
+#define _POSIX_C_SOURCE 200809L
+#endif
+#define HAS_POSIX 1
+#endif
+
 #include "fluxform_bundle.h"
 
 #include <limits.h>
@@ -7,6 +14,17 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#ifdef HAS_POSIX
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#endif
+
+/* Larger numbers are none that a coil or magnet gives; nodes lie within FARTHEST and no closer to
+ * each other than CLOSEST [m]: then what interpolation and equation 8 make of them is finite. */
+#define LARGEST 1e30
+#define FARTHEST 1e6
+#define CLOSEST 1e-15
 
 #define SCHEMA_MAJOR 1
 #define MAX_DIMENSIONS 6
@@ -50,13 +68,32 @@ static double f64(const unsigned char *p)
     return value;
 }
 
+/* Opens a plain file: a pipe would keep its reader waiting, a link may lead out of the bundle. */
+static FILE *open_plain(const char *path)
+{
+#ifdef HAS_POSIX
+    struct stat facts;
+    FILE *file;
+    int descriptor = open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK);
+    if (descriptor < 0)
+        return NULL;
+    if (fstat(descriptor, &facts) != 0 || !S_ISREG(facts.st_mode) || !(file = fdopen(descriptor, "rb"))) {
+        close(descriptor);
+        return NULL;
+    }
+    return file;
+#else
+    return fopen(path, "rb");
+#endif
+}
+
 static unsigned char *read_file(const char *path, size_t *size, const archive *a)
 {
-    FILE *file = fopen(path, "rb");
+    FILE *file = open_plain(path);
     unsigned char *data = NULL;
     long length = -1;
     if (!file) {
-        fail(a, path, "cannot be opened");
+        fail(a, path, "cannot be opened, or is a link or no plain file");
         return NULL;
     }
     if (fseek(file, 0, SEEK_END) == 0)
@@ -103,6 +140,7 @@ static int find_entry(const archive *a, const char *name, const unsigned char **
 {
     const size_t end_size = 22, head_size = 46, local_size = 30;
     size_t end, at, entries;
+    int found = 0;
     char wanted[64];
     snprintf(wanted, sizeof wanted, "%s.npy", name);
     if (a->size < end_size)
@@ -139,11 +177,13 @@ static int find_entry(const archive *a, const char *name, const unsigned char **
             *size = stored;
             if (crc32_of(*data, *size) != u32(head + 16))
                 return fail(a, name, "is damaged (CRC)");
-            return 1;
+            /* Of two entries of one name, other programs may read the other one. */
+            if (found++)
+                return fail(a, name, "stands there twice");
         }
         at += step;
     }
-    return 0;
+    return found;
 }
 
 /* Compares header text with what numpy writes, blanks aside; moves on. */
@@ -237,6 +277,11 @@ static double *copy(const archive *a, const char *name, const array *from)
             free(to);
             return NULL;
         }
+        if (fabs(to[i]) > LARGEST) {
+            fail(a, name, "holds a number beyond 1e30");
+            free(to);
+            return NULL;
+        }
     }
     return to;
 }
@@ -259,6 +304,9 @@ static int load_axis(const archive *a, const char *name, double **nodes, size_t 
     for (size_t i = 1; i < *count; i++)
         if (!((*nodes)[i - 1] < (*nodes)[i]))
             return fail(a, name, "must increase from node to node");
+    for (size_t i = 0; i < *count; i++)
+        if (fabs((*nodes)[i]) > FARTHEST || (i > 0 && (*nodes)[i] - (*nodes)[i - 1] < CLOSEST))
+            return fail(a, name, "must have nodes within 1e6 m and 1e-15 m apart");
     return 0;
 }
 
@@ -268,8 +316,8 @@ static int load_scalar(const archive *a, const char *name, double *value)
     int found = find_array(a, name, "<f8", 0, &from);
     if (found == 1) {
         *value = f64(from.data);
-        if (!isfinite(*value))
-            return fail(a, name, "is not finite");
+        if (!(fabs(*value) <= LARGEST))
+            return fail(a, name, "is not finite, or beyond 1e30");
     }
     return found;
 }
@@ -346,8 +394,11 @@ static int load_rendering(fluxform_bundle *b, const archive *a)
         load_grid(a, "static_current_a", 0, b->coil_count, &b->static_current_a))
         return -1;
     for (size_t i = 0; i < b->coil_count; i++)
-        if (!(b->resistance_ohm[i] > 0 && b->current_min_a[i] <= 0 && b->current_max_a[i] >= 0))
+        if (!(b->resistance_ohm[i] >= 1 / LARGEST && b->current_min_a[i] <= 0 && b->current_max_a[i] >= 0))
             return fail(a, "current_max_a", "limits must enclose 0, and resistances be above 0");
+    for (size_t i = 0; i < b->height_nx * b->height_ny; i++)
+        if (b->has_height[i] != 0 && b->has_height[i] != 1)
+            return fail(a, "has_height", "must hold 0 or 1");
     if (!(b->scratch = calloc(b->coil_count + 1, 8 * sizeof(double)))) /* see fluxform_currents.c */
         return fail(a, "", "no memory");
     b->has_rendering = 1;
@@ -371,8 +422,8 @@ static int load_all(fluxform_bundle *b, const archive *a)
         return fail(a, "moment_a_m2", "must hold three numbers");
     for (size_t i = 0; i < 3; i++) {
         b->moment_a_m2[i] = f64(from.data + 8 * i);
-        if (!isfinite(b->moment_a_m2[i]))
-            return fail(a, "moment_a_m2", "holds a number that is not finite");
+        if (!(fabs(b->moment_a_m2[i]) <= LARGEST))
+            return fail(a, "moment_a_m2", "holds a number that is not finite, or beyond 1e30");
     }
     if (load_map(b, a, "gz_t_per_m_per_a", 4, &b->gz_t_per_m_per_a))
         return -1;

@@ -12,8 +12,8 @@
  *   fluxform_currents(&bundle, x_m, y_m, z_m, current, &step);   // at every measured position
  *   fluxform_bundle_close(&bundle);
  *
- * The file is treated as untrusted: every offset and size is checked, and so is the CRC of every
- * array used. All it needs is in map.npz; manifest.json need not be read. A bundle holds room to
+ * The file is treated as untrusted: it must be a plain file and no link; every offset and size is
+ * checked, and so is the CRC of every array used. All it needs is in map.npz; manifest.json need not be read. A bundle holds room to
  * work in: fluxform_currents and fluxform_allocate serve one thread at a time.
  */
 #ifndef FLUXFORM_BUNDLE_H

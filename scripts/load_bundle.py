@@ -19,8 +19,11 @@ import io
 import json
 import math
 import os
+import re
+import struct
 import sys
 import zipfile
+import zlib
 
 import numpy as np
 
@@ -28,6 +31,31 @@ SCHEMA_MAJOR = 1
 INTERPOLATION = "tricubic-lagrange"
 REQUIRED = ("map.npz", "points.csv", "currents.csv", "lambda.json")
 CHUNK_POINTS = 4096
+# Of map.npz only these arrays are read.
+ARRAYS = (
+    "x_m", "y_m", "z_m", "coil", "gz_t_per_m_per_a", "moment_a_m2", "current_min_a",
+    "current_max_a", "resistance_ohm",
+)
+OPTIONAL_ARRAYS = (
+    "schema_version", "gradient_t_per_m_per_a", "field_t_per_a", "passive_force_n",
+    "working_point_gz_t_per_m", "total_current_max_a", "lambda_n_per_m", "height_x_m",
+    "height_y_m", "height_m", "has_height", "static_current_a", "inductance_h", "voltage_v",
+)
+# Headers as numpy writes them, blanks left out, and no others: no parser of Python's sees them.
+HEADER = re.compile(
+    rb"\{'descr':'(<f8|<i8)','fortran_order':False,'shape':\(((?:\d{1,18},)*(?:\d{1,18})?)\),?\}"
+)
+MANIFEST_MAX_BYTES = 64 << 20
+# Larger numbers are none that a coil or magnet gives; nodes lie within FARTHEST_M and are no closer
+# to each other than CLOSEST_M: then what interpolation and eq. 8 make of them is finite.
+LARGEST = 1e30
+FARTHEST_M = 1e6
+CLOSEST_M = 1e-15
+# What broken content makes Python raise.
+CONTENT_ERRORS = (
+    KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError, RecursionError,
+    csv.Error,
+)
 
 
 class BundleError(Exception):
@@ -45,17 +73,22 @@ class Bundle:
         self.folder = os.fspath(folder)
         try:
             self._load()
-        except (KeyError, TypeError, ValueError) as error:
+        except CONTENT_ERRORS as error:
             raise BundleError(f"{self.folder}: a key is missing or of the wrong kind: {error!r}") from None
+        except (OSError, MemoryError) as error:
+            raise BundleError(f"{self.folder}: cannot be read: {error!r}") from None
 
     def _load(self):
         self.manifest = self._read_manifest()
         files = self._read_files()
-        self.lambda_ = json.loads(files["lambda.json"])
+        self.lambda_ = _json(files["lambda.json"])
         self.points = _table(files["points.csv"], "points.csv")
         self.currents_a = _table(files["currents.csv"], "currents.csv")["current_a"]
         self.map = _arrays(files["map.npz"])
         self.lambda_n_per_m = self.manifest["lambda"]["lambda_n_per_m"]
+        chosen = self.map.get("lambda_n_per_m")
+        if self.lambda_n_per_m != (None if chosen is None else float(chosen)):
+            raise BundleError("map.npz and manifest.json must agree on lambda_n_per_m")
         told = self.manifest["map"]
         passive = told.get("passive_force")
         for told in [told] if passive is None else [told, passive]:
@@ -74,6 +107,10 @@ class Bundle:
             ("moment_a_m2", (3,)),
             ("current_min_a", coils),
             ("resistance_ohm", coils),
+            ("working_point_gz_t_per_m", grid[1:]),
+            ("total_current_max_a", ()),
+            ("lambda_n_per_m", ()),
+            ("voltage_v", ()),
             ("static_current_a", coils),
             ("inductance_h", coils + coils),
             ("height_m", self._surface()),
@@ -82,13 +119,33 @@ class Bundle:
             if key in self.map and self.map[key].shape != shape:
                 raise BundleError(f"map.npz: {key} must have shape {shape}, has {self.map[key].shape}")
         for key in ("x_m", "y_m", "z_m", *(("height_x_m", "height_y_m") if "height_m" in self.map else ())):
-            if not len(self.map[key]) or not np.all(np.diff(self.map[key]) > 0):
+            nodes = self.map[key]
+            if not len(nodes) or not np.all(np.diff(nodes) > 0):
                 raise BundleError(f"map.npz: {key} must increase from node to node")
+            if np.any(np.abs(nodes) > FARTHEST_M) or np.any(np.diff(nodes) < CLOSEST_M):
+                raise BundleError(f"map.npz: {key} must have nodes within 1e6 m and 1e-15 m apart")
         coil = self.map["coil"]
         if np.any(coil < 0) or np.any(coil >= self.coil_count) or np.any(np.diff(coil) <= 0):
             raise BundleError("map.npz: coil must hold increasing indices of coils")
         if self.currents_a.shape != coils:
             raise BundleError("currents.csv must have one row a coil")
+        moment = self.map["moment_a_m2"]
+        if np.any(moment[:2] != 0) and "gradient_t_per_m_per_a" not in self.map:
+            raise BundleError("map.npz: a tilted magnet needs gradient_t_per_m_per_a")
+        if "height_x_m" in self.map:
+            self._check_rendering()
+
+    def _check_rendering(self):
+        for key in ("height_y_m", "height_m", "has_height", "static_current_a", "inductance_h"):
+            if key not in self.map:
+                raise BundleError(f"map.npz: array {key} is missing")
+        if not np.all(np.isin(self.map["has_height"], (0.0, 1.0))):
+            raise BundleError("map.npz: has_height must hold 0 or 1")
+        if not np.all(self.map["resistance_ohm"] >= 1 / LARGEST):
+            raise BundleError("map.npz: resistance_ohm must be above 0")
+        low, high = self.map["current_min_a"], self.map["current_max_a"]
+        if np.any(low > 0) or np.any(high < 0) or self.map.get("total_current_max_a", 0.0) < 0:
+            raise BundleError("map.npz: current_max_a: limits must enclose 0")
 
     def _surface(self):
         return tuple(len(self.map.get(key, ())) for key in ("height_y_m", "height_x_m"))
@@ -199,26 +256,36 @@ class Bundle:
 
     def _read_manifest(self):
         path = os.path.join(self.folder, "manifest.json")
+        if not os.path.exists(path):
+            raise BundleError(f"{self.folder} is not a bundle: it has no manifest.json")
+        # Asked before opening: opening a pipe would wait for its other end.
+        if not os.path.isfile(path) or os.path.getsize(path) > MANIFEST_MAX_BYTES:
+            raise BundleError(f"{path}: expected a plain file of at most {MANIFEST_MAX_BYTES} bytes")
+        with open(path, "rb") as file:
+            content = file.read(MANIFEST_MAX_BYTES)
         try:
-            with open(path, encoding="utf-8") as file:
-                manifest = json.load(file)
-        except FileNotFoundError:
-            raise BundleError(f"{self.folder} is not a bundle: it has no manifest.json") from None
-        except ValueError as error:
+            manifest = _json(content)
+        except (ValueError, RecursionError) as error:
             raise BundleError(f"{path}: {error}") from None
         version = str(manifest.get("schema_version"))
         if version.split(".")[0] != str(SCHEMA_MAJOR):
-            raise BundleError(f"{path}: schema_version {version}, this loader reads {SCHEMA_MAJOR}.x")
+            raise BundleError(f"{path}: schema_version {version!r}, this loader reads {SCHEMA_MAJOR}.x")
         return manifest
 
     def _read_files(self):
         root = os.path.realpath(self.folder)
-        files = {}
+        files, names = {}, set()
         for entry in self.manifest["files"]:
             name = entry["path"]
-            path = os.path.realpath(os.path.join(root, name))
-            if os.path.isabs(name) or os.path.commonpath([root, path]) != root:
+            parts = name.split("/")
+            if os.path.isabs(name) or "\\" in name or any(part in ("", ".", "..") for part in parts):
                 raise BundleError(f"manifest.json lists {name!r}, which leads out of the bundle")
+            if name in names:
+                raise BundleError(f"manifest.json lists {name!r} twice")
+            names.add(name)
+            path = os.path.join(root, *parts)
+            if os.path.realpath(path) != path:
+                raise BundleError(f"manifest.json lists {name!r}, which is a link")
             if not os.path.isfile(path):
                 raise BundleError(f"{path} is missing or not a plain file")
             if os.path.getsize(path) != entry["bytes"]:
@@ -233,6 +300,21 @@ class Bundle:
             if name not in files:
                 raise BundleError(f"manifest.json does not list {name}")
         return files
+
+
+def _no_number(word):
+    raise ValueError(f"{word} is no number in JSON")
+
+
+def _finite(word):
+    value = float(word)
+    if not math.isfinite(value):
+        _no_number(word)
+    return value
+
+
+def _json(content):
+    return json.loads(content.decode("utf-8"), parse_constant=_no_number, parse_float=_finite)
 
 
 def _stencil(nodes, positions):
@@ -395,28 +477,49 @@ def _table(content, name):
     return {key: columns[:, place] for place, key in enumerate(rows[0])}
 
 
+def _array(name, data):
+    if data[:8] != b"\x93NUMPY\x01\x00" or len(data) < 10:
+        raise BundleError(f"map.npz: {name} is not an NPY 1.0 array")
+    start = 10 + int.from_bytes(data[8:10], "little")
+    header = HEADER.fullmatch(b"".join(data[10:start].split()))
+    kind = "<i8" if name in ("coil", "schema_version") else "<f8"
+    if start > len(data) or not header or header[1].decode() != kind:
+        raise BundleError(f"map.npz: {name} must hold {kind!r} in C order")
+    shape = tuple(int(size) for size in header[2].split(b",") if size)
+    if len(shape) > 6 or 8 * math.prod(shape) != len(data) - start:
+        raise BundleError(f"map.npz: {name} does not hold what its shape says")
+    values = np.frombuffer(data, dtype=kind, offset=start).reshape(shape)
+    if not np.all(np.isfinite(values)):
+        raise BundleError(f"map.npz: {name} holds a number that is not finite")
+    if kind == "<f8" and np.any(np.abs(values) > LARGEST):
+        raise BundleError(f"map.npz: {name} holds a number beyond 1e30")
+    return values
+
+
 def _arrays(content):
+    arrays = {}
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             for info in archive.infolist():
+                name = info.filename[: -len(".npy")]
+                if info.filename != name + ".npy" or name not in ARRAYS + OPTIONAL_ARRAYS:
+                    continue
                 if info.compress_type != zipfile.ZIP_STORED or info.file_size > len(content):
                     raise BundleError(f"map.npz: {info.filename} is not stored as it is")
-        with np.load(io.BytesIO(content), allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-    except (ValueError, OSError, zipfile.BadZipFile) as error:
+                if name in arrays:
+                    raise BundleError(f"map.npz: {info.filename} stands there twice")
+                arrays[name] = _array(name, archive.read(info))
+    except (
+        ValueError, OSError, EOFError, RuntimeError, OverflowError, KeyError, struct.error, zlib.error,
+        zipfile.BadZipFile,
+    ) as error:
         raise BundleError(f"map.npz: {error}") from None
-    for name in (
-        "x_m", "y_m", "z_m", "coil", "gz_t_per_m_per_a",
-        "moment_a_m2", "current_min_a", "current_max_a", "resistance_ohm",
-    ):
+    for name in ARRAYS:
         if name not in arrays:
             raise BundleError(f"map.npz: array {name} is missing")
-    for name, values in arrays.items():
-        kind = np.int64 if name in ("coil", "schema_version") else np.float64
-        if values.dtype != kind:
-            raise BundleError(f"map.npz: {name} is of type {values.dtype}, expected {kind.__name__}")
-        if not np.all(np.isfinite(values)):
-            raise BundleError(f"map.npz: {name} holds a number that is not finite")
+    version = arrays.get("schema_version")
+    if version is not None and (version.shape != (3,) or version[0] != SCHEMA_MAJOR):
+        raise BundleError("map.npz: schema_version is not one that this loader reads")
     return arrays
 
 

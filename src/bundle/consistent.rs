@@ -2,13 +2,15 @@
 
 use super::lambda_file::LambdaFile;
 use super::manifest::{AxisSummary, INTERPOLATION, Manifest};
-use super::npz::{MapArrays, PASSIVE};
+use super::npz::{LARGEST, MapArrays, PASSIVE};
 use super::rendering::HeightGrid;
 use super::table::{CurrentRow, PointRow};
 
 /// Points and axes' ends may differ by this from what the manifest says, relative to the largest
 /// coordinate: the files hold the numbers themselves.
 const ON_GRID: f64 = 1e-9;
+/// Longer names are none.
+const NAME_BYTES: usize = 4096;
 
 /// Checks a bundle's parts against each other.
 ///
@@ -21,6 +23,8 @@ pub(super) fn check(
     currents: &[CurrentRow],
     lambda: &LambdaFile,
 ) -> Result<(), String> {
+    check_names(manifest)?;
+    check_errors(manifest)?;
     check_coils(manifest, map)?;
     check_map(manifest, map)?;
     check_points(manifest, points)?;
@@ -83,6 +87,46 @@ fn check_rendering(
     )
 }
 
+/// Stated errors are multiplied with forces and currents.
+fn check_errors(manifest: &Manifest) -> Result<(), String> {
+    let map = &manifest.map;
+    let stages = manifest.accuracy.values().map(|stage| stage.estimate);
+    let passive = map.passive_force.as_ref();
+    let passive = passive.map(|p| [p.interpolation.largest_error, p.largest_n]);
+    let stated = stages
+        .chain([map.interpolation.largest_error])
+        .chain(passive.into_iter().flatten());
+    for number in stated {
+        if number.abs() > LARGEST {
+            return Err(format!(
+                "errors in accuracy and map must be below {LARGEST:e}, found {number:e}"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Names are told to people and to terminals.
+fn check_names(manifest: &Manifest) -> Result<(), String> {
+    let names = [
+        ("design", &manifest.design),
+        ("shape", &manifest.shape),
+        ("lambda.criterion", &manifest.lambda.criterion),
+        ("fluxform_version", &manifest.fluxform_version),
+    ];
+    let paths = manifest.inputs.iter().map(|input| ("inputs", &input.path));
+    for (key, name) in names.into_iter().chain(paths) {
+        if name.len() > NAME_BYTES || name.chars().any(char::is_control) {
+            let shown: String = name.chars().take(40).collect();
+            return Err(format!(
+                "{key} must be a name of at most {NAME_BYTES} bytes without control characters, \
+                 found {shown:?}"
+            ));
+        }
+    }
+    Ok(())
+}
+
 fn check_coils(manifest: &Manifest, map: &MapArrays) -> Result<(), String> {
     let coils = manifest.array.positions_m.len();
     let limits = &manifest.limits;
@@ -123,6 +167,21 @@ fn check_coils(manifest: &Manifest, map: &MapArrays) -> Result<(), String> {
         runtime.lambda_n_per_m,
         manifest.lambda.lambda_n_per_m,
     )?;
+    if let Some(circuit) = &manifest.circuit {
+        let square = circuit.inductance_h.iter().all(|row| row.len() == coils);
+        same(
+            "circuit.inductance_h has a row and a column a coil",
+            (circuit.inductance_h.len(), square),
+            (coils, true),
+        )?;
+    }
+    if let Some(point) = &manifest.map.working_point {
+        same(
+            "map.working_point has one current a coil",
+            point.currents_a.len(),
+            coils,
+        )?;
+    }
     let tilted = runtime.moment_a_m2[..2].iter().any(|&part| part != 0.0);
     if tilted && map.gradient_t_per_m_per_a.is_none() {
         return Err("a tilted magnet needs gradient_t_per_m_per_a in map.npz".to_owned());

@@ -1,11 +1,12 @@
 //! Reading a bundle back: the library's own loader.
 //!
 //! A bundle is untrusted. The manifest is read first; every file it lists must be a plain file
-//! inside the folder with the listed size and digest, and is read once: what is parsed is what was
-//! hashed. Memory is bounded by the size of the files.
+//! inside the folder, reached without links, with the listed size and digest, and is read once:
+//! what is parsed is what was hashed. Memory is bounded by the size of the files, time by what the
+//! manifest lists.
 
-use std::fs::File;
-use std::io::{self, Read};
+use std::collections::BTreeSet;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -16,12 +17,17 @@ use super::consistent;
 use super::lambda_file::LambdaFile;
 use super::manifest::Manifest;
 use super::npz::{MapArrays, from_npz};
+use super::plain::read_plain;
 use super::read_table::{read_currents, read_points};
 use super::table::{CurrentRow, PointRow};
 use crate::numerics::lagrange::{Cell, locate};
 
 /// Manifests larger than this are refused unread.
 const MANIFEST_MAX_BYTES: u64 = 64 << 20;
+
+/// Longer names are none of a bundle's files; of them so much is told.
+const NAME_BYTES: usize = 1024;
+const NAME_SHOWN: usize = 100;
 
 /// Why a bundle cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -109,21 +115,24 @@ impl Bundle {
         let manifest_path = folder.join("manifest.json");
         let (manifest, manifest_sha256) = read_manifest(folder, &manifest_path)?;
         let mut files = Vec::new();
+        let mut names = BTreeSet::new();
         for entry in &manifest.files {
             let listed = |message: &str| BundleError::Listed {
                 path: manifest_path.clone(),
-                name: entry.path.clone(),
+                name: entry.path.chars().take(NAME_SHOWN).collect(),
                 message: message.to_owned(),
             };
-            if check_name(&entry.path).is_err() || entry.path == "manifest.json" {
+            let named = entry.path.len() <= NAME_BYTES && check_name(&entry.path).is_ok();
+            if !named || entry.path == "manifest.json" {
                 return Err(listed("is not the name of a file inside the bundle"));
             }
-            if files.iter().any(|(name, _)| *name == entry.path) {
+            if !names.insert(entry.path.as_str()) {
                 return Err(listed("stands there twice"));
             }
             let bytes = read_listed(folder, &entry.path, entry.bytes, &entry.sha256, &listed)?;
-            let kept = REQUIRED.contains(&entry.path.as_str());
-            files.push((entry.path.clone(), if kept { bytes } else { Vec::new() }));
+            if REQUIRED.contains(&entry.path.as_str()) {
+                files.push((entry.path.clone(), bytes));
+            }
         }
         let part = |name: &str| {
             let found = files.iter().find(|(listed, _)| listed == name);
@@ -246,7 +255,7 @@ fn read_manifest(folder: &Path, path: &Path) -> Result<(Manifest, String), Bundl
     struct Version {
         schema_version: String,
     }
-    let text = match read_bounded(path, MANIFEST_MAX_BYTES) {
+    let text = match read_plain(path, MANIFEST_MAX_BYTES) {
         Err(error)
             if matches!(
                 error.kind(),
@@ -305,6 +314,9 @@ fn read_listed(
     if !real.starts_with(&root) {
         return Err(listed("leads out of the bundle"));
     }
+    if real != root.join(name) {
+        return Err(listed("is a link; a bundle holds its files themselves"));
+    }
     let metadata = real.metadata().map_err(read)?;
     if !metadata.is_file() {
         return Err(listed("is not a plain file"));
@@ -313,26 +325,12 @@ fn read_listed(
         let found = metadata.len();
         return Err(damaged(format!("{found} bytes, the manifest says {bytes}")));
     }
-    let content = read_bounded(&real, bytes).map_err(read)?;
+    let content = read_plain(&real, bytes).map_err(read)?;
     let found = sha256_hex(&content);
     if found != sha256 {
         return Err(damaged(format!(
             "its SHA-256 is {found}, the manifest says {sha256}"
         )));
     }
-    Ok(content)
-}
-
-fn read_bounded(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
-    // Asked before opening: opening a pipe would wait for its other end.
-    let metadata = path.metadata()?;
-    if !metadata.is_file() || metadata.len() > max_bytes {
-        let message = format!("expected a plain file of at most {max_bytes} bytes");
-        return Err(io::Error::new(io::ErrorKind::InvalidData, message));
-    }
-    let mut content = Vec::with_capacity(metadata.len() as usize);
-    File::open(path)?
-        .take(max_bytes)
-        .read_to_end(&mut content)?;
     Ok(content)
 }

@@ -218,6 +218,10 @@ impl PointsGrid {
     /// One flag a node, x fastest; `None` when the strings do not fit the axes or the count.
     #[must_use]
     pub fn flags(&self) -> Option<Vec<bool>> {
+        // An axis without nodes would leave the other one unbounded.
+        if self.x_m.samples == 0 || self.y_m.samples == 0 {
+            return None;
+        }
         let mut flags = Vec::new();
         for row in &self.present {
             if row.len() != self.x_m.samples {

@@ -30,6 +30,7 @@ pub mod manifest;
 mod npy;
 pub mod npz;
 pub mod number;
+pub mod plain;
 pub mod read_table;
 pub mod rendering;
 pub mod replay;

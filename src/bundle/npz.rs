@@ -150,7 +150,11 @@ impl MapArrays<'_> {
             .shape()
             .iter()
             .try_fold(1usize, |n, &size| n.checked_mul(size));
+        let [_, nz, ny, nx] = self.shape();
+        // Without a coil the product above is nothing, however many nodes there are.
+        let box_nodes = nz.checked_mul(ny).and_then(|n| n.checked_mul(nx));
         let nodes = nodes.ok_or_else(|| bad(GZ, "is too large"))?;
+        let box_nodes = box_nodes.ok_or_else(|| bad(GZ, "is too large"))?;
         let runtime = &self.runtime;
         let total = runtime.total_current_max_a.as_slice();
         let lambda = runtime.lambda_n_per_m.as_slice();
@@ -158,7 +162,6 @@ impl MapArrays<'_> {
         let field = self.field_t_per_a.as_deref();
         let passive = self.passive_force_n.as_deref();
         let working_point = self.working_point_gz_t_per_m.as_deref();
-        let [_, nz, ny, nx] = self.shape();
         for (name, values, count) in [
             (X, &*self.x_m, self.x_m.len()),
             (Y, &*self.y_m, self.y_m.len()),
@@ -177,12 +180,12 @@ impl MapArrays<'_> {
             (
                 PASSIVE,
                 passive.unwrap_or_default(),
-                passive.map_or(0, |_| nz.saturating_mul(ny).saturating_mul(nx)),
+                passive.map_or(0, |_| box_nodes),
             ),
             (
                 WORKING_POINT,
                 working_point.unwrap_or_default(),
-                working_point.map_or(0, |_| nz.saturating_mul(ny).saturating_mul(nx)),
+                working_point.map_or(0, |_| box_nodes),
             ),
             (MOMENT, &runtime.moment_a_m2, 3),
             (CURRENT_MIN, &runtime.current_min_a, coils),
@@ -198,12 +201,57 @@ impl MapArrays<'_> {
             if !all_finite(values) {
                 return Err(bad(name, "holds a number that is not finite"));
             }
+            if !all_within(values, LARGEST) {
+                return Err(bad(name, BEYOND));
+            }
         }
-        runtime
-            .rendering
-            .as_ref()
-            .map_or(Ok(()), |rendering| rendering.validate(coils))
+        for (name, nodes) in [(X, &self.x_m), (Y, &self.y_m), (Z, &self.z_m)] {
+            check_nodes(name, nodes)?;
+        }
+        let Some(rendering) = &runtime.rendering else {
+            return Ok(());
+        };
+        rendering.validate(coils)?;
+        // What follows a finger divides by resistances, and may always command no current.
+        if !runtime.resistance_ohm.iter().all(|&r| r >= 1.0 / LARGEST) {
+            return Err(bad(RESISTANCE, "must be above 0"));
+        }
+        let enclosed = |(low, high): (&f64, &f64)| *low <= 0.0 && *high >= 0.0;
+        let mut limits = runtime.current_min_a.iter().zip(&runtime.current_max_a);
+        if !limits.all(enclosed) || total.iter().any(|&total| total < 0.0) {
+            return Err(bad(CURRENT_MAX, "limits must enclose 0"));
+        }
+        Ok(())
     }
+}
+
+/// Numbers of a bundle are no larger, in their SI units: so many of them times each other, as eq. 8
+/// and the interpolation multiply them, are still numbers.
+pub(super) const LARGEST: f64 = 1e30;
+pub(super) const BEYOND: &str = "holds a number beyond 1e30, which no coil or magnet gives";
+/// Nodes lie no farther out, m, and are no closer to each other: nor are products of three such
+/// distances, by which the interpolation divides, nothing.
+const FARTHEST_M: f64 = 1e6;
+const CLOSEST_M: f64 = 1e-15;
+
+/// Whether no number is larger; in blocks, as [`all_finite`].
+pub(super) fn all_within(values: &[f64], largest: f64) -> bool {
+    values.chunks(1024).all(|block| {
+        block
+            .iter()
+            .fold(true, |all, value| all & (value.abs() <= largest))
+    })
+}
+
+/// Nodes, which increase, between which can be interpolated.
+pub(super) fn check_nodes(name: &'static str, nodes: &[f64]) -> Result<(), NpzError> {
+    if !all_within(nodes, FARTHEST_M) {
+        return Err(bad(name, "must lie within 1e6 m"));
+    }
+    if nodes.windows(2).any(|pair| pair[1] - pair[0] < CLOSEST_M) {
+        return Err(bad(name, "must have nodes at least 1e-15 m apart"));
+    }
+    Ok(())
 }
 
 /// Whether all numbers are finite; in blocks, so that it runs at memory speed.

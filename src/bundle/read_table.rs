@@ -25,6 +25,63 @@ impl TableError {
     }
 }
 
+/// Larger tables are refused: a million positions take some 60 MB.
+pub const TABLE_MAX_BYTES: u64 = 1 << 30;
+
+/// The table's bytes, without a byte order mark.
+fn whole(name: &str, source: impl Read) -> Result<Vec<u8>, TableError> {
+    let mut text = Vec::new();
+    source
+        .take(TABLE_MAX_BYTES + 1)
+        .read_to_end(&mut text)
+        .map_err(|error| TableError::one(format!("{name}: cannot be read: {error}")))?;
+    if text.len() as u64 > TABLE_MAX_BYTES {
+        let fault = format!(
+            "{name}: the table is larger than {TABLE_MAX_BYTES} bytes; is this the table? if so, \
+             split it"
+        );
+        return Err(TableError::one(fault));
+    }
+    if text.starts_with(b"\xef\xbb\xbf") {
+        text.drain(..3);
+    }
+    Ok(text)
+}
+
+/// Lines of rows, from 1. The reader's own count stands before the blank lines above a row.
+struct Line<'a> {
+    text: &'a [u8],
+    at: usize,
+    line: u64,
+}
+
+impl<'a> Line<'a> {
+    fn new(text: &'a [u8]) -> Self {
+        Self {
+            text,
+            at: 0,
+            line: 1,
+        }
+    }
+
+    /// The line of the row that begins at `byte` or after the blank lines there; rows are asked for
+    /// in order.
+    fn of_row(&mut self, byte: u64) -> u64 {
+        let byte = usize::try_from(byte).unwrap_or(usize::MAX);
+        while let Some(&found) = self.text.get(self.at) {
+            let ends = found == b'\n' || found == b'\r';
+            if self.at >= byte && !ends {
+                break;
+            }
+            // CRLF is one end: its second half counts.
+            let half = found == b'\r' && self.text.get(self.at + 1) == Some(&b'\n');
+            self.line += u64::from(ends && !half);
+            self.at += 1;
+        }
+        self.line
+    }
+}
+
 /// Reads the wanted columns of a CSV file, in the wanted order; other columns are passed over.
 /// A byte order mark, CRLF and blanks around cells are tolerated.
 ///
@@ -47,10 +104,11 @@ pub fn read_numbered(
     source: impl Read,
     wanted: &[&str],
 ) -> Result<(Vec<Vec<f64>>, Vec<u64>), TableError> {
+    let text = whole(name, source)?;
     let mut reader = ReaderBuilder::new()
         .trim(Trim::All)
         .flexible(true)
-        .from_reader(source);
+        .from_reader(text.as_slice());
     let header: Vec<String> = reader
         .byte_headers()
         .map_err(|error| TableError::one(format!("{name}: cannot be read: {error}")))?
@@ -63,6 +121,7 @@ pub fn read_numbered(
     let mut faults = Vec::new();
     let mut more = 0usize;
     let mut record = ByteRecord::new();
+    let mut place = Line::new(&text);
     loop {
         match reader.read_byte_record(&mut record) {
             Ok(false) => break,
@@ -72,7 +131,7 @@ pub fn read_numbered(
                 break;
             }
         }
-        let line = record.position().map_or(0, csv::Position::line);
+        let line = place.of_row(record.position().map_or(0, csv::Position::byte));
         let mut fault = |message: String| {
             if faults.len() < MAX_FAULTS {
                 faults.push(format!("{name}:{line}: {message}"));
@@ -168,11 +227,11 @@ pub fn read_points(name: &str, source: impl Read) -> Result<Vec<PointRow>, Table
 /// # Errors
 /// As [`read_columns`].
 pub fn read_currents(name: &str, source: impl Read) -> Result<Vec<CurrentRow>, TableError> {
-    let columns = read_columns(name, source, &CURRENT_COLUMNS)?;
+    let (columns, lines) = read_numbered(name, source, &CURRENT_COLUMNS)?;
     (0..columns[0].len())
         .map(|row| {
             if columns[0][row] != row as f64 {
-                let (line, found) = (row + 2, columns[0][row]);
+                let (line, found) = (lines[row], columns[0][row]);
                 let fault = format!("{name}:{line}: column coil: expected {row}, found {found}");
                 return Err(TableError::one(fault));
             }
@@ -227,6 +286,30 @@ mod tests {
             read_positions("p", text.as_bytes()).unwrap(),
             [[0.01, -0.02, 0.03]]
         );
+    }
+
+    #[test]
+    fn lines_are_counted_past_blank_lines_and_with_every_line_end() {
+        for end in ["\n", "\r\n", "\r"] {
+            for mark in ["", "\u{feff}"] {
+                let text = format!("{mark}x_m,y_m,z_m\n\n1,2,3\n\n\n1,bad,3\n\"1\",2,3\n1,2\n");
+                let text = text.replace('\n', end);
+                let error = read_positions("p.csv", text.as_bytes()).unwrap_err();
+                assert!(
+                    error.faults[0].starts_with("p.csv:6: column y_m"),
+                    "{error}"
+                );
+                assert!(error.faults[1].starts_with("p.csv:8: 2 cells"), "{error}");
+                let text = format!("{mark}coil,x_m,y_m,current_a\n0,1,1,1\n\n2,1,1,1\n");
+                let error = read_currents("c.csv", text.replace('\n', end).as_bytes());
+                assert!(
+                    error
+                        .unwrap_err()
+                        .to_string()
+                        .starts_with("c.csv:4: column coil")
+                );
+            }
+        }
     }
 
     #[test]

@@ -7,7 +7,7 @@
 //! are f64, the flags too, so that loaders of older bundles pass over them. New in schema 1.2.
 
 use super::manifest::PointsGrid;
-use super::npz::{NpzError, bad};
+use super::npz::{BEYOND, LARGEST, NpzError, all_within, bad, check_nodes};
 use super::table::PointRow;
 
 pub(super) const HEIGHT_X: &str = "height_x_m";
@@ -58,7 +58,12 @@ impl Rendering {
             if !values.iter().all(|value| value.is_finite()) {
                 return Err(bad(name, "holds a number that is not finite"));
             }
+            if !all_within(values, LARGEST) {
+                return Err(bad(name, BEYOND));
+            }
         }
+        check_nodes(HEIGHT_X, &heights.x_m)?;
+        check_nodes(HEIGHT_Y, &heights.y_m)?;
         if !heights
             .has_height
             .iter()

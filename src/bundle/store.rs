@@ -13,11 +13,14 @@ use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 
 use super::atomic::{self, Overwrite};
+use super::plain::read_plain;
 use crate::numerics::dispatch;
 
 /// First bytes of every entry.
 const MAGIC: &[u8; 8] = b"fluxkept";
 const DIGEST: usize = 32;
+/// Larger entries are not read.
+const ENTRY_MAX_BYTES: u64 = 16 << 30;
 /// Digest of the sources of this build.
 const BUILD: &str = env!("FLUXFORM_BUILD");
 
@@ -129,7 +132,7 @@ impl Store {
 }
 
 fn payload(path: &Path, origin: &[u8; DIGEST]) -> Option<Vec<u8>> {
-    let mut bytes = std::fs::read(path).ok()?;
+    let mut bytes = read_plain(path, ENTRY_MAX_BYTES).ok()?;
     let start = MAGIC.len() + 2 * DIGEST;
     let head = bytes.get(..start)?;
     let (magic, digests) = head.split_at(MAGIC.len());
@@ -143,6 +146,10 @@ fn payload(path: &Path, origin: &[u8; DIGEST]) -> Option<Vec<u8>> {
 
 fn may_replace(path: &Path) -> bool {
     let mut magic = [0; MAGIC.len()];
+    // Opening a pipe would wait for its other end.
+    if path.metadata().is_ok_and(|metadata| !metadata.is_file()) {
+        return false;
+    }
     match File::open(path) {
         Ok(mut file) => file.read_exact(&mut magic).is_ok() && magic == *MAGIC,
         Err(error) => error.kind() == io::ErrorKind::NotFound,

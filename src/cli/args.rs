@@ -1,5 +1,7 @@
 //! The arguments that commands share, and the command line as a whole.
 
+use std::sync::LazyLock;
+
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::commands::{
@@ -7,7 +9,15 @@ use super::commands::{
     probe, replay, sweep, verify,
 };
 use super::{help, values};
+use crate::bundle::artefact::SCHEMA_VERSION;
 use crate::job::discretize::scattered::Sampling;
+
+/// The crate's version, and the revision of a release build.
+const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("FLUXFORM_REVISION"));
+
+/// The version with that of what is written.
+static LONG_VERSION: LazyLock<String> =
+    LazyLock::new(|| format!("{VERSION}\nwrites artefacts of schema {SCHEMA_VERSION}"));
 
 /// Design the coils of a magnetic haptic display, map their field gradients and solve the force
 /// constant of an object.
@@ -19,7 +29,8 @@ use crate::job::discretize::scattered::Sampling;
 #[derive(Debug, Parser)]
 #[command(
     name = "fluxform",
-    version,
+    version = VERSION,
+    long_version = LONG_VERSION.as_str(),
     max_term_width = 100,
     subcommand_required = true,
     arg_required_else_help = true,

@@ -8,7 +8,7 @@ use super::failure::Failure;
 use super::printer::Printer;
 use super::values::{FileArgument, GridSize};
 use crate::bundle::artefact::Input;
-use crate::bundle::read_table::read_columns;
+use crate::bundle::read_table::{TABLE_MAX_BYTES, read_columns};
 use crate::bundle::sweep::PlanFile;
 use crate::bundle::trajectory::Trajectory;
 use crate::design::{Design, Faults, InvalidDocument, Need, source};
@@ -135,12 +135,17 @@ fn bytes_of(file: &FileArgument, what: &str) -> Result<Vec<u8>, Failure> {
     let name = path.display();
     if file.is_standard() {
         let mut bytes = Vec::new();
-        io::stdin().lock().read_to_end(&mut bytes).map(|_| bytes)
+        let stream = io::stdin().lock();
+        let read = stream.take(TABLE_MAX_BYTES + 1).read_to_end(&mut bytes);
+        read.map(|_| bytes)
     } else if path.is_dir() {
         let message = format!("{name}: expected {what}, found a directory");
         return Err(Failure::Input(message));
     } else {
-        std::fs::read(path)
+        let mut bytes = Vec::new();
+        let read = std::fs::File::open(path)
+            .and_then(|file| file.take(TABLE_MAX_BYTES + 1).read_to_end(&mut bytes));
+        read.map(|_| bytes)
     }
     .map_err(|error| Failure::Input(format!("{name}: cannot be read: {error}")))
 }

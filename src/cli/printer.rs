@@ -3,6 +3,7 @@
 //! With `--quiet` only errors and the data that was asked for (JSON, CSV, `--out -`) are left. With
 //! `--format json` warnings go into the JSON object, so that every stream holds one object at most.
 
+use std::borrow::Cow;
 use std::cell::RefCell;
 use std::io::{self, BufWriter, IsTerminal, Write};
 
@@ -99,7 +100,7 @@ impl Printer {
             self.warnings.borrow_mut().push(message.to_owned());
         } else if !self.quiet {
             let head = self.head("warning", "33");
-            say(&format!("{head} {message}\n"));
+            say(&format!("{head} {}\n", visible(message)));
         }
     }
 
@@ -143,7 +144,7 @@ impl Printer {
         let text = match self.format {
             Format::Json => to_json(json)?,
             Format::Human if self.quiet => return Ok(()),
-            Format::Human => human().into_bytes(),
+            Format::Human => visible(&human()).into_owned().into_bytes(),
         };
         match place {
             Place::Output => self.data(|out| out.write_all(&text)),
@@ -191,7 +192,7 @@ impl Printer {
             }
         } else {
             let head = self.head("error", "31");
-            say(&format!("{head} {}\n", failure.message()));
+            say(&format!("{head} {}\n", visible(&failure.message())));
         }
     }
 
@@ -213,8 +214,40 @@ pub fn say(text: &str) {
     let _ = io::stderr().lock().write_all(text.as_bytes());
 }
 
+/// The text with control characters escaped, line ends and tabs aside: what a file says must not
+/// command the terminal.
+fn visible(text: &str) -> Cow<'_, str> {
+    let commands = |c: char| c.is_control() && c != '\n' && c != '\t';
+    if !text.contains(commands) {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        if commands(c) {
+            shown.extend(c.escape_unicode());
+        } else {
+            shown.push(c);
+        }
+    }
+    Cow::Owned(shown)
+}
+
 /// Columns at which messages are wrapped.
 fn width() -> usize {
     let told = std::env::var("COLUMNS").ok().and_then(|c| c.parse().ok());
     told.unwrap_or(100).clamp(40, 160)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::visible;
+
+    #[test]
+    fn what_a_file_says_does_not_command_the_terminal() {
+        assert_eq!(
+            visible("a\u{1b}[31mb\r\n\tc\u{7}"),
+            "a\\u{1b}[31mb\\u{d}\n\tc\\u{7}"
+        );
+        assert_eq!(visible("ohm \u{3a9}"), "ohm \u{3a9}");
+    }
 }

@@ -16,6 +16,8 @@ const COLUMNS: [&str; 2] = ["b_t", "h_a_per_m"];
 
 /// A table that is wrong throughout is told of no more often than this.
 const FAULTS_MAX: usize = 20;
+/// After so many faults reading stops.
+const FOUND_MAX: usize = 1000;
 
 /// The points of a magnetisation curve, both columns growing.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,11 +54,17 @@ impl BhTable {
         if faults.is_empty() {
             return Ok(table);
         }
+        let stopped = if faults.len() < FOUND_MAX {
+            ""
+        } else {
+            "at least "
+        };
         let more = faults.len().saturating_sub(FAULTS_MAX);
         faults.truncate(FAULTS_MAX);
         if more > 0 {
             faults.push(
-                Fault::error("", format!("and {more} faults more")).at(&(text.len()..text.len())),
+                Fault::error("", format!("and {stopped}{more} faults more"))
+                    .at(&(text.len()..text.len())),
             );
         }
         Err(InvalidDocument {
@@ -78,7 +86,8 @@ fn read(text: &str, faults: &mut Vec<Fault>) -> BhTable {
     let mut record = StringRecord::new();
     let mut order = None;
     let mut before: Option<([f64; 2], usize)> = None;
-    loop {
+    // A table that is wrong throughout is not read to its end.
+    while faults.len() < FOUND_MAX {
         match reader.read_record(&mut record) {
             Ok(true) => {}
             Ok(false) => break,
@@ -98,11 +107,11 @@ fn read(text: &str, faults: &mut Vec<Fault>) -> BhTable {
         let Some(row) = row(&record, order, &span, faults) else {
             continue;
         };
-        let line = place_of(text, span.start).line;
-        if let Some((last, last_line)) = before {
-            grows(row, last, last_line, &span, faults);
+        if let Some((last, last_start)) = before {
+            let line = || place_of(text, last_start).line;
+            grows(row, last, line, &span, faults);
         }
-        before = Some((row, line));
+        before = Some((row, span.start));
         table.b_t.push(row[0]);
         table.h_a_per_m.push(row[1]);
     }
@@ -185,15 +194,16 @@ fn row(
 fn grows(
     row: [f64; 2],
     last: [f64; 2],
-    last_line: usize,
+    last_line: impl Fn() -> usize,
     span: &Range<usize>,
     faults: &mut Vec<Fault>,
 ) {
     for ((now, then), name) in row.into_iter().zip(last).zip(COLUMNS) {
         if now <= then {
             let message = format!(
-                "expected more than the {} of line {last_line}, found {}",
+                "expected more than the {} of line {}, found {}",
                 number(then),
+                last_line(),
                 number(now)
             );
             let help = "sort the rows by B, and keep one of equal ones";

@@ -46,6 +46,9 @@ impl Sink {
     }
 }
 
+/// Of larger texts only the first syntax error is told.
+const EVERY_ERROR_BYTES: usize = 64 << 10;
+
 /// Reads the document `text` with `read`, which takes the root section and the sink.
 ///
 /// Returns the value and the warnings.
@@ -60,7 +63,7 @@ pub fn read_document<T>(
 ) -> Result<(T, Faults), InvalidDocument> {
     // A byte order mark would count as a column.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let (table, errors) = DeTable::parse_recoverable(text);
+    let (table, errors) = parsed(text);
     let sink = Sink::default();
     errors
         .iter()
@@ -77,6 +80,18 @@ pub fn read_document<T>(
         Some(value) if !refused => Ok((value, faults)),
         _ => Err(InvalidDocument { faults }),
     }
+}
+
+/// The document's table and its errors: every one of a text of usual size, the first of a large one,
+/// which may have one for every byte.
+fn parsed(text: &str) -> (Spanned<DeTable<'_>>, Vec<toml::de::Error>) {
+    if text.len() > EVERY_ERROR_BYTES {
+        return match DeTable::parse(text) {
+            Ok(table) => (table, Vec::new()),
+            Err(error) => (Spanned::new(0..0, DeTable::new()), vec![error]),
+        };
+    }
+    DeTable::parse_recoverable(text)
 }
 
 fn syntax_fault(error: &toml::de::Error) -> Fault {

@@ -65,6 +65,9 @@ pub struct Slip {
     pub times: f64,
 }
 
+/// Larger numbers, in their keys' units, are no part of a display.
+const LARGEST: f64 = 1e16;
+
 /// A number's unit, range and likely slips.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rule {
@@ -121,7 +124,7 @@ impl Rule {
     #[must_use]
     pub fn error(&self, key: &str, value: f64, span: &Range<usize>) -> Option<Fault> {
         if value.is_finite() && self.bound.admits(value) {
-            return None;
+            return self.beyond(key, value, span);
         }
         let message = if value.is_finite() {
             let wanted = self.bound.words(self.unit);
@@ -139,6 +142,22 @@ impl Rule {
             }
             _ => fault,
         })
+    }
+
+    /// The error where `value` is so large, or divides and is so small, that what is computed of
+    /// it would be no number.
+    fn beyond(&self, key: &str, value: f64, span: &Range<usize>) -> Option<Fault> {
+        let size = value.abs();
+        let small = matches!(self.bound, Bound::Positive) && size < 1.0 / LARGEST;
+        if size <= LARGEST && !small {
+            return None;
+        }
+        let message = format!(
+            "expected a size between 1e-16 and {}, found {}",
+            quantity(LARGEST, self.unit),
+            quantity(value, self.unit)
+        );
+        Some(Fault::error(key, message).at(span))
     }
 
     /// The slip that `value` looks like, and the value that was then meant.

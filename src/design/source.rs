@@ -13,18 +13,22 @@ pub const DOCUMENT_MAX_BYTES: u64 = 4 << 20;
 #[derive(Debug, Clone, Copy)]
 struct Kind {
     name: &'static str,
+    /// Whether it may come through a pipe: what a person names may, what a document names may not.
+    piped: bool,
     too_large: &'static str,
     not_utf8: &'static str,
 }
 
 const DOCUMENT: Kind = Kind {
     name: "TOML file",
+    piped: true,
     too_large: "is this the TOML document, or the surface itself?",
     not_utf8: "save the file as UTF-8; a surface needs its own ending (.stl, .obj, ...)",
 };
 
 const TABLE: Kind = Kind {
     name: "CSV table",
+    piped: false,
     too_large: "is this the table?",
     not_utf8: "save the table as text: CSV in UTF-8",
 };
@@ -53,6 +57,11 @@ fn text_at(path: &Path, kind: Kind) -> Result<String, InvalidDocument> {
             let message = format!("expected a {}, found a directory", kind.name);
             let fault = Fault::error("", message);
             return refuse(fault.help("name the file inside it"));
+        }
+        Ok(found) if !kind.piped && !found.is_file() => {
+            let message = format!("expected a {}, found a device or a pipe", kind.name);
+            let fault = Fault::error("", message);
+            return refuse(fault.help("name a plain file"));
         }
         Ok(_) => {}
     }

@@ -6,6 +6,9 @@ use toml::{Table, Value};
 
 use super::diagnostics::{Fault, InvalidDocument};
 
+/// Parts of a dotted key.
+const PARTS_MAX: usize = 8;
+
 /// A design document whose keys can be set anew, one variant after the other.
 #[derive(Debug, Clone)]
 pub struct Template {
@@ -51,6 +54,14 @@ impl Template {
     ) -> Result<String, String> {
         let mut table = self.table.clone();
         for (key, value) in settings {
+            // No key of a design has so many; a table as deep as a key is long would not be written.
+            if key.split('.').nth(PARTS_MAX).is_some() {
+                let shown: String = key.chars().take(40).collect();
+                return Err(format!(
+                    "{shown}...: the key has more than {PARTS_MAX} parts; name a section and a key \
+                     in it, as in wire.diameter_mm"
+                ));
+            }
             let mut here = &mut table;
             let mut path = key;
             while let Some((section, rest)) = path.split_once('.') {
@@ -111,6 +122,9 @@ mod tests {
                 .unwrap_err()
                 .contains("diameter_mm is not a section")
         );
+        let deep = ["a"; 100_000].join(".");
+        let refused = template().with([(deep.as_str(), Value::Float(1.3))]);
+        assert!(refused.unwrap_err().contains("more than 8 parts"));
         assert!(Template::new("a = ", Path::new("a.toml")).is_err());
     }
 }

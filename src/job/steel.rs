@@ -15,6 +15,9 @@ use crate::field::steel::magnetized::MagnetizedCore;
 use crate::field::steel::sources::{ArraySources, Parts};
 use crate::field::winding::Winding;
 
+/// More permeable steel changes no field by more than its inverse.
+const MOST_PERMEABLE: f64 = 1e9;
+
 /// Default tolerance of one cored coil and of its maps.
 pub const CORED_TOLERANCE: f64 = 1e-6;
 /// Default tolerance of a coupled array.
@@ -83,12 +86,13 @@ impl SceneCore {
         })
     }
 
-    /// The permeability that linear solutions use: the constant one, or the curve's at the origin.
+    /// The permeability that linear solutions use: the constant one, or the curve's at the origin;
+    /// of a curve that starts level one at which they have come to their limit.
     #[must_use]
     pub fn relative_permeability(&self) -> f64 {
         match &self.material {
             Material::Linear(mu_r) => *mu_r,
-            Material::Curve(curve) => curve.initial_relative_permeability(),
+            Material::Curve(curve) => curve.initial_relative_permeability().min(MOST_PERMEABLE),
         }
     }
 }

@@ -19,8 +19,9 @@ use super::passive_map::PassiveMap;
 use super::scene::Scene;
 use super::steel::{Solved, Steel};
 use super::{JobError, KERNEL_ERROR, steel};
-use crate::bundle::artefact::{FileEntry, Input, sha256_hex};
+use crate::bundle::artefact::{Input, sha256_hex};
 use crate::bundle::load::{Bundle, BundleError};
+use crate::bundle::plain::read_plain;
 use crate::design::{Design, Need, Steel as Described};
 use crate::field::magnet::MagnetRule;
 use crate::field::steel::sources::Parts;
@@ -37,6 +38,10 @@ const FEWEST: usize = 200;
 const LAMBDA_AGREES: f64 = 1e-8;
 /// How much a force constant may move with the stated error of steel's forces.
 const FORCES_MOVE: f64 = 10.0;
+/// Inputs that are looked at again: a bundle names them, and is not trusted with any number or size.
+const INPUTS_MAX: usize = 16;
+/// The largest of them.
+const INPUT_MAX_BYTES: u64 = 1 << 30;
 /// Largest duality gap, relative to the mean square of the wanted force.
 const GAP_ALLOWED: f64 = 1e-10;
 
@@ -137,13 +142,19 @@ fn ratio(error: f64, size: f64) -> f64 {
 /// were checked with the others'.
 fn design(bundle: &Bundle) -> Result<Design, JobError> {
     let path = bundle.folder.join(DESIGN_FILE);
+    let lists = |name: &str| bundle.manifest.files.iter().any(|file| file.path == name);
+    if !lists(DESIGN_FILE) {
+        let message = "is not listed in manifest.json: nothing tells what to verify against; \
+                       calibrate again"
+            .to_owned();
+        return Err(BundleError::Content { path, message }.into());
+    }
     let (mut design, _) = Design::read(&path, Need::CALIBRATE)
         .map_err(|invalid| JobError::Input(invalid.to_string()))?;
     if let Some(core) = &mut design.core
         && let Described::Curve(curve) = &mut core.steel
     {
-        let kept = |file: &FileEntry| file.path == CURVE_FILE;
-        if !bundle.manifest.files.iter().any(kept) {
+        if !lists(CURVE_FILE) {
             let message = format!("has a core.bh_curve, but the bundle keeps no {CURVE_FILE}");
             return Err(BundleError::Content { path, message }.into());
         }
@@ -740,12 +751,14 @@ fn duality_gap(problem: &ForceProblem, residual: &[f64], currents: &[f64]) -> f6
 /// Input files that are still at their paths and are not what they were.
 fn changed_inputs(bundle: &Bundle) -> Vec<String> {
     let changed = |input: &&Input| {
-        std::fs::read(&input.path).is_ok_and(|bytes| sha256_hex(&bytes) != input.sha256)
+        read_plain(Path::new(&input.path), INPUT_MAX_BYTES)
+            .is_ok_and(|bytes| sha256_hex(&bytes) != input.sha256)
     };
     bundle
         .manifest
         .inputs
         .iter()
+        .take(INPUTS_MAX)
         .filter(changed)
         .map(|input| format!("{} has changed since the bundle was made", input.path))
         .collect()

@@ -93,7 +93,6 @@ const POWERS: &[Power] = &[
             "bundle/",
             "cli/documents.rs",
             "design/source.rs",
-            "job/verify.rs",
             "shape/surface.rs",
         ],
     },

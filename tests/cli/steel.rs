@@ -140,6 +140,17 @@ fn a_table_in_another_unit_is_warned_of() {
 }
 
 #[test]
+fn a_curve_that_starts_level_gives_numbers() {
+    // Broke: its infinite permeability at the origin made the linear steel it is compared with NaN.
+    let place = Place::new();
+    let rows = "0,0\n0.2,10\n0.3,200\n1.0,1500\n1.5,5000\n1.8,20000\n";
+    let ran = with_table(&place, rows);
+    ran.ends(0).says(&["starts level"]);
+    let ran = place.run(&["evaluate", "design.toml", "--format", "json"]);
+    ran.ends(0);
+}
+
+#[test]
 fn a_core_above_its_knee_is_warned_of() {
     let place = Place::new();
     let ran = evaluate(&place, "current_max_a = 2.0", "current_max_a = 5.0").ends(0);

@@ -6,7 +6,7 @@ mod store;
 mod summary;
 mod table;
 
-pub use plan::{Axis, Mode, PlanFile, Value};
+pub use plan::{Axis, Mode, POINTS_MAX, PlanFile, Value};
 pub use point::{CertificateWord, OptimumRow, PointFile, Row, Status};
 pub use store::{Found, PointStore};
 pub use summary::MergeSummary;

@@ -5,6 +5,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, check_version, sha256_hex};
 
+/// Most designs of one sweep.
+pub const POINTS_MAX: u64 = 100_000_000;
+/// Larger files are no plan.
+pub const PLAN_MAX_BYTES: u64 = 256 << 20;
+
 /// What is done with each design of a sweep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
@@ -119,6 +124,13 @@ impl PlanFile {
             return Err(format!(
                 "{name}: points = {} is not the number of combinations of the axes' values; make \
                  a new one with `fluxform sweep plan`",
+                plan.points
+            ));
+        }
+        if plan.points > POINTS_MAX {
+            return Err(format!(
+                "{name}: {} designs are more than {POINTS_MAX}; make a plan of fewer with \
+                 `fluxform sweep plan`",
                 plan.points
             ));
         }

@@ -7,14 +7,18 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::plan::PLAN_MAX_BYTES;
 use super::{PlanFile, PointFile};
 use crate::bundle::artefact::FLUXFORM_VERSION;
 use crate::bundle::atomic::{Overwrite, WriteError, clean_leftovers, write_unforced};
 use crate::bundle::json::JsonError;
+use crate::bundle::plain::read_plain;
 use crate::bundle::write::write_json;
 
 /// Points in one folder.
 const FOLDER: u64 = 1000;
+/// Larger files are no point of a sweep.
+const POINT_MAX_BYTES: u64 = 1 << 20;
 
 /// A sweep's folder.
 #[derive(Debug, Clone)]
@@ -91,7 +95,7 @@ impl PointStore {
     /// A file that is there and cannot be read.
     pub fn find(&self, plan_sha256: &str, index: u64) -> Result<Found, WriteError> {
         let path = self.path(index);
-        let bytes = match std::fs::read(&path) {
+        let bytes = match read_plain(&path, POINT_MAX_BYTES) {
             Ok(bytes) => bytes,
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Found::Nothing),
             Err(error) => return Err(WriteError::from_io("read", &path, error)),
@@ -128,7 +132,7 @@ impl PointStore {
 
 /// Whether the plan at `path` is this one; false where there is none, and where `force` replaces it.
 fn belongs_to(path: &Path, plan: &PlanFile, force: bool) -> Result<bool, WriteError> {
-    let bytes = match std::fs::read(path) {
+    let bytes = match read_plain(path, PLAN_MAX_BYTES) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
         Err(error) => return Err(WriteError::from_io("read", path, error)),

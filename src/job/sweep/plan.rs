@@ -6,13 +6,11 @@ use rayon::prelude::*;
 
 use super::point::toml_value;
 use crate::bundle::artefact::Input;
-use crate::bundle::sweep::{Axis, Mode, PlanFile, Value};
+use crate::bundle::sweep::{Axis, Mode, POINTS_MAX, PlanFile, Value};
 use crate::design::template::Template;
 use crate::design::{Design, Severity, Steel, source};
 use crate::job::JobError;
 
-/// Most designs of one sweep.
-pub const POINTS_MAX: u64 = 100_000_000;
 /// Values at fault that are told one by one.
 const TOLD: usize = 20;
 /// The key of a B-H table.

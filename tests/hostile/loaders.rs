@@ -1,0 +1,227 @@
+//! The loaders of bundles in Python and C on the same mutants as the library's.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Instant;
+
+use fluxform::job::replay::Opened;
+
+use crate::harness::Input;
+use crate::kinds::bundle::{hostile, mutate, seeds};
+use crate::sample::{has_numpy, scripts};
+use crate::support::Random;
+use crate::{alone, seconds};
+
+/// Positions in, around and far from the samples' map.
+const POSITIONS: &str =
+    "0 0 0.05\n-0.05 -0.043 0.01\n0.05 0.051 0.08\n0.013 -0.021 0.033\n1 1e300 -1\n";
+
+/// All hostile bundles, the seeds, then mutants.
+fn corpus(random: &mut Random) -> impl Iterator<Item = (String, Input)> {
+    let seeds = seeds();
+    let good = seeds
+        .clone()
+        .into_iter()
+        .map(|seed| ("a seed".to_owned(), seed));
+    let mutants = std::iter::from_fn({
+        let mut round = 0;
+        move || {
+            let mut input = seeds[round % seeds.len()].clone();
+            mutate(&mut input, random);
+            round += 1;
+            Some((format!("mutant {round}"), input))
+        }
+    });
+    hostile().into_iter().chain(good).chain(mutants)
+}
+
+/// The C loader with its sanitizers; `None`, with the reason printed, where they cannot be had.
+fn sanitized(folder: &Path) -> Option<PathBuf> {
+    let program = folder.join("replay");
+    let sources =
+        ["replay", "bundle", "currents"].map(|n| scripts().join(format!("fluxform_{n}.c")));
+    let built = Command::new("cc")
+        .args([
+            "-std=c99",
+            "-Wall",
+            "-Wextra",
+            "-Wpedantic",
+            "-Werror",
+            "-O1",
+            "-g",
+        ])
+        .args(["-fsanitize=address,undefined", "-fno-sanitize-recover=all"])
+        .args(sources)
+        .arg("-o")
+        .arg(&program)
+        .arg("-lm")
+        .stderr(Stdio::null())
+        .status();
+    if built.is_ok_and(|built| built.success()) {
+        return Some(program);
+    }
+    eprintln!("skipped: no C compiler with the address and undefined behaviour sanitizers");
+    None
+}
+
+/// Whether the library reads the bundle as far as the other loaders do.
+fn ours(folder: &Path) -> bool {
+    Opened::new(folder).is_ok()
+}
+
+#[test]
+fn the_c_loader_reads_or_refuses_the_same_bundles_under_sanitizers() {
+    let _alone = alone();
+    let folder = tempfile::tempdir().unwrap();
+    let Some(program) = sanitized(folder.path()) else {
+        return;
+    };
+    let bundle = folder.path().join("bundle");
+    let (start, mut read, mut inputs) = (Instant::now(), 0, 0);
+    let mut random = Random(2);
+    let must = hostile().len() + seeds().len();
+    for (what, input) in corpus(&mut random) {
+        if inputs >= must && start.elapsed().as_secs_f64() > seconds() {
+            break;
+        }
+        inputs += 1;
+        input.write(&bundle);
+        let mut child = Command::new(&program)
+            .arg(bundle.join("map.npz"))
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        // A program that refuses its file does not read.
+        let _ = child.stdin.take().unwrap().write_all(POSITIONS.as_bytes());
+        let output = child.wait_with_output().unwrap();
+        let words = String::from_utf8_lossy(&output.stderr);
+        let told = String::from_utf8_lossy(&output.stdout);
+        let code = output.status.code();
+        assert!(matches!(code, Some(0 | 3)), "{what}: {code:?}: {words}");
+        assert!(
+            !words.contains("Sanitizer") && !words.contains("runtime error"),
+            "{what}: {words}"
+        );
+        assert!(
+            code == Some(0) || !words.trim().is_empty(),
+            "{what}: no words"
+        );
+        assert!(
+            !told.contains("nan") && !told.contains("inf"),
+            "{what}: {told}"
+        );
+        if what.starts_with("the map") {
+            assert_eq!(code, Some(3), "{what}");
+        }
+        if ours(&bundle) {
+            // C reads the one form of archive that the writer gives, and may refuse others.
+            let form = [
+                "archive",
+                "lies outside the file",
+                "compressed",
+                "stands there twice",
+            ];
+            let form = form.iter().any(|words_of| words.contains(words_of));
+            assert!(
+                code == Some(0) || form,
+                "{what}: the library reads it, C does not: {words}"
+            );
+            read += 1;
+        }
+    }
+    eprintln!("C: {inputs} bundles, {read} read by both");
+    assert!(read >= 3);
+}
+
+const PYTHON: &str = r#"
+import sys, warnings
+sys.path.insert(0, sys.argv[1])
+import numpy as np
+from load_bundle import Bundle, BundleError
+warnings.simplefilter("error")
+points = [[0, 0, 0.05], [-0.05, -0.043, 0.01], [0.05, 0.051, 0.08], [0.013, -0.021, 0.033], [1, 1e300, -1]]
+for folder in sys.stdin.read().splitlines():
+    try:
+        bundle = Bundle(folder)
+        force = bundle.force_per_ampere(points)
+        passive = bundle.passive_force(points)
+        assert np.all(np.isfinite(force)) and np.all(np.isfinite(passive)), "not finite"
+        if bundle.lambda_n_per_m is not None and "height_x_m" in bundle.map:
+            currents, given, answers = bundle.currents(points)
+            assert np.all(np.isfinite(currents)) and np.all(np.isfinite(given)), "not finite"
+        print("read")
+    except BundleError as error:
+        print("refused", " ".join(str(error).split())[:300] if str(error) else "FAULT no words")
+    except BaseException as error:
+        print("FAULT", type(error), " ".join(str(error).split())[:300])
+"#;
+
+/// Bundles that one Python process is given.
+const BATCH: usize = 60;
+
+#[test]
+fn the_python_loader_reads_or_refuses_the_same_bundles_with_its_own_error() {
+    let _alone = alone();
+    if !has_numpy() {
+        eprintln!("skipped: no python3 with numpy");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mut random = Random(3);
+    let mut corpus = corpus(&mut random);
+    let (start, mut read, mut inputs) = (Instant::now(), 0, 0);
+    while inputs == 0 || start.elapsed().as_secs_f64() < seconds() {
+        let mut names = Vec::new();
+        let mut batch = String::new();
+        for number in 0..BATCH {
+            let Some((what, input)) = corpus.next() else {
+                break;
+            };
+            let bundle = folder.path().join(format!("bundle{number}"));
+            input.write(&bundle);
+            batch.push_str(&format!("{}\n", bundle.display()));
+            names.push((what, bundle));
+        }
+        let mut child = Command::new("python3")
+            .args(["-c", PYTHON])
+            .arg(scripts())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        child
+            .stdin
+            .take()
+            .unwrap()
+            .write_all(batch.as_bytes())
+            .unwrap();
+        let output = child.wait_with_output().unwrap();
+        let told = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success(), "Python ended: {told}");
+        assert_eq!(told.lines().count(), names.len(), "{told}");
+        for ((what, bundle), answer) in names.iter().zip(told.lines()) {
+            inputs += 1;
+            assert!(!answer.contains("FAULT"), "{what}: {answer}");
+            if what.contains("the path")
+                || what.starts_with("the map")
+                || what.starts_with("the manifest")
+            {
+                assert!(answer.starts_with("refused"), "{what}: {answer}");
+            }
+            if ours(bundle) {
+                // So does Python, but for what lies beside the archive's entries.
+                let read_too = answer == "read" || answer.contains("map.npz: ");
+                assert!(
+                    read_too,
+                    "{what}: the library reads it, Python does not: {answer}"
+                );
+                read += 1;
+            }
+        }
+    }
+    eprintln!("Python: {inputs} bundles, {read} read by both");
+    assert!(read >= 3);
+}

@@ -1,0 +1,104 @@
+//! Hostile inputs, for a moment: every kind within the limits that `tests/fuzz/kinds` states, and
+//! the three loaders of bundles. The long run is `cargo bench --bench fuzz_inputs`.
+#![allow(clippy::disallowed_methods, clippy::print_stderr)]
+
+#[path = "../fuzz/harness.rs"]
+mod harness;
+#[path = "../fuzz/kinds/mod.rs"]
+mod kinds;
+mod loaders;
+#[allow(dead_code)]
+#[path = "../fuzz/mutation.rs"]
+mod mutation;
+#[allow(dead_code)]
+#[path = "../bundle/sample.rs"]
+mod sample;
+#[allow(dead_code)]
+#[path = "../shape/samples.rs"]
+mod samples;
+#[path = "../fuzz/structure.rs"]
+mod structure;
+#[allow(dead_code)]
+#[path = "../shape/support.rs"]
+mod support;
+
+use std::sync::atomic::Ordering;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use harness::{BEGAN, Harness, millis};
+use peak_alloc::PeakAlloc;
+use support::Random;
+
+#[global_allocator]
+static HEAP: PeakAlloc = PeakAlloc;
+
+/// Memory is measured for the whole process: one test at a time.
+static ALONE: Mutex<()> = Mutex::new(());
+
+pub(crate) fn alone() -> MutexGuard<'static, ()> {
+    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// How long mutants are given, all kinds together or a loader: a moment, or what
+/// `FLUXFORM_HOSTILE_SECONDS` says.
+pub(crate) fn seconds() -> f64 {
+    let told = std::env::var("FLUXFORM_HOSTILE_SECONDS").ok();
+    told.and_then(|s| s.parse().ok()).unwrap_or(4.0)
+}
+
+/// Ends the process when a reader hangs: nothing else would tell.
+fn watch() {
+    std::thread::spawn(|| {
+        loop {
+            std::thread::sleep(Duration::from_secs(1));
+            let began = BEGAN.load(Ordering::Relaxed);
+            if began > 0 && millis() - began > 120_000 {
+                eprintln!("a reader hangs");
+                std::process::abort();
+            }
+        }
+    });
+}
+
+#[test]
+fn every_kind_of_input_is_read_or_refused_within_its_limits() {
+    let _alone = alone();
+    watch();
+    std::panic::set_hook(Box::new(|_| {}));
+    let folder = tempfile::tempdir().unwrap();
+    let harness = Harness {
+        heap: &HEAP,
+        folder: folder.path().join("now"),
+        kept: None,
+    };
+    let kinds = kinds::all();
+    let each = seconds() / kinds.len() as f64;
+    let mut faults = Vec::new();
+    for kind in &kinds {
+        let start = Instant::now();
+        let mut begun: Option<Instant> = None;
+        // The first mutants are always the same; how many there are, time decides.
+        let tally = harness.run(kind, &mut Random(1), |_| {
+            begun
+                .get_or_insert_with(Instant::now)
+                .elapsed()
+                .as_secs_f64()
+                < each
+        });
+        eprintln!(
+            "{}: {} inputs in {:.1} s, {} read; worst time {:.2}, worst memory {:.2} of the limit",
+            kind.name,
+            tally.inputs,
+            start.elapsed().as_secs_f64(),
+            tally.read,
+            tally.slowest,
+            tally.largest
+        );
+        assert!(tally.read > 0, "{}: nothing is read", kind.name);
+        let told = |(fault, count)| format!("{}: {count} x {fault}", kind.name);
+        faults.extend(tally.faults.into_iter().map(told));
+    }
+    drop(std::panic::take_hook());
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
