@@ -154,15 +154,15 @@ function text = listed(folder, known, name)
 % The bytes of a file that the manifest lists, after checking size and digest.
     path = fullfile(folder, name);
     at = find(strcmp({known.path}, name));
-    if isempty(at)
-        error('fluxform:bundle', 'manifest.json does not list %s', name);
+    if numel(at) ~= 1
+        error('fluxform:bundle', 'manifest.json must list %s once', name);
     end
     text = text_of(path);
-    if numel(text) ~= known(at(1)).bytes
+    if numel(text) ~= known(at).bytes
         error('fluxform:bundle', '%s was changed or damaged: its size differs', path);
     end
     digest = sha256(text);
-    if ~isempty(digest) && ~strcmpi(digest, known(at(1)).sha256)
+    if ~isempty(digest) && ~strcmpi(digest, known(at).sha256)
         error('fluxform:bundle', '%s was changed or damaged: its SHA-256 differs', path);
     end
 end
@@ -253,8 +253,8 @@ function values = read_npy(file, bytes, name)
     else
         values = fread(file, [1, prod(shape)], 'int64=>double');
     end
-    if ~all(isfinite(values))
-        error('fluxform:bundle', '%s holds a number that is not finite', name);
+    if ~all(abs(values) <= 1e30)
+        error('fluxform:bundle', '%s holds a number that is not finite or beyond 1e30', name);
     end
     if numel(shape) > 1
         values = permute(reshape(values, fliplr(shape)), numel(shape):-1:1);

@@ -156,3 +156,8 @@ pub mod job;
 pub mod bench;
 
 pub mod cli;
+
+/// The README's Rust compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
