@@ -127,7 +127,7 @@
 //! In the direction of their imports:
 //! [`numerics`] < [`design`] < [`field`] < [`coil`] < [`map`]; [`shape`] beside them;
 //! [`lambda`] on numbers alone; [`bundle`] writes and reads artefacts, [`plot`] draws,
-//! [`report`] makes pages; [`job`] joins them into what a command does; [`bench`] measures error
+//! [`report`] makes pages; [`job`] joins them into what a command does; [`bench`](mod@bench) measures error
 //! against time; [`cli`] is the only room that talks.
 
 pub mod accuracy;
