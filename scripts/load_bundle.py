@@ -466,7 +466,8 @@ def _allocate(force_per_ampere, wanted, r, lower, upper, total):
 
 
 def _table(content, name):
-    rows = list(csv.reader(io.StringIO(content.decode("utf-8"), newline=None)))
+    lines = csv.reader(io.StringIO(content.decode("utf-8"), newline=None))
+    rows = [row for row in lines if row]
     try:
         columns = np.array([[float(cell) for cell in row] for row in rows[1:]])
         columns = columns.reshape(len(rows) - 1, len(rows[0]))
