@@ -156,7 +156,9 @@ for folder in sys.stdin.read().splitlines():
     except BundleError as error:
         print("refused", " ".join(str(error).split())[:300] if str(error) else "FAULT no words")
     except BaseException as error:
-        print("FAULT", type(error), " ".join(str(error).split())[:300])
+        import traceback
+        at = traceback.extract_tb(error.__traceback__)[-1]
+        print("FAULT", type(error), f"{at.name}:{at.lineno}", " ".join(str(error).split())[:300])
 "#;
 
 /// Bundles that one Python process is given.
