@@ -230,10 +230,13 @@ class Bundle:
     def allocate(self, force_per_ampere, wanted_n):
         """Currents [A] of least power that give wanted_n, or the nearest force, and whether they do."""
         total = float(self.map.get("total_current_max_a", np.inf))
-        return _allocate(
-            np.asarray(force_per_ampere, dtype=float), float(wanted_n), self.map["resistance_ohm"],
-            self.map["current_min_a"], self.map["current_max_a"], total,
-        )
+        # Forces at the ends of what doubles hold overflow on the way, not at the end.
+        with np.errstate(over="ignore"):
+            return _allocate(
+                np.asarray(force_per_ampere, dtype=float), float(wanted_n),
+                self.map["resistance_ohm"], self.map["current_min_a"], self.map["current_max_a"],
+                total,
+            )
 
     def _interpolate(self, values, points_m):
         points_m = np.atleast_2d(np.asarray(points_m, dtype=float))
@@ -466,7 +469,8 @@ def _allocate(force_per_ampere, wanted, r, lower, upper, total):
 
 
 def _table(content, name):
-    rows = list(csv.reader(io.StringIO(content.decode("utf-8"))))
+    lines = csv.reader(io.StringIO(content.decode("utf-8"), newline=None))
+    rows = [row for row in lines if row]
     try:
         columns = np.array([[float(cell) for cell in row] for row in rows[1:]])
         columns = columns.reshape(len(rows) - 1, len(rows[0]))

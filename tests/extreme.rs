@@ -52,8 +52,7 @@ fn every_fast_case_passes() {
     assert!(failed.is_empty(), "{}", failed.join("\n"));
 }
 
-/// `cargo test --test extreme -- --ignored --nocapture` prints the whole table. One row fails: a
-/// curve of endless initial permeability stalls at weak fields.
+/// `cargo test --test extreme -- --ignored --nocapture` prints the whole table.
 #[test]
 #[ignore = "minutes: the whole catalogue, as `bench --extreme` runs it"]
 #[allow(clippy::print_stdout)]

@@ -12,6 +12,8 @@ pub enum Bound {
     Any,
     /// Greater than 0.
     Positive,
+    /// Greater than 0 and only compared with: as large or small as is wished.
+    Limit,
     /// 0 or greater.
     NotNegative,
     /// 0 or less.
@@ -26,7 +28,7 @@ impl Bound {
     fn admits(self, value: f64) -> bool {
         match self {
             Self::Any => true,
-            Self::Positive => value > 0.0,
+            Self::Positive | Self::Limit => value > 0.0,
             Self::NotNegative => value >= 0.0,
             Self::NotPositive => value <= 0.0,
             Self::AtLeast(least) => value >= least,
@@ -37,7 +39,7 @@ impl Bound {
     fn words(self, unit: &str) -> String {
         match self {
             Self::Any => format!("any number{}", spaced(unit)),
-            Self::Positive => "a number greater than 0".to_owned(),
+            Self::Positive | Self::Limit => "a number greater than 0".to_owned(),
             Self::NotNegative => "0 or more".to_owned(),
             Self::NotPositive => "0 or less".to_owned(),
             Self::AtLeast(least) => format!("at least {}", quantity(least, unit)),
@@ -149,7 +151,7 @@ impl Rule {
     fn beyond(&self, key: &str, value: f64, span: &Range<usize>) -> Option<Fault> {
         let size = value.abs();
         let small = matches!(self.bound, Bound::Positive) && size < 1.0 / LARGEST;
-        if size <= LARGEST && !small {
+        if matches!(self.bound, Bound::Limit) || (size <= LARGEST && !small) {
             return None;
         }
         let message = format!(

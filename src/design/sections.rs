@@ -323,7 +323,7 @@ pub fn supply(mut s: Section<'_>) -> SupplyDraft {
 }
 
 pub fn limits(mut s: Section<'_>) -> Limits {
-    let mut limit = |key, rule: Rule| s.number(key, &rule.positive()).map(|l| l.value);
+    let mut limit = |key, rule: Rule| s.number(key, &rule.bound(Bound::Limit)).map(|l| l.value);
     let limits = Limits {
         resistance_max_ohm: limit("resistance_max_ohm", Rule::any("ohm")),
         settling_max_s: limit("settling_max_ms", SETTLING_MS).map(|ms| ms / 1000.0),

@@ -1,5 +1,7 @@
 //! Help pages, their examples, completions and manual pages.
 
+use fluxform::bundle::artefact::SCHEMA_VERSION;
+
 use crate::support::Place;
 
 const COMMANDS: [&str; 13] = [
@@ -33,10 +35,14 @@ fn every_command_explains_itself() {
         assert!(about.len() > 100, "{command} has no paragraph: {about}");
         assert!(page.lines().filter(|l| l.starts_with("  # ")).count() >= 2);
     }
-    let version = place.run(&["--version"]).ends(0).out;
+    // A build for tests has no revision.
+    let crate_version = concat!("fluxform ", env!("CARGO_PKG_VERSION"));
+    assert_eq!(place.run(&["-V"]).ends(0).out.trim(), crate_version);
+    let whole = place.run(&["--version"]).ends(0).out;
+    let schema = format!("writes artefacts of schema {SCHEMA_VERSION}");
     assert_eq!(
-        version.trim(),
-        concat!("fluxform ", env!("CARGO_PKG_VERSION"))
+        whole.trim().lines().collect::<Vec<_>>(),
+        [crate_version, schema.as_str()]
     );
 }
 

@@ -11,7 +11,7 @@ use crate::harness::Input;
 use crate::kinds::bundle::{hostile, mutate, seeds};
 use crate::sample::{has_numpy, scripts};
 use crate::support::Random;
-use crate::{alone, seconds};
+use crate::{alone, another};
 
 /// Positions in, around and far from the samples' map.
 const POSITIONS: &str =
@@ -82,7 +82,7 @@ fn the_c_loader_reads_or_refuses_the_same_bundles_under_sanitizers() {
     let mut random = Random(2);
     let must = hostile().len() + seeds().len();
     for (what, input) in corpus(&mut random) {
-        if inputs >= must && start.elapsed().as_secs_f64() > seconds() {
+        if inputs >= must && !another((inputs - must) as u64, start) {
             break;
         }
         inputs += 1;
@@ -156,7 +156,9 @@ for folder in sys.stdin.read().splitlines():
     except BundleError as error:
         print("refused", " ".join(str(error).split())[:300] if str(error) else "FAULT no words")
     except BaseException as error:
-        print("FAULT", type(error), " ".join(str(error).split())[:300])
+        import traceback
+        at = traceback.extract_tb(error.__traceback__)[-1]
+        print("FAULT", type(error), f"{at.name}:{at.lineno}", " ".join(str(error).split())[:300])
 "#;
 
 /// Bundles that one Python process is given.
@@ -173,7 +175,8 @@ fn the_python_loader_reads_or_refuses_the_same_bundles_with_its_own_error() {
     let mut random = Random(3);
     let mut corpus = corpus(&mut random);
     let (start, mut read, mut inputs) = (Instant::now(), 0, 0);
-    while inputs == 0 || start.elapsed().as_secs_f64() < seconds() {
+    let must = hostile().len() + seeds().len();
+    while inputs < must || another((inputs - must) as u64, start) {
         let mut names = Vec::new();
         let mut batch = String::new();
         for number in 0..BATCH {

@@ -40,11 +40,19 @@ pub(crate) fn alone() -> MutexGuard<'static, ()> {
     ALONE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// How long mutants are given, all kinds together or a loader: a moment, or what
-/// `FLUXFORM_HOSTILE_SECONDS` says.
-pub(crate) fn seconds() -> f64 {
-    let told = std::env::var("FLUXFORM_HOSTILE_SECONDS").ok();
-    told.and_then(|s| s.parse().ok()).unwrap_or(4.0)
+/// Mutants a kind of input or a loader is given: always the same ones.
+const MUTANTS: u64 = 60;
+
+/// Whether another mutant is to come after `mutants` since `start`: [`MUTANTS`], or as many as fit
+/// into the seconds that `FLUXFORM_HOSTILE_SECONDS` gives each kind and loader.
+pub(crate) fn another(mutants: u64, start: Instant) -> bool {
+    match std::env::var("FLUXFORM_HOSTILE_SECONDS") {
+        Ok(told) => {
+            let seconds: f64 = told.parse().expect("a number of seconds");
+            start.elapsed().as_secs_f64() < seconds
+        }
+        Err(_) => mutants < MUTANTS,
+    }
 }
 
 /// Ends the process when a reader hangs: nothing else would tell.
@@ -73,18 +81,12 @@ fn every_kind_of_input_is_read_or_refused_within_its_limits() {
         kept: None,
     };
     let kinds = kinds::all();
-    let each = seconds() / kinds.len() as f64;
     let mut faults = Vec::new();
     for kind in &kinds {
         let start = Instant::now();
         let mut begun: Option<Instant> = None;
-        // The first mutants are always the same; how many there are, time decides.
-        let tally = harness.run(kind, &mut Random(1), |_| {
-            begun
-                .get_or_insert_with(Instant::now)
-                .elapsed()
-                .as_secs_f64()
-                < each
+        let tally = harness.run(kind, &mut Random(1), |mutants| {
+            another(mutants, *begun.get_or_insert_with(Instant::now))
         });
         eprintln!(
             "{}: {} inputs in {:.1} s, {} read; worst time {:.2}, worst memory {:.2} of the limit",

@@ -172,6 +172,11 @@ function chart(place, spec) {
       const frame = svg.getBoundingClientRect();
       show(near(((event.clientX - frame.left) / frame.width) * (pad.left + inner.w + pad.right)), event.clientY, false);
     };
+    heed(svg, move, hide, (step) => show((at ?? near(px(spec.start ?? unlog((x0 + x1) / 2)))) + step, undefined, true));
+  }
+
+  // Pointer and keys: where it moves, when it leaves, and by how many places a key goes on.
+  function heed(svg, move, hide, go) {
     svg.addEventListener("pointermove", move);
     svg.addEventListener("pointerdown", move);
     svg.addEventListener("pointerleave", hide);
@@ -181,7 +186,7 @@ function chart(place, spec) {
       if (event.key === "Escape") hide();
       if (steps[event.key] === undefined) return;
       event.preventDefault();
-      show((at ?? near(px(spec.start ?? unlog((x0 + x1) / 2)))) + steps[event.key], undefined, true);
+      go(steps[event.key]);
     });
   }
 
@@ -209,17 +214,7 @@ function chart(place, spec) {
       const off = (p) => Math.hypot(p.x - x, p.y - y);
       if (all.length) show(all.reduce((best, p, k) => (off(p) < off(all[best]) ? k : best), 0), false);
     };
-    svg.addEventListener("pointermove", move);
-    svg.addEventListener("pointerdown", move);
-    svg.addEventListener("pointerleave", hide);
-    svg.addEventListener("blur", hide);
-    svg.addEventListener("keydown", (event) => {
-      const steps = { ArrowLeft: -1, ArrowRight: 1, PageUp: -20, PageDown: 20, Home: -1e9, End: 1e9 };
-      if (event.key === "Escape") hide();
-      if (steps[event.key] === undefined || !all.length) return;
-      event.preventDefault();
-      show((at ?? -1) + steps[event.key], true);
-    });
+    heed(svg, move, hide, (step) => all.length && show((at ?? -1) + step, true));
   }
 
   // A line's value at x, straight between its points.
