@@ -189,7 +189,7 @@ end
 
 function columns = columns_of(text, name)
 % A table of numbers: its columns by the names in its first line.
-    lines = strsplit(strtrim(text), char(10));
+    lines = regexp(text, '[^\r\n]+', 'match');
     names = strsplit(lines{1}, ',');
     numbers = sscanf(strrep(strjoin(lines(2:end), ' '), ',', ' '), '%f');
     if mod(numel(numbers), numel(names)) ~= 0 || numel(numbers) ~= numel(names) * (numel(lines) - 1)
