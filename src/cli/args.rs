@@ -6,7 +6,7 @@ use super::commands::{
     bench, calibrate, compare, completions, discretize, evaluate, lambda, man, map, optimize,
     probe, replay, sweep, verify,
 };
-use super::{help, values};
+use super::{explain, help, values};
 use crate::job::discretize::scattered::Sampling;
 
 /// Design the coils of a magnetic haptic display, map their field gradients and solve the force
@@ -21,7 +21,7 @@ use crate::job::discretize::scattered::Sampling;
     name = "fluxform",
     version,
     max_term_width = 100,
-    subcommand_required = true,
+    override_usage = "fluxform [OPTIONS] <COMMAND>\n       fluxform --explain <CODE>",
     arg_required_else_help = true,
     disable_help_subcommand = true,
     after_help = help::main()
@@ -30,9 +30,12 @@ pub struct Arguments {
     /// What every command takes.
     #[command(flatten)]
     pub common: Common,
+    /// Tell more about an error code, like E301, or an exit code; `list` names all of them
+    #[arg(long, value_name = "CODE", value_parser = explain::asked)]
+    pub explain: Option<explain::Asked>,
     /// The command.
     #[command(subcommand)]
-    pub command: Command,
+    pub command: Option<Command>,
 }
 
 /// What every command takes.

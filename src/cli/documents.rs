@@ -275,6 +275,7 @@ fn raw_surface(path: &Path, flags: &SurfaceFlags) -> Result<ShapeSource, Failure
     };
     let document = ShapeDocument::raw(&surface).map_err(|error| match error {
         RawSurfaceError::UnknownFormat { .. } => Failure::Input(error.to_string()),
+        RawSurfaceError::UnitNeeded { .. } => Failure::SurfaceUnit(error.to_string()),
         _ => Failure::Usage(error.to_string()),
     })?;
     Ok(ShapeSource {
