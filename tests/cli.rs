@@ -17,6 +17,8 @@ mod lambda;
 mod messages;
 #[path = "cli/optimize.rs"]
 mod optimize;
+#[path = "cli/scan.rs"]
+mod scan;
 #[path = "cli/steel.rs"]
 mod steel;
 #[path = "cli/streams.rs"]

@@ -18,6 +18,7 @@ pub mod number;
 pub mod read_table;
 pub mod rendering;
 pub mod replay;
+pub mod scan;
 pub mod schema;
 pub mod store;
 pub mod sweep;

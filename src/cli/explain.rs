@@ -1,6 +1,5 @@
 //! `--explain`: what an error code means, what causes it and what to do.
 
-
 use serde::Serialize;
 
 use super::code::Code;
@@ -84,9 +83,7 @@ fn list(codes: &[Code]) -> String {
         let exit = code.exit_code().to_string();
         vec![code.name().to_owned(), exit, code.meaning().to_owned()]
     };
-    let rows: Vec<_> = std::iter::once(head)
-        .chain(codes.iter().map(row))
-        .collect();
+    let rows: Vec<_> = std::iter::once(head).chain(codes.iter().map(row)).collect();
     table(&[Side::Left, Side::Right, Side::Left], &rows)
 }
 

@@ -18,6 +18,7 @@ pub mod plan;
 pub mod probe;
 mod rated;
 pub mod replay;
+pub mod scan;
 pub mod scene;
 pub mod single;
 pub mod steel;

@@ -125,6 +125,16 @@ const CASES: &[Case] = &[
         &["newer", "schema_version", "update fluxform"],
     ),
     (
+        "E307",
+        &["probe", SEED, "--compare", "few.csv"],
+        &["few.csv", "1 measured value", "expected at least", "--fit"],
+    ),
+    (
+        "E302",
+        &["probe", SEED, "--compare", "bad.csv"],
+        &["bad.csv:1", "bx_t, by_t, bz_t"],
+    ),
+    (
         "E401",
         &["evaluate", SEED, "--strict"],
         &["not met", "resistance", "winding fill"],
@@ -200,6 +210,10 @@ fn prepared() -> Place {
     );
     place.write("bad.csv", "x_m,y_m,z_m\n0.1,0.2,0.3\n0.1,0.2,far\n");
     place.write("short.csv", "x_m,y_m\n0.1,0.2\n");
+    place.write(
+        "few.csv",
+        "x_m,y_m,z_m,coil,current_a,bz_t\n0.01,0.02,0.03,4,1.3,0.0001\n",
+    );
     // On the inner edge of the middle coil's top face.
     place.write("edge.csv", "x_m,y_m,z_m\n0.012,0,0\n");
     place.write(
