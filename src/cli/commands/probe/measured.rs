@@ -10,7 +10,7 @@ use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::printer::{Place, Printer};
-use crate::cli::quantity::{count, mm, number, number_to, percent, si};
+use crate::cli::quantity::{count, number, number_to, percent, si};
 use crate::cli::values::{self, FileArgument};
 use crate::design::Need;
 use crate::job::JobError;
@@ -122,15 +122,14 @@ fn told(file: &ScanFile, name: &str, out: Option<&FileArgument>) -> String {
     sheet.line("fitted", &left(&file.residuals.fitted));
     let fit = &file.fit;
     if let (Some(values), Some(errors)) = (fit.position_m, fit.position_error_m) {
-        let text = three(values, errors, |v| mm(v));
-        sheet.line("position", &format!("{text} to be added to the scan's"));
+        let text = three(values, errors, 1e3, "mm");
+        sheet.line("position", &format!("{text}, to be added to the scan's"));
     }
     if let (Some(values), Some(errors)) = (fit.rotation_deg, fit.rotation_error_deg) {
-        let text = three(values, errors, |v| format!("{} deg", number_to(v, 3)));
-        sheet.line("rotation", &text);
+        sheet.line("rotation", &three(values, errors, 1.0, "deg"));
     }
     if let (Some(values), Some(errors)) = (fit.background_t, fit.background_error_t) {
-        sheet.line("background", &three(values, errors, |v| si(v, "T")));
+        sheet.line("background", &three(values, errors, 1e6, "uT"));
     }
     if let Some(ratio) = fit.reduced_chi_square {
         let verdict = if ratio > 2.0 {
@@ -154,11 +153,11 @@ fn told(file: &ScanFile, name: &str, out: Option<&FileArgument>) -> String {
                 set.join(", ")
             ),
         };
-        sheet.line("not told apart", &text);
+        sheet.line("not fitted", &text);
     }
     let best = file.best_explanation.as_deref();
     sheet.line(
-        "explained by",
+        "explanation",
         &match best {
             Some(best) => explained(file.explanations.iter().find(|e| e.parameter == best), best),
             None => "no single parameter: what is left looks like noise to all of them".to_owned(),
@@ -225,13 +224,14 @@ fn left(left: &Left) -> String {
     lines.join("\n")
 }
 
-fn three(
-    values: [Option<f64>; 3],
-    errors: [Option<f64>; 3],
-    shown: impl Fn(f64) -> String,
-) -> String {
+/// Three numbers with their errors, `factor` of the unit each.
+fn three(values: [Option<f64>; 3], errors: [Option<f64>; 3], factor: f64, unit: &str) -> String {
     let one = |((axis, value), error): ((&str, Option<f64>), Option<f64>)| match (value, error) {
-        (Some(value), Some(error)) => format!("{axis} {} +- {}", shown(value), shown(error)),
+        (Some(value), Some(error)) => format!(
+            "{axis} {} +- {} {unit}",
+            number_to(value * factor, 4),
+            number_to(error * factor, 2)
+        ),
         _ => format!("{axis} not determined"),
     };
     let all = ["x", "y", "z"].into_iter().zip(values).zip(errors).map(one);
