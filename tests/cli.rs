@@ -1,6 +1,8 @@
 //! The binary as its users meet it: exit codes, streams, files, messages.
 #![cfg(unix)] // signals, /dev/full, links
 
+#[path = "cli/codes.rs"]
+mod codes;
 #[path = "cli/files.rs"]
 mod files;
 #[path = "cli/help.rs"]
@@ -15,6 +17,8 @@ mod lambda;
 mod messages;
 #[path = "cli/optimize.rs"]
 mod optimize;
+#[path = "cli/scan.rs"]
+mod scan;
 #[path = "cli/steel.rs"]
 mod steel;
 #[path = "cli/streams.rs"]

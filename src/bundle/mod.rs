@@ -34,6 +34,7 @@ pub mod plain;
 pub mod read_table;
 pub mod rendering;
 pub mod replay;
+pub mod scan;
 pub mod schema;
 pub mod store;
 pub mod sweep;

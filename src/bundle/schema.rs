@@ -5,10 +5,11 @@ use schemars::{JsonSchema, schema_for};
 use super::bench::BenchFile;
 use super::lambda_file::LambdaFile;
 use super::manifest::{Manifest, MapSidecar};
+use super::scan::ScanFile;
 use super::sweep::{MergeSummary, PlanFile, PointFile};
 
 /// The committed schemas: file name and text.
-pub const SCHEMAS: [(&str, &str); 7] = [
+pub const SCHEMAS: [(&str, &str); 8] = [
     (
         "manifest.schema.json",
         include_str!("schema/manifest.schema.json"),
@@ -34,11 +35,12 @@ pub const SCHEMAS: [(&str, &str); 7] = [
         "bench.schema.json",
         include_str!("schema/bench.schema.json"),
     ),
+    ("scan.schema.json", include_str!("schema/scan.schema.json")),
 ];
 
 /// The schemas as the structs have them now, in the order of [`SCHEMAS`].
 #[must_use]
-pub fn generated() -> [String; 7] {
+pub fn generated() -> [String; 8] {
     [
         text::<Manifest>(),
         text::<MapSidecar>(),
@@ -47,6 +49,7 @@ pub fn generated() -> [String; 7] {
         text::<PointFile>(),
         text::<MergeSummary>(),
         text::<BenchFile>(),
+        text::<ScanFile>(),
     ]
 }
 

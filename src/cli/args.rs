@@ -8,7 +8,7 @@ use super::commands::{
     bench, calibrate, compare, completions, discretize, evaluate, lambda, man, map, optimize,
     probe, replay, sweep, verify,
 };
-use super::{help, values};
+use super::{explain, help, values};
 use crate::bundle::artefact::SCHEMA_VERSION;
 use crate::job::discretize::scattered::Sampling;
 
@@ -32,7 +32,7 @@ static LONG_VERSION: LazyLock<String> =
     version = VERSION,
     long_version = LONG_VERSION.as_str(),
     max_term_width = 100,
-    subcommand_required = true,
+    override_usage = "fluxform [OPTIONS] <COMMAND>\n       fluxform --explain <CODE>",
     arg_required_else_help = true,
     disable_help_subcommand = true,
     after_help = help::main()
@@ -41,9 +41,12 @@ pub struct Arguments {
     /// What every command takes.
     #[command(flatten)]
     pub common: Common,
+    /// Tell more about an error code, like E301, or an exit code; `list` names all of them
+    #[arg(long, value_name = "CODE", value_parser = explain::asked)]
+    pub explain: Option<explain::Asked>,
     /// The command.
     #[command(subcommand)]
-    pub command: Command,
+    pub command: Option<Command>,
 }
 
 /// What every command takes.

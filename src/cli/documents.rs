@@ -9,6 +9,7 @@ use super::printer::Printer;
 use super::values::{FileArgument, GridSize};
 use crate::bundle::artefact::Input;
 use crate::bundle::read_table::{TABLE_MAX_BYTES, read_columns};
+use crate::bundle::scan::Scan;
 use crate::bundle::sweep::PlanFile;
 use crate::bundle::trajectory::Trajectory;
 use crate::design::{Design, Faults, InvalidDocument, Need, source};
@@ -97,6 +98,20 @@ pub fn points(file: &FileArgument) -> Result<(Vec<[f64; 3]>, Input), Failure> {
         .map(|row| [columns[0][row], columns[1][row], columns[2][row]])
         .collect();
     Ok((points, Input::of_bytes(name, &bytes)))
+}
+
+/// A Gauss-meter's scan over an array of `coils`, and its entry among the inputs.
+///
+/// # Errors
+/// Missing columns, cells that are no numbers, a file that cannot be read.
+pub fn scan(file: &FileArgument, coils: usize) -> Result<(Scan, Input), Failure> {
+    let name = file.as_given().display().to_string();
+    let bytes = bytes_of(
+        file,
+        "a CSV table with columns x_m,y_m,z_m and what was measured",
+    )?;
+    let scan = Scan::read(&name, &bytes, coils)?;
+    Ok((scan, Input::of_bytes(name, &bytes)))
 }
 
 /// A trajectory, and its entry among the inputs.
@@ -280,6 +295,7 @@ fn raw_surface(path: &Path, flags: &SurfaceFlags) -> Result<ShapeSource, Failure
     };
     let document = ShapeDocument::raw(&surface).map_err(|error| match error {
         RawSurfaceError::UnknownFormat { .. } => Failure::Input(error.to_string()),
+        RawSurfaceError::UnitNeeded { .. } => Failure::SurfaceUnit(error.to_string()),
         _ => Failure::Usage(error.to_string()),
     })?;
     Ok(ShapeSource {

@@ -4,8 +4,11 @@ use std::io;
 
 use serde::Serialize;
 
+use super::code::Code;
 use super::exit::Exit;
+use crate::bundle::atomic::WriteError;
 use crate::bundle::json::JsonError;
+use crate::bundle::load::BundleError;
 use crate::bundle::read_table::TableError;
 use crate::design::{Faults, InvalidDocument};
 use crate::job::JobError;
@@ -16,6 +19,9 @@ pub enum Failure {
     /// Arguments that do not go together.
     #[error("{0}")]
     Usage(String),
+    /// A raw surface without its unit.
+    #[error("{0}")]
+    SurfaceUnit(String),
     /// Documents that were refused; at least one.
     #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
     Documents(Vec<InvalidDocument>),
@@ -28,9 +34,9 @@ pub enum Failure {
     /// The job gave no result.
     #[error(transparent)]
     Job(#[from] JobError),
-    /// The result is there, but not as wished.
-    #[error("{0}")]
-    Unmet(String),
+    /// The result is there, but not as wished: why, and what is told.
+    #[error("{1}")]
+    Unmet(Wish, String),
     /// A verification failed.
     #[error("{0}")]
     Verification(String),
@@ -42,23 +48,53 @@ pub enum Failure {
     PipeClosed,
 }
 
+/// What a result was wished to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wish {
+    /// Within the limits.
+    Limits,
+    /// One with a force constant.
+    ForceConstant,
+    /// As accurate as asked for.
+    Accuracy,
+    /// A coil.
+    Coil,
+    /// A row for every point of a sweep.
+    Sweep,
+    /// One that JSON can hold.
+    Json,
+}
+
 impl Failure {
+    /// What kind of failure it is; `None` where there is nothing to tell.
+    #[must_use]
+    pub fn code(&self) -> Option<Code> {
+        Some(match self {
+            Self::PipeClosed => return None,
+            Self::Usage(_) => Code::Arguments,
+            Self::SurfaceUnit(_) => Code::SurfaceUnit,
+            Self::Documents(_) => Code::Document,
+            Self::Table(_) => Code::Table,
+            Self::Input(_) => Code::Unreadable,
+            Self::Unmet(wish, _) => match wish {
+                Wish::Limits => Code::Limits,
+                Wish::ForceConstant => Code::NoForceConstant,
+                Wish::Accuracy => Code::Accuracy,
+                Wish::Coil => Code::NoCoil,
+                Wish::Sweep => Code::Sweep,
+                Wish::Json => Code::Output,
+            },
+            Self::Verification(_) => Code::Check,
+            Self::Output(_) => Code::Output,
+            Self::Job(error) => code_of(error),
+        })
+    }
+
     /// The exit code's meaning.
     #[must_use]
     pub fn exit(&self) -> Exit {
-        match self {
-            Self::PipeClosed => Exit::Done,
-            Self::Usage(_) => Exit::Usage,
-            Self::Documents(_) | Self::Table(_) | Self::Input(_) => Exit::Input,
-            Self::Unmet(_) | Self::Output(_) => Exit::Unmet,
-            Self::Verification(_) => Exit::Verification,
-            Self::Job(error) => match error.exit_code() {
-                130 => Exit::Interrupted,
-                5 => Exit::Verification,
-                4 => Exit::Unmet,
-                _ => Exit::Input,
-            },
-        }
+        let exit = self.code().map(Code::exit);
+        exit.map_or(Exit::Done, |exit| exit.unwrap_or(Exit::Unmet))
     }
 
     /// The message, one line a fault.
@@ -72,7 +108,7 @@ impl Failure {
         }
     }
 
-    /// Every fault, for programs; empty where the message says it all.
+    /// Every fault, for programs; empty where it is not one of an input.
     #[must_use]
     pub fn faults(&self) -> Vec<FaultEntry> {
         match self {
@@ -80,13 +116,31 @@ impl Failure {
                 .iter()
                 .flat_map(|document| FaultEntry::of(&document.faults))
                 .collect(),
-            Self::Table(table) => table
-                .faults
-                .iter()
-                .map(|fault| FaultEntry::message(fault))
-                .collect(),
+            Self::Table(table) => table.faults.iter().map(|f| FaultEntry::line(f)).collect(),
+            _ if self.exit() == Exit::Input => vec![FaultEntry::line(&self.message())],
             _ => Vec::new(),
         }
+    }
+}
+
+fn code_of(error: &JobError) -> Code {
+    match error {
+        JobError::NotModelled(_)
+        | JobError::Input(_)
+        | JobError::OnEdge(_)
+        | JobError::Problem(_) => Code::Contradiction,
+        JobError::Scan(_) => Code::Scan,
+        JobError::Shape { .. } => Code::Surface,
+        JobError::Write(WriteError::OutputExists { .. }) => Code::OutputExists,
+        JobError::Write(_) => Code::Output,
+        JobError::Sweep(_) => Code::Sweep,
+        JobError::Bundle(BundleError::NoBundle { .. } | BundleError::Schema { .. }) => {
+            Code::NotABundle
+        }
+        JobError::Bundle(_) => Code::Damaged,
+        JobError::NoForceConstant(_) => Code::NoForceConstant,
+        JobError::Unmet(_) => Code::Measurement,
+        JobError::Interrupted(_) => Code::Interrupted,
     }
 }
 
@@ -102,12 +156,15 @@ impl From<io::Error> for Failure {
 
 impl From<JsonError> for Failure {
     fn from(error: JsonError) -> Self {
-        Self::Unmet(format!("the result cannot be told as JSON: {error}"))
+        Self::Unmet(
+            Wish::Json,
+            format!("the result cannot be told as JSON: {error}"),
+        )
     }
 }
 
-/// One fault as `--format json` tells it.
-#[derive(Debug, Clone, Serialize)]
+/// One fault as `--format json` tells it; what is not known is absent.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct FaultEntry {
     /// `error` or `warning`.
     severity: String,
@@ -117,30 +174,55 @@ pub struct FaultEntry {
     /// Line, from 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     line: Option<usize>,
-    /// Column in characters, from 1.
+    /// Place in the line in characters, from 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     column: Option<usize>,
-    /// Dotted key.
+    /// Dotted key of a document, or name of a table's column.
     #[serde(skip_serializing_if = "Option::is_none")]
     key: Option<String>,
-    /// What was expected and found.
+    /// What was expected, where the message says so.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    expected: Option<String>,
+    /// What is wrong: what was expected and found.
     message: String,
     /// What to do.
     #[serde(skip_serializing_if = "Option::is_none")]
-    help: Option<String>,
+    advice: Option<String>,
 }
 
 impl FaultEntry {
-    fn message(message: &str) -> Self {
-        Self {
+    /// What a line `file:line: column name: message` or `file: message` says. A message that names
+    /// no file is taken whole.
+    fn line(text: &str) -> Self {
+        let mut entry = Self {
             severity: "error".to_owned(),
-            file: None,
-            line: None,
-            column: None,
-            key: None,
-            message: message.to_owned(),
-            help: None,
+            ..Self::default()
+        };
+        let mut rest = text;
+        if let Some((head, tail)) = rest.split_once(": ") {
+            let numbered = head.rsplit_once(':').and_then(|(file, line)| {
+                let line = line.parse().ok()?;
+                Some((file, line))
+            });
+            if let Some((file, line)) = numbered {
+                (entry.file, entry.line) = (Some(file.to_owned()), Some(line));
+                rest = tail;
+            } else if head.contains(['.', '/']) && !head.contains(' ') {
+                entry.file = Some(head.to_owned());
+                rest = tail;
+            }
         }
+        if let Some(after) = rest.strip_prefix("column ")
+            && let Some(end) = after.find([':', ' '])
+        {
+            entry.key = Some(after[..end].to_owned());
+        }
+        if let Some((_, advice)) = rest.split_once("; ") {
+            entry.advice = Some(advice.to_owned());
+        }
+        entry.expected = expected(rest);
+        entry.message = rest.to_owned();
+        entry
     }
 
     fn of(faults: &Faults) -> Vec<Self> {
@@ -153,10 +235,59 @@ impl FaultEntry {
                 line: place.map(|place| place.line),
                 column: place.map(|place| place.column),
                 key: (!fault.key.is_empty()).then(|| fault.key.clone()),
+                expected: expected(&fault.message),
                 message: fault.message.clone(),
-                help: fault.help.clone(),
+                advice: fault.help.clone(),
             }
         };
         faults.list().iter().map(entry).collect()
+    }
+}
+
+/// What a message says was expected.
+fn expected(message: &str) -> Option<String> {
+    let (_, after) = message.split_once("expected ")?;
+    let end = after.find([';', '\n']).unwrap_or(after.len());
+    let end = after.find(", found").map_or(end, |found| found.min(end));
+    Some(after[..end].to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::progress::Interrupted;
+
+    #[test]
+    fn a_line_is_taken_apart() {
+        let entry = FaultEntry::line(
+            "a b.csv:3: column z_m: expected a finite number, found \"far\"; write 0.7",
+        );
+        assert_eq!(entry.file.as_deref(), Some("a b.csv"));
+        assert_eq!((entry.line, entry.key.as_deref()), (Some(3), Some("z_m")));
+        assert_eq!(entry.expected.as_deref(), Some("a finite number"));
+        assert_eq!(entry.advice.as_deref(), Some("write 0.7"));
+        let entry = FaultEntry::line("designs: expected a surface, found a directory");
+        assert_eq!(entry.file, None);
+        assert_eq!(entry.expected.as_deref(), Some("a surface"));
+        let entry = FaultEntry::line("none.csv: cannot be read: No such file");
+        assert_eq!(entry.file.as_deref(), Some("none.csv"));
+        assert_eq!(entry.message, "cannot be read: No such file");
+    }
+
+    #[test]
+    fn a_job_ends_with_the_exit_code_that_its_error_names() {
+        for error in [
+            JobError::Input(String::new()),
+            JobError::Scan(String::new()),
+            JobError::Sweep(String::new()),
+            JobError::Unmet(String::new()),
+            JobError::NoForceConstant(String::new()),
+            JobError::Interrupted(Interrupted),
+        ] {
+            let code = error.exit_code();
+            assert_eq!(Failure::Job(error).exit().code(), code);
+        }
+        let measured = Failure::Job(JobError::Unmet(String::new()));
+        assert_eq!(measured.code(), Some(Code::Measurement));
     }
 }

@@ -2,9 +2,11 @@
 
 mod args;
 mod bar;
+mod code;
 mod commands;
 mod documents;
 mod exit;
+mod explain;
 mod failure;
 mod help;
 mod interrupt;
@@ -23,16 +25,17 @@ use clap::{ColorChoice, CommandFactory, FromArgMatches};
 use args::{Arguments, Colour, Command, Common, Format};
 use exit::Exit;
 use failure::Failure;
-use printer::{Printer, say};
+use printer::Printer;
 
 /// Runs the command line and returns the process's exit code.
 pub fn main(args: impl Iterator<Item = OsString>) -> ExitCode {
-    std::panic::set_hook(Box::new(|panic| {
+    let args: Vec<OsString> = args.collect();
+    let early = told_early(&args);
+    std::panic::set_hook(Box::new(move |panic| {
         if !caught() {
-            say(&panic_message(panic));
+            Printer::new(&early).mistake(&panic_message(panic));
         }
     }));
-    let args: Vec<OsString> = args.collect();
     let parsed = Arguments::command()
         .color(colour_of(&args))
         .try_get_matches_from(&args)
@@ -41,15 +44,48 @@ pub fn main(args: impl Iterator<Item = OsString>) -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => return not_parsed(&error, &args).into(),
     };
-    interrupt::listen();
     let printer = Printer::new(&arguments.common);
-    match run(&arguments, &printer) {
-        Ok(()) => Exit::Done.into(),
+    let ran = match (&arguments.explain, &arguments.command) {
+        (Some(asked), _) => explain::run(asked, &printer),
+        (None, Some(command)) => {
+            interrupt::listen();
+            run(command, &arguments.common, &printer)
+        }
+        (None, None) => return not_parsed(&without_command(), &args).into(),
+    };
+    match ran {
+        Ok(()) => {
+            printer.finish();
+            Exit::Done.into()
+        }
         Err(failure) => {
             printer.failure(&failure);
             failure.exit().into()
         }
     }
+}
+
+/// What can be known of the common options before the arguments are parsed.
+fn told_early(args: &[OsString]) -> Common {
+    Common {
+        format: match value_of(args, "--format") {
+            Some("json") => Format::Json,
+            _ => Format::Human,
+        },
+        quiet: false,
+        threads: None,
+        color: match value_of(args, "--color") {
+            Some("always") => Colour::Always,
+            Some("never") => Colour::Never,
+            _ => Colour::Auto,
+        },
+    }
+}
+
+/// Options alone do nothing.
+fn without_command() -> clap::Error {
+    let message = "'fluxform' requires a subcommand but one was not provided";
+    Arguments::command().error(ErrorKind::MissingSubcommand, message)
 }
 
 /// Whether a panic is caught where it happens and told as what it means.
@@ -60,14 +96,14 @@ fn caught() -> bool {
     false
 }
 
-fn run(arguments: &Arguments, printer: &Printer) -> Result<(), Failure> {
-    if let Some(threads) = arguments.common.threads {
+fn run(command: &Command, common: &Common, printer: &Printer) -> Result<(), Failure> {
+    if let Some(threads) = common.threads {
         rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build_global()
             .map_err(|error| Failure::Usage(format!("--threads {threads}: {error}")))?;
     }
-    match &arguments.command {
+    match command {
         Command::Evaluate(command) => command.run(printer),
         Command::Probe(command) => command.run(printer),
         Command::Map(command) => command.run(printer),
@@ -87,25 +123,25 @@ fn run(arguments: &Arguments, printer: &Printer) -> Result<(), Failure> {
 
 /// What clap has to say: help, the version, or wrong usage.
 fn not_parsed(error: &clap::Error, args: &[OsString]) -> Exit {
-    let asked = matches!(
+    // Help is asked for, or shown where nothing was.
+    let help = matches!(
         error.kind(),
-        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion
+        ErrorKind::DisplayHelp
+            | ErrorKind::DisplayVersion
+            | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
     );
-    if !asked && value_of(args, "--format") == Some("json") {
-        let common = Common {
-            format: Format::Json,
-            quiet: false,
-            threads: None,
-            color: Colour::Never,
-        };
-        let told = error.render().to_string();
-        let message = told.trim().trim_start_matches("error: ").to_owned();
-        Printer::new(&common).failure(&Failure::Usage(message));
+    let printer = Printer::new(&told_early(args));
+    if !help || (error.use_stderr() && printer.json()) {
+        printer.usage(error);
     } else {
         // A closed pipe: nobody is left to read the help.
         let _ = error.print();
     }
-    if asked { Exit::Done } else { Exit::Usage }
+    if error.use_stderr() {
+        Exit::Usage
+    } else {
+        Exit::Done
+    }
 }
 
 /// The colours of help and usage errors, which are told before the arguments are known.
@@ -139,7 +175,7 @@ fn panic_message(panic: &std::panic::PanicHookInfo) -> String {
         .location()
         .map_or_else(String::new, |place| format!(" at {place}"));
     format!(
-        "error: fluxform {} stopped on a mistake of its own{place}: {what}\n\
+        "fluxform {} stopped on a mistake of its own{place}: {what}\n\
          Please report this line with the command and its input files.",
         env!("CARGO_PKG_VERSION")
     )

@@ -1,7 +1,9 @@
 //! The one place that talks: results to standard output, messages to standard error.
 //!
 //! With `--quiet` only errors and the data that was asked for (JSON, CSV, `--out -`) are left. With
-//! `--format json` warnings go into the JSON object, so that every stream holds one object at most.
+//! `--format json` warnings go into the JSON object, and a summary that belongs to standard error
+//! waits for the end of the command and goes into the error's object if there is an error, so that
+//! every stream holds one object at most.
 
 use std::borrow::Cow;
 use std::cell::RefCell;
@@ -10,6 +12,7 @@ use std::io::{self, BufWriter, IsTerminal, Write};
 use serde::Serialize;
 
 use super::args::{Colour, Common, Format};
+use super::code::Code;
 use super::failure::{Failure, FaultEntry};
 use crate::bundle::json::to_json;
 use crate::design::Faults;
@@ -24,6 +27,8 @@ pub struct Printer {
     quiet: bool,
     colour: bool,
     warnings: RefCell<Vec<String>>,
+    /// A summary as JSON that is due on standard error.
+    pending: RefCell<Option<Vec<u8>>>,
 }
 
 /// Where a summary goes.
@@ -50,10 +55,40 @@ struct ErrorObject {
 
 #[derive(Serialize)]
 struct ErrorFacts {
-    code: u8,
+    /// Stable name of the kind of failure.
+    code: &'static str,
+    /// The process's exit code.
+    exit_code: u8,
+    /// What the code means.
+    meaning: &'static str,
+    /// What happened, one line a fault.
     message: String,
     faults: Vec<FaultEntry>,
     warnings: Vec<String>,
+    /// The summary that would have gone to standard error.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    summary: Option<serde_json::Value>,
+}
+
+impl ErrorFacts {
+    /// What is known of every failure of that kind.
+    fn of(code: Code) -> Self {
+        Self {
+            code: code.name(),
+            exit_code: code.exit_code(),
+            meaning: code.meaning(),
+            message: String::new(),
+            faults: Vec::new(),
+            warnings: Vec::new(),
+            summary: None,
+        }
+    }
+
+    /// The object, on one line.
+    fn line(self) -> String {
+        // Plain texts and whole numbers always can be told.
+        serde_json::to_string(&ErrorObject { error: self }).unwrap_or_default()
+    }
 }
 
 impl Printer {
@@ -73,6 +108,7 @@ impl Printer {
             quiet: common.quiet,
             colour,
             warnings: RefCell::default(),
+            pending: RefCell::default(),
         }
     }
 
@@ -148,10 +184,21 @@ impl Printer {
         };
         match place {
             Place::Output => self.data(|out| out.write_all(&text)),
+            Place::Error if self.json() => {
+                self.pending.replace(Some(text));
+                Ok(())
+            }
             Place::Error => {
                 say(&String::from_utf8_lossy(&text));
                 Ok(())
             }
+        }
+    }
+
+    /// Tells what waited for the end of the command.
+    pub fn finish(&self) {
+        if let Some(text) = self.pending.take() {
+            say(&String::from_utf8_lossy(&text));
         }
     }
 
@@ -171,29 +218,67 @@ impl Printer {
 
     /// Tells why the command did not end well.
     pub fn failure(&self, failure: &Failure) {
-        if matches!(failure, Failure::PipeClosed) {
+        let Some(code) = failure.code() else {
             return;
-        }
+        };
         if self.json() {
-            let object = ErrorObject {
-                error: ErrorFacts {
-                    code: failure.exit().code(),
-                    message: failure.message(),
-                    faults: failure.faults(),
-                    warnings: self.warnings.take(),
-                },
+            let summary = self.pending.take();
+            let error = ErrorFacts {
+                message: failure.message(),
+                faults: failure.faults(),
+                warnings: self.warnings.take(),
+                summary: summary.and_then(|text| serde_json::from_slice(&text).ok()),
+                ..ErrorFacts::of(code)
             };
-            if let Ok(text) = to_json(&object) {
-                say(&String::from_utf8_lossy(&text));
-            }
+            say(&error.line());
         } else if let Failure::Documents(documents) = failure {
             for document in documents {
                 say(&document.faults.render(self.colour, width()));
             }
+            let names: Vec<String> = documents
+                .iter()
+                .map(|document| document.faults.path().display().to_string())
+                .collect();
+            self.tell(code, &format!("refused: {}", names.join(", ")));
         } else {
-            let head = self.head("error", "31");
-            say(&format!("{head} {}\n", visible(&failure.message())));
+            self.tell(code, &failure.message());
         }
+    }
+
+    /// Tells a mistake of the program itself.
+    pub fn mistake(&self, message: &str) {
+        if self.json() {
+            let error = ErrorFacts {
+                message: message.to_owned(),
+                ..ErrorFacts::of(Code::Internal)
+            };
+            say(&error.line());
+        } else {
+            self.tell(Code::Internal, message);
+        }
+    }
+
+    /// Tells wrong usage as `error` words it, and its code.
+    pub fn usage(&self, error: &clap::Error) {
+        if self.json() {
+            let told = error.render().to_string();
+            let message = told.trim().trim_start_matches("error: ").to_owned();
+            self.failure(&Failure::Usage(message));
+            return;
+        }
+        let told = error.render();
+        let told = if self.colour {
+            told.ansi().to_string()
+        } else {
+            told.to_string()
+        };
+        let marked = format!("error[{}]:", Code::Arguments.name());
+        say(&told.replacen("error:", &marked, 1));
+    }
+
+    fn tell(&self, code: Code, message: &str) {
+        let head = self.head(&format!("error[{}]", code.name()), "31");
+        say(&format!("{head} {}\n", visible(message)));
     }
 
     fn head(&self, word: &str, colour: &str) -> String {

@@ -91,6 +91,16 @@ pub fn translation(text: &str) -> Result<Translation, String> {
     numbers(text, "X,Y,Z in millimetres, like 0,0,30").map(|v| Translation(v.map(m_from_mm)))
 }
 
+/// The noise of a sensor, greater than 0.
+pub fn noise(text: &str) -> Result<f64, String> {
+    match number(text)? {
+        noise if noise > 0.0 => Ok(noise),
+        _ => Err(format!(
+            "{text} is no noise: expected a number greater than 0, like 1e-6"
+        )),
+    }
+}
+
 /// `S` or `X,Y,Z`, positive factors.
 pub fn scale(text: &str) -> Result<Scale, String> {
     let expected = "one factor like 2, or X,Y,Z like 1,1,2";

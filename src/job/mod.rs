@@ -18,6 +18,7 @@ pub mod plan;
 pub mod probe;
 mod rated;
 pub mod replay;
+pub mod scan;
 pub mod scene;
 pub mod single;
 pub mod steel;
@@ -69,6 +70,12 @@ pub enum JobError {
     /// A bundle cannot be used.
     #[error(transparent)]
     Bundle(#[from] BundleError),
+    /// A scan that does not determine what is to be fitted.
+    #[error("{0}")]
+    Scan(String),
+    /// A bundle whose force constant is null.
+    #[error("{0}")]
+    NoForceConstant(String),
     /// There is a result, but not one to go on with.
     #[error("{0}")]
     Unmet(String),
@@ -93,7 +100,7 @@ impl JobError {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Interrupted(_) => 130,
-            Self::Write(_) | Self::Sweep(_) | Self::Unmet(_) => 4,
+            Self::Write(_) | Self::Sweep(_) | Self::NoForceConstant(_) | Self::Unmet(_) => 4,
             Self::Bundle(BundleError::NoBundle { .. } | BundleError::Schema { .. }) => 3,
             Self::Bundle(_) => 5,
             _ => 3,

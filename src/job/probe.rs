@@ -167,6 +167,19 @@ impl<'a> Places<'a> {
         points_m: &[[f64; 3]],
         first: usize,
     ) -> Result<Vec<CartesianField>, JobError> {
+        self.driven_fields(points_m, first, &|_, _| true)
+    }
+
+    /// As [`Places::fields`], but only where `wanted` says so of a point and a coil; zero elsewhere.
+    ///
+    /// # Errors
+    /// As [`Places::fields`].
+    pub(super) fn driven_fields(
+        &self,
+        points_m: &[[f64; 3]],
+        first: usize,
+        wanted: &dyn Fn(usize, usize) -> bool,
+    ) -> Result<Vec<CartesianField>, JobError> {
         let scene = self.scene;
         let count = points_m.len();
         let added = self.sources.as_ref().map_or_else(Vec::new, |sources| {
@@ -176,6 +189,10 @@ impl<'a> Places<'a> {
         let mut fields = Vec::with_capacity(count * scene.coils.len());
         for (row, [x, y, z]) in points_m.iter().enumerate() {
             for (column, coil) in scene.coils.iter().enumerate() {
+                if !wanted(row, column) {
+                    fields.push(CartesianField::default());
+                    continue;
+                }
                 let (dx, dy) = (x - coil.axis_m[0], y - coil.axis_m[1]);
                 let axial = scene.winding.field(dx.hypot(dy), *z).map_err(|on_edge| {
                     JobError::Input(format!(

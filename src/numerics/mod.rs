@@ -13,6 +13,7 @@ pub mod interval;
 pub mod lagrange;
 pub mod lagrange_basis;
 pub mod laplace;
+pub mod least_squares;
 pub mod log_rule;
 pub mod matrix;
 pub mod qr;

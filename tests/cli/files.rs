@@ -33,7 +33,7 @@ fn what_is_not_ours_is_replaced_only_with_force() {
         "--format",
         "json",
     ]);
-    assert_eq!(told.ends(4).error()["error"]["code"], 4);
+    assert_eq!(told.ends(4).error()["error"]["exit_code"], 4);
     place.write("points_in.csv", "x_m,y_m,z_m\n0.007,0.013,0.03\n");
     let probe = ["probe", SEED, "points_in.csv", "--out", "points.csv"];
     place.run(&probe).ends(4).says(&["points.csv"]);
@@ -114,7 +114,7 @@ fn a_bundle_is_verified_and_a_changed_one_fails() {
         .ends(5)
         .says(&["currents.csv"]);
     let told = place.run(&["verify", bundle, "--format", "json"]).ends(5);
-    assert_eq!(told.error()["error"]["code"], 5);
+    assert_eq!(told.error()["error"]["exit_code"], 5);
 }
 
 #[test]

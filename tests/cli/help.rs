@@ -72,7 +72,7 @@ fn no_command_is_wrong_usage_and_so_is_an_unknown_one() {
     place.run(&[]).ends(2).says(&["Usage:"]);
     place.run(&["evaluat", "x"]).ends(2).says(&["evaluate"]);
     let told = place.run(&["map", "--format", "json"]).ends(2).error();
-    assert_eq!(told["error"]["code"], 2);
+    assert_eq!(told["error"]["exit_code"], 2);
 }
 
 #[test]

@@ -62,7 +62,8 @@ fn a_long_job_stops_and_leaves_nothing_half_written() {
     let (code, said) = wait(child);
     assert_eq!(code, Some(130), "{said}");
     assert!(said.contains("interrupted"), "{said}");
-    assert!(said.contains("\"code\": 130"), "{said}");
+    assert!(said.contains("\"code\":\"E130\""), "{said}");
+    assert!(said.contains("\"exit_code\":130"), "{said}");
     let files = |folder: &str| -> BTreeSet<String> {
         let entries = place.path(folder).read_dir().unwrap();
         let name = |entry: DirEntry| entry.file_name().into_string().unwrap();

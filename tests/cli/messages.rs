@@ -24,14 +24,14 @@ fn every_fault_is_shown_with_its_line_and_a_caret() {
         .ends(3);
     assert!(told.out.is_empty());
     let error = &told.error()["error"];
-    assert_eq!(error["code"], 3);
+    assert_eq!(error["exit_code"], 3);
     let faults = error["faults"].as_array().unwrap();
     assert_eq!(faults.len(), 2);
     let line = text.lines().position(|l| l.starts_with("pich_mm")).unwrap() + 1;
     assert!(faults.iter().any(|fault| fault["key"] == "array.pich_mm"
         && fault["line"] == line
         && fault["file"] == "bad.toml"
-        && fault["help"] == "did you mean pitch_mm?"));
+        && fault["advice"] == "did you mean pitch_mm?"));
 }
 
 #[test]
@@ -93,7 +93,7 @@ fn a_raw_surface_needs_its_unit() {
             .says(&["shapes/wedge.stl", "--unit", "mm"]);
     }
     let told = place.run(&["discretize", "shapes/wedge.stl", "--format", "json"]);
-    assert_eq!(told.ends(2).error()["error"]["code"], 2);
+    assert_eq!(told.ends(2).error()["error"]["exit_code"], 2);
     assert!(!place.path("points.csv").exists());
 }
 
@@ -230,7 +230,7 @@ fn a_result_not_as_wished_is_told_and_ends_with_4() {
     let accuracy = ["evaluate", SEED, "--tolerance", "1e-15", "--format", "json"];
     let ran = place.run(&accuracy).ends(4);
     assert_eq!(ran.json()["accuracy_reached"], false);
-    assert_eq!(ran.error()["error"]["code"], 4);
+    assert_eq!(ran.error()["error"]["exit_code"], 4);
 
     // A magnet that is only pulled down feels no object.
     let text = place.seed().replace("\"repel\"", "\"attract\"");
@@ -250,7 +250,7 @@ fn a_result_not_as_wished_is_told_and_ends_with_4() {
             .unwrap()
             .contains("polarity")
     );
-    assert_eq!(ran.error()["error"]["code"], 4);
+    assert_eq!(ran.error()["error"]["exit_code"], 4);
     let args = ["calibrate", "attract.toml", "shapes/flat.toml"];
     place.run(&args).ends(4).says(&["null for flat"]);
     assert!(place.path("results/seed_air/flat/manifest.json").exists());

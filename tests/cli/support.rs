@@ -34,6 +34,26 @@ impl Place {
         std::fs::write(self.path(name), text).unwrap();
     }
 
+    #[allow(clippy::disallowed_methods)] // a test's own folder
+    pub fn folder(&self, name: &str) {
+        std::fs::create_dir_all(self.path(name)).unwrap();
+    }
+
+    /// Copies the files of a folder into a new one.
+    #[allow(clippy::disallowed_methods)] // a test's own files
+    pub fn copy(&self, from: &str, to: &str) {
+        self.folder(to);
+        for entry in self.path(from).read_dir().unwrap() {
+            let entry = entry.unwrap();
+            let name = entry.file_name().into_string().unwrap();
+            if entry.path().is_dir() {
+                self.copy(&format!("{from}/{name}"), &format!("{to}/{name}"));
+            } else {
+                std::fs::copy(entry.path(), self.path(to).join(name)).unwrap();
+            }
+        }
+    }
+
     pub fn read(&self, name: &str) -> Vec<u8> {
         std::fs::read(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
     }

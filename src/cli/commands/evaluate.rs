@@ -6,7 +6,7 @@ use super::{accuracy_check, begin, describe};
 use crate::accuracy::StageAccuracy;
 use crate::cli::args::Tolerance;
 use crate::cli::documents;
-use crate::cli::failure::Failure;
+use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::printer::{Place, Printer};
@@ -69,7 +69,7 @@ impl Evaluate {
                 .map(|(name, _)| limit_name(name).0.to_owned())
                 .collect();
             let message = format!("limits that are not met: {}", unmet.join(", "));
-            return Err(Failure::Unmet(message));
+            return Err(Failure::Unmet(Wish::Limits, message));
         }
         Ok(())
     }

@@ -11,7 +11,7 @@ use crate::bundle::lambda_file::{
 };
 use crate::cli::args::{SamplingFlags, SurfaceFlags, Tolerance, Writing};
 use crate::cli::documents;
-use crate::cli::failure::Failure;
+use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::pictures::write_svg;
@@ -207,10 +207,11 @@ impl Lambda {
 
 /// The result is there, but there is no force constant.
 pub fn no_constant(shapes: &[&str]) -> Failure {
-    Failure::Unmet(format!(
+    let message = format!(
         "the chosen lambda is null for {}: see the warnings",
         shapes.join(", ")
-    ))
+    );
+    Failure::Unmet(Wish::ForceConstant, message)
 }
 
 fn summary(design: &Design, report: &LambdaReport) -> String {

@@ -54,7 +54,7 @@ impl Man {
                 .map_err(JobError::from)?;
         }
         set.commit().map_err(JobError::from)?;
-        if !printer.quiet() {
+        if !printer.quiet() && !printer.json() {
             let pages = count(pages.len(), "page");
             say(&format!("{}: {pages}", folder.display()));
         }

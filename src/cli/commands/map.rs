@@ -10,7 +10,7 @@ use crate::bundle::manifest::MapSidecar;
 use crate::bundle::write::{MAP_FILES, MapFormats};
 use crate::cli::args::{Tolerance, Writing};
 use crate::cli::documents;
-use crate::cli::failure::Failure;
+use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
 use crate::cli::printer::{Place, Printer};
@@ -357,6 +357,7 @@ impl Map {
             .is_some_and(|made| !made.reached())
         {
             return Err(Failure::Unmet(
+                Wish::Accuracy,
                 "the accuracy asked for with --mpem-tolerance was not reached: see the accuracy of \
                  mpem and mpem_gradient; the files are written. A workspace that begins higher \
                  above the coils, or a larger tolerance, helps"

@@ -20,7 +20,7 @@ mod describe;
 use std::path::PathBuf;
 
 use super::bar::Bar;
-use super::failure::Failure;
+use super::failure::{Failure, Wish};
 use super::interrupt;
 use super::printer::Printer;
 use super::values::FileArgument;
@@ -50,6 +50,7 @@ fn accuracy_check(reached: bool) -> Result<(), Failure> {
         return Ok(());
     }
     Err(Failure::Unmet(
+        Wish::Accuracy,
         "the accuracy asked for with --tolerance was not reached: see the accuracy that was; \
          the result itself is given"
             .to_owned(),

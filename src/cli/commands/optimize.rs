@@ -11,7 +11,7 @@ use crate::bundle::artefact::sha256_hex;
 use crate::bundle::atomic::{Overwrite, write};
 use crate::cli::args::{Tolerance, Writing};
 use crate::cli::documents::{self, DesignDocument};
-use crate::cli::failure::Failure;
+use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
 use crate::cli::pictures::{self, write_page};
 use crate::cli::printer::{Place, Printer};
@@ -133,7 +133,7 @@ impl Optimize {
         let json = printer.with_warnings(&result);
         printer.summary(place, &json, || told::summary(&result, self.out.as_ref()))?;
         if let Some(none) = &result.no_coil {
-            return Err(Failure::Unmet(none.message.clone()));
+            return Err(Failure::Unmet(Wish::Coil, none.message.clone()));
         }
         accuracy_check(result.accuracy_reached)
     }

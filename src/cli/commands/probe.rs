@@ -22,7 +22,9 @@ use crate::design::Need;
 use crate::job::JobError;
 use crate::job::probe::{ProbeComponents, ProbeRequest, ProbeTable, probe};
 
-/// Field and gradient per ampere of every coil at given points
+mod measured;
+
+/// Field and gradient per ampere of every coil at given points, or against a measured scan
 ///
 /// Computes the field and its gradient per ampere of every coil at the points of a CSV table with
 /// the columns x_m, y_m and z_m, directly and not through a map. The result is a CSV table with one
@@ -30,6 +32,12 @@ use crate::job::probe::{ProbeComponents, ProbeRequest, ProbeTable, probe};
 /// force and torque on the design's magnet follow, its centre at the points; the pull of unpowered
 /// steel is not part of them. With --format json the same columns come as arrays of one JSON
 /// object.
+///
+/// With --compare a Gauss-meter's scan takes the points' place: a CSV table with x_m, y_m, z_m, any of
+/// bx_t, by_t, bz_t, dbx_dx_t_per_m to dbz_dz_t_per_m, and the currents that flowed, either as coil
+/// and current_a or as current_0_a, current_1_a and so on. Told are the residuals, the scale of each
+/// coil with the line for `[array] gain`, a constant background, where the sensor's frame stands, and
+/// which parameter of the design would explain the residuals; --out takes the residuals as a table.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Reading, &[
     ("printf 'x_m,y_m,z_m\\n0.007,0.013,0.03\\n' | fluxform probe designs/seed.toml -",
@@ -38,23 +46,27 @@ use crate::job::probe::{ProbeComponents, ProbeRequest, ProbeTable, probe};
      "only dBz/dz, and no summary"),
     ("printf 'x_m,y_m,z_m\\n0,0.01,0.03\\n' | fluxform probe designs/seed.toml - --magnet-force",
      "what the magnet feels there, besides"),
+    ("fluxform probe designs/seed_air.toml --compare designs/scan_example.csv --noise-t 2e-6",
+     "a Gauss-meter's scan against the design"),
 ]))]
 pub struct Probe {
     /// Design file (TOML), `-` for standard input
     #[arg(value_name = "DESIGN")]
     design: FileArgument,
     /// CSV table with the columns x_m, y_m, z_m; `-` for standard input
-    #[arg(value_name = "POINTS")]
-    points: FileArgument,
+    #[arg(value_name = "POINTS", required_unless_present = "compare")]
+    points: Option<FileArgument>,
     /// What is told at each point
-    #[arg(long, value_enum, default_value_t = Components::All)]
+    #[arg(long, value_enum, default_value_t = Components::All, conflicts_with = "compare")]
     components: Components,
     /// Tell force and torque on the magnet per ampere too: six columns
-    #[arg(long)]
+    #[arg(long, conflicts_with = "compare")]
     magnet_force: bool,
-    /// Where the table goes; `-` is standard output
-    #[arg(long, value_name = "FILE", default_value = "-")]
-    out: FileArgument,
+    /// Where the table goes; `-` is standard output [default: -, with --compare nowhere]
+    #[arg(long, value_name = "FILE")]
+    out: Option<FileArgument>,
+    #[command(flatten)]
+    scan: measured::ScanFlags,
     #[command(flatten)]
     writing: Writing,
     #[command(flatten)]
@@ -91,9 +103,14 @@ impl Probe {
     /// # Errors
     /// See [`Failure`].
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
-        documents::one_standard_input([&self.design, &self.points])?;
+        if let Some(scan) = &self.scan.compare {
+            return self.compare(scan, printer);
+        }
+        let standard = FileArgument::Standard;
+        let points = self.points.as_ref().unwrap_or(&standard);
+        documents::one_standard_input([&self.design, points])?;
         let document = documents::design(&self.design, Need::PROBE, printer)?;
-        let (points_m, points_input) = documents::points(&self.points)?;
+        let (points_m, points_input) = documents::points(points)?;
         let points = points_m.len();
         let components = match self.components {
             Components::All => ProbeComponents::All,
@@ -101,8 +118,9 @@ impl Probe {
             Components::Gz => ProbeComponents::Gz,
         };
         let inputs = vec![document.input, points_input];
-        let overwrite = Overwrite::new(self.writing.force, self.out.as_given(), &inputs);
-        if let FileArgument::Path(path) = &self.out {
+        let out = self.out.as_ref().unwrap_or(&standard);
+        let overwrite = Overwrite::new(self.writing.force, out.as_given(), &inputs);
+        if let FileArgument::Path(path) = out {
             overwrite.check(path).map_err(JobError::from)?;
         }
         let bar = begin(printer);
@@ -124,7 +142,7 @@ impl Probe {
             accuracy: accuracy(&table),
             columns: None,
         };
-        let place = match &self.out {
+        let place = match out {
             FileArgument::Standard if printer.json() => {
                 summary.columns = Some(columns(&table)?);
                 Place::Output
@@ -152,7 +170,7 @@ impl Probe {
         ));
         let stages = summary.accuracy.iter().map(|(name, stage)| (*name, stage));
         sheet.line("accuracy", &describe::accuracy(stages));
-        if let FileArgument::Path(path) = &self.out {
+        if let Some(FileArgument::Path(path)) = &self.out {
             sheet.line("written to", &path.display().to_string());
         }
         sheet.finish()

@@ -49,7 +49,7 @@ impl Opened {
         let renderer = Renderer::new(&bundle).map_err(|error| {
             let message = format!("{}: {error}", bundle.folder.display());
             match error {
-                RendererError::NoForceConstant => JobError::Unmet(format!(
+                RendererError::NoForceConstant => JobError::NoForceConstant(format!(
                     "{message}; see lambda.json there, and calibrate with other limits or another \
                      shape"
                 )),

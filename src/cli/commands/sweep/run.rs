@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::cli::commands::{begin, folder};
 use crate::cli::documents;
-use crate::cli::failure::Failure;
+use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
 use crate::cli::printer::{Place, Printer};
@@ -144,7 +144,12 @@ fn unmet(report: &RunReport) -> Result<(), Failure> {
     if parts.is_empty() {
         Ok(())
     } else {
-        Err(Failure::Unmet(parts.join("; ")))
+        let wish = if report.failed > 0 {
+            Wish::Sweep
+        } else {
+            Wish::Accuracy
+        };
+        Err(Failure::Unmet(wish, parts.join("; ")))
     }
 }
 

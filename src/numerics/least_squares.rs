@@ -1,0 +1,161 @@
+//! Linear least squares of few columns, by singular values, with degenerate directions told.
+//!
+//! Minimises |b - A x|. Columns are divided by their lengths first, so that units do not decide what
+//! counts as small; directions whose singular value is below [`CUTOFF`] of the largest are not
+//! solved for: the least step is taken and the columns in them are named. Standard errors are those
+//! of independent errors of equal size in b (Golub and Van Loan, *Matrix Computations*, 5.5).
+
+use nalgebra::{DMatrix, DVector};
+
+/// Singular values below this part of the largest are taken as zero; columns shorter than this part
+/// of the longest as without effect.
+pub const CUTOFF: f64 = 1e-5;
+/// A column whose share in the directions left out exceeds this is not determined.
+const SHARE: f64 = 1e-4;
+/// Columns with a smaller component in a direction are not named with it.
+const NAMED: f64 = 0.05;
+
+/// The solution.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solution {
+    /// One a column; the least ones where they are not determined.
+    pub values: Vec<f64>,
+    /// Standard errors for errors of size one in `b`; `None` where a column is not determined.
+    pub unit_errors: Vec<Option<f64>>,
+    /// Columns that change nothing.
+    pub without_effect: Vec<usize>,
+    /// Sets of columns of which only some combinations are determined.
+    pub degenerate: Vec<Vec<usize>>,
+    /// Number of directions solved for.
+    pub rank: usize,
+    /// Sum of the squares of b that the columns take away.
+    pub removed: f64,
+}
+
+/// Least squares of `columns` against `b`. Columns should be given in steps of comparable meaning,
+/// since their lengths are compared for what has no effect.
+#[must_use]
+pub fn solve(columns: &[Vec<f64>], b: &[f64]) -> Solution {
+    let count = columns.len();
+    let lengths: Vec<f64> = columns.iter().map(|c| norm(c)).collect();
+    let longest = lengths.iter().copied().fold(0.0, f64::max);
+    let effective = |length: f64| length > CUTOFF * longest && length > 0.0;
+    let used: Vec<usize> = (0..count).filter(|j| effective(lengths[*j])).collect();
+    let mut solution = Solution {
+        values: vec![0.0; count],
+        unit_errors: vec![None; count],
+        without_effect: (0..count).filter(|j| !effective(lengths[*j])).collect(),
+        degenerate: Vec::new(),
+        rank: 0,
+        removed: 0.0,
+    };
+    if used.is_empty() || b.is_empty() {
+        return solution;
+    }
+    let matrix = DMatrix::from_fn(b.len(), used.len(), |i, k| {
+        columns[used[k]][i] / lengths[used[k]]
+    });
+    let rhs = DVector::from_column_slice(b);
+    let svd = matrix.svd(true, true);
+    let (Some(u), Some(v_t)) = (&svd.u, &svd.v_t) else {
+        return solution;
+    };
+    let largest = svd.singular_values.iter().copied().fold(0.0, f64::max);
+    let mut null_share = vec![0.0; used.len()];
+    let mut variance = vec![0.0; used.len()];
+    for (k, &singular) in svd.singular_values.iter().enumerate() {
+        let direction = v_t.row(k);
+        if singular > CUTOFF * largest {
+            let along = u.column(k).dot(&rhs);
+            solution.rank += 1;
+            solution.removed += along * along;
+            for (j, part) in direction.iter().enumerate() {
+                solution.values[used[j]] += part * along / (singular * lengths[used[j]]);
+                variance[j] += (part / singular).powi(2);
+            }
+        } else {
+            for (share, part) in null_share.iter_mut().zip(direction.iter()) {
+                *share += part * part;
+            }
+            let named = (0..used.len()).filter(|j| direction[*j].abs() > NAMED);
+            solution.degenerate.push(named.map(|j| used[j]).collect());
+        }
+    }
+    // More columns than rows: the directions that no singular value stands for.
+    if used.len() > b.len() {
+        for (j, share) in null_share.iter_mut().enumerate() {
+            let kept: f64 = (0..v_t.nrows()).map(|k| v_t[(k, j)].powi(2)).sum();
+            *share += 1.0 - kept;
+        }
+        solution.degenerate.push(used.clone());
+    }
+    for (j, &column) in used.iter().enumerate() {
+        if null_share[j] <= SHARE {
+            solution.unit_errors[column] = Some(variance[j].sqrt() / lengths[column]);
+        }
+    }
+    solution
+}
+
+/// Euclidean length.
+#[must_use]
+pub fn norm(values: &[f64]) -> f64 {
+    values.iter().map(|v| v * v).sum::<f64>().sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A straight line through points with residuals known in closed form.
+    #[test]
+    fn a_line_has_the_textbook_slope_and_errors() {
+        let x = [0.7, 1.3, 2.9, 4.1, 5.3];
+        let y = [1.1, 1.9, 4.7, 6.1, 8.3];
+        let columns = [vec![1.0; 5], x.to_vec()];
+        let fit = solve(&columns, &y);
+        let (mx, my) = (x.iter().sum::<f64>() / 5.0, y.iter().sum::<f64>() / 5.0);
+        let sxx: f64 = x.iter().map(|x| (x - mx).powi(2)).sum();
+        let sxy: f64 = x.iter().zip(&y).map(|(x, y)| (x - mx) * (y - my)).sum();
+        assert!((fit.values[1] - sxy / sxx).abs() < 1e-13);
+        assert!((fit.values[0] - (my - sxy / sxx * mx)).abs() < 1e-13);
+        let slope_error = fit.unit_errors[1].unwrap();
+        assert!((slope_error - sxx.sqrt().recip()).abs() < 1e-13);
+        let level_error = (0.2 + mx * mx / sxx).sqrt();
+        assert!((fit.unit_errors[0].unwrap() - level_error).abs() < 1e-13);
+        let left: f64 = x
+            .iter()
+            .zip(&y)
+            .map(|(x, y)| (y - fit.values[0] - fit.values[1] * x).powi(2))
+            .sum();
+        let all: f64 = y.iter().map(|y| y * y).sum();
+        assert!((fit.removed - (all - left)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_not_determined_is_named_and_the_rest_is_solved() {
+        let a = vec![0.7, 1.3, -0.3, 2.1];
+        let twice: Vec<f64> = a.iter().map(|v| 2.0 * v).collect();
+        let other = vec![0.2, -1.1, 0.9, 0.4];
+        let b: Vec<f64> = a
+            .iter()
+            .zip(&other)
+            .map(|(a, o)| 3.0 * a + 1.7 * o)
+            .collect();
+        let fit = solve(&[a, twice, other, vec![0.0; 4]], &b);
+        assert_eq!(fit.rank, 2);
+        assert_eq!(fit.without_effect, [3]);
+        assert_eq!(fit.degenerate, [vec![0, 1]]);
+        assert!(fit.unit_errors[0].is_none() && fit.unit_errors[1].is_none());
+        assert!((fit.values[2] - 1.7).abs() < 1e-12 && fit.unit_errors[2].is_some());
+        assert!((fit.values[0] + 2.0 * fit.values[1] - 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn fewer_rows_than_columns_determine_nothing_alone() {
+        let fit = solve(&[vec![0.7], vec![1.3]], &[2.0]);
+        assert_eq!(fit.rank, 1);
+        assert!(fit.unit_errors.iter().all(Option::is_none));
+        assert!(solve(&[vec![]], &[]).unit_errors[0].is_none());
+    }
+}

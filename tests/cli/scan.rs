@@ -1,0 +1,484 @@
+//! `probe --compare`: scans made by the program itself, with what was changed in them found again.
+
+use serde_json::Value;
+
+use crate::support::{Place, SEED};
+
+/// Uniform numbers of a linear congruence, summed to nearly normal ones.
+struct Noise(u64);
+
+impl Noise {
+    fn normal(&mut self) -> f64 {
+        let mut uniform = || {
+            self.0 = self
+                .0
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 11) as f64 / (1u64 << 53) as f64
+        };
+        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+    }
+}
+
+/// How a scan differs from what the design gives.
+#[derive(Clone)]
+struct Made {
+    columns: Vec<&'static str>,
+    coils: Vec<(usize, f64)>,
+    shift_m: [f64; 3],
+    background_t: [f64; 3],
+    noise_t: f64,
+    seed: u64,
+}
+
+impl Made {
+    fn new(columns: &[&'static str], coils: &[(usize, f64)]) -> Self {
+        Self {
+            columns: columns.to_vec(),
+            coils: coils.to_vec(),
+            shift_m: [0.0; 3],
+            background_t: [0.0; 3],
+            noise_t: 0.0,
+            seed: 7,
+        }
+    }
+
+    /// A row a point and coil, at 1.3 A.
+    fn write(&self, place: &Place, name: &str, points_m: &[[f64; 3]]) {
+        let mut table = "x_m,y_m,z_m\n".to_owned();
+        for p in points_m {
+            let [x, y, z]: [f64; 3] = std::array::from_fn(|i| p[i] + self.shift_m[i]);
+            table.push_str(&format!("{x},{y},{z}\n"));
+        }
+        let told = place.run_with_input(&["probe", SEED, "-", "-q"], &table);
+        let told = told.ends(0).out;
+        let mut lines = told.lines().map(|line| line.split(',').collect::<Vec<_>>());
+        let header = lines.next().unwrap();
+        let rows: Vec<Vec<&str>> = lines.collect();
+        let mut noise = Noise(self.seed);
+        let mut scan = format!("x_m,y_m,z_m,coil,current_a,{}\n", self.columns.join(","));
+        for (k, [x, y, z]) in points_m.iter().enumerate() {
+            for (coil, gain) in &self.coils {
+                let row = &rows[k * 9 + coil];
+                scan.push_str(&format!("{x},{y},{z},{coil},1.3"));
+                for column in &self.columns {
+                    let name = format!("{column}_per_a");
+                    let at = header.iter().position(|cell| *cell == name).unwrap();
+                    let axis = ["bx_t", "by_t", "bz_t"].iter().position(|c| c == column);
+                    let background = axis.map_or(0.0, |axis| self.background_t[axis]);
+                    let value: f64 = row[at].parse().unwrap();
+                    let value = 1.3 * gain * value + background + self.noise_t * noise.normal();
+                    scan.push_str(&format!(",{value}"));
+                }
+                scan.push('\n');
+            }
+        }
+        place.write(name, &scan);
+    }
+}
+
+const FIELD: [&str; 3] = ["bx_t", "by_t", "bz_t"];
+
+fn grid() -> Vec<[f64; 3]> {
+    let mut points = Vec::new();
+    for z in [0.011, 0.019, 0.034] {
+        for y in [-0.017, 0.004, 0.023] {
+            for x in [-0.021, -0.003, 0.013, 0.031] {
+                points.push([x, y, z]);
+            }
+        }
+    }
+    points
+}
+
+fn compare(place: &Place, scan: &str, more: &[&str]) -> Value {
+    let args = ["probe", SEED, "--compare", scan, "--format", "json"];
+    let ran = place.run(&[&args[..], more].concat()).ends(0);
+    assert!(ran.err.is_empty(), "{}", ran.err);
+    ran.json()
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    let list = value.as_array().unwrap_or_else(|| panic!("{value}"));
+    list.iter()
+        .map(|v| v.as_f64().unwrap_or(f64::NAN))
+        .collect()
+}
+
+#[test]
+fn what_was_changed_is_found_within_the_stated_errors() {
+    let place = Place::new();
+    let gains = [(1, 0.97), (4, 1.034), (5, 1.0)];
+    let mut made = Made::new(&FIELD, &gains);
+    made.shift_m = [0.0007, -0.0004, 0.0011];
+    made.background_t = [13e-6, -7e-6, -41e-6];
+    // Without noise: exactly, to the fit's own end.
+    made.write(&place, "exact.csv", &grid());
+    let exact = compare(&place, "exact.csv", &[]);
+    for (found, (_, gain)) in exact["fit"]["scales"].as_array().unwrap().iter().zip(gains) {
+        assert!(
+            (found["scale"].as_f64().unwrap() - gain).abs() < 1e-7,
+            "{found}"
+        );
+    }
+    for (found, shift) in numbers(&exact["fit"]["position_m"])
+        .iter()
+        .zip(made.shift_m)
+    {
+        assert!((found - shift).abs() < 1e-9, "{found} {shift}");
+    }
+    assert!(
+        exact["residuals"]["fitted"]["field"]["rms_t"]
+            .as_f64()
+            .unwrap()
+            < 1e-11
+    );
+
+    made.noise_t = 3e-6;
+    // How far off in stated errors, over several scans.
+    let mut squares = Vec::new();
+    for seed in [7, 13, 29] {
+        made.seed = seed;
+        made.write(&place, "scan.csv", &grid());
+        let told = compare(&place, "scan.csv", &["--noise-t", "3e-6"]);
+        let fit = &told["fit"];
+        let mut hold = |found: f64, error: f64, truth: f64| {
+            let off = (found - truth) / error;
+            assert!(off.abs() < 4.5, "{found} +- {error} against {truth}");
+            squares.push(off * off);
+        };
+        for (scale, (coil, gain)) in fit["scales"].as_array().unwrap().iter().zip(gains) {
+            assert_eq!(scale["coil"], coil);
+            let error = scale["standard_error"].as_f64().unwrap();
+            assert!(error < 0.002, "{error}");
+            hold(scale["scale"].as_f64().unwrap(), error, gain);
+        }
+        let of = |key: &str| numbers(&fit[key]);
+        for i in 0..3 {
+            let (shift, error) = (of("position_m")[i], of("position_error_m")[i]);
+            assert!(error < 1e-4);
+            hold(shift, error, made.shift_m[i]);
+            let (level, error) = (of("background_t")[i], of("background_error_t")[i]);
+            hold(level, error, made.background_t[i]);
+        }
+        let chi_square = fit["reduced_chi_square"].as_f64().unwrap();
+        assert!((0.7..1.4).contains(&chi_square), "{chi_square}");
+        assert_eq!(fit["undetermined"].as_array().unwrap().len(), 0);
+        let line = fit["gain_toml"].as_str().unwrap();
+        assert!(line.starts_with("gain = [1.000000, 0.9"), "{line}");
+    }
+    // As large as stated, neither larger nor smaller: the mean square of 27 numbers is near 1.
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    assert!((0.4..2.0).contains(&mean), "{mean}");
+
+    // The gains put into the design leave the rest to the frame.
+    let told = compare(&place, "scan.csv", &[]);
+    let line = told["fit"]["gain_toml"].as_str().unwrap();
+    let design = place
+        .seed()
+        .replace("[array]\n", &format!("[array]\n{line}\n"));
+    place.write("gained.toml", &design);
+    let args = [
+        "probe",
+        "gained.toml",
+        "--compare",
+        "scan.csv",
+        "--format",
+        "json",
+    ];
+    let again = place.run(&args).ends(0).json();
+    for scale in again["fit"]["scales"].as_array().unwrap() {
+        assert!(
+            (scale["scale"].as_f64().unwrap() - 1.0).abs() < 1e-5,
+            "{scale}"
+        );
+    }
+}
+
+#[test]
+fn a_turned_sensor_is_found_and_gradients_count_too() {
+    let place = Place::new();
+    let columns = ["bz_t", "dbz_dz_t_per_m", "dbx_dz_t_per_m"];
+    let mut made = Made::new(&columns, &[(4, 1.0), (3, 0.95)]);
+    made.shift_m = [-0.0003, 0.0008, -0.0006];
+    made.write(&place, "scan.csv", &grid());
+    let what = "scale,background,position,rotation";
+    let told = compare(&place, "scan.csv", &["--fit", what]);
+    for angle in numbers(&told["fit"]["rotation_deg"]) {
+        assert!(angle.abs() < 1e-4, "{angle}");
+    }
+    let shifts = numbers(&told["fit"]["position_m"]);
+    for (found, shift) in shifts.iter().zip(made.shift_m) {
+        assert!((found - shift).abs() < 1e-8, "{found} {shift}");
+    }
+    assert!(told["residuals"]["fitted"]["gradient"]["rms_t_per_m"].is_number());
+    // Only the background that was measured.
+    assert!(told["fit"]["background_t"][0].is_null());
+    assert!(told["fit"]["background_t"][2].is_number());
+}
+
+#[test]
+fn noise_alone_is_explained_by_nothing() {
+    let place = Place::new();
+    let mut made = Made::new(&FIELD, &[(4, 1.0), (0, 1.0)]);
+    made.noise_t = 2e-6;
+    made.write(&place, "scan.csv", &grid());
+    let told = compare(&place, "scan.csv", &["--noise-t", "2e-6"]);
+    assert!(told["best_explanation"].is_null(), "{told:#}");
+    for scale in told["fit"]["scales"].as_array().unwrap() {
+        let off = scale["scale"].as_f64().unwrap() - 1.0;
+        assert!(off.abs() < 4.0 * scale["standard_error"].as_f64().unwrap());
+    }
+    let left = &told["residuals"]["as_designed"]["field"];
+    let rms = left["rms_t"].as_f64().unwrap();
+    assert!((1.6e-6..2.4e-6).contains(&rms), "{rms}");
+    assert!(left["model_error_t"].as_f64().unwrap() < 1e-12);
+    let human = place.run(&["probe", SEED, "--compare", "scan.csv"]).ends(0);
+    assert!(human.out.contains("no single parameter"), "{}", human.out);
+}
+
+#[test]
+fn the_parameter_at_fault_is_named() {
+    let place = Place::new();
+    let best = |told: &Value| {
+        told["best_explanation"]
+            .as_str()
+            .unwrap_or("none")
+            .to_owned()
+    };
+    let share = |told: &Value, name: &str| {
+        let list = told["explanations"].as_array().unwrap();
+        let found = list.iter().find(|e| e["parameter"] == name).unwrap();
+        (found["share"].as_f64().unwrap(), found.clone())
+    };
+    let coils = [(4, 1.0), (5, 1.0)];
+    let mut high = Made::new(&FIELD, &coils);
+    high.shift_m[2] = 0.0009;
+    high.noise_t = 1e-6;
+    high.write(&place, "high.csv", &grid());
+    let told = compare(&place, "high.csv", &[]);
+    assert_eq!(best(&told), "height");
+    let (part, found) = share(&told, "height");
+    assert!(part > 0.99);
+    let change = found["change"].as_f64().unwrap();
+    assert!((change - 0.0009).abs() < 5e-5, "{change}");
+
+    // More turns are a larger scale: told, not chosen between.
+    let mut strong = Made::new(&FIELD, &coils.map(|(coil, _)| (coil, 1.021)));
+    strong.noise_t = 1e-6;
+    strong.write(&place, "strong.csv", &grid());
+    let told = compare(&place, "strong.csv", &[]);
+    assert_eq!(best(&told), "scale");
+    let (_, found) = share(&told, "scale");
+    assert_eq!(found["alike"][0], "coil.turns");
+    let (_, turns) = share(&told, "coil.turns");
+    let (change, error) = (&turns["change"], &turns["standard_error"]);
+    let off = change.as_f64().unwrap() - 0.021 * 1429.0;
+    assert!(off.abs() < 4.0 * error.as_f64().unwrap(), "{turns}");
+
+    // A longer coil, measured with the design of the shorter one.
+    let made = Made::new(&FIELD, &coils);
+    made.write(&place, "long.csv", &grid());
+    let short = place
+        .seed()
+        .replace("length_mm = 100.0", "length_mm = 99.0");
+    place.write(
+        "short.toml",
+        &short.replace("turns = 1429", "turns = 1414.71"),
+    );
+    let args = [
+        "probe",
+        "short.toml",
+        "--compare",
+        "long.csv",
+        "--format",
+        "json",
+    ];
+    let told = place.run(&args).ends(0).json();
+    let (part, found) = share(&told, "coil.length_mm");
+    assert!(found["change"].is_number() && part > 0.0, "{told:#}");
+}
+
+#[test]
+fn what_a_scan_cannot_tell_apart_is_told() {
+    let place = Place::new();
+    // On one coil's axis, vertical component: x and y change nothing.
+    let axis: Vec<[f64; 3]> = (0..14)
+        .map(|k| [0.0, 0.0, 0.01 + 0.0037 * f64::from(k)])
+        .collect();
+    let mut made = Made::new(&["bz_t"], &[(4, 1.02)]);
+    made.noise_t = 1e-7;
+    made.write(&place, "axis.csv", &axis);
+    let told = compare(&place, "axis.csv", &[]);
+    let named: Vec<String> = told["fit"]["undetermined"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(ToString::to_string)
+        .collect();
+    assert!(named.contains(&"[\"position x\"]".to_owned()), "{named:?}");
+    assert!(named.contains(&"[\"position y\"]".to_owned()), "{named:?}");
+    assert!(told["fit"]["position_m"][0].is_null() && told["fit"]["position_m"][2].is_number());
+    let scale = &told["fit"]["scales"][0];
+    let off = scale["scale"].as_f64().unwrap() - 1.02;
+    assert!(
+        off.abs() < 4.0 * scale["standard_error"].as_f64().unwrap(),
+        "{scale}"
+    );
+    let human = place.run(&["probe", SEED, "--compare", "axis.csv"]).ends(0);
+    assert!(
+        human.out.contains("changes nothing at these points"),
+        "{}",
+        human.out
+    );
+
+    // One place again and again: scale, background and height are one number.
+    made.write(&place, "one.csv", &[[0.003, 0.004, 0.02]; 12]);
+    let told = compare(&place, "one.csv", &["--fit", "scale,background"]);
+    assert_eq!(told["fit"]["undetermined"][0].as_array().unwrap().len(), 2);
+    assert!(told["fit"]["scales"][0]["scale"].is_null() && told["fit"]["gain_toml"].is_null());
+}
+
+#[test]
+fn scans_that_cannot_be_fitted_are_refused_with_what_to_do() {
+    let place = Place::new();
+    let made = Made::new(&["bz_t"], &[(4, 1.0)]);
+    made.write(&place, "scan.csv", &grid());
+    let text = String::from_utf8(place.read("scan.csv")).unwrap();
+    let refused = |name: &str, text: &str, words: &[&str]| {
+        place.write(name, text);
+        let args = ["probe", SEED, "--compare", name];
+        let ran = place.run(&args).ends(3).says(words);
+        assert!(
+            ran.err.starts_with("error[E307]:") && ran.err.contains(name),
+            "{}",
+            ran.err
+        );
+        assert!(ran.out.is_empty());
+    };
+    let rows: Vec<&str> = text.lines().collect();
+    refused(
+        "few.csv",
+        &rows[..6].join("\n"),
+        &["5 measured values", "5 numbers", "at least 8", "--fit"],
+    );
+    refused(
+        "off.csv",
+        &text.replace(",4,1.3,", ",4,0,"),
+        &["current is 0 in every row"],
+    );
+    let cells = |line: &str, factors: [f64; 6]| -> String {
+        let values = line.split(',').zip(factors);
+        let scaled = values.map(|(cell, f)| (cell.parse::<f64>().unwrap() * f).to_string());
+        scaled.collect::<Vec<_>>().join(",")
+    };
+    let scaled = |factors: [f64; 6]| {
+        let body: Vec<String> = rows[1..].iter().map(|row| cells(row, factors)).collect();
+        format!("{}\n{}\n", rows[0], body.join("\n"))
+    };
+    let mm = scaled([1e3, 1e3, 1e3, 1.0, 1.0, 1.0]);
+    refused(
+        "mm.csv",
+        &mm,
+        &["look like millimetres", "divide them by 1000"],
+    );
+    for (name, factor, unit) in [
+        ("mt.csv", 1e3, "millitesla"),
+        ("gauss.csv", 1e4, "gauss"),
+        ("ut.csv", 1e6, "microtesla"),
+    ] {
+        let text = scaled([1.0, 1.0, 1.0, 1.0, 1.0, factor]);
+        refused(name, &text, &[unit, "divide it by"]);
+    }
+    let ma = scaled([1.0, 1.0, 1.0, 1.0, 1e3, 1.0]);
+    refused("ma.csv", &ma, &["milliampere", "divide it by 1000"]);
+
+    // Swapped leads are a warning, and another coil's number is a fault of the table.
+    place.write("swapped.csv", &scaled([1.0, 1.0, 1.0, 1.0, -1.0, 1.0]));
+    let swapped = place
+        .run(&["probe", SEED, "--compare", "swapped.csv"])
+        .ends(0);
+    swapped.says(&["warning: coil 4", "leads may be swapped"]);
+    place.write("ninth.csv", &text.replace(",4,1.3,", ",9,1.3,"));
+    place
+        .run(&["probe", SEED, "--compare", "ninth.csv"])
+        .ends(3)
+        .says(&["E302", "ninth.csv:2", "column coil", "from 0 to 8"]);
+}
+
+#[test]
+fn currents_may_flow_in_all_coils_and_residuals_are_written() {
+    let place = Place::new();
+    let made = Made::new(&["bz_t"], &[(0, 1.0), (4, 1.0)]);
+    made.write(&place, "scan.csv", &grid());
+    let text = String::from_utf8(place.read("scan.csv")).unwrap();
+    // Both coils at once: the two rows of a point added.
+    let rows: Vec<Vec<&str>> = text
+        .lines()
+        .skip(1)
+        .map(|l| l.split(',').collect())
+        .collect();
+    let mut both = "x_m,y_m,z_m,current_0_a,current_4_a,bz_t\n".to_owned();
+    for pair in rows.chunks(2) {
+        let bz: f64 = pair.iter().map(|row| row[5].parse::<f64>().unwrap()).sum();
+        both.push_str(&format!(
+            "{},{},{},1.3,1.3,{bz}\n",
+            pair[0][0], pair[0][1], pair[0][2]
+        ));
+    }
+    place.write("both.csv", &both);
+    let args = ["--out", "left.csv"];
+    let told = compare(&place, "both.csv", &args);
+    assert_eq!(told["rows"], 36);
+    let left = String::from_utf8(place.read("left.csv")).unwrap();
+    assert!(left.starts_with("x_m,y_m,z_m,bz_t,bz_design_t,bz_residual_t,bz_fitted_residual_t\n"));
+    for row in left.lines().skip(1) {
+        let cells: Vec<f64> = row.split(',').map(|cell| cell.parse().unwrap()).collect();
+        assert!(
+            cells[5].abs() < 1e-14 && (cells[3] - cells[4] - cells[5]).abs() < 1e-18,
+            "{row}"
+        );
+    }
+    // The same inputs: ours to replace. The same bytes with one thread.
+    let again = compare(
+        &place,
+        "both.csv",
+        &[&args[..], &["--threads", "1"]].concat(),
+    );
+    assert_eq!(told, again);
+    let piped = place
+        .run(&["probe", SEED, "--compare", "both.csv", "--out", "-"])
+        .ends(0);
+    assert_eq!(piped.out, left);
+    assert!(piped.err.contains("against seed_air"), "{}", piped.err);
+    place.write("mine.csv", "precious");
+    place
+        .run(&["probe", SEED, "--compare", "both.csv", "--out", "mine.csv"])
+        .ends(4)
+        .says(&["E405", "--force"]);
+    // Points and a scan exclude each other, and one of them is needed.
+    place
+        .run(&["probe", SEED, "both.csv", "--compare", "both.csv"])
+        .ends(2);
+    place.run(&["probe", SEED]).ends(2).says(&["POINTS"]);
+}
+
+#[test]
+fn the_object_is_as_its_schema_says() {
+    let place = Place::new();
+    let mut made = Made::new(&["bz_t"], &[(4, 1.0)]);
+    made.noise_t = 1e-6;
+    made.write(&place, "scan.csv", &grid());
+    let told = compare(&place, "scan.csv", &["--noise-t", "1e-6"]);
+    let (_, schema) = fluxform::bundle::schema::SCHEMAS
+        .iter()
+        .find(|(name, _)| *name == "scan.schema.json")
+        .unwrap();
+    let schema: Value = serde_json::from_str(schema).unwrap();
+    let validator = jsonschema::validator_for(&schema).unwrap();
+    let faults: Vec<String> = validator
+        .iter_errors(&told)
+        .map(|e| e.to_string())
+        .collect();
+    assert!(faults.is_empty(), "{faults:?}");
+}
