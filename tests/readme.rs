@@ -193,3 +193,21 @@ fn every_command_has_a_row_and_every_row_is_a_command() {
         .collect();
     assert_eq!(rows, commands, "README.md's table and `fluxform --help`");
 }
+
+#[test]
+fn the_scan_is_compared_as_the_readme_shows() {
+    let readme = readme();
+    let (_, rest) = readme
+        .split_once("## Compare with a Gauss-meter scan")
+        .unwrap();
+    let (_, rest) = rest.split_once("```sh\n").unwrap();
+    let (command, rest) = rest.split_once("\n```").unwrap();
+    let (_, rest) = rest.split_once("```text\n").unwrap();
+    let (shown, _) = rest.split_once("```").unwrap();
+    let arguments: Vec<&str> = command.split(' ').skip(1).collect();
+    let printed = says(&arguments);
+    assert_eq!(
+        shown.lines().collect::<Vec<_>>(),
+        printed.lines().collect::<Vec<_>>()
+    );
+}

@@ -82,10 +82,10 @@ pub(super) fn explain(
         });
     }
     let count = residuals.values.len() as f64;
-    // Of several that take as much, the one with the fewest numbers; of those, the first.
-    let per_freedom = |e: &Explanation| {
+    // Bayes' criterion: more numbers must explain more. Of equals the first.
+    let cost = |e: &Explanation| {
         let left = (1.0 - e.share).max(1e-12);
-        left / (count - e.parameters as f64 - 1.0).max(1.0)
+        count * left.ln() + e.parameters as f64 * count.ln()
     };
     let worth = |e: &&Explanation| {
         let (free, left) = (e.parameters as f64, (1.0 - e.share).max(1e-12));
@@ -96,7 +96,7 @@ pub(super) fn explain(
         .iter()
         .filter(worth)
         .fold(None::<&Explanation>, |best, e| match best {
-            Some(b) if per_freedom(b) <= per_freedom(e) * 1.001 => Some(b),
+            Some(b) if cost(b) <= cost(e) + 1e-3 * count => Some(b),
             _ => Some(e),
         });
     let best = best.map(|e| e.parameter.clone());
