@@ -39,7 +39,11 @@ fn revision() -> Option<String> {
     println!("cargo::rerun-if-changed={log}");
     let changed = !git(&["status", "--porcelain", "--untracked-files=no"])?.is_empty();
     let sha1 = git(&["rev-parse", "--short=12", "HEAD"])?;
-    Some(if changed { format!("{sha1}, changed") } else { sha1 })
+    Some(if changed {
+        format!("{sha1}, changed")
+    } else {
+        sha1
+    })
 }
 
 fn main() {
