@@ -5,7 +5,6 @@
     pip install tree-sitter==0.26.1 tree-sitter-rust==0.24.2
     python3 scripts/mutants.py                  # the sample anew, with the table
     python3 scripts/mutants.py --survivors      # only those in mutants_survivors.csv
-    python3 scripts/mutants.py --coverage       # lines and regions that the same tests run
 
 `cargo mutants --list` names every mutant. A sample of each room, drawn with a fixed seed and
 spread evenly over its files, is planted into a copy of the tree, all at once, each behind a switch
@@ -43,7 +42,6 @@ TESTS = ["air_coil", "bh_curve", "core_field", "harmonic", "lambda", "magnet", "
          "shape", "steel", "steel_saturated", "transient"]
 TABLE = ROOT / "results/bench/mutants.csv"
 SURVIVORS = ROOT / "results/bench/mutants_survivors.csv"
-COVERAGE = ROOT / "results/bench/code_coverage.csv"
 # A test that takes longer than this is asked only by the whole suite, seconds of processor time.
 LONGEST_S = 10.0
 
@@ -317,56 +315,6 @@ def built(work, numbered):
     return tree, out, [m["executable"] for m in messages if m["reason"] == "compiler-artifact" and m.get("executable")]
 
 
-def coverage(work, rooms):
-    """Shares of lines and regions that the same tests run, by cargo-llvm-cov, test modules left out.
-
-    A region counts as run when any instance of a generic function runs it.
-    """
-    tree = copied(work)
-    environment = dict(os.environ, CARGO_PROFILE_DEV_OPT_LEVEL="1", CARGO_TERM_COLOR="never")
-    environment.setdefault("CARGO_TARGET_DIR", str(work / "target"))
-    # A test that holds a time may fail in a slow build; what it ran counts all the same.
-    subprocess.run(["cargo", "llvm-cov", "--no-report", "--ignore-run-fail", "--locked", "--lib",
-                    *(f"--test={t}" for t in TESTS)], cwd=tree, env=environment, check=True)
-    answer = {}
-    for form in ("--lcov", "--json"):
-        path = work / f"coverage{form}"
-        subprocess.run(["cargo", "llvm-cov", "report", form, "--output-path", path], cwd=tree, env=environment, check=True)
-        answer[form] = path.read_text()
-    first_test = {}
-    for path in (tree / "src").rglob("*.rs"):
-        rows = path.read_text().splitlines()
-        first_test[str(path)] = next((i for i, row in enumerate(rows, 1) if row.startswith("#[cfg(test)]")
-                                      and "mod" in rows[i] and "{" in rows[i]), len(rows) + 1)
-    runs = collections.defaultdict(dict)  # (room, what) -> place -> count
-
-    def note(path, line, place, what, count):
-        name = pathlib.Path(path)
-        if str(name) in first_test and line < first_test[str(name)] and name.stem != "tests" \
-                and not name.stem.endswith("_tests"):
-            known = runs[name.relative_to(tree / "src").parts[0], what]
-            known[path, place] = max(known.get((path, place), 0), count)
-
-    path = ""
-    for row in answer["--lcov"].splitlines():
-        if row.startswith("SF:"):
-            path = row[3:]
-        elif row.startswith("DA:"):
-            line, count = map(int, row[3:].split(",")[:2])
-            note(path, line, line, "lines", count)
-    for function in json.loads(answer["--json"])["data"][0]["functions"]:
-        for region in function["regions"]:
-            if region[7] == 0:
-                note(function["filenames"][region[5]], region[0], tuple(region[:4]), "regions", region[4])
-    with COVERAGE.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["room", "lines", "lines_run", "regions", "regions_run"])
-        for room in rooms:
-            counts = [runs[room, what].values() for what in ("lines", "regions")]
-            writer.writerow([room] + [n for c in counts for n in (len(c), sum(x > 0 for x in c))])
-    print(COVERAGE.read_text(), file=sys.stderr)
-
-
 def limited(seconds):
     def limit():
         resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, int(seconds) + 2))
@@ -442,11 +390,7 @@ def main():
     parser.add_argument("--work", type=pathlib.Path, default=ROOT / "target/mutants")
     parser.add_argument("--survivors", action="store_true", help="run those of the survivors' table again")
     parser.add_argument("--list", action="store_true", help="print the sample and stop")
-    parser.add_argument("--coverage", action="store_true", help="count lines and regions that the tests run, and stop")
     options = parser.parse_args()
-    if options.coverage:
-        coverage(options.work.resolve(), options.rooms)
-        return
 
     old = list(csv.DictReader(SURVIVORS.open())) if SURVIVORS.exists() else []
     wanted = {key(row) for row in old}
