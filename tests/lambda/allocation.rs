@@ -4,6 +4,12 @@ use fluxform::lambda::{Allocation, Allocator, AllocatorError, Reach};
 
 use crate::random::Random;
 
+impl Random {
+    fn below(&mut self, n: usize) -> usize {
+        (self.next() * n as f64) as usize
+    }
+}
+
 /// One allocation problem.
 #[derive(Debug, Clone)]
 struct Problem {

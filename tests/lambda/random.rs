@@ -11,8 +11,4 @@ impl Random {
             .wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
-
-    pub fn below(&mut self, n: usize) -> usize {
-        (self.next() * n as f64) as usize
-    }
 }
