@@ -369,3 +369,12 @@ fn where_a_table_ends_and_begins_is_warned_of() {
         flat.warnings()
     );
 }
+
+#[test]
+fn the_weakest_fields_meet_the_initial_permeability() {
+    let curve = curve("steel_1010");
+    let permeability = curve.initial_relative_permeability() * MU_0_T_M_PER_A;
+    for h_a_per_m in [1e-6, 1e-30, 1.3e-90, 0.7e-250] {
+        assert_close(curve.b_t(h_a_per_m), permeability * h_a_per_m, 1e-6);
+    }
+}

@@ -53,7 +53,6 @@ pub enum Reach {
 
 /// What an allocation says of itself: `I_i = clamp(mu (G_i - center) / R_i + nu / R_i)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
 pub struct Allocation {
     /// Whether the wanted force was within reach.
     pub reach: Reach,

@@ -154,4 +154,11 @@ mod tests {
         let all = Interval::point(1.0) / Interval::new(-0.1, 0.1);
         assert_eq!((all.lo, all.hi), (f64::NEG_INFINITY, f64::INFINITY));
     }
+
+    #[test]
+    fn widening_is_a_share_of_the_larger_end_on_both_sides() {
+        let wide = Interval::new(-0.7, 1.3).widened(0.01);
+        assert!(wide.lo <= -0.713 && wide.lo > -0.713 - 1e-15);
+        assert!(wide.hi >= 1.313 && wide.hi < 1.313 + 1e-15);
+    }
 }

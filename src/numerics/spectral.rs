@@ -420,4 +420,22 @@ mod tests {
             assert_eq!(*low, -*high);
         }
     }
+
+    #[test]
+    fn nodes_that_rise_follow_the_bernstein_ellipse() {
+        // From 1 to 16 about 0 the geometric mean is 4: half-axes 5/3 and 4/3, hence a rate of 3.
+        for tolerance in [1e-3, 1e-6, 1e-12] {
+            assert_eq!(
+                Spectral::rising_nodes(1.0, 16.0, 0.0, tolerance),
+                count(3.0_f64.ln(), GROWTH[1], tolerance)
+            );
+        }
+    }
+
+    #[test]
+    fn an_odd_rule_has_its_middle_node_at_zero() {
+        for n in [3, 5, 9, 31] {
+            assert_eq!(lobatto(n).0[n / 2], 0.0);
+        }
+    }
 }

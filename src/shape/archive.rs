@@ -105,3 +105,27 @@ pub(super) fn text_of(bytes: Vec<u8>) -> Result<String, String> {
     }
     Ok(text)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use zip::ZipWriter;
+    use zip::write::SimpleFileOptions;
+
+    use super::*;
+
+    #[test]
+    fn parts_share_one_budget() {
+        let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+        for name in ["a", "b"] {
+            zip.start_file(name, SimpleFileOptions::default()).unwrap();
+            zip.write_all(&vec![b' '; 5 << 20]).unwrap();
+        }
+        let bytes = zip.finish().unwrap().into_inner();
+        let mut archive = Archive::open(&bytes).unwrap();
+        assert_eq!(archive.text("a").unwrap().len(), 5 << 20);
+        let refused = archive.text("b").unwrap_err().to_string();
+        assert!(refused.contains("decompression bomb"), "{refused}");
+    }
+}

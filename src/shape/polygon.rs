@@ -145,4 +145,18 @@ mod tests {
         }
         assert_eq!(areas(&[p; 5]).0, 0.0);
     }
+
+    #[test]
+    fn a_notch_turns_against_the_rest() {
+        let mut pentagon = [
+            [0.0, 0.0, 0.3],
+            [1.3, 0.0, 0.3],
+            [1.3, 0.7, 0.3],
+            [0.6, 1.1, 0.3],
+            [0.0, 0.7, 0.3],
+        ];
+        assert!(is_convex(&pentagon, area_vector(&pentagon)));
+        pentagon[3][1] = 0.2;
+        assert!(!is_convex(&pentagon, area_vector(&pentagon)));
+    }
 }

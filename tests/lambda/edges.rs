@@ -173,3 +173,20 @@ fn malformed_problems_are_refused_with_the_place() {
         "resistance_ohm[1] is 0, expected a positive resistance"
     );
 }
+
+#[test]
+fn a_value_that_is_no_number_is_refused_wherever_it_stands() {
+    for points in 1..=4 {
+        let mut case = plain_case();
+        case.heights = vec![0.05; points];
+        case.forces = vec![0.7; 2 * points];
+        for place in 0..points {
+            for value in [f64::NAN, f64::INFINITY] {
+                let mut bad = case.clone();
+                bad.heights[place] = value;
+                let refused = solve(&bad.problem(), &Settings::default()).unwrap_err();
+                assert!(refused.to_string().contains("finite"), "{refused}");
+            }
+        }
+    }
+}

@@ -1,6 +1,7 @@
 //! The path of e*(lambda): against exhaustive search, exact rational solutions, its own
 //! certificate, closed forms and scaling laws.
 
+mod allocation;
 mod arrays;
 mod case;
 mod criteria;
@@ -9,6 +10,7 @@ mod exhaustive;
 mod feedback;
 mod oracle;
 mod power;
+mod random;
 mod search;
 mod vertices;
 mod worst;

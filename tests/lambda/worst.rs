@@ -1,7 +1,7 @@
 //! The worst-point form against every vertex of small problems, and on degenerate ones.
 
 use fluxform::lambda::worst::{WorstSolution, maxmin, worst_point};
-use fluxform::lambda::{Settings, solve};
+use fluxform::lambda::{Event, Settings, solve};
 
 use crate::case::{Case, Numbers, small_case};
 use crate::vertices::Vertices;
@@ -593,4 +593,26 @@ fn a_coil_of_next_to_no_force_at_the_highest_point_does_not_stop_the_path() {
     let most = 0.4 * 0.9 / 0.05;
     let linear = solution.lambda_linear_n_per_m.expect("binds");
     assert!((linear / most - 1.0).abs() < 1e-13, "{linear} not {most}");
+}
+
+#[test]
+fn turns_tell_what_the_currents_do() {
+    // One coil under one point: it leaves zero at once and meets 1.3 A at 0.7 * 1.3 / 0.05 N/m.
+    let case = Case {
+        forces: vec![0.7],
+        heights: vec![0.05],
+        offset: None,
+        lower: vec![0.0],
+        upper: vec![1.3],
+        total: None,
+        ohm: vec![6.0],
+    };
+    let solution = solved(&case);
+    let turns = solution.path.turns();
+    assert!(turns[0].events.contains(&Event::LeavesZero(0)), "{turns:?}");
+    let meets = turns
+        .iter()
+        .find(|turn| turn.events.contains(&Event::MeetsUpper(0)))
+        .expect("the coil meets its limit");
+    assert!((meets.lambda_n_per_m - 0.7 * 1.3 / 0.05).abs() < 1e-9);
 }

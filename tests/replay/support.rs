@@ -14,22 +14,9 @@ use fluxform::progress::Silent;
 use fluxform::shape::document::ShapeDocument;
 use tempfile::TempDir;
 
-pub struct Random(pub u64);
-
-impl Random {
-    /// From 0 to 1.
-    pub fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    pub fn below(&mut self, n: usize) -> usize {
-        (self.next() * n as f64) as usize
-    }
-}
+#[path = "../lambda/random.rs"]
+mod random;
+pub use random::Random;
 
 fn here(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)

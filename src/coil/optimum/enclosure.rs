@@ -433,3 +433,33 @@ fn rising(a: Interval, u: Interval) -> Interval {
     };
     Interval::new(at(a.lo, u.hi).lo.max(0.0), at(a.hi, u.lo).hi)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where the winding is a filament the differences cancel, and the integrals must hold alone.
+    #[test]
+    fn a_filaments_slopes_are_enclosed_closely() {
+        let (a, z, thin): (f64, f64, f64) = (0.007, 0.0031, 1e-12);
+        let cell = Cell {
+            inner: Interval::point(a),
+            depth: Interval::point(thin),
+            length: Interval::point(thin),
+        };
+        let slopes = axis_slopes(&cell, z);
+        let s = a.hypot(z);
+        let inner = 1.5 * thin * thin * a * z * (2.0 * z * z - 3.0 * a * a) / s.powi(7);
+        let length = 1.5 * thin * a * a * z / s.powi(5);
+        for (slope, wanted) in [(slopes[0], inner), (slopes[2], length)] {
+            assert!(
+                (slope.lo - wanted).abs() < 1e-7 * wanted.abs(),
+                "{slope:?} {wanted}"
+            );
+            assert!(
+                (slope.hi - wanted).abs() < 1e-7 * wanted.abs(),
+                "{slope:?} {wanted}"
+            );
+        }
+    }
+}

@@ -455,3 +455,17 @@ fn summit(f: impl Fn(f64) -> f64, lo: f64, hi: f64) -> (f64, f64) {
         (place(best), values[best])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::whole;
+
+    #[test]
+    fn a_turn_within_rounding_is_a_turn() {
+        for turns in [1.0_f64, 3.0, 70.0] {
+            let slack = [turns * (1.0 - f64::EPSILON), turns, turns + 0.7];
+            assert!(slack.iter().all(|&t| whole(t) == turns as u64));
+        }
+        assert_eq!((whole(0.3), whole(2.9)), (1, 2));
+    }
+}

@@ -79,4 +79,14 @@ mod tests {
         let (mut a, mut b) = (7, 8);
         assert!((uniform(&mut a) - uniform(&mut b)).abs() > 1e-3);
     }
+
+    #[test]
+    fn the_shift_is_splitmix64() {
+        // The generator's published numbers for the seed 1234567.
+        let mut state = 1_234_567;
+        for number in [6_457_827_717_110_365_317_u64, 3_203_168_211_198_807_973] {
+            let wanted = (number >> 11) as f64 / (1_u64 << 53) as f64;
+            assert_eq!(uniform(&mut state), wanted);
+        }
+    }
 }

@@ -405,3 +405,26 @@ fn representatives(cores: usize, symmetries: &[Motion]) -> Vec<usize> {
         .filter(|coil| symmetries.iter().all(|m| m.coil[*coil] >= *coil))
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A kernel is singular a gap away from a panel of one and a half gaps: half-axes 4/3 and 5/3
+    /// of its Bernstein ellipse in units of half the panel, hence an error of 3^(-2 n).
+    #[test]
+    fn exchange_panels_resolve_the_gap_between_cores() {
+        let shape = CoreShape {
+            radius_m: 0.007,
+            bottom_m: -0.05,
+            top_m: 0.0,
+        };
+        for digits in 1..=9 {
+            let tolerance = 10_f64.powi(-digits);
+            let resolution = ArrayResolution::for_tolerance(tolerance, shape, 0.02);
+            assert!((resolution.panel_m - 1.5 * (0.02 - 0.014)).abs() < 1e-12);
+            let error = 3_f64.powi(-2 * i32::try_from(resolution.order).unwrap());
+            assert!(error < 0.1 * tolerance, "{tolerance:e}: {error:e}");
+        }
+    }
+}

@@ -312,3 +312,18 @@ impl Links {
         Self { offsets_m, index }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::different_offsets;
+
+    #[test]
+    fn cores_on_a_grid_share_their_offsets() {
+        assert_eq!(different_offsets(&[[0.7, 1.3]]), 0);
+        // One apart and two apart, to either side; the last within rounding.
+        let row = [[0.1, 0.0], [0.2, 0.0], [0.1 + 0.2, 0.0]];
+        assert_eq!(different_offsets(&row), 4);
+        let square = [[0.0, 0.0], [1.3, 0.0], [0.0, 1.3], [1.3, 1.3]];
+        assert_eq!(different_offsets(&square), 8);
+    }
+}

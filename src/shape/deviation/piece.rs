@@ -391,3 +391,35 @@ pub(super) fn along(a: Point, b: Point, part: [f64; 2], value: &impl Fn(Point) -
     }
     ends
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_floor_is_level_and_holds_its_rectangle() {
+        let rect = Rect {
+            low_m: [0.3, -0.7],
+            high_m: [1.6, 0.2],
+        };
+        let floor = Face::floor(&rect, 0.11).unwrap();
+        for p in rect.corners() {
+            assert!(floor.holds(p, -0.01) && floor.height(p) == 0.11, "{p:?}");
+        }
+    }
+
+    #[test]
+    fn a_parabola_is_largest_at_its_vertex_on_any_part() {
+        let (a, b) = ([0.7, 0.2], [1.9, 1.1]);
+        // Vertex at 0.37 of the whole segment.
+        let value = |p: Point| {
+            let t = (p[0] - a[0]) / (b[0] - a[0]);
+            1.3 - 5.0 * (t - 0.37) * (t - 0.37)
+        };
+        for part in [[0.0, 1.0], [0.2, 0.5], [0.3, 0.9], [0.05, 0.38]] {
+            assert!((along(a, b, part, &value).value_m - 1.3).abs() < 1e-14);
+        }
+        let end = along(a, b, [0.5, 0.9], &value).value_m;
+        assert!((end - (1.3 - 5.0 * 0.13 * 0.13)).abs() < 1e-14);
+    }
+}

@@ -107,3 +107,29 @@ fn crossing(polygon: &Polygon, [from, to]: [Point; 2], hair_m: f64) -> Option<[f
     }
     (first < last).then_some([first, last])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_segment_is_cut_where_it_crosses_the_polygon() {
+        let square = Polygon::of(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
+        let close = |found: Option<[f64; 2]>, wanted: [f64; 2]| {
+            let found = found.unwrap();
+            assert!(
+                (0..2).all(|k| (found[k] - wanted[k]).abs() < 1e-15),
+                "{found:?}"
+            );
+        };
+        close(
+            crossing(&square, [[-0.7, 0.3], [1.3, 0.3]], 1e-9),
+            [0.35, 0.85],
+        );
+        close(
+            crossing(&square, [[0.2, 0.7], [0.4, 1.3]], 1e-9),
+            [0.0, 0.5],
+        );
+        assert!(crossing(&square, [[-0.7, 1.3], [1.3, 1.3]], 1e-9).is_none());
+    }
+}

@@ -132,3 +132,18 @@ impl Block {
         Ok(data)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_marker_is_found_behind_what_begins_like_one() {
+        let mut bytes = vec![MARKER[0]; 3];
+        bytes.push(!MARKER[0]);
+        let at = bytes.len();
+        bytes.extend(MARKER);
+        assert_eq!(position(&bytes), Some(at));
+        assert_eq!(position(&bytes[..at]), None);
+    }
+}

@@ -2,7 +2,13 @@
 
 use fluxform::lambda::{Allocation, Allocator, AllocatorError, Reach};
 
-use crate::support::Random;
+use crate::random::Random;
+
+impl Random {
+    fn below(&mut self, n: usize) -> usize {
+        (self.next() * n as f64) as usize
+    }
+}
 
 /// One allocation problem.
 #[derive(Debug, Clone)]
@@ -407,4 +413,65 @@ fn limits_that_no_array_has_are_refused() {
         let found = refused(&[6.0], &[0.0], &[1.0], Some(total));
         assert_eq!(found, AllocatorError::Total);
     }
+}
+
+#[test]
+fn the_certificate_measures_every_fault() {
+    let (force, ohm) = ([0.7, 1.3, -0.2], [6.0, 5.0, 7.0]);
+    let (lower, upper) = ([0.0, 0.0, -0.4], [1.5, 0.8, 0.9]);
+    for (total, wanted) in [
+        (None, 1.1),
+        (Some(1.1), 1.2),
+        (Some(1.1), -9.0),
+        (Some(1.1), 9.0),
+    ] {
+        let mut allocator = Allocator::new(&ohm, &lower, &upper, total).unwrap();
+        let mut currents = [0.0; 3];
+        let found = allocator.allocate(&force, wanted, &mut currents);
+        let judged = |currents: &[f64], wanted: f64, found: &Allocation| {
+            allocator.certificate(&force, wanted, currents, found)
+        };
+        assert!(judged(&currents, wanted, &found) < 1e-14, "{wanted}");
+        // A current that is not the optimum's, to either side.
+        for (i, step) in [(0, 0.01), (1, -0.02), (2, 0.03)] {
+            let mut other = currents;
+            other[i] += step;
+            assert!(judged(&other, wanted, &found) > 1e-3, "{wanted}: {i}");
+        }
+        if found.reach == Reach::Reached {
+            // The missing force over the sizes of its terms.
+            let size: f64 = force
+                .iter()
+                .zip(&currents)
+                .map(|(g, i)| (g * i).abs())
+                .sum();
+            let missing = judged(&currents, wanted + 0.1, &found);
+            let wanted_fault = 0.1 / (size + wanted + 0.1);
+            assert!((missing - wanted_fault).abs() < 1e-12, "{missing}");
+            // Multipliers of another problem.
+            for other in [
+                Allocation {
+                    mu: 1.1 * found.mu,
+                    ..found
+                },
+                Allocation {
+                    nu_v: found.nu_v - 0.5,
+                    ..found
+                },
+            ] {
+                assert!(judged(&currents, wanted, &other) > 1e-3);
+            }
+        }
+    }
+    // 0.3 A above the sum's limit of 1.1 A, over the sizes of both and of the lower limits.
+    let allocator = Allocator::new(&[6.0; 2], &[-0.2, 0.0], &[1.0; 2], Some(1.1)).unwrap();
+    let claim = Allocation {
+        reach: Reach::Reached,
+        force_n: 1.4,
+        mu: 12.0,
+        center_n_per_a: 0.0,
+        nu_v: -7.8,
+    };
+    let fault = allocator.certificate(&[1.0; 2], 1.4, &[0.7; 2], &claim);
+    assert!((fault - 0.3 / (1.4 + 0.2 + 1.1)).abs() < 1e-12, "{fault}");
 }
