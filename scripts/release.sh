@@ -5,8 +5,8 @@
 #     scripts/release.sh [FOLDER]      # default: target/release-tarball
 #
 # For x86_64 with musl where `rustup target add x86_64-unknown-linux-musl` was done, else with glibc
-# linked in. The same revision and compiler give the same bytes. Needs Rust, GNU tar and gzip; the
-# empty root needs `unshare` and the permission to make a user namespace, else it is left out, told.
+# linked in. Needs Rust, GNU tar and gzip; the empty root needs `unshare` and the permission to make a
+# user namespace, else it is left out, told.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 

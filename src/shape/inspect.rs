@@ -132,6 +132,7 @@ impl MeshReport {
 
     /// The same without self-intersections, layers and warnings.
     #[must_use]
+    #[cfg(feature = "step")]
     pub(super) fn of_edges(format: SurfaceFormat, file: &FileMesh) -> Self {
         Self::with_names(format, file).0
     }
