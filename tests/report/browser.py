@@ -7,16 +7,21 @@
 Needs Chromium and Python's standard library: the DevTools protocol goes over a pipe.
 """
 
+import atexit
 import base64
+import contextlib
 import json
 import os
 import pathlib
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 
 NAMES = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"]
+LONGEST_S = 180
 
 
 class Browser:
@@ -27,22 +32,27 @@ class Browser:
         if program is None:
             print("no chromium")
             sys.exit(77)
-        self.folder = tempfile.TemporaryDirectory()
+        self.folder = tempfile.mkdtemp()
         to_child, self.out = os.pipe()
         self.into, from_child = os.pipe()
         command = [
             program, "--headless=new", "--no-sandbox", "--disable-gpu", "--remote-debugging-pipe",
             "--disable-dev-shm-usage", "--hide-scrollbars", "--no-first-run",
-            "--disable-background-networking", f"--user-data-dir={self.folder.name}",
+            "--disable-background-networking", f"--user-data-dir={self.folder}",
         ]
         # Chromium reads from descriptor 3 and writes to 4.
         shell = f'exec "$@" 3<&{to_child} 4>&{from_child}'
         self.process = subprocess.Popen(
             ["bash", "-c", shell, "bash", *command],
             pass_fds=(to_child, from_child),
+            start_new_session=True,
+            env={**os.environ, "TMPDIR": self.folder},
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
+        atexit.register(self.close)
+        signal.signal(signal.SIGALRM, lambda *_: sys.exit(f"not done after {LONGEST_S} s"))
+        signal.alarm(LONGEST_S)
         os.close(to_child)
         os.close(from_child)
         self.buffer, self.count, self.session, self.events = b"", 0, None, []
@@ -93,7 +103,9 @@ class Browser:
         still = {"name": "prefers-reduced-motion", "value": "reduce"}
         self.call("Emulation.setEmulatedMedia", features=[scheme, still])
         self.call("Emulation.setTouchEmulationEnabled", enabled=mobile)
-        self.call("Page.navigate", url=pathlib.Path(page).resolve().as_uri())
+        answer = self.call("Page.navigate", url=pathlib.Path(page).resolve().as_uri())
+        if "errorText" in answer:
+            raise SystemExit(f"{page}: {answer['errorText']}")
         self.value(
             "new Promise((done) => { const look = () => document.readyState === 'complete' &&"
             " location.protocol === 'file:' ? requestAnimationFrame(() => done(true))"
@@ -149,9 +161,16 @@ class Browser:
         return self.value("document.getElementById('tip').hidden ? '' : document.getElementById('tip').textContent")
 
     def close(self):
-        self.process.terminate()
+        """Ends the browser and removes its profile, into which the last of its processes may
+        write for a moment after the first has ended."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.process.pid, signal.SIGKILL)
         self.process.wait()
-        self.folder.cleanup()
+        for _ in range(100):
+            shutil.rmtree(self.folder, ignore_errors=True)
+            if not os.path.exists(self.folder):
+                break
+            time.sleep(0.05)
 
 
 def check(page):
@@ -223,7 +242,6 @@ def check(page):
     told["first paint ms"] = browser.value(
         "(performance.getEntriesByName('first-contentful-paint')[0] || {}).startTime"
     )
-    browser.close()
     print(json.dumps(told, indent=1))
     sys.exit(1 if "failed" in told else 0)
 
@@ -289,7 +307,6 @@ def shot(page, folder):
     pdf = browser.call("Page.printToPDF", printBackground=False, paperWidth=8.27, paperHeight=11.69)
     (folder / f"{name}.pdf").write_bytes(base64.b64decode(pdf["data"]))
     print(browser.faults())
-    browser.close()
 
 
 if __name__ == "__main__":
