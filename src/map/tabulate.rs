@@ -149,36 +149,35 @@ pub fn tabulate(
             coils[coil].gain,
         )
     };
-    let gradient = (components != Components::Gz).then(|| {
-        let mut out = vec![0.0; planes * plane * 9];
-        out.par_chunks_mut(9 * plane.max(1))
+    // `N` numbers of every node's field, times the coil's gain.
+    fn spread<const N: usize>(
+        (planes, plane): (usize, usize),
+        of: impl Fn(usize, usize) -> (f64, [f64; N]) + Sync,
+    ) -> Vec<f64> {
+        let mut out = vec![0.0; planes * plane * N];
+        out.par_chunks_mut(N * plane.max(1))
             .enumerate()
             .for_each(|(piece, out)| {
-                for (place, tensor) in out.chunks_exact_mut(9).enumerate() {
-                    let (field, gain) = cartesian(piece, place);
-                    for (value, g) in tensor
-                        .iter_mut()
-                        .zip(field.gradient_t_per_m_per_a.as_flattened())
-                    {
-                        *value = gain * g;
-                    }
+                for (place, values) in out.as_chunks_mut::<N>().0.iter_mut().enumerate() {
+                    let (gain, numbers) = of(piece, place);
+                    *values = numbers.map(|number| gain * number);
                 }
             });
         out
+    }
+    let size = (planes, plane);
+    let gradient = (components != Components::Gz).then(|| {
+        spread::<9>(size, |piece, place| {
+            let (field, gain) = cartesian(piece, place);
+            let flat = field.gradient_t_per_m_per_a;
+            (gain, std::array::from_fn(|k| flat[k / 3][k % 3]))
+        })
     });
     let field = (components == Components::All).then(|| {
-        let mut out = vec![0.0; planes * plane * 3];
-        out.par_chunks_mut(3 * plane.max(1))
-            .enumerate()
-            .for_each(|(piece, out)| {
-                for (place, vector) in out.chunks_exact_mut(3).enumerate() {
-                    let (field, gain) = cartesian(piece, place);
-                    for (value, b) in vector.iter_mut().zip(field.field_t_per_a) {
-                        *value = gain * b;
-                    }
-                }
-            });
-        out
+        spread::<3>(size, |piece, place| {
+            let (field, gain) = cartesian(piece, place);
+            (gain, field.field_t_per_a)
+        })
     });
     Ok(FieldMap {
         x_m: grid.x_m.clone(),

@@ -187,6 +187,12 @@ fn nearest(target: [f64; 3], rows: &[([f64; 3], f64)]) -> Result<[f64; 3], Strin
     Ok(minimum.step)
 }
 
+/// How far the point of two half spaces nearest to `target` is from `expected`.
+fn projected(target: [f64; 3], rows: [([f64; 3], f64); 2], expected: [f64; 3]) -> Outcome {
+    let found = nearest(target, &rows)?;
+    measured(apart(&found, &expected), format!("{found:?}"))
+}
+
 fn parallel() -> Vec<Case> {
     vec![
         case(
@@ -194,11 +200,11 @@ fn parallel() -> Vec<Case> {
             "the projection onto the nearer of the two planes",
             1e-8,
             || {
-                let found = nearest(
+                projected(
                     [2.0, 0.0, 0.0],
-                    &[([1.0, 0.0, 0.0], 1.0), ([1.0, 1e-9, 0.0], 1.0 + 1e-6)],
-                )?;
-                measured(apart(&found, &[1.0, 0.0, 0.0]), format!("{found:?}"))
+                    [([1.0, 0.0, 0.0], 1.0), ([1.0, 1e-9, 0.0], 1.0 + 1e-6)],
+                    [1.0, 0.0, 0.0],
+                )
             },
         ),
         case(
@@ -206,12 +212,11 @@ fn parallel() -> Vec<Case> {
             "the projection onto the tighter one",
             1e-12,
             || {
-                let tight = 1.0 - 1e-8;
-                let found = nearest(
+                projected(
                     [2.0, 0.3, 0.0],
-                    &[([1.0, 0.0, 0.0], 1.0), ([1.0, 0.0, 0.0], tight)],
-                )?;
-                measured(apart(&found, &[tight, 0.3, 0.0]), format!("{found:?}"))
+                    [([1.0, 0.0, 0.0], 1.0), ([1.0, 0.0, 0.0], 1.0 - 1e-8)],
+                    [1.0 - 1e-8, 0.3, 0.0],
+                )
             },
         ),
         // 1e-10 (1 + |x| + limit) is what a limit may be exceeded by.
@@ -220,12 +225,11 @@ fn parallel() -> Vec<Case> {
             "the projection onto the tighter one, to the solver's slack of 3e-10",
             3.1e-10,
             || {
-                let tight = 1.0 - 1e-10;
-                let found = nearest(
+                projected(
                     [2.0, 0.3, 0.0],
-                    &[([1.0, 0.0, 0.0], 1.0), ([1.0, 0.0, 0.0], tight)],
-                )?;
-                measured(apart(&found, &[tight, 0.3, 0.0]), format!("{found:?}"))
+                    [([1.0, 0.0, 0.0], 1.0), ([1.0, 0.0, 0.0], 1.0 - 1e-10)],
+                    [1.0 - 1e-10, 0.3, 0.0],
+                )
             },
         ),
         case(
@@ -233,11 +237,11 @@ fn parallel() -> Vec<Case> {
             "the projection onto it",
             1e-14,
             || {
-                let found = nearest(
+                projected(
                     [2.0, 0.3, -0.7],
-                    &[([1.0, 0.0, 0.0], 1.0), ([1.0, 0.0, 0.0], 1.0)],
-                )?;
-                measured(apart(&found, &[1.0, 0.3, -0.7]), format!("{found:?}"))
+                    [([1.0, 0.0, 0.0], 1.0); 2],
+                    [1.0, 0.3, -0.7],
+                )
             },
         ),
         case(
@@ -245,16 +249,16 @@ fn parallel() -> Vec<Case> {
             "the wedge's edge: x = 1, y = 0, to rounding over the angle",
             1e-9,
             || {
-                let found = nearest(
+                projected(
+                    // Beyond both, between their normals' cone and the edge.
                     [2.0, 1.0, 0.4],
-                    // The target lies beyond both, between their normals' cone and the edge.
-                    &[
+                    // x <= 1 and (1 - 1e-6) x >= 1 - 1e-6 + 1e-6 y: with x = 1 that is y <= 0.
+                    [
                         ([1.0, 0.0, 0.0], 1.0),
                         ([-1.0 + 1e-6, 1e-6, 0.0], -1.0 + 1e-6),
                     ],
-                )?;
-                // x <= 1 and (1 - 1e-6) x >= 1 - 1e-6 + 1e-6 y: with x = 1 that is y <= 0.
-                measured(apart(&found, &[1.0, 0.0, 0.4]), format!("{found:?}"))
+                    [1.0, 0.0, 0.4],
+                )
             },
         ),
         case(

@@ -1,6 +1,6 @@
 //! The page of an optimisation.
 
-use super::facts::Optimization;
+use super::facts::{CircuitFacts, Optimization, SizeFacts};
 use crate::report::optimum::{ActiveLimit, Alternative, OptimumFacts, page};
 
 /// What `optimize` tells as one HTML page.
@@ -57,6 +57,9 @@ pub fn html(result: &Optimization) -> String {
     })
 }
 
+/// A number's name, and where it stands.
+type Column<T> = (&'static str, fn(&T) -> f64);
+
 /// The best coil's numbers beside those of the design's own.
 fn properties(result: &Optimization) -> Vec<(&'static str, f64, Option<f64>)> {
     let (Some(coil), Some(best)) = (&result.coil, &result.objective) else {
@@ -66,40 +69,24 @@ fn properties(result: &Optimization) -> Vec<(&'static str, f64, Option<f64>)> {
     let force_n = given.map(|given| given.force_n);
     let mut rows = vec![("force_n", best.force_n, force_n)];
     let (size, own) = (coil.size, given.map(|given| given.size));
+    let sizes: [Column<SizeFacts>; 3] = [
+        ("inner_diameter_m", |size| size.inner_diameter_m),
+        ("outer_diameter_m", |size| size.outer_diameter_m),
+        ("length_m", |size| size.length_m),
+    ];
+    rows.extend(sizes.map(|(name, of)| (name, of(&size), own.as_ref().map(of))));
     rows.extend([
-        (
-            "inner_diameter_m",
-            size.inner_diameter_m,
-            own.map(|own| own.inner_diameter_m),
-        ),
-        (
-            "outer_diameter_m",
-            size.outer_diameter_m,
-            own.map(|own| own.outer_diameter_m),
-        ),
-        ("length_m", size.length_m, own.map(|own| own.length_m)),
         ("turns", coil.turns, given.map(|given| given.turns)),
         ("wire_diameter_m", coil.wire_diameter_m, None),
     ]);
     let (circuit, own) = (coil.circuit, given.map(|given| given.circuit));
-    rows.extend([
-        (
-            "resistance_ohm",
-            circuit.resistance_ohm,
-            own.map(|own| own.resistance_ohm),
-        ),
-        (
-            "settling_s",
-            circuit.settling_s,
-            own.map(|own| own.settling_s),
-        ),
-        ("power_w", circuit.power_w, own.map(|own| own.power_w)),
-        ("mass_kg", circuit.mass_kg, own.map(|own| own.mass_kg)),
-        (
-            "wire_length_m",
-            circuit.wire_length_m,
-            own.map(|own| own.wire_length_m),
-        ),
-    ]);
+    let circuits: [Column<CircuitFacts>; 5] = [
+        ("resistance_ohm", |circuit| circuit.resistance_ohm),
+        ("settling_s", |circuit| circuit.settling_s),
+        ("power_w", |circuit| circuit.power_w),
+        ("mass_kg", |circuit| circuit.mass_kg),
+        ("wire_length_m", |circuit| circuit.wire_length_m),
+    ];
+    rows.extend(circuits.map(|(name, of)| (name, of(&circuit), own.as_ref().map(of))));
     rows
 }
