@@ -47,20 +47,36 @@ pub struct ParetoPlot {
     pub panels: [Panel; 3],
 }
 
+/// What a panel shows: cost along x, gain along y.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DrawnPanel {
+    /// Of cost and gain.
+    pub names: [&'static str; 2],
+    /// Of cost and gain.
+    pub units: [String; 2],
+    /// Ends of the axes.
+    pub ranges: [(f64, f64); 2],
+    /// Points that do not meet their limits.
+    pub unmet: Vec<(f64, f64)>,
+    /// Points that do.
+    pub met: Vec<(f64, f64)>,
+    /// The front, in its panel's order.
+    pub front: Vec<(f64, f64)>,
+}
+
+impl DrawnPanel {
+    /// Of the axes.
+    #[must_use]
+    pub fn labels(&self) -> [String; 2] {
+        std::array::from_fn(|k| format!("{} / {}", self.names[k], self.units[k]))
+    }
+}
+
 impl ParetoPlot {
     /// The drawing.
     #[must_use]
     pub fn svg(&self) -> String {
-        let (factor, unit) = readable(&self.gains, self.gain_unit);
-        let gains: Vec<f64> = self.gains.iter().map(|gain| gain * factor).collect();
-        let label = format!("{} / {unit}", self.gain);
-        let mut cells = Vec::new();
-        let mut layouts = Vec::new();
-        for panel in &self.panels {
-            let (plots, layout) = self.panel(panel, &gains);
-            cells.push(plots);
-            layouts.push(layout.with_y_label(label.clone()));
-        }
+        let (cells, layouts): (Vec<_>, Vec<_>) = self.drawn().iter().map(panel).unzip();
         let figure = Figure::new(1, 3)
             .with_title(self.title.clone())
             .with_cell_size(PANEL_PX[0], PANEL_PX[1])
@@ -71,38 +87,34 @@ impl ParetoPlot {
         renumbered(&SvgBackend::default().render_scene(&figure.render()))
     }
 
-    fn panel(&self, panel: &Panel, gains: &[f64]) -> (Vec<Plot>, Layout) {
-        let (factor, unit) = readable(&panel.values, panel.unit);
-        let costs: Vec<f64> = panel.values.iter().map(|value| value * factor).collect();
-        let (x, y) = (extent(&costs), extent(gains));
-        let cloud = |met: bool, colour: &str| {
-            let points = (0..costs.len()).filter(|at| self.limits_met[*at] == met);
-            let points: Vec<(f64, f64)> = points.map(|at| (costs[at], gains[at])).collect();
-            ScatterPlot::new()
-                .with_data(thinned(&points, x, y))
-                .with_color(colour)
-                .with_size(2.0)
-        };
-        let front: Vec<(f64, f64)> = panel
-            .front
-            .iter()
-            .map(|&at| (costs[at], gains[at]))
-            .collect();
-        let plots = vec![
-            Plot::Scatter(cloud(false, UNMET)),
-            Plot::Scatter(cloud(true, MET)),
-            Plot::Line(LinePlot::new().with_data(front.clone()).with_color(FRONT)),
-            Plot::Scatter(
-                ScatterPlot::new()
-                    .with_data(front)
-                    .with_color(FRONT)
-                    .with_size(3.0),
-            ),
-        ];
-        let layout = Layout::new(x, y)
-            .with_x_label(format!("{} / {unit}", panel.name))
-            .with_ticks(5);
-        (plots, layout)
+    /// What the panels show, in units that suit the values; of points that would lie on each other
+    /// only the first.
+    #[must_use]
+    pub fn drawn(&self) -> [DrawnPanel; 3] {
+        let (gain_factor, gain_unit) = readable(&self.gains, self.gain_unit);
+        let gains: Vec<f64> = self.gains.iter().map(|gain| gain * gain_factor).collect();
+        self.panels.each_ref().map(|panel| {
+            let (factor, unit) = readable(&panel.values, panel.unit);
+            let costs: Vec<f64> = panel.values.iter().map(|value| value * factor).collect();
+            let (x, y) = (extent(&costs), extent(&gains));
+            let cloud = |met: bool| {
+                let points = (0..costs.len()).filter(|at| self.limits_met[*at] == met);
+                let points: Vec<(f64, f64)> = points.map(|at| (costs[at], gains[at])).collect();
+                thinned(&points, x, y)
+            };
+            DrawnPanel {
+                names: [panel.name, self.gain],
+                units: [unit, gain_unit.clone()],
+                ranges: [x, y],
+                unmet: cloud(false),
+                met: cloud(true),
+                front: panel
+                    .front
+                    .iter()
+                    .map(|&at| (costs[at], gains[at]))
+                    .collect(),
+            }
+        })
     }
 
     fn legend(&self) -> Vec<LegendEntry> {
@@ -113,6 +125,27 @@ impl ParetoPlot {
             entry(self.front, FRONT),
         ]
     }
+}
+
+fn panel(drawn: &DrawnPanel) -> (Vec<Plot>, Layout) {
+    let dots = |points: &[(f64, f64)], colour: &str, size: f64| {
+        let points = ScatterPlot::new().with_data(points.to_vec());
+        Plot::Scatter(points.with_color(colour).with_size(size))
+    };
+    let front = LinePlot::new().with_data(drawn.front.clone());
+    let plots = vec![
+        dots(&drawn.unmet, UNMET, 2.0),
+        dots(&drawn.met, MET, 2.0),
+        Plot::Line(front.with_color(FRONT)),
+        dots(&drawn.front, FRONT, 3.0),
+    ];
+    let [x, y] = drawn.ranges;
+    let [x_label, y_label] = drawn.labels();
+    let layout = Layout::new(x, y)
+        .with_x_label(x_label)
+        .with_y_label(y_label)
+        .with_ticks(5);
+    (plots, layout)
 }
 
 /// The factor and the unit that make the largest value readable.

@@ -1,12 +1,12 @@
 //! The page of a merged sweep: the designs that no other one beats.
 
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
-use super::frame::{Page, Section};
+use super::frame::{Page, Section, figure};
 use super::html::Html;
 use super::number::{force, si};
 use super::optimum::sources;
-use super::pack::base64;
+use super::pack::f32s;
 use crate::plot::pareto::ParetoPlot;
 
 /// Designs that are listed; the table beside has all.
@@ -31,6 +31,8 @@ pub struct SweepFacts<'a> {
     pub keys: Vec<&'a str>,
     /// The best designs.
     pub best: Vec<BestDesign>,
+    /// Number in the plan of every point of the plot.
+    pub designs: Vec<u64>,
     /// Force against the costs.
     pub plot: &'a ParetoPlot,
 }
@@ -97,7 +99,7 @@ pub fn page(facts: &SweepFacts) -> String {
             },
             sources(&facts.inputs),
         ],
-        data: Value::Object(Map::new()),
+        data: drawn(facts),
         foot: format!(
             "fluxform {}. This page needs nothing but itself.",
             facts.version
@@ -106,18 +108,44 @@ pub fn page(facts: &SweepFacts) -> String {
     .html()
 }
 
+/// What the drawings show; each front with the numbers of its designs.
+fn drawn(facts: &SweepFacts) -> Value {
+    let cloud = |points: &[(f64, f64)]| {
+        let (x, y): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();
+        json!({ "x": f32s(x), "y": f32s(y) })
+    };
+    let fronts = facts.plot.drawn();
+    let fronts = fronts.iter().zip(&facts.plot.panels).map(|(panel, given)| {
+        let [x_label, y_label] = panel.labels();
+        json!({
+            "names": panel.names, "units": panel.units, "labels": [x_label, y_label],
+            "unmet": cloud(&panel.unmet), "met": cloud(&panel.met), "front": cloud(&panel.front),
+            "designs": given.front.iter().map(|at| facts.designs[*at]).collect::<Vec<_>>(),
+        })
+    });
+    let best = facts.best.iter();
+    let best: Map<String, Value> = best
+        .map(|one| (one.index.to_string(), json!(one.values)))
+        .collect();
+    json!({ "fronts": fronts.collect::<Vec<_>>(), "keys": facts.keys, "best": best })
+}
+
 fn answer(facts: &SweepFacts) -> Section {
     let mut body = Html::default();
-    body.raw("<figure><img class=\"picture\" alt=\"")
-        .text("Force against resistance, mass and settling time, one dot a design; the table holds the best.")
-        .raw("\" src=\"data:image/svg+xml;base64,")
-        .raw(&base64(facts.plot.svg().as_bytes()))
-        .raw("\">")
-        .element(
-            "figcaption",
-            "Every design as a dot; the line joins those that none beats in force and that cost.",
-        )
-        .raw("</figure>");
+    body.raw("<div class=\"pair\">");
+    for (number, panel) in facts.plot.drawn().iter().enumerate() {
+        let [cost, gain] = panel.names;
+        body.raw("<div>")
+            .element("h3", &format!("{gain} against {cost}"));
+        figure(
+            &mut body,
+            &format!("front-{number}"),
+            &format!("{gain} against {cost}, one dot a design; the table below holds the best"),
+            &format!("The line joins the designs that none beats in {gain} and {cost}."),
+        );
+        body.raw("</div>");
+    }
+    body.raw("</div>");
     body.raw("<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"The best designs\">")
         .raw("<table><caption>The best designs</caption><thead><tr><th scope=\"col\">design</th>");
     for key in &facts.keys {

@@ -200,7 +200,7 @@ def check(page):
         )
         expect(f"{width}: the pictures hold many colours", painted)
     browser.open(page)
-    for selector, unit in [("#draw-path svg[role]", "mN"), ("#draw-currents svg[role]", " A"), ("#draw-errors canvas", "mN"), ("#draw-field canvas", "T/m"), ("#draw-turn canvas", "mm"), ("#draw-cost svg[role]", "CPU time: "), ("#draw-stage-0 svg[role]", "CPU time: "), ("#draw-stage-4 svg[role]", "quartiles: ")]:
+    for selector, unit in [("#draw-path svg[role]", "mN"), ("#draw-currents svg[role]", " A"), ("#draw-errors canvas", "mN"), ("#draw-field canvas", "T/m"), ("#draw-turn canvas", "mm"), ("#draw-cost svg[role]", "CPU time: "), ("#draw-stage-0 svg[role]", "CPU time: "), ("#draw-stage-4 svg[role]", "quartiles: "), ("#draw-front-0 svg[role]", "force on the magnet: "), ("#draw-front-2 svg[role]", " ms")]:
         if not browser.value(f"!!document.querySelector({selector!r})"):
             continue
         browser.mouse("mouseMoved", *browser.middle(selector))
@@ -217,14 +217,14 @@ def check(page):
         first = browser.tip()
         browser.key("ArrowRight")
         expect("arrow keys read the path", "N/m" in first and browser.tip() not in ("", first))
-    for place in ["cost", "stage-0"]:
+    for place, word in [("cost", "error: "), ("stage-0", "error: "), ("front-1", "mass: ")]:
         if browser.value(f"!!document.querySelector('#draw-{place}')"):
             browser.value(f"document.querySelector('#draw-{place} svg[role]').focus()")
             browser.settle()
             browser.key("Home")
             first = browser.tip()
             browser.key("ArrowRight")
-            expect(f"arrow keys go from point to point of {place}", "error: " in first and browser.tip() not in ("", first))
+            expect(f"arrow keys go from point to point of {place}", word in first and browser.tip() not in ("", first))
     if browser.value("!!document.querySelector('#draw-turn')"):
         turns(browser, expect)
     if browser.value("!!document.querySelector('#draw-field')"):

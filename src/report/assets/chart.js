@@ -2,7 +2,8 @@
 
 const DASHES = ["", "6 3", "2 3", "8 3 2 3"];
 
-// series: {name, unit, x, y, colour, dash, width, right, dots, rings, tell}; marks: {x, name, chosen}.
+// series: {name, unit, x, y, colour, dash, width, right, dots, rings, cloud, tell}; marks: {x, name, chosen}.
+// A cloud is points alone; with `near` the axes end where the points do.
 // Where series tell(k) lines of their points, the cursor goes from point to point.
 function chart(place, spec) {
   const shown = place.dataset.what;
@@ -23,6 +24,7 @@ function chart(place, spec) {
       const all = spec.series.filter((one) => Boolean(one.right) === side);
       const values = all.flatMap((one) => Array.from(one.y, of).filter(Number.isFinite));
       const [lo, hi] = range(values);
+      if (spec.near) return widened([lo, hi]);
       return log ? decades([lo, hi]) : [Math.min(0, lo * 1.05), hi > 0 ? hi * 1.06 : 1];
     });
     const px = (v) => pad.left + ((of(v) - x0) / (x1 - x0)) * inner.w;
@@ -61,6 +63,10 @@ function chart(place, spec) {
     add(add(add(svg, "defs"), "clipPath", { id: clip }), "rect", { x: pad.left, y: pad.top - 3, width: inner.w, height: inner.h + 6 });
     const lines = add(svg, "g", { "clip-path": `url(#${clip})` });
     for (const one of spec.series) {
+      if (one.cloud) {
+        one.y.forEach((v, k) => add(lines, "circle", { class: "cloud", cx: px(one.x[k]).toFixed(1), cy: py(v, one.right).toFixed(1), r: 2, fill: `var(${one.colour})` }));
+        continue;
+      }
       let path = "";
       let on = false;
       one.y.forEach((v, k) => {
@@ -106,7 +112,8 @@ function chart(place, spec) {
     for (const one of spec.series) {
       const item = add(list, "li");
       const key = add(item, "svg", { width: 24, height: 6, "aria-hidden": "true" });
-      add(key, "line", { x1: 0, x2: 24, y1: 3, y2: 3, stroke: `var(${one.colour})`, "stroke-width": 2.4, "stroke-dasharray": one.dash || "none" });
+      if (one.cloud) add(key, "circle", { class: "cloud", cx: 12, cy: 3, r: 3, fill: `var(${one.colour})` });
+      else add(key, "line", { x1: 0, x2: 24, y1: 3, y2: 3, stroke: `var(${one.colour})`, "stroke-width": 2.4, "stroke-dasharray": one.dash || "none" });
       item.append(one.name);
     }
   }
@@ -190,7 +197,7 @@ function chart(place, spec) {
     });
   }
 
-  // The point nearest to the pointer, of all series that tell theirs; keys go through them in order.
+  // The point nearest to the pointer, of all series that tell theirs, the last of equals; keys go through them in order.
   function pointwise(svg, spot, px, py, width) {
     const all = spec.series.flatMap((one) => (one.tell ? Array.from(one.x, (v, k) => ({ one, k, x: px(v), y: py(one.y[k], one.right) })) : []));
     const show = (k, aloud) => {
@@ -212,7 +219,7 @@ function chart(place, spec) {
       const scale = width / frame.width;
       const [x, y] = [(event.clientX - frame.left) * scale, (event.clientY - frame.top) * scale];
       const off = (p) => Math.hypot(p.x - x, p.y - y);
-      if (all.length) show(all.reduce((best, p, k) => (off(p) < off(all[best]) ? k : best), 0), false);
+      if (all.length) show(all.reduce((best, p, k) => (off(p) <= off(all[best]) ? k : best), 0), false);
     };
     heed(svg, move, hide, (step) => all.length && show((at ?? -1) + step, true));
   }

@@ -143,6 +143,26 @@ own("cost", (place) => {
   series: stage.curves.map((one, k) => measured(one, `--c${k % 9}`, { dash: one.peer ? DASHES[1] : "", width: one.peer ? 1.6 : 2.2 })),
 })));
 
+// A sweep's designs: those that meet their limits, those that do not, and the front.
+(data.fronts || []).forEach((one, number) => own(`front-${number}`, (place) => {
+  const tell = (points) => (k) => [points.y, points.x].map((v, j) => `${one.names[1 - j]}: ${say(v[k])} ${one.units[1 - j]}`);
+  const series = [["does not meet its limits", one.unmet, "--soft"], ["meets its limits", one.met, "--c0"]].map(([name, packed, colour]) => {
+    const points = { x: numbers(packed.x), y: numbers(packed.y) };
+    return { name, unit: "", ...points, colour, cloud: true, tell: tell(points) };
+  });
+  const front = { x: numbers(one.front.x), y: numbers(one.front.y) };
+  return chart(place, {
+    xLabel: one.labels[0], yLabel: one.labels[1], near: true,
+    series: [
+      ...series.filter((cloud) => cloud.x.length),
+      {
+        name: "none is better", unit: "", ...front, colour: "--c1", dots: Array.from(front.x, (_, k) => k),
+        tell: (k) => [`design ${one.designs[k]}`, ...data.keys.map((key, j) => `${key}: ${(data.best[one.designs[k]] || [])[j] ?? "\u2013"}`), ...tell(front)(k)],
+      },
+    ],
+  });
+}));
+
 function drawAll() {
   for (const draw of drawings) draw();
 }

@@ -49,6 +49,7 @@ pub(super) fn html(
         largest_force_n: summary.largest_force_n,
         keys: plan.axes.iter().map(|axis| axis.key.as_str()).collect(),
         best: told,
+        designs: briefs.iter().map(|brief| brief.index).collect(),
         plot,
     })
 }
