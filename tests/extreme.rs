@@ -2,7 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use fluxform::bench::extreme::{Case, Catalogue, Got, cases, run};
+use fluxform::bench::extreme::{Case, Got, cases, run};
+use fluxform::bench::written::catalogue_file;
+use fluxform::bundle::schema::SCHEMAS;
 use fluxform::progress::Silent;
 
 #[test]
@@ -125,7 +127,7 @@ fn the_table_has_the_keys_it_must_have() {
         ],
         &Silent,
     );
-    let json = serde_json::to_value(Catalogue { cases: rows }).unwrap();
+    let json = serde_json::to_value(catalogue_file(&rows)).unwrap();
     let keys = |row: usize| -> Vec<&str> {
         let row = json["cases"][row].as_object().unwrap();
         row.keys().map(String::as_str).collect()
@@ -137,6 +139,13 @@ fn the_table_has_the_keys_it_must_have() {
     let mut found = keys(0);
     found.sort_unstable();
     assert_eq!(found, wanted);
+    let schema = SCHEMAS
+        .iter()
+        .find(|(name, _)| *name == "extreme.schema.json");
+    let schema = serde_json::from_str(schema.unwrap().1).unwrap();
+    let validator = jsonschema::validator_for(&schema).unwrap();
+    let faults: Vec<_> = validator.iter_errors(&json).collect();
+    assert!(faults.is_empty(), "{faults:?}");
     assert!(json["cases"][0]["error"].is_number());
     assert!(json["cases"][1]["error"].is_null());
 }

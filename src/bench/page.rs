@@ -1,10 +1,10 @@
 //! The pages of a run: its numbers as `report` is told them.
 
-use super::extreme;
 use super::summary::ratios;
 use super::written::unit_of;
 use crate::bundle::artefact::FLUXFORM_VERSION;
 use crate::bundle::bench::{BenchFile, Curve, Law, StageCurves};
+use crate::bundle::catalogue::CaseRow;
 use crate::report::bench::{BenchFacts, LawFacts, StageFacts, page};
 use crate::report::catalogue::{self, CaseFacts};
 use crate::report::measured::{MeasuredCurve, MeasuredRow};
@@ -29,7 +29,7 @@ pub fn html(file: &BenchFile) -> String {
 
 /// The page of the stability catalogue.
 #[must_use]
-pub fn catalogue(rows: &[extreme::Row]) -> String {
+pub fn catalogue(rows: &[CaseRow]) -> String {
     let cases: Vec<CaseFacts> = rows
         .iter()
         .map(|row| CaseFacts {

@@ -1,18 +1,15 @@
 //! The files of a run: table, plots, summary, and the JSON that tells of all.
 
-use std::io::{self, Write};
 use std::path::Path;
-
-use serde::Serialize;
 
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION, UNITS};
 use crate::bundle::atomic::{FileSet, Overwrite, Written};
-use crate::bundle::bench::{BenchFile, StageCurves, push_cell, push_text, write_laws, write_rows};
+use crate::bundle::bench::{BenchFile, StageCurves, write_laws, write_rows};
+use crate::bundle::catalogue::{CaseRow, CatalogueFile, write_cases};
 use crate::bundle::json::to_json;
 use crate::job::JobError;
 use crate::plot::curves::{CurvesPlot, Line};
 
-use super::extreme::Row;
 use super::page::{self, PAGE};
 use super::summary::markdown;
 
@@ -76,32 +73,27 @@ pub const CATALOGUE: &str = "extreme.json";
 ///
 /// # Errors
 /// Files that cannot be written or must not be replaced.
-pub fn write_catalogue(cases: &[Row], folder: &Path, force: bool) -> Result<(), JobError> {
+pub fn write_catalogue(cases: &[CaseRow], folder: &Path, force: bool) -> Result<(), JobError> {
     let mut set = FileSet::begin(folder, overwrite(&[], folder, CATALOGUE, force))?;
     set.write("extreme.csv", |out| write_cases(out, cases))?;
     let html = page::catalogue(cases);
     set.write(PAGE, |out| out.write_all(html.as_bytes()))?;
-    let file = CatalogueFile {
-        schema_version: SCHEMA_VERSION,
-        fluxform_version: FLUXFORM_VERSION,
-        inputs: &[],
-        units: UNITS,
-        cases,
-    };
-    let json = to_json(&file).map_err(|fault| JobError::Input(fault.to_string()))?;
+    let json =
+        to_json(&catalogue_file(cases)).map_err(|fault| JobError::Input(fault.to_string()))?;
     set.write(CATALOGUE, |out| out.write_all(&json))?;
     Ok(set.commit()?)
 }
 
-/// `extreme.json`.
-#[derive(Serialize)]
-struct CatalogueFile<'a> {
-    schema_version: &'a str,
-    fluxform_version: &'a str,
-    /// None: the cases are part of the program.
-    inputs: &'a [Input],
-    units: &'a str,
-    cases: &'a [Row],
+/// The catalogue as `extreme.json` and standard output tell it.
+#[must_use]
+pub fn catalogue_file(cases: &[CaseRow]) -> CatalogueFile {
+    CatalogueFile {
+        schema_version: SCHEMA_VERSION.to_owned(),
+        fluxform_version: FLUXFORM_VERSION.to_owned(),
+        inputs: Vec::new(),
+        units: UNITS.to_owned(),
+        cases: cases.to_vec(),
+    }
 }
 
 /// Refuses as [`check`] does, for the catalogue.
@@ -110,25 +102,6 @@ struct CatalogueFile<'a> {
 /// An output of something else.
 pub fn check_catalogue(folder: &Path, force: bool) -> Result<(), JobError> {
     Ok(overwrite(&[], folder, CATALOGUE, force).check(&folder.join(CATALOGUE))?)
-}
-
-fn write_cases(out: &mut dyn Write, cases: &[Row]) -> io::Result<()> {
-    writeln!(out, "case,verdict,error,bound,seconds,expected,got")?;
-    for case in cases {
-        let mut line = Vec::new();
-        push_text(&mut line, &case.name);
-        push_text(&mut line, if case.pass { "pass" } else { "fail" });
-        for value in [case.error, case.bound, case.seconds] {
-            push_cell(&mut line, value);
-        }
-        push_text(&mut line, &case.expected);
-        push_text(&mut line, &case.got);
-        // The last cell has no comma behind it.
-        line.pop();
-        line.push(b'\n');
-        out.write_all(&line)?;
-    }
-    Ok(())
 }
 
 /// One stage's curves in one plane.

@@ -3,13 +3,14 @@
 use schemars::{JsonSchema, schema_for};
 
 use super::bench::BenchFile;
+use super::catalogue::CatalogueFile;
 use super::lambda_file::LambdaFile;
 use super::manifest::{Manifest, MapSidecar};
 use super::scan::ScanFile;
 use super::sweep::{MergeSummary, PlanFile, PointFile};
 
 /// The committed schemas: file name and text.
-pub const SCHEMAS: [(&str, &str); 8] = [
+pub const SCHEMAS: [(&str, &str); 9] = [
     (
         "manifest.schema.json",
         include_str!("schema/manifest.schema.json"),
@@ -36,11 +37,15 @@ pub const SCHEMAS: [(&str, &str); 8] = [
         include_str!("schema/bench.schema.json"),
     ),
     ("scan.schema.json", include_str!("schema/scan.schema.json")),
+    (
+        "extreme.schema.json",
+        include_str!("schema/extreme.schema.json"),
+    ),
 ];
 
 /// The schemas as the structs have them now, in the order of [`SCHEMAS`].
 #[must_use]
-pub fn generated() -> [String; 8] {
+pub fn generated() -> [String; 9] {
     [
         text::<Manifest>(),
         text::<MapSidecar>(),
@@ -50,6 +55,7 @@ pub fn generated() -> [String; 8] {
         text::<MergeSummary>(),
         text::<BenchFile>(),
         text::<ScanFile>(),
+        text::<CatalogueFile>(),
     ]
 }
 

@@ -21,7 +21,7 @@ import tempfile
 import time
 
 NAMES = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"]
-LONGEST_S = 180
+LONGEST_S = 300
 
 
 class Browser:

@@ -23,9 +23,8 @@ mod wires;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use serde::{Serialize, Serializer};
-
 use crate::bench::clock::Watch;
+use crate::bundle::catalogue::CaseRow;
 use crate::progress::Progress;
 
 /// Seconds a case may take unless it says otherwise; unoptimised builds on busy machines included.
@@ -91,37 +90,6 @@ fn case(
     }
 }
 
-/// What became of a case.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Row {
-    /// The case's name.
-    pub name: String,
-    /// What must come out.
-    pub expected: String,
-    /// What came out.
-    pub got: String,
-    /// How far off it is; `null` in JSON where there is no number.
-    #[serde(serialize_with = "finite_or_null")]
-    pub error: f64,
-    /// How far off it may be.
-    pub bound: f64,
-    /// Wall-clock time, s.
-    pub seconds: f64,
-    /// Whether error and time kept their bounds.
-    pub pass: bool,
-}
-
-/// The table as it is written.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Catalogue {
-    /// One row a case.
-    pub cases: Vec<Row>,
-}
-
-fn finite_or_null<S: Serializer>(error: &f64, to: S) -> Result<S::Ok, S::Error> {
-    error.is_finite().then_some(*error).serialize(to)
-}
-
 /// Every case, family by family.
 #[must_use]
 pub fn cases() -> Vec<Case> {
@@ -146,7 +114,7 @@ pub fn cases() -> Vec<Case> {
 /// Runs `cases` one after the other; a panic fails its case alone. Stops early, with the rows
 /// there are, when the user asks to.
 #[must_use]
-pub fn run(cases: &[Case], progress: &dyn Progress) -> Vec<Row> {
+pub fn run(cases: &[Case], progress: &dyn Progress) -> Vec<CaseRow> {
     progress.begin("extreme cases", cases.len() as u64);
     let mut rows = Vec::with_capacity(cases.len());
     for case in cases {
@@ -160,7 +128,7 @@ pub fn run(cases: &[Case], progress: &dyn Progress) -> Vec<Row> {
     rows
 }
 
-fn row(case: &Case) -> Row {
+fn row(case: &Case) -> CaseRow {
     let watch = Watch::start();
     let outcome = catch_unwind(AssertUnwindSafe(case.run));
     let seconds = watch.elapsed_s();
@@ -175,7 +143,7 @@ fn row(case: &Case) -> Row {
             error: f64::INFINITY,
         },
     };
-    Row {
+    CaseRow {
         name: case.name.to_owned(),
         expected: case.expected.clone(),
         // False for a not-a-number.

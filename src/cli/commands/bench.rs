@@ -6,12 +6,13 @@ use clap::Args;
 use clap::builder::PossibleValuesParser;
 
 use super::{begin, folder};
-use crate::bench::extreme::{self, Case, Catalogue};
+use crate::bench::extreme::{self, Case};
 use crate::bench::pace::Pace;
 use crate::bench::stages::STAGES;
-use crate::bench::written::{check_catalogue, write_catalogue};
+use crate::bench::written::{catalogue_file, check_catalogue, write_catalogue};
 use crate::bench::{BenchRequest, run, scaling};
 use crate::bundle::bench::{BenchFile, Row};
+use crate::bundle::catalogue::CaseRow;
 use crate::bundle::json::to_json;
 use crate::cli::args::Writing;
 use crate::cli::failure::Failure;
@@ -176,7 +177,7 @@ impl Bench {
         if let Some(out) = &out {
             write_catalogue(&rows, out, self.writing.force)?;
         }
-        let table = Catalogue { cases: rows };
+        let table = catalogue_file(&rows);
         printer.summary(Place::Output, &table, || told_cases(&table.cases))?;
         let failed: Vec<&str> = (table.cases.iter())
             .filter(|row| !row.pass)
@@ -195,7 +196,7 @@ impl Bench {
 }
 
 /// Every case in a line, what was expected and what came out where they differ.
-fn told_cases(rows: &[extreme::Row]) -> String {
+fn told_cases(rows: &[CaseRow]) -> String {
     let passed = rows.iter().filter(|row| row.pass).count();
     let mut sheet = Sheet::new(&format!(
         "the stability catalogue: {passed} of {} as expected",
