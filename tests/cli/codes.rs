@@ -121,6 +121,11 @@ const CASES: &[Case] = &[
     ),
     (
         "E306",
+        &["replay", "shapes", "walk.csv", "--out", "r.csv"],
+        &["shapes", "not a bundle", "manifest.json"],
+    ),
+    (
+        "E306",
         &["verify", "newer"],
         &["newer", "schema_version", "update fluxform"],
     ),

@@ -14,7 +14,7 @@ use std::path::Path;
 
 use super::JobError;
 use crate::bundle::artefact::Input;
-use crate::bundle::load::Bundle;
+use crate::bundle::load::{Bundle, BundleError};
 use crate::bundle::replay::{Answer, ReplayRows};
 use crate::bundle::trajectory::Trajectory;
 use crate::coil::drive::Drive;
@@ -45,7 +45,11 @@ impl Opened {
     /// constant.
     pub fn new(path: &Path) -> Result<Self, JobError> {
         // Here a bundle is an input like any other.
-        let bundle = Bundle::open(path).map_err(|error| JobError::Input(error.to_string()))?;
+        let bundle = Bundle::open(path).map_err(|error| match error {
+            BundleError::NoBundle { .. } | BundleError::Schema { .. } => JobError::Bundle(error),
+            // A damaged bundle is a bad input here; `verify` is what passes judgement.
+            error => JobError::Input(error.to_string()),
+        })?;
         let renderer = Renderer::new(&bundle).map_err(|error| {
             let message = format!("{}: {error}", bundle.folder.display());
             match error {
