@@ -145,4 +145,30 @@ mod tests {
             assert!((fine.worst_n - found.worst_n).abs() < 1e-15);
         }
     }
+
+    /// Whatever unit the weights have.
+    #[test]
+    fn weights_count_as_repeated_points_do() {
+        let problem = |forces_n_per_a, height_m, weights| ForceProblem {
+            forces_n_per_a,
+            height_m,
+            offset_n: None,
+            weights,
+            lower_a: &[-0.4, 0.0],
+            upper_a: &[1.5, 2.0],
+            total_max_a: Some(1.2),
+            resistance_ohm: &[6.0, 6.0],
+        };
+        let repeated = [0.7, 0.2, 0.7, 0.2, 0.7, 0.2, 0.3, 1.1];
+        let wanted = problem(&repeated, &[1.3, 1.3, 1.3, 0.9], None);
+        let wanted = check::<f64>(&wanted, 1.7, &[0.1, 0.3]);
+        for weights in &[[0.3, 0.1], [3.0, 1.0], [3e9, 1e9]] {
+            let found = problem(&repeated[4..], &[1.3, 0.9], Some(weights));
+            let found = check::<f64>(&found, 1.7, &[0.1, 0.3]);
+            let close = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-14;
+            assert!(close(found.mean_square_n2, wanted.mean_square_n2));
+            assert!(close(found.gap_n2, wanted.gap_n2), "{found:?} {wanted:?}");
+            assert_eq!(found.worst_n, wanted.worst_n);
+        }
+    }
 }

@@ -284,4 +284,27 @@ mod tests {
         assert!(d.factor.contains(0) && !d.factor.contains(1));
         assert_eq!(d.rate[1], Num::ZERO);
     }
+
+    /// With the multiplier that stops the first variable nothing one-sided wants to move.
+    #[test]
+    fn the_first_of_the_sum_satisfies_all_others() {
+        let model = model(Some(vec![0.7, 1.3, 0.4, 1.0]));
+        for target in [[0.7, -1.3, 0.4], [-0.9, 0.1, 1.6], [-1.1, -0.6, -0.2]] {
+            let target = numbers(&target);
+            for (role, sign) in [(Role::Rising, 1.0), (Role::Falling, -1.0)] {
+                let first = first_of_the_sum(&model, &[role; 4], &target).unwrap();
+                let pull = |i: usize| Num::dot(model.column(i), &target).to_f64();
+                let weight = |i: usize| model.weight_of(i).to_f64();
+                let multiplier = pull(first) / weight(first);
+                for i in 0..4 {
+                    let gradient = pull(i) - multiplier * weight(i);
+                    assert!(sign * gradient < 1e-15, "{role:?} {i}: {gradient}");
+                }
+            }
+        }
+        assert_eq!(
+            first_of_the_sum(&model, &[Role::Fixed; 4], &numbers(&[0.7; 3])),
+            None
+        );
+    }
 }

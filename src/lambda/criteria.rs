@@ -217,7 +217,60 @@ fn upward_crossing(a: Num, b: Num, c: Num) -> Option<Num> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Num, Real};
+    use super::{Comparison, Num, Real};
+    use crate::lambda::follow::{Bounds, Follower};
+    use crate::lambda::model::Model;
+
+    /// Two opposed coils whose currents cancel, all but what rounding leaves of them, under a limit
+    /// of 0 A on the sum: what binds is the limit of the first coil.
+    #[test]
+    fn a_sum_that_rounding_alone_moves_binds_nowhere() {
+        let numbers = |values: &[f64]| values.iter().map(|&v| Num::of(v)).collect::<Vec<_>>();
+        let model = Model::new(
+            2,
+            numbers(&[1.0, 1e-3, 1.0, -1e-3, 0.0, 0.0]),
+            Some(numbers(&[1.0; 3])),
+            Num::EPSILON,
+        );
+        let mut bounds = Bounds {
+            lower: numbers(&[-1e9, -1e9, 0.0]),
+            upper: vec![None; 3],
+            total: Num::ZERO,
+        };
+        let coils = Model::new(2, numbers(&[1.0, 1e-3, 1.0, -1e-3]), None, Num::EPSILON);
+        let free = Bounds {
+            lower: numbers(&[-1e9, -1e9]),
+            upper: vec![None; 2],
+            total: Num::ZERO,
+        };
+        let follower = Follower {
+            model: &coils,
+            bounds: &free,
+        };
+        let mut path = follower.path(None, &numbers(&[0.0, 1.0]));
+        // Half a thousand amperes a unit, and as much the other way.
+        let piece = &mut path.pieces[0];
+        assert!((piece.x_rate[0].to_f64() - 500.0).abs() < 1e-12);
+        assert!((piece.x_rate[1].to_f64() + 500.0).abs() < 1e-12);
+        // A second piece, on which the sum is above its limit by less than rounding.
+        let mut second = piece.clone();
+        second.start = Num::of(0.7);
+        second.x = second
+            .x_rate
+            .iter()
+            .map(|&rate| second.start * rate)
+            .collect();
+        second.x[0] += Num::of(10.0 * second.blur);
+        path.pieces.push(second);
+        bounds.upper[0] = Some(Num::of(650.0));
+        let comparison = Comparison {
+            limited: &path,
+            unlimited: &path,
+            mean_square: Num::ONE,
+        };
+        let linear = comparison.linear(&model, &bounds).unwrap().to_f64();
+        assert!((linear - 1.3).abs() < 1e-12, "{linear}");
+    }
 
     fn upward_crossing(a: f64, b: f64, c: f64) -> Option<f64> {
         super::upward_crossing(Num::of(a), Num::of(b), Num::of(c)).map(Real::to_f64)

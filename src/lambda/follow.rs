@@ -487,3 +487,41 @@ impl Follower<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Turns come sooner for a larger target; nothing else is different, rounding included.
+    #[test]
+    fn a_paths_rounding_does_not_depend_on_the_targets_size() {
+        let numbers = |values: &[f64]| values.iter().map(|&v| Num::of(v)).collect::<Vec<_>>();
+        let model = Model::new(
+            3,
+            numbers(&[1.3, 0.2, -0.4, 0.7, 1.1, 0.3]),
+            None,
+            Num::EPSILON,
+        );
+        let bounds = Bounds {
+            lower: numbers(&[-0.3, 0.0]),
+            upper: numbers(&[1.7, 0.9]).into_iter().map(Some).collect(),
+            total: Num::ZERO,
+        };
+        let follower = Follower {
+            model: &model,
+            bounds: &bounds,
+        };
+        let path = |size: f64| follower.path(None, &numbers(&[0.7 * size, 1.9 * size, 1.6 * size]));
+        let one = path(1.0);
+        assert!(one.complete && one.pieces.len() > 1);
+        for size in [2.0f64.powi(-30), 2.0f64.powi(30)] {
+            let other = path(size);
+            assert_eq!(other.pieces.len(), one.pieces.len());
+            for (a, b) in one.pieces.iter().zip(&other.pieces) {
+                assert_eq!((a.noise, a.blur), (b.noise, b.blur));
+                assert_eq!(a.start, b.start * Num::of(size));
+                assert_eq!((&a.place, &a.x), (&b.place, &b.x));
+            }
+        }
+    }
+}

@@ -42,20 +42,8 @@ pub(super) fn least_power(
             Place::Low | Place::High => !sure(i),
         })
         .collect();
-    let sum_is_fixed = model.weight.is_some() && piece.place[coils] == Place::Low && sure(coils);
-    let heaviest = open
-        .iter()
-        .fold(Num::ZERO, |most, &i| most.larger(model.weight_of(i)));
-    let mut rows = model.rows;
-    let mut columns = Vec::new();
-    for &i in &open {
-        columns.extend_from_slice(model.column(i));
-        if sum_is_fixed {
-            columns.push(model.weight_of(i) / heaviest);
-        }
-    }
-    rows += usize::from(sum_is_fixed);
-    let kept = Model::new(rows, columns, None, Num::EPSILON);
+    let columns = open.iter().flat_map(|&i| model.column(i)).copied();
+    let kept = Model::new(model.rows, columns.collect(), None, Num::EPSILON);
     let moves = dependences(&kept, &open, cost);
     if moves.is_empty() {
         return x;
@@ -79,7 +67,8 @@ pub(super) fn least_power(
             constraints.at_least(&row, still[k] - cost[i] * upper);
         }
     }
-    if model.weight.is_some() && !sum_is_fixed {
+    // Where the sum's multiplier is not zero no change moves the sum: this says nothing then.
+    if model.weight.is_some() {
         let share: Vec<Num> = open.iter().map(|&i| model.weight_of(i) / cost[i]).collect();
         let row: Vec<Num> = moves
             .iter()

@@ -333,4 +333,35 @@ mod tests {
         assert_eq!(exponent_of(-0.7), -1);
         assert_eq!(exponent_of(0.0), 0);
     }
+
+    /// A column that is another one, a small share of a third, and next to nothing of its own.
+    #[test]
+    fn shares_within_rounding_are_left_out_whatever_the_columns_length() {
+        let unit = f64::EPSILON;
+        for length in [1.0, 1.9] {
+            for (share, kept) in [(30.0 * unit, false), (100.0 * unit, true)] {
+                let along = |v: [f64; 3]| v.map(|v| Num::of(v * length)).to_vec();
+                let reduced = Reduced {
+                    columns: vec![
+                        along([1.0, 0.0, 0.0]),
+                        along([0.0, 1.0, 0.0]),
+                        along([1.0, share, 10.0 * unit]),
+                    ],
+                    scale: vec![0; 3],
+                    coils: 3,
+                    force_scale: 0,
+                    lambda_scale: 0,
+                    epsilon: Num::EPSILON,
+                };
+                assert_eq!(reduced.rank(), 3);
+                let clean = reduced.with_clean_dependences().unwrap();
+                assert_eq!(clean.rank(), 2);
+                let wanted = if kept { share } else { 0.0 };
+                for (found, wanted) in clean.columns[2].iter().zip([1.0, wanted, 0.0]) {
+                    let off = (found.to_f64() / length - wanted).abs();
+                    assert!(off < 1e-25, "{length} {share}: {off}");
+                }
+            }
+        }
+    }
 }

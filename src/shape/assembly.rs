@@ -229,4 +229,19 @@ mod tests {
                 .contains("within itself")
         );
     }
+
+    #[test]
+    fn as_many_placements_as_stated_are_laid_out() {
+        let bodies = [
+            Body::default(),
+            Body {
+                triangles: Vec::new(),
+                children: vec![(0, Affine::IDENTITY); 999],
+            },
+        ];
+        let mut roots = vec![(1, Affine::IDENTITY); 1000];
+        assert_eq!(lay_out(&bodies, &roots), Ok(Vec::new()));
+        roots.push((0, Affine::IDENTITY));
+        assert!(lay_out(&bodies, &roots).unwrap_err().contains("placements"));
+    }
 }

@@ -267,4 +267,17 @@ mod tests {
             (pairs.len(), pairs.first().copied())
         );
     }
+
+    #[test]
+    fn what_enters_by_no_more_than_the_reach_only_touches() {
+        let base = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+        for reach in [0.0, 0.25] {
+            for (into, pairs) in [(-0.5, 0), (0.0, 0), (reach, 0), (reach + 0.125, 1)] {
+                // An upright triangle whose side stands so far within the border of the other.
+                let upright = [[1.0, into, -1.0], [1.0, into, 1.0], [1.0, -3.0, 0.5]];
+                let found = crossings(&[base, upright], &[[0, 1, 2], [3, 4, 5]], reach);
+                assert_eq!(found.pairs, pairs, "{reach} {into}");
+            }
+        }
+    }
 }

@@ -208,3 +208,54 @@ fn sector(triangle: &Triangle, p: [f64; 2]) -> Option<[f64; 2]> {
     }
     None
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    /// Against the places a little beside the point, in every direction.
+    #[test]
+    fn a_sector_holds_the_directions_that_stay_inside() {
+        let mut state = 5u64;
+        let mut next = || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (state >> 33) as f64 % 19.0 - 9.0
+        };
+        let mut looked = 0;
+        for _ in 0..200 {
+            // Even numbers: the middle of a side is exact.
+            let [a, b, c] = [0; 3].map(|_| [2.0 * next(), 2.0 * next(), next()]);
+            let (u, v) = (minus(b, a), minus(c, a));
+            let twice_area = u[0] * v[1] - u[1] * v[0];
+            if twice_area == 0.0 {
+                continue;
+            }
+            let inside = |p: [f64; 2]| {
+                [(a, b), (b, c), (c, a)].iter().all(|(q, r)| {
+                    let left = (r[0] - q[0]) * (p[1] - q[1]) - (r[1] - q[1]) * (p[0] - q[0]);
+                    left * twice_area > 0.0
+                })
+            };
+            let middle = |q: [f64; 3], r: [f64; 3]| [0, 1].map(|k| 0.5 * (q[k] + r[k]));
+            let corners = [a, b, c].map(|q| [q[0], q[1]]);
+            let borders = [middle(a, b), middle(b, c), middle(c, a)];
+            for p in corners.into_iter().chain(borders) {
+                let [from, to] = sector(&[a, b, c], p).unwrap();
+                assert!(from < to && to - from < TAU);
+                for k in 0..90 {
+                    let angle = 0.07 + TAU * f64::from(k) / 90.0;
+                    let within = (angle - from).rem_euclid(TAU) < to - from;
+                    let beside = [p[0] + 1e-3 * angle.cos(), p[1] + 1e-3 * angle.sin()];
+                    assert_eq!(inside(beside), within, "{a:?} {b:?} {c:?} {p:?} {angle}");
+                    looked += 1;
+                }
+            }
+            let centre = [0, 1].map(|k| (a[k] + b[k] + c[k]) / 3.0);
+            assert!(sector(&[a, b, c], centre).is_none());
+        }
+        assert!(looked > 50_000, "{looked}");
+    }
+}

@@ -91,3 +91,26 @@ fn significant_digits(word: &[u8]) -> usize {
 pub(super) fn shown(word: &[u8]) -> String {
     word[..word.len().min(40)].escape_ascii().to_string()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn placing_adds_the_rounding_of_what_it_adds() {
+        let read = |words: [&str; 3]| {
+            let mut numbers = Numbers::default();
+            words.map(|word| numbers.read(word.as_bytes()).unwrap());
+            numbers
+        };
+        let at = |c: f64| [[[c, -0.3, 0.1]; 3]];
+        let numbers = read(["0.7", "-1.3", "0"]);
+        let own = numbers.rounding();
+        assert_eq!(own, 1.3 * F32_ROUNDING);
+        // Nearer to the origin a number is no finer than it was read.
+        assert_eq!(numbers.rounding_placed(&at(0.9)), own);
+        assert_eq!(numbers.rounding_placed(&at(-13.0)), own * 10.0);
+        // Zeros are exact, wherever they are placed.
+        assert_eq!(read(["0", "-0.0", "0e3"]).rounding_placed(&at(13.0)), 0.0);
+    }
+}

@@ -314,3 +314,55 @@ fn edge_contact(a: Vertex, b: Vertex, p: Point, reach: f64) -> Option<f64> {
     let near = (p[0] - foot[0]).hypot(p[1] - foot[1]) <= reach;
     near.then(|| edge_height(a, b, foot))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whatever the unit of length: the quick way out must not be taken within reach.
+    #[test]
+    fn a_point_is_near_an_edge_within_reach_of_it_in_any_unit() {
+        for power in [-40, -10, 0, 10, 40] {
+            let unit = 2.0f64.powi(power);
+            let at = |v: [f64; 3]| v.map(|c| c * unit);
+            let triangle = [[0.0, 0.0, 0.2], [7.0, 0.0, 0.2], [0.0, 3.0, 0.2]].map(at);
+            let seen = Seen::new(&triangle, 1e-3 * unit);
+            for (below, wanted) in [
+                (-0.1, Contact::Covers(0.2 * unit)),
+                (0.9e-3, Contact::Near(0.2 * unit)),
+                (1.1e-3, Contact::None),
+                (5e-3, Contact::None),
+                (2.0, Contact::None),
+            ] {
+                let p = [1.3 * unit, -below * unit];
+                assert_eq!(seen.contact(p), wanted, "{power} {below}");
+            }
+        }
+    }
+
+    /// Near a low corner of a triangle that rises very high, whichever corner that is.
+    #[test]
+    fn a_height_is_as_fine_as_the_corner_that_it_is_near() {
+        let corners = [[0.0, 0.0], [8.0, 0.0], [4.0, 8.0]];
+        for (low, high) in [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)] {
+            let third = 3 - low - high;
+            let mut triangle = corners.map(|[x, y]| [x, y, 0.7]);
+            triangle[high][2] = 2.0f64.powi(40);
+            triangle[third][2] = 1.3;
+            // Powers of two, so that the place is exact.
+            let (share, aside) = (2.0f64.powi(-42), 2.0f64.powi(-44));
+            let p = [0, 1].map(|k| {
+                let from = corners[low][k];
+                from + share * (corners[high][k] - from) + aside * (corners[third][k] - from)
+            });
+            let rise = share * (triangle[high][2] - 0.7) + aside * 0.6;
+            let Contact::Covers(height) = Seen::new(&triangle, 0.0).contact(p) else {
+                panic!("{low} {high}: not covered");
+            };
+            assert!(
+                (height - 0.7 - rise).abs() < 1e-15,
+                "{low} {high}: {height}"
+            );
+        }
+    }
+}

@@ -1,8 +1,9 @@
 //! Degenerate problems with closed answers, criteria, refusals.
 
+use fluxform::lambda::worst::{felt, worst_point};
 use fluxform::lambda::{Criterion, Settings, Solution, Status, solve};
 
-use crate::case::Case;
+use crate::case::{Case, small_case};
 
 fn plain_case() -> Case {
     Case {
@@ -43,6 +44,42 @@ fn nothing_to_render_and_nothing_wanted_are_results() {
         ([None; 3], None)
     );
     assert_eq!(solution.path.error_n2(7.0), 0.0);
+}
+
+/// Nothing is wanted there, so no error can be a share of it.
+#[test]
+fn an_error_is_relative_only_where_something_is_wanted() {
+    let at = |lambda: f64| {
+        let settings = Settings {
+            at_n_per_m: Some(lambda),
+            ..Settings::default()
+        };
+        let case = plain_case();
+        let solution = solve(&case.problem(), &settings).unwrap();
+        solution.at.unwrap().relative_rms_error
+    };
+    assert_eq!(at(0.0), None);
+    assert!(at(1e-3).is_some_and(|error| error > 0.0 && error < 1.0));
+}
+
+/// Without a margin the largest force constant with no loss is where the first limit binds.
+#[test]
+fn no_noticeable_difference_at_all_is_the_linear_constant() {
+    let settings = Settings {
+        jnd_weight: 0.0,
+        ..Settings::default()
+    };
+    let mut bound = 0;
+    for seed in 0..400 {
+        let case = small_case(seed);
+        let all = solve(&case.problem(), &settings).unwrap();
+        assert_eq!(all.lambda_jnd_n_per_m, all.lambda_linear_n_per_m, "{seed}");
+        let worst = worst_point(&case.problem(), &settings).unwrap();
+        let pair = (worst.lambda_jnd_n_per_m, worst.lambda_linear_n_per_m);
+        assert_eq!(pair.0, pair.1, "{seed}");
+        bound += usize::from(pair.1.is_some_and(|lambda| lambda > 0.0));
+    }
+    assert!(bound > 100, "{bound}");
 }
 
 #[test]
@@ -187,6 +224,31 @@ fn a_value_that_is_no_number_is_refused_wherever_it_stands() {
                 let refused = solve(&bad.problem(), &Settings::default()).unwrap_err();
                 assert!(refused.to_string().contains("finite"), "{refused}");
             }
+        }
+    }
+}
+
+/// One coil over two points of equal height, where it pushes once and three times as much: the
+/// current that is not felt to be too weak at the first is felt to be too strong at the second.
+#[test]
+fn too_strong_a_force_is_felt_as_well() {
+    let height = 0.05;
+    let case = Case {
+        forces: vec![0.7, 2.1],
+        heights: vec![height; 2],
+        offset: None,
+        lower: vec![0.0],
+        upper: vec![10.0],
+        total: None,
+        ohm: vec![5.0],
+    };
+    for threshold_n in [0.013, 0.3] {
+        for share in [0.0, 0.07, 0.3] {
+            let found = felt(&case.problem(), share, threshold_n).unwrap().unwrap();
+            // lambda h - c <= f and 3 f <= lambda h + c, while c is above share lambda h.
+            let wanted = 2.0 * threshold_n / height;
+            let off = (found.lambda_n_per_m / wanted - 1.0).abs();
+            assert!(off < 1e-12, "{share}: {found:?} {wanted}");
         }
     }
 }

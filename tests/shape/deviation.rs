@@ -1,6 +1,7 @@
 //! The certificate of the points: against geometry known in closed form, and against brute force.
 
-use fluxform::progress::Silent;
+use fluxform::progress::{Progress, Silent};
+use fluxform::shape::certificate::{Certify, certify};
 use fluxform::shape::deviation::{Faces, Interval, Lattice, Vertical, hausdorff, vertical};
 use fluxform::shape::document::{Placement, Primitive};
 use fluxform::shape::height::Grid;
@@ -8,7 +9,7 @@ use fluxform::shape::mesh::{Mesh, Triangle};
 use fluxform::shape::placement::Transform;
 use fluxform::shape::primitive::PlacedPrimitive;
 use fluxform::shape::tessellation::estimated_deviation_m;
-use fluxform::shape::{deviation, stl};
+use fluxform::shape::{Surface, deviation, stl};
 
 use crate::support::{Random, exact, grid, root, sample};
 
@@ -480,4 +481,77 @@ fn a_turned_body_is_certified_alike_on_any_number_of_threads() {
             .unwrap();
         assert_eq!(pool.install(|| certified(&mesh, &plan)), (found, apart));
     }
+}
+
+#[test]
+fn a_certificate_holds_what_was_asked_for() {
+    let mesh = exact(roof(&[[-2.0, 0.5], [0.3, 0.7], [3.0, 0.5]], [-1.0, 2.0]));
+    let plan = grid((-1.0, 1.0, 3), (-0.5, 0.5, 3));
+    let samples = sample(&mesh, &plan);
+    let surface = Surface::Mesh(mesh);
+    let told = |how| {
+        let found = certify(&surface, &plan, &samples, how, &Silent).unwrap();
+        found.map(|certificate| certificate.hausdorff.is_some())
+    };
+    assert_eq!(told(Certify::No), None);
+    assert_eq!(told(Certify::Vertical), Some(false));
+    assert_eq!(told(Certify::Distance), Some(true));
+}
+
+/// The largest over all cells is the whole grid's; a cell without its four points has none.
+#[test]
+fn cells_one_by_one_add_up_to_the_whole() {
+    let radius_m = 0.05;
+    let formula = Primitive::HalfSphere {
+        radius_m,
+        base_m: 0.03,
+    };
+    let placed = PlacedPrimitive::new(formula, &Placement::default()).unwrap();
+    let mesh = shape("half_sphere");
+    // The sphere's border passes through it.
+    let plan = grid((-0.06, 0.033, 8), (-0.033, 0.034, 6));
+    let (x, y) = (plan.x_m.nodes(), plan.y_m.nodes());
+    let points = || y.iter().flat_map(|y| x.iter().map(|x| [*x, *y]));
+    let of_formula: Vec<Option<f64>> = points()
+        .map(|[x, y]| placed.sample(x, y).map(|s| s.height_m))
+        .collect();
+    let whole = |cells: &[Option<f64>]| cells.iter().flatten().fold(0.0_f64, |m, b| m.max(*b));
+    let corners = |heights: &[Option<f64>], cell: usize| {
+        let node = cell / 7 * 8 + cell % 7;
+        [0, 1, 8, 9].iter().all(|k| heights[node + k].is_some())
+    };
+
+    let found = deviation::primitive_by_cell(&placed, &plan, &of_formula);
+    let bound_m = deviation::primitive(&placed, &plan, &of_formula).bound_m();
+    assert_eq!(found.len(), 35);
+    assert!((whole(&found) / bound_m - 1.0).abs() < 1e-5, "{bound_m}");
+
+    let of_mesh = heights(&mesh, &plan);
+    let faces = Faces::new(&mesh, &plan);
+    let lattice = Lattice::new(&faces, &plan, &of_mesh);
+    let met = deviation::vertical_by_cell(&lattice, &Silent).unwrap();
+    let bound_m = vertical(&mesh, &plan, &lattice, &Silent).unwrap().bound_m();
+    assert_eq!(met.len(), 35);
+    assert!((whole(&met) / bound_m - 1.0).abs() < 1e-9, "{bound_m}");
+    for cell in 0..35 {
+        assert_eq!(found[cell].is_some(), corners(&of_formula, cell), "{cell}");
+        assert_eq!(met[cell].is_some(), corners(&of_mesh, cell), "{cell}");
+    }
+}
+
+#[test]
+fn an_interruption_ends_the_cells_too() {
+    struct Stop;
+    impl Progress for Stop {
+        fn interrupted(&self) -> bool {
+            true
+        }
+    }
+    let mesh = exact(roof(&[[-2.0, 0.5], [0.3, 0.7], [3.0, 0.5]], [-1.0, 2.0]));
+    let plan = grid((-1.0, 1.0, 3), (-0.5, 0.5, 3));
+    let heights = heights(&mesh, &plan);
+    let faces = Faces::new(&mesh, &plan);
+    let lattice = Lattice::new(&faces, &plan, &heights);
+    assert!(deviation::vertical_by_cell(&lattice, &Stop).is_err());
+    assert!(vertical(&mesh, &plan, &lattice, &Stop).is_err());
 }

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use fluxform::progress::Silent;
-use fluxform::shape::document::{AxisRequest, GridRequest, SurfaceFormat, SurfaceSource};
+use fluxform::shape::document::{
+    AxisRequest, GridRequest, ShapeDocument, SurfaceFormat, SurfaceSource,
+};
 use fluxform::shape::mesh::FileMesh;
 use fluxform::shape::{MeshReport, discretize};
 
@@ -490,5 +492,76 @@ fn the_oddities_of_writers_change_nothing() {
     for model in models {
         let read = read(SurfaceFormat::ThreeMf, &three_mf_of(&model)).expect(&model);
         assert_eq!(read.triangles.len(), 4, "{model}");
+    }
+}
+
+#[test]
+fn a_3dxml_body_that_is_no_tessellation_is_refused() {
+    let [manifest, structure, representation] = crate::samples::three_dxml_parts();
+    for (from, to, said) in [
+        ("\"TESSELLATED\"", "\"CGR\"", "stored as `CGR`"),
+        ("\"TESSELLATED\"", "\"\"", "stored as ``"),
+        ("urn:3DXML:R.3DRep", "", "only tessellations"),
+    ] {
+        assert!(structure.1.contains(from), "{from}");
+        let structure = structure.1.replacen(from, to, 1);
+        let bytes = zipped(&[
+            (manifest.0, &manifest.1),
+            ("P.3dxml", &structure),
+            ("R.3DRep", &representation.1),
+        ]);
+        let message = refusal(SurfaceFormat::ThreeDxml, &bytes);
+        assert!(message.contains(said), "{to}: {message}");
+    }
+}
+
+/// Wherever it stands among the faces, and with vertices of its own.
+#[test]
+fn a_coarser_version_in_3dxml_is_passed_over() {
+    let [manifest, structure, representation] = crate::samples::three_dxml_parts();
+    let wanted = read(SurfaceFormat::ThreeDxml, &three_dxml()).unwrap();
+    let end = "</VertexBuffer></Rep>";
+    assert!(representation.1.contains(end));
+    let coarser = "<PolygonalLOD accuracy=\"9\"><Faces><Face triangles=\"0 1 2\"/></Faces>\
+         <VertexBuffer><Positions>9 9 9,8 8 8,9 8 7</Positions></VertexBuffer></PolygonalLOD>";
+    let text = representation
+        .1
+        .replace(end, &format!("</VertexBuffer>{coarser}</Rep>"));
+    let bytes = zipped(&[
+        (manifest.0, &manifest.1),
+        (structure.0, &structure.1),
+        (representation.0, &text),
+    ]);
+    let found = read(SurfaceFormat::ThreeDxml, &bytes).unwrap();
+    assert_eq!(found.triangles, wanted.triangles);
+}
+
+#[test]
+fn a_document_names_the_unit_that_its_file_does_not_carry() {
+    let read = |file: &str, unit: &str| {
+        let text = format!("name = \"part\"\nsurface = \"{file}\"\n{unit}\n");
+        ShapeDocument::from_toml(&text, Path::new("part.toml"))
+            .map(|(document, _)| match document.source {
+                SurfaceSource::File { unit_m, .. } => unit_m,
+                other => unreachable!("a surface was named: {other:?}"),
+            })
+            .map_err(|faults| faults.to_string())
+    };
+    for (ending, carries) in [
+        ("stl", false),
+        ("obj", false),
+        ("ply", false),
+        ("3mf", true),
+        ("amf", true),
+        ("3dxml", true),
+    ] {
+        let file = format!("part.{ending}");
+        assert_eq!(read(&file, "unit = \"cm\""), Ok(Some(0.01)), "{file}");
+        if carries {
+            assert_eq!(read(&file, ""), Ok(None), "{file}");
+        } else {
+            let said = read(&file, "").unwrap_err();
+            assert!(said.contains("unit"), "{file}: {said}");
+        }
     }
 }

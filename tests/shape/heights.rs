@@ -434,3 +434,33 @@ fn plane_height(t: &Triangle, p: [f64; 2]) -> Option<f64> {
     );
     (s > 0.0 && r > 0.0 && s + r < 1.0).then(|| t[0][2] + s * u[2] + r * v[2])
 }
+
+/// Of two faces that both fall from a ridge the flatter is seen, of two that rise from a gutter the
+/// steeper, and of one that rises and one that does not the rising one.
+#[test]
+fn a_node_on_an_edge_shows_one_face_by_rule() {
+    let side = |x: f64, z: f64| [[x, -1.0, z], [x, 1.0, z]];
+    let quad = |[a, b]: [[f64; 3]; 2], [c, d]: [[f64; 3]; 2]| [[a, b, c], [b, d, c]];
+    let plan = grid((-0.5, 0.5, 3), (-0.5, 0.5, 3));
+    for (left, right, seen) in [
+        (0.7, -1.3, 0.7),
+        (1.3, -0.7, -0.7),
+        (-0.7, 1.3, 1.3),
+        (-1.3, 0.7, -1.3),
+        (0.7, 1.3, 1.3),
+        (1.3, 0.7, 0.7),
+        (-1.3, -0.7, -1.3),
+        (0.0, 0.7, 0.7),
+        (0.0, -0.7, 0.0),
+    ] {
+        let middle = side(0.0, 5.0);
+        let triangles = [
+            quad(side(-1.0, 5.0 - left), middle),
+            quad(middle, side(1.0, 5.0 + right)),
+        ];
+        let found = sample(&exact(triangles.concat()), &plan)[4].unwrap();
+        let slope = -found.normal[0] / found.normal[2];
+        assert_eq!(found.height_m, 5.0);
+        assert!((slope - seen).abs() < 1e-15, "{left} {right}: {slope}");
+    }
+}

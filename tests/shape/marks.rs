@@ -20,7 +20,7 @@ use fluxform::shape::scattered::adaptive::{Adaptive, Grading, adaptive};
 use fluxform::shape::scattered::poisson::poisson;
 use fluxform::shape::{Settings, Surface, discretize_with, stl};
 
-use crate::support::{block, exact, file, grid, lifted, root, sample, seed_grid};
+use crate::support::{Random, block, exact, file, grid, lifted, root, sample, seed_grid};
 
 /// Patches as wide as the deviation allows.
 fn to(max_deviation_m: f64) -> Grading {
@@ -136,9 +136,54 @@ fn holes_are_told_and_filled_only_when_asked() {
             (filled.height_m - wanted).abs() < 1e-11,
             "{filled:?} {wanted}"
         );
-        assert!((filled.normal[0] / filled.normal[2] + 0.2).abs() < 1e-9);
+        let length = 1.05f64.sqrt();
+        for (got, wanted) in filled.normal.iter().zip([-0.2, 0.1, 1.0]) {
+            assert!((got - wanted / length).abs() < 1e-9, "{filled:?}");
+        }
     }
     assert!(holes(&plan, &samples).is_empty());
+}
+
+/// Against a flood from outside over grids with a margin, sweep after sweep until nothing changes.
+#[test]
+fn random_holes_are_those_that_no_flood_reaches() {
+    let mut random = Random(17);
+    let some = sample(
+        &exact(block([-1.0; 3], [1.0; 3])),
+        &grid((0.0, 1.0, 2), (0.0, 1.0, 2)),
+    )[0];
+    let mut told = 0;
+    for _ in 0..1000 {
+        let (columns, rows) = (1 + random.below(7), 1 + random.below(7));
+        let plan = grid((0.0, 1.3, columns), (0.0, 0.7, rows));
+        let samples: Vec<_> = (0..columns * rows)
+            .map(|_| some.filter(|_| random.below(3) < 2))
+            .collect();
+        let mut wet = vec![vec![false; columns + 2]; rows + 2];
+        let is_margin = |c: usize, r: usize| c == 0 || r == 0 || c > columns || r > rows;
+        loop {
+            let before = wet.clone();
+            for r in 0..rows + 2 {
+                for c in 0..columns + 2 {
+                    let open = is_margin(c, r) || samples[(r - 1) * columns + c - 1].is_none();
+                    let beside = is_margin(c, r)
+                        || before[r - 1][c]
+                        || before[r + 1][c]
+                        || before[r][c - 1]
+                        || before[r][c + 1];
+                    wet[r][c] |= open && beside;
+                }
+            }
+            if wet == before {
+                break;
+            }
+        }
+        let dry = |k: &usize| samples[*k].is_none() && !wet[k / columns + 1][k % columns + 1];
+        let wanted: Vec<usize> = (0..samples.len()).filter(dry).collect();
+        assert_eq!(holes(&plan, &samples), wanted, "{columns} x {rows}");
+        told += wanted.len();
+    }
+    assert!(told > 200, "{told}");
 }
 
 #[test]
@@ -302,6 +347,18 @@ fn blue_noise_keeps_its_spacing_and_covers() {
         poisson(&probe, spacing_m, 8, &Silent).unwrap().points.x_m,
         points.x_m
     );
+}
+
+/// A body that fills the region: what is counted at the places adds up to all of it.
+#[test]
+fn blue_noises_areas_add_up_to_the_bodys() {
+    let surface = shape("flat");
+    for (width_m, spacing_m) in [(0.06, 7e-3), (0.1, 4.1e-3)] {
+        let region = grid((-0.05, -0.05 + width_m, 3), (-0.04, 0.03, 3));
+        let found = poisson(&Probe::new(&surface, &region), spacing_m, 3, &Silent).unwrap();
+        let sum: f64 = found.points.weight_m2.iter().sum();
+        assert!((sum / (0.07 * width_m) - 1.0).abs() < 1e-12, "{sum}");
+    }
 }
 
 /// Darts seldom hit what is narrow; what lay far from all of them was not counted.

@@ -352,3 +352,81 @@ impl Kernel for Search<'_> {
         found
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of the points above each probe's limit the furthest is told, and none below all limits.
+    #[test]
+    fn the_point_furthest_above_each_limit_is_found() {
+        let mut state = 3u64;
+        let mut next = || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        };
+        let count = 700;
+        // A curve of points and a little of chance, as neighbours on a surface have it.
+        let place = |j: usize| 0.011 * j as f64;
+        let forces: Vec<f64> = (0..count)
+            .flat_map(|j| [place(j).sin(), (1.7 * place(j)).cos()])
+            .map(|force| force + 0.02 * next())
+            .collect();
+        // It rises, so that those little above a limit come before those far above.
+        let rise = |j: usize| 1.3 - 0.7 * (0.4 * place(j)).cos();
+        let heights: Vec<f64> = (0..count).map(rise).collect();
+        let offsets: Vec<f64> = (0..count).map(|_| 0.1 * next()).collect();
+        let points = Points {
+            coils: 2,
+            forces_n_per_a: &forces,
+            height_m: &heights,
+            offset_n: Some(&offsets),
+        };
+        let blocks = Blocks::new(points, &[1.02, 1.02, 2.0, 0.1]);
+        let probes: Vec<Probe> = (0..23)
+            .map(|k| {
+                let lambda = 0.1 * f64::from(k);
+                Probe {
+                    lambda_n_per_m: lambda,
+                    offset_share: 1.0,
+                    currents_a: vec![0.7 * lambda + 0.1 * next(), 0.3 * lambda],
+                    limit_n: 0.3 + 0.9 * lambda,
+                }
+            })
+            .collect();
+        for form in [Form::Worst, Form::Least] {
+            let over = |probe: &Probe, j: usize| {
+                let pushed =
+                    forces[2 * j] * probe.currents_a[0] + forces[2 * j + 1] * probe.currents_a[1];
+                let rest = probe.lambda_n_per_m * heights[j] - offsets[j] - pushed;
+                let size = if form == Form::Worst {
+                    rest.abs()
+                } else {
+                    rest
+                };
+                size - probe.limit_n
+            };
+            let found = misses(points, &blocks, &probes, form);
+            let mut missed = 0;
+            for probe in &probes {
+                let furthest =
+                    (0..count).max_by(|&i, &j| over(probe, i).total_cmp(&over(probe, j)));
+                let furthest = furthest.unwrap();
+                if over(probe, furthest) > 1e-12 {
+                    missed += 1;
+                    assert!(
+                        found.contains(&furthest),
+                        "{form:?}: {}",
+                        probe.lambda_n_per_m
+                    );
+                }
+            }
+            assert!(missed > 5 && missed < probes.len(), "{form:?}: {missed}");
+            let above = |j: &usize| probes.iter().any(|probe| over(probe, *j) > -1e-12);
+            assert!(found.iter().all(above));
+            assert!(found.windows(2).all(|pair| pair[0] < pair[1]));
+        }
+    }
+}

@@ -324,3 +324,49 @@ fn probes(scaled: &Scaled, form: Form, followed: &mut Followed) -> (Vec<Probe>, 
     followed.doubt = doubt;
     (all, beyond)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::scaled::Limits;
+    use super::*;
+    use crate::lambda::problem::ForceProblem;
+    use crate::lambda::reduce::largest_entries;
+
+    /// Of a followed path no point is missed at any turn, at rest least of all.
+    #[test]
+    fn a_paths_own_probes_miss_no_point() {
+        for offset in [None, Some(&[0.01, -0.02, 0.03, 0.0][..])] {
+            let problem = ForceProblem {
+                forces_n_per_a: &[0.7, 0.2, 0.3, 1.1, 0.4, 0.5, 0.9, -0.1],
+                height_m: &[0.05, 0.03, 0.04, 0.02],
+                offset_n: offset,
+                weights: None,
+                lower_a: &[0.0; 2],
+                upper_a: &[1.3, 0.9],
+                total_max_a: Some(1.9),
+                resistance_ohm: &[6.0, 5.0],
+            };
+            let largest = largest_entries(&problem);
+            for form in [Form::Worst, Form::Least] {
+                let scaled = Scaled::new(&problem, &largest, form, Limits::All);
+                let mut followed = Search::new(&scaled, form).follow(&scaled);
+                assert_eq!(followed.end, End::Whole);
+                let (turns, beyond) = probes(&scaled, form, &mut followed);
+                assert_eq!(turns.len(), followed.pieces.len());
+                for probe in turns.iter().chain(&beyond) {
+                    for (j, row) in problem.forces_n_per_a.chunks_exact(2).enumerate() {
+                        let offset_n = probe.offset_share * offset.map_or(0.0, |o| o[j]);
+                        let pushed = row[0] * probe.currents_a[0] + row[1] * probe.currents_a[1];
+                        let error = probe.lambda_n_per_m * problem.height_m[j] - offset_n - pushed;
+                        let error = if form == Form::Worst {
+                            error.abs()
+                        } else {
+                            error
+                        };
+                        assert!(error <= probe.limit_n, "{form:?} {j}: {error} {probe:?}");
+                    }
+                }
+            }
+        }
+    }
+}

@@ -120,3 +120,82 @@ impl Kernel for First<'_> {
         missed.or(first)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rows held one by one come in the order in which they are missed.
+    #[test]
+    fn points_are_told_in_the_order_in_which_the_path_misses_them() {
+        let mut state = 9u64;
+        let mut next = || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        };
+        let count = 40;
+        let forces: Vec<f64> = (0..2 * count).map(|_| next()).collect();
+        let heights: Vec<f64> = (0..count).map(|_| 1.3 + 0.7 * next()).collect();
+        let offsets: Vec<f64> = (0..count).map(|_| 0.2 * next()).collect();
+        let points = Points {
+            coils: 2,
+            forces_n_per_a: &forces,
+            height_m: &heights,
+            offset_n: Some(&offsets),
+        };
+        // With the second limit some points are missed already.
+        for (form, limit_n) in [
+            (Form::Worst, 3.1),
+            (Form::Worst, 1.1),
+            (Form::Least, 3.1),
+            (Form::Least, 1.1),
+        ] {
+            let course = Course {
+                at: Probe {
+                    lambda_n_per_m: 0.7,
+                    offset_share: 1.0,
+                    currents_a: vec![0.4, -0.3],
+                    limit_n,
+                },
+                rounding_n: 1e-12,
+                rates_a: vec![0.9, 0.5],
+                limit_rate_m: 0.6,
+                lambda_rate: 1.0,
+                rounding_m: 1e-12,
+                step: 9.0,
+            };
+            let times = |j: usize, i: &[f64]| forces[2 * j] * i[0] + forces[2 * j + 1] * i[1];
+            // How far above, or the step till then.
+            let rows = (0..count).flat_map(|j| [(j, true), (j, false)]);
+            let mut wanted: Vec<((usize, bool), [f64; 2])> = rows
+                .filter(|(_, up)| *up || form == Form::Worst)
+                .filter_map(|(j, up)| {
+                    let sign = if up { 1.0 } else { -1.0 };
+                    let error = 0.7 * heights[j] - offsets[j] - times(j, &course.at.currents_a);
+                    let over = sign * error - limit_n;
+                    let speed = sign * (heights[j] - times(j, &course.rates_a)) - 0.6;
+                    if over > 0.0 {
+                        Some(((j, up), [-over, 0.0]))
+                    } else if speed > 0.0 && -over / speed < course.step {
+                        Some(((j, up), [0.0, -over / speed]))
+                    } else {
+                        None
+                    }
+                })
+                .collect();
+            wanted.sort_by(|a, b| a.1.partial_cmp(&b.1).unwrap());
+            let missed = wanted.iter().filter(|row| row.1[0] < 0.0).count();
+            assert_eq!(missed > 0, limit_n < 2.0);
+            assert!(wanted.len() > 10, "{}", wanted.len());
+            let mut held = vec![0; count];
+            for (row, _) in wanted {
+                // A row missed already is also left at once: it may only come once.
+                assert_eq!(first_missed(points, &held, &course, form), Some(row));
+                held[row.0] |= bit(row.1);
+            }
+            assert_eq!(first_missed(points, &held, &course, form), None);
+        }
+    }
+}

@@ -598,3 +598,76 @@ fn inverse(mut left: Vec<Vec<Num>>) -> Option<Vec<Vec<Num>>> {
             .collect(),
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Doubles only tell which rows need a closer look: with rows that differ by less than their
+    /// rounding, and a parameter of any size, the same are found as by looking at all of them.
+    #[test]
+    fn no_row_that_matters_is_passed_over() {
+        let mut state = 21u64;
+        let mut next = || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        };
+        let mut found = [0; 2];
+        for case in 0..600 {
+            let lambda = Num::of([0.0, 0.7, 1.3e3, 1.7e6][case % 4]);
+            let mut program = Program::new(vec![Num::ONE; 3], [1.0, 1.0], 0.0);
+            let size = 1.0 + lambda.to_f64();
+            let z: Vec<Num> = (0..4).map(|_| Num::of(size * next())).collect();
+            let rate: Vec<Num> = (0..4).map(|_| Num::of(next())).collect();
+            // About the edge of what is met, or all at a distance.
+            let base = if case % 3 == 0 {
+                -MET
+            } else {
+                0.1 * next().abs()
+            };
+            for _ in 0..12 {
+                let row: Vec<Num> = (0..4).map(|_| Num::of(next())).collect();
+                let slope = Num::of(next());
+                for _ in 0..4 {
+                    let slack = size * (base + 1e-16 * next());
+                    let constant = Num::dot(&row, &z) - lambda * slope - Num::of(slack);
+                    program.dense(&row, constant, slope);
+                }
+            }
+            let vertex = Vertex {
+                basis: Vec::new(),
+                active: (0..program.rows()).map(|r| r % 7 == 3).collect(),
+                matrix: Vec::new(),
+                inverse: Vec::new(),
+                steep: false,
+                z,
+                rate,
+                exchanges: 0,
+            };
+            let rows = || (0..program.rows()).filter(|&r| !vertex.active[r]);
+            let slack = |r: usize| {
+                program.times(r, &vertex.z) - program.constant[r] - lambda * program.slope[r]
+            };
+            let met = program.met * size + MET_AT_ZERO;
+            let worst = rows()
+                .filter(|&r| slack(r).to_f64() < -met)
+                .min_by(|&r, &s| slack(r).to_f64().total_cmp(&slack(s).to_f64()));
+            let (entering, next_row) = program.look(&vertex, lambda, false);
+            assert_eq!(entering, worst, "{case}");
+            let step = |r: usize| {
+                let rate = program.times(r, &vertex.rate) - program.slope[r];
+                let left = slack(r).larger(Num::ZERO) / -rate;
+                (rate.to_f64() < -STILL).then_some(left)
+            };
+            let least = rows().filter_map(step).reduce(Num::smaller);
+            if worst.is_none() {
+                assert_eq!(next_row.map(|(_, step)| step), least, "{case}");
+                assert_eq!(next_row.and_then(|(r, _)| step(r)), least, "{case}");
+            }
+            found[usize::from(worst.is_none())] += 1;
+        }
+        assert!(found.iter().all(|&n| n > 50), "{found:?}");
+    }
+}

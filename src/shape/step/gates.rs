@@ -76,3 +76,56 @@ pub(super) fn check(stated: &Stated, meshed: &Meshed) -> Result<(), String> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A closed box from the origin, its triangles in order outwards.
+    fn block(sides: [f64; 3]) -> Vec<Triangle> {
+        let corner = |n: usize| [0, 1, 2].map(|k| if n >> k & 1 == 1 { sides[k] } else { 0.0 });
+        [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ]
+        .into_iter()
+        .flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]])
+        .map(|triangle| triangle.map(corner))
+        .collect()
+    }
+
+    /// A box of 0.7, 1.3 and 2.9 units, whose coarse mesh is `grown` times as large.
+    fn verdict(unit: f64, grown: f64, chord: f64) -> Result<(), String> {
+        let sides = [0.7, 1.3, 2.9].map(|side| side * unit);
+        let fine = block(sides);
+        let stated = Stated {
+            vertices: fine.as_flattened().to_vec(),
+            euler: 2,
+        };
+        let meshed = Meshed {
+            coarse: (chord * unit, block(sides.map(|side| side * grown))),
+            fine: (0.25 * chord * unit, fine),
+            weld: 1e-7 * unit,
+        };
+        check(&stated, &meshed)
+    }
+
+    #[test]
+    fn the_verdict_is_the_same_in_every_unit() {
+        for unit in [1e-3, 1.0, 1e3] {
+            let told = |grown: f64, chord: f64| verdict(unit, grown, chord).unwrap_err();
+            // The volume grows three times as much as the sides, the area twice.
+            assert_eq!(verdict(unit, 1.006, 0.1), Ok(()));
+            assert_eq!(verdict(unit, 0.994, 0.1), Ok(()));
+            assert!(told(1.008, 0.1).contains("its volume does not settle"));
+            assert!(told(0.992, 0.1).contains("its volume does not settle"));
+            // 0.047 of a volume over an area of 13.4 are beyond twice this chord.
+            assert!(told(1.006, 1.7e-3).contains("its volume does not settle"));
+            assert_eq!(verdict(unit, 1.006, 1.9e-3), Ok(()));
+        }
+    }
+}

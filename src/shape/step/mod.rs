@@ -45,17 +45,20 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
         let what = "this is not a STEP file: it does not begin with `ISO-10303-21`";
         return Err(ReadError::file(what));
     }
-    // The crates state no freedom from panics on damaged files.
-    GUARDED.fetch_add(1, Ordering::SeqCst);
-    let caught = catch_unwind(AssertUnwindSafe(|| solids(bytes)));
-    GUARDED.fetch_sub(1, Ordering::SeqCst);
-    let result = caught.unwrap_or_else(|_| {
-        Err("its reader stopped on an entity that is damaged or beyond it".into())
-    });
-    result.map_err(|what| {
+    guarded(|| solids(bytes)).map_err(|what| {
         ReadError::file(format!(
             "the STEP file cannot be read safely: {what}; {ADVICE}"
         ))
+    })
+}
+
+/// The result of `work`, or of its panic: the crates state no freedom from panics on damaged files.
+fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+    GUARDED.fetch_add(1, Ordering::SeqCst);
+    let caught = catch_unwind(AssertUnwindSafe(work));
+    GUARDED.fetch_sub(1, Ordering::SeqCst);
+    caught.unwrap_or_else(|_| {
+        Err("its reader stopped on an entity that is damaged or beyond it".into())
     })
 }
 
@@ -177,7 +180,7 @@ fn solid(table: &Table, id: u64) -> Result<(Vec<Triangle>, f64), String> {
         // A mesh for its size alone: vertices do not tell it, a sphere may have one.
         let rough = extent(&stated.vertices).max(f64::MIN_POSITIVE);
         let size = extent(mesh(CHORD * rough.max(1e-3))?.as_flattened());
-        if !(size > 0.0 && size.is_finite()) {
+        if !is_extent(size) {
             return Err("it has no extent".into());
         }
         let chords = [CHORD * size, 0.25 * CHORD * size];
@@ -193,7 +196,12 @@ fn solid(table: &Table, id: u64) -> Result<(Vec<Triangle>, f64), String> {
     Ok((all, worst))
 }
 
-/// The diagonal of the points' box.
+/// Whether chords can be taken from a body of this diagonal.
+fn is_extent(size: f64) -> bool {
+    size > 0.0 && size.is_finite()
+}
+
+/// The diagonal of the points' box; 0 without points.
 fn extent(points: &[[f64; 3]]) -> f64 {
     let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for point in points {
@@ -204,4 +212,35 @@ fn extent(points: &[[f64; 3]]) -> f64 {
     }
     let square: f64 = (0..3).map(|k| (max[k] - min[k]).max(0.0).powi(2)).sum();
     square.sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_guarded_panic_is_told_as_a_fault_of_the_file() {
+        let said = guarded(|| -> Result<(), String> {
+            assert!(guards_panics());
+            // Unwinds like a panic, without its words on the screen.
+            std::panic::resume_unwind(Box::new(()))
+        });
+        assert!(said.unwrap_err().contains("damaged or beyond it"));
+        assert_eq!(guarded(|| Ok(guards_panics())), Ok(true));
+    }
+
+    #[test]
+    fn no_points_one_point_and_points_without_end_have_no_extent() {
+        let far = f64::INFINITY;
+        for points in [
+            vec![],
+            vec![[0.7, -1.3, 2.9]; 3],
+            vec![[0.7, 0.0, 0.0], [far, 0.0, 0.0]],
+        ] {
+            assert!(!is_extent(extent(&points)), "{points:?}");
+        }
+        // A box of 2, 3 and 6 has the diagonal 7.
+        let corners = [[1.0, 2.0, 5.0], [-1.0, 2.5, -1.0], [0.3, -0.5, 0.7]];
+        assert!((extent(&corners) - 7.0).abs() < 1e-15 && is_extent(7.0));
+    }
 }
