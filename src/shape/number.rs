@@ -100,7 +100,9 @@ mod tests {
     fn placing_adds_the_rounding_of_what_it_adds() {
         let read = |words: [&str; 3]| {
             let mut numbers = Numbers::default();
-            words.map(|word| numbers.read(word.as_bytes()).unwrap());
+            for word in words {
+                numbers.read(word.as_bytes()).unwrap();
+            }
             numbers
         };
         let at = |c: f64| [[[c, -0.3, 0.1]; 3]];
