@@ -420,12 +420,13 @@ fn ratio(x: f64, j1: f64) -> f64 {
 }
 
 /// The zero between `low` and `high` of a function that is negative below and positive above it;
-/// `at` gives value and derivative. Newton's method in a bracket that every third step halves; where
-/// Newton's step is within rounding the root may be an end of it.
+/// `at` gives value and derivative. Newton's method in a bracket, which is halved where Newton's
+/// step leaves it or is more than half the step before. The root may be an end of the bracket.
 fn safeguarded(low: f64, high: f64, at: impl Fn(f64) -> [f64; 2]) -> f64 {
     let (mut low, mut high) = (low, high);
     let mut x = 0.5 * (low + high);
-    for step in 0..ROOT_STEPS {
+    let mut longest = f64::INFINITY;
+    for _ in 0..ROOT_STEPS {
         let [value, slope] = at(x);
         if value > 0.0 {
             high = x;
@@ -433,12 +434,11 @@ fn safeguarded(low: f64, high: f64, at: impl Fn(f64) -> [f64; 2]) -> f64 {
             low = x;
         }
         let newton = x - value / slope;
-        if (newton - x).abs() <= 2.0 * f64::EPSILON * x {
+        let step = (newton - x).abs();
+        if step <= 2.0 * f64::EPSILON * x {
             return newton.clamp(low, high);
         }
-        let inside = low < newton && newton < high;
-        // A bad slope costs a factor of three and no more.
-        let next = if inside && step % 3 != 2 {
+        let next = if low < newton && newton < high && step <= longest {
             newton
         } else {
             0.5 * (low + high)
@@ -446,6 +446,7 @@ fn safeguarded(low: f64, high: f64, at: impl Fn(f64) -> [f64; 2]) -> f64 {
         if high - low <= 2.0 * f64::EPSILON * high {
             return next;
         }
+        longest = 0.5 * (next - x).abs();
         x = next;
     }
     x
@@ -518,7 +519,7 @@ mod tests {
         }
     }
 
-    /// Newton's method needs eight steps where the start is fair; bisection, forty.
+    /// Newton's method needs eight steps where the start is fair; bisection, fifty.
     #[test]
     fn a_root_takes_few_steps() {
         let mut most = 0;

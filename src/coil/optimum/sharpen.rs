@@ -116,7 +116,7 @@ mod tests {
 
     struct Bent(AirCoil, Known);
 
-    const BEND: f64 = 0.05;
+    const BEND: f64 = 0.02;
     const MIDDLE_M: f64 = 0.02;
 
     impl CoilModel for Bent {

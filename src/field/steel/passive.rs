@@ -435,14 +435,14 @@ mod tests {
             let mut along: Vec<f64> = places[2..].iter().map(|at| at[i]).collect();
             along.sort_by(f64::total_cmp);
             assert!(along[0] >= from && along[along.len() - 1] <= to);
-            // No gap of more than a fifth, heights by their logarithm above the steel.
+            // No gap of much more than a quarter, heights by their logarithm above the steel.
             let part = |v: f64| match i {
                 2 => ((v - 0.002) / 0.028).ln() / (0.088_f64 / 0.028).ln(),
                 _ => (v - from) / (to - from),
             };
             let ends = [&[from], along.as_slice(), &[to]].concat();
             assert!(
-                ends.windows(2).all(|v| part(v[1]) - part(v[0]) < 0.2),
+                ends.windows(2).all(|v| part(v[1]) - part(v[0]) < 0.26),
                 "{i}"
             );
         }
