@@ -223,6 +223,29 @@ mod tests {
         }
     }
 
+    /// Radii and lengths may be in any unit: a power of two changes no digit.
+    #[test]
+    fn a_change_of_unit_is_a_power() {
+        for [a, w, l] in SHAPES {
+            let base = section_integrals(a, w, l, &ROUGH);
+            for unit in [2.0_f64.powi(-40), 2.0_f64.powi(40)] {
+                let other = section_integrals(a * unit, w * unit, l * unit, &ROUGH);
+                for (x, y, power) in [
+                    (base.value, other.value, 5),
+                    (base.by_depth, other.by_depth, 4),
+                    (base.inner, other.inner, 4),
+                    (base.by_length, other.by_length, 4),
+                ] {
+                    let wanted = x * unit.powi(power);
+                    assert!(
+                        (y - wanted).abs() <= 1e-13 * wanted,
+                        "{a} {w} {l}: {y} {wanted}"
+                    );
+                }
+            }
+        }
+    }
+
     #[test]
     fn agrees_with_the_exact_integral() {
         for [a, w, l] in SHAPES {

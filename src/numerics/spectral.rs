@@ -434,7 +434,8 @@ mod tests {
 
     #[test]
     fn an_odd_rule_has_its_middle_node_at_zero() {
-        for n in [3, 5, 9, 31] {
+        // Newton's method leaves 1e-32 with some of them.
+        for n in [3, 5, 7, 9, 13, 27, 31, 55] {
             assert_eq!(lobatto(n).0[n / 2], 0.0);
         }
     }

@@ -135,3 +135,15 @@ impl CoilModel for AirCoil {
         self.height_m
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn starts_spread_around_the_magnet_s_height() {
+        let model = AirCoil::new(0.037, &MagnetRule::dipole([0.0, 0.0, 0.7])).expect("above");
+        assert_eq!(model.length_scale_m(), 0.037);
+        assert_eq!(model.air_dipoles(), Some(&[(0.037, 0.7)][..]));
+    }
+}

@@ -161,3 +161,66 @@ fn under(
     let local = best_near(&problem, &[Problem::coordinates(&best.window)])?;
     Some((Problem::window(local.x), local))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coil::optimum::tests::{HEIGHT_M, air, quick, seed_limits, task};
+    use crate::coil::optimum::{Settings, optimise};
+    use crate::progress::Silent;
+
+    #[test]
+    fn a_hundredth_of_the_force_buys_something_of_each() {
+        let limits = Limits {
+            settling_max_s: None,
+            ..seed_limits()
+        };
+        let task = task(limits, None);
+        let settings = Settings {
+            starts: 4,
+            cells: 0,
+            ..quick()
+        };
+        let model = air(HEIGHT_M);
+        let best = |limits| {
+            let task = Task {
+                limits,
+                ..task.clone()
+            };
+            let outcome = optimise(&model, &task, &settings, &Silent).expect("runs");
+            outcome.best.expect("optimal")
+        };
+        let top = best(limits);
+        let list = alternatives(&model, &task, &top, &Silent).expect("runs");
+        let reduced: Vec<Reduced> = list.iter().map(|found| found.reduced).collect();
+        assert_eq!(reduced, [Reduced::Length, Reduced::Mass, Reduced::Power]);
+        let volume = |window: &Window| window.volume_over_pi_m3().value;
+        for found in &list {
+            let ratio = found.force_n / top.force_n;
+            assert!((0.99..0.9903).contains(&ratio), "{found:?} {ratio}");
+            let amount = match found.reduced {
+                Reduced::Length => found.window.length_m / top.window.length_m,
+                Reduced::Mass | Reduced::Power => volume(&found.window) / volume(&top.window),
+            };
+            assert!(amount < 0.99, "{found:?} {amount}");
+            // No coil with so little of it is stronger.
+            let window = found.window;
+            let tighter = match found.reduced {
+                Reduced::Length => Limits {
+                    length_max_m: Some(window.length_m),
+                    ..limits
+                },
+                Reduced::Mass => Limits {
+                    mass_max_kg: Some(volume(&window) * top.strand.mass_per_volume()),
+                    ..limits
+                },
+                Reduced::Power => Limits {
+                    power_max_w: Some(4.0 * volume(&window) * top.strand.resistance_per_volume()),
+                    ..limits
+                },
+            };
+            let ratio = best(tighter).force_n / found.force_n;
+            assert!((ratio - 1.0).abs() < 1e-8, "{found:?} {ratio}");
+        }
+    }
+}

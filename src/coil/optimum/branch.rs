@@ -244,3 +244,114 @@ fn halves(cell: &Cell) -> Option<[Cell; 2]> {
     above.lo = middle;
     Some([low, high])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coil::optimum::enclosure::Multipliers;
+    use crate::coil::optimum::tests::{HEIGHT_M, air, seed_limits, task, wire};
+    use crate::coil::optimum::{Strand, Task};
+    use crate::design::Limits;
+    use crate::progress::Silent;
+
+    /// The best coil of the seed's limits without that on the settling time, N.
+    const BEST_N: f64 = 0.137_773_265_65;
+
+    /// What is proven of the seed's limits, without multipliers: slowly.
+    fn proven(best_ln: f64, budget: usize) -> (Proof, bool) {
+        let limits = Limits {
+            settling_max_s: None,
+            ..seed_limits()
+        };
+        let (model, task) = (air(HEIGHT_M), task(limits, None));
+        let problem = &Problem::of_wire(&model, &task, task.strands[0])[0];
+        let domain = finite_domain(problem, best_ln.exp()).expect("a box");
+        let bounding = Bounding::new(problem, domain, Multipliers::default(), false);
+        let bounding = bounding.expect("an air coil");
+        let cell = whole(&domain);
+        let proof = prove(&bounding, problem, cell, best_ln, budget, &Silent).expect("runs");
+        let better = proof.better.is_some_and(|window| {
+            let rated = problem.rate(window).expect("in the domain");
+            let met = problem.scaled(&rated).rows.iter().all(|&row| row <= 0.0);
+            met && rated.force_n.value.ln() > best_ln + GAP
+        });
+        (proof, better)
+    }
+
+    #[test]
+    fn a_better_coil_on_the_way_is_handed_over() {
+        let (proof, better) = proven((0.9 * BEST_N).ln(), 100_000);
+        assert!(better, "{proof:?}");
+    }
+
+    #[test]
+    fn the_budget_is_kept_and_what_is_left_open_stays_bounded() {
+        let ln = BEST_N.ln();
+        let (first, _) = proven(ln, 0);
+        for budget in [640, 3000] {
+            let (proof, _) = proven(ln, budget);
+            let used = proof.cells - first.cells;
+            assert!(used <= budget && used > budget / 2, "{used} {budget}");
+            assert!(proof.better.is_none() && proof.upper_ln >= ln);
+            assert!(proof.upper_ln <= first.upper_ln);
+        }
+    }
+
+    /// Without limits on sizes: the box scales with the problem, and no coil beyond it reaches
+    /// the force.
+    #[test]
+    fn the_finite_box_scales_and_holds_all_that_is_strong() {
+        let boxes = |k: f64| -> Vec<(Domain, f64)> {
+            let limits = Limits {
+                resistance_max_ohm: Some(6.0 / k),
+                ..Limits::default()
+            };
+            let task = Task {
+                strands: Strand::choices(&wire(0.0007 * k)),
+                ..task(limits, Some(8.0 / k))
+            };
+            let model = air(HEIGHT_M * k);
+            let force_n = 0.07 / (k * k);
+            let problems = Problem::of_wire(&model, &task, task.strands[0]);
+            let of = |problem: &Problem<'_>| {
+                let domain = finite_domain(problem, force_n).expect("bounded by the wire");
+                let most = domain.volume_m3[1];
+                let mut strongest = 0.0_f64;
+                let [outer, length] = [domain.outer_m[1], domain.length_m[1]];
+                for beyond in [1.01, 1.3, 7.0] {
+                    for share in [0.0, 0.3, 0.7, 0.97] {
+                        for amount in [1.0, 0.3, 0.01] {
+                            // Wide: as long as the wire suffices for; long: as deep.
+                            let (a2, l) = (outer * beyond, length * beyond);
+                            let a1 = share * a2;
+                            let wide = amount * most / (a2 * a2 - a1 * a1);
+                            let a = share * outer;
+                            let deep = (a * a + amount * most / l).sqrt() - a;
+                            for (a, w, l) in [(a1, a2 - a1, wide), (a, deep, l)] {
+                                let window = Window {
+                                    inner_radius_m: a,
+                                    depth_m: w,
+                                    length_m: l,
+                                };
+                                let rated = problem.rate(window).expect("in the domain");
+                                strongest = strongest.max(rated.force_n.value);
+                            }
+                        }
+                    }
+                }
+                assert!(strongest < force_n, "{strongest} {force_n}");
+                (domain, force_n)
+            };
+            problems.iter().map(of).collect()
+        };
+        let k = 1.7;
+        for ((small, _), (large, _)) in boxes(1.0).iter().zip(boxes(k)) {
+            for (a, b) in [
+                (small.outer_m[1], large.outer_m[1]),
+                (small.length_m[1], large.length_m[1]),
+            ] {
+                assert!((b / a / k - 1.0).abs() < 1e-12, "{a} {b}");
+            }
+        }
+    }
+}

@@ -123,6 +123,11 @@ struct Power {
 }
 
 impl Power {
+    /// Whether its exponents serve `at` too.
+    fn is_near(&self, at: [f64; 3]) -> bool {
+        (0..3).all(|i| (self.at[i] - at[i]).abs() <= KEPT)
+    }
+
     fn interpolated(&self, at: [f64; 3]) -> Interpolated {
         let ln: f64 = (0..3)
             .map(|i| self.exponents[i] * (at[i] - self.at[i]))
@@ -354,9 +359,10 @@ impl CoredModel {
         let at = self.coordinates(window).ok()?;
         if let Some(neighbours) = &self.neighbours {
             let value = self.among_factors(neighbours, at)?;
-            let close = |power: &Power| (0..3).all(|i| (power.at[i] - at[i]).abs() <= KEPT);
             let exponents = match self.factors.neighbours {
-                Some(old) if old.iter().all(close) => old.map(|power| power.exponents),
+                Some(old) if old.iter().all(|power| power.is_near(at)) => {
+                    old.map(|power| power.exponents)
+                }
                 _ => {
                     let mut exponents = [[0.0; 3]; 2];
                     for i in 0..3 {
@@ -545,5 +551,32 @@ impl CoilModel for CoredModel {
             });
             blunt
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_power_serves_what_has_moved_little_in_every_coordinate() {
+        let power = Power {
+            at: [-4.4, -2.3, 0.7],
+            value: 0.9,
+            exponents: [-0.3, 0.2, 0.1],
+        };
+        let moved = |by: [f64; 3]| std::array::from_fn(|i| power.at[i] + by[i]);
+        assert!(power.is_near(power.at) && power.is_near(moved([0.04, -0.04, 0.04])));
+        for i in 0..3 {
+            for by in [-0.06, 0.06] {
+                let mut far = [0.0; 3];
+                far[i] = by;
+                assert!(!power.is_near(moved(far)));
+            }
+        }
+        // A product of powers: its slopes are those of its logarithm.
+        let there = power.interpolated(moved([0.1, 0.0, 0.0]));
+        assert!((there.value - 0.9 * (-0.03_f64).exp()).abs() < 1e-15);
+        assert!((there.slope[0] / there.value + 0.3).abs() < 1e-15);
     }
 }

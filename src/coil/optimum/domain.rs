@@ -254,3 +254,38 @@ impl Domain {
         ]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coil::optimum::tests::{HEIGHT_M, air, task};
+    use crate::design::Limits;
+
+    /// The supply's regime asks for a least resistance, and a limit may ask for less.
+    #[test]
+    fn a_least_resistance_over_the_largest_is_a_contradiction() {
+        let model = air(HEIGHT_M);
+        let of = |limits: Limits, voltage_v: f64| {
+            let task = task(limits, Some(voltage_v));
+            let problems = Problem::of_wire(&model, &task, task.strands[0]);
+            assert_eq!(Domain::contradiction(&problems[0]), None);
+            Domain::contradiction(&problems[1])
+        };
+        let up_to = |resistance_ohm, power_max_w| Limits {
+            resistance_max_ohm: Some(resistance_ohm),
+            power_max_w,
+            ..Limits::default()
+        };
+        // 36 V at no more than 2 A; 4 V at no more than 3 W and 2 A.
+        for (limits, voltage_v, lower, by_ohm) in [
+            (up_to(6.0, None), 36.0, LimitName::Current, 12.0),
+            (up_to(5.0, Some(3.0)), 4.0, LimitName::Power, 1.0 / 3.0),
+        ] {
+            let found = of(limits, voltage_v).expect("a contradiction");
+            assert_eq!(found.between, [LimitName::Resistance, lower]);
+            assert!((found.by / by_ohm - 1.0).abs() < 1e-9, "{found:?}");
+        }
+        assert_eq!(of(up_to(18.0, None), 36.0), None);
+        assert_eq!(of(up_to(5.4, Some(3.0)), 4.0), None);
+    }
+}

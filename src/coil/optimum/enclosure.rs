@@ -437,6 +437,170 @@ fn rising(a: Interval, u: Interval) -> Interval {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::coil::optimum::tests::{air, seed_limits, task};
+    use crate::design::Limits;
+
+    /// A seed-like problem's Lagrangian by the problem's own numbers, and its bound over cells of
+    /// relative half width `wide` about one coil.
+    struct Lagrangian<'a> {
+        problem: &'a Problem<'a>,
+        bounding: Bounding<'a>,
+    }
+
+    impl<'a> Lagrangian<'a> {
+        fn new(problem: &'a Problem<'a>, multipliers: Multipliers) -> Self {
+            let domain = Domain::of(problem);
+            let bounding = Bounding::new(problem, domain, multipliers, true);
+            Self {
+                problem,
+                bounding: bounding.expect("an air coil"),
+            }
+        }
+
+        fn cell(wide: f64) -> Cell {
+            let about = |at: f64, wide: f64| Interval::new(at * (1.0 - wide), at * (1.0 + wide));
+            Cell {
+                inner: about(0.011, wide),
+                depth: about(0.007, 0.7 * wide),
+                length: about(0.07, 1.3 * wide),
+            }
+        }
+
+        fn at(&self, window: Window) -> f64 {
+            let Bounding {
+                domain,
+                multipliers: lambda,
+                ..
+            } = &self.bounding;
+            let rated = self.problem.rate(window).expect("in the domain");
+            let row = |name| {
+                let mut bounds = self.problem.bounds.iter();
+                let row = bounds.position(|bound| bound.name == name);
+                rated.values[row.expect("limited")].value
+            };
+            let volume = window.volume_over_pi_m3().value;
+            let weighted = |weight: f64, ratio: f64| {
+                if weight == 0.0 {
+                    0.0
+                } else {
+                    weight * ratio.ln()
+                }
+            };
+            let outer = row(LimitName::OuterDiameter) / (2.0 * domain.outer_m[1]);
+            rated.force_n.value.ln() - weighted(lambda.most, volume / domain.volume_m3[1])
+                + weighted(lambda.least, volume / domain.volume_m3[0])
+                - weighted(lambda.outer, outer)
+                - weighted(
+                    lambda.settling,
+                    row(LimitName::Settling) / domain.settling_max_s,
+                )
+        }
+
+        /// Largest value of the Lagrangian at 27 coils of the cell.
+        fn largest(&self, cell: &Cell) -> f64 {
+            let three = |i: Interval| [i.lo, 0.5 * (i.lo + i.hi), i.hi];
+            let mut most = f64::NEG_INFINITY;
+            for a in three(cell.inner) {
+                for w in three(cell.depth) {
+                    for l in three(cell.length) {
+                        most = most.max(self.at(Bounding::corner(a, w, l)));
+                    }
+                }
+            }
+            most
+        }
+
+        fn bound(&self, cell: &Cell) -> f64 {
+            let (a, w, l) = (cell.inner, cell.depth, cell.length);
+            let of = |a: f64, outer: f64, l: f64| {
+                let window = Bounding::corner(a, outer - a, l);
+                self.bounding.force_per_ampere(&window)
+            };
+            let force = Interval::new(of(a.hi, a.lo + w.lo, l.lo), of(a.lo, a.hi + w.hi, l.hi));
+            let slopes = self
+                .bounding
+                .slopes_of_ln_force(cell, force.widened(8.0 * axis_gradient::RELATIVE_ERROR));
+            let settling = self.bounding.settling(cell).expect("fast enough");
+            let lambda = self.bounding.multipliers;
+            self.bounding
+                .mean_value(cell, slopes, lambda, settling.as_ref())
+        }
+    }
+
+    /// Problems of the driver's regime and of the supply's, which asks for a least resistance.
+    fn problems(check: impl Fn(&Problem<'_>)) {
+        let limits = Limits {
+            settling_max_s: Some(0.013),
+            ..seed_limits()
+        };
+        let (model, task) = (air(0.03), task(limits, Some(4.0)));
+        for problem in Problem::of_wire(&model, &task, task.strands[0]) {
+            check(&problem);
+        }
+    }
+
+    #[test]
+    fn the_lagrangian_is_bounded_to_second_order() {
+        problems(|problem| {
+            let supply = problem.regime == Regime::Supply;
+            let lagrangian = Lagrangian::new(
+                problem,
+                Multipliers {
+                    most: 0.3,
+                    least: if supply { 0.2 } else { 0.0 },
+                    outer: 0.7,
+                    settling: 0.4,
+                },
+            );
+            let excess = |wide: f64| {
+                let cell = Lagrangian::cell(wide);
+                lagrangian.bound(&cell) - lagrangian.largest(&cell)
+            };
+            let [point, narrow, wide] = [0.0, 2e-3, 2e-2].map(excess);
+            let few = 10.0 * ROUGH.relative_error;
+            assert!(point >= 0.0 && point < few, "{point:e}");
+            assert!(narrow >= 0.0 && wide > 0.0);
+            assert!(narrow < 0.015 * wide + few, "{narrow:e} {wide:e}");
+        });
+    }
+
+    #[test]
+    fn every_multiplier_widens_the_bound_by_its_limit_s_error() {
+        problems(|problem| {
+            let large = 1e7;
+            let none = Multipliers::default();
+            let mut each = vec![
+                Multipliers {
+                    most: large,
+                    ..none
+                },
+                Multipliers {
+                    outer: large,
+                    ..none
+                },
+                Multipliers {
+                    outer: -large,
+                    ..none
+                },
+            ];
+            if problem.regime == Regime::Supply {
+                each.push(Multipliers {
+                    least: large,
+                    ..none
+                });
+            }
+            for multipliers in each {
+                let lagrangian = Lagrangian::new(problem, multipliers);
+                let cell = Lagrangian::cell(0.0);
+                let excess = lagrangian.bound(&cell) - lagrangian.largest(&cell);
+                let error = axis_gradient::RELATIVE_ERROR * large;
+                assert!(
+                    excess > 16.0 * error && excess < 64.0 * error,
+                    "{multipliers:?}: {excess:e} {error:e}"
+                );
+            }
+        });
+    }
 
     /// Where the winding is a filament the differences cancel, and the integrals must hold alone.
     #[test]

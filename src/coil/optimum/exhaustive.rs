@@ -17,7 +17,7 @@ use super::listing::{
 };
 use super::model::{CoilModel, Window};
 use super::outcome::{Certificate, CertificateKind, Status};
-use super::problem::{Fixed, Problem, Regime, Task};
+use super::problem::{Fixed, LimitName, Problem, Regime, Task};
 use super::scalar;
 use super::search::{self, Settings, Solved};
 use super::sequential::{self, FEASIBLE};
@@ -337,19 +337,25 @@ impl<'a> Pairs<'a> {
 
     /// The worst of all limits at a bore.
     fn over(&self, window: Window) -> f64 {
+        self.worst(window, |_| true)
+    }
+
+    /// The worst of the limits that are `asked` for.
+    fn worst(&self, window: Window, asked: impl Fn(LimitName) -> bool) -> f64 {
         let Some(rated) = self.problem.rate(window) else {
             return f64::INFINITY;
         };
         let point = self.problem.scaled(&rated);
         let rows = point.rows.iter().zip(&self.problem.bounds);
-        rows.map(|(&row, bound)| {
-            if bound.name.is_equality() {
-                row.abs()
-            } else {
-                row
-            }
-        })
-        .fold(f64::NEG_INFINITY, f64::max)
+        rows.filter(|(_, bound)| asked(bound.name))
+            .map(|(&row, bound)| {
+                if bound.name.is_equality() {
+                    row.abs()
+                } else {
+                    row
+                }
+            })
+            .fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// The best bore of one coil; `None` where no bore meets the limits or its force does not
@@ -390,7 +396,13 @@ impl<'a> Pairs<'a> {
         enough_ln: f64,
     ) -> Option<(f64, f64)> {
         let [lo, at, hi] = bores;
-        let over = |a: f64| self.over(window(a));
+        // The others are kept between `lo` and `hi`, and touched there or, with one layer or turn,
+        // throughout: a root of theirs is not looked for.
+        let of_the_model = |name| {
+            let names = [LimitName::Settling, LimitName::CoreField, LimitName::Mass];
+            names.contains(&name)
+        };
+        let over = |a: f64| self.worst(window(a), of_the_model);
         let ln_force = |a: f64| self.ln_force(window(a));
         let mut best: Option<(f64, f64)> = None;
         for end in [lo, hi] {
@@ -398,7 +410,7 @@ impl<'a> Pairs<'a> {
             let mut outside = at;
             for step in 1..=4 {
                 let bore = at + (end - at) * f64::from(step * step) / 16.0;
-                if bore == outside || ln_force(bore) < enough_ln {
+                if bore == outside {
                     break;
                 }
                 if over(bore) <= 0.0 {
@@ -412,11 +424,15 @@ impl<'a> Pairs<'a> {
                     } else {
                         root + inwards
                     };
-                    let edge = if over(edge) <= FEASIBLE { edge } else { bore };
+                    let met = self.over(window(edge)) <= FEASIBLE;
+                    let edge = if met { edge } else { bore };
                     let value = ln_force(edge);
                     if best.is_none_or(|(_, old)| value > old) {
                         best = Some((edge, value));
                     }
+                    break;
+                }
+                if ln_force(bore) < enough_ln {
                     break;
                 }
                 outside = bore;
@@ -458,7 +474,147 @@ fn summit(f: impl Fn(f64) -> f64, lo: f64, hi: f64) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::whole;
+    use super::*;
+    use crate::coil::optimum::air::AirCoil;
+    use crate::coil::optimum::model::{NoResponse, Response};
+    use crate::coil::optimum::tests::{HEIGHT_M, air, quick, task};
+    use crate::coil::optimum::wound::optimise_wound;
+    use crate::design::Limits;
+    use crate::progress::Silent;
+
+    /// An air coil that hides that it is one, so that nothing bounds its force.
+    struct Opaque(AirCoil);
+
+    impl CoilModel for Opaque {
+        fn response(
+            &self,
+            window: &Window,
+            turns_per_m2: f64,
+            current_a: f64,
+            with_inductance: bool,
+        ) -> Result<Response, NoResponse> {
+            self.0
+                .response(window, turns_per_m2, current_a, with_inductance)
+        }
+
+        fn relative_error(&self) -> f64 {
+            self.0.relative_error()
+        }
+
+        fn length_scale_m(&self) -> f64 {
+            self.0.length_scale_m()
+        }
+    }
+
+    fn small(settling_max_s: f64) -> Limits {
+        Limits {
+            resistance_max_ohm: Some(0.2),
+            settling_max_s: Some(settling_max_s),
+            outer_diameter_max_m: Some(0.02),
+            length_max_m: Some(0.006),
+            ..Limits::default()
+        }
+    }
+
+    #[test]
+    fn every_pair_tried_is_as_good_as_a_proof() {
+        for settling_max_s in [0.001, 0.0006] {
+            let task = task(small(settling_max_s), None);
+            let run = |model: &dyn CoilModel| {
+                optimise_wound(model, &task, &quick(), &Silent).expect("runs")
+            };
+            let (tried, proven) = (run(&Opaque(air(HEIGHT_M))), run(&air(HEIGHT_M)));
+            assert_eq!(tried.certificate.kind, CertificateKind::Exhaustive);
+            assert_eq!(tried.certificate.cells, 14 * 8);
+            assert_eq!(proven.certificate.kind, CertificateKind::Global);
+            let (a, b) = (tried.best.expect("a coil"), proven.best.expect("a coil"));
+            assert_eq!((a.layers, a.turns_per_layer), (b.layers, b.turns_per_layer));
+            assert!((a.force_n / b.force_n - 1.0).abs() < 1e-9, "{a:?} {b:?}");
+        }
+    }
+
+    #[test]
+    fn the_best_bore_is_what_a_fine_scan_finds() {
+        let model = Opaque(air(HEIGHT_M));
+        let mut limited = 0;
+        for settling_max_s in [0.1, 0.0006] {
+            let limits = Limits {
+                inner_diameter_min_m: Some(0.002),
+                ..small(settling_max_s)
+            };
+            let task = task(limits, None);
+            let problem = Problem::of_wire(&model, &task, task.strands[0]).remove(0);
+            let solved = Solved {
+                problem,
+                best: None,
+                contradiction: None,
+                missing: Vec::new(),
+                evaluations: 0,
+                starts: 0,
+            };
+            let problem = &solved.problem;
+            let pairs = Pairs::of(&solved, Domain::of(problem));
+            for (layers, turns) in [(1, 2), (1, 7), (3, 1), (4, 6), (8, 3), (12, 1), (13, 8)] {
+                let window = |a: f64| pairs.window(layers, turns, a);
+                let met = |a: f64| pairs.over(window(a)) <= 0.0;
+                let depth_m = window(0.0).depth_m;
+                let bore = |k: u32| 0.001 + (0.009 - depth_m) * f64::from(k) / 60.0;
+                // Limits on sizes and wire alone say where a bore may be.
+                let screen = problem.without_settling().expect("a settling time");
+                let fits = |k: &u32| {
+                    let rated = screen.rate(window(bore(*k))).expect("in the domain");
+                    let point = screen.scaled(&rated);
+                    bore(*k) >= NARROW * depth_m && point.rows.iter().all(|&row| row <= 0.0)
+                };
+                let fitting: Vec<f64> = (0..=60).filter(fits).map(bore).collect();
+                let Some([lo, hi]) = pairs.bores(layers, turns) else {
+                    assert!(fitting.is_empty(), "{layers} {turns}");
+                    continue;
+                };
+                for a in &fitting {
+                    assert!(
+                        (lo..=hi * (1.0 + 1e-12)).contains(a),
+                        "{layers} {turns}: {a}"
+                    );
+                }
+                let strongest = fitting.iter().filter(|a| met(**a));
+                let strongest = strongest.map(|a| pairs.ln_force(window(*a)));
+                let strongest = strongest.fold(f64::NEG_INFINITY, f64::max);
+                let leaf = pairs.best_bore(layers, turns, [lo, hi], f64::NEG_INFINITY);
+                let value = leaf.map_or(f64::NEG_INFINITY, |leaf| leaf.ln_force);
+                assert!(
+                    value >= strongest - 1e-9,
+                    "{layers} {turns}: {value} {strongest}"
+                );
+                let Some(leaf) = leaf else { continue };
+                let a = leaf.window.inner_radius_m;
+                assert!(pairs.over(leaf.window) <= FEASIBLE);
+                assert!((lo..=hi).contains(&a) && leaf.window == window(a));
+                let limit = scalar::maximum(|a| pairs.ln_force(window(a)), lo, hi);
+                if value < limit.1 - 1e-6 {
+                    // Held back by the settling time: beside it one that is as slow as may be.
+                    limited += 1;
+                    let over = pairs.over(leaf.window);
+                    assert!(over.abs() < 1e-7, "{layers} {turns}: {over:e}");
+                }
+            }
+        }
+        assert!(limited >= 2, "{limited}");
+    }
+
+    #[test]
+    fn a_summit_is_found_between_the_scan_s_places_and_at_the_ends() {
+        for peak in [0.3, 0.37, 0.71, 1.04, 1.29] {
+            let (x, value) = summit(|x| -(x - peak) * (x - peak), 0.3, 1.3);
+            assert!((x - peak).abs() < 1e-7 && value > -1e-14, "{x} {peak}");
+        }
+        let (x, _) = summit(|x| x, 0.3, 1.3);
+        assert_eq!(x, 1.3);
+        // Two maxima: the higher one's.
+        let bell = |x: f64, peak: f64| (-30.0 * (x - peak) * (x - peak)).exp();
+        let (x, _) = summit(|x| bell(x, 0.4) + 2.0 * bell(x, 1.1), 0.3, 1.3);
+        assert!((x - 1.1).abs() < 1e-6, "{x}");
+    }
 
     #[test]
     fn a_turn_within_rounding_is_a_turn() {

@@ -196,3 +196,48 @@ pub(super) fn worth_a_look(best: &WoundCoil, sorted: &[WoundCoil]) -> Vec<WoundC
     }
     kept
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coil::optimum::sequential::{Local, Smooth};
+    use crate::coil::optimum::tests::{air, task};
+    use crate::design::Limits;
+
+    #[test]
+    fn where_nothing_bounds_a_coil_the_box_is_three_times_the_best_one() {
+        let window = Window {
+            inner_radius_m: 0.007,
+            depth_m: 0.006,
+            length_m: 0.05,
+        };
+        let x = Problem::coordinates(&window);
+        for limit_m in [None, Some(0.03)] {
+            let limits = Limits {
+                settling_max_s: Some(0.1),
+                length_max_m: limit_m,
+                ..Limits::default()
+            };
+            let (model, task) = (air(0.03), task(limits, None));
+            let problem = Problem::of_wire(&model, &task, task.strands[0]).remove(0);
+            let point = problem.at(x).expect("in the domain");
+            let solved = Solved {
+                best: Some(Local {
+                    x,
+                    multipliers: vec![0.0; point.rows.len()],
+                    point,
+                    evaluations: 0,
+                }),
+                problem,
+                contradiction: None,
+                missing: Vec::new(),
+                evaluations: 0,
+                starts: 0,
+            };
+            let domain = around_optimum(&solved).expect("a best coil");
+            assert!((domain.outer_m[1] / 0.039 - 1.0).abs() < 1e-12);
+            let longest_m = limit_m.unwrap_or(0.15);
+            assert!((domain.length_m[1] / longest_m - 1.0).abs() < 1e-12);
+        }
+    }
+}

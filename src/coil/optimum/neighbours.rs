@@ -81,8 +81,8 @@ impl Neighbours {
             lowest_m,
         )
         .ok()?;
-        let distance_m = lowest_m - shape.top_m;
-        let sources = ArraySources::of_array(&array, lowest_m, distance_m, 0.1 * TOLERANCE);
+        // Above every core: their heights alone say how far the dipoles are.
+        let sources = ArraySources::of_array(&array, lowest_m, 0.0, 0.1 * TOLERANCE);
         let [x, y] = self.positions_m[self.drive];
         let points: Vec<[f64; 3]> = dipoles.iter().map(|d| [x, y, d.0]).collect();
         let mut steel = vec![0.0; self.positions_m.len() * points.len()];

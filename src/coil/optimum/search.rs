@@ -284,21 +284,26 @@ fn search(
             keep_better(problem, &mut best, local);
         }
     }
-    // On the axis the force's slope vanishes: a bore may be better and not be seen from there.
     if let Some(local) = &best
         && problem.task.fixed.inner_diameter_m.is_none()
     {
-        let mut window = Problem::window(local.x);
-        if window.inner_radius_m < 1e-3 * window.depth_m {
-            window.inner_radius_m = 0.05 * window.depth_m;
-            window.depth_m *= 0.95;
-            if let Some(local) = sequential::solve(problem, Problem::coordinates(&window)) {
-                evaluations += local.evaluations;
-                keep_better(problem, &mut best, local);
-            }
+        let bored = bored(&Problem::window(local.x)).map(|window| Problem::coordinates(&window));
+        if let Some(local) = bored.and_then(|x| sequential::solve(problem, x)) {
+            evaluations += local.evaluations;
+            keep_better(problem, &mut best, local);
         }
     }
     Ok((best, evaluations))
+}
+
+/// The same winding with a bore; `None` where it has one. On the axis the force's slope vanishes:
+/// a bore may be better and not be seen from there.
+fn bored(window: &Window) -> Option<Window> {
+    (window.inner_radius_m < 1e-3 * window.depth_m).then(|| Window {
+        inner_radius_m: 0.05 * window.depth_m,
+        depth_m: 0.95 * window.depth_m,
+        ..*window
+    })
 }
 
 pub(super) fn keep_better(problem: &Problem<'_>, best: &mut Option<Local>, local: Local) {
@@ -464,4 +469,28 @@ pub(super) fn describe(solved: &Solved<'_>) -> Option<BestCoil> {
         force_n: rated.force_n.value,
         limits,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn next_to_no_bore_is_none_at_any_size() {
+        for size_m in [1e-6, 0.007, 1e3] {
+            let window = |bore: f64| Window {
+                inner_radius_m: bore * size_m,
+                depth_m: size_m,
+                length_m: 3.0 * size_m,
+            };
+            for bore in [0.0, 9e-4] {
+                let wider = bored(&window(bore)).expect("none as yet");
+                assert!((wider.inner_radius_m / size_m - 0.05).abs() < 1e-15);
+                assert!((wider.outer_radius_m() / size_m - 1.0).abs() < 1e-15);
+            }
+            for bore in [1.1e-3, 0.7] {
+                assert_eq!(bored(&window(bore)), None);
+            }
+        }
+    }
 }

@@ -94,3 +94,94 @@ pub(super) fn restated<'a>(
 fn best_x(problems: &[Solved<'_>]) -> Option<[f64; 3]> {
     Some(best_of(problems)?.best.as_ref()?.x)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coil::optimum::Settings;
+    use crate::coil::optimum::air::AirCoil;
+    use crate::coil::optimum::model::{NoResponse, Response, Window};
+    use crate::coil::optimum::search::solve_all;
+    use crate::coil::optimum::tests::{HEIGHT_M, air, quick, seed_limits, task};
+    use crate::design::Limits;
+    use crate::progress::Silent;
+
+    /// What an air coil's ln F lacks, as a function of the length, is not known to the coarse
+    /// model; to the sharp one as a straight line about one length; to the exact one throughout.
+    enum Known {
+        Nothing,
+        About(f64),
+        All,
+    }
+
+    struct Bent(AirCoil, Known);
+
+    const BEND: f64 = 0.02;
+    const MIDDLE_M: f64 = 0.02;
+
+    impl CoilModel for Bent {
+        fn response(
+            &self,
+            window: &Window,
+            turns_per_m2: f64,
+            current_a: f64,
+            with_inductance: bool,
+        ) -> Result<Response, NoResponse> {
+            let mut response = self
+                .0
+                .response(window, turns_per_m2, current_a, with_inductance)?;
+            let t = (window.length_m / MIDDLE_M).ln();
+            let (ln, slope) = match self.1 {
+                Known::Nothing => (0.0, 0.0),
+                Known::About(p) => (-BEND * (2.0 * p * t - p * p), -2.0 * BEND * p),
+                Known::All => (-BEND * t * t, -2.0 * BEND * t),
+            };
+            let mut force = response.force_n.times(ln.exp());
+            force.slope[2] += force.value * slope / window.length_m;
+            response.force_n = force;
+            Ok(response)
+        }
+
+        fn relative_error(&self) -> f64 {
+            self.0.relative_error()
+        }
+
+        fn length_scale_m(&self) -> f64 {
+            self.0.length_scale_m()
+        }
+
+        fn sharpened(&self, window: &Window) -> Option<Box<dyn CoilModel>> {
+            let about = Known::About((window.length_m / MIDDLE_M).ln());
+            Some(Box::new(Self(self.0.clone(), about)))
+        }
+    }
+
+    #[test]
+    fn sharpening_goes_on_until_the_optimum_stands() {
+        let limits = Limits {
+            settling_max_s: None,
+            length_max_m: None,
+            ..seed_limits()
+        };
+        let task = task(limits, None);
+        let settings = Settings {
+            starts: 4,
+            ..quick()
+        };
+        let [coarse, exact] = [Known::Nothing, Known::All].map(|known| Bent(air(HEIGHT_M), known));
+        let Ok(wanted) = solve_all(&exact, &task, &settings, &Silent).expect("runs") else {
+            panic!("bounded");
+        };
+        let Ok(found) = solve_all(&coarse, &task, &settings, &Silent).expect("runs") else {
+            panic!("bounded");
+        };
+        let wanted = best_x(&wanted).expect("an optimum");
+        let away = |x: [f64; 3]| (0..3).fold(0.0_f64, |s, i| s.max((x[i] - wanted[i]).abs()));
+        let before = away(best_x(&found).expect("an optimum"));
+        assert!(before > 0.01, "{before:e}");
+        let sharp = sharpened(&coarse, &task, &found, &Silent).expect("runs");
+        let sharp = sharp.expect("can be sharpened");
+        let at = best_x(&restated(&*sharp, &task, &found)).expect("an optimum");
+        assert!(away(at) < 1e-4, "{:e}", away(at));
+    }
+}

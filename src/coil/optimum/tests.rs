@@ -7,10 +7,10 @@ use crate::design::{Limits, Wire};
 use crate::field::magnet::{Cylinder, MagnetRule, Sources};
 use crate::progress::Silent;
 
-const HEIGHT_M: f64 = 0.03;
+pub(super) const HEIGHT_M: f64 = 0.03;
 const MOMENT_A_M2: f64 = 0.909_41;
 
-fn wire(diameter_m: f64) -> Wire {
+pub(super) fn wire(diameter_m: f64) -> Wire {
     Wire {
         diameter_m,
         conductor_diameter_m: diameter_m,
@@ -20,11 +20,11 @@ fn wire(diameter_m: f64) -> Wire {
     }
 }
 
-fn air(height_m: f64) -> AirCoil {
+pub(super) fn air(height_m: f64) -> AirCoil {
     AirCoil::new(height_m, &MagnetRule::dipole([0.0, 0.0, -MOMENT_A_M2])).expect("above")
 }
 
-fn seed_limits() -> Limits {
+pub(super) fn seed_limits() -> Limits {
     Limits {
         resistance_max_ohm: Some(6.0),
         settling_max_s: Some(0.1),
@@ -34,7 +34,7 @@ fn seed_limits() -> Limits {
     }
 }
 
-fn task(limits: Limits, voltage_v: Option<f64>) -> Task {
+pub(super) fn task(limits: Limits, voltage_v: Option<f64>) -> Task {
     Task {
         limits,
         fixed: Fixed::default(),
@@ -44,14 +44,14 @@ fn task(limits: Limits, voltage_v: Option<f64>) -> Task {
     }
 }
 
-fn quick() -> Settings {
+pub(super) fn quick() -> Settings {
     Settings {
         valley: false,
         ..Settings::default()
     }
 }
 
-fn solved(task: &Task) -> Outcome {
+pub(super) fn solved(task: &Task) -> Outcome {
     optimise(&air(HEIGHT_M), task, &quick(), &Silent).expect("not interrupted")
 }
 
@@ -460,6 +460,28 @@ fn given_dimensions_are_kept() {
     // With the bore and the outer diameter known the resistance sets the length.
     let length_m = 6.0 / 6.0753 * 1429.0 / 1_428.571_428_6 * 0.1;
     assert!((coil.window.length_m - length_m).abs() < 1e-5);
+}
+
+#[test]
+fn searches_are_counted() {
+    let starts = |settling_max_s| {
+        let limits = Limits {
+            settling_max_s,
+            inner_diameter_min_m: Some(0.02),
+            ..seed_limits()
+        };
+        let settings = Settings {
+            starts: 5,
+            cells: 0,
+            ..quick()
+        };
+        let outcome = optimise(&air(HEIGHT_M), &task(limits, None), &settings, &Silent);
+        outcome.expect("runs").starts
+    };
+    assert_eq!(starts(None), 5);
+    // A limit that holds nothing back is left out, and nothing searched again; one that does is
+    // searched with besides.
+    assert_eq!([starts(Some(0.1)), starts(Some(0.004))], [5, 10]);
 }
 
 #[test]

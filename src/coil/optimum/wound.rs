@@ -315,7 +315,7 @@ impl<'a> Winder<'a> {
                     if found.cells.is_multiple_of(1024) {
                         progress.check()?;
                     }
-                    if found.cells > budget {
+                    if found.cells >= budget {
                         // Not enumerated: nothing is proven.
                         found.bounded_by(f64::INFINITY);
                         break;
@@ -414,5 +414,37 @@ impl<'a> Winder<'a> {
             stack.push(low);
             stack.push(high);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coil::optimum::tests::{HEIGHT_M, air, quick, seed_limits, task};
+    use crate::design::Limits;
+    use crate::progress::Silent;
+
+    /// Without a budget only the portions are made, one cut each, and nothing is proven.
+    #[test]
+    fn no_portion_takes_more_than_its_budget() {
+        let limits = Limits {
+            settling_max_s: None,
+            ..seed_limits()
+        };
+        let (model, task) = (air(HEIGHT_M), task(limits, None));
+        let settings = Settings {
+            starts: 2,
+            cells: 0,
+            ..quick()
+        };
+        let Ok(problems) = search::solve_all(&model, &task, &settings, &Silent).expect("runs")
+        else {
+            panic!("bounded");
+        };
+        let domain = Domain::of(&problems[0].problem);
+        let winder = Winder::new(&problems[0], domain, f64::NEG_INFINITY).expect("an air coil");
+        let found = winder.enumerate(0, &Silent).expect("runs");
+        assert_eq!(found.cells, PORTIONS - 1);
+        assert_eq!(found.upper_ln, Some(f64::INFINITY));
     }
 }

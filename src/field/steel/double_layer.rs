@@ -19,8 +19,6 @@ pub const MAX_MODES: usize = 64;
 const PIECE_ORDER: usize = 12;
 /// Longest piece over which the ring kernel is a logarithm times a smooth function, in radii.
 const LOG_PIECE: f64 = 1.0;
-/// Depth of halving at which a piece is taken as it is: 2^-60 of a panel.
-const MAX_HALVINGS: usize = 60;
 
 /// The kernel of mode m < `out.len()`, the source ring's radius included:
 /// (r'/4 pi) int cos(m psi) n'.(x - y)/|x - y|^3 dpsi, 1/m.
@@ -152,21 +150,16 @@ impl Aspect {
     fn pieces(&self, tolerance: f64, visit: &mut impl FnMut(f64, f64)) {
         let radius = tolerance.powf(-0.5 / PIECE_ORDER as f64).max(1.5);
         if self.lo < 0.0 && self.hi > 0.0 {
-            self.piece(self.lo, 0.0, radius, MAX_HALVINGS, visit);
-            self.piece(0.0, self.hi, radius, MAX_HALVINGS, visit);
+            self.piece(self.lo, 0.0, radius, visit);
+            self.piece(0.0, self.hi, radius, visit);
         } else {
-            self.piece(self.lo, self.hi, radius, MAX_HALVINGS, visit);
+            self.piece(self.lo, self.hi, radius, visit);
         }
     }
 
-    fn piece(
-        &self,
-        lo: f64,
-        hi: f64,
-        radius: f64,
-        halvings: usize,
-        visit: &mut impl FnMut(f64, f64),
-    ) {
+    /// Halves until the kernel is smooth, which it is on a piece shorter than its distance from
+    /// the target: on the target's own line a piece that reaches it is a logarithm before that.
+    fn piece(&self, lo: f64, hi: f64, radius: f64, visit: &mut impl FnMut(f64, f64)) {
         let length = hi - lo;
         if self.gap == 0.0 && (lo == 0.0 || hi == 0.0) && length <= self.log_piece {
             for [t, weight] in LOG_RULE {
@@ -175,8 +168,7 @@ impl Aspect {
             }
             return;
         }
-        let smooth = gauss::bernstein_radius(lo, hi, 0.0, self.gap) >= radius;
-        if smooth || halvings == 0 {
+        if gauss::bernstein_radius(lo, hi, 0.0, self.gap) >= radius {
             let rule = gauss::rule(PIECE_ORDER);
             let (half, middle) = (0.5 * length, 0.5 * (lo + hi));
             for (x, weight) in rule.nodes.iter().zip(&rule.weights) {
@@ -185,7 +177,7 @@ impl Aspect {
             return;
         }
         let middle = 0.5 * (lo + hi);
-        self.piece(lo, middle, radius, halvings - 1, visit);
-        self.piece(middle, hi, radius, halvings - 1, visit);
+        self.piece(lo, middle, radius, visit);
+        self.piece(middle, hi, radius, visit);
     }
 }

@@ -258,3 +258,37 @@ fn graded(lo: f64, hi: f64, lo_tip: f64, hi_tip: f64, ratio: f64) -> Vec<f64> {
     points.push(hi);
     points
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn panels_shrink_towards_the_ends_with_tips_at_any_size() {
+        for (lo_tip, hi_tip) in [(1.3, 0.01), (0.03, 0.7), (0.02, 0.004), (0.6, 2.0)] {
+            let (lo, hi, ratio) = (0.25, 1.5, 0.2);
+            let base = graded(lo, hi, lo_tip, hi_tip, ratio);
+            for unit in [2.0_f64.powi(-20), 1.0, 2.0_f64.powi(20)] {
+                let points = graded(unit * lo, unit * hi, unit * lo_tip, unit * hi_tip, ratio);
+                let scaled: Vec<f64> = base.iter().map(|p| p * unit).collect();
+                assert_eq!(points, scaled);
+            }
+            let lengths: Vec<f64> = base.windows(2).map(|p| p[1] - p[0]).collect();
+            assert!(base[0] == lo && base[base.len() - 1] == hi);
+            assert!(lengths.iter().all(|length| *length > 0.0));
+            // An end whose tip is half the interval or more is left as it is.
+            let ends = [(lo_tip, lengths[0]), (hi_tip, lengths[lengths.len() - 1])];
+            let longest = lengths.iter().fold(0.0_f64, |m, length| m.max(*length));
+            for (tip, length) in ends {
+                if tip < 0.625 {
+                    assert!(
+                        length <= tip && length > 0.9 * ratio * tip,
+                        "{tip} {length}"
+                    );
+                } else {
+                    assert_eq!(length, longest);
+                }
+            }
+        }
+    }
+}

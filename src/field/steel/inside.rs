@@ -612,9 +612,6 @@ fn scan(curve: &Generatrix, field: &Field, nearest_m: f64) -> Peak {
     let between = TAU / around.len() as f64;
     let mut angle = nearest as f64 * between;
     let (mut step, mut turn) = (2.0 / samples as f64, between);
-    if columns == 1 {
-        turn = 0.0;
-    }
     while step > 1e-5 {
         let moves = [(step, 0.0), (-step, 0.0), (0.0, turn), (0.0, -turn)];
         let next = moves

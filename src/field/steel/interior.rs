@@ -245,18 +245,18 @@ impl Interior {
         &self.boundary
     }
 
+    /// Radius of the core, m.
+    #[must_use]
+    pub fn radius_m(&self) -> f64 {
+        self.r_breaks_m[self.r_breaks_m.len() - 1]
+    }
+
     /// Volume of the core, m^3.
     #[must_use]
     pub fn volume_m3(&self) -> f64 {
-        let radius_m = self.r_breaks_m[self.r_breaks_m.len() - 1];
+        let radius_m = self.radius_m();
         let height_m = self.z_breaks_m[self.z_breaks_m.len() - 1] - self.z_breaks_m[0];
         std::f64::consts::PI * radius_m * radius_m * height_m
-    }
-
-    /// Breakpoints in r and in z, m.
-    #[must_use]
-    pub fn breaks_m(&self) -> (&[f64], &[f64]) {
-        (&self.r_breaks_m, &self.z_breaks_m)
     }
 
     /// Map from boundary values to boundary flux when mu = 1, m.

@@ -402,3 +402,49 @@ impl Checks {
             .fold(0.0, f64::max)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_of_the_error_s_search_fill_the_region() {
+        let region = Region {
+            x_m: [-0.07, 0.013],
+            y_m: [0.02, 0.05],
+            z_m: [0.03, 0.09],
+        };
+        let positions_m = [[0.0, 0.0], [0.05, 0.03]];
+        let places = spread(&Pulled {
+            shape: CoreShape {
+                radius_m: 0.012,
+                bottom_m: -0.1,
+                top_m: 0.002,
+            },
+            relative_permeability: 1000.0,
+            positions_m: &positions_m,
+            coupled: true,
+            moment_a_m2: [0.0, 0.0, -0.9],
+            size: None,
+            region,
+        });
+        // Over each axis, or as near as the region gets, and within.
+        assert_eq!(places[..2], [[0.0, 0.02, 0.03], [0.013, 0.03, 0.03]]);
+        assert_eq!(places.len(), 2 + 2 * CHECKS);
+        for (i, [from, to]) in [region.x_m, region.y_m, region.z_m].into_iter().enumerate() {
+            let mut along: Vec<f64> = places[2..].iter().map(|at| at[i]).collect();
+            along.sort_by(f64::total_cmp);
+            assert!(along[0] >= from && along[along.len() - 1] <= to);
+            // No gap of much more than a quarter, heights by their logarithm above the steel.
+            let part = |v: f64| match i {
+                2 => ((v - 0.002) / 0.028).ln() / (0.088_f64 / 0.028).ln(),
+                _ => (v - from) / (to - from),
+            };
+            let ends = [&[from], along.as_slice(), &[to]].concat();
+            assert!(
+                ends.windows(2).all(|v| part(v[1]) - part(v[0]) < 0.26),
+                "{i}"
+            );
+        }
+    }
+}

@@ -344,3 +344,30 @@ pub fn mean<'a>(outline: &Generatrix, values: impl Iterator<Item = &'a f64>) -> 
     }
     sum / total
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::steel::CoreShape;
+    use crate::field::steel::generatrix::Resolution;
+
+    /// Of a constant, of heights, and of radii: 2 pi a (a^2 (2/3) + a h) / 2 pi a (a + h).
+    #[test]
+    fn means_over_a_cylinder_s_surface() {
+        let (a, h) = (0.7, 1.9);
+        let shape = CoreShape {
+            radius_m: a,
+            bottom_m: 0.3,
+            top_m: 0.3 + h,
+        };
+        let outline = Generatrix::new(shape, &[], &Resolution::for_tolerance(1e-3));
+        let of = |value: &dyn Fn(&crate::field::steel::generatrix::Node) -> f64| {
+            let values: Vec<f64> = outline.nodes.iter().map(value).collect();
+            mean(&outline, values.iter())
+        };
+        assert!((of(&|_| 1.3) - 1.3).abs() < 1e-14);
+        assert!((of(&|node| node.z_m) - (0.3 + 0.5 * h)).abs() < 1e-14);
+        let radii = (2.0 / 3.0 * a * a + a * h) / (a + h);
+        assert!((of(&|node| node.r_m) - radii).abs() < 1e-14);
+    }
+}

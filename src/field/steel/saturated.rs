@@ -225,11 +225,10 @@ impl SaturatedCore {
             let h = sample.h_a_per_m();
             MU_0_T_M_PER_A * law.response(h).relative * h
         };
-        let (r_breaks, _) = self.interior.breaks_m();
-        let radius_m = r_breaks[r_breaks.len() - 1];
+        let skin_m = SKIN_M.min(0.1 * self.interior.radius_m());
         let mut peak = (0.0, (0.0, 0.0));
         self.interior
-            .sample_inside(&solution.u_a, SKIN_M.min(0.1 * radius_m), |sample| {
+            .sample_inside(&solution.u_a, skin_m, |sample| {
                 let b = b_t(sample);
                 if b > peak.0 {
                     peak = (b, (sample.r_m, sample.z_m));

@@ -398,6 +398,11 @@ impl SaturatedArray {
     }
 }
 
+/// Largest difference of a potential from its mean: its constant is no field.
+fn variation(potential: &DVector<f64>) -> f64 {
+    potential.add_scalar(-potential.mean()).amax()
+}
+
 /// The fixed point of one array.
 struct Problem<'a> {
     setup: &'a Setup,
@@ -445,12 +450,8 @@ impl Problem<'_> {
                 .collect();
             let axial: Vec<DVector<f64>> = modes.iter().map(|m| m.column(0).into_owned()).collect();
             let image = DMatrix::from_columns(&axial);
-            // A potential's constant is no field.
             let change = (0..cores)
-                .map(|core| {
-                    let change = image.column(core) - state.sent_a.column(core);
-                    change.add_scalar(-change.mean()).amax()
-                })
+                .map(|core| variation(&(image.column(core) - state.sent_a.column(core))))
                 .fold(0.0, f64::max);
             let relative = if scale > 0.0 { change / scale } else { change };
             steps.push(relative);
@@ -569,4 +570,18 @@ fn farthest(a: &[f64], b: &[f64]) -> f64 {
     a.iter()
         .zip(b)
         .fold(0.0, |m, (a, b)| f64::max(m, (a - b).abs()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_constant_is_no_variation() {
+        for constant in [-1.3, 0.0, 7.0] {
+            let values = [0.7, -0.2, -0.5].map(|v| v + constant);
+            let found = variation(&DVector::from_row_slice(&values));
+            assert!((found - 0.7).abs() < 1e-14, "{constant}: {found}");
+        }
+    }
 }

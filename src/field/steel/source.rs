@@ -70,3 +70,58 @@ impl AxialSource for CoredSource {
         self.steel.top_m().max(0.0)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::steel::CoreShape;
+    use crate::field::steel::cored_coil::CoredCoil;
+
+    #[test]
+    fn it_is_the_winding_and_its_core_on_the_axis_and_off() {
+        let winding = Winding {
+            inner_radius_m: 0.012,
+            outer_radius_m: 0.019,
+            length_m: 0.05,
+            turns: 700.0,
+        };
+        let shape = CoreShape {
+            radius_m: 0.011,
+            bottom_m: -0.053,
+            top_m: 0.001,
+        };
+        let coil = CoredCoil::new(&winding, shape, 300.0, 1e-3, 0.03).expect("off the edges");
+        let source = CoredSource {
+            winding,
+            steel: ArraySources::of_core(&coil.core, 0.03, 0.029, 1e-7),
+        };
+        let (r_m, z_m) = (
+            [0.0, 1e-9, 0.002, 0.0113, 0.031],
+            [0.03, 0.034, 0.03, 0.05, 0.037],
+        );
+        let all = source.gradients(&r_m, &z_m, 1e-9, Wanted::Gradient);
+        let all = all.expect("off the edges");
+        let one = source
+            .gradients(&r_m, &z_m, 1e-9, Wanted::Gz)
+            .expect("off the edges");
+        let along = source
+            .axial_fields(&r_m, &z_m, 1e-9)
+            .expect("off the edges");
+        let top = coil.field(0.0, 0.03).expect("off the edges");
+        for i in 0..r_m.len() {
+            let exact = coil.field(r_m[i], z_m[i]).expect("off the edges");
+            let gradient = top.dbz_dz.abs();
+            for (found, wanted, size) in [
+                (all.dbz_dz[i], exact.dbz_dz, gradient),
+                (one.dbz_dz[i], exact.dbz_dz, gradient),
+                (all.br_over_r[i], exact.br_over_r, gradient),
+                (all.dbr_dz_over_r[i], exact.dbr_dz_over_r, gradient / 0.03),
+                (along[i], exact.b_z, top.b_z.abs()),
+            ] {
+                let error = (found - wanted).abs() / size;
+                assert!(error < 1e-6, "{i}: {found} {wanted} {error:e}");
+            }
+        }
+        assert_eq!(source.top_m(), 0.001);
+    }
+}
