@@ -299,7 +299,7 @@ fn search(
 /// The same winding with a bore; `None` where it has one. On the axis the force's slope vanishes:
 /// a bore may be better and not be seen from there.
 fn bored(window: &Window) -> Option<Window> {
-    (window.inner_radius_m < 1e-3 * window.depth_m).then(|| Window {
+    (window.inner_radius_m < 1e-3 * window.depth_m).then_some(Window {
         inner_radius_m: 0.05 * window.depth_m,
         depth_m: 0.95 * window.depth_m,
         ..*window
