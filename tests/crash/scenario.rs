@@ -267,7 +267,7 @@ impl Prepared {
             let whole = if timing {
                 serde_json::from_slice::<Value>(bytes).is_ok()
             } else {
-                is(&self.before) || (is(&self.after) && !put_aside)
+                is(&self.before) || is(&self.after)
             };
             if !whole {
                 return Err(format!("{path} is neither what it was nor what it becomes"));
@@ -280,6 +280,8 @@ impl Prepared {
             return Err("the user's own file is gone".to_owned());
         }
         found.bundles = bundles(&now).len();
+        let gone = |manifest: &&String| !now.contains_key(*manifest);
+        found.absent = bundles(&self.before).iter().filter(gone).count();
         Ok(found)
     }
 
@@ -354,9 +356,10 @@ impl Prepared {
         Ok(found)
     }
 
-    /// What lies there is in order; nothing is run again.
+    /// What lies there is in order, no bundle is gone; nothing is run again.
     pub fn survived_as_it_is(&self, place: &Place) -> Result<Found, String> {
         let found = self.whole_or_absent(place)?;
+        found.no_bundle_is_absent()?;
         self.verified(place)?;
         Ok(found)
     }
@@ -370,6 +373,18 @@ pub struct Found {
     pub put_aside: usize,
     pub empty_folders: usize,
     pub bundles: usize,
+    /// Bundles that were there and are not now.
+    pub absent: usize,
+}
+
+impl Found {
+    /// Where two folders can change places, a bundle's name is never without one.
+    pub fn no_bundle_is_absent(&self) -> Result<(), String> {
+        if cfg!(target_os = "linux") && self.absent > 0 {
+            return Err(format!("a bundle that was there is not: {self:?}"));
+        }
+        Ok(())
+    }
 }
 
 impl std::ops::AddAssign for Found {
@@ -379,6 +394,7 @@ impl std::ops::AddAssign for Found {
         self.put_aside += other.put_aside;
         self.empty_folders += other.empty_folders;
         self.bundles += other.bundles;
+        self.absent += other.absent;
     }
 }
 

@@ -9,6 +9,7 @@
 //!
 //! The digest of a file is computed while it is written: no second pass.
 
+mod exchange;
 mod file;
 mod folder;
 mod leftovers;
