@@ -27,8 +27,10 @@ use super::exchange::exchange;
 use super::file::{fill, lock_folder, sync_folder};
 use super::leftovers::{clean_leftovers, is_temporary, temporary_folder};
 use super::made::{MadeFolders, made_in};
+use super::overwrite::RECORD_MAX_BYTES;
 use super::{Overwrite, WriteError};
 use crate::bundle::artefact::FileEntry;
+use crate::bundle::plain::read_plain;
 
 /// The file whose presence makes a folder a bundle.
 const MANIFEST: &str = "manifest.json";
@@ -298,9 +300,10 @@ fn absorb_folder(
     Ok(())
 }
 
-/// The files that a manifest or sidecar lists; none where it is not there or tells of none.
+/// The files that a manifest or sidecar lists; none where it is not there, no plain file, too large
+/// for one, or tells of none.
 pub(crate) fn listed_files(manifest: &Path) -> BTreeSet<PathBuf> {
-    let value: Value = fs::read(manifest)
+    let value: Value = read_plain(manifest, RECORD_MAX_BYTES)
         .ok()
         .and_then(|text| serde_json::from_slice(&text).ok())
         .unwrap_or_default();
