@@ -7,22 +7,35 @@ function bundle = load_bundle(folder)
 %   total = force * bundle.currents_a;                  % N
 %   total = total + bundle.passive_force([0.01, 0, 0.05]);   % N, the unpowered steel's pull
 %   h = bundle.height([0.01, 0]);                       % m, NaN where there is no surface
+%   [current, force, answer] = bundle.currents([0.01, 0, 0.05]);   % with position feedback (eq. 8)
 %
 % Fields: manifest and lambda (manifest.json, lambda.json), points (the columns of points.csv by
 % name), currents_a (one row a coil), lambda_n_per_m (empty if none), map: the arrays of map.npz,
 % gz_t_per_m_per_a as [coil, z, y, x]. Coils are numbered from 0 as everywhere, so coil k is row
 % or column k + 1. Points are rows of x, y, z in m. What lies outside the map has no force.
+% Currents are those of least power whose force is lambda times the height, or the nearest force:
+% A, one row a point, one column a coil; the force they give, N; 'ok', 'saturated' or 'outside'.
 %
-% Sizes are checked, and SHA-256 digests where there is a way to compute them (Octave, or MATLAB
+% Bundles are not trusted: what is wrong with one ends in an error 'fluxform:bundle'. Sizes are checked, and SHA-256 digests where there is a way to compute them (Octave, or MATLAB
 % with Java). JSON may lose the last digit of a number; map.npz and the tables do not.
 
+    try
+        bundle = loaded(folder);
+    catch problem
+        if strcmp(problem.identifier, 'fluxform:bundle')
+            rethrow(problem);
+        end
+        error('fluxform:bundle', '%s: a part is missing or of the wrong kind: %s', folder, problem.message);
+    end
+end
+
+function bundle = loaded(folder)
     bundle.manifest = read_manifest(folder);
-    known = bundle.manifest.files;
-    bundle.lambda = jsondecode(listed(folder, known, 'lambda.json'));
-    bundle.points = columns_of(listed(folder, known, 'points.csv'), 'points.csv');
-    currents = columns_of(listed(folder, known, 'currents.csv'), 'currents.csv');
+    files = read_files(folder, bundle.manifest.files);
+    bundle.lambda = decoded(files.lambda_json, 'lambda.json');
+    bundle.points = columns_of(files.points_csv, 'points.csv');
+    currents = columns_of(files.currents_csv, 'currents.csv');
     bundle.currents_a = currents.current_a;
-    listed(folder, known, 'map.npz');
     map = read_npz(fullfile(folder, 'map.npz'));
     check(map, bundle);
     bundle.map = map;
@@ -33,6 +46,7 @@ function bundle = load_bundle(folder)
     bundle.force_per_ampere = @(points_m) force_per_ampere(map, points_m);
     bundle.passive_force = @(points_m) passive_force(map, points_m);
     bundle.height = @(points_m) height(map, points_m);
+    bundle.currents = @(points_m) feedback(map, points_m);
 end
 
 function force = force_per_ampere(map, points_m)
@@ -128,12 +142,208 @@ function [cell, share] = between(nodes, position)
     end
 end
 
+function [currents, force, answers] = feedback(map, points_m)
+% Currents of least power at every position, A, their force, N, and how well it is met.
+    if ~isfield(map, 'lambda_n_per_m')
+        error('fluxform:bundle', 'the bundle has no force constant: nothing can be rendered');
+    end
+    total = Inf;
+    if isfield(map, 'total_current_max_a')
+        total = map.total_current_max_a;
+    end
+    per_ampere = force_per_ampere(map, points_m);
+    passive = passive_force(map, points_m);
+    wanted = map.lambda_n_per_m * height(map, points_m);
+    wanted(isnan(wanted)) = 0;
+    count = size(points_m, 1);
+    currents = zeros(count, numel(map.current_max_a));
+    force = zeros(count, 1);
+    answers = repmat({'outside'}, count, 1);
+    axes_m = {map.x_m, map.y_m, map.z_m};
+    for p = 1:count
+        if ~all(arrayfun(@(k) axes_m{k}(1) <= points_m(p, k) && points_m(p, k) <= axes_m{k}(end), 1:3))
+            continue
+        end
+        [currents(p, :), met] = allocate(per_ampere(p, :), wanted(p) - passive(p), map.resistance_ohm, ...
+                                         map.current_min_a, map.current_max_a, total);
+        force(p) = per_ampere(p, :) * currents(p, :).' + passive(p);
+        words = {'saturated', 'ok'};
+        answers{p} = words{1 + met};
+    end
+end
+
+% Currents of least power: I_i = clip((mu (g_i - center) + nu) / R_i). The algorithm is told in
+% src/lambda/allocate.rs; here it is written for clearness, not for speed.
+
+function [best, met] = allocate(per_ampere, wanted, r, lower, upper, total)
+% The currents of least power that give `wanted` N, or the nearest force, and whether they do.
+    rounding = 1e-14;
+    tied = 1e-13;
+    scale = max(abs(per_ampere));
+    if wanted == 0 || isnan(wanted) || scale == 0 || isinf(1 / scale)
+        best = zeros(size(r));
+        met = wanted == 0;
+        return
+    end
+    if wanted < 0
+        scale = -scale;
+    end
+    row = per_ampere / scale;
+    row(abs(row) < 1e-60) = 0;
+    target = wanted / scale;
+    clip = @(values) min(max(values, lower), upper);
+    met = true;
+    mu = multiplier(row, target, r, lower, upper);
+    if ~isempty(mu)
+        best = clip(mu * row ./ r);
+        if sum(best) <= total
+            return
+        end
+    end
+    largest = largest_force(row, r, lower, upper, total, tied);
+    best = largest;
+    most = sum(row .* largest);
+    if target >= most * (1 - rounding)
+        met = target <= most * (1 + rounding);
+        return
+    end
+    low = 0;
+    high = Inf;
+    sigma = 0;
+    least = Inf;
+    use = find(row);
+    for step = 0:119
+        % The piece of mu on which the force is met for this sigma.
+        breaks = sort([(lower(use) .* r(use) + sigma) ./ row(use), (upper(use) .* r(use) + sigma) ./ row(use)]);
+        forces = arrayfun(@(at) sum(row .* clip((at * row - sigma) ./ r)), breaks);
+        above = [find(forces >= target, 1), numel(breaks) + 1];
+        to = breaks(min(above(1), numel(breaks)));
+        since = breaks(max(min(above(1), numel(breaks) + 1) - 1, 1));
+        ends = [since; to] * row - sigma;
+        slack = 4 * eps * (sigma + max(abs(ends), [], 1));
+        moves = lower < upper & min(ends, [], 1) >= lower .* r - slack & max(ends, [], 1) <= upper .* r + slack;
+        slope = sum(row(moves) .^ 2 ./ r(moves));
+        mu = to;
+        if slope > 0
+            mu = min(max(to - (sum(row .* clip((to * row - sigma) ./ r)) - target) / slope, since), to);
+        end
+        % Both rows met if those coils are the ones that move.
+        center = 0;
+        nu = -sigma;
+        jump = mu;
+        if any(moves)
+            rest = clip((0.5 * (since + to) * row - sigma) ./ r);
+            rest = rest(~moves);
+            weight = sum(1 ./ r(moves));
+            center = sum(row(moves) ./ r(moves)) / weight;
+            force = target - sum(row(~moves) .* rest);
+            share = total - sum(rest);
+            offset = sum((row(moves) - center) ./ r(moves)) / weight;
+            spread = sum((row(moves) - center - offset) .^ 2 ./ r(moves));
+            jump = 0;
+            if spread > tied ^ 2 * weight
+                jump = (force - (center + offset) * share) / spread;
+            end
+            nu = share / weight - jump * offset;
+        end
+        currents = clip((jump * (row - center) + nu) ./ r);
+        fault = abs(sum(row .* currents) - target) / (sum(abs(row .* currents)) + target);
+        size_a = sum(abs(currents)) + total;
+        if size_a > 0
+            fault = max(fault, abs(sum(currents) - total) / size_a);
+        end
+        next = jump * center - nu;
+        if fault < least && next >= 0
+            least = fault;
+            best = currents;
+        end
+        if least <= rounding
+            break
+        end
+        excess = sum(clip((mu * row - sigma) ./ r)) - total;
+        if excess > 0
+            low = sigma;
+        else
+            high = sigma;
+        end
+        if low < next && next < high && mod(step, 3) ~= 2
+            sigma = next;
+        elseif isinf(high)
+            sigma = max(4 * low, excess / sum(1 ./ r));
+        elseif 0 < low && high > 4 * low
+            sigma = sqrt(low * high);
+        else
+            sigma = 0.5 * (low + high);
+        end
+        if ~(low < sigma && sigma < high)
+            break
+        end
+    end
+    if least > 1 - target / most
+        best = largest;
+    end
+end
+
+function mu = multiplier(row, target, r, lower, upper)
+% Where sum(row .* clip(mu * row ./ r)) is target > 0; empty where it cannot be.
+    mu = [];
+    use = find(row);
+    bound = lower(use);
+    up = row(use) > 0;
+    bound(up) = upper(use(up));
+    [leaves, order] = sort(bound .* r(use) ./ row(use));
+    use = use(order);
+    tail = fliplr(cumsum(fliplr(row(use) .^ 2 ./ r(use))));
+    held = [0, cumsum(row(use) .* bound(order))];
+    at = find(held(1:end - 1) + leaves .* tail >= target, 1);
+    if ~isempty(at)
+        mu = (target - held(at)) / tail(at);
+    elseif ~isempty(use) && held(end) >= target
+        mu = leaves(end);
+    end
+end
+
+function currents = largest_force(row, r, lower, upper, total, tied)
+% The currents of the largest force, those of least power among them.
+    currents = lower;
+    left = total - sum(lower);
+    [~, order] = sort(-row);
+    start = 1;
+    while start <= numel(row) && row(order(start)) >= -tied
+        gain = row(order(start));
+        rest = order(start:end);
+        group = rest(row(rest) >= gain - tied);
+        before = sum(upper(order(1:start - 1)));
+        if sum(upper(group) - lower(group)) <= left && gain > tied
+            currents(group) = upper(group);
+            start = start + numel(group);
+            left = total - sum(lower(order(start:end))) - before - sum(upper(group));
+            continue
+        end
+        share = total - before - sum(lower(order(start + numel(group):end)));
+        if gain <= tied
+            share = min(share, 0);
+        end
+        ones_of = zeros(size(row));
+        ones_of(group) = 1 - 2 * (share < 0);
+        mu = 0;
+        if share ~= 0
+            mu = multiplier(ones_of, abs(share), r, lower, upper);
+            if isempty(mu)
+                mu = 1e300;
+            end
+        end
+        currents(group) = min(max(mu * ones_of(group) ./ r(group), lower(group)), upper(group));
+        return
+    end
+end
+
 function manifest = read_manifest(folder)
     path = fullfile(folder, 'manifest.json');
     if ~exist(path, 'file')
         error('fluxform:bundle', '%s is not a bundle: it has no manifest.json', folder);
     end
-    manifest = jsondecode(text_of(path));
+    manifest = decoded(text_of(path, 2 ^ 26), path);
     if ~strncmp(manifest.schema_version, '1.', 2)
         error('fluxform:bundle', '%s: schema_version %s, this loader reads 1.x', path, ...
               manifest.schema_version);
@@ -150,30 +360,81 @@ function manifest = read_manifest(folder)
     end
 end
 
-function text = listed(folder, known, name)
-% The bytes of a file that the manifest lists, after checking size and digest.
-    path = fullfile(folder, name);
-    at = find(strcmp({known.path}, name));
-    if numel(at) ~= 1
-        error('fluxform:bundle', 'manifest.json must list %s once', name);
+function files = read_files(folder, known)
+% The bytes of the files that are needed, after checking place, size and digest of every listed one.
+    names = {known.path};
+    if numel(unique(names)) < numel(names)
+        error('fluxform:bundle', 'manifest.json lists a file twice');
     end
-    text = text_of(path);
-    if numel(text) ~= known(at).bytes
-        error('fluxform:bundle', '%s was changed or damaged: its size differs', path);
+    files = struct();
+    for k = 1:numel(known)
+        name = known(k).path;
+        parts = strsplit(name, '/', 'CollapseDelimiters', false);
+        if any(ismember(parts, {'', '.', '..'})) || any(name == '\') || any(name < ' ')
+            error('fluxform:bundle', 'manifest.json lists %s, which leads out of the bundle', name);
+        end
+        path = folder;
+        for part = 1:numel(parts)
+            path = fullfile(path, parts{part});
+            if is_link(path)
+                error('fluxform:bundle', 'manifest.json lists %s, which is a link', name);
+            end
+        end
+        text = text_of(path, known(k).bytes);
+        if numel(text) ~= known(k).bytes
+            error('fluxform:bundle', '%s was changed or damaged: its size differs', path);
+        end
+        digest = sha256(text);
+        if ~isempty(digest) && ~strcmp(digest, known(k).sha256)
+            error('fluxform:bundle', '%s was changed or damaged: its SHA-256 differs', path);
+        end
+        if any(strcmp(name, {'map.npz', 'points.csv', 'currents.csv', 'lambda.json'}))
+            files.(strrep(name, '.', '_')) = text;
+        end
     end
-    digest = sha256(text);
-    if ~isempty(digest) && ~strcmpi(digest, known(at).sha256)
-        error('fluxform:bundle', '%s was changed or damaged: its SHA-256 differs', path);
+    if numel(fieldnames(files)) < 4
+        error('fluxform:bundle', 'manifest.json must list map.npz, points.csv, currents.csv and lambda.json');
     end
 end
 
-function text = text_of(path)
+function text = text_of(path, most_bytes)
+% The bytes of a plain file; opening a pipe would wait for its other end.
+    found = dir(path);
+    plain = numel(found) == 1 && ~found.isdir;
+    if plain && exist('OCTAVE_VERSION', 'builtin')
+        [status, failed] = stat(path);
+        plain = failed == 0 && S_ISREG(status.mode);
+    end
+    if ~plain
+        error('fluxform:bundle', '%s is missing or not a plain file', path);
+    end
+    if found.bytes > most_bytes
+        error('fluxform:bundle', '%s was changed or damaged: its size differs', path);
+    end
     file = fopen(path, 'r');
     if file < 0
         error('fluxform:bundle', 'cannot read %s', path);
     end
     text = fread(file, [1, Inf], 'uint8=>char');
     fclose(file);
+end
+
+function yes = is_link(path)
+% Octave tells; MATLAB has no way to ask that all its versions know.
+    yes = false;
+    if exist('OCTAVE_VERSION', 'builtin')
+        [status, failed] = lstat(path);
+        yes = failed == 0 && S_ISLNK(status.mode);
+    end
+end
+
+function value = decoded(text, name)
+% JSON that nests no deeper than ours: the reader would run out of its stack.
+    depth = cumsum((text == '[') + (text == '{') - (text == ']') - (text == '}'));
+    if any(depth > 64)
+        error('fluxform:bundle', '%s nests too deep', name);
+    end
+    value = jsondecode(text);
 end
 
 function digest = sha256(text)
@@ -195,6 +456,9 @@ function columns = columns_of(text, name)
     if mod(numel(numbers), numel(names)) ~= 0 || numel(numbers) ~= numel(names) * (numel(lines) - 1)
         error('fluxform:bundle', '%s is not a table of numbers', name);
     end
+    if ~all(isfinite(numbers))
+        error('fluxform:bundle', '%s holds a number that is not finite', name);
+    end
     numbers = reshape(numbers, numel(names), []).';
     for k = 1:numel(names)
         columns.(names{k}) = numbers(:, k);
@@ -202,9 +466,15 @@ function columns = columns_of(text, name)
 end
 
 function map = read_npz(path)
-% The arrays of an uncompressed zip of .npy files, by name.
+% The arrays that are needed of an uncompressed zip of .npy files, by name.
+    names = {'x_m', 'y_m', 'z_m', 'coil', 'gz_t_per_m_per_a', 'moment_a_m2', 'current_min_a', ...
+             'current_max_a', 'resistance_ohm', 'gradient_t_per_m_per_a', 'field_t_per_a', 'passive_force_n', ...
+             'working_point_gz_t_per_m', 'total_current_max_a', 'lambda_n_per_m', 'height_x_m', 'height_y_m', ...
+             'height_m', 'has_height', 'static_current_a', 'inductance_h', 'voltage_v', 'schema_version'};
     file = fopen(path, 'r', 'ieee-le');
     closing = onCleanup(@() fclose(file));
+    fseek(file, 0, 'eof');
+    length_bytes = ftell(file);
     fseek(file, -22, 'eof');                      % the end record, which has no comment
     if fread(file, 1, 'uint32') ~= hex2dec('06054b50')
         error('fluxform:bundle', '%s is not a zip file without a comment', path);
@@ -213,21 +483,34 @@ function map = read_npz(path)
     count = fread(file, 1, 'uint16');
     fseek(file, 4, 'cof');
     entry = fread(file, 1, 'uint32');             % where the first entry of the directory stands
+    map = struct();
     for k = 1:count
         fseek(file, entry, 'bof');
         head = fread(file, 46, 'uint8=>double');
         number = @(at, bytes) sum(head(at + (1:bytes)).' .* 256 .^ (0:bytes - 1));
         lengths = [number(28, 2), number(30, 2), number(32, 2)];
         name = fread(file, [1, lengths(1)], 'uint8=>char');
-        if number(10, 2) ~= 0
+        entry = entry + 46 + sum(lengths);
+        key = regexprep(name, '\.npy$', '');
+        if ~any(strcmp(key, names)) || strcmp(key, name)
+            continue
+        end
+        if number(10, 2) ~= 0 || number(24, 4) > length_bytes
             error('fluxform:bundle', '%s: %s is not stored as it is', path, name);
+        end
+        if isfield(map, key)
+            error('fluxform:bundle', '%s: %s stands there twice', path, name);
         end
         local = number(42, 4);
         fseek(file, local + 26, 'bof');
         skip = fread(file, 2, 'uint16');
         fseek(file, local + 30 + sum(skip), 'bof');
-        map.(strrep(name, '.npy', '')) = read_npy(file, number(24, 4), name);
-        entry = entry + 46 + sum(lengths);
+        map.(key) = read_npy(file, number(24, 4), name);
+    end
+    missing = names(1:9);
+    missing = missing(~isfield(map, missing));
+    if ~isempty(missing)
+        error('fluxform:bundle', '%s: array %s is missing', path, missing{1});
     end
 end
 
@@ -271,24 +554,46 @@ function check(map, bundle)
         error('fluxform:bundle', 'map.npz: coil must hold increasing indices of coils');
     end
     names = {'x_m', 'y_m', 'z_m'};
-    for k = 1:3
-        if any(diff(map.(names{k})) <= 0) || isempty(map.(names{k}))
+    surface = [0, 0];
+    if isfield(map, 'height_m')
+        names = [names, {'height_x_m', 'height_y_m'}];
+        surface = [numel(map.height_y_m), numel(map.height_x_m)];
+    end
+    for k = 1:numel(names)
+        nodes = map.(names{k});
+        if isempty(nodes) || size(nodes, 1) > 1 || any(diff(nodes) < 1e-15) || any(abs(nodes) > 1e6)
             error('fluxform:bundle', 'map.npz: %s must increase from node to node', names{k});
         end
     end
     grid = [numel(map.z_m), numel(map.y_m), numel(map.x_m)];
     wanted = {'gz_t_per_m_per_a', [numel(map.coil), grid]; ...
               'gradient_t_per_m_per_a', [numel(map.coil), grid, 3, 3]; ...
-              'passive_force_n', grid; 'moment_a_m2', [1, 3]};
+              'passive_force_n', grid; 'moment_a_m2', [1, 3]; 'current_max_a', [1, coils]; ...
+              'current_min_a', [1, coils]; 'resistance_ohm', [1, coils]; 'lambda_n_per_m', [1, 1]; ...
+              'total_current_max_a', [1, 1]; 'height_m', surface; 'has_height', surface; ...
+              'static_current_a', [1, coils]; 'inductance_h', [coils, coils]};
     for k = 1:size(wanted, 1)
         if isfield(map, wanted{k, 1})
-            shape = arrayfun(@(d) size(map.(wanted{k, 1}), d), 1:numel(wanted{k, 2}));
-            if ~isequal(shape, wanted{k, 2})
+            found = map.(wanted{k, 1});
+            shape = arrayfun(@(d) size(found, d), 1:numel(wanted{k, 2}));
+            if ~isequal(shape, wanted{k, 2}) || numel(found) ~= prod(shape)
                 error('fluxform:bundle', 'map.npz: %s has the wrong shape', wanted{k, 1});
             end
         end
     end
     if any(map.moment_a_m2(1:2)) && ~isfield(map, 'gradient_t_per_m_per_a')
         error('fluxform:bundle', 'a tilted magnet needs gradient_t_per_m_per_a in map.npz');
+    end
+    if isfield(map, 'height_m')
+        if ~isfield(map, 'has_height') || ~all(map.has_height(:) == 0 | map.has_height(:) == 1)
+            error('fluxform:bundle', 'map.npz: has_height must hold 0 or 1');
+        end
+        if ~all(map.resistance_ohm >= 1e-30)
+            error('fluxform:bundle', 'map.npz: resistance_ohm must be above 0');
+        end
+        if any(map.current_min_a > 0) || any(map.current_max_a < 0) || ...
+           (isfield(map, 'total_current_max_a') && map.total_current_max_a < 0)
+            error('fluxform:bundle', 'map.npz: current_max_a: limits must enclose 0');
+        end
     end
 end

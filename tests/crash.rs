@@ -73,10 +73,26 @@ fn a_kill_at_a_random_moment_leaves_whole_files() {
 #[test]
 fn a_kill_before_any_call_leaves_whole_files() {
     match Strike::new() {
-        Ok(strike) => with(&EVERY, 2, |prepared, dice| {
-            let every = strike.calls(prepared)?.div_ceil(4);
-            strike.at_every(prepared, How::Kill, every, dice)
-        }),
+        Ok(strike) => {
+            with(&EVERY, 2, |prepared, dice| {
+                let every = strike.calls(prepared, How::Kill)?.div_ceil(4);
+                strike.at_every(prepared, How::Kill, every, dice)
+            });
+        }
+        Err(reason) => eprintln!("skipped: {reason}"),
+    }
+}
+
+#[test]
+fn a_kill_while_bundles_are_exchanged_leaves_one_of_them() {
+    match Strike::new() {
+        Ok(strike) => {
+            for how in [How::Renames, How::Plain] {
+                with(&EVERY[1..2], 10, |prepared, dice| {
+                    strike.at_every(prepared, how, 1, dice)
+                });
+            }
+        }
         Err(reason) => eprintln!("skipped: {reason}"),
     }
 }
@@ -87,7 +103,7 @@ fn a_disk_or_folder_that_gives_out_is_told_and_leaves_whole_files() {
         Ok(strike) => {
             for how in [How::Full, How::Denied, How::Broken] {
                 with(&EVERY, 3, |prepared, dice| {
-                    let every = strike.calls(prepared)?.div_ceil(2);
+                    let every = strike.calls(prepared, How::Kill)?.div_ceil(2);
                     strike.at_every(prepared, how, every, dice)
                 });
             }

@@ -1,5 +1,5 @@
 //! GNU Octave reads a bundle: with its own functions, and with `scripts/load_bundle.m`, whose
-//! forces and heights are Rust's. The same file serves MATLAB, which is not tried here.
+//! forces, heights and currents are Rust's. The same file serves MATLAB, which is not tried here.
 #![allow(clippy::disallowed_methods, clippy::print_stderr)]
 
 #[allow(dead_code)] // the other tests of bundles use the rest
@@ -11,6 +11,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use fluxform::bundle::load::Bundle;
+use fluxform::bundle::replay::Answer;
 use fluxform::job::replay::renderer::Renderer;
 
 use sample::*;
@@ -69,14 +70,17 @@ const FORCES: &str = "\
 addpath(getenv('FLUXFORM_SCRIPTS'));
 bundle = load_bundle('bundle');
 points = csvread('positions.csv');
-found = [bundle.force_per_ampere(points), bundle.passive_force(points), bundle.height(points)];
+[current, force, answer] = bundle.currents(points);
+[~, code] = ismember(answer, {'ok', 'saturated', 'outside'});
+found = [bundle.force_per_ampere(points), bundle.passive_force(points), bundle.height(points), ...
+         current, force, code];
 found(isnan(found)) = 0;
 format = [repmat('%.17g ', 1, columns(found)), '\\n'];
 printf(format, found.');
 ";
 
 #[test]
-fn octave_and_rust_give_the_same_forces_and_heights() {
+fn octave_and_rust_give_the_same_forces_heights_and_currents() {
     for (name, tilted, pulled, samples) in [
         ("upright", false, false, [13, 17, 11]),
         ("tilted with pull", true, true, [13, 9, 11]),
@@ -90,7 +94,7 @@ fn octave_and_rust_give_the_same_forces_and_heights() {
         let target = folder.path().join("bundle");
         sample.write(&target, false).unwrap();
         let bundle = Bundle::open(&target).unwrap();
-        let renderer = Renderer::new(&bundle).unwrap();
+        let mut renderer = Renderer::new(&bundle).unwrap();
         let at = positions(&bundle);
         let table: String = at
             .iter()
@@ -102,8 +106,9 @@ fn octave_and_rust_give_the_same_forces_and_heights() {
         };
         let found = rows(&output);
         assert_eq!(found.len(), at.len(), "{name}");
-        let mut worst = [0.0_f64; 3];
+        let mut worst = [0.0_f64; 4];
         let mut outside = 0;
+        let mut answers = [0; 3];
         for (position, found) in at.iter().zip(&found) {
             let coils = bundle.coil_count();
             let mut want = vec![f64::NAN; coils];
@@ -111,11 +116,24 @@ fn octave_and_rust_give_the_same_forces_and_heights() {
             want.push(bundle.passive_force_n(*position).unwrap_or(0.0));
             let [x, y, _] = *position;
             want.push(renderer.heights().height_m(x, y).unwrap_or(0.0));
-            assert_eq!(found.len(), want.len(), "{name}");
-            for (part, ends) in [(0, coils), (coils, coils + 1), (coils + 1, coils + 2)]
-                .into_iter()
-                .enumerate()
-            {
+            let mut currents = vec![f64::NAN; coils];
+            let step = renderer.step(*position, &mut currents);
+            want.extend(currents);
+            assert_eq!(found.len(), want.len() + 2, "{name}");
+            let [.., force_n, code] = found[..] else {
+                panic!("{name}")
+            };
+            // A force that cancels the pull is compared with the pull.
+            let least = step.force_n.abs().max(step.passive_n.abs());
+            assert!((force_n - step.force_n).abs() <= 1e-12 * least, "{name}");
+            let answer = [Answer::Ok, Answer::Saturated, Answer::Outside]
+                .iter()
+                .position(|answer| *answer == step.answer)
+                .unwrap();
+            assert_eq!(code, (answer + 1) as f64, "{name}");
+            answers[answer] += 1;
+            let parts = [0, coils, coils + 1, coils + 2, 2 * coils + 2];
+            for (part, ends) in parts.windows(2).map(|ends| (ends[0], ends[1])).enumerate() {
                 let scale = want[ends.0..ends.1]
                     .iter()
                     .fold(0.0_f64, |m, v| m.max(v.abs()));
@@ -130,8 +148,15 @@ fn octave_and_rust_give_the_same_forces_and_heights() {
             }
         }
         assert!(outside > 5 && outside < at.len() / 2, "{outside} outside");
+        assert!(
+            samples[2] == 1 || answers.iter().all(|n| *n > 5),
+            "{answers:?}"
+        );
         let worst = worst.map(|w| format!("{w:.1e}")).join(" ");
-        eprintln!("{name}: forces, pull and heights differ by at most {worst} of the largest");
+        eprintln!(
+            "{name}: forces, pull, heights and currents differ by at most {worst} of the largest; \
+             {answers:?} positions ok, saturated, outside"
+        );
     }
 }
 

@@ -16,7 +16,8 @@ pub fn read_plain(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
         let message = format!("expected a plain file of at most {max_bytes} bytes");
         return Err(io::Error::new(io::ErrorKind::InvalidData, message));
     }
-    let mut content = Vec::with_capacity(metadata.len() as usize);
+    let mut content = Vec::new();
+    content.try_reserve_exact(metadata.len() as usize)?;
     File::open(path)?
         .take(max_bytes)
         .read_to_end(&mut content)?;

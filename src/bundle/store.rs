@@ -1,10 +1,13 @@
 //! Results of earlier runs, kept so that what has not changed is not computed again.
 //!
-//! An entry is one file: the digest of all that its value was computed from, that of the value, and
-//! the value. An entry of other origin, of another build of this program, made with other vector
-//! instructions (on another machine that shares the folder), or damaged is not used, and is overwritten. A store that cannot be read or written is none: results are the same without it.
+//! An entry is one file: the digest of all that its value was computed from and of the folder it was
+//! kept in, that of the value, and the value. An entry of other origin, of another build of this program,
+//! made with other vector instructions (on another machine that shares the folder), or damaged is not
+//! used, and is overwritten. So is one that was made in another folder: whoever passes results on may
+//! have written anything into their store and the right digest beside it. A store that cannot be read
+//! or written is none: results are the same without it.
 
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
@@ -13,7 +16,6 @@ use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 
 use super::atomic::{self, Overwrite};
-use super::plain::read_plain;
 use crate::numerics::dispatch;
 
 /// First bytes of every entry.
@@ -57,8 +59,13 @@ impl Origin {
         self
     }
 
-    fn digest(&self) -> [u8; DIGEST] {
-        self.0.clone().finalize().into()
+    /// The digest of an entry of this origin in `folder`.
+    fn digest(&self, folder: &Path) -> [u8; DIGEST] {
+        self.clone()
+            .and(&atomic::identity(folder))
+            .0
+            .finalize()
+            .into()
     }
 }
 
@@ -105,13 +112,13 @@ impl Store {
     #[must_use]
     pub fn recall<T: DeserializeOwned>(&self, name: &str, origin: &Origin) -> Option<T> {
         let folder = self.folder.as_ref()?;
-        postcard::from_bytes(&payload(&folder.join(name), &origin.digest())?).ok()
+        postcard::from_bytes(&payload(folder, name, origin)?).ok()
     }
 
     /// Keeps `value` as entry `name`. What cannot be kept is computed again next time.
     pub fn keep<T: Serialize>(&self, name: &str, origin: &Origin, value: &T) {
         if let Some(folder) = &self.folder {
-            write(&folder.join(name), &origin.digest(), value);
+            write(folder, name, origin, value);
         }
     }
 
@@ -127,21 +134,31 @@ impl Store {
     pub fn holds(&self, name: &str, origin: &Origin) -> bool {
         self.folder
             .as_ref()
-            .is_some_and(|folder| payload(&folder.join(name), &origin.digest()).is_some())
+            .is_some_and(|folder| payload(folder, name, origin).is_some())
     }
 }
 
-fn payload(path: &Path, origin: &[u8; DIGEST]) -> Option<Vec<u8>> {
-    let mut bytes = read_plain(path, ENTRY_MAX_BYTES).ok()?;
-    let start = MAGIC.len() + 2 * DIGEST;
-    let head = bytes.get(..start)?;
-    let (magic, digests) = head.split_at(MAGIC.len());
-    let (of_origin, of_value) = digests.split_at(DIGEST);
-    if magic != MAGIC || of_origin != origin || of_value != &Sha256::digest(&bytes[start..])[..] {
+fn payload(folder: &Path, name: &str, origin: &Origin) -> Option<Vec<u8>> {
+    let path = folder.join(name);
+    let is_plain = |metadata: &Metadata| metadata.is_file() && metadata.len() <= ENTRY_MAX_BYTES;
+    if !path.metadata().is_ok_and(|metadata| is_plain(&metadata)) {
         return None;
     }
-    bytes.drain(..start);
-    Some(bytes)
+    let mut file = File::open(&path).ok()?;
+    // What is large and none of ours is not read to its end.
+    let mut head = [0; MAGIC.len() + 2 * DIGEST];
+    file.read_exact(&mut head).ok()?;
+    let (magic, digests) = head.split_at(MAGIC.len());
+    let (of_origin, of_value) = digests.split_at(DIGEST);
+    if magic != MAGIC || of_origin != origin.digest(folder) {
+        return None;
+    }
+    let mut bytes = Vec::new();
+    bytes
+        .try_reserve_exact(file.metadata().ok()?.len() as usize)
+        .ok()?;
+    file.take(ENTRY_MAX_BYTES).read_to_end(&mut bytes).ok()?;
+    (of_value == &Sha256::digest(&bytes)[..]).then_some(bytes)
 }
 
 fn may_replace(path: &Path) -> bool {
@@ -156,17 +173,19 @@ fn may_replace(path: &Path) -> bool {
     }
 }
 
-fn write<T: Serialize>(path: &Path, origin: &[u8; DIGEST], value: &T) {
+fn write<T: Serialize>(folder: &Path, name: &str, origin: &Origin, value: &T) {
+    let path = folder.join(name);
     let Ok(bytes) = postcard::to_stdvec(value) else {
         return;
     };
     // What lies there and is not an entry is left alone.
-    if !may_replace(path) {
+    if !may_replace(&path) {
         return;
     }
-    let _ = atomic::write(path, &Overwrite::Force, |out| {
+    let _ = atomic::write(&path, &Overwrite::Force, |out| {
         out.write_all(MAGIC)?;
-        out.write_all(origin)?;
+        // By now the folder is there.
+        out.write_all(&origin.digest(folder))?;
         out.write_all(&Sha256::digest(&bytes))?;
         out.write_all(&bytes)
     });
@@ -230,6 +249,47 @@ mod tests {
         ] {
             assert!(store.recall::<Vec<f64>>("steel", &other).is_none());
         }
+    }
+
+    /// A value with its right digest, in a folder that came from elsewhere.
+    #[cfg(target_os = "linux")]
+    #[test]
+    #[allow(clippy::disallowed_methods)] // a test's own files
+    fn an_entry_that_was_made_in_another_folder_is_not_used() {
+        let origin = Origin::default().and_numbers([0.7]);
+        let (folder, store, file) = kept(&origin);
+        let mut forged = std::fs::read(&file).unwrap();
+        let value = MAGIC.len() + 2 * DIGEST;
+        let last = forged.len() - 1;
+        forged[last] ^= 0x40;
+        let digest = Sha256::digest(&forged[value..]);
+        forged[value - DIGEST..value].copy_from_slice(&digest);
+        let sent = folder.path().join("sent");
+        atomic::write_unforced(&sent, "steel", &forged).unwrap();
+        let received = Store::in_folder(sent);
+        assert!(!received.holds("steel", &origin));
+        let computed = received.remember::<_, ()>("steel", &origin, || Ok(vec![0.7, 1.3]));
+        assert_eq!(computed, Ok(vec![0.7, 1.3]));
+        assert!(received.holds("steel", &origin), "written anew");
+        // A folder that is renamed stays the one it was.
+        let (from, to) = (folder.path().join("sent"), folder.path().join("renamed"));
+        std::fs::rename(from, &to).unwrap();
+        let renamed = Store::in_folder(to);
+        assert!(renamed.holds("steel", &origin) && store.holds("steel", &origin));
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    #[allow(clippy::disallowed_methods)] // a test's own files
+    fn an_entry_that_never_ends_or_is_none_of_ours_is_not_read() {
+        let origin = Origin::default();
+        let (folder, store, file) = kept(&origin);
+        let made = File::create(folder.path().join("steel")).unwrap();
+        made.set_len(ENTRY_MAX_BYTES).unwrap();
+        assert!(!store.holds("steel", &origin));
+        std::fs::remove_file(&file).unwrap();
+        std::os::unix::fs::symlink("/dev/zero", &file).unwrap();
+        assert!(!store.holds("steel", &origin));
     }
 
     #[test]

@@ -40,11 +40,6 @@ impl Buckets {
         Self { starts, members }
     }
 
-    /// How many buckets there are.
-    pub(super) fn count(&self) -> usize {
-        self.starts.len() - 1
-    }
-
     /// What belongs to a bucket.
     pub(super) fn of(&self, bucket: usize) -> &[u32] {
         &self.members[self.starts[bucket]..self.starts[bucket + 1]]

@@ -1,6 +1,7 @@
 //! A surface in metres, whether it is a mesh or a formula.
 
 use std::fs::File;
+use std::io::{self, Read};
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -187,13 +188,13 @@ pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
         path: path.into(),
         what,
     };
-    let failed = |error: std::io::Error| {
+    let failed = |error: io::Error| {
         unreadable(match error.kind() {
-            std::io::ErrorKind::NotFound => {
+            io::ErrorKind::NotFound => {
                 "no such file; check the path (in a shape file it counts from that file's folder)"
                     .into()
             }
-            std::io::ErrorKind::PermissionDenied => "it may not be read (permission denied)".into(),
+            io::ErrorKind::PermissionDenied => "it may not be read (permission denied)".into(),
             _ => format!("it cannot be read: {error}"),
         })
     };
@@ -213,5 +214,14 @@ pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
             "the file is larger than {LARGEST_FILE} bytes; export it coarser"
         )));
     }
-    std::fs::read(path).map_err(failed)
+    // Files of the system's own tell no size, and others may grow.
+    let read = || -> io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        bytes.try_reserve_exact(kind.len() as usize)?;
+        File::open(path)?
+            .take(LARGEST_FILE)
+            .read_to_end(&mut bytes)?;
+        Ok(bytes)
+    };
+    read().map_err(failed)
 }

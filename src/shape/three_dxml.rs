@@ -2,7 +2,8 @@
 //!
 //! A zipped XML file. Its `Manifest.xml` names the document with the structure, whose references
 //! and instances form a tree; representations lie in parts of their own. Only tessellations in
-//! XML are read, not Dassault's binary representations.
+//! XML are read, not Dassault's binary representations. An instance of what lies in another document
+//! is refused.
 
 use std::collections::HashMap;
 
@@ -88,8 +89,8 @@ impl Structure {
                     _ => {}
                 },
                 Step::End { name, text } => match name.as_str() {
-                    "IsAggregatedBy" => open.within = last_number(&text),
-                    "IsInstanceOf" => open.of = last_number(&text),
+                    "IsAggregatedBy" => open.within = reference(&text, part).map_err(told)?,
+                    "IsInstanceOf" => open.of = reference(&text, part).map_err(told)?,
                     "RelativeMatrix" => open.place = Some(transform(&text).map_err(told)?),
                     "Instance3D" | "InstanceRep" => {
                         found.instances.push(std::mem::take(&mut open));
@@ -159,6 +160,31 @@ impl Structure {
 fn id(e: &Element<'_>) -> Result<u64, String> {
     let id = e.get_exact("id").and_then(|id| last_number(&id));
     id.ok_or_else(|| format!("`{}` has no id", e.name()))
+}
+
+/// The id that an instance in the document `part` names. The same number in another document is
+/// another object, so that document must be this one.
+fn reference(text: &str, part: &str) -> Result<Option<u64>, String> {
+    let last = |path: &str| {
+        path.rsplit([':', '/'])
+            .next()
+            .unwrap_or_default()
+            .to_owned()
+    };
+    let elsewhere = match text.split_once('#') {
+        Some((document, _)) => {
+            let document = last(document);
+            !document.is_empty() && !document.eq_ignore_ascii_case(&last(part))
+        }
+        None => text.contains(":ext:"),
+    };
+    if elsewhere {
+        return Err(format!(
+            "an instance is of `{text:.80}`, which lies in another document; only the product's own is \
+             read: export the product with all its parts in one, or as 3MF or STL"
+        ));
+    }
+    Ok(last_number(text))
 }
 
 /// `7`, `urn:3DXML:Reference:loc:7` and `urn:3DXML:part.3dxml#7` all mean 7.

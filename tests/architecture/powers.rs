@@ -38,6 +38,7 @@ const POWERS: &[Power] = &[
             "File :: options",
             "OpenOptions",
             "tempfile",
+            "rustix",
         ],
         holders: &["bundle/atomic/"],
     },

@@ -6,8 +6,8 @@
 //!
 //! KILLS (500) runs are killed with SIGKILL at random moments, shared out among `calibrate`,
 //! `sweep run` and `map`, and a tenth of that among the other commands that write. Then a kill comes
-//! before every call that changes files, and every third of them fails in each way; with `--every 8`
-//! every eighth and every 24th. Ends with an error where a run left something behind that it must not.
+//! before every call that changes files and before every rename, and every third call fails in each way;
+//! with `--every 8` every eighth and every 24th. Ends with an error where a run left something behind that it must not.
 
 // A measurement: it reads the clock, prints and ends with a code.
 #![allow(clippy::print_stdout, clippy::disallowed_methods, clippy::exit)]
@@ -71,11 +71,13 @@ mod unix {
     use crate::together::{RIVALS, asked_to_stop, other_inputs, same_inputs};
 
     /// How calls are struck, and every how many of them.
-    const STRIKES: [(How, usize); 4] = [
+    const STRIKES: [(How, usize); 6] = [
         (How::Kill, 1),
         (How::Full, 3),
         (How::Denied, 3),
         (How::Broken, 3),
+        (How::Renames, 1),
+        (How::Plain, 1),
     ];
 
     /// What is done and what came of it so far.

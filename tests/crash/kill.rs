@@ -37,7 +37,9 @@ pub fn at_random(prepared: &Prepared, wanted: usize, dice: &mut Dice) -> Result<
         child.kill().unwrap();
         let ran = Ran::of(child.wait_with_output().unwrap());
         row.struck += usize::from(ran.code.is_none());
-        row.add(prepared.survived(&place)?);
+        let found = prepared.survived(&place)?;
+        found.no_bundle_is_absent()?;
+        row.add(found);
     }
     Ok(row)
 }
@@ -59,6 +61,10 @@ pub enum How {
     Denied,
     /// This one call fails with an I/O error.
     Broken,
+    /// SIGKILL; renames alone count.
+    Renames,
+    /// As before, where no two names can change places.
+    Plain,
 }
 
 impl How {
@@ -68,6 +74,8 @@ impl How {
             Self::Full => "full",
             Self::Denied => "denied",
             Self::Broken => "broken",
+            Self::Renames => "renames",
+            Self::Plain => "plain",
         }
     }
 
@@ -77,6 +85,8 @@ impl How {
             Self::Full => "disk full from the n-th call on",
             Self::Denied => "folder closed from the n-th call on",
             Self::Broken => "I/O error in the n-th call",
+            Self::Renames => "SIGKILL before the n-th rename",
+            Self::Plain => "SIGKILL before the n-th rename, without exchange",
         }
     }
 }
@@ -104,14 +114,14 @@ impl Strike {
             program,
             _folder: folder,
         };
-        let (ran, calls) = strike.run(&Place::empty(), "count", 0, &["--version"]);
+        let (ran, calls) = strike.run(&Place::empty(), "count", i64::MAX, &["--version"]);
         match (ran.code, calls) {
             (Some(0), Some(_)) => Ok(strike),
             _ => Err("the system does not allow tracing another process".to_owned()),
         }
     }
 
-    fn run(&self, place: &Place, mode: &str, at: usize, args: &[&str]) -> (Ran, Option<usize>) {
+    fn run(&self, place: &Place, mode: &str, at: i64, args: &[&str]) -> (Ran, Option<usize>) {
         let log = place.path().join("calls");
         let mut command = Command::new(&self.program);
         command
@@ -124,9 +134,13 @@ impl Strike {
         (ran, calls.and_then(|text| text.trim().parse().ok()))
     }
 
-    /// How many calls of `prepared` change files.
-    pub fn calls(&self, prepared: &Prepared) -> Result<usize, String> {
-        let (ran, calls) = self.run(&prepared.fresh(), "count", 0, prepared.scenario.args);
+    /// How many calls of `prepared` may be struck that way.
+    pub fn calls(&self, prepared: &Prepared, how: How) -> Result<usize, String> {
+        let mode = match how {
+            How::Renames | How::Plain => how.mode(),
+            _ => "count",
+        };
+        let (ran, calls) = self.run(&prepared.fresh(), mode, i64::MAX, prepared.scenario.args);
         ran.ends(&[0])?;
         calls.ok_or_else(|| "nobody counted the calls".to_owned())
     }
@@ -140,9 +154,9 @@ impl Strike {
         dice: &mut Dice,
     ) -> Result<Row, String> {
         let mut row = Row::new(prepared.scenario.name, how.told());
-        for at in (1 + dice.below(every)..=self.calls(prepared)?).step_by(every) {
+        for at in (1 + dice.below(every)..=self.calls(prepared, how)?).step_by(every) {
             let place = prepared.fresh();
-            let (ran, _) = self.run(&place, how.mode(), at, prepared.scenario.args);
+            let (ran, _) = self.run(&place, how.mode(), at as i64, prepared.scenario.args);
             let found = self.judged(prepared, how, &place, &ran);
             row.struck += usize::from(ran.code != Some(0));
             row.add(found.map_err(|told| format!("call {at}, {}: {told}", how.mode()))?);
@@ -159,7 +173,7 @@ impl Strike {
     ) -> Result<Found, String> {
         match how {
             // Threads may have done a little more, or all of it.
-            How::Kill => ran.ends(&[137, 0])?,
+            How::Kill | How::Renames | How::Plain => ran.ends(&[137, 0])?,
             // What is kept for the next run may go unkept without a word.
             How::Full | How::Denied | How::Broken => ran.ends(&[4, 0])?,
         }
@@ -174,7 +188,10 @@ impl Strike {
             }
         }
         let found = prepared.survived(place)?;
-        // An older folder stays put aside where not even its way back is free.
+        if how != How::Plain {
+            found.no_bundle_is_absent()?;
+        }
+        // A folder stays put aside where after the exchange not even the way back is free.
         if how == How::Full && found.temporary + found.empty_folders > 0 {
             return Err(format!("left temporary files: {ran:?}"));
         }

@@ -263,11 +263,11 @@ impl Prepared {
             let name = put_back(path);
             found.put_aside += usize::from(put_aside);
             let timing = file_name(&name).starts_with("timing");
-            let is = |tree: &Tree| tree.get(&name) == Some(bytes);
+            let is = |tree: &Tree| tree.get(&name).is_some_and(|it| agree(&name, it, bytes));
             let whole = if timing {
                 serde_json::from_slice::<Value>(bytes).is_ok()
             } else {
-                is(&self.before) || (is(&self.after) && !put_aside)
+                is(&self.before) || is(&self.after)
             };
             if !whole {
                 return Err(format!("{path} is neither what it was nor what it becomes"));
@@ -280,6 +280,8 @@ impl Prepared {
             return Err("the user's own file is gone".to_owned());
         }
         found.bundles = bundles(&now).len();
+        let gone = |manifest: &&String| !now.contains_key(*manifest);
+        found.absent = bundles(&self.before).iter().filter(gone).count();
         Ok(found)
     }
 
@@ -354,9 +356,10 @@ impl Prepared {
         Ok(found)
     }
 
-    /// What lies there is in order; nothing is run again.
+    /// What lies there is in order, no bundle is gone; nothing is run again.
     pub fn survived_as_it_is(&self, place: &Place) -> Result<Found, String> {
         let found = self.whole_or_absent(place)?;
+        found.no_bundle_is_absent()?;
         self.verified(place)?;
         Ok(found)
     }
@@ -370,6 +373,18 @@ pub struct Found {
     pub put_aside: usize,
     pub empty_folders: usize,
     pub bundles: usize,
+    /// Bundles that were there and are not now.
+    pub absent: usize,
+}
+
+impl Found {
+    /// Where two folders can change places, a bundle's name is never without one.
+    pub fn no_bundle_is_absent(&self) -> Result<(), String> {
+        if cfg!(target_os = "linux") && self.absent > 0 {
+            return Err(format!("a bundle that was there is not: {self:?}"));
+        }
+        Ok(())
+    }
 }
 
 impl std::ops::AddAssign for Found {
@@ -379,7 +394,17 @@ impl std::ops::AddAssign for Found {
         self.put_aside += other.put_aside;
         self.empty_folders += other.empty_folders;
         self.bundles += other.bundles;
+        self.absent += other.absent;
     }
+}
+
+/// A file is the same in two places; what is kept for the next run names its folder in its head.
+fn agree(name: &str, one: &[u8], other: &[u8]) -> bool {
+    const OWN: std::ops::Range<usize> = 8..40;
+    if !name.contains(".fluxform-kept/") || one.len().min(other.len()) < OWN.end {
+        return one == other;
+    }
+    one[..OWN.start] == other[..OWN.start] && one[OWN.end..] == other[OWN.end..]
 }
 
 /// Two trees are the same but for the seconds.
@@ -389,7 +414,7 @@ pub fn same(now: &Tree, wanted: &Tree) -> Result<(), String> {
         match (now.get(name), wanted.get(name)) {
             (Some(_), None) => return Err(format!("{name} is left over")),
             (None, _) => return Err(format!("{name} is missing")),
-            (Some(a), Some(b)) if a != b && !file_name(name).starts_with("timing") => {
+            (Some(a), Some(b)) if !agree(name, a, b) && !file_name(name).starts_with("timing") => {
                 return Err(format!("{name} differs"));
             }
             _ => {}

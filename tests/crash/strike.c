@@ -4,8 +4,9 @@
  *
  * MODE is `count` (let it run), `kill` (SIGKILL right before the call), `full` (this call and all later
  * ones find the disk full), `denied` (this and all later ones may not change the folder) or `broken` (this
- * one call fails with an I/O error). How many such calls there were is written to LOG. Ends with the
- * program's code, 137 where it was killed, 99 where the system does not allow tracing.
+ * one call fails with an I/O error). `renames` and `plain` kill as well, but only renames count, and with
+ * `plain` no two names can change places. How many such calls there were is written to LOG. Ends with
+ * the program's code, 137 where it was killed, 99 where the system does not allow tracing.
  * Linux on x86-64 only.
  */
 #define _GNU_SOURCE
@@ -58,6 +59,17 @@ static int is_file(pid_t pid, long fd) {
     return stat(path, &status) == 0 && S_ISREG(status.st_mode);
 }
 
+static int is_rename(const struct user_regs_struct *r) {
+    return r->orig_rax == SYS_rename || r->orig_rax == SYS_renameat || r->orig_rax == SYS_renameat2;
+}
+
+/* The call does not happen and fails with `error`. */
+static void fail_with(pid_t pid, struct user_regs_struct *r, int error) {
+    r->orig_rax = (unsigned long long)-1;
+    r->rax = (unsigned long long)-error;
+    ptrace(PTRACE_SETREGS, pid, 0, r);
+}
+
 enum kind { OTHER, ADDS, FILLS, REMOVES };
 
 /* What a call does to files: adds a name, fills what is open, or takes a name away. */
@@ -86,6 +98,7 @@ int main(int argc, char **argv) {
         return 2;
     const char *mode = argv[2];
     long at = atol(argv[3]), count = 0;
+    int plain = !strcmp(mode, "plain"), renames = plain || !strcmp(mode, "renames");
     pid_t child = fork();
     if (child == 0) {
         if (ptrace(PTRACE_TRACEME, 0, 0, 0))
@@ -120,12 +133,12 @@ int main(int argc, char **argv) {
             struct user_regs_struct regs;
             if (ptrace(PTRACE_GETREGS, pid, 0, &regs))
                 continue;
-            enum kind kind = kind_of(pid, &regs);
+            enum kind kind = renames && !is_rename(&regs) ? OTHER : kind_of(pid, &regs);
             if (kind != OTHER)
                 count++;
             if (kind != OTHER && count >= at) {
                 int error = 0;
-                if (!strcmp(mode, "kill")) {
+                if (renames || !strcmp(mode, "kill")) {
                     kill(child, SIGKILL);
                     continue;
                 }
@@ -135,11 +148,10 @@ int main(int argc, char **argv) {
                     error = EACCES;
                 if (!strcmp(mode, "broken") && count == at)
                     error = EIO;
-                if (error) {
-                    regs.orig_rax = (unsigned long long)-1;
-                    regs.rax = (unsigned long long)-error;
-                    ptrace(PTRACE_SETREGS, pid, 0, &regs);
-                }
+                if (error)
+                    fail_with(pid, &regs, error);
+            } else if (plain && regs.orig_rax == SYS_renameat2 && regs.r8 & RENAME_EXCHANGE) {
+                fail_with(pid, &regs, EINVAL);
             }
         } else if (WSTOPSIG(status) != SIGTRAP && !(WSTOPSIG(status) == SIGSTOP && status >> 16 == 0 && pid != child)) {
             deliver = WSTOPSIG(status);

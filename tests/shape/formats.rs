@@ -346,6 +346,33 @@ fn two_objects_of_one_id_are_refused_in_3dxml() {
 }
 
 #[test]
+fn a_body_in_another_document_is_refused_in_3dxml_not_taken_for_one_of_the_same_number() {
+    let [manifest, structure, representation] = crate::samples::three_dxml_parts();
+    let product = |to: &str| {
+        let from = "urn:3DXML:Reference:loc:2";
+        assert!(structure.1.contains(from));
+        zipped(&[
+            (manifest.0, &manifest.1),
+            ("P.3dxml", &structure.1.replacen(from, to, 1)),
+            ("R.3DRep", &representation.1),
+        ])
+    };
+    for to in ["urn:3DXML:other.3dxml#2", "urn:3DXML:Reference:ext:2"] {
+        let message = refusal(SurfaceFormat::ThreeDxml, &product(to));
+        assert!(
+            message.contains(to) && message.contains("another document"),
+            "{message}"
+        );
+    }
+    let own = product("urn:3DXML:p.3dxml#2");
+    let read = |bytes: &[u8]| {
+        let file = SurfaceFormat::ThreeDxml.read(Path::new("p.3dxml"), bytes);
+        file.unwrap().triangles
+    };
+    assert_eq!(read(&own), read(&three_dxml()));
+}
+
+#[test]
 fn a_damaged_native_part_is_refused() {
     let good = sldprt();
     for (at, byte, said) in [(4, 1, "its sign is missing"), (8, 1, "no block of data")] {

@@ -1,15 +1,19 @@
 //! Whole folders: a bundle is whole or absent.
 //!
 //! 1. All files are written and fsynced in a temporary folder beside the target.
-//! 2. Under a lock on the parent folder: an existing target is renamed to `.<name>.fluxform-old`,
-//!    the temporary folder is renamed to the target, the parent is fsynced.
+//! 2. Under a lock on the parent folder: where nothing is at the target, the temporary folder is
+//!    renamed to it; else it is renamed to `.<name>.fluxform-old` and changes places with the target.
+//!    The parent is fsynced.
 //! 3. What the user had added to the old folder (files its manifest does not list) is moved into
 //!    the new one; the rest of the old folder is removed.
 //!
-//! POSIX has no portable exchange of two folders, so between the two renames of step 2 the name is
-//! absent for some microseconds. A run killed there leaves the whole old folder under its other
-//! name; the next [`FolderDraft::begin`] puts it back. A run killed in step 3 leaves the new
-//! bundle whole; the next one finishes the step.
+//! So the target's name holds a whole folder at every moment. A run killed in steps 2 or 3 leaves a
+//! folder under the other name: the old one, or a new one that never came into place. Either way the
+//! next [`FolderDraft::begin`] does step 3 with it; of a new one nothing is the user's.
+//!
+//! Where the system knows no exchange (`exchange.rs`), the target is renamed to the other name and the
+//! temporary folder to the target. Between the two the name is absent for some microseconds: a run
+//! killed there leaves the whole old folder under its other name, and the next one puts it back.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -19,11 +23,14 @@ use std::path::{Component, Path, PathBuf};
 use serde_json::Value;
 use tempfile::TempDir;
 
+use super::exchange::exchange;
 use super::file::{fill, lock_folder, sync_folder};
 use super::leftovers::{clean_leftovers, is_temporary, temporary_folder};
 use super::made::{MadeFolders, made_in};
+use super::overwrite::RECORD_MAX_BYTES;
 use super::{Overwrite, WriteError};
 use crate::bundle::artefact::FileEntry;
+use crate::bundle::plain::read_plain;
 
 /// The file whose presence makes a folder a bundle.
 const MANIFEST: &str = "manifest.json";
@@ -117,25 +124,57 @@ impl FolderDraft {
         check_target(target, &self.overwrite)?;
         let old = old_name(target);
         let replaced = target.exists();
-        if replaced {
-            fs::rename(target, &old).map_err(fail)?;
-        }
         // From here on the temporary name is no more; dropping the guard must not remove anything.
         let draft = self.draft.keep();
-        if let Err(error) = fs::rename(&draft, target) {
-            if replaced {
-                let _ = fs::rename(&old, target);
-            }
+        let placed = if replaced {
+            replace(&draft, target, &old)
+        } else {
+            fs::rename(&draft, target)
+        };
+        if let Err(error) = placed {
             let _ = fs::remove_dir_all(&draft);
             return Err(fail(error));
         }
         drop(self.lock);
-        sync_folder(parent).map_err(fail)?;
+        if let Err(error) = sync_folder(parent) {
+            // Which of the two a lost system would find there is unknown: back to the one that was.
+            if replaced && matches!(exchange(&old, target), Ok(true)) {
+                let _ = fs::remove_dir_all(&old);
+            }
+            return Err(fail(error));
+        }
         if replaced {
             absorb(&old, target).map_err(fail)?;
         }
         Ok(())
     }
+}
+
+/// Puts the folder `draft` at `target`, and what is there at `old`. On an error the target is as it
+/// was, if the system allows that, and nothing but `draft` is left.
+fn replace(draft: &Path, target: &Path, old: &Path) -> io::Result<()> {
+    // Not from its temporary name: after the exchange the user's own files stand under it, and what
+    // is temporary is cleared.
+    fs::rename(draft, old)?;
+    match exchange(old, target) {
+        Ok(true) => Ok(()),
+        Ok(false) => {
+            fs::rename(old, draft)?;
+            replace_by_renames(draft, target, old)
+        }
+        Err(error) => {
+            let _ = fs::remove_dir_all(old);
+            Err(error)
+        }
+    }
+}
+
+/// As [`replace`], on systems without an exchange: between the two renames nothing is at `target`.
+fn replace_by_renames(draft: &Path, target: &Path, old: &Path) -> io::Result<()> {
+    fs::rename(target, old)?;
+    fs::rename(draft, target).inspect_err(|_| {
+        let _ = fs::rename(old, target);
+    })
 }
 
 /// A name inside a bundle: relative, `/`-separated plain names, none of them `.` or `..`.
@@ -261,9 +300,10 @@ fn absorb_folder(
     Ok(())
 }
 
-/// The files that a manifest or sidecar lists; none where it is not there or tells of none.
+/// The files that a manifest or sidecar lists; none where it is not there, no plain file, too large
+/// for one, or tells of none.
 pub(crate) fn listed_files(manifest: &Path) -> BTreeSet<PathBuf> {
-    let value: Value = fs::read(manifest)
+    let value: Value = read_plain(manifest, RECORD_MAX_BYTES)
         .ok()
         .and_then(|text| serde_json::from_slice(&text).ok())
         .unwrap_or_default();
@@ -304,6 +344,97 @@ mod tests {
             assert!(refused.to_string().contains("temporary"), "{refused}");
             assert_eq!(folder.path().read_dir().unwrap().count(), 0);
         }
+    }
+
+    /// A folder of one file and its manifest.
+    fn put(target: &Path, text: &str) -> Result<(), WriteError> {
+        let mut draft = FolderDraft::begin(target, Overwrite::Force)?;
+        let file = draft.write("a.txt", |out| out.write_all(text.as_bytes()))?;
+        let manifest = serde_json::json!({ "files": [{ "path": file.path }] }).to_string();
+        draft.write(MANIFEST, |out| out.write_all(manifest.as_bytes()))?;
+        draft.commit()
+    }
+
+    fn names(folder: &Path) -> BTreeSet<String> {
+        let entries = folder.read_dir().unwrap();
+        entries
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect()
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    #[allow(clippy::print_stderr)] // a skipped test says so
+    fn a_folder_is_there_at_every_moment_while_it_is_replaced() {
+        use std::sync::atomic::{AtomicBool, Ordering};
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("bump");
+        put(&target, "0").unwrap();
+        fs::write(target.join("mine.txt"), "mine").unwrap();
+        fs::create_dir(folder.path().join("probe")).unwrap();
+        if !exchange(&target, &folder.path().join("probe")).unwrap() {
+            eprintln!("skipped: this file system knows no exchange");
+            return;
+        }
+        exchange(&target, &folder.path().join("probe")).unwrap();
+        let (done, begun) = (AtomicBool::new(false), AtomicBool::new(false));
+        // Who had found the older folder may find it cleared: then the newer one is there.
+        let read = |name: &str| (0..9).find_map(|_| fs::read(target.join(name)).ok());
+        std::thread::scope(|scope| {
+            let reader = scope.spawn(|| {
+                let (mut looks, mut absent) = (0, 0);
+                while !done.load(Ordering::Relaxed) {
+                    let whole = |name| read(name).is_some_and(|bytes| !bytes.is_empty());
+                    let there = target.is_dir() && whole("a.txt") && whole(MANIFEST);
+                    absent += usize::from(!there);
+                    looks += 1;
+                    begun.store(true, Ordering::Relaxed);
+                }
+                (looks, absent)
+            });
+            while !begun.load(Ordering::Relaxed) {
+                std::thread::yield_now();
+            }
+            let put = (0..200).try_for_each(|round| put(&target, &round.to_string()));
+            done.store(true, Ordering::Relaxed);
+            let (looks, absent) = reader.join().unwrap();
+            put.unwrap();
+            assert!(looks > 200, "only {looks} looks");
+            assert_eq!(absent, 0, "of {looks} looks");
+        });
+        assert_eq!(fs::read(target.join("a.txt")).unwrap(), b"199");
+        assert_eq!(fs::read(target.join("mine.txt")).unwrap(), b"mine");
+        assert_eq!(names(folder.path()).len(), 2);
+    }
+
+    #[test]
+    fn a_new_folder_that_never_came_into_place_goes_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("bump");
+        put(&target, "old").unwrap();
+        fs::write(target.join("mine.txt"), "mine").unwrap();
+        // Killed right before the exchange.
+        put(&folder.path().join("new"), "new").unwrap();
+        fs::rename(folder.path().join("new"), old_name(&target)).unwrap();
+        drop(FolderDraft::begin(&target, Overwrite::Force).unwrap());
+        assert_eq!(fs::read(target.join("a.txt")).unwrap(), b"old");
+        assert_eq!(fs::read(target.join("mine.txt")).unwrap(), b"mine");
+        assert_eq!(names(folder.path()), ["bump".to_owned()].into());
+    }
+
+    #[test]
+    fn without_an_exchange_two_renames_do_and_a_failed_one_is_undone() {
+        let folder = tempfile::tempdir().unwrap();
+        let [draft, target] = ["draft", "bump"].map(|name| folder.path().join(name));
+        let old = old_name(&target);
+        put(&target, "old").unwrap();
+        // The second rename fails: there is nothing to rename.
+        replace_by_renames(&draft, &target, &old).unwrap_err();
+        assert_eq!(fs::read(target.join("a.txt")).unwrap(), b"old");
+        put(&draft, "new").unwrap();
+        replace_by_renames(&draft, &target, &old).unwrap();
+        assert_eq!(fs::read(target.join("a.txt")).unwrap(), b"new");
+        assert_eq!(fs::read(old.join("a.txt")).unwrap(), b"old");
     }
 
     #[test]

@@ -76,7 +76,8 @@ pub fn clean_leftovers(folder: &Path) {
         let Ok(kind) = entry.file_type() else {
             continue;
         };
-        if kind.is_symlink() {
+        // Ours are files and folders; opening a pipe of that name would wait for its other end.
+        if !kind.is_file() && !kind.is_dir() {
             continue;
         }
         let Ok(handle) = File::open(&path) else {
@@ -113,4 +114,67 @@ fn builder(mode: u32) -> Builder<'static, 'static> {
     #[cfg(not(unix))]
     let _ = mode;
     builder
+}
+
+#[cfg(target_os = "linux")]
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bundle::artefact::Input;
+    use crate::bundle::atomic::{FolderDraft, Overwrite, listed_files};
+
+    fn pipe(path: &Path) {
+        use rustix::fs::{CWD, FileType, Mode, mknodat};
+        mknodat(CWD, path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
+    }
+
+    /// What does not end in time waits for a pipe or reads without end.
+    fn in_time<T: Send + 'static>(act: impl FnOnce() -> T + Send + 'static) -> T {
+        let (done, wait) = std::sync::mpsc::channel();
+        std::thread::spawn(move || done.send(act()));
+        wait.recv_timeout(std::time::Duration::from_secs(60))
+            .expect("it waits")
+    }
+
+    #[test]
+    fn a_pipe_under_a_temporary_name_is_passed_by() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(".fluxform-7Xq.tmp");
+        pipe(&path);
+        let place = folder.path().to_path_buf();
+        in_time(move || {
+            clean_leftovers(&place);
+            remove_files_beginning_with(&place, b"fluxkept");
+        });
+        assert!(path.exists());
+    }
+
+    /// An older bundle whose manifest is a pipe, never ends, or is larger than any.
+    #[test]
+    fn the_manifest_of_a_replaced_folder_is_no_pipe_nor_endless() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("bump");
+        let manifest = target.join("manifest.json");
+        let lay: [&dyn Fn(); 3] = [
+            &|| pipe(&manifest),
+            &|| std::os::unix::fs::symlink("/dev/zero", &manifest).unwrap(),
+            &|| File::create(&manifest).unwrap().set_len(1 << 40).unwrap(),
+        ];
+        for lay in lay {
+            std::fs::create_dir(&target).unwrap();
+            lay();
+            let (place, record) = (target.clone(), manifest.clone());
+            in_time(move || {
+                assert!(listed_files(&record).is_empty());
+                let ours = Overwrite::new(false, record, &[Input::of_bytes("a.toml", b"a")]);
+                FolderDraft::begin(&place, ours).unwrap_err();
+                let mut draft = FolderDraft::begin(&place, Overwrite::Force).unwrap();
+                draft.write("a", |out| out.write_all(b"a")).unwrap();
+                draft.commit().unwrap();
+            });
+            assert!(target.join("a").is_file() && !manifest.exists());
+            assert_eq!(folder.path().read_dir().unwrap().count(), 1);
+            std::fs::remove_dir_all(&target).unwrap();
+        }
+    }
 }

@@ -9,8 +9,10 @@
 //!
 //! The digest of a file is computed while it is written: no second pass.
 
+mod exchange;
 mod file;
 mod folder;
+mod identity;
 mod leftovers;
 mod made;
 mod overwrite;
@@ -24,6 +26,7 @@ pub(crate) use file::hex;
 pub use file::{FileSet, write};
 pub use folder::FolderDraft;
 pub(crate) use folder::{check_name, listed_files};
+pub(crate) use identity::identity;
 pub use leftovers::{clean_leftovers, remove_files_beginning_with};
 pub use overwrite::{Overwrite, Record};
 pub use scratch::Scratch;

@@ -1,16 +1,16 @@
 //! When an existing output may be replaced.
 
-use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
 use super::WriteError;
 use crate::bundle::artefact::Input;
+use crate::bundle::plain::read_plain;
 
 /// Records larger than this are not read: ours are a few kilobytes to a few megabytes.
-const RECORD_MAX_BYTES: u64 = 64 << 20;
+pub(super) const RECORD_MAX_BYTES: u64 = 64 << 20;
 
 /// The policy for outputs that exist already.
 #[derive(Debug, Clone)]
@@ -76,9 +76,7 @@ impl Record {
     /// `Ok` when the record's inputs have this run's digests, in order; else the reason.
     fn confirm(&self) -> Result<(), String> {
         let name = self.path.display();
-        let mut text = Vec::new();
-        File::open(&self.path)
-            .and_then(|file| file.take(RECORD_MAX_BYTES).read_to_end(&mut text))
+        let text = read_plain(&self.path, RECORD_MAX_BYTES)
             .map_err(|_| format!("and no {name} tells what it was made from"))?;
         let value: Value = serde_json::from_slice(&text)
             .map_err(|_| format!("and {name} does not tell what it was made from"))?;

@@ -97,8 +97,9 @@ fn vertical_bound(
     if otherwise <= vertical.bound_m() {
         return otherwise;
     }
-    let covered =
-        |(cell, patch): &(usize, Patch)| lattice.faces.covered(&patch.rect, lattice.members(*cell));
+    let covered = |(cell, patch): &(usize, Patch)| {
+        lattice.faces.covered(&patch.rect, &lattice.members(*cell))
+    };
     if patches.iter().all(covered) {
         vertical.bound_m()
     } else {
@@ -208,7 +209,7 @@ impl Search<'_> {
             let faces = self.faces;
             faces.leaves(
                 patch.rect,
-                lattice.members(*cell),
+                &lattice.members(*cell),
                 DEEPEST,
                 &mut |rect, members| {
                     self.begin(rect, members, patch, &mut open);
@@ -335,7 +336,7 @@ impl Search<'_> {
         for (order, (cell, patch)) in patches.iter().enumerate() {
             progress.check()?;
             let members = lattice.members(*cell);
-            let covered = self.faces.covered(&patch.rect, members);
+            let covered = self.faces.covered(&patch.rect, &members);
             let mut bound_m = self.bound_of_rect(&patch.rect, patch);
             if covered && bound_m > self.enough_m() {
                 let known = Extreme {
@@ -346,7 +347,7 @@ impl Search<'_> {
                     above: known,
                     below: known,
                 };
-                let vertical = self.faces.worst(&patch.rect, members, patch, known);
+                let vertical = self.faces.worst(&patch.rect, &members, patch, known);
                 bound_m = bound_m.min(vertical.value_m());
             }
             if bound_m > self.enough_m() {

@@ -11,6 +11,9 @@ pub(super) mod piece;
 mod primitive;
 mod visible;
 
+use std::borrow::Cow;
+use std::ops::Range;
+
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -38,6 +41,11 @@ const DEEPEST: u32 = 9;
 const NO_NEARER: u32 = 5;
 /// Places nearer than this times the largest coordinate are not told apart.
 const HAIR: f64 = 1e-12;
+/// So many faces of cells, on average over the faces, are held at most: where faces lie over many cells
+/// each, blocks of cells share a list,
+const MOST_EACH: usize = 64;
+/// unless there are so few altogether.
+const FEW: usize = 1 << 22;
 /// Height hairs by which a difference may be off.
 const ROUNDINGS: f64 = 16.0;
 
@@ -268,23 +276,37 @@ pub struct Lattice<'a> {
     x: Vec<f64>,
     y: Vec<f64>,
     heights: &'a [Option<f64>],
+    /// Cells a side of a block.
+    block: usize,
+    /// The faces over each block.
     buckets: Buckets,
 }
 
 impl<'a> Lattice<'a> {
-    /// Sorts the faces into the cells. `heights` holds the points' heights, m, x fastest.
+    /// Sorts the faces into the cells. `heights` holds the points' heights, m, x fastest. Memory is
+    /// bounded by the number of faces: where they lie over many cells each, only blocks of cells have
+    /// a list, out of which a cell's is taken when it is looked at.
     #[must_use]
     pub fn new(faces: &'a Faces, grid: &Grid, heights: &'a [Option<f64>]) -> Self {
+        Self::within(FEW.max(MOST_EACH * faces.list.len()), faces, grid, heights)
+    }
+
+    /// As [`Self::new`], with `most` entries in the lists.
+    fn within(most: usize, faces: &'a Faces, grid: &Grid, heights: &'a [Option<f64>]) -> Self {
         let (x, y) = (grid.x_m.nodes(), grid.y_m.nodes());
+        let mut blocks = Blocks::new(1, &x, &y);
+        while blocks.count() > 1 && blocks.entries(&faces.list) > most {
+            blocks = Blocks::new(2 * blocks.side, &x, &y);
+        }
         let pairs: Vec<(u32, u32)> = (0..faces.list.len())
             .into_par_iter()
-            .flat_map_iter(|index| cells_of(&faces.list[index], index, &x, &y))
+            .flat_map_iter(|index| blocks.under(&faces.list[index], index))
             .collect();
-        let cells = x.len().saturating_sub(1) * y.len().saturating_sub(1);
         Self {
             faces,
             heights,
-            buckets: Buckets::new(cells, &pairs),
+            block: blocks.side,
+            buckets: Buckets::new(blocks.count(), &pairs),
             x,
             y,
         }
@@ -292,11 +314,31 @@ impl<'a> Lattice<'a> {
 
     /// Number of cells.
     pub(super) fn len(&self) -> usize {
-        self.buckets.count()
+        self.x.len().saturating_sub(1) * self.y.len().saturating_sub(1)
     }
 
-    pub(super) fn members(&self, cell: usize) -> &[u32] {
-        self.buckets.of(cell)
+    /// The faces over a cell, ascending.
+    pub(super) fn members(&self, cell: usize) -> Cow<'_, [u32]> {
+        let all = self.around(cell);
+        if self.block == 1 {
+            return Cow::Borrowed(all);
+        }
+        Cow::Owned(self.faces.over(&self.rect(cell), all))
+    }
+
+    /// Whether no face is over a cell.
+    fn is_bare(&self, cell: usize) -> bool {
+        let rect = self.rect(cell);
+        let over = |face: &u32| self.faces.list[*face as usize].overlaps(&rect);
+        !self.around(cell).iter().any(over)
+    }
+
+    /// The faces over a cell's block.
+    fn around(&self, cell: usize) -> &[u32] {
+        let columns = self.x.len() - 1;
+        let (column, row) = (cell % columns / self.block, cell / columns / self.block);
+        let bucket = row * columns.div_ceil(self.block) + column;
+        self.buckets.of(bucket)
     }
 
     pub(super) fn rect(&self, cell: usize) -> Rect {
@@ -324,7 +366,7 @@ impl<'a> Lattice<'a> {
         for cell in 0..self.len() {
             match self.corners(cell).iter().flatten().count() {
                 4 => cells.inner += 1,
-                0 if self.members(cell).is_empty() => {}
+                0 if self.is_bare(cell) => {}
                 0 => cells.missed += 1,
                 _ => cells.silhouette += 1,
             }
@@ -343,25 +385,71 @@ fn rect(x: &[f64], y: &[f64], cell: usize) -> Rect {
     }
 }
 
-/// The cells over which a face lies, each with the face's index.
-fn cells_of(face: &piece::Face, index: usize, x: &[f64], y: &[f64]) -> Vec<(u32, u32)> {
-    let between = |nodes: &[f64], (low, high): (f64, f64)| {
-        let from = nodes.partition_point(|node| *node <= low).saturating_sub(1);
-        from..nodes
-            .partition_point(|node| *node < high)
-            .min(nodes.len().saturating_sub(1))
-    };
-    let columns = between(x, face.range(0));
-    let mut found = Vec::new();
-    for row in between(y, face.range(1)) {
-        for column in columns.clone() {
-            let cell = row * (x.len() - 1) + column;
-            if face.overlaps(&rect(x, y, cell)) {
-                found.push((cell as u32, index as u32));
-            }
+/// Blocks of so many cells a side, from every so many-th node to the next; the last ones may be smaller.
+struct Blocks {
+    side: usize,
+    x: Vec<f64>,
+    y: Vec<f64>,
+}
+
+impl Blocks {
+    fn new(side: usize, x: &[f64], y: &[f64]) -> Self {
+        let borders = |nodes: &[f64]| {
+            let last = nodes.len().saturating_sub(1);
+            let inner = (0..last).step_by(side);
+            inner
+                .chain([last])
+                .filter_map(|node| nodes.get(node).copied())
+                .collect()
+        };
+        Self {
+            side,
+            x: borders(x),
+            y: borders(y),
         }
     }
-    found
+
+    fn count(&self) -> usize {
+        self.x.len().saturating_sub(1) * self.y.len().saturating_sub(1)
+    }
+
+    /// The columns and rows of blocks that a face's bounds touch.
+    fn bounds(&self, face: &piece::Face) -> [Range<usize>; 2] {
+        let between = |nodes: &[f64], (low, high): (f64, f64)| {
+            let from = nodes.partition_point(|node| *node <= low).saturating_sub(1);
+            from..nodes
+                .partition_point(|node| *node < high)
+                .min(nodes.len().saturating_sub(1))
+        };
+        [
+            between(&self.x, face.range(0)),
+            between(&self.y, face.range(1)),
+        ]
+    }
+
+    /// No fewer than how often a face lies over a block.
+    fn entries(&self, faces: &[piece::Face]) -> usize {
+        let touched = |face| {
+            let [columns, rows] = self.bounds(face);
+            columns.len() * rows.len()
+        };
+        faces.par_iter().map(touched).sum()
+    }
+
+    /// The blocks over which a face lies, each with the face's index.
+    fn under(&self, face: &piece::Face, index: usize) -> Vec<(u32, u32)> {
+        let [columns, rows] = self.bounds(face);
+        let mut found = Vec::new();
+        for row in rows {
+            for column in columns.clone() {
+                let block = row * (self.x.len() - 1) + column;
+                if face.overlaps(&rect(&self.x, &self.y, block)) {
+                    found.push((block as u32, index as u32));
+                }
+            }
+        }
+        found
+    }
 }
 
 /// The exact supremum of the vertical difference over all cells of four points.
@@ -389,7 +477,7 @@ pub fn vertical(
                 if let Some(patch) = lattice.patch(cell) {
                     worst = lattice
                         .faces
-                        .worst(&patch.rect, lattice.members(cell), &patch, worst);
+                        .worst(&patch.rect, &lattice.members(cell), &patch, worst);
                 }
             }
             progress.advance(row as u64);
@@ -422,7 +510,7 @@ pub fn vertical_by_cell(
                 progress.check()?;
             }
             let patch = lattice.patch(cell);
-            Ok(patch.map(|patch| lattice.faces.deviation_m(&patch, lattice.members(cell))))
+            Ok(patch.map(|patch| lattice.faces.deviation_m(&patch, &lattice.members(cell))))
         })
         .collect()
 }
@@ -462,4 +550,107 @@ fn start(
         });
     }
     Ok(worst)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::progress::Silent;
+    use crate::shape::document::Placement;
+    use crate::shape::mesh::{FileMesh, Triangle};
+    use crate::shape::placement::Transform;
+
+    fn placed(triangles: Vec<Triangle>) -> Mesh {
+        let file = FileMesh {
+            triangles,
+            ..FileMesh::default()
+        };
+        Mesh::place(file, &Transform::new(1.0, &Placement::default())).unwrap()
+    }
+
+    fn grid(samples: [usize; 2]) -> Grid {
+        let [x_m, y_m] = samples.map(|samples| Axis {
+            from: -0.013,
+            to: 0.017,
+            samples,
+        });
+        Grid { x_m, y_m }
+    }
+
+    /// A triangle over the whole grid, tilted.
+    fn sheet(k: usize) -> Triangle {
+        let t = k as f64;
+        [
+            [-0.07, -0.07, 0.010 + 1e-3 * (0.7 * t).sin()],
+            [0.13, -0.07, 0.011 + 1e-3 * (1.3 * t).sin()],
+            [-0.03, 0.13, 0.012 + 1e-3 * (1.7 * t).sin()],
+        ]
+    }
+
+    /// The lists of a million such triangles on this grid would have taken 40 GB.
+    #[test]
+    fn sheets_over_the_whole_grid_share_their_lists() {
+        let faces = placed((0..70_000).map(sheet).collect());
+        let grid = grid([61, 51]);
+        let faces = Faces::new(&faces, &grid);
+        let heights = vec![None; grid.len()];
+        let lattice = Lattice::new(&faces, &grid, &heights);
+        let side = lattice.block;
+        let first =
+            |cell: &usize| (cell % 60).is_multiple_of(side) && (cell / 60).is_multiple_of(side);
+        let blocks = (0..lattice.len()).filter(first);
+        let held: usize = blocks.map(|cell| lattice.around(cell).len()).sum();
+        assert!(side > 1 && held <= MOST_EACH * faces.list.len(), "{held}");
+        assert_eq!(lattice.members(1307).len(), faces.list.len());
+    }
+
+    #[test]
+    fn blocks_of_any_size_give_the_same_faces_and_the_same_bounds() {
+        let bump = |k: usize| {
+            let [x, y] = [0.7, 1.3].map(|c| -0.015 + 0.033 * (c * k as f64).fract());
+            let z = 0.01 + 0.004 * (1.1 * k as f64).sin();
+            [
+                [x, y, z],
+                [x + 0.004, y, z - 7e-4],
+                [x, y + 0.003, z + 1.3e-3],
+            ]
+        };
+        let mesh = placed((0..40).map(bump).chain((0..3).map(sheet)).collect());
+        let grid = grid([11, 8]);
+        let faces = Faces::new(&mesh, &grid);
+        let known = heights(&mesh, &grid, &Silent).unwrap();
+        let known: Vec<Option<f64>> = known.iter().map(|s| s.map(|s| s.height_m)).collect();
+        let fine = Lattice::new(&faces, &grid, &known);
+        let told = |lattice: &Lattice| {
+            let worst = vertical(&mesh, &grid, lattice, &Silent).unwrap();
+            (worst, vertical_by_cell(lattice, &Silent).unwrap())
+        };
+        let mut sides = Vec::new();
+        for most in [300, 150, 100, 1] {
+            let coarse = Lattice::within(most, &faces, &grid, &known);
+            for cell in 0..fine.len() {
+                assert_eq!(coarse.members(cell), fine.members(cell), "{most}: {cell}");
+            }
+            assert_eq!(told(&coarse), told(&fine));
+            sides.push(coarse.block);
+        }
+        assert_eq!(fine.block, 1);
+        assert!(
+            sides.is_sorted() && sides[0] > 1 && sides[3] >= 10,
+            "{sides:?}"
+        );
+    }
+
+    #[test]
+    fn a_grid_without_cells_has_no_faces() {
+        let mesh = placed((0..3).map(sheet).collect());
+        for samples in [[1, 7], [7, 1], [1, 1]] {
+            let grid = grid(samples);
+            let faces = Faces::new(&mesh, &grid);
+            let known = vec![Some(0.01); grid.len()];
+            let lattice = Lattice::new(&faces, &grid, &known);
+            assert_eq!(lattice.len(), 0);
+            assert_eq!(vertical_by_cell(&lattice, &Silent).unwrap(), []);
+        }
+    }
 }
