@@ -182,6 +182,7 @@ mod tests {
         let sharp = sharpened(&coarse, &task, &found, &Silent).expect("runs");
         let sharp = sharp.expect("can be sharpened");
         let at = best_x(&restated(&*sharp, &task, &found)).expect("an optimum");
-        assert!(away(at) < 1e-4, "{:e}", away(at));
+        // A single sharpening ends 3e-5 away.
+        assert!(away(at) < STANDS, "{:e}", away(at));
     }
 }
