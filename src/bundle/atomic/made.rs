@@ -24,6 +24,31 @@ impl Drop for MadeFolders {
     }
 }
 
+/// Folders that several threads fill. Were each to clear what it made, a folder would stay where the one
+/// that made it stops before another that has a temporary file in it.
+#[derive(Debug, Default)]
+#[must_use = "empty folders go when this does"]
+pub struct SharedFolders(Vec<MadeFolders>);
+
+impl SharedFolders {
+    /// Makes `folder` and its parents where needed.
+    ///
+    /// # Errors
+    /// [`WriteError`] where it cannot be made.
+    pub fn make(&mut self, folder: &Path) -> Result<(), WriteError> {
+        let made = make_folder(folder).map_err(|error| error.of("write", folder))?;
+        self.0.push(made);
+        Ok(())
+    }
+}
+
+impl Drop for SharedFolders {
+    fn drop(&mut self) {
+        // The last first: an earlier one may have made a later one's parent.
+        while self.0.pop().is_some() {}
+    }
+}
+
 /// Why nothing could be made.
 #[derive(Debug)]
 pub(super) enum MadeError {
@@ -89,4 +114,28 @@ fn make_folder(folder: &Path) -> Result<MadeFolders, MadeError> {
     std::fs::create_dir_all(folder)
         .map_err(|error| MadeError::Folder(folder.to_path_buf(), error))?;
     Ok(made)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shared_folders_without_files_go_with_their_parents() {
+        let place = tempfile::tempdir().unwrap();
+        let [out, own] = ["out", "own"].map(|name| place.path().join(name));
+        std::fs::create_dir(&own).unwrap();
+        let mut folders = SharedFolders::default();
+        for folder in ["out/points/000", "out/points/001", "own", "own/points/000"] {
+            folders.make(&place.path().join(folder)).unwrap();
+        }
+        // Another thread's file is cleared after the one that made the folder stopped.
+        let file = out.join("points/000/a");
+        std::fs::write(&file, "a").unwrap();
+        std::fs::write(own.join("points/000/b"), "b").unwrap();
+        std::fs::remove_file(&file).unwrap();
+        drop(folders);
+        assert!(!out.exists());
+        assert!(own.join("points/000/b").is_file());
+    }
 }

@@ -28,6 +28,7 @@ pub use folder::FolderDraft;
 pub(crate) use folder::{check_name, listed_files};
 pub(crate) use identity::identity;
 pub use leftovers::{clean_leftovers, remove_files_beginning_with};
+pub use made::SharedFolders;
 pub use overwrite::{Overwrite, Record};
 pub use scratch::Scratch;
 pub use unforced::write_unforced;

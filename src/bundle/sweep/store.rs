@@ -10,7 +10,9 @@ use std::path::{Path, PathBuf};
 use super::plan::PLAN_MAX_BYTES;
 use super::{PlanFile, PointFile};
 use crate::bundle::artefact::FLUXFORM_VERSION;
-use crate::bundle::atomic::{Overwrite, WriteError, clean_leftovers, write_unforced};
+use crate::bundle::atomic::{
+    Overwrite, SharedFolders, WriteError, clean_leftovers, write_unforced,
+};
 use crate::bundle::json::JsonError;
 use crate::bundle::plain::read_plain;
 use crate::bundle::write::write_json;
@@ -57,8 +59,9 @@ impl PointStore {
         self.folder.join("points").join(folder)
     }
 
-    /// Makes the folder this plan's: writes `plan.json` into it and removes what killed runs left
-    /// beside the points `indices`.
+    /// Makes the folder this plan's: writes `plan.json` into it, makes the folders of the points
+    /// `indices` and removes what killed runs left there. Folders into which no point came go when
+    /// what is returned does.
     ///
     /// # Errors
     /// [`WriteError`]; also when the folder belongs to another plan and `force` is not given.
@@ -67,7 +70,7 @@ impl PointStore {
         plan: &PlanFile,
         force: bool,
         indices: std::ops::Range<u64>,
-    ) -> Result<(), WriteError> {
+    ) -> Result<SharedFolders, WriteError> {
         let path = self.folder.join("plan.json");
         if !belongs_to(&path, plan, force)? {
             let overwrite = if force {
@@ -81,12 +84,15 @@ impl PointStore {
                 outcome => drop(outcome?),
             }
         }
+        let mut folders = SharedFolders::default();
         if !indices.is_empty() {
             for folder in indices.start / FOLDER..=(indices.end - 1) / FOLDER {
-                clean_leftovers(&self.subfolder(folder * FOLDER));
+                let folder = self.subfolder(folder * FOLDER);
+                folders.make(&folder)?;
+                clean_leftovers(&folder);
             }
         }
-        Ok(())
+        Ok(folders)
     }
 
     /// What stands where point `index` of the plan with this digest belongs.

@@ -84,7 +84,7 @@ pub fn run(
     check_inputs(plan)?;
     let sweep = Sweep::new(plan)?;
     let store = PointStore::new(folder);
-    store.claim(plan, force, indices.clone())?;
+    let _folders = store.claim(plan, force, indices.clone())?;
     let points = indices.end - indices.start;
     let (kept, failed, inaccurate) = (AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0));
     let first_failure: Mutex<Option<(u64, String)>> = Mutex::new(None);
