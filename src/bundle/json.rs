@@ -34,6 +34,20 @@ pub fn to_json<T: Serialize + ?Sized>(value: &T) -> Result<Vec<u8>, JsonError> {
     Ok(text)
 }
 
+/// What is wrong with JSON that was read. It may quote a text of any length: the middle of a long
+/// message is left out, its end tells line and column.
+pub(crate) fn fault(error: &serde_json::Error) -> String {
+    const HALF: usize = 400;
+    let text = error.to_string();
+    let count = text.chars().count();
+    if count <= 2 * HALF {
+        return text;
+    }
+    let start: String = text.chars().take(HALF).collect();
+    let end: String = text.chars().skip(count - HALF).collect();
+    format!("{start} ... {end}")
+}
+
 impl ser::Error for JsonError {
     fn custom<T: Display>(message: T) -> Self {
         Self::Other(message.to_string())
@@ -273,7 +287,7 @@ impl<'a> Serializer for Finite<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::{JsonError, to_json};
+    use super::{JsonError, fault, to_json};
     use serde::Serialize;
     use std::collections::BTreeMap;
 
@@ -320,5 +334,18 @@ mod tests {
             text,
             "{\n  \"lambda_n_per_m\": null,\n  \"currents_a\": [\n    0.30000000000000004\n  ]\n}\n"
         );
+    }
+
+    #[test]
+    fn a_message_that_quotes_a_long_text_is_cut_in_its_middle() {
+        let long = format!("\n\"{}\"", "a.".repeat(60_000));
+        let told = fault(&serde_json::from_str::<u8>(&long).unwrap_err());
+        assert!(told.len() < 900 && told.starts_with("invalid type: string"));
+        assert!(
+            told.ends_with("expected u8 at line 2 column 120002"),
+            "{told}"
+        );
+        let short = serde_json::from_str::<u8>("\"a\"").unwrap_err();
+        assert_eq!(fault(&short), short.to_string());
     }
 }

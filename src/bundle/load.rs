@@ -14,6 +14,7 @@ use serde::Deserialize;
 use super::artefact::{check_version, sha256_hex};
 use super::atomic::check_name;
 use super::consistent;
+use super::json::fault;
 use super::lambda_file::LambdaFile;
 use super::manifest::Manifest;
 use super::npz::{MapArrays, from_npz};
@@ -156,7 +157,7 @@ impl Bundle {
             currents: read_currents(currents, part(currents)?)
                 .map_err(|error| content(currents, error.to_string()))?,
             lambda: serde_json::from_slice(part(lambda)?)
-                .map_err(|error| content(lambda, error.to_string()))?,
+                .map_err(|error| content(lambda, fault(&error)))?,
             manifest,
             manifest_sha256,
         };
@@ -276,7 +277,7 @@ fn read_manifest(folder: &Path, path: &Path) -> Result<(Manifest, String), Bundl
     };
     let content = |error: serde_json::Error| BundleError::Content {
         path: path.to_path_buf(),
-        message: error.to_string(),
+        message: fault(&error),
     };
     let version: Version = serde_json::from_slice(&text).map_err(content)?;
     check_version(&version.schema_version).map_err(|message| BundleError::Schema {

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, check_version, sha256_hex};
+use crate::bundle::json::fault;
 
 /// Most designs of one sweep.
 pub const POINTS_MAX: u64 = 100_000_000;
@@ -110,6 +111,7 @@ impl PlanFile {
     /// What is wrong with it and what to do; `name` names the file.
     pub fn parse(name: &str, bytes: &[u8]) -> Result<Self, String> {
         let plan: Self = serde_json::from_slice(bytes).map_err(|error| {
+            let error = fault(&error);
             format!("{name}: not a plan of a sweep: {error}; make one with `fluxform sweep plan`")
         })?;
         check_version(&plan.schema_version)

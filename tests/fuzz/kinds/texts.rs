@@ -39,7 +39,7 @@ pub fn kinds() -> Vec<Kind> {
         ),
         kind(
             "points",
-            32.0,
+            64.0,
             points,
             || hostile_tables("x_m,y_m,z_m"),
             mutate,
@@ -47,7 +47,7 @@ pub fn kinds() -> Vec<Kind> {
         ),
         kind(
             "trajectory",
-            32.0,
+            64.0,
             trajectories,
             || hostile_tables("t_s,x_m,y_m,z_m"),
             mutate,
