@@ -196,7 +196,7 @@ fn a_hostile_path_stays_text() {
     let shape = place.read("shapes/flat.toml");
     place.write(
         hostile,
-        &shape.replace("\"flat.stl\"", "\"../../shapes/flat.stl\""),
+        &shape.replace("\"flat.stl\"", "\"../shapes/flat.stl\""),
     );
     let hostile_at = format!("./{hostile}");
     let shown = place.run(&["calibrate", DESIGN, &hostile_at, "--format", "json"], 0);

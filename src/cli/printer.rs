@@ -16,6 +16,7 @@ use super::code::Code;
 use super::failure::{Failure, FaultEntry};
 use crate::bundle::json::to_json;
 use crate::design::Faults;
+use crate::design::words::{shown_path, visible};
 
 /// Bytes gathered before standard output is written to.
 const BUFFER_BYTES: usize = 1 << 16;
@@ -237,7 +238,7 @@ impl Printer {
             }
             let names: Vec<String> = documents
                 .iter()
-                .map(|document| document.faults.path().display().to_string())
+                .map(|document| shown_path(document.faults.path()))
                 .collect();
             self.tell(code, &format!("refused: {}", names.join(", ")));
         } else {
@@ -266,11 +267,10 @@ impl Printer {
             self.failure(&Failure::Usage(message));
             return;
         }
-        let told = error.render();
-        let told = if self.colour {
-            told.ansi().to_string()
-        } else {
-            told.to_string()
+        let plain = error.render().to_string();
+        let told = match visible(&plain) {
+            Cow::Borrowed(_) if self.colour => error.render().ansi().to_string(),
+            tame => tame.into_owned(),
         };
         let marked = format!("error[{}]:", Code::Arguments.name());
         say(&told.replacen("error:", &marked, 1));
@@ -299,40 +299,8 @@ pub fn say(text: &str) {
     let _ = io::stderr().lock().write_all(text.as_bytes());
 }
 
-/// The text with control characters escaped, line ends and tabs aside: what a file says must not
-/// command the terminal.
-fn visible(text: &str) -> Cow<'_, str> {
-    let commands = |c: char| c.is_control() && c != '\n' && c != '\t';
-    if !text.contains(commands) {
-        return Cow::Borrowed(text);
-    }
-    let mut shown = String::with_capacity(text.len());
-    for c in text.chars() {
-        if commands(c) {
-            shown.extend(c.escape_unicode());
-        } else {
-            shown.push(c);
-        }
-    }
-    Cow::Owned(shown)
-}
-
 /// Columns at which messages are wrapped.
 fn width() -> usize {
     let told = std::env::var("COLUMNS").ok().and_then(|c| c.parse().ok());
     told.unwrap_or(100).clamp(40, 160)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::visible;
-
-    #[test]
-    fn what_a_file_says_does_not_command_the_terminal() {
-        assert_eq!(
-            visible("a\u{1b}[31mb\r\n\tc\u{7}"),
-            "a\\u{1b}[31mb\\u{d}\n\tc\\u{7}"
-        );
-        assert_eq!(visible("ohm \u{3a9}"), "ohm \u{3a9}");
-    }
 }

@@ -9,7 +9,7 @@ use csv::{ReaderBuilder, StringRecord, Trim};
 
 use super::diagnostics::{Fault, Faults, InvalidDocument, place_of};
 use super::source;
-use super::words::{number, quoted};
+use super::words::{number, token};
 
 /// The columns, in the order of the usual header.
 const COLUMNS: [&str; 2] = ["b_t", "h_a_per_m"];
@@ -147,17 +147,23 @@ fn header(
     if let (2, Some(b), Some(h)) = (record.len(), place(COLUMNS[0]), place(COLUMNS[1])) {
         return Some([b, h]);
     }
-    let found = record.iter().collect::<Vec<_>>().join(",");
+    let found = |marks: &[char]| record.iter().any(|cell| cell.contains(marks));
     let help = if record.iter().all(|cell| cell.parse::<f64>().is_ok()) {
         "the header line is missing: add it before the first row"
-    } else if found.contains([';', '\t']) {
+    } else if found(&[';', '\t']) {
         "separate the columns by commas, and write decimals with a point"
     } else {
         "two columns, B in T and H in A/m, with these names"
     };
+    // The file is whatever a document names: no more than a word of it is shown.
+    let strange = record.iter().find(|cell| !COLUMNS.contains(cell));
+    let columns = match record.len() {
+        1 => "1 column".to_owned(),
+        many => format!("{many} columns"),
+    };
     let message = format!(
-        "expected the header line \"b_t,h_a_per_m\", found {}",
-        quoted(&found)
+        "expected the header line \"b_t,h_a_per_m\", found {columns} and {}",
+        token(strange.unwrap_or(&record[0]))
     );
     faults.push(Fault::error("", message).at(span).help(help));
     None
@@ -182,7 +188,7 @@ fn row(
         match cell.parse::<f64>() {
             Ok(found) if found.is_finite() => *value = found,
             _ => {
-                let message = format!("expected a finite number, found {}", quoted(cell));
+                let message = format!("expected a finite number, found {}", token(cell));
                 faults.push(Fault::error(name, message).at(span));
             }
         }
@@ -246,25 +252,28 @@ mod tests {
     fn the_header_is_required_as_it_is() {
         let help = "two columns, B in T and H in A/m, with these names";
         let expected = "s.csv:1:1: error: expected the header line \"b_t,h_a_per_m\", found";
-        assert_eq!(said("B,H\n0,0\n"), [format!("{expected} \"B,H\" ({help})")]);
+        assert_eq!(
+            said("B,H\n0,0\n"),
+            [format!("{expected} 2 columns and \"B\" ({help})")]
+        );
         assert_eq!(
             said("b_t,h_a_per_m,mu\n0,0,1\n"),
-            [format!("{expected} \"b_t,h_a_per_m,mu\" ({help})")]
+            [format!("{expected} 3 columns and \"mu\" ({help})")]
         );
         assert_eq!(
             said("b_t,b_t\n0,0\n"),
-            [format!("{expected} \"b_t,b_t\" ({help})")]
+            [format!("{expected} 2 columns and \"b_t\" ({help})")]
         );
         assert_eq!(
             said("0,0\n0.7,170\n"),
             [format!(
-                "{expected} \"0,0\" (the header line is missing: add it before the first row)"
+                "{expected} 2 columns and \"0\" (the header line is missing: add it before the first row)"
             )]
         );
         assert_eq!(
             said("b_t;h_a_per_m\n0;0\n0,7;170\n"),
             [format!(
-                "{expected} \"b_t;h_a_per_m\" (separate the columns by commas, and write decimals with a point)"
+                "{expected} 1 column and \"b_t;h_a_per_m\" (separate the columns by commas, and write decimals with a point)"
             )]
         );
         let long = said(&"x,".repeat(50_000));

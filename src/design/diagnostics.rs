@@ -9,6 +9,8 @@ use miette::{
     MietteSpanContents, SourceCode, SourceSpan, SpanContents,
 };
 
+use super::words::{commands, escaped, shown_path, visible};
+
 /// Faults beyond this many are counted, not shown.
 const SHOWN_MAX: usize = 100;
 
@@ -155,6 +157,10 @@ impl Faults {
     pub fn new(path: &Path, source: &str, mut list: Vec<Fault>) -> Self {
         for fault in &mut list {
             fault.span = fault.span.take().map(|span| within(source, span));
+            // Names and values of the document stand in them.
+            fault.key = escaped(&fault.key, usize::MAX);
+            fault.message = visible(&fault.message).into_owned();
+            fault.help = fault.help.take().map(|help| visible(&help).into_owned());
         }
         list.sort_by_key(|fault| fault.span.as_ref().map(|span| span.start));
         Self {
@@ -238,15 +244,16 @@ impl Faults {
     }
 
     fn quotable(&self) -> bool {
-        let control = |c: char| c.is_control() && !matches!(c, '\n' | '\r' | '\t');
-        !self.source.contains(control) && self.source.lines().all(|l| l.len() <= QUOTED_LINE_MAX)
+        // A line end of two characters is one; alone, a carriage return hides what is before it.
+        let tame = |line: &str| line.len() <= QUOTED_LINE_MAX && !line.contains(commands);
+        self.source.lines().all(tame)
     }
 
     fn line(&self, fault: &Fault) -> String {
-        let path = self.path.display();
+        let path = shown_path(&self.path);
         let place = match self.place(fault) {
             Some(place) => format!("{path}:{}:{}", place.line, place.column),
-            None => path.to_string(),
+            None => path,
         };
         let help = fault
             .help
@@ -257,7 +264,10 @@ impl Faults {
 
     fn left_out(&self) -> Option<String> {
         let rest = self.list.len().checked_sub(SHOWN_MAX).filter(|&n| n > 0)?;
-        Some(format!("{}: and {rest} more faults", self.path.display()))
+        Some(format!(
+            "{}: and {rest} more faults",
+            shown_path(&self.path)
+        ))
     }
 
     fn headline(&self) -> String {
@@ -272,7 +282,7 @@ impl Faults {
             named(count(Severity::Warning), "warning"),
         ];
         let parts: Vec<String> = parts.into_iter().flatten().collect();
-        format!("{}: {}", self.path.display(), parts.join(", "))
+        format!("{}: {}", shown_path(&self.path), parts.join(", "))
     }
 }
 
@@ -350,7 +360,7 @@ impl<'a> Report<'a> {
         Self {
             faults,
             source: QuotedSource {
-                name: faults.path.display().to_string(),
+                name: shown_path(&faults.path),
                 text: &faults.source,
             },
             headline: faults.headline(),

@@ -33,6 +33,7 @@ mod checks;
 pub mod diagnostics;
 pub mod gauge;
 pub mod model;
+pub mod named_file;
 pub mod parse;
 pub mod reader;
 pub mod rule;

@@ -5,6 +5,7 @@ use std::io::{self, Read};
 use std::path::Path;
 
 use super::diagnostics::{Fault, InvalidDocument, place_of};
+use super::named_file::{self, NamedFileError};
 
 /// Largest document that is read, bytes (4 MiB): several times what ten thousand coils need.
 pub const DOCUMENT_MAX_BYTES: u64 = 4 << 20;
@@ -12,23 +13,16 @@ pub const DOCUMENT_MAX_BYTES: u64 = 4 << 20;
 /// What a text is, for the messages about one that cannot be read.
 #[derive(Debug, Clone, Copy)]
 struct Kind {
-    name: &'static str,
-    /// Whether it may come through a pipe: what a person names may, what a document names may not.
-    piped: bool,
     too_large: &'static str,
     not_utf8: &'static str,
 }
 
 const DOCUMENT: Kind = Kind {
-    name: "TOML file",
-    piped: true,
     too_large: "is this the TOML document, or the surface itself?",
     not_utf8: "save the file as UTF-8; a surface needs its own ending (.stl, .obj, ...)",
 };
 
 const TABLE: Kind = Kind {
-    name: "CSV table",
-    piped: false,
     too_large: "is this the table?",
     not_utf8: "save the table as text: CSV in UTF-8",
 };
@@ -38,36 +32,37 @@ const TABLE: Kind = Kind {
 /// # Errors
 /// A missing file, a directory, a file over 4 MiB or not in UTF-8, or what the system says.
 pub fn text_of(path: &Path) -> Result<String, InvalidDocument> {
-    text_at(path, DOCUMENT)
+    let refuse = |fault| InvalidDocument::unreadable(path, fault);
+    // What a person names may be a pipe.
+    if fs::metadata(path).is_ok_and(|found| found.is_dir()) {
+        let fault = Fault::error("", "expected a TOML file, found a directory");
+        return Err(refuse(fault.help("name the file inside it")));
+    }
+    let file = File::open(path).map_err(|error| refuse(cannot_read(&error)))?;
+    text_from(file, path)
 }
 
 /// The text of the CSV table at `path`, which a document names.
 ///
 /// # Errors
-/// As [`text_of`].
+/// What is no regular file of at most 4 MiB ([`named_file`]) or is not in UTF-8.
 pub fn table_text_of(path: &Path) -> Result<String, InvalidDocument> {
-    text_at(path, TABLE)
+    let read = named_file::read(path, DOCUMENT_MAX_BYTES).map_err(|error| not_a_table(&error));
+    read.and_then(|bytes| text_of_bytes(bytes, TABLE))
+        .map_err(|fault| InvalidDocument::unreadable(path, fault))
 }
 
-fn text_at(path: &Path, kind: Kind) -> Result<String, InvalidDocument> {
-    let refuse = |fault| Err(InvalidDocument::unreadable(path, fault));
-    match fs::metadata(path) {
-        Err(error) => return refuse(cannot_read(&error)),
-        Ok(found) if found.is_dir() => {
-            let message = format!("expected a {}, found a directory", kind.name);
-            let fault = Fault::error("", message);
-            return refuse(fault.help("name the file inside it"));
+fn not_a_table(error: &NamedFileError) -> Fault {
+    let expected = || Fault::error("", format!("expected a CSV table, {error}"));
+    match error {
+        NamedFileError::Unreadable(error) => cannot_read(error),
+        NamedFileError::Folder => expected().help("name the file inside it"),
+        NamedFileError::NotRegular => expected().help("name a plain file"),
+        NamedFileError::NoLength => {
+            expected().help("begin with the line b_t,h_a_per_m, then one row a point")
         }
-        Ok(found) if !kind.piped && !found.is_file() => {
-            let message = format!("expected a {}, found a device or a pipe", kind.name);
-            let fault = Fault::error("", message);
-            return refuse(fault.help("name a plain file"));
-        }
-        Ok(_) => {}
-    }
-    match File::open(path) {
-        Ok(file) => text_read(file, path, kind),
-        Err(error) => refuse(cannot_read(&error)),
+        NamedFileError::OtherLength => expected().help("name a file on a disk"),
+        NamedFileError::TooLarge(_) => Fault::error("", error.to_string()).help(TABLE.too_large),
     }
 }
 
@@ -76,18 +71,14 @@ fn text_at(path: &Path, kind: Kind) -> Result<String, InvalidDocument> {
 /// # Errors
 /// A document over 4 MiB or not in UTF-8, or what the system says.
 pub fn text_from(stream: impl Read, path: &Path) -> Result<String, InvalidDocument> {
-    text_read(stream, path, DOCUMENT)
-}
-
-fn text_read(stream: impl Read, path: &Path, kind: Kind) -> Result<String, InvalidDocument> {
     let mut bytes = Vec::new();
-    let result = stream.take(DOCUMENT_MAX_BYTES + 1).read_to_end(&mut bytes);
-    text_of_bytes(result.map(|_| bytes), kind)
+    let read = stream.take(DOCUMENT_MAX_BYTES + 1).read_to_end(&mut bytes);
+    read.map_err(|error| cannot_read(&error))
+        .and_then(|_| text_of_bytes(bytes, DOCUMENT))
         .map_err(|fault| InvalidDocument::unreadable(path, fault))
 }
 
-fn text_of_bytes(bytes: io::Result<Vec<u8>>, kind: Kind) -> Result<String, Fault> {
-    let bytes = bytes.map_err(|error| cannot_read(&error))?;
+fn text_of_bytes(bytes: Vec<u8>, kind: Kind) -> Result<String, Fault> {
     if bytes.len() as u64 > DOCUMENT_MAX_BYTES {
         let message = format!("the file is larger than {DOCUMENT_MAX_BYTES} bytes");
         return Err(Fault::error("", message).help(kind.too_large));

@@ -1,5 +1,8 @@
 //! How messages show numbers, the user's own text, names that are near and axes.
 
+use std::borrow::Cow;
+use std::path::Path;
+
 use crate::numerics::axis::Axis;
 
 /// Least similarity (Damerau-Levenshtein, normalised) at which a name is called near.
@@ -7,6 +10,10 @@ const NEAR: f64 = 0.6;
 
 /// Longest piece of the user's text that a message repeats, characters.
 pub const QUOTED_MAX: usize = 60;
+
+/// Longest piece of a file that another document names and that is no table, characters: enough to
+/// recognise a misspelt header, too little to publish a file that was named by mistake or malice.
+const TOKEN_MAX: usize = 20;
 
 /// `value` rounded to 12 significant digits, to hide the last bits of a product.
 #[must_use]
@@ -41,7 +48,14 @@ pub fn quoted(text: &str) -> String {
     format!("\"{}\"", escaped(text, QUOTED_MAX))
 }
 
-/// The user's text without control characters, cut after `most` characters.
+/// The first word of a text in a file that a document names, escaped, cut and in quotes.
+#[must_use]
+pub fn token(text: &str) -> String {
+    let word = text.split_whitespace().next().unwrap_or("");
+    format!("\"{}\"", escaped(word, TOKEN_MAX))
+}
+
+/// The user's text on one line without characters that command a screen, cut after `most` characters.
 #[must_use]
 pub fn escaped(text: &str, most: usize) -> String {
     let mut shown = String::new();
@@ -49,13 +63,50 @@ pub fn escaped(text: &str, most: usize) -> String {
         if i == most {
             return shown + "...";
         }
-        if c.is_control() {
-            shown.extend(c.escape_default());
-        } else {
-            shown.push(c);
-        }
+        push_shown(&mut shown, c, commands(c) || matches!(c, '\n' | '\t'));
     }
     shown
+}
+
+/// A file's name as a message shows it: on one line, without characters that command a screen.
+#[must_use]
+pub fn shown_path(path: &Path) -> String {
+    escaped(&path.to_string_lossy(), usize::MAX)
+}
+
+/// A message of any number of lines in which every character that commands a screen is escaped:
+/// what a file contains or is called must not command the terminal.
+#[must_use]
+pub fn visible(text: &str) -> Cow<'_, str> {
+    if !text.contains(commands) {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        push_shown(&mut shown, c, commands(c));
+    }
+    Cow::Owned(shown)
+}
+
+/// Whether a screen obeys the character instead of showing it: control characters but line feed and
+/// tab, separators of lines and paragraphs, and marks that reorder the text around them.
+#[must_use]
+pub fn commands(c: char) -> bool {
+    const REORDERING: [std::ops::RangeInclusive<char>; 4] = [
+        '\u{200e}'..='\u{200f}',
+        '\u{2028}'..='\u{202e}',
+        '\u{2066}'..='\u{2069}',
+        '\u{61c}'..='\u{61c}',
+    ];
+    (c.is_control() && c != '\n' && c != '\t') || REORDERING.iter().any(|marks| marks.contains(&c))
+}
+
+fn push_shown(shown: &mut String, c: char, escape: bool) {
+    match (escape, c) {
+        (false, _) => shown.push(c),
+        (true, '\n' | '\t' | '\r') => shown.extend(c.escape_default()),
+        (true, _) => shown.extend(c.escape_unicode()),
+    }
 }
 
 /// The name among `names` that `text` was probably meant to be.
@@ -126,6 +177,28 @@ mod tests {
         assert_eq!(nearest("Turn", &names), Some("turns"));
         assert_eq!(nearest("colour", &names), None);
         assert_eq!(nearest(&"turns".repeat(1000), &names), None);
+    }
+
+    #[test]
+    fn what_a_file_says_does_not_command_the_terminal() {
+        assert_eq!(
+            visible("a\u{1b}[31mb\r\n\tc\u{7}\u{9b}1m"),
+            "a\\u{1b}[31mb\\r\n\tc\\u{7}\\u{9b}1m"
+        );
+        assert_eq!(visible("ohm \u{3a9}"), "ohm \u{3a9}");
+        // A name that shows its ending reversed.
+        assert_eq!(visible("a\u{202e}vsc"), "a\\u{202e}vsc");
+        assert_eq!(shown_path(Path::new("a\nb\u{1b}c")), "a\\nb\\u{1b}c");
+    }
+
+    #[test]
+    fn of_a_file_named_in_a_document_one_short_word_is_shown() {
+        assert_eq!(token(" B  H"), "\"B\"");
+        assert_eq!(
+            token("SECRET=0123456789abcdef"),
+            "\"SECRET=0123456789abc...\""
+        );
+        assert_eq!(token("\u{1b}]0;"), "\"\\u{1b}]0;\"");
     }
 
     #[test]

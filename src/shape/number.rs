@@ -87,9 +87,9 @@ fn significant_digits(word: &[u8]) -> usize {
         .count()
 }
 
-/// A word for a message, at most 40 bytes of it.
+/// A word for a message, at most 20 bytes of it: a document may name any file as a surface.
 pub(super) fn shown(word: &[u8]) -> String {
-    word[..word.len().min(40)].escape_ascii().to_string()
+    word[..word.len().min(20)].escape_ascii().to_string()
 }
 
 #[cfg(test)]

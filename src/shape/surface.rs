@@ -1,11 +1,11 @@
 //! A surface in metres, whether it is a mesh or a formula.
 
-use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 use std::path::Path;
 
 use rayon::prelude::*;
 
+use crate::design::named_file::{self, NamedFileError};
 use crate::progress::Progress;
 use crate::shape::document::{Placement, ShapeDocument, SurfaceFormat, SurfaceSource, unit_name};
 use crate::shape::error::ShapeError;
@@ -155,15 +155,7 @@ pub(super) fn read_mesh(format: SurfaceFormat, path: &Path) -> Result<FileMesh, 
 /// `None` for what is no whole binary STL file, and where the file system fails: reading it
 /// otherwise tells why.
 fn streamed(path: &Path) -> Option<Result<FileMesh, StlError>> {
-    // Not to wait for a pipe, it must be known before it is opened.
-    if !std::fs::metadata(path).ok()?.is_file() {
-        return None;
-    }
-    let file = File::open(path).ok()?;
-    let length = file.metadata().ok()?.len();
-    if length > LARGEST_FILE {
-        return None;
-    }
+    let (file, length) = named_file::open(path, LARGEST_FILE).ok()?;
     stl::stream(file, length).ok()?
 }
 
@@ -184,44 +176,29 @@ fn check_placement(placement: &Placement) -> Result<(), ShapeError> {
 
 /// A regular file's bytes.
 pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
-    let unreadable = |what: String| ShapeError::Unreadable {
-        path: path.into(),
-        what,
-    };
-    let failed = |error: io::Error| {
-        unreadable(match error.kind() {
+    let what = |error: NamedFileError| match error {
+        NamedFileError::Unreadable(error) => match error.kind() {
             io::ErrorKind::NotFound => {
                 "no such file; check the path (in a shape file it counts from that file's folder)"
                     .into()
             }
             io::ErrorKind::PermissionDenied => "it may not be read (permission denied)".into(),
             _ => format!("it cannot be read: {error}"),
-        })
+        },
+        NamedFileError::Folder => "this is a folder; name the surface file in it".into(),
+        NamedFileError::NotRegular => {
+            "this is no regular file (a device, a pipe or a socket)".into()
+        }
+        NamedFileError::TooLarge(_) => {
+            format!("the file is larger than {LARGEST_FILE} bytes; export it coarser")
+        }
+        NamedFileError::NoLength => {
+            "the file is empty (0 bytes): the export or the download failed".into()
+        }
+        NamedFileError::OtherLength => format!("expected a surface, {error}"),
     };
-    let kind = std::fs::metadata(path).map_err(failed)?;
-    if kind.is_dir() {
-        return Err(unreadable(
-            "this is a folder; name the surface file in it".into(),
-        ));
-    }
-    if !kind.is_file() {
-        return Err(unreadable(
-            "this is no regular file (a device, a pipe or a socket)".into(),
-        ));
-    }
-    if kind.len() > LARGEST_FILE {
-        return Err(unreadable(format!(
-            "the file is larger than {LARGEST_FILE} bytes; export it coarser"
-        )));
-    }
-    // Files of the system's own tell no size, and others may grow.
-    let read = || -> io::Result<Vec<u8>> {
-        let mut bytes = Vec::new();
-        bytes.try_reserve_exact(kind.len() as usize)?;
-        File::open(path)?
-            .take(LARGEST_FILE)
-            .read_to_end(&mut bytes)?;
-        Ok(bytes)
-    };
-    read().map_err(failed)
+    named_file::read(path, LARGEST_FILE).map_err(|error| ShapeError::Unreadable {
+        path: path.into(),
+        what: what(error),
+    })
 }

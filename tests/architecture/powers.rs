@@ -93,8 +93,8 @@ const POWERS: &[Power] = &[
             "bench/memory.rs",
             "bundle/",
             "cli/documents.rs",
+            "design/named_file.rs",
             "design/source.rs",
-            "shape/surface.rs",
         ],
     },
     Power {
