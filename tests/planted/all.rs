@@ -1,0 +1,63 @@
+//! All of `tests/planted.rs`: every case, with a row each.
+//!
+//! ```text
+//! cargo bench --locked --bench planted -- [--rows] [--command map]
+//! FLUXFORM_OTHER=target/release/fluxform cargo bench --locked --bench planted
+//! ```
+//!
+//! Plants links, foreign files, foreign manifests and the user's own files at every name that a
+//! command may touch, runs it with and without `--force`, with good and with spoilt inputs, and
+//! compares every byte, mode, type and link target of what is the user's. Ends with an error where
+//! one changed. `--rows` prints a line for every case instead of those that changed alone.
+
+// A measurement: it prints and ends with a code.
+#![allow(clippy::print_stdout, clippy::disallowed_methods, clippy::exit)]
+
+#[cfg(target_os = "linux")]
+mod cases;
+#[cfg(target_os = "linux")]
+mod commands;
+#[cfg(target_os = "linux")]
+mod inputs_as_outputs;
+#[cfg(target_os = "linux")]
+mod judge;
+#[cfg(target_os = "linux")]
+mod run;
+#[cfg(target_os = "linux")]
+mod snapshot;
+
+#[cfg(not(target_os = "linux"))]
+fn main() {
+    println!("skipped: links and pipes are those of Linux");
+}
+
+#[cfg(target_os = "linux")]
+fn main() {
+    let words: Vec<String> = std::env::args().collect();
+    let only = words
+        .iter()
+        .position(|word| word == "--command")
+        .and_then(|at| words.get(at + 1));
+    let commands: Vec<_> = commands::COMMANDS
+        .iter()
+        .chain(commands::MEASURES)
+        .filter(|writes| only.is_none_or(|only| writes.name == only))
+        .copied()
+        .collect();
+    let rows = run::rows(&commands, 1);
+    let changed: Vec<_> = rows
+        .iter()
+        .filter(|row| !row.changed.is_empty())
+        .cloned()
+        .collect();
+    if words.iter().any(|word| word == "--rows") {
+        println!("{}", run::lines(&rows, false));
+    } else if !changed.is_empty() {
+        println!("{}", run::lines(&changed, false));
+    }
+    println!("{}", run::summary(&rows, "planted", |row| row.planted));
+    println!("{}", run::summary(&rows, "command", |row| row.command));
+    if !changed.is_empty() {
+        std::process::exit(1);
+    }
+}

@@ -1,0 +1,269 @@
+//! Every command that writes, with its inputs; what each writes is found by running it.
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// The program under test; another build of it by `FLUXFORM_OTHER`.
+pub fn program() -> String {
+    std::env::var("FLUXFORM_OTHER").unwrap_or_else(|_| env!("CARGO_BIN_EXE_fluxform").to_owned())
+}
+
+/// A command that writes, and what is run before it to make its inputs.
+#[derive(Clone, Copy, Debug)]
+pub struct Writes {
+    pub name: &'static str,
+    pub before: &'static [&'static str],
+    /// Words, separated by blanks.
+    pub line: &'static str,
+    /// Flags that make an earlier run of the same inputs leave something else.
+    pub earlier: &'static str,
+    /// An input that can be spoilt, so that the command is refused.
+    pub spoils: &'static str,
+    /// The outputs make up one folder, which is replaced as a whole.
+    pub bundle: bool,
+}
+
+const BUNDLE: &str = "calibrate air.toml bump.toml --out bundles";
+const PLAN: &str = "sweep plan air.toml --set wire.diameter_mm=0.6,0.7 --out plan.json";
+const POINTS: &str = "sweep run plan.json --out points";
+
+const fn writes(name: &'static str, line: &'static str) -> Writes {
+    Writes {
+        name,
+        before: &[],
+        line,
+        earlier: "",
+        spoils: "air.toml",
+        bundle: false,
+    }
+}
+
+pub const COMMANDS: &[Writes] = &[
+    Writes {
+        earlier: "--no-report --criterion linear",
+        bundle: true,
+        ..writes("calibrate", "calibrate air.toml bump.toml --out out")
+    },
+    Writes {
+        spoils: "steel.toml",
+        earlier: "--criterion linear",
+        bundle: true,
+        ..writes(
+            "calibrate (steel)",
+            "calibrate steel.toml bump.toml --out out",
+        )
+    },
+    Writes {
+        spoils: "steel.toml",
+        bundle: true,
+        ..writes(
+            "calibrate --no-cache",
+            "calibrate steel.toml bump.toml --no-cache --out out",
+        )
+    },
+    Writes {
+        earlier: "--components all",
+        ..writes(
+            "map",
+            "map air.toml --csv --vtk --vfield out/v.yaml --mpem out/m.yaml --mpem-tolerance 1e-1 --out out",
+        )
+    },
+    Writes {
+        earlier: "--csv --vtk",
+        ..writes("map (fewer files)", "map air.toml --out out")
+    },
+    Writes {
+        spoils: "bump.toml",
+        earlier: "--certify distance",
+        ..writes(
+            "discretize",
+            "discretize bump.toml --out out/points.csv --plot out/points.svg",
+        )
+    },
+    writes("lambda", "lambda air.toml bump.toml --plot out/lambda.svg"),
+    writes(
+        "optimize",
+        "optimize air.toml --out out/best.toml --report out/best.html",
+    ),
+    Writes {
+        earlier: "--components gz",
+        ..writes("probe", "probe air.toml places.csv --out out/probe.csv")
+    },
+    writes(
+        "probe --compare",
+        "probe air.toml --compare scan.csv --fit scale --out out/residuals.csv",
+    ),
+    Writes {
+        before: &[BUNDLE],
+        spoils: "finger.csv",
+        ..writes(
+            "replay",
+            "replay bundles/air/bump finger.csv --out out/replay.csv --plot out/replay.svg",
+        )
+    },
+    Writes {
+        before: &[BUNDLE],
+        spoils: "bundles/air/bump/manifest.json",
+        ..writes(
+            "replay --synthesize",
+            "replay bundles/air/bump --synthesize circle --duration 1 --trajectory-out out/made.csv --out out/replay.csv",
+        )
+    },
+    writes(
+        "compare",
+        "compare air.toml bump.toml knob.toml --plot out/compare.svg",
+    ),
+    writes(
+        "sweep plan",
+        "sweep plan air.toml --set wire.diameter_mm=0.6,0.7 --out out/plan.json",
+    ),
+    Writes {
+        before: &[PLAN],
+        spoils: "plan.json",
+        ..writes("sweep run", "sweep run plan.json --out out")
+    },
+    Writes {
+        before: &[PLAN, POINTS],
+        spoils: "plan.json",
+        ..writes(
+            "sweep merge",
+            "sweep merge plan.json points --out out/sweep.csv --report out/sweep.html",
+        )
+    },
+    Writes {
+        spoils: "",
+        ..writes("man", "man --out out")
+    },
+];
+
+/// Measures, which take seconds: only in the whole run.
+pub const MEASURES: &[Writes] = &[Writes {
+    spoils: "",
+    ..writes("bench", "bench --quick --stage inductance --out out")
+}];
+
+/// Lays the inputs.
+pub fn lay_inputs(place: &Path) {
+    let write = |name: &str, text: &str| fs::write(place.join(name), text).unwrap();
+    write("air.toml", AIR);
+    write(
+        "steel.toml",
+        &AIR.replace("\"air\"", "\"steel\"")
+            .replace("array = { rows = 1, columns = 2, pitch_mm = 43.0 }", CORE),
+    );
+    write("bump.toml", BUMP);
+    write(
+        "knob.toml",
+        &BUMP
+            .replace("bump", "knob")
+            .replace("base_mm = 37", "base_mm = 39"),
+    );
+    write(
+        "places.csv",
+        "x_m,y_m,z_m\n0.007,0.003,0.04\n0.001,-0.003,0.05\n",
+    );
+    write(
+        "finger.csv",
+        "t_s,x_m,y_m,z_m\n0,0.001,0.002,0.047\n0.1,0.002,0.002,0.047\n",
+    );
+    let rows = [[7.0, 1.0], [-3.0, 2.0], [13.0, 1.3], [-17.0, 0.7]];
+    let row = |[x, bz]: [f64; 2]| {
+        let row = |coil| format!("{},0.003,0.043,{},{coil},1\n", x * 1e-3, bz * 1e-3);
+        row(0) + &row(1)
+    };
+    let rows: String = rows.into_iter().map(row).collect();
+    write(
+        "scan.csv",
+        &format!("x_m,y_m,z_m,bz_t,coil,current_a\n{rows}"),
+    );
+}
+
+const CORE: &str = "core = { below_mm = 7.0, relative_permeability = 1300.0 }";
+
+const AIR: &str = r#"name = "air"
+coil = { inner_diameter_mm = 24.0, outer_diameter_mm = 38.0, length_mm = 70.0 }
+wire = { diameter_mm = 0.7 }
+array = { rows = 1, columns = 2, pitch_mm = 43.0 }
+magnet = { diameter_mm = 10.0, length_mm = 10.0, magnetization_a_per_m = 1.1579e6 }
+supply = { current_max_a = 1.3, voltage_v = 36.0 }
+limits = { resistance_max_ohm = 6.0, settling_max_ms = 100.0, outer_diameter_max_mm = 38.0, length_max_mm = 100.0 }
+target = { height_mm = 30.0 }
+[workspace]
+x_mm = [-20.0, 20.0, 7]
+y_mm = [-20.0, 20.0, 7]
+z_mm = [30.0, 70.0, 7]
+"#;
+
+const BUMP: &str = r#"name = "bump"
+primitive = "half-sphere"
+radius_mm = 13
+base_mm = 37
+[points]
+x_mm = [-13.0, 13.0, 5]
+y_mm = [-13.0, 13.0, 5]
+"#;
+
+/// How a run ended.
+#[derive(Clone, Debug)]
+pub struct Ran {
+    /// `None` where a signal ended it.
+    pub code: Option<i32>,
+    pub hangs: bool,
+    pub said: String,
+}
+
+/// A run that neither ends nor uses the processor for so long waits for something.
+const HANGS: Duration = Duration::from_secs(120);
+
+/// Runs the program in `place`.
+pub fn run(place: &Path, words: &[String]) -> Ran {
+    let log = place.with_extension("log");
+    let file = fs::File::create(&log).unwrap();
+    let mut child = Command::new(program())
+        .args(words)
+        .current_dir(place)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(file)
+        .spawn()
+        .unwrap();
+    let began = Instant::now();
+    let mut pause = Duration::from_micros(500);
+    let (code, hangs) = loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            break (status.code(), false);
+        }
+        if began.elapsed() > HANGS {
+            child.kill().unwrap();
+            child.wait().unwrap();
+            break (None, true);
+        }
+        std::thread::sleep(pause);
+        pause = (pause * 2).min(Duration::from_millis(20));
+    };
+    let said = String::from_utf8_lossy(&fs::read(&log).unwrap()).into_owned();
+    fs::remove_file(&log).unwrap();
+    Ran { code, hangs, said }
+}
+
+pub fn words(line: &str) -> Vec<String> {
+    line.split_whitespace().map(str::to_owned).collect()
+}
+
+/// Copies a folder with its modes; it holds only files and folders.
+pub fn copy(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in fs::read_dir(from).unwrap().map(Result::unwrap) {
+        let target = to.join(entry.file_name());
+        if entry.file_type().unwrap().is_dir() {
+            copy(&entry.path(), &target);
+        } else {
+            fs::copy(entry.path(), target).unwrap();
+        }
+    }
+    let mode = fs::metadata(from).unwrap().permissions().mode();
+    fs::set_permissions(to, fs::Permissions::from_mode(mode)).unwrap();
+}
