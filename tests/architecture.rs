@@ -6,6 +6,8 @@ mod source;
 
 #[path = "architecture/imports.rs"]
 mod imports;
+#[path = "architecture/outside.rs"]
+mod outside;
 #[path = "architecture/pages.rs"]
 mod pages;
 #[path = "architecture/powers.rs"]

@@ -251,9 +251,7 @@ mod linux {
             if let Some(code) = ran.code {
                 *self.codes.entry(code).or_default() += 1;
             }
-            let raw = ran
-                .said
-                .contains(|c: char| c.is_control() && c != '\n' && c != '\t');
+            let raw = ran.said.contains(commands_a_terminal);
             self.raw += usize::from(raw);
             let line = ran
                 .said
@@ -296,6 +294,12 @@ mod linux {
             self.seconds = self.seconds.max(other.seconds);
             self.mib = self.mib.max(other.mib);
         }
+    }
+
+    /// Control characters, and marks that reorder the text around them.
+    fn commands_a_terminal(c: char) -> bool {
+        let reorders = matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+        reorders || (c.is_control() && c != '\n' && c != '\t')
     }
 
     fn row(document: &str, command: &str, tally: &Tally) {

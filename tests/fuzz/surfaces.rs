@@ -4,7 +4,7 @@
 //! cargo bench --locked --bench fuzz_surfaces -- [--seconds 60] [--format step] [--seed 1]
 //! ```
 //!
-//! Samples made by the tests, and the real files in `../shared/corpus` where it is there, are
+//! Samples made by the tests, and the real files in the folder that `FLUXFORM_CORPUS` names are
 //! damaged inside their containers and packed again; before them come inputs made to exhaust a
 //! reader. No input may panic, take more than a second (and than a second a megabyte) of CPU, or
 //! make the reader hold more than 16 MiB (and than 16 times the content of the file, and than two
@@ -87,9 +87,10 @@ fn seeds(format: SurfaceFormat) -> Vec<Seed> {
             Seed::Plain(samples::sldprt()),
         ],
     };
-    let folder = support::root().join("../shared/corpus");
-    let mut real: Vec<PathBuf> = [folder.clone(), folder.join("bad_stl")]
+    let folder = support::corpus();
+    let mut real: Vec<PathBuf> = folder
         .iter()
+        .flat_map(|folder| [folder.clone(), folder.join("bad_stl")])
         .filter_map(|folder| std::fs::read_dir(folder).ok())
         .flat_map(|entries| entries.flatten().map(|entry| entry.path()))
         .filter(|path| SurfaceFormat::of(path) == Some(format))

@@ -37,19 +37,15 @@ pub fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The folder of real surface files, or `None` with a printed reason.
+/// The folder of real surface files with their index that `FLUXFORM_CORPUS` names, or `None` with a
+/// printed reason.
 #[allow(clippy::print_stderr)]
 pub fn corpus() -> Option<PathBuf> {
-    let folder = root().join("../shared/corpus");
-    if folder.is_dir() {
-        Some(folder)
-    } else {
-        eprintln!(
-            "skipped: no folder of real surface files at {}",
-            folder.display()
-        );
-        None
+    let folder = std::env::var_os("FLUXFORM_CORPUS").map(PathBuf::from);
+    if folder.is_none() {
+        eprintln!("skipped: FLUXFORM_CORPUS names no folder of real surface files");
     }
+    folder
 }
 
 pub fn binary(triangles: &[[[f32; 3]; 3]]) -> Vec<u8> {
