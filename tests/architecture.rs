@@ -4,6 +4,8 @@
 #[path = "architecture/source.rs"]
 mod source;
 
+#[path = "architecture/dependencies.rs"]
+mod dependencies;
 #[path = "architecture/imports.rs"]
 mod imports;
 #[path = "architecture/outside.rs"]

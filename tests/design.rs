@@ -5,6 +5,8 @@ mod support;
 
 #[path = "design/defaults.rs"]
 mod defaults;
+#[path = "design/hostile.rs"]
+mod hostile;
 #[path = "design/messages.rs"]
 mod messages;
 #[path = "design/mutations.rs"]

@@ -121,7 +121,8 @@ fn may_change(writes: &Writes, case: &Case, laid: &Laid, ran: &Ran, path: &str) 
         Plant::File | Plant::PrivateFile | Plant::HardLink | Plant::Manifest | Plant::Inside => {
             replaceable && !writes.bundle
         }
-        Plant::Edited | Plant::OwnManifestWithMore => replaceable,
+        Plant::Edited => replaceable || is_made_again(path),
+        Plant::OwnManifestWithMore => replaceable,
         // Its mode is looked at apart.
         Plant::Closed => true,
         Plant::LinkToFile
@@ -131,6 +132,15 @@ fn may_change(writes: &Writes, case: &Case, laid: &Laid, ran: &Ran, path: &str) 
         | Plant::Folder
         | Plant::Pipe => false,
     }
+}
+
+/// Files of the program's that no list has with a digest: seconds, what is cached, and the points of
+/// a sweep, which carry their own checksum and are computed again where it does not hold.
+fn is_made_again(path: &str) -> bool {
+    let name = path.rsplit('/').next().unwrap_or(path);
+    (name.starts_with("timing") && name.ends_with(".json"))
+        || path.contains("/.fluxform-kept/")
+        || path.contains("/points/")
 }
 
 /// With `--force` what is in the way may be moved, whole, to a name where nothing was.
