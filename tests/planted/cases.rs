@@ -165,23 +165,39 @@ impl Prepared {
                 if !fits(plant, name) {
                     continue;
                 }
-                for force in [false, true] {
-                    for refused in [false, true] {
-                        if refused && self.writes.spoils.is_empty() {
-                            continue;
-                        }
-                        cases.push(Case {
-                            name: name.clone(),
-                            plant,
-                            force,
-                            refused,
-                        });
+                // Beside what an earlier run left, too, at names that it did not write itself.
+                let beside = matches!(name.role, Role::Other | Role::Temporary);
+                let earlier = match (plant.after_a_run(), beside) {
+                    (true, _) => &[true][..],
+                    (false, true) => &[false, true],
+                    (false, false) => &[false],
+                };
+                for (after_a_run, force, refused) in combinations(earlier) {
+                    if refused && self.writes.spoils.is_empty() {
+                        continue;
                     }
+                    cases.push(Case {
+                        name: name.clone(),
+                        plant,
+                        after_a_run,
+                        force,
+                        refused,
+                    });
                 }
             }
         }
         cases
     }
+}
+
+fn combinations(earlier: &[bool]) -> impl Iterator<Item = (bool, bool, bool)> {
+    let flags = [(false, false), (false, true), (true, false), (true, true)];
+    let with = move |&after_a_run: &bool| {
+        flags
+            .into_iter()
+            .map(move |(force, refused)| (after_a_run, force, refused))
+    };
+    earlier.iter().flat_map(with)
 }
 
 fn well(place: &Path, words: &[String]) {
@@ -280,6 +296,8 @@ fn fits(plant: Plant, name: &Name) -> bool {
 pub struct Case {
     pub name: Name,
     pub plant: Plant,
+    /// An earlier run of the command left its files.
+    pub after_a_run: bool,
     pub force: bool,
     /// An input is spoilt, so that the command is refused.
     pub refused: bool,
@@ -294,10 +312,11 @@ pub struct Laid {
 
 impl Case {
     pub fn lay(&self, prepared: &Prepared, place: &Path) -> Option<Laid> {
-        let base = match (self.plant.after_a_run(), self.plant) {
+        let own = [Plant::Edited, Plant::Closed, Plant::OwnManifestWithMore];
+        let base = match (self.after_a_run, own.contains(&self.plant)) {
             (false, _) => &prepared.inputs,
-            (true, Plant::Inside) => &prepared.earlier,
-            (true, _) => &prepared.after,
+            (true, false) => &prepared.earlier,
+            (true, true) => &prepared.after,
         };
         copy(base, place);
         let target = place.join(&self.name.path);

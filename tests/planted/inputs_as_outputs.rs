@@ -134,6 +134,7 @@ fn row(
             line[line.iter().position(|word| word == flag).unwrap() + 1]
         ),
         planted: spelling,
+        after_a_run: true,
         force,
         refused: false,
         code: ran.code,

@@ -62,17 +62,17 @@ fn one(
 
 /// A line of the table for each row; `said` adds what the program said of those that changed.
 pub fn lines(rows: &[Row], said: bool) -> String {
-    let mut text = "| command | planted | at | --force | input | exit code | changed |\n|---|---|---|---|---|---|---|\n".to_owned();
+    let mut text = "| command | planted | at | after a run | --force | input | exit code | changed |\n|---|---|---|---|---|---|---|---|\n".to_owned();
     for row in rows {
         let code = row.code.map_or("none".to_owned(), |code| code.to_string());
         let changed = match row.changed.as_slice() {
             [] => "nothing".to_owned(),
             changes => changes.join("; "),
         };
-        let force = if row.force { "yes" } else { "no" };
+        let [after, force] = [row.after_a_run, row.force].map(|it| if it { "yes" } else { "no" });
         let input = if row.refused { "spoilt" } else { "good" };
         text += &format!(
-            "| {} | {} | {} | {force} | {input} | {code} | {changed} |\n",
+            "| {} | {} | {} | {after} | {force} | {input} | {code} | {changed} |\n",
             row.command, row.planted, row.at
         );
         if said && !row.changed.is_empty() {
