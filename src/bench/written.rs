@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION, UNITS};
-use crate::bundle::atomic::{FileSet, Overwrite, Written};
+use crate::bundle::atomic::{FileSet, Overwrite};
 use crate::bundle::bench::{BenchFile, StageCurves, write_laws, write_rows};
 use crate::bundle::catalogue::{CaseRow, CatalogueFile, write_cases};
 use crate::bundle::json::to_json;
@@ -35,31 +35,26 @@ pub fn check(inputs: &[Input], folder: &Path, force: bool) -> Result<(), JobErro
 /// Files that cannot be written or must not be replaced.
 pub fn write(file: &mut BenchFile, folder: &Path, force: bool) -> Result<(), JobError> {
     let overwrite = overwrite(&file.inputs, folder, JSON, force);
-    let mut set = FileSet::begin(folder, overwrite)?;
+    let mut set = FileSet::begin(folder, overwrite);
     let mut entries = Vec::new();
-    let entry = |name: &str, written: Written| FileEntry {
-        path: name.to_owned(),
-        bytes: written.bytes,
-        sha256: written.sha256,
-    };
     let table = set.write("bench.csv", |out| write_rows(out, &file.stages))?;
-    entries.push(entry("bench.csv", table));
+    entries.push(FileEntry::new("bench.csv", table));
     if !file.scaling.is_empty() {
         let table = set.write("scaling.csv", |out| write_laws(out, &file.scaling))?;
-        entries.push(entry("scaling.csv", table));
+        entries.push(FileEntry::new("scaling.csv", table));
     }
     for stage in &file.stages {
         let name = format!("{}.svg", stage.stage);
         let svg = picture(stage).svg();
         let drawn = set.write(&name, |out| out.write_all(svg.as_bytes()))?;
-        entries.push(entry(&name, drawn));
+        entries.push(FileEntry::new(name, drawn));
     }
     let text = markdown(file);
     let told = set.write("summary.md", |out| out.write_all(text.as_bytes()))?;
-    entries.push(entry("summary.md", told));
+    entries.push(FileEntry::new("summary.md", told));
     let html = page::html(file);
     let shown = set.write(PAGE, |out| out.write_all(html.as_bytes()))?;
-    entries.push(entry(PAGE, shown));
+    entries.push(FileEntry::new(PAGE, shown));
     file.files = entries;
     let json = to_json(file).map_err(|fault| JobError::Input(fault.to_string()))?;
     set.write(JSON, |out| out.write_all(&json))?;
@@ -74,12 +69,16 @@ pub const CATALOGUE: &str = "extreme.json";
 /// # Errors
 /// Files that cannot be written or must not be replaced.
 pub fn write_catalogue(cases: &[CaseRow], folder: &Path, force: bool) -> Result<(), JobError> {
-    let mut set = FileSet::begin(folder, overwrite(&[], folder, CATALOGUE, force))?;
-    set.write("extreme.csv", |out| write_cases(out, cases))?;
+    let mut set = FileSet::begin(folder, overwrite(&[], folder, CATALOGUE, force));
+    let mut file = catalogue_file(cases);
+    let table = set.write("extreme.csv", |out| write_cases(out, cases))?;
     let html = page::catalogue(cases);
-    set.write(PAGE, |out| out.write_all(html.as_bytes()))?;
-    let json =
-        to_json(&catalogue_file(cases)).map_err(|fault| JobError::Input(fault.to_string()))?;
+    let shown = set.write(PAGE, |out| out.write_all(html.as_bytes()))?;
+    file.files = vec![
+        FileEntry::new("extreme.csv", table),
+        FileEntry::new(PAGE, shown),
+    ];
+    let json = to_json(&file).map_err(|fault| JobError::Input(fault.to_string()))?;
     set.write(CATALOGUE, |out| out.write_all(&json))?;
     Ok(set.commit()?)
 }
@@ -93,6 +92,7 @@ pub fn catalogue_file(cases: &[CaseRow]) -> CatalogueFile {
         inputs: Vec::new(),
         units: UNITS.to_owned(),
         cases: cases.to_vec(),
+        files: Vec::new(),
     }
 }
 

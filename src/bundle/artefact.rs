@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::atomic::Written;
+
 /// Version of the artefacts' layout, `major.minor.patch`. A reader refuses another major; a new
 /// minor only adds keys, arrays or files.
 pub const SCHEMA_VERSION: &str = "1.2.0";
@@ -42,6 +44,18 @@ pub struct FileEntry {
     pub bytes: u64,
     /// SHA-256 of its bytes, 64 lower-case hexadecimal digits.
     pub sha256: String,
+}
+
+impl FileEntry {
+    /// The file that was written at `path`.
+    #[must_use]
+    pub fn new(path: impl Into<String>, written: Written) -> Self {
+        Self {
+            path: path.into(),
+            bytes: written.bytes,
+            sha256: written.sha256,
+        }
+    }
 }
 
 /// SHA-256 of `bytes`, 64 lower-case hexadecimal digits.

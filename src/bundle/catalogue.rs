@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 
-use super::artefact::Input;
+use super::artefact::{FileEntry, Input};
 use super::bench::{push_cell, push_text};
 
 /// `extreme.json`. Seconds in it differ from run to run.
@@ -21,6 +21,8 @@ pub struct CatalogueFile {
     pub units: String,
     /// One entry a case.
     pub cases: Vec<CaseRow>,
+    /// Table and page beside it, as written.
+    pub files: Vec<FileEntry>,
 }
 
 /// What became of a case.

@@ -3,15 +3,12 @@
 //!
 //! Keys are padded with zeros because that runtime takes coils in the order of their names.
 
-use std::fs::File;
-use std::io::{self, Read, Write};
-use std::path::Path;
+use std::io::{self, Write};
 
-use super::atomic::WriteError;
 use super::number::push_number;
 
 /// How every such file begins: what tells ours from others'.
-const HEAD: &str = "# fluxform ";
+pub(super) const HEAD: &str = "# fluxform ";
 
 /// The field per ampere on equally spaced nodes, as many along every axis: mag_manip 3.0.0 finds
 /// its way through the list only then.
@@ -149,37 +146,6 @@ pub fn write_multipoles(out: &mut dyn Write, model: &Multipoles) -> io::Result<(
         }
     }
     out.write_all(&text)
-}
-
-/// Refuses a target that exists and is no file, or, without `force`, that was not written here.
-///
-/// # Errors
-/// [`WriteError::OutputExists`].
-pub fn check_ours(path: &Path, force: bool) -> Result<(), WriteError> {
-    let refuse = |reason: &str| {
-        Err(WriteError::OutputExists {
-            path: path.to_path_buf(),
-            reason: reason.to_owned(),
-        })
-    };
-    match path.metadata() {
-        Err(_) => return Ok(()),
-        Ok(metadata) if metadata.is_dir() => {
-            return Err(WriteError::IsFolder {
-                path: path.to_path_buf(),
-            });
-        }
-        Ok(metadata) if !metadata.is_file() => return refuse("and is no regular file"),
-        Ok(_) if force => return Ok(()),
-        Ok(_) => {}
-    }
-    let mut start = Vec::new();
-    let read =
-        File::open(path).and_then(|file| file.take(HEAD.len() as u64).read_to_end(&mut start));
-    if read.is_ok() && start == HEAD.as_bytes() {
-        return Ok(());
-    }
-    refuse("and was not written by fluxform")
 }
 
 #[cfg(test)]

@@ -40,6 +40,7 @@ pub mod schema;
 pub mod store;
 pub mod sweep;
 pub mod table;
+pub mod timing;
 pub mod trajectory;
 pub mod vtk;
 pub mod write;

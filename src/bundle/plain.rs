@@ -32,7 +32,7 @@ mod tests {
     fn folders_devices_and_large_files_are_not_read() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a");
-        crate::bundle::atomic::write(&path, &crate::bundle::atomic::Overwrite::Force, |out| {
+        crate::bundle::atomic::write(&path, &crate::bundle::atomic::Overwrite::force(), |out| {
             std::io::Write::write_all(out, b"0123456")
         })
         .unwrap();

@@ -7,15 +7,15 @@
 //! have written anything into their store and the right digest beside it. A store that cannot be read
 //! or written is none: results are the same without it.
 
-use std::fs::{File, Metadata};
-use std::io::{self, Read};
-use std::path::{Path, PathBuf};
+use std::ffi::OsStr;
+use std::io::Read;
+use std::path::PathBuf;
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 
-use super::atomic::{self, Overwrite};
+use super::atomic::{self, Dir, Kind};
 use crate::numerics::dispatch;
 
 /// First bytes of every entry.
@@ -60,19 +60,17 @@ impl Origin {
     }
 
     /// The digest of an entry of this origin in `folder`.
-    fn digest(&self, folder: &Path) -> [u8; DIGEST] {
-        self.clone()
-            .and(&atomic::identity(folder))
-            .0
-            .finalize()
-            .into()
+    fn digest(&self, folder: &Dir) -> [u8; DIGEST] {
+        self.clone().and(&folder.identity()).0.finalize().into()
     }
 }
 
-/// Entries in one folder, or none.
+/// Entries in one folder, or none. The folder is never reached through a link of its name, nor is an
+/// entry.
 #[derive(Debug, Clone, Default)]
 pub struct Store {
-    folder: Option<PathBuf>,
+    /// The folder that it is in, and its name there.
+    place: Option<(PathBuf, &'static str)>,
 }
 
 impl Store {
@@ -82,12 +80,17 @@ impl Store {
         Self::default()
     }
 
-    /// The store in `folder`, which is made when something is kept.
+    /// The store in the folder `name` of `parent`, which is made when something is kept.
     #[must_use]
-    pub fn in_folder(folder: PathBuf) -> Self {
+    pub fn in_folder(parent: PathBuf, name: &'static str) -> Self {
         Self {
-            folder: Some(folder),
+            place: Some((parent, name)),
         }
+    }
+
+    fn folder(&self) -> Option<Dir> {
+        let (parent, name) = self.place.as_ref()?;
+        Dir::open(parent).and_then(|dir| dir.child(name)).ok()
     }
 
     /// The value of entry `name` if it is of this `origin`, or what `compute` gives, which is kept.
@@ -111,40 +114,57 @@ impl Store {
     /// The value of entry `name` if it is of this `origin`.
     #[must_use]
     pub fn recall<T: DeserializeOwned>(&self, name: &str, origin: &Origin) -> Option<T> {
-        let folder = self.folder.as_ref()?;
-        postcard::from_bytes(&payload(folder, name, origin)?).ok()
+        postcard::from_bytes(&payload(&self.folder()?, name, origin)?).ok()
     }
 
     /// Keeps `value` as entry `name`. What cannot be kept is computed again next time.
     pub fn keep<T: Serialize>(&self, name: &str, origin: &Origin, value: &T) {
-        if let Some(folder) = &self.folder {
-            write(folder, name, origin, value);
+        let (Some((parent, folder)), Ok(bytes)) = (&self.place, postcard::to_stdvec(value)) else {
+            return;
+        };
+        let Ok((dir, _made)) = atomic::open_made(parent, OsStr::new(folder)) else {
+            return;
+        };
+        // What is there and is no entry is left alone.
+        if matches!(dir.status(name), Ok(Some(_))) && !is_entry(&dir, OsStr::new(name)) {
+            return;
         }
+        let _ = atomic::put(&dir, name, true, |out| {
+            out.write_all(MAGIC)?;
+            out.write_all(&origin.digest(&dir))?;
+            out.write_all(&Sha256::digest(&bytes))?;
+            out.write_all(&bytes)
+        });
     }
 
-    /// Removes all entries.
+    /// Removes all entries, what killed runs left there, and the folder if nothing else is in it.
     pub fn clear(&self) {
-        if let Some(folder) = &self.folder {
-            atomic::remove_files_beginning_with(folder, MAGIC);
+        let (Some((parent, folder)), Some(dir)) = (&self.place, self.folder()) else {
+            return;
+        };
+        atomic::clean_leftovers(&dir);
+        for name in dir.names().unwrap_or_default() {
+            if is_entry(&dir, &name) {
+                let _ = dir.remove_file(&name);
+            }
         }
+        let _ = Dir::open(parent).and_then(|parent| parent.remove_empty(folder));
     }
 
     /// Whether entry `name` of this `origin` can be read.
     #[must_use]
     pub fn holds(&self, name: &str, origin: &Origin) -> bool {
-        self.folder
-            .as_ref()
-            .is_some_and(|folder| payload(folder, name, origin).is_some())
+        self.folder()
+            .is_some_and(|folder| payload(&folder, name, origin).is_some())
     }
 }
 
-fn payload(folder: &Path, name: &str, origin: &Origin) -> Option<Vec<u8>> {
-    let path = folder.join(name);
-    let is_plain = |metadata: &Metadata| metadata.is_file() && metadata.len() <= ENTRY_MAX_BYTES;
-    if !path.metadata().is_ok_and(|metadata| is_plain(&metadata)) {
+fn payload(folder: &Dir, name: &str, origin: &Origin) -> Option<Vec<u8>> {
+    let status = folder.status(name).ok()??;
+    if status.kind != Kind::File || status.bytes > ENTRY_MAX_BYTES {
         return None;
     }
-    let mut file = File::open(&path).ok()?;
+    let mut file = folder.file(name).ok()?;
     // What is large and none of ours is not read to its end.
     let mut head = [0; MAGIC.len() + 2 * DIGEST];
     file.read_exact(&mut head).ok()?;
@@ -154,41 +174,18 @@ fn payload(folder: &Path, name: &str, origin: &Origin) -> Option<Vec<u8>> {
         return None;
     }
     let mut bytes = Vec::new();
-    bytes
-        .try_reserve_exact(file.metadata().ok()?.len() as usize)
-        .ok()?;
+    bytes.try_reserve_exact(status.bytes as usize).ok()?;
     file.take(ENTRY_MAX_BYTES).read_to_end(&mut bytes).ok()?;
     (of_value == &Sha256::digest(&bytes)[..]).then_some(bytes)
 }
 
-fn may_replace(path: &Path) -> bool {
+/// Whether the file `name` begins as every entry does.
+fn is_entry(folder: &Dir, name: &OsStr) -> bool {
     let mut magic = [0; MAGIC.len()];
-    // Opening a pipe would wait for its other end.
-    if path.metadata().is_ok_and(|metadata| !metadata.is_file()) {
-        return false;
-    }
-    match File::open(path) {
-        Ok(mut file) => file.read_exact(&mut magic).is_ok() && magic == *MAGIC,
-        Err(error) => error.kind() == io::ErrorKind::NotFound,
-    }
-}
-
-fn write<T: Serialize>(folder: &Path, name: &str, origin: &Origin, value: &T) {
-    let path = folder.join(name);
-    let Ok(bytes) = postcard::to_stdvec(value) else {
-        return;
-    };
-    // What lies there and is not an entry is left alone.
-    if !may_replace(&path) {
-        return;
-    }
-    let _ = atomic::write(&path, &Overwrite::Force, |out| {
-        out.write_all(MAGIC)?;
-        // By now the folder is there.
-        out.write_all(&origin.digest(folder))?;
-        out.write_all(&Sha256::digest(&bytes))?;
-        out.write_all(&bytes)
-    });
+    let read = folder
+        .file(name)
+        .and_then(|mut file| file.read_exact(&mut magic));
+    read.is_ok() && magic == *MAGIC
 }
 
 #[cfg(test)]
@@ -198,10 +195,15 @@ mod tests {
     /// A store in a folder of its own with one entry, and that entry's file.
     fn kept(origin: &Origin) -> (tempfile::TempDir, Store, PathBuf) {
         let folder = tempfile::tempdir().unwrap();
-        let store = Store::in_folder(folder.path().to_path_buf());
+        let store = Store::in_folder(folder.path().to_path_buf(), "kept");
         store.keep("steel", origin, &vec![0.7, 1.3]);
-        let file = folder.path().join("steel");
+        let file = folder.path().join("kept/steel");
         (folder, store, file)
+    }
+
+    fn lay(folder: &std::path::Path, name: &str, bytes: &[u8]) {
+        let (dir, _made) = atomic::open_made(folder, OsStr::new("kept")).unwrap();
+        atomic::put(&dir, name, false, |out| out.write_all(bytes)).unwrap();
     }
 
     #[test]
@@ -209,7 +211,7 @@ mod tests {
         let origin = Origin::default().and_numbers([0.7]);
         let (folder, store, file) = kept(&origin);
         let damage = |bytes: &[u8]| {
-            atomic::write_unforced(folder.path(), "steel", bytes).unwrap();
+            lay(folder.path(), "steel", bytes);
         };
         let recall = || store.recall::<Vec<f64>>("steel", &origin);
         let whole = std::fs::read(&file).unwrap();
@@ -265,8 +267,8 @@ mod tests {
         let digest = Sha256::digest(&forged[value..]);
         forged[value - DIGEST..value].copy_from_slice(&digest);
         let sent = folder.path().join("sent");
-        atomic::write_unforced(&sent, "steel", &forged).unwrap();
-        let received = Store::in_folder(sent);
+        lay(&sent, "steel", &forged);
+        let received = Store::in_folder(sent, "kept");
         assert!(!received.holds("steel", &origin));
         let computed = received.remember::<_, ()>("steel", &origin, || Ok(vec![0.7, 1.3]));
         assert_eq!(computed, Ok(vec![0.7, 1.3]));
@@ -274,7 +276,7 @@ mod tests {
         // A folder that is renamed stays the one it was.
         let (from, to) = (folder.path().join("sent"), folder.path().join("renamed"));
         std::fs::rename(from, &to).unwrap();
-        let renamed = Store::in_folder(to);
+        let renamed = Store::in_folder(to, "kept");
         assert!(renamed.holds("steel", &origin) && store.holds("steel", &origin));
     }
 
@@ -283,8 +285,8 @@ mod tests {
     #[allow(clippy::disallowed_methods)] // a test's own files
     fn an_entry_that_never_ends_or_is_none_of_ours_is_not_read() {
         let origin = Origin::default();
-        let (folder, store, file) = kept(&origin);
-        let made = File::create(folder.path().join("steel")).unwrap();
+        let (_folder, store, file) = kept(&origin);
+        let made = std::fs::File::create(&file).unwrap();
         made.set_len(ENTRY_MAX_BYTES).unwrap();
         assert!(!store.holds("steel", &origin));
         std::fs::remove_file(&file).unwrap();
@@ -296,8 +298,32 @@ mod tests {
     fn what_killed_runs_left_is_cleared_with_the_entries() {
         let (folder, store, _file) = kept(&Origin::default());
         // Killed before the first byte was written: nothing tells whose it was but its name.
-        atomic::write_unforced(folder.path(), ".fluxform-7Xq.tmp", b"").unwrap();
+        lay(folder.path(), ".fluxform-7Xq.tmp", b"");
         store.clear();
-        assert!(!folder.path().exists());
+        assert!(!folder.path().join("kept").exists());
+    }
+
+    #[test]
+    #[allow(clippy::disallowed_methods)] // a test's own files
+    fn a_linked_store_is_neither_cleared_nor_written_to_nor_read() {
+        use std::os::unix::fs::symlink;
+        let origin = Origin::default();
+        let (victim, theirs, entry) = kept(&origin);
+        let place = tempfile::tempdir().unwrap();
+        symlink(victim.path().join("kept"), place.path().join("kept")).unwrap();
+        let store = Store::in_folder(place.path().to_path_buf(), "kept");
+        store.clear();
+        store.keep("other", &origin, &7);
+        assert!(!store.holds("steel", &origin));
+        assert!(entry.is_file() && theirs.holds("steel", &origin));
+        assert_eq!(victim.path().join("kept").read_dir().unwrap().count(), 1);
+        // Nor is an entry that is a link.
+        let own = tempfile::tempdir().unwrap();
+        let store = Store::in_folder(own.path().to_path_buf(), "kept");
+        std::fs::create_dir(own.path().join("kept")).unwrap();
+        symlink(&entry, own.path().join("kept/steel")).unwrap();
+        store.keep("steel", &origin, &7);
+        store.clear();
+        assert!(entry.is_file() && own.path().join("kept/steel").is_symlink());
     }
 }

@@ -1,19 +1,22 @@
 //! Whole artefacts: a bundle, a map with its sidecar, a JSON result.
 
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
 use super::artefact::{FileEntry, Input};
-use super::atomic::{FileSet, FolderDraft, Overwrite, WriteError, Written, listed_files, write};
+use super::atomic::{
+    FileSet, FolderDraft, Overwrite, WriteError, Written, check_distinct, listed_files, write,
+};
 use super::consistent;
 use super::json::to_json;
 use super::lambda_file::LambdaFile;
-use super::mag_manip::{Multipoles, VectorField, check_ours, write_multipoles, write_vector_field};
+use super::mag_manip::{HEAD, Multipoles, VectorField, write_multipoles, write_vector_field};
 use super::manifest::{Manifest, MapSidecar};
 use super::npz::{MapArrays, to_npz};
 use super::table::{CurrentRow, PointRow, write_currents, write_map, write_points};
+use super::timing::StageSeconds;
 use super::vtk::write_vti;
 
 /// Everything a bundle holds but its timing.
@@ -33,24 +36,36 @@ pub struct BundleContent<'a> {
     pub extra: &'a [(&'a str, &'a [u8])],
 }
 
-/// Refuses early, before a long computation, when the bundle at `target` must not be replaced.
+/// Refuses early, before a long computation, when the bundle at `target` must not be replaced. Nothing
+/// on the disk is changed.
 ///
 /// # Errors
 /// [`WriteError`].
 pub fn check_bundle_target(target: &Path, force: bool, inputs: &[Input]) -> Result<(), WriteError> {
-    FolderDraft::begin(target, overwrite_bundle(target, force, inputs)).map(drop)
+    let overwrite = overwrite_bundle(target, force, inputs);
+    FolderDraft::check(target, &overwrite, &BUNDLE_FILES)
 }
+
+/// The files that every bundle has.
+const BUNDLE_FILES: [&str; 6] = [
+    "map.npz",
+    "points.csv",
+    "currents.csv",
+    "lambda.json",
+    "timing.json",
+    "manifest.json",
+];
 
 /// Writes a bundle whole or not at all; `timing` becomes `timing.json`, which no manifest lists.
 /// Returns the manifest as written.
 ///
 /// # Errors
 /// [`WriteError`]; also when the parts contradict each other.
-pub fn write_bundle<T: Serialize + ?Sized>(
+pub fn write_bundle(
     target: &Path,
     force: bool,
     content: &BundleContent,
-    timing: &T,
+    timing: &[StageSeconds],
 ) -> Result<Manifest, WriteError> {
     let mut manifest = content.manifest.clone();
     consistent::check(
@@ -124,27 +139,54 @@ pub enum BesideContent<'a> {
     Multipoles(&'a Multipoles<'a>),
 }
 
-/// Refuses early when a file for another program must not be replaced: what is there must be ours
-/// and the record in `folder` tell the same inputs.
+/// Refuses early when the files of a map, or those for other programs beside it, must not be replaced.
+/// `protected` are files that the run reads and that are not among the inputs.
 ///
 /// # Errors
 /// [`WriteError`].
-pub fn check_beside(
-    path: &Path,
+pub fn check_map_files(
     folder: &Path,
     force: bool,
     inputs: &[Input],
+    protected: &[PathBuf],
+    formats: MapFormats,
+    besides: &[&Path],
 ) -> Result<(), WriteError> {
-    if let Some(name) = name_in(folder, path)
-        && MAP_FILES.contains(&name.as_str())
-    {
-        return Err(WriteError::Content {
+    let overwrite = overwrite_map(folder, force, inputs, protected);
+    let csv = formats.csv.then_some("map.csv");
+    let vti = formats.vtk.then_some("map.vti");
+    for name in ["map.npz", "map.json"].into_iter().chain(csv).chain(vti) {
+        overwrite.check(&folder.join(name))?;
+    }
+    check_distinct(besides)?;
+    for path in besides {
+        check_beside(path, folder)?;
+        overwrite_beside(path, folder, overwrite.clone()).check(path)?;
+    }
+    Ok(())
+}
+
+fn overwrite_map(folder: &Path, force: bool, inputs: &[Input], protected: &[PathBuf]) -> Overwrite {
+    Overwrite::new(force, folder.join("map.json"), inputs).protecting(protected)
+}
+
+/// Of files in the map's folder its sidecar tells; others are replaced by the same bytes alone.
+fn overwrite_beside(path: &Path, folder: &Path, of_map: Overwrite) -> Overwrite {
+    if name_in(folder, path).is_some() {
+        of_map
+    } else {
+        of_map.now_beginning(HEAD)
+    }
+}
+
+fn check_beside(path: &Path, folder: &Path) -> Result<(), WriteError> {
+    match name_in(folder, path) {
+        Some(name) if MAP_FILES.contains(&name.as_str()) => Err(WriteError::Content {
             path: path.to_path_buf(),
             message: "the map itself has a file of that name; choose another".to_owned(),
-        });
+        }),
+        _ => Ok(()),
     }
-    check_ours(path, force)?;
-    Overwrite::new(force, folder.join("map.json"), inputs).check(path)
 }
 
 /// The plain name of `path` where it lies in `folder`.
@@ -175,10 +217,11 @@ pub fn write_map_files(
     map: &MapArrays,
     formats: MapFormats,
 ) -> Result<MapSidecar, WriteError> {
-    write_map_and(folder, force, sidecar, map, formats, &[])
+    write_map_and(folder, force, sidecar, map, formats, &[], &[])
 }
 
 /// [`write_map_files`] and files for other programs; `files` lists those that lie in `folder`.
+/// `protected` as for [`check_map_files`].
 ///
 /// # Errors
 /// [`WriteError`].
@@ -189,16 +232,16 @@ pub fn write_map_and(
     map: &MapArrays,
     formats: MapFormats,
     besides: &[Beside],
+    protected: &[PathBuf],
 ) -> Result<MapSidecar, WriteError> {
     let mut sidecar = sidecar.clone();
-    let record = folder.join("map.json");
-    let earlier = listed_files(&record);
-    let overwrite = Overwrite::new(force, record, &sidecar.inputs);
-    let mut set = FileSet::begin(folder, overwrite)?;
+    let earlier = listed_files(&folder.join("map.json"));
+    let overwrite = overwrite_map(folder, force, &sidecar.inputs, protected);
+    let mut set = FileSet::begin(folder, overwrite.clone());
     let mut put =
         |set: &mut FileSet, name: &str, content: &dyn Fn(&mut dyn io::Write) -> io::Result<()>| {
             set.write(name, content)
-                .map(|written| sidecar.files.push(entry(name, written)))
+                .map(|written| sidecar.files.push(FileEntry::new(name, written)))
         };
     put(&mut set, "map.npz", &|out| {
         out.write_all(&to_npz(map).map_err(invalid)?)
@@ -210,19 +253,20 @@ pub fn write_map_and(
         put(&mut set, "map.vti", &|out| write_vti(out, map))?;
     }
     for beside in besides {
-        check_beside(beside.path, folder, force, &sidecar.inputs)?;
-        let written = set.write_at(beside.path, |out| match beside.content {
+        check_beside(beside.path, folder)?;
+        let overwrite = overwrite_beside(beside.path, folder, overwrite.clone());
+        let written = set.write_under(beside.path, overwrite, |out| match beside.content {
             BesideContent::VectorField(field) => write_vector_field(out, field),
             BesideContent::Multipoles(model) => write_multipoles(out, model),
         })?;
         if let Some(name) = name_in(folder, beside.path) {
-            sidecar.files.push(entry(&name, written));
+            sidecar.files.push(FileEntry::new(name, written));
         }
     }
     // Of an earlier map no other format may stay beside this one.
     for name in MAP_FILES {
         let made = name == "map.json" || sidecar.files.iter().any(|file| file.path == name);
-        if !made && earlier.contains(Path::new(name)) {
+        if !made && earlier.iter().any(|file| file == name) {
             set.outdate(name)?;
         }
     }
@@ -245,14 +289,6 @@ pub fn write_json<T: Serialize + ?Sized>(
     write(path, overwrite, |out| {
         out.write_all(&to_json(value).map_err(invalid)?)
     })
-}
-
-fn entry(name: &str, written: Written) -> FileEntry {
-    FileEntry {
-        path: name.to_owned(),
-        bytes: written.bytes,
-        sha256: written.sha256,
-    }
 }
 
 fn invalid(error: impl std::error::Error + Send + Sync + 'static) -> io::Error {

@@ -30,6 +30,13 @@ pub struct DesignDocument {
     pub input: Input,
 }
 
+impl DesignDocument {
+    /// The file that it names besides, which is read when the design is computed.
+    pub fn also_read(&self) -> impl Iterator<Item = &Path> {
+        self.design.curve_file().into_iter()
+    }
+}
+
 /// The design that a command needs.
 ///
 /// # Errors
@@ -134,14 +141,6 @@ pub fn plan(file: &FileArgument) -> Result<(PlanFile, Input), Failure> {
     let bytes = bytes_of(file, "the plan of a sweep")?;
     let plan = PlanFile::parse(&name, &bytes).map_err(Failure::Input)?;
     Ok((plan, Input::of_bytes(name, &bytes)))
-}
-
-/// Whether `path` is a file that begins with `mark`.
-#[must_use]
-pub fn begins_with(path: &Path, mark: &str) -> bool {
-    let mut head = vec![0; mark.len()];
-    std::fs::File::open(path).is_ok_and(|mut file| file.read_exact(&mut head).is_ok())
-        && head == mark.as_bytes()
 }
 
 /// The bytes of a file or of standard input; `what` was expected.

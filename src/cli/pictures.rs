@@ -1,80 +1,81 @@
 //! Files that carry in their first line what they were made of: pictures, pages and designs.
+//!
+//! Nothing lists such a file with its digest. One that is there is replaced with `--force`; a run that
+//! makes the same bytes again leaves it.
 
-use std::path::Path;
+use std::path::PathBuf;
 
-use super::documents::begins_with;
 use super::failure::Failure;
 use super::printer::{Place, Printer};
 use super::values::FileArgument;
 use crate::bundle::artefact::Input;
-use crate::bundle::atomic::{Overwrite, WriteError, write};
+use crate::bundle::atomic::{self, Overwrite, write};
 use crate::job::JobError;
 
-/// Writes a drawing, whole or not at all. What is there is replaced with `force`, or when it was
-/// drawn of the same inputs. Tells where a summary may go besides.
-///
-/// # Errors
-/// See [`Failure`].
-pub fn write_svg(
-    file: &FileArgument,
-    inputs: &[Input],
-    svg: &str,
+/// How the first line of a drawing or a page begins.
+const MARK: &str = "<!-- fluxform, drawn of ";
+
+/// A drawing or a page that a run is to make, and what of its files it must not replace.
+#[derive(Debug)]
+pub struct Picture<'a> {
+    file: &'a FileArgument,
     force: bool,
-    printer: &Printer,
-) -> Result<Place, Failure> {
-    write_marked(file, inputs, svg, force, printer)
+    protected: Vec<PathBuf>,
 }
 
-/// Writes a page, as [`write_svg`] writes a drawing.
-///
-/// # Errors
-/// See [`Failure`].
-pub fn write_page(
-    file: &FileArgument,
-    inputs: &[Input],
-    html: &str,
-    force: bool,
-    printer: &Printer,
-) -> Result<Place, Failure> {
-    write_marked(file, inputs, html, force, printer)
-}
-
-fn write_marked(
-    file: &FileArgument,
-    inputs: &[Input],
-    text: &str,
-    force: bool,
-    printer: &Printer,
-) -> Result<Place, Failure> {
-    let digests: Vec<&str> = inputs.iter().map(|input| input.sha256.as_str()).collect();
-    let mark = format!("<!-- fluxform, drawn of {} -->\n", digests.join(" "));
-    let path = match file {
-        FileArgument::Standard => {
-            printer.data(|out| out.write_all(text.as_bytes()))?;
-            return Ok(Place::Error);
+impl<'a> Picture<'a> {
+    /// The one that goes to `file`. `protected` are files that the run reads, or writes besides, and that
+    /// are not among its inputs.
+    pub fn new<P: Into<PathBuf>>(
+        file: &'a FileArgument,
+        force: bool,
+        protected: impl IntoIterator<Item = P>,
+    ) -> Self {
+        Self {
+            file,
+            force,
+            protected: protected.into_iter().map(Into::into).collect(),
         }
-        FileArgument::Path(path) => path,
-    };
-    check_target(path, &mark, force, "and was not drawn of these inputs")?;
-    write(path, &Overwrite::Force, |out| {
-        out.write_all(mark.as_bytes())?;
-        out.write_all(text.as_bytes())
-    })
-    .map_err(JobError::from)?;
-    Ok(Place::Output)
-}
-
-/// An existing file is replaced with `force`, or when it begins with `mark`.
-///
-/// # Errors
-/// [`WriteError::OutputExists`] with the reason.
-pub fn check_target(path: &Path, mark: &str, force: bool, reason: &str) -> Result<(), Failure> {
-    if force || !path.is_file() || begins_with(path, mark) {
-        return Ok(());
     }
-    Err(JobError::from(WriteError::OutputExists {
-        path: path.to_owned(),
-        reason: reason.to_owned(),
-    })
-    .into())
+
+    /// Refuses before a long run what will not be replaced, as far as its inputs are known.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn check(&self, inputs: &[Input]) -> Result<(), Failure> {
+        match self.file {
+            FileArgument::Standard => Ok(()),
+            FileArgument::Path(path) if atomic::is_stream(path) => Ok(()),
+            FileArgument::Path(path) => {
+                let overwrite = self.overwrite(MARK, inputs);
+                Ok(overwrite.check(path).map_err(JobError::from)?)
+            }
+        }
+    }
+
+    /// Writes it, whole or not at all. Tells where a summary may go besides.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn write(&self, inputs: &[Input], text: &str, printer: &Printer) -> Result<Place, Failure> {
+        let path = match self.file {
+            FileArgument::Standard => {
+                printer.data(|out| out.write_all(text.as_bytes()))?;
+                return Ok(Place::Error);
+            }
+            FileArgument::Path(path) => path,
+        };
+        let digests: Vec<&str> = inputs.iter().map(|input| input.sha256.as_str()).collect();
+        let mark = format!("{MARK}{} -->\n", digests.join(" "));
+        write(path, &self.overwrite(&mark, inputs), |out| {
+            out.write_all(mark.as_bytes())?;
+            out.write_all(text.as_bytes())
+        })
+        .map_err(JobError::from)?;
+        Ok(Place::Output)
+    }
+
+    fn overwrite(&self, mark: &str, inputs: &[Input]) -> Overwrite {
+        Overwrite::beginning(self.force, mark, inputs).protecting(self.protected.iter())
+    }
 }

@@ -1,6 +1,6 @@
 //! What a design file says, validated, in SI units.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::numerics::axis::Axis;
 
@@ -56,6 +56,17 @@ pub struct Wire {
     /// Insulated diameters that `optimize` may choose among, m; each with its conductor in the
     /// proportion of the two diameters above.
     pub choices_m: Vec<f64>,
+}
+
+impl Design {
+    /// The B-H table that it names.
+    #[must_use]
+    pub fn curve_file(&self) -> Option<&Path> {
+        match &self.core.as_ref()?.steel {
+            Steel::Curve(path) => Some(path),
+            Steel::Linear(_) => None,
+        }
+    }
 }
 
 /// How the core's steel is described.

@@ -3,8 +3,6 @@
 use std::borrow::Cow;
 use std::path::PathBuf;
 
-use serde::Serialize;
-
 use super::discretize::{self, point_rows, points_grid};
 use super::kept::{FieldStore, STORE_FOLDER, ShapeField};
 use super::lambda::{LambdaOptions, LambdaReport, solve};
@@ -26,8 +24,9 @@ use crate::bundle::npz::PASSIVE;
 use crate::bundle::rendering::{HeightGrid, Rendering};
 use crate::bundle::store::Store;
 use crate::bundle::table::CurrentRow;
+use crate::bundle::timing::StageSeconds;
 use crate::bundle::write::{BundleContent, check_bundle_target, write_bundle};
-use crate::design::{Design, Steel as Described, source};
+use crate::design::{Design, source};
 use crate::map::tabulate::{Grid, PlacedCoil};
 use crate::map::{Components, FieldMap};
 use crate::progress::Progress;
@@ -155,6 +154,15 @@ pub fn run(
     }
     let scene = Scene::new(source.design)?;
     let curve = curve_table(source.design)?;
+    // Before anything is computed, cleared or kept: a run that is refused changes nothing.
+    for shape in shapes {
+        let inputs = inputs(source, curve.as_ref(), shape);
+        let inputs = discretize::with_surface(&shape.document, inputs);
+        check_bundle_target(&folder_of(&scene, shape, options), options.force, &inputs)?;
+    }
+    if !options.keep {
+        store_of(&scene, options).clear();
+    }
     let field = field_store(&scene, curve.as_ref(), options);
     let solved = BothSolved::new(&scene, &field, options.lambda.tolerance, progress)?;
     let circuit = Inductances::new(&scene, &solved.map, progress);
@@ -179,19 +187,23 @@ pub(super) fn field_store(
     curve: Option<&(Input, String)>,
     options: &CalibrateOptions,
 ) -> FieldStore {
-    let folder = options.out.join(&scene.design.name).join(STORE_FOLDER);
-    let mut store = Store::in_folder(folder);
-    if !options.keep {
-        store.clear();
-        store = Store::none();
-    }
+    let store = if options.keep {
+        store_of(scene, options)
+    } else {
+        Store::none()
+    };
     let table = curve.map(|(_, text)| text.as_str());
     FieldStore::new(scene, options.lambda.tolerance, table, store)
 }
 
+/// Beside the design's bundles.
+fn store_of(scene: &Scene, options: &CalibrateOptions) -> Store {
+    Store::in_folder(options.out.join(&scene.design.name), STORE_FOLDER)
+}
+
 /// The table of the design's magnetisation curve: its entry among the inputs and its text.
 pub(super) fn curve_table(design: &Design) -> Result<Option<(Input, String)>, JobError> {
-    let Some(Described::Curve(path)) = design.core.as_ref().map(|core| &core.steel) else {
+    let Some(path) = design.curve_file() else {
         return Ok(None);
     };
     let text = source::table_text_of(path).map_err(|fault| JobError::Input(fault.to_string()))?;
@@ -255,11 +267,23 @@ impl BothSolved {
     }
 }
 
-/// Seconds of one stage, as `timing.json` tells them.
-#[derive(Serialize)]
-struct StageSeconds {
-    stage: String,
-    seconds: f64,
+/// Where the bundle of `shape` goes.
+fn folder_of(scene: &Scene, shape: &ShapeSource, options: &CalibrateOptions) -> PathBuf {
+    let design = options.out.join(&scene.design.name);
+    design.join(&shape.document.name)
+}
+
+/// What a bundle is made from, but for the surface that the shape's document names.
+fn inputs(
+    source: DesignSource,
+    curve: Option<&(Input, String)>,
+    shape: &ShapeSource,
+) -> Vec<Input> {
+    let curve = curve.map(|(input, _)| input);
+    let all = std::iter::once(source.input)
+        .chain(curve)
+        .chain(&shape.input);
+    all.cloned().collect()
 }
 
 fn calibrate_one(
@@ -276,17 +300,9 @@ fn calibrate_one(
     progress: &dyn Progress,
 ) -> Result<BundleReport, JobError> {
     progress.take_seconds();
-    let folder = options
-        .out
-        .join(&scene.design.name)
-        .join(&shape.document.name);
-    let inputs = std::iter::once(source.input)
-        .chain(curve.map(|(input, _)| input))
-        .chain(&shape.input)
-        .cloned()
-        .collect();
+    let folder = folder_of(scene, shape, options);
+    let inputs = inputs(source, curve, shape);
     let points = discretize::run_kept(&shape.document, inputs, field, progress)?;
-    check_bundle_target(&folder, options.force, &points.summary.inputs)?;
     let asked = LambdaOptions {
         picture: options.page,
         ..options.lambda.clone()

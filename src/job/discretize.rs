@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
 use super::JobError;
 use super::kept::ShapeField;
 use crate::accuracy::StageAccuracy;
-use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
-use crate::bundle::atomic::{FileSet, Overwrite, WriteError};
+use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION};
+use crate::bundle::atomic::{FileSet, Overwrite};
 use crate::bundle::json::to_json;
 use crate::bundle::manifest::{AxisSummary, PointsGrid};
 use crate::bundle::table::PointRow;
@@ -87,6 +87,8 @@ pub struct PointsSummary {
     pub accuracy: BTreeMap<&'static str, StageAccuracy>,
     /// What a careful person would mention.
     pub warnings: Vec<String>,
+    /// The table beside it, as written.
+    pub files: Vec<FileEntry>,
 }
 
 /// How many points are marked.
@@ -296,6 +298,7 @@ fn discretized_as(
         deviation,
         accuracy,
         warnings,
+        files: Vec::new(),
     };
     Ok(PointsReport {
         discretized,
@@ -314,7 +317,7 @@ fn shape_error(document: &ShapeDocument, source: ShapeError) -> JobError {
 }
 
 /// `inputs` and the surface file that `document` names, paths as given.
-fn with_surface(document: &ShapeDocument, mut inputs: Vec<Input>) -> Vec<Input> {
+pub(super) fn with_surface(document: &ShapeDocument, mut inputs: Vec<Input>) -> Vec<Input> {
     if let SurfaceSource::File { path, .. } = &document.source {
         // What cannot be read is told, with the reason, by the reader that comes next.
         if let Ok(bytes) = read_file(path) {
@@ -381,56 +384,95 @@ impl PointsReport {
     }
 
     /// Writes the points to `path` and the summary beside them, `points.csv` and `points.json`:
-    /// both or none. What is there is replaced only with `force` or when its summary tells of
-    /// the same inputs.
+    /// both or none. What is there is replaced only with `force` or when its summary is of the same
+    /// inputs and lists it unchanged.
     ///
     /// # Errors
     /// [`JobError::Write`].
-    pub fn write(&self, path: &Path, force: bool) -> Result<(), JobError> {
-        let inputs = &self.summary.inputs;
-        write_both(path, force, inputs, &self.summary, |out| {
-            self.write_csv(out)
-        })
+    pub fn write(&mut self, path: &Path, force: bool) -> Result<(), JobError> {
+        let files = TableFiles::new(path, force, &self.summary.inputs)?;
+        let (table, set) = files.table(|out| self.write_csv(out))?;
+        self.summary.files = vec![table];
+        files.summary(set, &self.summary)
     }
 }
 
-/// Writes a table and its summary beside it, both or none.
-fn write_both(
-    path: &Path,
-    force: bool,
-    inputs: &[Input],
-    told: &impl Serialize,
-    csv: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> Result<(), JobError> {
-    let name = path
-        .file_name()
-        .map(|name| name.to_string_lossy().into_owned());
-    let name = name.ok_or_else(|| {
-        JobError::Input(format!(
-            "{}: name a file to write the points to",
-            path.display()
-        ))
-    })?;
-    let summary = Path::new(&name)
-        .with_extension("json")
-        .to_string_lossy()
-        .into_owned();
-    if summary == name {
-        return Err(JobError::Input(format!(
-            "{}: the summary takes the ending .json; name the points otherwise",
-            path.display()
-        )));
+/// A table and its summary beside it, written both or none.
+pub struct TableFiles {
+    folder: PathBuf,
+    name: String,
+    summary: String,
+    overwrite: Overwrite,
+}
+
+impl TableFiles {
+    /// Those of the table at `path`, made from `inputs`.
+    ///
+    /// # Errors
+    /// A name that is none, or that ends as the summary does.
+    pub fn new(path: &Path, force: bool, inputs: &[Input]) -> Result<Self, JobError> {
+        let name = path
+            .file_name()
+            .map(|name| name.to_string_lossy().into_owned());
+        let name = name.ok_or_else(|| {
+            JobError::Input(format!(
+                "{}: name a file to write the points to",
+                path.display()
+            ))
+        })?;
+        let summary = Path::new(&name)
+            .with_extension("json")
+            .to_string_lossy()
+            .into_owned();
+        if summary == name {
+            return Err(JobError::Input(format!(
+                "{}: the summary takes the ending .json; name the points otherwise",
+                path.display()
+            )));
+        }
+        let folder = match path.parent() {
+            Some(parent) if parent != Path::new("") => parent,
+            _ => Path::new("."),
+        };
+        Ok(Self {
+            overwrite: Overwrite::new(force, folder.join(&summary), inputs),
+            folder: folder.to_path_buf(),
+            name,
+            summary,
+        })
     }
-    let folder = match path.parent() {
-        Some(parent) if parent != Path::new("") => parent,
-        _ => Path::new("."),
-    };
-    let overwrite = Overwrite::new(force, folder.join(&summary), inputs);
-    let mut set = FileSet::begin(folder, overwrite)?;
-    set.write(&name, |out| csv(out))?;
-    set.write(&summary, |out| {
-        let json = to_json(told).map_err(io::Error::other)?;
-        out.write_all(&json)
-    })?;
-    set.commit().map_err(|error: WriteError| error.into())
+
+    /// Where they go.
+    #[must_use]
+    pub fn paths(&self) -> [PathBuf; 2] {
+        [&self.name, &self.summary].map(|name| self.folder.join(name))
+    }
+
+    /// Refuses early when one of them must not be replaced.
+    ///
+    /// # Errors
+    /// [`JobError::Write`].
+    pub fn check(&self) -> Result<(), JobError> {
+        for path in self.paths() {
+            self.overwrite.check(&path)?;
+        }
+        Ok(())
+    }
+
+    fn table(
+        &self,
+        csv: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<(FileEntry, FileSet), JobError> {
+        let mut set = FileSet::begin(&self.folder, self.overwrite.clone());
+        let written = set.write(&self.name, |out| csv(out))?;
+        Ok((FileEntry::new(&self.name, written), set))
+    }
+
+    fn summary(&self, mut set: FileSet, summary: &impl Serialize) -> Result<(), JobError> {
+        set.write(&self.summary, |out| {
+            let json = to_json(summary).map_err(io::Error::other)?;
+            out.write_all(&json)
+        })?;
+        Ok(set.commit()?)
+    }
 }

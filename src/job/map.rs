@@ -6,7 +6,7 @@ mod vector_field;
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use self::mag_manip::{MULTIPOLE_TOLERANCE, MagManipRequest, MultipolesMade, VectorFieldMade};
 use super::maps::{Felt, SceneMap};
@@ -14,12 +14,11 @@ use super::scene::Scene;
 use super::working_point::{WorkingPoint, relative_difference, superposition_ends};
 use super::{JobError, KERNEL_ERROR, steel};
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
-use crate::bundle::atomic::Overwrite;
 use crate::bundle::manifest::{
     AxisSummary, Interpolation, MapSidecar, MapSummary, WorkingPointMap,
 };
 use crate::bundle::npz::{MapArrays, Runtime, WORKING_POINT};
-use crate::bundle::write::{Beside, BesideContent, MapFormats, check_beside, write_map_and};
+use crate::bundle::write::{Beside, BesideContent, MapFormats, check_map_files, write_map_and};
 use crate::design::Design;
 use crate::map::sampled::TableReport;
 use crate::map::tabulate::Grid;
@@ -106,15 +105,26 @@ pub fn run(
     progress: &dyn Progress,
 ) -> Result<MapReport, JobError> {
     let scene = Scene::new(design)?;
-    Overwrite::new(request.force, request.out.join("map.json"), &inputs)
-        .check(&request.out.join("map.npz"))?;
     let asked = &request.mag_manip;
-    for path in [&asked.vector_field, &asked.multipoles]
+    let besides = [&asked.vector_field, &asked.multipoles];
+    let besides: Vec<&Path> = besides
         .into_iter()
         .flatten()
-    {
-        check_beside(path, &request.out, request.force, &inputs)?;
-    }
+        .map(PathBuf::as_path)
+        .collect();
+    let protected: Vec<PathBuf> = design
+        .curve_file()
+        .map(Path::to_path_buf)
+        .into_iter()
+        .collect();
+    check_map_files(
+        &request.out,
+        request.force,
+        &inputs,
+        &protected,
+        request.formats,
+        &besides,
+    )?;
     let nodes = (asked.vector_field.as_ref())
         .map(|path| Ok::<_, JobError>((path, vector_field::nodes(&scene, asked.nodes)?)))
         .transpose()?;
@@ -236,6 +246,7 @@ pub fn run(
         &arrays,
         request.formats,
         &besides,
+        &protected,
     )?;
     progress.end();
     Ok(MapReport {

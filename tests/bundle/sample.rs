@@ -12,9 +12,9 @@ use fluxform::bundle::manifest::*;
 use fluxform::bundle::npz::{MapArrays, Runtime};
 use fluxform::bundle::rendering::{HeightGrid, Rendering};
 use fluxform::bundle::table::{CurrentRow, PointRow};
+use fluxform::bundle::timing::StageSeconds;
 use fluxform::bundle::write::{BundleContent, write_bundle};
 use fluxform::numerics::axis::Axis;
-use serde_json::json;
 
 /// A small bundle of an analytic field: a magnetic charge below each coil.
 pub struct Sample {
@@ -279,7 +279,11 @@ impl Sample {
             lambda: &self.lambda,
             extra: &[],
         };
-        write_bundle(target, force, &content, &json!({ "total_s": 0.013 }))
+        let timing = [StageSeconds {
+            stage: "map".to_owned(),
+            seconds: 0.013,
+        }];
+        write_bundle(target, force, &content, &timing)
     }
 }
 

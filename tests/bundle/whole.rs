@@ -67,33 +67,6 @@ fn a_bundle_is_replaced_only_when_it_is_ours_and_the_users_files_stay() {
 }
 
 #[test]
-fn an_interrupted_swap_is_finished_or_undone_by_the_next_run() {
-    let folder = temporary();
-    let target = folder.path().join("flat");
-    let old = folder.path().join(".flat.fluxform-old");
-    let sample = sample(false, [4, 4, 4]);
-    // Killed between the two renames: the old bundle stands under its other name.
-    sample.write(&target, false).unwrap();
-    fs::write(target.join("mine.txt"), "x").unwrap();
-    fs::rename(&target, &old).unwrap();
-    fs::create_dir(folder.path().join(".fluxform-AbC123.tmp")).unwrap();
-    fs::write(folder.path().join(".fluxform-AbC123.tmp/map.npz"), "half").unwrap();
-    sample.write(&target, false).unwrap();
-    Bundle::open(&target).unwrap();
-    assert!(target.join("mine.txt").exists());
-    assert_no_leftovers(folder.path());
-    // Killed while the old folder was being removed.
-    fs::create_dir(&old).unwrap();
-    fs::copy(target.join("manifest.json"), old.join("manifest.json")).unwrap();
-    fs::write(old.join("points.csv"), "old").unwrap();
-    fs::write(old.join("yours.txt"), "y").unwrap();
-    sample.write(&target, false).unwrap();
-    Bundle::open(&target).unwrap();
-    assert!(target.join("mine.txt").exists() && target.join("yours.txt").exists());
-    assert_no_leftovers(folder.path());
-}
-
-#[test]
 fn single_files_are_whole_or_absent() {
     let folder = temporary();
     let path = folder.path().join("new/points.csv");
@@ -112,8 +85,9 @@ fn single_files_are_whole_or_absent() {
         error.contains("points.json tells what it was made from"),
         "{error}"
     );
-    let sidecar =
-        json!({ "inputs": [{ "path": "other/name.stl", "sha256": sha256_hex(b"solid") }] });
+    let sidecar = json!({ "schema_version": "1.2.0", "fluxform_version": "0.1.0",
+        "inputs": [{ "path": "other/name.stl", "sha256": sha256_hex(b"solid") }],
+        "files": [{ "path": "points.csv", "bytes": 4, "sha256": sha256_hex(b"x_m\n") }] });
     fs::write(folder.path().join("new/points.json"), sidecar.to_string()).unwrap();
     write(&path, &ours(&inputs), put("y_m\n")).unwrap();
     let other = [Input::of_bytes("a.stl", b"other")];
@@ -122,22 +96,22 @@ fn single_files_are_whole_or_absent() {
         Err(WriteError::OutputExists { .. })
     ));
     assert_eq!(fs::read_to_string(&path).unwrap(), "y_m\n");
-    write(&path, &Overwrite::Force, put("z_m\n")).unwrap();
+    write(&path, &Overwrite::force(), put("z_m\n")).unwrap();
     assert_eq!(fs::read_to_string(&path).unwrap(), "z_m\n");
     // Content that fails half way.
-    let error = write(&path, &Overwrite::Force, |out| {
+    let error = write(&path, &Overwrite::force(), |out| {
         out.write_all(&[b'x'; 5 << 20])?;
         Err(std::io::Error::from(std::io::ErrorKind::StorageFull))
     });
     assert!(matches!(error, Err(WriteError::DiskFull { .. })));
     assert_eq!(fs::read_to_string(&path).unwrap(), "z_m\n");
     assert!(matches!(
-        write(folder.path(), &Overwrite::Force, put("x")),
+        write(folder.path(), &Overwrite::force(), put("x")),
         Err(WriteError::IsFolder { .. })
     ));
     let below_file = path.join("map.npz");
     assert!(matches!(
-        write(&below_file, &Overwrite::Force, put("x")),
+        write(&below_file, &Overwrite::force(), put("x")),
         Err(WriteError::NotFolder { .. })
     ));
     assert_no_leftovers(&folder.path().join("new"));
@@ -150,10 +124,10 @@ fn full_disks_and_read_only_folders_are_told() {
     use std::os::unix::fs::PermissionsExt;
     let put = |out: &mut dyn std::io::Write| out.write_all(&[b'x'; 3 << 20]);
     if Path::new("/dev/full").exists() {
-        let error = write(Path::new("/dev/full"), &Overwrite::Force, put).unwrap_err();
+        let error = write(Path::new("/dev/full"), &Overwrite::force(), put).unwrap_err();
         assert!(matches!(error, WriteError::DiskFull { .. }), "{error}");
         assert!(error.to_string().contains("the disk is full"));
-        write(Path::new("/dev/null"), &Overwrite::Force, put).unwrap();
+        write(Path::new("/dev/null"), &Overwrite::force(), put).unwrap();
         assert!(!Path::new("/dev/null").metadata().unwrap().is_file());
     }
     let folder = temporary();
@@ -164,7 +138,7 @@ fn full_disks_and_read_only_folders_are_told() {
         eprintln!("skipped: this user may write into read-only folders");
         return;
     }
-    let error = write(&shut.join("map.npz"), &Overwrite::Force, put).unwrap_err();
+    let error = write(&shut.join("map.npz"), &Overwrite::force(), put).unwrap_err();
     assert!(matches!(error, WriteError::ReadOnly { .. }), "{error}");
     let error = sample(false, [4, 4, 4])
         .write(&shut.join("flat"), false)

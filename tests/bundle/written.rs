@@ -253,7 +253,7 @@ fn figures() {
     time("sha256", &mut || assert_eq!(sha256_hex(&bytes).len(), 64));
     let path = folder.path().join("map.npz");
     time("npz to disk, with digest and fsync", &mut || {
-        write(&path, &Overwrite::Force, |out| {
+        write(&path, &Overwrite::force(), |out| {
             out.write_all(&to_npz(&sample.map).unwrap())
         })
         .unwrap();

@@ -146,3 +146,197 @@ fn summaries_answer_what_how_good_and_where() {
         assert_eq!(line, line.trim_end());
     }
 }
+
+/// Every file below, links by where they lead.
+#[allow(clippy::disallowed_methods)] // a test's own look
+fn tree(folder: &std::path::Path) -> std::collections::BTreeMap<std::path::PathBuf, Vec<u8>> {
+    let mut found = std::collections::BTreeMap::new();
+    for entry in folder.read_dir().unwrap() {
+        let path = entry.unwrap().path();
+        let kind = path.symlink_metadata().unwrap();
+        if kind.is_symlink() {
+            let to = std::fs::read_link(&path).unwrap();
+            found.insert(path, to.into_os_string().into_encoded_bytes());
+        } else if kind.is_dir() {
+            found.extend(tree(&path));
+            found.insert(path, Vec::new());
+        } else {
+            found.insert(path.clone(), std::fs::read(&path).unwrap());
+        }
+    }
+    found
+}
+
+#[test]
+#[allow(clippy::disallowed_methods)] // a test's own traps
+fn a_link_named_like_a_folder_put_aside_empties_no_folder() {
+    let place = Place::new();
+    let calibrate = ["calibrate", SEED, "shapes/flat.toml", "--out", "results"];
+    place.run(&calibrate).ends(0);
+    std::fs::create_dir_all(place.path("victim/deep")).unwrap();
+    place.write("victim/deep/thesis.tex", "years");
+    let victim = place.path("victim");
+    let kept = place.path("results/seed_air/.fluxform-kept");
+    let _ = std::fs::remove_dir_all(&kept);
+    let own = "results/seed_air";
+    for name in [
+        ".flat.fluxform-old",
+        ".flat.0-0.fluxform-old",
+        ".fluxform-1.tmp",
+    ] {
+        std::os::unix::fs::symlink(&victim, place.path(&format!("{own}/{name}"))).unwrap();
+    }
+    std::os::unix::fs::symlink(&victim, &kept).unwrap();
+    place.write("other.toml", &place.seed().replace("1429", "1400"));
+    let before = tree(&place.path("."));
+    let refused = ["calibrate", "other.toml", "shapes/flat.toml"];
+    place.run(&[&refused[..], &["--no-cache"]].concat()).ends(4);
+    assert!(
+        tree(&place.path(".")) == before,
+        "refused, and changed something"
+    );
+    place.run(&calibrate).ends(0);
+    place
+        .run(&[&calibrate[..], &["--no-cache", "--force"]].concat())
+        .ends(0);
+    assert!(kept.is_symlink());
+    assert_eq!(place.read("victim/deep/thesis.tex"), b"years");
+    assert_eq!(tree(&victim).len(), 2);
+}
+
+#[test]
+fn no_input_becomes_an_output() {
+    const DESIGN: &str = "d/seed_air.toml";
+    let place = Place::new();
+    // Not the repository's own.
+    place.copy("designs", "d");
+    place.copy("shapes", "s");
+    let discretize = ["discretize", "s/flat.toml", "--out", "s/flat.csv"];
+    place.run(&discretize).ends(0);
+    let flat = place.read("s/flat.toml");
+    let seed = place.read(DESIGN);
+    place.write("points_in.csv", "x_m,y_m,z_m\n0.007,0.013,0.03\n");
+    let points = place.read("points_in.csv");
+    let attempts: [&[&str]; 6] = [
+        &["discretize", "s/flat.toml", "--out", "s/flat.toml"],
+        &[
+            "discretize",
+            "s/flat.toml",
+            "--out",
+            "-",
+            "--plot",
+            "s/flat.toml",
+        ],
+        &["probe", DESIGN, "points_in.csv", "--out", "points_in.csv"],
+        &["probe", DESIGN, "points_in.csv", "--out", DESIGN],
+        &["lambda", DESIGN, "s/flat.toml", "--plot", DESIGN],
+        &[
+            "sweep",
+            "plan",
+            DESIGN,
+            "--set",
+            "wire.diameter_mm=0.5,0.7",
+            "--out",
+            DESIGN,
+        ],
+    ];
+    for attempt in attempts {
+        for force in [&[][..], &["--force"]] {
+            let ran = place.run(&[attempt, force].concat());
+            ran.ends(4).says(&["is read by this very run"]);
+        }
+    }
+    assert_eq!(place.read("s/flat.toml"), flat);
+    assert_eq!(place.read(DESIGN), seed);
+    assert_eq!(place.read("points_in.csv"), points);
+}
+
+#[test]
+fn only_what_a_sidecar_lists_unchanged_is_replaced() {
+    let place = Place::new();
+    place.run(&["calibrate", SEED, "shapes/flat.toml"]).ends(0);
+    let bundle = "results/seed_air/flat";
+    let replay = ["replay", bundle, "--synthesize", "circle"];
+    let to = |out: &str| place.run(&[&replay[..], &["--out", out]].concat());
+    to("felt.csv").ends(0);
+    to("felt.csv").ends(0);
+    // The same sidecar, another table.
+    place.write("felt.txt", "mine");
+    to("felt.txt").ends(4).says(&["felt.txt"]);
+    assert_eq!(place.read("felt.txt"), b"mine");
+    place.write("felt.csv", "edited");
+    to("felt.csv").ends(4).says(&["changed since"]);
+    assert_eq!(place.read("felt.csv"), b"edited");
+    // The bundle that is read, with --force too.
+    let manifest = place.read(&format!("{bundle}/manifest.json"));
+    for out in ["points.csv", "map.npz", "manifest.csv"] {
+        let out = format!("{bundle}/{out}");
+        let forced = [&replay[..], &["--force", "--out", &out]].concat();
+        place
+            .run(&forced)
+            .ends(4)
+            .says(&["is read by this very run"]);
+    }
+    assert_eq!(place.read(&format!("{bundle}/manifest.json")), manifest);
+    place.run(&["verify", bundle]).ends(0);
+    // Two outputs of one command.
+    let twice = [&replay[..], &["--out", "a.csv", "--plot", "./a.csv"]].concat();
+    place
+        .run(&twice)
+        .ends(4)
+        .says(&["another file of this command"]);
+    place.write("mine.svg", "<svg/>");
+    let drawn = [&replay[..], &["--out", "-", "--plot", "mine.svg"]].concat();
+    place.run(&drawn).ends(4).says(&["mine.svg"]);
+    assert_eq!(place.read("mine.svg"), b"<svg/>");
+
+    place.run(&["map", SEED, "--out", "maps"]).ends(0);
+    place.write("maps/map.csv", "mine");
+    place
+        .run(&["map", SEED, "--out", "maps", "--csv"])
+        .ends(4)
+        .says(&["map.csv"]);
+    assert_eq!(place.read("maps/map.csv"), b"mine");
+}
+
+#[test]
+fn a_user_s_page_in_a_bundle_is_named_and_never_lost() {
+    let place = Place::new();
+    let bare = ["calibrate", SEED, "shapes/flat.toml", "--no-report"];
+    place.run(&bare).ends(0);
+    let bundle = "results/seed_air/flat";
+    for name in ["report.html", "timing_notes.txt", "notes.txt"] {
+        place.write(&format!("{bundle}/{name}"), "mine");
+    }
+    place.run(&bare).ends(0);
+    place
+        .run(&bare[..3])
+        .ends(4)
+        .says(&["report.html", "--force"]);
+    assert_eq!(place.read(&format!("{bundle}/report.html")), b"mine");
+    place.run(&[&bare[..3], &["--force"]].concat()).ends(0);
+    for name in ["report.html.kept-1", "timing_notes.txt", "notes.txt"] {
+        assert_eq!(place.read(&format!("{bundle}/{name}")), b"mine", "{name}");
+    }
+    place.run(&["verify", bundle]).ends(0);
+}
+
+#[test]
+#[allow(clippy::disallowed_methods)] // a test's own traps
+fn a_sweep_follows_no_link_below_its_folder() {
+    let place = Place::new();
+    let plan = ["sweep", "plan", SEED, "--set", "wire.diameter_mm=0.5,0.7"];
+    place
+        .run(&[&plan[..], &["--out", "plan.json"]].concat())
+        .ends(0);
+    std::fs::create_dir_all(place.path("victim/000")).unwrap();
+    place.write("victim/000/000000.json", "mine");
+    std::fs::create_dir(place.path("out")).unwrap();
+    std::os::unix::fs::symlink(place.path("victim"), place.path("out/points")).unwrap();
+    for force in [&[][..], &["--force"]] {
+        let run = ["sweep", "run", "plan.json", "--out", "out"];
+        place.run(&[&run[..], force].concat()).ends(4);
+    }
+    assert_eq!(place.read("victim/000/000000.json"), b"mine");
+    assert!(!place.path("victim/000/000001.json").exists());
+}

@@ -293,7 +293,7 @@ fn older_bundles_replay_but_know_no_lag() {
         lambda: &older.lambda,
         extra: &[],
     };
-    write_bundle(&target, false, &content, &0).unwrap();
+    write_bundle(&target, false, &content, &[]).unwrap();
     let reopened = Opened::new(&target).unwrap();
     let (now, then) = (
         replayed(&opened, &trajectory, false),

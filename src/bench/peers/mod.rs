@@ -80,7 +80,7 @@ pub fn add(
             continue;
         }
         let path = scratch.path().join(format!("{number}.json"));
-        write_json(&path, &Overwrite::Force, &problem.content)?;
+        write_json(&path, &Overwrite::force(), &problem.content)?;
         let answer = ask(&pythons, &script, &path, &mut missing);
         let stage = measured
             .iter_mut()

@@ -1,15 +1,18 @@
 //! Single files: written beside the target, then renamed.
 
+use std::ffi::{OsStr, OsString};
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
-use tempfile::NamedTempFile;
 
-use super::leftovers::{clean_leftovers, temporary_file};
+use super::dir::{Dir, Kind, Status};
 use super::made::{MadeFolders, made_in};
-use super::{Overwrite, WriteError, Written};
+use super::overwrite::{Permit, real};
+use super::record::{Record, ReplacedNote, present};
+use super::temporary::{TemporaryFile, clean_leftovers};
+use super::{Overwrite, WriteError, Written, parent_of};
 
 /// Writes of at least this size pass through unbuffered.
 const BUFFER_BYTES: usize = 1 << 20;
@@ -17,7 +20,7 @@ const BUFFER_BYTES: usize = 1 << 20;
 /// Writes one file whole or not at all and returns its size and digest. Missing folders are made.
 /// `content` writes the bytes; an error of its own of kind `InvalidData` is reported as such.
 ///
-/// A target that is a device or a pipe is written to directly.
+/// A target that is a character device or a pipe is written to directly.
 ///
 /// # Errors
 /// [`WriteError`]; the target is then as it was.
@@ -26,65 +29,109 @@ pub fn write(
     overwrite: &Overwrite,
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<Written, WriteError> {
-    if let Ok(metadata) = path.metadata()
-        && !metadata.is_file()
-        && !metadata.is_dir()
-    {
+    if is_stream(path) {
         return File::options()
             .write(true)
             .open(path)
             .and_then(|mut device| fill(&mut device, content))
             .map_err(|error| WriteError::from_io("write", path, error));
     }
-    let name = path.file_name().ok_or_else(|| WriteError::IsFolder {
-        path: path.to_path_buf(),
-    })?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let mut set = FileSet::begin(folder, overwrite.clone())?;
-    let written = set.write_path(folder.join(name), content)?;
+    let mut set = FileSet::begin(parent_of(path), overwrite.clone());
+    let written = set.write_at(path, content)?;
     set.commit()?;
     Ok(written)
+}
+
+/// Whether `path` is a character device or a pipe, which take bytes and keep none.
+#[must_use]
+pub fn is_stream(path: &Path) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    path.metadata().is_ok_and(|found| {
+        let kind = found.file_type();
+        kind.is_char_device() || kind.is_fifo()
+    })
+}
+
+/// Puts one small file in the open folder `dir`, whole or not at all, replacing a regular file of that
+/// name; the caller has looked whose that is. Unless `forced`, nothing is forced to the disk: a lost
+/// system may leave it empty or cut short, which its reader must recognise, by a checksum.
+///
+/// # Errors
+/// What the system reports; the target is then as it was.
+pub(crate) fn put(
+    dir: &Dir,
+    name: &str,
+    forced: bool,
+    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<()> {
+    let earlier = dir.status(name)?;
+    if earlier.is_some_and(|there| there.kind != Kind::File) {
+        return Err(io::Error::other("what is there is no regular file"));
+    }
+    let mut made = new_temporary(dir, earlier)?;
+    fill(&mut made.file, content)?;
+    finish(&made, earlier)?;
+    if forced {
+        made.file.sync_all()?;
+    }
+    made.persist(OsStr::new(name))?;
+    if forced { dir.sync() } else { Ok(()) }
+}
+
+/// A temporary file that is to replace `earlier`: nobody else reads it before it has its mode.
+fn new_temporary(dir: &Dir, earlier: Option<Status>) -> io::Result<TemporaryFile> {
+    TemporaryFile::new(dir, if earlier.is_some() { 0o600 } else { 0o666 })
+}
+
+/// Gives it the owner and mode of the file that it replaces.
+fn finish(made: &TemporaryFile, earlier: Option<Status>) -> io::Result<()> {
+    earlier.map_or(Ok(()), |earlier| earlier.give(&made.file))
 }
 
 /// Files that belong together, such as an array file and its sidecar.
 ///
 /// All are written first, then renamed in reverse order: the sidecar, staged last because it lists
-/// the digests of the others, is in place first. After a kill between two renames the sidecar
-/// therefore tells that what lies there is ours, and the same command replaces it. Renames are made
-/// under a lock on the folder, so that the files of two runs do not mix.
+/// the digests of the others, is in place first. Files that are replaced are noted beside it until the
+/// last rename: after a kill between two renames sidecar and note together show that what is there is
+/// ours, and the same command replaces it. Renames are made under a lock on the folder, so that the
+/// files of two runs do not mix. Nothing is made or removed before every target may be replaced.
 #[derive(Debug)]
 pub struct FileSet {
     folder: PathBuf,
     overwrite: Overwrite,
-    staged: Vec<(NamedTempFile, PathBuf)>,
+    staged: Vec<Staged>,
     /// What an earlier set had and this one has not.
     outdated: Vec<PathBuf>,
     /// Dropped last: what is still empty then goes again.
     made: Vec<MadeFolders>,
 }
 
+/// A file that waits for its name.
+#[derive(Debug)]
+struct Staged {
+    temporary: TemporaryFile,
+    /// As given.
+    shown: PathBuf,
+    /// Where it belongs; no link.
+    target: PathBuf,
+    dir: Dir,
+    name: OsString,
+    written: Written,
+    permit: Permit,
+    overwrite: Overwrite,
+}
+
 impl FileSet {
-    /// Makes the folder where needed and removes the leftovers of killed runs in it.
-    ///
-    /// # Errors
-    /// [`WriteError`] when the folder cannot be made.
-    pub fn begin(folder: &Path, overwrite: Overwrite) -> Result<Self, WriteError> {
-        let folder = if folder.as_os_str().is_empty() {
-            Path::new(".")
-        } else {
-            folder
-        };
-        let made = made_in(folder, |_| Ok(()))
-            .map_err(|error| error.of("make the folder", folder))?
-            .1;
-        clean_leftovers(folder);
-        Ok(Self {
-            folder: folder.to_path_buf(),
+    /// A set whose files of plain names go to `folder`, which is made when the first is written.
+    #[must_use]
+    pub fn begin(folder: &Path, overwrite: Overwrite) -> Self {
+        Self {
+            folder: parent_of(&folder.join("-")).to_path_buf(),
             overwrite,
             staged: Vec::new(),
             outdated: Vec::new(),
-            made: vec![made],
-        })
+            made: Vec::new(),
+        }
     }
 
     /// Stages a file of the given plain name.
@@ -97,7 +144,7 @@ impl FileSet {
         content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<Written, WriteError> {
         super::folder::check_name(name)?;
-        self.write_path(self.folder.join(name), content)
+        self.write_at(&self.folder.join(name), content)
     }
 
     /// Stages a file of any path; its folder is made where needed.
@@ -109,22 +156,66 @@ impl FileSet {
         target: &Path,
         content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<Written, WriteError> {
-        // A bare name stands in the working directory, not in the set's folder.
-        let parent = target.parent().filter(|p| !p.as_os_str().is_empty());
-        let parent = parent.unwrap_or(Path::new("."));
-        let name = target.file_name().ok_or_else(|| WriteError::IsFolder {
-            path: target.to_path_buf(),
-        })?;
-        let made = made_in(parent, |_| Ok(()))
-            .map_err(|error| error.of("make the folder", parent))?
-            .1;
-        self.made.push(made);
-        clean_leftovers(parent);
-        self.write_path(parent.join(name), content)
+        self.write_under(target, self.overwrite.clone(), content)
     }
 
-    /// Removes the file of the given plain name, if there is one, when the others are put in place: an
-    /// earlier set had it, this one has not.
+    /// As [`Self::write_at`], replaced under a policy of its own.
+    ///
+    /// # Errors
+    /// As [`Self::write_at`].
+    pub fn write_under(
+        &mut self,
+        target: &Path,
+        overwrite: Overwrite,
+        content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<Written, WriteError> {
+        if target.file_name().is_none() {
+            return Err(WriteError::IsFolder {
+                path: target.to_path_buf(),
+            });
+        }
+        overwrite.check(target)?;
+        let fail = |error| WriteError::from_io("write", target, error);
+        // A link is followed: the file it leads to is replaced, not the link.
+        let shown = target.to_path_buf();
+        let target = real(target).map_err(fail)?;
+        let ((dir, name), made) = made_in(parent_of(&target), |_| Dir::of(&target))
+            .map_err(|error| error.of("open the folder", parent_of(&target)))?;
+        self.made.push(made);
+        let own = dir.own_status().map_err(fail)?;
+        for other in &self.staged {
+            if other.name == name && other.dir.own_status().map_err(fail)?.is(&own) {
+                return Err(WriteError::same_name(&target));
+            }
+        }
+        let earlier = dir.status(&name).map_err(fail)?;
+        // Another run that made the folder for nothing may have taken it away.
+        let ((dir, mut temporary), made) = made_in(parent_of(&target), |folder| {
+            let dir = Dir::open(folder)?;
+            let temporary = new_temporary(&dir, earlier)?;
+            Ok((dir, temporary))
+        })
+        .map_err(|error| error.of("write", &target))?;
+        self.made.push(made);
+        let written = fill(&mut temporary.file, content).map_err(fail)?;
+        finish(&temporary, earlier)
+            .and_then(|()| temporary.file.sync_all())
+            .map_err(fail)?;
+        self.staged.push(Staged {
+            temporary,
+            shown,
+            target,
+            dir,
+            name,
+            written: written.clone(),
+            permit: Permit::New,
+            overwrite,
+        });
+        Ok(written)
+    }
+
+    /// Removes the file of the given plain name when the others are put in place, if it is listed as
+    /// ours and unchanged: an earlier set had it, this one has not.
     ///
     /// # Errors
     /// A name that is none.
@@ -134,88 +225,78 @@ impl FileSet {
         Ok(())
     }
 
-    fn write_path(
-        &mut self,
-        target: PathBuf,
-        content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-    ) -> Result<Written, WriteError> {
-        if target.is_dir() {
-            return Err(WriteError::IsFolder { path: target });
-        }
-        self.overwrite.check(&target)?;
-        // A link is followed: the file it leads to is replaced, not the link.
-        let target = target.canonicalize().unwrap_or(target);
-        let place = place(&target);
-        if self
-            .staged
-            .iter()
-            .any(|(_, other)| self::place(other) == place)
-        {
-            return Err(WriteError::Content {
-                path: target,
-                message: "another file of this command has that name; choose another".to_owned(),
-            });
-        }
-        let beside = beside(&target, &self.folder);
-        let fail = |error| WriteError::from_io("write", &target, error);
-        let (mut file, made) =
-            made_in(beside, temporary_file).map_err(|error| error.of("write", &target))?;
-        self.made.push(made);
-        let written = fill(file.as_file_mut(), content)
-            .and_then(|written| file.as_file().sync_all().map(|()| written))
-            .map_err(fail)?;
-        self.staged.push((file, target));
-        Ok(written)
-    }
-
     /// Puts all staged files in place.
     ///
     /// # Errors
     /// [`WriteError`]; files not yet in place are removed.
-    pub fn commit(self) -> Result<(), WriteError> {
-        let _lock = lock_folder(&self.folder);
+    pub fn commit(mut self) -> Result<(), WriteError> {
+        let of_set = Dir::open(&self.folder).ok();
+        let _lock = of_set.as_ref().and_then(Dir::lock);
         // Another run may have been faster.
-        for (_, target) in &self.staged {
-            self.overwrite.check(target)?;
+        for file in &mut self.staged {
+            file.permit = file.overwrite.permit(&file.shown, Some(&file.written))?;
         }
+        let note = self.note_replaced()?;
         for path in &self.outdated {
-            match std::fs::remove_file(path) {
-                Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                    return Err(WriteError::from_io("remove", path, error));
-                }
-                _ => {}
+            if let Ok((dir, name)) = Dir::of(path)
+                && self.overwrite.owns(path)
+            {
+                dir.remove_file(&name)
+                    .map_err(|error| WriteError::from_io("remove", path, error))?;
             }
         }
-        let mut folders = Vec::new();
-        for (file, target) in self.staged.into_iter().rev() {
-            file.persist(&target)
-                .map_err(|error| WriteError::from_io("write", &target, error.error))?;
-            let folder = beside(&target, &self.folder).to_path_buf();
-            if !folders.contains(&folder) {
-                folders.push(folder);
+        let mut dirs: Vec<Dir> = Vec::new();
+        for file in self.staged.into_iter().rev() {
+            let placed = match file.permit {
+                Permit::Same => continue,
+                Permit::New => file.temporary.persist_new(&file.name),
+                Permit::Replace => file.temporary.persist(&file.name),
+            };
+            placed.map_err(|error| WriteError::from_io("write", &file.target, error))?;
+            if !dirs.iter().any(|dir| dir.path() == file.dir.path()) {
+                dirs.push(file.dir);
             }
         }
-        for folder in folders {
-            sync_folder(&folder).map_err(|error| WriteError::from_io("write", &folder, error))?;
+        if let Some((dir, name)) = note {
+            let _ = dir.remove_file(&name);
+        }
+        for dir in dirs {
+            dir.sync()
+                .map_err(|error| WriteError::from_io("write", dir.path(), error))?;
+            clean_leftovers(&dir);
         }
         Ok(())
     }
-}
 
-/// Where `target` is, however it is spelt.
-fn place(target: &Path) -> PathBuf {
-    let folder = beside(target, Path::new(".")).canonicalize();
-    match (folder, target.file_name()) {
-        (Ok(folder), Some(name)) => folder.join(name),
-        _ => target.to_path_buf(),
-    }
-}
-
-/// The folder of `target`; `folder` for a bare name, which has none of its own.
-fn beside<'a>(target: &'a Path, folder: &'a Path) -> &'a Path {
-    match target.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => folder,
+    /// Notes beside the record which files are about to be replaced, as they are now.
+    fn note_replaced(&self) -> Result<Option<(Dir, OsString)>, WriteError> {
+        let Some(record) = self.overwrite.record_path() else {
+            return Ok(None);
+        };
+        let replaced = |file: &&Staged| file.permit == Permit::Replace && file.target != record;
+        let mut files = Vec::new();
+        for file in self.staged.iter().filter(replaced) {
+            let entry = present(&file.dir, &file.name)
+                .map_err(|error| WriteError::from_io("read", &file.target, error))?;
+            files.extend(entry);
+        }
+        if files.is_empty() {
+            return Ok(None);
+        }
+        let path = ReplacedNote::path(record);
+        // Somebody else's file of that name stays; then a kill at the wrong moment costs a --force.
+        if path.symlink_metadata().is_ok() && Record::read(&path).is_none() {
+            return Ok(None);
+        }
+        let fail = |error| WriteError::from_io("write", &path, error);
+        let (dir, name) = Dir::of(&path).map_err(fail)?;
+        let bytes = ReplacedNote::new(files).bytes().map_err(fail)?;
+        match put(&dir, &name.to_string_lossy(), true, |out| {
+            out.write_all(&bytes)
+        }) {
+            Ok(()) => Ok(Some((dir, name))),
+            Err(error) => Err(fail(error)),
+        }
     }
 }
 
@@ -278,29 +359,160 @@ impl Write for Hashing<'_> {
     }
 }
 
-/// Serialises the renames of runs that write into the same folder. Where folders cannot be locked
-/// the renames go ahead without.
-pub(super) fn lock_folder(folder: &Path) -> Option<File> {
-    let handle = File::open(folder).ok()?;
-    handle.lock().ok()?;
-    Some(handle)
-}
-
-/// Makes renames in `folder` durable, where the system knows how.
-pub(super) fn sync_folder(folder: &Path) -> io::Result<()> {
-    if cfg!(unix) {
-        match File::open(folder)?.sync_all() {
-            Err(error) if error.kind() == io::ErrorKind::InvalidInput => {} // some network disks
-            outcome => return outcome,
-        }
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bundle::artefact::Input;
+    use crate::bundle::artefact::{FileEntry, Input};
+
+    fn record(inputs: &[Input], files: &[FileEntry]) -> String {
+        serde_json::json!({ "schema_version": "1.2.0", "fluxform_version": "0.1.0",
+            "inputs": inputs, "files": files })
+        .to_string()
+    }
+
+    fn inputs() -> Vec<Input> {
+        vec![Input::of_bytes("a.toml", b"a")]
+    }
+
+    /// A table and its sidecar.
+    fn put_both(folder: &Path, table: &str, text: &str, force: bool) -> Result<(), WriteError> {
+        let sidecar = Path::new(table).with_extension("json");
+        let sidecar = sidecar.to_str().unwrap();
+        let overwrite = Overwrite::new(force, folder.join(sidecar), &inputs());
+        let mut set = FileSet::begin(folder, overwrite);
+        let written = set.write(table, |out| out.write_all(text.as_bytes()))?;
+        let told = record(&inputs(), &[FileEntry::new(table, written)]);
+        set.write(sidecar, |out| out.write_all(told.as_bytes()))?;
+        set.commit()
+    }
+
+    #[test]
+    fn a_sidecar_is_a_permission_only_for_what_it_lists_unchanged() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        put_both(folder.path(), "plate.csv", "1", false).unwrap();
+        std::fs::write(path("plate.txt"), "mine").unwrap();
+        let refused = put_both(folder.path(), "plate.txt", "2", false).unwrap_err();
+        assert!(
+            refused.to_string().contains("does not list it"),
+            "{refused}"
+        );
+        assert_eq!(std::fs::read(path("plate.txt")).unwrap(), b"mine");
+        put_both(folder.path(), "plate.csv", "2", false).unwrap();
+        std::fs::write(path("plate.csv"), "edited").unwrap();
+        let refused = put_both(folder.path(), "plate.csv", "3", false).unwrap_err();
+        assert!(
+            refused.to_string().contains("was changed since"),
+            "{refused}"
+        );
+        assert_eq!(std::fs::read(path("plate.csv")).unwrap(), b"edited");
+        put_both(folder.path(), "plate.csv", "3", true).unwrap();
+        assert_eq!(folder.path().read_dir().unwrap().count(), 3);
+    }
+
+    #[test]
+    fn a_run_killed_between_two_renames_is_not_refused_by_its_own_files() {
+        let folder = tempfile::tempdir().unwrap();
+        put_both(folder.path(), "plate.csv", "1", false).unwrap();
+        let old = std::fs::read(folder.path().join("plate.csv")).unwrap();
+        // The sidecar of the second run, and the note of what it replaces, are in place.
+        let sidecar = folder.path().join("plate.json");
+        let note = ReplacedNote::new(vec![FileEntry {
+            path: "plate.csv".to_owned(),
+            bytes: 1,
+            sha256: crate::bundle::artefact::sha256_hex(&old),
+        }]);
+        let new = FileEntry {
+            path: "plate.csv".to_owned(),
+            bytes: 2,
+            sha256: crate::bundle::artefact::sha256_hex(b"22"),
+        };
+        std::fs::write(&sidecar, record(&inputs(), &[new])).unwrap();
+        put_both(folder.path(), "plate.csv", "22", false).unwrap_err();
+        std::fs::write(ReplacedNote::path(&sidecar), note.bytes().unwrap()).unwrap();
+        put_both(folder.path(), "plate.csv", "22", false).unwrap();
+        assert_eq!(folder.path().read_dir().unwrap().count(), 2);
+    }
+
+    #[test]
+    fn what_a_run_reads_is_never_replaced() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        std::fs::write(path("a.toml"), "a").unwrap();
+        std::fs::hard_link(path("a.toml"), path("hard.csv")).unwrap();
+        symlink(path("a.toml"), path("soft.csv")).unwrap();
+        std::fs::create_dir(path("read")).unwrap();
+        std::fs::write(path("read/b"), "b").unwrap();
+        let read = [Input::of_bytes(path("a.toml").display().to_string(), b"a")];
+        for force in [false, true] {
+            let overwrite = Overwrite::same_bytes(force, &read).protecting([path("read")]);
+            for name in ["a.toml", "hard.csv", "soft.csv", "read/b", "read/new"] {
+                let refused = write(&path(name), &overwrite, |out| out.write_all(b"x"));
+                let refused = refused.unwrap_err();
+                assert!(
+                    matches!(refused, WriteError::Protected { .. }),
+                    "{name}: {refused}"
+                );
+            }
+        }
+        assert_eq!(std::fs::read(path("a.toml")).unwrap(), b"a");
+        assert_eq!(path("read").read_dir().unwrap().count(), 1);
+    }
+
+    #[test]
+    fn force_replaces_no_folder_no_link_and_no_pipe() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        std::fs::write(path("thesis.tex"), "years").unwrap();
+        std::fs::create_dir(path("folder")).unwrap();
+        symlink(path("thesis.tex"), path("link")).unwrap();
+        symlink(path("none"), path("dangling")).unwrap();
+        for name in ["folder", "link", "dangling"] {
+            write(&path(name), &Overwrite::force(), |out| out.write_all(b"x")).unwrap_err();
+        }
+        assert_eq!(std::fs::read(path("thesis.tex")).unwrap(), b"years");
+        assert!(path("dangling").is_symlink() && !path("none").exists());
+        // A link to what is ours is followed.
+        put_both(folder.path(), "plate.csv", "1", false).unwrap();
+        std::fs::rename(path("plate.csv"), path("folder/real.csv")).unwrap();
+        symlink(path("folder/real.csv"), path("plate.csv")).unwrap();
+        put_both(folder.path(), "plate.csv", "2", false).unwrap();
+        assert!(path("plate.csv").is_symlink());
+        assert_eq!(std::fs::read(path("folder/real.csv")).unwrap(), b"2");
+    }
+
+    #[test]
+    fn the_mode_of_a_file_survives_a_rewrite() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("plate.csv");
+        put_both(folder.path(), "plate.csv", "1", false).unwrap();
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o600)).unwrap();
+        put_both(folder.path(), "plate.csv", "2", false).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"2");
+        assert_eq!(
+            path.metadata().unwrap().permissions().mode() & 0o7777,
+            0o600
+        );
+    }
+
+    #[test]
+    fn the_same_bytes_again_change_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.svg");
+        let put = |text: &'static str| {
+            let overwrite = Overwrite::same_bytes(false, &[]);
+            write(&path, &overwrite, |out| out.write_all(text.as_bytes()))
+        };
+        put("a").unwrap();
+        let before = path.metadata().unwrap().modified().unwrap();
+        put("a").unwrap();
+        assert_eq!(path.metadata().unwrap().modified().unwrap(), before);
+        assert!(matches!(put("b"), Err(WriteError::OutputExists { .. })));
+        assert_eq!(folder.path().read_dir().unwrap().count(), 1);
+    }
 
     #[test]
     fn a_faster_run_of_other_inputs_is_not_overwritten() {
@@ -308,10 +520,9 @@ mod tests {
         let input = |text: &str| Input::of_bytes(format!("{text}.toml"), text.as_bytes());
         let begun = |text: &str| {
             let overwrite = Overwrite::new(false, folder.path().join("map.json"), &[input(text)]);
-            let mut set = FileSet::begin(folder.path(), overwrite).unwrap();
-            let told = serde_json::json!({ "inputs": [input(text)] }).to_string();
-            set.write("map.npz", |out| out.write_all(text.as_bytes()))
-                .unwrap();
+            let mut set = FileSet::begin(folder.path(), overwrite);
+            let map = set.write("map.npz", |out| out.write_all(text.as_bytes()));
+            let told = record(&[input(text)], &[FileEntry::new("map.npz", map.unwrap())]);
             set.write("map.json", |out| out.write_all(told.as_bytes()))
                 .unwrap();
             set
@@ -332,7 +543,7 @@ mod tests {
     fn a_file_that_came_first_is_not_replaced() {
         let folder = tempfile::tempdir().unwrap();
         let begun = |text: &str| {
-            let mut set = FileSet::begin(folder.path(), Overwrite::Never).unwrap();
+            let mut set = FileSet::begin(folder.path(), Overwrite::same_bytes(false, &[]));
             set.write("plan.json", |out| out.write_all(text.as_bytes()))
                 .unwrap();
             set
@@ -340,7 +551,10 @@ mod tests {
         let (slow, fast) = (begun("slow"), begun("fast"));
         fast.commit().unwrap();
         let refused = slow.commit().unwrap_err();
-        assert!(refused.to_string().contains("exists already"), "{refused}");
+        assert!(
+            refused.to_string().contains("plan.json exists"),
+            "{refused}"
+        );
         let kept = std::fs::read(folder.path().join("plan.json")).unwrap();
         assert_eq!(kept, b"fast");
     }
@@ -349,11 +563,13 @@ mod tests {
     fn folders_made_for_nothing_go_again() {
         let folder = tempfile::tempdir().unwrap();
         let deep = folder.path().join("new/newer");
-        drop(FileSet::begin(&deep, Overwrite::Force).unwrap());
+        let mut set = FileSet::begin(&deep, Overwrite::force());
+        set.write("a", |_| Err(io::ErrorKind::Other.into()))
+            .unwrap_err();
+        drop(set);
         assert!(!folder.path().join("new").exists());
-        let mut set = FileSet::begin(&deep, Overwrite::Force).unwrap();
-        // Another run takes the empty folder away.
-        std::fs::remove_dir_all(folder.path().join("new")).unwrap();
+        let mut set = FileSet::begin(&deep, Overwrite::force());
+        assert!(!folder.path().join("new").exists());
         set.write("a", |out| out.write_all(b"a")).unwrap();
         set.commit().unwrap();
         assert_eq!(std::fs::read(deep.join("a")).unwrap(), b"a");
@@ -364,7 +580,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let inner = folder.path().join("inner");
         let overwrite = Overwrite::new(false, folder.path().join("map.json"), &[]);
-        let mut set = FileSet::begin(&inner, overwrite).unwrap();
+        let mut set = FileSet::begin(&inner, overwrite);
         set.write_at(&inner.join("a.yaml"), |out| out.write_all(b"nodes"))
             .unwrap();
         let again = folder.path().join("inner/../inner/a.yaml");

@@ -1,25 +1,45 @@
 //! Folders that are made for an output, and go again when nothing came into them.
 
+use std::ffi::{OsStr, OsString};
 use std::io;
 use std::path::{Path, PathBuf};
 
 use super::WriteError;
+use super::dir::Dir;
 
 /// How often another run may take a folder away between making it and the first file in it.
 const ATTEMPTS: usize = 100;
 
 /// Folders that a run made, the outermost first. Those that are empty when this is dropped go again:
 /// a run that was stopped leaves none behind.
-#[derive(Debug)]
-pub(super) struct MadeFolders(Vec<PathBuf>);
+#[derive(Debug, Default)]
+pub(super) struct MadeFolders(Vec<(Dir, OsString)>);
 
 impl Drop for MadeFolders {
     fn drop(&mut self) {
-        for folder in self.0.iter().rev() {
+        for (parent, name) in self.0.iter().rev() {
             // Fails, as it should, where something is in it.
-            if std::fs::remove_dir(folder).is_err() {
+            if parent.remove_empty(name).is_err() {
                 break;
             }
+        }
+    }
+}
+
+impl MadeFolders {
+    /// Makes the folder `name` in `parent` where nothing is and opens it. A link is refused.
+    ///
+    /// # Errors
+    /// What the system reports.
+    fn child(&mut self, parent: &Dir, name: impl AsRef<OsStr>) -> io::Result<Dir> {
+        let name = name.as_ref();
+        match parent.make(name, 0o777) {
+            Ok(child) => {
+                self.0.push((parent.clone(), name.to_owned()));
+                Ok(child)
+            }
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => parent.child(name),
+            Err(error) => Err(error),
         }
     }
 }
@@ -31,12 +51,24 @@ impl Drop for MadeFolders {
 pub struct SharedFolders(Vec<MadeFolders>);
 
 impl SharedFolders {
-    /// Makes `folder` and its parents where needed.
+    /// Makes `folder` and its parents where needed, then the folders `below` in one another; those are
+    /// never links.
     ///
     /// # Errors
-    /// [`WriteError`] where it cannot be made.
-    pub fn make(&mut self, folder: &Path) -> Result<(), WriteError> {
-        let made = make_folder(folder).map_err(|error| error.of("write", folder))?;
+    /// [`WriteError`] where they cannot be made.
+    pub fn make(&mut self, folder: &Path, below: &[&str]) -> Result<(), WriteError> {
+        let (dir, made) =
+            made_in(folder, Dir::open).map_err(|error| error.of("open the folder", folder))?;
+        self.0.push(made);
+        let mut made = MadeFolders::default();
+        let mut dir = dir;
+        for name in below {
+            let path = dir.path().join(name);
+            dir = made
+                .child(&dir, name)
+                .map_err(|error| WriteError::from_io("make the folder", &path, error))?;
+        }
+        super::temporary::clean_leftovers(&dir);
         self.0.push(made);
         Ok(())
     }
@@ -47,6 +79,18 @@ impl Drop for SharedFolders {
         // The last first: an earlier one may have made a later one's parent.
         while self.0.pop().is_some() {}
     }
+}
+
+/// The folder `name` in `parent`, both made where needed; `name` is never a link. What of it stays empty
+/// goes when the second value does.
+pub(crate) fn open_made(parent: &Path, name: &OsStr) -> io::Result<(Dir, impl Drop + use<>)> {
+    let fail = |error| match error {
+        MadeError::NotFolder(_) => io::ErrorKind::NotADirectory.into(),
+        MadeError::Folder(_, error) | MadeError::Inside(error) => error,
+    };
+    let (parent, mut made) = made_in(parent, Dir::open).map_err(fail)?;
+    let dir = made.child(&parent, name)?;
+    Ok((dir, made))
 }
 
 /// Why nothing could be made.
@@ -97,22 +141,32 @@ pub(super) fn made_in<T>(
 
 /// Makes a folder and its parents; the error names the path that stands in the way.
 fn make_folder(folder: &Path) -> Result<MadeFolders, MadeError> {
-    let mut made = MadeFolders(Vec::new());
-    if folder.is_dir() {
-        return Ok(made);
-    }
-    let missing = folder
+    let mut made = MadeFolders::default();
+    let mut missing: Vec<&Path> = folder
         .ancestors()
         .filter(|part| !part.as_os_str().is_empty())
-        .take_while(|part| !part.is_dir());
-    for part in missing {
+        .take_while(|part| !part.is_dir())
+        .collect();
+    while let Some(part) = missing.pop() {
+        let fail = |error| MadeError::Folder(part.to_path_buf(), error);
+        // `a/..` is there as soon as `a` is.
+        if part.is_dir() {
+            continue;
+        }
         if part.is_file() {
             return Err(MadeError::NotFolder(part.to_path_buf()));
         }
-        made.0.insert(0, part.to_path_buf());
+        let (parent, name) = Dir::of(part).map_err(fail)?;
+        match parent.make(&name, 0o777) {
+            Ok(_) => made.0.push((parent, name)),
+            // Another run was faster.
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists && part.is_dir() => {}
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+                return Err(MadeError::NotFolder(part.to_path_buf()));
+            }
+            Err(error) => return Err(fail(error)),
+        }
     }
-    std::fs::create_dir_all(folder)
-        .map_err(|error| MadeError::Folder(folder.to_path_buf(), error))?;
     Ok(made)
 }
 
@@ -126,8 +180,13 @@ mod tests {
         let [out, own] = ["out", "own"].map(|name| place.path().join(name));
         std::fs::create_dir(&own).unwrap();
         let mut folders = SharedFolders::default();
-        for folder in ["out/points/000", "out/points/001", "own", "own/points/000"] {
-            folders.make(&place.path().join(folder)).unwrap();
+        for (folder, below) in [
+            ("out", &["points", "000"][..]),
+            ("out", &["points", "001"]),
+            ("own", &[]),
+            ("own", &["points", "000"]),
+        ] {
+            folders.make(&place.path().join(folder), below).unwrap();
         }
         // Another thread's file is cleared after the one that made the folder stopped.
         let file = out.join("points/000/a");
@@ -137,5 +196,18 @@ mod tests {
         drop(folders);
         assert!(!out.exists());
         assert!(own.join("points/000/b").is_file());
+    }
+
+    #[test]
+    fn a_link_in_place_of_a_folder_below_is_refused() {
+        let place = tempfile::tempdir().unwrap();
+        let victim = place.path().join("victim");
+        std::fs::create_dir(&victim).unwrap();
+        std::os::unix::fs::symlink(&victim, place.path().join("points")).unwrap();
+        let mut folders = SharedFolders::default();
+        let refused = folders.make(place.path(), &["points", "000"]).unwrap_err();
+        assert!(refused.to_string().contains("not a folder"), "{refused}");
+        drop(folders);
+        assert_eq!(victim.read_dir().unwrap().count(), 0);
     }
 }

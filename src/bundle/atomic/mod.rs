@@ -3,35 +3,41 @@
 //! A file is written beside its target under a temporary name, fsynced, renamed into place, and
 //! its folder fsynced: it is whole or absent whenever the program ends. [`FileSet`] does that for
 //! a file and its sidecar, [`FolderDraft`] for a whole folder (see there for the scheme).
-//! [`write_unforced`] leaves out the fsyncs, for files whose reader recognises a torn one.
-//! Temporary names are `.fluxform-*.tmp`; their writer holds a lock on them, so that the next run
-//! can tell a killed run's leftovers ([`clean_leftovers`]) from another run's work.
+//! Temporary names are `.fluxform-*.tmp`; they hold the identity of what has them, and their writer
+//! holds a lock on it, so that the next run can tell a killed run's leftovers from another run's work
+//! and from anything else of that name.
+//!
+//! [`Overwrite`] decides what may be replaced. All that is removed, renamed or recovered is so by
+//! `dir::Dir`: in a folder that was opened, following no link.
 //!
 //! The digest of a file is computed while it is written: no second pass.
 
-mod exchange;
+mod absorb;
+mod dir;
 mod file;
 mod folder;
-mod identity;
-mod leftovers;
 mod made;
 mod overwrite;
+mod record;
 mod scratch;
-mod unforced;
+mod temporary;
 
 use std::io;
 use std::path::{Path, PathBuf};
 
-pub(crate) use file::hex;
-pub use file::{FileSet, write};
+pub(crate) use dir::{Dir, Kind};
+pub use file::{FileSet, is_stream, write};
+pub(crate) use file::{hex, put};
 pub use folder::FolderDraft;
 pub(crate) use folder::{check_name, listed_files};
-pub(crate) use identity::identity;
-pub use leftovers::{clean_leftovers, remove_files_beginning_with};
 pub use made::SharedFolders;
-pub use overwrite::{Overwrite, Record};
+pub(crate) use made::open_made;
+pub use overwrite::{Overwrite, check_distinct};
 pub use scratch::Scratch;
-pub use unforced::write_unforced;
+pub(crate) use temporary::clean_leftovers;
+
+/// What the name of a folder or note that a run puts aside ends with.
+const OLD: &str = ".fluxform-old";
 
 /// What was written: size and digest of the bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -52,6 +58,14 @@ pub enum WriteError {
         /// The target.
         path: PathBuf,
         /// Why it is not ours to replace.
+        reason: String,
+    },
+    /// The target is none that may be replaced, whatever is asked for.
+    #[error("{path} {reason}; nothing replaces it, choose another output")]
+    Protected {
+        /// The target.
+        path: PathBuf,
+        /// Why.
         reason: String,
     },
     /// A file was to be written where a folder is.
@@ -105,6 +119,14 @@ pub enum WriteError {
 }
 
 impl WriteError {
+    /// Two outputs of one command that have the same name.
+    fn same_name(path: &Path) -> Self {
+        Self::Content {
+            path: path.to_path_buf(),
+            message: "another file of this command has that name; choose another".to_owned(),
+        }
+    }
+
     /// Sorts an I/O error by what the user can do about it.
     pub(crate) fn from_io(action: &'static str, path: &Path, source: io::Error) -> Self {
         let path = path.to_path_buf();
@@ -125,5 +147,13 @@ impl WriteError {
                 source,
             },
         }
+    }
+}
+
+/// The folder that `path` is in, as it is spelt; `.` for a bare name.
+fn parent_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
     }
 }

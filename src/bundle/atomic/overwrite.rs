@@ -1,97 +1,327 @@
-//! When an existing output may be replaced.
+//! When an existing output may be replaced: the one policy for files and folders alike.
 
-use std::io;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use serde_json::Value;
-
-use super::WriteError;
+use super::dir::{Dir, Kind, Status, followed};
+use super::record::{Record, ReplacedNote, digest, is_timing, unchanged};
+use super::{WriteError, Written, parent_of};
 use crate::bundle::artefact::Input;
-use crate::bundle::plain::read_plain;
-
-/// Records larger than this are not read: ours are a few kilobytes to a few megabytes.
-pub(super) const RECORD_MAX_BYTES: u64 = 64 << 20;
 
 /// The policy for outputs that exist already.
+///
+/// What a run reads is never replaced. A regular file is replaced when it is known to be this
+/// program's own and unchanged, or with `force`; anything else never.
 #[derive(Debug, Clone)]
-pub enum Overwrite {
-    /// Replace whatever file is there.
-    Force,
-    /// Replace what comes from the same inputs, refuse the rest.
-    SameInputs(Record),
-    /// Replace nothing.
-    Never,
+pub struct Overwrite {
+    force: bool,
+    evidence: Evidence,
+    /// This run's inputs.
+    inputs: Vec<Input>,
+    /// What else must not be replaced: files, and folders with all that is in them.
+    protected: Vec<PathBuf>,
 }
 
-/// What an existing output is compared with: the inputs of this run, and the JSON file that
-/// tells those of the existing output (a sidecar, a manifest, or the output itself).
+/// What shows that an existing file is this program's own.
 #[derive(Debug, Clone)]
-pub struct Record {
-    /// A JSON artefact with a top-level `inputs[]`.
-    pub path: PathBuf,
-    /// This run's inputs.
-    pub inputs: Vec<Input>,
+enum Evidence {
+    /// A JSON artefact with the same inputs, or a file that it lists, unchanged since.
+    Record(PathBuf),
+    /// The same bytes; what begins otherwise than this is refused before they are known.
+    SameBytes(Vec<u8>),
+}
+
+/// How a file takes its place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Permit {
+    /// Nothing is there.
+    New,
+    /// The file that is there has these very bytes.
+    Same,
+    /// Something is there that may go.
+    Replace,
 }
 
 impl Overwrite {
-    /// `Force`, or compare with the record at `path`.
+    fn with(force: bool, evidence: Evidence, inputs: &[Input]) -> Self {
+        Self {
+            force,
+            evidence,
+            inputs: inputs.to_vec(),
+            protected: Vec::new(),
+        }
+    }
+
+    /// `force`, or what the record at `path` lists: a JSON artefact with top-level `inputs[]`, which
+    /// must be this run's, and `files[]`, which must be on the disk as listed.
     #[must_use]
     pub fn new(force: bool, path: impl Into<PathBuf>, inputs: &[Input]) -> Self {
-        if force {
-            return Self::Force;
-        }
-        Self::SameInputs(Record {
-            path: path.into(),
-            inputs: inputs.to_vec(),
-        })
+        Self::with(force, Evidence::Record(path.into()), inputs)
     }
 
-    /// Refuses when `target`, which exists, must not be replaced. Call it before a long
-    /// computation too; writing checks again.
+    /// `force`, or a file that has the very bytes which are to be written.
+    #[must_use]
+    pub fn same_bytes(force: bool, inputs: &[Input]) -> Self {
+        Self::beginning(force, "", inputs)
+    }
+
+    /// As [`Self::same_bytes`]; both begin with `mark`, so that a file of other inputs is refused
+    /// before anything is computed.
+    #[must_use]
+    pub fn beginning(force: bool, mark: &str, inputs: &[Input]) -> Self {
+        Self::with(force, Evidence::SameBytes(mark.into()), inputs)
+    }
+
+    /// The same, but that it must have the very bytes which are to be written, as
+    /// [`Self::beginning`].
+    #[must_use]
+    pub(crate) fn now_beginning(mut self, mark: &str) -> Self {
+        self.evidence = Evidence::SameBytes(mark.into());
+        self
+    }
+
+    /// Any regular file may be replaced.
+    #[must_use]
+    pub fn force() -> Self {
+        Self::same_bytes(true, &[])
+    }
+
+    /// Nor may these be replaced: files, or folders with all that is in them.
+    #[must_use]
+    pub fn protecting<P: Into<PathBuf>>(mut self, paths: impl IntoIterator<Item = P>) -> Self {
+        self.protected.extend(paths.into_iter().map(Into::into));
+        self
+    }
+
+    /// Whether the regular file at `path` is known to be ours and is not read by this run.
+    pub(super) fn owns(&self, path: &Path) -> bool {
+        let unforced = Self {
+            force: false,
+            ..self.clone()
+        };
+        !path.is_symlink() && matches!(unforced.permit(path, None), Ok(Permit::Replace))
+    }
+
+    /// The record that lists what is ours.
+    pub(super) fn record_path(&self) -> Option<&Path> {
+        match &self.evidence {
+            Evidence::Record(path) => Some(path),
+            Evidence::SameBytes(_) => None,
+        }
+    }
+
+    /// Whether whatever regular file is there may be replaced.
+    pub(super) fn forced(&self) -> bool {
+        self.force
+    }
+
+    /// This run's inputs.
+    pub(super) fn inputs(&self) -> &[Input] {
+        &self.inputs
+    }
+
+    /// Refuses when `target`, which exists, must not be replaced. Call it before a long computation
+    /// too; writing checks again.
     ///
     /// # Errors
-    /// [`WriteError::OutputExists`].
+    /// [`WriteError::OutputExists`], [`WriteError::Protected`], [`WriteError::IsFolder`].
     pub fn check(&self, target: &Path) -> Result<(), WriteError> {
-        if matches!(self, Self::Force) {
+        self.permit(target, None).map(drop)
+    }
+
+    /// How a file of these bytes takes its place at `target`; without bytes, as far as can be told.
+    ///
+    /// # Errors
+    /// As [`Self::check`].
+    pub(super) fn permit(
+        &self,
+        target: &Path,
+        written: Option<&Written>,
+    ) -> Result<Permit, WriteError> {
+        let fail = |error| WriteError::from_io("look at", target, error);
+        if self.reads(target).map_err(fail)? {
+            return Err(WriteError::Protected {
+                path: target.to_path_buf(),
+                reason: "is read by this very run".to_owned(),
+            });
+        }
+        let linked = target.is_symlink();
+        let status = match followed(target).map_err(fail)? {
+            None if linked => return protected(target, "is a link that leads nowhere"),
+            None => return Ok(Permit::New),
+            Some(status) => status,
+        };
+        match status.kind {
+            Kind::File => {}
+            Kind::Folder => {
+                return Err(WriteError::IsFolder {
+                    path: target.to_path_buf(),
+                });
+            }
+            Kind::Link | Kind::Special => return protected(target, "is no regular file"),
+        }
+        let shown = target;
+        let real = real(target).map_err(fail)?;
+        let (dir, name) = Dir::of(&real).map_err(fail)?;
+        if let Some(written) = written
+            && status.bytes == written.bytes
+            && digest(&dir, &name).map_err(fail)? == written.sha256
+        {
+            return Ok(Permit::Same);
+        }
+        if self.force && !linked {
+            return Ok(Permit::Replace);
+        }
+        match self.own(&dir, &real, &status, written.is_some()) {
+            Ok(()) => Ok(Permit::Replace),
+            Err(_) if self.force => protected(shown, "is a link to a file that is not ours"),
+            Err(reason) => Err(WriteError::OutputExists {
+                path: shown.to_path_buf(),
+                reason,
+            }),
+        }
+    }
+
+    /// `Ok` when the file at `target` in `dir` is known to be ours, else the reason why it is not.
+    fn own(&self, dir: &Dir, target: &Path, status: &Status, last: bool) -> Result<(), String> {
+        let name = target.file_name().unwrap_or_default();
+        let record = match &self.evidence {
+            Evidence::SameBytes(mark) if !last => {
+                let mut head = vec![0; mark.len()];
+                let read = dir
+                    .file(name)
+                    .and_then(|mut file| file.read_exact(&mut head));
+                return match read {
+                    Ok(()) if head == *mark => Ok(()),
+                    _ => Err("and was not made from these inputs".to_owned()),
+                };
+            }
+            Evidence::SameBytes(_) => return Err("and differs".to_owned()),
+            Evidence::Record(path) => path,
+        };
+        let shown = record.display();
+        let found = self.record(record)?;
+        let is = |path: &Path| followed(path).is_ok_and(|it| it.is_some_and(|it| it.is(status)));
+        if is(record) || is_timing(dir, name) {
             return Ok(());
         }
-        match target.symlink_metadata() {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-            Err(error) => return Err(WriteError::from_io("look at", target, error)),
-            Ok(_) => {}
+        let note = Record::read(&ReplacedNote::path(record));
+        let mut lists = false;
+        for list in std::iter::once(found).chain(note) {
+            for (listed, entry) in list.listed() {
+                if is(&parent_of(record).join(listed)) {
+                    lists = true;
+                    if unchanged(dir, name, &entry).unwrap_or(false) {
+                        return Ok(());
+                    }
+                }
+            }
         }
-        let confirmed = match self {
-            Self::Force => Ok(()),
-            Self::SameInputs(record) => record.confirm(),
-            Self::Never => Err("already".to_owned()),
-        };
-        confirmed.map_err(|reason| WriteError::OutputExists {
-            path: target.to_path_buf(),
-            reason,
+        Err(if lists {
+            format!("and was changed since (says {shown})")
+        } else {
+            format!("and {shown} does not list it")
         })
     }
-}
 
-impl Record {
-    /// `Ok` when the record's inputs have this run's digests, in order; else the reason.
-    fn confirm(&self) -> Result<(), String> {
-        let name = self.path.display();
-        let text = read_plain(&self.path, RECORD_MAX_BYTES)
-            .map_err(|_| format!("and no {name} tells what it was made from"))?;
-        let value: Value = serde_json::from_slice(&text)
-            .map_err(|_| format!("and {name} does not tell what it was made from"))?;
-        let found: Option<Vec<&str>> =
-            value.get("inputs").and_then(Value::as_array).map(|inputs| {
-                inputs
-                    .iter()
-                    .map(|input| input.get("sha256").and_then(Value::as_str).unwrap_or(""))
-                    .collect()
-            });
-        let wanted: Vec<&str> = self.inputs.iter().map(|i| i.sha256.as_str()).collect();
-        match found {
+    /// The record at `path` if it is of this run's inputs or need not be, else the reason why it is not.
+    pub(super) fn record(&self, path: &Path) -> Result<Record, String> {
+        let name = path.display();
+        if followed(path).map_or(true, |there| there.is_none()) {
+            return Err(format!("and no {name} tells what it was made from"));
+        }
+        match Record::read(path) {
             None => Err(format!("and {name} does not tell what it was made from")),
-            Some(found) if found == wanted => Ok(()),
+            Some(record) if self.force || record.is_of(&self.inputs) => Ok(record),
             Some(_) => Err(format!("and was made from other inputs (says {name})")),
         }
     }
+
+    /// Whether this run reads `target`.
+    pub(super) fn reads(&self, target: &Path) -> io::Result<bool> {
+        let there = followed(target)?;
+        for input in &self.inputs {
+            if input.path == "-" {
+                let stream = Status::from(rustix::fs::fstat(io::stdin())?);
+                let is_it = there.is_some_and(|it| it.kind == Kind::File && it.is(&stream));
+                if is_it {
+                    return Ok(true);
+                }
+            } else if same_place(Path::new(&input.path), target, there)? {
+                return Ok(true);
+            }
+        }
+        for path in &self.protected {
+            if same_place(path, target, there)? || (path.is_dir() && lies_in(target, path)) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+}
+
+/// Refuses outputs of one command that would have the same name.
+///
+/// # Errors
+/// [`WriteError::Content`].
+pub fn check_distinct<P: AsRef<Path>>(
+    outputs: impl IntoIterator<Item = P>,
+) -> Result<(), WriteError> {
+    let outputs: Vec<P> = outputs.into_iter().collect();
+    for (number, output) in outputs.iter().enumerate() {
+        let output = output.as_ref();
+        let look = |error| WriteError::from_io("look at", output, error);
+        let there = followed(output).map_err(look)?;
+        let special = there.is_some_and(|there| there.kind == Kind::Special);
+        for earlier in &outputs[..number] {
+            if !special && same_place(earlier.as_ref(), output, there).map_err(look)? {
+                return Err(WriteError::same_name(output));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Whether `path` is the file `there` at `target`, by what the system says where both exist, else by
+/// their names.
+fn same_place(path: &Path, target: &Path, there: Option<Status>) -> io::Result<bool> {
+    let (one, other) = match (followed(path), there) {
+        (Ok(Some(one)), Some(other)) => return Ok(one.is(&other)),
+        (Ok(None), None) => (path, target),
+        _ => return Ok(false),
+    };
+    Ok(one.file_name() == other.file_name() && {
+        let folders = [one, other].map(|it| followed(parent_of(it)));
+        match folders {
+            [Ok(Some(one)), Ok(Some(other))] => one.is(&other),
+            _ => parent_of(one) == parent_of(other),
+        }
+    })
+}
+
+/// Whether `target` is in `folder` or below it.
+fn lies_in(target: &Path, folder: &Path) -> bool {
+    match (
+        real(target).and_then(|it| parent_of(&it).canonicalize()),
+        folder.canonicalize(),
+    ) {
+        (Ok(parent), Ok(folder)) => parent.starts_with(folder),
+        _ => false,
+    }
+}
+
+/// Where the file at `target` is: a link leads elsewhere.
+pub(super) fn real(target: &Path) -> io::Result<PathBuf> {
+    if target.is_symlink() {
+        target.canonicalize()
+    } else {
+        Ok(target.to_path_buf())
+    }
+}
+
+fn protected<T>(target: &Path, reason: &str) -> Result<T, WriteError> {
+    Err(WriteError::Protected {
+        path: target.to_path_buf(),
+        reason: reason.to_owned(),
+    })
 }

@@ -1,6 +1,7 @@
 //! A point's file: its row, whose it is, and a checksum.
 
 use schemars::JsonSchema;
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
 use crate::bundle::artefact::{FLUXFORM_VERSION, SCHEMA_VERSION, sha256_hex};
@@ -199,12 +200,27 @@ impl PointFile {
         (whole && told).then_some(point)
     }
 
-    /// Whether `bytes`, which are no whole point, may be what a lost system left of one: empty,
-    /// zeros, or a beginning of ours.
+    /// Whether `bytes`, which are no whole point, may be what a lost system left of one: a beginning of
+    /// ours, if any, then zeros, if any.
     #[must_use]
     pub fn is_torn(bytes: &[u8]) -> bool {
-        let common = bytes.len().min(OPENING.len());
-        bytes[..common] == OPENING[..common] || bytes.iter().all(|byte| *byte == 0)
+        let end = bytes
+            .iter()
+            .rposition(|byte| *byte != 0)
+            .map_or(0, |at| at + 1);
+        let text = &bytes[..end];
+        let common = text.len().min(OPENING.len());
+        // A whole document is somebody's, whatever it begins with.
+        let last = text
+            .split(|byte| *byte == b'\n')
+            .next_back()
+            .unwrap_or_default();
+        let lines = text.split(|byte| *byte == b'\n').count();
+        let cut = |error: serde_json::Error| {
+            error.is_eof() || (error.line() == lines && error.column() >= last.len())
+        };
+        text[..common] == OPENING[..common]
+            && serde_json::from_slice::<IgnoredAny>(text).is_err_and(cut)
     }
 
     fn digest(&self) -> String {
@@ -258,6 +274,10 @@ mod tests {
         }
         assert!(PointFile::is_torn(&[0; 700]));
         assert!(!PointFile::is_torn(b"precious"));
+        // Of another kind, or edited: whole, and somebody's.
+        assert!(!PointFile::is_torn(
+            text.replace("done", "failed").as_bytes()
+        ));
     }
 
     #[test]

@@ -10,13 +10,13 @@ use std::path::{Path, PathBuf};
 use super::plan::PLAN_MAX_BYTES;
 use super::{PlanFile, PointFile};
 use crate::bundle::artefact::FLUXFORM_VERSION;
-use crate::bundle::atomic::{
-    Overwrite, SharedFolders, WriteError, clean_leftovers, write_unforced,
-};
+use crate::bundle::atomic::{Dir, Kind, Overwrite, SharedFolders, WriteError, put};
 use crate::bundle::json::JsonError;
 use crate::bundle::plain::read_plain;
 use crate::bundle::write::write_json;
 
+/// The folder of the points' folders.
+const POINTS: &str = "points";
 /// Points in one folder.
 const FOLDER: u64 = 1000;
 /// Larger files are no point of a sweep.
@@ -55,8 +55,14 @@ impl PointStore {
     }
 
     fn subfolder(&self, index: u64) -> PathBuf {
-        let folder = format!("{:03}", index / FOLDER);
-        self.folder.join("points").join(folder)
+        self.folder.join(POINTS).join(subfolder(index))
+    }
+
+    /// The folder of point `index`; below the store's own no link is followed.
+    fn open(&self, index: u64) -> io::Result<Dir> {
+        Dir::open(&self.folder)?
+            .child(POINTS)?
+            .child(subfolder(index))
     }
 
     /// Makes the folder this plan's: writes `plan.json` into it, makes the folders of the points
@@ -72,24 +78,18 @@ impl PointStore {
         indices: std::ops::Range<u64>,
     ) -> Result<SharedFolders, WriteError> {
         let path = self.folder.join("plan.json");
-        if !belongs_to(&path, plan, force)? {
-            let overwrite = if force {
-                Overwrite::Force
-            } else {
-                Overwrite::Never
-            };
-            match write_json(&path, &overwrite, plan) {
-                // Another run was faster: whose is the folder now?
-                Err(WriteError::OutputExists { .. }) if belongs_to(&path, plan, force)? => {}
-                outcome => drop(outcome?),
-            }
-        }
+        let ours = belongs_to(&path, plan, force)?;
         let mut folders = SharedFolders::default();
         if !indices.is_empty() {
             for folder in indices.start / FOLDER..=(indices.end - 1) / FOLDER {
-                let folder = self.subfolder(folder * FOLDER);
-                folders.make(&folder)?;
-                clean_leftovers(&folder);
+                folders.make(&self.folder, &[POINTS, &subfolder(folder * FOLDER)])?;
+            }
+        }
+        if !ours {
+            match write_json(&path, &Overwrite::same_bytes(force, &plan.inputs), plan) {
+                // Another run was faster: whose is the folder now?
+                Err(WriteError::OutputExists { .. }) if belongs_to(&path, plan, force)? => {}
+                outcome => drop(outcome?),
             }
         }
         Ok(folders)
@@ -102,6 +102,7 @@ impl PointStore {
     pub fn find(&self, plan_sha256: &str, index: u64) -> Result<Found, WriteError> {
         let path = self.path(index);
         let bytes = match read_plain(&path, POINT_MAX_BYTES) {
+            Ok(_) if path.is_symlink() => return Ok(Found::Foreign("and is a link".to_owned())),
             Ok(bytes) => bytes,
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Found::Nothing),
             Err(error) => return Err(WriteError::from_io("read", &path, error)),
@@ -120,19 +121,35 @@ impl PointStore {
         })
     }
 
-    /// Writes a point; whatever is there is replaced.
+    /// Writes a point. A point of the same plan that is there is replaced, and with `force` any regular
+    /// file.
     ///
     /// # Errors
     /// [`WriteError`]; a number that is none is [`WriteError::Content`].
-    pub fn write(&self, point: &PointFile) -> Result<(), WriteError> {
-        let bytes = point.to_bytes().map_err(|error: JsonError| {
-            let path = self.path(point.index);
-            WriteError::Content {
-                path,
+    pub fn write(&self, point: &PointFile, force: bool) -> Result<(), WriteError> {
+        let path = self.path(point.index);
+        let bytes = point
+            .to_bytes()
+            .map_err(|error: JsonError| WriteError::Content {
+                path: path.clone(),
                 message: error.to_string(),
+            })?;
+        let fail = |error| WriteError::from_io("write", &path, error);
+        let (dir, name) = (self.open(point.index).map_err(fail)?, name(point.index));
+        match dir.status(&name).map_err(fail)?.map(|there| there.kind) {
+            None => {}
+            Some(Kind::File) if force => {}
+            Some(Kind::File) => {
+                if let Found::Foreign(reason) = self.find(&point.plan_sha256, point.index)? {
+                    return Err(WriteError::OutputExists { path, reason });
+                }
             }
-        })?;
-        write_unforced(&self.subfolder(point.index), &name(point.index), &bytes)
+            Some(Kind::Folder | Kind::Link | Kind::Special) => {
+                let reason = "is no regular file".to_owned();
+                return Err(WriteError::Protected { path, reason });
+            }
+        }
+        put(&dir, &name, false, |out| out.write_all(&bytes)).map_err(fail)
     }
 }
 
@@ -151,6 +168,10 @@ fn belongs_to(path: &Path, plan: &PlanFile, force: bool) -> Result<bool, WriteEr
             reason: "and is another plan: the folder holds another sweep".to_owned(),
         }),
     }
+}
+
+fn subfolder(index: u64) -> String {
+    format!("{:03}", index / FOLDER)
 }
 
 fn name(index: u64) -> String {

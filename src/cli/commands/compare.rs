@@ -9,7 +9,7 @@ use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
-use crate::cli::pictures::write_svg;
+use crate::cli::pictures::Picture;
 use crate::cli::printer::{Place as Printed, Printer};
 use crate::cli::quantity::{count, force, number_to, percent};
 use crate::cli::values::{self, FileArgument};
@@ -80,6 +80,11 @@ impl Compare {
             jnd: self.jnd,
             tolerance: self.tolerance.tolerance,
         };
+        let force = self.writing.force;
+        let plot = (self.plot.as_ref()).map(|file| Picture::new(file, force, document.also_read()));
+        if let Some(plot) = &plot {
+            plot.check(std::slice::from_ref(&document.input))?;
+        }
         let bar = begin(printer);
         let report = run(&document.design, &shapes, &document.input, &options, &bar)?;
         drop(bar);
@@ -88,9 +93,8 @@ impl Compare {
         }
         let file = &report.file;
         let mut place = Printed::Output;
-        if let Some(path) = &self.plot {
-            let svg = file.picture().svg();
-            place = write_svg(path, &file.inputs, &svg, self.writing.force, printer)?;
+        if let Some(plot) = &plot {
+            place = plot.write(&file.inputs, &file.picture().svg(), printer)?;
         }
         printer.summary(place, &printer.with_warnings(file), || summary(file))?;
         accuracy_check(report.accuracy_reached)?;

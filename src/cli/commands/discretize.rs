@@ -1,25 +1,28 @@
 //! `discretize`: a surface to its constraint points.
 
-use std::path::Path;
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
 mod inspect;
 
 use super::{begin, describe};
-use crate::bundle::atomic::{self, Overwrite};
+use crate::bundle::artefact::Input;
+use crate::bundle::atomic::{self, Overwrite, check_distinct};
 use crate::cli::args::{SamplingFlags, SurfaceFlags, Writing};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
-use crate::cli::pictures::write_svg;
+use crate::cli::pictures::Picture;
 use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{count, length_error, mm, number};
 use crate::cli::values::FileArgument;
 use crate::job::JobError;
 use crate::job::discretize::scattered::{self, ScatteredSummary};
-use crate::job::discretize::{DeviationSummary, PointsOptions, PointsSummary, run_with};
+use crate::job::discretize::{
+    DeviationSummary, PointsOptions, PointsSummary, TableFiles, run_with,
+};
 use crate::shape::certificate::Certify;
 use crate::shape::holes::Holes;
 
@@ -115,15 +118,20 @@ impl Discretize {
         let shapes = documents::shapes(std::slice::from_ref(&self.shape), &self.surface, printer)?;
         let bar = begin(printer);
         for shape in shapes {
-            let inputs = shape.input.into_iter().collect();
+            let inputs: Vec<Input> = shape.input.into_iter().collect();
+            let plot = self.check_outputs(&inputs)?;
             if let Some(sampling) = self.sampling.sampling() {
                 let mut report = scattered::run(&shape.document, inputs, sampling, &bar)?;
                 self.warn(&report.summary.warnings, printer);
-                let place = self.write(
-                    printer,
-                    |out| report.write_csv(out),
-                    |path| report.write(path, self.writing.force),
-                )?;
+                let place = match self
+                    .table(printer, &report.summary.inputs, |out| report.write_csv(out))?
+                {
+                    Some(place) => place,
+                    None => {
+                        report.write(self.out.as_given(), self.writing.force)?;
+                        Place::Output
+                    }
+                };
                 report.summary.warnings = printer.warnings();
                 printer.summary(place, &report.summary, || {
                     self.told_scattered(&report.summary)
@@ -132,16 +140,19 @@ impl Discretize {
             }
             let mut report = run_with(&shape.document, inputs, &self.options(), &bar)?;
             self.warn(&report.summary.warnings, printer);
-            let place = self.write(
-                printer,
-                |out| report.write_csv(out),
-                |path| report.write(path, self.writing.force),
-            )?;
-            let place = match &self.plot {
+            let place =
+                match self.table(printer, &report.summary.inputs, |out| report.write_csv(out))? {
+                    Some(place) => place,
+                    None => {
+                        report.write(self.out.as_given(), self.writing.force)?;
+                        Place::Output
+                    }
+                };
+            let place = match &plot {
                 None => place,
-                Some(file) => {
+                Some(plot) => {
                     let (inputs, svg) = (&report.summary.inputs, report.picture().svg());
-                    let after = write_svg(file, inputs, &svg, self.writing.force, printer)?;
+                    let after = plot.write(inputs, &svg, printer)?;
                     if after == Place::Error { after } else { place }
                 }
             };
@@ -173,28 +184,48 @@ impl Discretize {
         }
     }
 
-    fn write(
+    /// Refuses before anything is computed outputs that must not be replaced, as far as the inputs are
+    /// known, or that have the same name. The picture, where one is drawn.
+    fn check_outputs(&self, inputs: &[Input]) -> Result<Option<Picture<'_>>, Failure> {
+        let mut outputs: Vec<PathBuf> = Vec::new();
+        if let FileArgument::Path(path) = &self.out
+            && !atomic::is_stream(path)
+        {
+            let files = TableFiles::new(path, self.writing.force, inputs)?;
+            outputs.extend(files.paths());
+        }
+        let plot = self.plot.as_ref().map(|file| {
+            let written = outputs.clone();
+            Picture::new(file, self.writing.force, written)
+        });
+        if let Some(FileArgument::Path(path)) = &self.plot {
+            outputs.push(path.clone());
+        }
+        check_distinct(&outputs).map_err(JobError::from)?;
+        if let Some(plot) = &plot {
+            plot.check(inputs)?;
+        }
+        Ok(plot)
+    }
+
+    /// Writes the table where it has nothing beside it: to standard output, a device or a pipe.
+    fn table(
         &self,
         printer: &Printer,
+        inputs: &[Input],
         csv: impl Fn(&mut dyn std::io::Write) -> std::io::Result<()>,
-        both: impl FnOnce(&Path) -> Result<(), JobError>,
-    ) -> Result<Place, Failure> {
+    ) -> Result<Option<Place>, Failure> {
         match &self.out {
             FileArgument::Standard => {
                 printer.data(|out| csv(out))?;
-                Ok(Place::Error)
+                Ok(Some(Place::Error))
             }
-            // A device or a pipe has nothing beside it.
-            FileArgument::Path(path)
-                if path.metadata().is_ok_and(|m| !m.is_file() && !m.is_dir()) =>
-            {
-                atomic::write(path, &Overwrite::Force, |out| csv(out)).map_err(JobError::from)?;
-                Ok(Place::Output)
+            FileArgument::Path(path) if atomic::is_stream(path) => {
+                let overwrite = Overwrite::same_bytes(self.writing.force, inputs);
+                atomic::write(path, &overwrite, |out| csv(out)).map_err(JobError::from)?;
+                Ok(Some(Place::Output))
             }
-            FileArgument::Path(path) => {
-                both(path)?;
-                Ok(Place::Output)
-            }
+            FileArgument::Path(_) => Ok(None),
         }
     }
 

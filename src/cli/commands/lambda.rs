@@ -14,7 +14,7 @@ use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
-use crate::cli::pictures::write_svg;
+use crate::cli::pictures::Picture;
 use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{count, force, mm, number, number_to, percent};
 use crate::cli::values::{self, FileArgument};
@@ -178,6 +178,11 @@ impl Lambda {
             printer,
         )?;
         let design = &document.design;
+        let force = self.writing.force;
+        let plot = (self.plot.as_ref()).map(|file| Picture::new(file, force, document.also_read()));
+        if let Some(plot) = &plot {
+            plot.check(from_ref(&document.input))?;
+        }
         let bar = begin(printer);
         for shape in shapes {
             let inputs = std::iter::once(document.input.clone())
@@ -187,10 +192,9 @@ impl Lambda {
             for warning in &report.warnings {
                 printer.warning(warning);
             }
-            let place = match (&self.plot, &report.picture) {
-                (Some(file), Some(picture)) => {
-                    let inputs = &report.file.inputs;
-                    write_svg(file, inputs, &picture.svg(), self.writing.force, printer)?
+            let place = match (&plot, &report.picture) {
+                (Some(plot), Some(picture)) => {
+                    plot.write(&report.file.inputs, &picture.svg(), printer)?
                 }
                 _ => Place::Output,
             };

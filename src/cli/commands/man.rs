@@ -45,8 +45,8 @@ impl Man {
             return printer.data(|out| out.write_all(&main));
         };
         let folder = folder(out)?;
-        let overwrite = Overwrite::new(self.writing.force, folder.join("fluxform.1"), &[]);
-        let mut set = FileSet::begin(&folder, overwrite).map_err(JobError::from)?;
+        let overwrite = Overwrite::same_bytes(self.writing.force, &[]);
+        let mut set = FileSet::begin(&folder, overwrite);
         let mut pages = vec![("fluxform.1".to_owned(), rendered(&command)?)];
         add_pages(&command, &mut pages)?;
         for (name, text) in &pages {

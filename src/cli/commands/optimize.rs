@@ -2,18 +2,18 @@
 
 mod told;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
 use super::{accuracy_check, begin};
 use crate::bundle::artefact::sha256_hex;
-use crate::bundle::atomic::{Overwrite, write};
+use crate::bundle::atomic::{Overwrite, check_distinct, write};
 use crate::cli::args::{Tolerance, Writing};
 use crate::cli::documents::{self, DesignDocument};
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
-use crate::cli::pictures::{self, write_page};
+use crate::cli::pictures::Picture;
 use crate::cli::printer::{Place, Printer};
 use crate::cli::values::FileArgument;
 use crate::design::Need;
@@ -101,9 +101,31 @@ impl Optimize {
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
         let document = documents::design(&self.design, Need::OPTIMIZE, printer)?;
         let mark = self.mark(&document);
+        let protected: Vec<PathBuf> = document.also_read().map(Path::to_path_buf).collect();
+        let inputs = vec![document.input.clone()];
+        let overwrite =
+            Overwrite::beginning(self.writing.force, &mark, &inputs).protecting(protected.iter());
+        let mut outputs = Vec::new();
         if let Some(FileArgument::Path(path)) = &self.out {
-            self.check_target(path, &mark)?;
+            outputs.push(path);
+            overwrite.check(path).map_err(JobError::from)?;
         }
+        let page = self.report.as_ref().map(|file| {
+            let written = outputs.iter().map(|path| path.to_path_buf());
+            Picture::new(
+                file,
+                self.writing.force,
+                protected.iter().cloned().chain(written),
+            )
+        });
+        if let Some(page) = &page {
+            page.check(&inputs)?;
+        }
+        outputs.extend(match &self.report {
+            Some(FileArgument::Path(path)) => Some(path),
+            Some(FileArgument::Standard) | None => None,
+        });
+        check_distinct(&outputs).map_err(JobError::from)?;
         if self.out == Some(FileArgument::Standard) && self.report == self.out {
             return Err(Failure::Usage(
                 "--out and --report cannot both go to standard output; give one of them a file"
@@ -116,16 +138,14 @@ impl Optimize {
             text: &document.text,
             path: self.design.as_given(),
         };
-        let inputs = vec![document.input.clone()];
         let result = optimize(&source, inputs, &self.request(), &bar)?;
         drop(bar);
         for note in &result.notes {
             printer.warning(note);
         }
-        let mut place = self.write(&result, &mark, printer)?;
-        if let Some(file) = &self.report {
-            let html = page::html(&result);
-            let after = write_page(file, &result.inputs, &html, self.writing.force, printer)?;
+        let mut place = self.write(&result, &mark, &overwrite, printer)?;
+        if let Some(page) = &page {
+            let after = page.write(&result.inputs, &page::html(&result), printer)?;
             if after == Place::Error {
                 place = after;
             }
@@ -170,6 +190,7 @@ impl Optimize {
         &self,
         result: &Optimization,
         mark: &str,
+        overwrite: &Overwrite,
         printer: &Printer,
     ) -> Result<Place, Failure> {
         let (Some(out), Some(text)) = (&self.out, &result.design_text) else {
@@ -182,18 +203,10 @@ impl Optimize {
                 Ok(Place::Error)
             }
             FileArgument::Path(path) => {
-                self.check_target(path, mark)?;
-                write(path, &Overwrite::Force, |out| {
-                    out.write_all(text.as_bytes())
-                })
-                .map_err(JobError::from)?;
+                write(path, overwrite, |out| out.write_all(text.as_bytes()))
+                    .map_err(JobError::from)?;
                 Ok(Place::Output)
             }
         }
-    }
-
-    fn check_target(&self, path: &Path, mark: &str) -> Result<(), Failure> {
-        let reason = "and was not made of this design";
-        pictures::check_target(path, mark, self.writing.force, reason)
     }
 }

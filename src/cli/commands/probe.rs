@@ -1,6 +1,7 @@
 //! `probe`: field and gradient at given points.
 
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -23,6 +24,9 @@ use crate::job::JobError;
 use crate::job::probe::{ProbeComponents, ProbeRequest, ProbeTable, probe};
 
 mod measured;
+
+/// How every table of points begins.
+const HEADER: &str = "x_m,y_m,z_m,coil,";
 
 /// Field and gradient per ampere of every coil at given points, or against a measured scan
 ///
@@ -117,10 +121,14 @@ impl Probe {
             Components::Gradient => ProbeComponents::Gradient,
             Components::Gz => ProbeComponents::Gz,
         };
+        let protected: Vec<PathBuf> = document.also_read().map(Path::to_path_buf).collect();
         let inputs = vec![document.input, points_input];
         let out = self.out.as_ref().unwrap_or(&standard);
-        let overwrite = Overwrite::new(self.writing.force, out.as_given(), &inputs);
-        if let FileArgument::Path(path) = out {
+        let overwrite =
+            Overwrite::beginning(self.writing.force, HEADER, &inputs).protecting(protected);
+        if let FileArgument::Path(path) = out
+            && !atomic::is_stream(path)
+        {
             overwrite.check(path).map_err(JobError::from)?;
         }
         let bar = begin(printer);

@@ -5,12 +5,13 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::begin;
-use crate::bundle::atomic::Overwrite;
+use crate::bundle::atomic::{Overwrite, check_distinct};
 use crate::cli::args::Writing;
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
+use crate::cli::pictures::Picture;
 use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{count, error, force, number, percent, si};
 use crate::cli::values::{self, FileArgument};
@@ -153,15 +154,32 @@ impl Replay {
         let inputs: Vec<_> = std::iter::once(opened.input.clone())
             .chain(told.input.clone())
             .collect();
-        let record = files
-            .as_ref()
-            .map_or_else(PathBuf::new, ReplayFiles::record);
-        let overwrite = Overwrite::new(self.writing.force, record, &inputs);
-        if let Some(files) = &files {
-            files.check(&overwrite)?;
+        let outputs = self.outputs(files.as_ref());
+        check_distinct(&outputs).map_err(JobError::from)?;
+        let force = self.writing.force;
+        let reads = opened.files();
+        let of_table = |files: &ReplayFiles| {
+            Overwrite::new(force, files.record(), &inputs).protecting(reads.iter())
+        };
+        let of_table = files.as_ref().map(of_table);
+        if let (Some(files), Some(overwrite)) = (&files, &of_table) {
+            for path in files.paths() {
+                overwrite.check(&path).map_err(JobError::from)?;
+            }
         }
-        for path in [&self.plot, &self.trajectory_out].into_iter().flatten() {
-            overwrite.check(path).map_err(JobError::from)?;
+        let table = files.iter().flat_map(ReplayFiles::paths);
+        let protected: Vec<PathBuf> = reads.iter().cloned().chain(table).collect();
+        if let Some(path) = &self.trajectory_out {
+            let overwrite = Overwrite::same_bytes(force, &inputs).protecting(protected.iter());
+            write_trajectory(&trajectory, path, &overwrite)?;
+        }
+        let plot = self.plot.clone().map(FileArgument::Path);
+        let plot = plot.as_ref().map(|file| {
+            let written = self.trajectory_out.clone();
+            Picture::new(file, force, protected.into_iter().chain(written))
+        });
+        if let Some(plot) = &plot {
+            plot.check(&inputs)?;
         }
         let bar = begin(printer);
         let mut report = run(&opened, &trajectory, told, self.dynamics, &bar)?;
@@ -169,26 +187,30 @@ impl Replay {
         for warning in &report.summary.warnings {
             printer.warning(warning);
         }
-        if let Some(path) = &self.trajectory_out {
-            write_trajectory(&trajectory, path, &overwrite)?;
+        if let Some(plot) = &plot {
+            plot.write(&inputs, &report.svg(), printer)?;
         }
-        if let Some(path) = &self.plot {
-            report.write_plot(path, &overwrite)?;
-        }
-        let place = match &files {
-            None => {
+        let place = match (&files, &of_table) {
+            (Some(files), Some(overwrite)) => {
+                report.write(files, overwrite)?;
+                Place::Output
+            }
+            _ => {
                 printer.data(|out| report.rows.write(out))?;
                 Place::Error
-            }
-            Some(files) => {
-                report.write(files, &overwrite)?;
-                Place::Output
             }
         };
         report.summary.warnings = printer.warnings();
         printer.summary(place, &report.summary, || {
             self.told(&report, files.as_ref())
         })
+    }
+
+    /// Every file that is to be written.
+    fn outputs(&self, files: Option<&ReplayFiles>) -> Vec<PathBuf> {
+        let table = files.into_iter().flat_map(ReplayFiles::paths);
+        let beside = [&self.plot, &self.trajectory_out].into_iter().flatten();
+        table.chain(beside.cloned()).collect()
     }
 
     /// What is to be made up, and its name for people.

@@ -6,9 +6,9 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::{MarkCounts, shape_error, table, with_surface, write_both};
+use super::{MarkCounts, TableFiles, shape_error, table, with_surface};
 use crate::accuracy::StageAccuracy;
-use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
+use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION};
 use crate::job::JobError;
 use crate::progress::Progress;
 use crate::shape::document::ShapeDocument;
@@ -82,6 +82,8 @@ pub struct ScatteredSummary {
     pub accuracy: BTreeMap<&'static str, StageAccuracy>,
     /// What a careful person would mention.
     pub warnings: Vec<String>,
+    /// The table beside it, as written.
+    pub files: Vec<FileEntry>,
 }
 
 /// Chooses points on `document`'s surface over the region of its grid. `inputs` holds the
@@ -169,6 +171,7 @@ pub fn run(
         cover_m,
         accuracy,
         warnings,
+        files: Vec::new(),
     };
     Ok(ScatteredReport { points, summary })
 }
@@ -186,10 +189,10 @@ impl ScatteredReport {
     ///
     /// # Errors
     /// [`JobError::Write`].
-    pub fn write(&self, path: &Path, force: bool) -> Result<(), JobError> {
-        let inputs = &self.summary.inputs;
-        write_both(path, force, inputs, &self.summary, |out| {
-            self.write_csv(out)
-        })
+    pub fn write(&mut self, path: &Path, force: bool) -> Result<(), JobError> {
+        let files = TableFiles::new(path, force, &self.summary.inputs)?;
+        let (table, set) = files.table(|out| self.write_csv(out))?;
+        self.summary.files = vec![table];
+        files.summary(set, &self.summary)
     }
 }

@@ -10,7 +10,7 @@ pub mod summary;
 pub mod synthesize;
 pub mod written;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::JobError;
 use crate::bundle::artefact::Input;
@@ -69,6 +69,15 @@ impl Opened {
             input,
             renderer,
         })
+    }
+
+    /// The bundle's files.
+    #[must_use]
+    pub fn files(&self) -> Vec<PathBuf> {
+        let listed = self.bundle.manifest.files.iter();
+        let listed = listed.map(|file| self.bundle.folder.join(&file.path));
+        let manifest = self.bundle.folder.join("manifest.json");
+        std::iter::once(manifest).chain(listed).collect()
     }
 
     /// A made-up trajectory over the bundle's object.

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::Opened;
 use crate::accuracy::StageAccuracy;
-use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
+use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION};
 use crate::bundle::load::Bundle;
 use crate::bundle::replay::{Answer, ReplayRows};
 use crate::bundle::trajectory::Trajectory;
@@ -54,6 +54,8 @@ pub struct ReplaySummary {
     pub accuracy: BTreeMap<&'static str, StageAccuracy>,
     /// What a careful person would mention.
     pub warnings: Vec<String>,
+    /// The table beside it, as written.
+    pub files: Vec<FileEntry>,
 }
 
 /// A trajectory.
@@ -288,6 +290,7 @@ impl ReplaySummary {
             accuracy: bounds.stages(bundle, dynamics.is_some()),
             dynamics,
             warnings,
+            files: Vec::new(),
         }
     }
 }

@@ -6,26 +6,14 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::ReplayReport;
+use crate::bundle::artefact::FileEntry;
 use crate::bundle::atomic::{self, FileSet, Overwrite};
 use crate::bundle::json::to_json;
 use crate::bundle::replay::Answer;
+use crate::bundle::timing::{ReplayTiming, StageSeconds};
 use crate::bundle::trajectory::Trajectory;
 use crate::job::JobError;
 use crate::plot::replay::ReplayPlot;
-
-/// `timing_*.json`.
-#[derive(Serialize)]
-struct Timing<'a> {
-    positions: usize,
-    seconds_per_step: Option<f64>,
-    stages: Vec<StageSeconds<'a>>,
-}
-
-#[derive(Serialize)]
-struct StageSeconds<'a> {
-    stage: &'a str,
-    seconds: f64,
-}
 
 /// Names of the files that go with a table.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -92,15 +80,10 @@ impl ReplayFiles {
         &self.folder
     }
 
-    /// Refuses early when one of them must not be replaced.
-    ///
-    /// # Errors
-    /// [`JobError::Write`].
-    pub fn check(&self, overwrite: &Overwrite) -> Result<(), JobError> {
-        for name in self.names() {
-            overwrite.check(&self.folder.join(name))?;
-        }
-        Ok(())
+    /// Their paths.
+    #[must_use]
+    pub fn paths(&self) -> [PathBuf; 3] {
+        self.names().map(|name| self.folder.join(name))
     }
 }
 
@@ -109,34 +92,31 @@ impl ReplayReport {
     ///
     /// # Errors
     /// [`JobError::Write`].
-    pub fn write(&self, files: &ReplayFiles, overwrite: &Overwrite) -> Result<(), JobError> {
-        let timing = Timing {
+    pub fn write(&mut self, files: &ReplayFiles, overwrite: &Overwrite) -> Result<(), JobError> {
+        let timing = ReplayTiming {
             positions: self.rows.len(),
             seconds_per_step: self.step_s,
             stages: self
                 .seconds
                 .iter()
                 .map(|(stage, seconds)| StageSeconds {
-                    stage,
+                    stage: stage.clone(),
                     seconds: *seconds,
                 })
                 .collect(),
         };
-        let mut set = FileSet::begin(&files.folder, overwrite.clone())?;
-        set.write(&files.table, |out| self.rows.write(out))?;
+        let mut set = FileSet::begin(&files.folder, overwrite.clone());
+        let table = set.write(&files.table, |out| self.rows.write(out))?;
+        self.summary.files = vec![FileEntry::new(&files.table, table)];
         set.write(&files.timing, |out| out.write_all(&json(&timing)?))?;
         set.write(&files.facts, |out| out.write_all(&json(&self.summary)?))?;
         Ok(set.commit()?)
     }
 
-    /// Writes the picture.
-    ///
-    /// # Errors
-    /// [`JobError::Write`].
-    pub fn write_plot(&self, path: &Path, overwrite: &Overwrite) -> Result<(), JobError> {
-        let svg = self.plot().svg();
-        atomic::write(path, overwrite, |out| out.write_all(svg.as_bytes()))?;
-        Ok(())
+    /// The picture.
+    #[must_use]
+    pub fn svg(&self) -> String {
+        self.plot().svg()
     }
 
     fn plot(&self) -> ReplayPlot<'_> {

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::front::front;
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION};
-use crate::bundle::atomic::{FileSet, Overwrite, WriteError, Written};
+use crate::bundle::atomic::{FileSet, Overwrite, WriteError};
 use crate::bundle::json::to_json;
 use crate::bundle::sweep::{Found, MergeSummary, PlanFile, PointFile, PointStore, TableWriter};
 use crate::job::JobError;
@@ -46,6 +46,22 @@ pub struct MergeFiles {
     pub table: PathBuf,
     /// Replace what is there.
     pub force: bool,
+}
+
+impl MergeFiles {
+    /// Table, plot, front and sidecar.
+    #[must_use]
+    pub fn paths(&self) -> [PathBuf; 4] {
+        let stem = self.table.file_stem().unwrap_or_default().to_string_lossy();
+        let beside = |suffix: &str| self.table.with_file_name(format!("{stem}{suffix}"));
+        let table = self.table.clone();
+        [
+            table,
+            beside(".svg"),
+            beside("_pareto.csv"),
+            beside("_merge.json"),
+        ]
+    }
 }
 
 /// A merged sweep.
@@ -110,8 +126,19 @@ pub fn merge(
         files.force,
         folder.join(name("_merge.json")),
         &summary.inputs,
+    )
+    // What `sweep run` wrote is read here.
+    .protecting(request.folders.iter().map(|folder| folder.join("points")))
+    .protecting(
+        request
+            .folders
+            .iter()
+            .map(|folder| folder.join("plan.json")),
     );
-    let mut set = FileSet::begin(folder, overwrite)?;
+    for path in files.paths() {
+        overwrite.check(&path)?;
+    }
+    let mut set = FileSet::begin(folder, overwrite);
     let table = files.table.file_name().unwrap_or_default();
     let table = table.to_string_lossy().into_owned();
     let (mut gathered, mut refused) = (Gathered::default(), None);
@@ -129,12 +156,12 @@ pub fn merge(
     if let Some(error) = refused {
         return Err(error);
     }
-    let mut listed = vec![entry(table, written?)];
+    let mut listed = vec![FileEntry::new(table, written?)];
     let (fronts, among_met) = fronts(&gathered.briefs);
     let plot = plot(plan, &gathered.briefs, &fronts, among_met);
     let plot_name = name(".svg");
     let written = set.write(&plot_name, |out| out.write_all(plot.svg().as_bytes()))?;
-    listed.push(entry(plot_name, written));
+    listed.push(FileEntry::new(plot_name, written));
     let best = rows_on(&gathered.briefs, &fronts);
     let points = best
         .iter()
@@ -152,7 +179,7 @@ pub fn merge(
         }
         Ok(())
     })?;
-    listed.push(entry(front_name, written));
+    listed.push(FileEntry::new(front_name, written));
     tell(&mut summary, &gathered, best.len() as u64, among_met);
     summary.files = listed;
     set.write(&name("_merge.json"), |out| {
@@ -399,14 +426,6 @@ fn report(summary: MergeSummary, gathered: &Gathered, page: Option<String>) -> M
         summary,
         page,
         missing: named(&gathered.missing),
-    }
-}
-
-fn entry(path: String, written: Written) -> FileEntry {
-    FileEntry {
-        path,
-        bytes: written.bytes,
-        sha256: written.sha256,
     }
 }
 

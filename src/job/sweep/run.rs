@@ -105,7 +105,7 @@ pub fn run(
                 }
                 None => {
                     let point = sweep.point(index);
-                    store.write(&point)?;
+                    store.write(&point, force)?;
                     point
                 }
             };

@@ -38,7 +38,7 @@ fn origin() -> Origin {
 #[allow(clippy::disallowed_methods)]
 fn seeds() -> Vec<Input> {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let store = Store::in_folder(folder.path().to_path_buf());
+    let store = Store::in_folder(folder.path().to_path_buf(), ".");
     let value: Value = (
         vec![0.7; 300],
         vec![vec![1.3; 7]; 5],
@@ -111,7 +111,7 @@ fn adopt(input: &Input, store: &Store, folder: &Path) {
 }
 
 fn give(input: &Input, folder: &Path) -> Result<bool, String> {
-    let store = Store::in_folder(folder.to_path_buf());
+    let store = Store::in_folder(folder.to_path_buf(), ".");
     adopt(input, &store, folder);
     let read = store.recall::<Value>(ENTRY, &origin()).is_some();
     if store.recall::<Value>(ENTRY, &Origin::default()).is_some() {

@@ -8,7 +8,7 @@ use crate::cli::commands::begin;
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::layout::Sheet;
-use crate::cli::pictures::write_svg;
+use crate::cli::pictures::Picture;
 use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{count, mm, number};
 use crate::cli::values::FileArgument;
@@ -34,8 +34,10 @@ impl Discretize {
         }
         let mut place = Place::Output;
         if let Some(file) = &self.plot {
+            let plot = Picture::new(file, self.writing.force, [&path]);
+            plot.check(&inspection.inputs)?;
             let svg = drawn(&path, unit_m, &bar)?.svg();
-            place = write_svg(file, &inspection.inputs, &svg, self.writing.force, printer)?;
+            place = plot.write(&inspection.inputs, &svg, printer)?;
         }
         printer.summary(place, &inspection, || self.report(&inspection))
     }

@@ -16,6 +16,9 @@ use crate::design::Need;
 use crate::job::JobError;
 use crate::job::scan::{Fitted, ScanRequest, compare};
 
+/// How every table of residuals begins.
+const HEADER: &str = "x_m,y_m,z_m,";
+
 /// Explanations beyond this many are told in the JSON object alone.
 const EXPLANATIONS: usize = 8;
 
@@ -76,11 +79,12 @@ impl Probe {
         let name = scan.as_given().display().to_string();
         let (scan, input) = documents::scan(scan, design.array.positions_m.len())?;
         let inputs = vec![document.input.clone(), input];
-        let standard = FileArgument::Standard;
         let out = self.out.as_ref();
-        let target = out.unwrap_or(&standard).as_given();
-        let overwrite = Overwrite::new(self.writing.force, target, &inputs);
-        if let Some(FileArgument::Path(path)) = out {
+        let overwrite = Overwrite::beginning(self.writing.force, HEADER, &inputs)
+            .protecting(document.also_read());
+        if let Some(FileArgument::Path(path)) = out
+            && !atomic::is_stream(path)
+        {
             overwrite.check(path).map_err(JobError::from)?;
         }
         let bar = begin(printer);

@@ -1,8 +1,11 @@
 //! `sweep merge`: a plan's points as one table and one plot.
 
+use std::path::Path;
+
 use clap::Args;
 use serde::Serialize;
 
+use crate::bundle::atomic::check_distinct;
 use crate::bundle::sweep::MergeSummary;
 use crate::cli::args::Writing;
 use crate::cli::commands::{begin, folder};
@@ -10,10 +13,11 @@ use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
-use crate::cli::pictures::write_page;
+use crate::cli::pictures::Picture;
 use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{bytes, count, force};
 use crate::cli::values::FileArgument;
+use crate::job::JobError;
 use crate::job::sweep::merge::{MergeFiles, MergeReport, MergeRequest, merge, merge_table};
 
 /// Join the points of a plan into one table, and plot the best designs
@@ -75,6 +79,23 @@ impl Merge {
             ));
         }
         let (plan, input) = documents::plan(&self.plan)?;
+        let points = request.folders.iter();
+        let points =
+            points.flat_map(|folder| ["points", "plan.json"].map(|name| folder.join(name)));
+        let (mut protected, mut outputs) = (points.collect::<Vec<_>>(), Vec::new());
+        if let FileArgument::Path(path) = &self.out {
+            outputs.extend(self.files(path).paths());
+            protected.extend(outputs.iter().cloned());
+        }
+        if let Some(FileArgument::Path(path)) = &self.report {
+            outputs.push(path.clone());
+        }
+        check_distinct(&outputs).map_err(JobError::from)?;
+        let page =
+            (self.report.as_ref()).map(|file| Picture::new(file, self.writing.force, protected));
+        if let Some(page) = &page {
+            page.check(std::slice::from_ref(&input))?;
+        }
         let (report, mut place) = match &self.out {
             FileArgument::Standard => {
                 let bar = begin(printer);
@@ -92,10 +113,7 @@ impl Merge {
                         path.display()
                     )));
                 }
-                let files = MergeFiles {
-                    table: path.clone(),
-                    force: self.writing.force,
-                };
+                let files = self.files(path);
                 let bar = begin(printer);
                 let report = merge(&plan, input, &request, &files, &bar)?;
                 drop(bar);
@@ -108,9 +126,8 @@ impl Merge {
                 report.summary.missing, report.summary.points, report.missing
             ));
         }
-        if let (Some(file), Some(html)) = (&self.report, &report.page) {
-            let inputs = &report.summary.inputs;
-            let after = write_page(file, inputs, html, self.writing.force, printer)?;
+        if let (Some(page), Some(html)) = (&page, &report.page) {
+            let after = page.write(&report.summary.inputs, html, printer)?;
             if after == Place::Error {
                 place = after;
             }
@@ -121,6 +138,13 @@ impl Merge {
         };
         let json = printer.with_warnings(&json);
         printer.summary(place, &json, || self.told(&report))
+    }
+
+    fn files(&self, table: &Path) -> MergeFiles {
+        MergeFiles {
+            table: table.to_path_buf(),
+            force: self.writing.force,
+        }
     }
 
     fn told(&self, report: &MergeReport) -> String {

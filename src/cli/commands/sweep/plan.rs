@@ -3,7 +3,7 @@
 use clap::Args;
 use serde::Serialize;
 
-use crate::bundle::atomic::{Overwrite, WriteError};
+use crate::bundle::atomic::Overwrite;
 use crate::bundle::json::to_json;
 use crate::bundle::sweep::{Axis, Mode, PlanFile};
 use crate::bundle::write::write_json;
@@ -108,8 +108,8 @@ impl Plan {
                 Place::Error
             }
             FileArgument::Path(path) => {
-                self.check_target(path, &plan)?;
-                write_json(path, &Overwrite::Force, &plan).map_err(JobError::from)?;
+                let overwrite = Overwrite::same_bytes(self.writing.force, &plan.inputs);
+                write_json(path, &overwrite, &plan).map_err(JobError::from)?;
                 Place::Output
             }
         };
@@ -131,21 +131,6 @@ impl Plan {
         };
         let json = printer.with_warnings(&json);
         printer.summary(place, &json, || self.told(&plan))
-    }
-
-    /// An existing file is replaced with --force, or when it is the same plan.
-    fn check_target(&self, path: &std::path::Path, plan: &PlanFile) -> Result<(), Failure> {
-        if self.writing.force || !path.is_file() {
-            return Ok(());
-        }
-        match documents::plan(&self.out) {
-            Ok((found, _)) if found == *plan => Ok(()),
-            _ => Err(JobError::from(WriteError::OutputExists {
-                path: path.to_owned(),
-                reason: "and is not this plan".to_owned(),
-            })
-            .into()),
-        }
     }
 
     fn told(&self, plan: &PlanFile) -> String {

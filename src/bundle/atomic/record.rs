@@ -1,0 +1,150 @@
+//! What tells the program's own files from the user's: records that list them with their digests.
+
+use std::collections::BTreeMap;
+use std::ffi::OsStr;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::dir::{Dir, Kind};
+use super::file::hex;
+use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION, parse_version};
+use crate::bundle::json::to_json;
+use crate::bundle::plain::read_plain;
+use crate::bundle::timing;
+
+/// Records larger than this are not read: ours are a few kilobytes to a few megabytes.
+const RECORD_MAX_BYTES: u64 = 64 << 20;
+
+/// What a manifest or sidecar states, as far as it decides what may be replaced.
+#[derive(Debug, Clone, Default, Deserialize)]
+pub(super) struct Record {
+    schema_version: String,
+    #[serde(rename = "fluxform_version")]
+    _fluxform_version: String,
+    /// Absent from a note of files that are about to be replaced.
+    #[serde(default)]
+    inputs: Vec<Input>,
+    #[serde(default)]
+    files: Vec<FileEntry>,
+}
+
+impl Record {
+    /// The record at `path`; `None` where none is, or one that this program did not write.
+    pub fn read(path: &Path) -> Option<Self> {
+        let text = read_plain(path, RECORD_MAX_BYTES).ok()?;
+        Self::parse(&text)
+    }
+
+    fn parse(text: &[u8]) -> Option<Self> {
+        let record: Self = serde_json::from_slice(text).ok()?;
+        parse_version(&record.schema_version)?;
+        Some(record)
+    }
+
+    /// The record `name` in `dir`; a link is none.
+    pub fn read_in(dir: &Dir, name: &str) -> Option<Self> {
+        let file = dir.file(name).ok()?;
+        let mut text = Vec::new();
+        let read = file.take(RECORD_MAX_BYTES + 1).read_to_end(&mut text);
+        let whole = read.is_ok_and(|bytes| bytes as u64 <= RECORD_MAX_BYTES);
+        whole.then(|| Self::parse(&text)).flatten()
+    }
+
+    /// Whether it was made from inputs of these digests, in this order.
+    pub fn is_of(&self, inputs: &[Input]) -> bool {
+        let digests = |inputs: &[Input]| -> Vec<String> {
+            inputs.iter().map(|input| input.sha256.clone()).collect()
+        };
+        digests(&self.inputs) == digests(inputs)
+    }
+
+    /// What it lists, by name.
+    pub fn listed(self) -> BTreeMap<String, FileEntry> {
+        let entries = self.files.into_iter();
+        entries.map(|file| (file.path.clone(), file)).collect()
+    }
+}
+
+/// Whether the regular file `name` in `dir` has the size and digest that `entry` states.
+pub(super) fn unchanged(dir: &Dir, name: &OsStr, entry: &FileEntry) -> io::Result<bool> {
+    match dir.status(name)? {
+        Some(status) if status.kind == Kind::File && status.bytes == entry.bytes => {}
+        _ => return Ok(false),
+    }
+    Ok(digest(dir, name)? == entry.sha256)
+}
+
+/// The digest of the regular file `name` in `dir`.
+pub(super) fn digest(dir: &Dir, name: &OsStr) -> io::Result<String> {
+    let mut file = dir.file(name)?;
+    let mut sha256 = Sha256::new();
+    let mut buffer = vec![0; 1 << 16];
+    loop {
+        match file.read(&mut buffer)? {
+            0 => return Ok(hex(&sha256.finalize())),
+            count => sha256.update(&buffer[..count]),
+        }
+    }
+}
+
+/// The regular file `name` in `dir` as it is now.
+pub(super) fn present(dir: &Dir, name: &OsStr) -> io::Result<Option<FileEntry>> {
+    let Some(status) = dir.status(name)?.filter(|there| there.kind == Kind::File) else {
+        return Ok(None);
+    };
+    Ok(Some(FileEntry {
+        path: name.to_string_lossy().into_owned(),
+        bytes: status.bytes,
+        sha256: digest(dir, name)?,
+    }))
+}
+
+/// Whether the file `name` in `dir` holds the seconds of a run, which no record lists: told by its
+/// content.
+pub(super) fn is_timing(dir: &Dir, name: &OsStr) -> bool {
+    let named = name
+        .to_str()
+        .is_some_and(|name| name.starts_with("timing") && name.ends_with(".json"));
+    if !named {
+        return false;
+    }
+    let mut text = Vec::new();
+    let read = dir
+        .file(name)
+        .and_then(|file| file.take(timing::BYTES_MAX + 1).read_to_end(&mut text));
+    read.is_ok() && timing::is_ours(&text)
+}
+
+/// The note beside a record on files that are about to be replaced: a run that is killed between two
+/// renames leaves both states told.
+#[derive(Debug, Serialize)]
+pub(super) struct ReplacedNote {
+    schema_version: &'static str,
+    fluxform_version: &'static str,
+    files: Vec<FileEntry>,
+}
+
+impl ReplacedNote {
+    /// Of these files as they are now.
+    pub fn new(files: Vec<FileEntry>) -> Self {
+        Self {
+            schema_version: SCHEMA_VERSION,
+            fluxform_version: FLUXFORM_VERSION,
+            files,
+        }
+    }
+
+    /// Where the note of the record at `path` is.
+    pub fn path(record: &Path) -> PathBuf {
+        let name = record.file_name().unwrap_or_default().to_string_lossy();
+        record.with_file_name(format!(".{name}{}", super::OLD))
+    }
+
+    /// Its bytes.
+    pub fn bytes(&self) -> io::Result<Vec<u8>> {
+        to_json(self).map_err(io::Error::other)
+    }
+}
