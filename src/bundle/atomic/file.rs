@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest, Sha256};
 use tempfile::NamedTempFile;
 
+use super::busy::{Writing, lock};
 use super::leftovers::{clean_leftovers, temporary_file};
 use super::made::{MadeFolders, made_in};
 use super::{Overwrite, WriteError, Written};
@@ -61,6 +62,7 @@ pub struct FileSet {
     outdated: Vec<PathBuf>,
     /// Dropped last: what is still empty then goes again.
     made: Vec<MadeFolders>,
+    _writing: Writing,
 }
 
 impl FileSet {
@@ -84,6 +86,7 @@ impl FileSet {
             staged: Vec::new(),
             outdated: Vec::new(),
             made: vec![made],
+            _writing: Writing::begin(),
         })
     }
 
@@ -282,8 +285,7 @@ impl Write for Hashing<'_> {
 /// the renames go ahead without.
 pub(super) fn lock_folder(folder: &Path) -> Option<File> {
     let handle = File::open(folder).ok()?;
-    handle.lock().ok()?;
-    Some(handle)
+    lock(&handle, folder).then_some(handle)
 }
 
 /// Makes renames in `folder` durable, where the system knows how.

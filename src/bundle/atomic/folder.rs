@@ -23,6 +23,7 @@ use std::path::{Component, Path, PathBuf};
 use serde_json::Value;
 use tempfile::TempDir;
 
+use super::busy::Writing;
 use super::exchange::exchange;
 use super::file::{fill, lock_folder, sync_folder};
 use super::leftovers::{clean_leftovers, is_temporary, temporary_folder};
@@ -47,6 +48,7 @@ pub struct FolderDraft {
     lock: Option<File>,
     /// Dropped after the draft: what is still empty then goes again.
     _made: MadeFolders,
+    _writing: Writing,
 }
 
 impl FolderDraft {
@@ -79,6 +81,7 @@ impl FolderDraft {
             draft,
             lock,
             _made: made,
+            _writing: Writing::begin(),
         })
     }
 

@@ -9,6 +9,7 @@
 //!
 //! The digest of a file is computed while it is written: no second pass.
 
+mod busy;
 mod exchange;
 mod file;
 mod folder;
@@ -22,6 +23,7 @@ mod unforced;
 use std::io;
 use std::path::{Path, PathBuf};
 
+pub use busy::{awaited_folder, is_writing};
 pub(crate) use file::hex;
 pub use file::{FileSet, write};
 pub use folder::FolderDraft;

@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use super::WriteError;
+use super::busy::Writing;
 use super::leftovers::temporary_file;
 use super::made::made_in;
 
@@ -14,6 +15,7 @@ use super::made::made_in;
 /// # Errors
 /// [`WriteError`]; the target is then as it was.
 pub fn write_unforced(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), WriteError> {
+    let _writing = Writing::begin();
     let target = folder.join(name);
     let fail = |error| WriteError::from_io("write", &target, error);
     let made = made_in(folder, temporary_file).map_err(|error| error.of("write", &target))?;

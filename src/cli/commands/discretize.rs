@@ -9,6 +9,7 @@ mod inspect;
 use super::{begin, describe};
 use crate::bundle::atomic::{self, Overwrite};
 use crate::cli::args::{SamplingFlags, SurfaceFlags, Writing};
+use crate::cli::budget::{allow, asked};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
@@ -18,6 +19,7 @@ use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{count, length_error, mm, number};
 use crate::cli::values::FileArgument;
 use crate::job::JobError;
+use crate::job::cost::of_points;
 use crate::job::discretize::scattered::{self, ScatteredSummary};
 use crate::job::discretize::{DeviationSummary, PointsOptions, PointsSummary, run_with};
 use crate::shape::certificate::Certify;
@@ -113,6 +115,11 @@ impl Discretize {
             return self.inspected(printer);
         }
         let shapes = documents::shapes(std::slice::from_ref(&self.shape), &self.surface, printer)?;
+        allow(
+            shapes.iter().map(|shape| of_points(&shape.document, 0)),
+            asked(&shapes),
+            printer,
+        )?;
         let bar = begin(printer);
         for shape in shapes {
             let inputs = shape.input.into_iter().collect();

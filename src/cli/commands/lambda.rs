@@ -10,6 +10,7 @@ use crate::bundle::lambda_file::{
     WiringFile, WorkingPointForces, WorstPointFile,
 };
 use crate::cli::args::{SamplingFlags, SurfaceFlags, Tolerance, Writing};
+use crate::cli::budget::{allow, asked, costs};
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
@@ -178,6 +179,11 @@ impl Lambda {
             printer,
         )?;
         let design = &document.design;
+        allow(
+            costs(design, &shapes, self.tolerance.tolerance),
+            asked(&shapes),
+            printer,
+        )?;
         let bar = begin(printer);
         for shape in shapes {
             let inputs = std::iter::once(document.input.clone())
