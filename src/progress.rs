@@ -6,8 +6,8 @@
 //! through `rayon`'s tasks, drops what was being made (temporary files among it) and needs no error
 //! in the signature of a function that has none.
 //!
-//! The flag is the process's, because a kernel may run on any thread: a stop ends every
-//! [`interruptible`] computation, and no other, since elsewhere [`poll`] does nothing.
+//! The flag is the process's, because a kernel may run on any thread: while any computation is
+//! [`interruptible`], a stop ends all that the process computes. Otherwise [`poll`] does nothing.
 //!
 //! ```
 //! use fluxform::progress::{self, Interrupted};
@@ -55,7 +55,7 @@ pub fn stop_requested() -> bool {
     STOP.load(Ordering::Relaxed)
 }
 
-/// Leaves the computation where a stop is requested and it runs under [`interruptible`]; kernels
+/// Leaves the computation where a stop is requested and one is [`interruptible`]; kernels
 /// call this at least every few milliseconds.
 #[inline]
 pub fn poll() {
@@ -66,7 +66,8 @@ pub fn poll() {
 
 #[cold]
 fn leave() {
-    if INTERRUPTIBLE.load(Ordering::SeqCst) > 0 {
+    // A destructor that runs while the thread unwinds must not unwind again.
+    if INTERRUPTIBLE.load(Ordering::SeqCst) > 0 && !std::thread::panicking() {
         // No panic: the hook is not called, so nothing is printed.
         resume_unwind(Box::new(Interrupted));
     }

@@ -114,6 +114,7 @@ fn terminate(child: &Child) {
 
 /// Sends SIGTERM into `args` after each of `after_ms`: the command ends with 130 in time, with one
 /// message; at least one of the signals reaches it at work.
+#[allow(clippy::disallowed_methods)] // a test's own clock
 fn stops(place: &Place, args: &[&str], after_ms: &[u64]) {
     let mut reached = 0;
     for after in after_ms {
