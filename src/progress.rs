@@ -1,4 +1,104 @@
-//! How the core tells of its progress, and learns that it should stop.
+//! How the core reports its progress, and how it learns that it should stop.
+//!
+//! Work that holds a [`Progress`] asks it between its items. Kernels far below a job hold none:
+//! they call [`poll`], which costs one load of an atomic flag and, once [`request_stop`] was called,
+//! leaves the computation by unwinding up to the enclosing [`interruptible`]. Unwinding passes
+//! through `rayon`'s tasks, drops what was being made (temporary files among it) and needs no error
+//! in the signature of a function that has none.
+//!
+//! The flag is the process's, because a kernel may run on any thread: while any computation is
+//! [`interruptible`], a stop ends all that the process computes. Otherwise [`poll`] does nothing.
+//!
+//! ```
+//! use fluxform::progress::{self, Interrupted};
+//!
+//! let stopped = progress::interruptible(|| {
+//!     progress::request_stop(); // as a rule from another thread, or by a signal
+//!     loop {
+//!         progress::poll();
+//!     }
+//! });
+//! assert_eq!(stopped, Err::<(), _>(Interrupted));
+//! progress::withdraw_stop();
+//! assert_eq!(progress::interruptible(|| 7), Ok(7));
+//! ```
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, LazyLock};
+
+/// Whether a stop is requested.
+static STOP: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
+/// Computations inside [`interruptible`].
+static INTERRUPTIBLE: AtomicUsize = AtomicUsize::new(0);
+
+/// The process's request to stop, for who sets it from a signal's handler: true to stop.
+#[must_use]
+pub fn stop_flag() -> Arc<AtomicBool> {
+    Arc::clone(&STOP)
+}
+
+/// Asks every [`interruptible`] computation of this process to stop.
+pub fn request_stop() {
+    STOP.store(true, Ordering::SeqCst);
+}
+
+/// Takes the request to stop back, so that new computations run.
+pub fn withdraw_stop() {
+    STOP.store(false, Ordering::SeqCst);
+}
+
+/// Whether a stop is requested.
+#[must_use]
+pub fn stop_requested() -> bool {
+    STOP.load(Ordering::Relaxed)
+}
+
+/// Leaves the computation where a stop is requested and one is [`interruptible`]; kernels
+/// call this at least every few milliseconds.
+#[inline]
+pub fn poll() {
+    if stop_requested() {
+        leave();
+    }
+}
+
+#[cold]
+fn leave() {
+    // A destructor that runs while the thread unwinds must not unwind again.
+    if INTERRUPTIBLE.load(Ordering::SeqCst) > 0 && !std::thread::panicking() {
+        // No panic: the hook is not called, so nothing is printed.
+        resume_unwind(Box::new(Interrupted));
+    }
+}
+
+/// Runs `work` so that [`poll`] can end it.
+///
+/// # Errors
+/// [`Interrupted`] where a stop ended it. Panics of `work` go on as they are.
+pub fn interruptible<T>(work: impl FnOnce() -> T) -> Result<T, Interrupted> {
+    INTERRUPTIBLE.fetch_add(1, Ordering::SeqCst);
+    let result = catch_unwind(AssertUnwindSafe(work));
+    INTERRUPTIBLE.fetch_sub(1, Ordering::SeqCst);
+    result.map_err(pass_on)
+}
+
+/// [`Interrupted`] where that is what `panic` holds; goes on unwinding otherwise. Whoever else
+/// catches panics passes on an interruption with [`pass_interruption`].
+fn pass_on(panic: Box<dyn Any + Send>) -> Interrupted {
+    match panic.downcast::<Interrupted>() {
+        Ok(interrupted) => *interrupted,
+        Err(panic) => resume_unwind(panic),
+    }
+}
+
+/// For code that catches panics: goes on unwinding where `panic` is an interruption.
+pub fn pass_interruption(panic: &(dyn Any + Send)) {
+    if panic.is::<Interrupted>() {
+        resume_unwind(Box::new(Interrupted));
+    }
+}
 
 /// Receives progress from the core. The core never prints and never reads a clock.
 pub trait Progress: Sync {
@@ -6,7 +106,7 @@ pub trait Progress: Sync {
     fn begin(&self, _stage: &str, _total: u64) {}
     /// `items` more work items of the current stage are finished.
     fn advance(&self, _items: u64) {}
-    /// A search has found a better value than any told before, in its own SI unit.
+    /// A search has found a better value than any reported before, in its own SI unit.
     fn improved(&self, _value: f64) {}
     /// The current stage is finished.
     fn end(&self) {}

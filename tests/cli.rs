@@ -1,6 +1,8 @@
 //! The binary as its users meet it: exit codes, streams, files, messages.
 #![cfg(unix)] // signals, /dev/full, links
 
+#[path = "cli/budget.rs"]
+mod budget;
 #[path = "cli/codes.rs"]
 mod codes;
 #[path = "cli/files.rs"]

@@ -62,6 +62,10 @@ pub struct Common {
     /// Threads to compute with [default: all cores]; results do not depend on it
     #[arg(long, global = true, value_name = "N", value_parser = values::threads, allow_hyphen_values = true)]
     pub threads: Option<usize>,
+    /// Memory that the run may take, like 20GB [default: three quarters of what is free]; more is
+    /// refused before anything is computed
+    #[arg(long, global = true, value_name = "SIZE", value_parser = values::memory)]
+    pub memory: Option<u64>,
     /// Colours in messages; `auto` means on terminals, unless NO_COLOR is set
     #[arg(long, global = true, value_enum, default_value_t = Colour::Auto, value_name = "WHEN")]
     pub color: Colour,

@@ -7,9 +7,8 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::interrupt;
 use super::quantity::force;
-use crate::progress::Progress;
+use crate::progress::{Progress, stop_requested};
 
 /// Stages that end sooner are never drawn.
 const DELAY: Duration = Duration::from_millis(500);
@@ -100,7 +99,7 @@ impl State {
             return;
         };
         let (name, elapsed) = (&stage.name, stage.began.elapsed());
-        let message = if interrupt::asked() {
+        let message = if stop_requested() {
             format!("{name} (stopping)")
         } else {
             match self.best_n {
@@ -198,7 +197,7 @@ impl Progress for Bar {
     }
 
     fn interrupted(&self) -> bool {
-        interrupt::asked()
+        stop_requested()
     }
 
     fn take_seconds(&self) -> Vec<(String, f64)> {

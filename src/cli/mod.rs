@@ -2,6 +2,7 @@
 
 mod args;
 mod bar;
+mod budget;
 mod code;
 mod commands;
 mod documents;
@@ -27,6 +28,9 @@ use exit::Exit;
 use failure::Failure;
 use printer::Printer;
 
+use crate::job::JobError;
+use crate::progress::interruptible;
+
 /// Runs the command line and returns the process's exit code.
 pub fn main(args: impl Iterator<Item = OsString>) -> ExitCode {
     let args: Vec<OsString> = args.collect();
@@ -48,11 +52,13 @@ pub fn main(args: impl Iterator<Item = OsString>) -> ExitCode {
     let ran = match (&arguments.explain, &arguments.command) {
         (Some(asked), _) => explain::run(asked, &printer),
         (None, Some(command)) => {
-            interrupt::listen();
-            run(command, &arguments.common, &printer)
+            interrupt::listen(&arguments.common);
+            interruptible(|| run(command, &arguments.common, &printer))
+                .unwrap_or_else(|stop| Err(JobError::from(stop).into()))
         }
         (None, None) => return not_parsed(&without_command(), &args).into(),
     };
+    interrupt::end();
     match ran {
         Ok(()) => {
             printer.finish();
@@ -74,6 +80,7 @@ fn told_early(args: &[OsString]) -> Common {
         },
         quiet: false,
         threads: None,
+        memory: None,
         color: match value_of(args, "--color") {
             Some("always") => Colour::Always,
             Some("never") => Colour::Never,
@@ -103,6 +110,7 @@ fn run(command: &Command, common: &Common, printer: &Printer) -> Result<(), Fail
             .build_global()
             .map_err(|error| Failure::Usage(format!("--threads {threads}: {error}")))?;
     }
+    budget::grant(common.memory);
     match command {
         Command::Evaluate(command) => command.run(printer),
         Command::Probe(command) => command.run(printer),

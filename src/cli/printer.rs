@@ -141,6 +141,13 @@ impl Printer {
         }
     }
 
+    /// Reports what the program is doing, to people alone.
+    pub fn notice(&self, message: &str) {
+        if !self.json() && !self.quiet {
+            say(&format!("{}\n", visible(message)));
+        }
+    }
+
     /// Tells the warnings about a document that was read.
     pub fn document_warnings(&self, faults: &Faults) {
         if faults.is_empty() {

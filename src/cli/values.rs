@@ -238,6 +238,23 @@ pub fn threads(text: &str) -> Result<usize, String> {
     }
 }
 
+/// Bytes, from a number and a unit: `500MB`, `20GB`, `1.5 TB`.
+pub fn memory(text: &str) -> Result<u64, String> {
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let factor = match text[digits.len()..].to_ascii_uppercase().as_str() {
+        "B" | "" => 1.0,
+        "KB" => 1e3,
+        "MB" => 1e6,
+        "GB" => 1e9,
+        "TB" => 1e12,
+        _ => f64::NAN,
+    };
+    match digits.trim().parse::<f64>() {
+        Ok(number) if number > 0.0 && (number * factor).is_finite() => Ok((number * factor) as u64),
+        _ => Err("expected a size like 500MB or 20GB".to_owned()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -30,6 +30,7 @@ const MOST_NODES: usize = 10;
 /// the flux returns outside. Domain: the windings do not overlap.
 #[must_use]
 pub fn mutual_inductance_h(winding: &Winding, distance_m: f64) -> f64 {
+    crate::progress::poll();
     let (a1, a2) = (winding.inner_radius_m, winding.outer_radius_m);
     let length = winding.length_m;
     let floor = NEAREST * a2;

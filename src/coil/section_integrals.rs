@@ -114,6 +114,7 @@ pub fn section_integrals(
     length: f64,
     accuracy: &'static Accuracy,
 ) -> SectionIntegrals {
+    crate::progress::poll();
     let tolerance = accuracy.tolerance;
     let outer = inner + depth;
     let mut total = SectionIntegrals::default();

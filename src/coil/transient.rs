@@ -313,6 +313,7 @@ impl Modes {
         let (mut low, mut index) = (0.0, 1);
         let mut ahead = Some(air);
         while low <= last {
+            crate::progress::poll();
             let zero = zero_of_j1(index);
             let high = match ahead {
                 Some(air) if air <= zero => {

@@ -141,6 +141,7 @@ impl Winding {
             out.br_over_r = vec![0.0; r_m.len()];
         }
         for start in (0..r_m.len()).step_by(CHUNK) {
+            crate::progress::poll();
             let range = start..(start + CHUNK).min(r_m.len());
             let (r, z) = (&r_m[range.clone()], &z_m[range.clone()]);
             match self.batch_rule(Extent::of(r, z), tolerance) {
@@ -203,6 +204,7 @@ impl Winding {
         let scale = MU_0_T_M_PER_A * self.current_density_per_m2() * half;
         let mut out = Vec::with_capacity(r_m.len());
         for (r, z) in r_m.chunks(CHUNK).zip(z_m.chunks(CHUNK)) {
+            crate::progress::poll();
             let Some(rule) = self.batch_rule(Extent::of(r, z), tolerance) else {
                 for (r, z) in r.iter().zip(z) {
                     out.push(self.field(*r, *z)?.b_z);

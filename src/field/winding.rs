@@ -154,6 +154,7 @@ impl Winding {
     /// # Errors
     /// [`OnEdge`] on the winding's edges.
     pub fn field(&self, r_m: f64, z_m: f64) -> Result<AxialField, OnEdge> {
+        crate::progress::poll();
         let (lo, hi) = self.offsets_m(r_m);
         let bottom_m = z_m + self.length_m;
         if (lo == 0.0 || hi == 0.0) && (z_m == 0.0 || bottom_m == 0.0) {

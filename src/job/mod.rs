@@ -4,6 +4,7 @@ mod air_sample;
 pub mod at_current;
 pub mod calibrate;
 pub mod compare;
+pub mod cost;
 pub mod discretize;
 pub mod evaluate;
 mod kept;

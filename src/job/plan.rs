@@ -1,6 +1,7 @@
 //! What `calibrate` is about to compute, what it leaves out, and what leaving it out costs.
 //!
-//! Costs are found by computing forces at a few points of every shape both ways.
+//! Costs are found by computing forces at a few points of every shape both ways, of the array's
+//! middle coils alone: the array itself is never solved here.
 
 use serde::Serialize;
 
@@ -17,6 +18,9 @@ use crate::design::{Coupling, Design, MagnetModel};
 use crate::progress::{Progress, Silent};
 use crate::shape::certificate::Certify;
 use crate::shape::points::ConstraintPoints;
+
+/// Most coils of which costs are computed.
+const MIDDLE_COILS: usize = 9;
 
 /// What is computed for a design's shapes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -101,9 +105,6 @@ pub fn plan(
     let field = field_store(&scene, curve.as_ref(), options);
     let kept = field.holds_steel();
     let tolerance = options.lambda.tolerance;
-    progress.begin("steel", 1);
-    let solved = field.steel(&scene, tolerance, MAP_TOLERANCE)?;
-    progress.end();
     let whole = workspace_grid(source.design);
     let size = |grid: &crate::map::tabulate::Grid| [grid.x_m.len(), grid.y_m.len(), grid.z_m.len()];
     let heights = PointsOptions {
@@ -125,10 +126,9 @@ pub fn plan(
             z_m: [grid.z_m[0], grid.z_m[grid.z_m.len() - 1]],
         });
     }
-    progress.check()?;
     Ok(Plan {
-        tolerance: solved.tolerance.max(KERNEL_ERROR),
-        terms: terms(&scene, kept, tolerance, &places)?,
+        tolerance: steel::tolerance_of(&scene, tolerance, MAP_TOLERANCE).max(KERNEL_ERROR),
+        terms: terms(&scene, kept, tolerance, &places, progress)?,
         shapes: planned,
     })
 }
@@ -159,8 +159,12 @@ fn terms(
     kept: bool,
     tolerance: Option<f64>,
     places: &[[f64; 3]],
+    progress: &dyn Progress,
 ) -> Result<Vec<Term>, JobError> {
     let design = scene.design;
+    progress.begin("costs", 3);
+    let middle = middle_coils(design);
+    let places = &near(&middle, places);
     let driven = needed_coils(scene).len();
     let coils = scene.coils.len();
     let mut terms = vec![
@@ -192,8 +196,9 @@ fn terms(
                 cost: Some(Cost::OfTheForce(0.0)),
             }
         },
-        finite_magnet(design, tolerance, places),
+        finite_magnet(&middle, tolerance, places),
     ];
+    progress.advance(1);
     let Some(core) = &scene.core else {
         terms.push(Term {
             what: "steel",
@@ -201,6 +206,7 @@ fn terms(
             why: "the design has no core".to_owned(),
             cost: Some(Cost::OfTheForce(0.0)),
         });
+        progress.end();
         return Ok(terms);
     };
     terms.push(Term {
@@ -231,9 +237,53 @@ fn terms(
             cost: None,
         },
     });
-    terms.extend(coupling(design, tolerance, places));
-    terms.push(passive_force(scene, places)?);
+    terms.extend(coupling(&middle, tolerance, places));
+    progress.advance(1);
+    terms.push(passive_force(&Scene::new(&middle)?, places)?);
+    progress.end();
     Ok(terms)
+}
+
+/// The design with no more than nine coils, those closest to the array's middle.
+fn middle_coils(design: &Design) -> Design {
+    let all = &design.array.positions_m;
+    if all.len() <= MIDDLE_COILS {
+        return design.clone();
+    }
+    let mean = |axis: usize| all.iter().map(|p| p[axis]).sum::<f64>() / all.len() as f64;
+    let centre = [mean(0), mean(1)];
+    let distance = |coil: usize| (all[coil][0] - centre[0]).hypot(all[coil][1] - centre[1]);
+    let mut order: Vec<usize> = (0..all.len()).collect();
+    order.sort_by(|a, b| distance(*a).total_cmp(&distance(*b)));
+    let mut kept = order[..MIDDLE_COILS].to_vec();
+    kept.sort_unstable();
+    let of = |values: &[f64]| kept.iter().map(|coil| values[*coil]).collect::<Vec<f64>>();
+    let mut middle = design.clone();
+    middle.array.grid = None;
+    middle.array.positions_m = kept.iter().map(|coil| all[*coil]).collect();
+    middle.array.gain = of(&design.array.gain);
+    middle.supply.current_max_a = of(&design.supply.current_max_a);
+    middle.supply.current_min_a = of(&design.supply.current_min_a);
+    middle
+}
+
+/// `places` moved over the nearest coil of `design`, where they lie beside all of them.
+fn near(design: &Design, places: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    let axes = &design.array.positions_m;
+    let Some(coil) = design.coil else {
+        return places.to_vec();
+    };
+    let mut near = places.to_vec();
+    for [x, y, _] in &mut near {
+        let distance = |p: &[f64; 2]| (p[0] - *x).hypot(p[1] - *y);
+        let nearest = axes
+            .iter()
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        if let Some(axis) = nearest.filter(|axis| distance(axis) > 5.0 * coil.outer_diameter_m) {
+            [*x, *y] = *axis;
+        }
+    }
+    near
 }
 
 /// Forces per ampere at `places` with another design; `None` where it cannot be computed.

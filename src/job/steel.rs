@@ -263,6 +263,20 @@ fn distance_to_surface_m(shape: CoreShape, r_m: f64, z_m: f64) -> f64 {
     beside.max(0.0).hypot(beyond.max(0.0))
 }
 
+/// The tolerance to which [`solve`] solves: `tolerance`, or the default of the scene's physics.
+#[must_use]
+pub fn tolerance_of(scene: &Scene, tolerance: Option<f64>, air_default: f64) -> f64 {
+    let default = match &scene.core {
+        None => air_default,
+        Some(_) if coupled(scene.design) => COUPLED_TOLERANCE,
+        Some(core) => match &core.material {
+            Material::Curve(_) if scene.rated_current_a() > 0.0 => SATURATED_TOLERANCE,
+            Material::Curve(_) | Material::Linear(_) => CORED_TOLERANCE,
+        },
+    };
+    tolerance.unwrap_or(default)
+}
+
 /// Solves the steel of `scene`, to `tolerance` or the default, for heights from `lowest_m` up.
 ///
 /// # Errors

@@ -60,6 +60,7 @@ pub(super) fn solve(model: &Model, roles: &[Role], likely: &[bool], target: &[Nu
     let mut entered = None;
     let limit = 30 * (count + 3);
     for _ in 0..limit {
+        crate::progress::poll();
         let candidate = factor.solve(model, target, Num::ZERO);
         if let Some(violators) = step(roles, &basis, &mut rate, &candidate.x) {
             match entered {

@@ -191,6 +191,7 @@ impl Follower<'_> {
         let mut pieces: Vec<Piece> = Vec::new();
         let limit = 200 * (self.model.count() + 2);
         for _ in 0..limit {
+            crate::progress::poll();
             let Some((piece, event)) = self.leave(&state, target) else {
                 break;
             };
@@ -231,6 +232,7 @@ impl Follower<'_> {
     fn leave(&self, state: &State, target: &Target) -> Option<(Piece, Option<Num>)> {
         let mut roles = self.roles(state, target);
         for _ in 0..=2 * self.model.count() {
+            crate::progress::poll();
             let likely: Vec<bool> = roles
                 .iter()
                 .zip(&state.place)

@@ -204,6 +204,7 @@ impl Table {
             .map(|samples| {
                 let mut u = vec![0.0; plane * z.len()];
                 for (k, out) in u.chunks_exact_mut(plane).enumerate() {
+                    crate::progress::poll();
                     transfers[k].spread(&layers[k], &samples[asked[k]..asked[k + 1]], out);
                 }
                 laplace.fill(&mut u);

@@ -89,6 +89,7 @@ pub fn triangular_factor<T: Real>(
         let mut factor = Triangle::zero(columns);
         let mut block = vec![T::ZERO; CHUNK_ROWS * columns];
         for start in (group * group_rows..end).step_by(CHUNK_ROWS) {
+            crate::progress::poll();
             let range = start..end.min(start + CHUNK_ROWS);
             let filled = range.len();
             fill(range, &mut block, CHUNK_ROWS);

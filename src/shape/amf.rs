@@ -59,6 +59,7 @@ impl Reader {
         let mut document = Document::new(part, text);
         let mut any = false;
         loop {
+            crate::progress::poll();
             let step = document.step()?;
             match step {
                 Step::Start(e) => {

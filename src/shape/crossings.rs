@@ -112,6 +112,7 @@ impl Search<'_> {
         let mut looked = 0;
         let mut open = vec![part];
         while let Some([a, b]) = open.pop() {
+            crate::progress::poll();
             if self.halve([a, b], &mut |pair| open.push(pair)) {
                 continue;
             }

@@ -17,6 +17,7 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
     let mut reader = Reader::default();
     let mut lines = Lines::new(bytes);
     while let Some(line) = lines.next_line() {
+        crate::progress::poll();
         let mut words = line.words();
         let told = |what| ReadError::new(Place::Line(line.number), what);
         match words.next() {

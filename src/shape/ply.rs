@@ -71,6 +71,7 @@ fn each<E: PropertyAccess>(
     let mut some = element.clone();
     let mut left = element.count;
     while left > 0 {
+        crate::progress::poll();
         some.count = left.min(AT_ONCE);
         left -= some.count;
         let read = Parser::new().read_payload_for_element(reader, &some, header);

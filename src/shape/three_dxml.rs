@@ -72,6 +72,7 @@ impl Structure {
         let mut open = Instance::default();
         let mut document = Document::new(part, text);
         loop {
+            crate::progress::poll();
             let step = document.step()?;
             let told = |what: String| document.fault(what);
             match step {

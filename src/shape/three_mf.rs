@@ -50,6 +50,7 @@ fn root_part(archive: &mut Archive<'_>) -> Result<String, ReadError> {
         let text = archive.text(&name)?;
         let mut document = Document::new(&name, &text);
         loop {
+            crate::progress::poll();
             match document.step()? {
                 Step::Start(e)
                     if e.name() == "Relationship"

@@ -11,7 +11,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("accuracy", &[]),
     ("numerics", &["units", "progress", "accuracy"]),
     ("design", &["units", "numerics"]),
-    ("field", &["units", "numerics"]),
+    ("field", &["units", "progress", "numerics"]),
     (
         "coil",
         &[
@@ -27,9 +27,9 @@ const ROOMS: &[(&str, &[&str])] = &[
         &["units", "progress", "accuracy", "numerics", "design"],
     ),
     ("lambda", &["units", "progress", "accuracy", "numerics"]),
-    ("bundle", &["units", "accuracy", "numerics"]),
-    ("plot", &[]),
-    ("report", &["units", "plot"]),
+    ("bundle", &["units", "progress", "accuracy", "numerics"]),
+    ("plot", &["progress"]),
+    ("report", &["units", "progress", "plot"]),
     (
         "job",
         &[

@@ -92,6 +92,7 @@ const POWERS: &[Power] = &[
         holders: &[
             "bench/memory.rs",
             "bundle/",
+            "cli/budget.rs",
             "cli/documents.rs",
             "design/named_file.rs",
             "design/source.rs",

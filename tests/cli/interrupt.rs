@@ -5,7 +5,7 @@ use std::fs::DirEntry;
 use std::io::Read;
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::support::{Place, SEED};
 
@@ -99,4 +99,174 @@ fn waiting_for_input_ends_at_once() {
     let (code, _) = wait(child);
     drop(input);
     assert_eq!(code, Some(130));
+}
+
+/// Longest answer to a signal, s: generous, because a loaded machine may not run the process at all
+/// for a while. `cargo bench --locked --bench stop_answer` prints the real ones.
+const LONGEST_ANSWER_S: u64 = 5;
+
+fn terminate(child: &Child) {
+    let sent = Command::new("kill")
+        .args(["-TERM", &child.id().to_string()])
+        .status();
+    assert!(sent.unwrap().success());
+}
+
+/// Sends SIGTERM into `args` after each of `after_ms`: the command ends with 130 in time, with one
+/// message; at least one of the signals reaches it at work.
+#[allow(clippy::disallowed_methods)] // a test's own clock
+fn stops(place: &Place, args: &[&str], after_ms: &[u64]) {
+    let mut reached = 0;
+    for after in after_ms {
+        let mut child = place
+            .command(args)
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        sleep(Duration::from_millis(*after));
+        if child.try_wait().unwrap().is_some() {
+            continue;
+        }
+        terminate(&child);
+        let sent = Instant::now();
+        let (code, said) = wait(child);
+        let answer = sent.elapsed();
+        assert_eq!(code, Some(130), "{args:?} after {after} ms: {said}");
+        assert!(
+            answer < Duration::from_secs(LONGEST_ANSWER_S),
+            "{args:?} after {after} ms: {answer:?}"
+        );
+        reached += 1;
+    }
+    assert!(reached > 0, "{args:?} ended before every signal");
+}
+
+/// A design of `count` x `count` coils, flat and close, with or without cores.
+fn array(count: usize, core: &str, length_mm: f64) -> String {
+    format!(
+        "name = \"array\"\n[coil]\ninner_diameter_mm = 24.0\nouter_diameter_mm = 38.0\n\
+         length_mm = {length_mm:?}\n[wire]\ndiameter_mm = 0.7\n{core}\n[array]\nrows = {count}\n\
+         columns = {count}\npitch_mm = 50.0\n[supply]\ncurrent_max_a = 2.0\n"
+    )
+}
+
+#[test]
+fn a_signal_ends_the_solution_of_steel_in_every_command() {
+    let place = Place::new();
+    place.write("cores.toml", &array(6, "[core]", 100.0));
+    place.write("points.csv", "x_m,y_m,z_m\n0.001,0.002,0.03\n");
+    for args in [
+        &["evaluate", "cores.toml"][..],
+        &["probe", "cores.toml", "points.csv"],
+        &["map", "cores.toml", "--out", "map"],
+        &["lambda", "cores.toml", "shapes/flat.toml"],
+        &[
+            "calibrate",
+            "cores.toml",
+            "shapes/flat.toml",
+            "--out",
+            "results",
+        ],
+        &[
+            "compare",
+            "cores.toml",
+            "shapes/flat.toml",
+            "shapes/wedge.toml",
+        ],
+    ] {
+        stops(&place, args, &[300, 900]);
+    }
+    assert!(!place.path("map").exists() && !place.path("results").exists());
+}
+
+#[test]
+fn a_signal_ends_points_paths_searches_and_stages() {
+    let place = Place::new();
+    place.write("air.toml", &array(8, "", 100.0));
+    let surface = [
+        "shapes/half_sphere.stl",
+        "--unit",
+        "mm",
+        "--translate",
+        "0,0,30",
+        "--grid",
+        "2500x2500",
+    ];
+    let with = |head: &[&'static str]| [head, &surface[..]].concat();
+    stops(
+        &place,
+        &with(&["discretize", "--out", "p.csv"]),
+        &[300, 900],
+    );
+    stops(&place, &with(&["lambda", SEED]), &[300, 1500]);
+    // The worst-point path of 64 coils over 3721 points takes minutes.
+    stops(
+        &place,
+        &["lambda", "air.toml", "shapes/flat.toml"],
+        &[600, 2500],
+    );
+    stops(&place, &["optimize", "designs/seed.toml"], &[300, 900]);
+    stops(
+        &place,
+        &["bench", "--quick", "--out", "bench"],
+        &[200, 1200],
+    );
+    assert!(!place.path("p.csv").exists() && !place.path("bench").exists());
+}
+
+#[test]
+fn a_signal_ends_what_reads_a_bundle() {
+    let place = Place::new();
+    let made = [
+        "calibrate",
+        "designs/seed.toml",
+        "shapes/wedge.toml",
+        "--no-report",
+    ];
+    place.run(&made).ends(0);
+    let bundle = "results/seed/wedge";
+    let mut walk = String::from("t_s,x_m,y_m,z_m\n");
+    for k in 0..300_000 {
+        let x = f64::from(k % 900) * 1e-4 - 0.045;
+        walk += &format!("{},{x},0.001,0.05\n", f64::from(k) * 1e-3);
+    }
+    place.write("walk.csv", &walk);
+    stops(&place, &["verify", bundle], &[100, 400]);
+    stops(
+        &place,
+        &["replay", bundle, "walk.csv", "--out", "r.csv"],
+        &[100, 500, 900],
+    );
+    assert!(!place.path("r.csv").exists());
+}
+
+/// A folder that another process holds: the wait is reported, and a signal ends it.
+#[test]
+#[allow(clippy::disallowed_methods)] // a test's own folder
+fn waiting_for_another_run_is_reported_and_ends_at_a_signal() {
+    let place = Place::new();
+    place.folder("results/seed_air");
+    let held = std::fs::File::open(place.path("results/seed_air")).unwrap();
+    held.lock().unwrap();
+    let child = place
+        .command(&["calibrate", SEED, "shapes/flat.toml", "--no-report"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    sleep(Duration::from_secs(4));
+    terminate(&child);
+    let (code, said) = wait(child);
+    assert_eq!(code, Some(130), "{said}");
+    assert!(
+        said.contains("waiting for another run in results/seed_air"),
+        "{said}"
+    );
+    let left = place.path("results/seed_air").read_dir().unwrap();
+    let names: Vec<_> = left.map(|entry| entry.unwrap().file_name()).collect();
+    assert!(
+        names.iter().all(|name| name == ".fluxform-kept"),
+        "{names:?}"
+    );
 }

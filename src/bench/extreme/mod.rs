@@ -25,7 +25,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crate::bench::clock::Watch;
 use crate::bundle::catalogue::CaseRow;
-use crate::progress::Progress;
+use crate::progress::{Progress, pass_interruption};
 
 /// Seconds a case may take unless it says otherwise; unoptimised builds on busy machines included.
 const SECONDS: f64 = 60.0;
@@ -138,10 +138,13 @@ fn row(case: &Case) -> CaseRow {
             value: message,
             error: f64::INFINITY,
         },
-        Err(panic) => Got {
-            value: format!("panic: {}", words(&*panic)),
-            error: f64::INFINITY,
-        },
+        Err(panic) => {
+            pass_interruption(&*panic);
+            Got {
+                value: format!("panic: {}", words(&*panic)),
+                error: f64::INFINITY,
+            }
+        }
     };
     CaseRow {
         name: case.name.to_owned(),

@@ -16,6 +16,7 @@ use rustix::fs::{
 use rustix::io::Errno;
 use sha2::{Digest, Sha256};
 
+use super::busy;
 use super::file::hex;
 
 /// Folders nested deeper than this are not entered.
@@ -381,7 +382,7 @@ impl Dir {
 
     /// Serialises the renames of runs that write into it: held until the handle is dropped. `None`
     /// where folders cannot be locked.
-    pub fn lock(&self) -> Option<File> {
+    pub fn lock(&self, shown: &Path) -> Option<File> {
         // Of its own: a lock belongs to a description, which clones share.
         let handle = File::from(
             openat(
@@ -392,8 +393,7 @@ impl Dir {
             )
             .ok()?,
         );
-        handle.lock().ok()?;
-        Some(handle)
+        busy::lock(&handle, shown).then_some(handle)
     }
 
     /// See [`identity`].

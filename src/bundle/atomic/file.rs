@@ -231,7 +231,7 @@ impl FileSet {
     /// [`WriteError`]; files not yet in place are removed.
     pub fn commit(mut self) -> Result<(), WriteError> {
         let of_set = Dir::open(&self.folder).ok();
-        let _lock = of_set.as_ref().and_then(Dir::lock);
+        let _lock = of_set.as_ref().and_then(|dir| dir.lock(&self.folder));
         // Another run may have been faster.
         for file in &mut self.staged {
             file.permit = file.overwrite.permit(&file.shown, Some(&file.written))?;

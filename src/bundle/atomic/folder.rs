@@ -94,7 +94,7 @@ impl FolderDraft {
         let (made, draft) = (made, draft);
         let place = Place::of(&target, parent)?;
         {
-            let _lock = place.parent.lock();
+            let _lock = place.parent.lock(parent_of(&place.target));
             place
                 .recover()
                 .map_err(|error| WriteError::from_io("recover", &target, error))?;
@@ -150,7 +150,7 @@ impl FolderDraft {
     pub fn commit(mut self) -> Result<(), WriteError> {
         let place = &self.place;
         let fail = |error| WriteError::from_io("write", &place.target, error);
-        let _lock = place.parent.lock();
+        let _lock = place.parent.lock(parent_of(&place.target));
         place.recover().map_err(fail)?;
         // Another run may have been faster.
         place.check(&self.overwrite, &self.written)?;

@@ -13,6 +13,7 @@
 //! The digest of a file is computed while it is written: no second pass.
 
 mod absorb;
+mod busy;
 mod dir;
 mod file;
 mod folder;
@@ -25,6 +26,7 @@ mod temporary;
 use std::io;
 use std::path::{Path, PathBuf};
 
+pub use busy::{awaited_folder, is_writing};
 pub(crate) use dir::{Dir, Kind};
 pub use file::{FileSet, is_stream, write};
 pub(crate) use file::{hex, put};

@@ -8,6 +8,7 @@ use std::fs::{File, TryLockError};
 use std::hash::{BuildHasher, RandomState};
 use std::io;
 
+use super::busy::Writing;
 use super::dir::{Dir, Kind, short_identity};
 
 const PREFIX: &str = ".fluxform-";
@@ -35,6 +36,7 @@ pub(super) struct TemporaryFile {
     dir: Dir,
     /// `None` once it has a name of its own.
     name: Option<OsString>,
+    _writing: Writing,
 }
 
 impl TemporaryFile {
@@ -50,6 +52,7 @@ impl TemporaryFile {
                 file,
                 dir: dir.clone(),
                 name: Some(name.into()),
+                _writing: Writing::begin(),
             };
             if let Some(name) = claim(dir, &made.file, made.name.take().as_deref())? {
                 made.name = Some(name);
@@ -99,6 +102,7 @@ pub(super) struct TemporaryFolder {
     /// `None` once it has a name of its own.
     name: Option<OsString>,
     _lock: File,
+    _writing: Writing,
 }
 
 impl TemporaryFolder {
@@ -125,6 +129,7 @@ impl TemporaryFolder {
                     parent: parent.clone(),
                     name: Some(name),
                     _lock: lock,
+                    _writing: Writing::begin(),
                 });
             }
         }

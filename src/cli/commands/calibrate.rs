@@ -12,6 +12,7 @@ use crate::bundle::artefact::{FLUXFORM_VERSION, SCHEMA_VERSION};
 use crate::bundle::lambda_file::WorkingPointForces;
 use crate::bundle::manifest::Manifest;
 use crate::cli::args::{SurfaceFlags, Tolerance, Writing};
+use crate::cli::budget::{allow, asked, costs};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
@@ -25,6 +26,7 @@ use crate::design::{Design, Need};
 use crate::job::calibrate::{
     BundleReport, CalibrateOptions, CalibrateReport, DEFAULT_REACH_M, DesignSource, run,
 };
+use crate::job::cost::{Components, of_map};
 use crate::job::plan::{Cost, Done, Plan, plan};
 
 /// The main job: maps, points, force constant and currents, one bundle a shape
@@ -149,6 +151,13 @@ impl Calibrate {
         if let Some(plan) = plan.as_ref().filter(|_| !printer.json()) {
             printer.summary(Place::Output, plan, || explained(plan))?;
         }
+        allow(
+            costs(design, &shapes, self.tolerance.tolerance)
+                .into_iter()
+                .chain([of_map(design, Components::Gz)]),
+            asked(&shapes),
+            printer,
+        )?;
         let bar = begin(printer);
         let report = run(source, &shapes, &options, &bar)?;
         drop(bar);

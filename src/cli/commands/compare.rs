@@ -5,6 +5,7 @@ use clap::Args;
 use super::lambda::no_constant;
 use super::{accuracy_check, begin, describe};
 use crate::cli::args::{SurfaceFlags, Tolerance, Writing};
+use crate::cli::budget::{allow, asked, costs};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
@@ -85,6 +86,11 @@ impl Compare {
         if let Some(plot) = &plot {
             plot.check(std::slice::from_ref(&document.input))?;
         }
+        allow(
+            costs(&document.design, &shapes, self.tolerance.tolerance),
+            asked(&shapes),
+            printer,
+        )?;
         let bar = begin(printer);
         let report = run(&document.design, &shapes, &document.input, &options, &bar)?;
         drop(bar);

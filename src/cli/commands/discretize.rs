@@ -10,6 +10,7 @@ use super::{begin, describe};
 use crate::bundle::artefact::Input;
 use crate::bundle::atomic::{self, Overwrite, check_distinct};
 use crate::cli::args::{SamplingFlags, SurfaceFlags, Writing};
+use crate::cli::budget::{allow, asked};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
@@ -19,6 +20,7 @@ use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{count, length_error, mm, number};
 use crate::cli::values::FileArgument;
 use crate::job::JobError;
+use crate::job::cost::of_points;
 use crate::job::discretize::scattered::{self, ScatteredSummary};
 use crate::job::discretize::{
     DeviationSummary, PointsOptions, PointsSummary, TableFiles, run_with,
@@ -116,6 +118,11 @@ impl Discretize {
             return self.inspected(printer);
         }
         let shapes = documents::shapes(std::slice::from_ref(&self.shape), &self.surface, printer)?;
+        allow(
+            shapes.iter().map(|shape| of_points(&shape.document, 0)),
+            asked(&shapes),
+            printer,
+        )?;
         let bar = begin(printer);
         for shape in shapes {
             let inputs: Vec<Input> = shape.input.into_iter().collect();

@@ -5,6 +5,7 @@ use clap::Args;
 use super::{accuracy_check, begin, describe};
 use crate::accuracy::StageAccuracy;
 use crate::cli::args::Tolerance;
+use crate::cli::budget::{Asked, allow};
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
@@ -13,6 +14,7 @@ use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{force, mass, mm, number, number_to, percent, si};
 use crate::cli::values::FileArgument;
 use crate::design::{Design, Need};
+use crate::job::cost::of_steel;
 use crate::job::evaluate::{CoreFacts, Evaluation, TargetFacts, TransientFacts, evaluate};
 use crate::job::neighbours::{ArrayFacts, WorkingPointFacts};
 
@@ -51,8 +53,10 @@ impl Evaluate {
     /// See [`Failure`].
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
         let document = documents::design(&self.design, Need::EVALUATE, printer)?;
-        let bar = begin(printer);
         let design = &document.design;
+        let steel = of_steel(design, self.tolerance.tolerance);
+        allow(steel, Asked::Document, printer)?;
+        let bar = begin(printer);
         let result = evaluate(design, vec![document.input], self.tolerance.tolerance)?;
         drop(bar);
         for note in &result.notes {

@@ -10,6 +10,7 @@ use crate::bundle::lambda_file::{
     WiringFile, WorkingPointForces, WorstPointFile,
 };
 use crate::cli::args::{SamplingFlags, SurfaceFlags, Tolerance, Writing};
+use crate::cli::budget::{allow, asked, costs};
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
@@ -183,6 +184,11 @@ impl Lambda {
         if let Some(plot) = &plot {
             plot.check(from_ref(&document.input))?;
         }
+        allow(
+            costs(design, &shapes, self.tolerance.tolerance),
+            asked(&shapes),
+            printer,
+        )?;
         let bar = begin(printer);
         for shape in shapes {
             let inputs = std::iter::once(document.input.clone())

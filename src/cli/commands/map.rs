@@ -9,6 +9,7 @@ use super::{accuracy_check, begin, describe, folder};
 use crate::bundle::manifest::MapSidecar;
 use crate::bundle::write::{MAP_FILES, MapFormats};
 use crate::cli::args::{Tolerance, Writing};
+use crate::cli::budget::{Asked, allow};
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
@@ -17,6 +18,7 @@ use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{bytes, count, error, mm, percent};
 use crate::cli::values::{self, FileArgument};
 use crate::design::{Design, Need, Steel};
+use crate::job::cost;
 use crate::job::map::mag_manip::{FEWEST_NODES, MagManipRequest, MultipolesMade, VectorFieldMade};
 use crate::job::map::{MapReport, MapRequest, run};
 use crate::map::Components;
@@ -332,6 +334,15 @@ impl Map {
             },
             force: self.writing.force,
         };
+        let wanted = request.mag_manip.nodes.filter(|_| self.vfield.is_some());
+        let vector_field = wanted.map(|nodes| cost::of_vector_field(design, nodes));
+        allow(vector_field, Asked::Flag, printer)?;
+        allow(
+            std::iter::once(cost::of_map(design, request.components))
+                .chain(cost::of_steel(design, request.tolerance)),
+            Asked::Document,
+            printer,
+        )?;
         let bar = begin(printer);
         let report = run(design, vec![document.input], &request, &bar)?;
         drop(bar);

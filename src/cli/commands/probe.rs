@@ -12,6 +12,7 @@ use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::bundle::atomic::{self, Overwrite};
 use crate::bundle::read_table::read_columns;
 use crate::cli::args::{Tolerance, Writing};
+use crate::cli::budget::{Asked, allow};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
@@ -21,6 +22,7 @@ use crate::cli::quantity::count;
 use crate::cli::values::FileArgument;
 use crate::design::Need;
 use crate::job::JobError;
+use crate::job::cost::{of_probe, of_steel};
 use crate::job::probe::{ProbeComponents, ProbeRequest, ProbeTable, probe};
 
 mod measured;
@@ -131,8 +133,19 @@ impl Probe {
         {
             overwrite.check(path).map_err(JobError::from)?;
         }
-        let bar = begin(printer);
         let design = &document.design;
+        let parts = match self.components {
+            Components::All => 12,
+            Components::Gradient => 9,
+            Components::Gz => 1,
+        };
+        allow(
+            std::iter::once(of_probe(design, points, parts))
+                .chain(of_steel(design, self.tolerance.tolerance)),
+            Asked::Document,
+            printer,
+        )?;
+        let bar = begin(printer);
         let request = ProbeRequest {
             components,
             force: self.magnet_force,

@@ -117,6 +117,7 @@ pub fn solve(problem: &dyn Smooth, start: [f64; 3]) -> Option<Local> {
     let mut multipliers = vec![0.0; point.rows.len()];
     let mut weight = 1.0_f64;
     for _ in 0..ITERATIONS {
+        crate::progress::poll();
         let Some((found, removed)) = step(problem, &point, b) else {
             break;
         };

@@ -83,7 +83,7 @@ impl ArrayResolution {
     }
 
     /// Unknowns a core.
-    fn unknowns(&self, shape: CoreShape) -> usize {
+    pub(super) fn unknowns(&self, shape: CoreShape) -> usize {
         let panels = |length_m: f64| (length_m / self.panel_m).ceil().max(1.0) as usize;
         let rings = self.order * (panels(shape.length_m()) + 2 * panels(shape.radius_m));
         rings * self.angles()
@@ -400,7 +400,7 @@ pub fn closest_m(positions_m: &[[f64; 2]]) -> f64 {
 }
 
 /// The first coil of every set of equivalent ones.
-fn representatives(cores: usize, symmetries: &[Motion]) -> Vec<usize> {
+pub(super) fn representatives(cores: usize, symmetries: &[Motion]) -> Vec<usize> {
     (0..cores)
         .filter(|coil| symmetries.iter().all(|m| m.coil[*coil] >= *coil))
         .collect()

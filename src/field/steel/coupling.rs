@@ -3,6 +3,7 @@
 
 use nalgebra::{DMatrix, Dyn};
 use rayon::prelude::*;
+use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 
 use super::response::{Response, Ring};
@@ -14,6 +15,10 @@ use crate::units::MU_0_T_M_PER_A;
 
 /// Most applications of the coupling.
 const MOST_STEPS: usize = 120;
+/// Rows of a product that are one piece of work, and most pairs of cores in it; fixed, so that
+/// bytes do not depend on threads.
+const ROWS: usize = 256;
+const PAIRS: usize = 64;
 
 /// What a winding sends to a core's exchange grid, per ampere.
 #[derive(Debug, Clone)]
@@ -151,23 +156,33 @@ impl Coupling {
         let cores = self.cores;
         let problems = moments.ncols() / cores.max(1);
         let size = moments.nrows();
-        // One receiver is one piece of work; its senders are added in order.
-        let received: Vec<DMatrix<f64>> = (0..cores)
-            .into_par_iter()
-            .map(|receiver| {
-                let mut sum = DMatrix::zeros(size, problems);
-                for sender in (0..cores).filter(|s| *s != receiver) {
-                    let block = &self.blocks[self.links.index[receiver * cores + sender]];
-                    let from =
-                        DMatrix::from_fn(size, problems, |i, p| moments[(i, p * cores + sender)]);
-                    sum.gemm(1.0, block, &from, 1.0);
+        let mut received = DMatrix::zeros(size, moments.ncols());
+        // Pairs that share an offset share a product: a matrix is read once for all of them. Offsets
+        // are added in order, whatever the threads.
+        for (block, pairs) in self.blocks.iter().zip(&self.links.pairs) {
+            for pairs in pairs.chunks(PAIRS) {
+                let column = |k: usize, core: usize| k / pairs.len() * cores + core;
+                let from = DMatrix::from_fn(size, pairs.len() * problems, |i, k| {
+                    moments[(i, column(k, pairs[k % pairs.len()].sender))]
+                });
+                let starts: Vec<usize> = (0..size).step_by(ROWS).collect();
+                let products: Vec<DMatrix<f64>> = starts
+                    .par_iter()
+                    .map(|start| {
+                        crate::progress::poll();
+                        block.rows(*start, ROWS.min(size - start)) * &from
+                    })
+                    .collect();
+                for (start, product) in starts.iter().zip(&products) {
+                    for (k, part) in product.column_iter().enumerate() {
+                        let to = column(k, pairs[k % pairs.len()].receiver);
+                        let mut rows = received.view_mut((*start, to), (part.len(), 1));
+                        rows += part;
+                    }
                 }
-                sum
-            })
-            .collect();
-        DMatrix::from_fn(size, moments.ncols(), |i, column| {
-            received[column % cores][(i, column / cores)]
-        })
+            }
+        }
+        received
     }
 }
 
@@ -197,6 +212,7 @@ pub(super) fn between_cores(
     let scale = -TAU / angles as f64 / (4.0 * PI);
     let mut matrix = DMatrix::zeros(points.len(), points.len());
     for (mut column, (y, n)) in matrix.column_iter_mut().zip(points) {
+        crate::progress::poll();
         for (value, (x, _)) in column.iter_mut().zip(points) {
             let d = [
                 x[0] + offset_m[0] - y[0],
@@ -244,6 +260,7 @@ fn from_winding(
             let (dx, dy) = (x[0] + offset_m[0], x[1] + offset_m[1]);
             let r = dx.hypot(dy);
             let (mut potential, mut slope_r, mut slope_z) = (0.0, 0.0, 0.0);
+            crate::progress::poll();
             for (height, sign) in [(0.0, 1.0), (-winding.length_m, -1.0)] {
                 let u = x[2] - height;
                 for (source_r, charge) in &discs {
@@ -283,6 +300,15 @@ struct Links {
     offsets_m: Vec<[f64; 2]>,
     /// [receiver, sender]; meaningless on the diagonal.
     index: Vec<usize>,
+    /// The pairs of every offset, receivers ascending.
+    pairs: Vec<Vec<Pair>>,
+}
+
+/// Two cores, one of which hears the other.
+#[derive(Debug, Clone, Copy)]
+struct Pair {
+    receiver: usize,
+    sender: usize,
 }
 
 impl Links {
@@ -294,22 +320,38 @@ impl Links {
             .iter()
             .flatten()
             .fold(0.0_f64, |e, x| e.max(x.abs()));
-        // Positions from a grid differ by rounding only.
+        // Positions from a grid differ by rounding only: known offsets are found by their cell in a
+        // lattice that is coarse against that, or by a cell beside it.
         let same = |a: f64, b: f64| (a - b).abs() <= 1e-12 * extent;
+        let cell = |x: f64| (x / (1e-9 * extent.max(f64::MIN_POSITIVE))).round() as i64;
+        let mut cells: HashMap<[i64; 2], Vec<usize>> = HashMap::new();
+        let mut pairs: Vec<Vec<Pair>> = Vec::new();
         for receiver in 0..cores {
             for sender in (0..cores).filter(|s| *s != receiver) {
                 let (a, b) = (positions_m[receiver], positions_m[sender]);
                 let offset = [a[0] - b[0], a[1] - b[1]];
-                let known = offsets_m
-                    .iter()
-                    .position(|o| same(o[0], offset[0]) && same(o[1], offset[1]));
-                index[receiver * cores + sender] = known.unwrap_or_else(|| {
+                let at = offset.map(cell);
+                let known = (0..9)
+                    .filter_map(|k| cells.get(&[at[0] + k % 3 - 1, at[1] + k / 3 - 1]))
+                    .flatten()
+                    .filter(|k| (0..2).all(|axis| same(offsets_m[**k][axis], offset[axis])))
+                    .min()
+                    .copied();
+                let number = known.unwrap_or_else(|| {
                     offsets_m.push(offset);
+                    pairs.push(Vec::new());
+                    cells.entry(at).or_default().push(offsets_m.len() - 1);
                     offsets_m.len() - 1
                 });
+                index[receiver * cores + sender] = number;
+                pairs[number].push(Pair { receiver, sender });
             }
         }
-        Self { offsets_m, index }
+        Self {
+            offsets_m,
+            index,
+            pairs,
+        }
     }
 }
 

@@ -58,6 +58,7 @@ pub fn operators(outline: &Generatrix, modes: usize, tolerance: f64) -> Vec<DMat
     // exp(-2 order ln(radius)) <= tolerance
     let far = tolerance.powf(-0.5 / order as f64);
     for (row, target) in outline.nodes.iter().enumerate() {
+        crate::progress::poll();
         let mut mass = 0.0;
         for (index, panel) in outline.panels.iter().enumerate() {
             let Some(aspect) = Aspect::new(target, panel, outline) else {

@@ -510,6 +510,7 @@ impl Targets {
             .map(|(index, current_a)| {
                 let mut values = DMatrix::zeros(COMPONENTS * self.own.len(), columns);
                 for (mode, product) in products.iter().enumerate() {
+                    crate::progress::poll();
                     let mine = columns_of(mode);
                     let width = mine.len();
                     values
@@ -571,6 +572,7 @@ fn scans(curve: &Generatrix, fields: &[Field], nearest_m: f64) -> Vec<Peak> {
 }
 
 fn scan(curve: &Generatrix, field: &Field, nearest_m: f64) -> Peak {
+    crate::progress::poll();
     let order = curve.order;
     let basis = Basis::new(gauss::rule(order));
     let columns = field.values.ncols();

@@ -506,6 +506,7 @@ impl Interior {
 
     /// Element matrix from the weighted tangent's rr, rz and zz components at the nodes.
     fn stiffness(&self, [rr, rz, zz]: &[DMatrix<f64>; 3]) -> DMatrix<f64> {
+        crate::progress::poll();
         let count = self.reference.degree + 1;
         let pairs = count * count;
         let mut right = DMatrix::zeros(4 * count, pairs);

@@ -43,6 +43,7 @@ pub fn gradient_operators(
         .map(|chunk| {
             let mut columns = vec![vec![0.0; chunk.len() * COMPONENTS * nodes]; modes];
             for (place, target) in chunk.iter().enumerate() {
+                crate::progress::poll();
                 let start = place * COMPONENTS * nodes;
                 let mut at: Vec<&mut [f64]> = columns
                     .iter_mut()

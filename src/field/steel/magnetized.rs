@@ -80,6 +80,7 @@ impl MagnetizedCore {
     /// B and its gradient, T and T/m, at radius `r_m` and height `z_m`, off the core's surface.
     #[must_use]
     pub fn field(&self, r_m: f64, z_m: f64) -> AxialField {
+        crate::progress::poll();
         let mut sums = Sums::default();
         let order = self.outline.order;
         let shape = self.outline.shape;

@@ -1,6 +1,7 @@
 //! Steel: cores that the coils magnetise.
 
 pub mod array;
+pub mod array_cost;
 pub mod bh_check;
 pub mod bh_curve;
 pub mod bore;

@@ -175,6 +175,7 @@ impl SaturatedCore {
         let mut secant = SECANT.0;
         let mut status = Status::Stalled;
         while status == Status::Stalled && steps.len() < MAX_STEPS {
+            crate::progress::poll();
             let Some((change, slope)) = self.correction(&state, law, secant) else {
                 break;
             };

@@ -182,6 +182,7 @@ impl ArraySources {
             .enumerate()
             .for_each(|(core, out)| {
                 for drive in 0..drives {
+                    crate::progress::poll();
                     let by_mode = rings.moments(&layers(drive, core));
                     let mut place = 0;
                     for (ring, angles) in angles.iter().enumerate() {
@@ -280,6 +281,7 @@ impl Pass<'_> {
         let count = self.points.len();
         let mut out = vec![0.0; drives * PARTS * count];
         for (group, points) in self.points.chunks(LANES).enumerate() {
+            crate::progress::poll();
             let axis = |i: usize| {
                 Lanes(std::array::from_fn(|lane| {
                     points[lane.min(points.len() - 1)][i]

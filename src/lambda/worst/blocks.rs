@@ -80,6 +80,7 @@ impl Kernel for Enclose<'_> {
         let mut row = vec![0.0; n];
         let mut towards = vec![0.0; n];
         for (k, bounds) in self.bounds.chunks_exact_mut(4 * n).enumerate() {
+            crate::progress::poll();
             let first = self.first + k * BLOCK;
             let last = (first + BLOCK).min(points.height_m.len()) - 1;
             let (start, rest) = bounds.split_at_mut(n);
@@ -293,6 +294,7 @@ impl Kernel for Search<'_> {
         let mut found: Vec<usize> = Vec::new();
         let mut stack: Vec<(usize, f64, f64)> = Vec::new();
         for (k, bounds) in self.bounds.chunks_exact(4 * n).enumerate() {
+            crate::progress::poll();
             let first = self.first + k * BLOCK;
             let last = (first + BLOCK).min(points.height_m.len());
             let root = tree.nodes.len() - 1;

@@ -57,6 +57,7 @@ pub fn felt(
         .collect();
     let (mut lambda, mut best) = (0.0, None::<Maxmin>);
     for _ in 0..PROGRAMS {
+        crate::progress::poll();
         let (mut heights, mut offsets) = (Vec::new(), Vec::new());
         for (j, &h) in problem.height_m.iter().enumerate() {
             let offset = problem.offset_n.map_or(0.0, |offset| offset[j]);

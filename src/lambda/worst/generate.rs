@@ -125,6 +125,7 @@ impl<'a> Search<'a> {
         let form = self.form;
         let mut working = self.working.clone();
         for _ in 0..ROUNDS {
+            crate::progress::poll();
             let near = match &self.pool {
                 Some(pool) => pool.points(self.all.coils),
                 None => self.all,

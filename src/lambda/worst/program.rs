@@ -171,6 +171,7 @@ impl Program {
         // Far more than there are turns: it ends what rounding keeps going in circles.
         let limit = 20_000 + 1000 * self.width;
         for _ in 0..limit {
+            crate::progress::poll();
             vertex.place(self, lambda);
             let cautious = exchanges_here > patience;
             let (mut entering, mut next) = self.look(&vertex, lambda, cautious);
@@ -178,6 +179,7 @@ impl Program {
             // A step without end is never taken before the last of them.
             let mut asked = 0;
             while entering.is_none() && (asked < TWINS || next.is_none()) {
+                crate::progress::poll();
                 let stand = Stand {
                     lambda,
                     z: &vertex.z,

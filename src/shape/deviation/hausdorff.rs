@@ -218,6 +218,7 @@ impl Search<'_> {
         }
         let mut looked = 0;
         while let Some(Open { bound_m, part, .. }) = open.pop() {
+            crate::progress::poll();
             if bound_m <= self.enough_m() || looked >= MOST {
                 return Ok(bound_m.max(self.enough_m()));
             }
@@ -360,6 +361,7 @@ impl Search<'_> {
         }
         let mut looked = 0;
         while let Some(Open { bound_m, part, .. }) = open.pop() {
+            crate::progress::poll();
             if bound_m <= self.enough_m() || looked >= MOST {
                 return Ok(bound_m.max(self.enough_m()));
             }

@@ -15,6 +15,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use monstertruck_io::step::load::Table;
 use monstertruck_meshing::prelude::*;
 
+use crate::progress::pass_interruption;
 use crate::shape::assembly::{Affine, Body, lay_out};
 use crate::shape::fault::ReadError;
 use crate::shape::mesh::{FileMesh, Triangle};
@@ -57,7 +58,8 @@ fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     GUARDED.fetch_add(1, Ordering::SeqCst);
     let caught = catch_unwind(AssertUnwindSafe(work));
     GUARDED.fetch_sub(1, Ordering::SeqCst);
-    caught.unwrap_or_else(|_| {
+    caught.unwrap_or_else(|panic| {
+        pass_interruption(&*panic);
         Err("its reader stopped on an entity that is damaged or beyond it".into())
     })
 }

@@ -42,6 +42,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<FileMesh, StlError> {
     let mut warnings = Vec::new();
     let mut solids = 0;
     while let Some(word) = reader.words.next() {
+        crate::progress::poll();
         reader.triangle = 0;
         if !is(Some(word), "solid") {
             return Err(reader.unexpected("`solid`", Some(word)));

@@ -52,6 +52,7 @@ pub(super) fn read_from(
     let mut found = Records::with_capacity(left);
     let mut piece = vec![0; RECORD * left.min(PIECE)];
     while left > 0 {
+        crate::progress::poll();
         let records = left.min(PIECE);
         let piece = &mut piece[..RECORD * records];
         source.read_exact(piece)?;

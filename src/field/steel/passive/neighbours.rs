@@ -137,6 +137,7 @@ impl Neighbours {
     }
 
     fn along<const N: usize>(&self, at_m: [f64; 3], axes: [usize; N]) -> [f64; N] {
+        crate::progress::poll();
         let kept = self.reduce.nrows();
         let mut seen = DMatrix::zeros(kept * self.positions_m.len(), 1 + N);
         let mut grid = DMatrix::zeros(self.points.len(), 1 + N);
@@ -266,6 +267,7 @@ impl Basis {
 
 /// 1/(4 pi |x - y|) from the grid of one core to that of a core at `offset_m` from it.
 fn inverse_distances(points: &Points, offset_m: [f64; 2]) -> DMatrix<f64> {
+    crate::progress::poll();
     DMatrix::from_fn(points.len(), points.len(), |row, column| {
         let (x, y) = (points[row].0, points[column].0);
         let d = minus([x[0] + offset_m[0], x[1] + offset_m[1], x[2]], y);
@@ -275,6 +277,7 @@ fn inverse_distances(points: &Points, offset_m: [f64; 2]) -> DMatrix<f64> {
 
 /// The normal derivative of [`inverse_distances`] by the receiver.
 fn normal_derivatives(points: &Points, offset_m: [f64; 2]) -> DMatrix<f64> {
+    crate::progress::poll();
     DMatrix::from_fn(points.len(), points.len(), |row, column| {
         let ((x, n), y) = (points[row], points[column].0);
         let d = minus([x[0] + offset_m[0], x[1] + offset_m[1], x[2]], y);

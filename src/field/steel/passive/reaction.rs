@@ -186,6 +186,7 @@ impl Reaction {
     /// The energy of `dipoles` and the layer they cause, J.
     #[must_use]
     pub fn energy_j(&self, dipoles: &[Dipole]) -> f64 {
+        crate::progress::poll();
         let (mut potential, mut normal) = (self.zeros(), self.zeros());
         for (((x, n), phi), slope) in self
             .points
@@ -221,6 +222,7 @@ impl Reaction {
     /// The field that the steel sends back to each of `dipoles`, all of them acting together.
     #[must_use]
     pub fn induced(&self, dipoles: &[Dipole]) -> Vec<Induced> {
+        crate::progress::poll();
         let mut potential = self.zeros();
         for ((x, _), phi) in self.points.iter().zip(potential.as_mut_slice()) {
             for dipole in dipoles {

@@ -1,0 +1,153 @@
+//! How much memory a run may take: a share of what the machine has free, or what `--memory` grants.
+
+use std::path::Path;
+use std::sync::OnceLock;
+
+use super::failure::Failure;
+use super::printer::Printer;
+use super::quantity::bytes;
+use crate::design::Design;
+use crate::job::JobError;
+use crate::job::calibrate::ShapeSource;
+use crate::job::cost::{Cost, of_points, of_steel};
+
+/// Share of the free memory that a run takes unasked.
+const SHARE: f64 = 0.75;
+/// Where the system does not say what is free: the memory of a small machine.
+const UNKNOWN_BYTES: f64 = 4e9;
+/// Computations that are expected to take longer are announced, s.
+const LONG_S: f64 = 60.0;
+
+static GRANTED: OnceLock<u64> = OnceLock::new();
+
+/// Grants `--memory`.
+pub fn grant(memory: Option<u64>) {
+    if let Some(memory) = memory {
+        let _ = GRANTED.set(memory);
+    }
+}
+
+/// Whether what was asked for comes from a document or from a flag of the command line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Asked {
+    /// A design or shape file.
+    Document,
+    /// A flag.
+    Flag,
+}
+
+/// Who asks for the points of `shapes`: the flags of a surface given directly, or a file.
+#[must_use]
+pub fn asked(shapes: &[ShapeSource]) -> Asked {
+    if shapes.iter().any(|shape| shape.input.is_none()) {
+        Asked::Flag
+    } else {
+        Asked::Document
+    }
+}
+
+/// What forces of `design` at the points of `shapes` take.
+#[must_use]
+pub fn costs(design: &Design, shapes: &[ShapeSource], tolerance: Option<f64>) -> Vec<Cost> {
+    let coils = design.array.positions_m.len();
+    let points = shapes.iter().map(|s| of_points(&s.document, coils));
+    points.chain(of_steel(design, tolerance)).collect()
+}
+
+/// Refuses costs that exceed the budget, and announces long ones.
+///
+/// # Errors
+/// More memory than allowed: a bad input where a document asks for it, wrong usage where a flag does.
+pub fn allow(
+    costs: impl IntoIterator<Item = Cost>,
+    asked: Asked,
+    printer: &Printer,
+) -> Result<(), Failure> {
+    let granted = GRANTED.get().copied();
+    let budget = granted.map_or_else(|| SHARE * available_bytes(), |granted| granted as f64);
+    for cost in costs {
+        if cost.bytes > budget {
+            let limit = match granted {
+                Some(_) => "--memory grants",
+                None => "three quarters of what this machine has free are",
+            };
+            let message = format!(
+                "{} would take about {} of memory, and {limit} {}; {}, or grant more with \
+                 --memory {}",
+                cost.what,
+                bytes(cost.bytes as u64),
+                bytes(budget as u64),
+                cost.reduce,
+                bytes((1.1 * cost.bytes) as u64).replace(' ', ""),
+            );
+            return Err(match asked {
+                Asked::Flag => Failure::Usage(message),
+                Asked::Document => JobError::Input(message).into(),
+            });
+        }
+        let seconds = cost.cpu_seconds / rayon::current_num_threads() as f64;
+        if seconds > LONG_S {
+            printer.notice(&format!(
+                "{} will take about {:.0} min and {}; Ctrl-C stops it",
+                cost.what,
+                (seconds / 60.0).ceil(),
+                bytes(cost.bytes as u64)
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Bytes that this process may still take: the least of the machine's free memory, the limit of its
+/// control group and that of the process.
+fn available_bytes() -> f64 {
+    let machine = || {
+        let text = read("/proc/meminfo")?;
+        let line = text.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
+        let kibibytes: f64 = line.split_whitespace().next()?.parse().ok()?;
+        Some(1024.0 * kibibytes)
+    };
+    let process = || {
+        let text = read("/proc/self/limits")?;
+        let line = text
+            .lines()
+            .find_map(|l| l.strip_prefix("Max address space"))?;
+        line.split_whitespace().next()?.parse::<f64>().ok()
+    };
+    let group = |limit: &str, used: &str| {
+        let limit: f64 = read(limit)?.trim().parse().ok()?;
+        let used: f64 = read(used)?.trim().parse().ok()?;
+        Some((limit - used).max(0.0))
+    };
+    let found = [
+        machine(),
+        process(),
+        group("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
+        group(
+            "/sys/fs/cgroup/memory/memory.limit_in_bytes",
+            "/sys/fs/cgroup/memory/memory.usage_in_bytes",
+        ),
+    ];
+    let least = found.into_iter().flatten().fold(f64::INFINITY, f64::min);
+    if least.is_finite() {
+        least
+    } else {
+        UNKNOWN_BYTES
+    }
+}
+
+fn read(path: &str) -> Option<String> {
+    std::fs::read_to_string(Path::new(path)).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn some_memory_is_free_and_no_more_than_there_is() {
+        let free = available_bytes();
+        assert!(free > 1e6 && free < 1e15, "{free}");
+    }
+}

@@ -1,0 +1,53 @@
+//! What solving an array of coupled cores takes, from its shape alone.
+
+use super::CoreShape;
+use super::array::{ArrayResolution, representatives};
+use super::coupling::different_offsets;
+use super::symmetry::motions;
+
+/// Cores of which offsets and symmetries are counted; of more, bounds are used.
+const COUNTED: usize = 1500;
+/// Applications of the coupling that a solution takes, about.
+const STEPS: f64 = 15.0;
+/// Solutions: the coarse and the fine one.
+const SOLUTIONS: f64 = 2.0;
+const NUMBER_BYTES: f64 = 8.0;
+/// Bytes of a pair of cores in the table of offsets.
+const PAIR_BYTES: f64 = 24.0;
+
+/// Memory and work of one array.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ArrayCost {
+    /// Peak memory, bytes.
+    pub bytes: f64,
+    /// Additions and multiplications of the largest products.
+    pub operations: f64,
+}
+
+impl ArrayCost {
+    /// The cost of cores of `shape` at `positions_m`, the closest two of them `closest_m` apart, to
+    /// a relative `tolerance`. Right within a factor of about three; of more than 1500 cores a
+    /// lower bound.
+    #[must_use]
+    pub fn new(shape: CoreShape, positions_m: &[[f64; 2]], closest_m: f64, tolerance: f64) -> Self {
+        let cores = positions_m.len();
+        let (offsets, drives) = if cores <= COUNTED {
+            let drives = representatives(cores, &motions(positions_m)).len();
+            (different_offsets(positions_m), drives)
+        } else {
+            (cores, cores.div_ceil(8))
+        };
+        let resolution = ArrayResolution::for_tolerance(tolerance, shape, closest_m)
+            .within_memory(shape, offsets);
+        let size = resolution.unknowns(shape) as f64;
+        let (cores, offsets, drives) = (cores as f64, offsets as f64, drives as f64);
+        let matrices = (offsets + 1.0) * size * size;
+        let potentials = SOLUTIONS * cores * cores * size;
+        let steps = (STEPS + 4.0) * drives * cores * size;
+        Self {
+            bytes: NUMBER_BYTES * (matrices + potentials + steps) + PAIR_BYTES * cores * cores,
+            operations: SOLUTIONS
+                * (STEPS * 2.0 * size * size * cores * cores * drives + 10.0 * matrices),
+        }
+    }
+}

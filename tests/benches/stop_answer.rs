@@ -1,0 +1,268 @@
+//! How long every command takes to answer SIGTERM, whenever it comes: a table of the longest answer
+//! and the peak memory until then. `FLUXFORM=path` measures another binary.
+#![allow(clippy::print_stdout)] // the table
+#![allow(clippy::disallowed_methods)] // own files, and wall time
+
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+/// When the signals are sent, s.
+const AFTER_S: [f64; 8] = [0.1, 0.3, 0.6, 1.0, 1.7, 3.0, 5.0, 8.0];
+/// An answer that takes longer is not waited for, s.
+const MOST_S: f64 = 30.0;
+
+const CASES: &[(&str, &[&str])] = &[
+    ("steel, 9 cores of 1 m", &["evaluate", "long.toml"]),
+    ("steel, 20 x 20 cores", &["evaluate", "many.toml"]),
+    (
+        "steel, saturated array",
+        &["evaluate", "designs/seed_1010.toml"],
+    ),
+    (
+        "steel and map, 1 m",
+        &["map", "long.toml", "--out", "m", "--force"],
+    ),
+    (
+        "probe, 20 x 20 cores",
+        &["probe", "many.toml", "points.csv"],
+    ),
+    (
+        "map, 120^3 nodes, all",
+        &[
+            "map",
+            "fine.toml",
+            "--components",
+            "all",
+            "--out",
+            "n",
+            "--force",
+        ],
+    ),
+    (
+        "points, 6e6",
+        &[
+            "discretize",
+            "shapes/half_sphere.stl",
+            "--unit",
+            "mm",
+            "--grid",
+            "2500x2500",
+            "--out",
+            "p.csv",
+            "--force",
+        ],
+    ),
+    (
+        "points, graded",
+        &[
+            "discretize",
+            "shapes/half_sphere.stl",
+            "--unit",
+            "mm",
+            "--max-deviation",
+            "0.0005",
+            "--out",
+            "q.csv",
+            "--force",
+        ],
+    ),
+    (
+        "forces and path, 6e6 points",
+        &[
+            "lambda",
+            "designs/seed.toml",
+            "shapes/half_sphere.stl",
+            "--unit",
+            "mm",
+            "--translate",
+            "0,0,30",
+            "--grid",
+            "2500x2500",
+        ],
+    ),
+    (
+        "worst-point path, 64 coils",
+        &["lambda", "air.toml", "shapes/flat.toml"],
+    ),
+    (
+        "calibrate, cored",
+        &[
+            "calibrate",
+            "designs/seed.toml",
+            "shapes/half_sphere.stl",
+            "--unit",
+            "mm",
+            "--translate",
+            "0,0,30",
+            "--grid",
+            "1000x1000",
+            "--out",
+            "r",
+            "--no-cache",
+            "--force",
+        ],
+    ),
+    (
+        "compare",
+        &[
+            "compare",
+            "many.toml",
+            "shapes/flat.toml",
+            "shapes/wedge.toml",
+        ],
+    ),
+    ("optimize, cored", &["optimize", "designs/seed.toml"]),
+    (
+        "optimize, cored, wound",
+        &["optimize", "designs/seed.toml", "--wound"],
+    ),
+    (
+        "sweep run, optimised",
+        &["sweep", "run", "plan.json", "--out", "s"],
+    ),
+    (
+        "bench --quick",
+        &["bench", "--quick", "--out", "b", "--force"],
+    ),
+    (
+        "bench --extreme",
+        &["bench", "--extreme", "--out", "e", "--force"],
+    ),
+    ("verify", &["verify", "bundle/seed/wedge"]),
+    (
+        "replay, 1e6 positions",
+        &[
+            "replay",
+            "bundle/seed/wedge",
+            "walk.csv",
+            "--out",
+            "w.csv",
+            "--force",
+        ],
+    ),
+];
+
+fn main() {
+    let binary =
+        std::env::var("FLUXFORM").unwrap_or_else(|_| env!("CARGO_BIN_EXE_fluxform").to_owned());
+    let folder = tempfile::tempdir().unwrap();
+    prepare(&binary, folder.path());
+    println!(
+        "{:<30} {:>8} {:>10} {:>9}  exit codes",
+        "stage", "signals", "longest ms", "peak MB"
+    );
+    for (stage, args) in CASES {
+        let (mut sent, mut longest_s, mut peak_kb) = (0, 0.0_f64, 0);
+        let mut codes = Vec::new();
+        for after_s in AFTER_S {
+            let mut child = run(&binary, folder.path(), args);
+            sleep(Duration::from_secs_f64(after_s));
+            if child.try_wait().unwrap().is_some() {
+                continue;
+            }
+            peak_kb = peak_kb.max(peak(&child));
+            let (answer_s, code) = answer(&mut child);
+            sent += 1;
+            longest_s = longest_s.max(answer_s);
+            codes.push(code);
+        }
+        codes.sort_unstable();
+        codes.dedup();
+        let (ms, mb) = (1e3 * longest_s, peak_kb as f64 / 1024.0);
+        println!("{stage:<30} {sent:>8} {ms:>10.0} {mb:>9.0}  {codes:?}");
+    }
+}
+
+fn run(binary: &str, folder: &Path, args: &[&str]) -> Child {
+    let mut command = Command::new(binary);
+    command.args(args).current_dir(folder);
+    command
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap()
+}
+
+/// Seconds until the process has ended after SIGTERM, and its exit code; `None`: it had to be killed.
+fn answer(child: &mut Child) -> (f64, Option<i32>) {
+    let sent = Instant::now();
+    let pid = child.id().to_string();
+    Command::new("kill").args(["-TERM", &pid]).status().unwrap();
+    loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            return (sent.elapsed().as_secs_f64(), status.code());
+        }
+        if sent.elapsed().as_secs_f64() > MOST_S {
+            child.kill().unwrap();
+            child.wait().unwrap();
+            return (sent.elapsed().as_secs_f64(), None);
+        }
+        sleep(Duration::from_millis(2));
+    }
+}
+
+/// Peak resident memory, KiB; 0 where the system does not say.
+fn peak(child: &Child) -> u64 {
+    let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    line.and_then(|line| line.split_whitespace().next()?.parse().ok())
+        .unwrap_or(0)
+}
+
+fn prepare(binary: &str, folder: &Path) {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for name in ["designs", "shapes"] {
+        std::os::unix::fs::symlink(root.join(name), folder.join(name)).unwrap();
+    }
+    let seed = fs::read_to_string(root.join("designs/seed.toml")).unwrap();
+    let air = fs::read_to_string(root.join("designs/seed_air.toml")).unwrap();
+    let array = |text: &str, count: usize| {
+        text.replace("rows = 3", &format!("rows = {count}"))
+            .replace("columns = 3", &format!("columns = {count}"))
+            .replace("total_current_max_a = 18.0", "")
+    };
+    let fine = air.replace(", 61]", ", 120]").replace(", 29]", ", 120]");
+    let write = |name: &str, text: &str| fs::write(folder.join(name), text).unwrap();
+    write(
+        "long.toml",
+        &seed.replace("\nlength_mm = 100.0", "\nlength_mm = 1000.0"),
+    );
+    write("many.toml", &array(&seed, 20));
+    write("air.toml", &array(&air, 8));
+    write("fine.toml", &fine);
+    write("points.csv", "x_m,y_m,z_m\n0.001,0.002,0.03\n");
+    let mut walk = String::from("t_s,x_m,y_m,z_m\n");
+    for k in 0..1_000_000 {
+        let x = f64::from(k % 900) * 1e-4 - 0.045;
+        walk += &format!("{},{x},0.001,0.05\n", f64::from(k) * 1e-3);
+    }
+    write("walk.csv", &walk);
+    for args in [
+        &[
+            "calibrate",
+            "designs/seed.toml",
+            "shapes/wedge.toml",
+            "--out",
+            "bundle",
+            "--no-report",
+        ][..],
+        &[
+            "sweep",
+            "plan",
+            "designs/seed.toml",
+            "--optimize",
+            "--set",
+            "target.height_mm=20:40:0.5",
+            "--out",
+            "plan.json",
+        ],
+    ] {
+        assert!(
+            run(binary, folder, args).wait().unwrap().success(),
+            "{args:?}"
+        );
+    }
+}

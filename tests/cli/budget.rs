@@ -1,0 +1,86 @@
+//! What would take more memory than there is, is refused before anything is computed.
+
+use crate::support::{Place, SEED};
+
+/// 7 GB and more of a map, 1e8 points, 1e9 nodes: the run once computed until it was killed.
+#[test]
+fn too_large_a_job_is_refused_at_once() {
+    let place = Place::new();
+    let seed = place.seed();
+    let fine = seed
+        .replace("-50.0, 50.0, 61]", "-50.0, 50.0, 460]")
+        .replace("10.0, 80.0, 29]", "10.0, 80.0, 460]");
+    assert_ne!(seed, fine);
+    place.write("fine.toml", &fine);
+    let grant = ["--memory", "6GB"];
+    let run = |args: &[&str], code: i32, what: &str| {
+        let ran = place.run(&[args, &grant[..]].concat()).ends(code);
+        assert!(ran.err.contains(what), "{}", ran.err);
+        assert!(ran.err.contains("--memory"), "{}", ran.err);
+    };
+    run(&["map", "fine.toml"], 3, "460 x 460 x 460 nodes");
+    run(&["map", "fine.toml", "--components", "all"], 3, "nodes");
+    run(
+        &["calibrate", "fine.toml", "shapes/flat.toml"],
+        3,
+        "460 x 460 x 460 nodes",
+    );
+    let huge = ["--vfield", "v.yaml", "--vfield-nodes", "1000000000"];
+    run(
+        &[&["map", SEED][..], &huge[..]].concat(),
+        2,
+        "--vfield-nodes",
+    );
+    let grid = [
+        "shapes/half_sphere.stl",
+        "--unit",
+        "mm",
+        "--grid",
+        "10000x10000",
+    ];
+    run(
+        &[&["lambda", SEED][..], &grid[..]].concat(),
+        2,
+        "10000 x 10000 points",
+    );
+    run(
+        &[&["discretize"][..], &grid[..], &["--out", "p.csv"]].concat(),
+        2,
+        "points",
+    );
+    let dense = seed
+        .replace("rows = 3", "rows = 100")
+        .replace("columns = 3", "columns = 100");
+    let dense = dense.replace("total_current_max_a = 18.0", "");
+    place.write("dense.toml", &format!("{dense}\n[core]\n"));
+    run(&["evaluate", "dense.toml"], 3, "10000 coupled cores");
+}
+
+/// The plan of 100 x 100 cores solved the whole array, and said nothing for minutes.
+#[test]
+fn a_plan_solves_no_array() {
+    let place = Place::new();
+    let dense = place
+        .seed()
+        .replace("rows = 3", "rows = 100")
+        .replace("columns = 3", "columns = 100")
+        .replace("total_current_max_a = 18.0", "")
+        .replace(", 61]", ", 31]");
+    place.write("dense.toml", &format!("{dense}\n[core]\n"));
+    // The plan is printed, then the run is refused.
+    let args = [
+        "calibrate",
+        "dense.toml",
+        "shapes/flat.toml",
+        "--explain",
+        "--memory",
+        "2GB",
+    ];
+    let ran = place.run(&args).ends(3);
+    assert!(
+        ran.out.contains("coupling between the cores"),
+        "{}",
+        ran.out
+    );
+    assert!(ran.err.contains("10000 coupled cores"), "{}", ran.err);
+}
