@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::artefact::{FileEntry, Input};
+use super::artefact::{FileEntry, Input, sha256_hex};
+use super::json::to_json;
 use crate::accuracy::StageAccuracy;
 use crate::numerics::axis::Axis;
 
@@ -71,6 +72,21 @@ pub struct MadeWith {
     /// Unit, placement and grid of a surface that was given directly, without a shape file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub surface: Option<SurfaceOptions>,
+    /// SHA-256 of these options in canonical JSON, this key empty: an option that changes nothing
+    /// else in a bundle is not edited unnoticed either.
+    pub sha256: String,
+}
+
+impl MadeWith {
+    /// The digest of these options.
+    #[must_use]
+    pub fn digest(&self) -> String {
+        let bare = Self {
+            sha256: String::new(),
+            ..self.clone()
+        };
+        to_json(&bare).map_or_else(|_| String::new(), |text| sha256_hex(&text))
+    }
 }
 
 /// What the command line says of a surface that is given directly.

@@ -423,13 +423,16 @@ fn made_with(options: &CalibrateOptions, shape: &ShapeSource) -> MadeWith {
         }
         (Some(_), _) | (None, SurfaceSource::Primitive(_)) => None,
     };
-    MadeWith {
+    let mut made_with = MadeWith {
         tolerance: options.lambda.tolerance,
         reach_m: options.reach_m,
         report: options.page,
         arithmetic: arithmetic(),
         surface,
-    }
+        sha256: String::new(),
+    };
+    made_with.sha256 = made_with.digest();
+    made_with
 }
 
 /// The unpowered steel's pull on the map's nodes, where the design asks for it.

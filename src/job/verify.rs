@@ -339,10 +339,11 @@ impl Bounds {
         Self {
             forces: claimed.forces.min(CLAIMED_MAX),
             map: claimed.map.min(CLAIMED_MAX),
-            between: claimed.between.min(CLAIMED_MAX),
+            // Nodes that are right leave nothing to claim between them.
+            between: claimed.between.min(1.0),
             pull: claimed.pull.min(CLAIMED_MAX),
             pull_map: claimed.pull_map.min(CLAIMED_MAX),
-            pull_between: claimed.pull_between.min(CLAIMED_MAX),
+            pull_between: claimed.pull_between.min(1.0),
         }
     }
 }
@@ -369,6 +370,10 @@ fn inputs_agree(bundle: &Bundle, sources: &Sources) -> Check {
         if !same {
             faults.push(format!("manifest.json and lambda.json differ in {what}"));
         }
+    }
+    let made_with = manifest.made_with.as_ref();
+    if made_with.is_some_and(|made| made.sha256 != made.digest()) {
+        faults.push("the options in made_with do not have their digest".to_owned());
     }
     let how = if faults.is_empty() {
         "the files that the bundle names as inputs, and the copies it keeps".to_owned()

@@ -8,7 +8,7 @@ use fluxform::bundle::artefact::{FileEntry, Input, arithmetic, sha256_hex};
 use fluxform::bundle::json::to_json;
 use fluxform::bundle::lambda_file::LambdaFile;
 use fluxform::bundle::load::Bundle;
-use fluxform::bundle::manifest::{LeftOut, Manifest};
+use fluxform::bundle::manifest::{LeftOut, MadeWith, Manifest};
 use fluxform::bundle::npz::{MapArrays, to_npz};
 use fluxform::bundle::rendering::HeightGrid;
 use fluxform::bundle::table::{CurrentRow, PointRow, write_currents, write_points};
@@ -23,7 +23,7 @@ use crate::sample::temporary;
 const DESIGN: &str = "name = \"small\"\n[coil]\ninner_diameter_mm = 24\nouter_diameter_mm = 38\n\
                       length_mm = 70\n[wire]\ndiameter_mm = 0.7\n[array]\nrows = 1\ncolumns = 2\n\
                       pitch_mm = 50\n[supply]\ncurrent_max_a = 2\nvoltage_v = 36\n[workspace]\n\
-                      x_mm = [-40, 40, 6]\ny_mm = [-30, 30, 5]\nz_mm = [20, 60, 5]\n";
+                      x_mm = [-40, 40, 6]\ny_mm = [-30, 30, 5]\nz_mm = [20, 60, 9]\n";
 const SHAPE: &str = "name = \"slope\"\nprimitive = \"wedge\"\nlow_mm = 31\nhigh_mm = 43\n[points]\n\
                      x_mm = [-37, 37, 5]\ny_mm = [-23, 23, 4]\n";
 
@@ -88,6 +88,10 @@ impl Parts {
         }
     }
 
+    fn options(&mut self) -> &mut MadeWith {
+        self.manifest.made_with.as_mut().unwrap()
+    }
+
     /// Writes all parts with fitting sizes and digests, as the program itself writes them.
     fn write(&self, folder: &Path) {
         let mut map = to_npz(&self.map).unwrap();
@@ -102,6 +106,9 @@ impl Parts {
         files.insert("lambda.json".to_owned(), to_json(&self.lambda).unwrap());
         files.extend(self.others.clone());
         let mut manifest = self.manifest.clone();
+        if let Some(made_with) = &mut manifest.made_with {
+            made_with.sha256 = made_with.digest();
+        }
         manifest.files.retain(|file| files.contains_key(&file.path));
         for (name, bytes) in &files {
             let (bytes, sha256) = (bytes.len() as u64, sha256_hex(bytes));
@@ -435,13 +442,13 @@ const FORGERIES: &[Forgery] = &[
         p.manifest.left_out[0].error_cost = 0.5
     }),
     ("the tolerance of the run", Noticed, |p| {
-        p.manifest.made_with.as_mut().unwrap().tolerance = Some(1e-3);
+        p.options().tolerance = Some(1e-3);
     }),
     ("the reach of the map", Noticed, |p| {
-        p.manifest.made_with.as_mut().unwrap().reach_m = 1e-3;
+        p.options().reach_m = 1e-3;
     }),
     ("a report that was not requested", Noticed, |p| {
-        p.manifest.made_with.as_mut().unwrap().report = false;
+        p.options().report = false;
     }),
     ("a report removed", Noticed, |p| {
         p.others.remove("report.html");
