@@ -194,7 +194,11 @@ const CASES: &[Case] = &[
         &["sweep", "merge", "plan.json", "points"],
         &["2 of 2 points are missing", "sweep run", "--partial"],
     ),
-    ("E501", &["verify", "edited"], &["edited", "failed", "inputs"]),
+    (
+        "E501",
+        &["verify", "edited"],
+        &["edited", "failed", "inputs"],
+    ),
     (
         "E502",
         &["verify", "cut"],

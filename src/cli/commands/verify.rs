@@ -57,11 +57,9 @@ impl Verify {
         }
         let json = printer.with_warnings(&report);
         printer.summary(Place::Output, &json, || self.summary(&report))?;
-        let failed: Vec<&str> = report
-            .checks
-            .iter()
-            .filter(|check| !check.passed)
-            .map(|check| check.name)
+        let failed = report.checks.iter().filter(|check| !check.passed);
+        let failed: Vec<String> = failed
+            .map(|check| format!("{} ({})", check.name, check.how))
             .collect();
         if report.passed {
             return Ok(());
