@@ -15,7 +15,7 @@ use serde::Deserialize;
 use super::artefact::{FileEntry, check_version, sha256_hex};
 use super::atomic::check_name;
 use super::consistent;
-use super::json::{fault, to_json};
+use super::json::fault;
 use super::lambda_file::LambdaFile;
 use super::manifest::Manifest;
 use super::npz::{MapArrays, from_npz};
@@ -102,8 +102,6 @@ pub struct Bundle {
     pub lambda: LambdaFile,
     /// Digest of `manifest.json`, which holds those of all other files.
     pub manifest_sha256: String,
-    /// Whether `manifest.json` is byte for byte what this program writes for its content.
-    pub manifest_canonical: bool,
 }
 
 impl Bundle {
@@ -119,7 +117,6 @@ impl Bundle {
         let manifest_path = folder.join("manifest.json");
         let (manifest, text) = read_manifest(folder, &manifest_path)?;
         let manifest_sha256 = sha256_hex(&text);
-        let manifest_canonical = to_json(&manifest).is_ok_and(|ours| ours == text);
         drop(text);
         let listed = Listed {
             folder,
@@ -171,7 +168,6 @@ impl Bundle {
                 .map_err(|error| content(lambda, fault(&error)))?,
             manifest,
             manifest_sha256,
-            manifest_canonical,
         };
         consistent::check(
             &bundle.manifest,
