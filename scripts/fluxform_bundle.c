@@ -28,6 +28,16 @@
 
 #define SCHEMA_MAJOR 1
 #define MAX_DIMENSIONS 6
+#define MAX_ENTRIES 64
+
+/* Larger files are none of ours; of one beyond HOLES_FROM at least one byte in HOLES_SHARE lies on
+ * the disk: a file of holes takes far more memory than it took to make. */
+#define FILE_MAX 0x100000000u
+#define HOLES_FROM (16 << 20)
+#define HOLES_SHARE 64
+#ifdef __linux__
+#define WHENCE_HOLE 4
+#endif
 
 /* ---- the file in memory -------------------------------------------------------------------- */
 
@@ -36,6 +46,7 @@ typedef struct {
     size_t size;
     char *message;
     size_t message_size;
+    size_t directory, entries; /* known once check_archive has passed */
 } archive;
 
 static int fail(const archive *a, const char *name, const char *what)
@@ -68,6 +79,21 @@ static double f64(const unsigned char *p)
     return value;
 }
 
+#ifdef HAS_POSIX
+static int has_holes(int descriptor, const struct stat *facts)
+{
+#ifdef WHENCE_HOLE
+    /* Some file systems count blocks late; they know of no hole then. */
+    return facts->st_size > HOLES_FROM && facts->st_size / HOLES_SHARE / 512 > facts->st_blocks &&
+           (lseek(descriptor, 0, WHENCE_HOLE) < facts->st_size || lseek(descriptor, 0, SEEK_SET) != 0);
+#else
+    (void)descriptor;
+    (void)facts;
+    return 0;
+#endif
+}
+#endif
+
 /* Opens a plain file: a pipe would keep its reader waiting, a link may lead out of the bundle. */
 static FILE *open_plain(const char *path)
 {
@@ -77,7 +103,8 @@ static FILE *open_plain(const char *path)
     int descriptor = open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK);
     if (descriptor < 0)
         return NULL;
-    if (fstat(descriptor, &facts) != 0 || !S_ISREG(facts.st_mode) || !(file = fdopen(descriptor, "rb"))) {
+    if (fstat(descriptor, &facts) != 0 || !S_ISREG(facts.st_mode) || has_holes(descriptor, &facts) ||
+        !(file = fdopen(descriptor, "rb"))) {
         close(descriptor);
         return NULL;
     }
@@ -93,12 +120,14 @@ static unsigned char *read_file(const char *path, size_t *size, const archive *a
     unsigned char *data = NULL;
     long length = -1;
     if (!file) {
-        fail(a, path, "cannot be opened, or is a link or no plain file");
+        fail(a, path, "cannot be opened, or is a link, full of holes or no plain file");
         return NULL;
     }
     if (fseek(file, 0, SEEK_END) == 0)
         length = ftell(file);
-    if (length <= 0 || length == LONG_MAX || fseek(file, 0, SEEK_SET) != 0)
+    if (length > 0 && (uint64_t)length > FILE_MAX)
+        fail(a, path, "is larger than 4 GiB");
+    else if (length <= 0 || length == LONG_MAX || fseek(file, 0, SEEK_SET) != 0)
         fail(a, path, "cannot be read");
     else if (!(data = malloc((size_t)length)))
         fail(a, path, "does not fit into memory");
@@ -135,55 +164,82 @@ typedef struct {
     size_t count;
 } array;
 
-/* The bytes of an entry: 1 found, 0 absent, -1 damaged. */
+/* The directory's part at `at`, before `end`; how long it is, or 0 where it is damaged. */
+static size_t head_at(const archive *a, size_t at, size_t end)
+{
+    size_t step;
+    if (end - at < 46 || u32(a->data + at) != 0x02014b50u)
+        return 0;
+    step = (size_t)46 + u16(a->data + at + 28) + u16(a->data + at + 30) + u16(a->data + at + 32);
+    return end - at < step ? 0 : step;
+}
+
+/* An entry's bytes, stored as they are between the file's start and the directory. */
+static int entry_at(const archive *a, size_t at, const unsigned char **data, size_t *size)
+{
+    const unsigned char *head = a->data + at;
+    size_t stored = u32(head + 20), local = u32(head + 42), begin;
+    if (u16(head + 10) != 0 || (u16(head + 8) & 1) || stored != u32(head + 24))
+        return fail(a, "", "an entry is compressed, encrypted or larger than 4 GiB");
+    if (local > a->directory || a->directory - local < 30 || u32(a->data + local) != 0x04034b50u)
+        return fail(a, "", "an entry lies outside the file");
+    begin = (size_t)30 + u16(a->data + local + 26) + u16(a->data + local + 28);
+    if (a->directory - local < begin || a->directory - local - begin < stored)
+        return fail(a, "", "an entry lies outside the file");
+    *data = a->data + local + begin;
+    *size = stored;
+    return 0;
+}
+
+static int same_name(const archive *a, size_t at, size_t other)
+{
+    size_t size = u16(a->data + at + 28);
+    return size == u16(a->data + other + 28) && memcmp(a->data + at + 46, a->data + other + 46, size) == 0;
+}
+
+/* All loaders accept the same archives: the directory fills the file from the last entry to an end
+ * record without a comment, and every entry is stored as it is, undamaged, its name there once (of
+ * two, other programs may read the other one). */
+static int check_archive(archive *a)
+{
+    size_t end, at, other, step;
+    if (a->size < 22 || u32(a->data + a->size - 22) != 0x06054b50u || u16(a->data + a->size - 2) != 0)
+        return fail(a, "", "not a zip archive, cut short, or with bytes behind its end");
+    end = a->size - 22;
+    a->entries = u16(a->data + end + 10);
+    a->directory = u32(a->data + end + 16);
+    if (u32(a->data + end + 4) != 0 || u16(a->data + end + 8) != a->entries || a->directory > end ||
+        end - a->directory != u32(a->data + end + 12))
+        return fail(a, "", "the archive's directory is damaged");
+    if (a->entries > MAX_ENTRIES)
+        return fail(a, "", "the archive has more than 64 entries");
+    at = a->directory;
+    for (size_t i = 0; i < a->entries; i++, at += step) {
+        const unsigned char *data;
+        size_t size;
+        if (!(step = head_at(a, at, end)))
+            return fail(a, "", "the archive's directory is damaged");
+        if (entry_at(a, at, &data, &size))
+            return -1;
+        if (crc32_of(data, size) != u32(a->data + at + 16))
+            return fail(a, "", "an entry is damaged (CRC)");
+        for (other = a->directory; other < at; other += head_at(a, other, end))
+            if (same_name(a, at, other))
+                return fail(a, "", "an entry stands there twice");
+    }
+    return at == end ? 0 : fail(a, "", "the archive's directory is damaged");
+}
+
+/* The bytes of an entry of a checked archive: 1 found, 0 absent. */
 static int find_entry(const archive *a, const char *name, const unsigned char **data, size_t *size)
 {
-    const size_t end_size = 22, head_size = 46, local_size = 30;
-    size_t end, at, entries;
-    int found = 0;
+    size_t at = a->directory;
     char wanted[64];
     snprintf(wanted, sizeof wanted, "%s.npy", name);
-    if (a->size < end_size)
-        return fail(a, "", "not a zip archive");
-    /* The end record may be followed by a comment of at most 65535 bytes. */
-    end = a->size - end_size;
-    while (u32(a->data + end) != 0x06054b50u) {
-        if (end == 0 || a->size - end > end_size + 65535)
-            return fail(a, "", "not a zip archive, or cut short");
-        end--;
-    }
-    entries = u16(a->data + end + 10);
-    at = u32(a->data + end + 16);
-    for (size_t i = 0; i < entries; i++) {
-        const unsigned char *head;
-        size_t name_size, step;
-        if (at > end || end - at < head_size || u32(a->data + at) != 0x02014b50u)
-            return fail(a, "", "the archive's directory is damaged");
-        head = a->data + at;
-        name_size = u16(head + 28);
-        step = head_size + name_size + u16(head + 30) + u16(head + 32);
-        if (end - at < step)
-            return fail(a, "", "the archive's directory is damaged");
-        if (name_size == strlen(wanted) && memcmp(head + head_size, wanted, name_size) == 0) {
-            size_t stored = u32(head + 20), local = u32(head + 42), begin;
-            if (u16(head + 10) != 0 || (u16(head + 8) & 1) || stored != u32(head + 24))
-                return fail(a, name, "is compressed, encrypted or larger than 4 GiB");
-            if (local > a->size || a->size - local < local_size || u32(a->data + local) != 0x04034b50u)
-                return fail(a, name, "lies outside the file");
-            begin = local_size + u16(a->data + local + 26) + u16(a->data + local + 28);
-            if (a->size - local < begin || a->size - local - begin < stored)
-                return fail(a, name, "lies outside the file");
-            *data = a->data + local + begin;
-            *size = stored;
-            if (crc32_of(*data, *size) != u32(head + 16))
-                return fail(a, name, "is damaged (CRC)");
-            /* Of two entries of one name, other programs may read the other one. */
-            if (found++)
-                return fail(a, name, "stands there twice");
-        }
-        at += step;
-    }
-    return found;
+    for (size_t i = 0; i < a->entries; i++, at += head_at(a, at, a->size - 22))
+        if (u16(a->data + at + 28) == strlen(wanted) && memcmp(a->data + at + 46, wanted, strlen(wanted)) == 0)
+            return entry_at(a, at, data, size) ? -1 : 1;
+    return 0;
 }
 
 /* Compares header text with what numpy writes, blanks aside; moves on. */
@@ -405,10 +461,12 @@ static int load_rendering(fluxform_bundle *b, const archive *a)
     return 0;
 }
 
-static int load_all(fluxform_bundle *b, const archive *a)
+static int load_all(fluxform_bundle *b, archive *a)
 {
     array from;
     int tilted;
+    if (check_archive(a))
+        return -1;
     if (need(a, "schema_version", "<i8", 1, &from))
         return -1;
     if (from.count != 3 || u64(from.data) != SCHEMA_MAJOR)
@@ -443,7 +501,7 @@ static int load_all(fluxform_bundle *b, const archive *a)
 
 int fluxform_bundle_open(fluxform_bundle *bundle, const char *path, char *message, size_t message_size)
 {
-    archive a = {NULL, 0, message, message_size};
+    archive a = {NULL, 0, message, message_size, 0, 0};
     unsigned char *data;
     int outcome;
     memset(bundle, 0, sizeof *bundle);

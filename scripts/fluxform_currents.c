@@ -1,7 +1,6 @@
 /* Follows a finger on a loaded bundle: heights and currents; see fluxform_bundle.h. */
 #include "fluxform_bundle.h"
 
-#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -167,34 +166,38 @@ static void add(double sum[2], double term)
 /* Writes the currents of the largest force, of least power among them; returns that force. */
 static double largest_force(problem *p, double *currents)
 {
-    double left[2] = {p->total, 0}, force = 0;
+    double spent[2] = {0, 0}, force = 0, back = 0;
     size_t start = 0, end;
     for (size_t i = 0; i < p->n; i++) {
         currents[i] = p->lower[i];
-        add(left, -p->lower[i]);
         p->order[i].key = -p->row[i];
         p->order[i].coil = i;
     }
     sort_keys(p->order, p->n);
+    /* What the coils from a place on give back at their lower limits; terms of one sign, so a limit
+     * of 1e30 A beside one of 1 A takes no digit of it. */
+    for (size_t k = p->n; k-- > 0;) {
+        back -= p->lower[p->order[k].coil];
+        p->tail[k] = back;
+    }
     for (; start < p->n && -p->order[start].key >= -TIED; start = end) {
-        double gain = -p->order[start].key, room[2] = {0, 0}, sum, mu = 0;
-        for (end = start; end < p->n && -p->order[end].key >= gain - TIED; end++) {
-            add(room, p->upper[p->order[end].coil]);
-            add(room, -p->lower[p->order[end].coil]);
-        }
-        if (room[0] + room[1] <= left[0] + left[1] && gain > TIED) {
+        double gain = -p->order[start].key, upper[2] = {0, 0}, left[2] = {p->total, 0}, sum, mu = 0;
+        for (end = start; end < p->n && -p->order[end].key >= gain - TIED; end++)
+            add(upper, p->upper[p->order[end].coil]);
+        add(left, end < p->n ? p->tail[end] : 0);
+        add(left, -spent[0]);
+        add(left, -spent[1]);
+        if (upper[0] + upper[1] <= left[0] + left[1] && gain > TIED) {
             for (size_t k = start; k < end; k++)
                 currents[p->order[k].coil] = p->upper[p->order[k].coil];
-            add(left, -room[0]);
-            add(left, -room[1]);
+            add(spent, upper[0]);
+            add(spent, upper[1]);
             continue;
         }
         /* What is left is shared among equal coils; coils without force take none of it. */
         memset(p->ones, 0, p->n * sizeof *p->ones);
-        for (size_t k = start; k < end; k++) {
-            add(left, p->lower[p->order[k].coil]);
+        for (size_t k = start; k < end; k++)
             p->ones[p->order[k].coil] = 1;
-        }
         sum = left[0] + left[1];
         if (gain <= TIED && sum > 0)
             sum = 0;
@@ -222,24 +225,33 @@ static double force_at(const problem *p, double mu, double sigma)
     return force;
 }
 
-/* Whether a coil is between its limits all over a piece. */
+/* The force's multiplier at which a coil with force meets a limit. */
+static double meets(const problem *p, size_t i, double limit, double sigma)
+{
+    return (limit * p->resistance[i] + sigma) / p->row[i];
+}
+
+/* Whether a coil is between its limits all over a piece, whose ends are such multipliers themselves. */
 static int moves(const problem *p, size_t i, double sigma, double from, double to)
 {
-    double low = p->lower[i] * p->resistance[i], high = p->upper[i] * p->resistance[i];
-    double a = from * p->row[i] - sigma, b = to * p->row[i] - sigma;
-    double slack = 4 * DBL_EPSILON * (sigma + (fabs(a) > fabs(b) ? fabs(a) : fabs(b)));
-    return low < high && (a < b ? a : b) >= low - slack && (a > b ? a : b) <= high + slack;
+    double a, b;
+    if (p->lower[i] >= p->upper[i])
+        return 0;
+    if (p->row[i] == 0)
+        return p->lower[i] <= -sigma / p->resistance[i] && -sigma / p->resistance[i] <= p->upper[i];
+    a = meets(p, i, p->lower[i], sigma);
+    b = meets(p, i, p->upper[i], sigma);
+    return (a < b ? a : b) <= from && to <= (a > b ? a : b);
 }
 
 /* The piece between two breakpoints on which the force is met for sigma; returns where. */
 static double find_piece(problem *p, double sigma, double target, double *from, double *to)
 {
     size_t count = 0, low = 0, high;
-    double slope = 0;
+    double slope = 0, near;
     for (size_t i = 0; i < p->n; i++)
         for (int upper = 0; upper < 2 && p->row[i] != 0; upper++) {
-            double limit = upper ? p->upper[i] : p->lower[i];
-            p->order[count].key = (limit * p->resistance[i] + sigma) / p->row[i];
+            p->order[count].key = meets(p, i, upper ? p->upper[i] : p->lower[i], sigma);
             p->order[count++].coil = i;
         }
     sort_keys(p->order, count);
@@ -255,7 +267,9 @@ static double find_piece(problem *p, double sigma, double target, double *from, 
     for (size_t i = 0; i < p->n; i++)
         if (moves(p, i, sigma, *from, *to))
             slope += p->row[i] * p->row[i] / p->resistance[i];
-    return slope > 0 ? clamp(*to - (force_at(p, *to, sigma) - target) / slope, *from, *to) : *to;
+    /* From the piece's point nearest to nothing: far ends would take the digits. */
+    near = clamp(0, *from, *to);
+    return slope > 0 ? clamp(near + (target - force_at(p, near, sigma)) / slope, *from, *to) : *to;
 }
 
 /* The multipliers that meet force and sum if the coils that move on a piece are the ones that do. */

@@ -219,13 +219,19 @@ function [best, met] = allocate(per_ampere, wanted, r, lower, upper, total)
         above = [find(forces >= target, 1), numel(breaks) + 1];
         to = breaks(min(above(1), numel(breaks)));
         since = breaks(max(min(above(1), numel(breaks) + 1) - 1, 1));
-        ends = [since; to] * row - sigma;
-        slack = 4 * eps * (sigma + max(abs(ends), [], 1));
-        moves = lower < upper & min(ends, [], 1) >= lower .* r - slack & max(ends, [], 1) <= upper .* r + slack;
+        % The piece's ends are multipliers at which coils meet limits: there is nothing to round.
+        idle = -sigma ./ r;
+        moves = lower <= idle & idle <= upper;
+        meets = [(lower(use) .* r(use) + sigma) ./ row(use); (upper(use) .* r(use) + sigma) ./ row(use)];
+        moves(use) = min(meets, [], 1) <= since & to <= max(meets, [], 1);
+        moves = moves & lower < upper;
         slope = sum(row(moves) .^ 2 ./ r(moves));
         mu = to;
         if slope > 0
-            mu = min(max(to - (sum(row .* clip((to * row - sigma) ./ r)) - target) / slope, since), to);
+            % From the piece's point nearest to nothing: far ends would take the digits.
+            near = min(max(0, since), to);
+            mu = near + (target - sum(row .* clip((near * row - sigma) ./ r))) / slope;
+            mu = min(max(mu, since), to);
         end
         % Both rows met if those coils are the ones that move.
         center = 0;
@@ -306,21 +312,20 @@ end
 function currents = largest_force(row, r, lower, upper, total, tied)
 % The currents of the largest force, those of least power among them.
     currents = lower;
-    left = total - sum(lower);
     [~, order] = sort(-row);
     start = 1;
     while start <= numel(row) && row(order(start)) >= -tied
         gain = row(order(start));
         rest = order(start:end);
         group = rest(row(rest) >= gain - tied);
-        before = sum(upper(order(1:start - 1)));
-        if sum(upper(group) - lower(group)) <= left && gain > tied
+        % What the sum allows this group. Its own lower limits are left out of account: one of 1e30 A
+        % would take every digit of a limit of 1 A.
+        share = total - sum(upper(order(1:start - 1))) - sum(lower(order(start + numel(group):end)));
+        if sum(upper(group)) <= share && gain > tied
             currents(group) = upper(group);
             start = start + numel(group);
-            left = total - sum(lower(order(start:end))) - before - sum(upper(group));
             continue
         end
-        share = total - before - sum(lower(order(start + numel(group):end)));
         if gain <= tied
             share = min(share, 0);
         end
@@ -367,6 +372,8 @@ function files = read_files(folder, known)
         error('fluxform:bundle', 'manifest.json lists a file twice');
     end
     files = struct();
+    needed = {'map.npz', 'points.csv', 'currents.csv', 'lambda.json'};
+    paths = cell(size(names));
     for k = 1:numel(known)
         name = known(k).path;
         parts = strsplit(name, '/', 'CollapseDelimiters', false);
@@ -380,6 +387,16 @@ function files = read_files(folder, known)
                 error('fluxform:bundle', 'manifest.json lists %s, which is a link', name);
             end
         end
+        most = 2 ^ 28;                            % of what is only hashed
+        if any(strcmp(name, needed))
+            most = 2 ^ 32;
+        end
+        check_plain(path, min(known(k).bytes, most));
+        paths{k} = path;
+    end
+    for k = 1:numel(known)                        % all sizes before any content
+        name = known(k).path;
+        path = paths{k};
         text = text_of(path, known(k).bytes);
         if numel(text) ~= known(k).bytes
             error('fluxform:bundle', '%s was changed or damaged: its size differs', path);
@@ -388,7 +405,7 @@ function files = read_files(folder, known)
         if ~isempty(digest) && ~strcmp(digest, known(k).sha256)
             error('fluxform:bundle', '%s was changed or damaged: its SHA-256 differs', path);
         end
-        if any(strcmp(name, {'map.npz', 'points.csv', 'currents.csv', 'lambda.json'}))
+        if any(strcmp(name, needed))
             files.(strrep(name, '.', '_')) = text;
         end
     end
@@ -397,25 +414,33 @@ function files = read_files(folder, known)
     end
 end
 
-function text = text_of(path, most_bytes)
-% The bytes of a plain file; opening a pipe would wait for its other end.
+function check_plain(path, most_bytes)
+% Looks at a file without opening it: opening a pipe would wait for its other end. A file of holes
+% takes far more memory than it took to make.
     found = dir(path);
     plain = numel(found) == 1 && ~found.isdir;
+    holes = false;
     if plain && exist('OCTAVE_VERSION', 'builtin')
         [status, failed] = stat(path);
         plain = failed == 0 && S_ISREG(status.mode);
+        holes = plain && found.bytes > 2 ^ 24 && found.bytes > 64 * 512 * status.blocks;
     end
     if ~plain
         error('fluxform:bundle', '%s is missing or not a plain file', path);
     end
-    if found.bytes > most_bytes
-        error('fluxform:bundle', '%s was changed or damaged: its size differs', path);
+    if found.bytes > most_bytes || holes
+        error('fluxform:bundle', '%s was changed or damaged: its size differs, or it is too large or full of holes', path);
     end
+end
+
+function text = text_of(path, most_bytes)
+% The bytes of a plain file, at most so many.
+    check_plain(path, most_bytes);
     file = fopen(path, 'r');
     if file < 0
         error('fluxform:bundle', 'cannot read %s', path);
     end
-    text = fread(file, [1, Inf], 'uint8=>char');
+    text = fread(file, [1, most_bytes], 'uint8=>char');
     fclose(file);
 end
 
@@ -475,37 +500,59 @@ function map = read_npz(path)
     closing = onCleanup(@() fclose(file));
     fseek(file, 0, 'eof');
     length_bytes = ftell(file);
-    fseek(file, -22, 'eof');                      % the end record, which has no comment
-    if fread(file, 1, 'uint32') ~= hex2dec('06054b50')
+    % The one form that all loaders accept, see _entries in load_bundle.py.
+    fseek(file, -22, 'eof');
+    last = fread(file, 22, 'uint8=>double').';
+    tail = @(at, bytes) sum(last(at + (1:bytes)) .* 256 .^ (0:bytes - 1));
+    if numel(last) ~= 22 || tail(0, 4) ~= hex2dec('06054b50') || tail(20, 2) ~= 0
         error('fluxform:bundle', '%s is not a zip file without a comment', path);
     end
-    fseek(file, 6, 'cof');
-    count = fread(file, 1, 'uint16');
-    fseek(file, 4, 'cof');
-    entry = fread(file, 1, 'uint32');             % where the first entry of the directory stands
+    count = tail(10, 2);
+    directory = tail(16, 4);
+    if tail(4, 4) ~= 0 || tail(8, 2) ~= count || count > 64 || directory + tail(12, 4) ~= length_bytes - 22
+        error('fluxform:bundle', '%s: its directory is damaged or too long', path);
+    end
+    entry = directory;
+    seen = {};
     map = struct();
     for k = 1:count
         fseek(file, entry, 'bof');
         head = fread(file, 46, 'uint8=>double');
+        if numel(head) ~= 46 || ~isequal(head(1:4).', [80, 75, 1, 2])
+            error('fluxform:bundle', '%s: its directory is damaged', path);
+        end
         number = @(at, bytes) sum(head(at + (1:bytes)).' .* 256 .^ (0:bytes - 1));
         lengths = [number(28, 2), number(30, 2), number(32, 2)];
         name = fread(file, [1, lengths(1)], 'uint8=>char');
         entry = entry + 46 + sum(lengths);
+        size_bytes = number(24, 4);
+        if entry > length_bytes - 22 || number(42, 4) + 30 > directory
+            error('fluxform:bundle', '%s: its directory is damaged', path);
+        end
+        if number(10, 2) ~= 0 || mod(number(8, 2), 2) ~= 0 || number(20, 4) ~= size_bytes
+            error('fluxform:bundle', '%s: %s is not stored as it is', path, name);
+        end
+        if any(strcmp(seen, name))
+            error('fluxform:bundle', '%s: %s stands there twice', path, name);
+        end
+        seen{end + 1} = name;
+        local = number(42, 4);
+        fseek(file, local, 'bof');
+        mark = fread(file, [1, 4], 'uint8=>double');
+        fseek(file, local + 26, 'bof');
+        skip = fread(file, 2, 'uint16');
+        if ~isequal(mark, [80, 75, 3, 4]) || local + 30 + sum(skip) + size_bytes > directory
+            error('fluxform:bundle', '%s: %s lies outside the file', path, name);
+        end
         key = regexprep(name, '\.npy$', '');
         if ~any(strcmp(key, names)) || strcmp(key, name)
             continue
         end
-        if number(10, 2) ~= 0 || number(24, 4) > length_bytes
-            error('fluxform:bundle', '%s: %s is not stored as it is', path, name);
-        end
-        if isfield(map, key)
-            error('fluxform:bundle', '%s: %s stands there twice', path, name);
-        end
-        local = number(42, 4);
-        fseek(file, local + 26, 'bof');
-        skip = fread(file, 2, 'uint16');
         fseek(file, local + 30 + sum(skip), 'bof');
-        map.(key) = read_npy(file, number(24, 4), name);
+        map.(key) = read_npy(file, size_bytes, name);
+    end
+    if entry ~= length_bytes - 22
+        error('fluxform:bundle', '%s: its directory is damaged', path);
     end
     missing = names(1:9);
     missing = missing(~isfield(map, missing));

@@ -21,8 +21,8 @@ import math
 import os
 import re
 import struct
+import stat
 import sys
-import zipfile
 import zlib
 
 import numpy as np
@@ -46,6 +46,13 @@ HEADER = re.compile(
     rb"\{'descr':'(<f8|<i8)','fortran_order':False,'shape':\(((?:\d{1,18},)*(?:\d{1,18})?)\),?\}"
 )
 MANIFEST_MAX_BYTES = 64 << 20
+# Larger files are none of a bundle's; of one beyond HOLES_FROM bytes at least one byte in HOLES_SHARE
+# lies on the disk: a file of holes takes far more memory than it took to make.
+FILE_MAX_BYTES = 1 << 32
+HOLES_FROM = 16 << 20
+HOLES_SHARE = 64
+BLOCK_BYTES = 1 << 16
+MAX_ENTRIES = 64
 # Larger numbers are none that a coil or magnet gives; nodes lie within FARTHEST_M and are no closer
 # to each other than CLOSEST_M: then what interpolation and eq. 8 make of them is finite.
 LARGEST = 1e30
@@ -277,32 +284,62 @@ class Bundle:
 
     def _read_files(self):
         root = os.path.realpath(self.folder)
-        files, names = {}, set()
+        files, paths = {}, {}
         for entry in self.manifest["files"]:
             name = entry["path"]
             parts = name.split("/")
             if os.path.isabs(name) or "\\" in name or any(part in ("", ".", "..") for part in parts):
                 raise BundleError(f"manifest.json lists {name!r}, which leads out of the bundle")
-            if name in names:
+            if name in paths:
                 raise BundleError(f"manifest.json lists {name!r} twice")
-            names.add(name)
             path = os.path.join(root, *parts)
             if os.path.realpath(path) != path:
                 raise BundleError(f"manifest.json lists {name!r}, which is a link")
-            if not os.path.isfile(path):
-                raise BundleError(f"{path} is missing or not a plain file")
-            if os.path.getsize(path) != entry["bytes"]:
-                raise BundleError(f"{path} was changed or damaged: its size differs")
-            with open(path, "rb") as file:
-                content = file.read()
-            if hashlib.sha256(content).hexdigest() != entry["sha256"]:
-                raise BundleError(f"{path} was changed or damaged: its SHA-256 differs")
+            _check_size(path, entry["bytes"])
+            paths[name] = path
+        # All sizes before any content.
+        for entry in self.manifest["files"]:
+            name = entry["path"]
+            content, digest = _read(paths[name], entry["bytes"], name in REQUIRED)
+            if digest != entry["sha256"]:
+                raise BundleError(f"{paths[name]} was changed or damaged: its SHA-256 differs")
             if name in REQUIRED:
                 files[name] = content
         for name in REQUIRED:
             if name not in files:
                 raise BundleError(f"manifest.json does not list {name}")
         return files
+
+
+def _check_size(path, size):
+    """Looks at a file without opening it: opening a pipe would wait for its other end."""
+    if not os.path.isfile(path):
+        raise BundleError(f"{path} is missing or not a plain file")
+    if os.path.getsize(path) != size or size > FILE_MAX_BYTES:
+        raise BundleError(f"{path} was changed or damaged: its size differs, or is more than 4 GiB")
+
+
+def _read(path, size, keep):
+    """A plain file's content, if it is to be kept, and digest; read block by block."""
+    digest, blocks = hashlib.sha256(), []
+    with open(path, "rb") as file:
+        found = os.fstat(file.fileno())
+        if not stat.S_ISREG(found.st_mode) or found.st_size != size:
+            raise BundleError(f"{path} was changed or damaged: its size differs")
+        if size > HOLES_FROM and size // HOLES_SHARE > 512 * getattr(found, "st_blocks", size):
+            # Some file systems count blocks late; they know of no hole then.
+            if os.lseek(file.fileno(), 0, getattr(os, "SEEK_HOLE", os.SEEK_END)) < size:
+                raise BundleError(f"{path} claims {size} bytes, but is almost all holes")
+            os.lseek(file.fileno(), 0, os.SEEK_SET)
+        while size > 0:
+            block = file.read(min(BLOCK_BYTES, size))
+            if not block:
+                raise BundleError(f"{path} was changed or damaged: its size differs")
+            size -= len(block)
+            digest.update(block)
+            if keep:
+                blocks.append(block)
+    return b"".join(blocks), digest.hexdigest()
 
 
 def _no_number(word):
@@ -369,21 +406,19 @@ def _sorted_row(row, target, r, lower, upper):
 def _largest(row, r, lower, upper, total):
     """The currents of the largest force, those of least power among them."""
     currents = lower.astype(float)
-    left = math.fsum([total, *-lower]) if np.isfinite(total) else np.inf
     order = np.argsort(-row, kind="stable")
     start = 0
     while start < len(row) and row[order[start]] >= -TIED:
         gain = row[order[start]]
         group = order[start:][row[order[start:]] >= gain - TIED]
-        room = math.fsum([*upper[group], *-lower[group]])
-        if room <= left and gain > TIED:
-            currents[group] = upper[group]
-            start += len(group)
-            spent = [*-lower[order[start:]], *-upper[order[:start]]]
-            left = math.fsum([total, *spent]) if np.isfinite(total) else np.inf
-            continue
+        # What the sum allows this group. Its own lower limits are left out of account: one of 1e30 A
+        # would take every digit of a limit of 1 A.
         share = math.fsum([total, *-upper[order[:start]], *-lower[order[start + len(group):]]]) \
             if np.isfinite(total) else np.inf
+        if math.fsum(upper[group]) <= share and gain > TIED:
+            currents[group] = upper[group]
+            start += len(group)
+            continue
         if gain <= TIED:
             share = min(share, 0.0)
         ones = np.zeros(len(row))
@@ -427,14 +462,19 @@ def _allocate(force_per_ampere, wanted, r, lower, upper, total):
         above = int(np.searchsorted(forces >= target, True))
         to = breaks[min(above, len(breaks) - 1)]
         since = breaks[above - 1] if above else to
-        ends = np.array([since, to])[:, None] * row - sigma
-        slack = 4 * np.finfo(float).eps * (sigma + np.max(np.abs(ends), axis=0))
-        moves = (lower < upper) & (np.min(ends, axis=0) >= lower * r - slack)
-        moves &= np.max(ends, axis=0) <= upper * r + slack
+        # The piece's ends are multipliers at which coils meet limits: there is nothing to round.
+        idle = -sigma / r
+        moves = (lower <= idle) & (idle <= upper)
+        meets = np.array([(b[use] * r[use] + sigma) / row[use] for b in (lower, upper)])
+        moves[use] = (np.min(meets, axis=0) <= since) & (to <= np.max(meets, axis=0))
+        moves &= lower < upper
         slope = np.sum(row[moves] ** 2 / r[moves])
         mu = to
         if slope > 0:
-            mu = min(max(to - (np.sum(row * fill(to, 0.0, -sigma)) - target) / slope, since), to)
+            # From the piece's point nearest to nothing: far ends would take the digits.
+            near = min(max(0.0, since), to)
+            mu = near + (target - np.sum(row * fill(near, 0.0, -sigma))) / slope
+            mu = min(max(mu, since), to)
         # Both rows met if those coils are the ones that move.
         center, nu, jump = 0.0, -sigma, mu
         if np.any(moves):
@@ -500,24 +540,55 @@ def _array(name, data):
     return values
 
 
+def _entries(content):
+    """Names and bytes of an archive's entries, the one form that all loaders accept: the directory
+    fills the file from the last entry to an end record without a comment, and every entry is stored
+    as it is, undamaged, its name there once (of two, other programs may read the other one)."""
+    end = len(content) - 22
+    if end < 0 or content[end : end + 4] != b"PK\x05\x06" or content[-2:] != b"\0\0":
+        raise BundleError("map.npz: not a zip archive, cut short, or with bytes behind its end")
+    disks, here, count, size, directory = struct.unpack_from("<IHHII", content, end + 4)
+    damaged = BundleError("map.npz: the archive's directory is damaged")
+    if disks or here != count or directory + size != end:
+        raise damaged
+    if count > MAX_ENTRIES:
+        raise BundleError(f"map.npz: the archive has more than {MAX_ENTRIES} entries")
+    entries, at = {}, directory
+    for _ in range(count):
+        if end - at < 46 or content[at : at + 4] != b"PK\x01\x02":
+            raise damaged
+        flags, method = struct.unpack_from("<HH", content, at + 8)
+        crc, packed, size, *lengths = struct.unpack_from("<IIIHHH", content, at + 16)
+        (local,) = struct.unpack_from("<I", content, at + 42)
+        name = content[at + 46 : at + 46 + lengths[0]]
+        at += 46 + sum(lengths)
+        if at > end:
+            raise damaged
+        if method != 0 or flags & 1 or packed != size:
+            raise BundleError(f"map.npz: {name!r} is compressed, encrypted or larger than 4 GiB")
+        if directory - local < 30 or content[local : local + 4] != b"PK\x03\x04":
+            raise BundleError(f"map.npz: {name!r} lies outside the file")
+        begin = local + 30 + sum(struct.unpack_from("<HH", content, local + 26))
+        if begin + size > directory:
+            raise BundleError(f"map.npz: {name!r} lies outside the file")
+        data = content[begin : begin + size]
+        if zlib.crc32(data) != crc:
+            raise BundleError(f"map.npz: {name!r} is damaged (CRC)")
+        if name in entries:
+            raise BundleError(f"map.npz: {name!r} stands there twice")
+        entries[name] = data
+    if at != end:
+        raise damaged
+    return entries
+
+
 def _arrays(content):
+    entries = _entries(content)
     arrays = {}
-    try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            for info in archive.infolist():
-                name = info.filename[: -len(".npy")]
-                if info.filename != name + ".npy" or name not in ARRAYS + OPTIONAL_ARRAYS:
-                    continue
-                if info.compress_type != zipfile.ZIP_STORED or info.file_size > len(content):
-                    raise BundleError(f"map.npz: {info.filename} is not stored as it is")
-                if name in arrays:
-                    raise BundleError(f"map.npz: {info.filename} stands there twice")
-                arrays[name] = _array(name, archive.read(info))
-    except (
-        ValueError, OSError, EOFError, RuntimeError, OverflowError, KeyError, struct.error, zlib.error,
-        zipfile.BadZipFile,
-    ) as error:
-        raise BundleError(f"map.npz: {error}") from None
+    for name in ARRAYS + OPTIONAL_ARRAYS:
+        data = entries.get(f"{name}.npy".encode())
+        if data is not None:
+            arrays[name] = _array(name, data)
     for name in ARRAYS:
         if name not in arrays:
             raise BundleError(f"map.npz: array {name} is missing")

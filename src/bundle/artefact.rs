@@ -1,5 +1,7 @@
 //! What every artefact says about itself: versions, inputs, files.
 
+use std::io::{self, Read};
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -7,13 +9,16 @@ use super::atomic::Written;
 
 /// Version of the artefacts' layout, `major.minor.patch`. A reader refuses another major; a new
 /// minor only adds keys, arrays or files.
-pub const SCHEMA_VERSION: &str = "1.2.0";
+pub const SCHEMA_VERSION: &str = "1.3.0";
 
 /// Version of the program that wrote an artefact.
 pub const FLUXFORM_VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// The sentence on units that every artefact carries.
 pub const UNITS: &str = "SI throughout; the unit of every number stands in its key, column or array name (m, A, T, N, ohm)";
+
+/// Files are hashed in blocks of this size.
+const BLOCK_BYTES: usize = 64 << 10;
 
 /// A file that went into an artefact.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -58,11 +63,44 @@ impl FileEntry {
     }
 }
 
+/// Platform and instructions of this program: with others the last bits of results differ.
+#[must_use]
+pub fn arithmetic() -> String {
+    format!(
+        "{} {}, {}",
+        std::env::consts::ARCH,
+        std::env::consts::OS,
+        crate::numerics::dispatch::instructions()
+    )
+}
+
 /// SHA-256 of `bytes`, 64 lower-case hexadecimal digits.
 #[must_use]
 pub fn sha256_hex(bytes: &[u8]) -> String {
     use sha2::{Digest, Sha256};
     super::atomic::hex(&Sha256::digest(bytes))
+}
+
+/// SHA-256 and size of a stream, read block by block: the memory does not grow with it.
+///
+/// # Errors
+/// The reader's.
+pub fn sha256_of(mut stream: impl Read) -> io::Result<(u64, String)> {
+    use sha2::{Digest, Sha256};
+    let mut digest = Sha256::new();
+    let mut block = vec![0; BLOCK_BYTES];
+    let mut bytes = 0;
+    loop {
+        match stream.read(&mut block) {
+            Ok(0) => return Ok((bytes, super::atomic::hex(&digest.finalize()))),
+            Ok(read) => {
+                digest.update(&block[..read]);
+                bytes += read as u64;
+            }
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
 }
 
 /// The three numbers of a schema version; `None` when it is not `major.minor.patch`.

@@ -1,9 +1,10 @@
 //! Reading a bundle back: the library's own loader.
 //!
 //! A bundle is untrusted. The manifest is read first; every file it lists must be a plain file
-//! inside the folder, reached without links, with the listed size and digest, and is read once:
-//! what is parsed is what was hashed. Memory is bounded by the size of the files, time by what the
-//! manifest lists.
+//! inside the folder, reached without links, with the listed size and digest. All sizes are checked
+//! before any file is read; a file that is parsed is read once, so what is parsed is what was
+//! hashed, and the others are hashed block by block. Memory is bounded by the size that the parsed
+//! files take on the disk and by [`FILE_MAX_BYTES`] each.
 
 use std::collections::BTreeSet;
 use std::io;
@@ -11,14 +12,14 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::artefact::{check_version, sha256_hex};
+use super::artefact::{FileEntry, check_version, sha256_hex};
 use super::atomic::check_name;
 use super::consistent;
 use super::json::fault;
 use super::lambda_file::LambdaFile;
 use super::manifest::Manifest;
 use super::npz::{MapArrays, from_npz};
-use super::plain::read_plain;
+use super::plain::{FILE_MAX_BYTES, check_plain, digest_plain, read_plain};
 use super::read_table::{read_currents, read_points};
 use super::table::{CurrentRow, PointRow};
 use crate::numerics::lagrange::{Cell, locate};
@@ -114,25 +115,32 @@ impl Bundle {
             _ => path,
         };
         let manifest_path = folder.join("manifest.json");
-        let (manifest, manifest_sha256) = read_manifest(folder, &manifest_path)?;
-        let mut files = Vec::new();
+        let (manifest, text) = read_manifest(folder, &manifest_path)?;
+        let manifest_sha256 = sha256_hex(&text);
+        drop(text);
+        let listed = Listed {
+            folder,
+            manifest: &manifest_path,
+            root: folder.canonicalize().map_err(|source| BundleError::Read {
+                path: folder.to_path_buf(),
+                source,
+            })?,
+        };
+        // All places and sizes before any content.
         let mut names = BTreeSet::new();
+        let mut paths = Vec::new();
         for entry in &manifest.files {
-            let listed = |message: &str| BundleError::Listed {
-                path: manifest_path.clone(),
-                name: entry.path.chars().take(NAME_SHOWN).collect(),
-                message: message.to_owned(),
-            };
-            let named = entry.path.len() <= NAME_BYTES && check_name(&entry.path).is_ok();
-            if !named || entry.path == "manifest.json" {
-                return Err(listed("is not the name of a file inside the bundle"));
-            }
+            paths.push(listed.checked(entry)?);
             if !names.insert(entry.path.as_str()) {
-                return Err(listed("stands there twice"));
+                return Err(listed.refused(entry, "stands there twice"));
             }
-            let bytes = read_listed(folder, &entry.path, entry.bytes, &entry.sha256, &listed)?;
+        }
+        let mut files = Vec::new();
+        for (entry, path) in manifest.files.iter().zip(&paths) {
             if REQUIRED.contains(&entry.path.as_str()) {
-                files.push((entry.path.clone(), bytes));
+                files.push((entry.path.clone(), listed.read(entry, path)?));
+            } else {
+                listed.digested(entry, path)?;
             }
         }
         let part = |name: &str| {
@@ -250,7 +258,7 @@ impl Bundle {
 /// What every bundle has.
 const REQUIRED: [&str; 4] = ["map.npz", "points.csv", "currents.csv", "lambda.json"];
 
-fn read_manifest(folder: &Path, path: &Path) -> Result<(Manifest, String), BundleError> {
+fn read_manifest(folder: &Path, path: &Path) -> Result<(Manifest, Vec<u8>), BundleError> {
     /// Of a newer manifest only this is understood.
     #[derive(Deserialize)]
     struct Version {
@@ -284,54 +292,101 @@ fn read_manifest(folder: &Path, path: &Path) -> Result<(Manifest, String), Bundl
         path: path.to_path_buf(),
         message,
     })?;
-    let manifest = serde_json::from_slice(&text).map_err(content)?;
-    Ok((manifest, sha256_hex(&text)))
+    let manifest: Manifest = serde_json::from_slice(&text).map_err(content)?;
+    Ok((manifest, text))
 }
 
-/// The bytes of a listed file, after checking place, size and digest.
-fn read_listed(
-    folder: &Path,
-    name: &str,
-    bytes: u64,
-    sha256: &str,
-    listed: &dyn Fn(&str) -> BundleError,
-) -> Result<Vec<u8>, BundleError> {
-    let path = folder.join(name);
-    let read = |source| BundleError::Read {
-        path: path.clone(),
-        source,
-    };
-    let damaged = |message| BundleError::Damaged {
-        path: path.clone(),
-        message,
-    };
-    let root = folder.canonicalize().map_err(read)?;
-    let real = match path.canonicalize() {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            return Err(damaged("it is missing".to_owned()));
+/// The files that a manifest lists.
+struct Listed<'a> {
+    folder: &'a Path,
+    manifest: &'a Path,
+    /// The folder, links followed.
+    root: PathBuf,
+}
+
+impl Listed<'_> {
+    fn refused(&self, entry: &FileEntry, message: &str) -> BundleError {
+        BundleError::Listed {
+            path: self.manifest.to_path_buf(),
+            name: entry.path.chars().take(NAME_SHOWN).collect(),
+            message: message.to_owned(),
         }
-        other => other.map_err(read)?,
-    };
-    if !real.starts_with(&root) {
-        return Err(listed("leads out of the bundle"));
     }
-    if real != root.join(name) {
-        return Err(listed("is a link; a bundle holds its files themselves"));
+
+    fn damaged(&self, entry: &FileEntry, message: String) -> BundleError {
+        BundleError::Damaged {
+            path: self.folder.join(&entry.path),
+            message,
+        }
     }
-    let metadata = real.metadata().map_err(read)?;
-    if !metadata.is_file() {
-        return Err(listed("is not a plain file"));
+
+    fn failed(&self, entry: &FileEntry, source: io::Error) -> BundleError {
+        match source.kind() {
+            io::ErrorKind::InvalidData => self.damaged(entry, source.to_string()),
+            _ => BundleError::Read {
+                path: self.folder.join(&entry.path),
+                source,
+            },
+        }
     }
-    if metadata.len() != bytes {
-        let found = metadata.len();
-        return Err(damaged(format!("{found} bytes, the manifest says {bytes}")));
+
+    /// The path of a listed file, after checking name, place, kind and size; nothing is read.
+    fn checked(&self, entry: &FileEntry) -> Result<PathBuf, BundleError> {
+        let named = entry.path.len() <= NAME_BYTES && check_name(&entry.path).is_ok();
+        if !named || entry.path == "manifest.json" {
+            return Err(self.refused(entry, "is not the name of a file inside the bundle"));
+        }
+        let real = match self.folder.join(&entry.path).canonicalize() {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                return Err(self.damaged(entry, "it is missing".to_owned()));
+            }
+            other => other.map_err(|error| self.failed(entry, error))?,
+        };
+        if !real.starts_with(&self.root) {
+            return Err(self.refused(entry, "leads out of the bundle"));
+        }
+        if real != self.root.join(&entry.path) {
+            let message = "is a link; a bundle holds its files themselves";
+            return Err(self.refused(entry, message));
+        }
+        let metadata = real.metadata().map_err(|error| self.failed(entry, error))?;
+        if !metadata.is_file() {
+            return Err(self.refused(entry, "is not a plain file"));
+        }
+        self.same_size(entry, metadata.len())?;
+        check_plain(&metadata, FILE_MAX_BYTES).map_err(|error| self.failed(entry, error))?;
+        Ok(real)
     }
-    let content = read_plain(&real, bytes).map_err(read)?;
-    let found = sha256_hex(&content);
-    if found != sha256 {
-        return Err(damaged(format!(
-            "its SHA-256 is {found}, the manifest says {sha256}"
-        )));
+
+    fn same_size(&self, entry: &FileEntry, found: u64) -> Result<(), BundleError> {
+        if found == entry.bytes {
+            return Ok(());
+        }
+        let message = format!("{found} bytes, the manifest says {}", entry.bytes);
+        Err(self.damaged(entry, message))
     }
-    Ok(content)
+
+    fn same_digest(&self, entry: &FileEntry, found: &str) -> Result<(), BundleError> {
+        if found == entry.sha256 {
+            return Ok(());
+        }
+        let message = format!("its SHA-256 is {found}, the manifest says {}", entry.sha256);
+        Err(self.damaged(entry, message))
+    }
+
+    /// The bytes of a file whose content is needed.
+    fn read(&self, entry: &FileEntry, path: &Path) -> Result<Vec<u8>, BundleError> {
+        let content = read_plain(path, entry.bytes).map_err(|error| self.failed(entry, error))?;
+        self.same_size(entry, content.len() as u64)?;
+        self.same_digest(entry, &sha256_hex(&content))?;
+        Ok(content)
+    }
+
+    /// Checks the digest of a file whose content is not needed, in bounded memory.
+    fn digested(&self, entry: &FileEntry, path: &Path) -> Result<(), BundleError> {
+        let (bytes, found) =
+            digest_plain(path, entry.bytes).map_err(|error| self.failed(entry, error))?;
+        self.same_size(entry, bytes)?;
+        self.same_digest(entry, &found)
+    }
 }

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::artefact::{FileEntry, Input};
+use super::artefact::{FileEntry, Input, sha256_hex};
+use super::json::to_json;
 use crate::accuracy::StageAccuracy;
 use crate::numerics::axis::Axis;
 
@@ -25,6 +26,10 @@ pub struct Manifest {
     pub shape: String,
     /// What went in, paths as given on the command line.
     pub inputs: Vec<Input>,
+    /// The options of the run, as far as no other file states them; absent from bundles of schema
+    /// 1.2 and before. With the inputs they decide every byte of the bundle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_with: Option<MadeWith>,
     /// A sentence on units.
     pub units: String,
     /// Where the coils stand.
@@ -50,6 +55,57 @@ pub struct Manifest {
     pub accuracy: BTreeMap<String, StageAccuracy>,
     /// Every other file of the bundle but `timing*`.
     pub files: Vec<FileEntry>,
+}
+
+/// The options of the run that made a bundle. Criterion and just-noticeable difference are in
+/// `lambda.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MadeWith {
+    /// `--tolerance`; null for the default.
+    pub tolerance: Option<f64>,
+    /// How far from the object's points the map reaches, m.
+    pub reach_m: f64,
+    /// Whether `report.html` and `plots/` were requested.
+    pub report: bool,
+    /// Platform and instructions: with others the last bits of the numbers differ.
+    pub arithmetic: String,
+    /// Unit, placement and grid of a surface that was given directly, without a shape file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surface: Option<SurfaceOptions>,
+    /// SHA-256 of these options in canonical JSON, this key empty: an option that changes nothing
+    /// else in a bundle is not edited unnoticed either.
+    pub sha256: String,
+}
+
+impl MadeWith {
+    /// The digest of these options.
+    #[must_use]
+    pub fn digest(&self) -> String {
+        let bare = Self {
+            sha256: String::new(),
+            ..self.clone()
+        };
+        to_json(&bare).map_or_else(|_| String::new(), |text| sha256_hex(&text))
+    }
+}
+
+/// What the command line says of a surface that is given directly.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SurfaceOptions {
+    /// Metres per unit of the file's coordinates; null where its format says it.
+    pub unit_m: Option<f64>,
+    /// Factors along the file's axes.
+    pub scale: [f64; 3],
+    /// Translation, m.
+    pub translate_m: [f64; 3],
+    /// Rotation about x, then y, then z, degrees.
+    pub rotate_deg: [f64; 3],
+    /// Samples of the grid along x and y.
+    pub samples: [usize; 2],
+    /// Ends of the grid along x, m; null for the surface's own extent.
+    pub x_m: Option<[f64; 2]>,
+    /// Ends of the grid along y, m; null for the surface's own extent.
+    pub y_m: Option<[f64; 2]>,
 }
 
 /// What lies in the `map.npz` beside it.

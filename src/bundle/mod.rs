@@ -38,6 +38,7 @@ pub mod replay;
 pub mod scan;
 pub mod schema;
 pub mod store;
+mod stored;
 pub mod sweep;
 pub mod table;
 pub mod timing;

@@ -33,9 +33,8 @@ pub(super) fn header(kind: &str, shape: &[usize]) -> Vec<u8> {
     header
 }
 
-/// The shape of an array of `kind` whose file begins with `file`. The shape's product is checked
-/// against `file_bytes`, the whole file's size.
-pub(super) fn parse(file: &[u8], file_bytes: u64, kind: &str) -> Result<Vec<usize>, String> {
+/// Shape and data of an array of `kind` in an NPY file; the data are as long as the shape says.
+pub(super) fn parse<'a>(file: &'a [u8], kind: &str) -> Result<(Vec<usize>, &'a [u8]), String> {
     let rest = file
         .strip_prefix(MAGIC.as_slice())
         .ok_or("is not an NPY 1.0 array")?;
@@ -43,8 +42,9 @@ pub(super) fn parse(file: &[u8], file_bytes: u64, kind: &str) -> Result<Vec<usiz
         .split_first_chunk::<2>()
         .ok_or("ends within its header")?;
     let length = usize::from(u16::from_le_bytes(*length));
-    let text = rest.get(..length).ok_or("ends within its header")?;
-    let start = MAGIC.len() + 2 + length;
+    let (text, data) = rest
+        .split_at_checked(length)
+        .ok_or("ends within its header")?;
     let text: String = text
         .iter()
         .map(|&byte| char::from(byte))
@@ -76,13 +76,13 @@ pub(super) fn parse(file: &[u8], file_bytes: u64, kind: &str) -> Result<Vec<usiz
         .try_fold(ELEMENT_BYTES as u64, |product, &size| {
             product.checked_mul(size as u64)
         });
-    let found = file_bytes.saturating_sub(start as u64);
-    if elements != Some(found) {
+    if elements != Some(data.len() as u64) {
         return Err(format!(
-            "says its shape is {shape:?}, but holds {found} bytes of data"
+            "says its shape is {shape:?}, but holds {} bytes of data",
+            data.len()
         ));
     }
-    Ok(shape)
+    Ok((shape, data))
 }
 
 #[cfg(test)]
@@ -113,14 +113,16 @@ mod tests {
     #[test]
     fn reads_its_own_and_refuses_the_rest() {
         for shape in [vec![], vec![7], vec![2, 3, 5, 7, 3, 3]] {
-            let head = header("<f8", &shape);
-            let size = (head.len() + 8 * shape.iter().product::<usize>()) as u64;
-            assert_eq!(parse(&head, size, "<f8"), Ok(shape.clone()));
-            assert!(parse(&head, size + 8, "<f8").is_err());
-            assert!(parse(&head, size, "<i8").is_err());
-            for cut in 0..head.len() {
-                assert!(parse(&head[..cut], size, "<f8").is_err());
+            let mut file = header("<f8", &shape);
+            let head = file.len();
+            file.resize(head + 8 * shape.iter().product::<usize>(), 7);
+            assert_eq!(parse(&file, "<f8"), Ok((shape.clone(), &file[head..])));
+            assert!(parse(&file, "<i8").is_err());
+            for cut in 0..file.len() {
+                assert!(parse(&file[..cut], "<f8").is_err());
             }
+            file.extend([0; 8]);
+            assert!(parse(&file, "<f8").is_err());
         }
         let replace = |from: &str, to: &str| {
             let text = String::from_utf8_lossy(&header("<f8", &[3, 2])[10..]).replace(from, to);
@@ -138,9 +140,9 @@ mod tests {
             ("<f8", "|O"),
             ("<f8", ">f8"),
         ] {
-            let file = replace(from, to);
-            let size = file.len() as u64 + 48;
-            assert!(parse(&file, size, "<f8").is_err(), "{from} -> {to}");
+            let mut file = replace(from, to);
+            file.extend([0; 48]);
+            assert!(parse(&file, "<f8").is_err(), "{from} -> {to}");
         }
     }
 }

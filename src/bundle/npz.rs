@@ -10,11 +10,11 @@
 //! finger is told in [`super::rendering`].
 
 use std::borrow::Cow;
-use std::io::{self, Cursor, Read, Write};
+use std::collections::BTreeMap;
+use std::io::{self, Cursor, Write};
 
-use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
+use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use super::artefact::{SCHEMA_VERSION, check_version, parse_version};
 use super::npy;
@@ -22,6 +22,7 @@ use super::rendering::{
     HAS_HEIGHT, HEIGHT, HEIGHT_X, HEIGHT_Y, HeightGrid, INDUCTANCE, Rendering, STATIC_CURRENT,
     VOLTAGE,
 };
+use super::stored;
 
 #[cfg(target_endian = "big")]
 compile_error!("arrays are written as they lie in memory, which must be little-endian");
@@ -380,17 +381,13 @@ impl Archive {
     }
 }
 
-/// The arrays of an untrusted `map.npz`. Nothing is allocated before its size was checked against
-/// the file's; unknown arrays are passed over.
+/// The arrays of an untrusted `map.npz`, an archive of the form that [`stored`] states. Nothing is
+/// allocated beyond the file's own size; unknown arrays are passed over.
 ///
 /// # Errors
 /// [`NpzError`]: what is wrong, and with which array.
 pub fn from_npz(bytes: &[u8]) -> Result<MapArrays<'static>, NpzError> {
-    let archive = ZipArchive::new(Cursor::new(bytes));
-    let mut arrays = Arrays {
-        archive: archive.map_err(|error| NpzError::Archive(error.to_string()))?,
-        file_bytes: bytes.len() as u64,
-    };
+    let mut arrays = Arrays(stored::entries(bytes).map_err(NpzError::Archive)?);
     let version: Vec<i64> = arrays.need(VERSION, &[Some(3)])?;
     let version: Vec<String> = version.iter().map(i64::to_string).collect();
     check_version(&version.join(".")).map_err(|message| bad(VERSION, message))?;
@@ -431,10 +428,8 @@ pub fn from_npz(bytes: &[u8]) -> Result<MapArrays<'static>, NpzError> {
     Ok(map)
 }
 
-struct Arrays<'a> {
-    archive: ZipArchive<Cursor<&'a [u8]>>,
-    file_bytes: u64,
-}
+/// Entries by name.
+struct Arrays<'a>(BTreeMap<&'a [u8], &'a [u8]>);
 
 /// Element types of arrays and what NPY calls them.
 trait Element: bytemuck::Pod {
@@ -488,28 +483,10 @@ impl Arrays<'_> {
         name: &'static str,
         shape: &[Option<usize>],
     ) -> Result<Option<Vec<T>>, NpzError> {
-        let mut entry = match self.archive.by_name(&format!("{name}.npy")) {
-            Ok(entry) => entry,
-            Err(ZipError::FileNotFound) => return Ok(None),
-            Err(error) => return Err(bad(name, format!("cannot be read ({error})"))),
+        let Some(entry) = self.0.remove(format!("{name}.npy").as_bytes()) else {
+            return Ok(None);
         };
-        if entry.compression() != CompressionMethod::Stored || entry.encrypted() {
-            return Err(bad(
-                name,
-                "is compressed or encrypted, expected stored as it is",
-            ));
-        }
-        let size = entry.size();
-        if size > self.file_bytes {
-            let message = format!("claims {size} bytes, the file has {}", self.file_bytes);
-            return Err(bad(name, message));
-        }
-        let cut = |error: io::Error| bad(name, format!("cannot be read ({error})"));
-        let mut head = vec![0; 10];
-        entry.read_exact(&mut head).map_err(cut)?;
-        head.resize(10 + usize::from(u16::from_le_bytes([head[8], head[9]])), 0);
-        entry.read_exact(&mut head[10..]).map_err(cut)?;
-        let found = npy::parse(&head, size, T::KIND).map_err(|message| bad(name, message))?;
+        let (found, data) = npy::parse(entry, T::KIND).map_err(|message| bad(name, message))?;
         let fits = |(want, size): (&Option<usize>, &usize)| want.is_none_or(|want| want == *size);
         if found.len() != shape.len() || !shape.iter().zip(&found).all(fits) {
             let want: Vec<String> = shape
@@ -519,12 +496,8 @@ impl Arrays<'_> {
             let message = format!("must have shape [{}], has {found:?}", want.join(", "));
             return Err(bad(name, message));
         }
-        let mut values = vec![T::zeroed(); found.iter().product()];
-        entry
-            .read_exact(bytemuck::cast_slice_mut(&mut values))
-            .map_err(cut)?;
-        // Reading to the end is what checks the CRC.
-        entry.read(&mut [0]).map_err(cut)?;
+        let mut values = vec![T::zeroed(); data.len() / npy::ELEMENT_BYTES];
+        bytemuck::cast_slice_mut(&mut values).copy_from_slice(data);
         Ok(Some(values))
     }
 }
@@ -573,6 +546,55 @@ mod tests {
         let bytes = to_npz(&map).unwrap();
         assert_eq!(bytes, to_npz(&map).unwrap());
         assert_eq!(from_npz(&bytes).unwrap(), map);
+    }
+
+    /// Local header, directory entry and content of an entry, to be put together to archives.
+    fn parts_of(bytes: &[u8]) -> (Vec<u8>, Vec<Vec<u8>>) {
+        let end = bytes.len() - 22;
+        let at = |i: usize| u32::from_le_bytes(bytes[i..i + 4].try_into().unwrap()) as usize;
+        let mut heads = Vec::new();
+        let mut head = at(end + 16);
+        let data = bytes[..head].to_vec();
+        while head < end {
+            let name = usize::from(bytes[head + 28]) + usize::from(bytes[head + 30]);
+            heads.push(bytes[head..head + 46 + name].to_vec());
+            head += 46 + name;
+        }
+        (data, heads)
+    }
+
+    /// An archive of these directory entries, its end as it must be.
+    fn archive(data: &[u8], heads: &[Vec<u8>]) -> Vec<u8> {
+        let (count, directory) = (heads.len() as u16, heads.concat());
+        let mut bytes = [data, &directory].concat();
+        bytes.extend([0x50, 0x4b, 5, 6, 0, 0, 0, 0]);
+        bytes.extend([count.to_le_bytes(), count.to_le_bytes()].concat());
+        bytes.extend((directory.len() as u32).to_le_bytes());
+        bytes.extend((data.len() as u32).to_le_bytes());
+        bytes.extend([0, 0]);
+        bytes
+    }
+
+    #[test]
+    fn an_array_that_stands_in_the_archive_twice_is_refused() {
+        let bytes = to_npz(&sample()).unwrap();
+        let (data, heads) = parts_of(&bytes);
+        assert_eq!(archive(&data, &heads), bytes);
+        for k in 0..heads.len() {
+            let mut twice = heads.clone();
+            twice.push(heads[k].clone());
+            let message = from_npz(&archive(&data, &twice)).unwrap_err().to_string();
+            assert!(message.contains("twice"), "{message}");
+        }
+        for (behind, at) in [(0, bytes.len()), (7, bytes.len()), (1, 0)] {
+            let mut longer = bytes.clone();
+            longer.splice(at..at, vec![0; behind]);
+            assert_eq!(
+                from_npz(&longer).is_ok(),
+                behind == 0,
+                "{behind} bytes at {at}"
+            );
+        }
     }
 
     #[test]

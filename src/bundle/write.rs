@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::artefact::{FileEntry, Input};
+use super::artefact::{FileEntry, Input, sha256_hex};
 use super::atomic::{
     FileSet, FolderDraft, Overwrite, WriteError, Written, check_distinct, listed_files, write,
 };
@@ -68,33 +68,9 @@ pub fn write_bundle(
     timing: &[StageSeconds],
 ) -> Result<Manifest, WriteError> {
     let mut manifest = content.manifest.clone();
-    consistent::check(
-        &manifest,
-        content.map,
-        content.points,
-        content.currents,
-        content.lambda,
-    )
-    .map_err(|message| WriteError::Content {
-        path: target.to_path_buf(),
-        message,
-    })?;
+    check_content(content, target)?;
     let mut draft = FolderDraft::begin(target, overwrite_bundle(target, force, &manifest.inputs))?;
-    manifest.files = vec![
-        draft.write("map.npz", |out| {
-            out.write_all(&to_npz(content.map).map_err(invalid)?)
-        })?,
-        draft.write("points.csv", |out| write_points(out, content.points))?,
-        draft.write("currents.csv", |out| write_currents(out, content.currents))?,
-        draft.write("lambda.json", |out| {
-            out.write_all(&to_json(content.lambda).map_err(invalid)?)
-        })?,
-    ];
-    for (name, bytes) in content.extra {
-        manifest
-            .files
-            .push(draft.write(name, |out| out.write_all(bytes))?);
-    }
+    manifest.files = put_files(content, &mut |name, fill| draft.write(name, fill))?;
     draft.write("timing.json", |out| {
         out.write_all(&to_json(timing).map_err(invalid)?)
     })?;
@@ -103,6 +79,66 @@ pub fn write_bundle(
     })?;
     draft.commit()?;
     Ok(manifest)
+}
+
+/// The manifest that [`write_bundle`] would write with `content`, sizes and digests of all files
+/// included; nothing is written.
+///
+/// # Errors
+/// [`WriteError::Content`] when the parts contradict each other.
+pub fn sealed_manifest(content: &BundleContent) -> Result<Manifest, WriteError> {
+    check_content(content, Path::new("manifest.json"))?;
+    let files = put_files(content, &mut |name, fill| {
+        let mut bytes = Vec::new();
+        fill(&mut bytes).map_err(|error| WriteError::from_io("write", Path::new(name), error))?;
+        Ok(FileEntry {
+            path: name.to_owned(),
+            bytes: bytes.len() as u64,
+            sha256: sha256_hex(&bytes),
+        })
+    })?;
+    Ok(Manifest {
+        files,
+        ..content.manifest.clone()
+    })
+}
+
+fn check_content(content: &BundleContent, target: &Path) -> Result<(), WriteError> {
+    consistent::check(
+        &content.manifest,
+        content.map,
+        content.points,
+        content.currents,
+        content.lambda,
+    )
+    .map_err(|message| WriteError::Content {
+        path: target.to_path_buf(),
+        message,
+    })
+}
+
+/// Fills a file.
+type Fill<'a> = &'a dyn Fn(&mut dyn io::Write) -> io::Result<()>;
+
+/// Hands every listed file of a bundle to `put`, in the manifest's order.
+fn put_files(
+    content: &BundleContent,
+    put: &mut dyn FnMut(&str, Fill) -> Result<FileEntry, WriteError>,
+) -> Result<Vec<FileEntry>, WriteError> {
+    let mut files = vec![
+        put("map.npz", &|out| {
+            out.write_all(&to_npz(content.map).map_err(invalid)?)
+        })?,
+        put("points.csv", &|out| write_points(out, content.points))?,
+        put("currents.csv", &|out| write_currents(out, content.currents))?,
+        put("lambda.json", &|out| {
+            out.write_all(&to_json(content.lambda).map_err(invalid)?)
+        })?,
+    ];
+    for (name, bytes) in content.extra {
+        files.push(put(name, &|out| out.write_all(bytes))?);
+    }
+    Ok(files)
 }
 
 fn overwrite_bundle(target: &Path, force: bool, inputs: &[Input]) -> Overwrite {

@@ -1,9 +1,11 @@
 //! `calibrate`: map, points and lambda for each shape, one bundle each.
 
 use std::borrow::Cow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use super::discretize::{self, point_rows, points_grid};
+use serde::Serialize;
+
+use super::discretize::{self, PointsReport, point_rows, points_grid};
 use super::kept::{FieldStore, STORE_FOLDER, ShapeField};
 use super::lambda::{LambdaOptions, LambdaReport, solve};
 use super::map::{MAP_TOLERANCE, arrays, runtime, summary, workspace_grid};
@@ -15,10 +17,11 @@ use super::scene::{MAGNET_SHARE, Scene};
 use super::steel::{Solved, Steel};
 use super::{JobError, KERNEL_ERROR, steel};
 use crate::accuracy::StageAccuracy;
-use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
+use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS, arithmetic};
 use crate::bundle::atomic::WriteError;
 use crate::bundle::manifest::{
-    AxisSummary, CircuitSummary, Interpolation, LambdaSummary, LeftOut, Manifest, PassiveForce,
+    AxisSummary, CircuitSummary, Interpolation, LambdaSummary, LeftOut, MadeWith, Manifest,
+    PassiveForce, SurfaceOptions,
 };
 use crate::bundle::npz::PASSIVE;
 use crate::bundle::rendering::{HeightGrid, Rendering};
@@ -30,9 +33,10 @@ use crate::design::{Design, source};
 use crate::map::tabulate::{Grid, PlacedCoil};
 use crate::map::{Components, FieldMap};
 use crate::progress::Progress;
-use crate::shape::document::ShapeDocument;
+use crate::shape::document::{AxisRequest, ShapeDocument, SurfaceSource};
 use crate::shape::points::ConstraintPoints;
 
+pub(super) mod again;
 mod page;
 mod recorded;
 
@@ -220,6 +224,18 @@ struct Kept<'a> {
     field: ShapeField<'a>,
 }
 
+impl Kept<'_> {
+    /// The object's points; their inputs are those of the whole bundle.
+    fn points(
+        &self,
+        shape: &ShapeSource,
+        progress: &dyn Progress,
+    ) -> Result<PointsReport, JobError> {
+        let inputs = inputs(self.source, self.curve, shape);
+        discretize::run_kept(&shape.document, inputs, self.field, progress)
+    }
+}
+
 /// How the coils' currents follow their voltages; the same for every shape.
 struct Inductances {
     circuit: CircuitSummary,
@@ -289,20 +305,60 @@ fn inputs(
 fn calibrate_one(
     scene: &Scene,
     solved: &BothSolved,
-    Kept {
-        source,
-        curve,
-        circuit,
-        field,
-    }: Kept,
+    kept: Kept,
     shape: &ShapeSource,
     options: &CalibrateOptions,
     progress: &dyn Progress,
 ) -> Result<BundleReport, JobError> {
     progress.take_seconds();
     let folder = folder_of(scene, shape, options);
-    let inputs = inputs(source, curve, shape);
-    let points = discretize::run_kept(&shape.document, inputs, field, progress)?;
+    let points = kept.points(shape, progress)?;
+    check_bundle_target(&folder, options.force, &points.summary.inputs)?;
+    let write = |content: &BundleContent| {
+        let timing: Vec<StageSeconds> = progress
+            .take_seconds()
+            .into_iter()
+            .map(|(stage, seconds)| StageSeconds { stage, seconds })
+            .collect();
+        progress.check()?;
+        progress.begin("write", 1);
+        let manifest = write_bundle(&folder, options.force, content, &timing)?;
+        progress.end();
+        Ok(manifest)
+    };
+    let (manifest, lambda) = compute(
+        scene,
+        solved,
+        kept,
+        (shape, points),
+        options,
+        progress,
+        write,
+    )?;
+    Ok(BundleReport {
+        folder,
+        manifest,
+        lambda,
+    })
+}
+
+/// Computes everything that a bundle holds and hands it to `take`, which returns the manifest with
+/// its list of files.
+fn compute(
+    scene: &Scene,
+    solved: &BothSolved,
+    kept: Kept,
+    (shape, points): (&ShapeSource, PointsReport),
+    options: &CalibrateOptions,
+    progress: &dyn Progress,
+    take: impl FnOnce(&BundleContent) -> Result<Manifest, JobError>,
+) -> Result<(Manifest, LambdaReport), JobError> {
+    let Kept {
+        source,
+        curve,
+        circuit,
+        field,
+    } = kept;
     let asked = LambdaOptions {
         picture: options.page,
         ..options.lambda.clone()
@@ -318,6 +374,7 @@ fn calibrate_one(
     )?;
     let passive = passive_map(scene, &needed.made.map, progress)?;
     let mut manifest = manifest(scene, &lambda, &needed, passive.as_ref());
+    manifest.made_with = Some(made_with(options, shape));
     manifest.circuit = Some(circuit.circuit.clone());
     let stage = circuit.accuracy.clone();
     manifest.accuracy.insert("inductances".to_owned(), stage);
@@ -348,32 +405,53 @@ fn calibrate_one(
         };
         let others: Vec<&str> = extra.iter().map(|(name, _)| *name).collect();
         pages = page::files(&seen, &others)
-            .map_err(|error| WriteError::from_io("write", &folder.join(PAGE_FILE), error))?;
+            .map_err(|error| WriteError::from_io("write", Path::new(PAGE_FILE), error))?;
         progress.end();
     }
     extra.extend(pages.iter().map(|(name, bytes)| (*name, bytes.as_slice())));
-    let timing: Vec<StageSeconds> = progress
-        .take_seconds()
-        .into_iter()
-        .map(|(stage, seconds)| StageSeconds { stage, seconds })
-        .collect();
-    progress.check()?;
-    progress.begin("write", 1);
-    let content = BundleContent {
+    let manifest = take(&BundleContent {
         manifest,
         map: &map,
         points: &rows,
         currents: &currents,
         lambda: &lambda.file,
         extra: &extra,
+    })?;
+    Ok((manifest, lambda))
+}
+
+/// What `verify` needs besides the inputs to compute the same bundle again.
+fn made_with(options: &CalibrateOptions, shape: &ShapeSource) -> MadeWith {
+    let document = &shape.document;
+    let surface = match (&shape.input, &document.source) {
+        (None, SurfaceSource::File { unit_m, .. }) => {
+            let (x, y) = (document.grid.x, document.grid.y);
+            let parts = |axis: AxisRequest| match axis {
+                AxisRequest::Given(axis) => (axis.samples, Some([axis.from, axis.to])),
+                AxisRequest::Extent(samples) => (samples, None),
+            };
+            Some(SurfaceOptions {
+                unit_m: *unit_m,
+                scale: document.scale,
+                translate_m: document.placement.translate_m,
+                rotate_deg: document.placement.rotate_deg,
+                samples: [parts(x).0, parts(y).0],
+                x_m: parts(x).1,
+                y_m: parts(y).1,
+            })
+        }
+        (Some(_), _) | (None, SurfaceSource::Primitive(_)) => None,
     };
-    let manifest = write_bundle(&folder, options.force, &content, &timing)?;
-    progress.end();
-    Ok(BundleReport {
-        folder,
-        manifest,
-        lambda,
-    })
+    let mut made_with = MadeWith {
+        tolerance: options.lambda.tolerance,
+        reach_m: options.reach_m,
+        report: options.page,
+        arithmetic: arithmetic(),
+        surface,
+        sha256: String::new(),
+    };
+    made_with.sha256 = made_with.digest();
+    made_with
 }
 
 /// The unpowered steel's pull on the map's nodes, where the design asks for it.
@@ -598,6 +676,7 @@ fn manifest(
         design: file.design.clone(),
         shape: file.shape.clone(),
         inputs: file.inputs.clone(),
+        made_with: None,
         units: UNITS.to_owned(),
         array: scene.array_geometry(),
         limits: scene.current_limits(),

@@ -463,6 +463,20 @@ pub fn criterion_name(criterion: Criterion) -> &'static str {
     }
 }
 
+/// The criterion of that name in artefacts and on the command line.
+#[must_use]
+pub fn criterion_named(name: &str) -> Option<Criterion> {
+    // A criterion without its place in this row does not compile.
+    let next = |criterion: &Criterion| match criterion {
+        Criterion::Jnd => Some(Criterion::Linear),
+        Criterion::Linear => Some(Criterion::Saturation),
+        Criterion::Saturation => Some(Criterion::Maxmin),
+        Criterion::Maxmin => None,
+    };
+    std::iter::successors(Some(Criterion::Jnd), next)
+        .find(|criterion| criterion_name(*criterion) == name)
+}
+
 fn warnings(points: &WantedPoints, solution: &Solution, options: &LambdaOptions) -> Vec<String> {
     let mut warnings = points.warnings.clone();
     match solution.status {

@@ -284,9 +284,14 @@ impl Allocator {
         self.order
             .extend(self.row.iter().enumerate().map(|(i, &g)| (-g, i)));
         self.order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-        // What may be added to all coils at their lower limits.
-        let mut left = Careful::of(self.total_a);
-        self.lower_a.iter().for_each(|lower| left.add(-lower));
+        // What the coils from a place on give back at their lower limits. All terms of this and of
+        // the next sum have one sign: a limit of 1e30 A beside one of 1 A takes no digit of it.
+        let mut back = 0.0;
+        for (place, &(_, i)) in self.order.iter().enumerate().rev() {
+            back -= self.lower_a[i];
+            self.tail[place] = back;
+        }
+        let mut spent = Careful::of(0.0);
         let mut threshold = 0.0;
         let mut start = 0;
         while start < coils {
@@ -295,23 +300,26 @@ impl Allocator {
                 break;
             }
             let mut end = start;
-            let mut room = Careful::of(0.0);
+            let mut upper = Careful::of(0.0);
             while end < coils && -self.order[end].0 >= gain - TIED {
-                let i = self.order[end].1;
-                room.add(self.upper_a[i]);
-                room.add(-self.lower_a[i]);
+                upper.add(self.upper_a[self.order[end].1]);
                 end += 1;
             }
-            if room.value() <= left.value() && gain > TIED {
+            // What the sum allows this group, its own lower limits left out of account.
+            let mut left = Careful::of(self.total_a);
+            left.add(self.tail.get(end).copied().unwrap_or(0.0));
+            left.add(-spent.head);
+            left.add(-spent.rest);
+            if upper.value() <= left.value() && gain > TIED {
                 for &(_, i) in &self.order[start..end] {
                     currents[i] = self.upper_a[i];
                 }
-                left.add(-room.head);
-                left.add(-room.rest);
+                spent.add(upper.head);
+                spent.add(upper.rest);
                 start = end;
                 continue;
             }
-            self.share(start..end, left, gain <= TIED, currents);
+            self.share(start..end, left.value(), gain <= TIED, currents);
             threshold = gain.max(0.0);
             break;
         }
@@ -319,25 +327,20 @@ impl Allocator {
         (force, threshold)
     }
 
-    /// Shares a sum among equal coils by least power: exactly `left` above their lower limits, or
-    /// with `at_most` no more than that.
+    /// Shares a sum among equal coils by least power: exactly that sum, or with `at_most` no more
+    /// and no current where none is needed.
     fn share(
         &mut self,
         group: std::ops::Range<usize>,
-        left: Careful,
+        sum: f64,
         at_most: bool,
         currents: &mut [f64],
     ) {
         self.ones.fill(0.0);
-        let mut sum = left;
         for &(_, i) in &self.order[group] {
-            sum.add(self.lower_a[i]);
             self.ones[i] = 1.0;
         }
-        let mut sum = sum.value();
-        if at_most {
-            sum = sum.min(0.0);
-        }
+        let sum = if at_most { sum.min(0.0) } else { sum };
         if sum < 0.0 {
             self.ones.iter_mut().for_each(|c| *c = -*c);
         }
@@ -408,8 +411,7 @@ impl Allocator {
         for (i, &g) in self.row.iter().enumerate() {
             if g != 0.0 {
                 for bound in [self.lower_a[i], self.upper_a[i]] {
-                    let at = (bound * self.resistance_ohm[i] + sigma) / g;
-                    self.order.push((at, i));
+                    self.order.push((self.meets(i, bound, sigma), i));
                 }
             }
         }
@@ -438,25 +440,34 @@ impl Allocator {
             .filter(|&i| self.moves(i, sigma, from, to))
             .map(|i| self.row[i] * self.row[i] * self.conductance_s[i])
             .sum();
+        // From the piece's point nearest to nothing: far ends would take the digits.
         let mu = if slope > 0.0 {
-            (to - (force(to) - target) / slope).clamp(from, to)
+            let near = 0.0_f64.clamp(from, to);
+            (near + (target - force(near)) / slope).clamp(from, to)
         } else {
             to
         };
         Piece { from, to, mu }
     }
 
-    /// Whether a coil is between its limits all over a piece.
+    /// The force's multiplier at which a coil with force meets a limit.
+    fn meets(&self, i: usize, limit_a: f64, sigma: f64) -> f64 {
+        (limit_a * self.resistance_ohm[i] + sigma) / self.row[i]
+    }
+
+    /// Whether a coil is between its limits all over a piece. The piece's ends are such multipliers
+    /// themselves, so there is nothing to round.
     fn moves(&self, i: usize, sigma: f64, from: f64, to: f64) -> bool {
-        let (low, high) = (
-            self.lower_a[i] * self.resistance_ohm[i],
-            self.upper_a[i] * self.resistance_ohm[i],
-        );
-        let pressure = |mu: f64| mu * self.row[i] - sigma;
-        let (a, b) = (pressure(from), pressure(to));
-        // The piece ends where a coil meets its limit: up to rounding.
-        let slack = 4.0 * f64::EPSILON * (sigma + a.abs().max(b.abs()));
-        low < high && a.min(b) >= low - slack && a.max(b) <= high + slack
+        let (lower, upper) = (self.lower_a[i], self.upper_a[i]);
+        if lower >= upper {
+            return false;
+        }
+        if self.row[i] == 0.0 {
+            let pressure = -sigma * self.conductance_s[i];
+            return lower <= pressure && pressure <= upper;
+        }
+        let (a, b) = (self.meets(i, lower, sigma), self.meets(i, upper, sigma));
+        a.min(b) <= from && to <= a.max(b)
     }
 
     /// The multipliers that meet both rows if the coils that move on `piece` are the ones that do.

@@ -80,7 +80,7 @@ for row, pull, height, currents, force, answer in found:
 ";
 
 /// The C loader as a program; `None` without a C compiler.
-fn c_loader(folder: &Path, flags: &[&str]) -> Option<PathBuf> {
+pub fn c_loader(folder: &Path, flags: &[&str]) -> Option<PathBuf> {
     let program = folder.join("replay");
     let built = Command::new("cc")
         .args([
@@ -232,6 +232,91 @@ fn rust_python_and_c_give_the_same_forces() {
             None => eprintln!("skipped: no C compiler"),
         }
     }
+}
+
+/// Broke: with a lower limit of -1e30 A the C loader answered 8 A where the sum may be 5 A.
+#[test]
+fn extreme_limits_give_the_same_currents_in_all_runtimes() {
+    let folder = temporary();
+    let program = c_loader(folder.path(), &[]);
+    for (number, (lower, upper, total)) in [
+        ([-1e30; 4], [8.0; 4], Some(5.0)),
+        ([-1e30, 0.0, 0.0, -1e30], [8.0, 2.0, 1.3, 1e30], Some(5.0)),
+        ([-1e30; 4], [1e30; 4], Some(0.0)),
+        ([-1e30; 4], [1e30; 4], None),
+        ([0.0; 4], [1e30, 0.7, 1e30, 0.7], Some(1e30)),
+        ([0.0; 4], [0.0; 4], Some(0.0)),
+        ([-0.7, -0.7, 0.0, -0.7], [0.7; 4], Some(0.0)),
+        ([-1e-9, -1e30, 0.0, 0.0], [1e-9, 2.0, 2.0, 1e9], Some(1e-9)),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let mut sample = sample(false, [13, 17, 11]).with_pull();
+        let (runtime, limits) = (&mut sample.map.runtime, &mut sample.manifest.limits);
+        (limits.current_min_a, limits.current_max_a) = (lower.to_vec(), upper.to_vec());
+        limits.total_current_max_a = total;
+        (runtime.current_min_a, runtime.current_max_a) = (lower.to_vec(), upper.to_vec());
+        runtime.total_current_max_a = total;
+        let target = folder.path().join(format!("bundle{number}"));
+        sample.write(&target, false).unwrap();
+        let bundle = Bundle::open(&target).unwrap();
+        let mut at = positions(&bundle.map);
+        at.truncate(200);
+        let mut renderer = Renderer::new(&bundle).unwrap();
+        let want: Vec<Vec<f64>> = at
+            .iter()
+            .map(|p| answered(&bundle, &mut renderer, *p))
+            .collect();
+        for row in &want {
+            let currents = &row[COILS + 4..];
+            let (sum, size) = currents
+                .iter()
+                .fold((0.0, 0.0), |(s, z), i| (s + i, z + i.abs()));
+            let most = total.unwrap_or(f64::INFINITY);
+            assert!(
+                sum <= most + 1e-12 * (size + most),
+                "{number}: {currents:?}"
+            );
+        }
+        if has_numpy() {
+            let mut python = Command::new("python3");
+            python
+                .args(["-c", PYTHON_READS_STDIN])
+                .arg(scripts())
+                .arg(&target)
+                .env("PYTHONDONTWRITEBYTECODE", "1");
+            let found = forces_from(python, &at).unwrap();
+            compare(&format!("limits {number}, Python"), &found, &want);
+        }
+        if let Some(program) = &program {
+            let mut c = Command::new(program);
+            c.arg(target.join("map.npz"));
+            compare(
+                &format!("limits {number}, C"),
+                &forces_from(c, &at).unwrap(),
+                &want,
+            );
+        }
+    }
+}
+
+/// What the library answers at a position, in the order of the other loaders' lines.
+fn answered(bundle: &Bundle, renderer: &mut Renderer, position: [f64; 3]) -> Vec<f64> {
+    let mut line = vec![f64::NAN; bundle.coil_count()];
+    bundle.force_per_ampere(position, &mut line);
+    line.push(bundle.passive_force_n(position).unwrap_or(0.0));
+    let mut currents = vec![f64::NAN; COILS];
+    let step = renderer.step(position, &mut currents);
+    let answer = match step.answer {
+        Answer::Ok => 0.0,
+        Answer::Saturated => 1.0,
+        Answer::Outside => 2.0,
+    };
+    assert!(renderer.certificate(&step, &currents) < 1e-12);
+    line.extend([step.height_m, answer, step.force_n]);
+    line.extend(currents);
+    line
 }
 
 #[test]

@@ -2,6 +2,8 @@
 //! or hostile bundles are refused with words that help.
 #![allow(clippy::disallowed_methods, clippy::print_stderr)]
 
+mod archives;
+mod forgeries;
 mod hostile;
 mod loaders;
 mod sample;

@@ -186,6 +186,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
         design: "a".to_owned(),
         shape: "b".to_owned(),
         inputs,
+        made_with: None,
         units: UNITS.to_owned(),
         array: ArrayGeometry {
             positions_m,

@@ -194,7 +194,11 @@ const CASES: &[Case] = &[
         &["sweep", "merge", "plan.json", "points"],
         &["2 of 2 points are missing", "sweep run", "--partial"],
     ),
-    ("E501", &["verify", "edited"], &["edited", "failed", "map"]),
+    (
+        "E501",
+        &["verify", "edited"],
+        &["edited", "failed", "inputs"],
+    ),
     (
         "E502",
         &["verify", "cut"],
@@ -248,7 +252,7 @@ fn prepared() -> Place {
     let version = &version[..version.find('"').unwrap()];
     place.write("newer/manifest.json", &manifest.replace(version, "7.0.0"));
     place.write("cut/currents.csv", "coil,x_m,y_m,current_a\n");
-    // Another design under a right checksum: only the physics tells.
+    // Another design under a right checksum: lambda.json names the other one.
     let design = String::from_utf8(place.read("edited/design.toml")).unwrap();
     let wrong = design.replace("turns = 1429", "turns = 1428");
     assert_ne!(design, wrong);

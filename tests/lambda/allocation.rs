@@ -293,6 +293,63 @@ fn exhaustive_search_over_all_states_finds_nothing_better() {
     assert!(worst < 1e-13, "worst certificate {worst:e}");
 }
 
+/// Broke: with a lower limit of -1e30 A, 8 A flowed where the sum may be 5 A.
+#[test]
+fn extreme_limits_are_kept_to_the_last_ampere() {
+    let mut random = Random(29);
+    let ends = [0.0, 1e-30, 1e-9, 0.7, 2.0, 8.0, 1e9, 1e30];
+    let (mut reached, mut saturated) = (0, 0);
+    for round in 0..20_000 {
+        let coils = 1 + random.below(5);
+        let mut pick =
+            |n: usize| -> Vec<f64> { (0..n).map(|_| ends[random.below(ends.len())]).collect() };
+        let (upper, lower, total) = (pick(coils), pick(coils), pick(1)[0]);
+        let mut between = |from: f64, to: f64| from + (to - from) * random.next();
+        let forces: Vec<f64> = (0..coils)
+            .map(|_| {
+                let force: f64 = between(-0.3, 1.0);
+                // Some alike, some none.
+                (8.0 * force).round() / 8.0
+            })
+            .collect();
+        let problem = Problem {
+            force_n_per_a: forces,
+            resistance_ohm: (0..coils).map(|_| between(3.0, 9.0)).collect(),
+            lower_a: lower.iter().map(|a| -a).collect(),
+            upper_a: upper,
+            total_a: (round % 4 > 0).then_some(total),
+            wanted_n: between(-8.0, 20.0),
+        };
+        let (currents, found, certificate) = problem.solve();
+        let context = || format!("{round}: {problem:?} {currents:?} {found:?}");
+        assert!(certificate <= 1e-12, "{certificate:e} {}", context());
+        let limits = problem.lower_a.iter().zip(&problem.upper_a);
+        for (current, (lower, upper)) in currents.iter().zip(limits) {
+            assert!(lower <= current && current <= upper, "{}", context());
+        }
+        let sum: f64 = currents.iter().sum();
+        let size: f64 = currents.iter().map(|current| current.abs()).sum();
+        if let Some(total) = problem.total_a {
+            assert!(sum - total <= 1e-12 * (size + total), "{sum} {}", context());
+        }
+        match found.reach {
+            Reach::Reached => {
+                reached += 1;
+                let terms = currents.iter().zip(&problem.force_n_per_a);
+                let size: f64 = terms.map(|(i, g)| (i * g).abs()).sum();
+                let missing = (found.force_n - problem.wanted_n).abs();
+                let allowed = 1e-11 * (size + problem.wanted_n.abs());
+                assert!(missing <= allowed, "{missing:e} {}", context());
+            }
+            Reach::Saturated => saturated += 1,
+        }
+    }
+    assert!(
+        reached > 3_000 && saturated > 3_000,
+        "{reached} {saturated}"
+    );
+}
+
 #[test]
 fn other_currents_of_the_same_force_cost_more() {
     // Nine coils: any move that keeps the force and the limits raises the power.

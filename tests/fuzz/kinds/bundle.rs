@@ -424,7 +424,7 @@ pub fn hostile() -> Vec<(String, Input)> {
             input.put("lambda.json", Content::Bytes(b"[".repeat(1 << 20)));
         }),
         with("a deep manifest", |input| {
-            let text = b"{\"schema_version\":\"1.2.0\",\"x\":".repeat(20_000);
+            let text = b"{\"schema_version\":\"1.3.0\",\"x\":".repeat(20_000);
             input.put(MANIFEST, Content::Bytes(text));
         }),
         with("many coils in few bytes", |input| {

@@ -1,0 +1,68 @@
+//! The bundle that inputs and options give, computed in memory: what `verify` compares with.
+
+use super::{
+    BothSolved, CalibrateOptions, DesignSource, Inductances, Kept, ShapeSource, compute, point_rows,
+};
+use crate::bundle::artefact::Input;
+use crate::bundle::lambda_file::LambdaFile;
+use crate::bundle::manifest::Manifest;
+use crate::bundle::store::Store;
+use crate::bundle::table::PointRow;
+use crate::bundle::write::{BundleContent, sealed_manifest};
+use crate::job::JobError;
+use crate::job::kept::FieldStore;
+use crate::job::scene::Scene;
+use crate::progress::Progress;
+
+/// What a bundle must hold. The digests in the manifest's list stand for the content of all files.
+#[derive(Debug, Clone)]
+pub struct Expected {
+    /// `manifest.json`.
+    pub manifest: Manifest,
+    /// `lambda.json`.
+    pub lambda: LambdaFile,
+    /// `points.csv`.
+    pub points: Vec<PointRow>,
+}
+
+/// Computes the bundle of `shape` on `scene` again. Nothing is written, and nothing that an
+/// earlier run cached is used.
+///
+/// # Errors
+/// As [`super::run`], but for what concerns the output.
+pub fn expected(
+    scene: &Scene,
+    source: DesignSource,
+    curve: Option<&(Input, String)>,
+    shape: &ShapeSource,
+    options: &CalibrateOptions,
+    progress: &dyn Progress,
+) -> Result<Expected, JobError> {
+    let tolerance = options.lambda.tolerance;
+    let table = curve.map(|(_, text)| text.as_str());
+    let field = FieldStore::new(scene, tolerance, table, Store::none());
+    let solved = BothSolved::new(scene, &field, tolerance, progress)?;
+    let circuit = Inductances::new(scene, &solved.map, progress);
+    let kept = Kept {
+        source,
+        curve,
+        circuit: &circuit,
+        field: field.of_shape(&shape.document.name),
+    };
+    let points = kept.points(shape, progress)?;
+    let seal = |content: &BundleContent| Ok(sealed_manifest(content)?);
+    let (manifest, lambda) = compute(
+        scene,
+        &solved,
+        kept,
+        (shape, points),
+        options,
+        progress,
+        seal,
+    )?;
+    Ok(Expected {
+        manifest,
+        points: point_rows(&lambda.points.discretized.points),
+        lambda: lambda.file,
+    })
+}

@@ -1,0 +1,270 @@
+//! Malformed archives: every loader refuses every one of them, the digests being right.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use fluxform::bundle::artefact::sha256_hex;
+use fluxform::bundle::json::to_json;
+use fluxform::bundle::load::Bundle;
+
+use crate::loaders::c_loader;
+use crate::sample::*;
+
+/// A good archive taken apart.
+#[derive(Clone)]
+struct Archive {
+    data: Vec<u8>,
+    heads: Vec<Vec<u8>>,
+    count: u16,
+    behind: Vec<u8>,
+}
+
+impl Archive {
+    fn of(bytes: &[u8]) -> Self {
+        let end = bytes.len() - 22;
+        let place = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+        let (mut at, mut heads) = (place(end + 16), Vec::new());
+        let data = bytes[..at].to_vec();
+        while at < end {
+            let step = 46 + usize::from(bytes[at + 28]) + usize::from(bytes[at + 30]);
+            heads.push(bytes[at..at + step].to_vec());
+            at += step;
+        }
+        Self {
+            count: heads.len() as u16,
+            data,
+            heads,
+            behind: Vec::new(),
+        }
+    }
+
+    fn bytes(&self) -> Vec<u8> {
+        let directory = self.heads.concat();
+        let mut bytes = [self.data.as_slice(), &directory].concat();
+        bytes.extend([b'P', b'K', 5, 6, 0, 0, 0, 0]);
+        bytes.extend([self.count.to_le_bytes(), self.count.to_le_bytes()].concat());
+        bytes.extend((directory.len() as u32).to_le_bytes());
+        bytes.extend((self.data.len() as u32).to_le_bytes());
+        bytes.extend((self.behind.len() as u16).to_le_bytes());
+        bytes.extend(&self.behind);
+        bytes
+    }
+
+    fn twice(&mut self, entry: usize) {
+        self.heads.push(self.heads[entry].clone());
+        self.count += 1;
+    }
+}
+
+type Damage = (&'static str, fn(&mut Archive));
+
+const DAMAGES: &[Damage] = &[
+    ("an array twice", |a| a.twice(5)),
+    ("the first array twice", |a| a.twice(0)),
+    ("an unknown array twice", |a| {
+        a.heads[3][46] = b'q';
+        a.twice(3);
+    }),
+    ("a comment", |a| a.behind = b"made by hand".to_vec()),
+    ("one entry less", |a| a.count -= 1),
+    ("one entry more", |a| a.count += 1),
+    ("more than 64 entries", |a| {
+        for k in 0..60u8 {
+            let mut head = a.heads[0].clone();
+            head[46] = b'A' + k % 26;
+            head[47] = b'a' + k / 26;
+            a.heads.push(head);
+            a.count += 1;
+        }
+    }),
+    ("a compressed entry", |a| a.heads[4][10] = 8),
+    ("an encrypted entry", |a| a.heads[4][8] |= 1),
+    ("another packed size", |a| a.heads[4][20] ^= 8),
+    ("an entry beyond the directory", |a| {
+        a.heads[4][45] = 0x7f;
+    }),
+    ("an entry that reaches into the directory", |a| {
+        let long = (a.data.len() as u32).to_le_bytes();
+        a.heads[4][20..24].copy_from_slice(&long);
+        a.heads[4][24..28].copy_from_slice(&long);
+    }),
+    ("no local header", |a| a.data[0] = b'X'),
+    ("a name longer than the directory", |a| {
+        a.heads.last_mut().unwrap()[29] = 0xff
+    }),
+    ("no mark in the directory", |a| a.heads[2][0] = b'X'),
+];
+
+/// Bundles with such archives, their digests sealed.
+fn malformed(folder: &Path) -> Vec<(&'static str, PathBuf)> {
+    let sample = sample(false, [4, 4, 4]);
+    let good = folder.join("good");
+    sample.write(&good, false).unwrap();
+    let bytes = fs::read(good.join("map.npz")).unwrap();
+    let whole = Archive::of(&bytes);
+    assert_eq!(whole.bytes(), bytes);
+    let damaged = DAMAGES.iter().map(|(name, damage)| {
+        let mut archive = whole.clone();
+        damage(&mut archive);
+        (*name, archive.bytes())
+    });
+    let edited = [
+        ("bytes behind the end", [bytes.as_slice(), &[0; 5]].concat()),
+        (
+            "bytes before the start",
+            [&[0; 5], bytes.as_slice()].concat(),
+        ),
+        ("cut short", bytes[..bytes.len() - 1].to_vec()),
+        ("an end record alone", bytes[bytes.len() - 22..].to_vec()),
+        ("nothing", Vec::new()),
+    ];
+    damaged
+        .chain(edited)
+        .enumerate()
+        .map(|(number, (name, map))| {
+            let target = folder.join(format!("bundle{number}"));
+            let mut manifest = sample.write(&target, false).unwrap();
+            let entry = manifest
+                .files
+                .iter_mut()
+                .find(|file| file.path == "map.npz")
+                .unwrap();
+            (entry.bytes, entry.sha256) = (map.len() as u64, sha256_hex(&map));
+            fs::write(target.join("map.npz"), map).unwrap();
+            fs::write(target.join("manifest.json"), to_json(&manifest).unwrap()).unwrap();
+            (name, target)
+        })
+        .collect()
+}
+
+const OCTAVE: &str = "addpath(getenv('FLUXFORM_SCRIPTS'));
+folders = strsplit(strtrim(fileread('folders.txt')), \"\\n\");
+for k = 1:numel(folders)
+    try
+        load_bundle(folders{k});
+        printf('read\\n');
+    catch problem
+        printf('%s\\n', problem.identifier);
+    end
+end";
+
+#[test]
+fn all_loaders_refuse_the_same_malformed_archives() {
+    let folder = temporary();
+    let bundles = malformed(folder.path());
+    let read: Vec<&str> = bundles
+        .iter()
+        .filter(|(_, target)| Bundle::open(target).is_ok())
+        .map(|(name, _)| *name)
+        .collect();
+    assert_eq!(read, [""; 0], "the library reads them");
+    Bundle::open(&folder.path().join("good")).unwrap();
+    if has_numpy() {
+        for (name, target) in &bundles {
+            let mut python = Command::new("python3");
+            python.arg(scripts().join("load_bundle.py")).arg(target);
+            let output = python.env("PYTHONDONTWRITEBYTECODE", "1").output().unwrap();
+            let words = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert_eq!(output.status.code(), Some(3), "Python, {name}: {words}");
+            assert!(words.contains("map.npz"), "Python, {name}: {words}");
+        }
+    } else {
+        eprintln!("skipped: no python3 with numpy");
+    }
+    match c_loader(folder.path(), &[]) {
+        Some(program) => {
+            for (name, target) in &bundles {
+                let mut c = Command::new(&program);
+                let output = c.arg(target.join("map.npz")).output().unwrap();
+                assert_eq!(output.status.code(), Some(3), "C, {name}");
+            }
+        }
+        None => eprintln!("skipped: no C compiler"),
+    }
+    let folders: String = std::iter::once(folder.path().join("good"))
+        .chain(bundles.iter().map(|(_, target)| target.clone()))
+        .map(|target| format!("{}\n", target.display()))
+        .collect();
+    fs::write(folder.path().join("folders.txt"), folders).unwrap();
+    let octave = Command::new("octave-cli")
+        .args(["--norc", "--quiet", "--eval", OCTAVE])
+        .env("FLUXFORM_SCRIPTS", scripts())
+        .current_dir(folder.path())
+        .output();
+    match octave {
+        Ok(output) => {
+            let told = String::from_utf8_lossy(&output.stdout).into_owned();
+            let mut answers = told.lines();
+            assert_eq!(answers.next(), Some("read"), "{told}");
+            for (name, _) in &bundles {
+                assert_eq!(answers.next(), Some("fluxform:bundle"), "Octave, {name}");
+            }
+        }
+        Err(_) => eprintln!("skipped: no octave-cli (Debian: octave)"),
+    }
+}
+
+/// A file of holes took the memory that it claims to need.
+#[cfg(target_os = "linux")]
+#[test]
+fn files_of_holes_are_refused_by_all_loaders_before_they_are_read() {
+    let folder = temporary();
+    let sample = sample(false, [4, 4, 4]);
+    for (name, bytes) in [
+        ("map.npz", 6_000_000_000),
+        ("map.npz", 3_000_000_000),
+        ("more", 20_000_000_000_u64),
+    ] {
+        let target = folder.path().join(format!("{name}{bytes}"));
+        let mut manifest = sample.write(&target, false).unwrap();
+        let file = fs::File::options()
+            .create(true)
+            .append(true)
+            .open(target.join(name))
+            .unwrap();
+        file.set_len(bytes).unwrap();
+        let entry = manifest.files.iter_mut().find(|file| file.path == name);
+        match entry {
+            Some(entry) => entry.bytes = bytes,
+            None => manifest.files.push(fluxform::bundle::artefact::FileEntry {
+                path: name.to_owned(),
+                bytes,
+                sha256: sha256_hex(b""),
+            }),
+        }
+        fs::write(target.join("manifest.json"), to_json(&manifest).unwrap()).unwrap();
+        let error = Bundle::open(&target).unwrap_err().to_string();
+        assert!(
+            error.contains("holes") || error.contains("at most"),
+            "{error}"
+        );
+        if has_numpy() {
+            // 2 GB of address space are too few to read any of them.
+            let command = "ulimit -v 2000000; exec python3 \"$0\" \"$1\"";
+            let mut python = Command::new("sh");
+            python
+                .args(["-c", command])
+                .arg(scripts().join("load_bundle.py"))
+                .arg(&target);
+            python.env("OPENBLAS_NUM_THREADS", "1");
+            let output = python.env("PYTHONDONTWRITEBYTECODE", "1").output().unwrap();
+            let words = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert_eq!(output.status.code(), Some(3), "{words}");
+            assert!(
+                words.contains("holes") || words.contains("4 GiB"),
+                "{words}"
+            );
+        }
+        if name == "map.npz"
+            && let Some(program) = c_loader(folder.path(), &[])
+        {
+            let output = Command::new(program)
+                .arg(target.join(name))
+                .output()
+                .unwrap();
+            let words = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert_eq!(output.status.code(), Some(3), "{words}");
+        }
+    }
+}
