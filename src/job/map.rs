@@ -12,7 +12,8 @@ use self::mag_manip::{MULTIPOLE_TOLERANCE, MagManipRequest, MultipolesMade, Vect
 use super::maps::{Felt, SceneMap};
 use super::scene::Scene;
 use super::working_point::{WorkingPoint, relative_difference, superposition_ends};
-use super::{JobError, KERNEL_ERROR, steel};
+use super::{JobError, steel};
+use crate::accuracy::missed;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
 use crate::bundle::atomic::Overwrite;
 use crate::bundle::manifest::{
@@ -73,6 +74,8 @@ pub struct MapReport {
     pub warnings: Vec<String>,
     /// Whether the tolerance asked for was reached.
     pub accuracy_reached: bool,
+    /// What misses it.
+    pub accuracy_missed: Vec<String>,
 }
 
 /// Largest difference of `gz` from the sum of the coils' maps times their currents, relative to
@@ -238,6 +241,7 @@ pub fn run(
         &besides,
     )?;
     progress.end();
+    let accuracy_missed = missed(&sidecar.accuracy, solved.tolerance);
     Ok(MapReport {
         sidecar,
         folder: request.out.clone(),
@@ -248,7 +252,8 @@ pub fn run(
         vector_field,
         multipoles,
         warnings,
-        accuracy_reached: solved.tolerance >= KERNEL_ERROR && solved.reached(),
+        accuracy_reached: accuracy_missed.is_empty(),
+        accuracy_missed,
     })
 }
 

@@ -93,7 +93,7 @@ impl Compare {
             place = write_svg(path, &file.inputs, &svg, self.writing.force, printer)?;
         }
         printer.summary(place, &printer.with_warnings(file), || summary(file))?;
-        accuracy_check(report.accuracy_reached)?;
+        accuracy_check(&report.accuracy_missed)?;
         match file.without_constant() {
             none if none.is_empty() => Ok(()),
             none => Err(no_constant(&none)),
