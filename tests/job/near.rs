@@ -96,7 +96,7 @@ fn a_coarse_probe_near_the_steel_is_within_its_claim() {
                 coarse.relative_error
             );
             assert!(coarse.accuracy_missed.is_empty());
-            for point in 0..points.len() {
+            for (point, place) in points.iter().enumerate() {
                 let [a, b] =
                     [&coarse, &tight].map(|table| table.field(point, 0).gradient_t_per_m_per_a);
                 let (mut off, mut size) = (0.0_f64, 0.0_f64);
@@ -106,7 +106,7 @@ fn a_coarse_probe_near_the_steel_is_within_its_claim() {
                 }
                 // Relative to |grad B| at the point itself: more than is claimed.
                 let part = off / size.sqrt() / coarse.relative_error;
-                let most = if points[point][0] == 0.0 { 20.0 } else { 1.0 };
+                let most = if place[0] == 0.0 { 20.0 } else { 1.0 };
                 assert!(part < most, "{core} {point} {tolerance:e}: {part}");
             }
         }

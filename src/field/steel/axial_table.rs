@@ -199,7 +199,8 @@ impl AxialTable {
             let along = z_m.max(-winding.length_m - z_m);
             distance_m = distance_m.min(across.max(0.0).hypot(along.max(0.0)));
         }
-        if self.terms > MOST_TERMS || !(distance_m >= NEAREST * shape.radius_m) {
+        let nearest_m = NEAREST * shape.radius_m;
+        if self.terms > MOST_TERMS || distance_m < nearest_m || !distance_m.is_finite() {
             return None;
         }
         let exponent = (distance_m / (1.0 + SQRT_2)).log2().floor() as i32;
