@@ -2,6 +2,8 @@
 
 #[path = "job/cored.rs"]
 mod cored;
+#[path = "job/near.rs"]
+mod near;
 
 use std::path::{Path, PathBuf};
 

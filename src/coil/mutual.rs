@@ -17,27 +17,89 @@ use crate::units::MU_0_T_M_PER_A;
 
 /// Relative error of [`mutual_inductance_h`] for gaps of at least a tenth of the outer radius.
 pub const RELATIVE_ERROR: f64 = 1e-6;
-/// Relative error where the windings touch.
-pub const RELATIVE_ERROR_TOUCHING: f64 = 1e-3;
-const TOLERANCE: f64 = 1e-7;
-/// Singularities closer than this multiple of the outer radius are treated as being there: what
-/// they leave of the integral is a logarithm of small weight.
-const NEAREST: f64 = 0.05;
-/// Most radial nodes.
-const MOST_NODES: usize = 10;
+
+/// How finely the integral is taken.
+#[derive(Debug, Clone, Copy)]
+struct Rule {
+    tolerance: f64,
+    /// Singularities closer than this multiple of the outer radius are treated as being there:
+    /// what they leave of the integral is a logarithm of small weight.
+    nearest: f64,
+    /// Most radial nodes.
+    most_nodes: usize,
+}
+
+/// From the rule of [`mutual_inductance_h`] on, each finer than the one before.
+const RULES: [Rule; 4] = [
+    Rule {
+        tolerance: 1e-7,
+        nearest: 0.05,
+        most_nodes: 10,
+    },
+    Rule {
+        tolerance: 1e-9,
+        nearest: 0.03,
+        most_nodes: 14,
+    },
+    Rule {
+        tolerance: 1e-10,
+        nearest: 0.02,
+        most_nodes: 18,
+    },
+    Rule {
+        tolerance: 1e-11,
+        nearest: 0.012,
+        most_nodes: 22,
+    },
+];
+/// The difference of two rules, times this, is claimed of the coarser one.
+const CHANCE: f64 = 2.0;
+/// Rounding of a sum over all nodes, relative.
+const ROUNDING: f64 = 1e-14;
 
 /// Mutual inductance of two equal windings whose axes are `distance_m` apart, H; negative, as
 /// the flux returns outside. Domain: the windings do not overlap.
 #[must_use]
 pub fn mutual_inductance_h(winding: &Winding, distance_m: f64) -> f64 {
+    by_rule(winding, distance_m, RULES[0])
+}
+
+/// As [`mutual_inductance_h`], with the estimate of its relative error: at most `tolerance`, or as
+/// far as the finest rule carries.
+#[must_use]
+pub fn estimated_mutual_inductance_h(
+    winding: &Winding,
+    distance_m: f64,
+    tolerance: f64,
+) -> (f64, f64) {
+    let mut value = by_rule(winding, distance_m, RULES[0]);
+    let mut error = f64::INFINITY;
+    for rule in &RULES[1..] {
+        let finer = by_rule(winding, distance_m, *rule);
+        error = CHANCE * (value - finer).abs() / finer.abs() + ROUNDING;
+        if error <= tolerance {
+            break;
+        }
+        // What two rules differ by is the coarser one's error: the finer is at least as good.
+        value = finer;
+    }
+    (value, error)
+}
+
+fn by_rule(winding: &Winding, distance_m: f64, rule: Rule) -> f64 {
+    let Rule {
+        tolerance,
+        nearest: nearest_share,
+        most_nodes,
+    } = rule;
     crate::progress::poll();
     let (a1, a2) = (winding.inner_radius_m, winding.outer_radius_m);
     let length = winding.length_m;
-    let floor = NEAREST * a2;
+    let floor = nearest_share * a2;
     let (centre, half) = (0.5 * (a1 + a2), 0.5 * (a2 - a1));
     let along_axis = |a: f64, rho: f64| {
         let mut sum = 0.0;
-        gauss::graded(0.0, length, (rho - a).max(floor), TOLERANCE, |u, weight| {
+        gauss::graded(0.0, length, (rho - a).max(floor), tolerance, |u, weight| {
             let at = RingPoint {
                 radius_m: a,
                 r_m: rho,
@@ -51,16 +113,16 @@ pub fn mutual_inductance_h(winding: &Winding, distance_m: f64) -> f64 {
     // Either radius is singular where the other winding's nearest filament would be met.
     let nearest = (distance_m - a2).max(a2 + floor);
     let radius = gauss::bernstein_radius(a1, a2, nearest, 0.0);
-    let order = gauss::order_for(radius, 4.0 * PI, TOLERANCE).unwrap_or(MOST_NODES);
-    let rule = gauss::rule((order + 1).min(MOST_NODES));
+    let order = gauss::order_for(radius, 4.0 * PI, tolerance).unwrap_or(most_nodes);
+    let rule = gauss::rule((order + 1).min(most_nodes));
     let mut total = 0.0;
     for (x, weight_b) in rule.nodes.iter().zip(&rule.weights) {
         let b = centre + half * x;
         let gap2 = ((distance_m - b).powi(2) - a2 * a2).max(0.0);
-        let near = (gap2 / (distance_m * b)).sqrt().max(NEAREST);
+        let near = (gap2 / (distance_m * b)).sqrt().max(nearest_share);
         // phi = pi - theta is zero at the closest approach. The midpoint rule over a period
         // converges like exp(-n near), exactly for the harmonics that cancel far away.
-        let steps = ((distance_m / (b * TOLERANCE)).ln() / (2.0 * near)).ceil() + 2.0;
+        let steps = ((distance_m / (b * tolerance)).ln() / (2.0 * near)).ceil() + 2.0;
         for step in 0..steps as usize {
             let phi = PI * (step as f64 + 0.5) / steps;
             let sine = (0.5 * phi).sin();
@@ -80,6 +142,34 @@ pub fn mutual_inductance_h(winding: &Winding, distance_m: f64) -> f64 {
 /// computed once.
 #[must_use]
 pub fn inductance_matrix_h(winding: &Winding, self_h: f64, axes_m: &[[f64; 2]]) -> Vec<Vec<f64>> {
+    matrix_of(self_h, axes_m, |distance_m| {
+        mutual_inductance_h(winding, distance_m)
+    })
+}
+
+/// As [`inductance_matrix_h`], with the largest estimate of a mutual inductance's relative error:
+/// at most `tolerance`, or as far as the finest rule carries.
+#[must_use]
+pub fn estimated_matrix_h(
+    winding: &Winding,
+    self_h: f64,
+    axes_m: &[[f64; 2]],
+    tolerance: f64,
+) -> (Vec<Vec<f64>>, f64) {
+    let mut worst = 0.0_f64;
+    let matrix = matrix_of(self_h, axes_m, |distance_m| {
+        let (value, error) = estimated_mutual_inductance_h(winding, distance_m, tolerance);
+        worst = worst.max(error);
+        value
+    });
+    (matrix, worst)
+}
+
+fn matrix_of(
+    self_h: f64,
+    axes_m: &[[f64; 2]],
+    mut mutual_h: impl FnMut(f64) -> f64,
+) -> Vec<Vec<f64>> {
     // Distances that differ by rounding only share a key.
     const SAME: f64 = 1e-9;
     let mut known: Vec<(f64, f64)> = Vec::new();
@@ -88,7 +178,7 @@ pub fn inductance_matrix_h(winding: &Winding, self_h: f64, axes_m: &[[f64; 2]]) 
         if let Some((_, value)) = known.iter().find(|(d, _)| same(*d)) {
             return *value;
         }
-        let value = mutual_inductance_h(winding, distance);
+        let value = mutual_h(distance);
         known.push((distance, value));
         value
     };
@@ -161,6 +251,26 @@ mod tests {
         let direct = 1429.0 * flux;
         let value = mutual_inductance_h(&winding, distance);
         assert!((value / direct - 1.0).abs() < 1e-5, "{value:e} {direct:e}");
+    }
+
+    #[test]
+    fn estimates_cover_finer_rules_and_are_of_their_size() {
+        for (outer_radius_m, length_m) in [(0.019, 0.1), (0.031, 0.013)] {
+            let winding = Winding {
+                inner_radius_m: 0.012,
+                outer_radius_m,
+                length_m,
+                turns: 700.0,
+            };
+            for gap in [0.02, 0.1, 0.4, 3.0] {
+                let distance = (2.0 + gap) * outer_radius_m;
+                let finest = by_rule(&winding, distance, RULES[3]);
+                let (value, error) = estimated_mutual_inductance_h(&winding, distance, 1e-5);
+                let off = (value / finest - 1.0).abs();
+                println!("gap {gap} of the radius: off by {off:.1e}, estimate {error:.1e}");
+                assert!(off <= error && error < 1e-4, "{gap}: {off:e} {error:e}");
+            }
+        }
     }
 
     #[test]

@@ -48,6 +48,12 @@ impl Cylinder {
         0.5 * self.diameter_m.hypot(self.length_m)
     }
 
+    /// As [`Cylinder::depth_m`] for the axis along a moment.
+    #[must_use]
+    pub fn depth_along_m(&self, moment_a_m2: [f64; 3]) -> f64 {
+        self.depth_m(direction(moment_a_m2))
+    }
+
     /// How far below its centre a cylinder with axis `axis` (a unit vector) extends, m.
     #[must_use]
     pub fn depth_m(&self, axis: [f64; 3]) -> f64 {

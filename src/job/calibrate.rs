@@ -15,7 +15,7 @@ use super::passive::PASSIVE_TOLERANCE;
 use super::passive_map::PassiveMap;
 use super::scene::{MAGNET_SHARE, Scene};
 use super::steel::{Solved, Steel};
-use super::{JobError, KERNEL_ERROR, steel};
+use super::{JobError, steel};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS, arithmetic};
 use crate::bundle::atomic::WriteError;
@@ -236,6 +236,9 @@ impl Kept<'_> {
     }
 }
 
+/// Finest tolerance asked of inductances in air, which decide how currents lag alone.
+const INDUCTANCE_TOLERANCE: f64 = 1e-6;
+
 /// How the coils' currents follow their voltages; the same for every shape.
 struct Inductances {
     circuit: CircuitSummary,
@@ -245,8 +248,9 @@ struct Inductances {
 impl Inductances {
     fn new(scene: &Scene, solved: &Solved, progress: &dyn Progress) -> Self {
         progress.begin("inductances", 1);
-        let in_air = neighbours::in_air(scene);
-        let (inductance_h, accuracy) = neighbours::inductances(scene, solved, in_air);
+        let wanted = solved.tolerance.max(INDUCTANCE_TOLERANCE);
+        let in_air = neighbours::in_air(scene, wanted);
+        let (inductance_h, accuracy) = neighbours::inductances(solved, in_air);
         progress.end();
         Self {
             circuit: CircuitSummary {
@@ -275,7 +279,7 @@ impl BothSolved {
         progress.begin("steel", 1);
         let map = field.steel(scene, tolerance, MAP_TOLERANCE)?;
         let forces = match map.steel {
-            Steel::None => steel::solve(scene, tolerance, KERNEL_ERROR, lowest_m)?,
+            Steel::None => steel::solve(scene, tolerance, scene.force_tolerance(), lowest_m)?,
             Steel::Alone(_) | Steel::Coupled(_) => map.clone(),
         };
         progress.end();

@@ -15,8 +15,8 @@ use super::discretize::{self, PointsReport, point_rows, points_grid};
 use super::lambda::{criterion_name, proven_accuracy};
 use super::scene::Scene;
 use super::steel::{Material, Solved};
-use super::{JobError, KERNEL_ERROR, passive, steel};
-use crate::accuracy::StageAccuracy;
+use super::{JobError, passive, steel};
+use crate::accuracy::{StageAccuracy, missed};
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::bundle::rendering::HeightGrid;
 use crate::design::Design;
@@ -52,6 +52,8 @@ pub struct CompareReport {
     pub warnings: Vec<String>,
     /// Whether the tolerance asked for was reached.
     pub accuracy_reached: bool,
+    /// What misses it.
+    pub accuracy_missed: Vec<String>,
 }
 
 /// What `compare` prints; SI.
@@ -193,7 +195,7 @@ pub fn run(
         .iter()
         .fold(f64::INFINITY, |z, p| z.min(p.summary.min_height_m));
     progress.begin("steel", 1);
-    let solved = steel::solve(&scene, options.tolerance, KERNEL_ERROR, lowest_m)?;
+    let solved = steel::solve(&scene, options.tolerance, scene.force_tolerance(), lowest_m)?;
     progress.end();
     let mut warnings = Vec::new();
     let objects = points
@@ -244,10 +246,12 @@ pub fn run(
         pairs,
         accuracy: BTreeMap::from([("forces", stage), ("difference", difference)]),
     };
+    let accuracy_missed = missed(&file.accuracy, solved.tolerance);
     Ok(CompareReport {
         file,
         warnings,
-        accuracy_reached: solved.tolerance >= KERNEL_ERROR && solved.reached(),
+        accuracy_reached: accuracy_missed.is_empty(),
+        accuracy_missed,
     })
 }
 

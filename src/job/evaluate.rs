@@ -46,6 +46,9 @@ pub struct Evaluation {
     pub accuracy: BTreeMap<&'static str, StageAccuracy>,
     /// Whether the tolerance asked for was reached.
     pub accuracy_reached: bool,
+    /// What misses it.
+    #[serde(skip)]
+    pub accuracy_missed: Vec<String>,
     /// What a careful person would mention.
     #[serde(skip)]
     pub notes: Vec<String>,
@@ -170,11 +173,14 @@ pub fn evaluate(
         mass_kg,
         force,
         limits,
-        accuracy_reached,
+        mut accuracy_missed,
     } = Rated::new(&scene, tolerance)?;
     let mut accuracy = single.accuracy.clone();
     let mut notes = single.notes.clone();
-    let array = neighbours::array(&scene, &mut accuracy, &mut notes)?;
+    let array = neighbours::array(&scene, tolerance, &mut accuracy, &mut notes)?;
+    if let Some(array) = &array {
+        accuracy_missed.extend_from_slice(&array.accuracy_missed);
+    }
     let transient = transient(&scene, &single, &mut accuracy);
     Ok(Evaluation {
         schema_version: SCHEMA_VERSION,
@@ -210,7 +216,8 @@ pub fn evaluate(
         limits,
         array,
         accuracy,
-        accuracy_reached,
+        accuracy_reached: accuracy_missed.is_empty(),
+        accuracy_missed,
         notes,
     })
 }

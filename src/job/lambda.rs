@@ -13,12 +13,12 @@ use super::air_sample::{self, PLACES, Sample, spread};
 use super::discretize::scattered::{self, Sampling, ScatteredSummary};
 use super::discretize::{self, PointsReport};
 use super::kept::ShapeField;
-use super::scene::{MAGNET_SHARE, Scene};
+use super::scene::{AIR_SHARE, MAGNET_FINEST, MAGNET_SHARE, Scene};
 use super::single::above_knee;
 use super::steel::{EVALUATION_SHARE, Material, Solved, Steel};
 use super::working_point::{WorkingPoint, relative_difference, superposition_ends};
 use super::{JobError, KERNEL_ERROR, passive, steel};
-use crate::accuracy::StageAccuracy;
+use crate::accuracy::{StageAccuracy, missed};
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::bundle::lambda_file::{
     ActivePointShare, AtLambda, LambdaFile, PathStep, SampledPoints, WorkingPointForces,
@@ -83,6 +83,8 @@ pub struct LambdaReport {
     pub warnings: Vec<String>,
     /// Whether the tolerance asked for was reached.
     pub accuracy_reached: bool,
+    /// What misses it.
+    pub accuracy_missed: Vec<String>,
 }
 
 /// Solves eq. 9 and 10 for `document` on `design`.
@@ -114,7 +116,7 @@ pub fn run(
         .feedback
         .map_or(lowest_m, |asked| asked.lowest_m(&scene, lowest_m));
     progress.begin("steel", 1);
-    let solved = steel::solve(&scene, options.tolerance, KERNEL_ERROR, lowest_m)?;
+    let solved = steel::solve(&scene, options.tolerance, scene.force_tolerance(), lowest_m)?;
     progress.end();
     let Some(chosen) = chosen else {
         let field = ShapeField::default();
@@ -226,6 +228,7 @@ struct Found {
     precision: Precision,
     warnings: Vec<String>,
     accuracy_reached: bool,
+    accuracy_missed: Vec<String>,
 }
 
 impl Found {
@@ -238,6 +241,7 @@ impl Found {
             precision: self.precision,
             warnings: self.warnings,
             accuracy_reached: self.accuracy_reached,
+            accuracy_missed: self.accuracy_missed,
         }
     }
 }
@@ -389,13 +393,15 @@ fn solve_at(
         file.accuracy
             .insert("passive_force".to_owned(), passive::accuracy(pull));
     }
+    let accuracy_missed = missed(&file.accuracy, solved.tolerance);
     Ok(Found {
         file,
         picture,
         status: solution.status,
         precision: solution.precision,
         warnings,
-        accuracy_reached: solved.tolerance >= KERNEL_ERROR && solved.reached(),
+        accuracy_reached: accuracy_missed.is_empty(),
+        accuracy_missed,
     })
 }
 
@@ -678,7 +684,7 @@ pub(super) fn proven_accuracy(scene: &Scene, solved: &Solved) -> StageAccuracy {
     let rules = solved.tolerance.max(KERNEL_ERROR);
     let magnet = match scene.design.magnet.model {
         MagnetModel::Dipole => 0.0,
-        MagnetModel::Cylinder => MAGNET_SHARE * rules,
+        MagnetModel::Cylinder => MAGNET_SHARE * rules.max(MAGNET_FINEST),
     };
     let method = match solved.steel {
         Steel::None => "a-priori quadrature bound, evaluated at the points directly",
@@ -691,8 +697,12 @@ pub(super) fn proven_accuracy(scene: &Scene, solved: &Solved) -> StageAccuracy {
         }
     };
     let estimate = match solved.steel {
-        Steel::None => rules,
-        Steel::Alone(_) | Steel::Coupled(_) => EVALUATION_SHARE * rules + solved.steel_estimate(),
+        Steel::None if magnet == 0.0 => rules,
+        Steel::None => (AIR_SHARE * rules).max(KERNEL_ERROR),
+        // The winding's rule and the steel's.
+        Steel::Alone(_) | Steel::Coupled(_) => {
+            2.0 * EVALUATION_SHARE * rules + solved.steel_estimate()
+        }
     };
     StageAccuracy {
         estimate: estimate + magnet,

@@ -12,7 +12,8 @@ use self::mag_manip::{MULTIPOLE_TOLERANCE, MagManipRequest, MultipolesMade, Vect
 use super::maps::{Felt, SceneMap};
 use super::scene::Scene;
 use super::working_point::{WorkingPoint, relative_difference, superposition_ends};
-use super::{JobError, KERNEL_ERROR, steel};
+use super::{JobError, steel};
+use crate::accuracy::missed;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
 use crate::bundle::manifest::{
     AxisSummary, Interpolation, MapSidecar, MapSummary, WorkingPointMap,
@@ -72,6 +73,8 @@ pub struct MapReport {
     pub warnings: Vec<String>,
     /// Whether the tolerance asked for was reached.
     pub accuracy_reached: bool,
+    /// What misses it.
+    pub accuracy_missed: Vec<String>,
 }
 
 /// Largest difference of `gz` from the sum of the coils' maps times their currents, relative to
@@ -249,6 +252,7 @@ pub fn run(
         &protected,
     )?;
     progress.end();
+    let accuracy_missed = missed(&sidecar.accuracy, solved.tolerance);
     Ok(MapReport {
         sidecar,
         folder: request.out.clone(),
@@ -259,7 +263,8 @@ pub fn run(
         vector_field,
         multipoles,
         warnings,
-        accuracy_reached: solved.tolerance >= KERNEL_ERROR && solved.reached(),
+        accuracy_reached: accuracy_missed.is_empty(),
+        accuracy_missed,
     })
 }
 

@@ -4,11 +4,11 @@ use serde::{Deserialize, Serialize};
 
 use super::JobError;
 use super::air_sample::{self, PLACES, Sample, spread};
-use super::scene::Scene;
-use super::steel::{Solved, Steel};
+use super::scene::{AIR_SHARE, Scene};
+use super::steel::{EVALUATION_SHARE, Solved, Steel, SteelField, clearance_m};
 use crate::accuracy::StageAccuracy;
 use crate::field::magnet::MagnetRule;
-use crate::field::steel::source::CoredSource;
+use crate::field::steel::axial_table::AxialTable;
 use crate::field::steel::sources::{ArraySources, Parts};
 use crate::map::sampled::{SampledField, TableReport};
 use crate::map::sampler::Sampler;
@@ -32,7 +32,7 @@ pub struct SceneMap {
 }
 
 /// Share of the tolerance given to the maps' own rules beside the steel's solution.
-const MAP_SHARE: f64 = 0.3;
+const MAP_SHARE: f64 = 0.08;
 
 impl SceneMap {
     /// Maps of `coils` of `scene` over `grid`: of the field itself, or of the mean that a magnet
@@ -54,7 +54,8 @@ impl SceneMap {
         let lowest = lowest_plane(grid);
         let (table, map, between) = match &solved.steel {
             Steel::None => {
-                let tolerance = solved.tolerance / felt.amplification;
+                let share = if felt.is_field() { 1.0 } else { AIR_SHARE };
+                let tolerance = share * solved.tolerance / felt.amplification;
                 let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
                     tabulate(&scene.winding, coils, grid, components, tolerance, p)
                 };
@@ -68,16 +69,13 @@ impl SceneMap {
                 };
                 (None, map, between)
             }
-            Steel::Alone(_) => {
+            Steel::Alone(coil) => {
                 let tolerance = MAP_SHARE * solved.tolerance / felt.amplification;
-                // The nearest core decides how fine the rings are; seen from its own axis.
-                let steel = solved
-                    .sources(scene, &lowest, felt.reach_m)?
-                    .ok_or_else(no_steel)?;
-                let source = CoredSource {
-                    winding: scene.winding,
-                    steel,
-                };
+                if let Some(core) = &scene.core {
+                    clearance_m(scene, core, &lowest, felt.reach_m)?;
+                }
+                let own = EVALUATION_SHARE * tolerance;
+                let source = AxialTable::new(Some(scene.winding), coil.layer.clone(), own);
                 let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
                     tabulate(&source, coils, grid, components, tolerance, p)
                 };
@@ -88,9 +86,10 @@ impl SceneMap {
             }
             Steel::Coupled(_) => {
                 let tolerance = MAP_SHARE * solved.tolerance / felt.amplification;
-                let steel = solved
-                    .sources(scene, &lowest, felt.reach_m)?
-                    .ok_or_else(no_steel)?;
+                let steel = solved.sources(scene, &lowest, felt.reach_m)?;
+                let Some(SteelField::Coupled(steel)) = steel else {
+                    return Err(no_steel());
+                };
                 let sampled = SampledField::new(
                     &steel,
                     &widest,
@@ -431,7 +430,10 @@ fn samples(map: &FieldMap, coils: &[PlacedCoil]) -> Vec<Sample> {
 fn accuracy(map: &FieldMap, solved: &Solved, magnet: f64) -> StageAccuracy {
     let rules = match solved.steel {
         Steel::None => map.relative_error.max(super::KERNEL_ERROR),
-        Steel::Alone(_) | Steel::Coupled(_) => MAP_SHARE * solved.tolerance,
+        // The winding's rule, the steel's evaluation and its table.
+        Steel::Alone(_) | Steel::Coupled(_) => {
+            (2.0 * MAP_SHARE + EVALUATION_SHARE) * solved.tolerance
+        }
     };
     let winding = if map.tabulated {
         "a-priori bounds of the radial quadrature and of the tables"

@@ -6,13 +6,12 @@ use serde::Serialize;
 
 use super::scene::Scene;
 use super::single::above_knee;
-use super::steel::{Solved, Steel};
+use super::steel::{COUPLED_TOLERANCE, Solved, Steel};
 use super::working_point::{WorkingPoint, relative_difference};
 use super::{JobError, KERNEL_ERROR, steel};
-use crate::accuracy::StageAccuracy;
+use crate::accuracy::{StageAccuracy, missed};
 use crate::coil::mutual;
 use crate::field::batch::Wanted;
-use crate::field::steel::array::closest_m;
 use crate::field::steel::inside::peak_depth_m;
 use crate::field::steel::sources::Parts;
 
@@ -31,6 +30,9 @@ pub struct ArrayFacts {
     /// With a B-H curve: all coils at their rated currents.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub working_point: Option<WorkingPointFacts>,
+    /// What misses the tolerance.
+    #[serde(skip)]
+    pub(super) accuracy_missed: Vec<String>,
 }
 
 /// All coils at their rated currents, along the B-H curve.
@@ -69,6 +71,7 @@ pub struct ArrayCoil {
 /// The array among its neighbours; `None` for a single coil.
 pub(super) fn array(
     scene: &Scene,
+    tolerance: Option<f64>,
     accuracy: &mut BTreeMap<&'static str, StageAccuracy>,
     notes: &mut Vec<String>,
 ) -> Result<Option<ArrayFacts>, JobError> {
@@ -77,9 +80,12 @@ pub(super) fn array(
     }
     let axes = &scene.design.array.positions_m;
     let lowest_m = scene.design.target_height_m;
-    let solved = steel::solve(scene, None, KERNEL_ERROR, lowest_m)?;
-    let air = in_air(scene);
-    let (matrix, stage) = inductances(scene, &solved, air.clone());
+    let solved = steel::solve(scene, tolerance, KERNEL_ERROR, lowest_m)?;
+    let wanted = tolerance.unwrap_or(COUPLED_TOLERANCE);
+    let in_air = in_air(scene, wanted);
+    let air = in_air.0.clone();
+    let (matrix, stage) = inductances(&solved, in_air);
+    let accuracy_missed = missed([(&"mutual_inductance", &stage)], wanted);
     accuracy.insert("mutual_inductance", stage);
     let (mut peak_t, mut mean_t) = (Vec::new(), Vec::new());
     let working_point = match WorkingPoint::new(scene, &solved, &scene.upper_a, None, lowest_m)? {
@@ -124,29 +130,25 @@ pub(super) fn array(
             .is_some()
             .then_some(solved.relative_permeability),
         working_point,
+        accuracy_missed,
     }))
 }
 
-/// The windings' inductance matrix without steel, H.
-pub(super) fn in_air(scene: &Scene) -> Vec<Vec<f64>> {
+/// The windings' inductance matrix without steel, H, and the relative error of its entries, to
+/// `tolerance` if that can be had.
+pub(super) fn in_air(scene: &Scene, tolerance: f64) -> (Vec<Vec<f64>>, f64) {
     let axes = &scene.design.array.positions_m;
-    mutual::inductance_matrix_h(&scene.winding, scene.circuit.inductance_h, axes)
+    mutual::estimated_matrix_h(&scene.winding, scene.circuit.inductance_h, axes, tolerance)
 }
 
 /// The array's inductance matrix, H, from that of its windings `in_air` and its steel's solution.
 pub(super) fn inductances(
-    scene: &Scene,
     solved: &Solved,
-    in_air: Vec<Vec<f64>>,
+    (in_air, error): (Vec<Vec<f64>>, f64),
 ) -> (Vec<Vec<f64>>, StageAccuracy) {
     let mut matrix = in_air;
-    let gap_m = closest_m(&scene.design.array.positions_m) - 2.0 * scene.winding.outer_radius_m;
-    let mut estimate = if gap_m >= 0.1 * scene.winding.outer_radius_m {
-        mutual::RELATIVE_ERROR
-    } else {
-        mutual::RELATIVE_ERROR_TOUCHING
-    };
-    let mut method = "a-priori quadrature bound for the narrowest gap between windings";
+    let mut estimate = error;
+    let mut method = "two quadratures of the windings' mutual inductance";
     let mut relative_to = "each mutual inductance";
     match &solved.steel {
         Steel::None => {}
@@ -163,7 +165,7 @@ pub(super) fn inductances(
                     *value += array.added_inductance_h[(i, j)];
                 }
             }
-            estimate = estimate.max(array.relative_error);
+            estimate += array.relative_error;
             relative_to = "the largest self inductance";
             method = "coupled cores by two resolutions";
         }

@@ -1,17 +1,20 @@
 //! `probe`: field, gradient and force of every coil at given points.
 
+use std::collections::BTreeMap;
 use std::io::{self, Write};
 
 use rayon::prelude::*;
 
 use super::scene::{MAGNET_FINEST, MAGNET_SHARE, Scene};
-use super::steel::{EVALUATION_SHARE, Solved, Steel};
+use super::steel::{Solved, Steel, SteelField, clearance_of_m};
 use super::{JobError, KERNEL_ERROR, steel};
+use crate::accuracy::{StageAccuracy, missed};
 use crate::bundle::table::{FIELD_COLUMNS, FORCE_COLUMNS, GRADIENT_COLUMNS, write_samples};
 use crate::design::Design;
 use crate::field::frame::{CartesianField, to_cartesian};
 use crate::field::magnet::MagnetRule;
-use crate::field::steel::sources::{ArraySources, Parts};
+use crate::field::steel::CLOSEST;
+use crate::field::steel::sources::Parts;
 use crate::progress::Progress;
 
 /// What is asked at the points.
@@ -42,8 +45,8 @@ pub struct ProbeTable {
     pub relative_to_height: bool,
     /// Estimated error of the forces, relative to |m| times the largest |grad B| at the height.
     pub force_error: Option<f64>,
-    /// Whether the tolerance asked for was reached.
-    pub accuracy_reached: bool,
+    /// What misses the tolerance.
+    pub accuracy_missed: Vec<String>,
 }
 
 /// What is asked of [`probe`].
@@ -84,59 +87,122 @@ pub fn probe(
     progress: &dyn Progress,
 ) -> Result<ProbeTable, JobError> {
     let scene = Scene::new(design)?;
-    let lowest_m = points_m.iter().fold(f64::INFINITY, |z, p| z.min(p[2]));
-    let solved = steel::solve(&scene, request.tolerance, KERNEL_ERROR, lowest_m)?;
-    let rule = request
-        .force
-        .then(|| scene.magnet_rule(lowest_m, MAGNET_SHARE * solved.tolerance.max(MAGNET_FINEST)))
-        .transpose()?;
-    let nodes = rule.as_ref().map_or(&[][..], MagnetRule::nodes);
-    let reach_m = nodes.iter().fold(0.0_f64, |reach, node| {
-        let [x, y, z] = node.offset_m;
-        reach.max(x.hypot(y).hypot(z))
-    });
-    let places = Places::new(&scene, &solved, &points_m, reach_m)?;
+    // A value depends on its own point alone: neither the solution nor how it is evaluated may
+    // depend on where the other points are.
+    let solved = steel::solve(&scene, request.tolerance, KERNEL_ERROR, f64::NEG_INFINITY)?;
+    let groups = groups(&scene, &points_m)?;
     progress.begin("probe", points_m.len() as u64);
-    let portions = points_m
-        .par_chunks(PORTION)
-        .enumerate()
-        .map(|(portion, points)| {
-            progress.check()?;
-            let first = portion * PORTION + 1;
-            let fields = places.fields(points, first)?;
-            let forces = rule
-                .as_ref()
-                .map_or_else(|| Ok(Vec::new()), |rule| places.forces(points, first, rule))?;
-            progress.advance(points.len() as u64);
-            Ok((fields, forces))
-        })
-        .collect::<Result<Vec<_>, JobError>>()?;
-    progress.end();
-    let (fields, forces): (Vec<_>, Vec<_>) = portions.into_iter().unzip();
-    let relative_error = match solved.steel {
-        Steel::None => KERNEL_ERROR,
-        Steel::Alone(_) | Steel::Coupled(_) => {
-            solved.steel_estimate() + EVALUATION_SHARE * solved.tolerance
+    let coils = scene.coils.len();
+    let mut fields = vec![CartesianField::default(); points_m.len() * coils];
+    let mut forces = vec![[0.0; 6]; if request.force { fields.len() } else { 0 }];
+    let mut magnet_error = 0.0_f64;
+    let finest = MAGNET_SHARE * solved.tolerance.max(MAGNET_FINEST);
+    for group in groups.values() {
+        let rule = request
+            .force
+            .then(|| scene.magnet_rule(group.magnet_lowest_m, finest))
+            .transpose()?;
+        let reach_m = rule.as_ref().map_or(0.0, MagnetRule::reach_m);
+        let own: Vec<[f64; 3]> = group.rows.iter().map(|row| points_m[*row]).collect();
+        let places = Places::of_group(&scene, &solved, group, &points_m, reach_m)?;
+        let portions = own
+            .par_chunks(PORTION)
+            .zip(group.rows.par_chunks(PORTION))
+            .map(|(points, rows)| {
+                progress.check()?;
+                let number = |place: usize| rows[place] + 1;
+                let fields = places.numbered_fields(points, &number, &|_, _| true)?;
+                let forces = rule.as_ref().map_or_else(
+                    || Ok(Vec::new()),
+                    |rule| places.forces(points, &number, rule),
+                )?;
+                progress.advance(points.len() as u64);
+                Ok((rows, fields, forces))
+            })
+            .collect::<Result<Vec<_>, JobError>>()?;
+        for (rows, of_rows, felt) in portions {
+            for (place, row) in rows.iter().enumerate() {
+                let from = place * coils..(place + 1) * coils;
+                let to = row * coils..(row + 1) * coils;
+                fields[to.clone()].clone_from_slice(&of_rows[from.clone()]);
+                if request.force {
+                    forces[to].copy_from_slice(&felt[from]);
+                }
+            }
         }
+        if let Some(rule) = &rule {
+            let error = solved.point_error() * rule.amplification() + rule.bound();
+            magnet_error = magnet_error.max(error);
+        }
+    }
+    progress.end();
+    let stage = StageAccuracy {
+        estimate: solved.point_error(),
+        relative_to: match solved.steel {
+            Steel::None => "|grad B| at the point",
+            Steel::Alone(_) | Steel::Coupled(_) => "the largest |grad B| at the point's height",
+        }
+        .to_owned(),
+        method: String::new(),
     };
     Ok(ProbeTable {
         components: request.components,
-        coils: scene.coils.len(),
-        fields: fields.concat(),
-        forces: forces.concat(),
+        coils,
+        fields,
+        forces,
         points_m,
-        relative_error,
+        relative_error: solved.point_error(),
         relative_to_height: !matches!(solved.steel, Steel::None),
-        force_error: rule.map(|rule| relative_error * rule.amplification() + rule.bound()),
-        accuracy_reached: solved.tolerance >= KERNEL_ERROR && solved.reached(),
+        force_error: request.force.then_some(magnet_error),
+        accuracy_missed: missed([(&"field", &stage)], solved.tolerance),
     })
+}
+
+/// Rows that are evaluated alike, whatever other rows there are.
+struct Group {
+    rows: Vec<usize>,
+    /// Height that no row's point is below, for the steel and for the magnet.
+    lowest_m: f64,
+    magnet_lowest_m: f64,
+    /// Distance that no row's point is closer to a core than.
+    distance_m: f64,
+}
+
+/// The points by powers of two of their distance from the nearest core and of the gap between
+/// array and magnet.
+fn groups(scene: &Scene, points_m: &[[f64; 3]]) -> Result<BTreeMap<[i32; 2], Group>, JobError> {
+    let core = scene.core.as_ref();
+    let top_m = core.map_or(0.0, |core| core.shape.top_m.max(0.0));
+    let unit_m = CLOSEST * core.map_or(scene.winding.inner_radius_m, |core| core.shape.radius_m);
+    let depth_m = scene.magnet_depth_m();
+    let step = |length_m: f64| (length_m / unit_m).log2().floor();
+    let mut groups = BTreeMap::new();
+    for (row, point) in points_m.iter().enumerate() {
+        let distance_m = match core {
+            Some(core) => clearance_of_m(scene, core, row + 1, *point, 0.0)?,
+            None => unit_m,
+        };
+        let near = step(distance_m).max(0.0);
+        let gap_m = point[2] - top_m - depth_m;
+        let up = (gap_m > 0.0).then(|| step(gap_m));
+        let above_m = up.map(|up| top_m + depth_m + unit_m * up.exp2());
+        let key = [near as i32, up.map_or(i32::MIN, |up| up as i32)];
+        let group = groups.entry(key).or_insert_with(|| Group {
+            rows: Vec::new(),
+            lowest_m: above_m.unwrap_or(f64::NEG_INFINITY),
+            magnet_lowest_m: above_m.unwrap_or(top_m),
+            distance_m: unit_m * near.exp2(),
+        });
+        group.rows.push(row);
+    }
+    Ok(groups)
 }
 
 /// What gives the field at any place.
 pub(super) struct Places<'a> {
     scene: &'a Scene<'a>,
     solved: &'a Solved,
-    sources: Option<ArraySources>,
+    sources: Option<SteelField>,
 }
 
 impl<'a> Places<'a> {
@@ -154,6 +220,26 @@ impl<'a> Places<'a> {
             scene,
             solved,
             sources: solved.sources(scene, points_m, reach_m)?,
+        })
+    }
+
+    /// For the places of a group within `reach_m`.
+    fn of_group(
+        scene: &'a Scene<'a>,
+        solved: &'a Solved,
+        group: &Group,
+        points_m: &[[f64; 3]],
+        reach_m: f64,
+    ) -> Result<Self, JobError> {
+        if let Some(core) = &scene.core {
+            for row in &group.rows {
+                clearance_of_m(scene, core, row + 1, points_m[*row], reach_m)?;
+            }
+        }
+        Ok(Self {
+            scene,
+            solved,
+            sources: solved.sources_at(group.lowest_m - reach_m, group.distance_m - reach_m),
         })
     }
 
@@ -180,6 +266,16 @@ impl<'a> Places<'a> {
         first: usize,
         wanted: &dyn Fn(usize, usize) -> bool,
     ) -> Result<Vec<CartesianField>, JobError> {
+        self.numbered_fields(points_m, &|row| first + row, wanted)
+    }
+
+    /// As [`Places::driven_fields`], with the numbers by which messages name the points.
+    fn numbered_fields(
+        &self,
+        points_m: &[[f64; 3]],
+        number: &dyn Fn(usize) -> usize,
+        wanted: &dyn Fn(usize, usize) -> bool,
+    ) -> Result<Vec<CartesianField>, JobError> {
         let scene = self.scene;
         let count = points_m.len();
         let added = self.sources.as_ref().map_or_else(Vec::new, |sources| {
@@ -197,7 +293,7 @@ impl<'a> Places<'a> {
                 let axial = scene.winding.field(dx.hypot(dy), *z).map_err(|on_edge| {
                     JobError::Input(format!(
                         "point {} ({x}, {y}, {z} m), coil {}: {on_edge}",
-                        first + row,
+                        number(row),
                         coil.number
                     ))
                 })?;
@@ -216,7 +312,7 @@ impl<'a> Places<'a> {
     fn forces(
         &self,
         points_m: &[[f64; 3]],
-        first: usize,
+        number: &dyn Fn(usize) -> usize,
         rule: &MagnetRule,
     ) -> Result<Vec<[f64; 6]>, JobError> {
         let mut felt = Vec::with_capacity(rule.nodes().len());
@@ -225,7 +321,7 @@ impl<'a> Places<'a> {
                 .iter()
                 .map(|p| std::array::from_fn(|i| p[i] + node.offset_m[i]))
                 .collect();
-            felt.push(self.fields(&moved, first)?);
+            felt.push(self.numbered_fields(&moved, number, &|_, _| true)?);
         }
         let pairs = points_m.len() * self.scene.coils.len();
         Ok((0..pairs)

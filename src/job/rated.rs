@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::JobError;
 use super::scene::Scene;
 use super::single::{Single, TargetForce};
+use crate::accuracy::missed;
 use crate::coil::circuit::Circuit;
 use crate::coil::limits::{self, LimitCheck};
 use crate::units::STEEL_DENSITY_KG_PER_M3;
@@ -25,8 +26,8 @@ pub(super) struct Rated {
     pub force: TargetForce,
     /// The design's limits by name.
     pub limits: BTreeMap<&'static str, LimitCheck>,
-    /// Whether field and inductance reach the tolerance asked for.
-    pub accuracy_reached: bool,
+    /// What misses the tolerance.
+    pub accuracy_missed: Vec<String>,
 }
 
 impl Rated {
@@ -46,9 +47,6 @@ impl Rated {
             .map_or(0.0, |core| core.shape.volume_m3() * STEEL_DENSITY_KG_PER_M3);
         let mass_kg = circuit.wire_mass_kg + steel_kg;
         let force = single.force(scene, current_a)?;
-        let worst = single.accuracy["field"]
-            .estimate
-            .max(single.accuracy["inductance"].estimate);
         let limits = limits::check(
             scene.design,
             &circuit,
@@ -57,7 +55,7 @@ impl Rated {
             single.core.as_ref().map(|core| core.peak_field_t),
         );
         Ok(Self {
-            accuracy_reached: worst <= single.tolerance,
+            accuracy_missed: missed(&single.accuracy, single.tolerance),
             single,
             circuit,
             current_a,

@@ -2,15 +2,15 @@
 
 use rayon::prelude::*;
 
-use super::JobError;
-use super::steel::{SceneCore, Solved};
+use super::steel::{EVALUATION_SHARE, SceneCore, Solved, Steel, SteelField};
+use super::{JobError, KERNEL_ERROR};
 use crate::bundle::manifest::{ArrayGeometry, CurrentLimits, MagnetSummary};
 use crate::coil::circuit::{self, Circuit};
 use crate::design::{Coil, Coupling, Design, MagnetModel, Polarity};
 use crate::field::batch::Wanted;
 use crate::field::dipole;
 use crate::field::magnet::{Cylinder, MagnetRule, Sources};
-use crate::field::steel::sources::{ArraySources, Parts};
+use crate::field::steel::sources::Parts;
 use crate::field::winding::Winding;
 use crate::map::tabulate::PlacedCoil;
 use crate::progress::Progress;
@@ -20,6 +20,8 @@ const PORTION: usize = 4096;
 /// Share of the tolerance given to the magnet's dipoles, and the finest asked of them.
 pub(super) const MAGNET_SHARE: f64 = 0.3;
 pub(super) const MAGNET_FINEST: f64 = 1e-9;
+/// Share of the tolerance given to the windings' field where the magnet takes its own.
+pub(super) const AIR_SHARE: f64 = 0.6;
 
 /// The magnet's moment, A m^2.
 pub(crate) fn moment_a_m2(design: &Design) -> [f64; 3] {
@@ -146,6 +148,30 @@ impl<'a> Scene<'a> {
         self.upper_a.iter().copied().fold(0.0, f64::max)
     }
 
+    /// How far below its centre the magnet extends, m; 0 for a dipole.
+    #[must_use]
+    pub fn magnet_depth_m(&self) -> f64 {
+        let magnet = &self.design.magnet;
+        match magnet.model {
+            MagnetModel::Dipole => 0.0,
+            MagnetModel::Cylinder => Cylinder {
+                diameter_m: magnet.diameter_m,
+                length_m: magnet.length_m,
+            }
+            .depth_along_m(self.moment_a_m2),
+        }
+    }
+
+    /// Default tolerance of forces in air: that of the kernel for a dipole, of the finest rule for
+    /// a cylinder.
+    #[must_use]
+    pub fn force_tolerance(&self) -> f64 {
+        match self.design.magnet.model {
+            MagnetModel::Dipole => KERNEL_ERROR,
+            MagnetModel::Cylinder => MAGNET_FINEST,
+        }
+    }
+
     /// Whether the moment is tilted, so that the force needs the whole gradient.
     #[must_use]
     pub fn tilted(&self) -> bool {
@@ -203,7 +229,7 @@ impl<'a> Scene<'a> {
     fn add_forces(
         &self,
         solved: &Solved,
-        sources: Option<&ArraySources>,
+        sources: Option<&SteelField>,
         rule: &MagnetRule,
         points_m: &[[f64; 3]],
         rows: &mut [f64],
@@ -215,7 +241,16 @@ impl<'a> Scene<'a> {
         } else {
             (Wanted::Gz, Parts::Gz)
         };
-        let tolerance = solved.tolerance / rule.amplification();
+        let share = match solved.steel {
+            Steel::None => AIR_SHARE,
+            Steel::Alone(_) | Steel::Coupled(_) => EVALUATION_SHARE,
+        };
+        let share = if rule.nodes().len() > 1 || sources.is_some() {
+            share
+        } else {
+            1.0
+        };
+        let tolerance = share * solved.tolerance / rule.amplification();
         for node in rule.nodes() {
             let [m_x, m_y, m_z] = node.moment_a_m2;
             let places: Vec<[f64; 3]> = points_m

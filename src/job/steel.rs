@@ -1,18 +1,21 @@
 //! The steel of a design: its material, its solution, and the field it adds.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
-use super::JobError;
 use super::at_current::{AtCurrent, SATURATED_TOLERANCE};
 use super::scene::Scene;
+use super::{JobError, KERNEL_ERROR};
 use crate::design::bh_table::read_bh_table;
 use crate::design::{Core, Coupling, Design, Steel as Described};
-use crate::field::steel::CoreShape;
 use crate::field::steel::array::CoupledArray;
+use crate::field::steel::axial_table::AxialTable;
 use crate::field::steel::bh_curve::BhCurve;
 use crate::field::steel::cored_coil::CoredCoil;
 use crate::field::steel::magnetized::MagnetizedCore;
 use crate::field::steel::sources::{ArraySources, Parts};
+use crate::field::steel::{CLOSEST, CoreShape};
 use crate::field::winding::Winding;
 
 /// More permeable steel changes no field by more than its inverse.
@@ -24,8 +27,8 @@ pub const CORED_TOLERANCE: f64 = 1e-6;
 pub const COUPLED_TOLERANCE: f64 = 1e-4;
 /// Share of the tolerance given to evaluating a solution.
 pub(super) const EVALUATION_SHARE: f64 = 0.1;
-/// Points closer to the steel's surface than this multiple of its radius are refused.
-const CLOSEST: f64 = 0.02;
+/// Share of the tolerance given to what is claimed of the steel's solution.
+const STEEL_SHARE: f64 = 0.45;
 
 /// The steel of every core of a design.
 #[derive(Debug, Clone)]
@@ -118,6 +121,30 @@ pub struct AloneCore {
     pub added_inductance_h: f64,
 }
 
+/// The field that steel adds, ready to be evaluated.
+#[derive(Debug, Clone)]
+pub enum SteelField {
+    /// Of one core at the origin that answers to its own winding alone, per ampere.
+    Alone(Arc<AxialTable>),
+    /// Of all cores, per ampere of every winding.
+    Coupled(ArraySources),
+}
+
+impl SteelField {
+    /// The field at `points_m`, [drive, component, point].
+    ///
+    /// # Panics
+    /// When `out` has another length than drives x components x points.
+    pub fn sample(&self, points_m: &[[f64; 3]], parts: Parts, out: &mut [f64]) {
+        match self {
+            Self::Alone(table) => table
+                .sample_parts(points_m, parts, out)
+                .expect("a table without a winding has no winding's edge"),
+            Self::Coupled(sources) => sources.sample(points_m, parts, out),
+        }
+    }
+}
+
 /// A scene's field sources, ready to be evaluated.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Solved {
@@ -146,13 +173,25 @@ impl Solved {
         CHANCE * self.steel_error
     }
 
-    /// Whether the solution is as good as asked for.
+    /// What is claimed of the field at points: the steel's solution and its evaluation; in air the
+    /// kernel's error.
     #[must_use]
-    pub fn reached(&self) -> bool {
-        self.steel_error <= self.tolerance
+    pub fn point_error(&self) -> f64 {
+        match self.steel {
+            Steel::None => KERNEL_ERROR,
+            Steel::Alone(_) | Steel::Coupled(_) => {
+                self.steel_estimate() + EVALUATION_SHARE * self.tolerance
+            }
+        }
     }
 
-    /// The dipoles that stand for the steel at places within `reach_m` of `points_m`; `None`
+    /// Whether the field at points is within the tolerance.
+    #[must_use]
+    pub fn reached(&self) -> bool {
+        self.point_error() <= self.tolerance
+    }
+
+    /// The steel's field at places within `reach_m` of `points_m`; `None`
     /// without steel.
     ///
     /// # Errors
@@ -162,33 +201,40 @@ impl Solved {
         scene: &Scene,
         points_m: &[[f64; 3]],
         reach_m: f64,
-    ) -> Result<Option<ArraySources>, JobError> {
+    ) -> Result<Option<SteelField>, JobError> {
         let Some(core) = &scene.core else {
             return Ok(None);
         };
         let (lowest_m, distance_m) = clearance_m(scene, core, points_m, reach_m)?;
-        let tolerance = EVALUATION_SHARE * self.tolerance;
-        Ok(match &self.steel {
-            Steel::None => None,
-            Steel::Alone(coil) => Some(ArraySources::of_core(
-                &coil.layer,
-                lowest_m,
-                distance_m,
-                tolerance,
-            )),
-            Steel::Coupled(array) => Some(ArraySources::of_array(
-                array, lowest_m, distance_m, tolerance,
-            )),
-        })
+        Ok(self.sources_at(lowest_m, distance_m))
     }
 
-    /// The steel's part of the field per ampere of every coil at `points_m`, by the dipoles that
+    /// The steel's field at places no lower than `lowest_m` and no closer to a core than
+    /// `distance_m`; `None` without steel.
+    #[must_use]
+    pub fn sources_at(&self, lowest_m: f64, distance_m: f64) -> Option<SteelField> {
+        let tolerance = EVALUATION_SHARE * self.tolerance;
+        match &self.steel {
+            Steel::None => None,
+            Steel::Alone(coil) => Some(SteelField::Alone(Arc::new(AxialTable::new(
+                None,
+                coil.layer.clone(),
+                tolerance,
+            )))),
+            Steel::Coupled(array) => {
+                let sources = ArraySources::of_array(array, lowest_m, distance_m, tolerance);
+                Some(SteelField::Coupled(sources))
+            }
+        }
+    }
+
+    /// The steel's part of the field per ampere of every coil at `points_m`, by what
     /// [`Solved::sources`] gave for them: [coil, component, point], gains not applied.
     #[must_use]
     pub fn steel_fields(
         &self,
         scene: &Scene,
-        sources: &ArraySources,
+        sources: &SteelField,
         points_m: &[[f64; 3]],
         parts: Parts,
     ) -> Vec<f64> {
@@ -231,21 +277,8 @@ pub(super) fn clearance_m(
         if *z > shape.top_m + shape.length_m() {
             continue;
         }
-        for coil in &scene.coils {
-            let r = (x - coil.axis_m[0]).hypot(y - coil.axis_m[1]);
-            let distance = distance_to_surface_m(shape, r, *z);
-            if distance - reach_m < CLOSEST * shape.radius_m {
-                return Err(JobError::Input(format!(
-                    "point {} ({x}, {y}, {z} m) is {:.3} mm from the surface of the core of \
-                     coil {}, where the field is not resolved; keep {:.3} mm away from it",
-                    number + 1,
-                    distance * 1e3,
-                    coil.number,
-                    (reach_m + CLOSEST * shape.radius_m) * 1e3
-                )));
-            }
-            distance_m = distance_m.min(distance);
-        }
+        let distance = clearance_of_m(scene, core, number + 1, [*x, *y, *z], reach_m)?;
+        distance_m = distance_m.min(distance);
     }
     Ok((
         lowest_m - reach_m,
@@ -253,14 +286,34 @@ pub(super) fn clearance_m(
     ))
 }
 
-/// Distance from a core's surface, m.
-fn distance_to_surface_m(shape: CoreShape, r_m: f64, z_m: f64) -> f64 {
-    let beside = r_m - shape.radius_m;
-    let beyond = (z_m - shape.top_m).max(shape.bottom_m - z_m);
-    if beside < 0.0 && beyond < 0.0 {
-        return -beside.max(beyond);
+/// Distance of point `number` from the nearest core, at most a core's length, m.
+///
+/// # Errors
+/// A place within `reach_m` of the point on the steel's surface or hardly off it.
+pub(super) fn clearance_of_m(
+    scene: &Scene,
+    core: &SceneCore,
+    number: usize,
+    [x, y, z]: [f64; 3],
+    reach_m: f64,
+) -> Result<f64, JobError> {
+    let shape = core.shape;
+    let mut distance_m = shape.length_m();
+    for coil in &scene.coils {
+        let r = (x - coil.axis_m[0]).hypot(y - coil.axis_m[1]);
+        let distance = shape.distance_m(r, z);
+        if distance - reach_m < CLOSEST * shape.radius_m {
+            return Err(JobError::Input(format!(
+                "point {number} ({x}, {y}, {z} m) is {:.3} mm from the surface of the core of \
+                 coil {}, where the field is not resolved; keep {:.3} mm away from it",
+                distance * 1e3,
+                coil.number,
+                (reach_m + CLOSEST * shape.radius_m) * 1e3
+            )));
+        }
+        distance_m = distance_m.min(distance);
     }
-    beside.max(0.0).hypot(beyond.max(0.0))
+    Ok(distance_m)
 }
 
 /// The tolerance to which [`solve`] solves: `tolerance`, or the default of the scene's physics.
@@ -277,7 +330,8 @@ pub fn tolerance_of(scene: &Scene, tolerance: Option<f64>, air_default: f64) -> 
     tolerance.unwrap_or(default)
 }
 
-/// Solves the steel of `scene`, to `tolerance` or the default, for heights from `lowest_m` up.
+/// Solves the steel of `scene`, to `tolerance` or the default, for heights from `lowest_m` up; cores
+/// that are linear and answer to their own winding alone for all places.
 ///
 /// # Errors
 /// An outline that meets a winding's edge; a B-H curve along which no state is found.
@@ -299,7 +353,8 @@ pub fn solve(
     let at_current = match &core.material {
         Material::Curve(curve) if current_a > 0.0 => {
             let tolerance = tolerance.unwrap_or(SATURATED_TOLERANCE);
-            let state = AtCurrent::new(scene, core, curve, current_a, tolerance, lowest_m)?;
+            let aim = STEEL_SHARE / CHANCE * tolerance;
+            let state = AtCurrent::new(scene, core, curve, current_a, aim, lowest_m)?;
             let secant = curve.relative_permeability(state.inside.mean_b_t).max(1.0);
             Some((state, secant, tolerance))
         }
@@ -316,7 +371,7 @@ pub fn solve(
             core.shape,
             relative_permeability,
             &scene.design.array.positions_m,
-            tolerance,
+            STEEL_SHARE / CHANCE * tolerance,
             lowest_m,
         )?;
         return Ok(Solved {
@@ -337,12 +392,11 @@ pub fn solve(
         ),
         None => {
             let tolerance = tolerance.unwrap_or(CORED_TOLERANCE);
-            let coil = CoredCoil::new(
+            let coil = CoredCoil::everywhere(
                 &scene.winding,
                 core.shape,
                 relative_permeability,
-                tolerance,
-                lowest_m,
+                STEEL_SHARE / CHANCE * tolerance,
             )?;
             (
                 AloneCore {

@@ -4,8 +4,11 @@ use super::JobError;
 use super::at_current::{AtCurrent, no_state};
 use super::maps::{lowest_plane, parts_of};
 use super::scene::{MAGNET_SHARE, Scene, upward_n};
-use super::steel::{EVALUATION_SHARE, Material, SceneCore, Solved, Steel, clearance_m, coupled};
+use super::steel::{
+    EVALUATION_SHARE, Material, SceneCore, Solved, Steel, SteelField, clearance_m, coupled,
+};
 use crate::accuracy::StageAccuracy;
+use crate::field::steel::axial_table::AxialTable;
 use crate::field::steel::bh_curve::BhCurve;
 use crate::field::steel::inside::peak_depth_m;
 use crate::field::steel::saturated::Status;
@@ -191,18 +194,17 @@ impl WorkingPoint {
     pub fn field(&self, scene: &Scene, lowest_m: f64, distance_m: f64) -> TotalField {
         let tolerance = EVALUATION_SHARE * self.tolerance;
         let parts = match &self.cores {
-            Cores::Coupled(array) => vec![(
-                1.0,
-                [0.0, 0.0],
-                ArraySources::of_saturated(array, lowest_m, distance_m, tolerance),
-            )],
+            Cores::Coupled(array) => {
+                let sources = ArraySources::of_saturated(array, lowest_m, distance_m, tolerance);
+                vec![(1.0, [0.0, 0.0], SteelField::Coupled(sources))]
+            }
             Cores::Alone(states) => states
                 .iter()
                 .zip(&scene.coils)
                 .filter_map(|((current, state), coil)| {
                     let layer = &state.as_ref()?.layer;
-                    let sources = ArraySources::of_core(layer, lowest_m, distance_m, tolerance);
-                    Some((*current, coil.axis_m, sources))
+                    let table = AxialTable::new(None, layer.clone(), tolerance);
+                    Some((*current, coil.axis_m, SteelField::Alone(table.into())))
                 })
                 .collect(),
         };
@@ -332,8 +334,8 @@ pub(super) fn superposition_ends(
 /// The steel's field at a working point: the sum of all cores'.
 #[derive(Debug, Clone)]
 pub struct TotalField {
-    /// Current, axis, and the dipoles per ampere, their core at the origin.
-    parts: Vec<(f64, [f64; 2], ArraySources)>,
+    /// Current, axis, and the field per ampere, their core at the origin.
+    parts: Vec<(f64, [f64; 2], SteelField)>,
     top_m: f64,
 }
 

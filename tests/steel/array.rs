@@ -10,6 +10,7 @@ use fluxform::field::steel::CoreShape;
 use fluxform::field::steel::array::{ArrayResolution, CoupledArray};
 use fluxform::field::steel::cored_coil::CoredCoil;
 use fluxform::field::steel::generatrix::Face;
+use fluxform::field::steel::magnetized::MagnetizedCore;
 use fluxform::field::steel::sources::{ArraySources, Parts};
 use fluxform::field::winding::Winding;
 use fluxform::numerics::gauss;
@@ -449,14 +450,13 @@ fn neighbours_weaken_what_a_coil_sends_beyond_them() {
 /// The dipoles that stand for a core against its field by loops, down to a thirteenth of its radius.
 #[test]
 fn near_fields_by_dipoles_are_those_by_loops() {
-    let design = Design {
-        winding: SEED_COIL,
-        core: SEED_CORE,
-        mu_r: MU_R,
-    };
-    let core = design.solve(1e-8).core;
+    let resolution = ArrayResolution::for_tolerance(1e-8, SEED_CORE, f64::INFINITY);
+    let one = CoupledArray::at_resolution(&SEED_COIL, SEED_CORE, MU_R, &[[0.0; 2]], &resolution)
+        .expect("off the winding's edges");
+    let layer = one.layers(0, 0).column(0).iter().copied().collect();
+    let core = MagnetizedCore::new(one.response.outline.clone(), layer);
     for distance_m in [0.0009, 0.0031, 0.017] {
-        let sources = ArraySources::of_core(&core, distance_m, distance_m, 1e-7);
+        let sources = ArraySources::of_array(&one, distance_m, distance_m, 1e-7);
         let points: Vec<[f64; 3]> = [0.0, 0.0031, 0.0089, 0.0117, 0.0163, 0.041]
             .map(|r| [0.6 * r, -0.8 * r, distance_m])
             .to_vec();

@@ -8,5 +8,6 @@ mod convergence;
 mod demagnetization;
 mod extremes;
 mod field;
+mod near;
 mod oracle;
 mod support;

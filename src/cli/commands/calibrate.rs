@@ -172,7 +172,9 @@ impl Calibrate {
         let json = printer.with_warnings(&json);
         let folder = options.out.join(&design.name);
         printer.summary(Place::Output, &json, || summary(design, &report, &folder))?;
-        accuracy_check(report.bundles.iter().all(|b| b.lambda.accuracy_reached))?;
+        let missed = |b: &BundleReport| b.lambda.accuracy_missed.clone();
+        let missed: Vec<String> = report.bundles.iter().flat_map(missed).collect();
+        accuracy_check(&missed)?;
         let without: Vec<&str> = report
             .bundles
             .iter()

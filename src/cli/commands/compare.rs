@@ -103,7 +103,7 @@ impl Compare {
             place = plot.write(&file.inputs, &file.picture().svg(), printer)?;
         }
         printer.summary(place, &printer.with_warnings(file), || summary(file))?;
-        accuracy_check(report.accuracy_reached)?;
+        accuracy_check(&report.accuracy_missed)?;
         match file.without_constant() {
             none if none.is_empty() => Ok(()),
             none => Err(no_constant(&none)),

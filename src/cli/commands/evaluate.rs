@@ -64,7 +64,7 @@ impl Evaluate {
         }
         let json = printer.with_warnings(&result);
         printer.summary(Place::Output, &json, || summary(design, &result))?;
-        accuracy_check(result.accuracy_reached)?;
+        accuracy_check(&result.accuracy_missed)?;
         if self.strict && !result.limits_met() {
             let unmet: Vec<String> = result
                 .limits

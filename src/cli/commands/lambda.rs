@@ -206,7 +206,7 @@ impl Lambda {
             };
             let json = printer.with_warnings(&report.file);
             printer.summary(place, &json, || summary(design, &report))?;
-            accuracy_check(report.accuracy_reached)?;
+            accuracy_check(&report.accuracy_missed)?;
             if report.file.lambda_n_per_m.is_none() {
                 return Err(no_constant(&[report.file.shape.as_str()]));
             }

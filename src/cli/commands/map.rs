@@ -361,7 +361,7 @@ impl Map {
         };
         let json = printer.with_warnings(&json);
         printer.summary(Place::Output, &json, || summary(design, &report))?;
-        accuracy_check(report.accuracy_reached)?;
+        accuracy_check(&report.accuracy_missed)?;
         if report
             .multipoles
             .as_ref()

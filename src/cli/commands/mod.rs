@@ -44,15 +44,16 @@ fn folder(file: &FileArgument) -> Result<PathBuf, Failure> {
     }
 }
 
-/// The result is there, but its accuracy is not as wished.
-fn accuracy_check(reached: bool) -> Result<(), Failure> {
-    if reached {
+/// The result is there, but `missed` names the stages whose accuracy misses the tolerance.
+fn accuracy_check(missed: &[String]) -> Result<(), Failure> {
+    if missed.is_empty() {
         return Ok(());
     }
     Err(Failure::Unmet(
         Wish::Accuracy,
-        "the accuracy asked for with --tolerance was not reached: see the accuracy that was; \
-         the result itself is given"
-            .to_owned(),
+        format!(
+            "the accuracy asked for with --tolerance was not reached by {}; the result itself is given",
+            missed.join("; ")
+        ),
     ))
 }

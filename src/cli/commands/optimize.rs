@@ -155,7 +155,9 @@ impl Optimize {
         if let Some(none) = &result.no_coil {
             return Err(Failure::Unmet(Wish::Coil, none.message.clone()));
         }
-        accuracy_check(result.accuracy_reached)
+        let missed =
+            (!result.accuracy_reached).then(|| "the best coil: see its accuracy".to_owned());
+        accuracy_check(missed.as_slice())
     }
 
     fn request(&self) -> OptimizeRequest {

@@ -179,7 +179,7 @@ impl Probe {
         };
         let json = printer.with_warnings(&summary);
         printer.summary(place, &json, || self.told(&summary))?;
-        accuracy_check(table.accuracy_reached)
+        accuracy_check(&table.accuracy_missed)
     }
 
     fn told(&self, summary: &ProbeSummary) -> String {

@@ -14,12 +14,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::CoreShape;
 use super::bore::bore_field;
 use super::double_layer::operators;
 use super::generatrix::{Face, Generatrix, Resolution};
 use super::magnetized::MagnetizedCore;
 use super::response::{mean, system};
+use super::{CLOSEST, CoreShape};
 use crate::field::winding::{AxialField, OnEdge, Winding};
 use crate::numerics::gauss;
 use crate::numerics::lagrange_basis::Basis;
@@ -100,8 +100,40 @@ pub struct CoredCoil {
 
 /// Refinements after which a tolerance that is not reached is given up, with its estimate.
 const MAX_REFINEMENTS: usize = 5;
-/// Distance above the core, in radii, below which no error is estimated.
-const CLOSEST: f64 = 0.1;
+/// Distance above the core, in radii, below which [`CoredCoil::new`] estimates no error.
+const CLOSEST_ABOVE: f64 = 0.1;
+/// Distances from the steel, in units of [`CLOSEST`] times its radius, at which errors are compared.
+const DISTANCES: [f64; 5] = [1.0, 3.0, 10.0, 50.0, 200.0];
+
+/// Places (r, z) about a core at which two resolutions are compared, one list for each height.
+fn planes_around(shape: CoreShape) -> Vec<Vec<[f64; 2]>> {
+    let CoreShape {
+        radius_m,
+        bottom_m,
+        top_m,
+    } = shape;
+    let mut planes = Vec::new();
+    for distance_m in DISTANCES.map(|d| d * CLOSEST * radius_m) {
+        // The ends: on the axis, above the face, above the edge and beyond it.
+        for z_m in [top_m + distance_m, bottom_m - distance_m] {
+            let across = [0.0, 0.8 * radius_m, radius_m, radius_m + distance_m];
+            planes.push(across.map(|r_m| [r_m, z_m]).to_vec());
+        }
+        // The side: at the edges, half a radius below them, and at the middle.
+        let inwards = (0.5 * radius_m).min(0.5 * shape.length_m());
+        for z_m in [
+            top_m,
+            top_m - inwards,
+            0.5 * (top_m + bottom_m),
+            bottom_m + inwards,
+            bottom_m,
+        ] {
+            let across = [radius_m + CLOSEST * radius_m, radius_m + distance_m];
+            planes.push(across.map(|r_m| [r_m, z_m]).to_vec());
+        }
+    }
+    planes
+}
 
 impl CoredCoil {
     /// Solves to an estimated error below `tolerance` at heights from `lowest_m` up, or as far as
@@ -119,17 +151,74 @@ impl CoredCoil {
         tolerance: f64,
         lowest_m: f64,
     ) -> Result<Self, OnEdge> {
-        let closest_m = shape.top_m.max(0.0) + CLOSEST * shape.radius_m;
+        let closest_m = shape.top_m.max(0.0) + CLOSEST_ABOVE * shape.radius_m;
         let lowest_m = lowest_m.max(closest_m);
+        let planes = [0.0, 1.0, 4.0].map(|height| {
+            let z_m = lowest_m + height * shape.radius_m;
+            [0.0, 0.8, 1.7]
+                .map(|across| [across * shape.radius_m, z_m])
+                .to_vec()
+        });
+        let pair = |aim| {
+            let fine = Resolution::for_tolerance(aim);
+            [fine, fine.coarser()]
+        };
+        Self::refined(
+            winding,
+            shape,
+            relative_permeability,
+            tolerance,
+            &planes,
+            pair,
+        )
+    }
+
+    /// As [`CoredCoil::new`], with the estimate of the gradient's error valid everywhere outside
+    /// winding and steel, as close to the steel as [`CLOSEST`] of its radius.
+    ///
+    /// # Errors
+    /// A node on the winding's edge.
+    pub fn everywhere(
+        winding: &Winding,
+        shape: CoreShape,
+        relative_permeability: f64,
+        tolerance: f64,
+    ) -> Result<Self, OnEdge> {
+        let planes = planes_around(shape);
+        let pair = |aim| {
+            let fine = Resolution::near_steel(aim);
+            [fine, fine.coarser_near_steel()]
+        };
+        Self::refined(
+            winding,
+            shape,
+            relative_permeability,
+            tolerance,
+            &planes,
+            pair,
+        )
+    }
+
+    /// Solves to an estimated error below `tolerance` at `planes`: places (r, z) of one height
+    /// each, whose errors are relative to the largest |grad B| among them; `pair` gives the
+    /// resolutions, fine and coarse, for an aim.
+    fn refined(
+        winding: &Winding,
+        shape: CoreShape,
+        relative_permeability: f64,
+        tolerance: f64,
+        planes: &[Vec<[f64; 2]>],
+        pair: impl Fn(f64) -> [Resolution; 2],
+    ) -> Result<Self, OnEdge> {
         let mut aim = tolerance;
         let mut best: Option<Self> = None;
         for _ in 0..=MAX_REFINEMENTS {
-            let resolution = Resolution::for_tolerance(aim);
+            let [fine, coarse] = pair(aim);
             let solve =
                 |r: &Resolution| Self::at_resolution(winding, shape, relative_permeability, r);
-            let coarse = solve(&resolution.coarser())?;
-            let mut fine = solve(&resolution)?;
-            fine.relative_error = fine.difference(&coarse, lowest_m)?;
+            let coarse = solve(&coarse)?;
+            let mut fine = solve(&fine)?;
+            fine.relative_error = fine.difference(&coarse, planes);
             let better = best
                 .as_ref()
                 .is_none_or(|b| fine.relative_error < b.relative_error);
@@ -146,18 +235,17 @@ impl CoredCoil {
         Ok(best.expect("at least one resolution was solved"))
     }
 
-    /// Largest difference of the gradients at a few heights above coil and core, relative to the
-    /// largest |grad B| there, and of the added inductances.
-    fn difference(&self, other: &Self, lowest_m: f64) -> Result<f64, OnEdge> {
-        let shape = self.core.outline().shape;
+    /// Largest difference of the gradients at `planes`, relative to the largest |grad B| of each,
+    /// and of the added inductances.
+    fn difference(&self, other: &Self, planes: &[Vec<[f64; 2]>]) -> f64 {
         let mut worst = 0.0_f64;
-        for height in [0.0, 1.0, 4.0] {
-            let z_m = lowest_m + height * shape.radius_m;
+        for plane in planes {
             let (mut size, mut difference) = (0.0_f64, 0.0_f64);
-            for across in [0.0, 0.8, 1.7] {
-                let r_m = across * shape.radius_m;
-                let (a, b) = (self.core.field(r_m, z_m), other.core.field(r_m, z_m));
-                size = size.max(self.field(r_m, z_m)?.gradient_norm());
+            for [r_m, z_m] in plane {
+                let (a, b) = (self.core.field(*r_m, *z_m), other.core.field(*r_m, *z_m));
+                // On the winding's own edge its gradient is unbounded; the steel's is what differs.
+                let total = self.field(*r_m, *z_m).unwrap_or(a);
+                size = size.max(total.gradient_norm());
                 difference = difference
                     .max((a.dbz_dz - b.dbz_dz).abs())
                     .max((a.dbr_dz - b.dbr_dz).abs())
@@ -170,7 +258,7 @@ impl CoredCoil {
         let size = added
             .abs()
             .max(0.1 * MU_0_T_M_PER_A * self.winding.turns.powi(2) * self.winding.inner_radius_m);
-        Ok(worst.max((added - other.added_inductance_h).abs() / size))
+        worst.max((added - other.added_inductance_h).abs() / size)
     }
 
     /// Solves at one resolution.

@@ -89,6 +89,34 @@ impl Resolution {
         }
     }
 
+    /// The resolution whose field is right close to the steel too, to about `tolerance` of the
+    /// largest |grad B| a fiftieth of the radius off it.
+    ///
+    /// Far away the layer's error is felt squared; close by it is felt as it is, and derivatives
+    /// of it: half as many nodes again on each panel, and panels graded by less.
+    #[must_use]
+    pub fn near_steel(tolerance: f64) -> Self {
+        let tolerance = tolerance.clamp(1e-12, 0.1);
+        Self {
+            order: (3.0 - 1.5 * tolerance.log10()).ceil() as usize,
+            ratio: 0.3,
+            tip: (0.1 * tolerance).powf(0.6).min(0.05),
+            quadrature: 1e-4 * tolerance,
+        }
+    }
+
+    /// What [`Resolution::near_steel`] is compared with: its error is that of more than a node a
+    /// panel, so that two may not lie close to each other by chance.
+    #[must_use]
+    pub fn coarser_near_steel(&self) -> Self {
+        Self {
+            order: self.order - 2,
+            tip: self.tip / self.ratio,
+            quadrature: 10.0 * self.quadrature,
+            ..*self
+        }
+    }
+
     /// The next coarser resolution: a node a panel and a panel at every edge fewer.
     #[must_use]
     pub fn coarser(&self) -> Self {

@@ -2,6 +2,7 @@
 
 pub mod array;
 pub mod array_cost;
+pub mod axial_table;
 pub mod bh_check;
 pub mod bh_curve;
 pub mod bore;
@@ -20,12 +21,15 @@ pub mod permeability;
 pub mod response;
 pub mod saturated;
 pub mod saturated_array;
-pub mod source;
 pub mod sources;
 pub mod symmetry;
 pub mod trace;
 
 use serde::{Deserialize, Serialize};
+
+/// Distance from a core's surface, in its radii, from which on solutions are estimated and places
+/// are accepted.
+pub const CLOSEST: f64 = 0.02;
 
 /// A cylindrical core on the coil's axis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -43,6 +47,17 @@ impl CoreShape {
     #[must_use]
     pub fn length_m(&self) -> f64 {
         self.top_m - self.bottom_m
+    }
+
+    /// Distance of a place at radius `r_m` and height `z_m` from the surface, m.
+    #[must_use]
+    pub fn distance_m(&self, r_m: f64, z_m: f64) -> f64 {
+        let beside = r_m - self.radius_m;
+        let beyond = (z_m - self.top_m).max(self.bottom_m - z_m);
+        if beside < 0.0 && beyond < 0.0 {
+            return -beside.max(beyond);
+        }
+        beside.max(0.0).hypot(beyond.max(0.0))
     }
 
     /// Volume, m^3.

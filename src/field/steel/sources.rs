@@ -10,9 +10,9 @@ use std::f64::consts::{PI, TAU};
 
 use super::array::CoupledArray;
 use super::generatrix::Generatrix;
-use super::magnetized::MagnetizedCore;
 use super::response::Rings;
 use super::saturated_array::SaturatedArray;
+use crate::field::winding::Winding;
 use crate::numerics::dispatch::{self, Kernel, LANES, Lanes};
 use crate::units::MU_0_T_M_PER_A;
 
@@ -48,11 +48,16 @@ impl Parts {
     }
 }
 
-/// How close points come, and how well they want to know.
-struct Near {
+/// Most digits by which the layer's parts may cancel in the field that is left.
+const MOST_CANCELLATION: f64 = 1e12;
+
+/// How close points come, and how exact their values are to be.
+struct Near<'a> {
     lowest_m: f64,
     distance_m: f64,
     tolerance: f64,
+    /// The winding, whose gradient is what errors are relative to.
+    winding: &'a Winding,
 }
 
 /// Dipoles that stand for all cores of an array, for every drive.
@@ -82,6 +87,7 @@ impl ArraySources {
                 lowest_m,
                 distance_m,
                 tolerance,
+                winding: &array.winding,
             },
         )
     }
@@ -104,24 +110,7 @@ impl ArraySources {
                 lowest_m,
                 distance_m,
                 tolerance,
-            },
-        )
-    }
-
-    /// The same for one core under its own winding, standing at the origin: one drive.
-    #[must_use]
-    pub fn of_core(core: &MagnetizedCore, lowest_m: f64, distance_m: f64, tolerance: f64) -> Self {
-        let density = core.density_a();
-        Self::new(
-            core.outline(),
-            &[[0.0, 0.0]],
-            1,
-            1,
-            |_, _| DMatrix::from_column_slice(density.len(), 1, density),
-            Near {
-                lowest_m,
-                distance_m,
-                tolerance,
+                winding: &array.winding,
             },
         )
     }
@@ -132,16 +121,36 @@ impl ArraySources {
         modes: usize,
         drives: usize,
         layers: impl Fn(usize, usize) -> DMatrix<f64> + Sync,
-        near: Near,
+        near: Near<'_>,
     ) -> Self {
         let Near {
             lowest_m,
             distance_m,
             tolerance,
+            winding,
         } = near;
         let shape = outline.shape;
         let floor_m = distance_m.max(CLOSEST * shape.radius_m);
         let distance = |z_m: f64| floor_m.max(lowest_m - z_m);
+        // A layer's parts cancel (a constant layer has no field at all), so that an error relative
+        // to one ring's field is a larger one relative to the field that is left.
+        let largest = largest_layer(outline, positions_m.len(), drives, &layers);
+        let height_m = (shape.top_m.max(0.0) + floor_m).max(lowest_m);
+        let size = winding
+            .field(winding.outer_radius_m, height_m)
+            .map_or(f64::INFINITY, |field| field.gradient_norm());
+        let parts: f64 = outline
+            .areas_m2()
+            .zip(&outline.nodes)
+            .zip(&largest)
+            .map(|((area, node), layer)| {
+                let d = distance(node.z_m);
+                // A ring's part near a point is as long as its distance, at most the whole ring.
+                let share = (d / (PI * node.r_m)).min(1.0);
+                area * layer * share * 6.0 * MU_0_T_M_PER_A / (4.0 * PI * d.powi(4))
+            })
+            .sum();
+        let tolerance = tolerance / (parts / size).clamp(1.0, MOST_CANCELLATION);
         let order = (4.0 - 1.3 * tolerance.log10()).ceil().max(3.0) as usize;
         let rings = Rings::new(outline, order, |z| PANEL * distance(z));
         let angles: Vec<usize> = rings
@@ -252,6 +261,28 @@ impl ArraySources {
             }
         }
     }
+}
+
+/// The largest layer on every node over all drives and cores, A per ampere.
+fn largest_layer(
+    outline: &Generatrix,
+    cores: usize,
+    drives: usize,
+    layers: &(impl Fn(usize, usize) -> DMatrix<f64> + Sync),
+) -> Vec<f64> {
+    let of_core = |core: usize| {
+        let mut largest = vec![0.0_f64; outline.nodes.len()];
+        for drive in 0..drives {
+            for (largest, row) in largest.iter_mut().zip(layers(drive, core).row_iter()) {
+                *largest = largest.max(row.iter().map(|v| v.abs()).sum());
+            }
+        }
+        largest
+    };
+    let all: Vec<Vec<f64>> = (0..cores).into_par_iter().map(of_core).collect();
+    (0..outline.nodes.len())
+        .map(|node| all.iter().fold(0.0_f64, |m, core| m.max(core[node])))
+        .collect()
 }
 
 /// One chunk of points, [drive, component, point].

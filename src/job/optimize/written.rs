@@ -260,7 +260,7 @@ impl RatedFacts {
             core_peak_field_t: rated.single.core.as_ref().map(|core| core.peak_field_t),
             limits: rated.limits,
             accuracy: rated.single.accuracy,
-            accuracy_reached: rated.accuracy_reached,
+            accuracy_reached: rated.accuracy_missed.is_empty(),
             notes: rated.single.notes,
         })
     }

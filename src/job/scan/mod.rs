@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use super::scene::Scene;
 use super::steel::{EVALUATION_SHARE, Material, Solved, Steel};
 use super::{JobError, KERNEL_ERROR, steel};
-use crate::accuracy::StageAccuracy;
+use crate::accuracy::{StageAccuracy, missed};
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::bundle::scan::{
     CoilScale, FieldLeft, FitFile, GradientLeft, Left, Measured, Residuals, Scan, ScanFile,
@@ -57,6 +57,8 @@ pub struct ScanReport {
     pub warnings: Vec<String>,
     /// Whether the tolerance asked for was reached.
     pub accuracy_reached: bool,
+    /// What misses it.
+    pub accuracy_missed: Vec<String>,
 }
 
 /// Residuals of the design as it stands, and the weights of all measured numbers.
@@ -161,12 +163,14 @@ pub fn compare(
         best_explanation,
         accuracy: BTreeMap::from([("field".to_owned(), accuracy(&solved, relative_error))]),
     };
+    let accuracy_missed = missed(&file.accuracy, solved.tolerance);
     Ok(ScanReport {
         file,
         fitted: fit.fitted,
         predicted: weighted.predicted,
         warnings,
-        accuracy_reached: solved.tolerance >= KERNEL_ERROR && solved.reached(),
+        accuracy_reached: accuracy_missed.is_empty(),
+        accuracy_missed,
     })
 }
 

@@ -160,7 +160,7 @@ fn evaluated(design: &Design, tolerance: Option<f64>) -> Result<(Row, Status), J
         limits_met: rated.limits.values().all(|check| check.met),
         optimum: None,
     };
-    let status = if rated.accuracy_reached {
+    let status = if rated.accuracy_missed.is_empty() {
         Status::Done
     } else {
         Status::AccuracyNotReached

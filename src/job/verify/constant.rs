@@ -38,7 +38,7 @@ pub(super) fn checks(
         Steel::Alone(_) | Steel::Coupled(_) => FORCES_MOVE * bounds.forces,
     };
     let solved = match &route.solved.steel {
-        Steel::None => steel::solve(scene, None, KERNEL_ERROR, lowest_m)?,
+        Steel::None => steel::solve(scene, None, scene.force_tolerance(), lowest_m)?,
         Steel::Alone(_) | Steel::Coupled(_) => route.solved.clone(),
     };
     let forces = scene.forces_n_per_a(&solved, &positions, progress)?;

@@ -110,7 +110,7 @@ impl Probe {
         }
         let json = printer.with_warnings(&report.file);
         printer.summary(place, &json, || told(&report.file, &name, out))?;
-        accuracy_check(report.accuracy_reached)
+        accuracy_check(&report.accuracy_missed)
     }
 }
 

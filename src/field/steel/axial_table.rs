@@ -1,0 +1,422 @@
+//! The field of a magnetised core, with or without its winding, as a table over the half plane.
+//!
+//! The table consists of square cells of size s on a grid of size s, s a power of two. A point at
+//! distance d from the nearest source belongs to the cell of the largest s with (1 + sqrt(2)) s <= d
+//! that holds it, so every cell is at least s away from all sources, whatever cell a neighbour
+//! belongs to. In either coordinate the nearest singularity then is s off an interval of
+//! half-width s/2 or more: Bernstein radius 2 + sqrt(5). A cell is a product of Chebyshev series,
+//! computed from the exact field when a point first falls into it. What a point's value is thus
+//! depends on the point alone. Points closer than [`NEAREST`] to a source get the exact field.
+
+use std::collections::HashMap;
+use std::f64::consts::{PI, SQRT_2};
+use std::sync::{Arc, PoisonError, RwLock};
+
+use super::magnetized::MagnetizedCore;
+use super::sources::Parts;
+use crate::field::batch::{Gradients, Wanted};
+use crate::field::source::AxialSource;
+use crate::field::winding::{AxialField, OnEdge, Winding};
+use crate::numerics::dispatch::{self, Kernel};
+
+/// Points closer to a source than this multiple of the core's radius get the exact field.
+const NEAREST: f64 = 0.01;
+/// Constant of the bound `SCALE * radius^-terms` of a cell's error, relative to |grad B| there.
+const SCALE: f64 = 100.0;
+/// Terms beyond which the exact field is cheaper.
+const MOST_TERMS: usize = 20;
+/// Quantities that a cell holds: b_z, dB_z/dz, (dB_r/dz)/r, B_r/r.
+const QUANTITIES: usize = 4;
+
+/// What a table gives at a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// B_z, T.
+    Bz,
+    /// dB_z/dz, T/m.
+    DbzDz,
+    /// (dB_r/dz)/r, T/m^2.
+    DbrDzOverR,
+    /// B_r/r, T/m.
+    BrOverR,
+}
+
+/// A core, with or without its winding, per ampere; standing at the origin.
+#[derive(Debug)]
+pub struct AxialTable {
+    winding: Option<Winding>,
+    core: MagnetizedCore,
+    terms: usize,
+    cells: RwLock<HashMap<Key, Arc<Cell>>>,
+}
+
+/// Exponent of the cell's size and the cell's place along r and z.
+type Key = (i32, i64, i64);
+
+/// Coefficients [quantity][degree in z][degree in r].
+type Cell = Vec<f64>;
+
+/// A point's cell and its place there, -1 to 1 along r and z.
+struct Place {
+    key: Key,
+    x: f64,
+    y: f64,
+}
+
+impl AxialTable {
+    /// The table with errors below `tolerance` of |grad B| at the point (of |B| for the field).
+    #[must_use]
+    pub fn new(winding: Option<Winding>, core: MagnetizedCore, tolerance: f64) -> Self {
+        let radius = 2.0 + 5.0_f64.sqrt();
+        let terms = ((SCALE / tolerance).ln() / radius.ln()).ceil().max(4.0) as usize;
+        Self {
+            winding,
+            core,
+            terms,
+            cells: RwLock::default(),
+        }
+    }
+
+    /// The field itself, without the table.
+    ///
+    /// # Errors
+    /// A point on the winding's edge.
+    pub fn exact(&self, r_m: f64, z_m: f64) -> Result<AxialField, OnEdge> {
+        let steel = self.core.field(r_m, z_m);
+        Ok(match &self.winding {
+            Some(winding) => winding.field(r_m, z_m)? + steel,
+            None => steel,
+        })
+    }
+
+    /// `wanted` at the points (`r_m`, `z_m`), [quantity][point].
+    ///
+    /// # Errors
+    /// A point on the winding's edge.
+    ///
+    /// # Panics
+    /// When the two slices differ in length.
+    pub fn sample(
+        &self,
+        r_m: &[f64],
+        z_m: &[f64],
+        wanted: &[Quantity],
+    ) -> Result<Vec<Vec<f64>>, OnEdge> {
+        assert_eq!(r_m.len(), z_m.len(), "one height per radius");
+        let mut out = vec![Vec::with_capacity(r_m.len()); wanted.len()];
+        let mut last: Option<(Key, Arc<Cell>)> = None;
+        let mut room = [0.0; MOST_TERMS];
+        for (r, z) in r_m.iter().zip(z_m) {
+            let Some(place) = self.place(*r, *z) else {
+                let field = self.exact(*r, *z)?;
+                for (values, quantity) in out.iter_mut().zip(wanted) {
+                    values.push(quantity.of(&field));
+                }
+                continue;
+            };
+            let cell = match &last {
+                Some((key, cell)) if *key == place.key => cell,
+                Some(_) | None => &last.insert((place.key, self.cell(place.key)?)).1,
+            };
+            let (along_r, along_z) = (polynomials(place.x), polynomials(place.y));
+            let rows = &mut room[..self.terms];
+            for (values, quantity) in out.iter_mut().zip(wanted) {
+                let size = self.terms * self.terms;
+                values.push(dispatch::run(Series {
+                    coefficients: &cell[*quantity as usize * size..][..size],
+                    along_r: &along_r[..self.terms],
+                    along_z: &along_z[..self.terms],
+                    rows,
+                }));
+            }
+        }
+        Ok(out)
+    }
+
+    /// `parts` at `points_m`, into `out`, [component, point], in the order of [`Parts`]; away from
+    /// the winding's conductor, if the table has one.
+    ///
+    /// # Errors
+    /// A point on the winding's edge.
+    ///
+    /// # Panics
+    /// When `out` has another length than components x points.
+    pub fn sample_parts(
+        &self,
+        points_m: &[[f64; 3]],
+        parts: Parts,
+        out: &mut [f64],
+    ) -> Result<(), OnEdge> {
+        let count = points_m.len();
+        assert_eq!(out.len(), parts.count() * count);
+        let r_m: Vec<f64> = points_m.iter().map(|[x, y, _]| x.hypot(*y)).collect();
+        let z_m: Vec<f64> = points_m.iter().map(|p| p[2]).collect();
+        let wanted: &[Quantity] = match parts {
+            Parts::Gz => {
+                let values = self.sample(&r_m, &z_m, &[Quantity::DbzDz])?;
+                out.copy_from_slice(&values[0]);
+                return Ok(());
+            }
+            Parts::Gradient => &Quantity::ALL[1..],
+            Parts::All => &[
+                Quantity::DbzDz,
+                Quantity::DbrDzOverR,
+                Quantity::BrOverR,
+                Quantity::Bz,
+            ],
+        };
+        let values = self.sample(&r_m, &z_m, wanted)?;
+        for (place, [x, y, _]) in points_m.iter().enumerate() {
+            let (zz, slope, ratio) = (values[0][place], values[1][place], values[2][place]);
+            // dB_r/dr = -B_r/r - dB_z/dz; along the direction of r the tensor is that, across B_r/r.
+            let square = r_m[place] * r_m[place];
+            let turn = if square > 0.0 {
+                -(2.0 * ratio + zz) / square
+            } else {
+                0.0
+            };
+            let mut put = |component: usize, value: f64| out[component * count + place] = value;
+            put(0, ratio + turn * x * x);
+            put(1, turn * x * y);
+            put(2, slope * x);
+            put(3, slope * y);
+            put(4, zz);
+            if parts == Parts::All {
+                put(5, ratio * x);
+                put(6, ratio * y);
+                put(7, values[3][place]);
+            }
+        }
+        Ok(())
+    }
+
+    /// The cell of a point; `None` where the exact field is due.
+    fn place(&self, r_m: f64, z_m: f64) -> Option<Place> {
+        let shape = self.core.outline().shape;
+        let mut distance_m = shape.distance_m(r_m, z_m);
+        if let Some(winding) = &self.winding {
+            let across = (winding.inner_radius_m - r_m).max(r_m - winding.outer_radius_m);
+            let along = z_m.max(-winding.length_m - z_m);
+            distance_m = distance_m.min(across.max(0.0).hypot(along.max(0.0)));
+        }
+        let nearest_m = NEAREST * shape.radius_m;
+        if self.terms > MOST_TERMS || distance_m < nearest_m || !distance_m.is_finite() {
+            return None;
+        }
+        let exponent = (distance_m / (1.0 + SQRT_2)).log2().floor() as i32;
+        let size_m = 2.0_f64.powi(exponent);
+        let (i, j) = ((r_m / size_m).floor(), (z_m / size_m).floor());
+        Some(Place {
+            key: (exponent, i as i64, j as i64),
+            x: 2.0 * (r_m / size_m - i) - 1.0,
+            y: 2.0 * (z_m / size_m - j) - 1.0,
+        })
+    }
+
+    fn cell(&self, key: Key) -> Result<Arc<Cell>, OnEdge> {
+        let known = |cells: &HashMap<Key, Arc<Cell>>| cells.get(&key).cloned();
+        let read = self.cells.read().unwrap_or_else(PoisonError::into_inner);
+        if let Some(cell) = known(&read) {
+            return Ok(cell);
+        }
+        drop(read);
+        // Outside the lock: two threads may compute the same cell, with the same result.
+        let cell = Arc::new(self.computed(key)?);
+        let mut cells = self.cells.write().unwrap_or_else(PoisonError::into_inner);
+        Ok(Arc::clone(cells.entry(key).or_insert(cell)))
+    }
+
+    fn computed(&self, (exponent, i, j): Key) -> Result<Cell, OnEdge> {
+        let n = self.terms;
+        let size_m = 2.0_f64.powi(exponent);
+        let node = |k: usize| (PI * (k as f64 + 0.5) / n as f64).cos();
+        let at = |place: i64, k: usize| size_m * (place as f64 + 0.5 * (1.0 + node(k)));
+        let mut values = vec![0.0; QUANTITIES * n * n];
+        for row in 0..n {
+            for column in 0..n {
+                let field = self.exact(at(i, column), at(j, row))?;
+                for quantity in Quantity::ALL {
+                    values[(quantity as usize * n + row) * n + column] = quantity.of(&field);
+                }
+            }
+        }
+        // Values to coefficients, along r and then along z.
+        let transform: Vec<f64> = (0..n * n)
+            .map(|index| {
+                let (degree, k) = (index / n, index % n);
+                let scale = if degree == 0 { 1.0 } else { 2.0 } / n as f64;
+                scale * (PI * degree as f64 * (k as f64 + 0.5) / n as f64).cos()
+            })
+            .collect();
+        let mut coefficients = vec![0.0; values.len()];
+        for (values, coefficients) in values
+            .chunks_exact(n * n)
+            .zip(coefficients.chunks_exact_mut(n * n))
+        {
+            let mut along_r = vec![0.0; n * n];
+            for row in 0..n {
+                for degree in 0..n {
+                    along_r[row * n + degree] = (0..n)
+                        .map(|k| transform[degree * n + k] * values[row * n + k])
+                        .sum();
+                }
+            }
+            for degree in 0..n {
+                for column in 0..n {
+                    coefficients[degree * n + column] = (0..n)
+                        .map(|k| transform[degree * n + k] * along_r[k * n + column])
+                        .sum();
+                }
+            }
+        }
+        Ok(coefficients)
+    }
+}
+
+/// A product of two Chebyshev series at a point.
+struct Series<'a> {
+    /// [degree in z][degree in r]
+    coefficients: &'a [f64],
+    along_r: &'a [f64],
+    along_z: &'a [f64],
+    /// Room for one number per degree in r.
+    rows: &'a mut [f64],
+}
+
+impl Kernel for Series<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<const FMA: bool>(self) -> f64 {
+        self.rows.fill(0.0);
+        let by_row = self.coefficients.chunks_exact(self.along_r.len());
+        for (row, factor) in by_row.zip(self.along_z) {
+            for (sum, coefficient) in self.rows.iter_mut().zip(row) {
+                *sum = if FMA {
+                    factor.mul_add(*coefficient, *sum)
+                } else {
+                    factor * coefficient + *sum
+                };
+            }
+        }
+        self.rows.iter().zip(self.along_r).map(|(a, b)| a * b).sum()
+    }
+}
+
+impl Quantity {
+    const ALL: [Self; QUANTITIES] = [Self::Bz, Self::DbzDz, Self::DbrDzOverR, Self::BrOverR];
+
+    fn of(self, field: &AxialField) -> f64 {
+        match self {
+            Self::Bz => field.b_z,
+            Self::DbzDz => field.dbz_dz,
+            Self::DbrDzOverR => field.dbr_dz_over_r,
+            Self::BrOverR => field.br_over_r,
+        }
+    }
+}
+
+/// T_0 to T_(MOST_TERMS - 1).
+fn polynomials(x: f64) -> [f64; MOST_TERMS] {
+    let mut values = [1.0; MOST_TERMS];
+    values[1] = x;
+    for k in 2..MOST_TERMS {
+        values[k] = 2.0 * x * values[k - 1] - values[k - 2];
+    }
+    values
+}
+
+impl AxialSource for AxialTable {
+    fn gradients(
+        &self,
+        r_m: &[f64],
+        z_m: &[f64],
+        _tolerance: f64,
+        wanted: Wanted,
+    ) -> Result<Gradients, OnEdge> {
+        let quantities: &[Quantity] = match wanted {
+            Wanted::Gz => &[Quantity::DbzDz],
+            Wanted::Gradient => &[Quantity::DbzDz, Quantity::DbrDzOverR, Quantity::BrOverR],
+        };
+        let mut values = self.sample(r_m, z_m, quantities)?.into_iter();
+        let mut next = || values.next().unwrap_or_default();
+        Ok(Gradients {
+            dbz_dz: next(),
+            dbr_dz_over_r: next(),
+            br_over_r: next(),
+        })
+    }
+
+    fn axial_fields(&self, r_m: &[f64], z_m: &[f64], _tolerance: f64) -> Result<Vec<f64>, OnEdge> {
+        Ok(self.sample(r_m, z_m, &[Quantity::Bz])?.swap_remove(0))
+    }
+
+    fn top_m(&self) -> f64 {
+        let top_m = self.core.outline().shape.top_m;
+        self.winding.map_or(top_m, |_| top_m.max(0.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::frame::to_cartesian;
+    use crate::field::steel::CoreShape;
+    use crate::field::steel::cored_coil::CoredCoil;
+
+    #[test]
+    fn it_is_the_winding_and_its_core_on_the_axis_and_off_whatever_the_other_points() {
+        let winding = Winding {
+            inner_radius_m: 0.012,
+            outer_radius_m: 0.019,
+            length_m: 0.05,
+            turns: 700.0,
+        };
+        let shape = CoreShape {
+            radius_m: 0.011,
+            bottom_m: -0.053,
+            top_m: 0.001,
+        };
+        let coil = CoredCoil::everywhere(&winding, shape, 300.0, 1e-3).expect("off the edges");
+        let places = [
+            [0.0, 0.0, 0.03],
+            [1e-9, 0.0, 0.034],
+            [0.0, 0.002, 0.0021],
+            [0.0113, 0.003, 0.0017],
+            [-0.031, 0.011, 0.05],
+            [0.023, -0.001, -0.017],
+            [0.0, 0.0, 0.00125],
+        ];
+        for tolerance in [1e-3, 1e-6, 1e-9] {
+            let table = AxialTable::new(Some(winding), coil.core.clone(), tolerance);
+            let mut all = vec![0.0; 8 * places.len()];
+            table
+                .sample_parts(&places, Parts::All, &mut all)
+                .expect("off the edges");
+            for (place, point) in places.iter().enumerate() {
+                let r_m = point[0].hypot(point[1]);
+                let axial = coil.field(r_m, point[2]).expect("off the edges");
+                let exact = to_cartesian(&axial, point[0], point[1]);
+                let (g, b) = (exact.gradient_t_per_m_per_a, exact.field_t_per_a);
+                let wanted = [
+                    g[0][0], g[0][1], g[0][2], g[1][2], g[2][2], b[0], b[1], b[2],
+                ];
+                let sizes = [axial.gradient_norm(), axial.b_r.hypot(axial.b_z)];
+                for (component, wanted) in wanted.into_iter().enumerate() {
+                    let size = sizes[usize::from(component >= 5)];
+                    let error = (all[component * places.len() + place] - wanted).abs() / size;
+                    assert!(error < tolerance, "{point:?} {component}: {error:e}");
+                }
+                let alone = AxialTable::new(Some(winding), coil.core.clone(), tolerance);
+                let mut one = vec![0.0; 8];
+                alone
+                    .sample_parts(&[*point], Parts::All, &mut one)
+                    .expect("off the edges");
+                for (component, value) in one.into_iter().enumerate() {
+                    assert_eq!(value, all[component * places.len() + place]);
+                }
+            }
+            assert_eq!(AxialSource::top_m(&table), 0.001);
+        }
+    }
+}
