@@ -137,9 +137,17 @@ impl Single {
             (
                 "core_field",
                 stage(
-                    inside.relative_error,
-                    "the peak and the mean",
-                    "two resolutions of the core's surface and of the scan",
+                    inside.peak_error,
+                    "the peak",
+                    "what the highest degrees of the core's surface and of the scan contribute",
+                ),
+            ),
+            (
+                "core_field_mean",
+                stage(
+                    inside.mean_error,
+                    "the mean",
+                    "two resolutions of the core's surface and of the volume's rule",
                 ),
             ),
         ]);

@@ -4,6 +4,7 @@
 #![allow(clippy::print_stdout, clippy::disallowed_methods)]
 
 mod array;
+mod claims;
 mod convergence;
 mod demagnetization;
 mod extremes;
