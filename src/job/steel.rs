@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::JobError;
-use super::at_current::{AtCurrent, SATURATED_TOLERANCE};
+use super::at_current::{self, SATURATED_TOLERANCE};
 use super::scene::Scene;
 use crate::design::bh_table::read_bh_table;
 use crate::design::{Core, Coupling, Design, Steel as Described};
@@ -285,7 +285,7 @@ pub fn solve(
     let at_current = match &core.material {
         Material::Curve(curve) if current_a > 0.0 => {
             let tolerance = tolerance.unwrap_or(SATURATED_TOLERANCE);
-            let state = AtCurrent::new(scene, core, curve, current_a, tolerance, lowest_m)?;
+            let state = at_current::solve(scene, core, curve, current_a, tolerance, lowest_m)?;
             let secant = curve.relative_permeability(state.inside.mean_b_t).max(1.0);
             Some((state, secant, tolerance))
         }

@@ -15,7 +15,7 @@ const STEPS: usize = 36;
 
 /// Coils and cores of every aspect: thin and thick, recessed and protruding at either end, mu_r
 /// 2 to 1e5.
-fn random_cores(count: usize) -> Vec<Design> {
+pub fn random_cores(count: usize) -> Vec<Design> {
     let mut random = Lcg(20_261_122);
     (0..count)
         .map(|_| {
@@ -143,7 +143,7 @@ fn peak_errors<const N: usize>(design: &Design, tolerances: [f64; N]) -> [(f64, 
 }
 
 /// Prints how many claims cover and how claim and truth compare; the cases that do not cover.
-fn covered(what: &str, errors: &[(f64, f64)]) -> usize {
+pub fn covered(what: &str, errors: &[(f64, f64)]) -> usize {
     let mut ratios: Vec<f64> = errors.iter().map(|(claim, off)| claim / off).collect();
     ratios.sort_by(f64::total_cmp);
     let at = |share: f64| ratios[(share * (ratios.len() - 1) as f64).round() as usize];
@@ -173,14 +173,14 @@ fn the_peak_in_a_recessed_core_is_where_it_is_claimed() {
 
 /// The small version of the study below.
 #[test]
-fn random_cores_have_the_peak_that_is_claimed() {
+pub fn random_cores_have_the_peak_that_is_claimed() {
     study(&random_cores(12));
 }
 
 /// `cargo test --test steel -- --ignored --nocapture claimed_in_full` prints the table.
 #[test]
 #[ignore = "a minute of CPU: 160 random cored coils"]
-fn random_cores_have_the_peak_that_is_claimed_in_full() {
+pub fn random_cores_have_the_peak_that_is_claimed_in_full() {
     study(&random_cores(160));
 }
 

@@ -10,4 +10,5 @@ mod demagnetization;
 mod extremes;
 mod field;
 mod oracle;
+mod saturation;
 mod support;
