@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::at_current::{AtCurrent, SATURATED_TOLERANCE};
+use super::at_current::{self, SATURATED_TOLERANCE};
 use super::evaluate::CoreFacts;
 use super::scene::{MAGNET_SHARE, Scene};
 use super::steel::{CORED_TOLERANCE, Material, SceneCore};
@@ -137,9 +137,17 @@ impl Single {
             (
                 "core_field",
                 stage(
-                    inside.relative_error,
-                    "the peak and the mean",
-                    "two resolutions of the core's surface and of the scan",
+                    inside.peak_error,
+                    "the peak",
+                    "what the highest degrees of the core's surface and of the scan contribute",
+                ),
+            ),
+            (
+                "core_field_mean",
+                stage(
+                    inside.mean_error,
+                    "the mean",
+                    "two resolutions of the core's surface and of the volume's rule",
                 ),
             ),
         ]);
@@ -189,27 +197,26 @@ impl Single {
         let tolerance = tolerance.unwrap_or(SATURATED_TOLERANCE);
         let height_m = scene.design.target_height_m;
         let current_a = scene.rated_current_a();
-        let state = AtCurrent::new(scene, core, curve, current_a, tolerance, height_m)?;
-        let (field, error) = (state.field(scene, height_m)?, state.relative_error);
+        let state = at_current::solve(scene, core, curve, current_a, tolerance, height_m)?;
+        let field = scene.winding.field(0.0, height_m)? + state.layer.field(0.0, height_m);
+        let error = state.relative_error;
         let inductance_h = scene.circuit.inductance_h + state.added_inductance_h;
         let shape = core.shape;
         let initial = core.relative_permeability();
         let linear = CoredCoil::new(&scene.winding, shape, initial, tolerance, height_m)?;
         let linear = linear.field(0.0, height_m)?;
-        let method = "difference of two resolutions of the core's surface and inside";
+        let method = "the larger difference among three resolutions of the core's surface and inside, times a \
+                      safety factor";
         let accuracy = BTreeMap::from([
             (
                 "field",
                 stage(error, "|grad B| (|B|) at the target", method),
             ),
             ("inductance", stage(error, "the flux linkage", method)),
+            ("core_field", stage(state.peak_error, "the peak", method)),
             (
-                "core_field",
-                stage(
-                    state.inside.resolution.max(error),
-                    "the peak and the mean",
-                    "what the elements' highest degree contributes",
-                ),
+                "core_field_mean",
+                stage(state.mean_error, "the mean", method),
             ),
         ]);
         let mean_t = state.inside.mean_b_t;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::at_current::{AtCurrent, SATURATED_TOLERANCE};
+use super::at_current::{self, SATURATED_TOLERANCE};
 use super::scene::Scene;
 use super::{JobError, KERNEL_ERROR};
 use crate::design::bh_table::read_bh_table;
@@ -354,7 +354,7 @@ pub fn solve(
         Material::Curve(curve) if current_a > 0.0 => {
             let tolerance = tolerance.unwrap_or(SATURATED_TOLERANCE);
             let aim = STEEL_SHARE / CHANCE * tolerance;
-            let state = AtCurrent::new(scene, core, curve, current_a, aim, lowest_m)?;
+            let state = at_current::solve(scene, core, curve, current_a, aim, lowest_m)?;
             let secant = curve.relative_permeability(state.inside.mean_b_t).max(1.0);
             Some((state, secant, tolerance))
         }

@@ -1,7 +1,7 @@
 //! The steel at given currents in all coils, along its B-H curve: what superposition leaves out.
 
 use super::JobError;
-use super::at_current::{AtCurrent, no_state};
+use super::at_current::{self, no_state};
 use super::maps::{lowest_plane, parts_of};
 use super::scene::{MAGNET_SHARE, Scene, upward_n};
 use super::steel::{
@@ -13,6 +13,7 @@ use crate::field::steel::bh_curve::BhCurve;
 use crate::field::steel::inside::peak_depth_m;
 use crate::field::steel::saturated::Status;
 use crate::field::steel::saturated_array::SaturatedArray;
+use crate::field::steel::saturated_coil::SaturatedCoil;
 use crate::field::steel::sources::{ArraySources, Parts};
 use crate::map::Components;
 use crate::map::sampled::SampledField;
@@ -50,7 +51,7 @@ pub struct WorkingPoint {
 enum Cores {
     /// Every core under its own winding: the coils' effective currents, A, and the states, of
     /// which coils of the same current share one; `None` without current.
-    Alone(Vec<(f64, Option<AtCurrent>)>),
+    Alone(Vec<(f64, Option<SaturatedCoil>)>),
     /// All under all.
     Coupled(Box<SaturatedArray>),
 }
@@ -138,7 +139,7 @@ impl WorkingPoint {
         tolerance: f64,
         lowest_m: f64,
     ) -> Result<Self, JobError> {
-        let mut states: Vec<(f64, Option<AtCurrent>)> = Vec::new();
+        let mut states: Vec<(f64, Option<SaturatedCoil>)> = Vec::new();
         for current in currents_a {
             let known = states
                 .iter()
@@ -146,7 +147,7 @@ impl WorkingPoint {
             let state = match known {
                 Some((_, state)) => state.clone(),
                 None if *current == 0.0 => None,
-                None => Some(AtCurrent::new(
+                None => Some(at_current::solve(
                     scene,
                     core,
                     curve,
@@ -157,7 +158,7 @@ impl WorkingPoint {
             };
             states.push((*current, state));
         }
-        let of = |pick: &dyn Fn(f64, &AtCurrent) -> f64| -> Vec<f64> {
+        let of = |pick: &dyn Fn(f64, &SaturatedCoil) -> f64| -> Vec<f64> {
             states
                 .iter()
                 .map(|(current, state)| state.as_ref().map_or(0.0, |state| pick(*current, state)))

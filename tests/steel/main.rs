@@ -4,10 +4,12 @@
 #![allow(clippy::print_stdout, clippy::disallowed_methods)]
 
 mod array;
+mod claims;
 mod convergence;
 mod demagnetization;
 mod extremes;
 mod field;
 mod near;
 mod oracle;
+mod saturation;
 mod support;

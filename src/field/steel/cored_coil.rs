@@ -96,6 +96,8 @@ pub struct CoredCoil {
     /// and of the added inductance; the larger. The difference from the next coarser resolution,
     /// whose error is three to eight times larger as a rule, and nearly as small by chance.
     pub relative_error: f64,
+    /// The core by the next coarser resolution, of a coil whose error is estimated.
+    pub(super) coarser: Option<Box<MagnetizedCore>>,
 }
 
 /// Refinements after which a tolerance that is not reached is given up, with its estimate.
@@ -219,6 +221,7 @@ impl CoredCoil {
             let coarse = solve(&coarse)?;
             let mut fine = solve(&fine)?;
             fine.relative_error = fine.difference(&coarse, planes);
+            fine.coarser = Some(Box::new(coarse.core));
             let better = best
                 .as_ref()
                 .is_none_or(|b| fine.relative_error < b.relative_error);
@@ -314,6 +317,7 @@ impl CoredCoil {
                     core: MagnetizedCore::new(outline.clone(), density.as_slice().to_vec()),
                     added_inductance_h,
                     relative_error: f64::NAN,
+                    coarser: None,
                 }
             })
             .collect())

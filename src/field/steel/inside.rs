@@ -22,11 +22,20 @@ use super::cored_coil::CoredCoil;
 use super::double_layer::operators;
 use super::generatrix::{Face, Generatrix, Panel, Resolution};
 use super::layer_gradient::{COMPONENTS, gradient_operators};
+use super::magnetized::MagnetizedCore;
 use crate::field::winding::{OnEdge, Winding};
 use crate::numerics::gauss;
 use crate::numerics::lagrange_basis::Basis;
 use crate::units::MU_0_T_M_PER_A;
 
+/// What the layers' last degrees give at the peak counts so many times in its error, where the
+/// difference of two solutions is known as well and where it is not: alone it is at times a
+/// thirtieth of the error, the rest coming from all of the outline. By the table of
+/// `cargo test --test steel -- --ignored --nocapture claimed_in_full`.
+const LOST_BESIDE_DIFFERENCE: f64 = 0.1;
+const LOST_ALONE: f64 = 3.0;
+/// Share of a panel's two highest degrees that the degrees beyond them give together.
+const BEYOND: f64 = 0.3;
 /// Depth below which the core's largest |B| is told, m.
 const DEPTH_M: f64 = 1e-3;
 /// The same in radii, if that is less.
@@ -34,16 +43,22 @@ const DEPTH_RADII: f64 = 0.1;
 /// Least room, as a share of radius and length, that is left inside the depth.
 const DEEPEST: f64 = 0.25;
 /// Target of the quadratures over the outline, relative to the kernels.
-const QUADRATURE: f64 = 1e-7;
-/// The curve along which |B| is scanned: the surface at the depth, in a half plane.
+const QUADRATURE: f64 = 1e-8;
+/// The same where the peak was found: close to the surface the kernels exceed what their sum
+/// gives by radius over depth.
+const PEAK_QUADRATURE: f64 = 1e-11;
+/// The curve along which |B| is scanned: the surface at the depth, in a half plane. Its panels'
+/// polynomials stand for the field between the nodes: panels graded so miss about 3.4^-order of it,
+/// and what is missed moves a flat maximum far.
 const SCAN: Resolution = Resolution {
-    order: 8,
+    order: 14,
     ratio: 0.3,
     tip: 0.0,
     quadrature: QUADRATURE,
 };
-/// Samples a node of that curve, before the best is polished.
-const SAMPLES: usize = 2;
+/// Samples that are higher than their neighbours and at least this share of the highest are
+/// followed to the maximum beside them: the highest sample need not lie beside the largest.
+const FOLLOWED: f64 = 0.95;
 /// Angles a mode of the scan, and of the mean.
 const ANGLES: usize = 8;
 /// The volume's rule: nodes of this outline's side times nodes of its bottom.
@@ -65,11 +80,22 @@ pub struct CoreField {
     pub peak_at_m: [f64; 3],
     /// Mean of |B| over the whole core's volume, T.
     pub mean_t: f64,
-    /// Estimated error of either, relative to it: the larger. Of outline and modes, what the
-    /// last polynomial degrees of every panel and the last mode contribute; of the mean, what a
-    /// node a panel less changes. No less than the estimate of the coil's own solution, if that
-    /// has one.
-    pub relative_error: f64,
+    /// Estimated error of the peak, relative to it: the difference from the next coarser
+    /// solution there, if there is one, what the last polynomial degrees of every panel and the
+    /// last mode contribute, and by how much |B| can be larger elsewhere. No less than the
+    /// estimate of the solution itself, if that has one.
+    pub peak_error: f64,
+    /// Estimated error of the mean, relative to it: what the same degrees and mode contribute,
+    /// and a node a panel of the volume's rule.
+    pub mean_error: f64,
+}
+
+impl CoreField {
+    /// The larger of both estimated errors.
+    #[must_use]
+    pub fn relative_error(&self) -> f64 {
+        self.peak_error.max(self.mean_error)
+    }
 }
 
 /// The depth at which a core's peak is told: 1 mm, a tenth of the radius if that is less; a
@@ -95,6 +121,7 @@ impl CoredCoil {
     /// A point on the winding's edge: the core is not in the bore.
     pub fn core_field(&self, current_a: f64, depth_m: f64) -> Result<CoreField, OnEdge> {
         let outline = self.core.outline();
+        let shape = outline.shape;
         let density = self.core.density_a();
         let layers = DMatrix::from_column_slice(density.len(), 1, density) * current_a;
         let core = Core {
@@ -102,12 +129,42 @@ impl CoredCoil {
             current_a,
             position_m: [0.0, 0.0],
         };
-        let field = core_fields(outline, &self.winding, &[core], depth_m)?[0];
+        let lost_counts = if self.coarser.is_some() {
+            LOST_BESIDE_DIFFERENCE
+        } else {
+            LOST_ALONE
+        };
+        let field = core_fields(outline, &self.winding, &[core], depth_m, lost_counts)?[0];
+        // A coil solved at a resolution of the caller's has no estimate, NaN: max drops it.
+        let differs = match &self.coarser {
+            Some(coarser) => {
+                let differs_t = self.differs_t(coarser, &field, allowed_depth_m(shape, depth_m));
+                share(current_a.abs() * differs_t, field.peak_t)
+            }
+            None => 0.0,
+        };
         Ok(CoreField {
-            // A coil solved at a resolution of the caller's has no estimate, NaN: max drops it.
-            relative_error: field.relative_error.max(self.relative_error),
+            peak_error: (field.peak_error + differs).max(self.relative_error),
+            mean_error: field.mean_error.max(self.relative_error),
             ..field
         })
+    }
+
+    /// Largest difference from the B of the coarser solution, at the peak and a depth beside it
+    /// to either side: at one place both may agree by chance. T/A.
+    fn differs_t(&self, coarser: &MagnetizedCore, peak: &CoreField, depth_m: f64) -> f64 {
+        let shape = self.core.outline().shape;
+        let [x_m, y_m, z_m] = peak.peak_at_m;
+        let r_m = x_m.hypot(y_m);
+        [(0.0, 0.0), (-depth_m, 0.0), (0.0, depth_m), (0.0, -depth_m)]
+            .into_iter()
+            .map(|(dr_m, dz_m)| {
+                let r_m = (r_m + dr_m).max(AXIS * shape.radius_m);
+                let z_m = (z_m + dz_m).clamp(shape.bottom_m + depth_m, shape.top_m - depth_m);
+                let (a, b) = (self.core.field(r_m, z_m), coarser.field(r_m, z_m));
+                (a.b_r - b.b_r).hypot(a.b_z - b.b_z)
+            })
+            .fold(0.0, f64::max)
     }
 }
 
@@ -121,7 +178,16 @@ impl CoupledArray {
     /// A point on the winding's edge: the cores are not in the bores.
     pub fn core_fields(&self, currents_a: &[f64], depth_m: f64) -> Result<Vec<CoreField>, OnEdge> {
         let cores = self.cores(&Incident::new(self), currents_a);
-        core_fields(&self.response.outline, &self.winding, &cores, depth_m)
+        let (outline, winding) = (&self.response.outline, &self.winding);
+        let fields = core_fields(outline, winding, &cores, depth_m, LOST_ALONE)?;
+        Ok(fields
+            .into_iter()
+            .map(|field| CoreField {
+                peak_error: field.peak_error.max(self.relative_error),
+                mean_error: field.mean_error.max(self.relative_error),
+                ..field
+            })
+            .collect())
     }
 
     /// What all other modes add to the largest |B| of the axisymmetric one in every core, T.
@@ -194,7 +260,13 @@ impl Inspection {
         let (winding, shape) = (&array.winding, outline.shape);
         let incident = Incident::new(array);
         let curve = scan_curve(winding, shape, allowed_depth_m(shape, depth_m));
-        let at_curve = Targets::new(outline, winding, places(&curve), incident.modes())?;
+        let at_curve = Targets::new(
+            outline,
+            winding,
+            places(&curve),
+            incident.modes(),
+            QUADRATURE,
+        )?;
         Ok(Self {
             incident,
             curve,
@@ -222,6 +294,7 @@ impl Inspection {
             &array.winding,
             peaks.iter().map(|peak| peak.place_m).collect(),
             self.incident.modes(),
+            PEAK_QUADRATURE,
         )?;
         let fields = there.fields(&layers, &currents);
         Ok(fields
@@ -295,6 +368,7 @@ fn core_fields(
     winding: &Winding,
     cores: &[Core],
     depth_m: f64,
+    lost_counts: f64,
 ) -> Result<Vec<CoreField>, OnEdge> {
     let shape = outline.shape;
     let depth_m = allowed_depth_m(shape, depth_m);
@@ -314,11 +388,13 @@ fn core_fields(
     targets.extend(&fine.points);
     let first_coarse = targets.len();
     targets.extend(&coarse.points);
-    let fields = Targets::new(outline, winding, targets, modes)?.fields(&layers, &currents);
+    let fields =
+        Targets::new(outline, winding, targets, modes, QUADRATURE)?.fields(&layers, &currents);
 
     let peaks = scans(&curve, &fields[..cores.len()], AXIS * shape.radius_m);
     let targets = peaks.iter().map(|peak| peak.place_m).collect();
-    let there = Targets::new(outline, winding, targets, modes)?.fields(&layers, &currents);
+    let there =
+        Targets::new(outline, winding, targets, modes, PEAK_QUADRATURE)?.fields(&layers, &currents);
 
     Ok(cores
         .iter()
@@ -326,6 +402,7 @@ fn core_fields(
         .map(|(index, core)| {
             let Peak {
                 scanned_t,
+                bound_t,
                 place_m: (r_m, z_m),
                 angle,
             } = peaks[index];
@@ -337,21 +414,22 @@ fn core_fields(
             let mean_t = fine.mean(&fields[index], first_fine);
             let less = fine.mean(&fields[index + cores.len()], first_fine);
             let coarser = coarse.mean(&fields[index], first_coarse);
-            let share = |error: f64, of: f64| if of > 0.0 { error / of } else { 0.0 };
-            let relative_error = share(lost + (scanned_t - peak_t).abs(), peak_t).max(share(
-                (less - mean_t).abs() + (coarser - mean_t).abs(),
-                mean_t,
-            ));
+            let searched_t = (scanned_t - peak_t).abs() + (bound_t - peak_t).max(0.0);
             let (sin, cos) = angle.sin_cos();
             let [x_m, y_m] = core.position_m;
             CoreField {
                 peak_t,
                 peak_at_m: [x_m + r_m * cos, y_m + r_m * sin, z_m],
                 mean_t,
-                relative_error,
+                peak_error: share(lost_counts * lost + searched_t, peak_t),
+                mean_error: share((less - mean_t).abs() + (coarser - mean_t).abs(), mean_t),
             }
         })
         .collect())
+}
+
+fn share(error: f64, of: f64) -> f64 {
+    if of > 0.0 { error / of } else { 0.0 }
 }
 
 fn norm(b: [f64; 3]) -> f64 {
@@ -381,13 +459,8 @@ fn reduced(outline: &Generatrix, layers: &DMatrix<f64>) -> DMatrix<f64> {
         .zip(kept.iter().cycle())
     {
         for polynomial in &polynomials[*kept..] {
-            let weighted = || polynomial.iter().zip(weights).map(|(p, w)| p * w);
-            let square: f64 = weighted().zip(polynomial).map(|(a, p)| a * p).sum();
-            let share = weighted()
-                .zip(values.iter())
-                .map(|(a, v)| a * v)
-                .sum::<f64>()
-                / square;
+            let projection = projection(polynomial, weights);
+            let share: f64 = projection.iter().zip(&*values).map(|(a, v)| a * v).sum();
             for (value, p) in values.iter_mut().zip(polynomial) {
                 *value -= share * p;
             }
@@ -398,6 +471,13 @@ fn reduced(outline: &Generatrix, layers: &DMatrix<f64>) -> DMatrix<f64> {
         out.columns_mut(columns - 2, 2).fill(0.0);
     }
     out
+}
+
+/// A polynomial's share in another, as weights of that one's values at the nodes.
+fn projection(polynomial: &[f64], weights: &[f64]) -> Vec<f64> {
+    let weighted = || polynomial.iter().zip(weights).map(|(p, w)| p * w);
+    let square: f64 = weighted().zip(polynomial).map(|(a, p)| a * p).sum();
+    weighted().map(|value| value / square).collect()
 }
 
 /// Legendre polynomials of degree 0 to `order` - 1 on the nodes of that order.
@@ -478,12 +558,13 @@ impl Targets {
         winding: &Winding,
         places_m: Vec<(f64, f64)>,
         modes: usize,
+        quadrature: f64,
     ) -> Result<Self, OnEdge> {
         let own = places_m
             .par_iter()
-            .map(|(r_m, z_m)| bore_field(winding, *r_m, *z_m, QUADRATURE))
+            .map(|(r_m, z_m)| bore_field(winding, *r_m, *z_m, quadrature))
             .collect::<Result<_, _>>()?;
-        let operators = gradient_operators(outline, &places_m, modes, QUADRATURE);
+        let operators = gradient_operators(outline, &places_m, modes, quadrature);
         Ok(Self { own, operators })
     }
 
@@ -558,7 +639,10 @@ fn scan_curve(winding: &Winding, shape: CoreShape, depth_m: f64) -> Generatrix {
 /// Largest |B| on the curve, from the nodes' fields.
 #[derive(Debug, Clone, Copy)]
 struct Peak {
+    /// By the panels' polynomials.
     scanned_t: f64,
+    /// No |B| on the curve is larger, by the panels' highest degrees.
+    bound_t: f64,
     /// Radius and height.
     place_m: (f64, f64),
     angle: f64,
@@ -573,72 +657,181 @@ fn scans(curve: &Generatrix, fields: &[Field], nearest_m: f64) -> Vec<Peak> {
 
 fn scan(curve: &Generatrix, field: &Field, nearest_m: f64) -> Peak {
     crate::progress::poll();
-    let order = curve.order;
-    let basis = Basis::new(gauss::rule(order));
-    let columns = field.values.ncols();
-    let mut weights = vec![0.0; order];
-    // The components' modes on a panel at -1 <= x <= 1.
-    let mut modes_at = |panel: usize, x: f64| {
-        basis.weights(x, &mut weights);
-        let mut modes = vec![[0.0; COMPONENTS]; columns];
+    let polynomials = Polynomials::new(curve.order, field);
+    let around = turns_around(field.modes());
+    let between = TAU / around.len() as f64;
+    let highest: Vec<Sample> = (0..curve.panels.len())
+        .flat_map(|panel| polynomials.local_maxima(panel, &around))
+        .collect();
+    let most_t = highest
+        .iter()
+        .fold(0.0_f64, |m, sample| m.max(sample.size_t));
+    let (mut best, mut bound_t) = (highest[0], 0.0_f64);
+    for sample in highest {
+        let followed = if sample.size_t >= FOLLOWED * most_t {
+            polynomials.follow(sample, between)
+        } else {
+            sample
+        };
+        if followed.size_t > best.size_t {
+            best = followed;
+        }
+        bound_t = bound_t.max(followed.size_t + polynomials.missed_t(sample.panel));
+    }
+    let panel = curve.panels[best.panel];
+    let coordinate = panel.from_m + 0.5 * (panel.to_m - panel.from_m) * (1.0 + best.x);
+    let (r_m, z_m, _) = curve.shape.on(panel.face, coordinate);
+    Peak {
+        scanned_t: best.size_t,
+        bound_t,
+        place_m: (r_m.max(nearest_m), z_m),
+        angle: best.angle,
+    }
+}
+
+/// |B| at a place of a scanned curve.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    size_t: f64,
+    panel: usize,
+    /// On the panel, -1 to 1.
+    x: f64,
+    angle: f64,
+}
+
+/// The field along a curve, a polynomial on every panel.
+struct Polynomials<'a> {
+    field: &'a Field,
+    basis: Basis,
+    order: usize,
+    /// Places on a panel that are sampled, and the nodes' shares in them.
+    samples: Vec<(f64, Vec<f64>)>,
+    legendre: Vec<Vec<f64>>,
+}
+
+impl<'a> Polynomials<'a> {
+    fn new(order: usize, field: &'a Field) -> Self {
+        let basis = Basis::new(gauss::rule(order));
+        let samples = (0..=order)
+            .map(|sample| {
+                let x = 2.0 * sample as f64 / order as f64 - 1.0;
+                let mut weights = vec![0.0; order];
+                basis.weights(x, &mut weights);
+                (x, weights)
+            })
+            .collect();
+        Self {
+            field,
+            basis,
+            order,
+            samples,
+            legendre: legendre(order),
+        }
+    }
+
+    /// The components' modes on a panel, the nodes counting as `weights`.
+    fn modes(&self, panel: usize, weights: &[f64]) -> Vec<[f64; COMPONENTS]> {
+        let mut modes = vec![[0.0; COMPONENTS]; self.field.values.ncols()];
         for (place, weight) in weights.iter().enumerate() {
-            let row = COMPONENTS * (panel * order + place);
+            let row = COMPONENTS * (panel * self.order + place);
             for (column, slot) in modes.iter_mut().enumerate() {
                 for (component, value) in slot.iter_mut().enumerate() {
-                    *value += weight * field.values[(row + component, column)];
+                    *value += weight * self.field.values[(row + component, column)];
                 }
             }
         }
         modes
-    };
-    let size = |modes: &[[f64; COMPONENTS]], turns: &[(f64, f64)]| {
-        norm(combine(turns, |component, column| modes[column][component]))
-    };
-    let around = turns_around(field.modes());
-    let samples = SAMPLES * order;
-    let mut best = (f64::NEG_INFINITY, 0, 0.0, 0);
-    for panel in 0..curve.panels.len() {
-        for sample in 0..=samples {
-            let x = 2.0 * sample as f64 / samples as f64 - 1.0;
-            let modes = modes_at(panel, x);
-            for (k, turns) in around.iter().enumerate() {
-                let value = size(&modes, turns);
-                if value > best.0 {
-                    best = (value, panel, x, k);
+    }
+
+    /// The samples of a panel that no neighbour on it, or beside it in angle, exceeds.
+    fn local_maxima(&self, panel: usize, around: &[Vec<(f64, f64)>]) -> Vec<Sample> {
+        let sizes: Vec<Vec<f64>> = self
+            .samples
+            .iter()
+            .map(|(_, weights)| {
+                let modes = self.modes(panel, weights);
+                around.iter().map(|turns| size_t(&modes, turns)).collect()
+            })
+            .collect();
+        let (rows, angles) = (sizes.len(), around.len());
+        let mut found = Vec::new();
+        for (row, (x, _)) in self.samples.iter().enumerate() {
+            for turn in 0..angles {
+                let size_t = sizes[row][turn];
+                let highest = [
+                    (row.saturating_sub(1), turn),
+                    ((row + 1).min(rows - 1), turn),
+                    (row, (turn + 1) % angles),
+                    (row, (turn + angles - 1) % angles),
+                ]
+                .into_iter()
+                .all(|(row, turn)| size_t >= sizes[row][turn]);
+                if highest {
+                    found.push(Sample {
+                        size_t,
+                        panel,
+                        x: *x,
+                        angle: TAU * turn as f64 / angles as f64,
+                    });
                 }
             }
         }
+        found
     }
-    // Steps to the four sides that shrink where none of them leads higher.
-    let (mut value, panel, mut x, nearest) = best;
-    let between = TAU / around.len() as f64;
-    let mut angle = nearest as f64 * between;
-    let (mut step, mut turn) = (2.0 / samples as f64, between);
-    while step > 1e-5 {
-        let moves = [(step, 0.0), (-step, 0.0), (0.0, turn), (0.0, -turn)];
-        let next = moves
-            .into_iter()
-            .map(|(dx, dt)| ((x + dx).clamp(-1.0, 1.0), angle + dt))
-            .map(|(x, angle)| {
-                let turned = turns(angle, field.modes());
-                (size(&modes_at(panel, x), &turned), x, angle)
-            })
-            .fold((value, x, angle), |a, b| if b.0 > a.0 { b } else { a });
-        if next.0 > value {
-            (value, x, angle) = next;
-        } else {
-            step *= 0.5;
-            turn *= 0.5;
+
+    /// Steps to the four sides that shrink where none of them leads higher.
+    fn follow(&self, mut at: Sample, between: f64) -> Sample {
+        let (mut step, mut turn) = (2.0 / self.order as f64, between);
+        let mut weights = vec![0.0; self.order];
+        let several = self.field.modes() > 1;
+        while step > 1e-5 {
+            let moves = [(step, 0.0), (-step, 0.0), (0.0, turn), (0.0, -turn)];
+            let count = if several { moves.len() } else { 2 };
+            let mut next = at;
+            for (dx, dt) in &moves[..count] {
+                let (x, angle) = ((at.x + dx).clamp(-1.0, 1.0), at.angle + dt);
+                self.basis.weights(x, &mut weights);
+                let turned = turns(angle, self.field.modes());
+                let size_t = size_t(&self.modes(at.panel, &weights), &turned);
+                if size_t > next.size_t {
+                    next = Sample {
+                        size_t,
+                        x,
+                        angle,
+                        ..at
+                    };
+                }
+            }
+            if next.size_t > at.size_t {
+                at = next;
+            } else {
+                step *= 0.5;
+                turn *= 0.5;
+            }
         }
+        at
     }
-    let panel = curve.panels[panel];
-    let coordinate = panel.from_m + 0.5 * (panel.to_m - panel.from_m) * (1.0 + x);
-    let (r_m, z_m, _) = curve.shape.on(panel.face, coordinate);
-    Peak {
-        scanned_t: value,
-        place_m: (r_m.max(nearest_m), z_m),
-        angle,
+
+    /// What a panel's polynomials miss of the field, T: from one degree to the next a panel's
+    /// terms fall by 3.4 or more.
+    fn missed_t(&self, panel: usize) -> f64 {
+        let weights = &gauss::rule(self.order).weights;
+        let highest = self.order.saturating_sub(2);
+        self.legendre[highest..]
+            .iter()
+            .map(|polynomial| {
+                let modes = self.modes(panel, &projection(polynomial, weights));
+                let sum = modes.iter().fold([0.0; COMPONENTS], |sum, mode| {
+                    std::array::from_fn(|i| sum[i] + mode[i].abs())
+                });
+                BEYOND * norm(sum)
+            })
+            .sum()
     }
+}
+
+fn size_t(modes: &[[f64; COMPONENTS]], turns: &[(f64, f64)]) -> f64 {
+    norm(combine(turns, |component, column| modes[column][component]))
 }
 
 /// A rule over the core's half plane.

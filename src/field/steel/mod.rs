@@ -21,6 +21,7 @@ pub mod permeability;
 pub mod response;
 pub mod saturated;
 pub mod saturated_array;
+pub mod saturated_coil;
 pub mod sources;
 pub mod symmetry;
 pub mod trace;

@@ -1,0 +1,215 @@
+//! One winding with its core along a magnetisation curve, at one current, to an estimated error.
+
+use super::CoreShape;
+use super::cored_coil::Excitation;
+use super::generatrix::{Generatrix, Resolution};
+use super::interior::MeshError;
+use super::magnetized::MagnetizedCore;
+use super::permeability::Permeability;
+use super::saturated::{CoreField, SaturatedCore, Status};
+use crate::field::winding::{OnEdge, Winding};
+
+/// How much smaller a panel is than its neighbour away from the edge, from try to try: the curve's
+/// kinks cross the elements inside, where shorter ones help and higher degrees hardly do. After
+/// the last a tolerance that is not reached is given up, with its estimate.
+const RATIOS: [f64; 4] = [0.2, 0.35, 0.5, 0.5];
+/// The coarsest of three solutions needs two nodes a panel.
+const LEAST_ORDER: usize = 4;
+/// The outline's aim from one try to the next.
+const FINER: f64 = 0.3;
+/// Times the larger of two differences between resolutions, the former counting `BEFORE`, the
+/// error is stated. By the table of
+/// `cargo test --test steel -- --ignored --nocapture along_curves_in_full`.
+const SAFETY: f64 = 2.0;
+const BEFORE: f64 = 0.5;
+/// Distance above the core, in radii, below which no error is estimated.
+const CLOSEST: f64 = 0.1;
+
+/// Why a coil has no state at a current.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SaturatedCoilError {
+    /// A node of the outline lies on the winding's edge.
+    #[error(transparent)]
+    OnEdge(#[from] OnEdge),
+    /// The core cannot be meshed.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// The iteration found no state of the steel.
+    #[error("no state of the steel was found")]
+    Stalled,
+}
+
+/// A coil whose core saturates.
+#[derive(Debug, Clone, Copy)]
+pub struct CoilWithCurve<'a, L> {
+    /// The winding.
+    pub winding: &'a Winding,
+    /// Its self inductance without the core, H.
+    pub air_inductance_h: f64,
+    /// The core.
+    pub shape: CoreShape,
+    /// Its material.
+    pub law: &'a L,
+}
+
+/// The state of a coil with its core at one current.
+#[derive(Debug, Clone)]
+pub struct SaturatedCoil {
+    /// The steel's layer over the current.
+    pub layer: MagnetizedCore,
+    /// Flux of the layer through the winding over the current, H.
+    pub added_inductance_h: f64,
+    /// |B| inside.
+    pub inside: CoreField,
+    /// Estimated error: of the gradient at the height asked for and above, relative to the largest
+    /// |grad B| there, and of the flux linkage; the larger.
+    pub relative_error: f64,
+    /// Estimated error of the largest |B| inside, relative to it.
+    pub peak_error: f64,
+    /// Estimated error of the mean |B| inside, relative to it.
+    pub mean_error: f64,
+}
+
+impl<L: Permeability> CoilWithCurve<'_, L> {
+    /// Solves to an estimated error below `tolerance` from `lowest_m` up, or as far as the
+    /// refinements carry: [`SaturatedCoil::relative_error`] states what was reached.
+    ///
+    /// Domain: a current that is not 0. No error is estimated closer to the core's top than a
+    /// tenth of its radius.
+    ///
+    /// # Errors
+    /// See [`SaturatedCoilError`].
+    pub fn solve(
+        &self,
+        current_a: f64,
+        tolerance: f64,
+        lowest_m: f64,
+    ) -> Result<SaturatedCoil, SaturatedCoilError> {
+        let lowest_m = lowest_m.max(self.shape.top_m.max(0.0) + CLOSEST * self.shape.radius_m);
+        let mut aim = tolerance;
+        let mut best: Option<SaturatedCoil> = None;
+        for ratio in RATIOS {
+            let aimed = Resolution::for_tolerance(aim);
+            let resolution = Resolution {
+                ratio,
+                order: aimed.order.max(LEAST_ORDER),
+                ..aimed
+            };
+            let coarser = resolution.coarser();
+            let of_lower_degree = Resolution {
+                order: coarser.order - 1,
+                ..coarser
+            };
+            let fine = self.at_resolution(current_a, &resolution)?;
+            let coarse = self.at_resolution(current_a, &coarser)?;
+            let coarsest = self.at_resolution(current_a, &of_lower_degree)?;
+            let found = self.estimated(fine, &coarse, &coarsest, lowest_m)?;
+            let better = best
+                .as_ref()
+                .is_none_or(|best| found.relative_error < best.relative_error);
+            if better {
+                best = Some(found);
+            }
+            if best
+                .as_ref()
+                .is_some_and(|best| best.relative_error <= tolerance)
+            {
+                break;
+            }
+            aim *= FINER;
+        }
+        best.ok_or(SaturatedCoilError::Stalled)
+    }
+
+    /// `fine` with its errors, from two coarser solutions that differ by their degree alone.
+    ///
+    /// Edges converge as their grading says, and what a finer one changes is several times what it
+    /// leaves. Where the curve's kinks cross the elements, which wander with the state, each degree
+    /// is wrong by about as much as the one before and in either direction: two may agree by
+    /// chance, three hardly ever.
+    fn estimated(
+        &self,
+        fine: SaturatedCoil,
+        coarse: &SaturatedCoil,
+        coarsest: &SaturatedCoil,
+        lowest_m: f64,
+    ) -> Result<SaturatedCoil, OnEdge> {
+        let last = self.difference(&fine, coarse, lowest_m)?;
+        let before = self.difference(coarse, coarsest, lowest_m)?;
+        let relative_error = SAFETY * last.max(BEFORE * before);
+        let field = |pick: fn(&CoreField) -> f64| {
+            let [a, b, c] = [&fine.inside, &coarse.inside, &coarsest.inside].map(pick);
+            let size = if a > 0.0 { a } else { 1.0 };
+            SAFETY * (a - b).abs().max(BEFORE * (b - c).abs()) / size + relative_error
+        };
+        Ok(SaturatedCoil {
+            relative_error,
+            peak_error: field(|inside| inside.peak_b_t),
+            mean_error: field(|inside| inside.mean_b_t),
+            ..fine
+        })
+    }
+
+    /// Solves at one resolution; no error is estimated.
+    ///
+    /// Domain: a current that is not 0.
+    ///
+    /// # Errors
+    /// See [`SaturatedCoilError`].
+    pub fn at_resolution(
+        &self,
+        current_a: f64,
+        resolution: &Resolution,
+    ) -> Result<SaturatedCoil, SaturatedCoilError> {
+        let outline = Generatrix::of_coil(self.winding, self.shape, resolution);
+        let excitation = Excitation::new(self.winding, &outline, resolution.quadrature)?;
+        let solver = SaturatedCore::new(&outline, resolution.quadrature)?;
+        let solution = solver.solve(&(&excitation.potential * current_a), self.law, None);
+        if solution.status == Status::Stalled {
+            return Err(SaturatedCoilError::Stalled);
+        }
+        let flux_wb = solver.flux_linkage_wb(&solution, &excitation.potential);
+        let inside = solver.field(&solution, self.law);
+        let density = (&solution.v_a / current_a).as_slice().to_vec();
+        Ok(SaturatedCoil {
+            layer: MagnetizedCore::new(outline, density),
+            added_inductance_h: flux_wb / current_a,
+            inside,
+            relative_error: f64::NAN,
+            peak_error: f64::NAN,
+            mean_error: f64::NAN,
+        })
+    }
+
+    /// Largest difference of the gradients at a few heights from `lowest_m` up, relative to the
+    /// largest |grad B| at each, and of the flux linkages.
+    ///
+    /// # Errors
+    /// A place on the winding's edge.
+    pub fn difference(
+        &self,
+        a: &SaturatedCoil,
+        b: &SaturatedCoil,
+        lowest_m: f64,
+    ) -> Result<f64, OnEdge> {
+        let radius_m = self.shape.radius_m;
+        let mut worst = (a.added_inductance_h - b.added_inductance_h).abs()
+            / (self.air_inductance_h + a.added_inductance_h).abs();
+        for height in [0.0, 1.0, 4.0] {
+            let z_m = lowest_m + height * radius_m;
+            let (mut size, mut differs) = (0.0_f64, 0.0_f64);
+            for across in [0.0, 0.8, 1.7] {
+                let r_m = across * radius_m;
+                let (f, g) = (a.layer.field(r_m, z_m), b.layer.field(r_m, z_m));
+                size = size.max((self.winding.field(r_m, z_m)? + f).gradient_norm());
+                differs = differs
+                    .max((f.dbz_dz - g.dbz_dz).abs())
+                    .max((f.dbr_dz - g.dbr_dz).abs())
+                    .max((f.br_over_r - g.br_over_r).abs());
+            }
+            worst = worst.max(differs / size);
+        }
+        Ok(worst)
+    }
+}
