@@ -15,8 +15,7 @@ pub struct StageAccuracy {
     pub method: String,
 }
 
-/// How sure it is that no coil within the limits is better: one word from the optimiser to every
-/// output.
+/// How sure it is that no coil is better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum CertificateKind {
@@ -24,10 +23,9 @@ pub enum CertificateKind {
     Local,
     /// The best of several.
     Multistart,
-    /// Every number of layers and turns a layer was examined, with the best bore found for each;
-    /// nothing is proven about other bores.
+    /// The best of every number of layers and turns, each with the best bore found.
     Exhaustive,
-    /// Proven over all coils within the limits.
+    /// Proven.
     Global,
 }
 

@@ -72,7 +72,8 @@ pub(super) fn optimise(
     let mut examined = 0;
     let mut complete = true;
     let mut list = Vec::new();
-    for lost in LOST {
+    let mut lost = 0.0;
+    for more in MORE_LOST {
         progress.begin("wind", open.len() as u64);
         let screening = Screening {
             screen,
@@ -86,8 +87,11 @@ pub(super) fn optimise(
         complete = portion.complete;
         list = decided(&portion.found, sharp, doubt, progress)?;
         let best_ln = list.first().map(|coil: &WoundCoil| coil.force_n.ln());
-        if best_ln.is_some_and(|best_ln| best_ln >= portion.best_ln - lost - doubt) {
-            break;
+        // Where the best is weaker than the coarse model promised, what the promise hid.
+        match best_ln.map(|best_ln| portion.best_ln - best_ln) {
+            Some(short) if short <= lost + doubt => break,
+            Some(short) => lost = short,
+            None => lost = more,
         }
     }
     let Some(best) = list.first().cloned() else {
@@ -114,9 +118,9 @@ pub(super) fn optimise(
     })
 }
 
-/// How much weaker than the best of the coarse model's coils, in ln F, the sharp one's best may
-/// be, in turn: the coarse one's best may turn out to break a limit.
-const LOST: [f64; 4] = [0.0, 0.05, 0.4, f64::INFINITY];
+/// How much weaker than the best of the coarse model's coils, in ln F, are looked at in turn
+/// where none of the stronger ones keeps the limits on the sharp model.
+const MORE_LOST: [f64; 4] = [0.05, 0.4, f64::INFINITY, f64::INFINITY];
 
 /// What goes through all layers and turns on the coarse model.
 struct Screening<'a> {
