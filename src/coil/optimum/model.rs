@@ -184,7 +184,7 @@ pub trait CoilModel: Sync {
     /// Rough length on which the response varies, m: starting points spread around it.
     fn length_scale_m(&self) -> f64;
 
-    /// The same coil computed roughly, to some hundredths, where that is much cheaper: tells
+    /// The same coil computed roughly, to some hundredths, where that is much cheaper: shows
     /// which starting points are worth a search.
     fn draft(&self) -> Option<Box<dyn CoilModel>> {
         None
