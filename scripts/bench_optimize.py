@@ -11,6 +11,11 @@ included (`fluxform_proven`, air coils only). Both are CPU time. An error is wha
 lacks of the reference's force, which is the best of NLopt's own; with a core NLopt reads a table
 made beforehand, while fluxform solves for the steel and finds valley and alternatives besides.
 A solver fails where that is more than the objective's tolerance.
+
+    python3 scripts/bench_optimize.py --random 48 [--before OLD_BINARY]
+
+runs `optimize` and `optimize --wound` on random cored designs with a limit on the flux density, of
+a fixed seed, and prints CPU times and forces, beside those of another build where one is named.
 """
 
 import argparse
@@ -18,9 +23,12 @@ import csv
 import json
 import math
 import pathlib
+import random
 import resource
+import statistics
 import subprocess
 import sys
+import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "tests" / "oracles" / "nlopt"
@@ -132,13 +140,82 @@ def draw(path, table, reference, solvers):
     figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None, dpi=110)
 
 
+def random_design(index):
+    """A cored design with a limit on the flux density and a random subset of the others."""
+    source = random.Random(f"cored {index}")
+
+    def log(lo, hi):
+        return lo * (hi / lo) ** source.random()
+
+    def number(x):
+        return repr(float(f"{x:.6g}"))
+
+    optional = {
+        "resistance_max_ohm": (1.0, 15.0),
+        "settling_max_ms": (8.0, 120.0),
+        "inner_diameter_min_mm": (2.0, 8.0),
+        "power_max_w": (2.0, 40.0),
+        "mass_max_kg": (0.05, 0.8),
+        "wire_length_max_m": (15.0, 150.0),
+    }
+    limits = {"core_field_max_t": log(0.1, 1.6), "outer_diameter_max_mm": log(18.0, 50.0), "length_max_mm": log(15.0, 90.0)}
+    limits |= {key: log(*ends) for key, ends in optional.items() if source.random() < 0.4}
+    supply = {"current_max_a": log(0.7, 4.0)}
+    if source.random() < 0.3:
+        supply["voltage_v"] = log(4.0, 40.0)
+    core = {
+        "clearance_mm": source.choice([0.0, source.uniform(0.1, 1.0)]),
+        "above_mm": source.choice([0.0, 0.0, source.uniform(-4.0, 4.0)]),
+        "below_mm": source.choice([0.0, 5.0, 10.0]),
+        "relative_permeability": log(20.0, 4000.0),
+    }
+    magnet = {"diameter_mm": 8.0, "length_mm": 8.0, "magnetization_a_per_m": 1e6}
+    sections = {"wire": {"diameter_mm": log(0.25, 1.1)}, "core": core, "magnet": magnet, "supply": supply}
+    sections |= {"target": {"height_mm": log(15.0, 45.0)}, "limits": limits}
+    lines = [f'name = "random_{index}"']
+    for section, keys in sections.items():
+        lines += [f"[{section}]", *(f"{key} = {number(value)}" for key, value in keys.items())]
+    return "\n".join(lines) + "\n"
+
+
+def on_random_designs(binary, before, count, limit_s):
+    """CPU times and forces of `count` random designs, a line each, and the worst and median."""
+    seconds = []
+    with tempfile.TemporaryDirectory() as folder:
+        for index in range(count):
+            design = pathlib.Path(folder) / f"random_{index}.toml"
+            design.write_text(random_design(index))
+            for options in ([], ["--wound"]):
+                row = [design.stem, *options]
+                for program in filter(None, (binary, before)):
+                    command = [program, "optimize", design, *options, "--threads", "1", "--format", "json"]
+                    limited = ["sh", "-c", f'ulimit -t {limit_s}; exec "$@"', "sh", *map(str, command)]
+                    start = resource.getrusage(resource.RUSAGE_CHILDREN)
+                    out = subprocess.run(limited, capture_output=True, text=True).stdout
+                    end = resource.getrusage(resource.RUSAGE_CHILDREN)
+                    spent = end.ru_utime + end.ru_stime - start.ru_utime - start.ru_stime
+                    result = json.loads(out) if out.strip() else {"status": "not finished"}
+                    force = (result.get("objective") or {}).get("force_n", result["status"])
+                    row += [f"{spent:.2f} s", force, (result.get("certificate") or {}).get("kind")]
+                    if program is binary:
+                        seconds.append(spent)
+                print(*row, sep="\t", flush=True)
+    print(f"worst {max(seconds):.2f} s, median {statistics.median(seconds):.2f} s of {len(seconds)} runs")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--binary", type=pathlib.Path, default=ROOT / "target" / "release" / "fluxform")
     parser.add_argument("--table", type=pathlib.Path, default=TABLE)
     parser.add_argument("--plot", type=pathlib.Path, help="SVG or PNG; default beside the table")
     parser.add_argument("--no-run", action="store_true", help="draw and print what the table holds")
+    parser.add_argument("--random", type=int, help="this many random cored designs instead")
+    parser.add_argument("--before", type=pathlib.Path, help="another build to compare with on random designs")
+    parser.add_argument("--limit", type=int, default=120, help="CPU seconds allowed for one random design")
     arguments = parser.parse_args()
+    if arguments.random:
+        on_random_designs(arguments.binary, arguments.before, arguments.random, arguments.limit)
+        return
     problems = json.loads((FOLDER / "problems.json").read_text())["problems"]
     reference = json.loads((FOLDER / "reference.json").read_text())["problems"]
     with open(arguments.table, newline="") as file:

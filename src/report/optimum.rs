@@ -24,8 +24,12 @@ pub struct OptimumFacts<'a> {
     pub coil: Vec<(&'a str, f64, Option<f64>)>,
     /// The limits.
     pub limits: Vec<ActiveLimit<'a>>,
-    /// Kind of certificate, upper bound of the force, N, and its gap.
-    pub certificate: (&'a str, Option<f64>, Option<f64>),
+    /// Kind of certificate.
+    pub certificate: &'a str,
+    /// What the coil is the best of, and what remains open without a bound.
+    pub scope: [&'a str; 2],
+    /// Upper bound of the force, N, and its gap.
+    pub bound: (Option<f64>, Option<f64>),
     /// Local searches, evaluations of a coil, boxes of coils bounded.
     pub searched: [usize; 3],
     /// Other coils worth a look.
@@ -227,16 +231,16 @@ fn limits(facts: &OptimumFacts) -> Section {
 
 fn sure(facts: &OptimumFacts) -> Section {
     let mut body = Html::default();
-    let (kind, bound, gap) = facts.certificate;
+    let (kind, [scope, open]) = (facts.certificate, facts.scope);
     let [starts, evaluations, cells] = facts.searched;
-    let said = match (bound, gap) {
+    let said = match facts.bound {
         (Some(bound_n), Some(gap)) => format!(
             "Certificate: {kind}. No coil within the limits gives more than {}, which is {} more \
              than this one.",
             force(bound_n),
             percent(gap)
         ),
-        _ => format!("Certificate: {kind}. Nothing is proven beyond the searches."),
+        (None, _) | (_, None) => format!("Certificate: {kind} ({scope}; {open})."),
     };
     body.raw("<ul class=\"said\">").element("li", &said);
     let text = format!(

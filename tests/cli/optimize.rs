@@ -366,3 +366,38 @@ fn neighbours_cores_change_the_best_force() {
     let settling = &found["limits"]["settling_s"];
     assert!(number(settling, "value") <= number(settling, "limit") * (1.0 + 1e-3));
 }
+
+/// Whole turns around a core were `exhaustive` in JSON, nothing proven on screen, `multistart` in
+/// a sweep.
+#[test]
+fn regression_one_word_for_a_certificate_everywhere() {
+    let place = Place::new();
+    let design = "name = \"small\"\n[wire]\ndiameter_mm = 1.3\n[core]\n\
+                  relative_permeability = 70.0\n[magnet]\ndiameter_mm = 7.0\nlength_mm = 7.0\n\
+                  magnetization_a_per_m = 1e6\n[supply]\ncurrent_max_a = 1.7\n[target]\n\
+                  height_mm = 23.0\n[limits]\nouter_diameter_max_mm = 17.0\n\
+                  length_max_mm = 9.0\ncore_field_max_t = 0.3\n";
+    place.write("small.toml", design);
+    let args = ["optimize", "small.toml", "--wound"];
+    let json = place
+        .run(&[&args[..], &["--format", "json"]].concat())
+        .ends(0);
+    assert!(
+        json.out.contains("\"kind\": \"exhaustive\""),
+        "{}",
+        json.out
+    );
+    let screen = place.run(&args).ends(0).out;
+    assert!(screen.contains("exhaustive"), "{screen}");
+    assert!(!screen.contains("nothing is proven"), "{screen}");
+    let set = "limits.core_field_max_t=0.3";
+    let plan = ["sweep", "plan", "small.toml", "--set", set, "--force"];
+    place
+        .run(&[&plan[..], &["--optimize", "--wound"]].concat())
+        .ends(0);
+    let run = ["sweep", "run", "plan.json", "--out", "points", "--force"];
+    place.run(&run).ends(0);
+    let merge = ["sweep", "merge", "plan.json", "points", "--out", "-"];
+    let table = place.run(&merge).ends(0).out;
+    assert!(table.contains(",exhaustive,"), "{table}");
+}

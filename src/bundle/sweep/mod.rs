@@ -7,7 +7,7 @@ mod summary;
 mod table;
 
 pub use plan::{Axis, Mode, POINTS_MAX, PlanFile, Value};
-pub use point::{CertificateWord, OptimumRow, PointFile, Row, Status};
+pub use point::{OptimumRow, PointFile, Row, Status};
 pub use store::{Found, PointStore};
 pub use summary::MergeSummary;
 pub use table::{OPTIMUM_COLUMNS, ROW_COLUMNS, TableWriter, value_text};

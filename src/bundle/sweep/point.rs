@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
+use crate::accuracy::CertificateKind;
 use crate::bundle::artefact::{FLUXFORM_VERSION, SCHEMA_VERSION, sha256_hex};
 use crate::bundle::json::{JsonError, to_json};
 
@@ -92,33 +93,9 @@ pub struct OptimumRow {
     /// Whole turns a layer; null where they need not be.
     pub turns_per_layer: Option<u64>,
     /// How sure it is that no coil is better.
-    pub certificate: CertificateWord,
+    pub certificate: CertificateKind,
     /// No coil within the limits gives more force; null where nothing is proven.
     pub upper_bound_n: Option<f64>,
-}
-
-/// How sure it is that no coil is better.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum CertificateWord {
-    /// The best near one starting point.
-    Local,
-    /// The best of several.
-    Multistart,
-    /// Proven.
-    Global,
-}
-
-impl CertificateWord {
-    /// As files tell it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Local => "local",
-            Self::Multistart => "multistart",
-            Self::Global => "global",
-        }
-    }
 }
 
 /// A point's file.

@@ -13,7 +13,7 @@ use crate::numerics::gauss;
 use crate::numerics::lagrange_basis::Basis;
 
 /// Functions tabulated together.
-pub const COUNT: usize = 2;
+pub const COUNT: usize = 3;
 /// Their values at one place.
 pub type Values = [f64; COUNT];
 /// Values along the third variable's nodes; `None` where they are not defined.
@@ -45,6 +45,7 @@ type Cell = Option<Vec<Values>>;
 /// The table.
 pub struct Cells {
     lattice: Lattice,
+    origin: OnceLock<[f64; 3]>,
     axes: [Axis; 3],
     cells: Mutex<BTreeMap<[i64; 3], Arc<OnceLock<Cell>>>>,
 }
@@ -88,8 +89,21 @@ impl Cells {
         Self {
             axes: lattice.order.map(Axis::new),
             lattice,
+            origin: OnceLock::new(),
             cells: Mutex::new(BTreeMap::new()),
         }
+    }
+
+    /// Moves the cells so that one of them has `at` in its middle. Without effect once a point
+    /// has been asked for. Not for use within a parallel loop.
+    pub fn focus(&self, at: [f64; 3]) {
+        let origin = std::array::from_fn(|i| at[i] - 0.5 * self.lattice.width[i]);
+        // Later points find the cells where the first one did.
+        let _ = self.origin.set(origin);
+    }
+
+    fn origin(&self) -> [f64; 3] {
+        *self.origin.get_or_init(|| self.lattice.origin)
     }
 
     /// How many cells have been asked for.
@@ -104,9 +118,8 @@ impl Cells {
     }
 
     fn key(&self, at: [f64; 3]) -> [i64; 3] {
-        std::array::from_fn(|i| {
-            ((at[i] - self.lattice.origin[i]) / self.lattice.width[i]).floor() as i64
-        })
+        let origin = self.origin();
+        std::array::from_fn(|i| ((at[i] - origin[i]) / self.lattice.width[i]).floor() as i64)
     }
 
     /// Fills the cell of `at` on all threads, `line` giving the values for two variables at
@@ -131,7 +144,7 @@ impl Cells {
     }
 
     fn nodes(&self, axis: usize, key: i64) -> Vec<f64> {
-        let (origin, width) = (self.lattice.origin[axis], self.lattice.width[axis]);
+        let (origin, width) = (self.origin()[axis], self.lattice.width[axis]);
         let place = |x: &f64| origin + width * (key as f64 + 0.5 * (1.0 + x));
         self.axes[axis].nodes.iter().map(place).collect()
     }
@@ -154,7 +167,8 @@ impl Cells {
         }
         let key = self.key(at);
         let slot = self.slot(key);
-        // One thread fills, alone: nothing in here waits for another.
+        // One thread fills, alone: `line` must not hand work to other threads, one of which may
+        // come to wait for this very cell.
         let cell = slot.get_or_init(|| {
             let thirds = self.nodes(2, key[2]);
             let pairs = self.pairs(key).into_iter();
@@ -164,9 +178,9 @@ impl Cells {
     }
 
     fn interpolate(&self, values: &[Values], key: [i64; 3], at: [f64; 3]) -> [Interpolated; COUNT] {
-        let width = self.lattice.width;
+        let (origin, width) = (self.origin(), self.lattice.width);
         let [x, y, z]: [[Vec<f64>; 2]; 3] = std::array::from_fn(|i| {
-            let low = self.lattice.origin[i] + width[i] * key[i] as f64;
+            let low = origin[i] + width[i] * key[i] as f64;
             self.axes[i].weights(2.0 * (at[i] - low) / width[i] - 1.0)
         });
         let [nx, ny, nz] = self.lattice.order;
@@ -220,6 +234,7 @@ mod tests {
             [
                 (0.7 * x - y).sin() * (1.3 * z).exp(),
                 1.0 / (3.0 + x + y * z),
+                0.7 * x,
             ]
         };
         (x < 2.0).then(|| thirds.iter().map(value).collect())
@@ -237,7 +252,7 @@ mod tests {
     fn values_and_slopes_are_the_functions() {
         let cells = cells();
         for [x, y, z] in [[0.3, 0.7, 0.25], [1.1, -0.9, 0.81], [-0.5, 0.2, -0.1]] {
-            let [f, g] = cells.at([x, y, z], line).expect("defined");
+            let [f, g, h] = cells.at([x, y, z], line).expect("defined");
             let (s, c) = (0.7 * x - y).sin_cos();
             let e = (1.3 * z).exp();
             let wanted = [s * e, 0.7 * c * e, -c * e, 1.3 * s * e];
@@ -246,8 +261,25 @@ mod tests {
                 assert!((a - b).abs() < 2e-9, "{got:?} {wanted:?}");
             }
             assert!((g.value - 1.0 / (3.0 + x + y * z)).abs() < 1e-9);
+            assert!((h.value - 0.7 * x).abs() < 1e-12 && (h.slope[0] - 0.7).abs() < 1e-11);
         }
         assert_eq!(cells.count(), 3);
+    }
+
+    #[test]
+    fn a_focus_is_in_the_middle_of_its_cell_and_stays() {
+        let cells = cells();
+        let at = [0.45, -0.29, 0.8];
+        cells.focus(at);
+        let half = [0.35, 0.4, 0.3];
+        for side in [-0.99, 0.99] {
+            let beside = std::array::from_fn(|i| at[i] + side * half[i]);
+            assert!(cells.at(beside, line).is_some());
+        }
+        assert_eq!(cells.count(), 1);
+        cells.focus([7.0, -1.3, 0.1]);
+        assert!(cells.at(at, line).is_some());
+        assert_eq!(cells.count(), 1);
     }
 
     #[test]

@@ -3,15 +3,16 @@
 //! The core follows the winding: its radius is the bore's less the clearance, its ends stand
 //! `below` and `above` the winding's. What the steel adds, relative to the air coil's exact
 //! values, is smooth in (ln core radius, ln length, ln a2/a1) and does not depend on the wire: it
-//! is tabulated where the search comes ([`super::cells`]), coarsely for the search, then finely
-//! about the best coil found ([`CoilModel::sharpened`]). Slopes are those of the table's
+//! is tabulated where the search comes ([`super::cells`]): roughly for the many starting points
+//! ([`CoilModel::draft`]), coarsely for the search, then finely about the best coil found
+//! ([`CoilModel::sharpened`]). Slopes are those of the table's
 //! polynomials, consistent with its values. All depths around one core share one factorisation.
 
 use std::sync::Arc;
 
 use super::air::{AirCoil, NoAirCoil};
 use super::axis_gradient::axis_gradient;
-use super::cells::{Cells, Interpolated, Lattice, Line};
+use super::cells::{Cells, Interpolated, Lattice, Line, Values};
 use super::model::{CoilModel, NoResponse, Response, Sloped, Window};
 use super::neighbours::Neighbours;
 use crate::coil::inductance::self_inductance_h;
@@ -20,7 +21,7 @@ use crate::field::magnet::MagnetRule;
 use crate::field::steel::CoreShape;
 use crate::field::steel::cored_coil::CoredCoil;
 use crate::field::steel::generatrix::Resolution;
-use crate::field::steel::inside::peak_depth_m;
+use crate::field::steel::inside::{peak_depth_m, peaks_of_family_t};
 use crate::field::winding::Winding;
 use crate::units::{MU_0_T_M_PER_A, STEEL_DENSITY_KG_PER_M3};
 use std::f64::consts::PI;
@@ -71,14 +72,23 @@ const THINNEST: f64 = 0.004;
 /// Shorter cores than this share of their radius are not asked about.
 const FLATTEST: f64 = 1e-3;
 
-/// Relative accuracy of the search's solutions, and of those about the optimum.
+/// Relative accuracy of the draft's solutions, of the search's and of those about the optimum.
+const DRAFT: f64 = 3e-3;
 const COARSE: f64 = 3e-4;
 const FINE: f64 = 1e-6;
+const DRAFT_LATTICE: Lattice = Lattice {
+    origin: [0.0; 3],
+    width: [2.0, 2.4, 2.0],
+    order: [5, 5, 5],
+};
 const COARSE_LATTICE: Lattice = Lattice {
     origin: [0.0; 3],
     width: [1.0, 1.2, 1.0],
     order: [5, 5, 4],
 };
+/// Of the quadratures for a tabulated peak of |B|, and for one that is compared with.
+const PEAK_QUADRATURE: f64 = 1e-5;
+const PEAK_QUADRATURE_FINE: f64 = 1e-7;
 const FINE_WIDTH: [f64; 3] = [0.5, 0.6, 0.8];
 const FINE_ORDER: [usize; 3] = [6, 6, 7];
 /// Largest width of a cell along ln(a2/a1), relative to its middle.
@@ -92,14 +102,18 @@ pub struct CoredModel {
     dipoles: Vec<(f64, f64)>,
     rule: CoreRule,
     resolution: Resolution,
-    /// (added over air force, added inductance over mu_0 x core radius x turns^2).
+    /// (added over air force, added inductance over mu_0 x core radius x turns^2, and where it
+    /// is limited ln of peak |B| per ampere-turn over mu_0 / core radius).
     added: Arc<Cells>,
-    /// (ln of peak |B| per ampere-turn over mu_0 / core radius, nothing), where it is limited.
-    peaks: Option<Arc<Cells>>,
+    /// Whether the flux density in the core is limited.
+    with_peak: bool,
+    /// The last of the three, where `added` is so fine that it is tabulated for itself.
+    sharp_peaks: Option<Arc<Cells>>,
     /// Whether it has been sharpened.
     sharp: bool,
-    /// The search's table, kept beside the sharp one.
+    /// The search's table and the draft's, kept beside the sharp one.
     coarse: Arc<Cells>,
+    rough: Arc<Cells>,
     neighbours: Option<Neighbours>,
     factors: Factors,
     relative_error: f64,
@@ -112,7 +126,15 @@ struct Factors {
     neighbours: Option<[Power; 2]>,
     /// The table's error on the core's peak field, which has kinks.
     peak: f64,
+    /// The same of the search's table.
+    coarse_peak: f64,
 }
+
+const NO_FACTORS: Factors = Factors {
+    neighbours: None,
+    peak: 1.0,
+    coarse_peak: 1.0,
+};
 
 /// A product of powers of core radius, length and a2/a1: a factor with its slopes at one coil.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -180,12 +202,11 @@ impl CoredModel {
             resolution: Resolution::for_tolerance(COARSE),
             added: Arc::clone(&coarse),
             coarse,
+            rough: Arc::new(Cells::new(DRAFT_LATTICE)),
             neighbours: None,
-            factors: Factors {
-                neighbours: None,
-                peak: 1.0,
-            },
-            peaks: with_peak.then(|| Arc::new(Cells::new(COARSE_LATTICE))),
+            factors: NO_FACTORS,
+            with_peak,
+            sharp_peaks: None,
             sharp: false,
             relative_error: COARSE,
         })
@@ -255,24 +276,31 @@ impl CoredModel {
             .collect()
     }
 
+    /// What `added` holds.
     fn line(&self, ln_radius: f64, ln_length: f64, shares: &[f64]) -> Line {
         let (radius_m, length_m) = (ln_radius.exp(), ln_length.exp());
         let depths_m = self.depths_m(radius_m, shares);
         let solved = self.solve(radius_m, length_m, &depths_m, &self.resolution)?;
         let scale_h = MU_0_T_M_PER_A * radius_m;
-        let values = |(_, d): &(CoredCoil, Direct)| [d.force_ratio, d.added_inductance_h / scale_h];
-        Some(solved.iter().map(values).collect())
+        let peaks = if self.with_peak && !self.sharp {
+            ln_peaks(&solved)?
+        } else {
+            vec![0.0; solved.len()]
+        };
+        let values = |((_, d), peak): (&(CoredCoil, Direct), f64)| {
+            [d.force_ratio, d.added_inductance_h / scale_h, peak]
+        };
+        Some(solved.iter().zip(peaks).map(values).collect())
     }
 
+    /// What `sharp_peaks` holds.
     fn peak_line(&self, ln_radius: f64, ln_length: f64, shares: &[f64]) -> Line {
         let (radius_m, length_m) = (ln_radius.exp(), ln_length.exp());
         let depths_m = self.depths_m(radius_m, shares);
         let resolution = Resolution::for_tolerance(COARSE);
         let solved = self.solve(radius_m, length_m, &depths_m, &resolution)?;
-        solved
-            .iter()
-            .map(|(coil, _)| Some([(peak_t(coil)? * radius_m / MU_0_T_M_PER_A).ln(), 0.0]))
-            .collect()
+        let values = |ln: f64| -> Values { [0.0, 0.0, ln] };
+        Some(ln_peaks(&solved)?.into_iter().map(values).collect())
     }
 
     fn depths_m(&self, radius_m: f64, shares: &[f64]) -> Vec<f64> {
@@ -341,7 +369,7 @@ impl CoredModel {
             .pop()?
             .1;
         let at = self.coordinates(window).ok()?;
-        let [ratio, added] = self.added.at(at, |x, y, z| self.line(x, y, z))?;
+        let [ratio, added, _] = self.added.at(at, |x, y, z| self.line(x, y, z))?;
         let added_h = added.value * MU_0_T_M_PER_A * shape.radius_m;
         let force = (ratio.value - direct.force_ratio).abs() / (1.0 + direct.force_ratio).abs();
         let inductance = (added_h / direct.added_inductance_h - 1.0).abs();
@@ -350,12 +378,35 @@ impl CoredModel {
 }
 
 impl CoredModel {
+    /// The model of the search, with what was learnt when it was sharpened.
+    fn coarse_model(&self) -> Self {
+        Self {
+            sharp: false,
+            sharp_peaks: None,
+            resolution: Resolution::for_tolerance(COARSE),
+            added: Arc::clone(&self.coarse),
+            relative_error: COARSE,
+            air: self.air.clone().with_accuracy(&section_integrals::ROUGH),
+            factors: Factors {
+                peak: self.factors.coarse_peak,
+                ..self.factors
+            },
+            ..self.clone()
+        }
+    }
+
+    /// ln of the peak |B| per ampere-turn over mu_0 / core radius, as tabulated.
+    fn ln_peak(&self, at: [f64; 3]) -> Option<Interpolated> {
+        let [_, _, ln] = match &self.sharp_peaks {
+            Some(peaks) => peaks.at(at, |x, y, z| self.peak_line(x, y, z))?,
+            None => self.added.at(at, |x, y, z| self.line(x, y, z))?,
+        };
+        Some(ln)
+    }
+
     /// The factors that make the tables right at `window`.
     fn factors_at(&self, window: &Window) -> Option<Factors> {
-        let mut factors = Factors {
-            neighbours: None,
-            peak: 1.0,
-        };
+        let mut factors = NO_FACTORS;
         let at = self.coordinates(window).ok()?;
         if let Some(neighbours) = &self.neighbours {
             let value = self.among_factors(neighbours, at)?;
@@ -382,14 +433,17 @@ impl CoredModel {
                 exponents: exponents[f],
             }));
         }
-        if let Some(peaks) = &self.peaks {
+        if self.with_peak {
             let shape = self.rule.shape(window.inner_radius_m, window.length_m)?;
             let depths_m = [window.depth_m];
-            let solved = self.solve(shape.radius_m, window.length_m, &depths_m, &self.resolution);
-            let (coil, _) = solved?.pop()?;
-            let [ln, _] = peaks.at(at, |x, y, z| self.peak_line(x, y, z))?;
-            let per_ampere_turn = ln.value.exp() * MU_0_T_M_PER_A / shape.radius_m;
-            factors.peak = peak_t(&coil)? / per_ampere_turn;
+            let solved =
+                self.solve(shape.radius_m, window.length_m, &depths_m, &self.resolution)?;
+            let coils = [solved.into_iter().next()?.0];
+            let exact = ln_peaks_of(&coils, PEAK_QUADRATURE_FINE)?.pop()?;
+            let blunt = self.coarse_model();
+            let [_, _, coarse] = blunt.added.at(at, |x, y, z| blunt.line(x, y, z))?;
+            factors.coarse_peak = (exact - coarse.value).exp();
+            factors.peak = (exact - self.ln_peak(at)?.value).exp();
         }
         Some(factors)
     }
@@ -406,11 +460,21 @@ impl CoredModel {
     }
 }
 
-/// Largest |B| in the core per ampere, T/A.
-fn peak_t(coil: &CoredCoil) -> Option<f64> {
-    let depth_m = peak_depth_m(coil.core.outline().shape);
-    let peak_t = coil.core_field(1.0, depth_m).ok()?.peak_t;
-    (peak_t > 0.0 && peak_t.is_finite()).then_some(peak_t)
+/// ln of the largest |B| in the core per ampere over mu_0 / core radius, of windings of one turn
+/// around one core.
+fn ln_peaks(solved: &[(CoredCoil, Direct)]) -> Option<Vec<f64>> {
+    let coils: Vec<CoredCoil> = solved.iter().map(|(coil, _)| coil.clone()).collect();
+    ln_peaks_of(&coils, PEAK_QUADRATURE)
+}
+
+fn ln_peaks_of(coils: &[CoredCoil], quadrature: f64) -> Option<Vec<f64>> {
+    let shape = coils.first()?.core.outline().shape;
+    let peaks_t = peaks_of_family_t(coils, peak_depth_m(shape), quadrature).ok()?;
+    let ln = |peak_t: f64| {
+        let good = peak_t > 0.0 && peak_t.is_finite();
+        good.then(|| (peak_t * shape.radius_m / MU_0_T_M_PER_A).ln())
+    };
+    peaks_t.into_iter().map(ln).collect()
 }
 
 fn product(a: Sloped, b: Sloped) -> Sloped {
@@ -433,7 +497,7 @@ impl CoilModel for CoredModel {
             .air
             .response(window, turns_per_m2, current_a, with_inductance)?;
         let unsolved = || NoResponse("the steel's equations have no finite solution".to_owned());
-        let [ratio, added] = self
+        let [ratio, added, peak] = self
             .added
             .at(at, |x, y, z| self.line(x, y, z))
             .ok_or_else(unsolved)?;
@@ -473,10 +537,11 @@ impl CoilModel for CoredModel {
             value: section * radius_m * length_m,
             slope: [2.0 * section * length_m, 0.0, section * radius_m, 0.0],
         };
-        if let Some(peaks) = &self.peaks {
-            let [ln, _] = peaks
-                .at(at, |x, y, z| self.peak_line(x, y, z))
-                .ok_or_else(unsolved)?;
+        if self.with_peak {
+            let ln = match &self.sharp_peaks {
+                Some(_) => self.ln_peak(at).ok_or_else(unsolved)?,
+                None => peak,
+            };
             let ln = self.chained(window, &ln);
             let per_turn = self.factors.peak * ln.value.exp() * MU_0_T_M_PER_A / radius_m;
             let peak_t = per_turn * turns_per_m2 * area_m2 * current_a;
@@ -501,9 +566,15 @@ impl CoilModel for CoredModel {
         self.air.length_scale_m()
     }
 
+    fn focus(&self, window: &Window) {
+        if let Ok(at) = self.coordinates(window) {
+            self.added.focus(at);
+        }
+    }
+
     fn sharpened(&self, window: &Window) -> Option<Box<dyn CoilModel>> {
         let at = self.coordinates(window).ok()?;
-        if self.sharp && self.peaks.is_none() && self.neighbours.is_none() {
+        if self.sharp && !self.with_peak && self.neighbours.is_none() {
             return None;
         }
         let mut sharp = self.clone();
@@ -529,10 +600,10 @@ impl CoilModel for CoredModel {
                 length_m: 1.04 * window.length_m,
             };
             sharp.relative_error = sharp.checked(&beside)?.max(FINE);
-            if sharp.peaks.is_some() {
+            if sharp.with_peak {
                 let peaks = Cells::new(lattice(COARSE_LATTICE.order));
                 peaks.fill(at, |x, y, z| sharp.peak_line(x, y, z));
-                sharp.peaks = Some(Arc::new(peaks));
+                sharp.sharp_peaks = Some(Arc::new(peaks));
             }
         }
         sharp.factors = sharp.factors_at(window)?;
@@ -541,15 +612,20 @@ impl CoilModel for CoredModel {
 
     fn blunted(&self) -> Option<Box<dyn CoilModel>> {
         self.sharp.then(|| {
-            let blunt: Box<dyn CoilModel> = Box::new(Self {
-                sharp: false,
-                resolution: Resolution::for_tolerance(COARSE),
-                added: Arc::clone(&self.coarse),
-                relative_error: COARSE,
-                air: self.air.clone().with_accuracy(&section_integrals::ROUGH),
+            let blunt: Box<dyn CoilModel> = Box::new(self.coarse_model());
+            blunt
+        })
+    }
+
+    fn draft(&self) -> Option<Box<dyn CoilModel>> {
+        (!self.sharp).then(|| {
+            let draft: Box<dyn CoilModel> = Box::new(Self {
+                resolution: Resolution::for_tolerance(DRAFT),
+                added: Arc::clone(&self.rough),
+                relative_error: DRAFT,
                 ..self.clone()
             });
-            blunt
+            draft
         })
     }
 }

@@ -4,8 +4,8 @@ use super::domain::Domain;
 use super::model::Window;
 use super::outcome::{Status, Violation};
 use super::problem::{LimitName, Problem, Regime};
-use super::search::{Settings, Solved};
-use super::sequential::{self, FEASIBLE, Local, Point, Smooth};
+use super::search::{self, Settings, Solved};
+use super::sequential::{FEASIBLE, Local, Point, Smooth};
 use super::starts;
 use crate::progress::{Interrupted, Progress};
 
@@ -65,11 +65,21 @@ pub(super) fn why_none(
             depth_m: domain.depth_min_m,
             length_m: domain.length_m[0],
         }));
-        for x in points {
-            progress.check()?;
-            let Some(local) = sequential::solve(&Violated(problem), x) else {
-                continue;
-            };
+        let ends = match problem.model.draft() {
+            Some(draft) => {
+                let draft = problem.with_model(&*draft);
+                let draft = Violated(&draft);
+                let ends = search::locals(&draft, points, 0, progress)?;
+                search::locals(
+                    &Violated(problem),
+                    search::promising(&draft, ends),
+                    0,
+                    progress,
+                )?
+            }
+            None => search::locals(&Violated(problem), points, 0, progress)?,
+        };
+        for local in ends {
             if local.violation(&Violated(problem)) > 1e3 * FEASIBLE {
                 continue;
             }

@@ -19,7 +19,7 @@ use super::model::{CoilModel, Window};
 use super::outcome::{Certificate, CertificateKind, Status};
 use super::problem::{Fixed, LimitName, Problem, Regime, Task};
 use super::scalar;
-use super::search::{self, Settings, Solved};
+use super::search::{self, DRAFT_DOUBT, Settings, Solved};
 use super::sequential::{self, FEASIBLE};
 use super::sharpen;
 use crate::progress::{Interrupted, Progress};
@@ -64,40 +64,36 @@ pub(super) fn optimise(
         .as_deref()
         .map(|blunt| sharpen::restated(blunt, task, sharp));
     let screen = screened.as_ref().unwrap_or(&coarse);
+    let draft_model = blunt_model.as_deref().unwrap_or(model).draft();
     let open: Vec<usize> = (0..screen.len())
         .filter(|&index| screen[index].contradiction.is_none())
         .collect();
-    progress.begin("wind", open.len() as u64);
     let doubt = DOUBT * model.relative_error();
-    let mut found: Vec<(usize, Leaf)> = Vec::new();
     let mut examined = 0;
     let mut complete = true;
-    let mut best_ln = f64::NEG_INFINITY;
-    for &index in &open {
-        let mut finite = Domain::of(&screen[index].problem);
-        if !(finite.outer_m[1].is_finite() && finite.length_m[1].is_finite()) {
-            complete = false;
-            match around_optimum(&screen[index]) {
-                Some(around) => finite = around,
-                None => continue,
-            }
+    let mut list = Vec::new();
+    let mut lost = 0.0;
+    for more in MORE_LOST {
+        progress.begin("wind", open.len() as u64);
+        let screening = Screening {
+            screen,
+            open: &open,
+            draft: draft_model.as_deref(),
+            doubt: doubt + lost,
+        };
+        let portion = screening.leaves(progress)?;
+        progress.end();
+        examined = portion.examined;
+        complete = portion.complete;
+        list = decided(&portion.found, sharp, doubt, progress)?;
+        let best_ln = list.first().map(|coil: &WoundCoil| coil.force_n.ln());
+        // Where the best is weaker than the coarse model promised, what the promise hid.
+        match best_ln.map(|best_ln| portion.best_ln - best_ln) {
+            Some(short) if short <= lost + doubt => break,
+            Some(short) => lost = short,
+            None => lost = more,
         }
-        let pairs = Pairs::of(&screen[index], finite);
-        if pairs.count() > PAIRS {
-            complete = false;
-        }
-        let leaves = pairs.leaves(best_ln + (-SHARE).ln_1p() - doubt, &screen[index], progress)?;
-        examined += leaves.1;
-        for leaf in leaves.0 {
-            best_ln = best_ln.max(leaf.ln_force);
-            found.push((index, leaf));
-        }
-        progress.advance(1);
     }
-    progress.end();
-    found.retain(|(_, leaf)| leaf.ln_force >= best_ln + (-SHARE).ln_1p() - doubt);
-    found.sort_by(|a, b| b.1.ln_force.total_cmp(&a.1.ln_force));
-    let list = decided(&found, sharp, progress)?;
     let Some(best) = list.first().cloned() else {
         let open: Vec<&Solved<'_>> = open.iter().map(|&index| &screen[index]).collect();
         return Ok(WoundOutcome::none(rounded_status(&open), sharp));
@@ -112,7 +108,7 @@ pub(super) fn optimise(
             kind: if complete {
                 CertificateKind::Exhaustive
             } else {
-                CertificateKind::Multistart
+                CertificateKind::of_searches(search::starts_of(sharp))
             },
             upper_bound_n: None,
             gap: None,
@@ -122,38 +118,119 @@ pub(super) fn optimise(
     })
 }
 
+/// How much weaker than the best of the coarse model's coils, in ln F, are looked at in turn
+/// where none of the stronger ones keeps the limits on the sharp model.
+const MORE_LOST: [f64; 4] = [0.05, 0.4, f64::INFINITY, f64::INFINITY];
+
+/// What goes through all layers and turns on the coarse model.
+struct Screening<'a> {
+    screen: &'a [Solved<'a>],
+    /// The problems that have coils.
+    open: &'a [usize],
+    draft: Option<&'a dyn CoilModel>,
+    /// How far below the best, in ln F and beyond [`SHARE`], a coil is still looked at.
+    doubt: f64,
+}
+
+/// What it found.
+struct Portion {
+    /// Problems and their coils, the strongest first.
+    found: Vec<(usize, Leaf)>,
+    best_ln: f64,
+    examined: usize,
+    complete: bool,
+}
+
+impl Screening<'_> {
+    fn leaves(&self, progress: &dyn Progress) -> Result<Portion, Interrupted> {
+        let mut portion = Portion {
+            found: Vec::new(),
+            best_ln: f64::NEG_INFINITY,
+            examined: 0,
+            complete: true,
+        };
+        let within = |best_ln: f64| best_ln + (-SHARE).ln_1p() - self.doubt;
+        for &index in self.open {
+            let solved = &self.screen[index];
+            let mut finite = Domain::of(&solved.problem);
+            if !(finite.outer_m[1].is_finite() && finite.length_m[1].is_finite()) {
+                portion.complete = false;
+                match around_optimum(solved) {
+                    Some(around) => finite = around,
+                    None => continue,
+                }
+            }
+            let pairs = Pairs::of(solved, finite).with_draft(self.draft);
+            if pairs.count() > PAIRS {
+                portion.complete = false;
+            }
+            let enough_ln = within(portion.best_ln);
+            let (leaves, examined) = pairs.leaves(enough_ln, self.doubt, solved, progress)?;
+            portion.examined += examined;
+            for leaf in leaves {
+                portion.best_ln = portion.best_ln.max(leaf.ln_force);
+                portion.found.push((index, leaf));
+            }
+            progress.advance(1);
+        }
+        let enough_ln = within(portion.best_ln);
+        portion.found.retain(|(_, leaf)| leaf.ln_force >= enough_ln);
+        portion
+            .found
+            .sort_by(|a, b| b.1.ln_force.total_cmp(&a.1.ln_force));
+        Ok(portion)
+    }
+}
+
 /// Most coils that are decided on the sharp model.
 const DECIDED: usize = 2000;
 
+/// Coils that are decided at a time; fixed, so that results do not depend on the threads.
+const AT_A_TIME: usize = 16;
+
 /// The strongest of coarse leaves, sorted by force, with their best bores on the sharp model;
-/// strongest first.
+/// strongest first. Ends where what is left cannot come within [`SHARE`] of the best.
 fn decided(
     found: &[(usize, Leaf)],
     sharp: &[Solved<'_>],
+    doubt: f64,
     progress: &dyn Progress,
 ) -> Result<Vec<WoundCoil>, Interrupted> {
     let chosen = &found[..found.len().min(DECIDED)];
-    let coils: Vec<Result<Option<WoundCoil>, Interrupted>> = chosen
-        .par_iter()
-        .map(|(index, leaf)| {
-            progress.check()?;
-            let solved = &sharp[*index];
-            let problem = &solved.problem;
-            let pairs = Pairs::of(solved, Domain::of(problem));
-            let [lo, hi] = pairs.bores(leaf.layers, leaf.turns).unwrap_or([0.0, 0.0]);
-            let outer_m = leaf.window.outer_radius_m();
-            let at = leaf.window.inner_radius_m;
-            let near = [lo.max(at - NEAR * outer_m), hi.min(at + NEAR * outer_m)];
-            let sharp = pairs.best_bore(leaf.layers, leaf.turns, near, f64::NEG_INFINITY);
-            Ok(sharp.and_then(|leaf| describe(problem, &leaf)))
-        })
-        .collect();
-    let mut list = Vec::new();
-    for coil in coils {
-        list.extend(coil?);
+    let mut list: Vec<WoundCoil> = Vec::new();
+    let mut best_ln = f64::NEG_INFINITY;
+    for some in chosen.chunks(AT_A_TIME) {
+        if some[0].1.ln_force < best_ln + (-SHARE).ln_1p() - doubt {
+            break;
+        }
+        let coils: Vec<Result<Option<WoundCoil>, Interrupted>> = some
+            .par_iter()
+            .map(|(index, leaf)| {
+                progress.check()?;
+                Ok(decide(&sharp[*index], leaf))
+            })
+            .collect();
+        for coil in coils {
+            list.extend(coil?);
+        }
+        best_ln = list
+            .iter()
+            .fold(best_ln, |most, coil| most.max(coil.force_n.ln()));
     }
     list.sort_by(|a: &WoundCoil, b| b.force_n.total_cmp(&a.force_n));
     Ok(list)
+}
+
+/// A coarse leaf with its best bore on the sharp model.
+fn decide(solved: &Solved<'_>, leaf: &Leaf) -> Option<WoundCoil> {
+    let problem = &solved.problem;
+    let pairs = Pairs::of(solved, Domain::of(problem));
+    let [lo, hi] = pairs.bores(leaf.layers, leaf.turns).unwrap_or([0.0, 0.0]);
+    let outer_m = leaf.window.outer_radius_m();
+    let at = leaf.window.inner_radius_m;
+    let near = [lo.max(at - NEAR * outer_m), hi.min(at + NEAR * outer_m)];
+    let sharp = pairs.best_bore(leaf.layers, leaf.turns, near, f64::NEG_INFINITY)?;
+    describe(problem, &sharp)
 }
 
 /// The coils of one wire and regime by layers and turns a layer.
@@ -161,6 +238,8 @@ struct Pairs<'a> {
     problem: &'a Problem<'a>,
     /// The problem without limits that cost an inductance.
     screen: Option<Problem<'a>>,
+    /// The same on a rough model that costs next to nothing, where there is one.
+    draft: Option<Problem<'a>>,
     domain: Domain,
     /// Least bore's radius that is looked at over the depth.
     narrow: f64,
@@ -177,8 +256,24 @@ impl<'a> Pairs<'a> {
             narrow,
             problem,
             screen: problem.without_settling(),
+            draft: None,
             domain,
         }
+    }
+
+    /// Looks for what is worth more on `model` first.
+    fn with_draft(self, model: Option<&'a dyn CoilModel>) -> Self {
+        let problem = self.screen.as_ref().unwrap_or(self.problem);
+        let draft = model.map(|model| problem.with_model(model));
+        Self { draft, ..self }
+    }
+
+    /// Whether the draft is sure that no bore reaches `enough_ln` at `window`.
+    fn is_hopeless(&self, window: Window, enough_ln: f64) -> bool {
+        let rated = |draft: &Problem<'_>| draft.rate(window);
+        let ln = |draft| rated(draft).map(|rated| rated.force_n.value.ln());
+        let draft_ln = self.draft.as_ref().and_then(ln);
+        draft_ln.is_some_and(|ln| ln < enough_ln - DRAFT_DOUBT)
     }
 
     fn most_layers(&self) -> u64 {
@@ -230,11 +325,12 @@ impl<'a> Pairs<'a> {
         (hi.is_finite() && lo <= hi + slack).then_some([lo.min(hi), hi])
     }
 
-    /// Every coil's best bore, where its force's logarithm is at least `enough_ln` or close to
-    /// the best of its portion; and how many pairs were looked at.
+    /// Every coil's best bore, where its force's logarithm is at least `enough_ln` or within
+    /// [`SHARE`] and `doubt` of the best of its portion; and how many pairs were looked at.
     fn leaves(
         &self,
         enough_ln: f64,
+        doubt: f64,
         solved: &Solved<'_>,
         progress: &dyn Progress,
     ) -> Result<(Vec<Leaf>, usize), Interrupted> {
@@ -271,7 +367,6 @@ impl<'a> Pairs<'a> {
             if let Some(bores) = self.bores(n, m)
                 && let Some(leaf) = self.best_bore(n, m, bores, f64::NEG_INFINITY)
             {
-                let doubt = DOUBT * self.problem.model.relative_error();
                 enough_ln = enough_ln.max(leaf.ln_force + (-SHARE).ln_1p() - doubt);
             }
         }
@@ -312,20 +407,25 @@ impl<'a> Pairs<'a> {
             },
             ..self.problem.task.clone()
         };
-        let row = self.problem.with_task(&task);
-        // Without the settling time the force can only be higher.
-        let row = row.without_settling().unwrap_or(row);
-        let best = [1.0, 0.5].into_iter().filter_map(|thinner| {
-            let window = Problem::window(local.x);
-            let start = Problem::coordinates(&Window {
-                length_m,
-                depth_m: window.depth_m * thinner,
-                ..window
+        let reaches = |problem: &Problem<'_>, enough_ln: f64| {
+            let row = problem.with_task(&task);
+            // Without the settling time the force can only be higher.
+            let row = row.without_settling().unwrap_or(row);
+            let best = [1.0, 0.5].into_iter().filter_map(|thinner| {
+                let window = Problem::window(local.x);
+                let start = Problem::coordinates(&Window {
+                    length_m,
+                    depth_m: window.depth_m * thinner,
+                    ..window
+                });
+                let local = sequential::solve(&row, start)?;
+                (local.violation(&row) <= FEASIBLE).then_some(-local.point.objective)
             });
-            let local = sequential::solve(&row, start)?;
-            (local.violation(&row) <= FEASIBLE).then_some(-local.point.objective)
-        });
-        best.reduce(f64::max).is_none_or(|best| best >= enough_ln)
+            best.reduce(f64::max).is_none_or(|best| best >= enough_ln)
+        };
+        let draft = self.draft.as_ref();
+        draft.is_none_or(|draft| reaches(draft, enough_ln - DRAFT_DOUBT))
+            && reaches(self.problem, enough_ln)
     }
 
     /// ln F at a bore, limits that need an inductance apart; -infinity where the model fails.
@@ -364,7 +464,20 @@ impl<'a> Pairs<'a> {
         let window = |a: f64| self.window(layers, turns, a);
         let ln_force = |a: f64| self.ln_force(window(a));
         let [lo, hi] = bores;
-        let (mut at, mut value) = summit(ln_force, lo, hi);
+        let (mut at, mut value) = match &self.draft {
+            Some(draft) => {
+                let rough = |a: f64| {
+                    let rated = draft.rate(window(a));
+                    rated.map_or(f64::NEG_INFINITY, |rated| rated.force_n.value.ln())
+                };
+                let (index, rough_ln) = highest(rough, lo, hi);
+                if rough_ln < enough_ln - DRAFT_DOUBT {
+                    return None;
+                }
+                climb(ln_force, lo, hi, index)
+            }
+            None => climb(ln_force, lo, hi, highest(ln_force, lo, hi).0),
+        };
         if value < enough_ln {
             return None;
         }
@@ -410,7 +523,7 @@ impl<'a> Pairs<'a> {
             let mut outside = at;
             for step in 1..=4 {
                 let bore = at + (end - at) * f64::from(step * step) / 16.0;
-                if bore == outside {
+                if bore == outside || self.is_hopeless(window(bore), enough_ln) {
                     break;
                 }
                 if over(bore) <= 0.0 {
@@ -446,30 +559,52 @@ fn whole(ratio: f64) -> u64 {
     (ratio + WHOLE).floor().clamp(1.0, 1e15) as u64
 }
 
-/// Where `f` is largest: the best of a scan, refined between its neighbours.
-fn summit(f: impl Fn(f64) -> f64, lo: f64, hi: f64) -> (f64, f64) {
-    if hi - lo <= f64::EPSILON * hi {
-        return (hi, f(hi));
-    }
-    let place = |k: usize| match k {
+/// Sample `index` of [`SCAN`] between `lo` and `hi`.
+fn sample(lo: f64, hi: f64, index: usize) -> f64 {
+    match index {
         0 => lo,
         k if k == SCAN - 1 => hi,
         k => lo + (hi - lo) * k as f64 / (SCAN - 1) as f64,
-    };
-    let values: Vec<f64> = (0..SCAN).map(|k| f(place(k))).collect();
-    let best = (0..SCAN)
-        .max_by(|&i, &j| values[i].total_cmp(&values[j]))
-        .unwrap_or(0);
-    let (low, high) = (
-        place(best.saturating_sub(1)),
-        place((best + 1).min(SCAN - 1)),
-    );
-    let refined = scalar::maximum(f, low, high);
-    if refined.1 > values[best] {
-        refined
-    } else {
-        (place(best), values[best])
     }
+}
+
+/// The sample at which `f` is largest, and its value there.
+fn highest(f: impl Fn(f64) -> f64, lo: f64, hi: f64) -> (usize, f64) {
+    let first = if is_one_bore(lo, hi) { SCAN - 1 } else { 0 };
+    (first..SCAN)
+        .map(|k| (k, f(sample(lo, hi, k))))
+        .reduce(|best, next| if next.1 > best.1 { next } else { best })
+        .unwrap_or((0, f64::NEG_INFINITY))
+}
+
+fn is_one_bore(lo: f64, hi: f64) -> bool {
+    hi - lo <= f64::EPSILON * hi
+}
+
+/// The maximum of `f` next to a sample: between its neighbours, and farther on where it lies at
+/// one of them.
+fn climb(f: impl Fn(f64) -> f64, lo: f64, hi: f64, index: usize) -> (f64, f64) {
+    if is_one_bore(lo, hi) {
+        return (hi, f(hi));
+    }
+    let mut index = index;
+    let mut best = (sample(lo, hi, index), f(sample(lo, hi, index)));
+    for _ in 0..SCAN {
+        let sides = [index.saturating_sub(1), (index + 1).min(SCAN - 1)];
+        let [low, high] = sides.map(|k| sample(lo, hi, k));
+        let refined = scalar::maximum(&f, low, high);
+        if refined.1 > best.1 {
+            best = refined;
+        }
+        let next = sides
+            .into_iter()
+            .find(|&k| k != 0 && k != SCAN - 1 && k != index && sample(lo, hi, k) == best.0);
+        match next {
+            Some(k) => index = k,
+            None => break,
+        }
+    }
+    best
 }
 
 #[cfg(test)]
@@ -600,6 +735,19 @@ mod tests {
             }
         }
         assert!(limited >= 2, "{limited}");
+    }
+
+    fn summit(f: impl Fn(f64) -> f64, lo: f64, hi: f64) -> (f64, f64) {
+        climb(&f, lo, hi, highest(&f, lo, hi).0)
+    }
+
+    /// A rough scan may point to a sample beside the right one.
+    #[test]
+    fn a_climb_goes_on_where_the_summit_lies_farther() {
+        for index in 0..SCAN {
+            let (x, _) = climb(|x| -(x - 0.71) * (x - 0.71), 0.3, 1.3, index);
+            assert!((x - 0.71).abs() < 1e-7, "{index}: {x}");
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::diagnosis;
 use super::domain::Domain;
 use super::model::{Strand, Window};
-use super::outcome::{BestCoil, Certificate, CertificateKind, LimitUse, Status, Violation};
+use super::outcome::{BestCoil, Certificate, LimitUse, Status, Violation};
 use super::problem::{LimitName, Problem};
 use super::search::{self, Solved};
 
@@ -75,16 +75,11 @@ impl WoundOutcome {
             status,
             best: None,
             alternatives: Vec::new(),
-            certificate: Certificate {
-                kind: CertificateKind::Multistart,
-                upper_bound_n: None,
-                gap: None,
-                cells: 0,
-            },
+            certificate: Certificate::of_searches(search::starts_of(problems), 0),
             continuous_n: search::best_of(problems).and_then(Solved::force_n),
             continuous: search::best_of(problems).and_then(search::describe),
             evaluations: problems.iter().map(|s| s.evaluations).sum(),
-            starts: problems.iter().map(|s| s.starts).sum(),
+            starts: search::starts_of(problems),
         }
     }
 }

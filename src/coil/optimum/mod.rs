@@ -20,8 +20,9 @@
 //! (`scalar`).
 //!
 //! A cored coil enters through the same [`model::CoilModel`]. `cored` tabulates what the steel
-//! adds to force and inductance, coarsely for the search and, about the optimum found, sharply
-//! (`sharpen`). Nothing bounds its force: the continuous optimum's certificate is of kind
+//! adds to force, inductance and flux density: roughly for the starting points (`search` goes on
+//! from the different ends that may be best), coarsely about those and, about the optimum found,
+//! sharply (`sharpen`). Nothing bounds its force: the continuous optimum's certificate is of kind
 //! `multistart`, that of wound coils, each of which is tried (`exhaustive`), of that name.
 
 pub mod air;

@@ -184,6 +184,16 @@ pub trait CoilModel: Sync {
     /// Rough length on which the response varies, m: starting points spread around it.
     fn length_scale_m(&self) -> f64;
 
+    /// The same coil computed roughly, to some hundredths, where that is much cheaper: shows
+    /// which starting points are worth a search.
+    fn draft(&self) -> Option<Box<dyn CoilModel>> {
+        None
+    }
+
+    /// Says about which window a model that tabulates will be asked most; the first time alone
+    /// counts. Not for use within a parallel loop.
+    fn focus(&self, _window: &Window) {}
+
     /// The same coil computed more exactly about `window`, where the model is a coarse one meant
     /// for the search. Not for use within a parallel loop.
     fn sharpened(&self, _window: &Window) -> Option<Box<dyn CoilModel>> {

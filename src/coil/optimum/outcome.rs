@@ -3,6 +3,7 @@
 use super::domain::Contradiction;
 use super::model::{Strand, Window};
 use super::problem::{LimitName, Regime};
+pub use crate::accuracy::CertificateKind;
 
 /// How an optimisation ended.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,31 +76,6 @@ pub struct BestCoil {
     pub limits: Vec<LimitUse>,
 }
 
-/// How sure it is that no coil is better.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum CertificateKind {
-    /// The best of several local searches.
-    Multistart,
-    /// Every number of layers and turns a layer was examined, with the best bore found for each;
-    /// nothing is proven about other bores.
-    Exhaustive,
-    /// Proven over all coils within the limits.
-    Global,
-}
-
-impl CertificateKind {
-    /// The word that artefacts use.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Multistart => "multistart",
-            Self::Exhaustive => "exhaustive",
-            Self::Global => "global",
-        }
-    }
-}
-
 /// What was proven.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Certificate {
@@ -111,6 +87,19 @@ pub struct Certificate {
     pub gap: Option<f64>,
     /// Boxes of coils that were bounded, or coils that were examined.
     pub cells: usize,
+}
+
+impl Certificate {
+    /// What `starts` local searches say; `cells` were bounded in vain.
+    #[must_use]
+    pub fn of_searches(starts: usize, cells: usize) -> Self {
+        Self {
+            kind: CertificateKind::of_searches(starts),
+            upper_bound_n: None,
+            gap: None,
+            cells,
+        }
+    }
 }
 
 /// What the best force of one wire is.

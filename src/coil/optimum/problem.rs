@@ -243,6 +243,20 @@ impl<'a> Problem<'a> {
         Problem::new(self.model, task, self.strand, self.regime)
     }
 
+    /// The same problem on another model.
+    #[must_use]
+    pub fn with_model<'b>(&self, model: &'b dyn CoilModel) -> Problem<'b>
+    where
+        'a: 'b,
+    {
+        Problem {
+            model,
+            task: self.task,
+            bounds: self.bounds.clone(),
+            ..*self
+        }
+    }
+
     /// The problem without its limit on the settling time; `None` where it has none.
     #[must_use]
     pub fn without_settling(&self) -> Option<Problem<'a>> {

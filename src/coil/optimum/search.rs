@@ -11,7 +11,7 @@ use super::outcome::{
     BestCoil, Certificate, CertificateKind, LimitUse, Outcome, Status, WireOutcome,
 };
 use super::problem::{LimitName, Problem, Task};
-use super::sequential::{self, FEASIBLE, Local};
+use super::sequential::{self, FEASIBLE, Local, Smooth};
 use super::sharpen;
 use super::starts;
 use super::valley;
@@ -106,7 +106,7 @@ pub fn optimise(
         certificate,
         wires: wires(&problems),
         evaluations: problems.iter().map(|s| s.evaluations).sum(),
-        starts: problems.iter().map(|s| s.starts).sum(),
+        starts: starts_of(&problems),
         valley_m,
     })
 }
@@ -191,6 +191,11 @@ pub(super) fn best_of<'b, 'a>(problems: &'b [Solved<'a>]) -> Option<&'b Solved<'
     winner
 }
 
+/// Local searches of all problems together.
+pub(super) fn starts_of(problems: &[Solved<'_>]) -> usize {
+    problems.iter().map(|solved| solved.starts).sum()
+}
+
 fn wires(problems: &[Solved<'_>]) -> Vec<WireOutcome> {
     let mut wires: Vec<WireOutcome> = Vec::new();
     for solved in problems {
@@ -215,15 +220,10 @@ fn without_coil(status: Status, problems: &[Solved<'_>]) -> Outcome {
     Outcome {
         status,
         best: None,
-        certificate: Certificate {
-            kind: CertificateKind::Multistart,
-            upper_bound_n: None,
-            gap: None,
-            cells: 0,
-        },
+        certificate: Certificate::of_searches(starts_of(problems), 0),
         wires: wires(problems),
         evaluations: problems.iter().map(|s| s.evaluations).sum(),
-        starts: problems.iter().map(|s| s.starts).sum(),
+        starts: starts_of(problems),
         valley_m: None,
     }
 }
@@ -267,22 +267,36 @@ fn search(
         .map(|index| starts::start(&domain, scale_m, settings.seed, index))
         .collect();
     points.extend(settings.initial.as_ref().map(Problem::coordinates));
-    let found: Vec<Result<Option<Local>, Interrupted>> = points
-        .into_par_iter()
-        .map(|x| {
-            progress.check()?;
-            let local = sequential::solve(problem, x);
-            progress.advance(1);
-            Ok(local)
-        })
-        .collect();
-    let mut best: Option<Local> = None;
     let mut evaluations = 0;
-    for local in found {
-        if let Some(local) = local? {
-            evaluations += local.evaluations;
-            keep_better(problem, &mut best, local);
+    let ends = match problem.model.draft() {
+        Some(draft) => {
+            let draft = problem.with_model(&*draft);
+            let found = locals(&draft, points, 1, progress)?;
+            evaluations += found.iter().map(|local| local.evaluations).sum::<usize>();
+            let starts = promising(&draft, found);
+            if let Some(best) = starts.first() {
+                problem.model.focus(&Problem::window(*best));
+            }
+            let mut ends = Vec::new();
+            // Smaller ones where the limits turn out to be tighter than on the draft.
+            for less in SMALLER {
+                let starts = starts.iter().map(|x| x.map(|x| x - less)).collect();
+                ends.extend(locals(problem, starts, 0, progress)?);
+                if ends
+                    .iter()
+                    .any(|local| local.violation(problem) <= FEASIBLE)
+                {
+                    break;
+                }
+            }
+            ends
         }
+        None => locals(problem, points, 1, progress)?,
+    };
+    let mut best: Option<Local> = None;
+    for local in ends {
+        evaluations += local.evaluations;
+        keep_better(problem, &mut best, local);
     }
     if let Some(local) = &best
         && problem.task.fixed.inner_diameter_m.is_none()
@@ -294,6 +308,61 @@ fn search(
         }
     }
     Ok((best, evaluations))
+}
+
+/// Where local searches from `points` end, each `items` of progress.
+pub(super) fn locals(
+    problem: &(impl Smooth + Sync),
+    points: Vec<[f64; 3]>,
+    items: u64,
+    progress: &dyn Progress,
+) -> Result<Vec<Local>, Interrupted> {
+    let found: Vec<Result<Option<Local>, Interrupted>> = points
+        .into_par_iter()
+        .map(|x| {
+            progress.check()?;
+            let local = sequential::solve(problem, x);
+            progress.advance(items);
+            Ok(local)
+        })
+        .collect();
+    let mut ends = Vec::new();
+    for local in found {
+        ends.extend(local?);
+    }
+    Ok(ends)
+}
+
+/// Most ends of a draft's searches that are searched from again.
+const PROMISING: usize = 6;
+/// How far below the draft's best objective the true best may be.
+pub(super) const DRAFT_DOUBT: f64 = 0.3;
+/// How much smaller, relatively, coils are tried in turn where a draft's do not lead to one that
+/// meets the limits.
+const SMALLER: [f64; 3] = [0.0, 0.04, 0.15];
+/// Ends closer than this in every coordinate are one.
+const SAME: f64 = 0.03;
+
+/// The different ends of searches on a draft that may be the best one: of those that meet the
+/// limits, or else those that violate them least.
+pub(super) fn promising(draft: &impl Smooth, mut ends: Vec<Local>) -> Vec<[f64; 3]> {
+    let met = |local: &Local| local.violation(draft) <= 1e3 * FEASIBLE;
+    if ends.iter().any(met) {
+        ends.retain(met);
+        ends.sort_by(|a, b| a.point.objective.total_cmp(&b.point.objective));
+        let best = ends[0].point.objective;
+        ends.retain(|local| local.point.objective <= best + DRAFT_DOUBT);
+    } else {
+        ends.sort_by(|a, b| a.violation(draft).total_cmp(&b.violation(draft)));
+    }
+    let mut kept: Vec<[f64; 3]> = Vec::new();
+    for local in ends {
+        let is_same = |x: &[f64; 3]| (0..3).all(|i| (x[i] - local.x[i]).abs() < SAME);
+        if kept.len() < PROMISING && !kept.iter().any(is_same) {
+            kept.push(local.x);
+        }
+    }
+    kept
 }
 
 /// The same winding with a bore; `None` where it has one. On the axis the force's slope vanishes:
@@ -326,12 +395,8 @@ fn certify(
     let mut cells = 0;
     let mut upper_ln = f64::NEG_INFINITY;
     let mut best_ln = best_of(problems).map_or(f64::NEG_INFINITY, best_ln_of);
-    let unproven = |cells| Certificate {
-        kind: CertificateKind::Multistart,
-        upper_bound_n: None,
-        gap: None,
-        cells,
-    };
+    let starts = starts_of(problems);
+    let unproven = |cells| Certificate::of_searches(starts, cells);
     if settings.cells == 0 {
         return Ok(unproven(0));
     }
@@ -372,7 +437,7 @@ fn certify(
     let kind = if gap <= GAP {
         CertificateKind::Global
     } else {
-        CertificateKind::Multistart
+        CertificateKind::of_searches(starts)
     };
     Ok(Certificate {
         kind,

@@ -141,7 +141,7 @@ pub fn optimise_wound(
             kind: if complete && gap <= GAP {
                 CertificateKind::Global
             } else {
-                CertificateKind::Multistart
+                CertificateKind::of_searches(search::starts_of(&problems))
             },
             upper_bound_n: complete.then(|| upper_ln.exp()),
             gap: complete.then_some(gap),

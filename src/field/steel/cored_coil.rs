@@ -14,9 +14,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::bore::bore_field;
+use super::bore::{bore_field, nested_bore_fields};
 use super::double_layer::operators;
-use super::generatrix::{Face, Generatrix, Resolution};
+use super::generatrix::{Face, Generatrix, Node, Resolution};
 use super::magnetized::MagnetizedCore;
 use super::response::{mean, system};
 use super::{CLOSEST, CoreShape};
@@ -41,16 +41,39 @@ impl Excitation {
     /// # Errors
     /// A node on the winding's edge.
     pub fn new(winding: &Winding, outline: &Generatrix, tolerance: f64) -> Result<Self, OnEdge> {
+        let field = |node: &Node| bore_field(winding, node.r_m, node.z_m, tolerance);
+        let fields: Vec<_> = outline.nodes.iter().map(field).collect::<Result<_, _>>()?;
+        Ok(Self::of_fields(outline, |node| fields[node]))
+    }
+
+    /// The same for windings that share inner radius and length, outer radii ascending.
+    ///
+    /// # Errors
+    /// A node on a winding's edge.
+    pub fn nested(
+        windings: &[Winding],
+        outline: &Generatrix,
+        tolerance: f64,
+    ) -> Result<Vec<Self>, OnEdge> {
+        let fields = |node: &Node| nested_bore_fields(windings, node.r_m, node.z_m, tolerance);
+        let fields: Vec<_> = outline.nodes.iter().map(fields).collect::<Result<_, _>>()?;
+        let of = |index: usize| Self::of_fields(outline, |node| fields[node][index]);
+        Ok((0..windings.len()).map(of).collect())
+    }
+
+    /// From (B_r, B_z) at the outline's nodes.
+    fn of_fields(outline: &Generatrix, field: impl Fn(usize) -> (f64, f64)) -> Self {
         let order = outline.order;
         let basis = Basis::new(gauss::rule(order));
         let integral = basis.integral();
         let mut potential = Vec::with_capacity(outline.nodes.len());
         let mut normal_field_t_per_a = Vec::with_capacity(outline.nodes.len());
         let mut start = 0.0;
-        for (panel, nodes) in outline.panels.iter().zip(outline.nodes.chunks(order)) {
+        for (index, panel) in outline.panels.iter().enumerate() {
             let mut tangential = Vec::with_capacity(order);
-            for node in nodes {
-                let (b_r, b_z) = bore_field(winding, node.r_m, node.z_m, tolerance)?;
+            for place in index * order..(index + 1) * order {
+                let node = &outline.nodes[place];
+                let (b_r, b_z) = field(place);
                 normal_field_t_per_a.push(node.normal[0] * b_r + node.normal[1] * b_z);
                 tangential.push(match panel.face {
                     Face::Bottom => b_r,
@@ -64,10 +87,10 @@ impl Excitation {
             potential.extend(integral[..order].iter().map(|row| start - rise(row)));
             start -= rise(&integral[order]);
         }
-        Ok(Self {
+        Self {
             potential: DVector::from_vec(potential),
             normal_field_t_per_a,
-        })
+        }
     }
 }
 
@@ -281,7 +304,8 @@ impl CoredCoil {
     /// Solves several windings around one core at one resolution: the outline's operator is set
     /// up and factorised once.
     ///
-    /// Domain: windings that differ in outer radius and turns only; at least one.
+    /// Domain: windings that differ in outer radius and turns only, outer radii ascending; at least
+    /// one.
     ///
     /// # Errors
     /// A node on a winding's edge.
@@ -295,10 +319,10 @@ impl CoredCoil {
             return Ok(Vec::new());
         };
         let outline = Generatrix::of_coil(first, shape, resolution);
-        let excitations: Vec<Excitation> = windings
-            .iter()
-            .map(|winding| Excitation::new(winding, &outline, resolution.quadrature))
-            .collect::<Result<_, _>>()?;
+        let excitations = match windings {
+            [winding] => vec![Excitation::new(winding, &outline, resolution.quadrature)?],
+            _ => Excitation::nested(windings, &outline, resolution.quadrature)?,
+        };
         let w = operators(&outline, 1, resolution.quadrature).remove(0);
         let potentials: Vec<DVector<f64>> =
             excitations.iter().map(|e| e.potential.clone()).collect();

@@ -17,11 +17,11 @@ use std::f64::consts::TAU;
 
 use super::CoreShape;
 use super::array::CoupledArray;
-use super::bore::bore_field;
+use super::bore::{bore_field, nested_bore_fields};
 use super::cored_coil::CoredCoil;
 use super::double_layer::operators;
 use super::generatrix::{Face, Generatrix, Panel, Resolution};
-use super::layer_gradient::{COMPONENTS, gradient_operators};
+use super::layer_gradient::{COMPONENTS, axial_gradient_operator, gradient_operators};
 use super::magnetized::MagnetizedCore;
 use crate::field::winding::{OnEdge, Winding};
 use crate::numerics::gauss;
@@ -166,6 +166,55 @@ impl CoredCoil {
             })
             .fold(0.0, f64::max)
     }
+}
+
+/// The largest |B| per ampere at least `depth_m` below the surface of the cores of `coils`, which
+/// differ in their windings' outer radii alone, ascending ([`CoredCoil::family`]), T/A:
+/// [`CoreField::peak_t`] without the rest, quadratures to `tolerance`. Works on the calling thread.
+///
+/// # Errors
+/// As [`CoredCoil::core_field`].
+pub fn peaks_of_family_t(
+    coils: &[CoredCoil],
+    depth_m: f64,
+    tolerance: f64,
+) -> Result<Vec<f64>, OnEdge> {
+    let Some(first) = coils.first() else {
+        return Ok(Vec::new());
+    };
+    let outline = first.core.outline();
+    let shape = outline.shape;
+    let curve = scan_curve(&first.winding, shape, allowed_depth_m(shape, depth_m));
+    let windings: Vec<Winding> = coils.iter().map(|coil| coil.winding).collect();
+    let targets = places(&curve);
+    let own: Vec<Vec<(f64, f64)>> = targets
+        .iter()
+        .map(|(r_m, z_m)| nested_bore_fields(&windings, *r_m, *z_m, tolerance))
+        .collect::<Result<_, _>>()?;
+    let operator = axial_gradient_operator(outline, &targets, tolerance);
+    let axial = |operator: &DMatrix<f64>, coil: &CoredCoil| {
+        let density = DMatrix::from_column_slice(outline.nodes.len(), 1, coil.core.density_a());
+        operator.tr_mul(&(density * MU_0_T_M_PER_A))
+    };
+    coils
+        .iter()
+        .enumerate()
+        .map(|(index, coil)| {
+            let mut values = axial(&operator, coil);
+            for (target, own) in own.iter().enumerate() {
+                values[(COMPONENTS * target, 0)] += own[index].0;
+                values[(COMPONENTS * target + 1, 0)] += own[index].1;
+            }
+            let peak = scan(&curve, &Field { values }, AXIS * shape.radius_m);
+            let (r_m, z_m) = peak.place_m;
+            let steel = axial(
+                &axial_gradient_operator(outline, &[(r_m, z_m)], tolerance),
+                coil,
+            );
+            let (b_r, b_z) = bore_field(&coil.winding, r_m, z_m, tolerance)?;
+            Ok(norm([steel[(0, 0)] + b_r, 0.0, steel[(1, 0)] + b_z]))
+        })
+        .collect()
 }
 
 impl CoupledArray {

@@ -65,6 +65,24 @@ pub fn gradient_operators(
         .collect()
 }
 
+/// grad D for mode 0 alone, as [`gradient_operators`] has it, on the calling thread: for callers
+/// that hold what another piece of parallel work may wait for.
+#[must_use]
+pub fn axial_gradient_operator(
+    outline: &Generatrix,
+    targets: &[(f64, f64)],
+    tolerance: f64,
+) -> DMatrix<f64> {
+    let nodes = outline.nodes.len();
+    let basis = Basis::new(gauss::rule(outline.order));
+    let mut operator = DMatrix::zeros(nodes, COMPONENTS * targets.len());
+    let columns = operator.as_mut_slice().chunks_mut(COMPONENTS * nodes);
+    for (target, columns) in targets.iter().zip(columns) {
+        one_target(outline, &basis, *target, tolerance, &mut [columns]);
+    }
+    operator
+}
+
 /// Adds one target's rows to `out`, [mode][component * nodes + node].
 fn one_target(
     outline: &Generatrix,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::accuracy::StageAccuracy;
+use crate::accuracy::{CertificateKind, StageAccuracy};
 use crate::bundle::artefact::Input;
 use crate::coil::limits::LimitCheck;
 
@@ -206,8 +206,8 @@ pub struct LimitFacts {
 /// How sure it is that no coil is better.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CertificateFacts {
-    /// `local`: one search; `multistart`: the best of several; `global`: proven.
-    pub kind: &'static str,
+    /// What was proven, or searched.
+    pub kind: CertificateKind,
     /// No coil within the limits gives more, N; null where nothing is proven.
     pub upper_bound_n: Option<f64>,
     /// The bound over the force, less one.

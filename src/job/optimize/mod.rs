@@ -137,10 +137,7 @@ pub fn optimize(
         limits: BTreeMap::new(),
         bounds: BTreeMap::new(),
         certificate: CertificateFacts {
-            kind: match search.certificate.kind.word() {
-                "multistart" if search.starts == 1 => "local",
-                word => word,
-            },
+            kind: search.certificate.kind,
             upper_bound_n: search.certificate.upper_bound_n,
             gap: search.certificate.gap,
             cells: search.certificate.cells,

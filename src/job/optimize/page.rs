@@ -31,11 +31,12 @@ pub fn html(result: &Optimization) -> String {
                 sensitivity_n_per_unit: limit.sensitivity_n_per_unit,
             })
             .collect(),
-        certificate: (
-            result.certificate.kind,
-            result.certificate.upper_bound_n,
-            result.certificate.gap,
-        ),
+        certificate: result.certificate.kind.name(),
+        scope: [
+            result.certificate.kind.scope(),
+            result.certificate.kind.open_question(),
+        ],
+        bound: (result.certificate.upper_bound_n, result.certificate.gap),
         searched: [result.starts, result.evaluations, result.certificate.cells],
         alternatives: result
             .alternatives

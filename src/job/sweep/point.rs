@@ -2,9 +2,7 @@
 
 use std::path::Path;
 
-use crate::bundle::sweep::{
-    CertificateWord, Mode, OptimumRow, PlanFile, PointFile, Row, Status, Value,
-};
+use crate::bundle::sweep::{Mode, OptimumRow, PlanFile, PointFile, Row, Status, Value};
 use crate::design::template::Template;
 use crate::design::{Design, InvalidDocument, Need, Severity};
 use crate::job::JobError;
@@ -125,11 +123,7 @@ fn optimum(result: &Optimization) -> Found {
             wire_diameter_m: coil.wire_diameter_m,
             layers: coil.layers,
             turns_per_layer: coil.turns_per_layer,
-            certificate: match result.certificate.kind {
-                "global" => CertificateWord::Global,
-                "local" => CertificateWord::Local,
-                _ => CertificateWord::Multistart,
-            },
+            certificate: result.certificate.kind,
             upper_bound_n: result.certificate.upper_bound_n,
         }),
     };

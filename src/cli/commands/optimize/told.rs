@@ -1,5 +1,6 @@
 //! The summary of `optimize`.
 
+use crate::accuracy::CertificateKind;
 use crate::cli::commands::describe;
 use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::quantity::{count, error, force, mass, mm, number, number_to, percent, si};
@@ -170,19 +171,22 @@ fn certificate(result: &Optimization, objective: &ObjectiveFacts) -> String {
     let bound = certificate
         .upper_bound_n
         .map(|bound| (bound, bound / objective.force_n.abs() - 1.0));
-    match (certificate.kind, bound) {
-        ("global", Some((bound, gap))) => format!(
-            "proven best: no coil within the limits gives more than {}, {} above",
-            above(bound),
-            error(gap)
-        ),
-        (kind, Some((bound, gap))) => format!(
-            "{}; no coil within the limits gives more than {}, {} above",
-            searched_for(kind),
-            above(bound),
-            percent(gap)
-        ),
-        (kind, None) => format!("{}; nothing is proven", searched_for(kind)),
+    let kind = certificate.kind;
+    match bound {
+        Some((bound, gap)) => {
+            let (separator, gap) = match kind {
+                CertificateKind::Global => (":", error(gap)),
+                CertificateKind::Local
+                | CertificateKind::Multistart
+                | CertificateKind::Exhaustive => (";", percent(gap)),
+            };
+            format!(
+                "{}{separator} no coil within the limits gives more than {}, {gap} above",
+                kind.scope(),
+                above(bound)
+            )
+        }
+        None => format!("{}; {}", kind.scope(), kind.open_question()),
     }
 }
 
@@ -195,14 +199,6 @@ fn above(bound_n: f64) -> String {
         format!("{} mN", number_to(up * 1e3, 6))
     } else {
         format!("{} N", number_to(up, 6))
-    }
-}
-
-fn searched_for(kind: &str) -> &'static str {
-    if kind == "local" {
-        "the best near one starting point"
-    } else {
-        "the best of many starting points"
     }
 }
 
