@@ -434,7 +434,8 @@ fn bundles(tree: &Tree) -> Vec<String> {
 }
 
 fn is_temporary(part: &str) -> bool {
-    part.starts_with(".fluxform-") && part.ends_with(".tmp")
+    let note = part.starts_with('.') && part.ends_with(".json.fluxform-old");
+    note || (part.starts_with(".fluxform-") && part.ends_with(".tmp"))
 }
 
 fn file_name(path: &str) -> &str {
@@ -446,8 +447,10 @@ fn put_back(path: &str) -> String {
     let back = |part: &str| {
         let inner = part
             .strip_prefix('.')
-            .and_then(|rest| rest.strip_suffix(".fluxform-old"));
-        inner.unwrap_or(part).to_owned()
+            .and_then(|rest| rest.strip_suffix(".fluxform-old"))
+            // The identities of both folders.
+            .and_then(|rest| rest.rsplit_once('.'));
+        inner.map_or(part, |(name, _)| name).to_owned()
     };
     path.split('/').map(back).collect::<Vec<_>>().join("/")
 }
