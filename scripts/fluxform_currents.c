@@ -1,6 +1,7 @@
 /* Follows a finger on a loaded bundle: heights and currents; see fluxform_bundle.h. */
 #include "fluxform_bundle.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -65,6 +66,7 @@ typedef char keyed_fits[sizeof(keyed) <= 2 * sizeof(double) ? 1 : -1];
 #define ROUNDING 1e-14
 #define TIED 1e-13
 #define NOTHING 1e-60
+#define FAR 1e3
 #define STEPS 120
 
 /* I = clamp((mu (g - center) + nu) / R) */
@@ -231,24 +233,22 @@ static double meets(const problem *p, size_t i, double limit, double sigma)
     return (limit * p->resistance[i] + sigma) / p->row[i];
 }
 
-/* Whether a coil is between its limits all over a piece, whose ends are such multipliers themselves. */
+/* Whether a coil is between its limits all over a piece, which ends where a coil meets its limit: up
+ * to the rounding at that end, not at the other, which may lie at 1e30. */
 static int moves(const problem *p, size_t i, double sigma, double from, double to)
 {
-    double a, b;
-    if (p->lower[i] >= p->upper[i])
-        return 0;
-    if (p->row[i] == 0)
-        return p->lower[i] <= -sigma / p->resistance[i] && -sigma / p->resistance[i] <= p->upper[i];
-    a = meets(p, i, p->lower[i], sigma);
-    b = meets(p, i, p->upper[i], sigma);
-    return (a < b ? a : b) <= from && to <= (a > b ? a : b);
+    double low = p->lower[i] * p->resistance[i], high = p->upper[i] * p->resistance[i];
+    double a = from * p->row[i] - sigma, b = to * p->row[i] - sigma;
+    double least = a < b ? a : b, most = a < b ? b : a;
+    return low < high && least >= low - 4 * DBL_EPSILON * (sigma + fabs(least)) &&
+           most <= high + 4 * DBL_EPSILON * (sigma + fabs(most));
 }
 
 /* The piece between two breakpoints on which the force is met for sigma; returns where. */
 static double find_piece(problem *p, double sigma, double target, double *from, double *to)
 {
     size_t count = 0, low = 0, high;
-    double slope = 0, near;
+    double slope = 0, near, at;
     for (size_t i = 0; i < p->n; i++)
         for (int upper = 0; upper < 2 && p->row[i] != 0; upper++) {
             p->order[count].key = meets(p, i, upper ? p->upper[i] : p->lower[i], sigma);
@@ -267,9 +267,10 @@ static double find_piece(problem *p, double sigma, double target, double *from, 
     for (size_t i = 0; i < p->n; i++)
         if (moves(p, i, sigma, *from, *to))
             slope += p->row[i] * p->row[i] / p->resistance[i];
-    /* From the piece's point nearest to nothing: far ends would take the digits. */
+    /* A far end would take the digits: then from the piece's point nearest to nothing. */
     near = clamp(0, *from, *to);
-    return slope > 0 ? clamp(near + (target - force_at(p, near, sigma)) / slope, *from, *to) : *to;
+    at = fabs(*to) > FAR * (sigma > fabs(near) ? sigma : fabs(near)) ? near : *to;
+    return slope > 0 ? clamp(at + (target - force_at(p, at, sigma)) / slope, *from, *to) : *to;
 }
 
 /* The multipliers that meet force and sum if the coils that move on a piece are the ones that do. */

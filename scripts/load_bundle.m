@@ -219,19 +219,22 @@ function [best, met] = allocate(per_ampere, wanted, r, lower, upper, total)
         above = [find(forces >= target, 1), numel(breaks) + 1];
         to = breaks(min(above(1), numel(breaks)));
         since = breaks(max(min(above(1), numel(breaks) + 1) - 1, 1));
-        % The piece's ends are multipliers at which coils meet limits: there is nothing to round.
-        idle = -sigma ./ r;
-        moves = lower <= idle & idle <= upper;
-        meets = [(lower(use) .* r(use) + sigma) ./ row(use); (upper(use) .* r(use) + sigma) ./ row(use)];
-        moves(use) = min(meets, [], 1) <= since & to <= max(meets, [], 1);
-        moves = moves & lower < upper;
+        ends = [since; to] * row - sigma;
+        least_end = min(ends, [], 1);
+        most_end = max(ends, [], 1);
+        % Up to the rounding at an end, not at the other, which may lie at 1e30.
+        moves = lower < upper & least_end >= lower .* r - 4 * eps * (sigma + abs(least_end)) & ...
+                most_end <= upper .* r + 4 * eps * (sigma + abs(most_end));
         slope = sum(row(moves) .^ 2 ./ r(moves));
         mu = to;
         if slope > 0
-            % From the piece's point nearest to nothing: far ends would take the digits.
+            % A far end would take the digits: then from the piece's point nearest to nothing.
             near = min(max(0, since), to);
-            mu = near + (target - sum(row .* clip((near * row - sigma) ./ r))) / slope;
-            mu = min(max(mu, since), to);
+            at = to;
+            if abs(to) > 1e3 * max(sigma, abs(near))
+                at = near;
+            end
+            mu = min(max(at + (target - sum(row .* clip((at * row - sigma) ./ r))) / slope, since), to);
         end
         % Both rows met if those coils are the ones that move.
         center = 0;

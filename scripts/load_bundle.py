@@ -386,6 +386,7 @@ def _between(nodes, positions):
 # src/lambda/allocate.rs; here it is written for clearness, not for speed.
 ROUNDING = 1e-14
 TIED = 1e-13
+FAR = 1e3
 
 
 def _sorted_row(row, target, r, lower, upper):
@@ -462,19 +463,19 @@ def _allocate(force_per_ampere, wanted, r, lower, upper, total):
         above = int(np.searchsorted(forces >= target, True))
         to = breaks[min(above, len(breaks) - 1)]
         since = breaks[above - 1] if above else to
-        # The piece's ends are multipliers at which coils meet limits: there is nothing to round.
-        idle = -sigma / r
-        moves = (lower <= idle) & (idle <= upper)
-        meets = np.array([(b[use] * r[use] + sigma) / row[use] for b in (lower, upper)])
-        moves[use] = (np.min(meets, axis=0) <= since) & (to <= np.max(meets, axis=0))
-        moves &= lower < upper
+        ends = np.array([since, to])[:, None] * row - sigma
+        least, most_end = np.min(ends, axis=0), np.max(ends, axis=0)
+        # Up to the rounding at an end, not at the other, which may lie at 1e30.
+        slack = 4 * np.finfo(float).eps
+        moves = (lower < upper) & (least >= lower * r - slack * (sigma + np.abs(least)))
+        moves &= most_end <= upper * r + slack * (sigma + np.abs(most_end))
         slope = np.sum(row[moves] ** 2 / r[moves])
         mu = to
         if slope > 0:
-            # From the piece's point nearest to nothing: far ends would take the digits.
+            # A far end would take the digits: then from the piece's point nearest to nothing.
             near = min(max(0.0, since), to)
-            mu = near + (target - np.sum(row * fill(near, 0.0, -sigma))) / slope
-            mu = min(max(mu, since), to)
+            at = near if abs(to) > FAR * max(sigma, abs(near)) else to
+            mu = min(max(at + (target - np.sum(row * fill(at, 0.0, -sigma))) / slope, since), to)
         # Both rows met if those coils are the ones that move.
         center, nu, jump = 0.0, -sigma, mu
         if np.any(moves):

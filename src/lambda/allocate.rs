@@ -22,6 +22,8 @@ const ROUNDING: f64 = 1e-14;
 const TIED: f64 = 1e-13;
 /// Forces per ampere below this share of the largest are none.
 const NOTHING: f64 = 1e-60;
+/// An end of a piece that is so many times farther than what is searched takes its digits.
+const FAR: f64 = 1e3;
 /// Steps of the search for the second multiplier.
 const STEPS: usize = 120;
 
@@ -440,10 +442,12 @@ impl Allocator {
             .filter(|&i| self.moves(i, sigma, from, to))
             .map(|i| self.row[i] * self.row[i] * self.conductance_s[i])
             .sum();
-        // From the piece's point nearest to nothing: far ends would take the digits.
         let mu = if slope > 0.0 {
+            // A far end would take the digits: then from the piece's point nearest to nothing.
             let near = 0.0_f64.clamp(from, to);
-            (near + (target - force(near)) / slope).clamp(from, to)
+            let far = to.abs() > FAR * sigma.max(near.abs());
+            let at = if far { near } else { to };
+            (at + (target - force(at)) / slope).clamp(from, to)
         } else {
             to
         };
@@ -455,19 +459,19 @@ impl Allocator {
         (limit_a * self.resistance_ohm[i] + sigma) / self.row[i]
     }
 
-    /// Whether a coil is between its limits all over a piece. The piece's ends are such multipliers
-    /// themselves, so there is nothing to round.
+    /// Whether a coil is between its limits all over a piece.
     fn moves(&self, i: usize, sigma: f64, from: f64, to: f64) -> bool {
-        let (lower, upper) = (self.lower_a[i], self.upper_a[i]);
-        if lower >= upper {
-            return false;
-        }
-        if self.row[i] == 0.0 {
-            let pressure = -sigma * self.conductance_s[i];
-            return lower <= pressure && pressure <= upper;
-        }
-        let (a, b) = (self.meets(i, lower, sigma), self.meets(i, upper, sigma));
-        a.min(b) <= from && to <= a.max(b)
+        let (low, high) = (
+            self.lower_a[i] * self.resistance_ohm[i],
+            self.upper_a[i] * self.resistance_ohm[i],
+        );
+        let pressure = |mu: f64| mu * self.row[i] - sigma;
+        let (a, b) = (pressure(from), pressure(to));
+        let (least, most) = (a.min(b), a.max(b));
+        // The piece ends where a coil meets its limit: up to the rounding at that end, not at the
+        // other, which may lie at 1e30.
+        let slack = |end: f64| 4.0 * f64::EPSILON * (sigma + end.abs());
+        low < high && least >= low - slack(least) && most <= high + slack(most)
     }
 
     /// The multipliers that meet both rows if the coils that move on `piece` are the ones that do.
