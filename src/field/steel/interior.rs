@@ -341,7 +341,7 @@ impl Interior {
         sum
     }
 
-    /// Visits grad u at the quadrature's nodes, each moved inwards to the nearest point that is
+    /// Visits grad u at twice the quadrature's nodes either way, each moved inwards to the nearest point that is
     /// `depth_m` inside the surface: a sampling of the core without its skin, ends included.
     /// A depth beyond the core's middle is cut there.
     pub fn sample_inside(&self, u: &DVector<f64>, depth_m: f64, mut visit: impl FnMut(Sample)) {
@@ -535,7 +535,7 @@ impl Interior {
         matrix
     }
 
-    /// Quadrature's nodes along one axis, moved inwards from its ends: element, place, values
+    /// Twice the quadrature's nodes along one axis, moved inwards from its ends: element, place, values
     /// and slopes (in the reference coordinate) of its basis there.
     fn depths(
         &self,
@@ -553,7 +553,7 @@ impl Interior {
         let mut places: Vec<f64> = breaks
             .windows(2)
             .flat_map(|ends| {
-                let rule = gauss::rule(self.reference.degree + 1);
+                let rule = gauss::rule((2 * self.reference.degree + 2).min(gauss::MAX_ORDER));
                 rule.nodes
                     .iter()
                     .map(|&x| between((ends[0], ends[1]), x).clamp(lo, hi))

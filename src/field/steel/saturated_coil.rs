@@ -22,6 +22,8 @@ const FINER: f64 = 0.3;
 /// `cargo test --test steel -- --ignored --nocapture along_curves_in_full`.
 const SAFETY: f64 = 2.0;
 const BEFORE: f64 = 0.5;
+/// The same of |B| inside, of which the largest is seen at samples: kinks reach it undamped.
+const SAFETY_INSIDE: f64 = 4.0;
 /// Distance above the core, in radii, below which no error is estimated.
 const CLOSEST: f64 = 0.1;
 
@@ -141,7 +143,7 @@ impl<L: Permeability> CoilWithCurve<'_, L> {
         let field = |pick: fn(&CoreField) -> f64| {
             let [a, b, c] = [&fine.inside, &coarse.inside, &coarsest.inside].map(pick);
             let size = if a > 0.0 { a } else { 1.0 };
-            SAFETY * (a - b).abs().max(BEFORE * (b - c).abs()) / size + relative_error
+            SAFETY_INSIDE * (a - b).abs().max(BEFORE * (b - c).abs()) / size + relative_error
         };
         Ok(SaturatedCoil {
             relative_error,
