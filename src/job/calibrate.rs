@@ -34,9 +34,11 @@ use crate::progress::Progress;
 use crate::shape::document::ShapeDocument;
 use crate::shape::points::ConstraintPoints;
 
+mod ignored_pull;
 mod page;
 mod recorded;
 
+pub(super) use ignored_pull::IgnoredPull;
 pub use page::PAGE_FILE;
 
 /// The name under which a bundle keeps the design it was made from.
@@ -292,7 +294,7 @@ fn calibrate_one(
         ..options.lambda.clone()
     };
     let mut lambda = solve(scene, &solved.forces, field, points, &asked, progress)?;
-    let needed = NeededMap::new(
+    let mut needed = NeededMap::new(
         scene,
         &solved.map,
         field,
@@ -301,6 +303,13 @@ fn calibrate_one(
         progress,
     )?;
     let passive = passive_map(scene, &needed.made.map, progress)?;
+    progress.begin("passive force", 1);
+    let ignored = IgnoredPull::new(scene, &lambda)?;
+    progress.end();
+    if let Some(ignored) = ignored {
+        lambda.warnings.extend(ignored.warning(lambda.file.jnd));
+        needed.left_out.push(ignored.left_out());
+    }
     let mut manifest = manifest(scene, &lambda, &needed, passive.as_ref());
     manifest.circuit = Some(circuit.circuit.clone());
     let stage = circuit.accuracy.clone();
