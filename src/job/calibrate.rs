@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
 
 use super::discretize::{self, PointsReport, point_rows, points_grid};
 use super::kept::{FieldStore, STORE_FOLDER, ShapeField};
@@ -37,9 +36,11 @@ use crate::shape::document::{AxisRequest, ShapeDocument, SurfaceSource};
 use crate::shape::points::ConstraintPoints;
 
 pub(super) mod again;
+mod ignored_pull;
 mod page;
 mod recorded;
 
+pub(super) use ignored_pull::IgnoredPull;
 pub use page::PAGE_FILE;
 
 /// The name under which a bundle keeps the design it was made from.
@@ -368,7 +369,7 @@ fn compute(
         ..options.lambda.clone()
     };
     let mut lambda = solve(scene, &solved.forces, field, points, &asked, progress)?;
-    let needed = NeededMap::new(
+    let mut needed = NeededMap::new(
         scene,
         &solved.map,
         field,
@@ -377,6 +378,13 @@ fn compute(
         progress,
     )?;
     let passive = passive_map(scene, &needed.made.map, progress)?;
+    progress.begin("passive force", 1);
+    let ignored = IgnoredPull::new(scene, &lambda)?;
+    progress.end();
+    if let Some(ignored) = ignored {
+        lambda.warnings.extend(ignored.warning(lambda.file.jnd));
+        needed.left_out.push(ignored.left_out());
+    }
     let mut manifest = manifest(scene, &lambda, &needed, passive.as_ref());
     manifest.made_with = Some(made_with(options, shape));
     manifest.circuit = Some(circuit.circuit.clone());

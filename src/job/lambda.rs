@@ -34,6 +34,7 @@ use crate::shape::document::ShapeDocument;
 mod picture;
 mod points;
 mod points_effect;
+mod warnings;
 
 /// Forces change over about the height above the coils: so many patches resolve them.
 const PATCHES_A_HEIGHT: f64 = 16.0;
@@ -292,7 +293,7 @@ fn solve_at(
         options.wiring.spread(&mut point.currents_a);
     }
     progress.end();
-    let mut warnings = warnings(points, &solution, options);
+    let mut warnings = warnings::all(points, &problem, &solution, options);
     if !worst.complete {
         warnings.push(
             "the worst-point path could not be followed to its end: its numbers are not the \
@@ -481,55 +482,6 @@ pub fn criterion_named(name: &str) -> Option<Criterion> {
     };
     std::iter::successors(Some(Criterion::Jnd), next)
         .find(|criterion| criterion_name(*criterion) == name)
-}
-
-fn warnings(points: &WantedPoints, solution: &Solution, options: &LambdaOptions) -> Vec<String> {
-    let mut warnings = points.warnings.clone();
-    match solution.status {
-        Status::Solved => {}
-        Status::NothingWanted => warnings.push(
-            "every height is zero: no force is wanted, so no limit binds and lambda is null"
-                .to_owned(),
-        ),
-        Status::NothingRendered => warnings.push(
-            "no current within the limits pushes the magnet up at these points: lambda is null; \
-             check magnet.polarity (\"repel\" for drivers that do not reverse), current_max_a and \
-             the object's place"
-                .to_owned(),
-        ),
-        Status::Stalled => warnings.push(
-            "the path could not be followed to its end: numbers beyond its last breakpoint are \
-             not the minimum; please report this design and shape"
-                .to_owned(),
-        ),
-    }
-    let wanted = criterion_name(options.settings.criterion);
-    if solution.chosen.is_none() && solution.status == Status::Solved {
-        warnings.push(format!(
-            "the limits never bind by the criterion {wanted}: lambda is null; \
-             choose another with --criterion"
-        ));
-    }
-    if solution
-        .chosen
-        .as_ref()
-        .is_some_and(|chosen| chosen.lambda_n_per_m == 0.0)
-    {
-        warnings.push(format!(
-            "lambda is 0: a limit of zero already adds more error than the criterion {wanted} \
-             allows; raise it, or leave coils that carry no current out of the array \
-             (positions_mm)"
-        ));
-    } else if let (Some(chosen), Some(floor)) = (&solution.chosen, solution.lambda_floor_n_per_m)
-        && chosen.lambda_n_per_m < floor
-    {
-        warnings.push(format!(
-            "the lowest point is not felt: lambda {:.4} N/m gives it less than the 0.8 mN a \
-             finger feels (lambda_floor {floor:.4} N/m)",
-            chosen.lambda_n_per_m
-        ));
-    }
-    warnings
 }
 
 fn file(

@@ -1,5 +1,7 @@
 //! The force constants on a followed path (eq. 10), in scaled units.
 
+use std::cmp::Ordering;
+
 use crate::numerics::double_double::DoubleDouble as Num;
 use crate::numerics::real::Real;
 
@@ -9,11 +11,11 @@ use super::model::Model;
 /// Above this share of `lambda^2 mean(h^2)` e* has left e_0 where currents are not unique.
 const VISIBLE: f64 = 1e-24;
 
-/// e* and the error e_0 without upper limits, both as functions of lambda.
+/// e* and the error e_0 without the drivers' size, both as functions of lambda.
 pub(super) struct Comparison<'a> {
     /// The path under all limits.
     pub limited: &'a Trace,
-    /// The path without upper limits and without a limit on the sum.
+    /// The path of e_0.
     pub unlimited: &'a Trace,
     /// Mean of h^2, scaled.
     pub mean_square: Num,
@@ -27,12 +29,13 @@ pub(super) struct Overlap {
     pub pieces: [usize; 2],
 }
 
-/// The stretches between the starts of the pieces of either path; both begin at zero.
+/// The stretches between the starts of the pieces of either path; both begin at zero. Every stretch
+/// passes the start of at least one piece, so there are at most as many as pieces.
 pub(super) fn overlaps<P>(a: &[P], b: &[P], start_of: impl Fn(&P) -> Num) -> Vec<Overlap> {
     let (mut i, mut k) = (0, 0);
     let mut start = Num::ZERO;
     let mut all = Vec::new();
-    loop {
+    for _ in 0..a.len() + b.len() {
         let (next_a, next_b) = (a.get(i + 1).map(&start_of), b.get(k + 1).map(&start_of));
         let end = match (next_a, next_b) {
             (Some(x), Some(y)) => Some(x.smaller(y)),
@@ -44,12 +47,17 @@ pub(super) fn overlaps<P>(a: &[P], b: &[P], start_of: impl Fn(&P) -> Num) -> Vec
             pieces: [i, k],
         });
         let Some(end) = end else {
-            return all;
+            break;
         };
-        i += usize::from(next_a == Some(end));
-        k += usize::from(next_b == Some(end));
+        // A start that is not a number is passed as well.
+        let passed = |next: Option<Num>| {
+            next.is_some_and(|next| next.partial_cmp(&end) != Some(Ordering::Greater))
+        };
+        i += usize::from(passed(next_a));
+        k += usize::from(passed(next_b));
         start = end;
     }
+    all
 }
 
 /// On one stretch between breakpoints of either path.
@@ -95,8 +103,9 @@ impl<'a> Comparison<'a> {
     }
 
     /// Where the first limit binds, if the unlimited currents are unique: the first lambda at
-    /// which they leave the bounds (slack last in the model, its weights among `limited`'s).
-    pub fn linear(&self, model: &Model, bounds: &Bounds) -> Option<Num> {
+    /// which they leave the bounds (slack last in the model, its weights among `limited`'s) where
+    /// `free` has none.
+    pub fn linear(&self, model: &Model, bounds: &Bounds, free: &Bounds) -> Option<Num> {
         let slope = self.mean_square.sqrt();
         let pieces = &self.unlimited.pieces;
         let coils = pieces[0].x.len();
@@ -124,8 +133,12 @@ impl<'a> Comparison<'a> {
                 for (sum, term) in sums.iter_mut().zip([x, rate, blur]) {
                     *sum += weight * term;
                 }
-                if let Some(upper) = bounds.upper[i] {
-                    meet(beyond_rounding(upper - x, floor * piece.start), rate, floor);
+                let near = |distance| beyond_rounding(distance, floor * piece.start);
+                if let (Some(upper), None) = (bounds.upper[i], free.upper[i]) {
+                    meet(near(upper - x), rate, floor);
+                }
+                if let (Some(lower), None) = (bounds.lower[i], free.lower[i]) {
+                    meet(near(x - lower), -rate, floor);
                 }
             }
             if model.weight.is_some() {
@@ -233,13 +246,13 @@ mod tests {
             Num::EPSILON,
         );
         let mut bounds = Bounds {
-            lower: numbers(&[-1e9, -1e9, 0.0]),
+            lower: numbers(&[-1e9, -1e9, 0.0]).into_iter().map(Some).collect(),
             upper: vec![None; 3],
             total: Num::ZERO,
         };
         let coils = Model::new(2, numbers(&[1.0, 1e-3, 1.0, -1e-3]), None, Num::EPSILON);
         let free = Bounds {
-            lower: numbers(&[-1e9, -1e9]),
+            lower: vec![None; 2],
             upper: vec![None; 2],
             total: Num::ZERO,
         };
@@ -268,7 +281,7 @@ mod tests {
             unlimited: &path,
             mean_square: Num::ONE,
         };
-        let linear = comparison.linear(&model, &bounds).unwrap().to_f64();
+        let linear = comparison.linear(&model, &bounds, &free).unwrap().to_f64();
         assert!((linear - 1.3).abs() < 1e-12, "{linear}");
     }
 

@@ -15,10 +15,10 @@ use super::model::Model;
 /// Relative distance from a bound or a zero multiplier that counts as none.
 const GRAIN: f64 = 1e-27;
 
-/// Bounds of the variables; `None` above: unbounded.
+/// Bounds of the variables; `None`: unbounded on that side.
 #[derive(Debug, Clone)]
 pub(super) struct Bounds {
-    pub lower: Vec<Num>,
+    pub lower: Vec<Option<Num>>,
     pub upper: Vec<Option<Num>>,
     /// Right-hand side of the model's equality.
     pub total: Num,
@@ -179,10 +179,10 @@ impl Follower<'_> {
         } else {
             Num::ZERO
         };
-        match self.bounds.upper[i] {
-            Some(upper) if upper <= lower => Place::Pinned,
-            _ if value <= lower => Place::Low,
-            Some(upper) if value >= upper => Place::High,
+        match (lower, self.bounds.upper[i]) {
+            (Some(lower), Some(upper)) if upper <= lower => Place::Pinned,
+            (Some(lower), _) if value <= lower => Place::Low,
+            (_, Some(upper)) if value >= upper => Place::High,
             _ => Place::Free,
         }
     }
@@ -282,18 +282,20 @@ impl Follower<'_> {
                     if distance <= near { role } else { Role::Fixed }
                 }
                 Place::Free | Place::Held => {
-                    let down = state.x[i] - self.bounds.lower[i];
+                    let down = self.bounds.lower[i].map(|l| state.x[i] - l);
                     let up = self.bounds.upper[i].map(|u| u - state.x[i]);
-                    let range = up.map_or(size, |up| size.smaller(up + down));
+                    let both = up.zip(down).map(|(up, down)| size.smaller(up + down));
+                    let range = both.unwrap_or(size);
                     let range = if Some(i) == slack {
                         self.bounds.total
                     } else {
                         range
                     };
                     let near = |rate: Num| (grain * range).larger(soon * rate.larger(Num::ZERO));
-                    if up.is_some_and(|up| up <= near(state.x_rate[i]) && up < down) {
+                    let nearer = |up: Num| down.is_none_or(|down| up < down);
+                    if up.is_some_and(|up| up <= near(state.x_rate[i]) && nearer(up)) {
                         Role::Falling
-                    } else if down <= near(-state.x_rate[i]) {
+                    } else if down.is_some_and(|down| down <= near(-state.x_rate[i])) {
                         Role::Rising
                     } else if state.place[i] == Place::Free {
                         Role::Free
@@ -325,7 +327,7 @@ impl Follower<'_> {
             .collect();
         let still = |i: usize| match place[i] {
             Place::Pinned => Num::ZERO,
-            Place::Low => self.bounds.lower[i],
+            Place::Low => self.bounds.lower[i].unwrap_or(state.x[i]),
             Place::High => self.bounds.upper[i].unwrap_or(state.x[i]),
             Place::Free | Place::Held => state.x[i],
         };
@@ -410,10 +412,14 @@ impl Follower<'_> {
                     if rate.abs() <= still {
                         continue;
                     }
-                    if rate < Num::ZERO {
-                        offer(i, piece.x[i] - self.bounds.lower[i], -rate, Role::Rising);
-                    } else if let Some(upper) = self.bounds.upper[i] {
-                        offer(i, upper - piece.x[i], rate, Role::Falling);
+                    match (self.bounds.lower[i], self.bounds.upper[i]) {
+                        (Some(lower), _) if rate < Num::ZERO => {
+                            offer(i, piece.x[i] - lower, -rate, Role::Rising);
+                        }
+                        (_, Some(upper)) if rate > Num::ZERO => {
+                            offer(i, upper - piece.x[i], rate, Role::Falling);
+                        }
+                        _ => {}
                     }
                 }
                 Place::Low | Place::High if role == Role::Fixed || !direction.blocked[i] => {
@@ -444,7 +450,9 @@ impl Follower<'_> {
             let mut see = |violation: Num| worst = worst.larger(violation / size);
             for i in 0..self.model.count() {
                 let x = piece.x[i] * self.model.norm[i];
-                see(self.bounds.lower[i] * self.model.norm[i] - x);
+                if let Some(lower) = self.bounds.lower[i] {
+                    see(lower * self.model.norm[i] - x);
+                }
                 if let Some(upper) = self.bounds.upper[i] {
                     see(x - upper * self.model.norm[i]);
                 }
@@ -505,7 +513,7 @@ mod tests {
             Num::EPSILON,
         );
         let bounds = Bounds {
-            lower: numbers(&[-0.3, 0.0]),
+            lower: numbers(&[-0.3, 0.0]).into_iter().map(Some).collect(),
             upper: numbers(&[1.7, 0.9]).into_iter().map(Some).collect(),
             total: Num::ZERO,
         };

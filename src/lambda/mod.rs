@@ -59,6 +59,7 @@ mod path;
 mod power;
 mod problem;
 mod reduce;
+mod rest;
 mod solve;
 mod wiring;
 pub mod worst;

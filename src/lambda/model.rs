@@ -151,7 +151,8 @@ impl Factor {
     pub fn pivoted(model: &Model, variables: &[usize], share: f64) -> Self {
         let mut taken = Vec::new();
         let mut factor = Self::new(model, &taken);
-        loop {
+        // Each turn takes one more of them.
+        for _ in 0..variables.len() {
             let outside = |i: usize| {
                 let rest = factor.solve(model, model.column(i), Num::ZERO).residual;
                 (Num::dot(&rest, &rest).sqrt() / model.norm[i]).to_f64()
@@ -170,10 +171,11 @@ impl Factor {
                 _ => None,
             };
             let Some(grown) = grown else {
-                return factor;
+                break;
             };
             factor = grown;
         }
+        factor
     }
 
     /// Number of variables that may move: the members and the pivot.

@@ -151,14 +151,10 @@ impl Path {
                         .collect(),
                     standing: (0..piece.x.len())
                         .map(|i| {
+                            // The slack of the sum lies between zero and the limit.
+                            let lower = bounds.lower[i].unwrap_or(Num::ZERO);
                             let upper = bounds.upper[i].unwrap_or(bounds.total);
-                            standing_of(
-                                piece.place[i],
-                                x[i],
-                                piece.x_rate[i],
-                                bounds.lower[i],
-                                upper,
-                            )
+                            standing_of(piece.place[i], x[i], piece.x_rate[i], lower, upper)
                         })
                         .collect(),
                 }
@@ -304,7 +300,8 @@ impl Path {
         all
     }
 
-    /// The force constant beyond which no coil follows any more; `None` where the path never turns.
+    /// The smallest force constant beyond which the currents no longer change; `None` where the path
+    /// never turns.
     pub(super) fn last_turn(&self) -> Option<f64> {
         let last = self.turns.last().map(|&k| self.pieces[k].start);
         last.filter(|&lambda| lambda > 0.0)

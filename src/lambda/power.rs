@@ -61,7 +61,9 @@ pub(super) fn least_power(
     };
     for (k, &i) in open.iter().enumerate() {
         let row: Vec<Num> = moves.iter().map(|vector| vector[k]).collect();
-        constraints.at_least(&row, cost[i] * bounds.lower[i] - still[k]);
+        if let Some(lower) = bounds.lower[i] {
+            constraints.at_least(&row, cost[i] * lower - still[k]);
+        }
         if let Some(upper) = bounds.upper[i] {
             let row: Vec<Num> = row.iter().map(|&v| -v).collect();
             constraints.at_least(&row, still[k] - cost[i] * upper);
@@ -94,7 +96,7 @@ pub(super) fn least_power(
 }
 
 fn clipped(bounds: &Bounds, i: usize, x: Num) -> Num {
-    let x = x.larger(bounds.lower[i]);
+    let x = bounds.lower[i].map_or(x, |lower| x.larger(lower));
     bounds.upper[i].map_or(x, |upper| x.smaller(upper))
 }
 

@@ -24,6 +24,19 @@ pub struct ForceProblem<'a> {
     pub resistance_ohm: &'a [f64],
 }
 
+/// The directions of current that a driver has, whatever its size.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Directions {
+    /// Above zero.
+    pub up: bool,
+    /// Below zero.
+    pub down: bool,
+}
+
+/// A coil whose largest force is a smaller share of the strongest coil's is refused: what it adds
+/// is lost in the rounding of the worst-point form, and far below that in the range of doubles.
+const LEAST_REACH: f64 = 1e-20;
+
 /// Which force constant is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
@@ -33,7 +46,7 @@ pub enum Criterion {
     Jnd,
     /// Where the first limit binds.
     Linear,
-    /// Where the last coil stops following.
+    /// The smallest beyond which the currents no longer change.
     Saturation,
     /// The largest with no point too weak.
     Maxmin,
@@ -79,6 +92,22 @@ pub enum ProblemError {
         found: usize,
         /// Entries expected.
         expected: usize,
+    },
+    /// A coil that is too weak beside another one.
+    #[error(
+        "coil {coil} gives at most {most_n:.3e} N and coil {strongest} {strongest_n:.3e} N: a force \
+         that is a smaller share of it than 1e-20 cannot be computed; leave the coil out of the \
+         array, or set its gain to 0"
+    )]
+    TooWeak {
+        /// Its number.
+        coil: usize,
+        /// Its largest force at any point within its limits, N.
+        most_n: f64,
+        /// The strongest coil.
+        strongest: usize,
+        /// Its largest force, N.
+        strongest_n: f64,
     },
     /// Infinite or not a number.
     #[error("{name}[{index}] is {value}: only finite numbers can be used")]
@@ -163,6 +192,48 @@ impl ForceProblem<'_> {
     pub(super) fn heaviest(&self) -> f64 {
         let weights = self.weights.unwrap_or(&[1.0]);
         weights.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// The directions of current of coil `i`; a driver without any counts as one that pushes.
+    pub(super) fn directions(&self, i: usize) -> Directions {
+        let down = self.lower_a[i] < 0.0;
+        Directions {
+            up: self.upper_a[i] > 0.0 || !down,
+            down,
+        }
+    }
+
+    /// Largest |current| of coil `i`, A.
+    pub(super) fn reach_a(&self, i: usize) -> f64 {
+        self.upper_a[i].max(-self.lower_a[i])
+    }
+
+    /// Checks that no coil is lost beside the strongest one; `largest` holds the largest force per
+    /// ampere of every coil.
+    ///
+    /// # Errors
+    /// The first coil that is.
+    pub(super) fn comparable(&self, largest: &[f64]) -> Result<(), ProblemError> {
+        // A product may leave the range of doubles, so products are compared by their logarithms.
+        let reach = |i: usize| largest[i].log10() + self.reach_a(i).log10();
+        let live = (0..self.coils()).filter(|&i| largest[i] > 0.0 && self.reach_a(i) > 0.0);
+        let Some(strongest) = live
+            .clone()
+            .reduce(|a, b| if reach(b) > reach(a) { b } else { a })
+        else {
+            return Ok(());
+        };
+        let least = reach(strongest) + LEAST_REACH.log10();
+        live.into_iter()
+            .find(|&i| reach(i) < least)
+            .map_or(Ok(()), |coil| {
+                Err(ProblemError::TooWeak {
+                    coil,
+                    most_n: largest[coil] * self.reach_a(coil),
+                    strongest,
+                    strongest_n: largest[strongest] * self.reach_a(strongest),
+                })
+            })
     }
 
     /// Checks shapes, finiteness and signs.

@@ -265,8 +265,8 @@ impl Reduced {
     /// The problem with all its limits; a limit on the sum has its slack as the last variable.
     pub fn limited(&self, problem: &ForceProblem) -> (Model, Bounds) {
         let scaled = |i: usize, v: f64| Num::of(times_power(v, self.current_scale(i)));
-        let mut lower: Vec<Num> = (0..self.coils)
-            .map(|i| scaled(i, problem.lower_a[i]))
+        let mut lower: Vec<Option<Num>> = (0..self.coils)
+            .map(|i| Some(scaled(i, problem.lower_a[i])))
             .collect();
         let mut upper: Vec<Option<Num>> = (0..self.coils)
             .map(|i| Some(scaled(i, problem.upper_a[i])))
@@ -292,7 +292,7 @@ impl Reduced {
             .map(|i| Num::of(power_of_two(ampere(i) - unit)))
             .collect();
         weight.push(Num::ONE);
-        lower.push(Num::ZERO);
+        lower.push(Some(Num::ZERO));
         upper.push(None);
         (
             self.model(Some(weight)),
@@ -304,14 +304,14 @@ impl Reduced {
         )
     }
 
-    /// The problem without upper limits and without a limit on the sum.
+    /// The problem without the drivers' size: without a limit on the sum, and of every coil's
+    /// limits only a zero that keeps the driver from reversing is left.
     pub fn unlimited(&self, problem: &ForceProblem) -> (Model, Bounds) {
-        let lower = (0..self.coils)
-            .map(|i| Num::of(times_power(problem.lower_a[i], self.current_scale(i))))
-            .collect();
+        let directions = (0..self.coils).map(|i| problem.directions(i));
+        let zero_unless = |goes: bool| (!goes).then_some(Num::ZERO);
         let bounds = Bounds {
-            lower,
-            upper: vec![None; self.coils],
+            lower: directions.clone().map(|d| zero_unless(d.down)).collect(),
+            upper: directions.map(|d| zero_unless(d.up)).collect(),
             total: Num::ZERO,
         };
         (self.model(None), bounds)

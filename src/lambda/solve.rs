@@ -12,6 +12,7 @@ use super::model::Model;
 use super::path::Path;
 use super::problem::{Criterion, ForceProblem, ProblemError, Settings};
 use super::reduce::{Reduced, largest_entries, times_power};
+use super::rest;
 use super::worst;
 
 /// Above this condition number of the coils' columns doubles do not decide.
@@ -70,10 +71,15 @@ pub struct Solution {
     pub lambda_linear_n_per_m: Option<f64>,
     /// The largest with `e* - e_0 <= w^2 lambda^2 mean(h^2)`, N/m; `None`: all are.
     pub lambda_jnd_n_per_m: Option<f64>,
-    /// The last breakpoint, N/m, beyond which no coil follows; `None` where nothing ever binds.
+    /// The smallest, N/m, beyond which the currents no longer change: the last breakpoint. A change
+    /// that is worth less than 1e-15 of `lambda^2 mean(h^2)` at every lambda is none: where the sum
+    /// binds, rounding of the forces alone decides among coils that tie. `None` where nothing ever
+    /// binds.
     pub lambda_saturation_n_per_m: Option<f64>,
     /// The largest with no point too weak, N/m; `None`: none, or nothing can be rendered.
     pub lambda_maxmin_n_per_m: Option<f64>,
+    /// The points that decide it: no currents within the limits give all of them more.
+    pub maxmin_points: Vec<usize>,
     /// Below it the lowest point is not felt, N/m; `None` where that height is not positive.
     pub lambda_floor_n_per_m: Option<f64>,
     /// The force constant that the criterion chooses, with its currents.
@@ -97,6 +103,8 @@ struct Solved {
     reduced: Reduced,
     model: Model,
     bounds: Bounds,
+    /// The bounds of `unlimited`.
+    free_bounds: Bounds,
     limited: Trace,
     unlimited: Trace,
     /// Rounding in e*, relative to `lambda^2 mean(h^2)`.
@@ -113,7 +121,7 @@ impl Solved {
             model: &model,
             bounds: &bounds,
         };
-        let limited = follower.path(offset.as_deref(), heights);
+        let mut limited = follower.path(offset.as_deref(), heights);
         let (free_model, free_bounds) = reduced.unlimited(problem);
         let free = Follower {
             model: &free_model,
@@ -124,10 +132,15 @@ impl Solved {
             .flaw(&limited, offset.as_deref(), heights)
             .max(free.flaw(&unlimited, offset.as_deref(), heights));
         let size = Num::dot(heights, heights).sqrt();
-        let error = rounding(&model, &limited, size).max(rounding(&free_model, &unlimited, size));
+        let mut error =
+            rounding(&model, &limited, size).max(rounding(&free_model, &unlimited, size));
+        if limited.complete && rest::bring_to_rest(&mut limited, offset.as_deref(), heights) {
+            error += rest::COST;
+        }
         Self {
             model,
             bounds,
+            free_bounds,
             limited,
             unlimited,
             error,
@@ -201,10 +214,11 @@ fn rounding(model: &Model, trace: &Trace, size: Num) -> f64 {
 ///
 /// # Errors
 /// Where the problem is malformed: lists of the wrong length, numbers that are not finite,
-/// limits of the wrong sign.
+/// limits of the wrong sign, a coil that is 1e-20 of the strongest one.
 pub fn solve(problem: &ForceProblem, settings: &Settings) -> Result<Solution, ProblemError> {
     problem.validate(settings)?;
     let largest = largest_entries(problem);
+    problem.comparable(&largest)?;
     if let Some(plain) = solve_plainly(problem, &largest) {
         let path = Path::new(problem, &plain.reduced, &plain.bounds, &plain.limited);
         let rank = problem.coils();
@@ -283,7 +297,7 @@ fn finish<T: Real>(
     let linear = if !wanted {
         None
     } else if rank == problem.coils() {
-        comparison.linear(&solved.model, &solved.bounds)
+        comparison.linear(&solved.model, &solved.bounds, &solved.free_bounds)
     } else {
         comparison.linear_by_error()
     };
@@ -348,7 +362,10 @@ fn finish<T: Real>(
         lambda_linear_n_per_m: linear,
         lambda_jnd_n_per_m: jnd,
         lambda_saturation_n_per_m: saturation,
-        lambda_maxmin_n_per_m: maxmin.map(|maxmin| maxmin.lambda_n_per_m),
+        lambda_maxmin_n_per_m: maxmin.as_ref().map(|maxmin| maxmin.lambda_n_per_m),
+        maxmin_points: maxmin.map_or_else(Vec::new, |maxmin| {
+            maxmin.active.iter().map(|active| active.point).collect()
+        }),
         lambda_floor_n_per_m: (lowest > 0.0).then(|| DETECTION_THRESHOLD_N / lowest),
         chosen,
         at: settings.at_n_per_m.map(evaluate),

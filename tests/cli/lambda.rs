@@ -287,3 +287,106 @@ fn a_picture_shows_the_path_and_is_not_written_over_a_stranger() {
     let svg = String::from_utf8(place.read("none.svg")).unwrap();
     assert!(svg.contains("no lambda is chosen") && !svg.contains("NaN"));
 }
+
+/// A point beyond the reach of one coil, where its field pulls: the limits were blamed for it, and
+/// the run was a success.
+#[test]
+fn a_maxmin_of_zero_names_the_point_and_fails() {
+    let place = Place::new();
+    let one = place.seed().replace("rows = 3", "rows = 1");
+    let one = one.replace("columns = 3", "columns = 1");
+    place.write("one.toml", &one);
+    place.write(
+        "low.toml",
+        "name = \"low\"\nprimitive = \"flat\"\nside_mm = 100.0\nheight_mm = 10.0\n\n[points]\n\
+         x_mm = [-50.0, 50.0, 11]\ny_mm = [-50.0, 50.0, 11]\n",
+    );
+    let ran = place.run(&["lambda", "one.toml", "low.toml", "--criterion", "maxmin"]);
+    assert!(!ran.err.contains("limit of zero"), "{}", ran.err);
+    ran.ends(4).says(&[
+        "E402",
+        "the chosen lambda is 0 for low",
+        "by the criterion maxmin",
+        "no current within the limits pushes the magnet up at point",
+    ]);
+}
+
+/// With drivers that reverse, a magnet that is attracted once had no force constant.
+#[test]
+fn attracted_and_repelled_magnets_mirror_each_other() {
+    let place = Place::new();
+    let both = ["repel", "attract"].map(|polarity| {
+        let name = format!("{polarity}.toml");
+        let design = place
+            .seed()
+            .replace(
+                "polarity = \"repel\"",
+                &format!("polarity = \"{polarity}\""),
+            )
+            .replace("[supply]\n", "[supply]\ncurrent_min_a = -2.0\n");
+        let total = design.lines().filter(|l| !l.starts_with("total_current"));
+        place.write(&name, &total.collect::<Vec<_>>().join("\n"));
+        place
+            .run(&["lambda", &name, WEDGE, "--format", "json"])
+            .ends(0)
+            .json()
+    });
+    let [repel, attract] = &both;
+    for key in [
+        "lambda_linear_n_per_m",
+        "lambda_jnd_n_per_m",
+        "lambda_saturation_n_per_m",
+        "lambda_maxmin_n_per_m",
+        "rms_error_n",
+        "worst_error_n",
+    ] {
+        let of = |told: &serde_json::Value| told[key].as_f64().unwrap();
+        let off = (of(repel) - of(attract)).abs();
+        assert!(
+            off <= 1e-12 * of(repel),
+            "{key}: {} {}",
+            of(repel),
+            of(attract)
+        );
+    }
+    for coil in 0..9 {
+        let of = |told: &serde_json::Value| told["currents_a"][coil].as_f64().unwrap();
+        assert!((of(repel) + of(attract)).abs() < 1e-12);
+    }
+}
+
+/// Rounding of the forces once put lambda_saturation at 3.9e12 N/m, and `verify` of the fresh bundle
+/// failed.
+#[test]
+fn a_sum_that_binds_has_a_saturation_that_verifies() {
+    let place = Place::new();
+    let seed = String::from_utf8(place.read("designs/seed.toml")).unwrap();
+    let design = seed.replace("total_current_max_a = 18.0", "total_current_max_a = 5.0");
+    assert_ne!(design, seed);
+    place.write("five.toml", &design);
+    let shape = "shapes/half_sphere.toml";
+    let told = place
+        .run(&["lambda", "five.toml", shape, "--format", "json"])
+        .ends(0)
+        .json();
+    let of = |key: &str| told[key].as_f64().unwrap();
+    let (jnd, last) = (of("lambda_jnd_n_per_m"), of("lambda_saturation_n_per_m"));
+    assert!(jnd < last && last < 10.0 * jnd, "{jnd} {last}");
+    place
+        .run(&["calibrate", "five.toml", shape, "--out", "out"])
+        .ends(0)
+        .says(&["unpowered steel pulls", "passive_force = false"]);
+    let folder = "out/seed/half-sphere";
+    let manifest: serde_json::Value =
+        serde_json::from_slice(&place.read(&format!("{folder}/manifest.json"))).unwrap();
+    let left_out = manifest["left_out"].as_array().unwrap();
+    let pull = left_out
+        .iter()
+        .find(|part| part["what"] == "pull of the unpowered steel")
+        .unwrap();
+    assert!(
+        pull["why"].as_str().unwrap().contains("mN at point"),
+        "{pull}"
+    );
+    place.run(&["verify", folder]).ends(0);
+}

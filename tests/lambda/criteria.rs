@@ -142,10 +142,20 @@ fn worst_point_constants_stand_between_proofs() {
         let mut free = case.clone();
         free.total = None;
         free.upper = case.upper.iter().map(|u| u * 1e4 + 1e3).collect();
+        // A driver that reverses has no lower limit either.
+        let lower = case.lower.iter();
+        free.lower = lower
+            .map(|l| if *l < 0.0 { l * 1e4 - 1e3 } else { 0.0 })
+            .collect();
         let excess = |lambda: f64| {
             let (t, gap, _) = proven(&case, lambda);
             let (t_0, gap_0, currents) = proven(&free, lambda);
-            let binds = currents.iter().zip(&free.upper).any(|(i, u)| *i > 0.5 * u);
+            let near =
+                |(i, (l, u)): (&f64, (&f64, &f64))| *i > 0.5 * u || (*l < 0.0 && *i < 0.5 * l);
+            let binds = currents
+                .iter()
+                .zip(free.lower.iter().zip(&free.upper))
+                .any(near);
             let scale = lambda * top;
             (!binds).then_some(((t - t_0) / scale, (gap + gap_0) / scale))
         };

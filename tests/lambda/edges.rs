@@ -211,6 +211,35 @@ fn malformed_problems_are_refused_with_the_place() {
     );
 }
 
+/// A coil that is nothing beside the others: its constants follow its gain as far as they can be
+/// computed, and beyond that it is refused. It once took all memory.
+#[test]
+fn a_gain_beyond_what_can_be_computed_is_refused() {
+    let weak = |gain: f64| {
+        let mut case = plain_case();
+        case.total = None;
+        case.forces.iter_mut().step_by(2).for_each(|g| *g *= gain);
+        case
+    };
+    let linear = |gain: f64| weak(gain).solve().lambda_linear_n_per_m.expect("binds");
+    let unit = linear(1e-3) / 1e-3;
+    for gain in [1e-6, 1e-12, 1e-18] {
+        let off = (linear(gain) / gain / unit - 1.0).abs();
+        assert!(off < 1e-2, "{gain}: {off}");
+    }
+    for gain in [1e-25, 1e-160, 1e-300, 1e-307, 1e-323] {
+        let case = weak(gain);
+        let refused = solve(&case.problem(), &Settings::default()).expect_err("too weak");
+        let message = refused.to_string();
+        assert!(
+            message.starts_with("coil 0 gives at most"),
+            "{gain}: {message}"
+        );
+        // The worst-point form ends, whatever the gain.
+        worst_point(&case.problem(), &Settings::default()).expect("well formed");
+    }
+}
+
 #[test]
 fn a_value_that_is_no_number_is_refused_wherever_it_stands() {
     for points in 1..=4 {

@@ -54,7 +54,7 @@ impl<'a> Search<'a> {
                 if sum_is_met && (!limited || self.case.total.is_none()) {
                     continue;
                 }
-                let Some(x) = self.stationary(lambda, &place, sum_is_met) else {
+                let Some(x) = self.stationary(lambda, &place, sum_is_met, limited) else {
                     continue;
                 };
                 if self.keeps_within(&x, limited) {
@@ -68,6 +68,12 @@ impl<'a> Search<'a> {
         best.expect("zero currents are always possible").nearest()
     }
 
+    /// Whether zero keeps coil `i`'s driver from going below (or above) it, whatever its size.
+    fn one_way(&self, i: usize) -> (bool, bool) {
+        let pulls = self.case.lower[i] < 0.0;
+        (!pulls, pulls && self.case.upper[i] == 0.0)
+    }
+
     pub fn keeps_within(&self, x: &[D], limited: bool) -> bool {
         let slip = d(1e-24);
         let size = x
@@ -76,8 +82,13 @@ impl<'a> Search<'a> {
             .fold(D::ZERO, |s, (v, &u)| s + Real::abs(*v) + d(u));
         let within = (0..x.len()).all(|i| {
             let (low, high) = (d(self.case.lower[i]), d(self.case.upper[i]));
-            x[i] >= low - slip * (size + Real::abs(low))
-                && (!limited || x[i] <= high + slip * (size + high))
+            let (of_low, of_high) = if limited {
+                (true, true)
+            } else {
+                self.one_way(i)
+            };
+            (!of_low || x[i] >= low - slip * (size + Real::abs(low)))
+                && (!of_high || x[i] <= high + slip * (size + high))
         });
         let sum = x.iter().fold(D::ZERO, |s, v| s + *v);
         let total = self.case.total.filter(|_| limited);
@@ -85,11 +96,18 @@ impl<'a> Search<'a> {
     }
 
     /// Gaussian elimination on the normal equations of the free coils; `None` if singular.
-    pub fn stationary(&self, lambda: f64, place: &[usize], sum_is_met: bool) -> Option<Vec<D>> {
+    /// Coils that are not free rest at a limit, or at zero without the drivers' size.
+    pub fn stationary(
+        &self,
+        lambda: f64,
+        place: &[usize],
+        sum_is_met: bool,
+        limited: bool,
+    ) -> Option<Vec<D>> {
         let m = place.len();
         let mut x: Vec<D> = (0..m)
             .map(|i| match place[i] {
-                0 => d(self.case.lower[i]),
+                0 if limited => d(self.case.lower[i]),
                 1 => d(self.case.upper[i]),
                 _ => D::ZERO,
             })

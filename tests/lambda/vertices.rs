@@ -15,6 +15,9 @@ pub struct Demand {
     pub offset: f64,
 }
 
+/// A.
+const BEYOND: f64 = 1e12;
+
 /// The rows of a case's limits.
 fn limits(case: &Case, limited: bool) -> Vec<Row> {
     let m = case.coils();
@@ -25,9 +28,21 @@ fn limits(case: &Case, limited: bool) -> Vec<Row> {
         row
     };
     for i in 0..m {
-        rows.push((unit(i, 1.0), d(case.lower[i]), D::ZERO));
-        if limited {
-            rows.push((unit(i, -1.0), d(-case.upper[i]), D::ZERO));
+        // Without the drivers' size only a zero that keeps a driver from reversing is left; beyond
+        // any current of interest a limit makes sure of a vertex.
+        let (low, high) = (case.lower[i], case.upper[i]);
+        let size = |v: f64, open: bool| {
+            if limited || !open {
+                v
+            } else {
+                v.signum() * BEYOND
+            }
+        };
+        let down = low < 0.0;
+        let up = high > 0.0 || !down;
+        rows.push((unit(i, 1.0), d(size(low, down)), D::ZERO));
+        if limited || down {
+            rows.push((unit(i, -1.0), d(-size(high, up)), D::ZERO));
         }
     }
     if let (true, Some(total)) = (limited, case.total) {
@@ -46,7 +61,7 @@ pub struct Vertices {
 }
 
 impl Vertices {
-    /// With all limits, or with the lower ones alone.
+    /// With all limits, or without the drivers' size.
     pub fn new(case: &Case, limited: bool) -> Self {
         let m = case.coils();
         let mut rows = Vec::new();

@@ -6,7 +6,7 @@ use std::path::Path;
 use clap::Args;
 use serde::Serialize;
 
-use super::lambda::{CriterionFlags, no_constant};
+use super::lambda::{CriterionFlags, rendered};
 use super::{accuracy_check, begin, describe, folder};
 use crate::bundle::artefact::{FLUXFORM_VERSION, SCHEMA_VERSION};
 use crate::bundle::lambda_file::WorkingPointForces;
@@ -175,17 +175,12 @@ impl Calibrate {
         let missed = |b: &BundleReport| b.lambda.accuracy_missed.clone();
         let missed: Vec<String> = report.bundles.iter().flat_map(missed).collect();
         accuracy_check(&missed)?;
-        let without: Vec<&str> = report
+        let constants: Vec<(&str, Option<f64>)> = report
             .bundles
             .iter()
-            .filter(|bundle| bundle.lambda.file.lambda_n_per_m.is_none())
-            .map(|bundle| bundle.manifest.shape.as_str())
+            .map(|b| (b.manifest.shape.as_str(), b.lambda.file.lambda_n_per_m))
             .collect();
-        if without.is_empty() {
-            Ok(())
-        } else {
-            Err(no_constant(&without))
-        }
+        rendered(&constants)
     }
 }
 

@@ -124,7 +124,7 @@ enum Wanted {
     Jnd,
     /// The largest at which no limit binds
     Linear,
-    /// The largest at which a coil still moves
+    /// The largest at which a current still changes
     Saturation,
     /// The largest with no point too weak; its currents may push too much elsewhere
     Maxmin,
@@ -207,12 +207,35 @@ impl Lambda {
             let json = printer.with_warnings(&report.file);
             printer.summary(place, &json, || summary(design, &report))?;
             accuracy_check(&report.accuracy_missed)?;
-            if report.file.lambda_n_per_m.is_none() {
-                return Err(no_constant(&[report.file.shape.as_str()]));
-            }
+            let file = &report.file;
+            rendered(&[(file.shape.as_str(), file.lambda_n_per_m)])?;
         }
         Ok(())
     }
+}
+
+/// Fails where a shape's force constant is null or zero: the result is there, but no force.
+///
+/// # Errors
+/// The shapes that no force can be rendered for.
+pub fn rendered(shapes: &[(&str, Option<f64>)]) -> Result<(), Failure> {
+    let named = |with: fn(Option<f64>) -> bool| -> Vec<&str> {
+        let those = shapes.iter().filter(|(_, lambda)| with(*lambda));
+        those.map(|(shape, _)| *shape).collect()
+    };
+    let null = named(|lambda| lambda.is_none());
+    if !null.is_empty() {
+        return Err(no_constant(&null));
+    }
+    let zero = named(|lambda| lambda == Some(0.0));
+    if zero.is_empty() {
+        return Ok(());
+    }
+    let message = format!(
+        "the chosen lambda is 0 for {}: see the warnings",
+        zero.join(", ")
+    );
+    Err(Failure::Unmet(Wish::ForceConstant, message))
 }
 
 /// The result is there, but there is no force constant.

@@ -76,6 +76,7 @@ fn infeasible(violations: &[Violation], wound: bool) -> String {
     };
     let (value, unit) = people(worst.name, worst.value);
     let (limit, _) = people(worst.name, worst.limit);
+    let [value, limit] = apart(value, limit);
     let others = violations.len() - 1;
     let besides = match others {
         0 => String::new(),
@@ -84,10 +85,33 @@ fn infeasible(violations: &[Violation], wound: bool) -> String {
     };
     format!(
         "no {kind} meets the limits: nearest to blame is {}; even the coil that misses least has \
-         {value:.5} {unit} where {limit:.5} {unit} are allowed, {:.1} % off{besides}",
+         {value} {unit} where {limit} {unit} are allowed, {:.1} % off{besides}",
         design_key(worst.name),
         worst.excess.exp_m1().abs() * 100.0
     )
+}
+
+/// Two numbers with as many digits as it takes to see that they differ, at least five.
+fn apart(a: f64, b: f64) -> [String; 2] {
+    let with = |digits: usize| {
+        [a, b].map(|value| {
+            let exponent = if value == 0.0 {
+                0
+            } else {
+                value.abs().log10().floor() as i32
+            };
+            if (-4..15).contains(&exponent) {
+                let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
+                format!("{value:.decimals$}")
+            } else {
+                format!("{value:.*e}", digits - 1)
+            }
+        })
+    };
+    (5..17)
+        .map(with)
+        .find(|[a, b]| a != b)
+        .unwrap_or_else(|| with(17))
 }
 
 /// A limit's value in the unit of its key.
@@ -291,5 +315,19 @@ fn best_coil(coil: &WoundCoil) -> BestCoil {
         current_a: coil.current_a,
         force_n: coil.force_n,
         limits: coil.limits.clone(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A limit of 1e-9 ohm was once printed as 0.00000 ohm.
+    #[test]
+    fn compared_numbers_show_what_is_compared() {
+        assert_eq!(apart(5.9e-9, 1e-9), ["5.9000e-9", "1.0000e-9"]);
+        assert_eq!(apart(6.2, 6.0), ["6.2000", "6.0000"]);
+        assert_eq!(apart(6.000_000_1, 6.0), ["6.0000001", "6.0000000"]);
+        assert_eq!(apart(0.000_31, 0.0), ["0.00031000", "0.0000"]);
     }
 }

@@ -1,6 +1,7 @@
 //! The largest force constant with no point too weak.
 
 use super::generate::Search;
+use super::path::{ActivePoint, active};
 use super::program::End;
 use super::scaled::{Form, Limits, NOTHING, Scaled};
 use crate::lambda::problem::{ForceProblem, ProblemError, Settings};
@@ -14,6 +15,8 @@ pub struct Maxmin {
     pub lambda_n_per_m: f64,
     /// Currents, A.
     pub currents_a: Vec<f64>,
+    /// The points that decide: no currents within the limits give all of them more.
+    pub active: Vec<ActivePoint>,
 }
 
 /// Solves that linear program; `None` where no height is above zero, or where not even
@@ -49,5 +52,6 @@ pub(in crate::lambda) fn largest(problem: &ForceProblem, entries: &[f64]) -> Opt
     (lambda >= 0.0).then(|| Maxmin {
         lambda_n_per_m: times_power(lambda, scaled.lambda_unit()),
         currents_a: scaled.currents_a(&piece.z),
+        active: active(&followed, piece),
     })
 }

@@ -3,8 +3,8 @@
 //!
 //! `t*(lambda) = min over I in C of max_j |lambda h_j - offset_j - (G I)_j|` with
 //! `C = {lower <= I <= upper, sum I <= total}` is convex and piecewise linear. Let t_0 be the same
-//! without upper limits and without a limit on the sum (without offset and pull it is
-//! `w_0 lambda max h`). Then
+//! without the drivers' size: of their limits only a zero that keeps a driver from reversing is left
+//! (without offset it is `w_0 lambda max h`). Then
 //!
 //! - `lambda_linear` is where t* leaves t_0,
 //! - `lambda_jnd` is the largest lambda with `t* - t_0 <= w lambda max |h|`: without offset that
@@ -20,6 +20,7 @@
 mod blocks;
 mod criteria;
 mod felt;
+mod free;
 mod generate;
 mod maxmin;
 mod path;
@@ -40,6 +41,7 @@ use crate::numerics::real::Real;
 use super::problem::{ForceProblem, ProblemError, Settings};
 use super::reduce::{largest_entries, times_power};
 use criteria::Comparison;
+use free::FreeProblem;
 use generate::{Followed, Search};
 use program::End;
 use scaled::{Form, Limits, Scaled};
@@ -96,15 +98,26 @@ pub fn worst_point(
 ) -> Result<WorstSolution, ProblemError> {
     problem.validate(settings)?;
     let largest = largest_entries(problem);
+    let open = FreeProblem::new(problem, &largest);
+    let open_problem = open.as_ref().map(|open| open.problem(problem));
     let mut scaled = Scaled::new(problem, &largest, Form::Worst, Limits::All);
-    let mut free = Scaled::new(problem, &largest, Form::Worst, Limits::Lower);
+    let mut free = Scaled::new(
+        open_problem.as_ref().unwrap_or(problem),
+        open.as_ref().map_or(&largest, |open| &open.largest),
+        Form::Worst,
+        Limits::Lower,
+    );
     let whole = |followed: &Followed| followed.end == End::Whole && !followed.pieces.is_empty();
     let mut follow = |leeway: f64| {
         scaled.leeway = leeway;
         free.leeway = leeway;
         let mut search = Search::new(&scaled, Form::Worst);
         let limited = search.follow(&scaled);
-        let unlimited = search.follow(&free);
+        // Other columns are other points to this search.
+        let unlimited = match &open_problem {
+            Some(_) => Search::new(&free, Form::Worst).follow(&free),
+            None => search.follow(&free),
+        };
         let complete = whole(&limited) && whole(&unlimited);
         (limited, unlimited, complete)
     };

@@ -190,7 +190,7 @@ impl WorstPath {
     }
 }
 
-fn active(followed: &Followed, piece: &Piece) -> Vec<ActivePoint> {
+pub(super) fn active(followed: &Followed, piece: &Piece) -> Vec<ActivePoint> {
     let mut all: Vec<ActivePoint> = piece
         .active
         .iter()

@@ -1,0 +1,192 @@
+//! Warnings about a force constant: why there is none, why it is zero, who does not feel it.
+
+use super::points::WantedPoints;
+use super::{LambdaOptions, criterion_name};
+use crate::lambda::feedback::reachable;
+use crate::lambda::{Criterion, ForceProblem, Solution, Status};
+
+/// More deciding points than this are counted, not listed.
+const LISTED: usize = 3;
+
+/// Every warning about `solution`, the points' own first.
+pub(super) fn all(
+    points: &WantedPoints,
+    problem: &ForceProblem,
+    solution: &Solution,
+    options: &LambdaOptions,
+) -> Vec<String> {
+    let mut warnings = points.warnings.clone();
+    warnings.extend(of_status(solution.status).map(str::to_owned));
+    let criterion = options.settings.criterion;
+    match &solution.chosen {
+        None if solution.status == Status::Solved => warnings.push(match criterion {
+            Criterion::Maxmin => no_maxmin(points, problem),
+            Criterion::Jnd | Criterion::Linear | Criterion::Saturation => format!(
+                "the limits never bind by the criterion {}: lambda is null; choose another with \
+                 --criterion",
+                criterion_name(criterion)
+            ),
+        }),
+        Some(chosen) if chosen.lambda_n_per_m == 0.0 => warnings.push(match criterion {
+            Criterion::Maxmin => maxmin_is_zero(points, problem, &solution.maxmin_points),
+            Criterion::Jnd | Criterion::Linear | Criterion::Saturation => format!(
+                "lambda is 0 by the criterion {}: {}",
+                criterion_name(criterion),
+                binds_at_zero(problem)
+            ),
+        }),
+        Some(chosen) => warnings.extend(
+            solution
+                .lambda_floor_n_per_m
+                .filter(|floor| chosen.lambda_n_per_m < *floor)
+                .map(|floor| {
+                    format!(
+                        "the lowest point is not felt: lambda {:.4} N/m gives it less than the \
+                         0.8 mN a finger feels (lambda_floor {floor:.4} N/m)",
+                        chosen.lambda_n_per_m
+                    )
+                }),
+        ),
+        None => {}
+    }
+    warnings
+}
+
+fn of_status(status: Status) -> Option<&'static str> {
+    match status {
+        Status::Solved => None,
+        Status::NothingWanted => {
+            Some("every height is zero: no force is wanted, so no limit binds and lambda is null")
+        }
+        Status::NothingRendered => Some(
+            "no current within the limits pushes the magnet up at these points: lambda is null; \
+             check magnet.polarity (\"repel\" for drivers that do not reverse), current_max_a and \
+             the object's place",
+        ),
+        Status::Stalled => Some(
+            "the path could not be followed to its end: numbers beyond its last breakpoint are \
+             not the minimum; please report this design and shape",
+        ),
+    }
+}
+
+/// A point's number and place.
+fn place(points: &WantedPoints, point: usize) -> String {
+    let [x, y, z] = points.positions_m[point].map(|v| v * 1e3);
+    format!("point {point} (x {x:.4}, y {y:.4}, z {z:.4} mm)")
+}
+
+/// The point at which the largest force within reach is least, and that force, N.
+fn weakest(problem: &ForceProblem) -> Option<(usize, f64)> {
+    let most = reachable(problem).ok()?.most_n.into_iter().enumerate();
+    most.reduce(|a, b| if b.1 < a.1 { b } else { a })
+}
+
+/// Why maxmin is null although forces can be rendered.
+fn no_maxmin(points: &WantedPoints, problem: &ForceProblem) -> String {
+    if problem.height_m.iter().all(|&h| h <= 0.0) {
+        return "no height is above zero, so no point can be too weak: lambda is null by the \
+                criterion maxmin"
+            .to_owned();
+    }
+    match weakest(problem) {
+        Some((point, most_n)) if most_n < 0.0 => format!(
+            "lambda is null by the criterion maxmin: at {} the pull without currents leaves the \
+             magnet {:.4} mN short of no force, whatever the currents within the limits",
+            place(points, point),
+            -most_n * 1e3
+        ),
+        _ => "lambda is null by the criterion maxmin: no currents within the limits make up for \
+              the pull without currents at all points at once"
+            .to_owned(),
+    }
+}
+
+/// Why no lambda above zero leaves every point strong enough.
+fn maxmin_is_zero(points: &WantedPoints, problem: &ForceProblem, deciding: &[usize]) -> String {
+    let height = |point: usize| problem.height_m[point];
+    match weakest(problem) {
+        Some((point, most_n)) if most_n <= 0.0 && height(point) > 0.0 => format!(
+            "lambda is 0 by the criterion maxmin: no current within the limits pushes the magnet \
+             up at {}; leave it out of the object, or bring coils nearer to it",
+            place(points, point)
+        ),
+        _ => {
+            let mut named: Vec<String> = deciding
+                .iter()
+                .take(LISTED)
+                .map(|&point| place(points, point))
+                .collect();
+            if deciding.len() > LISTED {
+                named.push(format!("{} more", deciding.len() - LISTED));
+            }
+            format!(
+                "lambda is 0 by the criterion maxmin: no currents within the limits push the magnet \
+                 up at every point at once; what helps one point pulls down at another ({}): \
+                 drivers that reverse (current_min_a) or other points help",
+                named.join(", ")
+            )
+        }
+    }
+}
+
+/// What binds before any force is rendered.
+fn binds_at_zero(problem: &ForceProblem) -> String {
+    if problem.total_max_a == Some(0.0) {
+        return "the sum of the currents may not exceed 0 A; raise total_current_max_a".to_owned();
+    }
+    let dead: Vec<String> = (0..problem.coils())
+        .filter(|&i| problem.upper_a[i] == 0.0 && problem.lower_a[i] == 0.0)
+        .filter(|&i| {
+            let mut rows = problem.forces_n_per_a.chunks_exact(problem.coils());
+            rows.any(|row| row[i] != 0.0)
+        })
+        .map(|i| i.to_string())
+        .collect();
+    if !dead.is_empty() {
+        return format!(
+            "the current limit of coil {} is 0 A; raise it, or leave coils that carry no current \
+             out of the array (positions_mm)",
+            dead.join(", ")
+        );
+    }
+    if problem.offset_n.is_some() {
+        return "the force without currents (magnet.passive_force) already asks for more current \
+                than the limits give"
+            .to_owned();
+    }
+    "a limit binds at the smallest force already".to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each reason for a lambda of zero is the one that holds.
+    #[test]
+    fn a_lambda_of_zero_is_blamed_on_what_binds() {
+        let problem = ForceProblem {
+            forces_n_per_a: &[0.7, 0.2, 0.3, 1.1],
+            height_m: &[0.05, 0.03],
+            offset_n: None,
+            weights: None,
+            lower_a: &[0.0; 2],
+            upper_a: &[1.3, 0.9],
+            total_max_a: Some(0.0),
+            resistance_ohm: &[6.0, 5.0],
+        };
+        assert!(binds_at_zero(&problem).contains("total_current_max_a"));
+        let dead = ForceProblem {
+            total_max_a: None,
+            upper_a: &[1.3, 0.0],
+            ..problem
+        };
+        assert!(binds_at_zero(&dead).contains("coil 1 is 0 A"));
+        let pulled = ForceProblem {
+            total_max_a: None,
+            offset_n: Some(&[-3.0, -3.0]),
+            ..problem
+        };
+        assert!(binds_at_zero(&pulled).contains("passive_force"));
+    }
+}
