@@ -130,26 +130,26 @@
 //! [`report`] makes pages; [`job`] joins them into what a command does; [`bench`](mod@bench) measures error
 //! against time; [`cli`] is the only room that talks.
 
-pub mod accuracy;
-pub mod progress;
-pub mod units;
+pub use fluxform_base::accuracy;
+pub use fluxform_base::progress;
+pub use fluxform_base::units;
 
-pub mod numerics;
+pub use fluxform_numerics as numerics;
 
-pub mod design;
+pub use fluxform_design as design;
 
-pub mod field;
+pub use fluxform_field as field;
 
-pub mod coil;
-pub mod map;
+pub use fluxform_coil as coil;
+pub use fluxform_map as map;
 
-pub mod shape;
+pub use fluxform_shape as shape;
 
-pub mod lambda;
+pub use fluxform_lambda as lambda;
 
-pub mod bundle;
-pub mod plot;
-pub mod report;
+pub use fluxform_bundle as bundle;
+pub use fluxform_render::plot;
+pub use fluxform_render::report;
 
 pub mod job;
 

@@ -70,7 +70,7 @@ pub fn arithmetic() -> String {
         "{} {}, {}",
         std::env::consts::ARCH,
         std::env::consts::OS,
-        crate::numerics::dispatch::instructions()
+        fluxform_numerics::dispatch::instructions()
     )
 }
 

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::artefact::{FileEntry, Input};
 use super::number::push_number;
-use crate::accuracy::StageAccuracy;
+use fluxform_base::accuracy::StageAccuracy;
 
 /// `bench.json`. Seconds in it differ from run to run; errors do not.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -6,7 +6,7 @@
 //! [`Bundle::force_per_ampere`] up to rounding. Nothing is allocated after [`ForceMap::new`].
 
 use super::load::Bundle;
-use crate::numerics::lagrange::{ORDER_NODES, stencil};
+use fluxform_numerics::lagrange::{ORDER_NODES, stencil};
 
 /// Coils summed together.
 const GROUP: usize = 4;

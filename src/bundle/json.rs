@@ -7,7 +7,6 @@ use serde::ser::{self, Serialize, Serializer};
 
 /// Why a value has no JSON.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
 pub enum JsonError {
     /// A NaN or an infinity; JSON would silently say `null`.
     #[error("{key} is not a finite number")]

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::artefact::Input;
-use crate::accuracy::StageAccuracy;
+use fluxform_base::accuracy::StageAccuracy;
 
 /// The path of e*(lambda) and the constants read off it. `null` where a limit never binds or
 /// nothing can be rendered.

@@ -22,7 +22,7 @@ use super::npz::{MapArrays, from_npz};
 use super::plain::{FILE_MAX_BYTES, check_plain, digest_plain, read_plain};
 use super::read_table::{read_currents, read_points};
 use super::table::{CurrentRow, PointRow};
-use crate::numerics::lagrange::{Cell, locate};
+use fluxform_numerics::lagrange::{Cell, locate};
 
 /// Manifests larger than this are refused unread.
 const MANIFEST_MAX_BYTES: u64 = 64 << 20;
@@ -33,7 +33,6 @@ const NAME_SHOWN: usize = 100;
 
 /// Why a bundle cannot be used.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum BundleError {
     /// There is no manifest: not a bundle.
     #[error("{path} is not a bundle: it has no manifest.json")]

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use super::artefact::{FileEntry, Input, sha256_hex};
 use super::json::to_json;
-use crate::accuracy::StageAccuracy;
-use crate::numerics::axis::Axis;
+use fluxform_base::accuracy::StageAccuracy;
+use fluxform_numerics::axis::Axis;
 
 /// The interpolation between nodes that every loader implements.
 pub const INTERPOLATION: &str = "tricubic-lagrange";
@@ -395,7 +395,7 @@ pub struct LeftOut {
 #[cfg(test)]
 mod tests {
     use super::PointsGrid;
-    use crate::numerics::axis::Axis;
+    use fluxform_numerics::axis::Axis;
 
     #[test]
     fn grid_rows_read_back() {

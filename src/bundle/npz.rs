@@ -73,7 +73,6 @@ pub struct Runtime {
 
 /// What is wrong with a `map.npz`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
 pub enum NpzError {
     /// Not a zip archive, or cut short.
     #[error("not a readable NPZ archive ({0})")]

@@ -93,7 +93,7 @@ pub fn digest_plain(path: &Path, max_bytes: u64) -> io::Result<(u64, String)> {
 #[cfg(test)]
 mod tests {
     use super::{FILE_MAX_BYTES, digest_plain, read_plain};
-    use crate::bundle::artefact::sha256_hex;
+    use crate::artefact::sha256_hex;
 
     #[test]
     #[cfg(target_os = "linux")]
@@ -116,7 +116,7 @@ mod tests {
     fn folders_devices_and_large_files_are_not_read() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a");
-        crate::bundle::atomic::write(&path, &crate::bundle::atomic::Overwrite::force(), |out| {
+        crate::atomic::write(&path, &crate::atomic::Overwrite::force(), |out| {
             std::io::Write::write_all(out, b"0123456")
         })
         .unwrap();

@@ -248,7 +248,7 @@ pub fn read_currents(name: &str, source: impl Read) -> Result<Vec<CurrentRow>, T
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bundle::table::{write_currents, write_points};
+    use crate::table::{write_currents, write_points};
 
     #[test]
     fn what_was_written_is_read_back() {

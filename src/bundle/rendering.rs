@@ -154,7 +154,7 @@ fn between(nodes: &[f64], position: f64) -> Option<(usize, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::axis::Axis;
+    use fluxform_numerics::axis::Axis;
 
     /// A saddle on uneven nodes: bilinear in every cell.
     fn grid() -> HeightGrid {

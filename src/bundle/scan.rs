@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::artefact::Input;
 use super::read_table::{TableError, read_numbered};
 use super::table::{Column, GRADIENT_COLUMNS, write_columns};
-use crate::accuracy::StageAccuracy;
+use fluxform_base::accuracy::StageAccuracy;
 
 /// Columns of field components, T.
 const FIELD: [&str; 3] = ["bx_t", "by_t", "bz_t"];

@@ -16,29 +16,27 @@ use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 
 use super::atomic::{self, Dir, Kind};
-use crate::numerics::dispatch;
+use fluxform_numerics::dispatch;
 
 /// First bytes of every entry.
 const MAGIC: &[u8; 8] = b"fluxkept";
 const DIGEST: usize = 32;
 /// Larger entries are not read.
 const ENTRY_MAX_BYTES: u64 = 16 << 30;
-/// Digest of the sources of this build.
-const BUILD: &str = env!("FLUXFORM_BUILD");
 
 /// What a value is computed from, as a digest.
 #[derive(Debug, Clone)]
 pub struct Origin(Sha256);
 
-impl Default for Origin {
-    fn default() -> Self {
+impl Origin {
+    /// The origin of what the build of this name computes with the present vector instructions.
+    #[must_use]
+    pub fn of_build(build: &str) -> Self {
         Self(Sha256::new())
-            .and(BUILD.as_bytes())
+            .and(build.as_bytes())
             .and(dispatch::instructions().as_bytes())
     }
-}
 
-impl Origin {
     /// With `part` besides; the order counts.
     #[must_use]
     pub fn and(mut self, part: &[u8]) -> Self {
@@ -208,7 +206,7 @@ mod tests {
 
     #[test]
     fn any_changed_or_missing_byte_is_noticed_and_mended() {
-        let origin = Origin::default().and_numbers([0.7]);
+        let origin = Origin::of_build("a").and_numbers([0.7]);
         let (folder, store, file) = kept(&origin);
         let damage = |bytes: &[u8]| {
             lay(folder.path(), "steel", bytes);
@@ -235,17 +233,17 @@ mod tests {
 
     #[test]
     fn another_origin_or_build_is_not_used() {
-        let origin = Origin::default().and_numbers([0.7]);
+        let origin = Origin::of_build("a").and_numbers([0.7]);
         let (_folder, store, _file) = kept(&origin);
         for other in [
-            Origin::default(),
-            Origin::default().and_numbers([0.7, 0.7]),
-            Origin::default().and_numbers([0.70001]),
+            Origin::of_build("a"),
+            Origin::of_build("a").and_numbers([0.7, 0.7]),
+            Origin::of_build("a").and_numbers([0.70001]),
             Origin(Sha256::new())
                 .and(b"another build")
                 .and_numbers([0.7]),
             Origin(Sha256::new())
-                .and(BUILD.as_bytes())
+                .and(b"a")
                 .and(b"other instructions")
                 .and_numbers([0.7]),
         ] {
@@ -258,7 +256,7 @@ mod tests {
     #[test]
     #[allow(clippy::disallowed_methods)] // a test's own files
     fn an_entry_that_was_made_in_another_folder_is_not_used() {
-        let origin = Origin::default().and_numbers([0.7]);
+        let origin = Origin::of_build("a").and_numbers([0.7]);
         let (folder, store, file) = kept(&origin);
         let mut forged = std::fs::read(&file).unwrap();
         let value = MAGIC.len() + 2 * DIGEST;
@@ -284,7 +282,7 @@ mod tests {
     #[test]
     #[allow(clippy::disallowed_methods)] // a test's own files
     fn an_entry_that_never_ends_or_is_none_of_ours_is_not_read() {
-        let origin = Origin::default();
+        let origin = Origin::of_build("a");
         let (_folder, store, file) = kept(&origin);
         let made = std::fs::File::create(&file).unwrap();
         made.set_len(ENTRY_MAX_BYTES).unwrap();
@@ -296,7 +294,7 @@ mod tests {
 
     #[test]
     fn what_killed_runs_left_is_cleared_with_the_entries() {
-        let (folder, store, _file) = kept(&Origin::default());
+        let (folder, store, _file) = kept(&Origin::of_build("a"));
         // Killed before the first byte was written: nothing tells whose it was but its name.
         lay(folder.path(), ".fluxform-7Xq.tmp", b"");
         store.clear();
@@ -307,7 +305,7 @@ mod tests {
     #[allow(clippy::disallowed_methods)] // a test's own files
     fn a_linked_store_is_neither_cleared_nor_written_to_nor_read() {
         use std::os::unix::fs::symlink;
-        let origin = Origin::default();
+        let origin = Origin::of_build("a");
         let (victim, theirs, entry) = kept(&origin);
         let place = tempfile::tempdir().unwrap();
         symlink(victim.path().join("kept"), place.path().join("kept")).unwrap();

@@ -298,7 +298,7 @@ fn invalid(message: impl Into<String>) -> io::Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bundle::npz::Runtime;
+    use crate::npz::Runtime;
 
     #[test]
     fn points_currents_and_columns() {

@@ -3,11 +3,11 @@
 use std::f64::consts::PI;
 
 use super::inductance::self_inductance_h;
-use crate::design::{Coil, Wire};
-use crate::field::winding::Winding;
-use crate::units::{
+use fluxform_base::units::{
     COPPER_DENSITY_KG_PER_M3, COPPER_TEMPERATURE_COEFFICIENT_PER_K, REFERENCE_TEMPERATURE_C,
 };
+use fluxform_design::{Coil, Wire};
+use fluxform_field::winding::Winding;
 
 /// Time constants after which a current counts as settled.
 pub const SETTLING_TIME_CONSTANTS: f64 = 5.0;

@@ -14,7 +14,6 @@ const SYMMETRIC: f64 = 1e-2;
 
 /// Why the currents of an array cannot be followed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
 pub enum DriveError {
     /// Lists of different lengths.
     #[error("expected {coils} resistances and {coils} x {coils} inductances")]

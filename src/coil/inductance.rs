@@ -11,10 +11,10 @@
 //! at t = u = 0 is moved into one variable by splitting the (t, u) rectangle along its diagonal
 //! (Duffy), and smoothed there by a power substitution.
 
-use crate::field::ring::mutual_over_mu_0;
-use crate::field::winding::Winding;
-use crate::numerics::gauss;
-use crate::units::MU_0_T_M_PER_A;
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_field::ring::mutual_over_mu_0;
+use fluxform_field::winding::Winding;
+use fluxform_numerics::gauss;
 
 /// Relative error of [`self_inductance_h`]; held by the tests against 20-digit values.
 pub const RELATIVE_ERROR: f64 = 1e-12;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::circuit::{Circuit, turns_that_fit};
-use crate::design::Design;
+use fluxform_design::Design;
 
 /// Relative difference between turns and turns that fit that counts as none.
 const FULL: f64 = 1e-12;

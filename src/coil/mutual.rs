@@ -10,10 +10,10 @@
 
 use std::f64::consts::PI;
 
-use crate::field::ring::{RingPoint, ring_field};
-use crate::field::winding::Winding;
-use crate::numerics::gauss;
-use crate::units::MU_0_T_M_PER_A;
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_field::ring::{RingPoint, ring_field};
+use fluxform_field::winding::Winding;
+use fluxform_numerics::gauss;
 
 /// Relative error of [`mutual_inductance_h`] for gaps of at least a tenth of the outer radius.
 pub const RELATIVE_ERROR: f64 = 1e-6;
@@ -92,7 +92,7 @@ fn by_rule(winding: &Winding, distance_m: f64, rule: Rule) -> f64 {
         nearest: nearest_share,
         most_nodes,
     } = rule;
-    crate::progress::poll();
+    fluxform_base::progress::poll();
     let (a1, a2) = (winding.inner_radius_m, winding.outer_radius_m);
     let length = winding.length_m;
     let floor = nearest_share * a2;

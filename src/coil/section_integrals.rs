@@ -14,7 +14,7 @@
 
 use std::sync::OnceLock;
 
-use crate::numerics::gauss;
+use fluxform_numerics::gauss;
 
 /// How exactly the integrals are wanted.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,7 +114,7 @@ pub fn section_integrals(
     length: f64,
     accuracy: &'static Accuracy,
 ) -> SectionIntegrals {
-    crate::progress::poll();
+    fluxform_base::progress::poll();
     let tolerance = accuracy.tolerance;
     let outer = inner + depth;
     let mut total = SectionIntegrals::default();
@@ -192,10 +192,10 @@ fn aligned(s: f64, t: f64, length: f64, accuracy: &'static Accuracy) -> (f64, f6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coil::inductance::self_inductance_h;
-    use crate::field::ring::mutual_over_mu_0;
-    use crate::field::winding::Winding;
-    use crate::units::MU_0_T_M_PER_A;
+    use crate::inductance::self_inductance_h;
+    use fluxform_base::units::MU_0_T_M_PER_A;
+    use fluxform_field::ring::mutual_over_mu_0;
+    use fluxform_field::winding::Winding;
 
     const SHAPES: [[f64; 3]; 10] = [
         [0.012, 0.007, 0.1],

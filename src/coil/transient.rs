@@ -32,12 +32,12 @@
 //! Left out: the coil's own eddy currents, what the core screens beyond its steel's part (1/mu_r of
 //! the whole), hysteresis, and how flux spreads along the core while it settles: the ends are lumped.
 
-use crate::accuracy::StageAccuracy;
-use crate::field::steel::bore::bore_field;
-use crate::field::winding::Winding;
-use crate::numerics::bessel::{j0_j1, zero_of_j1};
-use crate::numerics::gauss;
-use crate::units::MU_0_T_M_PER_A;
+use fluxform_base::accuracy::StageAccuracy;
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_field::steel::bore::bore_field;
+use fluxform_field::winding::Winding;
+use fluxform_numerics::bessel::{j0_j1, zero_of_j1};
+use fluxform_numerics::gauss;
 
 /// What is left of a step when it counts as settled.
 const LEFT: f64 = 0.05;
@@ -91,7 +91,6 @@ pub struct Settling {
 
 /// Why there is no settling time.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
 pub enum TransientError {
     /// An input outside its domain.
     #[error("{name}: expected {expected}, found {found:?}")]
@@ -313,7 +312,7 @@ impl Modes {
         let (mut low, mut index) = (0.0, 1);
         let mut ahead = Some(air);
         while low <= last {
-            crate::progress::poll();
+            fluxform_base::progress::poll();
             let zero = zero_of_j1(index);
             let high = match ahead {
                 Some(air) if air <= zero => {

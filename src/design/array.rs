@@ -1,6 +1,6 @@
 //! Where the coils of an array stand, and whether they overlap.
 
-use crate::units::m_from_mm;
+use fluxform_base::units::m_from_mm;
 
 /// Most coils of an array.
 pub const COILS_MAX: usize = 10_000;

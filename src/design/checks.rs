@@ -11,8 +11,8 @@ use super::reader::{Located, Sink};
 use super::sections::{CoilDraft, CoreDraft, Layout, WireDraft};
 use super::values::OneOrMany;
 use super::words::{number, twelve_digits};
-use crate::numerics::axis::Axis;
-use crate::units::{COPPER_TEMPERATURE_COEFFICIENT_PER_K, REFERENCE_TEMPERATURE_C};
+use fluxform_base::units::{COPPER_TEMPERATURE_COEFFICIENT_PER_K, REFERENCE_TEMPERATURE_C};
+use fluxform_numerics::axis::Axis;
 
 /// Most map values, coils times workspace nodes: 8 GB of doubles.
 pub const MAP_VALUES_MAX: f64 = 1e9;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::numerics::axis::Axis;
+use fluxform_numerics::axis::Axis;
 
 /// A validated design.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,7 +71,6 @@ impl Design {
 
 /// How the core's steel is described.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub enum Steel {
     /// Linear, homogeneous: mu_r.
     Linear(f64),
@@ -99,7 +98,6 @@ pub struct Core {
 
 /// How the neighbours' cores are treated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum Coupling {
     /// All cores respond to each driven coil.
     Full,
@@ -142,7 +140,6 @@ pub enum Polarity {
 
 /// How the magnet's force is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum MagnetModel {
     /// A point dipole at the magnet's centre (eq. 5).
     Dipole,

@@ -12,7 +12,7 @@ use super::sections::{self, ArrayDraft, CoilDraft, CoreDraft, Layout, MagnetDraf
 use super::sections::{SupplyDraft, WireDraft, WorkspaceDraft, axis_m};
 use super::source;
 use super::values::OneOrMany;
-use crate::units::m_from_mm;
+use fluxform_base::units::m_from_mm;
 
 /// What a command needs of a design. What it does not place may overlap: then that is a warning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

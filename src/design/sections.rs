@@ -8,8 +8,8 @@ use super::model::{ArrayGrid, Coupling, Limits, MagnetModel, Polarity};
 use super::reader::{Located, Section};
 use super::rule::{Bound, Rule, Slip};
 use super::values::OneOrMany;
-use crate::numerics::axis::Axis;
-use crate::units::{MU_0_T_M_PER_A, REFERENCE_TEMPERATURE_C, m_from_mm};
+use fluxform_base::units::{MU_0_T_M_PER_A, REFERENCE_TEMPERATURE_C, m_from_mm};
+use fluxform_numerics::axis::Axis;
 
 /// Absolute zero, C.
 const ABSOLUTE_ZERO_C: f64 = -273.15;

@@ -8,7 +8,7 @@ use super::gauge::awg_mm;
 use super::reader::{Found, Located, Section};
 use super::rule::{Bound, Rule};
 use super::words::{axis_fault, nearest, number, quoted};
-use crate::numerics::axis::Axis;
+use fluxform_numerics::axis::Axis;
 
 /// Longest name of a document, bytes.
 const NAME_MAX: usize = 100;

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::path::Path;
 
-use crate::numerics::axis::Axis;
+use fluxform_numerics::axis::Axis;
 
 /// Least similarity (Damerau-Levenshtein, normalised) at which a name is called near.
 const NEAR: f64 = 0.6;

@@ -6,9 +6,9 @@
 //! are given to the exact path.
 
 use super::winding::{AxialField, OnEdge, Winding, sheet_end};
-use crate::numerics::dispatch::{self, Kernel, LANES, Lanes};
-use crate::numerics::gauss;
-use crate::units::MU_0_T_M_PER_A;
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_numerics::dispatch::{self, Kernel, LANES, Lanes};
+use fluxform_numerics::gauss;
 
 /// Points that share one quadrature rule; fixed, so that results do not depend on threads.
 pub const CHUNK: usize = 256;
@@ -141,7 +141,7 @@ impl Winding {
             out.br_over_r = vec![0.0; r_m.len()];
         }
         for start in (0..r_m.len()).step_by(CHUNK) {
-            crate::progress::poll();
+            fluxform_base::progress::poll();
             let range = start..(start + CHUNK).min(r_m.len());
             let (r, z) = (&r_m[range.clone()], &z_m[range.clone()]);
             match self.batch_rule(Extent::of(r, z), tolerance) {
@@ -204,7 +204,7 @@ impl Winding {
         let scale = MU_0_T_M_PER_A * self.current_density_per_m2() * half;
         let mut out = Vec::with_capacity(r_m.len());
         for (r, z) in r_m.chunks(CHUNK).zip(z_m.chunks(CHUNK)) {
-            crate::progress::poll();
+            fluxform_base::progress::poll();
             let Some(rule) = self.batch_rule(Extent::of(r, z), tolerance) else {
                 for (r, z) in r.iter().zip(z) {
                     out.push(self.field(*r, *z)?.b_z);

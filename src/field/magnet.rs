@@ -13,7 +13,7 @@
 //! Closer than that the volume itself is integrated (`magnet::solid`).
 //!
 //! Nodes for the seed's magnet, and the force's error in the field of the seed's winding 8 mm off
-//! its axis, from `cargo test --test magnet -- --nocapture the_table` (upright; tilted by 23 and
+//! its axis, from `cargo test --test field magnet -- --nocapture the_table` (upright; tilted by 23 and
 //! -41 degrees needs as many on the axis, more in the volume):
 //!
 //! | height | bound 1e-3 | 1e-6 | 1e-9 | 1e-12 |
@@ -97,7 +97,6 @@ impl Sources {
 
 /// Why there is no rule.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
-#[non_exhaustive]
 pub enum NoRule {
     /// A size, distance or tolerance that is not a positive number, or a moment that is not finite.
     #[error("the magnet's size, its distance and the tolerance must be positive numbers")]

@@ -6,7 +6,7 @@
 //! tau = sum 2^(n-1) gamma_n^2, every quantity below is free of cancellation on the axis:
 //! p^2 tau is the T of the classical form, whose division by r^2 is thus carried out on paper.
 
-use crate::numerics::dual::Number;
+use fluxform_numerics::dual::Number;
 
 /// Geometry of a loop and a field point. `offset` is a - r, passed beside both radii because
 /// near the wire their difference must not be formed from rounded values.
@@ -103,7 +103,7 @@ pub fn mutual_over_mu_0(a_m: f64, b_m: f64, offset_m: f64, u_m: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::dual::Dual;
+    use fluxform_numerics::dual::Dual;
 
     /// Biot-Savart by the trapezoidal rule in azimuth: converges geometrically off the wire.
     fn by_azimuth(a: f64, r: f64, u: f64) -> (f64, f64, f64) {

@@ -23,9 +23,9 @@ use std::f64::consts::PI;
 use ellip::cel;
 
 use super::ring::{RingField, RingPoint, ring_field};
-use crate::numerics::dual::Dual;
-use crate::numerics::gauss;
-use crate::units::MU_0_T_M_PER_A;
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_numerics::dual::Dual;
+use fluxform_numerics::gauss;
 
 /// A winding of rectangular section, top face at z = 0.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -154,7 +154,7 @@ impl Winding {
     /// # Errors
     /// [`OnEdge`] on the winding's edges.
     pub fn field(&self, r_m: f64, z_m: f64) -> Result<AxialField, OnEdge> {
-        crate::progress::poll();
+        fluxform_base::progress::poll();
         let (lo, hi) = self.offsets_m(r_m);
         let bottom_m = z_m + self.length_m;
         if (lo == 0.0 || hi == 0.0) && (z_m == 0.0 || bottom_m == 0.0) {

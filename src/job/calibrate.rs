@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-
 use super::discretize::{self, PointsReport, point_rows, points_grid};
 use super::kept::{FieldStore, STORE_FOLDER, ShapeField};
 use super::lambda::{LambdaOptions, LambdaReport, solve};

@@ -12,6 +12,9 @@ use super::scene::Scene;
 use super::steel::{self, Solved};
 use crate::bundle::artefact::Input;
 use crate::bundle::store::{Origin, Store};
+
+/// Digest of the sources of this build.
+const BUILD: &str = env!("FLUXFORM_BUILD");
 use crate::design::Steel as Described;
 use crate::field::steel::array::CoupledArray;
 use crate::field::steel::inside::{Inspection, peak_depth_m};
@@ -63,7 +66,7 @@ impl FieldStore {
                 tolerance,
             )
         );
-        let mut field = Origin::default().and(parts.as_bytes());
+        let mut field = Origin::of_build(BUILD).and(parts.as_bytes());
         if let Some(Described::Curve(_)) = design.core.as_ref().map(|core| &core.steel) {
             // Along a curve the rated current counts too.
             let supply = format!("{:?}", design.supply);
@@ -168,11 +171,10 @@ impl<'a> ShapeField<'a> {
     #[must_use]
     pub fn certificate(self, document: &ShapeDocument, inputs: &[Input]) -> Entry<'a> {
         let what = format!("{document:?}");
-        let origin = inputs
-            .iter()
-            .fold(Origin::default().and(what.as_bytes()), |origin, input| {
-                origin.and(input.sha256.as_bytes())
-            });
+        let origin = inputs.iter().fold(
+            Origin::of_build(BUILD).and(what.as_bytes()),
+            |origin, input| origin.and(input.sha256.as_bytes()),
+        );
         Entry {
             store: self.kept.map(|(field, _)| &field.shapes),
             name: format!("{}.points", document.name),

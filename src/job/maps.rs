@@ -453,32 +453,3 @@ fn accuracy(map: &FieldMap, solved: &Solved, magnet: f64) -> StageAccuracy {
         method,
     }
 }
-
-/// What is sampled for a map's components.
-pub(super) fn parts_of(components: Components) -> Parts {
-    match components {
-        Components::Gz => Parts::Gz,
-        Components::Gradient => Parts::Gradient,
-        Components::All => Parts::All,
-    }
-}
-
-impl Sampler for ArraySources {
-    fn drives(&self) -> usize {
-        Self::drives(self)
-    }
-
-    fn top_m(&self) -> f64 {
-        Self::top_m(self)
-    }
-
-    fn sample(
-        &self,
-        points_m: &[[f64; 3]],
-        components: Components,
-        out: &mut [f64],
-    ) -> Result<(), MapError> {
-        Self::sample(self, points_m, parts_of(components), out);
-        Ok(())
-    }
-}

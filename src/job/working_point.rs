@@ -2,7 +2,7 @@
 
 use super::JobError;
 use super::at_current::{self, no_state};
-use super::maps::{lowest_plane, parts_of};
+use super::maps::lowest_plane;
 use super::scene::{MAGNET_SHARE, Scene, upward_n};
 use super::steel::{
     EVALUATION_SHARE, Material, SceneCore, Solved, Steel, SteelField, clearance_m, coupled,
@@ -18,6 +18,7 @@ use crate::field::steel::sources::{ArraySources, Parts};
 use crate::map::Components;
 use crate::map::sampled::SampledField;
 use crate::map::sampler::Sampler;
+use crate::map::sampler::parts_of;
 use crate::map::tabulate::{Grid, MapError, PlacedCoil, tabulate};
 use crate::progress::Progress;
 

@@ -70,7 +70,6 @@ pub struct Allocation {
 
 /// Why an allocator cannot be made.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
 pub enum AllocatorError {
     /// Lists of different lengths.
     #[error("resistances and both limits must have one entry a coil")]

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::numerics::real::Real;
+use fluxform_numerics::real::Real;
 
 use super::problem::ForceProblem;
 
@@ -112,7 +112,7 @@ pub(super) fn best_within_limits(problem: &ForceProblem, gradient: &[f64]) -> Ve
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::double_double::DoubleDouble;
+    use fluxform_numerics::double_double::DoubleDouble;
 
     #[test]
     fn the_gap_bounds_the_error_of_any_currents() {

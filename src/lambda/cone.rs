@@ -3,8 +3,8 @@
 //! Lawson and Hanson's active-set method for non-negative least squares, with
 //! two-sided variables, either sign of one-sided ones, and one equality.
 
-use crate::numerics::double_double::DoubleDouble as Num;
-use crate::numerics::real::Real;
+use fluxform_numerics::double_double::DoubleDouble as Num;
+use fluxform_numerics::real::Real;
 
 use super::model::{Factor, Model};
 
@@ -60,7 +60,7 @@ pub(super) fn solve(model: &Model, roles: &[Role], likely: &[bool], target: &[Nu
     let mut entered = None;
     let limit = 30 * (count + 3);
     for _ in 0..limit {
-        crate::progress::poll();
+        fluxform_base::progress::poll();
         let candidate = factor.solve(model, target, Num::ZERO);
         if let Some(violators) = step(roles, &basis, &mut rate, &candidate.x) {
             match entered {

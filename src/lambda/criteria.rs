@@ -2,8 +2,8 @@
 
 use std::cmp::Ordering;
 
-use crate::numerics::double_double::DoubleDouble as Num;
-use crate::numerics::real::Real;
+use fluxform_numerics::double_double::DoubleDouble as Num;
+use fluxform_numerics::real::Real;
 
 use super::follow::{Bounds, Piece, Trace};
 use super::model::Model;
@@ -231,8 +231,8 @@ fn upward_crossing(a: Num, b: Num, c: Num) -> Option<Num> {
 #[cfg(test)]
 mod tests {
     use super::{Comparison, Num, Real};
-    use crate::lambda::follow::{Bounds, Follower};
-    use crate::lambda::model::Model;
+    use crate::follow::{Bounds, Follower};
+    use crate::model::Model;
 
     /// Two opposed coils whose currents cancel, all but what rounding leaves of them, under a limit
     /// of 0 A on the sum: what binds is the limit of the first coil.

@@ -35,7 +35,6 @@ pub struct Reachable {
 
 /// Why a problem cannot be rendered with feedback.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
 pub enum FeedbackError {
     /// Not a force problem.
     #[error(transparent)]
@@ -86,7 +85,6 @@ pub struct Decided {
 
 /// Why no force constant above zero can be given to every point.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[non_exhaustive]
 pub enum NoLambda {
     /// All heights are zero.
     #[error("no force is wanted at any point")]
@@ -248,7 +246,7 @@ pub fn render(problem: &ForceProblem, lambda_n_per_m: f64) -> Result<Rendered, F
             let mut allocator = allocator.clone();
             let first = chunk * CHUNK_POINTS;
             for point in first..first + heights.len() {
-                crate::progress::poll();
+                fluxform_base::progress::poll();
                 let weight = problem.weights.map_or(1.0, |all| all[point] / heaviest);
                 sums.add(problem, &mut allocator, point, weight, lambda_n_per_m);
             }

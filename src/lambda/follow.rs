@@ -6,8 +6,8 @@
 //! breakpoint the next direction is itself a small minimisation over all constraints
 //! that are about to change, so that ties need no special case.
 
-use crate::numerics::double_double::DoubleDouble as Num;
-use crate::numerics::real::Real;
+use fluxform_numerics::double_double::DoubleDouble as Num;
+use fluxform_numerics::real::Real;
 
 use super::cone::{self, Role};
 use super::model::Model;
@@ -191,7 +191,7 @@ impl Follower<'_> {
         let mut pieces: Vec<Piece> = Vec::new();
         let limit = 200 * (self.model.count() + 2);
         for _ in 0..limit {
-            crate::progress::poll();
+            fluxform_base::progress::poll();
             let Some((piece, event)) = self.leave(&state, target) else {
                 break;
             };
@@ -232,7 +232,7 @@ impl Follower<'_> {
     fn leave(&self, state: &State, target: &Target) -> Option<(Piece, Option<Num>)> {
         let mut roles = self.roles(state, target);
         for _ in 0..=2 * self.model.count() {
-            crate::progress::poll();
+            fluxform_base::progress::poll();
             let likely: Vec<bool> = roles
                 .iter()
                 .zip(&state.place)

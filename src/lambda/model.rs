@@ -1,7 +1,7 @@
 //! Least squares over scaled currents: columns, their factorisation, an optional sum row.
 
-use crate::numerics::double_double::DoubleDouble as Num;
-use crate::numerics::real::Real;
+use fluxform_numerics::double_double::DoubleDouble as Num;
+use fluxform_numerics::real::Real;
 
 /// Columns `a_i` of one least-squares problem and the weights of its equality
 /// `sum w_i x_i = total` (a limit on the sum enters as an equality with a slack

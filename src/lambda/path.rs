@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use crate::numerics::double_double::DoubleDouble as Num;
-use crate::numerics::real::Real;
+use fluxform_numerics::double_double::DoubleDouble as Num;
+use fluxform_numerics::real::Real;
 
 use super::follow::{Bounds, Piece, Place, Trace};
 use super::model::Model;
@@ -13,7 +13,6 @@ use super::reduce::{Reduced, power_of_two, times_power};
 
 /// What changes at a breakpoint. Coils are numbered from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum Event {
     /// A coil begins to carry current.
     LeavesZero(usize),
@@ -50,7 +49,6 @@ impl fmt::Display for Event {
 
 /// A force constant at which the path turns.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct Breakpoint {
     /// Force constant, N/m.
     pub lambda_n_per_m: f64,

@@ -5,8 +5,8 @@
 //! left is a least-distance problem over the dependences, solved as Lawson and Hanson
 //! do: by non-negative least squares on its constraints.
 
-use crate::numerics::double_double::DoubleDouble as Num;
-use crate::numerics::real::Real;
+use fluxform_numerics::double_double::DoubleDouble as Num;
+use fluxform_numerics::real::Real;
 
 use super::cone::{self, Role};
 use super::follow::{Bounds, Piece, Place};

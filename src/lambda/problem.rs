@@ -39,7 +39,6 @@ const LEAST_REACH: f64 = 1e-20;
 
 /// Which force constant is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
 pub enum Criterion {
     /// The largest whose error, added by the limits, stays below the just-noticeable difference.
     #[default]
@@ -67,7 +66,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             criterion: Criterion::Jnd,
-            jnd_weight: crate::units::FORCE_JND,
+            jnd_weight: fluxform_base::units::FORCE_JND,
             at_n_per_m: None,
         }
     }
@@ -75,7 +74,6 @@ impl Default for Settings {
 
 /// Why a problem cannot be stated. Each names the entry at fault.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
 pub enum ProblemError {
     /// No points.
     #[error("no constraint points: at least one height is needed")]

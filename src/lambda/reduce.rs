@@ -8,9 +8,9 @@
 
 use rayon::prelude::*;
 
-use crate::numerics::double_double::DoubleDouble as Num;
-use crate::numerics::qr::{Triangle, triangular_factor};
-use crate::numerics::real::Real;
+use fluxform_numerics::double_double::DoubleDouble as Num;
+use fluxform_numerics::qr::{Triangle, triangular_factor};
+use fluxform_numerics::real::Real;
 
 use super::follow::Bounds;
 use super::model::{Factor, Model};

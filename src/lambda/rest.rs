@@ -16,8 +16,8 @@
 //! relative change `d` of the forces would move beyond `lambda_k` cost about `d^2`: ties are those to
 //! about 3e-8.
 
-use crate::numerics::double_double::DoubleDouble as Num;
-use crate::numerics::real::Real;
+use fluxform_numerics::double_double::DoubleDouble as Num;
+use fluxform_numerics::real::Real;
 
 use super::follow::{Piece, Trace};
 

@@ -1,9 +1,9 @@
 //! The whole of eq. 9 and 10 for one object: precision, path, criteria, certificate.
 
-use crate::accuracy::StageAccuracy;
-use crate::numerics::double_double::DoubleDouble as Num;
-use crate::numerics::real::Real;
-use crate::units::DETECTION_THRESHOLD_N;
+use fluxform_base::accuracy::StageAccuracy;
+use fluxform_base::units::DETECTION_THRESHOLD_N;
+use fluxform_numerics::double_double::DoubleDouble as Num;
+use fluxform_numerics::real::Real;
 
 use super::certificate;
 use super::criteria::Comparison;
@@ -24,7 +24,6 @@ const FLAW: f64 = 1e-8;
 
 /// How far a solution may be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum Status {
     /// The path is exact.
     Solved,
@@ -47,7 +46,6 @@ pub enum Precision {
 
 /// Currents at one force constant and what they are worth.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct OperatingPoint {
     /// Force constant, N/m.
     pub lambda_n_per_m: f64,
@@ -65,7 +63,6 @@ pub struct OperatingPoint {
 
 /// The path, the force constants and the currents of one object.
 #[derive(Debug, Clone)]
-#[non_exhaustive]
 pub struct Solution {
     /// Where the first limit binds, N/m; `None`: none ever does.
     pub lambda_linear_n_per_m: Option<f64>,

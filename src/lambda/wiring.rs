@@ -13,7 +13,6 @@ pub struct Wiring {
 
 /// Why coils cannot be wired like that.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
 pub enum WiringError {
     /// No such coil.
     #[error("coil {coil} is not in the array: its coils are numbered 0 to {last}")]

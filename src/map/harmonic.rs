@@ -9,9 +9,9 @@ use rayon::prelude::*;
 
 use super::sampler::{GRADIENT, Sampler, series};
 use super::tabulate::{Components, MapError};
-use crate::numerics::laplace::Laplace;
-use crate::numerics::matrix::{product, transpose};
-use crate::numerics::spectral::Spectral;
+use fluxform_numerics::laplace::Laplace;
+use fluxform_numerics::matrix::{product, transpose};
+use fluxform_numerics::spectral::Spectral;
 
 /// A box, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -204,7 +204,7 @@ impl Table {
             .map(|samples| {
                 let mut u = vec![0.0; plane * z.len()];
                 for (k, out) in u.chunks_exact_mut(plane).enumerate() {
-                    crate::progress::poll();
+                    fluxform_base::progress::poll();
                     transfers[k].spread(&layers[k], &samples[asked[k]..asked[k + 1]], out);
                 }
                 laplace.fill(&mut u);

@@ -3,14 +3,13 @@
 use serde::{Deserialize, Serialize};
 
 use super::tabulate::{Components, FieldMap, Grid, MapError, PlacedCoil, tabulate};
-use crate::field::source::AxialSource;
-use crate::numerics::lagrange;
-use crate::progress::Silent;
+use fluxform_base::progress::Silent;
+use fluxform_field::source::AxialSource;
+use fluxform_numerics::lagrange;
 
 /// The largest error found, relative to the largest |dB_z/dz| at its height, and at how many
 /// places it was looked for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[non_exhaustive]
 pub struct InterpolationError {
     /// Relative error.
     pub largest: f64,

@@ -10,7 +10,7 @@
 use rayon::prelude::*;
 
 use super::multipole::{PARTS, Source, magnitudes};
-use crate::numerics::qr::{Triangle, triangular_factor};
+use fluxform_numerics::qr::{Triangle, triangular_factor};
 
 /// Sources of one kind on every axis.
 #[derive(Debug, Clone, Copy, PartialEq)]

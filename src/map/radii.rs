@@ -44,7 +44,7 @@ impl Radii {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::axis::Axis;
+    use fluxform_numerics::axis::Axis;
 
     #[test]
     fn the_seed_grid_repeats_its_radii() {

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::harmonic::{Extent, Table, kind};
 use super::sampler::{GRADIENT, Sampler, gz, series, tensor};
 use super::tabulate::{Components, FieldMap, Grid, MapError, PlacedCoil};
-use crate::progress::Progress;
+use fluxform_base::progress::Progress;
 
 /// The field of every drive over a workspace, to a tolerance relative to the largest component
 /// of the gradient (of the field) at each height.

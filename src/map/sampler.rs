@@ -1,5 +1,7 @@
 //! What a map needs of a source without symmetry: an array whose cores all answer to every coil.
 
+use fluxform_field::steel::sources::{ArraySources, Parts};
+
 use super::tabulate::{Components, MapError};
 
 /// An array of coils, each of which can be driven with 1 A. Above [`Sampler::top_m`] every
@@ -53,4 +55,34 @@ pub(super) fn gz(components: Components) -> usize {
 /// The nine components of the gradient from its five.
 pub(super) fn tensor([xx, xy, xz, yz, zz]: [f64; GRADIENT]) -> [f64; 9] {
     [xx, xy, xz, xy, -xx - zz, yz, xz, yz, zz]
+}
+
+/// What is sampled for a map's components.
+#[must_use]
+pub fn parts_of(components: Components) -> Parts {
+    match components {
+        Components::Gz => Parts::Gz,
+        Components::Gradient => Parts::Gradient,
+        Components::All => Parts::All,
+    }
+}
+
+impl Sampler for ArraySources {
+    fn drives(&self) -> usize {
+        Self::drives(self)
+    }
+
+    fn top_m(&self) -> f64 {
+        Self::top_m(self)
+    }
+
+    fn sample(
+        &self,
+        points_m: &[[f64; 3]],
+        components: Components,
+        out: &mut [f64],
+    ) -> Result<(), MapError> {
+        Self::sample(self, points_m, parts_of(components), out);
+        Ok(())
+    }
 }

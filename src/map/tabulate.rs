@@ -9,17 +9,16 @@ use serde::{Deserialize, Serialize};
 use rayon::prelude::*;
 
 use super::radii::Radii;
-use crate::field::batch::Wanted;
-use crate::field::frame::to_cartesian;
-use crate::field::source::AxialSource;
-use crate::field::winding::{AxialField, OnEdge};
-use crate::numerics::chebyshev::{Evaluation, Layout};
-use crate::numerics::dispatch;
-use crate::progress::{Interrupted, Progress};
+use fluxform_base::progress::{Interrupted, Progress};
+use fluxform_field::batch::Wanted;
+use fluxform_field::frame::to_cartesian;
+use fluxform_field::source::AxialSource;
+use fluxform_field::winding::{AxialField, OnEdge};
+use fluxform_numerics::chebyshev::{Evaluation, Layout};
+use fluxform_numerics::dispatch;
 
 /// What a map holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum Components {
     /// dB_z/dz.
     Gz,
@@ -57,7 +56,6 @@ pub struct FieldMap {
 
 /// Why a map could not be made.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum MapError {
     /// A node lies on an edge of a source.
     #[error(transparent)]

@@ -144,7 +144,7 @@ fn clenshaw<const FMA: bool>(series: &[f64], x: Lanes) -> Lanes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::dispatch;
+    use crate::dispatch;
 
     #[test]
     fn the_error_stays_below_the_tolerance() {

@@ -37,7 +37,7 @@ pub fn gmres(
     let mut triangles: Vec<Triangle> = norms.iter().map(|n| Triangle::new(*n)).collect();
     let mut relative_residual = f64::from(u8::from(norms.iter().any(|n| *n > 0.0)));
     while relative_residual > tolerance && basis.len() <= most {
-        crate::progress::poll();
+        fluxform_base::progress::poll();
         let mut next = apply(&basis[basis.len() - 1]);
         for (column, triangle) in triangles.iter_mut().enumerate() {
             let mut entries = Vec::with_capacity(basis.len() + 1);

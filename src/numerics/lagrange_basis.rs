@@ -99,7 +99,7 @@ impl Basis {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::gauss;
+    use crate::gauss;
 
     #[test]
     fn interpolates_differentiates_and_integrates_polynomials() {

@@ -89,7 +89,7 @@ pub fn triangular_factor<T: Real>(
         let mut factor = Triangle::zero(columns);
         let mut block = vec![T::ZERO; CHUNK_ROWS * columns];
         for start in (group * group_rows..end).step_by(CHUNK_ROWS) {
-            crate::progress::poll();
+            fluxform_base::progress::poll();
             let range = start..end.min(start + CHUNK_ROWS);
             let filled = range.len();
             fill(range, &mut block, CHUNK_ROWS);
@@ -112,7 +112,7 @@ pub fn triangular_factor<T: Real>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::double_double::DoubleDouble;
+    use crate::double_double::DoubleDouble;
 
     /// A full, badly balanced matrix whose entries are exact in both precisions.
     fn entry(i: usize, j: usize) -> f64 {

@@ -2,14 +2,14 @@
 
 use std::collections::HashMap;
 
-use crate::shape::archive::{Archive, text_of};
-use crate::shape::assembly::{Affine, Body, corner, lay_out};
-use crate::shape::document::parse_unit;
-use crate::shape::fault::ReadError;
-use crate::shape::mesh::FileMesh;
-use crate::shape::number::Numbers;
-use crate::shape::placement::sin_cos_deg;
-use crate::shape::xml::{Document, Element, Step};
+use crate::archive::{Archive, text_of};
+use crate::assembly::{Affine, Body, corner, lay_out};
+use crate::document::parse_unit;
+use crate::fault::ReadError;
+use crate::mesh::FileMesh;
+use crate::number::Numbers;
+use crate::placement::sin_cos_deg;
+use crate::xml::{Document, Element, Step};
 
 /// Reads an AMF file's bytes. Without a unit it is in millimetres.
 ///
@@ -59,7 +59,7 @@ impl Reader {
         let mut document = Document::new(part, text);
         let mut any = false;
         loop {
-            crate::progress::poll();
+            fluxform_base::progress::poll();
             let step = document.step()?;
             match step {
                 Step::Start(e) => {

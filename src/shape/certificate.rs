@@ -3,21 +3,20 @@
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-use crate::accuracy::StageAccuracy;
-use crate::progress::{Interrupted, Progress};
-use crate::shape::deviation::{
+use crate::deviation::{
     Faces, Interval, Lattice, Vertical, hausdorff, primitive, primitive_by_cell, vertical,
     vertical_by_cell,
 };
-use crate::shape::error::ShapeError;
-use crate::shape::height::{Grid, Sample};
-use crate::shape::mesh::{Mesh, MeshFacts};
-use crate::shape::surface::Surface;
-use crate::shape::tessellation::estimated_deviation_m;
+use crate::error::ShapeError;
+use crate::height::{Grid, Sample};
+use crate::mesh::{Mesh, MeshFacts};
+use crate::surface::Surface;
+use crate::tessellation::estimated_deviation_m;
+use fluxform_base::accuracy::StageAccuracy;
+use fluxform_base::progress::{Interrupted, Progress};
 
 /// How much is looked into.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
 pub enum Certify {
     /// Heights alone.
     #[default]

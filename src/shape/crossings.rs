@@ -6,8 +6,8 @@
 
 use rayon::prelude::*;
 
-use crate::shape::boxes::{Box3, BoxTree};
-use crate::shape::mesh::{Triangle, cross, minus};
+use crate::boxes::{Box3, BoxTree};
+use crate::mesh::{Triangle, cross, minus};
 
 /// Parts into which the search is cut, about.
 const PARTS: usize = 256;
@@ -112,7 +112,7 @@ impl Search<'_> {
         let mut looked = 0;
         let mut open = vec![part];
         while let Some([a, b]) = open.pop() {
-            crate::progress::poll();
+            fluxform_base::progress::poll();
             if self.halve([a, b], &mut |pair| open.push(pair)) {
                 continue;
             }

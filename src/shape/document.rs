@@ -6,7 +6,7 @@ mod read;
 
 use std::path::PathBuf;
 
-use crate::numerics::axis::Axis;
+use fluxform_numerics::axis::Axis;
 
 pub use format::{SurfaceFormat, parse_unit, unit_name};
 pub use raw::{RawSurface, RawSurfaceError};
@@ -29,7 +29,6 @@ pub struct ShapeDocument {
 
 /// Where a surface comes from.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub enum SurfaceSource {
     /// A file, path resolved against the shape file's folder, and metres per file unit
     /// as the user states it; where the format itself carries the unit, `None` will do.
@@ -45,7 +44,6 @@ pub enum SurfaceSource {
 
 /// The seed's shapes, exact (physics.md 8).
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
 pub enum Primitive {
     /// A horizontal square.
     Flat {

@@ -2,14 +2,13 @@
 
 use std::path::PathBuf;
 
-use crate::progress::Interrupted;
-use crate::shape::document::SurfaceFormat;
-use crate::shape::fault::ReadError;
-use crate::shape::stl::StlError;
+use crate::document::SurfaceFormat;
+use crate::fault::ReadError;
+use crate::stl::StlError;
+use fluxform_base::progress::Interrupted;
 
 /// A shape that gives no constraint points. Lengths are metres inside, millimetres in messages.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum ShapeError {
     /// The surface's path cannot be read as a file.
     #[error("{}: {what}", path.display())]

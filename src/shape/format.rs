@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use crate::shape::document::SurfaceFormat;
-use crate::shape::error::ShapeError;
-use crate::shape::fault::ReadError;
-use crate::shape::mesh::FileMesh;
-use crate::shape::{amf, obj, ply, sldprt, stl, three_dxml, three_mf};
+use crate::document::SurfaceFormat;
+use crate::error::ShapeError;
+use crate::fault::ReadError;
+use crate::mesh::FileMesh;
+use crate::{amf, obj, ply, sldprt, stl, three_dxml, three_mf};
 
 impl SurfaceFormat {
     /// The triangles of a file's bytes, in the file's unit; `path` names it in messages.
@@ -28,7 +28,7 @@ impl SurfaceFormat {
             Self::ThreeDxml => three_dxml::read,
             Self::Sldprt => sldprt::read,
             #[cfg(feature = "step")]
-            Self::Step => crate::shape::step::read,
+            Self::Step => crate::step::read,
             #[cfg(not(feature = "step"))]
             Self::Step => step,
         };

@@ -10,10 +10,10 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use crate::numerics::axis::Axis;
-use crate::progress::{Interrupted, Progress};
-use crate::shape::mesh::{Mesh, Triangle};
-use crate::shape::seen::{Contact, Seen, WALL_NORMAL_Z, upward_normal};
+use crate::mesh::{Mesh, Triangle};
+use crate::seen::{Contact, Seen, WALL_NORMAL_Z, upward_normal};
+use fluxform_base::progress::{Interrupted, Progress};
+use fluxform_numerics::axis::Axis;
 
 /// How many coordinate roundings a point may lie off an edge: x and y of its ends are rounded
 /// (1.4), by some programs twice (metres to millimetres, say).

@@ -1,10 +1,9 @@
 //! Grid points without surface inside the silhouette: found, and filled when asked to.
 
-use crate::shape::height::{Grid, Sample};
+use crate::height::{Grid, Sample};
 
 /// What is done with holes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
 pub enum Holes {
     /// They give no points, like what lies outside.
     #[default]
@@ -72,7 +71,7 @@ pub fn fill(grid: &Grid, samples: &mut [Option<Sample>], holes: &[usize]) {
     // Successive over-relaxation with the factor that suits the longest hole there can be.
     let factor = 2.0 / (1.0 + (std::f64::consts::PI / (longest + 1) as f64).sin());
     for _ in 0..SWEEPS * longest {
-        crate::progress::poll();
+        fluxform_base::progress::poll();
         let mut change = 0.0_f64;
         for &index in holes {
             let around = neighbours(grid, index).map(|k| height(samples, k));

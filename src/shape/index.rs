@@ -4,8 +4,8 @@ use std::ops::RangeInclusive;
 
 use rayon::prelude::*;
 
-use crate::shape::mesh::{Mesh, Triangle};
-use crate::shape::seen::Seen;
+use crate::mesh::{Mesh, Triangle};
+use crate::seen::Seen;
 
 /// Buckets a side, at most.
 const MOST_A_SIDE: usize = 2048;
@@ -164,10 +164,10 @@ impl Raster {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shape::document::Placement;
-    use crate::shape::mesh::FileMesh;
-    use crate::shape::placement::Transform;
-    use crate::shape::seen::Contact;
+    use crate::document::Placement;
+    use crate::mesh::FileMesh;
+    use crate::placement::Transform;
+    use crate::seen::Contact;
 
     fn index(triangles: Vec<Triangle>) -> (Mesh, Index) {
         let file = FileMesh {

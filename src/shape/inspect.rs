@@ -8,16 +8,16 @@ use std::path::Path;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::numerics::axis::Axis;
-use crate::shape::crossings::crossings;
-use crate::shape::document::{Placement, SurfaceFormat};
-use crate::shape::edges::{Edges, WELD_ROUNDINGS, bodies, weld};
-use crate::shape::error::ShapeError;
-use crate::shape::height::Grid;
-use crate::shape::mesh::{FileMesh, Mesh, Triangle, cross, minus};
-use crate::shape::placement::Transform;
-use crate::shape::scattered::Probe;
-use crate::shape::surface::{Surface, read_mesh};
+use crate::crossings::crossings;
+use crate::document::{Placement, SurfaceFormat};
+use crate::edges::{Edges, WELD_ROUNDINGS, bodies, weld};
+use crate::error::ShapeError;
+use crate::height::Grid;
+use crate::mesh::{FileMesh, Mesh, Triangle, cross, minus};
+use crate::placement::Transform;
+use crate::scattered::Probe;
+use crate::surface::{Surface, read_mesh};
+use fluxform_numerics::axis::Axis;
 
 /// What a surface file holds. Lengths are in the file's unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -1,8 +1,8 @@
 //! What a point is besides a height: on a wall, a rim, a crease, under or over other sheets.
 
-use crate::shape::height::{Sample, sample_of};
-use crate::shape::mesh::{Triangle, dot, minus};
-use crate::shape::seen::{Contact, Seen, WALL_NORMAL_Z, upward_normal};
+use crate::height::{Sample, sample_of};
+use crate::mesh::{Triangle, dot, minus};
+use crate::seen::{Contact, Seen, WALL_NORMAL_Z, upward_normal};
 
 /// Faces that turn by less are neighbours on a curved surface, degrees.
 pub const CREASE_DEG: f64 = 20.0;

@@ -1,7 +1,7 @@
 //! A triangle soup in metres and the facts about it.
 
-use crate::shape::error::ShapeError;
-use crate::shape::placement::Transform;
+use crate::error::ShapeError;
+use crate::placement::Transform;
 
 /// Three vertices, x, y, z each.
 pub type Triangle = [[f64; 3]; 3];

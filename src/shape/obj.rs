@@ -3,11 +3,11 @@
 //! Indices count from 1, negative ones back from the last vertex so far. Colours after a vertex,
 //! texture and normal indices are not used. The file carries no unit.
 
-use crate::shape::fault::{Place, ReadError};
-use crate::shape::mesh::FileMesh;
-use crate::shape::number::{Numbers, shown};
-use crate::shape::polygon::{Cutter, MOST_CORNERS};
-use crate::shape::words::Lines;
+use crate::fault::{Place, ReadError};
+use crate::mesh::FileMesh;
+use crate::number::{Numbers, shown};
+use crate::polygon::{Cutter, MOST_CORNERS};
+use crate::words::Lines;
 
 /// Reads an OBJ file's bytes; names may be in any encoding.
 ///
@@ -17,7 +17,7 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
     let mut reader = Reader::default();
     let mut lines = Lines::new(bytes);
     while let Some(line) = lines.next_line() {
-        crate::progress::poll();
+        fluxform_base::progress::poll();
         let mut words = line.words();
         let told = |what| ReadError::new(Place::Line(line.number), what);
         match words.next() {

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::shape::document::Placement;
+use crate::document::Placement;
 
 /// Unit and placement as one map of points; right angles rotate exactly.
 #[derive(Debug, Clone, PartialEq)]
@@ -91,7 +91,7 @@ fn rotation(rotate_deg: [f64; 3]) -> Matrix3<f64> {
 #[cfg(test)]
 mod tests {
     use super::{Transform, sin_cos_deg};
-    use crate::shape::document::Placement;
+    use crate::document::Placement;
 
     fn turned(rotate_deg: [f64; 3]) -> Transform {
         Transform::new(

@@ -12,10 +12,10 @@ use ply_rs_bw::ply::{
     ScalarType,
 };
 
-use crate::shape::fault::ReadError;
-use crate::shape::mesh::FileMesh;
-use crate::shape::number::{F32_ROUNDING, shown};
-use crate::shape::polygon::{Cutter, MOST_CORNERS};
+use crate::fault::ReadError;
+use crate::mesh::FileMesh;
+use crate::number::{F32_ROUNDING, shown};
+use crate::polygon::{Cutter, MOST_CORNERS};
 
 /// Elements that the parser makes at once: it allocates for each.
 const AT_ONCE: usize = 1 << 12;
@@ -71,7 +71,7 @@ fn each<E: PropertyAccess>(
     let mut some = element.clone();
     let mut left = element.count;
     while left > 0 {
-        crate::progress::poll();
+        fluxform_base::progress::poll();
         some.count = left.min(AT_ONCE);
         left -= some.count;
         let read = Parser::new().read_payload_for_element(reader, &some, header);

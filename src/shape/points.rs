@@ -2,18 +2,18 @@
 
 use rayon::prelude::*;
 
-use crate::accuracy::StageAccuracy;
-use crate::numerics::axis::Axis;
-use crate::progress::{Interrupted, Progress};
-use crate::shape::certificate::{Certificate, Certify, by_cell, certify};
-use crate::shape::document::{AxisRequest, ShapeDocument};
-use crate::shape::error::ShapeError;
-use crate::shape::height::{Grid, Sample};
-use crate::shape::holes::{self, Holes};
-use crate::shape::marks::Marks;
-use crate::shape::mesh::{Bounds, MeshFacts};
-use crate::shape::scattered::Probe;
-use crate::shape::surface::Surface;
+use crate::certificate::{Certificate, Certify, by_cell, certify};
+use crate::document::{AxisRequest, ShapeDocument};
+use crate::error::ShapeError;
+use crate::height::{Grid, Sample};
+use crate::holes::{self, Holes};
+use crate::marks::Marks;
+use crate::mesh::{Bounds, MeshFacts};
+use crate::scattered::Probe;
+use crate::surface::Surface;
+use fluxform_base::accuracy::StageAccuracy;
+use fluxform_base::progress::{Interrupted, Progress};
+use fluxform_numerics::axis::Axis;
 
 /// More grid points than this are refused: their files and matrices fit no computer.
 const MOST_POINTS: usize = 100_000_000;
@@ -24,7 +24,6 @@ const MARKED_BETWEEN_LOOKS: usize = 4096;
 
 /// The points of a grid that lie on the surface, m; columns of equal length.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct ConstraintPoints {
     /// The grid they were taken from.
     pub grid: Grid,
@@ -48,7 +47,6 @@ pub struct ConstraintPoints {
 
 /// Figures that sum the points up.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
 pub struct PointFacts {
     /// Number of points.
     pub points: usize,
@@ -114,7 +112,6 @@ impl ConstraintPoints {
 
 /// What discretising a document gives.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct Discretized {
     /// The constraint points.
     pub points: ConstraintPoints,

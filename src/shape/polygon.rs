@@ -2,7 +2,7 @@
 
 use earcut::Earcut;
 
-use crate::shape::mesh::{Triangle, cross, dot, minus};
+use crate::mesh::{Triangle, cross, dot, minus};
 
 /// A face with more corners was not written by a program that draws faces, and to cut it could
 /// take minutes.

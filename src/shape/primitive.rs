@@ -1,10 +1,10 @@
 //! The seed's four shapes as formulas: exact heights and normals, borders inclusive.
 
-use crate::shape::document::{Placement, Primitive};
-use crate::shape::error::ShapeError;
-use crate::shape::height::Sample;
-use crate::shape::mesh::Bounds;
-use crate::shape::placement::sin_cos_deg;
+use crate::document::{Placement, Primitive};
+use crate::error::ShapeError;
+use crate::height::Sample;
+use crate::mesh::Bounds;
+use crate::placement::sin_cos_deg;
 
 /// Roundings of the largest coordinate within which a point lies on a border.
 const BORDER_EPSILONS: f64 = 8.0;
@@ -185,8 +185,8 @@ fn circle(radius: f64, distance: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::PlacedPrimitive;
-    use crate::numerics::axis::Axis;
-    use crate::shape::document::{Placement, Primitive};
+    use crate::document::{Placement, Primitive};
+    use fluxform_numerics::axis::Axis;
 
     const HALF_SPHERE: Primitive = Primitive::HalfSphere {
         radius_m: 0.05,

@@ -3,15 +3,15 @@
 pub mod adaptive;
 pub mod poisson;
 
-use crate::shape::deviation::{Faces, Patch, Rect, primitive};
-use crate::shape::edges::{Edges, WELD_ROUNDINGS, weld};
-use crate::shape::error::ShapeError;
-use crate::shape::height::{Grid, Sample, reach_m};
-use crate::shape::index::Index;
-use crate::shape::marks::{self, Marks, Rules};
-use crate::shape::mesh::Mesh;
-use crate::shape::primitive::PlacedPrimitive;
-use crate::shape::surface::Surface;
+use crate::deviation::{Faces, Patch, Rect, primitive};
+use crate::edges::{Edges, WELD_ROUNDINGS, weld};
+use crate::error::ShapeError;
+use crate::height::{Grid, Sample, reach_m};
+use crate::index::Index;
+use crate::marks::{self, Marks, Rules};
+use crate::mesh::Mesh;
+use crate::primitive::PlacedPrimitive;
+use crate::surface::Surface;
 
 /// More points than this are refused.
 const MOST_POINTS: usize = 5_000_000;
@@ -150,7 +150,7 @@ impl<'a> Probe<'a> {
         match &self.kind {
             Kind::Mesh { faces, .. } => faces.deviation_m(patch, among),
             Kind::Primitive(shape) => {
-                let axis = |k: usize| crate::numerics::axis::Axis {
+                let axis = |k: usize| fluxform_numerics::axis::Axis {
                     from: patch.rect.low_m[k],
                     to: patch.rect.high_m[k],
                     samples: 2,

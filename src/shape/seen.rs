@@ -3,10 +3,10 @@
 //! Vertices are put into one canonical order first, so that neighbours evaluate a shared edge
 //! identically and orientation does not matter. Sides are decided by exact predicates.
 
-use crate::numerics::double_double::DoubleDouble;
+use fluxform_numerics::double_double::DoubleDouble;
 use robust::{Coord, orient2d};
 
-use crate::shape::mesh::{Triangle, cross, minus};
+use crate::mesh::{Triangle, cross, minus};
 
 /// |n_z| below which a sliver in plan is taken as a vertical wall.
 pub(super) const WALL_NORMAL_Z: f64 = 1e-4;

@@ -5,15 +5,15 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use crate::design::named_file::{self, NamedFileError};
-use crate::progress::Progress;
-use crate::shape::document::{Placement, ShapeDocument, SurfaceFormat, SurfaceSource, unit_name};
-use crate::shape::error::ShapeError;
-use crate::shape::height::{self, Grid, Sample};
-use crate::shape::mesh::{Bounds, FileMesh, Mesh, MeshFacts};
-use crate::shape::placement::Transform;
-use crate::shape::primitive::PlacedPrimitive;
-use crate::shape::stl::{self, StlError};
+use crate::document::{Placement, ShapeDocument, SurfaceFormat, SurfaceSource, unit_name};
+use crate::error::ShapeError;
+use crate::height::{self, Grid, Sample};
+use crate::mesh::{Bounds, FileMesh, Mesh, MeshFacts};
+use crate::placement::Transform;
+use crate::primitive::PlacedPrimitive;
+use crate::stl::{self, StlError};
+use fluxform_base::progress::Progress;
+use fluxform_design::named_file::{self, NamedFileError};
 
 /// Larger files fit no computer's memory together with what is made of them, bytes (8 GiB).
 const LARGEST_FILE: u64 = 8 << 30;
@@ -175,7 +175,7 @@ fn check_placement(placement: &Placement) -> Result<(), ShapeError> {
 }
 
 /// A regular file's bytes.
-pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
+pub fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
     let what = |error: NamedFileError| match error {
         NamedFileError::Unreadable(error) => match error.kind() {
             io::ErrorKind::NotFound => {

@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use crate::shape::mesh::{Mesh, cross, dot, minus};
+use crate::mesh::{Mesh, cross, dot, minus};
 
 /// Turns beyond this are edges of the body, not of the tessellation, degrees.
 const SHARPEST_DEG: f64 = 20.0;

@@ -7,13 +7,13 @@
 
 use std::collections::HashMap;
 
-use crate::shape::archive::Archive;
-use crate::shape::assembly::{Affine, Body, corner, lay_out};
-use crate::shape::fault::{Place, ReadError};
-use crate::shape::mesh::{FileMesh, Triangle};
-use crate::shape::number::Numbers;
-use crate::shape::three_mf::transform;
-use crate::shape::xml::{Document, Element, Step};
+use crate::archive::Archive;
+use crate::assembly::{Affine, Body, corner, lay_out};
+use crate::fault::{Place, ReadError};
+use crate::mesh::{FileMesh, Triangle};
+use crate::number::Numbers;
+use crate::three_mf::transform;
+use crate::xml::{Document, Element, Step};
 
 /// Reads a 3DXML file's bytes.
 ///
@@ -72,7 +72,7 @@ impl Structure {
         let mut open = Instance::default();
         let mut document = Document::new(part, text);
         loop {
-            crate::progress::poll();
+            fluxform_base::progress::poll();
             let step = document.step()?;
             let told = |what: String| document.fault(what);
             match step {

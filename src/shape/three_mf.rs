@@ -6,13 +6,13 @@
 
 use std::collections::{HashMap, HashSet};
 
-use crate::shape::archive::Archive;
-use crate::shape::assembly::{Affine, Body, corner, lay_out};
-use crate::shape::document::parse_unit;
-use crate::shape::fault::{Place, ReadError};
-use crate::shape::mesh::FileMesh;
-use crate::shape::number::Numbers;
-use crate::shape::xml::{Document, Element, Step};
+use crate::archive::Archive;
+use crate::assembly::{Affine, Body, corner, lay_out};
+use crate::document::parse_unit;
+use crate::fault::{Place, ReadError};
+use crate::mesh::FileMesh;
+use crate::number::Numbers;
+use crate::xml::{Document, Element, Step};
 
 /// More model parts than this belong to no surface.
 const MOST_PARTS: usize = 1000;
@@ -50,7 +50,7 @@ fn root_part(archive: &mut Archive<'_>) -> Result<String, ReadError> {
         let text = archive.text(&name)?;
         let mut document = Document::new(&name, &text);
         loop {
-            crate::progress::poll();
+            fluxform_base::progress::poll();
             match document.step()? {
                 Step::Start(e)
                     if e.name() == "Relationship"

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use fluxform::design::bh_table::read_bh_table;
-use fluxform::design::{Coupling, Design, Limits, MagnetModel, Need, Polarity, Steel};
+use fluxform_design::bh_table::read_bh_table;
+use fluxform_design::{Coupling, Design, Limits, MagnetModel, Need, Polarity, Steel};
 
 use crate::support::{CORED, SOUND, but, read, sound, sound_but};
 

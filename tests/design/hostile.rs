@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use fluxform::design::bh_table::{BhTable, read_bh_table};
-use fluxform::design::{Design, InvalidDocument, Need};
-use fluxform::shape::document::ShapeDocument;
+use fluxform_design::bh_table::{BhTable, read_bh_table};
+use fluxform_design::{Design, InvalidDocument, Need};
+use fluxform_shape::document::ShapeDocument;
 
 /// Characters that a screen obeys: control characters, and marks that reorder the text around them.
 fn commands(c: char) -> bool {

@@ -1,6 +1,6 @@
 //! The words and the places of what is wrong with the text itself.
 
-use fluxform::design::Need;
+use fluxform_design::Need;
 
 use crate::support::{SOUND, read, refused, sound_but};
 

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use fluxform::design::{Design, Need};
-use fluxform::shape::document::ShapeDocument;
+use fluxform_design::{Design, Need};
+use fluxform_shape::document::ShapeDocument;
 
 /// A small deterministic generator (splitmix64).
 struct Random(u64);

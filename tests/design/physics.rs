@@ -1,6 +1,6 @@
 //! Designs whose parts do not fit together.
 
-use fluxform::design::Need;
+use fluxform_design::Need;
 
 use crate::support::{CORED, SOUND, but, read, refused, sound_but, warned};
 

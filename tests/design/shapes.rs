@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use fluxform::numerics::axis::Axis;
-use fluxform::shape::document::{
+use fluxform_numerics::axis::Axis;
+use fluxform_shape::document::{
     AxisRequest, Placement, Primitive, RawSurface, RawSurfaceError, ShapeDocument, SurfaceSource,
     parse_unit,
 };

@@ -1,6 +1,6 @@
 //! Values that look like another unit's: warned about, never refused.
 
-use fluxform::design::Need;
+use fluxform_design::Need;
 
 use crate::support::{SOUND, read, sound_but, warned};
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use fluxform::design::{Design, Faults, Need};
+use fluxform_design::{Design, Faults, Need};
 
 /// A design without a fault; line 1 is the name.
 pub const SOUND: &str = r#"name = "sound"

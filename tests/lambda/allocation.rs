@@ -1,6 +1,6 @@
 //! The allocation against an exhaustive search over every coil's state.
 
-use fluxform::lambda::{Allocation, Allocator, AllocatorError, Reach};
+use fluxform_lambda::{Allocation, Allocator, AllocatorError, Reach};
 
 use crate::random::Random;
 

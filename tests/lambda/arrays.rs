@@ -1,6 +1,6 @@
 //! Arrays like the real one: ties, far and coincident coils, scaling laws, many points.
 
-use fluxform::lambda::{Event, Settings, Solution, Status, solve};
+use fluxform_lambda::{Event, Settings, Solution, Status, solve};
 
 use crate::case::{Case, D, Numbers, d, telling_lambdas};
 

@@ -1,8 +1,8 @@
 //! Problems that own their data, and random ones with everything that goes wrong.
 
-use fluxform::lambda::{ForceProblem, Settings, Solution, solve};
-use fluxform::numerics::double_double::DoubleDouble;
-use fluxform::numerics::real::Real;
+use fluxform_lambda::{ForceProblem, Settings, Solution, solve};
+use fluxform_numerics::double_double::DoubleDouble;
+use fluxform_numerics::real::Real;
 
 pub type D = DoubleDouble;
 

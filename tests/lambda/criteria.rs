@@ -4,9 +4,9 @@
 // The largest errors found are told with --nocapture.
 #![allow(clippy::print_stdout)]
 
-use fluxform::lambda::worst::{felt, maxmin, worst_point};
-use fluxform::lambda::{Settings, Status, Wiring, solve};
-use fluxform::units::DETECTION_THRESHOLD_N;
+use fluxform_base::units::DETECTION_THRESHOLD_N;
+use fluxform_lambda::worst::{felt, maxmin, worst_point};
+use fluxform_lambda::{Settings, Status, Wiring, solve};
 
 use crate::case::{Case, Numbers, small_case};
 use crate::vertices::{Demand, Vertices};

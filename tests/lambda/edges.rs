@@ -1,7 +1,7 @@
 //! Degenerate problems with closed answers, criteria, refusals.
 
-use fluxform::lambda::worst::{felt, worst_point};
-use fluxform::lambda::{Criterion, Settings, Solution, Status, solve};
+use fluxform_lambda::worst::{felt, worst_point};
+use fluxform_lambda::{Criterion, Settings, Solution, Status, solve};
 
 use crate::case::{Case, small_case};
 

@@ -1,7 +1,7 @@
 //! Thousands of small problems against exhaustive search.
 
-use fluxform::lambda::{Solution, Status};
-use fluxform::numerics::real::Real;
+use fluxform_lambda::{Solution, Status};
+use fluxform_numerics::real::Real;
 
 use crate::case::{Case, D, Numbers, d, small_case, telling_lambdas};
 use crate::search::Search;

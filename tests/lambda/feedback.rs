@@ -1,8 +1,8 @@
 //! Currents of their own at every point: what is within reach, and what it takes.
 
-use fluxform::lambda::feedback::{NoLambda, Reachable, Span, dip_between, reachable, render};
-use fluxform::lambda::worst::maxmin;
-use fluxform::numerics::real::Real;
+use fluxform_lambda::feedback::{NoLambda, Reachable, Span, dip_between, reachable, render};
+use fluxform_lambda::worst::maxmin;
+use fluxform_numerics::real::Real;
 
 use crate::case::{Case, D, Numbers, d, small_case};
 

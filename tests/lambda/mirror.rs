@@ -1,8 +1,8 @@
 //! Magnets turned over and currents reversed: every result is the mirror image.
 
-use fluxform::lambda::feedback::{Span, reachable};
-use fluxform::lambda::worst::{felt, maxmin, worst_point};
-use fluxform::lambda::{Settings, Status};
+use fluxform_lambda::feedback::{Span, reachable};
+use fluxform_lambda::worst::{felt, maxmin, worst_point};
+use fluxform_lambda::{Settings, Status};
 
 use crate::case::{Case, Numbers, small_case};
 

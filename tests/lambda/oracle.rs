@@ -1,6 +1,6 @@
 //! Nine coils against exact rational solutions.
 
-use fluxform::lambda::Status;
+use fluxform_lambda::Status;
 
 use crate::case::Case;
 

@@ -1,6 +1,6 @@
 //! Where the currents no longer change: sums that bind, coils that tie, rounding that must not decide.
 
-use fluxform::lambda::{Settings, solve};
+use fluxform_lambda::{Settings, solve};
 
 use crate::case::{Case, D, Numbers, d, small_case};
 use crate::search::Search;

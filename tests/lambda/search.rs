@@ -1,6 +1,6 @@
 //! The minimum by exhaustive search over all active sets, in double-double.
 
-use fluxform::numerics::real::Real;
+use fluxform_numerics::real::Real;
 
 use crate::case::{Case, D, d};
 

@@ -1,6 +1,6 @@
 //! The least largest error by trying every vertex, in double-double.
 
-use fluxform::numerics::real::Real;
+use fluxform_numerics::real::Real;
 
 use crate::case::{Case, D, d};
 

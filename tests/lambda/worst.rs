@@ -1,7 +1,7 @@
 //! The worst-point form against every vertex of small problems, and on degenerate ones.
 
-use fluxform::lambda::worst::{WorstSolution, maxmin, worst_point};
-use fluxform::lambda::{Event, Settings, solve};
+use fluxform_lambda::worst::{WorstSolution, maxmin, worst_point};
+use fluxform_lambda::{Event, Settings, solve};
 
 use crate::case::{Case, Numbers, small_case};
 use crate::vertices::Vertices;

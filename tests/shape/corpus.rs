@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use fluxform::shape::MeshReport;
+use fluxform_shape::MeshReport;
 
 use crate::support::corpus;
 

@@ -1,15 +1,15 @@
 //! The certificate of the points: against geometry known in closed form, and against brute force.
 
-use fluxform::progress::{Progress, Silent};
-use fluxform::shape::certificate::{Certify, certify};
-use fluxform::shape::deviation::{Faces, Interval, Lattice, Vertical, hausdorff, vertical};
-use fluxform::shape::document::{Placement, Primitive};
-use fluxform::shape::height::Grid;
-use fluxform::shape::mesh::{Mesh, Triangle};
-use fluxform::shape::placement::Transform;
-use fluxform::shape::primitive::PlacedPrimitive;
-use fluxform::shape::tessellation::estimated_deviation_m;
-use fluxform::shape::{Surface, deviation, stl};
+use fluxform_base::progress::{Progress, Silent};
+use fluxform_shape::certificate::{Certify, certify};
+use fluxform_shape::deviation::{Faces, Interval, Lattice, Vertical, hausdorff, vertical};
+use fluxform_shape::document::{Placement, Primitive};
+use fluxform_shape::height::Grid;
+use fluxform_shape::mesh::{Mesh, Triangle};
+use fluxform_shape::placement::Transform;
+use fluxform_shape::primitive::PlacedPrimitive;
+use fluxform_shape::tessellation::estimated_deviation_m;
+use fluxform_shape::{Surface, deviation, stl};
 
 use crate::support::{Random, exact, grid, root, sample};
 

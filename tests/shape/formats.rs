@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use fluxform::progress::Silent;
-use fluxform::shape::document::{
+use fluxform_base::progress::Silent;
+use fluxform_shape::document::{
     AxisRequest, GridRequest, ShapeDocument, SurfaceFormat, SurfaceSource,
 };
-use fluxform::shape::mesh::FileMesh;
-use fluxform::shape::{MeshReport, discretize};
+use fluxform_shape::mesh::FileMesh;
+use fluxform_shape::{MeshReport, discretize};
 
 use crate::samples::{
     amf, amf_parts, obj, ply_ascii, ply_binary, sldprt, three_dxml, three_mf, three_mf_of, zipped,

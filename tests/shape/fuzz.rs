@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use fluxform::shape::MeshReport;
-use fluxform::shape::document::{Placement, SurfaceFormat};
-use fluxform::shape::mesh::Mesh;
-use fluxform::shape::placement::Transform;
-use fluxform::shape::stl;
+use fluxform_shape::MeshReport;
+use fluxform_shape::document::{Placement, SurfaceFormat};
+use fluxform_shape::mesh::Mesh;
+use fluxform_shape::placement::Transform;
+use fluxform_shape::stl;
 
 use crate::samples;
 use crate::support::{Random, binary, grid, sample};

@@ -1,10 +1,10 @@
 //! Heights against exact arithmetic, and against what must not matter.
 
-use fluxform::shape::document::Placement;
-use fluxform::shape::height::{Grid, Sample};
-use fluxform::shape::mesh::{FileMesh, Mesh, Triangle};
-use fluxform::shape::placement::Transform;
-use fluxform::shape::stl;
+use fluxform_shape::document::Placement;
+use fluxform_shape::height::{Grid, Sample};
+use fluxform_shape::mesh::{FileMesh, Mesh, Triangle};
+use fluxform_shape::placement::Transform;
+use fluxform_shape::stl;
 
 use crate::support::{Random, binary, box_of, corpus, exact, grid, root, sample};
 

@@ -1,6 +1,6 @@
 //! Files made to exhaust a reader; each was found by `tests/fuzz`, or stands for its kind.
 
-use fluxform::shape::document::SurfaceFormat;
+use fluxform_shape::document::SurfaceFormat;
 
 use crate::formats::refusal;
 use crate::samples::{amf, three_mf_of, zipped};

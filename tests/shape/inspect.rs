@@ -1,8 +1,8 @@
 //! What is told of a surface's file before anything is made of it.
 
-use fluxform::shape::MeshReport;
-use fluxform::shape::document::SurfaceFormat;
-use fluxform::shape::mesh::{FileMesh, Triangle};
+use fluxform_shape::MeshReport;
+use fluxform_shape::document::SurfaceFormat;
+use fluxform_shape::mesh::{FileMesh, Triangle};
 
 use crate::support::block;
 

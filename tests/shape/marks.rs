@@ -2,23 +2,23 @@
 
 use std::f64::consts::PI;
 
-use fluxform::numerics::axis::Axis;
-use fluxform::progress::Silent;
-use fluxform::shape::certificate::Certify;
-use fluxform::shape::deviation::{Faces, Lattice, vertical};
-use fluxform::shape::document::{
+use fluxform_base::progress::Silent;
+use fluxform_numerics::axis::Axis;
+use fluxform_shape::certificate::Certify;
+use fluxform_shape::deviation::{Faces, Lattice, vertical};
+use fluxform_shape::document::{
     AxisRequest, GridRequest, Placement, Primitive, ShapeDocument, SurfaceSource,
 };
-use fluxform::shape::height::Grid;
-use fluxform::shape::holes::{Holes, fill, holes};
-use fluxform::shape::marks::Marks;
-use fluxform::shape::mesh::{Mesh, Triangle};
-use fluxform::shape::placement::Transform;
-use fluxform::shape::primitive::PlacedPrimitive;
-use fluxform::shape::scattered::Probe;
-use fluxform::shape::scattered::adaptive::{Adaptive, Grading, adaptive};
-use fluxform::shape::scattered::poisson::poisson;
-use fluxform::shape::{Settings, Surface, discretize_with, stl};
+use fluxform_shape::height::Grid;
+use fluxform_shape::holes::{Holes, fill, holes};
+use fluxform_shape::marks::Marks;
+use fluxform_shape::mesh::{Mesh, Triangle};
+use fluxform_shape::placement::Transform;
+use fluxform_shape::primitive::PlacedPrimitive;
+use fluxform_shape::scattered::Probe;
+use fluxform_shape::scattered::adaptive::{Adaptive, Grading, adaptive};
+use fluxform_shape::scattered::poisson::poisson;
+use fluxform_shape::{Settings, Surface, discretize_with, stl};
 
 use crate::support::{Random, block, exact, file, grid, lifted, root, sample, seed_grid};
 

@@ -3,12 +3,12 @@
 use std::path::Path;
 use std::process::Command;
 
-use fluxform::numerics::axis::Axis;
-use fluxform::progress::{Progress, Silent};
-use fluxform::shape::document::{
+use fluxform_base::progress::{Progress, Silent};
+use fluxform_numerics::axis::Axis;
+use fluxform_shape::document::{
     AxisRequest, GridRequest, Placement, Primitive, ShapeDocument, SurfaceSource,
 };
-use fluxform::shape::{ConstraintPoints, Discretized, ShapeError, discretize};
+use fluxform_shape::{ConstraintPoints, Discretized, ShapeError, discretize};
 
 use crate::support::{file, lifted, root, seed_grid};
 

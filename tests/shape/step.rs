@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use fluxform::shape::MeshReport;
-use fluxform::shape::document::SurfaceFormat;
+use fluxform_shape::MeshReport;
+use fluxform_shape::document::SurfaceFormat;
 
 use crate::support::corpus;
 

@@ -1,9 +1,9 @@
 //! The STL readers: real files, damaged files, and the messages.
 
-use fluxform::shape::document::{AxisRequest, GridRequest, Placement};
-use fluxform::shape::mesh::Mesh;
-use fluxform::shape::placement::Transform;
-use fluxform::shape::stl::{StlError, read, stream};
+use fluxform_shape::document::{AxisRequest, GridRequest, Placement};
+use fluxform_shape::mesh::Mesh;
+use fluxform_shape::placement::Transform;
+use fluxform_shape::stl::{StlError, read, stream};
 
 use crate::support::{binary, corpus};
 
@@ -398,7 +398,7 @@ fn the_degenerate_triangle_is_left_out_and_said() {
     };
     let placement = crate::support::lifted(1.3);
     let document = crate::support::file(&path, 1.0, placement, grid);
-    let result = fluxform::shape::discretize(&document, &fluxform::progress::Silent).unwrap();
+    let result = fluxform_shape::discretize(&document, &fluxform_base::progress::Silent).unwrap();
     let facts = result.mesh.unwrap();
     assert_eq!((facts.triangles, facts.degenerate), (12, 1));
     assert!(

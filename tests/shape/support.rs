@@ -2,14 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use fluxform::numerics::axis::Axis;
-use fluxform::progress::Silent;
-use fluxform::shape::document::{
-    AxisRequest, GridRequest, Placement, ShapeDocument, SurfaceSource,
-};
-use fluxform::shape::height::{Grid, Sample, heights};
-use fluxform::shape::mesh::{FileMesh, Mesh, Triangle};
-use fluxform::shape::placement::Transform;
+use fluxform_base::progress::Silent;
+use fluxform_numerics::axis::Axis;
+use fluxform_shape::document::{AxisRequest, GridRequest, Placement, ShapeDocument, SurfaceSource};
+use fluxform_shape::height::{Grid, Sample, heights};
+use fluxform_shape::mesh::{FileMesh, Mesh, Triangle};
+use fluxform_shape::placement::Transform;
 
 /// A repeatable stream of numbers (splitmix64).
 pub struct Random(pub u64);
@@ -34,7 +32,7 @@ impl Random {
 }
 
 pub fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
 }
 
 /// The folder of real surface files with their index that `FLUXFORM_CORPUS` names, or `None` with a

@@ -9,7 +9,7 @@ use super::dir::{Dir, Kind, Status, followed};
 use super::folder::MANIFEST;
 use super::record::{Record, digest, is_timing, unchanged};
 use super::{Overwrite, WriteError};
-use crate::bundle::artefact::FileEntry;
+use crate::artefact::FileEntry;
 
 /// The seconds of the run that wrote the folder.
 const TIMING: &str = "timing.json";

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use crate::progress::poll;
+use fluxform_base::progress::poll;
 
 /// Writers at work.
 static WRITERS: AtomicUsize = AtomicUsize::new(0);

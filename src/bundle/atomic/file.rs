@@ -362,7 +362,7 @@ impl Write for Hashing<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bundle::artefact::{FileEntry, Input};
+    use crate::artefact::{FileEntry, Input};
 
     fn record(inputs: &[Input], files: &[FileEntry]) -> String {
         serde_json::json!({ "schema_version": "1.2.0", "fluxform_version": "0.1.0",
@@ -420,12 +420,12 @@ mod tests {
         let note = ReplacedNote::new(vec![FileEntry {
             path: "plate.csv".to_owned(),
             bytes: 1,
-            sha256: crate::bundle::artefact::sha256_hex(&old),
+            sha256: crate::artefact::sha256_hex(&old),
         }]);
         let new = FileEntry {
             path: "plate.csv".to_owned(),
             bytes: 2,
-            sha256: crate::bundle::artefact::sha256_hex(b"22"),
+            sha256: crate::artefact::sha256_hex(b"22"),
         };
         std::fs::write(&sidecar, record(&inputs(), &[new])).unwrap();
         put_both(folder.path(), "plate.csv", "22", false).unwrap_err();

@@ -28,7 +28,7 @@ use super::overwrite::real;
 use super::record::Record;
 use super::temporary::{TemporaryFolder, clean_leftovers, is_temporary};
 use super::{OLD, Overwrite, WriteError, parent_of};
-use crate::bundle::artefact::FileEntry;
+use crate::artefact::FileEntry;
 
 /// The file whose presence makes a folder a bundle.
 pub(super) const MANIFEST: &str = "manifest.json";
@@ -426,7 +426,7 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::bundle::artefact::Input;
+    use crate::artefact::Input;
 
     #[test]
     fn a_bundle_named_like_a_temporary_folder_is_refused_not_lost() {
@@ -727,7 +727,7 @@ mod tests {
         fs::create_dir(&target).unwrap();
         fs::write(target.join("thesis.tex"), "years").unwrap();
         let entry = serde_json::json!({ "path": "thesis.tex", "bytes": 5,
-            "sha256": crate::bundle::artefact::sha256_hex(b"years") });
+            "sha256": crate::artefact::sha256_hex(b"years") });
         let theirs = serde_json::json!({ "name": "theirs", "files": [entry] }).to_string();
         fs::write(target.join(MANIFEST), &theirs).unwrap();
         put_files(&target, ours(&target), &[("a.txt", "a")]).unwrap_err();

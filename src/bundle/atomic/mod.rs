@@ -52,7 +52,6 @@ pub struct Written {
 
 /// Why an output was not written. Nothing is left half written.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum WriteError {
     /// The target exists and is not known to come from the same inputs.
     #[error("{path} exists {reason}; use --force to replace it, or choose another --out")]
@@ -130,7 +129,7 @@ impl WriteError {
     }
 
     /// Sorts an I/O error by what the user can do about it.
-    pub(crate) fn from_io(action: &'static str, path: &Path, source: io::Error) -> Self {
+    pub fn from_io(action: &'static str, path: &Path, source: io::Error) -> Self {
         let path = path.to_path_buf();
         match source.kind() {
             io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {

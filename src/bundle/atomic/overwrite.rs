@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::dir::{Dir, Kind, Status, followed};
 use super::record::{Record, ReplacedNote, digest, is_timing, unchanged};
 use super::{WriteError, Written, parent_of};
-use crate::bundle::artefact::Input;
+use crate::artefact::Input;
 
 /// The policy for outputs that exist already.
 ///

@@ -10,10 +10,10 @@ use sha2::{Digest, Sha256};
 
 use super::dir::{Dir, Kind};
 use super::file::hex;
-use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION, parse_version};
-use crate::bundle::json::to_json;
-use crate::bundle::plain::read_plain;
-use crate::bundle::timing;
+use crate::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION, parse_version};
+use crate::json::to_json;
+use crate::plain::read_plain;
+use crate::timing;
 
 /// Records larger than this are not read: ours are a few kilobytes to a few megabytes.
 const RECORD_MAX_BYTES: u64 = 64 << 20;

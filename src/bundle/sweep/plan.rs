@@ -3,8 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, check_version, sha256_hex};
-use crate::bundle::json::fault;
+use crate::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, check_version, sha256_hex};
+use crate::json::fault;
 
 /// Most designs of one sweep.
 pub const POINTS_MAX: u64 = 100_000_000;
@@ -188,7 +188,7 @@ fn combinations(axes: &[Axis]) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bundle::json::to_json;
+    use crate::json::to_json;
 
     fn plan() -> PlanFile {
         let axis = |key: &str, values: &[f64]| Axis {

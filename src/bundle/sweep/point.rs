@@ -4,14 +4,13 @@ use schemars::JsonSchema;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
-use crate::accuracy::CertificateKind;
-use crate::bundle::artefact::{FLUXFORM_VERSION, SCHEMA_VERSION, sha256_hex};
-use crate::bundle::json::{JsonError, to_json};
+use crate::artefact::{FLUXFORM_VERSION, SCHEMA_VERSION, sha256_hex};
+use crate::json::{JsonError, to_json};
+use fluxform_base::accuracy::CertificateKind;
 
 /// How a point ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-#[non_exhaustive]
 pub enum Status {
     /// Computed to the tolerance.
     Done,

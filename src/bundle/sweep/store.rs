@@ -9,11 +9,11 @@ use std::path::{Path, PathBuf};
 
 use super::plan::PLAN_MAX_BYTES;
 use super::{PlanFile, PointFile};
-use crate::bundle::artefact::FLUXFORM_VERSION;
-use crate::bundle::atomic::{Dir, Kind, Overwrite, SharedFolders, WriteError, put};
-use crate::bundle::json::JsonError;
-use crate::bundle::plain::read_plain;
-use crate::bundle::write::write_json;
+use crate::artefact::FLUXFORM_VERSION;
+use crate::atomic::{Dir, Kind, Overwrite, SharedFolders, WriteError, put};
+use crate::json::JsonError;
+use crate::plain::read_plain;
+use crate::write::write_json;
 
 /// The folder of the points' folders.
 const POINTS: &str = "points";

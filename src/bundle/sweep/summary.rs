@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::bundle::artefact::{FileEntry, Input};
+use crate::artefact::{FileEntry, Input};
 
 /// `sweep_merge.json` beside `sweep.csv`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use super::{Mode, OptimumRow, PointFile, Value};
-use crate::bundle::number::{push_index, push_number};
+use crate::number::{push_index, push_number};
 
 /// Columns after `index` and the set keys. Cells that do not apply are empty.
 pub const ROW_COLUMNS: [&str; 14] = [

@@ -2,9 +2,9 @@
 
 use super::axis_gradient::{self, axis_gradient};
 use super::model::{CoilModel, NoResponse, Response, Sloped, Window};
-use crate::coil::section_integrals::{Accuracy, FINE, section_integrals};
-use crate::field::magnet::MagnetRule;
-use crate::units::MU_0_T_M_PER_A;
+use crate::section_integrals::{Accuracy, FINE, section_integrals};
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_field::magnet::MagnetRule;
 
 /// Relative size of a node's distance from the axis that counts as none.
 const ON_AXIS: f64 = 1e-12;
@@ -20,7 +20,6 @@ pub struct AirCoil {
 
 /// Why there is no air model.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[non_exhaustive]
 pub enum NoAirCoil {
     /// A dipole at or below the winding's top face.
     #[error("the magnet must be above the winding's top face: raise the target")]

@@ -6,8 +6,8 @@ use super::problem::{Problem, Task};
 use super::scalar;
 use super::sequential::Local;
 use super::valley::best_near;
-use crate::design::Limits;
-use crate::progress::{Interrupted, Progress};
+use fluxform_base::progress::{Interrupted, Progress};
+use fluxform_design::Limits;
 
 /// Share of the best force that is given up.
 pub const SHARE: f64 = 0.01;
@@ -165,9 +165,9 @@ fn under(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coil::optimum::tests::{HEIGHT_M, air, quick, seed_limits, task};
-    use crate::coil::optimum::{Settings, optimise};
-    use crate::progress::Silent;
+    use crate::optimum::tests::{HEIGHT_M, air, quick, seed_limits, task};
+    use crate::optimum::{Settings, optimise};
+    use fluxform_base::progress::Silent;
 
     #[test]
     fn a_hundredth_of_the_force_buys_something_of_each() {

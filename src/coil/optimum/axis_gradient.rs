@@ -12,7 +12,7 @@
 //! loop below the point contributes with the same sign: h grows with the window.
 
 use super::model::{Sloped, Window};
-use crate::numerics::gauss;
+use fluxform_numerics::gauss;
 
 /// Relative error of the value; the sums have positive terms only.
 pub const RELATIVE_ERROR: f64 = 1e-14;
@@ -66,8 +66,8 @@ pub fn axis_gradient(window: &Window, z_m: f64) -> Sloped {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::winding::Winding;
-    use crate::units::MU_0_T_M_PER_A;
+    use fluxform_base::units::MU_0_T_M_PER_A;
+    use fluxform_field::winding::Winding;
 
     fn window(a: f64, w: f64, l: f64) -> Window {
         Window {

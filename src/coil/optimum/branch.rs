@@ -8,9 +8,9 @@ use super::domain::Domain;
 use super::enclosure::{Bounding, Cell};
 use super::model::Window;
 use super::problem::{Problem, Regime};
-use crate::numerics::interval::Interval;
-use crate::progress::{Interrupted, Progress};
-use crate::units::MU_0_T_M_PER_A;
+use fluxform_base::progress::{Interrupted, Progress};
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_numerics::interval::Interval;
 
 /// Relative gap that makes a certificate global.
 pub const GAP: f64 = 1e-6;
@@ -248,11 +248,11 @@ fn halves(cell: &Cell) -> Option<[Cell; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coil::optimum::enclosure::Multipliers;
-    use crate::coil::optimum::tests::{HEIGHT_M, air, seed_limits, task, wire};
-    use crate::coil::optimum::{Strand, Task};
-    use crate::design::Limits;
-    use crate::progress::Silent;
+    use crate::optimum::enclosure::Multipliers;
+    use crate::optimum::tests::{HEIGHT_M, air, seed_limits, task, wire};
+    use crate::optimum::{Strand, Task};
+    use fluxform_base::progress::Silent;
+    use fluxform_design::Limits;
 
     /// The best coil of the seed's limits without that on the settling time, N.
     const BEST_N: f64 = 0.137_773_265_65;

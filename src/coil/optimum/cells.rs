@@ -9,8 +9,8 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use rayon::prelude::*;
 
-use crate::numerics::gauss;
-use crate::numerics::lagrange_basis::Basis;
+use fluxform_numerics::gauss;
+use fluxform_numerics::lagrange_basis::Basis;
 
 /// Functions tabulated together.
 pub const COUNT: usize = 3;

@@ -15,15 +15,15 @@ use super::axis_gradient::axis_gradient;
 use super::cells::{Cells, Interpolated, Lattice, Line, Values};
 use super::model::{CoilModel, NoResponse, Response, Sloped, Window};
 use super::neighbours::Neighbours;
-use crate::coil::inductance::self_inductance_h;
-use crate::coil::section_integrals;
-use crate::field::magnet::MagnetRule;
-use crate::field::steel::CoreShape;
-use crate::field::steel::cored_coil::CoredCoil;
-use crate::field::steel::generatrix::Resolution;
-use crate::field::steel::inside::{peak_depth_m, peaks_of_family_t};
-use crate::field::winding::Winding;
-use crate::units::{MU_0_T_M_PER_A, STEEL_DENSITY_KG_PER_M3};
+use crate::inductance::self_inductance_h;
+use crate::section_integrals;
+use fluxform_base::units::{MU_0_T_M_PER_A, STEEL_DENSITY_KG_PER_M3};
+use fluxform_field::magnet::MagnetRule;
+use fluxform_field::steel::CoreShape;
+use fluxform_field::steel::cored_coil::CoredCoil;
+use fluxform_field::steel::generatrix::Resolution;
+use fluxform_field::steel::inside::{peak_depth_m, peaks_of_family_t};
+use fluxform_field::winding::Winding;
 use std::f64::consts::PI;
 
 /// How a core sits in its winding.
@@ -54,7 +54,6 @@ impl CoreRule {
 
 /// Why there is no cored model.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[non_exhaustive]
 pub enum NoCoredCoil {
     /// As for air.
     #[error(transparent)]

@@ -7,13 +7,13 @@ use super::cored::{CoreRule, CoredModel, NoCoredCoil};
 use super::problem::Problem;
 use super::sequential::Smooth;
 use super::*;
-use crate::coil::inductance::self_inductance_h;
-use crate::design::{Design, Limits, Need};
-use crate::field::magnet::MagnetRule;
-use crate::field::steel::CoreShape;
-use crate::field::steel::cored_coil::CoredCoil;
-use crate::field::winding::Winding;
-use crate::progress::Silent;
+use crate::inductance::self_inductance_h;
+use fluxform_base::progress::Silent;
+use fluxform_design::{Design, Limits, Need};
+use fluxform_field::magnet::MagnetRule;
+use fluxform_field::steel::CoreShape;
+use fluxform_field::steel::cored_coil::CoredCoil;
+use fluxform_field::winding::Winding;
 
 const HEIGHT_M: f64 = 0.03;
 const NOTHING: Need = Need {
@@ -311,7 +311,7 @@ fn a_limit_on_the_core_s_field_is_met_and_costs_force() {
         .shape(window.inner_radius_m, window.length_m)
         .expect("fits");
     let coil = CoredCoil::new(&winding, shape, 1000.0, 1e-5, HEIGHT_M).expect("off the edges");
-    let depth_m = crate::field::steel::inside::peak_depth_m(shape);
+    let depth_m = fluxform_field::steel::inside::peak_depth_m(shape);
     let peak_t = coil
         .core_field(limited.current_a, depth_m)
         .expect("inside")

@@ -7,7 +7,7 @@ use super::problem::{LimitName, Problem, Regime};
 use super::search::{self, Settings, Solved};
 use super::sequential::{FEASIBLE, Local, Point, Smooth};
 use super::starts;
-use crate::progress::{Interrupted, Progress};
+use fluxform_base::progress::{Interrupted, Progress};
 
 /// The sum of the squared violations of all limits that can be blamed, geometry held.
 struct Violated<'a>(&'a Problem<'a>);

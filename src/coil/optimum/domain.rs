@@ -258,8 +258,8 @@ impl Domain {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coil::optimum::tests::{HEIGHT_M, air, task};
-    use crate::design::Limits;
+    use crate::optimum::tests::{HEIGHT_M, air, task};
+    use fluxform_design::Limits;
 
     /// The supply's regime asks for a least resistance, and a limit may ask for less.
     #[test]

@@ -18,10 +18,10 @@ use super::axis_gradient::{self, axis_gradient};
 use super::domain::Domain;
 use super::model::Window;
 use super::problem::{LimitName, Problem, Regime};
-use crate::coil::circuit::SETTLING_TIME_CONSTANTS;
-use crate::coil::section_integrals::{ROUGH, section_integrals};
-use crate::numerics::interval::Interval;
-use crate::units::MU_0_T_M_PER_A;
+use crate::circuit::SETTLING_TIME_CONSTANTS;
+use crate::section_integrals::{ROUGH, section_integrals};
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_numerics::interval::Interval;
 
 /// A box of windows.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -437,8 +437,8 @@ fn rising(a: Interval, u: Interval) -> Interval {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coil::optimum::tests::{air, seed_limits, task};
-    use crate::design::Limits;
+    use crate::optimum::tests::{air, seed_limits, task};
+    use fluxform_design::Limits;
 
     /// A seed-like problem's Lagrangian by the problem's own numbers, and its bound over cells of
     /// relative half width `wide` about one coil.

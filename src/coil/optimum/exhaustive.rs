@@ -22,7 +22,7 @@ use super::scalar;
 use super::search::{self, DRAFT_DOUBT, Settings, Solved};
 use super::sequential::{self, FEASIBLE};
 use super::sharpen;
-use crate::progress::{Interrupted, Progress};
+use fluxform_base::progress::{Interrupted, Progress};
 
 /// Bores at which each coil is tried.
 const SCAN: usize = 9;
@@ -610,12 +610,12 @@ fn climb(f: impl Fn(f64) -> f64, lo: f64, hi: f64, index: usize) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coil::optimum::air::AirCoil;
-    use crate::coil::optimum::model::{NoResponse, Response};
-    use crate::coil::optimum::tests::{HEIGHT_M, air, quick, task};
-    use crate::coil::optimum::wound::optimise_wound;
-    use crate::design::Limits;
-    use crate::progress::Silent;
+    use crate::optimum::air::AirCoil;
+    use crate::optimum::model::{NoResponse, Response};
+    use crate::optimum::tests::{HEIGHT_M, air, quick, task};
+    use crate::optimum::wound::optimise_wound;
+    use fluxform_base::progress::Silent;
+    use fluxform_design::Limits;
 
     /// An air coil that hides that it is one, so that nothing bounds its force.
     struct Opaque(AirCoil);

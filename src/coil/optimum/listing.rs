@@ -195,9 +195,9 @@ pub(super) fn worth_a_look(best: &WoundCoil, sorted: &[WoundCoil]) -> Vec<WoundC
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coil::optimum::sequential::{Local, Smooth};
-    use crate::coil::optimum::tests::{air, task};
-    use crate::design::Limits;
+    use crate::optimum::sequential::{Local, Smooth};
+    use crate::optimum::tests::{air, task};
+    use fluxform_design::Limits;
 
     #[test]
     fn where_nothing_bounds_a_coil_the_box_is_three_times_the_best_one() {

@@ -1,9 +1,9 @@
 //! What the optimiser asks of a coil's physics, so that air and cored coils are solved alike.
 
-use crate::design::Wire;
-use crate::units::{
+use fluxform_base::units::{
     COPPER_DENSITY_KG_PER_M3, COPPER_TEMPERATURE_COEFFICIENT_PER_K, REFERENCE_TEMPERATURE_C,
 };
+use fluxform_design::Wire;
 use std::f64::consts::PI;
 
 /// The winding's section: a1 <= r <= a1 + depth, -length <= z <= 0.

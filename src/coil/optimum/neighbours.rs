@@ -4,11 +4,11 @@
 //! and taken as powers of the dimensions while the coil alone is optimised; again at what comes
 //! out, until that stands: then values and slopes are those of the coupled array.
 
-use crate::field::steel::CoreShape;
-use crate::field::steel::array::CoupledArray;
-use crate::field::steel::cored_coil::CoredCoil;
-use crate::field::steel::sources::{ArraySources, Parts};
-use crate::field::winding::Winding;
+use fluxform_field::steel::CoreShape;
+use fluxform_field::steel::array::CoupledArray;
+use fluxform_field::steel::cored_coil::CoredCoil;
+use fluxform_field::steel::sources::{ArraySources, Parts};
+use fluxform_field::winding::Winding;
 
 /// Relative accuracy of the coupled solution.
 const TOLERANCE: f64 = 1e-3;

@@ -3,11 +3,10 @@
 use super::domain::Contradiction;
 use super::model::{Strand, Window};
 use super::problem::{LimitName, Regime};
-pub use crate::accuracy::CertificateKind;
+pub use fluxform_base::accuracy::CertificateKind;
 
 /// How an optimisation ended.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub enum Status {
     /// The best coil within the limits.
     Optimal,

@@ -7,8 +7,8 @@
 
 use super::model::{CoilModel, Sloped, Strand, Window};
 use super::sequential::{Local, Point, Smooth};
-use crate::coil::circuit::SETTLING_TIME_CONSTANTS;
-use crate::design::Limits;
+use crate::circuit::SETTLING_TIME_CONSTANTS;
+use fluxform_design::Limits;
 
 /// Dimensions that are given, not sought; diameters and length in m.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -38,7 +38,6 @@ pub struct Task {
 
 /// What bounds a coil. The first nine are the design file's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[non_exhaustive]
 pub enum LimitName {
     /// R, ohm.
     Resistance,

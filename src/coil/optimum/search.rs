@@ -15,7 +15,7 @@ use super::sequential::{self, FEASIBLE, Local, Smooth};
 use super::sharpen;
 use super::starts;
 use super::valley;
-use crate::progress::{Interrupted, Progress};
+use fluxform_base::progress::{Interrupted, Progress};
 
 /// How the search is carried out.
 #[derive(Debug, Clone, Copy, PartialEq)]

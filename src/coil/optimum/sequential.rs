@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::numerics::small_quadratic::{Row, dot, minimise};
+use fluxform_numerics::small_quadratic::{Row, dot, minimise};
 
 /// A smooth problem's values and slopes at a point: minimise `objective` with `rows` <= 0.
 #[derive(Debug, Clone, PartialEq)]
@@ -117,7 +117,7 @@ pub fn solve(problem: &dyn Smooth, start: [f64; 3]) -> Option<Local> {
     let mut multipliers = vec![0.0; point.rows.len()];
     let mut weight = 1.0_f64;
     for _ in 0..ITERATIONS {
-        crate::progress::poll();
+        fluxform_base::progress::poll();
         let Some((found, removed)) = step(problem, &point, b) else {
             break;
         };

@@ -4,7 +4,7 @@ use super::model::CoilModel;
 use super::problem::{Problem, Task};
 use super::search::{Solved, best_of, keep_better};
 use super::sequential;
-use crate::progress::{Interrupted, Progress};
+use fluxform_base::progress::{Interrupted, Progress};
 
 /// Most sharpenings.
 const ROUNDS: usize = 8;
@@ -98,13 +98,13 @@ fn best_x(problems: &[Solved<'_>]) -> Option<[f64; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coil::optimum::Settings;
-    use crate::coil::optimum::air::AirCoil;
-    use crate::coil::optimum::model::{NoResponse, Response, Window};
-    use crate::coil::optimum::search::solve_all;
-    use crate::coil::optimum::tests::{HEIGHT_M, air, quick, seed_limits, task};
-    use crate::design::Limits;
-    use crate::progress::Silent;
+    use crate::optimum::Settings;
+    use crate::optimum::air::AirCoil;
+    use crate::optimum::model::{NoResponse, Response, Window};
+    use crate::optimum::search::solve_all;
+    use crate::optimum::tests::{HEIGHT_M, air, quick, seed_limits, task};
+    use fluxform_base::progress::Silent;
+    use fluxform_design::Limits;
 
     /// What an air coil's ln F lacks, as a function of the length, is not known to the coarse
     /// model; to the sharp one as a straight line about one length; to the exact one throughout.

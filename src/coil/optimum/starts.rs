@@ -63,8 +63,8 @@ fn uniform(state: &mut u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coil::optimum::tests::{air, task};
-    use crate::design::Limits;
+    use crate::optimum::tests::{air, task};
+    use fluxform_design::Limits;
 
     #[test]
     fn the_sequence_fills_the_unit_interval_evenly() {

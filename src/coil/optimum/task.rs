@@ -5,12 +5,11 @@ use super::cored::{CoreRule, CoredModel, NoCoredCoil};
 use super::model::{CoilModel, Strand, Window};
 use super::neighbours::Neighbours;
 use super::problem::{Fixed, Task};
-use crate::design::{Coil, Core, Design, Steel};
-use crate::field::magnet::MagnetRule;
+use fluxform_design::{Coil, Core, Design, Steel};
+use fluxform_field::magnet::MagnetRule;
 
 /// What cannot be optimised.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[non_exhaustive]
 pub enum NoTask {
     /// The drivers give no current.
     #[error("supply.current_max_a is zero: without current no coil exerts a force")]

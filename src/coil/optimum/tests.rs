@@ -2,10 +2,10 @@ use super::air::AirCoil;
 use super::problem::{Problem, Regime};
 use super::sequential::Smooth;
 use super::*;
-use crate::coil::circuit::Circuit;
-use crate::design::{Limits, Wire};
-use crate::field::magnet::{Cylinder, MagnetRule, Sources};
-use crate::progress::Silent;
+use crate::circuit::Circuit;
+use fluxform_base::progress::Silent;
+use fluxform_design::{Limits, Wire};
+use fluxform_field::magnet::{Cylinder, MagnetRule, Sources};
 
 pub(super) const HEIGHT_M: f64 = 0.03;
 const MOMENT_A_M2: f64 = 0.909_41;

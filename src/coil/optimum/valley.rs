@@ -6,7 +6,7 @@ use super::problem::{Fixed, LimitName, Problem, Task};
 use super::scalar;
 use super::search::{Solved, keep_better};
 use super::sequential::{self, FEASIBLE, Local};
-use crate::progress::{Interrupted, Progress};
+use fluxform_base::progress::{Interrupted, Progress};
 
 /// Share of the best force that a coil in the valley may lack.
 pub const SHARE: f64 = 1e-3;

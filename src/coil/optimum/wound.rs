@@ -23,8 +23,8 @@ use super::problem::{LimitName, Problem, Regime, Task};
 use super::scalar;
 use super::search::{self, Settings, Solved};
 use super::sequential::FEASIBLE;
-use crate::numerics::interval::Interval;
-use crate::progress::{Interrupted, Progress};
+use fluxform_base::progress::{Interrupted, Progress};
+use fluxform_numerics::interval::Interval;
 
 const USED: f64 = 0.9;
 const PORTIONS: usize = 64;
@@ -420,9 +420,9 @@ impl<'a> Winder<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coil::optimum::tests::{HEIGHT_M, air, quick, seed_limits, task};
-    use crate::design::Limits;
-    use crate::progress::Silent;
+    use crate::optimum::tests::{HEIGHT_M, air, quick, seed_limits, task};
+    use fluxform_base::progress::Silent;
+    use fluxform_design::Limits;
 
     /// Without a budget only the portions are made, one cut each, and nothing is proven.
     #[test]

@@ -14,7 +14,7 @@
 //! sum w_k s_k^l they match: up to N for odd N, N - 1 for even.
 
 use super::{MagnetRule, Node, Placed};
-use crate::numerics::gauss;
+use fluxform_numerics::gauss;
 
 /// Sources closer than R / 0.8 are left to the volume rule.
 const LARGEST_RATIO: f64 = 0.8;
@@ -189,7 +189,7 @@ fn mirrored<'a>(distances: &'a [f64], factors: &'a [f64]) -> impl Iterator<Item 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::magnet::Cylinder;
+    use crate::magnet::Cylinder;
 
     fn magnet(diameter_m: f64, length_m: f64) -> Placed {
         Placed {

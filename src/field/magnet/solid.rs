@@ -8,7 +8,7 @@
 use std::f64::consts::TAU;
 
 use super::{MOST_NODES, MagnetRule, Node, Placed, Sources, dot};
-use crate::numerics::gauss;
+use fluxform_numerics::gauss;
 
 /// Constant of the bounds `scale * (distance / gap) * radius^(-2 n)`: close by, the integrand
 /// grows above its size at the centre. `tests/magnet.rs` holds it against point charges.

@@ -21,8 +21,8 @@ use super::generatrix::{Generatrix, Resolution};
 use super::response::{Response, Rings};
 use super::sources::{ArraySources, Parts};
 use super::symmetry::{Motion, motions};
-use crate::field::winding::{OnEdge, Winding};
-use crate::units::MU_0_T_M_PER_A;
+use crate::winding::{OnEdge, Winding};
+use fluxform_base::units::MU_0_T_M_PER_A;
 
 /// Most azimuthal modes; beyond, the stated error grows.
 const MOST_MODES: usize = 17;

@@ -14,10 +14,10 @@ use std::sync::{Arc, PoisonError, RwLock};
 
 use super::magnetized::MagnetizedCore;
 use super::sources::Parts;
-use crate::field::batch::{Gradients, Wanted};
-use crate::field::source::AxialSource;
-use crate::field::winding::{AxialField, OnEdge, Winding};
-use crate::numerics::dispatch::{self, Kernel};
+use crate::batch::{Gradients, Wanted};
+use crate::source::AxialSource;
+use crate::winding::{AxialField, OnEdge, Winding};
+use fluxform_numerics::dispatch::{self, Kernel};
 
 /// Points closer to a source than this multiple of the core's radius get the exact field.
 const NEAREST: f64 = 0.01;
@@ -360,9 +360,9 @@ impl AxialSource for AxialTable {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::frame::to_cartesian;
-    use crate::field::steel::CoreShape;
-    use crate::field::steel::cored_coil::CoredCoil;
+    use crate::frame::to_cartesian;
+    use crate::steel::CoreShape;
+    use crate::steel::cored_coil::CoredCoil;
 
     #[test]
     fn it_is_the_winding_and_its_core_on_the_axis_and_off_whatever_the_other_points() {

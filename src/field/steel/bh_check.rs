@@ -1,7 +1,7 @@
 //! What a magnetisation table must be, and what in it betrays another unit.
 
 use super::bh_curve::BhCurve;
-use crate::units::MU_0_T_M_PER_A;
+use fluxform_base::units::MU_0_T_M_PER_A;
 
 /// Beyond this nothing is a flux density, in gauss or any unit.
 const LARGEST_B: f64 = 1e6;
@@ -29,7 +29,6 @@ const A_PER_M_IN_OERSTED: f64 = 79.577_471_545_947_67;
 
 /// Why points are no magnetisation curve. Rows count from 1, the origin's row.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
 pub enum BhCurveError {
     /// The columns differ in length.
     #[error("{b} values of B and {h} of H: expected as many of one as of the other")]
@@ -111,7 +110,6 @@ pub enum BhCurveError {
 
 /// What looks wrong with a magnetisation table. The numbers are used as they stand all the same.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub enum BhWarning {
     /// B looks like another unit.
     UnitOfB {

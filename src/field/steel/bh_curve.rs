@@ -6,7 +6,7 @@
 //! It is odd in B, and beyond the last point its slope is that of vacuum, 1/mu_0.
 
 use super::bh_check::{self, BhCurveError, BhWarning};
-use crate::units::MU_0_T_M_PER_A;
+use fluxform_base::units::MU_0_T_M_PER_A;
 
 /// Share of its largest value at which the differential permeability marks the knee.
 const KNEE_SHARE: f64 = 0.1;

@@ -1,9 +1,9 @@
 //! The winding's own field in its bore, to a tolerance: quicker than to full double precision.
 
-use crate::field::ring::{RingPoint, ring_field};
-use crate::field::winding::{OnEdge, Winding, sheet_end};
-use crate::numerics::gauss;
-use crate::units::MU_0_T_M_PER_A;
+use crate::ring::{RingPoint, ring_field};
+use crate::winding::{OnEdge, Winding, sheet_end};
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_numerics::gauss;
 
 /// Windings shorter than this share of their outer radius, whose two faces cancel, are left to
 /// [`Winding::field`].

@@ -161,7 +161,7 @@ impl Plan {
         let mut factors = Vec::with_capacity(self.fronts.len());
         let mut pending: Vec<Option<Element>> = Vec::with_capacity(self.fronts.len());
         for (index, front) in self.fronts.iter().enumerate() {
-            crate::progress::poll();
+            fluxform_base::progress::poll();
             let size = front.unknowns.len();
             let mut sum = Element {
                 matrix: DMatrix::zeros(size, size),

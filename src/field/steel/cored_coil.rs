@@ -20,10 +20,10 @@ use super::generatrix::{Face, Generatrix, Node, Resolution};
 use super::magnetized::MagnetizedCore;
 use super::response::{mean, system};
 use super::{CLOSEST, CoreShape};
-use crate::field::winding::{AxialField, OnEdge, Winding};
-use crate::numerics::gauss;
-use crate::numerics::lagrange_basis::Basis;
-use crate::units::MU_0_T_M_PER_A;
+use crate::winding::{AxialField, OnEdge, Winding};
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_numerics::gauss;
+use fluxform_numerics::lagrange_basis::Basis;
 
 /// The winding's scalar potential and normal flux density on a core's outline, per ampere.
 #[derive(Debug, Clone)]

@@ -7,11 +7,11 @@ use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 
 use super::response::{Response, Ring};
-use crate::field::winding::Winding;
-use crate::numerics::gauss;
-use crate::numerics::gmres::gmres;
-use crate::numerics::ring_functions::azimuthal_integrals;
-use crate::units::MU_0_T_M_PER_A;
+use crate::winding::Winding;
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_numerics::gauss;
+use fluxform_numerics::gmres::gmres;
+use fluxform_numerics::ring_functions::azimuthal_integrals;
 
 /// Most applications of the coupling.
 const MOST_STEPS: usize = 120;
@@ -169,7 +169,7 @@ impl Coupling {
                 let products: Vec<DMatrix<f64>> = starts
                     .par_iter()
                     .map(|start| {
-                        crate::progress::poll();
+                        fluxform_base::progress::poll();
                         block.rows(*start, ROWS.min(size - start)) * &from
                     })
                     .collect();
@@ -212,7 +212,7 @@ pub(super) fn between_cores(
     let scale = -TAU / angles as f64 / (4.0 * PI);
     let mut matrix = DMatrix::zeros(points.len(), points.len());
     for (mut column, (y, n)) in matrix.column_iter_mut().zip(points) {
-        crate::progress::poll();
+        fluxform_base::progress::poll();
         for (value, (x, _)) in column.iter_mut().zip(points) {
             let d = [
                 x[0] + offset_m[0] - y[0],
@@ -260,7 +260,7 @@ fn from_winding(
             let (dx, dy) = (x[0] + offset_m[0], x[1] + offset_m[1]);
             let r = dx.hypot(dy);
             let (mut potential, mut slope_r, mut slope_z) = (0.0, 0.0, 0.0);
-            crate::progress::poll();
+            fluxform_base::progress::poll();
             for (height, sign) in [(0.0, 1.0), (-winding.length_m, -1.0)] {
                 let u = x[2] - height;
                 for (source_r, charge) in &discs {

@@ -8,10 +8,10 @@ use nalgebra::DMatrix;
 use std::f64::consts::PI;
 
 use super::generatrix::{Face, Generatrix, Node, Panel};
-use crate::numerics::gauss;
-use crate::numerics::lagrange_basis::Basis;
-use crate::numerics::log_rule::LOG_RULE;
-use crate::numerics::ring_functions::azimuthal_integrals;
+use fluxform_numerics::gauss;
+use fluxform_numerics::lagrange_basis::Basis;
+use fluxform_numerics::log_rule::LOG_RULE;
+use fluxform_numerics::ring_functions::azimuthal_integrals;
 
 /// Most azimuthal modes, m = 0 to this minus one.
 pub const MAX_MODES: usize = 64;
@@ -58,7 +58,7 @@ pub fn operators(outline: &Generatrix, modes: usize, tolerance: f64) -> Vec<DMat
     // exp(-2 order ln(radius)) <= tolerance
     let far = tolerance.powf(-0.5 / order as f64);
     for (row, target) in outline.nodes.iter().enumerate() {
-        crate::progress::poll();
+        fluxform_base::progress::poll();
         let mut mass = 0.0;
         for (index, panel) in outline.panels.iter().enumerate() {
             let Some(aspect) = Aspect::new(target, panel, outline) else {

@@ -4,8 +4,8 @@
 //! the outer normal is to the right of that direction.
 
 use super::CoreShape;
-use crate::field::winding::Winding;
-use crate::numerics::gauss;
+use crate::winding::Winding;
+use fluxform_numerics::gauss;
 use serde::{Deserialize, Serialize};
 
 /// The three faces of the cylinder.
@@ -77,7 +77,7 @@ impl Resolution {
     /// The double layer's density behaves like rho^(2/3) at an edge of the steel, and what a tip
     /// panel of length t does wrong is felt outside like t^(5/3); each further node on panels
     /// graded by a fifth gains about a digit. The constants are those of the table that
-    /// `cargo test --test steel converges -- --nocapture` prints.
+    /// `cargo test --test field steel converges -- --nocapture` prints.
     #[must_use]
     pub fn for_tolerance(tolerance: f64) -> Self {
         let tolerance = tolerance.clamp(1e-12, 0.1);

@@ -23,15 +23,15 @@ use super::double_layer::operators;
 use super::generatrix::{Face, Generatrix, Panel, Resolution};
 use super::layer_gradient::{COMPONENTS, axial_gradient_operator, gradient_operators};
 use super::magnetized::MagnetizedCore;
-use crate::field::winding::{OnEdge, Winding};
-use crate::numerics::gauss;
-use crate::numerics::lagrange_basis::Basis;
-use crate::units::MU_0_T_M_PER_A;
+use crate::winding::{OnEdge, Winding};
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_numerics::gauss;
+use fluxform_numerics::lagrange_basis::Basis;
 
 /// What the layers' last degrees give at the peak counts so many times in its error, where the
 /// difference of two solutions is known as well and where it is not: alone it is at times a
 /// thirtieth of the error, the rest coming from all of the outline. By the table of
-/// `cargo test --test steel -- --ignored --nocapture claimed_in_full`.
+/// `cargo test --test field steel -- --ignored --nocapture claimed_in_full`.
 const LOST_BESIDE_DIFFERENCE: f64 = 0.1;
 const LOST_ALONE: f64 = 3.0;
 /// Share of a panel's two highest degrees that the degrees beyond them give together.
@@ -640,7 +640,7 @@ impl Targets {
             .map(|(index, current_a)| {
                 let mut values = DMatrix::zeros(COMPONENTS * self.own.len(), columns);
                 for (mode, product) in products.iter().enumerate() {
-                    crate::progress::poll();
+                    fluxform_base::progress::poll();
                     let mine = columns_of(mode);
                     let width = mine.len();
                     values
@@ -705,7 +705,7 @@ fn scans(curve: &Generatrix, fields: &[Field], nearest_m: f64) -> Vec<Peak> {
 }
 
 fn scan(curve: &Generatrix, field: &Field, nearest_m: f64) -> Peak {
-    crate::progress::poll();
+    fluxform_base::progress::poll();
     let polynomials = Polynomials::new(curve.order, field);
     let around = turns_around(field.modes());
     let between = TAU / around.len() as f64;

@@ -25,11 +25,10 @@ use nalgebra::{DMatrix, DVector};
 use super::condensation::{Condensed, Element, NotPositive, Plan};
 use super::lobatto;
 use super::permeability::{Constant, Permeability};
-use crate::numerics::gauss;
+use fluxform_numerics::gauss;
 
 /// A mesh that cannot be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
 pub enum MeshError {
     /// Breakpoints must be finite, strictly increasing, at least two; radii begin at 0.
     #[error("the core's breakpoints in {axis} must be finite and increasing")]
@@ -506,7 +505,7 @@ impl Interior {
 
     /// Element matrix from the weighted tangent's rr, rz and zz components at the nodes.
     fn stiffness(&self, [rr, rz, zz]: &[DMatrix<f64>; 3]) -> DMatrix<f64> {
-        crate::progress::poll();
+        fluxform_base::progress::poll();
         let count = self.reference.degree + 1;
         let pairs = count * count;
         let mut right = DMatrix::zeros(4 * count, pairs);

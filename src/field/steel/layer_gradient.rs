@@ -11,9 +11,9 @@ use std::f64::consts::PI;
 
 use super::double_layer::MAX_MODES;
 use super::generatrix::{Face, Generatrix};
-use crate::numerics::gauss;
-use crate::numerics::lagrange_basis::Basis;
-use crate::numerics::ring_functions::azimuthal_integrals;
+use fluxform_numerics::gauss;
+use fluxform_numerics::lagrange_basis::Basis;
+use fluxform_numerics::ring_functions::azimuthal_integrals;
 
 /// Components of the gradient: d/dr, d/dz and m/r.
 pub const COMPONENTS: usize = 3;
@@ -43,7 +43,7 @@ pub fn gradient_operators(
         .map(|chunk| {
             let mut columns = vec![vec![0.0; chunk.len() * COMPONENTS * nodes]; modes];
             for (place, target) in chunk.iter().enumerate() {
-                crate::progress::poll();
+                fluxform_base::progress::poll();
                 let start = place * COMPONENTS * nodes;
                 let mut at: Vec<&mut [f64]> = columns
                     .iter_mut()
@@ -187,7 +187,7 @@ mod tests {
     use super::super::generatrix::Resolution;
     use super::super::magnetized::MagnetizedCore;
     use super::*;
-    use crate::units::MU_0_T_M_PER_A;
+    use fluxform_base::units::MU_0_T_M_PER_A;
 
     #[test]
     fn the_kernel_is_differentiated() {
@@ -265,9 +265,8 @@ mod tests {
         let operators = gradient_operators(&outline, &[(r, z)], 4, 1e-9);
         for (mode, operator) in operators.iter().enumerate() {
             let m = mode as f64;
-            let layer = |node: &crate::field::steel::generatrix::Node| {
-                node.r_m.powf(m) * (1.0 + 0.5 * node.z_m)
-            };
+            let layer =
+                |node: &crate::steel::generatrix::Node| node.r_m.powf(m) * (1.0 + 0.5 * node.z_m);
             let density = nalgebra::DVector::from_iterator(
                 outline.nodes.len(),
                 outline.nodes.iter().map(layer),

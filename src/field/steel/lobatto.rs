@@ -77,7 +77,7 @@ fn product(nodes: &[f64], x: f64, without: &[usize]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::gauss;
+    use fluxform_numerics::gauss;
 
     #[test]
     fn nodes_of_known_degrees() {

@@ -7,12 +7,12 @@
 use serde::{Deserialize, Serialize};
 
 use super::generatrix::{Face, Generatrix};
-use crate::field::ring::{RingPoint, ring_field};
-use crate::field::winding::AxialField;
-use crate::numerics::dual::Dual;
-use crate::numerics::gauss;
-use crate::numerics::lagrange_basis::Basis;
-use crate::units::MU_0_T_M_PER_A;
+use crate::ring::{RingPoint, ring_field};
+use crate::winding::AxialField;
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_numerics::dual::Dual;
+use fluxform_numerics::gauss;
+use fluxform_numerics::lagrange_basis::Basis;
 
 /// Target of the quadrature over a panel, relative to the panel's own field.
 const TOLERANCE: f64 = 1e-12;
@@ -80,7 +80,7 @@ impl MagnetizedCore {
     /// B and its gradient, T and T/m, at radius `r_m` and height `z_m`, off the core's surface.
     #[must_use]
     pub fn field(&self, r_m: f64, z_m: f64) -> AxialField {
-        crate::progress::poll();
+        fluxform_base::progress::poll();
         let mut sums = Sums::default();
         let order = self.outline.order;
         let shape = self.outline.shape;

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::CoreShape;
-use crate::field::magnet::{Cylinder, NoRule};
+use crate::magnet::{Cylinder, NoRule};
 use isolated::{Isolated, placed};
 use magnet::PassiveMagnet;
 use neighbours::Neighbours;
@@ -39,7 +39,6 @@ pub struct Region {
 
 /// Why there is no pull.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
-#[non_exhaustive]
 pub enum NoPull {
     /// A size, place or tolerance that is not a number in its range.
     #[error(

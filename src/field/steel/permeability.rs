@@ -1,7 +1,7 @@
 //! What the solvers ask of a material: an isotropic, single-valued B(H).
 
 use super::bh_curve::BhCurve;
-use crate::units::MU_0_T_M_PER_A;
+use fluxform_base::units::MU_0_T_M_PER_A;
 
 /// A material's answer at one field strength, over mu_0.
 #[derive(Debug, Clone, Copy, PartialEq)]

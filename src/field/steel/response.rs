@@ -12,8 +12,8 @@ use std::f64::consts::TAU;
 
 use super::double_layer::operators;
 use super::generatrix::{Face, Generatrix};
-use crate::numerics::gauss;
-use crate::numerics::lagrange_basis::Basis;
+use fluxform_numerics::gauss;
+use fluxform_numerics::lagrange_basis::Basis;
 
 /// A ring of the exchange grid.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -348,8 +348,8 @@ pub fn mean<'a>(outline: &Generatrix, values: impl Iterator<Item = &'a f64>) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::steel::CoreShape;
-    use crate::field::steel::generatrix::Resolution;
+    use crate::steel::CoreShape;
+    use crate::steel::generatrix::Resolution;
 
     /// Of a constant, of heights, and of radii: 2 pi a (a^2 (2/3) + a h) / 2 pi a (a + h).
     #[test]
@@ -361,7 +361,7 @@ mod tests {
             top_m: 0.3 + h,
         };
         let outline = Generatrix::new(shape, &[], &Resolution::for_tolerance(1e-3));
-        let of = |value: &dyn Fn(&crate::field::steel::generatrix::Node) -> f64| {
+        let of = |value: &dyn Fn(&crate::steel::generatrix::Node) -> f64| {
             let values: Vec<f64> = outline.nodes.iter().map(value).collect();
             mean(&outline, values.iter())
         };

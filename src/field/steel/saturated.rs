@@ -30,7 +30,7 @@ use super::generatrix::{Face, Generatrix};
 use super::interior::{Interior, MeshError, Sample};
 use super::permeability::Permeability;
 use super::trace::Trace;
-use crate::units::MU_0_T_M_PER_A;
+use fluxform_base::units::MU_0_T_M_PER_A;
 
 /// Corrections below this part of u, in the energy norm, end the iteration; the error
 /// that is left is about its square.
@@ -175,7 +175,7 @@ impl SaturatedCore {
         let mut secant = SECANT.0;
         let mut status = Status::Stalled;
         while status == Status::Stalled && steps.len() < MAX_STEPS {
-            crate::progress::poll();
+            fluxform_base::progress::poll();
             let Some((change, slope)) = self.correction(&state, law, secant) else {
                 break;
             };

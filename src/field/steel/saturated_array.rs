@@ -31,9 +31,9 @@ use super::response::{Response, Rings, mean};
 use super::saturated::{CoreField, SaturatedCore, Solution, Status};
 use super::sources::{ArraySources, Parts};
 use super::symmetry::motions;
-use crate::field::winding::{OnEdge, Winding};
-use crate::numerics::anderson::Anderson;
-use crate::units::MU_0_T_M_PER_A;
+use crate::winding::{OnEdge, Winding};
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_numerics::anderson::Anderson;
 
 /// Iterates that the acceleration remembers.
 const DEPTH: usize = 5;
@@ -51,7 +51,6 @@ const PLACES: [[f64; 2]; 4] = [[0.0, 0.0], [0.7, 0.2], [-0.4, 1.1], [1.5, -1.2]]
 
 /// Why an array cannot be solved.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
 pub enum SaturatedArrayError {
     /// A node of the outline lies on the winding's edge.
     #[error(transparent)]

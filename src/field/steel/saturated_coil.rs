@@ -7,7 +7,7 @@ use super::interior::MeshError;
 use super::magnetized::MagnetizedCore;
 use super::permeability::Permeability;
 use super::saturated::{CoreField, SaturatedCore, Status};
-use crate::field::winding::{OnEdge, Winding};
+use crate::winding::{OnEdge, Winding};
 
 /// How much smaller a panel is than its neighbour away from the edge, from try to try: the curve's
 /// kinks cross the elements inside, where shorter ones help and higher degrees hardly do. After
@@ -19,7 +19,7 @@ const LEAST_ORDER: usize = 4;
 const FINER: f64 = 0.3;
 /// Times the larger of two differences between resolutions, the former counting `BEFORE`, the
 /// error is stated. By the table of
-/// `cargo test --test steel -- --ignored --nocapture along_curves_in_full`.
+/// `cargo test --test field steel -- --ignored --nocapture along_curves_in_full`.
 const SAFETY: f64 = 2.0;
 const BEFORE: f64 = 0.5;
 /// The same of |B| inside, of which the largest is seen at samples: kinks reach it undamped.
@@ -29,7 +29,6 @@ const CLOSEST: f64 = 0.1;
 
 /// Why a coil has no state at a current.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
 pub enum SaturatedCoilError {
     /// A node of the outline lies on the winding's edge.
     #[error(transparent)]

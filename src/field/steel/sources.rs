@@ -12,9 +12,9 @@ use super::array::CoupledArray;
 use super::generatrix::Generatrix;
 use super::response::Rings;
 use super::saturated_array::SaturatedArray;
-use crate::field::winding::Winding;
-use crate::numerics::dispatch::{self, Kernel, LANES, Lanes};
-use crate::units::MU_0_T_M_PER_A;
+use crate::winding::Winding;
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_numerics::dispatch::{self, Kernel, LANES, Lanes};
 
 /// Points of one piece of work; fixed, so that results do not depend on threads.
 const CHUNK: usize = 64;
@@ -191,7 +191,7 @@ impl ArraySources {
             .enumerate()
             .for_each(|(core, out)| {
                 for drive in 0..drives {
-                    crate::progress::poll();
+                    fluxform_base::progress::poll();
                     let by_mode = rings.moments(&layers(drive, core));
                     let mut place = 0;
                     for (ring, angles) in angles.iter().enumerate() {
@@ -312,7 +312,7 @@ impl Pass<'_> {
         let count = self.points.len();
         let mut out = vec![0.0; drives * PARTS * count];
         for (group, points) in self.points.chunks(LANES).enumerate() {
-            crate::progress::poll();
+            fluxform_base::progress::poll();
             let axis = |i: usize| {
                 Lanes(std::array::from_fn(|lane| {
                     points[lane.min(points.len() - 1)][i]

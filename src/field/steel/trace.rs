@@ -9,7 +9,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::lobatto;
-use crate::numerics::gauss;
+use fluxform_numerics::gauss;
 
 /// The maps for panels of `order` Gauss nodes and edges of one degree.
 #[derive(Debug)]

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::points::{Points, Probe};
 use super::scaled::Form;
-use crate::numerics::dispatch::{self, Kernel, LANES, Lanes, mul_add};
+use fluxform_numerics::dispatch::{self, Kernel, LANES, Lanes, mul_add};
 
 /// Points of a block: fewer bound tighter, more need less memory.
 const BLOCK: usize = 32;
@@ -80,7 +80,7 @@ impl Kernel for Enclose<'_> {
         let mut row = vec![0.0; n];
         let mut towards = vec![0.0; n];
         for (k, bounds) in self.bounds.chunks_exact_mut(4 * n).enumerate() {
-            crate::progress::poll();
+            fluxform_base::progress::poll();
             let first = self.first + k * BLOCK;
             let last = (first + BLOCK).min(points.height_m.len()) - 1;
             let (start, rest) = bounds.split_at_mut(n);
@@ -294,7 +294,7 @@ impl Kernel for Search<'_> {
         let mut found: Vec<usize> = Vec::new();
         let mut stack: Vec<(usize, f64, f64)> = Vec::new();
         for (k, bounds) in self.bounds.chunks_exact(4 * n).enumerate() {
-            crate::progress::poll();
+            fluxform_base::progress::poll();
             let first = self.first + k * BLOCK;
             let last = (first + BLOCK).min(points.height_m.len());
             let root = tree.nodes.len() - 1;

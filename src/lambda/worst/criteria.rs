@@ -1,9 +1,9 @@
 //! The worst-point force constants on two followed paths, in scaled units.
 
 use super::program::Piece;
-use crate::lambda::criteria::{Overlap, overlaps};
-use crate::numerics::double_double::DoubleDouble as Num;
-use crate::numerics::real::Real;
+use crate::criteria::{Overlap, overlaps};
+use fluxform_numerics::double_double::DoubleDouble as Num;
+use fluxform_numerics::real::Real;
 
 /// Above this share of lambda max h and of the error without currents (or above what rounding may hide) t* has left t_0.
 const VISIBLE: f64 = 1e-12;

@@ -10,8 +10,8 @@
 //! there to the result are; without an offset no lambda above it is.
 
 use super::maxmin::{Maxmin, largest};
-use crate::lambda::problem::{ForceProblem, ProblemError, Settings};
-use crate::lambda::reduce::largest_entries;
+use crate::problem::{ForceProblem, ProblemError, Settings};
+use crate::reduce::largest_entries;
 
 /// More programs than there are choices worth making.
 const PROGRAMS: usize = 200;
@@ -57,7 +57,7 @@ pub fn felt(
         .collect();
     let (mut lambda, mut best) = (0.0, None::<Maxmin>);
     for _ in 0..PROGRAMS {
-        crate::progress::poll();
+        fluxform_base::progress::poll();
         let (mut heights, mut offsets) = (Vec::new(), Vec::new());
         for (j, &h) in problem.height_m.iter().enumerate() {
             let offset = problem.offset_n.map_or(0.0, |offset| offset[j]);

@@ -3,7 +3,7 @@
 //! A driver that reverses has two columns, `G_i` and `-G_i`, and one that only pulls has the second,
 //! so that all currents are at least zero and every vertex of the program is one of its limits.
 
-use crate::lambda::problem::ForceProblem;
+use crate::problem::ForceProblem;
 
 /// The lists of that problem, where they are not those of the limited one.
 pub(super) struct FreeProblem {

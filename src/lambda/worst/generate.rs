@@ -11,9 +11,9 @@ use super::blocks::{Blocks, misses};
 use super::points::{Course, Held, Points, Probe, bit, first_missed};
 use super::program::{End, Piece, Program, Stand};
 use super::scaled::{Form, Scaled};
-use crate::lambda::reduce::times_power;
-use crate::numerics::double_double::DoubleDouble as Num;
-use crate::numerics::real::Real;
+use crate::reduce::times_power;
+use fluxform_numerics::double_double::DoubleDouble as Num;
+use fluxform_numerics::real::Real;
 
 /// Points tried first: with more, the rest are only looked at to confirm.
 const POOL: usize = 4096;
@@ -125,7 +125,7 @@ impl<'a> Search<'a> {
         let form = self.form;
         let mut working = self.working.clone();
         for _ in 0..ROUNDS {
-            crate::progress::poll();
+            fluxform_base::progress::poll();
             let near = match &self.pool {
                 Some(pool) => pool.points(self.all.coils),
                 None => self.all,
@@ -330,8 +330,8 @@ fn probes(scaled: &Scaled, form: Form, followed: &mut Followed) -> (Vec<Probe>, 
 mod tests {
     use super::super::scaled::Limits;
     use super::*;
-    use crate::lambda::problem::ForceProblem;
-    use crate::lambda::reduce::largest_entries;
+    use crate::problem::ForceProblem;
+    use crate::reduce::largest_entries;
 
     /// Of a followed path no point is missed at any turn, at rest least of all.
     #[test]

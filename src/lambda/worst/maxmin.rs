@@ -4,9 +4,9 @@ use super::generate::Search;
 use super::path::{ActivePoint, active};
 use super::program::End;
 use super::scaled::{Form, Limits, NOTHING, Scaled};
-use crate::lambda::problem::{ForceProblem, ProblemError, Settings};
-use crate::lambda::reduce::{largest_entries, times_power};
-use crate::numerics::real::Real;
+use crate::problem::{ForceProblem, ProblemError, Settings};
+use crate::reduce::{largest_entries, times_power};
+use fluxform_numerics::real::Real;
 
 /// The largest lambda with `G I + offset >= lambda h` at every point, and currents for it.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,7 +30,7 @@ pub fn maxmin(problem: &ForceProblem) -> Result<Option<Maxmin>, ProblemError> {
 }
 
 /// The same for a problem that is well formed.
-pub(in crate::lambda) fn largest(problem: &ForceProblem, entries: &[f64]) -> Option<Maxmin> {
+pub(crate) fn largest(problem: &ForceProblem, entries: &[f64]) -> Option<Maxmin> {
     let scaled = Scaled::new(problem, entries, Form::Least, Limits::All);
     if problem.height_m[scaled.highest] <= 0.0 {
         return None;

@@ -35,8 +35,8 @@ pub use maxmin::{Maxmin, maxmin};
 pub use path::{ActivePoint, Turn, WorstPath};
 pub use proof::lower_bound_n;
 
-use crate::accuracy::StageAccuracy;
-use crate::numerics::real::Real;
+use fluxform_base::accuracy::StageAccuracy;
+use fluxform_numerics::real::Real;
 
 use super::problem::{ForceProblem, ProblemError, Settings};
 use super::reduce::{largest_entries, times_power};
@@ -141,7 +141,7 @@ pub fn worst_point(
         Some(lambda) if settings.jnd_weight == 0.0 => Some(lambda),
         Some(_) => comparison.jnd(settings.jnd_weight),
     };
-    let si = |lambda: crate::numerics::double_double::DoubleDouble| {
+    let si = |lambda: fluxform_numerics::double_double::DoubleDouble| {
         times_power(lambda.to_f64(), scaled.lambda_unit())
     };
     let path = WorstPath::new(problem, &scaled, &limited);

@@ -3,10 +3,10 @@
 use super::generate::Followed;
 use super::program::Piece;
 use super::scaled::Scaled;
-use crate::lambda::path::{Event, Limits, Standing};
-use crate::lambda::problem::ForceProblem;
-use crate::lambda::reduce::times_power;
-use crate::numerics::real::Real;
+use crate::path::{Event, Limits, Standing};
+use crate::problem::ForceProblem;
+use crate::reduce::times_power;
+use fluxform_numerics::real::Real;
 
 /// Slopes of t* that differ by less, relative to max h, are one.
 const SAME_SLOPE: f64 = 1e-13;

@@ -1,7 +1,7 @@
 //! Points, what they are asked, and which of a few a path misses first.
 
 use super::scaled::Form;
-use crate::numerics::dispatch::{self, Kernel, mul_add};
+use fluxform_numerics::dispatch::{self, Kernel, mul_add};
 
 /// Forces, heights and offsets of some points.
 #[derive(Clone, Copy)]

@@ -6,8 +6,8 @@
 //! dependent rows cost no digits. Ties are decided by a second objective (among equally
 //! good x those of the least weighted sum), then by the order of the rows (Bland's rule).
 
-use crate::numerics::double_double::DoubleDouble as Num;
-use crate::numerics::real::Real;
+use fluxform_numerics::double_double::DoubleDouble as Num;
+use fluxform_numerics::real::Real;
 
 /// A row below its bound by less than this share of the bounds' size is met: rows of doubles
 /// that ought to be equal differ by about as much, and as active rows would be nearly dependent.
@@ -171,7 +171,7 @@ impl Program {
         // Far more than there are turns: it ends what rounding keeps going in circles.
         let limit = 20_000 + 1000 * self.width;
         for _ in 0..limit {
-            crate::progress::poll();
+            fluxform_base::progress::poll();
             vertex.place(self, lambda);
             let cautious = exchanges_here > patience;
             let (mut entering, mut next) = self.look(&vertex, lambda, cautious);
@@ -179,7 +179,7 @@ impl Program {
             // A step without end is never taken before the last of them.
             let mut asked = 0;
             while entering.is_none() && (asked < TWINS || next.is_none()) {
-                crate::progress::poll();
+                fluxform_base::progress::poll();
                 let stand = Stand {
                     lambda,
                     z: &vertex.z,

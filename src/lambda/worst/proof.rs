@@ -3,10 +3,10 @@
 use rayon::prelude::*;
 
 use super::path::ActivePoint;
-use crate::lambda::certificate::best_within_limits;
-use crate::lambda::problem::ForceProblem;
-use crate::numerics::double_double::DoubleDouble as Num;
-use crate::numerics::real::Real;
+use crate::certificate::best_within_limits;
+use crate::problem::ForceProblem;
+use fluxform_numerics::double_double::DoubleDouble as Num;
+use fluxform_numerics::real::Real;
 
 /// Points looked at together; a maximum does not depend on it.
 const CHUNK_POINTS: usize = 4096;

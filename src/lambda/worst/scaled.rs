@@ -3,12 +3,12 @@
 //! With `2^k_i` near the largest force per ampere of coil i and `2^f` near the largest force
 //! within the limits, `x_i = I_i 2^(k_i - f)`, `t' = t 2^-f` and `lambda' = lambda 2^(k_h - f)`.
 
-use crate::numerics::double_double::DoubleDouble as Num;
-use crate::numerics::real::Real;
+use fluxform_numerics::double_double::DoubleDouble as Num;
+use fluxform_numerics::real::Real;
 
 use super::program::Program;
-use crate::lambda::problem::ForceProblem;
-use crate::lambda::reduce::{exponent_of, times_power};
+use crate::problem::ForceProblem;
+use crate::reduce::{exponent_of, times_power};
 
 /// What rounding leaves of a scaled current, or force per ampere, of zero.
 pub(super) const NOTHING: f64 = 1e-24;

@@ -14,8 +14,8 @@ use super::nearest::Tree;
 use super::piece::{Face, Patch, Point, Polygon, Rect};
 use super::visible::supremum_over_visible;
 use super::{DEEPEST, Extreme, Faces, Lattice, Vertical, Worst};
-use crate::progress::{Interrupted, Progress};
-use crate::shape::mesh::{Mesh, Triangle};
+use crate::mesh::{Mesh, Triangle};
+use fluxform_base::progress::{Interrupted, Progress};
 
 /// Relative width at which a search ends.
 const NARROW: f64 = 0.01;
@@ -218,7 +218,7 @@ impl Search<'_> {
         }
         let mut looked = 0;
         while let Some(Open { bound_m, part, .. }) = open.pop() {
-            crate::progress::poll();
+            fluxform_base::progress::poll();
             if bound_m <= self.enough_m() || looked >= MOST {
                 return Ok(bound_m.max(self.enough_m()));
             }
@@ -361,7 +361,7 @@ impl Search<'_> {
         }
         let mut looked = 0;
         while let Some(Open { bound_m, part, .. }) = open.pop() {
-            crate::progress::poll();
+            fluxform_base::progress::poll();
             if bound_m <= self.enough_m() || looked >= MOST {
                 return Ok(bound_m.max(self.enough_m()));
             }

@@ -17,12 +17,12 @@ use std::ops::Range;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::numerics::axis::Axis;
-use crate::progress::{Interrupted, Progress};
-use crate::shape::height::{Grid, heights, reach_m};
-use crate::shape::index::Buckets;
-use crate::shape::mesh::Mesh;
-use crate::shape::seen::is_wall;
+use crate::height::{Grid, heights, reach_m};
+use crate::index::Buckets;
+use crate::mesh::Mesh;
+use crate::seen::is_wall;
+use fluxform_base::progress::{Interrupted, Progress};
+use fluxform_numerics::axis::Axis;
 
 use self::visible::{HIGHEST, Hair, supremum_over_visible};
 
@@ -555,10 +555,10 @@ fn start(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::progress::Silent;
-    use crate::shape::document::Placement;
-    use crate::shape::mesh::{FileMesh, Triangle};
-    use crate::shape::placement::Transform;
+    use crate::document::Placement;
+    use crate::mesh::{FileMesh, Triangle};
+    use crate::placement::Transform;
+    use fluxform_base::progress::Silent;
 
     fn placed(triangles: Vec<Triangle>) -> Mesh {
         let file = FileMesh {

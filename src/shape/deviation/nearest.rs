@@ -1,7 +1,7 @@
 //! The distance from a point to a set of triangles: by a tree of boxes, nearest first.
 
-use crate::shape::boxes::{Box3, BoxTree};
-use crate::shape::mesh::{Triangle, dot, minus};
+use crate::boxes::{Box3, BoxTree};
+use crate::mesh::{Triangle, dot, minus};
 
 /// A tree of boxes over triangles, and the triangles in its order.
 pub(super) struct Tree {

@@ -3,7 +3,7 @@
 //! The difference is a saddle: inside a polygon it has no extremum, along an edge it is quadratic.
 //! So its supremum stands at a corner or at the stationary point of an edge, in closed form.
 
-use crate::shape::mesh::Triangle;
+use crate::mesh::Triangle;
 use serde::{Deserialize, Serialize};
 
 /// Corners of a triangle cut by a rectangle, by three lines and by a plane.
@@ -21,11 +21,11 @@ pub struct Rect {
 }
 
 impl Rect {
-    pub(in crate::shape) fn centre(&self) -> Point {
+    pub(crate) fn centre(&self) -> Point {
         [0, 1].map(|k| 0.5 * (self.low_m[k] + self.high_m[k]))
     }
 
-    pub(in crate::shape) fn sides(&self) -> Point {
+    pub(crate) fn sides(&self) -> Point {
         [0, 1].map(|k| self.high_m[k] - self.low_m[k])
     }
 

@@ -9,9 +9,9 @@ use rayon::prelude::*;
 
 use super::piece::{Extreme, Patch, Point, Rect};
 use super::{Cells, Vertical};
-use crate::numerics::axis::Axis;
-use crate::shape::height::{Grid, Sample};
-use crate::shape::primitive::PlacedPrimitive;
+use crate::height::{Grid, Sample};
+use crate::primitive::PlacedPrimitive;
+use fluxform_numerics::axis::Axis;
 
 /// Relative width at which the search ends.
 const NARROW: f64 = 1e-6;

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::format::{SurfaceFormat, unit_names};
 use super::{AxisRequest, GridRequest, Placement, ShapeDocument, SurfaceSource};
-use crate::design::words::axis_fault;
-use crate::numerics::axis::Axis;
+use fluxform_design::words::axis_fault;
+use fluxform_numerics::axis::Axis;
 
 /// What the command line says of a surface.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,7 +29,6 @@ pub struct RawSurface {
 
 /// Why a surface on the command line cannot be taken as it stands: wrong usage.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
 pub enum RawSurfaceError {
     /// The format carries no unit and none was given.
     #[error("{}: this format carries no unit of length: add --unit ({})", path.display(), unit_names().join(", "))]

@@ -4,14 +4,14 @@ use std::path::Path;
 
 use super::format::{SurfaceFormat, parse_unit, unit_names};
 use super::{AxisRequest, GridRequest, Placement, Primitive, ShapeDocument, SurfaceSource};
-use crate::design::diagnostics::{Faults, InvalidDocument};
-use crate::design::reader::{Section, read_document};
-use crate::design::rule::{Bound, Rule};
-use crate::design::sections::{BODY_MM, SEED_SIDE_MM, axis_m};
-use crate::design::source;
-use crate::design::values::OneOrMany;
-use crate::design::words::{nearest, quoted};
-use crate::units::m_from_mm;
+use fluxform_base::units::m_from_mm;
+use fluxform_design::diagnostics::{Faults, InvalidDocument};
+use fluxform_design::reader::{Section, read_document};
+use fluxform_design::rule::{Bound, Rule};
+use fluxform_design::source;
+use fluxform_design::values::OneOrMany;
+use fluxform_design::words::{nearest, quoted};
+use fluxform_design::{BODY_MM, SEED_SIDE_MM, axis_m};
 
 /// Most grid points of one shape.
 pub const POINTS_MAX: usize = 100_000_000;

@@ -7,11 +7,11 @@
 use std::collections::BTreeMap;
 
 use super::{MOST_POINTS, Probe, Scattered, too_many};
-use crate::progress::Progress;
-use crate::shape::deviation::{Patch, Rect};
-use crate::shape::error::ShapeError;
-use crate::shape::height::Sample;
-use crate::shape::marks::Marks;
+use crate::deviation::{Patch, Rect};
+use crate::error::ShapeError;
+use crate::height::Sample;
+use crate::marks::Marks;
+use fluxform_base::progress::Progress;
 
 /// Rectangles along the longer side to begin with.
 const FIRST: f64 = 4.0;

@@ -6,10 +6,10 @@
 //! a spacing or more from all points becomes one.
 
 use super::{MOST_POINTS, Probe, Scattered, too_many};
-use crate::progress::Progress;
-use crate::shape::error::ShapeError;
-use crate::shape::height::Sample;
-use crate::shape::marks::Marks;
+use crate::error::ShapeError;
+use crate::height::Sample;
+use crate::marks::Marks;
+use fluxform_base::progress::Progress;
 
 /// Darts into every free cell.
 const ROUNDS: u64 = 40;

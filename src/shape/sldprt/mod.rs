@@ -7,9 +7,9 @@
 mod container;
 mod display;
 
-use crate::shape::fault::ReadError;
-use crate::shape::mesh::{FileMesh, Triangle};
-use crate::shape::number::F32_ROUNDING;
+use crate::fault::ReadError;
+use crate::mesh::{FileMesh, Triangle};
+use crate::number::F32_ROUNDING;
 
 /// What to do instead, for messages.
 const ADVICE: &str = "open it in SOLIDWORKS and save the body as STL (binary, fine resolution) \

@@ -3,9 +3,9 @@
 //! A wrong body rarely holds all of this: closed, one sense, the topology that the file states,
 //! volume and area that stay when the mesh is made finer, and every vertex of the file in its box.
 
-use crate::shape::document::SurfaceFormat;
-use crate::shape::inspect::MeshReport;
-use crate::shape::mesh::{FileMesh, Triangle};
+use crate::document::SurfaceFormat;
+use crate::inspect::MeshReport;
+use crate::mesh::{FileMesh, Triangle};
 
 /// Volume and area of a coarse and a four times finer mesh may differ by so much of the finer's.
 const MOST_CHANGE: f64 = 0.02;

@@ -15,10 +15,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use monstertruck_io::step::load::Table;
 use monstertruck_meshing::prelude::*;
 
-use crate::progress::pass_interruption;
-use crate::shape::assembly::{Affine, Body, lay_out};
-use crate::shape::fault::ReadError;
-use crate::shape::mesh::{FileMesh, Triangle};
+use crate::assembly::{Affine, Body, lay_out};
+use crate::fault::ReadError;
+use crate::mesh::{FileMesh, Triangle};
+use fluxform_base::progress::pass_interruption;
 
 /// Readings under way whose panics are caught and told as faults of the file.
 static GUARDED: AtomicUsize = AtomicUsize::new(0);

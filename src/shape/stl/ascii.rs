@@ -1,8 +1,8 @@
 //! ASCII STL: one pass over the words, whatever separates the lines.
 
-use crate::shape::mesh::{FileMesh, Triangle};
-use crate::shape::number::{Numbers, shown};
-use crate::shape::stl::StlError;
+use crate::mesh::{FileMesh, Triangle};
+use crate::number::{Numbers, shown};
+use crate::stl::StlError;
 
 /// The bytes after a UTF-8 byte-order mark.
 pub(super) fn after_mark(bytes: &[u8]) -> &[u8] {
@@ -42,7 +42,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<FileMesh, StlError> {
     let mut warnings = Vec::new();
     let mut solids = 0;
     while let Some(word) = reader.words.next() {
-        crate::progress::poll();
+        fluxform_base::progress::poll();
         reader.triangle = 0;
         if !is(Some(word), "solid") {
             return Err(reader.unexpected("`solid`", Some(word)));

@@ -2,9 +2,9 @@
 
 use std::io::{self, Read};
 
-use crate::shape::mesh::{FileMesh, Triangle};
-use crate::shape::number::F32_ROUNDING;
-use crate::shape::stl::StlError;
+use crate::mesh::{FileMesh, Triangle};
+use crate::number::F32_ROUNDING;
+use crate::stl::StlError;
 
 const HEADER: usize = 84;
 const RECORD: usize = 50;
@@ -52,7 +52,7 @@ pub(super) fn read_from(
     let mut found = Records::with_capacity(left);
     let mut piece = vec![0; RECORD * left.min(PIECE)];
     while left > 0 {
-        crate::progress::poll();
+        fluxform_base::progress::poll();
         let records = left.min(PIECE);
         let piece = &mut piece[..RECORD * records];
         source.read_exact(piece)?;

@@ -8,11 +8,10 @@ mod binary;
 
 use std::io::{self, Read};
 
-use crate::shape::mesh::FileMesh;
+use crate::mesh::FileMesh;
 
 /// Why bytes are no STL mesh, and where.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
 pub enum StlError {
     /// No byte at all.
     #[error("the file is empty (0 bytes): the export or the download failed")]

@@ -31,7 +31,7 @@ const ORIGIN: std::ops::Range<usize> = 8..40;
 type Value = (Vec<f64>, Vec<Vec<f64>>, String, Option<u64>);
 
 fn origin() -> Origin {
-    Origin::default().and(b"a design")
+    Origin::of_build("a build").and(b"a design")
 }
 
 /// The files that the store itself writes.
@@ -114,7 +114,10 @@ fn give(input: &Input, folder: &Path) -> Result<bool, String> {
     let store = Store::in_folder(folder.to_path_buf(), ".");
     adopt(input, &store, folder);
     let read = store.recall::<Value>(ENTRY, &origin()).is_some();
-    if store.recall::<Value>(ENTRY, &Origin::default()).is_some() {
+    if store
+        .recall::<Value>(ENTRY, &Origin::of_build("a build"))
+        .is_some()
+    {
         return Err("an entry of another origin is used".to_owned());
     }
     // What is no entry is left alone; what is one is written anew.

@@ -1,5 +1,5 @@
 use super::*;
-use crate::field::steel::permeability::Froehlich;
+use crate::steel::permeability::Froehlich;
 
 const R_M: f64 = 0.7;
 const Z_M: (f64, f64) = (-0.9, 1.3);

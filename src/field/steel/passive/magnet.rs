@@ -2,7 +2,7 @@
 
 use super::NoPull;
 use super::reaction::Dipole;
-use crate::field::magnet::{Cylinder, MagnetRule, Sources};
+use crate::magnet::{Cylinder, MagnetRule, Sources};
 
 /// Height, in radii of the ball around the magnet, from which dipoles on its axis do.
 const FAR_REACHES: f64 = 2.0;

@@ -17,12 +17,12 @@ use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
 use super::reaction::{Dipole, dot, minus};
-use crate::field::steel::CoreShape;
-use crate::field::steel::array::ArrayResolution;
-use crate::field::steel::coupling::grid_points;
-use crate::field::steel::generatrix::Generatrix;
-use crate::field::steel::response::{Response, Rings};
-use crate::units::MU_0_T_M_PER_A;
+use crate::steel::CoreShape;
+use crate::steel::array::ArrayResolution;
+use crate::steel::coupling::grid_points;
+use crate::steel::generatrix::Generatrix;
+use crate::steel::response::{Response, Rings};
+use fluxform_base::units::MU_0_T_M_PER_A;
 
 /// Longest panel of the exchange grid, in distances from the magnet.
 const PANEL: f64 = 1.5;
@@ -137,7 +137,7 @@ impl Neighbours {
     }
 
     fn along<const N: usize>(&self, at_m: [f64; 3], axes: [usize; N]) -> [f64; N] {
-        crate::progress::poll();
+        fluxform_base::progress::poll();
         let kept = self.reduce.nrows();
         let mut seen = DMatrix::zeros(kept * self.positions_m.len(), 1 + N);
         let mut grid = DMatrix::zeros(self.points.len(), 1 + N);
@@ -267,7 +267,7 @@ impl Basis {
 
 /// 1/(4 pi |x - y|) from the grid of one core to that of a core at `offset_m` from it.
 fn inverse_distances(points: &Points, offset_m: [f64; 2]) -> DMatrix<f64> {
-    crate::progress::poll();
+    fluxform_base::progress::poll();
     DMatrix::from_fn(points.len(), points.len(), |row, column| {
         let (x, y) = (points[row].0, points[column].0);
         let d = minus([x[0] + offset_m[0], x[1] + offset_m[1], x[2]], y);
@@ -277,7 +277,7 @@ fn inverse_distances(points: &Points, offset_m: [f64; 2]) -> DMatrix<f64> {
 
 /// The normal derivative of [`inverse_distances`] by the receiver.
 fn normal_derivatives(points: &Points, offset_m: [f64; 2]) -> DMatrix<f64> {
-    crate::progress::poll();
+    fluxform_base::progress::poll();
     DMatrix::from_fn(points.len(), points.len(), |row, column| {
         let ((x, n), y) = (points[row], points[column].0);
         let d = minus([x[0] + offset_m[0], x[1] + offset_m[1], x[2]], y);
@@ -289,7 +289,7 @@ fn normal_derivatives(points: &Points, offset_m: [f64; 2]) -> DMatrix<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::steel::coupling::between_cores;
+    use crate::steel::coupling::between_cores;
 
     /// The coupling of two cores without reciprocity or chosen potentials: all moments of both
     /// solved at once, and the potential they send to the magnet.

@@ -11,11 +11,11 @@
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::{PI, TAU};
 
-use crate::field::steel::CoreShape;
-use crate::field::steel::double_layer::{MAX_MODES, operators};
-use crate::field::steel::generatrix::{Generatrix, Resolution};
-use crate::field::steel::response::{mean, system};
-use crate::units::MU_0_T_M_PER_A;
+use crate::steel::CoreShape;
+use crate::steel::double_layer::{MAX_MODES, operators};
+use crate::steel::generatrix::{Generatrix, Resolution};
+use crate::steel::response::{mean, system};
+use fluxform_base::units::MU_0_T_M_PER_A;
 
 /// A point dipole in the frame of a core, whose axis is z.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -186,7 +186,7 @@ impl Reaction {
     /// The energy of `dipoles` and the layer they cause, J.
     #[must_use]
     pub fn energy_j(&self, dipoles: &[Dipole]) -> f64 {
-        crate::progress::poll();
+        fluxform_base::progress::poll();
         let (mut potential, mut normal) = (self.zeros(), self.zeros());
         for (((x, n), phi), slope) in self
             .points
@@ -222,7 +222,7 @@ impl Reaction {
     /// The field that the steel sends back to each of `dipoles`, all of them acting together.
     #[must_use]
     pub fn induced(&self, dipoles: &[Dipole]) -> Vec<Induced> {
-        crate::progress::poll();
+        fluxform_base::progress::poll();
         let mut potential = self.zeros();
         for ((x, _), phi) in self.points.iter().zip(potential.as_mut_slice()) {
             for dipole in dipoles {

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::{MAX_TRIALS, SLOPE_LEFT, SaturatedCore};
-use crate::field::steel::permeability::Permeability;
+use crate::steel::permeability::Permeability;
 
 /// Trials of the uniform permeability to begin with.
 const START_TRIALS: usize = 12;

@@ -1,11 +1,11 @@
 use super::*;
-use crate::field::steel::CoreShape;
-use crate::field::steel::bh_curve::BhCurve;
-use crate::field::steel::cored_coil::{CoredCoil, Excitation};
-use crate::field::steel::generatrix::Resolution;
-use crate::field::steel::magnetized::MagnetizedCore;
-use crate::field::steel::permeability::{Constant, Froehlich, Response};
-use crate::field::winding::Winding;
+use crate::steel::CoreShape;
+use crate::steel::bh_curve::BhCurve;
+use crate::steel::cored_coil::{CoredCoil, Excitation};
+use crate::steel::generatrix::Resolution;
+use crate::steel::magnetized::MagnetizedCore;
+use crate::steel::permeability::{Constant, Froehlich, Response};
+use crate::winding::Winding;
 
 const WINDING: Winding = Winding {
     inner_radius_m: 0.013,

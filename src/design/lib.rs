@@ -37,11 +37,13 @@ pub mod named_file;
 pub mod parse;
 pub mod reader;
 pub mod rule;
-pub(crate) mod sections;
+mod sections;
 pub mod source;
 pub mod template;
 pub mod values;
 pub mod words;
+
+pub use sections::{BODY_MM, SEED_SIDE_MM, axis_m};
 
 pub use diagnostics::{Fault, Faults, InvalidDocument, Severity};
 pub use model::*;

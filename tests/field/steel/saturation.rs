@@ -2,10 +2,10 @@
 
 use super::claims::{covered, random_cores};
 use super::support::{Design, Lcg, SEED_COIL, SEED_CORE};
-use fluxform::coil::inductance::self_inductance_h;
-use fluxform::field::steel::bh_curve::BhCurve;
-use fluxform::field::steel::generatrix::Resolution;
-use fluxform::field::steel::saturated_coil::CoilWithCurve;
+use fluxform_coil::inductance::self_inductance_h;
+use fluxform_field::steel::bh_curve::BhCurve;
+use fluxform_field::steel::generatrix::Resolution;
+use fluxform_field::steel::saturated_coil::CoilWithCurve;
 use rayon::prelude::*;
 
 /// The committed table, one of cobalt-iron that ends high, and a coarse one whose kinks are sharp.
@@ -126,7 +126,7 @@ fn claims_hold_along_curves() {
     study(&cases(0)[2..5], [1e-4]);
 }
 
-/// `cargo test --test steel -- --ignored --nocapture along_curves_in_full` prints the table.
+/// `cargo test --test field steel -- --ignored --nocapture along_curves_in_full` prints the table.
 #[test]
 #[ignore = "minutes of CPU: 42 states of the steel"]
 fn claims_hold_along_curves_in_full() {

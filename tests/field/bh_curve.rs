@@ -1,12 +1,12 @@
 //! Magnetisation curves: against scipy's PCHIP, and as physics has them.
 
-use fluxform::field::steel::bh_check::{BhCurveError, BhWarning};
-use fluxform::field::steel::bh_curve::BhCurve;
-use fluxform::units::MU_0_T_M_PER_A;
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_field::steel::bh_check::{BhCurveError, BhWarning};
+use fluxform_field::steel::bh_curve::BhCurve;
 use serde_json::Value;
 
 fn oracle() -> Value {
-    serde_json::from_str(include_str!("oracles/bh_curve.json")).unwrap()
+    serde_json::from_str(include_str!("../oracles/bh_curve.json")).unwrap()
 }
 
 fn column(table: &Value, name: &str) -> Vec<f64> {
@@ -65,7 +65,7 @@ fn agrees_with_scipy() {
 
 #[test]
 fn the_committed_table_is_the_oracle_s() {
-    let text = include_str!("../designs/steel_1010.csv");
+    let text = include_str!("../../designs/steel_1010.csv");
     let rows: Vec<Vec<f64>> = text
         .lines()
         .skip(1)

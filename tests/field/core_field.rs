@@ -1,14 +1,14 @@
 //! Flux density inside linear cores against brute force, limits and symmetries.
 
-use fluxform::field::steel::CoreShape;
-use fluxform::field::steel::array::{ArrayResolution, CoupledArray};
-use fluxform::field::steel::cored_coil::CoredCoil;
-use fluxform::field::steel::generatrix::Face;
-use fluxform::field::steel::inside::{CoreField, Inspection, peak_depth_m};
-use fluxform::field::winding::{AxialField, Winding};
-use fluxform::numerics::gauss;
-use fluxform::numerics::lagrange_basis::Basis;
-use fluxform::units::MU_0_T_M_PER_A;
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_field::steel::CoreShape;
+use fluxform_field::steel::array::{ArrayResolution, CoupledArray};
+use fluxform_field::steel::cored_coil::CoredCoil;
+use fluxform_field::steel::generatrix::Face;
+use fluxform_field::steel::inside::{CoreField, Inspection, peak_depth_m};
+use fluxform_field::winding::{AxialField, Winding};
+use fluxform_numerics::gauss;
+use fluxform_numerics::lagrange_basis::Basis;
 use std::f64::consts::{PI, TAU};
 
 const WINDING: Winding = Winding {

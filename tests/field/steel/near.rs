@@ -1,10 +1,10 @@
 //! Close to the steel: claims hold at every place that is accepted.
 
-use fluxform::field::steel::CLOSEST;
-use fluxform::field::steel::cored_coil::CoredCoil;
-use fluxform::field::winding::AxialField;
+use fluxform_field::steel::CLOSEST;
+use fluxform_field::steel::cored_coil::CoredCoil;
+use fluxform_field::winding::AxialField;
 
-use crate::support::{Design, Lcg, designs};
+use super::support::{Design, Lcg, designs};
 
 /// A place outside winding and steel, its distance from the steel uniform in the logarithm.
 fn place(design: &Design, random: &mut Lcg) -> (f64, f64) {

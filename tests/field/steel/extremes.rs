@@ -1,12 +1,12 @@
 //! Designs at the limits of what may be asked.
 
-use fluxform::field::steel::CoreShape;
-use fluxform::field::steel::cored_coil::CoredCoil;
-use fluxform::field::steel::generatrix::Resolution;
-use fluxform::field::winding::Winding;
-use fluxform::units::MU_0_T_M_PER_A;
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_field::steel::CoreShape;
+use fluxform_field::steel::cored_coil::CoredCoil;
+use fluxform_field::steel::generatrix::Resolution;
+use fluxform_field::winding::Winding;
 
-use crate::support::{Design, SEED_COIL, SEED_CORE, designs};
+use super::support::{Design, SEED_COIL, SEED_CORE, designs};
 
 fn winding(inner_radius_m: f64, outer_radius_m: f64, length_m: f64) -> Winding {
     Winding {

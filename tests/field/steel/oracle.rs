@@ -1,11 +1,11 @@
 //! Against finite elements and against a boundary-integral solution by surface charge.
 
-use fluxform::coil::inductance::self_inductance_h;
-use fluxform::field::steel::CoreShape;
-use fluxform::field::winding::Winding;
+use fluxform_coil::inductance::self_inductance_h;
+use fluxform_field::steel::CoreShape;
+use fluxform_field::winding::Winding;
 use serde_json::Value;
 
-use crate::support::{Design, SEED_COIL, SEED_CORE, number, oracle};
+use super::support::{Design, SEED_COIL, SEED_CORE, number, oracle};
 
 /// dB_z/dz to 1e-5 of the peak at its height, B_z to 5e-6, L to 1e-7, at tolerance 1e-6.
 #[test]

@@ -2,11 +2,11 @@
 
 use std::f64::consts::PI;
 
-use fluxform::field::steel::CoreShape;
-use fluxform::field::winding::AxialField;
-use fluxform::numerics::gauss;
+use fluxform_field::steel::CoreShape;
+use fluxform_field::winding::AxialField;
+use fluxform_numerics::gauss;
 
-use crate::support::{Design, SEED_COIL, designs};
+use super::support::{Design, SEED_COIL, designs};
 
 /// The smooth part of the derivative: central differences of fourth order.
 fn derivative(f: impl Fn(f64) -> f64, h: f64) -> f64 {

@@ -3,18 +3,18 @@
 // Some tests print the figures that the documentation quotes.
 #![allow(clippy::print_stdout)]
 
-use fluxform::coil::inductance::self_inductance_h;
-use fluxform::field::steel::CoreShape;
-use fluxform::field::steel::array::{ArrayResolution, CoupledArray, closest_m};
-use fluxform::field::steel::bh_curve::BhCurve;
-use fluxform::field::steel::cored_coil::Excitation;
-use fluxform::field::steel::generatrix::{Generatrix, Resolution};
-use fluxform::field::steel::magnetized::MagnetizedCore;
-use fluxform::field::steel::permeability::{Constant, Permeability};
-use fluxform::field::steel::saturated::{CoreField, SaturatedCore, Status};
-use fluxform::field::steel::saturated_array::{SaturatedArray, SaturatedArrayError};
-use fluxform::field::steel::sources::{ArraySources, Parts};
-use fluxform::field::winding::Winding;
+use fluxform_coil::inductance::self_inductance_h;
+use fluxform_field::steel::CoreShape;
+use fluxform_field::steel::array::{ArrayResolution, CoupledArray, closest_m};
+use fluxform_field::steel::bh_curve::BhCurve;
+use fluxform_field::steel::cored_coil::Excitation;
+use fluxform_field::steel::generatrix::{Generatrix, Resolution};
+use fluxform_field::steel::magnetized::MagnetizedCore;
+use fluxform_field::steel::permeability::{Constant, Permeability};
+use fluxform_field::steel::saturated::{CoreField, SaturatedCore, Status};
+use fluxform_field::steel::saturated_array::{SaturatedArray, SaturatedArrayError};
+use fluxform_field::steel::sources::{ArraySources, Parts};
+use fluxform_field::winding::Winding;
 use nalgebra::DMatrix;
 
 const WINDING: Winding = Winding {
@@ -37,7 +37,7 @@ const MIXED_A: [f64; 3] = [7.3, -8.9, 2.1];
 
 /// The committed table of a low-carbon steel.
 fn steel() -> BhCurve {
-    let text = include_str!("../designs/steel_1010.csv");
+    let text = include_str!("../../designs/steel_1010.csv");
     let (b_t, h): (Vec<f64>, Vec<f64>) = text
         .lines()
         .skip(1)
@@ -592,7 +592,7 @@ fn a_gap_of_one_millimetre_is_solved_to_a_stated_error() {
 /// elements state and those of an outline for 1e-6.
 #[test]
 fn finite_elements_agree_on_one_saturating_coil() {
-    let text = include_str!("oracles/steel/nonlinear_coil.json");
+    let text = include_str!("../oracles/steel/nonlinear_coil.json");
     let oracle: serde_json::Value = serde_json::from_str(text).expect("JSON");
     let numbers = |value: &serde_json::Value| -> Vec<f64> {
         let of = |v: &serde_json::Value| v.as_f64().expect("a number");

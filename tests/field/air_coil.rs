@@ -1,12 +1,15 @@
 //! The air coil against high-precision values and against physics.
 
-use fluxform::coil::inductance::self_inductance_h;
-use fluxform::field::batch::Wanted;
-use fluxform::field::winding::{AxialField, Winding};
+use fluxform_coil::inductance::self_inductance_h;
+use fluxform_field::batch::Wanted;
+use fluxform_field::winding::{AxialField, Winding};
 use serde_json::Value;
 
 fn oracle() -> Value {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/oracles/air_coil.json");
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../tests/oracles/air_coil.json"
+    );
     let text = std::fs::read_to_string(path).expect("committed oracle tests/oracles/air_coil.json");
     serde_json::from_str(&text).expect("JSON")
 }

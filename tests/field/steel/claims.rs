@@ -1,10 +1,10 @@
 //! What is claimed of |B| in linear cores against much finer solutions, searched differently.
 
 use super::support::{Design, Lcg};
-use fluxform::field::steel::CoreShape;
-use fluxform::field::steel::cored_coil::CoredCoil;
-use fluxform::field::steel::inside::{CoreField, peak_depth_m};
-use fluxform::field::winding::Winding;
+use fluxform_field::steel::CoreShape;
+use fluxform_field::steel::cored_coil::CoredCoil;
+use fluxform_field::steel::inside::{CoreField, peak_depth_m};
+use fluxform_field::winding::Winding;
 use std::f64::consts::PI;
 
 /// Tolerance of the solutions that stand for the truth.
@@ -177,7 +177,7 @@ pub fn random_cores_have_the_peak_that_is_claimed() {
     study(&random_cores(12));
 }
 
-/// `cargo test --test steel -- --ignored --nocapture claimed_in_full` prints the table.
+/// `cargo test --test field steel -- --ignored --nocapture claimed_in_full` prints the table.
 #[test]
 #[ignore = "a minute of CPU: 160 random cored coils"]
 pub fn random_cores_have_the_peak_that_is_claimed_in_full() {

@@ -4,11 +4,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
-use fluxform::map::sampled::{SampledField, TableReport};
-use fluxform::map::sampler::{Sampler, series};
-use fluxform::map::tabulate::{Grid, MapError, PlacedCoil};
-use fluxform::map::{Components, FieldMap};
-use fluxform::progress::Silent;
+use fluxform_base::progress::Silent;
+use fluxform_map::sampled::{SampledField, TableReport};
+use fluxform_map::sampler::{Sampler, series};
+use fluxform_map::tabulate::{Grid, MapError, PlacedCoil};
+use fluxform_map::{Components, FieldMap};
 
 const TOP_M: f64 = 0.0;
 
@@ -134,7 +134,7 @@ fn coils() -> Vec<PlacedCoil> {
 }
 
 fn axis(from: f64, to: f64, samples: usize) -> Vec<f64> {
-    fluxform::numerics::axis::Axis { from, to, samples }.nodes()
+    fluxform_numerics::axis::Axis { from, to, samples }.nodes()
 }
 
 fn cube(x: (f64, f64, usize), y: (f64, f64, usize), z: (f64, f64, usize)) -> Grid {

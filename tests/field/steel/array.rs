@@ -3,22 +3,22 @@
 use std::f64::consts::{PI, TAU};
 use std::time::Instant;
 
-use fluxform::coil::inductance::self_inductance_h;
-use fluxform::coil::mutual::mutual_inductance_h;
-use fluxform::field::frame::to_cartesian;
-use fluxform::field::steel::CoreShape;
-use fluxform::field::steel::array::{ArrayResolution, CoupledArray};
-use fluxform::field::steel::cored_coil::CoredCoil;
-use fluxform::field::steel::generatrix::Face;
-use fluxform::field::steel::magnetized::MagnetizedCore;
-use fluxform::field::steel::sources::{ArraySources, Parts};
-use fluxform::field::winding::Winding;
-use fluxform::numerics::gauss;
-use fluxform::numerics::lagrange_basis::Basis;
-use fluxform::units::MU_0_T_M_PER_A;
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_coil::inductance::self_inductance_h;
+use fluxform_coil::mutual::mutual_inductance_h;
+use fluxform_field::frame::to_cartesian;
+use fluxform_field::steel::CoreShape;
+use fluxform_field::steel::array::{ArrayResolution, CoupledArray};
+use fluxform_field::steel::cored_coil::CoredCoil;
+use fluxform_field::steel::generatrix::Face;
+use fluxform_field::steel::magnetized::MagnetizedCore;
+use fluxform_field::steel::sources::{ArraySources, Parts};
+use fluxform_field::winding::Winding;
+use fluxform_numerics::gauss;
+use fluxform_numerics::lagrange_basis::Basis;
 use nalgebra::DMatrix;
 
-use crate::support::{Design, SEED_COIL, SEED_CORE, number, oracle};
+use super::support::{Design, SEED_COIL, SEED_CORE, number, oracle};
 
 const MU_R: f64 = 1000.0;
 const LOWEST_M: f64 = 0.01;
@@ -129,7 +129,7 @@ fn finite_elements_agree_on_nine_coils() {
 }
 
 /// Prints unknowns, milliseconds, errors and estimate:
-/// `cargo test --test steel resolutions -- --nocapture`.
+/// `cargo test --test field steel resolutions -- --nocapture`.
 #[test]
 fn finer_resolutions_agree_and_the_estimate_covers_the_error() {
     let fine = at(&SCATTER, 1e-6, 0.05);

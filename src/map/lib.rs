@@ -2,7 +2,7 @@
 //!
 //! [`tabulate()`] makes the maps of identical coils on a grid; [`interpolation_error`] says how far
 //! interpolation between the nodes is off, with the rule that every loader of bundles uses
-//! ([`crate::numerics::lagrange`]).
+//! ([`fluxform_numerics::lagrange`]).
 //!
 //! ```
 //! use fluxform::field::winding::Winding;

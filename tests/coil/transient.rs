@@ -1,9 +1,9 @@
 //! Settling after a voltage step: limits, and direct integration of the same equations.
 
-use fluxform::coil::inductance::self_inductance_h;
-use fluxform::coil::transient::{Settling, TransientError, VoltageStep, core_energy_share};
-use fluxform::field::winding::Winding;
-use fluxform::units::MU_0_T_M_PER_A;
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_coil::inductance::self_inductance_h;
+use fluxform_coil::transient::{Settling, TransientError, VoltageStep, core_energy_share};
+use fluxform_field::winding::Winding;
 
 const SEED: VoltageStep = VoltageStep {
     resistance_ohm: 6.0753,
@@ -158,7 +158,7 @@ fn agrees_with_direct_integration() {
 #[test]
 fn agrees_with_the_inverted_laplace_transform() {
     let cases: Vec<serde_json::Value> =
-        serde_json::from_str(include_str!("oracles/transient.json")).unwrap();
+        serde_json::from_str(include_str!("../oracles/transient.json")).unwrap();
     assert_eq!(cases.len(), 7);
     for case in cases {
         let value = |key: &str| case[key].as_f64().unwrap();

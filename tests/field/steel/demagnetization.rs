@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
-use fluxform::field::steel::CoreShape;
-use fluxform::field::steel::double_layer::operators;
-use fluxform::field::steel::generatrix::{Generatrix, Resolution};
-use fluxform::field::steel::response::{mean, system};
+use fluxform_field::steel::CoreShape;
+use fluxform_field::steel::double_layer::operators;
+use fluxform_field::steel::generatrix::{Generatrix, Resolution};
+use fluxform_field::steel::response::{mean, system};
 use nalgebra::DVector;
 
 /// Axial and transverse moment per volume of a core in a unit field, per unit field.

@@ -1,9 +1,9 @@
 //! What the tests share: designs, the oracles, and how a difference is measured.
 
-use fluxform::field::steel::CoreShape;
-use fluxform::field::steel::cored_coil::CoredCoil;
-use fluxform::field::winding::Winding;
-use fluxform::units::MU_0_T_M_PER_A;
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_field::steel::CoreShape;
+use fluxform_field::steel::cored_coil::CoredCoil;
+use fluxform_field::winding::Winding;
 use serde_json::Value;
 
 pub const SEED_COIL: Winding = Winding {
@@ -121,7 +121,7 @@ pub fn designs(count: usize) -> Vec<Design> {
 /// A committed oracle, `tests/oracles/steel/<name>.json`.
 pub fn oracle(name: &str) -> Value {
     let path = format!(
-        "{}/tests/oracles/steel/{name}.json",
+        "{}/../../tests/oracles/steel/{name}.json",
         env!("CARGO_MANIFEST_DIR")
     );
     let text = std::fs::read_to_string(&path).expect("committed oracle");

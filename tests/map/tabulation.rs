@@ -1,14 +1,14 @@
 //! Maps against direct evaluation, and their interpolation error against other places.
 
-use fluxform::field::batch::{Gradients, Wanted};
-use fluxform::field::frame::to_cartesian;
-use fluxform::field::source::AxialSource;
-use fluxform::field::winding::{OnEdge, Winding};
-use fluxform::map::tabulate::{Grid, PlacedCoil};
-use fluxform::map::{Components, FieldMap, interpolation_error, tabulate};
-use fluxform::numerics::axis::Axis;
-use fluxform::numerics::lagrange;
-use fluxform::progress::Silent;
+use fluxform_base::progress::Silent;
+use fluxform_field::batch::{Gradients, Wanted};
+use fluxform_field::frame::to_cartesian;
+use fluxform_field::source::AxialSource;
+use fluxform_field::winding::{OnEdge, Winding};
+use fluxform_map::tabulate::{Grid, PlacedCoil};
+use fluxform_map::{Components, FieldMap, interpolation_error, tabulate};
+use fluxform_numerics::axis::Axis;
+use fluxform_numerics::lagrange;
 
 fn seed() -> Winding {
     Winding {

@@ -5,16 +5,16 @@
 
 use std::f64::consts::PI;
 
-use fluxform::field::dipole::cylinder_moment_a_m2;
-use fluxform::field::magnet::{Cylinder, MagnetRule, Sources};
-use fluxform::field::steel::CoreShape;
-use fluxform::field::steel::cored_coil::CoredCoil;
-use fluxform::field::steel::passive::{NoPull, PassivePull, Pulled, Region};
-use fluxform::field::winding::Winding;
-use fluxform::units::MU_0_T_M_PER_A;
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_field::dipole::cylinder_moment_a_m2;
+use fluxform_field::magnet::{Cylinder, MagnetRule, Sources};
+use fluxform_field::steel::CoreShape;
+use fluxform_field::steel::cored_coil::CoredCoil;
+use fluxform_field::steel::passive::{NoPull, PassivePull, Pulled, Region};
+use fluxform_field::winding::Winding;
 use serde_json::Value;
 
-const ORACLE: &str = include_str!("oracles/steel/magnet_force.json");
+const ORACLE: &str = include_str!("../oracles/steel/magnet_force.json");
 /// Of the finite elements, relative.
 const ORACLE_ERROR: f64 = 1e-5;
 const CORE: CoreShape = CoreShape {

@@ -2,10 +2,10 @@
 
 use std::time::Instant;
 
-use fluxform::field::steel::cored_coil::CoredCoil;
-use fluxform::field::steel::generatrix::Resolution;
+use fluxform_field::steel::cored_coil::CoredCoil;
+use fluxform_field::steel::generatrix::Resolution;
 
-use crate::support::{Design, SEED_COIL, SEED_CORE, designs, inductance_difference};
+use super::support::{Design, SEED_COIL, SEED_CORE, designs, inductance_difference};
 
 fn at(design: &Design, resolution: &Resolution) -> CoredCoil {
     CoredCoil::at_resolution(&design.winding, design.core, design.mu_r, resolution)
@@ -16,7 +16,7 @@ fn truth(design: &Design) -> CoredCoil {
     at(design, &Resolution::for_tolerance(1e-10))
 }
 
-/// Prints nodes, milliseconds, error and estimate: `cargo test --test steel converges -- --nocapture`.
+/// Prints nodes, milliseconds, error and estimate: `cargo test --test field steel converges -- --nocapture`.
 #[test]
 fn converges_geometrically() {
     let seed = Design {

@@ -5,13 +5,13 @@
 
 use std::f64::consts::TAU;
 
-use fluxform::field::dipole::{cylinder_moment_a_m2, tilted_moment_a_m2};
-use fluxform::field::frame::{CartesianField, to_cartesian};
-use fluxform::field::magnet::{Cylinder, MagnetRule, NoRule, Sources};
-use fluxform::field::ring::mutual_over_mu_0;
-use fluxform::field::winding::Winding;
-use fluxform::numerics::gauss;
-use fluxform::units::MU_0_T_M_PER_A;
+use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_field::dipole::{cylinder_moment_a_m2, tilted_moment_a_m2};
+use fluxform_field::frame::{CartesianField, to_cartesian};
+use fluxform_field::magnet::{Cylinder, MagnetRule, NoRule, Sources};
+use fluxform_field::ring::mutual_over_mu_0;
+use fluxform_field::winding::Winding;
+use fluxform_numerics::gauss;
 
 type Vector = [f64; 3];
 
@@ -126,7 +126,7 @@ fn sizes(m: Vector, centre: Vector) -> (f64, f64) {
     (norm(m) * gradient, norm(m) * norm(field.field_t_per_a))
 }
 
-/// Run with `cargo test --test magnet -- --nocapture table` to see it.
+/// Run with `cargo test --test field magnet -- --nocapture table` to see it.
 #[test]
 fn the_table_of_nodes_against_accuracy() {
     println!("seed magnet over the seed's winding: nodes and error of the force, upright; tilted");

@@ -1,0 +1,9 @@
+//! Fields of coils, steel and magnets: against oracles by other formulations, closed forms and physics.
+
+mod air_coil;
+mod bh_curve;
+mod core_field;
+mod magnet;
+mod passive;
+mod saturated;
+mod steel;

@@ -1,0 +1,4 @@
+//! Maps of fields over a workspace: against direct evaluation.
+
+mod harmonic;
+mod tabulation;
