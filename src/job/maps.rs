@@ -9,9 +9,8 @@ use super::steel::{EVALUATION_SHARE, Solved, Steel, SteelField, clearance_m};
 use crate::accuracy::StageAccuracy;
 use crate::field::magnet::MagnetRule;
 use crate::field::steel::axial_table::AxialTable;
-use crate::field::steel::sources::{ArraySources, Parts};
 use crate::map::sampled::{SampledField, TableReport};
-use crate::map::sampler::Sampler;
+
 use crate::map::tabulate::{Grid, MapError, PlacedCoil};
 use crate::map::{
     Components, FieldMap, InterpolationError, interpolation_error, interpolation_error_by, tabulate,

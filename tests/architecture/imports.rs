@@ -1,77 +1,31 @@
-//! Imports run one way.
+//! Imports run one way: among members Cargo holds it, inside the root package this table; and no
+//! module of a room imports back to one that imports it.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
-use crate::source::{Source, sources};
+use crate::source::{Source, members, sources};
 
-/// Every room with the rooms it may import; each imports only rooms listed before it.
+/// The root package's rooms with those of them that they may import.
 const ROOMS: &[(&str, &[&str])] = &[
-    ("units", &[]),
-    ("progress", &[]),
-    ("accuracy", &[]),
-    ("numerics", &["units", "progress", "accuracy"]),
-    ("design", &["units", "numerics"]),
-    ("field", &["units", "progress", "numerics"]),
-    (
-        "coil",
-        &[
-            "units", "progress", "accuracy", "numerics", "design", "field",
-        ],
-    ),
-    (
-        "map",
-        &["units", "progress", "accuracy", "numerics", "field"],
-    ),
-    (
-        "shape",
-        &["units", "progress", "accuracy", "numerics", "design"],
-    ),
-    ("lambda", &["units", "progress", "accuracy", "numerics"]),
-    ("bundle", &["units", "progress", "accuracy", "numerics"]),
-    ("plot", &["progress"]),
-    ("report", &["units", "progress", "plot"]),
-    (
-        "job",
-        &[
-            "units", "progress", "accuracy", "numerics", "design", "field", "coil", "map", "shape",
-            "lambda", "bundle", "plot", "report",
-        ],
-    ),
-    (
-        "bench",
-        &[
-            "units", "progress", "accuracy", "numerics", "design", "field", "coil", "map", "shape",
-            "lambda", "bundle", "plot", "report", "job",
-        ],
-    ),
-    (
-        "cli",
-        &[
-            "units", "progress", "accuracy", "numerics", "design", "shape", "bundle", "job",
-            "bench",
-        ],
-    ),
+    ("job", &[]),
+    ("bench", &["job"]),
+    ("cli", &["job", "bench"]),
     ("main", &["cli"]),
-    ("lib", &[]),
+    ("lib", &["job", "bench", "cli"]),
 ];
 
-/// Imports against the table that are not mended yet: (file under `src`, room). The list may
-/// only shrink.
-const EXCEPTIONS: &[(&str, &str)] = &[
-    // Types of requests and results that `job` does not name itself.
-    ("cli/commands/evaluate.rs", "coil"),
-    ("cli/commands/lambda.rs", "lambda"),
-    ("cli/commands/map.rs", "map"),
-];
+/// Modules of one room that import each other, not mended yet: each group sorted, with `::`. The
+/// list may only shrink.
+const CIRCLES: &[&[&str]] = &[];
 
 fn allowed(room: &str) -> &'static [&'static str] {
     let entry = ROOMS.iter().find(|(name, _)| *name == room);
     entry
-        .unwrap_or_else(|| panic!("src/{room} is in no row of ROOMS"))
+        .unwrap_or_else(|| panic!("src/{room} is neither a member nor in a row of ROOMS"))
         .1
 }
 
-/// The rooms a file imports; the binary sees the library as `fluxform`.
+/// The rooms of the root package that a file imports; the binary sees the library as `fluxform`.
 fn imported(source: &Source) -> BTreeSet<String> {
     let mut rooms: BTreeSet<String> = source
         .crate_paths()
@@ -83,33 +37,32 @@ fn imported(source: &Source) -> BTreeSet<String> {
             rooms.insert(window[2].clone());
         }
     }
-    rooms.remove(source.room());
+    rooms.retain(|room| room != source.room() && ROOMS.iter().any(|(name, _)| name == room));
     rooms
 }
 
 #[test]
-fn the_table_runs_one_way_and_names_every_room() {
-    for (at, (room, allowed)) in ROOMS.iter().enumerate() {
-        for other in *allowed {
-            assert!(
-                ROOMS[..at].iter().any(|(name, _)| name == other),
-                "{room} may not import {other}: it stands above it"
-            );
-        }
-    }
+fn every_room_is_a_member_or_in_the_table() {
     let rooms: BTreeSet<String> = sources().iter().map(|s| s.room().to_owned()).collect();
-    let named: BTreeSet<String> = ROOMS.iter().map(|(name, _)| (*name).to_owned()).collect();
-    assert_eq!(rooms, named, "rooms under src and rooms in the table");
+    let mut named: BTreeSet<String> = ROOMS.iter().map(|(name, _)| (*name).to_owned()).collect();
+    named.extend(members());
+    assert_eq!(
+        rooms, named,
+        "rooms under src, members and rooms in the table"
+    );
 }
 
 #[test]
 fn imports_run_one_way() {
+    let members = members();
     let mut faults = Vec::new();
     for source in sources() {
+        if members.contains(source.room()) {
+            continue;
+        }
         let may = allowed(source.room());
         for room in imported(&source) {
-            let excepted = EXCEPTIONS.contains(&(source.path.as_str(), room.as_str()));
-            if !may.contains(&room.as_str()) && !excepted {
+            if !may.contains(&room.as_str()) {
                 faults.push(format!("src/{} imports {room}", source.path));
             }
         }
@@ -123,30 +76,82 @@ fn imports_run_one_way() {
 }
 
 #[test]
-fn every_exception_is_still_needed() {
-    let sources = sources();
-    for (path, room) in EXCEPTIONS {
-        let used = sources
-            .iter()
-            .any(|s| s.path == *path && imported(s).contains(*room));
-        let needed = used && !allowed(path.split('/').next().unwrap()).contains(room);
-        assert!(
-            needed,
-            "({path:?}, {room:?}) is no longer needed: delete it"
-        );
+fn an_import_against_the_table_is_seen() {
+    let upward = Source::new(
+        "job/probe.rs",
+        "fn f() -> f64 { crate::cli::printer::g() + crate::numerics::h() }",
+    );
+    assert_eq!(imported(&upward), BTreeSet::from(["cli".to_owned()]));
+    assert!(!allowed("job").contains(&"cli"));
+    let glob = Source::new("bench/stages/mod.rs", "use super::super::job::*;");
+    assert_eq!(imported(&glob), BTreeSet::from(["job".to_owned()]));
+    let binary = Source::new("main.rs", "fn main() { fluxform::job::run() }");
+    assert_eq!(imported(&binary), BTreeSet::from(["job".to_owned()]));
+}
+
+/// A file's module path, and those of the modules that it imports: the longest that is a file.
+fn edges(files: &[Source]) -> BTreeMap<Vec<String>, BTreeSet<Vec<String>>> {
+    let modules: BTreeSet<Vec<String>> = files.iter().map(Source::module).collect();
+    let mut edges = BTreeMap::new();
+    for source in files {
+        let here = source.module();
+        let mut to = BTreeSet::new();
+        for path in source.crate_paths() {
+            let target = (1..=path.len())
+                .rev()
+                .map(|n| path[..n].to_vec())
+                .find(|path| modules.contains(path));
+            // A module and the ones inside it are one idea in several files.
+            if let Some(target) = target {
+                let related = target.starts_with(&here) || here.starts_with(&target);
+                if !related {
+                    to.insert(target);
+                }
+            }
+        }
+        edges.insert(here, to);
     }
+    edges
+}
+
+/// Whether `to` is reached from `from`.
+fn reaches(
+    edges: &BTreeMap<Vec<String>, BTreeSet<Vec<String>>>,
+    from: &[String],
+    to: &[String],
+) -> bool {
+    let mut seen = BTreeSet::new();
+    let mut open = vec![from.to_vec()];
+    while let Some(at) = open.pop() {
+        for next in edges.get(&at).into_iter().flatten() {
+            if next == to {
+                return true;
+            }
+            if seen.insert(next.clone()) {
+                open.push(next.clone());
+            }
+        }
+    }
+    false
 }
 
 #[test]
-fn an_import_against_the_table_is_seen() {
-    let upward = Source::new(
-        "field/ring.rs",
-        "fn f() -> f64 { crate::coil::circuit::g() }",
-    );
-    assert_eq!(imported(&upward), BTreeSet::from(["coil".to_owned()]));
-    assert!(!allowed("field").contains(&"coil"));
-    let glob = Source::new("shape/stl/mod.rs", "use super::super::map::*;");
-    assert_eq!(imported(&glob), BTreeSet::from(["map".to_owned()]));
-    let binary = Source::new("main.rs", "fn main() { fluxform::job::run() }");
-    assert_eq!(imported(&binary), BTreeSet::from(["job".to_owned()]));
+fn no_module_imports_in_a_circle() {
+    let edges = edges(&sources());
+    let mut circles: BTreeSet<Vec<String>> = BTreeSet::new();
+    for module in edges.keys() {
+        if reaches(&edges, module, module) {
+            let group = edges
+                .keys()
+                .filter(|other| reaches(&edges, module, other) && reaches(&edges, other, module))
+                .map(|path| path.join("::"))
+                .collect();
+            circles.insert(group);
+        }
+    }
+    let known: BTreeSet<Vec<String>> = CIRCLES
+        .iter()
+        .map(|group| group.iter().map(|&name| name.to_owned()).collect())
+        .collect();
+    assert_eq!(circles, known, "modules that import each other");
 }

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::source::{files, read, sources};
+use crate::source::{Source, files, manifests, members, read, sources};
 
 const MOST_LINES: usize = 800;
 const MOST_LINES_OF_MAIN: usize = 30;
@@ -42,22 +42,13 @@ fn assert_same(what: &str, page: &BTreeSet<String>, tree: &BTreeSet<String>) {
 }
 
 #[test]
-fn the_design_page_has_one_line_for_every_file() {
-    let tree = files()
-        .iter()
-        .filter_map(|path| path.strip_prefix("src/"))
-        .filter(|path| *path != "DESIGN.md")
-        .map(str::to_owned)
-        .collect();
-    assert_same("files", &names(&entries("src/DESIGN.md", "Files")), &tree);
-}
-
-#[test]
 fn the_design_page_has_one_line_for_every_dependency() {
     let manifest: toml::Table = read("Cargo.toml").parse().unwrap();
-    let tree = ["dependencies", "dev-dependencies"]
-        .iter()
-        .flat_map(|kind| manifest[*kind].as_table().unwrap().keys().cloned())
+    let table = manifest["workspace"]["dependencies"].as_table().unwrap();
+    let tree = table
+        .keys()
+        .filter(|name| !name.starts_with("fluxform-"))
+        .cloned()
         .collect();
     let page = names(&entries("src/DESIGN.md", "Dependencies"));
     assert_same("dependencies", &page, &tree);
@@ -107,15 +98,60 @@ fn the_readme_and_the_gate_run_the_same_tests() {
 #[test]
 fn every_dependency_is_used() {
     let sources = sources();
-    let manifest: toml::Table = read("Cargo.toml").parse().unwrap();
-    for name in manifest["dependencies"].as_table().unwrap().keys() {
-        let in_code = name.replace('-', "_");
-        let used = sources.iter().any(|s| s.tokens.contains(&in_code));
-        assert!(
-            used,
-            "nothing under src names {name}: delete the dependency"
-        );
+    let members = members();
+    for path in manifests() {
+        let manifest: toml::Table = read(&path).parse().unwrap();
+        let room = path
+            .strip_prefix("src/")
+            .and_then(|path| path.split('/').next());
+        let inside = |source: &&Source| match room {
+            Some(room) => source.room() == room,
+            None => !members.contains(source.room()),
+        };
+        for name in manifest["dependencies"].as_table().unwrap().keys() {
+            let in_code = name.replace('-', "_");
+            let used = sources
+                .iter()
+                .filter(inside)
+                .any(|s| s.tokens.contains(&in_code));
+            assert!(used, "{path}: nothing names {name}: delete the dependency");
+        }
     }
+}
+
+/// A test that no manifest names is never run.
+#[test]
+fn every_test_is_a_target() {
+    let mut named = BTreeSet::new();
+    for path in manifests() {
+        let folder = path.strip_suffix("Cargo.toml").unwrap();
+        let manifest: toml::Table = read(&path).parse().unwrap();
+        let targets = manifest.get("test").and_then(toml::Value::as_array);
+        for target in targets.into_iter().flatten() {
+            let file = target["path"].as_str().unwrap();
+            let file = if folder.is_empty() {
+                file
+            } else {
+                file.strip_prefix("../../").unwrap()
+            };
+            named.insert(file.to_owned());
+        }
+    }
+    let tests: BTreeSet<String> = files()
+        .into_iter()
+        .filter(|path| {
+            let parts: Vec<&str> = path.split('/').collect();
+            match parts[..] {
+                ["tests", file] => file.ends_with(".rs"),
+                ["tests", _, file] => file == "main.rs",
+                _ => false,
+            }
+        })
+        .collect();
+    assert_eq!(
+        tests, named,
+        "test files and the targets that manifests name"
+    );
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The crate's source as tokens: comments, texts and test modules taken out.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -18,8 +19,8 @@ impl Source {
         first.strip_suffix(".rs").unwrap_or(first)
     }
 
-    /// The file's module path, from the crate's root.
-    fn module(&self) -> Vec<String> {
+    /// The file's module path; that of a member's file begins with the member.
+    pub fn module(&self) -> Vec<String> {
         let stem = self.path.strip_suffix(".rs").unwrap();
         let mut parts: Vec<String> = stem.split('/').map(str::to_owned).collect();
         if ["mod", "lib", "main"].contains(&parts.last().unwrap().as_str()) {
@@ -41,8 +42,18 @@ impl Source {
         self.tokens.windows(wanted.len()).any(|w| w == wanted)
     }
 
-    /// The paths from the crate's root that the file names through `crate::`, `super::` or
-    /// `self::`, as far as the first brace; a group right after the anchor is spelled out.
+    /// The root of the file's crate: the member, or nothing for the root package.
+    fn crate_root(&self) -> Vec<String> {
+        let room = self.room();
+        if members().contains(room) {
+            vec![room.to_owned()]
+        } else {
+            Vec::new()
+        }
+    }
+
+    /// The paths that the file names through `crate::`, `super::` or `self::`, as far as the first
+    /// brace; a group right after the anchor is spelled out. They begin with the room.
     pub fn crate_paths(&self) -> Vec<Vec<String>> {
         let mut paths = Vec::new();
         let mut inline = Vec::new(); // (name, depth of its braces)
@@ -64,7 +75,7 @@ impl Source {
                 }
                 "crate" | "super" | "self" if self.token(i + 1) == "::" => {
                     let mut base = if self.tokens[i] == "crate" {
-                        Vec::new()
+                        self.crate_root()
                     } else {
                         let mut here = self.module();
                         here.extend(inline.iter().map(|(name, _)| name.clone()));
@@ -259,6 +270,25 @@ fn past_group(tokens: &[String], mut i: usize, open: &str, close: &str) -> usize
     i
 }
 
+/// The members of the workspace under `src`.
+pub fn members() -> BTreeSet<String> {
+    let manifest: toml::Table = read("Cargo.toml").parse().unwrap();
+    let members = manifest["workspace"]["members"].as_array().unwrap();
+    members
+        .iter()
+        .filter_map(|path| path.as_str().unwrap().strip_prefix("src/"))
+        .map(str::to_owned)
+        .collect()
+}
+
+/// The manifests of all packages.
+pub fn manifests() -> Vec<String> {
+    let members = members().into_iter();
+    let mut all = vec!["Cargo.toml".to_owned()];
+    all.extend(members.map(|member| format!("src/{member}/Cargo.toml")));
+    all
+}
+
 /// The crate's folder.
 pub fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -330,14 +360,14 @@ fn comments_texts_and_test_modules_are_no_code() {
     assert_eq!(
         found,
         [
-            "field",
-            "bundle::npz",
-            "numerics",
+            "coil::field",
+            "coil::bundle::npz",
+            "coil::numerics",
             "coil::circuit::g",
             "coil::mutual",
             "coil::limits::inner::k",
             "map::m",
-            "units",
+            "coil::units",
         ]
     );
     assert!(source.has("mod inner {") && !source.has("mod tests"));

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 /// The committed table, one of cobalt-iron that ends high, and a coarse one whose kinks are sharp.
 fn curves() -> Vec<BhCurve> {
-    let text = include_str!("../../designs/steel_1010.csv");
+    let text = include_str!("../../../designs/steel_1010.csv");
     let (b_t, h): (Vec<f64>, Vec<f64>) = text
         .lines()
         .skip(1)
