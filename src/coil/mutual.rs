@@ -267,7 +267,6 @@ mod tests {
                 let finest = by_rule(&winding, distance, RULES[3]);
                 let (value, error) = estimated_mutual_inductance_h(&winding, distance, 1e-5);
                 let off = (value / finest - 1.0).abs();
-                println!("gap {gap} of the radius: off by {off:.1e}, estimate {error:.1e}");
                 assert!(off <= error && error < 1e-4, "{gap}: {off:e} {error:e}");
             }
         }

@@ -40,7 +40,7 @@ const POWERS: &[Power] = &[
             "tempfile",
             "rustix",
         ],
-        holders: &["bundle/atomic/"],
+        holders: &["bundle/atomic/", "bundle/plain.rs"],
     },
     Power {
         name: "lifting the lint on writing and clocks",
@@ -78,7 +78,17 @@ const POWERS: &[Power] = &[
     },
     Power {
         name: "reading the environment",
-        marks: &["env ::"],
+        marks: &[
+            "env :: var",
+            "env :: vars",
+            "env :: var_os",
+            "env :: args",
+            "env :: args_os",
+            "env :: current_dir",
+            "env :: current_exe",
+            "env :: temp_dir",
+            "env :: home_dir",
+        ],
         holders: &[
             "bench/peers/mod.rs",
             "bench/scaling/mod.rs",

@@ -1,5 +1,5 @@
 //! How long every command takes to answer SIGTERM, whenever it comes: a table of the longest answer
-//! and the peak memory until then. `FLUXFORM=path` measures another binary.
+//! and the peak memory until then. `FLUXFORM_OTHER=path` measures another binary.
 #![allow(clippy::print_stdout)] // the table
 #![allow(clippy::disallowed_methods)] // own files, and wall time
 
@@ -146,8 +146,8 @@ const CASES: &[(&str, &[&str])] = &[
 ];
 
 fn main() {
-    let binary =
-        std::env::var("FLUXFORM").unwrap_or_else(|_| env!("CARGO_BIN_EXE_fluxform").to_owned());
+    let binary = std::env::var("FLUXFORM_OTHER")
+        .unwrap_or_else(|_| env!("CARGO_BIN_EXE_fluxform").to_owned());
     let folder = tempfile::tempdir().unwrap();
     prepare(&binary, folder.path());
     println!(

@@ -69,7 +69,7 @@ impl From<rustix::fs::Stat> for Status {
             bytes: stat.st_size as u64,
             device: stat.st_dev as u64,
             inode: stat.st_ino as u64,
-            mode: u32::from(stat.st_mode) & 0o7777,
+            mode: stat.st_mode & 0o7777,
             owner: stat.st_uid,
             group: stat.st_gid,
         }

@@ -62,9 +62,9 @@ fn largest(design: &Design, coil: &CoredCoil, (r, z): (f64, f64)) -> f64 {
     .fold(0.0_f64, |m, field| m.max(field.gradient_norm()))
 }
 
-/// Designs of the study: a few in a test; `NEAR_DESIGNS=40` prints the whole table.
+/// Designs of the study: a few in a test; `FLUXFORM_NEAR_DESIGNS=40` prints the whole table.
 fn studied() -> usize {
-    std::env::var("NEAR_DESIGNS").map_or(2, |count| count.parse().expect("a number"))
+    std::env::var("FLUXFORM_NEAR_DESIGNS").map_or(2, |count| count.parse().expect("a number"))
 }
 
 /// Solutions close to the steel against tight ones. The claim is twice the difference of two
