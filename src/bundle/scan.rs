@@ -398,7 +398,7 @@ pub struct Explanation {
     /// The design's key, or `scale`, `scale of each coil`, `background`, `position`, `height`,
     /// `rotation`.
     pub parameter: String,
-    /// Share of the sum of the squares of the residuals as designed that it takes away, linearised.
+    /// Share of the sum of the squares of the residuals as designed that it takes away when fitted.
     pub share: f64,
     /// How many numbers are free.
     pub parameters: usize,

@@ -1,284 +1,394 @@
 //! Which parameter would explain what a scan and a design differ by.
 //!
-//! Each is changed a little, alone, and the share of the residuals' squares that its direction takes
-//! away is told, linearised at the design as it stands. Parameters whose directions are parallel
-//! cannot be told apart by this scan and are named together.
+//! Each candidate is changed alone and fitted until it settles: the frame, scales and background by
+//! [`super::fit`], a key of the design by Gauss-Newton steps within its range, the field of the changed
+//! design computed again at every step. The share of the residuals' squares that it takes away is
+//! reported, and a standard error that holds where the field bends: the larger side of the interval in
+//! which the likelihood stays within the 95 % of one number, over 1.96. Candidates with as many free
+//! numbers whose likelihoods differ by less than [`DISTINCT`] cannot be told apart by this scan and are
+//! named together.
 
-use super::fit::{Fitted, parameters};
+use super::fit::{self, Fitted, Parameter, parameters};
+use super::keys::{Key, keys};
 use super::model::{Model, Pose};
-use super::{Weighted, fit};
+use super::{ScanRequest, Weighted, noises};
 use crate::bundle::scan::{Explanation, Scan};
-use crate::design::{Design, Steel};
+use crate::design::Design;
 use crate::job::scene::Scene;
 use crate::job::{JobError, KERNEL_ERROR, steel};
 use crate::numerics::least_squares::{self, norm};
 use crate::progress::Progress;
 
-/// Relative steps of the design's lengths: in air, and with steel, whose solution is rougher.
-const STEP: f64 = 1e-3;
-const STEP_STEEL: f64 = 1e-2;
-/// Directions with a larger cosine cannot be told apart.
-const PARALLEL: f64 = 0.99;
+/// Most steps of one key of the design.
+const ITERATIONS: usize = 10;
+/// Most halvings of a step.
+const HALVINGS: usize = 6;
+/// A step that takes less than this part of what is left ends the iteration.
+const SETTLED: f64 = 1e-7;
+/// Half the width of the 95 % interval of a normal number, in standard deviations.
+const WIDTH: f64 = 1.96;
+/// Most fields computed to find one end of an interval.
+const PROFILE: usize = 5;
+/// Below this share of the differences' step the field does not bend.
+const STRAIGHT: f64 = 0.3;
 /// An explanation must take this many times more, a parameter, than noise would.
 const WORTH: f64 = 12.0;
 /// And at least this share.
 const WORTH_SHARE: f64 = 0.02;
+/// Twice the logarithm of a ratio of likelihoods below which two are alike.
+const DISTINCT: f64 = 6.0;
 
-/// A candidate with the weighted direction of each of its free numbers.
-struct Candidate {
+/// A candidate as it settled.
+struct Settled {
     name: &'static str,
-    columns: Vec<Vec<f64>>,
-    /// The key's change for one step of the column, where one number is free.
-    unit: Option<f64>,
+    /// Weighted sum of the squares that are left.
+    left: f64,
+    parameters: usize,
+    change: Option<f64>,
+    standard_error: Option<f64>,
+}
+
+/// What every candidate is fitted to.
+pub(super) struct Task<'a> {
+    pub design: &'a Design,
+    pub model: &'a Model<'a>,
+    pub scan: &'a Scan,
+    pub residuals: &'a Weighted,
+    pub request: &'a ScanRequest,
+    /// The claimed relative error of the computed field.
+    pub relative_error: f64,
+    /// The size of the field, T.
+    pub field_t: f64,
+    pub progress: &'a dyn Progress,
+}
+
+/// A key of the design at a value, and what is left there.
+struct At {
+    by: f64,
+    values: Vec<f64>,
+    left: f64,
 }
 
 /// Everything that is tried, the most telling first, and the best for its number of parameters.
 ///
 /// # Errors
 /// Interruption; a scan on a winding's edge or the steel.
-pub(super) fn explain(
-    design: &Design,
-    model: &Model,
-    scan: &Scan,
-    residuals: &Weighted,
-    tolerance: Option<f64>,
-    progress: &dyn Progress,
-) -> Result<(Vec<Explanation>, Option<String>), JobError> {
-    let candidates = candidates(design, model, scan, residuals, tolerance, progress)?;
-    let total: f64 = residuals.values.iter().map(|r| r * r).sum();
-    let parallel = |a: &Candidate, b: &Candidate| {
-        let ([a], [b]) = (&a.columns[..], &b.columns[..]) else {
-            return false;
-        };
-        let dot: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
-        dot.abs() > PARALLEL * norm(a) * norm(b) && dot != 0.0
-    };
-    let mut list = Vec::new();
-    for candidate in &candidates {
-        let solution = least_squares::solve(&candidate.columns, &residuals.values);
-        if solution.rank == 0 {
-            continue;
-        }
-        let share = if total > 0.0 {
-            (solution.removed / total).min(1.0)
+pub(super) fn explain(task: &Task) -> Result<(Vec<Explanation>, Option<String>), JobError> {
+    let candidates = task.candidates()?;
+    let total = squares(&task.residuals.values);
+    let count = task.residuals.values.len() as f64;
+    // Below the computed field's own error nothing is told apart.
+    let floor = (task.relative_error * task.computed()).powi(2) + 1e-24 * task.measured().powi(2);
+    let share = |c: &Settled| {
+        if total > 0.0 {
+            (1.0 - c.left / total).clamp(0.0, 1.0)
         } else {
             0.0
-        };
-        let freedom = residuals.values.len().saturating_sub(solution.rank).max(1);
-        let noise = (total * (1.0 - share) / freedom as f64).sqrt();
-        let alike = candidates
-            .iter()
-            .filter(|other| other.name != candidate.name && parallel(candidate, other));
-        list.push(Explanation {
-            parameter: candidate.name.to_owned(),
-            share,
-            parameters: solution.rank,
-            change: candidate.unit.map(|unit| unit * solution.values[0]),
-            standard_error: candidate.unit.and_then(|unit| {
-                let error = solution.unit_errors[0]?;
-                Some(unit.abs() * error * noise)
-            }),
-            alike: alike.map(|other| other.name.to_owned()).collect(),
-        });
-    }
-    let count = residuals.values.len() as f64;
-    // Bayes' criterion: more numbers must explain more. Of equals the first.
-    let cost = |e: &Explanation| {
-        let left = (1.0 - e.share).max(1e-12);
-        count * left.ln() + e.parameters as f64 * count.ln()
+        }
     };
-    let worth = |e: &&Explanation| {
-        let (free, left) = (e.parameters as f64, (1.0 - e.share).max(1e-12));
-        let ratio = e.share / free / (left / (count - free).max(1.0));
-        ratio > WORTH && e.share > WORTH_SHARE
+    // Bayes' criterion: more numbers must explain more.
+    let cost =
+        |c: &Settled| count * (c.left + floor).max(1e-300).ln() + c.parameters as f64 * count.ln();
+    let worth = |c: &&Settled| {
+        let (free, left) = (c.parameters as f64, (1.0 - share(c)).max(1e-12));
+        let ratio = share(c) / free / (left / (count - free).max(1.0));
+        ratio > WORTH && share(c) > WORTH_SHARE
     };
-    let best = list
+    // Of equals the first.
+    let best = candidates
         .iter()
         .filter(worth)
-        .fold(None::<&Explanation>, |best, e| match best {
-            Some(b) if cost(b) <= cost(e) + 1e-3 * count => Some(b),
-            _ => Some(e),
+        .fold(None::<&Settled>, |best, c| match best {
+            Some(b) if cost(b) <= cost(c) + 1e-3 * count => Some(b),
+            _ => Some(c),
         });
-    let best = best.map(|e| e.parameter.clone());
+    let best = best.map(|c| c.name.to_owned());
+    let alike = |c: &Settled| -> Vec<String> {
+        let others = candidates.iter().filter(worth).filter(|other| {
+            other.name != c.name
+                && other.parameters == c.parameters
+                && (cost(other) - cost(c)).abs() < DISTINCT
+        });
+        if worth(&c) {
+            others.map(|other| other.name.to_owned()).collect()
+        } else {
+            Vec::new()
+        }
+    };
+    let mut list: Vec<Explanation> = candidates
+        .iter()
+        .map(|c| Explanation {
+            parameter: c.name.to_owned(),
+            share: share(c),
+            parameters: c.parameters,
+            change: c.change,
+            standard_error: c.standard_error,
+            alike: alike(c),
+        })
+        .collect();
     list.sort_by(|a, b| b.share.total_cmp(&a.share));
     Ok((list, best))
 }
 
-fn candidates(
-    design: &Design,
-    model: &Model,
-    scan: &Scan,
-    residuals: &Weighted,
-    tolerance: Option<f64>,
-    progress: &dyn Progress,
-) -> Result<Vec<Candidate>, JobError> {
-    let weighted = |values: Vec<f64>| residuals.weighted(values);
-    let computed = &residuals.predicted;
-    let mut list = vec![Candidate {
-        name: "scale",
-        columns: vec![weighted(computed.clone())],
-        unit: Some(1.0),
-    }];
-    let coils = design.array.positions_m.len();
-    let all = Fitted {
-        scale: true,
-        background: true,
-        position: true,
-        rotation: true,
-    };
-    let parameters = parameters(all, scan, coils);
-    let steps = vec![1.0; parameters.len()];
-    let columns = fit::columns(
-        model,
-        scan,
-        &parameters,
-        &steps,
-        &residuals.weights,
-        progress,
-    )?;
-    let of = |wanted: &dyn Fn(&fit::Parameter) -> bool| -> Vec<Vec<f64>> {
-        let pairs = parameters.iter().zip(&columns);
-        let chosen = pairs.filter(|(parameter, _)| wanted(parameter));
-        chosen.map(|(_, column)| column.clone()).collect()
-    };
-    let scales = of(&|p| matches!(p, fit::Parameter::Scale(_)));
-    if scales.len() > 1 {
-        list.push(group("scale of each coil", scales));
+fn squares(values: &[f64]) -> f64 {
+    values.iter().map(|v| v * v).sum()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+impl Task<'_> {
+    /// Length of the computed numbers, weighted.
+    fn computed(&self) -> f64 {
+        norm(&self.residuals.weighted(self.residuals.predicted.clone()))
     }
-    let background = of(&|p| matches!(p, fit::Parameter::Background(_)));
-    if !background.is_empty() {
-        list.push(group("background", background));
+
+    /// Length of the measured numbers, weighted.
+    fn measured(&self) -> f64 {
+        norm(&self.residuals.weighted(self.scan.values.clone()))
     }
-    list.push(Candidate {
-        name: "height",
-        columns: of(&|p| *p == fit::Parameter::Shift(2)),
-        unit: Some(1.0),
-    });
-    list.push(group(
-        "position",
-        of(&|p| matches!(p, fit::Parameter::Shift(_))),
-    ));
-    list.push(group(
-        "rotation",
-        of(&|p| matches!(p, fit::Parameter::Angle(_))),
-    ));
-    // The field is proportional to the turns, with linear steel too.
-    let turns = Scene::new(design)?.circuit.turns;
-    list.push(Candidate {
-        name: "coil.turns",
-        columns: vec![weighted(computed.clone())],
-        unit: Some(turns),
-    });
-    for (name, size, changed) in changes(design, turns) {
-        let step = if design.core.is_some() {
-            STEP_STEEL
+
+    /// Size of a weighted number's error where `left` remains: stated noise is believed unless more
+    /// is left.
+    fn noise(&self, left: f64, parameters: usize) -> f64 {
+        let freedom = self
+            .residuals
+            .values
+            .len()
+            .saturating_sub(parameters)
+            .max(1);
+        let mean = left / freedom as f64;
+        if noises(self.scan, self.request).is_some() {
+            mean.max(1.0).sqrt()
         } else {
-            STEP
+            mean.sqrt()
+        }
+    }
+
+    /// A standard error in steps of `slope`, the computed field's own error added.
+    fn error(&self, noise: f64, slope: f64) -> f64 {
+        (noise / slope).hypot(self.relative_error * self.computed() / slope)
+    }
+
+    fn candidates(&self) -> Result<Vec<Settled>, JobError> {
+        let turns = Scene::new(self.design)?.circuit.turns;
+        let coils = self.design.array.positions_m.len();
+        let all = Fitted {
+            scale: true,
+            background: true,
+            position: true,
+            rotation: true,
         };
-        let sides = [1.0 + step, 1.0 - step]
-            .map(|factor| computed_for(&changed(factor), scan, tolerance, progress));
-        match sides {
-            [Ok(up), Ok(down)] => {
-                let slope = up.iter().zip(&down).map(|(u, d)| (u - d) / (2.0 * step));
-                list.push(Candidate {
-                    name,
-                    columns: vec![weighted(slope.collect())],
-                    unit: Some(size),
-                });
+        let all = parameters(all, self.scan, coils);
+        let of = |wanted: &dyn Fn(&Parameter) -> bool| -> Vec<Parameter> {
+            all.iter().copied().filter(|p| wanted(p)).collect()
+        };
+        let mut list = Vec::new();
+        list.extend(self.scaled("scale", 1.0));
+        let scales = of(&|p| matches!(p, Parameter::Scale(_)));
+        if scales.len() > 1 {
+            list.extend(self.group("scale of each coil", &scales)?);
+        }
+        let background = of(&|p| matches!(p, Parameter::Background(_)));
+        if !background.is_empty() {
+            list.extend(self.group("background", &background)?);
+        }
+        list.extend(self.group("height", &[Parameter::Shift(2)])?);
+        list.extend(self.group("position", &of(&|p| matches!(p, Parameter::Shift(_))))?);
+        list.extend(self.group("rotation", &of(&|p| matches!(p, Parameter::Angle(_))))?);
+        // The field is proportional to the turns, with linear steel too.
+        list.extend(self.scaled("coil.turns", turns));
+        for key in keys(self.design, turns) {
+            list.extend(self.key(&key)?);
+        }
+        Ok(list)
+    }
+
+    /// One scale of everything: linear.
+    fn scaled(&self, name: &'static str, unit: f64) -> Option<Settled> {
+        let column = self.residuals.weighted(self.residuals.predicted.clone());
+        let solution = least_squares::solve(&[column], &self.residuals.values);
+        let slope = solution.unit_errors[0]?.recip();
+        let left = (squares(&self.residuals.values) - solution.removed).max(0.0);
+        Some(Settled {
+            name,
+            left,
+            parameters: 1,
+            change: Some(unit * solution.values[0]),
+            standard_error: Some(unit * self.error(self.noise(left, 1), slope)),
+        })
+    }
+
+    /// Numbers of the frame, of scales or of the background, fitted together.
+    fn group(
+        &self,
+        name: &'static str,
+        parameters: &[Parameter],
+    ) -> Result<Option<Settled>, JobError> {
+        let weights = &self.residuals.weights;
+        let found = fit::fit(
+            self.model,
+            self.scan,
+            parameters,
+            weights,
+            self.field_t,
+            self.progress,
+        )?;
+        if found.linear.rank == 0 {
+            return Ok(None);
+        }
+        let alone = parameters.len() == 1;
+        let noise = self.noise(found.left, found.linear.rank);
+        let error = found.linear.unit_errors[0].filter(|_| alone);
+        Ok(Some(Settled {
+            name,
+            left: found.left,
+            parameters: found.linear.rank,
+            change: error.map(|_| found.values[0]),
+            standard_error: error.map(|unit| self.error(noise, unit.recip()) * found.steps[0]),
+        }))
+    }
+
+    /// Measured less computed with the key changed `by`, weighted; `None` where that design cannot be
+    /// computed.
+    fn at(&self, key: &Key, by: f64) -> Result<Option<At>, JobError> {
+        if !(key.range[0]..=key.range[1]).contains(&by) {
+            return Ok(None);
+        }
+        match self.computed_for(&(key.changed)(by)) {
+            Ok(computed) => {
+                let pairs = self.scan.values.iter().zip(&computed);
+                let values = self.residuals.weighted(pairs.map(|(m, c)| m - c).collect());
+                let left = squares(&values);
+                Ok(Some(At { by, values, left }))
             }
-            [Err(JobError::Interrupted(stop)), _] | [_, Err(JobError::Interrupted(stop))] => {
-                return Err(stop.into());
-            }
+            Err(JobError::Interrupted(stop)) => Err(stop.into()),
             // A changed coil may not be possible: then it is no explanation.
-            _ => {}
+            Err(_) => Ok(None),
         }
     }
-    Ok(list)
-}
 
-fn group(name: &'static str, columns: Vec<Vec<f64>>) -> Candidate {
-    Candidate {
-        name,
-        columns,
-        unit: None,
+    /// What the scan would show of another design, [row, quantity].
+    fn computed_for(&self, design: &Design) -> Result<Vec<f64>, JobError> {
+        let scene = Scene::new(design)?;
+        let lowest_m = super::lowest_m(self.scan);
+        let solved = steel::solve(&scene, self.request.tolerance, KERNEL_ERROR, lowest_m)?;
+        let model = Model::new(&scene, &solved, self.scan);
+        let places = model.places(Pose::default())?;
+        let contributions = model.contributions(&places, Pose::default(), self.progress)?;
+        Ok(model.sum(&contributions, |_| 1.0))
     }
-}
 
-type Change<'a> = Box<dyn Fn(f64) -> Design + 'a>;
+    /// What one unit of the key changes there, by differences to both sides, or to one at the range's end.
+    fn slope(&self, key: &Key, at: &At) -> Result<Option<Vec<f64>>, JobError> {
+        let up = self.at(key, at.by + key.step)?;
+        let down = self.at(key, at.by - key.step)?;
+        let (high, low) = match (&up, &down) {
+            (Some(up), Some(down)) => (up, down),
+            (Some(up), None) => (up, at),
+            (None, Some(down)) => (at, down),
+            (None, None) => return Ok(None),
+        };
+        let pairs = low.values.iter().zip(&high.values);
+        Ok(Some(
+            pairs.map(|(l, h)| (l - h) / (high.by - low.by)).collect(),
+        ))
+    }
 
-/// The design's numbers that are tried: the key, its value in the key's unit, and the design with
-/// the value multiplied.
-fn changes(design: &Design, turns: f64) -> Vec<(&'static str, f64, Change<'_>)> {
-    let Some(coil) = design.coil else {
-        return Vec::new();
-    };
-    // More space does not mean more turns here.
-    let with = move |change: &dyn Fn(&mut crate::design::Coil)| {
-        let mut changed = design.clone();
-        if let Some(coil) = &mut changed.coil {
-            coil.turns = Some(turns);
-            change(coil);
+    /// The key fitted until it settles.
+    fn key(&self, key: &Key) -> Result<Option<Settled>, JobError> {
+        let values = self.residuals.values.clone();
+        let left = squares(&values);
+        let mut at = At {
+            by: 0.0,
+            values,
+            left,
+        };
+        let Some(mut slope) = self.slope(key, &at)? else {
+            return Ok(None);
+        };
+        if norm(&slope) == 0.0 {
+            return Ok(None);
         }
-        changed
-    };
-    let mut list: Vec<(&'static str, f64, Change<'_>)> = vec![
-        (
-            "coil.inner_diameter_mm",
-            coil.inner_diameter_m * 1e3,
-            Box::new(move |factor| with(&|coil| coil.inner_diameter_m *= factor)),
-        ),
-        (
-            "coil.outer_diameter_mm",
-            coil.outer_diameter_m * 1e3,
-            Box::new(move |factor| with(&|coil| coil.outer_diameter_m *= factor)),
-        ),
-        (
-            "coil.length_mm",
-            coil.length_m * 1e3,
-            Box::new(move |factor| with(&|coil| coil.length_m *= factor)),
-        ),
-    ];
-    if let Some(mu_r) = design.core.as_ref().and_then(|core| match core.steel {
-        Steel::Linear(mu_r) => Some(mu_r),
-        Steel::Curve(_) => None,
-    }) {
-        let changed = move |factor| {
-            let mut changed = design.clone();
-            if let Some(core) = &mut changed.core {
-                core.steel = Steel::Linear(mu_r * factor);
+        for _ in 0..ITERATIONS {
+            let step = dot(&slope, &at.values) / squares(&slope);
+            let Some(next) = self.stepped(key, &at, step)? else {
+                break;
+            };
+            let settled = at.left - next.left <= SETTLED * next.left;
+            // The slope between both serves the next step.
+            let pairs = at.values.iter().zip(&next.values);
+            slope = pairs.map(|(a, b)| (a - b) / (next.by - at.by)).collect();
+            at = next;
+            if settled {
+                break;
             }
-            changed
-        };
-        list.push(("core.relative_permeability", mu_r, Box::new(changed)));
+        }
+        if let Some(fresh) = self.slope(key, &at)?.filter(|slope| norm(slope) > 0.0) {
+            slope = fresh;
+        }
+        let noise = self.noise(at.left, 1);
+        let straight = noise / norm(&slope);
+        let sides = [1.0, -1.0].map(|side| self.side(key, &at, side, noise, straight));
+        let value = |by: f64| (key.value)(by);
+        let mut error = Some(0.0_f64);
+        for (sign, side) in [1.0, -1.0].into_iter().zip(sides) {
+            let length = side?.map(|s| (value(at.by + sign * s) - value(at.by)).abs() / WIDTH);
+            error = error.zip(length).map(|(most, length)| most.max(length));
+        }
+        let own = self.relative_error * self.computed() / norm(&slope);
+        let own = (value(at.by + own) - value(at.by)).abs();
+        Ok(Some(Settled {
+            name: key.name,
+            left: at.left,
+            parameters: 1,
+            change: Some(value(at.by) - value(0.0)),
+            standard_error: error.map(|error| error.hypot(own)),
+        }))
     }
-    if let Some(grid) = design
-        .array
-        .grid
-        .filter(|grid| grid.rows * grid.columns > 1)
-    {
-        let changed = move |factor: f64| {
-            let mut changed = design.clone();
-            let positions = changed.array.positions_m.iter_mut().flatten();
-            positions.for_each(|x| *x *= factor);
-            changed
-        };
-        list.push(("array.pitch_mm", grid.pitch_m * 1e3, Box::new(changed)));
-    }
-    list
-}
 
-/// What another design gives for the scan, [row, quantity].
-fn computed_for(
-    design: &Design,
-    scan: &Scan,
-    tolerance: Option<f64>,
-    progress: &dyn Progress,
-) -> Result<Vec<f64>, JobError> {
-    let scene = Scene::new(design)?;
-    let lowest_m = super::lowest_m(scan);
-    let solved = steel::solve(&scene, tolerance, KERNEL_ERROR, lowest_m)?;
-    let model = Model::new(&scene, &solved, scan);
-    let places = model.places(Pose::default())?;
-    let contributions = model.contributions(&places, Pose::default(), progress)?;
-    Ok(model.sum(&contributions, |_| 1.0))
+    /// The key after the step, or after part of it; `None` where none leaves less.
+    fn stepped(&self, key: &Key, at: &At, step: f64) -> Result<Option<At>, JobError> {
+        let mut step = step.clamp(-key.longest, key.longest);
+        for _ in 0..HALVINGS {
+            let by = (at.by + step).clamp(key.range[0], key.range[1]);
+            if by == at.by {
+                return Ok(None);
+            }
+            if let Some(next) = self.at(key, by)?.filter(|next| next.left < at.left) {
+                return Ok(Some(next));
+            }
+            step *= 0.5;
+        }
+        Ok(None)
+    }
+
+    /// How far to one side the likelihood stays within 95 %; `None` where it does so to the range's end.
+    fn side(
+        &self,
+        key: &Key,
+        at: &At,
+        side: f64,
+        noise: f64,
+        straight: f64,
+    ) -> Result<Option<f64>, JobError> {
+        let mut length = WIDTH * straight;
+        if length < STRAIGHT * key.step {
+            return Ok(Some(length));
+        }
+        let rise = (WIDTH * noise).powi(2);
+        for _ in 0..PROFILE {
+            let Some(there) = self.at(key, at.by + side * length)? else {
+                return Ok(None);
+            };
+            let share = ((there.left - at.left).max(0.0) / rise).sqrt();
+            if share >= 1.0 {
+                // Not shorter than a straight field has it.
+                return Ok(Some((length / share).max(WIDTH * straight)));
+            }
+            length *= (1.05 / share.max(0.3)).max(1.1);
+        }
+        Ok(Some(length))
+    }
 }

@@ -151,28 +151,6 @@ pub(super) fn fit(
     })
 }
 
-/// What each of `parameters` changes, a step of it, at the design as it stands, weighted.
-///
-/// # Errors
-/// As [`fit`].
-pub(super) fn columns(
-    model: &Model,
-    scan: &Scan,
-    parameters: &[Parameter],
-    steps: &[f64],
-    weights: &[f64],
-    progress: &dyn Progress,
-) -> Result<Vec<Vec<f64>>, JobError> {
-    let task = Task {
-        model,
-        scan,
-        parameters,
-        weights,
-        progress,
-    };
-    task.columns(&task.state(start(parameters))?, steps)
-}
-
 /// The design as it stands.
 fn start(parameters: &[Parameter]) -> Vec<f64> {
     let value = |parameter: &Parameter| match parameter {

@@ -21,6 +21,7 @@ use crate::progress::Progress;
 
 mod explain;
 mod fit;
+mod keys;
 mod model;
 mod units;
 
@@ -124,12 +125,20 @@ pub fn compare(
         field_t,
         progress,
     )?;
-    let tolerance = request.tolerance;
-    let (explanations, best_explanation) =
-        explain::explain(design, &model, scan, &weighted, tolerance, progress)?;
+    let relative_error = claimed(&solved);
+    let task = explain::Task {
+        design,
+        model: &model,
+        scan,
+        residuals: &weighted,
+        request,
+        relative_error,
+        field_t,
+        progress,
+    };
+    let (explanations, best_explanation) = explain::explain(&task)?;
     progress.end();
 
-    let relative_error = claimed(&solved);
     let told = Told {
         scan,
         request,
