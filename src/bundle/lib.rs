@@ -9,7 +9,7 @@
 //! ```
 //! use std::path::Path;
 //!
-//! use fluxform::bundle::load::{Bundle, BundleError};
+//! use fluxform_bundle::load::{Bundle, BundleError};
 //!
 //! let refused = Bundle::open(Path::new("no/such/folder")).unwrap_err();
 //! assert!(matches!(refused, BundleError::NoBundle { .. }));

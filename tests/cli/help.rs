@@ -94,6 +94,8 @@ fn completions_and_manual_pages() {
             "{page}"
         );
     }
+    place.run(&["man", "--out", "man1"]).ends(0);
+    place.write("man1/fluxform-map.1", "mine");
     place
         .run(&["man", "--out", "man1"])
         .ends(4)

@@ -42,7 +42,7 @@ fn a_picture_is_drawn_and_replaced_only_where_it_shows_the_same() {
     let out = ["--out", "b.csv"];
     let refused = place.run(&[&other[..], &out].concat()).ends(4);
     assert!(
-        refused.err.contains("was not drawn of these inputs"),
+        refused.err.contains("was not made from these inputs"),
         "{refused:?}"
     );
     assert!(place.read("a.svg") == drawn);

@@ -276,10 +276,7 @@ fn torn_points_are_computed_again_and_foreign_ones_are_left_alone() {
     let text = String::from_utf8(place.read(&point("p", 7))).unwrap();
     place.write(&point("p", 7), "");
     place.write(&point("p", 8), &text[..100]);
-    place.write(
-        &point("p", 9),
-        &text.replace("\"turns\": 1", "\"turns\": 2"),
-    );
+    place.write(&point("p", 9), &text[..1]);
     place
         .run(&["sweep", "merge", "plan.json", "p", "--out", "b.csv"])
         .ends(4)
@@ -288,6 +285,12 @@ fn torn_points_are_computed_again_and_foreign_ones_are_left_alone() {
     assert_eq!(told.ends(0).json()["computed"], 3);
     assert!(whole == merged(&place, "p", "b"));
 
+    // An edited point is the user's.
+    let edited = text.replace("\"turns\": 1", "\"turns\": 2");
+    assert_ne!(edited, text);
+    place.write(&point("p", 7), &edited);
+    place.run(&run).ends(4).says(&["000007.json", "--force"]);
+    assert_eq!(place.read(&point("p", 7)), edited.as_bytes());
     place.write(&point("p", 7), "precious\n");
     place.run(&run).ends(4).says(&["000007.json", "--force"]);
     assert_eq!(place.read(&point("p", 7)), b"precious\n");

@@ -407,7 +407,7 @@ impl Case {
 }
 
 /// The user's files that a planted manifest lists.
-const LISTED: [&str; 2] = ["precious.txt", "timing_precious.txt"];
+pub const LISTED: [&str; 2] = ["precious.txt", "timing_precious.txt"];
 
 /// Entries of the user's files and of victims outside, with their true sizes and digests.
 fn entries(folder: &Path, victims: &Path) -> String {

@@ -7,8 +7,8 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use crate::cases::{Case, Laid, Plant, Prepared, Role};
-use crate::commands::{Ran, Writes, run, words};
+use crate::cases::{Case, LISTED, Laid, Plant, Prepared, Role};
+use crate::commands::{Ran, run, words};
 use crate::snapshot::{Kind, Snapshot, change, snapshot};
 
 /// One row of the table.
@@ -53,7 +53,7 @@ fn row(
 ) -> Row {
     let mut changed: Vec<String> = before
         .keys()
-        .filter(|path| !may_change(&prepared.writes, case, laid, ran, path))
+        .filter(|path| !may_change(prepared, case, laid, ran, path))
         .filter(|path| !moved_aside(case, path, before, after))
         .filter_map(|path| change(path, before, after))
         .collect();
@@ -89,7 +89,8 @@ fn row(
 }
 
 /// What the program may replace or remove.
-fn may_change(writes: &Writes, case: &Case, laid: &Laid, ran: &Ran, path: &str) -> bool {
+fn may_change(prepared: &Prepared, case: &Case, laid: &Laid, ran: &Ran, path: &str) -> bool {
+    let writes = &prepared.writes;
     // Leftovers of killed runs have names that nobody else uses.
     if case.name.role == Role::Temporary
         && (path == case.name.path || path.starts_with(&format!("{}/", case.name.path)))
@@ -114,8 +115,19 @@ fn may_change(writes: &Writes, case: &Case, laid: &Laid, ran: &Ran, path: &str) 
     if laid.ours.contains(path) {
         return !case.refused || path.contains("/.fluxform-kept");
     }
-    if path != case.name.path || case.refused {
+    if case.refused {
         return false;
+    }
+    if case.plant == Plant::OwnManifestWithMore && writes.bundle {
+        // What our list has of the folder's own files, with their digests, is the program's.
+        let (folder, _) = case.name.path.rsplit_once('/').unwrap();
+        let mut listed = LISTED.iter().map(|name| format!("{folder}/{name}"));
+        if is_manifest(&case.name.path) && listed.any(|listed| listed == path) {
+            return true;
+        }
+    }
+    if path != case.name.path {
+        return case.force && is_output_through(prepared, case, path);
     }
     let replaceable = case.name.role == Role::Output && case.force && ran.code != Some(2);
     match case.plant {
@@ -124,7 +136,8 @@ fn may_change(writes: &Writes, case: &Case, laid: &Laid, ran: &Ran, path: &str) 
             replaceable && !writes.bundle
         }
         Plant::Edited => replaceable || is_made_again(path),
-        Plant::OwnManifestWithMore => replaceable,
+        // A record is known by its inputs: it has no digest of itself.
+        Plant::OwnManifestWithMore => true,
         // Its mode is looked at apart.
         Plant::Closed => true,
         Plant::LinkToFile
@@ -134,6 +147,26 @@ fn may_change(writes: &Writes, case: &Case, laid: &Laid, ran: &Ran, path: &str) 
         | Plant::Folder
         | Plant::Pipe => false,
     }
+}
+
+fn is_manifest(path: &str) -> bool {
+    path.ends_with("/manifest.json")
+}
+
+/// Whether a victim is a plain file at an output's name: folders above it may be links, as in any path
+/// that a user gives. A bundle's folder is replaced as a whole, so a link in its place is not followed.
+fn is_output_through(prepared: &Prepared, case: &Case, path: &str) -> bool {
+    let Some(name) = path.strip_prefix("victims/folder/") else {
+        return false;
+    };
+    let output = format!("{}/{name}", case.name.path);
+    case.plant == Plant::LinkToFolder
+        && case.name.role == Role::Folder
+        && !prepared.writes.bundle
+        && prepared
+            .names
+            .iter()
+            .any(|it| it.path == output && it.role == Role::Output)
 }
 
 /// Files of the program's that no list has with a digest: seconds, what is cached, and the points of

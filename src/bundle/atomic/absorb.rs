@@ -70,7 +70,8 @@ impl Owned {
     }
 
     /// Refuses to write files where `folder`, shown as `target`, has something else of their names:
-    /// unless that is ours or has the same bytes. With force only what this run reads is refused.
+    /// unless that is ours or has the same bytes. With force a regular file makes way that this run does
+    /// not read.
     ///
     /// # Errors
     /// [`WriteError::OutputExists`], [`WriteError::Protected`].
@@ -95,8 +96,14 @@ impl Owned {
                         reason: "is read by this very run".to_owned(),
                     });
                 }
-                State::Foreign if overwrite.forced() => {}
-                State::Foreign => {
+                State::Foreign(Kind::File) if overwrite.forced() => {}
+                State::Foreign(Kind::Folder | Kind::Link | Kind::Special) if overwrite.forced() => {
+                    return Err(WriteError::Protected {
+                        path,
+                        reason: "is no regular file".to_owned(),
+                    });
+                }
+                State::Foreign(_) => {
                     return Err(WriteError::OutputExists {
                         path,
                         reason: "and is not as this program wrote it".to_owned(),
@@ -115,7 +122,9 @@ impl Owned {
             dir = match dir.status(part)?.map(|status| status.kind) {
                 None => return Ok(State::Free),
                 Some(Kind::Folder) => dir.child(part)?,
-                Some(Kind::File | Kind::Link | Kind::Special) => return Ok(State::Foreign),
+                Some(kind @ (Kind::File | Kind::Link | Kind::Special)) => {
+                    return Ok(State::Foreign(kind));
+                }
             };
         }
         let Some(status) = dir.status(name)? else {
@@ -129,7 +138,7 @@ impl Owned {
         } else if self.reads(Some(status)) {
             State::Input
         } else {
-            State::Foreign
+            State::Foreign(status.kind)
         })
     }
 }
@@ -141,7 +150,7 @@ enum State {
     /// What this run reads.
     Input,
     /// What is not known to be ours.
-    Foreign,
+    Foreign(Kind),
 }
 
 /// Gives the folder `new`, and what it has in common with `old`, the owners and modes there.

@@ -52,6 +52,8 @@ struct Place {
     target: PathBuf,
     parent: Dir,
     name: OsString,
+    /// Whether a link was given, which led here.
+    linked: bool,
 }
 
 impl FolderDraft {
@@ -61,13 +63,14 @@ impl FolderDraft {
     /// # Errors
     /// [`WriteError`].
     pub fn check(target: &Path, overwrite: &Overwrite, names: &[&str]) -> Result<(), WriteError> {
+        let linked = target.is_symlink();
         let target = resolved(target)?;
         let entries: Vec<FileEntry> = names.iter().map(|name| unknown(name)).collect();
         let fail = |error| WriteError::from_io("write", &target, error);
         match Dir::open(parent_of(&target)) {
             Ok(parent) => {
                 parent.writable().map_err(fail)?;
-                Place::of(&target, parent)?.check(overwrite, &entries)
+                Place::of(&target, parent, linked)?.check(overwrite, &entries)
             }
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
             Err(error) => Err(fail(error)),
@@ -80,6 +83,7 @@ impl FolderDraft {
     /// [`WriteError`] when the target is not ours to replace or the place cannot be written to.
     pub fn begin(target: &Path, overwrite: Overwrite) -> Result<Self, WriteError> {
         Self::check(target, &overwrite, &[])?;
+        let linked = target.is_symlink();
         let target = resolved(target)?;
         let mode = if target.is_dir() { 0o700 } else { 0o777 };
         let ((parent, draft), made) = made_in(parent_of(&target), |folder| {
@@ -90,7 +94,7 @@ impl FolderDraft {
         .map_err(|error| error.of("write", &target))?;
         // Dropped in the reverse order: the draft goes before the folder that was made for it.
         let (made, draft) = (made, draft);
-        let place = Place::of(&target, parent)?;
+        let place = Place::of(&target, parent, linked)?;
         {
             let _lock = place.parent.lock(parent_of(&place.target));
             place
@@ -180,7 +184,7 @@ impl FolderDraft {
 }
 
 impl Place {
-    fn of(target: &Path, parent: Dir) -> Result<Self, WriteError> {
+    fn of(target: &Path, parent: Dir, linked: bool) -> Result<Self, WriteError> {
         let name = target.file_name().ok_or_else(|| WriteError::BadName {
             name: target.display().to_string(),
         })?;
@@ -188,6 +192,7 @@ impl Place {
             target: target.to_path_buf(),
             parent,
             name: name.to_owned(),
+            linked,
         })
     }
 
@@ -200,8 +205,24 @@ impl Place {
         }
     }
 
-    /// Refuses a folder that files of these names must not go to.
+    /// Refuses a folder that files of these names must not go to. Force does not reach through a link:
+    /// what it leads to must be ours.
     fn check(&self, overwrite: &Overwrite, written: &[FileEntry]) -> Result<(), WriteError> {
+        if !(self.linked && overwrite.forced()) {
+            return self.check_here(overwrite, written);
+        }
+        let unforced = overwrite.unforced();
+        self.check_here(&unforced, written)
+            .map_err(|error| match error {
+                WriteError::OutputExists { .. } => WriteError::Protected {
+                    path: self.target.clone(),
+                    reason: "is behind a link and not ours".to_owned(),
+                },
+                error => error,
+            })
+    }
+
+    fn check_here(&self, overwrite: &Overwrite, written: &[FileEntry]) -> Result<(), WriteError> {
         let fail = |error| WriteError::from_io("write", &self.target, error);
         let folder = match self.folder().map_err(fail)? {
             Some(folder) => Some(folder),

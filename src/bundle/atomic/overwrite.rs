@@ -97,11 +97,16 @@ impl Overwrite {
 
     /// Whether the regular file at `path` is known to be ours and is not read by this run.
     pub(super) fn owns(&self, path: &Path) -> bool {
-        let unforced = Self {
+        let unforced = self.unforced();
+        !path.is_symlink() && matches!(unforced.permit(path, None), Ok(Permit::Replace))
+    }
+
+    /// The same without force.
+    pub(super) fn unforced(&self) -> Self {
+        Self {
             force: false,
             ..self.clone()
-        };
-        !path.is_symlink() && matches!(unforced.permit(path, None), Ok(Permit::Replace))
+        }
     }
 
     /// The record that lists what is ours.

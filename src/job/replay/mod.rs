@@ -71,13 +71,13 @@ impl Opened {
         })
     }
 
-    /// The bundle's files.
+    /// The bundle's files, its seconds, which no manifest lists, among them.
     #[must_use]
     pub fn files(&self) -> Vec<PathBuf> {
         let listed = self.bundle.manifest.files.iter();
-        let listed = listed.map(|file| self.bundle.folder.join(&file.path));
-        let manifest = self.bundle.folder.join("manifest.json");
-        std::iter::once(manifest).chain(listed).collect()
+        let listed = listed.map(|file| file.path.as_str());
+        let all = ["manifest.json", "timing.json"].into_iter().chain(listed);
+        all.map(|name| self.bundle.folder.join(name)).collect()
     }
 
     /// A made-up trajectory over the bundle's object.

@@ -91,7 +91,7 @@ fn a_folder_is_there_at_every_moment_while_it_is_replaced() {
     let dir = Dir::open(folder.path()).unwrap();
     // Some file systems know no exchange.
     if !dir.exchange("bump", "probe").unwrap() {
-            return;
+        return;
     }
     dir.exchange("bump", "probe").unwrap();
     let (done, begun) = (AtomicBool::new(false), AtomicBool::new(false));
@@ -126,7 +126,7 @@ fn a_folder_is_there_at_every_moment_while_it_is_replaced() {
 
 /// A run that was killed right after it renamed its draft, or right after the exchange.
 fn killed(target: &Path, text: &str, exchanged: bool) {
-    let place = Place::of(target, Dir::open(parent_of(target)).unwrap()).unwrap();
+    let place = Place::of(target, Dir::open(parent_of(target)).unwrap(), false).unwrap();
     let mut draft = FolderDraft::begin(target, ours(target)).unwrap();
     let entry = draft.write("a.txt", |out| out.write_all(text.as_bytes()));
     let manifest = manifest(&[entry.unwrap()]);
@@ -181,7 +181,7 @@ fn without_an_exchange_two_renames_do_and_a_kill_between_them_is_undone() {
     let target = folder.path().join("bump");
     put(&target, "old").unwrap();
     put(&folder.path().join("draft"), "new").unwrap();
-    let place = Place::of(&target, Dir::open(folder.path()).unwrap()).unwrap();
+    let place = Place::of(&target, Dir::open(folder.path()).unwrap(), false).unwrap();
     let new = place.parent.child("draft").unwrap();
     let aside = place.aside(&place.folder().unwrap().unwrap(), &new);
     // The second rename fails: there is nothing to rename.
@@ -212,7 +212,7 @@ fn a_link_or_a_folder_that_is_named_like_one_put_aside_is_left_alone() {
     put(&target, "old").unwrap();
     put(&victim, "theirs").unwrap();
     fs::write(victim.join("thesis.tex"), "years").unwrap();
-    let place = Place::of(&target, Dir::open(folder.path()).unwrap()).unwrap();
+    let place = Place::of(&target, Dir::open(folder.path()).unwrap(), false).unwrap();
     let own = place.folder().unwrap().unwrap();
     let identities = place.aside(&own, &own).into_string().unwrap();
     let plain = ".bump.fluxform-old".to_owned();
@@ -280,11 +280,13 @@ fn what_the_user_lays_into_a_bundle_is_kept() {
         assert!(refused.to_string().contains(name), "{refused}");
         assert_eq!(tree(folder.path()), before);
     }
-    let forced = [
-        ("report.html", "page"),
-        ("b.txt", "b4"),
-        ("notes", "a file"),
-    ];
+    // With force a file makes way, a folder does not.
+    let before = tree(folder.path());
+    let refused = put_files(&target, Overwrite::force(), &[("notes", "a file")]);
+    let refused = refused.unwrap_err();
+    assert!(matches!(refused, WriteError::Protected { .. }), "{refused}");
+    assert_eq!(tree(folder.path()), before);
+    let forced = [("report.html", "page"), ("b.txt", "b4")];
     put_files(&target, Overwrite::force(), &forced).unwrap();
     let read = |name: &str| fs::read(target.join(name)).unwrap();
     assert_eq!(
@@ -293,7 +295,7 @@ fn what_the_user_lays_into_a_bundle_is_kept() {
     );
     assert_eq!(read("report.html.kept-1"), b"mine");
     assert_eq!(read("b.txt.kept-1"), b"edited");
-    assert_eq!(read("notes.kept-1/deep/a"), b"mine");
+    assert_eq!(read("notes/deep/a"), b"mine");
     assert!(!target.join("a.txt").exists(), "listed and unchanged");
 }
 
@@ -359,15 +361,12 @@ fn the_manifest_of_a_replaced_folder_is_no_pipe_nor_endless() {
     for lay in lay {
         fs::create_dir(&target).unwrap();
         lay();
+        let is_file = fs::symlink_metadata(&manifest).unwrap().is_file();
         FolderDraft::begin(&target, ours(&target)).unwrap_err();
-        put_files(&target, Overwrite::force(), &[("a.txt", "a")]).unwrap();
-        assert!(target.join("a.txt").is_file() && manifest.is_file());
-        assert!(
-            target
-                .join("manifest.json.kept-1")
-                .symlink_metadata()
-                .is_ok()
-        );
+        let forced = put_files(&target, Overwrite::force(), &[("a.txt", "a")]);
+        assert_eq!(forced.is_ok(), is_file, "only a plain file makes way");
+        assert_eq!(target.join("a.txt").is_file(), is_file);
+        assert_eq!(target.join("manifest.json.kept-1").exists(), is_file);
         assert_eq!(folder.path().read_dir().unwrap().count(), 1);
         fs::remove_dir_all(&target).unwrap();
     }
@@ -386,4 +385,49 @@ fn folders_made_for_nothing_go_again() {
         })
         .unwrap();
     assert!(target.join("a").is_file());
+}
+
+#[test]
+fn force_does_not_reach_a_foreign_folder_through_a_link() {
+    let folder = tempfile::tempdir().unwrap();
+    let [target, link, victim] = ["bump", "link", "victim"].map(|name| folder.path().join(name));
+    fs::create_dir(&victim).unwrap();
+    fs::write(victim.join(MANIFEST), "theirs").unwrap();
+    std::os::unix::fs::symlink(&victim, &link).unwrap();
+    let before = tree(folder.path());
+    let record = link.join(MANIFEST);
+    let overwrite = Overwrite::new(true, record, &[Input::of_bytes("a.toml", b"a")]);
+    let refused = put_files(&link, overwrite, &[("a.txt", "a")]).unwrap_err();
+    assert!(matches!(refused, WriteError::Protected { .. }), "{refused}");
+    assert_eq!(tree(folder.path()), before);
+    // To what is ours it leads.
+    put(&target, "old").unwrap();
+    fs::remove_file(&link).unwrap();
+    std::os::unix::fs::symlink(&target, &link).unwrap();
+    put(&link, "new").unwrap();
+    assert!(link.is_symlink());
+    assert_eq!(fs::read(target.join("a.txt")).unwrap(), b"new");
+}
+
+#[test]
+fn the_owner_survives_a_rewrite() {
+    use std::os::unix::fs::{MetadataExt, chown};
+    const OTHER: u32 = 12_345;
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("bump");
+    put(&target, "old").unwrap();
+    let owned = ["", "a.txt", MANIFEST].map(|name| target.join(name));
+    // Only the superuser may give a file away.
+    if owned
+        .iter()
+        .any(|path| chown(path, Some(OTHER), Some(OTHER)).is_err())
+    {
+        return;
+    }
+    put(&target, "new").unwrap();
+    assert_eq!(fs::read(target.join("a.txt")).unwrap(), b"new");
+    for path in &owned {
+        let found = path.metadata().unwrap();
+        assert_eq!((found.uid(), found.gid()), (OTHER, OTHER), "{path:?}");
+    }
 }
