@@ -95,12 +95,6 @@ const CASES: &[Case] = &[
         0,
     ),
     (
-        "the steel's pull counted, uncoupled",
-        [CORE, APART, "passive_force = true\n", SUPPLY],
-        &["slope.toml"],
-        0,
-    ),
-    (
         "a tilted cylinder magnet",
         [
             AIR,
@@ -160,7 +154,7 @@ const CASES: &[Case] = &[
             "current_max_a = [2.0, 0.0, 1.7]\n",
         ],
         &["slope.toml"],
-        0,
+        4,
     ),
     (
         "a surface given directly",

@@ -32,7 +32,11 @@ impl Random {
 }
 
 pub fn root() -> PathBuf {
-    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+    // Tests of the member and of the whole program share this file.
+    let own = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut folders = own.ancestors();
+    let top = folders.find(|folder| folder.join("Cargo.lock").is_file());
+    top.expect("the repository").to_path_buf()
 }
 
 /// The folder of real surface files with their index that `FLUXFORM_CORPUS` names, or `None` with a
