@@ -54,6 +54,28 @@ impl Cylinder {
         self.depth_m(direction(moment_a_m2))
     }
 
+    /// The mean over the cylinder of what falls off from a plane `height_m` below its centre like
+    /// the distance to the minus fourth, as a coil's gradient does at most, relative to its value
+    /// at the centre; `axis` is the cylinder's, a unit vector. Domain: height_m above
+    /// [`Cylinder::depth_m`].
+    ///
+    /// An error of the field that stays below a part of the gradient at every height acts on the
+    /// magnet by no more than that part times this: outside its sources it is harmonic, so
+    /// that its mean is at most its largest value, whatever rule takes the mean.
+    #[must_use]
+    pub fn growth(&self, height_m: f64, axis: [f64; 3]) -> f64 {
+        let part = self.depth_m(axis) / height_m;
+        // ((1 - t)^-3 - (1 + t)^-3) / (6 t)
+        let square = part * part;
+        (1.0 + square / 3.0) / (1.0 - square).powi(3)
+    }
+
+    /// As [`Cylinder::growth`] for the axis along a moment.
+    #[must_use]
+    pub fn growth_along(&self, height_m: f64, moment_a_m2: [f64; 3]) -> f64 {
+        self.growth(height_m, direction(moment_a_m2))
+    }
+
     /// How far below its centre a cylinder with axis `axis` (a unit vector) extends, m.
     #[must_use]
     pub fn depth_m(&self, axis: [f64; 3]) -> f64 {

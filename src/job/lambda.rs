@@ -658,7 +658,15 @@ pub(super) fn proven_accuracy(scene: &Scene, solved: &Solved) -> StageAccuracy {
     };
     StageAccuracy {
         estimate: estimate + magnet,
-        relative_to: "the largest |grad B| at the point's height".to_owned(),
+        relative_to: match (&solved.steel, scene.design.magnet.model) {
+            (Steel::Alone(_) | Steel::Coupled(_), MagnetModel::Cylinder) => {
+                "the largest |grad B| at each height of the magnet, averaged over it"
+            }
+            (Steel::None, _) | (_, MagnetModel::Dipole) => {
+                "the largest |grad B| at the point's height"
+            }
+        }
+        .to_owned(),
         method: method.to_owned(),
     }
 }

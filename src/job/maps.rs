@@ -5,10 +5,11 @@ use serde::{Deserialize, Serialize};
 use super::JobError;
 use super::air_sample::{self, PLACES, Sample, spread};
 use super::scene::{AIR_SHARE, Scene};
-use super::steel::{EVALUATION_SHARE, Solved, Steel, SteelField, clearance_m};
+use super::steel::{EVALUATION_SHARE, Solved, Steel, SteelField, clearance_m, coupled};
 use crate::accuracy::StageAccuracy;
 use crate::field::magnet::MagnetRule;
 use crate::field::steel::axial_table::AxialTable;
+use crate::map::mean::MeanField;
 use crate::map::sampled::{SampledField, TableReport};
 
 use crate::map::tabulate::{Grid, MapError, PlacedCoil};
@@ -58,6 +59,18 @@ impl SceneMap {
                 let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
                     tabulate(&scene.winding, coils, grid, components, tolerance, p)
                 };
+                let means = MeanField::new(
+                    &scene.winding,
+                    coils,
+                    grid,
+                    components,
+                    MEAN_SHARE * share * solved.tolerance,
+                    SOURCE_SHARE * tolerance,
+                );
+                let one = Maker {
+                    one: &one,
+                    means: means.as_ref(),
+                };
                 let map = mean(&one, felt, coils, grid, components, progress)?;
                 progress.begin("interpolation error", 1);
                 let between = if felt.is_field() {
@@ -78,6 +91,18 @@ impl SceneMap {
                 let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
                     tabulate(&source, coils, grid, components, tolerance, p)
                 };
+                let means = MeanField::new(
+                    &source,
+                    coils,
+                    grid,
+                    components,
+                    MEAN_SHARE * MAP_SHARE * solved.tolerance,
+                    SOURCE_SHARE * tolerance,
+                );
+                let one = Maker {
+                    one: &one,
+                    means: means.as_ref(),
+                };
                 let map = mean(&one, felt, coils, grid, components, progress)?;
                 progress.begin("interpolation error", 1);
                 let between = between(&one, felt, coils, grid, &map)?;
@@ -85,7 +110,7 @@ impl SceneMap {
             }
             Steel::Coupled(_) => {
                 let tolerance = MAP_SHARE * solved.tolerance / felt.amplification;
-                let steel = solved.sources(scene, &lowest, felt.reach_m)?;
+                let steel = solved.sources(scene, &lowest, felt.reach_m, felt.amplification)?;
                 let Some(SteelField::Coupled(steel)) = steel else {
                     return Err(no_steel());
                 };
@@ -102,6 +127,10 @@ impl SceneMap {
                         tabulate(&scene.winding, coils, grid, components, tolerance, &Silent)?;
                     add(&mut map, &sampled.map(coils, grid, p)?, 1.0);
                     Ok(map)
+                };
+                let one = Maker {
+                    one: &one,
+                    means: None,
                 };
                 let map = mean(&one, felt, coils, grid, components, progress)?;
                 progress.begin("interpolation error", 1);
@@ -127,9 +156,16 @@ fn no_steel() -> JobError {
     JobError::Input("the design has steel, but its solution holds none".to_owned())
 }
 
-type Maker<'a> = dyn Fn(&[PlacedCoil], &Grid, Components, &dyn Progress) -> Result<FieldMap, MapError>
-    + Sync
-    + 'a;
+/// Shares of a map's tolerance given to the series of means and to the field that they are of.
+const MEAN_SHARE: f64 = 0.5;
+const SOURCE_SHARE: f64 = 0.4;
+
+/// Makes maps of the field of one source.
+struct Maker<'a> {
+    one: &'a dyn Fn(&[PlacedCoil], &Grid, Components, &dyn Progress) -> Result<FieldMap, MapError>,
+    /// Means of it, where coils are alike.
+    means: Option<&'a MeanField<'a>>,
+}
 
 /// Offsets of a magnet's dipoles from its centre, m, and their parts of its moment.
 type Shares = Vec<([f64; 3], f64)>;
@@ -149,6 +185,8 @@ pub struct Felt {
 
 /// A rule whose parts cancel more than this is not worth its few dipoles.
 const MOST_AMPLIFICATION: f64 = 3.0;
+/// The same where a table gives the field, whose cost hardly grows with its digits.
+const MOST_AMPLIFICATION_OF_TABLES: f64 = 100.0;
 /// Growth of the distance from the sources at which a rule of fewer dipoles is sought.
 const FARTHER: f64 = 1.25;
 
@@ -174,6 +212,11 @@ impl Felt {
             layers: Vec::new(),
             ..Self::field()
         };
+        let most = if scene.core.is_some() && !coupled(scene.design) {
+            MOST_AMPLIFICATION_OF_TABLES
+        } else {
+            MOST_AMPLIFICATION
+        };
         let mut sought_m = f64::NEG_INFINITY;
         for z in z_m {
             if z - top_m < FARTHER * (sought_m - top_m) {
@@ -185,7 +228,7 @@ impl Felt {
                 .layers
                 .last()
                 .is_none_or(|(_, shares)| rule.nodes().len() < shares.len());
-            if fewer && (felt.layers.is_empty() || rule.amplification() <= MOST_AMPLIFICATION) {
+            if fewer && (felt.layers.is_empty() || rule.amplification() <= most) {
                 felt.amplification = felt.amplification.max(rule.amplification());
                 felt.bound = felt.bound.max(rule.bound());
                 felt.reach_m = felt.reach_m.max(rule.reach_m());
@@ -259,7 +302,7 @@ fn mean(
         pieces.push(mean_of(one, shares, coils, &grid, components, progress)?);
     }
     if pieces.is_empty() {
-        return one(coils, grid, components, progress);
+        return (one.one)(coils, grid, components, progress);
     }
     Ok(stacked(pieces, coils.len()))
 }
@@ -307,9 +350,14 @@ fn mean_of(
     components: Components,
     progress: &dyn Progress,
 ) -> Result<FieldMap, MapError> {
+    if let (Some(means), [_, _, ..]) = (one.means, shares)
+        && let Some(map) = means.map(shares, coils, grid, components, progress)?
+    {
+        return Ok(map);
+    }
     let mut whole: Option<FieldMap> = None;
     for (offset_m, share) in shares {
-        let mut part = one(coils, &shifted(grid, *offset_m), components, progress)?;
+        let mut part = (one.one)(coils, &shifted(grid, *offset_m), components, progress)?;
         match &mut whole {
             None => {
                 if *share != 1.0 {
@@ -322,7 +370,7 @@ fn mean_of(
     }
     let mut map = match whole {
         Some(map) => map,
-        None => one(coils, grid, components, progress)?,
+        None => (one.one)(coils, grid, components, progress)?,
     };
     (map.x_m, map.y_m, map.z_m) = (grid.x_m.clone(), grid.y_m.clone(), grid.z_m.clone());
     Ok(map)

@@ -186,7 +186,7 @@ fn working_point_facts(
     air_inductance_h: &[Vec<f64>],
 ) -> Result<WorkingPointFacts, JobError> {
     let places = around(scene);
-    let sources = solved.sources(scene, &places, 0.0)?;
+    let sources = solved.sources(scene, &places, 0.0, 1.0)?;
     let steel = sources.map_or_else(Vec::new, |sources| {
         solved.steel_fields(scene, &sources, &places, Parts::Gz)
     });

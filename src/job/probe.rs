@@ -102,9 +102,8 @@ pub fn probe(
             .force
             .then(|| scene.magnet_rule(group.magnet_lowest_m, finest))
             .transpose()?;
-        let reach_m = rule.as_ref().map_or(0.0, MagnetRule::reach_m);
         let own: Vec<[f64; 3]> = group.rows.iter().map(|row| points_m[*row]).collect();
-        let places = Places::of_group(&scene, &solved, group, &points_m, reach_m)?;
+        let places = Places::of_group(&scene, &solved, group, &points_m, rule.as_ref())?;
         let portions = own
             .par_chunks(PORTION)
             .zip(group.rows.par_chunks(PORTION))
@@ -131,7 +130,8 @@ pub fn probe(
             }
         }
         if let Some(rule) = &rule {
-            let error = solved.point_error() * rule.amplification() + rule.bound();
+            let growth = scene.magnet_growth(group.magnet_lowest_m);
+            let error = solved.force_error(growth, rule.amplification(), rule.bound());
             magnet_error = magnet_error.max(error);
         }
     }
@@ -219,18 +219,20 @@ impl<'a> Places<'a> {
         Ok(Self {
             scene,
             solved,
-            sources: solved.sources(scene, points_m, reach_m)?,
+            sources: solved.sources(scene, points_m, reach_m, 1.0)?,
         })
     }
 
-    /// For the places of a group within `reach_m`.
+    /// For the points of a group and the dipoles of the magnet about them.
     fn of_group(
         scene: &'a Scene<'a>,
         solved: &'a Solved,
         group: &Group,
         points_m: &[[f64; 3]],
-        reach_m: f64,
+        rule: Option<&MagnetRule>,
     ) -> Result<Self, JobError> {
+        let reach_m = rule.map_or(0.0, MagnetRule::reach_m);
+        let amplification = rule.map_or(1.0, MagnetRule::amplification);
         if let Some(core) = &scene.core {
             for row in &group.rows {
                 clearance_of_m(scene, core, row + 1, points_m[*row], reach_m)?;
@@ -239,7 +241,11 @@ impl<'a> Places<'a> {
         Ok(Self {
             scene,
             solved,
-            sources: solved.sources_at(group.lowest_m - reach_m, group.distance_m - reach_m),
+            sources: solved.sources_at(
+                group.lowest_m - reach_m,
+                group.distance_m - reach_m,
+                amplification,
+            ),
         })
     }
 

@@ -1,5 +1,7 @@
 //! What every command needs of a design: the source, the coils, the magnet, the currents.
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 
 use super::steel::{EVALUATION_SHARE, SceneCore, Solved, Steel, SteelField};
@@ -10,6 +12,8 @@ use crate::design::{Coil, Coupling, Design, MagnetModel, Polarity};
 use crate::field::batch::Wanted;
 use crate::field::dipole;
 use crate::field::magnet::{Cylinder, MagnetRule, Sources};
+use crate::field::source::AxialSource;
+use crate::field::steel::axial_table::AxialTable;
 use crate::field::steel::sources::Parts;
 use crate::field::winding::Winding;
 use crate::map::tabulate::PlacedCoil;
@@ -189,8 +193,53 @@ impl<'a> Scene<'a> {
     /// # Errors
     /// A magnet that touches what it is attracted by.
     pub fn magnet_rule(&self, lowest_m: f64, tolerance: f64) -> Result<MagnetRule, JobError> {
-        let top_m = self.core.as_ref().map_or(0.0, |c| c.shape.top_m.max(0.0));
-        magnet_rule(self.design, lowest_m, top_m, tolerance)
+        magnet_rule(self.design, lowest_m, self.sources_top_m(), tolerance)
+    }
+
+    /// How much larger the gradient's mean over the magnet may be than the gradient at its centre
+    /// `height_m` high; 1 for a dipole.
+    #[must_use]
+    pub fn magnet_growth(&self, height_m: f64) -> f64 {
+        let magnet = &self.design.magnet;
+        let top_m = self.sources_top_m();
+        match magnet.model {
+            MagnetModel::Dipole => 1.0,
+            MagnetModel::Cylinder => Cylinder {
+                diameter_m: magnet.diameter_m,
+                length_m: magnet.length_m,
+            }
+            .growth_along(height_m - top_m, self.moment_a_m2),
+        }
+    }
+
+    /// Height of the highest winding or core, m.
+    fn sources_top_m(&self) -> f64 {
+        self.core.as_ref().map_or(0.0, |c| c.shape.top_m.max(0.0))
+    }
+
+    /// Rows of points that share a rule for the magnet, with a height none of them is below: those
+    /// whose gap to the array lies between the same two steps of the square root of two.
+    fn by_gap(&self, points_m: &[[f64; 3]]) -> Vec<(f64, Vec<usize>)> {
+        let lowest_m = points_m.iter().fold(f64::INFINITY, |z, p| z.min(p[2]));
+        let depth_m = self.magnet_depth_m();
+        if depth_m == 0.0 {
+            return vec![(lowest_m, (0..points_m.len()).collect())];
+        }
+        let foot_m = self.sources_top_m() + depth_m;
+        let mut groups: BTreeMap<i32, Vec<usize>> = BTreeMap::new();
+        for (row, point) in points_m.iter().enumerate() {
+            let step = (2.0 * ((point[2] - foot_m) / depth_m).log2()).floor();
+            // Where the magnet touches, the least of all steps; the rule refuses.
+            let step = if step.is_nan() { i32::MIN } else { step as i32 };
+            groups.entry(step).or_default().push(row);
+        }
+        groups
+            .into_iter()
+            .map(|(step, rows)| {
+                let edge_m = foot_m + depth_m * (0.5 * f64::from(step)).exp2();
+                (edge_m.max(lowest_m), rows)
+            })
+            .collect()
     }
 
     /// Upward force per ampere of every coil at every point, N/A, [point, coil], to the tolerance
@@ -206,30 +255,64 @@ impl<'a> Scene<'a> {
         progress: &dyn Progress,
     ) -> Result<Vec<f64>, JobError> {
         let coils = self.coils.len();
-        let lowest_m = points_m.iter().fold(f64::INFINITY, |z, p| z.min(p[2]));
-        let rule =
-            self.magnet_rule(lowest_m, MAGNET_SHARE * solved.tolerance.max(MAGNET_FINEST))?;
+        let finest = MAGNET_SHARE * solved.tolerance.max(MAGNET_FINEST);
+        let groups = self
+            .by_gap(points_m)
+            .into_iter()
+            .map(|(height_m, rows)| Ok((self.magnet_rule(height_m, finest)?, rows)))
+            .collect::<Result<Vec<_>, JobError>>()?;
+        let of_rules = |of: fn(&MagnetRule) -> f64| {
+            let values = groups.iter().map(|(rule, _)| of(rule));
+            values.fold(0.0, f64::max)
+        };
+        let (reach_m, amplification) = (
+            of_rules(MagnetRule::reach_m),
+            of_rules(MagnetRule::amplification),
+        );
         let mut forces = vec![0.0; points_m.len() * coils];
         progress.begin("forces", points_m.len() as u64);
         // As fine as the nearest of all points needs, whatever the portion.
-        let sources = solved.sources(self, points_m, rule.reach_m())?;
-        forces
-            .par_chunks_mut(PORTION * coils)
-            .zip(points_m.par_chunks(PORTION))
-            .try_for_each(|(rows, points)| -> Result<(), JobError> {
-                progress.check()?;
-                self.add_forces(solved, sources.as_ref(), &rule, points, rows)?;
-                progress.advance(points.len() as u64);
-                Ok(())
-            })?;
+        let sources = solved.sources(self, points_m, reach_m, amplification)?;
+        // Many dipoles take a winding and its own core from one table.
+        let table = match &solved.steel {
+            Steel::Alone(coil) if reach_m > 0.0 => Some(AxialTable::new(
+                Some(self.winding),
+                coil.layer.clone(),
+                EVALUATION_SHARE * solved.tolerance / amplification,
+            )),
+            Steel::None | Steel::Alone(_) | Steel::Coupled(_) => None,
+        };
+        let (own, sources): (&dyn AxialSource, _) = match &table {
+            Some(table) => (table, None),
+            None => (&self.winding, sources.as_ref()),
+        };
+        for (rule, rows) in &groups {
+            let portions = rows
+                .par_chunks(PORTION)
+                .map(|rows| {
+                    progress.check()?;
+                    let points: Vec<[f64; 3]> = rows.iter().map(|row| points_m[*row]).collect();
+                    let mut out = vec![0.0; rows.len() * coils];
+                    self.add_forces(solved, (own, sources), rule, &points, &mut out)?;
+                    progress.advance(rows.len() as u64);
+                    Ok((rows, out))
+                })
+                .collect::<Result<Vec<_>, JobError>>()?;
+            for (rows, values) in portions {
+                for (row, values) in rows.iter().zip(values.chunks_exact(coils)) {
+                    forces[row * coils..(row + 1) * coils].copy_from_slice(values);
+                }
+            }
+        }
         progress.end();
         Ok(forces)
     }
 
+    /// Adds the forces by the field of each coil's own source and of what else there is.
     fn add_forces(
         &self,
         solved: &Solved,
-        sources: Option<&SteelField>,
+        (own, sources): (&dyn AxialSource, Option<&SteelField>),
         rule: &MagnetRule,
         points_m: &[[f64; 3]],
         rows: &mut [f64],
@@ -271,7 +354,7 @@ impl<'a> Scene<'a> {
                         dx.hypot(dy)
                     })
                     .collect();
-                let air = self.winding.gradients(&r_m, &z_m, tolerance, wanted)?;
+                let air = own.gradients(&r_m, &z_m, tolerance, wanted)?;
                 let block = parts.count() * count;
                 let steel = steel.get(column * block..(column + 1) * block);
                 for (row, place) in places.iter().enumerate() {

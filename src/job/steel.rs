@@ -185,14 +185,26 @@ impl Solved {
         }
     }
 
+    /// What is claimed of a magnet's force, relative to its moment and the gradient at its height:
+    /// by dipoles of a rule of this `amplification` and `bound`, `growth` being
+    /// [`Scene::magnet_growth`].
+    #[must_use]
+    pub fn force_error(&self, growth: f64, amplification: f64, bound: f64) -> f64 {
+        let evaluation = match self.steel {
+            Steel::None => 0.0,
+            Steel::Alone(_) | Steel::Coupled(_) => EVALUATION_SHARE * self.tolerance,
+        };
+        self.steel_estimate() * growth + evaluation + KERNEL_ERROR * amplification + bound
+    }
+
     /// Whether the field at points is within the tolerance.
     #[must_use]
     pub fn reached(&self) -> bool {
         self.point_error() <= self.tolerance
     }
 
-    /// The steel's field at places within `reach_m` of `points_m`; `None`
-    /// without steel.
+    /// The steel's field at places within `reach_m` of `points_m`, whose errors may grow by
+    /// `amplification` in what becomes of it; `None` without steel.
     ///
     /// # Errors
     /// A point on the steel's surface or hardly off it.
@@ -201,19 +213,25 @@ impl Solved {
         scene: &Scene,
         points_m: &[[f64; 3]],
         reach_m: f64,
+        amplification: f64,
     ) -> Result<Option<SteelField>, JobError> {
         let Some(core) = &scene.core else {
             return Ok(None);
         };
         let (lowest_m, distance_m) = clearance_m(scene, core, points_m, reach_m)?;
-        Ok(self.sources_at(lowest_m, distance_m))
+        Ok(self.sources_at(lowest_m, distance_m, amplification))
     }
 
     /// The steel's field at places no lower than `lowest_m` and no closer to a core than
-    /// `distance_m`; `None` without steel.
+    /// `distance_m`, whose errors may grow by `amplification`; `None` without steel.
     #[must_use]
-    pub fn sources_at(&self, lowest_m: f64, distance_m: f64) -> Option<SteelField> {
-        let tolerance = EVALUATION_SHARE * self.tolerance;
+    pub fn sources_at(
+        &self,
+        lowest_m: f64,
+        distance_m: f64,
+        amplification: f64,
+    ) -> Option<SteelField> {
+        let tolerance = EVALUATION_SHARE * self.tolerance / amplification;
         match &self.steel {
             Steel::None => None,
             Steel::Alone(coil) => Some(SteelField::Alone(Arc::new(AxialTable::new(

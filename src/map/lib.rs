@@ -38,6 +38,7 @@
 pub mod catmull_rom;
 pub mod harmonic;
 pub mod interpolation;
+pub mod mean;
 pub mod multipole;
 pub mod multipole_fit;
 pub mod radii;

@@ -112,3 +112,56 @@ fn a_coarse_probe_near_the_steel_is_within_its_claim() {
         }
     }
 }
+
+/// Force on the magnet per ampere and |grad B| of coil 0 at every point, from the table's rows.
+fn forces(table: &ProbeTable, coils: usize) -> Vec<([f64; 3], f64)> {
+    let rows = rows(table, coils);
+    let of_row = |(point, row): (usize, &String)| {
+        let first = row.lines().next().expect("a row for each coil");
+        let values: Vec<f64> = first
+            .split(',')
+            .map(|v| v.parse().expect("a number"))
+            .collect();
+        let force = values[values.len() - 6..][..3].try_into().expect("three");
+        let gradient = table.field(point, 0).gradient_t_per_m_per_a;
+        let square: f64 = gradient.as_flattened().iter().map(|g| g * g).sum();
+        (force, square.sqrt())
+    };
+    rows.iter().enumerate().map(of_row).collect()
+}
+
+/// A rule whose weights cancel makes nothing of an error that is a field itself: the claim on a
+/// cylinder over coupled cores was that error times the weights' magnitudes.
+#[test]
+fn the_claimed_error_of_a_force_over_cores_covers_it_without_the_weights() {
+    const MOMENT_A_M2: f64 = 0.909_41;
+    let points = [
+        [0.025, 0.0, 0.03],
+        [0.021, 0.003, 0.017],
+        [0.013, -0.004, 0.041],
+    ];
+    println!("core, coupling, tolerance: claimed, true, true / claimed");
+    for (columns, coupling, loose, tight) in [(1, "", 1e-4, 1e-7), (2, "full", 1e-4, 1e-6)] {
+        for core in [FLUSH, RECESSED] {
+            let design = design(
+                core,
+                columns,
+                "model = \"cylinder\"\ntilt_deg = [10.0, -5.0]",
+            );
+            let exact = forces(&table(&design, &points, tight, true), columns);
+            for point in 0..points.len() {
+                let coarse = table(&design, &points[point..=point], loose, true);
+                let claimed = coarse.force_error.expect("a force");
+                let (force, size) = forces(&coarse, columns)[0];
+                let off = (0..3).map(|i| (force[i] - exact[point].0[i]).abs());
+                let off = off.fold(0.0, f64::max) / (MOMENT_A_M2 * size);
+                println!(
+                    "{core:?}, {coupling:?}, {loose:e}: {claimed:.1e}, {off:.1e}, {:.3}",
+                    off / claimed
+                );
+                assert!(off <= claimed, "{core} {point}: {off:e} of {claimed:e}");
+                assert!(claimed <= 6.0 * loose, "{core} {point}: {claimed:e}");
+            }
+        }
+    }
+}

@@ -10,7 +10,7 @@
 
 use std::collections::HashMap;
 use std::f64::consts::{PI, SQRT_2};
-use std::sync::{Arc, PoisonError, RwLock};
+use std::sync::{Arc, OnceLock, PoisonError, RwLock};
 
 use super::magnetized::MagnetizedCore;
 use super::sources::Parts;
@@ -24,7 +24,7 @@ const NEAREST: f64 = 0.01;
 /// Constant of the bound `SCALE * radius^-terms` of a cell's error, relative to |grad B| there.
 const SCALE: f64 = 100.0;
 /// Terms beyond which the exact field is cheaper.
-const MOST_TERMS: usize = 20;
+const MOST_TERMS: usize = 24;
 /// Quantities that a cell holds: b_z, dB_z/dz, (dB_r/dz)/r, B_r/r.
 const QUANTITIES: usize = 4;
 
@@ -53,8 +53,8 @@ pub struct AxialTable {
 /// Exponent of the cell's size and the cell's place along r and z.
 type Key = (i32, i64, i64);
 
-/// Coefficients [quantity][degree in z][degree in r].
-type Cell = Vec<f64>;
+/// Coefficients [quantity][degree in z][degree in r], once they are computed.
+type Cell = OnceLock<Result<Vec<f64>, OnEdge>>;
 
 /// A point's cell and its place there, -1 to 1 along r and z.
 struct Place {
@@ -116,8 +116,12 @@ impl AxialTable {
             };
             let cell = match &last {
                 Some((key, cell)) if *key == place.key => cell,
-                Some(_) | None => &last.insert((place.key, self.cell(place.key)?)).1,
+                Some(_) | None => &last.insert((place.key, self.cell(place.key))).1,
             };
+            let cell = cell
+                .get_or_init(|| self.computed(place.key))
+                .as_ref()
+                .map_err(|on_edge| *on_edge)?;
             let (along_r, along_z) = (polynomials(place.x), polynomials(place.y));
             let rows = &mut room[..self.terms];
             for (values, quantity) in out.iter_mut().zip(wanted) {
@@ -213,20 +217,19 @@ impl AxialTable {
         })
     }
 
-    fn cell(&self, key: Key) -> Result<Arc<Cell>, OnEdge> {
+    /// The cell, perhaps still empty: who needs it first computes it while others wait.
+    fn cell(&self, key: Key) -> Arc<Cell> {
         let known = |cells: &HashMap<Key, Arc<Cell>>| cells.get(&key).cloned();
         let read = self.cells.read().unwrap_or_else(PoisonError::into_inner);
         if let Some(cell) = known(&read) {
-            return Ok(cell);
+            return cell;
         }
         drop(read);
-        // Outside the lock: two threads may compute the same cell, with the same result.
-        let cell = Arc::new(self.computed(key)?);
         let mut cells = self.cells.write().unwrap_or_else(PoisonError::into_inner);
-        Ok(Arc::clone(cells.entry(key).or_insert(cell)))
+        Arc::clone(cells.entry(key).or_default())
     }
 
-    fn computed(&self, (exponent, i, j): Key) -> Result<Cell, OnEdge> {
+    fn computed(&self, (exponent, i, j): Key) -> Result<Vec<f64>, OnEdge> {
         let n = self.terms;
         let size_m = 2.0_f64.powi(exponent);
         let node = |k: usize| (PI * (k as f64 + 0.5) / n as f64).cos();

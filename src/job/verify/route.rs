@@ -57,9 +57,12 @@ impl<'a> Route<'a> {
         let moment = self.scene.moment_a_m2;
         let square: f64 = moment.iter().map(|m| m * m).sum();
         let mut out = vec![[0.0; 3]; wanted.len()];
-        let sources = self
-            .solved
-            .sources(self.scene, &centres, self.rule.reach_m())?;
+        let sources = self.solved.sources(
+            self.scene,
+            &centres,
+            self.rule.reach_m(),
+            self.rule.amplification(),
+        )?;
         for node in self.rule.nodes() {
             let share: f64 = node
                 .moment_a_m2
