@@ -18,6 +18,7 @@ pub mod log_rule;
 pub mod matrix;
 pub mod qr;
 pub mod real;
+pub mod refinement;
 pub mod ring_functions;
 pub mod small_quadratic;
 pub mod spectral;

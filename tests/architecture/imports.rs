@@ -38,12 +38,6 @@ const CIRCLES: &[&[&str]] = &[
         "coil::optimum::valley",
     ],
     &["design::checks", "design::parse"],
-    &[
-        "field::steel::array",
-        "field::steel::saturated_array",
-        "field::steel::sources",
-    ],
-    &["field::steel::bh_check", "field::steel::bh_curve"],
     &["job::at_current", "job::scene", "job::steel"],
     &[
         "job::evaluate",

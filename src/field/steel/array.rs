@@ -20,7 +20,7 @@ use super::coupling::{Coupling, different_offsets};
 use super::exchange::{Grading, LEAST_GAP, PART, side_panels};
 use super::generatrix::{Generatrix, Resolution};
 use super::response::{Response, Rings};
-use super::sources::{ArraySources, Parts};
+use super::sources::{ArraySources, Near, Parts};
 use super::symmetry::{Motion, motions};
 use crate::winding::{OnEdge, Winding};
 use fluxform_base::units::MU_0_T_M_PER_A;
@@ -414,6 +414,28 @@ impl CoupledArray {
             layers.column_mut(0).axpy(1.0, &self.own_layer, 1.0);
         }
         layers
+    }
+}
+
+impl ArraySources {
+    /// Dipoles for points no closer than `distance_m` to any core and no lower than `lowest_m`,
+    /// to a relative error `tolerance`.
+    #[must_use]
+    pub fn of_array(array: &CoupledArray, lowest_m: f64, distance_m: f64, tolerance: f64) -> Self {
+        let response = &array.response;
+        Self::new(
+            &response.outline,
+            &array.positions_m,
+            response.layers.len(),
+            array.positions_m.len(),
+            |drive, core| array.layers(drive, core),
+            Near {
+                lowest_m,
+                distance_m,
+                tolerance,
+                winding: &array.winding,
+            },
+        )
     }
 }
 

@@ -1,6 +1,5 @@
 //! What a magnetisation table must be, and what in it betrays another unit.
 
-use super::bh_curve::BhCurve;
 use fluxform_base::units::MU_0_T_M_PER_A;
 
 /// Beyond this nothing is a flux density, in gauss or any unit.
@@ -267,8 +266,18 @@ fn step_permeability(b: &[f64], h: &[f64], k: usize) -> f64 {
     (b[k + 1] - b[k]) / MU_0_T_M_PER_A / (h[k + 1] - h[k])
 }
 
-/// What looks wrong with the table of `curve`.
-pub(super) fn warnings(curve: &BhCurve, b: &[f64], h: &[f64]) -> Vec<BhWarning> {
+/// Slopes dH/dB of the curve through a table, m/H.
+pub(super) struct Slopes {
+    /// At the origin.
+    pub(super) first: f64,
+    /// At the last point, seen from below.
+    pub(super) last: f64,
+    /// The largest in every step.
+    pub(super) steepest: Vec<f64>,
+}
+
+/// What looks wrong with a table through which the curve has `slopes`.
+pub(super) fn warnings(slopes: &Slopes, b: &[f64], h: &[f64]) -> Vec<BhWarning> {
     let (largest_b_t, largest_h_a_per_m) = (b[b.len() - 1], h[h.len() - 1]);
     if largest_b_t > GAUSS_BELOW
         || (largest_b_t > PLAUSIBLE_B_T && largest_h_a_per_m < PLAUSIBLE_B_T)
@@ -282,9 +291,9 @@ pub(super) fn warnings(curve: &BhCurve, b: &[f64], h: &[f64]) -> Vec<BhWarning> 
     // H is judged with B as it is probably meant.
     let times = unit_of_b(largest_b_t, &mut found);
     let before = found.len();
-    unit_of_h(curve, b, h, times, &mut found);
+    unit_of_h(slopes.last, b, h, times, &mut found);
     let in_si = found.is_empty();
-    let last_permeability = times / (MU_0_T_M_PER_A * curve.last_slope());
+    let last_permeability = times / (MU_0_T_M_PER_A * slopes.last);
     if found.len() == before && last_permeability > VACUUM_FOLLOWS {
         found.push(BhWarning::EndsEarly {
             largest_b_t: largest_b_t * times,
@@ -292,7 +301,7 @@ pub(super) fn warnings(curve: &BhCurve, b: &[f64], h: &[f64]) -> Vec<BhWarning> 
         });
     }
     if in_si {
-        let steepest = (0..b.len() - 1).map(|k| (k, curve.steepest_slope(k)));
+        let steepest = slopes.steepest.iter().copied().enumerate();
         let least = steepest.fold(
             (0, 0.0),
             |best, next| if next.1 > best.1 { next } else { best },
@@ -306,7 +315,7 @@ pub(super) fn warnings(curve: &BhCurve, b: &[f64], h: &[f64]) -> Vec<BhWarning> 
             });
         }
     }
-    if curve.dh_db(0.0) == 0.0 {
+    if slopes.first == 0.0 {
         found.push(BhWarning::LevelOrigin { first_b_t: b[1] });
     }
     found
@@ -331,10 +340,10 @@ fn unit_of_b(largest_b_t: f64, found: &mut Vec<BhWarning>) -> f64 {
 }
 
 /// Warns of H in another unit, judged with B times `times`.
-fn unit_of_h(curve: &BhCurve, b: &[f64], h: &[f64], times: f64, found: &mut Vec<BhWarning>) {
+fn unit_of_h(last_slope: f64, b: &[f64], h: &[f64], times: f64, found: &mut Vec<BhWarning>) {
     let steps = (0..b.len() - 1).map(|k| times * step_permeability(b, h, k));
     let relative_permeability = steps.fold(0.0, f64::max);
-    let last_relative_permeability = times / (MU_0_T_M_PER_A * curve.last_slope());
+    let last_relative_permeability = times / (MU_0_T_M_PER_A * last_slope);
     let end_t = times * b[b.len() - 1];
     let still_permeable = SATURATED
         .iter()

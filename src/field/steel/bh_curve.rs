@@ -5,7 +5,7 @@
 //! means inside, one-sided three-point formulas at the ends, the choice that PCHIP commonly names.
 //! It is odd in B, and beyond the last point its slope is that of vacuum, 1/mu_0.
 
-use super::bh_check::{self, BhCurveError, BhWarning};
+use super::bh_check::{self, BhCurveError, BhWarning, Slopes};
 use fluxform_base::units::MU_0_T_M_PER_A;
 
 /// Share of its largest value at which the differential permeability marks the knee.
@@ -64,7 +64,14 @@ impl BhCurve {
     /// What looks wrong with the table without refusing it: units, steps, where it ends.
     #[must_use]
     pub fn warnings(&self) -> Vec<BhWarning> {
-        bh_check::warnings(self, &self.b_t, &self.h_a_per_m)
+        let slopes = Slopes {
+            first: self.dh_db(0.0),
+            last: self.last_slope,
+            steepest: (0..self.cubics.len())
+                .map(|k| self.steepest_slope(k))
+                .collect(),
+        };
+        bh_check::warnings(&slopes, &self.b_t, &self.h_a_per_m)
     }
 
     /// H at the flux density `b_t`, A/m; odd in B.
@@ -188,11 +195,6 @@ impl BhCurve {
         self.h_a_per_m[self.h_a_per_m.len() - 1]
     }
 
-    /// dH/dB at the last point, seen from below, m/H.
-    pub(super) fn last_slope(&self) -> f64 {
-        self.last_slope
-    }
-
     /// The knee, T: the lowest B above the most permeable step of the table at which the
     /// differential permeability has fallen to a tenth of that step's; the last point where it
     /// never does.
@@ -258,7 +260,7 @@ impl BhCurve {
     }
 
     /// The largest dH/dB in the step from point `k` to the next, m/H.
-    pub(super) fn steepest_slope(&self, k: usize) -> f64 {
+    fn steepest_slope(&self, k: usize) -> f64 {
         let width = self.b_t[k + 1] - self.b_t[k];
         self.slope_in(k, self.steepest_in(k, width))
     }

@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::generatrix::{Face, Generatrix};
+use super::generatrix::{Face, Generatrix, Panel};
 use crate::ring::{RingPoint, ring_field};
 use crate::winding::AxialField;
 use fluxform_base::units::MU_0_T_M_PER_A;
@@ -34,6 +34,38 @@ pub struct MagnetizedCore {
 }
 
 impl MagnetizedCore {
+    /// The density at the nodes of another outline of the same core, A.
+    #[must_use]
+    pub(super) fn density_on(&self, other: &Generatrix) -> Vec<f64> {
+        let order = self.outline.order;
+        let mut weights = vec![0.0; order];
+        let mut panel = 0;
+        let panels = &self.outline.panels;
+        let mut out = Vec::with_capacity(other.nodes.len());
+        for (theirs, nodes) in other.panels.iter().zip(other.nodes.chunks(other.order)) {
+            for node in nodes {
+                let at_m = match theirs.face {
+                    Face::Bottom | Face::Top => node.r_m,
+                    Face::Side => node.z_m,
+                };
+                // Both outlines run the same way.
+                let holds = |panel: &Panel| {
+                    let (from_m, to_m) = panel.range_m();
+                    panel.face == theirs.face && from_m <= at_m && at_m <= to_m
+                };
+                while panel + 1 < panels.len() && !holds(&panels[panel]) {
+                    panel += 1;
+                }
+                let Panel { from_m, to_m, .. } = panels[panel];
+                let x = 2.0 * (at_m - from_m) / (to_m - from_m) - 1.0;
+                self.basis.weights(x.clamp(-1.0, 1.0), &mut weights);
+                let values = &self.density_a[panel * order..(panel + 1) * order];
+                out.push(weights.iter().zip(values).map(|(w, v)| w * v).sum());
+            }
+        }
+        out
+    }
+
     /// The layer with density `density_a` at the nodes of `outline`.
     #[must_use]
     pub fn new(outline: Generatrix, density_a: Vec<f64>) -> Self {

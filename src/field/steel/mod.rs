@@ -18,6 +18,7 @@ pub mod layer_gradient;
 pub mod lobatto;
 pub mod magnetized;
 pub mod passive;
+mod peak_search;
 pub mod permeability;
 pub mod response;
 pub mod saturated;

@@ -29,7 +29,7 @@ use super::interior::MeshError;
 use super::permeability::Permeability;
 use super::response::{Response, Rings, mean};
 use super::saturated::{CoreField, SaturatedCore, Solution, Status};
-use super::sources::{ArraySources, Parts};
+use super::sources::{ArraySources, Near, Parts};
 use super::symmetry::motions;
 use crate::winding::{OnEdge, Winding};
 use fluxform_base::units::MU_0_T_M_PER_A;
@@ -404,6 +404,31 @@ impl SaturatedArray {
     }
 }
 
+impl ArraySources {
+    /// As [`ArraySources::of_array`] for a saturated array at its working point: one drive, of all its currents.
+    #[must_use]
+    pub fn of_saturated(
+        array: &SaturatedArray,
+        lowest_m: f64,
+        distance_m: f64,
+        tolerance: f64,
+    ) -> Self {
+        Self::new(
+            array.outline(),
+            &array.positions_m,
+            array.modes(),
+            1,
+            |_, core| array.layers(core).clone(),
+            Near {
+                lowest_m,
+                distance_m,
+                tolerance,
+                winding: &array.winding,
+            },
+        )
+    }
+}
+
 /// Largest difference of a potential from its mean: its constant is no field.
 fn variation(potential: &DVector<f64>) -> f64 {
     potential.add_scalar(-potential.mean()).amax()
@@ -512,7 +537,8 @@ impl Problem<'_> {
                 (self.alike[core] == core).then(|| {
                     let phi = &self.setup.excitation.potential * self.currents_a[core]
                         + to_nodes * state.sent_a.column(core);
-                    self.setup.core.solve(&phi, law, state.cores[core].as_ref())
+                    let start = state.cores[core].as_ref().map(|solution| &solution.v_a);
+                    self.setup.core.solve(&phi, law, start)
                 })
             })
             .collect();

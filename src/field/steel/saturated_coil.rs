@@ -1,5 +1,7 @@
 //! One winding with its core along a magnetisation curve, at one current, to an estimated error.
 
+use nalgebra::DVector;
+
 use super::CoreShape;
 use super::cored_coil::Excitation;
 use super::generatrix::{Generatrix, Resolution};
@@ -8,6 +10,7 @@ use super::magnetized::MagnetizedCore;
 use super::permeability::Permeability;
 use super::saturated::{CoreField, SaturatedCore, Status};
 use crate::winding::{OnEdge, Winding};
+use fluxform_numerics::refinement::error_of_finest;
 
 /// How much smaller a panel is than its neighbour away from the edge, from try to try: the curve's
 /// kinks cross the elements inside, where shorter ones help and higher degrees hardly do. After
@@ -17,13 +20,10 @@ const RATIOS: [f64; 4] = [0.2, 0.35, 0.5, 0.5];
 const LEAST_ORDER: usize = 4;
 /// The outline's aim from one try to the next.
 const FINER: f64 = 0.3;
-/// Times the larger of two differences between resolutions, the former counting `BEFORE`, the
-/// error is stated. By the table of
+/// How much more the differences of |B| inside count, of which the largest is seen at samples:
+/// kinks reach it undamped. By the table of
 /// `cargo test --test field steel -- --ignored --nocapture along_curves_in_full`.
-const SAFETY: f64 = 2.0;
-const BEFORE: f64 = 0.5;
-/// The same of |B| inside, of which the largest is seen at samples: kinks reach it undamped.
-const SAFETY_INSIDE: f64 = 4.0;
+const INSIDE: f64 = 2.0;
 /// Distance above the core, in radii, below which no error is estimated.
 const CLOSEST: f64 = 0.1;
 
@@ -90,7 +90,7 @@ impl<L: Permeability> CoilWithCurve<'_, L> {
         let lowest_m = lowest_m.max(self.shape.top_m.max(0.0) + CLOSEST * self.shape.radius_m);
         let mut aim = tolerance;
         let mut best: Option<SaturatedCoil> = None;
-        for ratio in RATIOS {
+        for (index, ratio) in RATIOS.into_iter().enumerate() {
             let aimed = Resolution::for_tolerance(aim);
             let resolution = Resolution {
                 ratio,
@@ -102,10 +102,16 @@ impl<L: Permeability> CoilWithCurve<'_, L> {
                 order: coarser.order - 1,
                 ..coarser
             };
-            let fine = self.at_resolution(current_a, &resolution)?;
-            let coarse = self.at_resolution(current_a, &coarser)?;
-            let coarsest = self.at_resolution(current_a, &of_lower_degree)?;
-            let found = self.estimated(fine, &coarse, &coarsest, lowest_m)?;
+            let coarsest = self.from(current_a, &of_lower_degree, None)?;
+            let coarse = self.from(current_a, &coarser, Some(&coarsest))?;
+            let before = self.difference(&coarse, &coarsest, lowest_m)?;
+            // Whatever the finest solution is, the tolerance would not be reached.
+            if error_of_finest(0.0, before) > tolerance && index + 1 < RATIOS.len() {
+                aim *= FINER;
+                continue;
+            }
+            let fine = self.from(current_a, &resolution, Some(&coarse))?;
+            let found = self.estimated(fine, [&coarse, &coarsest], before, lowest_m)?;
             let better = best
                 .as_ref()
                 .is_none_or(|best| found.relative_error < best.relative_error);
@@ -123,26 +129,24 @@ impl<L: Permeability> CoilWithCurve<'_, L> {
         best.ok_or(SaturatedCoilError::Stalled)
     }
 
-    /// `fine` with its errors, from two coarser solutions that differ by their degree alone.
+    /// `fine` with its errors, from two coarser solutions that differ by their degree alone, in
+    /// what [`CoilWithCurve::difference`] compares by `before`; see [`error_of_finest`].
     ///
-    /// Edges converge as their grading says, and what a finer one changes is several times what it
-    /// leaves. Where the curve's kinks cross the elements, which wander with the state, each degree
-    /// is wrong by about as much as the one before and in either direction: two may agree by
-    /// chance, three hardly ever.
+    /// Edges converge as their grading says. Where the curve's kinks cross the elements, which
+    /// wander with the state, errors of consecutive degrees are of one size and of either sign.
     fn estimated(
         &self,
         fine: SaturatedCoil,
-        coarse: &SaturatedCoil,
-        coarsest: &SaturatedCoil,
+        [coarse, coarsest]: [&SaturatedCoil; 2],
+        before: f64,
         lowest_m: f64,
     ) -> Result<SaturatedCoil, OnEdge> {
         let last = self.difference(&fine, coarse, lowest_m)?;
-        let before = self.difference(coarse, coarsest, lowest_m)?;
-        let relative_error = SAFETY * last.max(BEFORE * before);
+        let relative_error = error_of_finest(last, before);
         let field = |pick: fn(&CoreField) -> f64| {
             let [a, b, c] = [&fine.inside, &coarse.inside, &coarsest.inside].map(pick);
             let size = if a > 0.0 { a } else { 1.0 };
-            SAFETY_INSIDE * (a - b).abs().max(BEFORE * (b - c).abs()) / size + relative_error
+            INSIDE * error_of_finest((a - b).abs(), (b - c).abs()) / size + relative_error
         };
         Ok(SaturatedCoil {
             relative_error,
@@ -163,10 +167,23 @@ impl<L: Permeability> CoilWithCurve<'_, L> {
         current_a: f64,
         resolution: &Resolution,
     ) -> Result<SaturatedCoil, SaturatedCoilError> {
+        self.from(current_a, resolution, None)
+    }
+
+    /// The same, the iteration beginning with the layer of a coarser solution.
+    fn from(
+        &self,
+        current_a: f64,
+        resolution: &Resolution,
+        start: Option<&SaturatedCoil>,
+    ) -> Result<SaturatedCoil, SaturatedCoilError> {
         let outline = Generatrix::of_coil(self.winding, self.shape, resolution);
         let excitation = Excitation::new(self.winding, &outline, resolution.quadrature)?;
         let solver = SaturatedCore::new(&outline, resolution.quadrature)?;
-        let solution = solver.solve(&(&excitation.potential * current_a), self.law, None);
+        let start =
+            start.map(|coarser| current_a * DVector::from_vec(coarser.layer.density_on(&outline)));
+        let potential = &excitation.potential * current_a;
+        let solution = solver.solve(&potential, self.law, start.as_ref());
         if solution.status == Status::Stalled {
             return Err(SaturatedCoilError::Stalled);
         }

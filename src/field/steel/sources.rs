@@ -8,10 +8,8 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
-use super::array::CoupledArray;
 use super::generatrix::Generatrix;
 use super::response::Rings;
-use super::saturated_array::SaturatedArray;
 use crate::winding::Winding;
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::dispatch::{self, Kernel, LANES, Lanes};
@@ -52,12 +50,12 @@ impl Parts {
 const MOST_CANCELLATION: f64 = 1e12;
 
 /// How close points come, and how exact their values are to be.
-struct Near<'a> {
-    lowest_m: f64,
-    distance_m: f64,
-    tolerance: f64,
+pub(super) struct Near<'a> {
+    pub(super) lowest_m: f64,
+    pub(super) distance_m: f64,
+    pub(super) tolerance: f64,
     /// The winding, whose gradient is what errors are relative to.
-    winding: &'a Winding,
+    pub(super) winding: &'a Winding,
 }
 
 /// Dipoles that stand for all cores of an array, for every drive.
@@ -72,50 +70,7 @@ pub struct ArraySources {
 }
 
 impl ArraySources {
-    /// Dipoles for points no closer than `distance_m` to any core and no lower than `lowest_m`,
-    /// to a relative error `tolerance`.
-    #[must_use]
-    pub fn of_array(array: &CoupledArray, lowest_m: f64, distance_m: f64, tolerance: f64) -> Self {
-        let response = &array.response;
-        Self::new(
-            &response.outline,
-            &array.positions_m,
-            response.layers.len(),
-            array.positions_m.len(),
-            |drive, core| array.layers(drive, core),
-            Near {
-                lowest_m,
-                distance_m,
-                tolerance,
-                winding: &array.winding,
-            },
-        )
-    }
-
-    /// The same for a saturated array at its working point: one drive, of all its currents.
-    #[must_use]
-    pub fn of_saturated(
-        array: &SaturatedArray,
-        lowest_m: f64,
-        distance_m: f64,
-        tolerance: f64,
-    ) -> Self {
-        Self::new(
-            array.outline(),
-            &array.positions_m,
-            array.modes(),
-            1,
-            |_, core| array.layers(core).clone(),
-            Near {
-                lowest_m,
-                distance_m,
-                tolerance,
-                winding: &array.winding,
-            },
-        )
-    }
-
-    fn new(
+    pub(super) fn new(
         outline: &Generatrix,
         positions_m: &[[f64; 2]],
         modes: usize,

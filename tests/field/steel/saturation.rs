@@ -8,6 +8,8 @@ use fluxform_field::steel::generatrix::Resolution;
 use fluxform_field::steel::saturated_coil::CoilWithCurve;
 use rayon::prelude::*;
 
+const SEED: u64 = 20_261_123;
+
 /// The committed table, one of cobalt-iron that ends high, and a coarse one whose kinks are sharp.
 fn curves() -> Vec<BhCurve> {
     let text = include_str!("../../../designs/steel_1010.csv");
@@ -41,9 +43,8 @@ struct Case {
 }
 
 /// The seed's coil and random ones, the steel from far below its knee to far above it.
-fn cases(count: usize) -> Vec<Case> {
+fn cases(mut random: Lcg, count: usize) -> Vec<Case> {
     let curves = curves();
-    let mut random = Lcg(20_261_123);
     let seed = Design {
         winding: SEED_COIL,
         core: SEED_CORE,
@@ -56,7 +57,8 @@ fn cases(count: usize) -> Vec<Case> {
             current_a,
         })
         .into();
-    for design in random_cores(count) {
+    let of_cores = Lcg(random.0 + 1);
+    for design in random_cores(of_cores, count) {
         // Ampere turns over the length drive 10 to 1000 kA/m.
         let field = random.decades(1e4, 1e6);
         cases.push(Case {
@@ -108,6 +110,14 @@ fn study<const N: usize>(cases: &[Case], tolerances: [f64; N]) {
         .map(|case| errors(case, tolerances))
         .collect();
     let mut missed = 0;
+    for (case, errors) in cases.iter().zip(&errors) {
+        if errors.iter().flatten().any(|(claim, off)| claim < off) {
+            let Case {
+                design, current_a, ..
+            } = case;
+            println!("{errors:?}: {current_a} A, {design:?}");
+        }
+    }
     for (k, tolerance) in tolerances.iter().enumerate() {
         for (quantity, what) in ["gradient and flux", "peak |B|", "mean |B|"]
             .iter()
@@ -123,12 +133,13 @@ fn study<const N: usize>(cases: &[Case], tolerances: [f64; N]) {
 /// The small version of the study below.
 #[test]
 fn claims_hold_along_curves() {
-    study(&cases(0)[2..5], [1e-4]);
+    study(&cases(Lcg(SEED), 0)[2..5], [1e-4]);
 }
 
-/// `cargo test --test field steel -- --ignored --nocapture along_curves_in_full` prints the table.
+/// `cargo test --test field steel -- --ignored --nocapture along_curves_in_full` prints the table;
+/// with `FLUXFORM_SEED=<number>` of other states.
 #[test]
 #[ignore = "minutes of CPU: 42 states of the steel"]
 fn claims_hold_along_curves_in_full() {
-    study(&cases(36), [1e-4]);
+    study(&cases(Lcg::of_study(SEED), 36), [1e-4]);
 }

@@ -76,6 +76,11 @@ pub fn inductance_difference(a: &CoredCoil, b: &CoredCoil) -> f64 {
 pub struct Lcg(pub u64);
 
 impl Lcg {
+    /// The generator of a full study: `FLUXFORM_SEED` draws other cases than the committed seed.
+    pub fn of_study(committed: u64) -> Self {
+        Self(std::env::var("FLUXFORM_SEED").map_or(committed, |seed| seed.parse().expect("a seed")))
+    }
+
     /// Uniform in `lo..hi`.
     pub fn between(&mut self, lo: f64, hi: f64) -> f64 {
         self.0 = self

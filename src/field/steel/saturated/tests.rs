@@ -202,7 +202,9 @@ fn a_start_nearby_saves_steps_and_changes_nothing() {
     let case = case(1e-4);
     let first = case.core.solve(&(&case.phi * 5.0), &steel(), None);
     let afresh = case.core.solve(&(&case.phi * 5.1), &steel(), None);
-    let onwards = case.core.solve(&(&case.phi * 5.1), &steel(), Some(&first));
+    let onwards = case
+        .core
+        .solve(&(&case.phi * 5.1), &steel(), Some(&first.v_a));
     assert!(onwards.status == Status::Converged && afresh.status == Status::Converged);
     let (a, b) = (case.gradients(&afresh), case.gradients(&onwards));
     assert!((a[0] / b[0] - 1.0).abs() < 1e-9 && (a[1] / b[1] - 1.0).abs() < 1e-9);
