@@ -56,6 +56,10 @@ const SCAN: Resolution = Resolution {
     tip: 0.0,
     quadrature: QUADRATURE,
 };
+/// By how much a further node a panel of [`SCAN`] lowers what its polynomials miss.
+const FALL: f64 = 3.4;
+/// Fewest nodes a panel of a scan.
+const LEAST_ORDER: f64 = 4.0;
 /// Samples that are higher than their neighbours and at least this share of the highest are
 /// followed to the maximum beside them: the highest sample need not lie beside the largest.
 const FOLLOWED: f64 = 0.95;
@@ -184,7 +188,10 @@ pub fn peaks_of_family_t(
     };
     let outline = first.core.outline();
     let shape = outline.shape;
-    let curve = scan_curve(&first.winding, shape, allowed_depth_m(shape, depth_m));
+    let order = (-tolerance.ln() / FALL.ln()).ceil();
+    let order = order.clamp(LEAST_ORDER, SCAN.order as f64) as usize;
+    let scan_depth_m = allowed_depth_m(shape, depth_m);
+    let curve = scan_curve(&first.winding, shape, scan_depth_m, order);
     let windings: Vec<Winding> = coils.iter().map(|coil| coil.winding).collect();
     let targets = places(&curve);
     let own: Vec<Vec<(f64, f64)>> = targets
@@ -308,7 +315,7 @@ impl Inspection {
         let outline = &array.response.outline;
         let (winding, shape) = (&array.winding, outline.shape);
         let incident = Incident::new(array);
-        let curve = scan_curve(winding, shape, allowed_depth_m(shape, depth_m));
+        let curve = scan_curve(winding, shape, allowed_depth_m(shape, depth_m), SCAN.order);
         let at_curve = Targets::new(
             outline,
             winding,
@@ -429,7 +436,7 @@ fn core_fields(
         .collect();
 
     let modes = full.first().map_or(1, |l| l.ncols().div_ceil(2));
-    let curve = scan_curve(winding, shape, depth_m);
+    let curve = scan_curve(winding, shape, depth_m, SCAN.order);
     let fine = Volume::new(winding, shape, VOLUME.order);
     let coarse = Volume::new(winding, shape, VOLUME.order - 1);
     let mut targets = places(&curve);
@@ -667,7 +674,7 @@ fn columns_of(mode: usize) -> std::ops::Range<usize> {
 }
 
 /// The surface `depth_m` inside, cut into panels as fine as what lies that far off.
-fn scan_curve(winding: &Winding, shape: CoreShape, depth_m: f64) -> Generatrix {
+fn scan_curve(winding: &Winding, shape: CoreShape, depth_m: f64, order: usize) -> Generatrix {
     let inner = CoreShape {
         radius_m: shape.radius_m - depth_m,
         bottom_m: shape.bottom_m + depth_m,
@@ -679,6 +686,7 @@ fn scan_curve(winding: &Winding, shape: CoreShape, depth_m: f64) -> Generatrix {
         inner,
         &[(0.0, tip_m), (-winding.length_m, tip_m)],
         &Resolution {
+            order,
             tip: depth_m / smaller,
             ..SCAN
         },
