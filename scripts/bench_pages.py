@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Copies the tables of results/bench into README.md and src/DESIGN.md.
+"""Copies the tables of results/bench into tests/README.md and src/DESIGN.md.
 
     fluxform bench --peers --out results/bench
     FLUXFORM_COVERAGE=results/bench/coverage.md cargo test --locked --test bench a_hundred
@@ -18,7 +18,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 SUMMARY = ROOT / "results" / "bench" / "summary.md"
 SCALING = ROOT / "results" / "bench" / "scaling" / "summary.md"
 COVERAGE = ROOT / "results" / "bench" / "coverage.md"
-PAGES = [ROOT / "README.md", ROOT / "src" / "DESIGN.md"]
+PAGES = [ROOT / "tests" / "README.md", ROOT / "src" / "DESIGN.md"]
 
 
 def section(text, title):

@@ -3,7 +3,7 @@
 
     python3 scripts/feedback_table.py [PROGRAM]
 
-Prints the table that README.md shows. PROGRAM is the fluxform binary; without it the release build
+Prints the table that results/README.md shows. PROGRAM is the fluxform binary; without it the release build
 is made and used. Standard library only.
 """
 

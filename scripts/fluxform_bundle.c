@@ -461,6 +461,34 @@ static int load_rendering(fluxform_bundle *b, const archive *a)
     return 0;
 }
 
+/* An array that is not loaded: absent, or of the given shape and finite. */
+static int check_array(const archive *a, const char *name, size_t dimensions, const size_t *shape)
+{
+    array from;
+    int found = find_array(a, name, "<f8", dimensions, &from);
+    if (found <= 0)
+        return found;
+    for (size_t i = 0; i < dimensions; i++)
+        if (from.shape[i] != shape[i])
+            return fail(a, name, "does not have the expected shape");
+    for (size_t i = 0; i < from.count; i++)
+        if (!(fabs(f64(from.data + 8 * i)) <= LARGEST))
+            return fail(a, name, "holds a number that is not finite, or beyond 1e30");
+    return 0;
+}
+
+/* What forces and currents do not need is refused where it does not fit, as by the other loaders. */
+static int check_others(const fluxform_bundle *b, const archive *a)
+{
+    const size_t grid[MAX_DIMENSIONS] = {b->map_count, b->nz, b->ny, b->nx, 3, 3};
+    const size_t coils[] = {b->coil_count, b->coil_count};
+    return check_array(a, "gradient_t_per_m_per_a", 6, grid) || check_array(a, "field_t_per_a", 5, grid) ||
+                   check_array(a, "working_point_gz_t_per_m", 3, grid + 1) ||
+                   check_array(a, "inductance_h", 2, coils) || check_array(a, "voltage_v", 0, NULL)
+               ? -1
+               : 0;
+}
+
 static int load_all(fluxform_bundle *b, archive *a)
 {
     array from;
@@ -490,7 +518,7 @@ static int load_all(fluxform_bundle *b, archive *a)
         return -1;
     if (load_passive(b, a))
         return -1;
-    if (load_rendering(b, a))
+    if (load_rendering(b, a) || check_others(b, a))
         return -1;
     b->has_total_current_max = load_scalar(a, "total_current_max_a", &b->total_current_max_a);
     if (b->has_total_current_max > 0 && b->total_current_max_a < 0)

@@ -552,7 +552,9 @@ function map = read_npz(path)
             continue
         end
         fseek(file, local + 30 + sum(skip), 'bof');
-        map.(key) = read_npy(file, size_bytes, name);
+        kinds = {'f8', 'i8'};
+        kind = kinds{1 + any(strcmp(key, {'coil', 'schema_version'}))};
+        map.(key) = read_npy(file, size_bytes, name, kind);
     end
     if entry ~= length_bytes - 22
         error('fluxform:bundle', '%s: its directory is damaged', path);
@@ -564,7 +566,7 @@ function map = read_npz(path)
     end
 end
 
-function values = read_npy(file, bytes, name)
+function values = read_npy(file, bytes, name, kind)
 % One array in C order as an array of the same indices, or a row where it has one dimension.
     magic = fread(file, 8, 'uint8=>double').';
     if ~isequal(magic, [147, double('NUMPY'), 1, 0])
@@ -574,8 +576,8 @@ function values = read_npy(file, bytes, name)
     header = fread(file, [1, header_bytes], 'uint8=>char');
     found = regexp(header, ['''descr'': ''<(f8|i8)'', ''fortran_order'': False, ' ...
                             '''shape'': \(([0-9, ]*)\)'], 'tokens', 'once');
-    if isempty(found)
-        error('fluxform:bundle', '%s must hold numbers of 8 bytes in C order', name);
+    if isempty(found) || ~strcmp(found{1}, kind)
+        error('fluxform:bundle', '%s must hold numbers of kind %s in C order', name, kind);
     end
     shape = sscanf(strrep(found{2}, ',', ' '), '%d').';
     if 8 * prod(shape) ~= bytes - 10 - header_bytes
@@ -621,7 +623,8 @@ function check(map, bundle)
               'passive_force_n', grid; 'moment_a_m2', [1, 3]; 'current_max_a', [1, coils]; ...
               'current_min_a', [1, coils]; 'resistance_ohm', [1, coils]; 'lambda_n_per_m', [1, 1]; ...
               'total_current_max_a', [1, 1]; 'height_m', surface; 'has_height', surface; ...
-              'static_current_a', [1, coils]; 'inductance_h', [coils, coils]};
+              'static_current_a', [1, coils]; 'inductance_h', [coils, coils]; 'voltage_v', [1, 1]; ...
+              'field_t_per_a', [numel(map.coil), grid, 3]; 'working_point_gz_t_per_m', grid};
     for k = 1:size(wanted, 1)
         if isfield(map, wanted{k, 1})
             found = map.(wanted{k, 1});

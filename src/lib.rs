@@ -157,7 +157,7 @@ pub mod bench;
 
 pub mod cli;
 
-/// The README's Rust compiles.
+/// The Rust of the page on results compiles.
 #[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;
+#[doc = include_str!("../results/README.md")]
+struct Results;

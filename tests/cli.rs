@@ -31,3 +31,5 @@ mod support;
 mod surfaces;
 #[path = "cli/sweep.rs"]
 mod sweep;
+#[path = "cli/verify.rs"]
+mod verify;

@@ -277,11 +277,11 @@ fn the_confusions_are_what_the_readme_shows() {
     };
     let errors = String::from_utf8(run.stderr).unwrap();
     assert!(run.status.success(), "{errors}");
-    let readme = std::fs::read_to_string(root().join("README.md")).unwrap();
+    let page = std::fs::read_to_string(root().join("results/README.md")).unwrap();
     for part in String::from_utf8(run.stdout).unwrap().split("\n\n") {
         assert!(
-            readme.contains(part.trim_end()),
-            "not in README.md:\n{part}"
+            page.contains(part.trim_end()),
+            "not in results/README.md:\n{part}"
         );
     }
 }

@@ -32,6 +32,9 @@ static ENDED: AtomicBool = AtomicBool::new(false);
 const LOOK: Duration = Duration::from_millis(10);
 /// Looks after a request to stop until the guard ends the process.
 const PATIENCE: u32 = 10;
+/// Said where the guard has to end the process.
+const NO_POLL: &str = "the computation did not stop by itself within a tenth of a second: the process \
+                       was ended";
 /// Looks at another run's lock until the wait is reported: one second.
 const SILENT_LOOKS: u32 = 100;
 
@@ -83,7 +86,9 @@ fn guard(common: &Common) {
             if ENDED.swap(true, Ordering::SeqCst) {
                 return;
             }
-            Printer::new(common).failure(&Failure::Job(JobError::Interrupted(Interrupted)));
+            let printer = Printer::new(common);
+            printer.warning(NO_POLL);
+            printer.failure(&Failure::Job(JobError::Interrupted(Interrupted)));
             std::process::exit(i32::from(Exit::Interrupted.code()));
         }
     }

@@ -68,7 +68,7 @@ pub struct CalibrateOptions {
     pub reach_m: f64,
     /// Keep the design's field for the next run, and use what an earlier one kept.
     pub keep: bool,
-    /// Whether a page and plots for people are written besides.
+    /// Whether a page and plots for people are written too.
     pub page: bool,
 }
 
@@ -431,7 +431,7 @@ fn compute(
     Ok((manifest, lambda))
 }
 
-/// What `verify` needs besides the inputs to compute the same bundle again.
+/// What `verify` needs beside the inputs to compute the same bundle again.
 fn made_with(options: &CalibrateOptions, shape: &ShapeSource) -> MadeWith {
     let document = &shape.document;
     let surface = match (&shape.input, &document.source) {

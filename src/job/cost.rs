@@ -106,6 +106,7 @@ pub fn of_steel(design: &Design, tolerance: Option<f64>) -> Option<Cost> {
     let positions_m = &design.array.positions_m;
     let cost = ArrayCost::new(
         scene.core.as_ref()?.shape,
+        scene.winding.length_m,
         positions_m,
         closest_m(positions_m),
         tolerance.unwrap_or(COUPLED_TOLERANCE),

@@ -200,10 +200,10 @@ impl Verifier {
         progress: &dyn Progress,
     ) -> Result<Option<Arc<Expected>>, JobError> {
         let Some(shape) = &sources.shape else {
-            all.unchecked.push(
-                "points, pages, plots, words and stated errors: the shape's files that the                  manifest names as inputs are not here; verify where calibrate ran"
-                    .to_owned(),
-            );
+            all.unchecked.push(format!(
+                "points, pages, plots, texts and stated errors: {}",
+                sources.without_shape()
+            ));
             return Ok(None);
         };
         let wrong = |message: String| check("recomputed", 1.0, 0.0, message);
@@ -246,12 +246,11 @@ impl Verifier {
         all.add([compared.check]);
         all.unchecked.extend(compared.unchecked);
         if !compared.exact {
-            let made = all.bundle.manifest.made_with.as_ref();
             all.notes.push(format!(
                 "made by fluxform {} on {}: numbers are compared within the bounds computed here, \
                  not byte for byte",
                 all.bundle.manifest.fluxform_version,
-                made.map_or("a platform that it does not name", |made| &made.arithmetic)
+                compared::made_on(&all.bundle)
             ));
         }
         Ok(Some(found))

@@ -23,16 +23,6 @@ const CIRCLES: &[&[&str]] = &[
         "bench::stages::map_table",
         "bench::stages::problem",
     ],
-    &[
-        "bundle::atomic::absorb",
-        "bundle::atomic::dir",
-        "bundle::atomic::file",
-        "bundle::atomic::folder",
-        "bundle::atomic::made",
-        "bundle::atomic::overwrite",
-        "bundle::atomic::record",
-        "bundle::atomic::temporary",
-    ],
     &["bundle::npz", "bundle::rendering", "bundle::table"],
     &[
         "cli::args",

@@ -51,6 +51,28 @@ impl Archive {
         bytes
     }
 
+    /// Other words in the header of an array, under a fitting checksum.
+    fn reword(&mut self, array: &str, from: &str, to: &str) {
+        let name = format!("{array}.npy");
+        let named = |head: &Vec<u8>| head[46..].starts_with(name.as_bytes());
+        let head = self.heads.iter_mut().find(|head| named(head)).unwrap();
+        let number =
+            |bytes: &[u8], at| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+        let (local, size) = (number(head, 42), number(head, 24));
+        let skipped = self.data[local + 26..local + 30].iter();
+        let skipped: Vec<usize> = skipped.map(|byte| usize::from(*byte)).collect();
+        let start = local + 30 + skipped[0] + 256 * skipped[1] + skipped[2] + 256 * skipped[3];
+        let content = &mut self.data[start..start + size];
+        let at = content
+            .windows(from.len())
+            .position(|part| part == from.as_bytes());
+        let at = at.unwrap();
+        content[at..at + from.len()].copy_from_slice(to.as_bytes());
+        let sum = crc32fast::hash(content).to_le_bytes();
+        self.data[local + 14..local + 18].copy_from_slice(&sum);
+        head[16..20].copy_from_slice(&sum);
+    }
+
     fn twice(&mut self, entry: usize) {
         self.heads.push(self.heads[entry].clone());
         self.count += 1;
@@ -94,6 +116,15 @@ const DAMAGES: &[Damage] = &[
         a.heads.last_mut().unwrap()[29] = 0xff
     }),
     ("no mark in the directory", |a| a.heads[2][0] = b'X'),
+    ("an array of another shape", |a| {
+        a.reword("resistance_ohm", "(4,)", "(2,)");
+    }),
+    ("inductances in two rows of eight", |a| {
+        a.reword("inductance_h", "(4, 4)", "(2, 8)");
+    }),
+    ("a voltage of another kind", |a| {
+        a.reword("voltage_v", "<f8", "<i8");
+    }),
 ];
 
 /// Bundles with such archives, their digests sealed.

@@ -6,7 +6,7 @@ use std::io;
 use std::path::Path;
 
 use super::dir::{Dir, Kind, Status, followed};
-use super::folder::MANIFEST;
+use super::names::MANIFEST;
 use super::record::{Record, digest, is_timing, unchanged};
 use super::{Overwrite, WriteError};
 use crate::artefact::FileEntry;

@@ -17,7 +17,8 @@ use rustix::io::Errno;
 use sha2::{Digest, Sha256};
 
 use super::busy;
-use super::file::hex;
+use super::digest::hex;
+use super::names::parent_of;
 
 /// Folders nested deeper than this are not entered.
 const DEPTH_MAX: usize = 64;
@@ -148,7 +149,7 @@ impl Dir {
     /// What the system reports; a path without a name.
     pub fn of(path: &Path) -> io::Result<(Self, OsString)> {
         let name = path.file_name().ok_or(io::ErrorKind::InvalidInput)?;
-        Ok((Self::open(super::parent_of(path))?, name.to_owned()))
+        Ok((Self::open(parent_of(path))?, name.to_owned()))
     }
 
     /// Its path when it was opened.

@@ -2,20 +2,17 @@
 
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use sha2::{Digest, Sha256};
-
+use super::digest::{Written, fill};
 use super::dir::{Dir, Kind, Status};
 use super::made::{MadeFolders, made_in};
+use super::names::{check_name, parent_of};
 use super::overwrite::{Permit, real};
 use super::record::{Record, ReplacedNote, present};
 use super::temporary::{TemporaryFile, clean_leftovers};
-use super::{Overwrite, WriteError, Written, parent_of};
-
-/// Writes of at least this size pass through unbuffered.
-const BUFFER_BYTES: usize = 1 << 20;
+use super::{Overwrite, WriteError};
 
 /// Writes one file whole or not at all and returns its size and digest. Missing folders are made.
 /// `content` writes the bytes; an error of its own of kind `InvalidData` is reported as such.
@@ -143,7 +140,7 @@ impl FileSet {
         name: &str,
         content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<Written, WriteError> {
-        super::folder::check_name(name)?;
+        check_name(name)?;
         self.write_at(&self.folder.join(name), content)
     }
 
@@ -220,7 +217,7 @@ impl FileSet {
     /// # Errors
     /// A name that is none.
     pub fn outdate(&mut self, name: &str) -> Result<(), WriteError> {
-        super::folder::check_name(name)?;
+        check_name(name)?;
         self.outdated.push(self.folder.join(name));
         Ok(())
     }
@@ -297,65 +294,6 @@ impl FileSet {
             Ok(()) => Ok(Some((dir, name))),
             Err(error) => Err(fail(error)),
         }
-    }
-}
-
-/// Runs `content` into `file` through a buffer, hashing on the way.
-pub(super) fn fill(
-    file: &mut File,
-    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> io::Result<Written> {
-    let mut buffered = BufWriter::with_capacity(
-        BUFFER_BYTES,
-        Hashing {
-            file,
-            sha256: Sha256::new(),
-            bytes: 0,
-        },
-    );
-    let outcome = content(&mut buffered);
-    // On failure the buffer's rest is dropped unwritten.
-    let hashing = match outcome {
-        Ok(()) => buffered
-            .into_inner()
-            .map_err(io::IntoInnerError::into_error)?,
-        Err(error) => {
-            let _ = buffered.into_parts();
-            return Err(error);
-        }
-    };
-    Ok(Written {
-        bytes: hashing.bytes,
-        sha256: hex(&hashing.sha256.finalize()),
-    })
-}
-
-/// Lower-case hexadecimal digits.
-pub(crate) fn hex(bytes: &[u8]) -> String {
-    const DIGITS: &[u8; 16] = b"0123456789abcdef";
-    bytes
-        .iter()
-        .flat_map(|b| [b >> 4, b & 15])
-        .map(|nibble| char::from(DIGITS[usize::from(nibble)]))
-        .collect()
-}
-
-struct Hashing<'a> {
-    file: &'a mut File,
-    sha256: Sha256,
-    bytes: u64,
-}
-
-impl Write for Hashing<'_> {
-    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
-        let count = self.file.write(buffer)?;
-        self.sha256.update(&buffer[..count]);
-        self.bytes += count as u64;
-        Ok(count)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.file.flush()
     }
 }
 

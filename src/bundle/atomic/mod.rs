@@ -14,10 +14,12 @@
 
 mod absorb;
 mod busy;
+mod digest;
 mod dir;
 mod file;
 mod folder;
 mod made;
+mod names;
 mod overwrite;
 mod record;
 mod scratch;
@@ -27,28 +29,19 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 pub use busy::{awaited_folder, is_writing};
+pub use digest::Written;
+pub(crate) use digest::hex;
 pub(crate) use dir::{Dir, Kind};
+pub(crate) use file::put;
 pub use file::{FileSet, is_stream, write};
-pub(crate) use file::{hex, put};
 pub use folder::FolderDraft;
-pub(crate) use folder::{check_name, listed_files};
+pub(crate) use folder::listed_files;
 pub use made::SharedFolders;
 pub(crate) use made::open_made;
+pub(crate) use names::check_name;
 pub use overwrite::{Overwrite, check_distinct};
 pub use scratch::Scratch;
 pub(crate) use temporary::clean_leftovers;
-
-/// What the name of a folder or note that a run puts aside ends with.
-const OLD: &str = ".fluxform-old";
-
-/// What was written: size and digest of the bytes.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Written {
-    /// Number of bytes.
-    pub bytes: u64,
-    /// SHA-256 of the bytes, 64 lower-case hexadecimal digits.
-    pub sha256: String,
-}
 
 /// Why an output was not written. Nothing is left half written.
 #[derive(Debug, thiserror::Error)]
@@ -148,13 +141,5 @@ impl WriteError {
                 source,
             },
         }
-    }
-}
-
-/// The folder that `path` is in, as it is spelt; `.` for a bare name.
-fn parent_of(path: &Path) -> &Path {
-    match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
     }
 }

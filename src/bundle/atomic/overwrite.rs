@@ -3,9 +3,11 @@
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
+use super::WriteError;
+use super::digest::Written;
 use super::dir::{Dir, Kind, Status, followed};
+use super::names::parent_of;
 use super::record::{Record, ReplacedNote, digest, is_timing, unchanged};
-use super::{WriteError, Written, parent_of};
 use crate::artefact::Input;
 
 /// The policy for outputs that exist already.

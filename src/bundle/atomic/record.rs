@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::digest::hex;
 use super::dir::{Dir, Kind};
-use super::file::hex;
+use super::names::OLD;
 use crate::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION, parse_version};
 use crate::json::to_json;
 use crate::plain::read_plain;
@@ -140,7 +141,7 @@ impl ReplacedNote {
     /// Where the note of the record at `path` is.
     pub fn path(record: &Path) -> PathBuf {
         let name = record.file_name().unwrap_or_default().to_string_lossy();
-        record.with_file_name(format!(".{name}{}", super::OLD))
+        record.with_file_name(format!(".{name}{}", OLD))
     }
 
     /// Its bytes.

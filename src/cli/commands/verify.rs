@@ -65,11 +65,14 @@ impl Verify {
             return Ok(());
         }
         if failed.is_empty() {
+            let parts = report.unchecked.len();
             return Err(Failure::Verification(format!(
-                "{}: {} passed, but not everything could be checked; accept that with \
-                 --accept-unchecked",
+                "{}: {} passed, {} not checked ({}{}); accept that with --accept-unchecked",
                 self.bundle.display(),
                 count(report.checks.len(), "check"),
+                count(parts, "part"),
+                report.unchecked.first().map_or("", String::as_str),
+                if parts > 1 { "; ..." } else { "" },
             )));
         }
         Err(Failure::Verification(format!(

@@ -17,6 +17,7 @@ use nalgebra::{DMatrix, DVector};
 use super::CoreShape;
 use super::cored_coil::Excitation;
 use super::coupling::{Coupling, different_offsets};
+use super::exchange::{Grading, LEAST_GAP, PART, side_panels};
 use super::generatrix::{Generatrix, Resolution};
 use super::response::{Response, Rings};
 use super::sources::{ArraySources, Parts};
@@ -40,7 +41,7 @@ pub struct ArrayResolution {
     pub outline: Resolution,
     /// Azimuthal modes.
     pub modes: usize,
-    /// Length of the exchange panels, m.
+    /// Length of the exchange panels beside the ends of cores and windings, m.
     pub panel_m: f64,
     /// Exchange rings a panel.
     pub order: usize,
@@ -72,29 +73,43 @@ impl ArrayResolution {
         let radius_m = shape.radius_m;
         let decay = 2.0 * ((closest_m - radius_m) / radius_m).ln();
         let modes = 2 + ((1.0 / tolerance).ln() / decay.max(1e-3)).ceil() as usize;
-        let gap_m = (closest_m - 2.0 * radius_m).max(0.05 * radius_m);
+        let gap_m = (closest_m - 2.0 * radius_m).max(LEAST_GAP * radius_m);
         Self {
             outline,
             modes: modes.clamp(2, MOST_MODES),
-            panel_m: 1.5 * gap_m,
+            panel_m: PART * gap_m,
             order: (2.0 - 1.3 * tolerance.log10()).ceil() as usize,
             residual,
         }
     }
 
+    /// The exchange panels of a core about which a winding reaches `winding_length_m` down.
+    pub(super) fn grading(&self, shape: CoreShape, winding_length_m: f64) -> Grading {
+        Grading::new(self.panel_m, shape, winding_length_m)
+    }
+
     /// Unknowns a core.
-    pub(super) fn unknowns(&self, shape: CoreShape) -> usize {
-        let panels = |length_m: f64| (length_m / self.panel_m).ceil().max(1.0) as usize;
-        let rings = self.order * (panels(shape.length_m()) + 2 * panels(shape.radius_m));
+    pub(super) fn unknowns(&self, shape: CoreShape, winding_length_m: f64) -> usize {
+        let grading = self.grading(shape, winding_length_m);
+        let side = side_panels(shape, |z_m| grading.length_m(z_m)).len();
+        let end = (shape.radius_m / self.panel_m).ceil().max(1.0) as usize;
+        let rings = self.order * (side + 2 * end);
         rings * self.angles()
     }
 
     /// Longer exchange panels, if these would take more memory than the caps for an array with
     /// `offsets` different offsets between cores.
-    pub(super) fn within_memory(mut self, shape: CoreShape, offsets: usize) -> Self {
+    pub(super) fn within_memory(
+        mut self,
+        shape: CoreShape,
+        winding_length_m: f64,
+        offsets: usize,
+    ) -> Self {
         let entries = (MOST_ENTRIES / (offsets + 1)) as f64;
         let most = MOST_UNKNOWNS.min(entries.sqrt() as usize);
-        while self.unknowns(shape) > most && self.panel_m < shape.length_m() + shape.radius_m {
+        while self.unknowns(shape, winding_length_m) > most
+            && self.panel_m < shape.length_m() + shape.radius_m
+        {
             self.panel_m *= 1.1;
         }
         self
@@ -198,8 +213,8 @@ impl CoupledArray {
         let mut aim = FIRST_AIM * tolerance;
         let mut best: Option<Self> = None;
         for _ in 0..=MOST_REFINEMENTS {
-            let mut resolution =
-                ArrayResolution::for_tolerance(aim, shape, closest_m).within_memory(shape, offsets);
+            let mut resolution = ArrayResolution::for_tolerance(aim, shape, closest_m)
+                .within_memory(shape, winding.length_m, offsets);
             let mut coarse = resolution.coarser();
             if near {
                 resolution.outline = Resolution::near_steel(0.3 * aim);
@@ -278,7 +293,11 @@ impl CoupledArray {
     ) -> Result<Self, OnEdge> {
         let outline = Generatrix::of_coil(winding, shape, &resolution.outline);
         let excitation = Excitation::new(winding, &outline, resolution.outline.quadrature)?;
-        let exchange = Rings::new(&outline, resolution.order, |_| resolution.panel_m);
+        let exchange = Rings::graded(
+            &outline,
+            resolution.order,
+            &resolution.grading(shape, winding.length_m),
+        );
         let response = Response::new(
             outline,
             exchange,

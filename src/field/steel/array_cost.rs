@@ -25,11 +25,17 @@ pub struct ArrayCost {
 }
 
 impl ArrayCost {
-    /// The cost of cores of `shape` at `positions_m`, the closest two of them `closest_m` apart, to
-    /// a relative `tolerance`. Right within a factor of about three; of more than 1500 cores a
+    /// The cost of cores of `shape` at `positions_m`, the closest two of them `closest_m` apart, with
+    /// windings of `winding_length_m`, to a relative `tolerance`. Right within a factor of about three; of more than 1500 cores a
     /// lower bound.
     #[must_use]
-    pub fn new(shape: CoreShape, positions_m: &[[f64; 2]], closest_m: f64, tolerance: f64) -> Self {
+    pub fn new(
+        shape: CoreShape,
+        winding_length_m: f64,
+        positions_m: &[[f64; 2]],
+        closest_m: f64,
+        tolerance: f64,
+    ) -> Self {
         let cores = positions_m.len();
         let (offsets, drives) = if cores <= COUNTED {
             let drives = representatives(cores, &motions(positions_m)).len();
@@ -37,9 +43,12 @@ impl ArrayCost {
         } else {
             (cores, cores.div_ceil(8))
         };
-        let resolution = ArrayResolution::for_tolerance(tolerance, shape, closest_m)
-            .within_memory(shape, offsets);
-        let size = resolution.unknowns(shape) as f64;
+        let resolution = ArrayResolution::for_tolerance(tolerance, shape, closest_m).within_memory(
+            shape,
+            winding_length_m,
+            offsets,
+        );
+        let size = resolution.unknowns(shape, winding_length_m) as f64;
         let (cores, offsets, drives) = (cores as f64, offsets as f64, drives as f64);
         let matrices = (offsets + 1.0) * size * size;
         let potentials = SOLUTIONS * cores * cores * size;

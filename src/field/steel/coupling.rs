@@ -6,11 +6,13 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 
+use super::exchange::{LEAST_GAP, Stretched};
 use super::response::{Response, Ring};
 use crate::winding::Winding;
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::gauss;
 use fluxform_numerics::gmres::gmres;
+use fluxform_numerics::lagrange_basis::Basis;
 use fluxform_numerics::ring_functions::azimuthal_integrals;
 
 /// Most applications of the coupling.
@@ -74,7 +76,7 @@ impl Coupling {
         let blocks = links
             .offsets_m
             .par_iter()
-            .map(|offset| between_cores(&points, response.angles, *offset))
+            .map(|offset| between_cores(&points, response, *offset))
             .collect();
         let windings = links
             .offsets_m
@@ -203,28 +205,87 @@ pub(super) fn grid_points(response: &Response) -> Vec<([f64; 3], [f64; 3])> {
 }
 
 /// Potential at the grid of a core at `offset_m` from the sender, for unit moments on the
-/// sender's grid: -(1/4 pi) n'.(x - y)/|x - y|^3 dtheta, [receiver, sender].
+/// sender's grid: -(1/4 pi) n'.(x - y)/|x - y|^3 dtheta, [receiver, sender]. On long panels the
+/// moments stand for the layer that they interpolate.
 pub(super) fn between_cores(
-    points: &[([f64; 3], [f64; 3])],
-    angles: usize,
+    points: &[GridPoint],
+    response: &Response,
     offset_m: [f64; 2],
 ) -> DMatrix<f64> {
-    let scale = -TAU / angles as f64 / (4.0 * PI);
+    let scale = -TAU / response.angles as f64 / (4.0 * PI);
     let mut matrix = DMatrix::zeros(points.len(), points.len());
-    for (mut column, (y, n)) in matrix.column_iter_mut().zip(points) {
+    for (mut column, from) in matrix.column_iter_mut().zip(points) {
         fluxform_base::progress::poll();
         for (value, (x, _)) in column.iter_mut().zip(points) {
-            let d = [
-                x[0] + offset_m[0] - y[0],
-                x[1] + offset_m[1] - y[1],
-                x[2] - y[2],
-            ];
-            let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-            let along = n[0] * d[0] + n[1] * d[1] + n[2] * d[2];
-            *value = scale * along / (square * square.sqrt());
+            *value = scale * dipole([x[0] + offset_m[0], x[1] + offset_m[1], x[2]], *from);
         }
     }
+    for stretched in &response.exchange.stretched {
+        integrate_stretched(&mut matrix, points, response, offset_m, stretched);
+    }
     matrix
+}
+
+/// A place on a core's surface and the outer normal there.
+type GridPoint = ([f64; 3], [f64; 3]);
+
+/// n.(x - y)/|x - y|^3 of the dipole n at y, 1/m^2.
+fn dipole(x: [f64; 3], (y, n): GridPoint) -> f64 {
+    let d = [x[0] - y[0], x[1] - y[1], x[2] - y[2]];
+    let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    (n[0] * d[0] + n[1] * d[1] + n[2] * d[2]) / (square * square.sqrt())
+}
+
+/// The columns of [`between_cores`] of one long panel: the kernel is integrated over parts of it,
+/// short beside each receiver, against the polynomial that is one at one ring.
+fn integrate_stretched(
+    matrix: &mut DMatrix<f64>,
+    points: &[GridPoint],
+    response: &Response,
+    offset_m: [f64; 2],
+    stretched: &Stretched,
+) {
+    let (rings, order) = (response.exchange.rings.len(), response.exchange.order);
+    let radius_m = response.outline.shape.radius_m;
+    let gap_m = (offset_m[0].hypot(offset_m[1]) - 2.0 * radius_m).max(LEAST_GAP * radius_m);
+    let scale = -TAU / response.angles as f64 / (4.0 * PI);
+    let rule = gauss::rule(order);
+    let basis = Basis::new(rule);
+    let (from, to) = stretched.panel.range_m();
+    let mut values = vec![0.0; order];
+    for (ring, receiver) in response.exchange.rings.iter().enumerate() {
+        fluxform_base::progress::poll();
+        // Heights, and the weight of every ring there.
+        let mut nodes: Vec<(f64, Vec<f64>)> = Vec::new();
+        for (lo, hi) in stretched.parts(receiver.z_m, gap_m) {
+            for (x, weight) in rule.nodes.iter().zip(&rule.weights) {
+                let z_m = lo + 0.5 * (hi - lo) * (1.0 + x);
+                basis.weights(2.0 * (z_m - from) / (to - from) - 1.0, &mut values);
+                let share = weight * (hi - lo) / (to - from);
+                let weights = values.iter().zip(&rule.weights);
+                nodes.push((z_m, weights.map(|(v, w)| share * v / w).collect()));
+            }
+        }
+        for sender_angle in 0..response.angles {
+            let first = sender_angle * rings + stretched.first;
+            let (place, normal) = points[first];
+            for receiver_angle in 0..response.angles {
+                let row = receiver_angle * rings + ring;
+                let (x, _) = points[row];
+                let x = [x[0] + offset_m[0], x[1] + offset_m[1], x[2]];
+                values.fill(0.0);
+                for (z_m, weights) in &nodes {
+                    let kernel = scale * dipole(x, ([place[0], place[1], *z_m], normal));
+                    for (value, weight) in values.iter_mut().zip(weights) {
+                        *value += kernel * weight;
+                    }
+                }
+                for (k, value) in values.iter().enumerate() {
+                    matrix[(row, first + k)] = *value;
+                }
+            }
+        }
+    }
 }
 
 /// The winding's potential (A/A) and normal flux density n.B (T/A) per ampere at the grid of a

@@ -10,6 +10,7 @@ pub mod condensation;
 pub mod cored_coil;
 pub mod coupling;
 pub mod double_layer;
+pub mod exchange;
 pub mod generatrix;
 pub mod inside;
 pub mod interior;

@@ -11,7 +11,8 @@ use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 
 use super::double_layer::operators;
-use super::generatrix::{Face, Generatrix};
+use super::exchange::{Grading, Stretched, side_panels};
+use super::generatrix::{Face, Generatrix, Panel};
 use fluxform_numerics::gauss;
 use fluxform_numerics::lagrange_basis::Basis;
 
@@ -35,6 +36,10 @@ pub struct Rings {
     pub to_nodes: DMatrix<f64>,
     /// Layers on the outline's nodes to moments on the rings, [outline node, ring].
     gather: DMatrix<f64>,
+    /// Panels over parts of which kernels vary.
+    pub stretched: Vec<Stretched>,
+    /// Rings a panel.
+    pub order: usize,
 }
 
 impl Rings {
@@ -54,26 +59,8 @@ impl Rings {
                 panels.push((face, edge(piece), edge(piece + 1)));
             }
         }
-        let mut top = shape.top_m;
-        while top > shape.bottom_m {
-            let left = top - shape.bottom_m;
-            let mut length = length_m(top).min(left);
-            // No sliver at the end.
-            if left - length < 0.5 * length {
-                length = if left < 1.2 * length {
-                    left
-                } else {
-                    0.5 * left
-                };
-            }
-            let bottom = if length >= left {
-                shape.bottom_m
-            } else {
-                top - length
-            };
-            panels.push((Face::Side, bottom, top));
-            top = bottom;
-        }
+        let side = side_panels(shape, &length_m);
+        panels.extend(side.into_iter().map(|(from, to)| (Face::Side, from, to)));
         let mut rings = Vec::with_capacity(panels.len() * order);
         for (face, from, to) in &panels {
             rings.extend(rule.nodes.iter().map(|x| {
@@ -144,7 +131,32 @@ impl Rings {
             rings,
             to_nodes,
             gather,
+            stretched: Vec::new(),
+            order,
         }
+    }
+
+    /// The rings by which the cores of an array exchange potentials: panels graded by `grading`.
+    #[must_use]
+    pub fn graded(outline: &Generatrix, order: usize, grading: &Grading) -> Self {
+        let mut rings = Self::new(outline, order, |z_m| grading.length_m(z_m));
+        // The side's panels come last.
+        let side = side_panels(outline.shape, |z_m| grading.length_m(z_m));
+        let ends = rings.rings.len() - order * side.len();
+        rings.stretched = side
+            .into_iter()
+            .enumerate()
+            .filter(|(_, (from, to))| grading.stretches(to - from))
+            .map(|(index, (from_m, to_m))| Stretched {
+                first: ends + index * order,
+                panel: Panel {
+                    face: Face::Side,
+                    from_m,
+                    to_m,
+                },
+            })
+            .collect();
+        rings
     }
 
     /// Moments on the rings of layers on the nodes: [ring, layer], A m^2 a radian.

@@ -166,8 +166,11 @@ impl SaturatedArray {
         let mut best: Option<Self> = None;
         let mut modes_error = None;
         for _ in 0..=MOST_REFINEMENTS {
-            let resolution =
-                ArrayResolution::for_tolerance(aim, shape, closest_m).within_memory(shape, offsets);
+            let resolution = ArrayResolution::for_tolerance(aim, shape, closest_m).within_memory(
+                shape,
+                winding.length_m,
+                offsets,
+            );
             // Where the caps bind, two wrong solutions may agree by chance.
             let exchange_error = resolution.exchange_error(shape, closest_m);
             let solve = |setup: &Setup, reference: f64, start: Option<&State>| {
@@ -260,7 +263,11 @@ impl SaturatedArray {
         start: Option<&State>,
     ) -> Self {
         let resolution = &setup.resolution;
-        let exchange = Rings::new(&setup.outline, resolution.order, |_| resolution.panel_m);
+        let exchange = Rings::graded(
+            &setup.outline,
+            resolution.order,
+            &resolution.grading(setup.outline.shape, winding.length_m),
+        );
         let response = Response::new(
             setup.outline.clone(),
             exchange,

@@ -55,6 +55,12 @@ pub(super) fn same_program(bundle: &Bundle) -> bool {
         && made_with.is_some_and(|made| made.arithmetic == arithmetic())
 }
 
+/// The platform that a bundle names.
+pub(super) fn made_on(bundle: &Bundle) -> &str {
+    let made_with = bundle.manifest.made_with.as_ref();
+    made_with.map_or("a platform that it does not name", |made| &made.arithmetic)
+}
+
 /// Compares all that `bundle` holds with `expected`.
 pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
     let exact = same_program(bundle);
@@ -88,9 +94,9 @@ pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
     }
     let tolerance = tolerance(expected);
     let mut unchecked = vec![format!(
-        "that fluxform {} made it, as it claims: this program and platform do not give every byte \
-         of it",
-        bundle.manifest.fluxform_version
+        "the last bits of numbers: made by fluxform {} on {}; verify there",
+        bundle.manifest.fluxform_version,
+        made_on(bundle)
     )];
     kept_and_pages(bundle, expected, &mut faults, &mut unchecked);
     for side in [&mut told, &mut wanted] {

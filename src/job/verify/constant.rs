@@ -18,7 +18,7 @@ const FORCES_MOVE: f64 = 10.0;
 /// Largest duality gap, relative to the mean square of the wanted force.
 const GAP_ALLOWED: f64 = 1e-10;
 
-/// The force constant, the currents and their errors from forces computed anew.
+/// The force constant, the currents and their errors from forces computed again.
 pub(super) fn checks(
     bundle: &Bundle,
     route: &Route,
@@ -95,7 +95,8 @@ pub(super) fn checks(
 
     if let Some(told) = &stored.worst_point {
         let lambda = stored.lambda_n_per_m;
-        checks.extend(worst::checks(&problem, &settings, told, lambda, agrees)?);
+        let found = worst::checks(&problem, &settings, again.status, told, lambda, agrees)?;
+        checks.extend(found);
     }
     let (Some(lambda), Some(currents)) = (stored.lambda_n_per_m, &stored.currents_a) else {
         return Ok(checks);

@@ -37,6 +37,8 @@ pub(super) struct Sources {
     pub(super) faults: Vec<String>,
     /// Files that are not here, their content known all the same.
     pub(super) notes: Vec<String>,
+    /// Files of the shape that are not here.
+    pub(super) missing: Vec<String>,
 }
 
 impl Sources {
@@ -93,7 +95,7 @@ impl Sources {
                         ));
                     }
                 }
-                Found::Missing => missing.push(input.path.as_str()),
+                Found::Missing => missing.push(input.path.clone()),
             }
         }
         let shape = match inputs.get(kept.len()..) {
@@ -108,7 +110,21 @@ impl Sources {
             shape,
             faults,
             notes,
+            missing,
         })
+    }
+
+    /// Why the shape cannot be read again, and what helps.
+    pub(super) fn without_shape(&self) -> String {
+        let named: Vec<&str> = self.missing.iter().map(String::as_str).collect();
+        match named[..] {
+            [] => "the manifest does not name the shape's files".to_owned(),
+            [STANDARD] => "calibrate read the shape from standard input".to_owned(),
+            _ => format!(
+                "{} not found; verify in the folder where calibrate ran",
+                named.join(", ")
+            ),
+        }
     }
 }
 

@@ -37,7 +37,7 @@ pub(super) fn checks(
     let map = &bundle.map;
     let wanted = scene.design.magnet.passive_force && scene.core.is_some();
     let Some(values) = &map.passive_force_n else {
-        let how = "the design has passive_force, the bundle holds none: make it anew".to_owned();
+        let how = "the design has passive_force, the bundle holds none: calibrate again".to_owned();
         return Ok(wanted
             .then(|| check(NODES, f64::MAX, 0.0, how))
             .into_iter()

@@ -16,7 +16,7 @@ const SAMPLES: usize = 2000;
 const FEWEST: usize = 200;
 
 /// Fields by another route than the bundle's: the winding's derivative integrated over its
-/// section, the steel solved anew and finer, the magnet by a finer rule.
+/// section, the steel solved again and finer, the magnet by a finer rule.
 pub(super) struct Route<'a> {
     pub(super) scene: &'a Scene<'a>,
     pub(super) solved: Solved,

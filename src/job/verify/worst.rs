@@ -1,23 +1,29 @@
-//! The worst-point form of a bundle against forces computed anew.
+//! The worst-point form of a bundle against forces computed again.
 
 use super::{Check, JobError, check, difference, ratio};
 use crate::bundle::lambda_file::WorstPointFile;
 use crate::lambda::worst::{ActivePoint, lower_bound_n, worst_point};
-use crate::lambda::{ForceProblem, Settings};
+use crate::lambda::{ForceProblem, Settings, Status};
 
 /// Constants solved for again, the largest error at any point, and the proof that the points
-/// named in the file give: no currents within the limits bring it much lower.
+/// named in the file give: no currents within the limits bring it much lower. `status` is that of
+/// the mean square's solution: where nothing is rendered there are no constants.
 pub(super) fn checks(
     problem: &ForceProblem,
     settings: &Settings,
+    status: Status,
     told: &WorstPointFile,
     lambda_n_per_m: Option<f64>,
     agrees: f64,
 ) -> Result<Vec<Check>, JobError> {
     let again = worst_point(problem, settings)?;
+    let rendered = |lambda: Option<f64>| lambda.filter(|_| status != Status::NothingRendered);
     let constants = [
-        (told.lambda_linear_n_per_m, again.lambda_linear_n_per_m),
-        (told.lambda_jnd_n_per_m, again.lambda_jnd_n_per_m),
+        (
+            told.lambda_linear_n_per_m,
+            rendered(again.lambda_linear_n_per_m),
+        ),
+        (told.lambda_jnd_n_per_m, rendered(again.lambda_jnd_n_per_m)),
     ];
     let worst = constants
         .iter()

@@ -10,8 +10,11 @@ use fluxform_field::frame::to_cartesian;
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::{ArrayResolution, CoupledArray};
 use fluxform_field::steel::cored_coil::CoredCoil;
-use fluxform_field::steel::generatrix::Face;
+use fluxform_field::steel::coupling::Coupling;
+use fluxform_field::steel::exchange::Grading;
+use fluxform_field::steel::generatrix::{Face, Generatrix};
 use fluxform_field::steel::magnetized::MagnetizedCore;
+use fluxform_field::steel::response::{Response, Rings};
 use fluxform_field::steel::sources::{ArraySources, Parts};
 use fluxform_field::winding::Winding;
 use fluxform_numerics::gauss;
@@ -529,4 +532,89 @@ fn the_field_of_an_array_is_divergence_free_and_a_gradient() {
             assert!(off.abs() < 1e-7 * size, "drive {drive}: {name} {off:e}");
         }
     }
+}
+
+/// Cores and coils of `length_m`, two of them, whose core 1 hears winding 0: the flux of core 1
+/// through coil 0 by `rings`, Wb/A.
+fn returned_flux_wb(
+    length_m: f64,
+    rings: impl Fn(&Generatrix, &ArrayResolution) -> Rings,
+) -> (f64, usize) {
+    let winding = Winding {
+        length_m,
+        ..SEED_COIL
+    };
+    let shape = CoreShape {
+        radius_m: 0.0078,
+        bottom_m: -length_m - 0.013,
+        top_m: 0.0,
+    };
+    let resolution = ArrayResolution::for_tolerance(1e-4, shape, 0.05);
+    let outline = Generatrix::of_coil(&winding, shape, &resolution.outline);
+    let exchange = rings(&outline, &resolution);
+    let (modes, quadrature) = (resolution.modes, resolution.outline.quadrature);
+    let response = Response::new(
+        outline,
+        exchange,
+        resolution.angles(),
+        modes,
+        MU_R,
+        quadrature,
+    );
+    let places = [[0.0, 0.0], [0.041, 0.0286]];
+    let coupling = Coupling::new(&winding, &places, &response, 1e-8);
+    let mut sent = DMatrix::zeros(response.size(), 2);
+    sent.column_mut(1)
+        .copy_from_slice(&coupling.winding(1, 0).potential);
+    let own = DMatrix::zeros(response.size(), 2);
+    let solved = coupling.solve(sent, &own, 1e-10);
+    let moments =
+        |core: usize| &solved.moments.as_slice()[core * response.size()..][..response.size()];
+    (coupling.flux_of_others_wb(0, moments), response.size())
+}
+
+/// The exchange rings of a long core were as many as gaps fit along it.
+#[test]
+fn graded_exchange_rings_do_what_even_ones_do() {
+    for length_m in [0.31, 0.9] {
+        let even = |outline: &Generatrix, resolution: &ArrayResolution| {
+            Rings::new(outline, resolution.order, |_| resolution.panel_m)
+        };
+        let graded = |outline: &Generatrix, resolution: &ArrayResolution| {
+            let shape = outline.shape;
+            let grading = Grading::new(resolution.panel_m, shape, length_m);
+            Rings::graded(outline, resolution.order, &grading)
+        };
+        let (all, most) = returned_flux_wb(length_m, even);
+        let (few, size) = returned_flux_wb(length_m, graded);
+        let off = (few / all - 1.0).abs();
+        println!("{length_m} m: {most} and {size} unknowns a core, {off:.1e} apart");
+        assert!(off < 2e-6, "{length_m} m: {off:e}");
+        assert!(length_m < 0.5 || size * 3 < most * 2, "{size} of {most}");
+    }
+}
+
+/// Reciprocity and convergence of an array of 1 m, which no even grid enters.
+#[test]
+fn an_array_of_long_cores_states_an_error_that_covers() {
+    let winding = Winding {
+        length_m: 1.0,
+        ..SEED_COIL
+    };
+    let shape = CoreShape {
+        radius_m: 0.0078,
+        bottom_m: -1.0,
+        top_m: 0.0,
+    };
+    let solve = |tolerance: f64| {
+        CoupledArray::new(&winding, shape, MU_R, &SCATTER[..3], tolerance, LOWEST_M)
+            .expect("off the winding's edges")
+    };
+    let (coarse, fine) = (solve(1e-3), solve(1e-5));
+    let (inductance, gradient) = differences(&fine, &coarse);
+    assert!(
+        inductance.max(gradient) < coarse.relative_error && coarse.relative_error < 1e-3,
+        "{inductance:e}, {gradient:e} of {:e}",
+        coarse.relative_error
+    );
 }

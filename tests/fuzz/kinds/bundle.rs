@@ -2,16 +2,20 @@
 
 use std::io::{Cursor, Read, Write};
 use std::path::Path;
+use std::sync::OnceLock;
 
-use fluxform::bundle::artefact::{FileEntry, sha256_hex};
+use fluxform::bundle::artefact::{FileEntry, Input as Named, sha256_hex};
 use fluxform::bundle::json::to_json;
 use fluxform::bundle::load::Bundle;
 use fluxform::bundle::npz::to_npz;
 use fluxform::bundle::table::{write_currents, write_points};
 use fluxform::bundle::trajectory::Trajectory;
+use fluxform::design::{Design, Need};
+use fluxform::job::calibrate::{self, CalibrateOptions, DesignSource, ShapeSource};
 use fluxform::job::replay::{self, Opened, summary::Told};
 use fluxform::job::verify;
 use fluxform::progress::Silent;
+use fluxform::shape::document::ShapeDocument;
 use serde_json::{Value, json};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
@@ -36,16 +40,83 @@ pub fn kind() -> Kind {
 const MANIFEST: &str = "manifest.json";
 const MAP: &str = "map.npz";
 
-/// A design of the same coils as the sample's, for `verify`.
+/// A design of the sample's coils and limits; the magnet's tilt is written behind it.
 const DESIGN: &str = "name = \"a\"\n[coil]\ninner_diameter_mm = 24\nouter_diameter_mm = 38\n\
                       length_mm = 70\n[wire]\ndiameter_mm = 0.7\n[array]\npositions_mm = [[-50, -50], \
-                      [50, -50], [-50, 50], [50, 50]]\n[magnet]\nmagnetization_a_per_m = 1.1579e6\n\
-                      [supply]\ncurrent_max_a = 2\n[workspace]\nx_mm = [-50, 50, 4]\ny_mm = [-43, 51, 4]\n\
-                      z_mm = [10, 80, 4]\n";
+                      [50, -50], [-50, 50], [50, 50]]\n[supply]\ncurrent_min_a = [0, -0.7, 0, 0]\n\
+                      current_max_a = [2, 2, 1.3, 2]\ntotal_current_max_a = 5.3\nvoltage_v = 36\n\
+                      [workspace]\nx_mm = [-50, 50, 4]\ny_mm = [-43, 51, 4]\nz_mm = [10, 80, 4]\n\
+                      [magnet]\nmagnetization_a_per_m = 1.1579e6\n";
+/// An object that needs no surface's file.
+const SHAPE: &str = "name = \"b\"\nprimitive = \"wedge\"\nlow_mm = 31\nhigh_mm = 43\n[points]\n\
+                     x_mm = [-37, 37, 3]\ny_mm = [-23, 23, 3]\n";
+
+/// The design's text, and the bundle that it gives: file by file, and loaded.
+struct Honest {
+    design: String,
+    files: Input,
+    bundle: Bundle,
+}
+
+/// What upright and tilted designs give. The shape is not found again, so that `verify` goes on to
+/// its independent route; the bundles' files are found in `with_inputs`.
+fn honest(tilted: bool) -> &'static Honest {
+    static MADE: [OnceLock<Honest>; 2] = [const { OnceLock::new() }; 2];
+    MADE[usize::from(tilted)].get_or_init(|| {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let tilt = if tilted { "tilt_deg = [7, -3]\n" } else { "" };
+        let text = format!("{DESIGN}{tilt}");
+        let (design, _) =
+            Design::from_toml(&text, Path::new("a.toml"), Need::CALIBRATE).expect("a design");
+        let (document, _) = ShapeDocument::from_toml(SHAPE, Path::new("b.toml")).expect("a shape");
+        let source = DesignSource {
+            design: &design,
+            text: &text,
+            input: &Named::of_bytes("-", text.as_bytes()),
+        };
+        let shape = ShapeSource {
+            document,
+            input: Some(Named::of_bytes("-", SHAPE.as_bytes())),
+        };
+        let mut options = CalibrateOptions::new(folder.path());
+        options.keep = false;
+        let report = calibrate::run(source, &[shape], &options, &Silent).expect("a bundle");
+        let folder = &report.bundles[0].folder;
+        let bundle = Bundle::open(folder).expect("a bundle");
+        let mut files = Input::default();
+        let listed = bundle.manifest.files.iter().map(|file| file.path.as_str());
+        for name in listed.chain([MANIFEST]) {
+            let bytes = std::fs::read(folder.join(name)).expect("a bundle's file");
+            files.put(name, Content::Bytes(bytes));
+        }
+        Honest {
+            design: text,
+            files,
+            bundle,
+        }
+    })
+}
+
+/// The sample with the inputs, coils and magnet of a design that is kept with it.
+fn of_design(mut sample: Sample) -> (Sample, &'static str) {
+    let moment = sample.map.runtime.moment_a_m2;
+    let honest = honest(moment[0] != 0.0);
+    let manifest = &honest.bundle.manifest;
+    sample.lambda.inputs = manifest.inputs.clone();
+    sample.manifest.inputs = manifest.inputs.clone();
+    sample.manifest.made_with = manifest.made_with.clone();
+    sample.manifest.array = manifest.array.clone();
+    sample.manifest.magnet = manifest.magnet.clone();
+    sample.manifest.resistance_ohm = manifest.resistance_ohm.clone();
+    let runtime = &mut sample.map.runtime;
+    runtime.moment_a_m2 = manifest.magnet.moment_a_m2;
+    runtime.resistance_ohm = manifest.resistance_ohm.clone();
+    (sample, &honest.design)
+}
 
 /// The files of a bundle, with fitting digests. What the writer refuses is written all the same
 /// where it can be told.
-fn packed(sample: &Sample) -> Option<Input> {
+fn packed((sample, design): &(Sample, &str)) -> Option<Input> {
     let mut input = Input::default();
     let mut put = |name: &str, bytes: Vec<u8>| input.put(name, Content::Bytes(bytes));
     put(MAP, to_npz(&sample.map).ok()?);
@@ -56,7 +127,7 @@ fn packed(sample: &Sample) -> Option<Input> {
     write_currents(&mut table, &sample.currents).ok()?;
     put("currents.csv", table);
     put("lambda.json", to_json(&sample.lambda).ok()?);
-    put("design.toml", DESIGN.into());
+    put("design.toml", design.as_bytes().to_vec());
     let mut manifest = sample.manifest.clone();
     manifest.files = Vec::new();
     put(MANIFEST, serde_json::to_vec(&manifest).ok()?);
@@ -117,19 +188,19 @@ fn seal(input: &mut Input) {
 }
 
 pub fn seeds() -> Vec<Input> {
-    [
+    let samples = [
         sample(false, [4, 4, 4]).with_pull(),
         sample(true, [4, 3, 4]),
         sample(false, [3, 2, 1]).without_rendering(),
-    ]
-    .iter()
-    .map(|sample| packed(sample).expect("a sample"))
-    .collect()
+    ];
+    let samples = samples.map(|sample| packed(&of_design(sample)).expect("a sample"));
+    let honest = [false, true].map(|tilted| honest(tilted).files.clone());
+    samples.into_iter().chain(honest).collect()
 }
 
 /// The sample with numbers at the ends, told alike wherever they are told.
 fn extremes(random: &mut Random) -> Option<Input> {
-    let mut sample = sample(random.below(2) == 0, [4, 3, 4]);
+    let (mut sample, design) = of_design(sample(random.below(2) == 0, [4, 3, 4]));
     if random.below(2) == 0 {
         sample = sample.with_pull();
     }
@@ -204,7 +275,7 @@ fn extremes(random: &mut Random) -> Option<Input> {
             }
         }
     }
-    packed(&sample)
+    packed(&(sample, design))
 }
 
 /// The arrays of a map, damaged and packed again.

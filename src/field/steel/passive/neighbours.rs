@@ -311,7 +311,7 @@ mod tests {
         let size = points.len();
         let mut system = DMatrix::identity(2 * size, 2 * size);
         for (row, column, dx) in [(0, size, -closest_m), (size, 0, closest_m)] {
-            let back = &answer * between_cores(&points, angles, [dx, 0.0]);
+            let back = &answer * between_cores(&points, &response, [dx, 0.0]);
             system
                 .view_mut((row, column), (size, size))
                 .copy_from(&-back);

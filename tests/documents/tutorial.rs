@@ -1,53 +1,13 @@
-//! The README's tutorial: its files are written, its commands run in order, its outputs compared.
-#![allow(clippy::disallowed_methods, clippy::print_stderr)]
+//! The tutorial: its files are written, its commands run in order, its outputs compared.
 
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-const TUTORIAL: &str = "From a blank page to a felt force";
+use crate::pages::{blocks, page, root, section};
 
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
-fn readme() -> String {
-    fs::read_to_string(root().join("README.md")).unwrap()
-}
-
-/// The text of one section.
-fn section(title: &str) -> String {
-    let readme = readme();
-    let (_, rest) = readme.split_once(&format!("\n## {title}\n")).unwrap();
-    rest.split("\n## ").next().unwrap().to_owned()
-}
-
-/// A fenced block: its language, its text, and the last line of words before it.
-struct Block {
-    language: String,
-    text: String,
-    before: String,
-}
-
-fn blocks(section: &str) -> Vec<Block> {
-    let mut blocks = Vec::new();
-    let mut before = String::new();
-    let mut lines = section.lines();
-    while let Some(line) = lines.next() {
-        if let Some(language) = line.strip_prefix("```") {
-            let inside: Vec<&str> = lines.by_ref().take_while(|line| *line != "```").collect();
-            blocks.push(Block {
-                language: language.to_owned(),
-                text: inside.join("\n") + "\n",
-                before: std::mem::take(&mut before),
-            });
-        } else if !line.is_empty() {
-            before = line.to_owned();
-        }
-    }
-    blocks
-}
+const TUTORIAL: &str = "designs/first_display.md";
 
 /// A folder with the repository's scripts, designs and shapes.
 fn place() -> tempfile::TempDir {
@@ -108,7 +68,7 @@ fn the_tutorial_runs_and_prints_what_it_shows() {
     let folder = place();
     let mut printed: Option<String> = None;
     let (mut files, mut commands, mut outputs) = (0, 0, 0);
-    for block in blocks(&section(TUTORIAL)) {
+    for block in blocks(&page(TUTORIAL)) {
         match block.language.as_str() {
             "sh" => {
                 printed = None;
@@ -193,10 +153,10 @@ fn evaluated(folder: &Path, text: &str) -> [f64; 3] {
 #[test]
 fn the_table_of_what_one_percent_changes_is_true() {
     let folder = place();
-    let section = section(TUTORIAL);
-    let design = &blocks(&section)[0].text;
+    let tutorial = page(TUTORIAL);
+    let design = &blocks(&tutorial)[0].text;
     let as_given = evaluated(folder.path(), design);
-    let rows = section.lines().filter(|line| line.starts_with("| `"));
+    let rows = tutorial.lines().filter(|line| line.starts_with("| `"));
     let mut checked = 0;
     for row in rows {
         let cells: Vec<&str> = row.split('|').map(str::trim).collect();
@@ -234,7 +194,7 @@ fn the_table_of_what_one_percent_changes_is_true() {
 #[test]
 fn the_warnings_of_the_table_are_what_is_said() {
     let folder = place();
-    let tutorial = section(TUTORIAL);
+    let tutorial = page(TUTORIAL);
     for block in blocks(&tutorial) {
         for name in ["desk.toml", "plate.toml"] {
             if block.before.contains(name) && block.language == "toml" {
@@ -272,41 +232,5 @@ fn the_warnings_of_the_table_are_what_is_said() {
         // Long messages are wrapped.
         let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(said.contains(message), "{script}\n{said}");
-    }
-}
-
-#[test]
-fn the_contents_list_every_section() {
-    let readme = readme();
-    let link = |title: &str| {
-        let kept = |c: &char| c.is_alphanumeric() || " -_".contains(*c);
-        let anchor: String = title.to_lowercase().chars().filter(kept).collect();
-        format!("#{}", anchor.replace(' ', "-"))
-    };
-    let mut fenced = false;
-    let mut headings = Vec::new();
-    for line in readme.lines() {
-        fenced ^= line.starts_with("```");
-        if !fenced && line.starts_with("##") {
-            headings.push(line);
-        }
-    }
-    let sections = headings.iter().filter_map(|line| line.strip_prefix("## "));
-    let want: Vec<String> = sections
-        .map(|title| format!("- [{title}]({})", link(title)))
-        .collect();
-    let found: Vec<&str> = readme
-        .lines()
-        .filter(|line| line.starts_with("- [") && line.contains("](#"))
-        .collect();
-    assert_eq!(found, want);
-    // Every other link into the page leads somewhere.
-    let anchors: Vec<String> = headings
-        .iter()
-        .map(|line| link(line.trim_start_matches('#').trim_start()))
-        .collect();
-    for target in readme.split("](#").skip(1) {
-        let target = format!("#{}", target.split(')').next().unwrap());
-        assert!(anchors.contains(&target), "{target}");
     }
 }

@@ -1,0 +1,77 @@
+//! Bytes that are hashed while they are written: no second pass.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+
+use sha2::{Digest, Sha256};
+
+/// Writes of at least this size pass through unbuffered.
+const BUFFER_BYTES: usize = 1 << 20;
+
+/// What was written: size and digest of the bytes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Written {
+    /// Number of bytes.
+    pub bytes: u64,
+    /// SHA-256 of the bytes, 64 lower-case hexadecimal digits.
+    pub sha256: String,
+}
+
+/// Runs `content` into `file` through a buffer, hashing on the way.
+pub(super) fn fill(
+    file: &mut File,
+    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<Written> {
+    let mut buffered = BufWriter::with_capacity(
+        BUFFER_BYTES,
+        Hashing {
+            file,
+            sha256: Sha256::new(),
+            bytes: 0,
+        },
+    );
+    let outcome = content(&mut buffered);
+    // On failure the buffer's rest is dropped unwritten.
+    let hashing = match outcome {
+        Ok(()) => buffered
+            .into_inner()
+            .map_err(io::IntoInnerError::into_error)?,
+        Err(error) => {
+            let _ = buffered.into_parts();
+            return Err(error);
+        }
+    };
+    Ok(Written {
+        bytes: hashing.bytes,
+        sha256: hex(&hashing.sha256.finalize()),
+    })
+}
+
+/// Lower-case hexadecimal digits.
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    const DIGITS: &[u8; 16] = b"0123456789abcdef";
+    bytes
+        .iter()
+        .flat_map(|b| [b >> 4, b & 15])
+        .map(|nibble| char::from(DIGITS[usize::from(nibble)]))
+        .collect()
+}
+
+struct Hashing<'a> {
+    file: &'a mut File,
+    sha256: Sha256,
+    bytes: u64,
+}
+
+impl Write for Hashing<'_> {
+    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
+        let count = self.file.write(buffer)?;
+        self.sha256.update(&buffer[..count]);
+        self.bytes += count as u64;
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}

@@ -1,0 +1,210 @@
+//! `verify` of fresh bundles: what calibrate wrote follows from its inputs, whatever was requested.
+
+use crate::support::Place;
+
+/// The parts of a design that the cases change.
+const AIR: &str = "";
+const CORE: &str = "[core]\nclearance_mm = 0.7\nbelow_mm = 7.0\nrelative_permeability = 300.0\n";
+const CURVE: &str = "[core]\nclearance_mm = 0.7\nbelow_mm = 7.0\nbh_curve = \"steel_1010.csv\"\n";
+const PAIR: &str = "rows = 1\ncolumns = 2\npitch_mm = 47.0\n";
+const ONE: &str = "rows = 1\ncolumns = 1\npitch_mm = 47.0\n";
+const APART: &str = "rows = 1\ncolumns = 2\npitch_mm = 47.0\ncoupling = \"none\"\n";
+const UPRIGHT: &str = "";
+const SUPPLY: &str = "current_max_a = 2.0\nvoltage_v = 36.0\n";
+
+fn design(core: &str, array: &str, magnet: &str, supply: &str) -> String {
+    format!(
+        "name = \"small\"\n[coil]\ninner_diameter_mm = 23.0\nouter_diameter_mm = 37.0\n\
+         length_mm = 71.0\n[wire]\ndiameter_mm = 0.7\n{core}[array]\n{array}[magnet]\n\
+         diameter_mm = 9.0\nlength_mm = 11.0\nmagnetization_a_per_m = 1.1579e6\n{magnet}[supply]\n\
+         {supply}[workspace]\nx_mm = [-37.0, 41.0, 7]\ny_mm = [-31.0, 29.0, 6]\n\
+         z_mm = [19.0, 83.0, 9]\n"
+    )
+}
+
+const SLOPE: &str = "name = \"slope\"\nprimitive = \"wedge\"\nlow_mm = 31\nhigh_mm = 43\n[points]\n\
+                     x_mm = [-33, 37, 6]\ny_mm = [-23, 27, 5]\n";
+
+/// What is calibrated: core, array, magnet, supply, and the arguments behind the design.
+type Case = (
+    &'static str,
+    [&'static str; 4],
+    &'static [&'static str],
+    i32,
+);
+
+const GIVEN: &[&str] = &[
+    "shapes/wedge.stl",
+    "--unit",
+    "mm",
+    "--translate",
+    "1,-2,30",
+    "--rotate",
+    "0,0,17",
+    "--grid",
+    "6x5",
+    "--x",
+    "-31,33",
+    "--y",
+    "-23,27",
+    "--scale",
+    "0.7",
+];
+
+const CASES: &[Case] = &[
+    ("air", [AIR, PAIR, UPRIGHT, SUPPLY], &["slope.toml"], 0),
+    (
+        "the four shapes",
+        [AIR, PAIR, UPRIGHT, SUPPLY],
+        &[
+            "shapes/flat.toml",
+            "shapes/half_sphere.toml",
+            "shapes/half_cylinder.toml",
+            "shapes/wedge.toml",
+        ],
+        0,
+    ),
+    ("coupled", [CORE, PAIR, UPRIGHT, SUPPLY], &["slope.toml"], 0),
+    (
+        "uncoupled",
+        [CORE, APART, UPRIGHT, SUPPLY],
+        &["slope.toml"],
+        0,
+    ),
+    (
+        "drivers that reverse",
+        [
+            AIR,
+            PAIR,
+            "polarity = \"attract\"\n",
+            "current_max_a = 2.0\ncurrent_min_a = -1.7\n",
+        ],
+        &["slope.toml"],
+        0,
+    ),
+    (
+        "no force constant",
+        [AIR, PAIR, "polarity = \"attract\"\n", SUPPLY],
+        &["slope.toml"],
+        4,
+    ),
+    (
+        "the steel's pull counted",
+        [CORE, PAIR, "passive_force = true\n", SUPPLY],
+        &["slope.toml"],
+        0,
+    ),
+    (
+        "the steel's pull counted, uncoupled",
+        [CORE, APART, "passive_force = true\n", SUPPLY],
+        &["slope.toml"],
+        0,
+    ),
+    (
+        "a tilted cylinder magnet",
+        [
+            AIR,
+            PAIR,
+            "model = \"cylinder\"\ntilt_deg = [7.0, -3.0]\n",
+            SUPPLY,
+        ],
+        &["slope.toml"],
+        0,
+    ),
+    (
+        "a tilted cylinder magnet above cores",
+        [
+            CORE,
+            PAIR,
+            "model = \"cylinder\"\ntilt_deg = [7.0, -3.0]\n",
+            SUPPLY,
+        ],
+        &["slope.toml"],
+        0,
+    ),
+    (
+        "maxmin",
+        [AIR, PAIR, UPRIGHT, SUPPLY],
+        &["slope.toml", "--criterion", "maxmin"],
+        0,
+    ),
+    (
+        "saturation",
+        [AIR, PAIR, UPRIGHT, SUPPLY],
+        &["slope.toml", "--criterion", "saturation"],
+        0,
+    ),
+    (
+        "linear, with currents at another constant",
+        [CORE, PAIR, UPRIGHT, SUPPLY],
+        &["slope.toml", "--criterion", "linear", "--at", "0.7"],
+        0,
+    ),
+    (
+        "a total current that binds",
+        [
+            AIR,
+            PAIR,
+            UPRIGHT,
+            "current_max_a = [2.0, 1.3]\ntotal_current_max_a = 1.7\n",
+        ],
+        &["slope.toml", "--jnd", "0.13"],
+        0,
+    ),
+    (
+        "a coil without current, measured gains",
+        [
+            AIR,
+            "rows = 1\ncolumns = 3\npitch_mm = 41.0\ngain = [1.03, 0.97, 1.01]\n",
+            UPRIGHT,
+            "current_max_a = [2.0, 0.0, 1.7]\n",
+        ],
+        &["slope.toml"],
+        0,
+    ),
+    (
+        "a surface given directly",
+        [AIR, PAIR, UPRIGHT, SUPPLY],
+        GIVEN,
+        0,
+    ),
+    (
+        "one coil along a B-H curve",
+        [CURVE, ONE, UPRIGHT, SUPPLY],
+        &["slope.toml"],
+        0,
+    ),
+    (
+        "no pages",
+        [CORE, PAIR, UPRIGHT, SUPPLY],
+        &["slope.toml", "--no-report"],
+        0,
+    ),
+    (
+        "another tolerance and reach",
+        [AIR, PAIR, UPRIGHT, SUPPLY],
+        &["slope.toml", "--tolerance", "1e-6", "--reach", "3"],
+        0,
+    ),
+];
+
+#[test]
+fn fresh_bundles_verify_whatever_was_requested() {
+    for (name, [core, array, magnet, supply], args, code) in CASES {
+        let place = Place::new();
+        place.write("small.toml", &design(core, array, magnet, supply));
+        place.copy("designs", "elsewhere");
+        let curve = String::from_utf8(place.read("elsewhere/steel_1010.csv")).unwrap();
+        place.write("steel_1010.csv", &curve);
+        place.write("slope.toml", SLOPE);
+        let calibrate = [&["calibrate", "small.toml", "--format", "json"], *args].concat();
+        let ran = place.run(&calibrate).ends(*code);
+        for bundle in ran.json()["bundles"].as_array().unwrap() {
+            let folder = bundle["folder"].as_str().unwrap();
+            let verified = place.run(&["verify", folder, "--format", "json"]);
+            assert_eq!(verified.code, Some(0), "{name}: {verified:#?}");
+            let report = verified.json();
+            assert_eq!(report["unchecked"].as_array().unwrap().len(), 0, "{name}");
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! The documents show what the program really prints.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::Command;
+
+use crate::pages::{command_and_output, page, root, section};
+
+fn printed(arguments: &[impl AsRef<std::ffi::OsStr> + std::fmt::Debug]) -> String {
+    let run = Command::new(env!("CARGO_BIN_EXE_fluxform"))
+        .args(arguments)
+        .current_dir(root())
+        .output()
+        .unwrap();
+    let errors = String::from_utf8(run.stderr).unwrap();
+    assert!(run.status.success(), "{arguments:?}: {errors}");
+    String::from_utf8(run.stdout).unwrap()
+}
+
+/// Without the line that names the folder, and how long a step takes on this machine.
+fn lasting(text: &str) -> Vec<&str> {
+    text.lines()
+        .map(str::trim_end)
+        .filter(|line| !line.trim_start().starts_with("written to") && !line.starts_with("  step "))
+        .collect()
+}
+
+/// The arguments of a shown command, `files` of it inside `folder`.
+fn arguments(command: &str, files: &[&str], folder: &Path) -> Vec<String> {
+    command
+        .strip_prefix("fluxform ")
+        .unwrap()
+        .split(' ')
+        .map(|argument| {
+            if files.contains(&argument) {
+                folder.join(argument).display().to_string()
+            } else {
+                argument.to_owned()
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn the_first_command_prints_what_the_readme_shows() {
+    let (command, shown) = command_and_output("Try it");
+    let command = command
+        .strip_prefix("cargo run --release --locked -- ")
+        .unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let mut arguments: Vec<&str> = command.split(' ').collect();
+    assert_eq!(arguments[0], "calibrate");
+    arguments.extend(["--out", folder.path().to_str().unwrap()]);
+    assert_eq!(lasting(&shown), lasting(&printed(&arguments)));
+}
+
+/// The numbers of a picture, to three digits, between the rest of its text.
+fn coarse(picture: &str) -> String {
+    let numeric = |c: char| c.is_ascii_digit() || c == '.';
+    let mut coarse = String::new();
+    let mut rest = picture;
+    while let Some(start) = rest.find(numeric) {
+        let number = &rest[start..];
+        let end = number.find(|c| !numeric(c)).unwrap_or(number.len());
+        coarse += &rest[..start];
+        match number[..end].parse::<f64>() {
+            Ok(value) => coarse += &format!("{value:.2e}"),
+            Err(_) => coarse += &number[..end],
+        }
+        rest = &number[end..];
+    }
+    coarse + rest
+}
+
+#[test]
+fn the_picture_is_what_its_command_draws() {
+    let readme = page("README.md");
+    let (_, rest) = readme.split_once("The picture is what `").unwrap();
+    let command = rest.split('`').next().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    printed(&arguments(command, &["half_sphere.svg"], folder.path()));
+    let drawn = std::fs::read_to_string(folder.path().join("half_sphere.svg")).unwrap();
+    let same = coarse(&drawn) == coarse(&page("results/half_sphere.svg"));
+    assert!(same, "draw results/half_sphere.svg again: {command}");
+}
+
+#[test]
+fn the_table_of_numbers_is_what_the_commands_print() {
+    let readme = page("README.md");
+    let coil = printed(&["evaluate", "designs/seed.toml"]);
+    let flat = printed(&["lambda", "designs/seed.toml", "shapes/flat.toml"]);
+    let air = printed(&["evaluate", "designs/seed_air.toml"]);
+    let flat_air = printed(&["lambda", "designs/seed_air.toml", "shapes/flat.toml"]);
+    for (printed, value) in [
+        (&coil, "6.0753 ohm"),
+        (&coil, "778.87 mN"),
+        (&coil, "151.51 ms"),
+        (&coil, "99.112 ms, give or take 5.41 %"),
+        (&flat, "3.2544 N/m"),
+        (&air, "99.709 mN"),
+        (&air, "11.935 ms"),
+        (&flat_air, "0.62098 N/m"),
+    ] {
+        assert!(printed.contains(value), "no {value} in:\n{printed}");
+        assert!(readme.contains(value), "no {value} in README.md");
+    }
+}
+
+#[test]
+fn one_command_of_a_section_prints_what_is_shown() {
+    for title in ["Find the best coil", "Compare with a Gauss-meter scan"] {
+        let (command, shown) = command_and_output(title);
+        let printed = printed(&arguments(&command, &[], Path::new("")));
+        assert_eq!(lasting(&shown), lasting(&printed), "{title}");
+    }
+}
+
+#[test]
+fn the_sweep_prints_what_is_shown() {
+    let (commands, shown) = command_and_output("Sweep designs");
+    let folder = tempfile::tempdir().unwrap();
+    let files = ["plan.json", "points", "sweep.csv"];
+    let all: String = commands
+        .lines()
+        .map(|command| printed(&arguments(command, &files, folder.path())))
+        .collect();
+    assert_eq!(lasting(&shown), lasting(&all));
+}
+
+#[test]
+fn the_replay_prints_what_is_shown() {
+    let (command, shown) = command_and_output("Follow a finger");
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("results").display().to_string();
+    let shape = "shapes/flat.toml";
+    printed(&["calibrate", "designs/seed.toml", shape, "--out", &out]);
+    let command = format!("{command} --out replay.csv");
+    let files = ["results/seed/flat", "replay.svg", "replay.csv"];
+    let printed = printed(&arguments(&command, &files, folder.path()));
+    assert_eq!(lasting(&shown), lasting(&printed));
+}
+
+#[test]
+fn the_table_of_force_constants_is_what_its_script_prints() {
+    let run = Command::new("python3")
+        .args(["scripts/seed_table.py", env!("CARGO_BIN_EXE_fluxform")])
+        .current_dir(root())
+        .output();
+    let Ok(run) = run else {
+        eprintln!("skipped: no python3");
+        return;
+    };
+    let errors = String::from_utf8(run.stderr).unwrap();
+    assert!(run.status.success(), "{errors}");
+    let printed = String::from_utf8(run.stdout).unwrap();
+    let readme = page("README.md");
+    assert!(printed.lines().count() > 6, "{printed}");
+    for part in printed.split("\n\n") {
+        let shown = readme.contains(part.trim_end());
+        assert!(shown, "not in README.md:\n{part}");
+    }
+}
+
+#[test]
+fn every_command_has_a_row_and_every_row_is_a_command() {
+    let commands = section("Commands");
+    let rows: BTreeSet<&str> = commands
+        .lines()
+        .filter_map(|line| line.strip_prefix("| `"))
+        .filter_map(|row| row.split(['`', ' ']).next())
+        .collect();
+    let help = printed(&["--help"]);
+    let commands: BTreeSet<&str> = help
+        .lines()
+        .skip_while(|line| *line != "Commands:")
+        .skip(1)
+        .take_while(|line| !line.is_empty())
+        .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next())
+        .collect();
+    assert_eq!(rows, commands, "README.md's table and `fluxform --help`");
+}
