@@ -73,7 +73,8 @@ mod tests {
             assert!(
                 *committed == generated,
                 "src/bundle/schema/{name} is out of date: raise SCHEMA_VERSION where the layout \
-                 changed and run `cargo test --lib -- --ignored regenerate_schemas`"
+                 changed and run `cargo test -p \
+                 fluxform-bundle --lib -- --ignored regenerate_schemas`"
             );
         }
     }
@@ -82,7 +83,7 @@ mod tests {
     #[ignore = "writes src/bundle/schema"]
     #[allow(clippy::disallowed_methods)]
     fn regenerate_schemas() {
-        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/bundle/schema");
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("schema");
         for ((name, _), generated) in SCHEMAS.iter().zip(generated()) {
             std::fs::write(folder.join(name), generated).unwrap();
         }

@@ -48,8 +48,8 @@ fn a_map_of_means_is_the_weighted_sum_of_shifted_maps() {
             })
             .collect();
         assert!(shares.len() > 50);
-        let means = MeanField::new(&winding, &coils, &grid, all, tolerance, 1e-10)
-            .expect("many places");
+        let means =
+            MeanField::new(&winding, &coils, &grid, all, tolerance, 1e-10).expect("many places");
         let map = means
             .map(&shares, &coils, &grid, all, &Silent)
             .expect("off the edges")

@@ -85,9 +85,10 @@ const COARSE_LATTICE: Lattice = Lattice {
     width: [1.0, 1.2, 1.0],
     order: [5, 5, 4],
 };
-/// Of the quadratures for a tabulated peak of |B|, and for one that is compared with.
-const PEAK_QUADRATURE: f64 = 1e-5;
-const PEAK_QUADRATURE_FINE: f64 = 1e-7;
+/// Accuracy of a tabulated peak of |B| over that of the solutions, and of one that is compared
+/// with.
+const PEAK_SHARE: f64 = 0.3;
+const PEAK_FINE: f64 = 1e-7;
 const FINE_WIDTH: [f64; 3] = [0.5, 0.6, 0.8];
 const FINE_ORDER: [usize; 3] = [6, 6, 7];
 /// Largest width of a cell along ln(a2/a1), relative to its middle.
@@ -282,7 +283,7 @@ impl CoredModel {
         let solved = self.solve(radius_m, length_m, &depths_m, &self.resolution)?;
         let scale_h = MU_0_T_M_PER_A * radius_m;
         let peaks = if self.with_peak && !self.sharp {
-            ln_peaks(&solved)?
+            ln_peaks(&solved, PEAK_SHARE * self.relative_error)?
         } else {
             vec![0.0; solved.len()]
         };
@@ -299,7 +300,8 @@ impl CoredModel {
         let resolution = Resolution::for_tolerance(COARSE);
         let solved = self.solve(radius_m, length_m, &depths_m, &resolution)?;
         let values = |ln: f64| -> Values { [0.0, 0.0, ln] };
-        Some(ln_peaks(&solved)?.into_iter().map(values).collect())
+        let peaks = ln_peaks(&solved, PEAK_SHARE * COARSE)?;
+        Some(peaks.into_iter().map(values).collect())
     }
 
     fn depths_m(&self, radius_m: f64, shares: &[f64]) -> Vec<f64> {
@@ -438,7 +440,7 @@ impl CoredModel {
             let solved =
                 self.solve(shape.radius_m, window.length_m, &depths_m, &self.resolution)?;
             let coils = [solved.into_iter().next()?.0];
-            let exact = ln_peaks_of(&coils, PEAK_QUADRATURE_FINE)?.pop()?;
+            let exact = ln_peaks_of(&coils, PEAK_FINE)?.pop()?;
             let blunt = self.coarse_model();
             let [_, _, coarse] = blunt.added.at(at, |x, y, z| blunt.line(x, y, z))?;
             factors.coarse_peak = (exact - coarse.value).exp();
@@ -461,14 +463,14 @@ impl CoredModel {
 
 /// ln of the largest |B| in the core per ampere over mu_0 / core radius, of windings of one turn
 /// around one core.
-fn ln_peaks(solved: &[(CoredCoil, Direct)]) -> Option<Vec<f64>> {
+fn ln_peaks(solved: &[(CoredCoil, Direct)], accuracy: f64) -> Option<Vec<f64>> {
     let coils: Vec<CoredCoil> = solved.iter().map(|(coil, _)| coil.clone()).collect();
-    ln_peaks_of(&coils, PEAK_QUADRATURE)
+    ln_peaks_of(&coils, accuracy)
 }
 
-fn ln_peaks_of(coils: &[CoredCoil], quadrature: f64) -> Option<Vec<f64>> {
+fn ln_peaks_of(coils: &[CoredCoil], accuracy: f64) -> Option<Vec<f64>> {
     let shape = coils.first()?.core.outline().shape;
-    let peaks_t = peaks_of_family_t(coils, peak_depth_m(shape), quadrature).ok()?;
+    let peaks_t = peaks_of_family_t(coils, peak_depth_m(shape), accuracy).ok()?;
     let ln = |peak_t: f64| {
         let good = peak_t > 0.0 && peak_t.is_finite();
         good.then(|| (peak_t * shape.radius_m / MU_0_T_M_PER_A).ln())

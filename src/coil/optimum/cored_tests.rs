@@ -1,7 +1,7 @@
 //! Cored coils: slopes, references, brute force, limits.
 
 use std::f64::consts::PI;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::cored::{CoreRule, CoredModel, NoCoredCoil};
 use super::problem::Problem;
@@ -40,8 +40,13 @@ fn model(rule: CoreRule, with_peak: bool) -> CoredModel {
     CoredModel::new(HEIGHT_M, &magnet(), rule, with_peak).expect("above the core")
 }
 
+fn in_repository(path: &str) -> PathBuf {
+    let member = Path::new(env!("CARGO_MANIFEST_DIR"));
+    member.join("../..").join(path)
+}
+
 fn seed() -> Design {
-    Design::read(Path::new("designs/seed.toml"), NOTHING)
+    Design::read(&in_repository("designs/seed.toml"), NOTHING)
         .expect("a good design")
         .0
 }
@@ -164,7 +169,7 @@ fn taylor_test_of_force_and_every_limit() {
 /// References of three kinds of active limits, by NLopt on another model.
 #[test]
 fn meets_the_reference_optima() {
-    let folder = Path::new("tests/oracles/nlopt");
+    let folder = in_repository("tests/oracles/nlopt");
     let text = include_str!("../../../tests/oracles/nlopt/reference.json");
     let reference: serde_json::Value = serde_json::from_str(text).expect("JSON");
     for name in ["seed_cored", "cored_mass", "cored_wire_choices"] {
@@ -404,4 +409,74 @@ fn slopes_of_a_thin_winding_around_a_thick_core() {
         (by_depth / difference - 1.0).abs() < 1e-3,
         "{by_depth} {difference}"
     );
+}
+
+/// Rules and windows of a fixed sequence, of every kind that a design may ask for.
+fn drawn(count: usize) -> Vec<(CoreRule, Window)> {
+    let mut state = 7_u64;
+    let mut log = move |lo: f64, hi: f64| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        lo * (hi / lo).powf((state >> 11) as f64 / (1_u64 << 53) as f64)
+    };
+    (0..count)
+        .map(|_| {
+            let rule = CoreRule {
+                clearance_m: log(0.02, 1.0) * 1e-3,
+                above_m: (log(1.0, 3.0) - 2.0) * 0.004,
+                below_m: (log(1.0, 3.0) - 1.0) * 0.005,
+                relative_permeability: log(20.0, 4000.0),
+            };
+            let window = Window {
+                inner_radius_m: rule.clearance_m + log(0.001, 0.012),
+                depth_m: log(0.0006, 0.02),
+                length_m: log(0.008, 0.09),
+            };
+            (rule, window)
+        })
+        .collect()
+}
+
+/// What the search drops on the draft's word is far below what it may be wrong by.
+#[test]
+fn the_draft_is_far_better_than_it_is_trusted() {
+    for (rule, window) in drawn(16) {
+        let draft = model(rule, false).draft().expect("a rough table");
+        let response = draft
+            .response(&window, 1.0 / 0.49e-6, 1.0, false)
+            .expect("in the domain");
+        let (force_n, _) = direct(&window, &rule);
+        let wrong = (response.force_n.value / force_n).ln();
+        assert!(
+            wrong.abs() < 0.1 * search::DRAFT_DOUBT,
+            "{wrong:e} {rule:?} {window:?}"
+        );
+    }
+}
+
+#[test]
+fn the_limited_flux_density_is_what_an_evaluation_prints() {
+    for (rule, window) in drawn(3) {
+        let sharp = model(rule, true).sharpened(&window).expect("a core fits");
+        let response = sharp
+            .response(&window, 1.0 / 0.49e-6, 1.3, false)
+            .expect("in the domain");
+        let winding = Winding {
+            inner_radius_m: window.inner_radius_m,
+            outer_radius_m: window.outer_radius_m(),
+            length_m: window.length_m,
+            turns: window.depth_m * window.length_m / 0.49e-6,
+        };
+        let shape = rule
+            .shape(window.inner_radius_m, window.length_m)
+            .expect("a core fits");
+        let coil = CoredCoil::new(&winding, shape, rule.relative_permeability, 1e-6, HEIGHT_M)
+            .expect("off the edges");
+        let depth_m = fluxform_field::steel::inside::peak_depth_m(shape);
+        let told_t = coil.core_field(1.3, depth_m).expect("inside").peak_t;
+        let wrong = response.core_field_t.value / told_t - 1.0;
+        // What a written design gives way by is ten times that.
+        assert!(wrong.abs() < 1e-6, "{wrong:e} {rule:?} {window:?}");
+    }
 }

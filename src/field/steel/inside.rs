@@ -23,8 +23,8 @@ use super::generatrix::{Face, Generatrix, Panel, Resolution};
 use super::layer_gradient::{COMPONENTS, axial_gradient_operator, gradient_operators};
 use super::magnetized::MagnetizedCore;
 use super::peak_search::{
-    Field, Peak, QUADRATURE, legendre, norm, projection, scan, scan_curve, scans, turns,
-    turns_around,
+    Field, Peak, QUADRATURE, SCAN_ORDER, legendre, norm, projection, scan, scan_curve, scan_order,
+    scans, turns, turns_around,
 };
 use crate::winding::{OnEdge, Winding};
 use fluxform_base::units::MU_0_T_M_PER_A;
@@ -168,7 +168,8 @@ pub fn peaks_of_family_t(
     };
     let outline = first.core.outline();
     let shape = outline.shape;
-    let curve = scan_curve(&first.winding, shape, allowed_depth_m(shape, depth_m));
+    let scan_depth_m = allowed_depth_m(shape, depth_m);
+    let curve = scan_curve(&first.winding, shape, scan_depth_m, scan_order(tolerance));
     let windings: Vec<Winding> = coils.iter().map(|coil| coil.winding).collect();
     let targets = places(&curve);
     let own: Vec<Vec<(f64, f64)>> = targets
@@ -292,7 +293,7 @@ impl Inspection {
         let outline = &array.response.outline;
         let (winding, shape) = (&array.winding, outline.shape);
         let incident = Incident::new(array);
-        let curve = scan_curve(winding, shape, allowed_depth_m(shape, depth_m));
+        let curve = scan_curve(winding, shape, allowed_depth_m(shape, depth_m), SCAN_ORDER);
         let at_curve = Targets::new(
             outline,
             winding,
@@ -413,7 +414,7 @@ fn core_fields(
         .collect();
 
     let modes = full.first().map_or(1, |l| l.ncols().div_ceil(2));
-    let curve = scan_curve(winding, shape, depth_m);
+    let curve = scan_curve(winding, shape, depth_m, SCAN_ORDER);
     let fine = Volume::new(winding, shape, VOLUME.order);
     let coarse = Volume::new(winding, shape, VOLUME.order - 1);
     let mut targets = places(&curve);

@@ -20,11 +20,17 @@ use fluxform_numerics::lagrange_basis::Basis;
 pub(super) const QUADRATURE: f64 = 1e-8;
 /// Share of a panel's two highest degrees that the degrees beyond them give together.
 const BEYOND: f64 = 0.3;
+/// Nodes a panel of the finest scan.
+pub(super) const SCAN_ORDER: usize = 14;
+/// By how much a further node a panel of [`SCAN`] lowers what its polynomials miss.
+const FALL: f64 = 3.4;
+/// Fewest nodes a panel of a scan.
+const LEAST_ORDER: f64 = 4.0;
 /// The curve along which |B| is scanned: the surface at the depth, in a half plane. Its panels'
 /// polynomials stand for the field between the nodes: panels graded so miss about 3.4^-order of it,
 /// and what is missed moves a flat maximum far.
 const SCAN: Resolution = Resolution {
-    order: 14,
+    order: SCAN_ORDER,
     ratio: 0.3,
     tip: 0.0,
     quadrature: QUADRATURE,
@@ -44,6 +50,12 @@ pub(super) fn projection(polynomial: &[f64], weights: &[f64]) -> Vec<f64> {
     let weighted = || polynomial.iter().zip(weights).map(|(p, w)| p * w);
     let square: f64 = weighted().zip(polynomial).map(|(a, p)| a * p).sum();
     weighted().map(|value| value / square).collect()
+}
+
+/// Nodes a panel with which a scan misses at most `tolerance` of the field, up to [`SCAN_ORDER`].
+pub(super) fn scan_order(tolerance: f64) -> usize {
+    let order = (-tolerance.ln() / FALL.ln()).ceil();
+    order.clamp(LEAST_ORDER, SCAN_ORDER as f64) as usize
 }
 
 /// Legendre polynomials of degree 0 to `order` - 1 on the nodes of that order.
@@ -110,7 +122,12 @@ pub(super) fn combine(turns: &[(f64, f64)], value: impl Fn(usize, usize) -> f64)
 }
 
 /// The surface `depth_m` inside, cut into panels as fine as what lies that far off.
-pub(super) fn scan_curve(winding: &Winding, shape: CoreShape, depth_m: f64) -> Generatrix {
+pub(super) fn scan_curve(
+    winding: &Winding,
+    shape: CoreShape,
+    depth_m: f64,
+    order: usize,
+) -> Generatrix {
     let inner = CoreShape {
         radius_m: shape.radius_m - depth_m,
         bottom_m: shape.bottom_m + depth_m,
@@ -123,6 +140,7 @@ pub(super) fn scan_curve(winding: &Winding, shape: CoreShape, depth_m: f64) -> G
         &[(0.0, tip_m), (-winding.length_m, tip_m)],
         &Resolution {
             tip: depth_m / smaller,
+            order,
             ..SCAN
         },
     )
