@@ -27,6 +27,10 @@ const MIDDLE_COILS: usize = 9;
 pub struct Plan {
     /// Tolerance of forces and maps, relative to the largest |grad B| at a height.
     pub tolerance: f64,
+    /// Coils of the design.
+    pub coils: usize,
+    /// Coils of which the costs of terms are computed: those closest to the array's middle.
+    pub cost_coils: usize,
     /// The physics, term by term.
     pub terms: Vec<Term>,
     /// The shapes.
@@ -126,7 +130,10 @@ pub fn plan(
             z_m: [grid.z_m[0], grid.z_m[grid.z_m.len() - 1]],
         });
     }
+    let coils = source.design.array.positions_m.len();
     Ok(Plan {
+        coils,
+        cost_coils: coils.min(MIDDLE_COILS),
         tolerance: steel::tolerance_of(&scene, tolerance, MAP_TOLERANCE).max(KERNEL_ERROR),
         terms: terms(&scene, kept, tolerance, &places, progress)?,
         shapes: planned,

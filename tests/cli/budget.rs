@@ -82,5 +82,10 @@ fn a_plan_solves_no_array() {
         "{}",
         ran.out
     );
+    assert!(
+        ran.out.contains("the 9 coils in the middle of the 10000"),
+        "{}",
+        ran.out
+    );
     assert!(ran.err.contains("10000 coupled cores"), "{}", ran.err);
 }

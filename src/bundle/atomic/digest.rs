@@ -65,7 +65,9 @@ struct Hashing<'a> {
 
 impl Write for Hashing<'_> {
     fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
-        let count = self.file.write(buffer)?;
+        // What is half written is temporary, and goes as it is dropped.
+        fluxform_base::progress::poll();
+        let count = self.file.write(&buffer[..buffer.len().min(BUFFER_BYTES)])?;
         self.sha256.update(&buffer[..count]);
         self.bytes += count as u64;
         Ok(count)

@@ -205,6 +205,15 @@ fn explained(plan: &Plan) -> String {
         };
         sheet.line(does, &format!("{}: {}{cost}", term.what, term.why));
     }
+    if plan.cost_coils < plan.coils {
+        sheet.line(
+            "costs",
+            &format!(
+                "are those of the {} coils in the middle of the {}",
+                plan.cost_coils, plan.coils
+            ),
+        );
+    }
     for shape in &plan.shapes {
         let nodes = |n: [usize; 3]| format!("{} x {} x {}", n[0], n[1], n[2]);
         sheet.line(
