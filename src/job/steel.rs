@@ -27,6 +27,8 @@ pub const CORED_TOLERANCE: f64 = 1e-6;
 pub const COUPLED_TOLERANCE: f64 = 1e-4;
 /// Share of the tolerance given to evaluating a solution.
 pub(super) const EVALUATION_SHARE: f64 = 0.1;
+/// Heights above a core, in radii, from which on places are far from the steel.
+const FAR: f64 = 0.5;
 /// Share of the tolerance given to what is claimed of the steel's solution.
 const STEEL_SHARE: f64 = 0.45;
 
@@ -349,7 +351,7 @@ pub fn tolerance_of(scene: &Scene, tolerance: Option<f64>, air_default: f64) -> 
 }
 
 /// Solves the steel of `scene`, to `tolerance` or the default, for heights from `lowest_m` up; cores
-/// that are linear and answer to their own winding alone for all places.
+/// that are linear and answer to their own winding alone for all places, where `lowest_m` is close.
 ///
 /// # Errors
 /// An outline that meets a winding's edge; a B-H curve along which no state is found.
@@ -410,12 +412,14 @@ pub fn solve(
         ),
         None => {
             let tolerance = tolerance.unwrap_or(CORED_TOLERANCE);
-            let coil = CoredCoil::everywhere(
-                &scene.winding,
-                core.shape,
-                relative_permeability,
-                STEEL_SHARE / CHANCE * tolerance,
-            )?;
+            let (winding, shape, aim) =
+                (&scene.winding, core.shape, STEEL_SHARE / CHANCE * tolerance);
+            // Far from the steel a solution does that is several times cheaper to evaluate.
+            let coil = if lowest_m > shape.top_m.max(0.0) + FAR * shape.radius_m {
+                CoredCoil::new(winding, shape, relative_permeability, aim, lowest_m)?
+            } else {
+                CoredCoil::everywhere(winding, shape, relative_permeability, aim)?
+            };
             (
                 AloneCore {
                     layer: coil.core,

@@ -30,12 +30,14 @@ impl Axis {
 
     /// All nodes in order.
     #[must_use]
+    #[inline]
     pub fn nodes(&self) -> Vec<f64> {
         (0..self.samples).map(|i| self.node(i)).collect()
     }
 
     /// Distance between neighbouring nodes; 0 for a single node.
     #[must_use]
+    #[inline]
     pub fn step(&self) -> f64 {
         if self.samples < 2 {
             0.0

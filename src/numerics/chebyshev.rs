@@ -55,6 +55,7 @@ impl Layout {
 
     /// The nodes, panel by panel.
     #[must_use]
+    #[inline]
     pub fn nodes(&self) -> Vec<f64> {
         let n = self.terms as f64;
         (0..self.panels)
@@ -94,6 +95,7 @@ impl Layout {
 impl Table {
     /// The value at `x`, within the table's interval.
     #[must_use]
+    #[inline]
     pub fn at(&self, x: f64) -> f64 {
         let panels = self.coefficients.len() / self.terms;
         let place = (x - self.from) / self.width;

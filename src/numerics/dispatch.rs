@@ -33,6 +33,7 @@ fn has_avx2() -> bool {
 
 /// Which instructions kernels run on here: with others the last bits of their results differ.
 #[must_use]
+#[inline]
 pub fn instructions() -> &'static str {
     #[cfg(target_arch = "x86_64")]
     if has_avx2() {
@@ -43,6 +44,7 @@ pub fn instructions() -> &'static str {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
+#[inline]
 fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<true>()
 }

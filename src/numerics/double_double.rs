@@ -16,6 +16,7 @@ pub struct DoubleDouble {
 }
 
 /// `a + b = s + e` exactly.
+#[inline]
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let s = a + b;
     let part = s - a;
@@ -23,12 +24,14 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
 }
 
 /// The same where `|a| >= |b|`.
+#[inline]
 fn fast_two_sum(a: f64, b: f64) -> (f64, f64) {
     let s = a + b;
     (s, b - (s - a))
 }
 
 /// `a` as a sum of two numbers of 26 bits.
+#[inline]
 fn split(a: f64) -> (f64, f64) {
     let t = 134_217_729.0 * a;
     let high = t - (t - a);
@@ -36,6 +39,7 @@ fn split(a: f64) -> (f64, f64) {
 }
 
 /// `a b = p + e` exactly.
+#[inline]
 fn two_product(a: f64, b: f64) -> (f64, f64) {
     let p = a * b;
     let ((ah, al), (bh, bl)) = (split(a), split(b));
@@ -45,24 +49,28 @@ fn two_product(a: f64, b: f64) -> (f64, f64) {
 impl DoubleDouble {
     /// The double `value`.
     #[must_use]
+    #[inline]
     pub const fn exactly(value: f64) -> Self {
         Self { hi: value, lo: 0.0 }
     }
 
     /// The nearest double.
     #[must_use]
+    #[inline]
     pub fn nearest(self) -> f64 {
         self.hi
     }
 
     /// What the nearest double leaves.
     #[must_use]
+    #[inline]
     pub fn remainder(self) -> f64 {
         self.lo
     }
 
     /// Square root; 0 for 0, NaN below.
     #[must_use]
+    #[inline]
     pub fn square_root(self) -> Self {
         if self.hi == 0.0 {
             return Self::exactly(0.0);
@@ -75,6 +83,7 @@ impl DoubleDouble {
 
 impl Add for DoubleDouble {
     type Output = Self;
+    #[inline]
     fn add(self, rhs: Self) -> Self {
         let (s, e) = two_sum(self.hi, rhs.hi);
         let (t, f) = two_sum(self.lo, rhs.lo);
@@ -86,6 +95,7 @@ impl Add for DoubleDouble {
 
 impl Neg for DoubleDouble {
     type Output = Self;
+    #[inline]
     fn neg(self) -> Self {
         Self {
             hi: -self.hi,
@@ -96,6 +106,7 @@ impl Neg for DoubleDouble {
 
 impl Sub for DoubleDouble {
     type Output = Self;
+    #[inline]
     fn sub(self, rhs: Self) -> Self {
         self + -rhs
     }
@@ -103,6 +114,7 @@ impl Sub for DoubleDouble {
 
 impl Mul for DoubleDouble {
     type Output = Self;
+    #[inline]
     fn mul(self, rhs: Self) -> Self {
         let (p, e) = two_product(self.hi, rhs.hi);
         let (hi, lo) = fast_two_sum(p, e + (self.hi * rhs.lo + self.lo * rhs.hi));
@@ -113,6 +125,7 @@ impl Mul for DoubleDouble {
 impl Div for DoubleDouble {
     type Output = Self;
     /// Long division: two quotient digits of 53 bits.
+    #[inline]
     fn div(self, rhs: Self) -> Self {
         let first = self.hi / rhs.hi;
         let rest = self - rhs * Self::exactly(first);
@@ -122,18 +135,21 @@ impl Div for DoubleDouble {
 }
 
 impl AddAssign for DoubleDouble {
+    #[inline]
     fn add_assign(&mut self, rhs: Self) {
         *self = *self + rhs;
     }
 }
 
 impl SubAssign for DoubleDouble {
+    #[inline]
     fn sub_assign(&mut self, rhs: Self) {
         *self = *self - rhs;
     }
 }
 
 impl PartialOrd for DoubleDouble {
+    #[inline]
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         match self.hi.partial_cmp(&other.hi) {
             Some(Ordering::Equal) => self.lo.partial_cmp(&other.lo),

@@ -22,12 +22,15 @@ pub trait Number:
 }
 
 impl Number for f64 {
+    #[inline]
     fn sqrt(self) -> Self {
         f64::sqrt(self)
     }
+    #[inline]
     fn value(self) -> f64 {
         self
     }
+    #[inline]
     fn constant(value: f64) -> Self {
         value
     }
@@ -45,6 +48,7 @@ pub struct Dual {
 impl Dual {
     /// The independent variable.
     #[must_use]
+    #[inline]
     pub fn variable(value: f64) -> Self {
         Self { re: value, du: 1.0 }
     }
@@ -52,6 +56,7 @@ impl Dual {
 
 impl Add for Dual {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         Self {
             re: self.re + other.re,
@@ -62,6 +67,7 @@ impl Add for Dual {
 
 impl Sub for Dual {
     type Output = Self;
+    #[inline]
     fn sub(self, other: Self) -> Self {
         Self {
             re: self.re - other.re,
@@ -72,6 +78,7 @@ impl Sub for Dual {
 
 impl Mul for Dual {
     type Output = Self;
+    #[inline]
     fn mul(self, other: Self) -> Self {
         Self {
             re: self.re * other.re,
@@ -82,6 +89,7 @@ impl Mul for Dual {
 
 impl Div for Dual {
     type Output = Self;
+    #[inline]
     fn div(self, other: Self) -> Self {
         let re = self.re / other.re;
         Self {
@@ -93,6 +101,7 @@ impl Div for Dual {
 
 impl Mul<f64> for Dual {
     type Output = Self;
+    #[inline]
     fn mul(self, factor: f64) -> Self {
         Self {
             re: self.re * factor,
@@ -103,6 +112,7 @@ impl Mul<f64> for Dual {
 
 impl Add<f64> for Dual {
     type Output = Self;
+    #[inline]
     fn add(self, term: f64) -> Self {
         Self {
             re: self.re + term,
@@ -112,6 +122,7 @@ impl Add<f64> for Dual {
 }
 
 impl Number for Dual {
+    #[inline]
     fn sqrt(self) -> Self {
         let re = self.re.sqrt();
         Self {
@@ -119,9 +130,11 @@ impl Number for Dual {
             du: 0.5 * self.du / re,
         }
     }
+    #[inline]
     fn value(self) -> f64 {
         self.re
     }
+    #[inline]
     fn constant(value: f64) -> Self {
         Self { re: value, du: 0.0 }
     }

@@ -17,23 +17,27 @@ pub struct Interval {
 impl Interval {
     /// From `lo` to `hi`; the caller sees to lo <= hi.
     #[must_use]
+    #[inline]
     pub const fn new(lo: f64, hi: f64) -> Self {
         Self { lo, hi }
     }
 
     /// One number.
     #[must_use]
+    #[inline]
     pub const fn point(value: f64) -> Self {
         Self::new(value, value)
     }
 
     /// One step outwards.
+    #[inline]
     fn outward(lo: f64, hi: f64) -> Self {
         Self::new(lo.next_down(), hi.next_up())
     }
 
     /// Every square.
     #[must_use]
+    #[inline]
     pub fn square(self) -> Self {
         let (a, b) = (self.lo * self.lo, self.hi * self.hi);
         let least = if self.lo <= 0.0 && self.hi >= 0.0 {
@@ -46,6 +50,7 @@ impl Interval {
 
     /// Every square root of what is not negative.
     #[must_use]
+    #[inline]
     pub fn sqrt(self) -> Self {
         let lo = self.lo.max(0.0).sqrt().next_down().max(0.0);
         Self::new(lo, self.hi.max(0.0).sqrt().next_up())
@@ -54,6 +59,7 @@ impl Interval {
     /// What lies in both; `self` where they are disjoint, which two enclosures of one number
     /// never are.
     #[must_use]
+    #[inline]
     pub fn and(self, other: Self) -> Self {
         let (lo, hi) = (self.lo.max(other.lo), self.hi.min(other.hi));
         if lo <= hi { Self::new(lo, hi) } else { self }
@@ -61,6 +67,7 @@ impl Interval {
 
     /// Widened by `relative` times the larger end's size on either side.
     #[must_use]
+    #[inline]
     pub fn widened(self, relative: f64) -> Self {
         let by = relative * self.lo.abs().max(self.hi.abs());
         Self::outward(self.lo - by, self.hi + by)
@@ -69,6 +76,7 @@ impl Interval {
 
 impl Add for Interval {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         Self::outward(self.lo + other.lo, self.hi + other.hi)
     }
@@ -76,6 +84,7 @@ impl Add for Interval {
 
 impl Sub for Interval {
     type Output = Self;
+    #[inline]
     fn sub(self, other: Self) -> Self {
         Self::outward(self.lo - other.hi, self.hi - other.lo)
     }
@@ -83,6 +92,7 @@ impl Sub for Interval {
 
 impl Neg for Interval {
     type Output = Self;
+    #[inline]
     fn neg(self) -> Self {
         Self::new(-self.hi, -self.lo)
     }
@@ -110,6 +120,7 @@ impl Mul for Interval {
 
 impl Mul<f64> for Interval {
     type Output = Self;
+    #[inline]
     fn mul(self, factor: f64) -> Self {
         self * Self::point(factor)
     }
@@ -118,6 +129,7 @@ impl Mul<f64> for Interval {
 impl Div for Interval {
     type Output = Self;
     /// Everything where the divisor may be zero.
+    #[inline]
     fn div(self, other: Self) -> Self {
         if other.lo <= 0.0 && other.hi >= 0.0 {
             return Self::new(f64::NEG_INFINITY, f64::INFINITY);

@@ -67,6 +67,7 @@ pub struct Cell {
 
 /// The cell at `position` (x, y, z) on the axes; `None` outside the grid.
 #[must_use]
+#[inline]
 pub fn locate(axes: [&[f64]; 3], position: [f64; 3]) -> Option<Cell> {
     Some(Cell {
         x: stencil(axes[0], position[0])?,
@@ -83,6 +84,7 @@ impl Cell {
     /// # Panics
     /// When `values` is shorter than the grid.
     #[must_use]
+    #[inline]
     pub fn value(&self, values: &[f64]) -> f64 {
         self.component(values, 1, 0)
     }

@@ -29,6 +29,7 @@ pub fn product(a: &[f64], b: &[f64], inner: usize, out: &mut [f64]) {
 
 /// The transpose of `a`, which has rows of `columns`.
 #[must_use]
+#[inline]
 pub fn transpose(a: &[f64], columns: usize) -> Vec<f64> {
     let rows = a.len() / columns.max(1);
     (0..a.len())

@@ -40,6 +40,7 @@ pub trait Real:
     fn abs(self) -> Self;
 
     /// Sum of products over the shorter length.
+    #[inline]
     fn dot(a: &[Self], b: &[Self]) -> Self {
         a.iter()
             .zip(b)
@@ -47,6 +48,7 @@ pub trait Real:
     }
 
     /// `y += factor x` over the shorter length.
+    #[inline]
     fn add_scaled(y: &mut [Self], factor: Self, x: &[Self]) {
         for (y, &x) in y.iter_mut().zip(x) {
             *y += factor * x;
@@ -54,11 +56,13 @@ pub trait Real:
     }
 
     /// The larger of two numbers.
+    #[inline]
     fn larger(self, other: Self) -> Self {
         if other > self { other } else { self }
     }
 
     /// The smaller of two numbers.
+    #[inline]
     fn smaller(self, other: Self) -> Self {
         if other < self { other } else { self }
     }
@@ -69,22 +73,27 @@ impl Real for f64 {
     const ONE: Self = 1.0;
     const EPSILON: f64 = f64::EPSILON;
 
+    #[inline]
     fn of(value: f64) -> Self {
         value
     }
 
+    #[inline]
     fn to_f64(self) -> f64 {
         self
     }
 
+    #[inline]
     fn widened(self) -> DoubleDouble {
         DoubleDouble::exactly(self)
     }
 
+    #[inline]
     fn sqrt(self) -> Self {
         self.sqrt()
     }
 
+    #[inline]
     fn abs(self) -> Self {
         self.abs()
     }
@@ -116,22 +125,27 @@ impl Real for DoubleDouble {
     /// 2^-102: the worst of the operations stays below it.
     const EPSILON: f64 = 1.0 / (1_u128 << 102) as f64;
 
+    #[inline]
     fn of(value: f64) -> Self {
         DoubleDouble::exactly(value)
     }
 
+    #[inline]
     fn to_f64(self) -> f64 {
         self.nearest()
     }
 
+    #[inline]
     fn widened(self) -> DoubleDouble {
         self
     }
 
+    #[inline]
     fn sqrt(self) -> Self {
         self.square_root()
     }
 
+    #[inline]
     fn abs(self) -> Self {
         if self < Self::ZERO { -self } else { self }
     }

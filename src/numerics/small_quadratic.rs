@@ -36,6 +36,7 @@ const ROUNDS: usize = 3;
 
 /// a'b.
 #[must_use]
+#[inline]
 pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

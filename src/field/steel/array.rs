@@ -177,6 +177,8 @@ const FIRST_AIM: f64 = 4.0;
 const CLOSEST: f64 = 0.1;
 /// Heights above the cores, in radii, below which the outline is resolved for places close to it.
 const NEAR: f64 = 0.5;
+/// Modes that each refinement adds where places close to the cores are asked for.
+const MODES_NEAR: usize = 2;
 /// Places about every coil at which two resolutions are compared, in units of its outer radius.
 const PLACES: [[f64; 2]; 5] = [[0.0, 0.0], [0.6, 0.2], [0.7, 0.2], [-0.4, 1.1], [1.5, -1.2]];
 
@@ -212,9 +214,13 @@ impl CoupledArray {
         };
         let mut aim = FIRST_AIM * tolerance;
         let mut best: Option<Self> = None;
-        for _ in 0..=MOST_REFINEMENTS {
-            let mut resolution = ArrayResolution::for_tolerance(aim, shape, closest_m)
-                .within_memory(shape, winding.length_m, offsets);
+        for refinement in 0..=MOST_REFINEMENTS {
+            let mut resolution = ArrayResolution::for_tolerance(aim, shape, closest_m);
+            if near && resolution.modes > 1 {
+                // Close to a core its own modes are seen, before they have come back from another.
+                resolution.modes = (resolution.modes + MODES_NEAR * refinement).min(MOST_MODES);
+            }
+            let mut resolution = resolution.within_memory(shape, winding.length_m, offsets);
             let mut coarse = resolution.coarser();
             if near {
                 resolution.outline = Resolution::near_steel(0.3 * aim);
