@@ -10,7 +10,7 @@
 //! [`interruptible`], a stop ends all that the process computes. Otherwise [`poll`] does nothing.
 //!
 //! ```
-//! use fluxform::progress::{self, Interrupted};
+//! use fluxform_base::progress::{self, Interrupted};
 //!
 //! let stopped = progress::interruptible(|| {
 //!     progress::request_stop(); // as a rule from another thread, or by a signal

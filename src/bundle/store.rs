@@ -123,6 +123,7 @@ impl Store {
         let Ok((dir, _made)) = atomic::open_made(parent, OsStr::new(folder)) else {
             return;
         };
+        atomic::clean_leftovers(&dir);
         // What is there and is no entry is left alone.
         if matches!(dir.status(name), Ok(Some(_))) && !is_entry(&dir, OsStr::new(name)) {
             return;

@@ -5,7 +5,7 @@
 //! ```
 //! use std::path::Path;
 //!
-//! use fluxform::design::{Design, Need};
+//! use fluxform_design::{Design, Need};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let text = "

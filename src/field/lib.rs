@@ -4,9 +4,9 @@
 //! force.
 //!
 //! ```
-//! use fluxform::field::dipole::{cylinder_moment_a_m2, force_n};
-//! use fluxform::field::frame::to_cartesian;
-//! use fluxform::field::winding::Winding;
+//! use fluxform_field::dipole::{cylinder_moment_a_m2, force_n};
+//! use fluxform_field::frame::to_cartesian;
+//! use fluxform_field::winding::Winding;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let coil = Winding { inner_radius_m: 0.012, outer_radius_m: 0.019, length_m: 0.1, turns: 1429.0 };

@@ -160,9 +160,13 @@ fn no_steel() -> JobError {
 const MEAN_SHARE: f64 = 0.5;
 const SOURCE_SHARE: f64 = 0.4;
 
+/// Maps the field of one source.
+type MapOne<'a> =
+    &'a dyn Fn(&[PlacedCoil], &Grid, Components, &dyn Progress) -> Result<FieldMap, MapError>;
+
 /// Makes maps of the field of one source.
 struct Maker<'a> {
-    one: &'a dyn Fn(&[PlacedCoil], &Grid, Components, &dyn Progress) -> Result<FieldMap, MapError>,
+    one: MapOne<'a>,
     /// Means of it, where coils are alike.
     means: Option<&'a MeanField<'a>>,
 }

@@ -7,9 +7,9 @@
 //! The room knows numbers alone: forces, heights and limits of any origin.
 //!
 //! ```
-//! use fluxform::lambda::{ForceProblem, Settings, solve};
+//! use fluxform_lambda::{ForceProblem, Settings, solve};
 //!
-//! # fn main() -> Result<(), fluxform::lambda::ProblemError> {
+//! # fn main() -> Result<(), fluxform_lambda::ProblemError> {
 //! // Two coils, each felt at one of two points 50 mm high, a third point between them.
 //! let problem = ForceProblem {
 //!     forces_n_per_a: &[0.13, 0.0, 0.05, 0.07, 0.0, 0.11],

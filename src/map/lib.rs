@@ -5,10 +5,10 @@
 //! ([`fluxform_numerics::lagrange`]).
 //!
 //! ```
-//! use fluxform::field::winding::Winding;
-//! use fluxform::map::{Components, Grid, PlacedCoil, interpolation_error, tabulate};
-//! use fluxform::numerics::lagrange::locate;
-//! use fluxform::progress::Silent;
+//! use fluxform_field::winding::Winding;
+//! use fluxform_map::{Components, Grid, PlacedCoil, interpolation_error, tabulate};
+//! use fluxform_numerics::lagrange::locate;
+//! use fluxform_base::progress::Silent;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let winding =

@@ -6,8 +6,8 @@
 //! ```
 //! use std::path::Path;
 //!
-//! use fluxform::progress::Silent;
-//! use fluxform::shape::{discretize, document::ShapeDocument};
+//! use fluxform_base::progress::Silent;
+//! use fluxform_shape::{discretize, document::ShapeDocument};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let text = "

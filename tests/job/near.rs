@@ -1,5 +1,8 @@
 //! Points close to the steel: a value is its own point's, and its error is what is claimed.
 
+// One test prints a table.
+#![allow(clippy::print_stdout)]
+
 use std::path::Path;
 
 use fluxform::design::{Design, Need};

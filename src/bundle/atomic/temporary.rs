@@ -54,8 +54,9 @@ impl TemporaryFile {
                 name: Some(name.into()),
                 _writing: Writing::begin(),
             };
-            if let Some(name) = claim(dir, &made.file, made.name.take().as_deref())? {
-                made.name = Some(name);
+            // On an error it is removed as it is dropped.
+            made.name = claim(dir, &made.file, made.name.as_deref())?;
+            if made.name.is_some() {
                 return Ok(made);
             }
         }
@@ -101,7 +102,7 @@ pub(super) struct TemporaryFolder {
     parent: Dir,
     /// `None` once it has a name of its own.
     name: Option<OsString>,
-    _lock: File,
+    lock: File,
     _writing: Writing,
 }
 
@@ -122,15 +123,17 @@ impl TemporaryFolder {
                 }
                 made => made?,
             };
-            let lock = dir.handle()?;
-            if let Some(name) = claim(parent, &lock, Some(OsStr::new(&name)))? {
-                return Ok(Self {
-                    dir,
-                    parent: parent.clone(),
-                    name: Some(name),
-                    _lock: lock,
-                    _writing: Writing::begin(),
-                });
+            let mut made = Self {
+                lock: dir.handle()?,
+                dir,
+                parent: parent.clone(),
+                name: Some(name.into()),
+                _writing: Writing::begin(),
+            };
+            // On an error it is removed as it is dropped.
+            made.name = claim(parent, &made.lock, made.name.as_deref())?;
+            if made.name.is_some() {
+                return Ok(made);
             }
         }
     }
