@@ -320,7 +320,7 @@ mod tests {
 
     #[test]
     fn the_file_itself_may_be_at_fault() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
         let why = |path: &Path| read_bh_table(path).unwrap_err().faults.plain();
         assert!(why(folder).contains("expected a CSV table, found a directory"));
         assert!(why(&folder.join("no_such.csv")).contains("cannot read the file"));
