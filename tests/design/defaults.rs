@@ -8,7 +8,8 @@ use fluxform_design::{Coupling, Design, Limits, MagnetModel, Need, Polarity, Ste
 use crate::support::{CORED, SOUND, but, read, sound, sound_but};
 
 fn committed(file: &str) -> Design {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
+    let repository = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2);
+    let path = repository.unwrap().join(file);
     let (design, warnings) = Design::read(&path, Need::CALIBRATE).unwrap();
     assert!(warnings.is_empty(), "{warnings}");
     design
