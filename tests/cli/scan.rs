@@ -242,7 +242,7 @@ fn a_turned_sensor_is_found_over_coils_with_steel() {
     // `probe` solves the steel for any place, the fit for those of the scan: they differ by what
     // both state.
     for (found, turn) in numbers(&fit["rotation_deg"]).iter().zip(made.turn_deg) {
-        assert!((found - turn).abs() < 1e-5, "{fit:#}");
+        assert!((found - turn).abs() < 1e-4, "{fit:#}");
     }
     for (found, shift) in numbers(&fit["position_m"]).iter().zip(made.shift_m) {
         assert!((found - shift).abs() < 1e-8, "{fit:#}");
