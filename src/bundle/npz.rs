@@ -380,7 +380,7 @@ impl Archive {
     }
 }
 
-/// The arrays of an untrusted `map.npz`, an archive of the form that [`stored`] states. Nothing is
+/// The arrays of an untrusted `map.npz`, an archive of the form that `stored` states. Nothing is
 /// allocated beyond the file's own size; unknown arrays are passed over.
 ///
 /// # Errors

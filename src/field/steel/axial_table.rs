@@ -6,7 +6,7 @@
 //! belongs to. In either coordinate the nearest singularity then is s off an interval of
 //! half-width s/2 or more: Bernstein radius 2 + sqrt(5). A cell is a product of Chebyshev series,
 //! computed from the exact field when a point first falls into it. What a point's value is thus
-//! depends on the point alone. Points closer than [`NEAREST`] to a source get the exact field.
+//! depends on the point alone. Points closer than `NEAREST` to a source get the exact field.
 
 use std::collections::HashMap;
 use std::f64::consts::{PI, SQRT_2};
@@ -89,7 +89,7 @@ impl AxialTable {
         })
     }
 
-    /// `wanted` at the points (`r_m`, `z_m`), [quantity][point].
+    /// `wanted` at the points (`r_m`, `z_m`), `[quantity][point]`.
     ///
     /// # Errors
     /// A point on the winding's edge.
