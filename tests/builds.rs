@@ -13,6 +13,8 @@
 
 #[path = "builds/difference.rs"]
 mod difference;
+#[path = "support/needs.rs"]
+mod needs;
 #[allow(dead_code)]
 #[path = "crash/place.rs"]
 mod place;
@@ -20,11 +22,24 @@ mod place;
 #[path = "crash/scenario.rs"]
 mod scenario;
 
+use std::ffi::OsString;
 use std::path::PathBuf;
-use std::process::Command;
+use std::process::{Command, ExitCode};
 
 use difference::{Difference, between};
+use needs::trials;
 use place::{PROGRAM, Place, Tree};
+
+fn main() -> ExitCode {
+    needs::run(trials! {
+        None => [threads_change_no_byte, the_c_library_may_do_without_avx2_and_fma],
+        no_emulator() => [
+            a_processor_without_avx2_and_fma_agrees,
+            what_another_processor_kept_is_not_used,
+        ],
+        no_other_build() => [another_build_agrees],
+    })
+}
 
 /// How the program is started.
 #[derive(Clone, Default)]
@@ -153,7 +168,6 @@ fn agree(name: &str, way: &Way) {
     }
 }
 
-#[test]
 fn threads_change_no_byte() {
     for threads in ["1", "5"] {
         let mut way = Way::plain();
@@ -162,7 +176,6 @@ fn threads_change_no_byte() {
     }
 }
 
-#[test]
 fn the_c_library_may_do_without_avx2_and_fma() {
     let mut way = Way::plain();
     let without = "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4,-AVX512F";
@@ -170,30 +183,29 @@ fn the_c_library_may_do_without_avx2_and_fma() {
     agree("the C library's plain functions", &way);
 }
 
+const EMULATOR: &str = "qemu-x86_64";
+
+/// What emulates a processor without AVX, where it is missing.
+fn no_emulator() -> Option<String> {
+    let found = Command::new(EMULATOR).arg("--version").output();
+    let there = cfg!(target_arch = "x86_64") && found.is_ok_and(|output| output.status.success());
+    (!there).then(|| format!("{EMULATOR} (Debian: qemu-user)"))
+}
+
 /// A processor without AVX, emulated.
-fn old_processor() -> Option<Way> {
-    let emulator = "qemu-x86_64";
-    let found = Command::new(emulator).arg("--version").output();
-    if !cfg!(target_arch = "x86_64") || !found.is_ok_and(|output| output.status.success()) {
-        eprintln!("skipped: no {emulator} (Debian: qemu-user)");
-        return None;
-    }
+fn old_processor() -> Way {
     let mut way = Way::plain();
-    let start = [emulator, "-cpu", "Westmere", PROGRAM];
+    let start = [EMULATOR, "-cpu", "Westmere", PROGRAM];
     way.start = start.map(str::to_owned).to_vec();
-    Some(way)
+    way
 }
 
-#[test]
 fn a_processor_without_avx2_and_fma_agrees() {
-    if let Some(way) = old_processor() {
-        agree("a processor without AVX2 and FMA", &way);
-    }
+    agree("a processor without AVX2 and FMA", &old_processor());
 }
 
-#[test]
 fn what_another_processor_kept_is_not_used() {
-    let Some(way) = old_processor() else { return };
+    let way = old_processor();
     let args = [
         "calibrate",
         "two.toml",
@@ -209,12 +221,17 @@ fn what_another_processor_kept_is_not_used() {
     scenario::same(&shared.tree(), &own.tree()).unwrap();
 }
 
-#[test]
+fn other_build() -> Option<OsString> {
+    std::env::var_os("FLUXFORM_OTHER")
+}
+
+fn no_other_build() -> Option<String> {
+    let missing = "FLUXFORM_OTHER to name another build";
+    other_build().is_none().then(|| missing.to_owned())
+}
+
 fn another_build_agrees() {
-    let Some(other) = std::env::var_os("FLUXFORM_OTHER") else {
-        eprintln!("skipped: FLUXFORM_OTHER names no other build");
-        return;
-    };
+    let other = other_build().unwrap_or_default();
     let other = PathBuf::from(&other)
         .canonicalize()
         .unwrap_or_else(|error| {

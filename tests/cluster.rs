@@ -1,19 +1,31 @@
 //! A sweep as a cluster runs it: GNU parallel and a Slurm of its own, each killed half way and
-//! begun again. Skips what is not installed, and says so.
-#![cfg(unix)]
-#![allow(clippy::print_stderr)] // what was skipped, and why
+//! begun again.
+#![allow(clippy::print_stderr)] // what the script reports
+
+#[path = "support/needs.rs"]
+mod needs;
 
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, ExitCode};
 
-fn run(with: &str, tool: &str) {
-    // Slurm's tools tell their version only where Slurm is configured.
+use needs::trials;
+
+fn main() -> ExitCode {
+    needs::run(trials! {
+        missing("parallel") => [shards_under_gnu_parallel],
+        missing("sbatch") => [a_job_array_under_slurm],
+    })
+}
+
+/// `tool`, where there is none. Slurm's report their version only where Slurm is configured.
+fn missing(tool: &str) -> Option<String> {
     let look = format!("command -v {tool}");
     let there = Command::new("sh").args(["-c", &look]).output();
-    if !there.is_ok_and(|output| output.status.success()) {
-        eprintln!("skipped: no {tool}");
-        return;
-    }
+    let there = there.is_ok_and(|output| output.status.success());
+    (!there).then(|| tool.to_owned())
+}
+
+fn run(with: &str) {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cluster/run_local.sh");
     let output = Command::new("bash")
         .arg(script)
@@ -28,12 +40,10 @@ fn run(with: &str, tool: &str) {
     eprint!("{out}");
 }
 
-#[test]
 fn shards_under_gnu_parallel() {
-    run("parallel", "parallel");
+    run("parallel");
 }
 
-#[test]
 fn a_job_array_under_slurm() {
-    run("slurm", "sbatch");
+    run("slurm");
 }

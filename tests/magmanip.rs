@@ -1,16 +1,34 @@
 //! The files for mag_manip: read back by hand, and by mag_manip itself.
 //!
 //! The latter needs a Python with the package mag-manip: what `FLUXFORM_MAGMANIP_PYTHON` names, or
-//! `python3.11` or `python3`. Without one that test says so and is skipped.
+//! `python3.11` or `python3`. Without one that test is reported as ignored.
 #![allow(clippy::print_stderr, clippy::print_stdout)] // a test may tell what it compared
 #![allow(clippy::disallowed_methods)] // a test writes where it likes
 
+#[path = "support/needs.rs"]
+mod needs;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, ExitCode, Output};
 
 use fluxform::map::multipole::{PARTS, Source, magnitudes};
+use needs::trials;
 use serde_json::Value;
+
+fn main() -> ExitCode {
+    needs::run(trials! {
+        None => [
+            nodes_hold_what_probe_says_x_slowest,
+            sources_of_air_coils_stand_on_their_own_axes,
+            sources_of_coupled_cores_stand_on_all_axes,
+            an_unmet_tolerance_ends_with_four_and_the_files,
+            the_same_bytes_on_any_number_of_threads_and_over_our_own_files,
+            wrong_usage_and_workspaces_that_do_not_do_are_told,
+        ],
+        missing() => [mag_manip_reads_what_is_stated],
+    })
+}
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -153,7 +171,6 @@ fn read_nodes(text: &str) -> Nodes {
     Nodes { keys, axes, data }
 }
 
-#[test]
 fn nodes_hold_what_probe_says_x_slowest() {
     let made = Made::new("seed_air.toml", &[]);
     assert_eq!(made.code, Some(0));
@@ -308,7 +325,6 @@ fn multipoles(made: &Made, tolerance: f64) {
     }
 }
 
-#[test]
 fn sources_of_air_coils_stand_on_their_own_axes() {
     let made = Made::new("seed_air.toml", &[]);
     multipoles(&made, 1e-3);
@@ -325,7 +341,6 @@ fn sources_of_air_coils_stand_on_their_own_axes() {
     }
 }
 
-#[test]
 fn sources_of_coupled_cores_stand_on_all_axes() {
     let made = Made::new("seed.toml", &[]);
     assert_eq!(made.code, Some(0));
@@ -337,7 +352,6 @@ fn sources_of_coupled_cores_stand_on_all_axes() {
     assert!(terms(&looser) < terms(&made));
 }
 
-#[test]
 fn an_unmet_tolerance_ends_with_four_and_the_files() {
     let made = Made::new("seed_air.toml", &["--mpem-tolerance", "1e-13"]);
     assert_eq!(made.code, Some(4));
@@ -345,7 +359,6 @@ fn an_unmet_tolerance_ends_with_four_and_the_files() {
     assert!(made.text("mpem.yaml").len() > 1000);
 }
 
-#[test]
 fn the_same_bytes_on_any_number_of_threads_and_over_our_own_files() {
     let made = Made::new("seed_air.toml", &["--threads", "1"]);
     let sidecar: Value = serde_json::from_str(&made.text("map/map.json")).unwrap();
@@ -384,7 +397,6 @@ fn the_same_bytes_on_any_number_of_threads_and_over_our_own_files() {
     assert_eq!(made.text("mpem.yaml"), before.1);
 }
 
-#[test]
 fn wrong_usage_and_workspaces_that_do_not_do_are_told() {
     let folder = tempfile::tempdir().unwrap();
     let design = coarse("seed_air.toml", folder.path());
@@ -423,30 +435,28 @@ fn wrong_usage_and_workspaces_that_do_not_do_are_told() {
     }
 }
 
-/// A Python with mag_manip; `None` with a word where there is none.
+/// A Python with mag_manip.
 fn python() -> Option<PathBuf> {
     let named: Vec<PathBuf> = match std::env::var_os("FLUXFORM_MAGMANIP_PYTHON") {
         Some(named) => vec![named.into()],
         None => vec!["python3.11".into(), "python3".into()],
     };
-    let found = named.iter().find(|python| {
+    named.into_iter().find(|python| {
         let run = Command::new(python)
             .args(["-c", "import numpy; from mag_manip import mag_manip"])
             .output();
         run.is_ok_and(|run| run.status.success())
-    });
-    if found.is_none() {
-        eprintln!(
-            "skipped: no Python that imports numpy and mag_manip (pip install -r \
-             scripts/peers/requirements_magmanip.txt, then FLUXFORM_MAGMANIP_PYTHON=...)"
-        );
-    }
-    found.cloned()
+    })
 }
 
-#[test]
+fn missing() -> Option<String> {
+    let missing = "a Python with numpy and mag_manip (pip install -r \
+                   scripts/peers/requirements_magmanip.txt, then FLUXFORM_MAGMANIP_PYTHON=...)";
+    python().is_none().then(|| missing.to_owned())
+}
+
 fn mag_manip_reads_what_is_stated() {
-    let Some(python) = python() else { return };
+    let python = python().unwrap_or_default();
     let folder = tempfile::tempdir().unwrap();
     for design in ["seed_air.toml", "seed.toml"] {
         let run = Command::new(&python)

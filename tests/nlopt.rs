@@ -1,16 +1,20 @@
 //! `optimize` against NLopt and an independent model of the coil (`scripts/nlopt_reference.py`).
 //!
 //! Needs a Python with numpy, scipy and nlopt: `python3`, or what `FLUXFORM_PYTHON` names. Without
-//! one the tests say so and are skipped. `FLUXFORM_NLOPT=all` judges all problems instead of those
+//! one the tests are reported as ignored. `FLUXFORM_NLOPT=all` judges all problems instead of those
 //! marked `ci`, and solves all of them anew.
 #![allow(clippy::print_stderr, clippy::print_stdout)] // a test may tell what it compared
 
+#[path = "support/needs.rs"]
+mod needs;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, ExitCode, Output};
 
 use fluxform::design::{Design, Need};
 use fluxform::job::evaluate::evaluate;
+use needs::trials;
 use serde_json::{Value, json};
 
 const DESIGNS: usize = 100;
@@ -19,23 +23,34 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// A Python that has what the script needs; `None` with a word where there is none.
-fn python() -> Option<PathBuf> {
-    let named = std::env::var_os("FLUXFORM_PYTHON").unwrap_or_else(|| "python3".into());
-    let run = Command::new(&named)
+fn main() -> ExitCode {
+    needs::run(trials! {
+        missing() => [
+            both_models_agree_on_random_designs,
+            no_problem_has_a_better_coil_and_no_limit_is_missed,
+            wrong_models_fail_the_judge,
+            the_reference_is_what_its_script_finds,
+        ],
+    })
+}
+
+/// `python3`, or the one that `FLUXFORM_PYTHON` names.
+fn python() -> PathBuf {
+    std::env::var_os("FLUXFORM_PYTHON").map_or_else(|| "python3".into(), PathBuf::from)
+}
+
+/// A Python that has what the script needs, where there is none.
+fn missing() -> Option<String> {
+    let run = Command::new(python())
         .args(["-c", "import numpy, scipy, nlopt"])
         .output();
-    match run {
-        Ok(run) if run.status.success() => Some(named.into()),
-        _ => {
-            eprintln!(
-                "skipped: {} cannot import numpy, scipy and nlopt (pip install -r \
-                 scripts/nlopt_requirements.txt)",
-                Path::new(&named).display()
-            );
-            None
-        }
-    }
+    let there = run.is_ok_and(|run| run.status.success());
+    (!there).then(|| {
+        format!(
+            "numpy, scipy and nlopt for {} (pip install -r scripts/nlopt_requirements.txt)",
+            python().display()
+        )
+    })
 }
 
 fn script(python: &Path, arguments: &[&str]) -> Output {
@@ -175,9 +190,8 @@ fn random_design(numbers: &mut Numbers, core: bool) -> Value {
     })
 }
 
-#[test]
 fn both_models_agree_on_random_designs() {
-    let Some(python) = python() else { return };
+    let python = python();
     let mut numbers = Numbers(7);
     let designs: Vec<Value> = (0..2 * DESIGNS)
         .map(|k| random_design(&mut numbers, k >= DESIGNS))
@@ -196,9 +210,8 @@ fn both_models_agree_on_random_designs() {
     assert!(!script(&python, &["--models", &models]).status.success());
 }
 
-#[test]
 fn no_problem_has_a_better_coil_and_no_limit_is_missed() {
-    let Some(python) = python() else { return };
+    let python = python();
     let claims: BTreeMap<String, Value> = problems()
         .into_iter()
         .map(|(name, design)| (name, claim(&design)))
@@ -212,15 +225,13 @@ fn no_problem_has_a_better_coil_and_no_limit_is_missed() {
     passes(&python, &arguments);
 }
 
-#[test]
 fn wrong_models_fail_the_judge() {
-    let Some(python) = python() else { return };
+    let python = python();
     passes(&python, &["--mutants"]);
 }
 
-#[test]
 fn the_reference_is_what_its_script_finds() {
-    let Some(python) = python() else { return };
+    let python = python();
     let which: &[&str] = if all() {
         &["--all"]
     } else {

@@ -2,35 +2,54 @@
 //! forces, heights and currents are Rust's. The same file serves MATLAB, which is not tried here.
 #![allow(clippy::disallowed_methods, clippy::print_stderr)]
 
+#[path = "support/needs.rs"]
+mod needs;
 #[allow(dead_code)] // the other tests of bundles use the rest
 #[path = "bundle/sample.rs"]
 mod sample;
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, ExitCode, Output};
 
 use fluxform::bundle::load::Bundle;
 use fluxform::bundle::replay::Answer;
 use fluxform::job::replay::renderer::Renderer;
 
+use needs::trials;
 use sample::*;
 
-/// Octave on a script in a folder; `None`, with a reason, where there is none of version 7.
-fn octave(folder: &Path, script: &str) -> Option<Output> {
-    let run = |text: &str| {
-        Command::new("octave-cli")
-            .args(["--norc", "--quiet", "--eval", text])
-            .env("FLUXFORM_SCRIPTS", scripts())
-            .current_dir(folder)
-            .output()
-    };
-    let version = run("printf('%d', compare_versions(version, '7.0.0', '>='))");
-    if !version.is_ok_and(|output| output.stdout == b"1") {
-        eprintln!("skipped: no octave-cli of version 7 or newer (Debian: octave)");
-        return None;
-    }
-    Some(run(script).unwrap())
+fn main() -> ExitCode {
+    needs::run(trials! {
+        missing() => [
+            octave_and_rust_give_the_same_forces_heights_and_currents,
+            octave_reads_the_tables_and_the_json_files_by_its_own_functions,
+            a_loaded_map_goes_into_a_mat_file,
+            a_changed_file_is_refused,
+        ],
+    })
+}
+
+/// Octave of version 7 or newer, where there is none.
+fn missing() -> Option<String> {
+    let newer = "printf('%d', compare_versions(version, '7.0.0', '>='))";
+    let found = command(Path::new("."), newer).output();
+    let there = found.is_ok_and(|output| output.stdout == b"1");
+    (!there).then(|| "octave-cli 7 or newer (Debian: octave)".to_owned())
+}
+
+fn command(folder: &Path, script: &str) -> Command {
+    let mut command = Command::new("octave-cli");
+    command
+        .args(["--norc", "--quiet", "--eval", script])
+        .env("FLUXFORM_SCRIPTS", scripts())
+        .current_dir(folder);
+    command
+}
+
+/// Octave on a script in a folder.
+fn octave(folder: &Path, script: &str) -> Output {
+    command(folder, script).output().unwrap()
 }
 
 /// What Octave prints, as rows of numbers.
@@ -79,7 +98,6 @@ format = [repmat('%.17g ', 1, columns(found)), '\\n'];
 printf(format, found.');
 ";
 
-#[test]
 fn octave_and_rust_give_the_same_forces_heights_and_currents() {
     for (name, tilted, pulled, samples) in [
         ("upright", false, false, [13, 17, 11]),
@@ -101,9 +119,7 @@ fn octave_and_rust_give_the_same_forces_heights_and_currents() {
             .map(|[x, y, z]| format!("{x},{y},{z}\n"))
             .collect();
         fs::write(folder.path().join("positions.csv"), table).unwrap();
-        let Some(output) = octave(folder.path(), FORCES) else {
-            return;
-        };
+        let output = octave(folder.path(), FORCES);
         let found = rows(&output);
         assert_eq!(found.len(), at.len(), "{name}");
         let mut worst = [0.0_f64; 4];
@@ -176,15 +192,12 @@ printf('%d ', strcmp(manifest.map.interpolation.name, 'tricubic-lagrange'), nume
 printf('\\n');
 ";
 
-#[test]
 fn octave_reads_the_tables_and_the_json_files_by_its_own_functions() {
     let folder = temporary();
     let target = folder.path().join("bundle");
     sample(false, [4, 3, 2]).write(&target, false).unwrap();
     let bundle = Bundle::open(&target).unwrap();
-    let Some(output) = octave(folder.path(), TABLES) else {
-        return;
-    };
+    let output = octave(folder.path(), TABLES);
     let found = rows(&output);
     let points = bundle
         .points
@@ -221,18 +234,14 @@ printf('%d\\n', isequal(again, map));
 printf('%d ', size(again.gz_t_per_m_per_a));
 ";
 
-#[test]
 fn a_loaded_map_goes_into_a_mat_file() {
     let folder = temporary();
     let target = folder.path().join("bundle");
     sample(false, [5, 4, 3]).write(&target, false).unwrap();
-    let Some(output) = octave(folder.path(), KEPT) else {
-        return;
-    };
+    let output = octave(folder.path(), KEPT);
     assert_eq!(rows(&output), [vec![1.0], vec![3.0, 3.0, 4.0, 5.0]]);
 }
 
-#[test]
 fn a_changed_file_is_refused() {
     let folder = temporary();
     let target = folder.path().join("bundle");
@@ -255,9 +264,7 @@ fn a_changed_file_is_refused() {
         }
         fs::write(&path, bytes).unwrap();
         let script = "addpath(getenv('FLUXFORM_SCRIPTS')); load_bundle('bundle');";
-        let Some(output) = octave(folder.path(), script) else {
-            return;
-        };
+        let output = octave(folder.path(), script);
         let words = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(!output.status.success(), "{file} was read");
         assert!(
