@@ -94,10 +94,14 @@ impl Cells {
         }
     }
 
-    /// Moves the cells so that one of them has `at` in its middle. Without effect once a point
+    /// Moves the cells along the first two axes so that one of them has `at` in its middle: the
+    /// third variable's origin is a border of the functions' domain. Without effect once a point
     /// has been asked for. Not for use within a parallel loop.
     pub fn focus(&self, at: [f64; 3]) {
-        let origin = std::array::from_fn(|i| at[i] - 0.5 * self.lattice.width[i]);
+        let mut origin = self.lattice.origin;
+        for i in 0..2 {
+            origin[i] = at[i] - 0.5 * self.lattice.width[i];
+        }
         // Later points find the cells where the first one did.
         let _ = self.origin.set(origin);
     }
@@ -269,8 +273,9 @@ mod tests {
     #[test]
     fn a_focus_is_in_the_middle_of_its_cell_and_stays() {
         let cells = cells();
-        let at = [0.45, -0.29, 0.8];
+        let at = [0.45, -0.29, 0.5];
         cells.focus(at);
+        // Along the third axis the cells are where they were: 0.2 to 0.8.
         let half = [0.35, 0.4, 0.3];
         for side in [-0.99, 0.99] {
             let beside = std::array::from_fn(|i| at[i] + side * half[i]);

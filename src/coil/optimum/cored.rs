@@ -234,6 +234,9 @@ impl CoredModel {
         depths_m: &[f64],
         resolution: &Resolution,
     ) -> Option<Vec<(CoredCoil, Direct)>> {
+        if depths_m.iter().any(|depth_m| *depth_m <= 0.0) {
+            return None;
+        }
         let inner_radius_m = radius_m + self.rule.clearance_m;
         let shape = CoreShape {
             radius_m,

@@ -411,6 +411,35 @@ fn slopes_of_a_thin_winding_around_a_thick_core() {
     );
 }
 
+/// Regression: moved to a thick winding, the table's cells reached depths below zero, and a thin
+/// winding's force was half of what it is; wound coils half as strong as the best were the answer.
+#[test]
+fn a_table_moved_to_a_thick_winding_serves_thin_ones() {
+    let coarse = model(rule(), true);
+    coarse.focus(&Window {
+        inner_radius_m: 0.008,
+        depth_m: 0.0026,
+        length_m: 0.029,
+    });
+    for depth_m in [0.0004, 0.0012, 0.006] {
+        let window = Window {
+            inner_radius_m: 0.0086,
+            depth_m,
+            length_m: 0.029,
+        };
+        let response = coarse
+            .response(&window, 1.0 / 0.49e-6, 1.0, true)
+            .expect("in the domain");
+        let (force_n, inductance_h) = direct(&window, &rule());
+        let force = response.force_n.value / force_n - 1.0;
+        let inductance = response.inductance_h.value / inductance_h - 1.0;
+        assert!(
+            force.abs() < 3e-3 && inductance.abs() < 3e-3,
+            "{depth_m}: {force:e} {inductance:e}"
+        );
+    }
+}
+
 /// Rules and windows of a fixed sequence, of every kind that a design may ask for.
 fn drawn(count: usize) -> Vec<(CoreRule, Window)> {
     let mut state = 7_u64;

@@ -443,6 +443,34 @@ fn a_missing_limit_is_named() {
     is_global(&outcome, outcome.best.as_ref().expect("optimal"));
 }
 
+/// Regression: a coil of kilometres was the answer, and winding it did not end.
+#[test]
+fn a_settling_time_that_any_length_meets_leaves_the_length_without_an_end() {
+    let of = |settling_max_s: f64, inner_diameter_min_m: Option<f64>| {
+        let limits = Limits {
+            outer_diameter_max_m: Some(0.0326),
+            settling_max_s: Some(settling_max_s),
+            inner_diameter_min_m,
+            ..Limits::default()
+        };
+        let settings = Settings {
+            starts: 6,
+            cells: 0,
+            ..quick()
+        };
+        let outcome = optimise(&air(HEIGHT_M), &task(limits, None), &settings, &Silent);
+        outcome.expect("runs")
+    };
+    // What a solid coil of 32.6 mm approaches: 5 mu_0 a^2 pi / 24 over the resistivity.
+    for (inner_m, approached_s) in [(None, 0.013_008), (Some(0.02), 0.010_457)] {
+        let status = of(1.02 * approached_s, inner_m).status;
+        let missing = vec![LimitName::Length];
+        assert_eq!(status, Status::Unbounded { missing });
+        let best = of(0.9 * approached_s, inner_m).best.expect("an end");
+        assert!(best.window.length_m < 1.0, "{best:?}");
+    }
+}
+
 #[test]
 fn given_dimensions_are_kept() {
     let fixed = Fixed {
