@@ -68,14 +68,10 @@ pub(super) fn why_none(
         let ends = match problem.model.draft() {
             Some(draft) => {
                 let draft = problem.with_model(&*draft);
-                let draft = Violated(&draft);
-                let ends = search::locals(&draft, points, 0, progress)?;
-                search::locals(
-                    &Violated(problem),
-                    search::promising(&draft, ends),
-                    0,
-                    progress,
-                )?
+                let ends = search::locals(&Violated(&draft), points, 0, progress)?;
+                // Violations are sums of squares, whose errors no model states.
+                let starts = search::promising(&Violated(&draft), |_| f64::INFINITY, ends);
+                search::locals(&Violated(problem), starts, 0, progress)?
             }
             None => search::locals(&Violated(problem), points, 0, progress)?,
         };

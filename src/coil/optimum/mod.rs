@@ -28,7 +28,10 @@
 pub mod air;
 pub mod alternatives;
 pub mod axis_gradient;
+mod best_bore;
+mod bounded_coils;
 pub mod branch;
+pub mod candidates;
 pub mod cells;
 pub mod cored;
 #[cfg(test)]
@@ -36,13 +39,12 @@ mod cored_tests;
 mod diagnosis;
 pub mod domain;
 pub mod enclosure;
-pub mod exhaustive;
-pub mod listing;
 pub mod model;
 pub mod neighbours;
 pub mod outcome;
 pub mod problem;
 mod scalar;
+mod screened_coils;
 pub mod search;
 pub mod sequential;
 mod sharpen;
@@ -53,7 +55,7 @@ mod tests;
 pub mod valley;
 pub mod wound;
 
-pub use listing::{WoundCoil, WoundOutcome};
+pub use candidates::{WoundCoil, WoundOutcome};
 pub use model::{CoilModel, Strand, Window};
 pub use outcome::{BestCoil, Certificate, CertificateKind, LimitUse, Outcome, Status};
 pub use problem::{Fixed, LimitName, Task};

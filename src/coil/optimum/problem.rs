@@ -256,17 +256,15 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The problem without its limit on the settling time; `None` where it has none.
+    /// The problem without the limits `names`; `None` where it has none of them.
     #[must_use]
-    pub fn without_settling(&self) -> Option<Problem<'a>> {
-        self.with_inductance.then(|| {
-            let mut bounds = self.bounds.clone();
-            bounds.retain(|bound| bound.name != LimitName::Settling);
-            Problem {
-                bounds,
-                with_inductance: false,
-                ..*self
-            }
+    pub fn without(&self, names: &[LimitName]) -> Option<Problem<'a>> {
+        let mut bounds = self.bounds.clone();
+        bounds.retain(|bound| !names.contains(&bound.name));
+        (bounds.len() < self.bounds.len()).then(|| Problem {
+            with_inductance: bounds.iter().any(|b| b.name == LimitName::Settling),
+            bounds,
+            ..*self
         })
     }
 

@@ -236,7 +236,7 @@ fn multistart(
 ) -> Result<(), Interrupted> {
     // The inductance costs most. Without the settling time the force can only be higher: a coil
     // that is best without it and meets it is best with it.
-    if let Some(relaxed) = solved.problem.without_settling() {
+    if let Some(relaxed) = solved.problem.without(&[LimitName::Settling]) {
         let (best, evaluations) = search(&relaxed, settings, progress)?;
         solved.evaluations += evaluations;
         solved.starts += settings.starts;
@@ -273,7 +273,8 @@ fn search(
             let draft = problem.with_model(&*draft);
             let found = locals(&draft, points, 1, progress)?;
             evaluations += found.iter().map(|local| local.evaluations).sum::<usize>();
-            let starts = promising(&draft, found);
+            let doubt = |x| draft.model.doubts(&Problem::window(x)).force_ln;
+            let starts = promising(&draft, doubt, found);
             if let Some(best) = starts.first() {
                 problem.model.focus(&Problem::window(*best));
             }
@@ -335,8 +336,6 @@ pub(super) fn locals(
 
 /// Most ends of a draft's searches that are searched from again.
 const PROMISING: usize = 6;
-/// How far below the draft's best objective the true best may be.
-pub(super) const DRAFT_DOUBT: f64 = 0.3;
 /// How much smaller, relatively, coils are tried in turn where a draft's do not lead to one that
 /// meets the limits.
 const SMALLER: [f64; 3] = [0.0, 0.04, 0.15];
@@ -345,13 +344,18 @@ const SAME: f64 = 0.03;
 
 /// The different ends of searches on a draft that may be the best one: of those that meet the
 /// limits, or else those that violate them least.
-pub(super) fn promising(draft: &impl Smooth, mut ends: Vec<Local>) -> Vec<[f64; 3]> {
+pub(super) fn promising(
+    draft: &impl Smooth,
+    doubt: impl Fn([f64; 3]) -> f64,
+    mut ends: Vec<Local>,
+) -> Vec<[f64; 3]> {
     let met = |local: &Local| local.violation(draft) <= 1e3 * FEASIBLE;
     if ends.iter().any(met) {
         ends.retain(met);
         ends.sort_by(|a, b| a.point.objective.total_cmp(&b.point.objective));
-        let best = ends[0].point.objective;
-        ends.retain(|local| local.point.objective <= best + DRAFT_DOUBT);
+        let sure = |best: f64, local: &Local| best.min(local.point.objective + doubt(local.x));
+        let best = ends.iter().fold(f64::INFINITY, sure);
+        ends.retain(|local| local.point.objective - doubt(local.x) <= best);
     } else {
         ends.sort_by(|a, b| a.violation(draft).total_cmp(&b.violation(draft)));
     }

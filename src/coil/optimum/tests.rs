@@ -115,7 +115,7 @@ fn best_random(task: &Task, count: usize, outer_m: f64, length_m: f64) -> f64 {
                 met.then_some(rated.force_n.value)
             };
             let screened = problem
-                .without_settling()
+                .without(&[LimitName::Settling])
                 .map_or(Some(f64::MAX), |p| met(&p));
             if screened.is_some_and(|force_n| force_n > best)
                 && let Some(force_n) = met(&problem)
@@ -574,7 +574,9 @@ fn winding_equals_brute_force() {
     assert_eq!(outcome.certificate.kind, CertificateKind::Global);
     let best = outcome.best.expect("optimal");
     let problem = &Problem::of_wire(&model, &task, task.strands[0])[0];
-    let relaxed = problem.without_settling().expect("a settling time");
+    let relaxed = problem
+        .without(&[LimitName::Settling])
+        .expect("a settling time");
     let d = 0.0007;
     let (mut brute, mut which) = (0.0, (0, 0));
     for n in 1..=14 {

@@ -91,7 +91,7 @@ fn best_ln_at(problem: &Problem<'_>, near: &Window, inner_m: f64) -> f64 {
 /// The best coil of `problem` that local searches from `starts` find.
 pub(super) fn best_near(problem: &Problem<'_>, starts: &[[f64; 3]]) -> Option<Local> {
     // The settling time is costly to know and often holds nothing back.
-    if let Some(relaxed) = problem.without_settling()
+    if let Some(relaxed) = problem.without(&[LimitName::Settling])
         && let Some(local) = best_from(&relaxed, starts)
         && let Some(adopted) = problem.adopted(&relaxed, &local)
         && adopted.violation(problem) <= FEASIBLE

@@ -1,6 +1,4 @@
-//! Coils that can be wound: what is told about them, and which are worth telling about.
-
-use std::collections::BTreeMap;
+//! Coils that can be wound: what is reported of them, and which are worth a look.
 
 use super::diagnosis;
 use super::domain::Domain;
@@ -120,18 +118,6 @@ pub(super) fn rounded_status(open: &[&Solved<'_>]) -> Status {
     Status::Infeasible { violations, least }
 }
 
-/// The best leaf of every coil, in order of layers and turns.
-pub(super) fn once_each(leaves: Vec<Leaf>) -> Vec<Leaf> {
-    let mut best: BTreeMap<(u64, u64), Leaf> = BTreeMap::new();
-    for leaf in leaves {
-        let slot = best.entry((leaf.layers, leaf.turns)).or_insert(leaf);
-        if leaf.ln_force > slot.ln_force {
-            *slot = leaf;
-        }
-    }
-    best.into_values().collect()
-}
-
 /// The coil of a leaf in SI units.
 pub(super) fn describe(problem: &Problem<'_>, leaf: &Leaf) -> Option<WoundCoil> {
     let rated = problem.rate(leaf.window)?;
@@ -169,27 +155,41 @@ pub(super) fn describe(problem: &Problem<'_>, leaf: &Leaf) -> Option<WoundCoil> 
     })
 }
 
-/// Of coils sorted by force: the strongest [`LISTED`] of those better than `best` in length, mass or heat, and not beaten
-/// by a stronger one in all three.
-pub(super) fn worth_a_look(best: &WoundCoil, sorted: &[WoundCoil]) -> Vec<WoundCoil> {
-    let traits = |coil: &WoundCoil| [coil.window.length_m, coil.wire_mass_kg, coil.power_w];
-    let mut kept: Vec<WoundCoil> = Vec::new();
-    for coil in sorted.iter().skip(1) {
+/// The strongest coil and, of those that follow, the ones better than it in length, mass or heat and
+/// not beaten by a stronger one in all three.
+#[derive(Debug, Default)]
+pub(super) struct Listed {
+    best: Option<WoundCoil>,
+    others: Vec<WoundCoil>,
+}
+
+impl Listed {
+    /// Takes the next coil in the order of force.
+    pub fn add(&mut self, coil: WoundCoil) {
+        let traits = |coil: &WoundCoil| [coil.window.length_m, coil.wire_mass_kg, coil.power_w];
+        let ours = traits(&coil);
         // Rounding is no advantage.
         let beaten = |other: &WoundCoil| {
-            traits(other)
-                .iter()
-                .zip(traits(coil))
-                .all(|(theirs, ours)| *theirs <= ours * (1.0 + 1e-9))
+            let pairs = traits(other).into_iter().zip(ours);
+            pairs.fold(true, |all, (theirs, ours)| {
+                all && theirs <= ours * (1.0 + 1e-9)
+            })
         };
-        if kept.len() == LISTED {
-            break;
-        }
-        if !beaten(best) && !kept.iter().any(beaten) {
-            kept.push(coil.clone());
+        if self.best.is_none() {
+            self.best = Some(coil);
+        } else if !self.best.iter().chain(&self.others).any(beaten) {
+            self.others.push(coil);
         }
     }
-    kept
+
+    /// Whether no more are listed.
+    pub fn is_full(&self) -> bool {
+        self.others.len() >= LISTED
+    }
+
+    pub fn finish(self) -> (Option<WoundCoil>, Vec<WoundCoil>) {
+        (self.best, self.others)
+    }
 }
 
 #[cfg(test)]
