@@ -9,7 +9,7 @@ use super::domain::Domain;
 use super::model::Window;
 use super::problem::{LimitName, Problem, Regime};
 use super::scalar;
-use super::sequential::FEASIBLE;
+use super::sqp::FEASIBLE;
 
 /// Bores at which each coil is tried.
 const SCAN: usize = 9;

@@ -4,13 +4,13 @@
 //! numbers; what remains is a search in the bore alone, itself bounded. Nothing is rounded to.
 
 use super::best_bore::Bores;
-use super::branch::{self, GAP};
+use super::best_first::{CoilSets, Parts, WHOLE, whole};
+use super::branch_and_bound::{self, GAP};
 use super::candidates::{Leaf, SHARE};
 use super::domain::Domain;
-use super::enclosure::{Bounding, Cell, Multipliers};
+use super::interval_bounds::{Bounding, Cell, Multipliers};
+use super::local_searches::Solved;
 use super::problem::Problem;
-use super::search::Solved;
-use super::wound::{CoilSets, Parts, WHOLE, whole};
 use fluxform_numerics::interval::Interval;
 
 const USED: f64 = 0.9;
@@ -156,7 +156,7 @@ impl CoilSets for BoundedCoils<'_> {
     }
 
     fn all(&self, enough_ln: f64) -> Parts<LatticeBox> {
-        let all = branch::whole(&self.bounding.domain);
+        let all = branch_and_bound::whole(&self.bounding.domain);
         let most = |hi: f64| whole(hi / self.wire_m());
         let all = LatticeBox {
             layers: [1, most(all.depth.hi)],

@@ -2,10 +2,11 @@
 
 use super::diagnosis;
 use super::domain::Domain;
+use super::local_searches::{self, Solved};
 use super::model::{Strand, Window};
-use super::outcome::{BestCoil, Certificate, LimitUse, Status, Violation};
+use super::outcome::{BestCoil, Certificate, LimitUse, OptimumStatus, Violation};
 use super::problem::{LimitName, Problem};
-use super::search::{self, Solved};
+use super::search;
 
 /// Share of the best force that a listed coil may lack.
 pub const SHARE: f64 = 0.01;
@@ -39,8 +40,8 @@ pub struct WoundCoil {
 #[derive(Debug, Clone, PartialEq)]
 pub struct WoundOutcome {
     /// How it ended.
-    pub status: Status,
-    /// The best; present with [`Status::Optimal`].
+    pub status: OptimumStatus,
+    /// The best; present with [`OptimumStatus::Optimal`].
     pub best: Option<WoundCoil>,
     /// Coils within [`SHARE`] of its force that are shorter, lighter or cooler, none of them
     /// beaten by another in force, length, mass and heat together; strongest first.
@@ -68,16 +69,16 @@ pub(super) struct Leaf {
 
 impl WoundOutcome {
     /// No coil that can be wound, beside what `problems` found of those that cannot.
-    pub(super) fn none(status: Status, problems: &[Solved<'_>]) -> Self {
+    pub(super) fn none(status: OptimumStatus, problems: &[Solved<'_>]) -> Self {
         Self {
             status,
             best: None,
             alternatives: Vec::new(),
-            certificate: Certificate::of_searches(search::starts_of(problems), 0),
-            continuous_n: search::best_of(problems).and_then(Solved::force_n),
-            continuous: search::best_of(problems).and_then(search::describe),
+            certificate: Certificate::of_searches(local_searches::starts_of(problems), 0),
+            continuous_n: local_searches::best_of(problems).and_then(Solved::force_n),
+            continuous: local_searches::best_of(problems).and_then(search::describe),
             evaluations: problems.iter().map(|s| s.evaluations).sum(),
-            starts: search::starts_of(problems),
+            starts: local_searches::starts_of(problems),
         }
     }
 }
@@ -93,7 +94,7 @@ pub(super) fn around_optimum(solved: &Solved<'_>) -> Option<Domain> {
 }
 
 /// Why no coil can be wound though coils of any turns exist: what the nearest whole one breaks.
-pub(super) fn rounded_status(open: &[&Solved<'_>]) -> Status {
+pub(super) fn rounded_status(open: &[&Solved<'_>]) -> OptimumStatus {
     let mut least: Option<(Vec<Violation>, Window)> = None;
     for solved in open {
         let Some(local) = &solved.best else { continue };
@@ -115,7 +116,7 @@ pub(super) fn rounded_status(open: &[&Solved<'_>]) -> Status {
             length_m: 0.0,
         },
     ));
-    Status::Infeasible { violations, least }
+    OptimumStatus::Infeasible { violations, least }
 }
 
 /// The coil of a leaf in SI units.
@@ -195,7 +196,7 @@ impl Listed {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::optimum::sequential::{Local, Smooth};
+    use crate::optimum::sqp::{Local, Smooth};
     use crate::optimum::tests::{air, task};
     use fluxform_design::Limits;
 

@@ -3,7 +3,7 @@
 //! The core follows the winding: its radius is the bore's less the clearance, its ends stand
 //! `below` and `above` the winding's. What the steel adds, relative to the air coil's exact
 //! values, is smooth in (ln core radius, ln length, ln a2/a1) and does not depend on the wire: it
-//! is tabulated where the search comes ([`super::cells`]): roughly for the many starting points
+//! is tabulated where the search comes ([`super::lazy_table`]): roughly for the many starting points
 //! ([`CoilModel::draft`]), coarsely for the search, then finely about the best coil found
 //! ([`CoilModel::sharpened`]). Slopes are those of the table's
 //! polynomials, consistent with its values. All depths around one core share one factorisation.
@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use super::air::{AirCoil, NoAirCoil};
 use super::axis_gradient::axis_gradient;
-use super::cells::{COUNT, Cells, Interpolated, Lattice, Line, Values};
+use super::lazy_table::{COUNT, Cells, Interpolated, Lattice, Line, Values};
 use super::model::{CoilModel, Doubts, NoResponse, Response, Sloped, Window};
 use super::neighbours::Neighbours;
 use crate::inductance::self_inductance_h;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::cored::{CoreRule, CoredModel, NoCoredCoil};
 use super::problem::Problem;
-use super::sequential::Smooth;
+use super::sqp::Smooth;
 use super::*;
 use crate::inductance::self_inductance_h;
 use fluxform_base::progress::Silent;
@@ -373,7 +373,8 @@ fn what_cannot_be_is_told() {
         ..seed().limits
     };
     let outcome = optimise(&model, &task_of(impossible), &quick(), &Silent);
-    let Status::Infeasible { violations, .. } = outcome.expect("not interrupted").status else {
+    let OptimumStatus::Infeasible { violations, .. } = outcome.expect("not interrupted").status
+    else {
         panic!("no coil settles so fast");
     };
     assert_eq!(violations[0].name, LimitName::Settling);

@@ -12,15 +12,15 @@
 use rayon::prelude::*;
 
 use super::best_bore::{Bores, summit};
+use super::best_first::{CoilSets, Parts, Strongest, WHOLE, whole};
 use super::candidates::{Leaf, WoundOutcome, around_optimum, rounded_status};
 use super::domain::Domain;
+use super::local_searches::{self, Solved};
 use super::model::{CoilModel, Window};
-use super::outcome::{Certificate, CertificateKind, Status};
+use super::outcome::{Certificate, CertificateKind, OptimumStatus};
 use super::problem::{Fixed, LimitName, Problem, Task};
-use super::search::{self, Solved};
-use super::sequential::{self, FEASIBLE};
-use super::sharpen;
-use super::wound::{CoilSets, Parts, Strongest, WHOLE, whole};
+use super::sqp::{self, FEASIBLE};
+use super::surrogate;
 use fluxform_base::progress::{Interrupted, Progress};
 
 /// Bores narrower than this share of the winding's depth are not looked at, unless the
@@ -42,10 +42,10 @@ pub(super) fn optimise(
     coarse: &[Solved<'_>],
     progress: &dyn Progress,
 ) -> Result<WoundOutcome, Interrupted> {
-    let sharp_model = sharpen::sharpened(model, task, coarse, progress)?;
+    let sharp_model = surrogate::sharpened(model, task, coarse, progress)?;
     let restated = sharp_model
         .as_deref()
-        .map(|sharp| sharpen::restated(sharp, task, coarse));
+        .map(|sharp| surrogate::restated(sharp, task, coarse));
     let sharp = restated.as_deref().unwrap_or(coarse);
     // What the search did not know, of neighbours say, is screened for too.
     let blunt_model = sharp_model.as_deref().and_then(CoilModel::blunted);
@@ -89,13 +89,13 @@ pub(super) fn optimise(
             kind: if complete {
                 CertificateKind::Exhaustive
             } else {
-                CertificateKind::of_searches(search::starts_of(sharp))
+                CertificateKind::of_searches(local_searches::starts_of(sharp))
             },
             upper_bound_n: None,
             gap: None,
             cells: search.cells,
         },
-        ..WoundOutcome::none(Status::Optimal, sharp)
+        ..WoundOutcome::none(OptimumStatus::Optimal, sharp)
     })
 }
 
@@ -216,7 +216,7 @@ impl<'a> ScreenedCoils<'a> {
                 depth_m: window.depth_m * thinner,
                 ..window
             });
-            let local = sequential::solve(&row, start)?;
+            let local = sqp::solve(&row, start)?;
             let doubts = row.model.doubts(&Problem::window(local.x));
             // A field that is overstated costs what the limit's multiplier says.
             let by_field = field.map_or(0.0, |row| local.multipliers[row]);

@@ -1,6 +1,6 @@
 use super::air::AirCoil;
 use super::problem::{Problem, Regime};
-use super::sequential::Smooth;
+use super::sqp::Smooth;
 use super::*;
 use crate::circuit::Circuit;
 use fluxform_base::progress::Silent;
@@ -393,7 +393,8 @@ fn extremes_are_solved_or_told() {
         resistance_max_ohm: Some(1e-6),
         ..seed_limits()
     };
-    let Status::Infeasible { violations, .. } = solved(&task(tiny, Some(36.0))).status else {
+    let OptimumStatus::Infeasible { violations, .. } = solved(&task(tiny, Some(36.0))).status
+    else {
         panic!("no coil has a microohm");
     };
     assert_eq!(violations[0].name, LimitName::Resistance);
@@ -418,7 +419,10 @@ fn extremes_are_solved_or_told() {
         },
     ] {
         let status = solved(&task(limits, Some(36.0))).status;
-        assert!(matches!(status, Status::Contradictory(_)), "{status:?}");
+        assert!(
+            matches!(status, OptimumStatus::Contradictory(_)),
+            "{status:?}"
+        );
     }
 }
 
@@ -431,13 +435,13 @@ fn a_missing_limit_is_named() {
     let status = solved(&task(limits, None)).status;
     assert_eq!(
         status,
-        Status::Unbounded {
+        OptimumStatus::Unbounded {
             missing: vec![LimitName::OuterDiameter]
         }
     );
     let status = solved(&task(Limits::default(), None)).status;
     let both = vec![LimitName::OuterDiameter, LimitName::Length];
-    assert_eq!(status, Status::Unbounded { missing: both });
+    assert_eq!(status, OptimumStatus::Unbounded { missing: both });
     // The supply's voltage alone bounds the coil.
     let outcome = solved(&task(Limits::default(), Some(36.0)));
     is_global(&outcome, outcome.best.as_ref().expect("optimal"));
@@ -465,7 +469,7 @@ fn a_settling_time_that_any_length_meets_leaves_the_length_without_an_end() {
     for (inner_m, approached_s) in [(None, 0.013_008), (Some(0.02), 0.010_457)] {
         let status = of(1.02 * approached_s, inner_m).status;
         let missing = vec![LimitName::Length];
-        assert_eq!(status, Status::Unbounded { missing });
+        assert_eq!(status, OptimumStatus::Unbounded { missing });
         let best = of(0.9 * approached_s, inner_m).best.expect("an end");
         assert!(best.window.length_m < 1.0, "{best:?}");
     }

@@ -1,251 +1,19 @@
 //! The best coil that can be wound: whole layers, whole turns a layer, any bore.
 //!
-//! OD = ID + 2 n d and L = m d. Sets of coils wait in the order of an upper bound of their force. The
-//! first is taken apart until it is one coil with its best bore, and a coil that no waiting set can
-//! exceed is the next strongest. Coils in air are bounded by interval arithmetic
-//! (`bounded_coils`), cored ones by cheaper models (`screened_coils`). The search ends where what
-//! waits lacks more than [`SHARE`] of the best, or with as many coils worth a look as are listed.
+//! OD = ID + 2 n d and L = m d. Coils in air are bounded by interval arithmetic (`bounded_coils`), cored
+//! ones by cheaper models (`screened_coils`), and searched through best first (`best_first`).
 
-use std::cmp::Ordering;
-use std::collections::{BTreeSet, BinaryHeap};
-
-use rayon::prelude::*;
-
+use super::best_first::Strongest;
 use super::bounded_coils::{BoundedCoils, next_to_continuous};
-use super::branch::{self, GAP};
-use super::candidates::{
-    Leaf, Listed, SHARE, WoundOutcome, around_optimum, describe, rounded_status,
-};
+use super::branch_and_bound::{self, GAP};
+use super::candidates::{SHARE, WoundOutcome, around_optimum, rounded_status};
+use super::local_searches::{self, Settings, Solved};
 use super::model::CoilModel;
-use super::outcome::{Certificate, CertificateKind, Status};
-use super::problem::{Problem, Task};
+use super::outcome::{Certificate, CertificateKind, OptimumStatus};
+use super::problem::Task;
 use super::screened_coils;
-use super::search::{self, Settings, Solved};
+use super::search;
 use fluxform_base::progress::{Interrupted, Progress};
-
-/// Slack, in turns, of a dimension that must be a whole number of them.
-pub(super) const WHOLE: f64 = 1e-9;
-/// Sets taken apart at a time; fixed, so that results do not depend on the threads.
-const AT_A_TIME: usize = 32;
-
-/// How many whole wires fit, at least one.
-pub(super) fn whole(ratio: f64) -> u64 {
-    (ratio + WHOLE).floor().clamp(1.0, 1e15) as u64
-}
-
-/// One problem's coils as sets that can be bounded and taken apart.
-pub(super) trait CoilSets: Sync {
-    type Set: Send + Sync;
-
-    fn problem(&self) -> &Problem<'_>;
-
-    /// Sets that hold every coil whose ln F may reach `enough_ln`.
-    fn all(&self, enough_ln: f64) -> Parts<Self::Set>;
-
-    /// What a set holds that may reach `enough_ln`.
-    fn parts(&self, set: &Self::Set, enough_ln: f64) -> Parts<Self::Set>;
-}
-
-/// What a set of coils was taken apart into.
-pub(super) struct Parts<S> {
-    /// Smaller sets, each with an upper bound of ln F.
-    pub sets: Vec<(f64, S)>,
-    /// Coils with their best bores.
-    pub coils: Vec<Leaf>,
-    /// Upper bound of ln F of what is in neither.
-    pub bound_ln: f64,
-    /// Boxes bounded or coils examined on the way.
-    pub cells: usize,
-}
-
-impl<S> Default for Parts<S> {
-    fn default() -> Self {
-        Self {
-            sets: Vec::new(),
-            coils: Vec::new(),
-            bound_ln: f64::NEG_INFINITY,
-            cells: 0,
-        }
-    }
-}
-
-enum Content<S> {
-    Set(S),
-    Coil(Leaf),
-}
-
-/// What waits to be taken apart or listed: strongest first, then earliest.
-struct Waiting<S> {
-    bound_ln: f64,
-    order: usize,
-    /// Index of its problem.
-    of: usize,
-    content: Content<S>,
-}
-
-impl<S> Ord for Waiting<S> {
-    fn cmp(&self, other: &Self) -> Ordering {
-        let by_bound = self.bound_ln.total_cmp(&other.bound_ln);
-        by_bound.then(other.order.cmp(&self.order))
-    }
-}
-
-impl<S> PartialOrd for Waiting<S> {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl<S> PartialEq for Waiting<S> {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl<S> Eq for Waiting<S> {}
-
-/// The search over all problems' coils.
-pub(super) struct Strongest<'a, C: CoilSets> {
-    problems: &'a [C],
-    queue: BinaryHeap<Waiting<C::Set>>,
-    order: usize,
-    /// ln F of the strongest coil met.
-    best_ln: f64,
-    /// The strongest coils.
-    pub listed: Listed,
-    listed_pairs: BTreeSet<(usize, u64, u64)>,
-    /// No coil's ln F exceeds this or the best one's.
-    pub bound_ln: f64,
-    /// Boxes bounded or coils examined.
-    pub cells: usize,
-}
-
-impl<'a, C: CoilSets> Strongest<'a, C> {
-    /// Searches among `problems`' coils, one of which has `best_ln`, taking at most `budget` sets apart.
-    ///
-    /// # Errors
-    /// Interruption.
-    pub fn of(
-        problems: &'a [C],
-        best_ln: f64,
-        budget: usize,
-        progress: &dyn Progress,
-    ) -> Result<Self, Interrupted> {
-        let mut search = Self {
-            problems,
-            queue: BinaryHeap::new(),
-            order: 0,
-            best_ln,
-            listed: Listed::default(),
-            listed_pairs: BTreeSet::new(),
-            bound_ln: f64::NEG_INFINITY,
-            cells: 0,
-        };
-        for (of, problem) in problems.iter().enumerate() {
-            progress.check()?;
-            let parts = problem.all(search.enough_ln());
-            search.add(of, parts);
-        }
-        search.run(budget, progress)?;
-        Ok(search)
-    }
-
-    fn enough_ln(&self) -> f64 {
-        self.best_ln + (-SHARE).ln_1p()
-    }
-
-    fn add(&mut self, of: usize, parts: Parts<C::Set>) {
-        self.cells += parts.cells;
-        self.bound_ln = self.bound_ln.max(parts.bound_ln);
-        for leaf in &parts.coils {
-            self.best_ln = self.best_ln.max(leaf.ln_force);
-        }
-        let enough_ln = self.enough_ln();
-        let coils = parts.coils.into_iter();
-        let coils = coils.map(|leaf| (leaf.ln_force, Content::Coil(leaf)));
-        let sets = parts.sets.into_iter();
-        let sets = sets.map(|(bound_ln, set)| (bound_ln, Content::Set(set)));
-        for (bound_ln, content) in sets.chain(coils) {
-            if bound_ln >= enough_ln {
-                self.order += 1;
-                self.queue.push(Waiting {
-                    bound_ln,
-                    order: self.order,
-                    of,
-                    content,
-                });
-            }
-        }
-    }
-
-    fn list(&mut self, of: usize, leaf: &Leaf) {
-        let fresh = self.listed_pairs.insert((of, leaf.layers, leaf.turns));
-        if let (true, Some(coil)) = (fresh, describe(self.problems[of].problem(), leaf)) {
-            self.listed.add(coil);
-        }
-    }
-
-    fn run(&mut self, budget: usize, progress: &dyn Progress) -> Result<(), Interrupted> {
-        let mut taken = 0;
-        while let Some(first) = self.queue.pop() {
-            let enough_ln = self.enough_ln();
-            if first.bound_ln < enough_ln || self.listed.is_full() {
-                break;
-            }
-            let set = match first.content {
-                Content::Coil(leaf) => {
-                    self.list(first.of, &leaf);
-                    continue;
-                }
-                Content::Set(set) => set,
-            };
-            progress.check()?;
-            if taken >= budget {
-                self.give_up(first.bound_ln);
-                break;
-            }
-            let mut sets = vec![(first.of, set)];
-            while sets.len() < AT_A_TIME {
-                let Some(next) = self.queue.pop() else { break };
-                match next.content {
-                    Content::Set(set) if next.bound_ln >= enough_ln => sets.push((next.of, set)),
-                    Content::Set(_) | Content::Coil(_) => {
-                        self.queue.push(next);
-                        break;
-                    }
-                }
-            }
-            taken += sets.len();
-            let parts: Vec<Result<Parts<C::Set>, Interrupted>> = sets
-                .par_iter()
-                .map(|(of, set)| {
-                    progress.check()?;
-                    Ok(self.problems[*of].parts(set, enough_ln))
-                })
-                .collect();
-            for ((of, _), parts) in sets.iter().zip(parts) {
-                self.add(*of, parts?);
-            }
-        }
-        Ok(())
-    }
-
-    /// Lists the coils met so far; what waits is bounded by `bound_ln`.
-    fn give_up(&mut self, bound_ln: f64) {
-        self.bound_ln = self.bound_ln.max(bound_ln);
-        for waiting in std::mem::take(&mut self.queue)
-            .into_sorted_vec()
-            .iter()
-            .rev()
-        {
-            if let Content::Coil(leaf) = &waiting.content
-                && leaf.ln_force >= self.enough_ln()
-            {
-                self.list(waiting.of, leaf);
-            }
-        }
-    }
-}
 
 /// Maximises |force| over the coils that can be wound within `task`. Coils for which no bounds
 /// exist, cored ones, are examined one by one ([`super::screened_coils`]).
@@ -276,7 +44,7 @@ pub fn optimise_wound(
     let mut complete = true;
     let mut coils = Vec::new();
     for solved in &open {
-        let domain = branch::finite_domain(&solved.problem, reach_n).or_else(|| {
+        let domain = branch_and_bound::finite_domain(&solved.problem, reach_n).or_else(|| {
             // Nothing bounds the coil for certain: what is near the continuous optimum.
             complete = false;
             around_optimum(solved)
@@ -304,13 +72,13 @@ pub fn optimise_wound(
             kind: if complete && gap <= GAP {
                 CertificateKind::Global
             } else {
-                CertificateKind::of_searches(search::starts_of(&problems))
+                CertificateKind::of_searches(local_searches::starts_of(&problems))
             },
             upper_bound_n: complete.then(|| upper_ln.exp()),
             gap: complete.then_some(gap),
             cells: search.cells,
         },
-        ..WoundOutcome::none(Status::Optimal, &problems)
+        ..WoundOutcome::none(OptimumStatus::Optimal, &problems)
     })
 }
 
@@ -349,14 +117,5 @@ mod tests {
         assert!(none.bound_ln > best_ln);
         let some = of(64);
         assert!(some.cells > 64 && some.bound_ln > best_ln && some.bound_ln < none.bound_ln);
-    }
-
-    #[test]
-    fn a_turn_within_rounding_is_a_turn() {
-        for turns in [1.0_f64, 3.0, 70.0] {
-            let slack = [turns * (1.0 - f64::EPSILON), turns, turns + 0.7];
-            assert!(slack.iter().all(|&t| whole(t) == turns as u64));
-        }
-        assert_eq!((whole(0.3), whole(2.9)), (1, 2));
     }
 }

@@ -1,11 +1,11 @@
 //! The flat valley: bores that cost next to no force, all else re-optimised.
 
 use super::domain::Domain;
+use super::local_searches::{Solved, keep_better};
 use super::model::Window;
 use super::problem::{Fixed, LimitName, Problem, Task};
 use super::scalar;
-use super::search::{Solved, keep_better};
-use super::sequential::{self, FEASIBLE, Local};
+use super::sqp::{self, FEASIBLE, Local};
 use fluxform_base::progress::{Interrupted, Progress};
 
 /// Share of the best force that a coil in the valley may lack.
@@ -104,7 +104,7 @@ pub(super) fn best_near(problem: &Problem<'_>, starts: &[[f64; 3]]) -> Option<Lo
 fn best_from(problem: &Problem<'_>, starts: &[[f64; 3]]) -> Option<Local> {
     let mut best = None;
     for &start in starts {
-        if let Some(local) = sequential::solve(problem, start) {
+        if let Some(local) = sqp::solve(problem, start) {
             keep_better(problem, &mut best, local);
         }
     }
