@@ -12,6 +12,7 @@ mod failure;
 mod help;
 mod interrupt;
 mod layout;
+mod limits;
 mod pictures;
 mod printer;
 mod quantity;

@@ -1,14 +1,370 @@
-//! The limits of equation 11 and of good practice, checked on a coil.
+//! The limits of equation 11 and of good practice: one table, from which the optimiser's, the
+//! evaluation's and the reports' lists are made.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
 use super::circuit::{Circuit, turns_that_fit};
-use fluxform_design::Design;
+use fluxform_design::{Coil, Design, Limits};
 
 /// Relative difference between turns and turns that fit that counts as none.
 const FULL: f64 = 1e-12;
+
+/// What bounds a coil: the design file's limits, then what follows from the supply, from the wire and from
+/// dimensions that are given. In the order of [`LIMITS`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum LimitName {
+    /// Outer diameter, m.
+    OuterDiameter,
+    /// Inner diameter, m; a lower limit.
+    InnerDiameter,
+    /// Length, m.
+    Length,
+    /// R, ohm.
+    Resistance,
+    /// Five time constants, s.
+    Settling,
+    /// Heat at the rated current, W.
+    Power,
+    /// Mass of wire and core, kg.
+    Mass,
+    /// Length of wire, m.
+    WireLength,
+    /// Flux density in the core, T.
+    CoreField,
+    /// Turns over turns that fit; always holds.
+    WindingFill,
+    /// The supply's voltage, V, where the driver's current is the rated one.
+    Voltage,
+    /// The driver's current, A, where the supply's voltage sets the rated one.
+    Current,
+    /// One layer of wire must fit.
+    OneLayer,
+    /// One turn a layer must fit.
+    OneTurn,
+    /// The inner radius is not negative.
+    Axis,
+    /// A given inner diameter.
+    FixedInner,
+    /// A given outer diameter.
+    FixedOuter,
+    /// A given length.
+    FixedLength,
+}
+
+/// Which side of a limit a value must be on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Direction {
+    /// At most the limit.
+    AtMost,
+    /// At least the limit.
+    AtLeast,
+    /// The limit itself.
+    Equal,
+}
+
+/// A unit and how many of it are one SI unit.
+pub type Scaled = (&'static str, f64);
+
+/// One limit.
+pub struct Limit {
+    /// Which.
+    pub name: LimitName,
+    /// Its name in artefacts.
+    pub key: &'static str,
+    /// What sets it in a design file.
+    pub design_key: &'static str,
+    /// Its name on screen.
+    pub label: &'static str,
+    /// Its unit on screen; empty for a ratio.
+    pub unit: &'static str,
+    /// The unit of its design key.
+    pub written: Scaled,
+    /// The step by which it is said to move.
+    pub step: Scaled,
+    /// Which side is allowed.
+    pub direction: Direction,
+    /// Whether it alone gives the force a maximum.
+    pub ends_growth: bool,
+    /// The limit that a design sets, SI.
+    pub of: fn(&Limits) -> Option<f64>,
+    /// What an evaluated coil has of it, SI.
+    pub value: fn(&Evaluated<'_>) -> Option<f64>,
+}
+
+/// A coil as evaluated.
+#[derive(Debug, Clone, Copy)]
+pub struct Evaluated<'a> {
+    /// Its design.
+    pub design: &'a Design,
+    /// Its circuit.
+    pub circuit: &'a Circuit,
+    /// Heat at the rated current, W.
+    pub power_w: f64,
+    /// Mass of wire and core, kg.
+    pub mass_kg: f64,
+    /// Flux density in the core where there is one, T.
+    pub core_field_t: Option<f64>,
+}
+
+impl Evaluated<'_> {
+    fn coil(&self) -> Option<&Coil> {
+        self.design.coil.as_ref()
+    }
+}
+
+/// Turns over turns that fit; a window of whole layers is full but for the rounding of its
+/// dimensions.
+fn winding_fill(at: &Evaluated<'_>) -> Option<f64> {
+    let fill = at.circuit.turns / turns_that_fit(at.coil()?, &at.design.wire);
+    Some(if (fill - 1.0).abs() <= FULL {
+        1.0
+    } else {
+        fill
+    })
+}
+
+const MM: Scaled = ("mm", 1e3);
+
+/// A size of the coil, and what most rows have.
+const SIZE: Limit = Limit {
+    name: LimitName::OuterDiameter,
+    key: "outer_diameter_m",
+    design_key: "limits.outer_diameter_max_mm",
+    label: "outer diameter",
+    unit: "mm",
+    written: MM,
+    step: MM,
+    direction: Direction::AtMost,
+    ends_growth: false,
+    of: |limits| limits.outer_diameter_max_m,
+    value: |at| Some(at.coil()?.outer_diameter_m),
+};
+
+/// What follows from more than the coil's design file says of limits.
+const IMPLIED: Limit = Limit {
+    of: |_| None,
+    value: |_| None,
+    ..SIZE
+};
+
+/// Every limit, in the order of [`LimitName`].
+pub static LIMITS: [Limit; 18] = [
+    SIZE,
+    Limit {
+        name: LimitName::InnerDiameter,
+        key: "inner_diameter_m",
+        design_key: "limits.inner_diameter_min_mm",
+        label: "inner diameter",
+        direction: Direction::AtLeast,
+        of: |limits| limits.inner_diameter_min_m,
+        value: |at| Some(at.coil()?.inner_diameter_m),
+        ..SIZE
+    },
+    Limit {
+        name: LimitName::Length,
+        key: "length_m",
+        design_key: "limits.length_max_mm",
+        label: "length",
+        of: |limits| limits.length_max_m,
+        value: |at| Some(at.coil()?.length_m),
+        ..SIZE
+    },
+    Limit {
+        name: LimitName::Resistance,
+        key: "resistance_ohm",
+        design_key: "limits.resistance_max_ohm",
+        label: "resistance",
+        unit: "ohm",
+        written: ("ohm", 1.0),
+        step: ("ohm", 1.0),
+        ends_growth: true,
+        of: |limits| limits.resistance_max_ohm,
+        value: |at| Some(at.circuit.resistance_ohm),
+        ..SIZE
+    },
+    Limit {
+        name: LimitName::Settling,
+        key: "settling_s",
+        design_key: "limits.settling_max_ms",
+        label: "settling",
+        unit: "s",
+        written: ("ms", 1e3),
+        step: ("ms", 1e3),
+        ends_growth: true,
+        of: |limits| limits.settling_max_s,
+        value: |at| Some(at.circuit.settling_s()),
+        ..SIZE
+    },
+    Limit {
+        name: LimitName::Power,
+        key: "power_w",
+        design_key: "limits.power_max_w",
+        label: "heat",
+        unit: "W",
+        written: ("W", 1.0),
+        step: ("W", 1.0),
+        ends_growth: true,
+        of: |limits| limits.power_max_w,
+        value: |at| Some(at.power_w),
+        ..SIZE
+    },
+    Limit {
+        name: LimitName::Mass,
+        key: "mass_kg",
+        design_key: "limits.mass_max_kg",
+        label: "mass",
+        unit: "g",
+        written: ("kg", 1.0),
+        step: ("g", 1e3),
+        ends_growth: true,
+        of: |limits| limits.mass_max_kg,
+        value: |at| Some(at.mass_kg),
+        ..SIZE
+    },
+    Limit {
+        name: LimitName::WireLength,
+        key: "wire_length_m",
+        design_key: "limits.wire_length_max_m",
+        label: "wire length",
+        unit: "m",
+        written: ("m", 1.0),
+        step: ("m of wire", 1.0),
+        ends_growth: true,
+        of: |limits| limits.wire_length_max_m,
+        value: |at| Some(at.circuit.wire_length_m),
+        ..SIZE
+    },
+    Limit {
+        name: LimitName::CoreField,
+        key: "core_field_t",
+        design_key: "limits.core_field_max_t",
+        label: "core field",
+        unit: "T",
+        written: ("T", 1.0),
+        step: ("mT", 1e3),
+        of: |limits| limits.core_field_max_t,
+        value: |at| at.core_field_t,
+        ..SIZE
+    },
+    Limit {
+        name: LimitName::WindingFill,
+        key: "winding_fill",
+        design_key: "coil.turns",
+        label: "winding fill",
+        unit: "",
+        written: ("", 1.0),
+        step: ("", 1.0),
+        of: |_| Some(1.0),
+        value: winding_fill,
+        ..SIZE
+    },
+    Limit {
+        name: LimitName::Voltage,
+        key: "voltage_v",
+        design_key: "supply.voltage_v",
+        label: "the supply's voltage",
+        unit: "V",
+        written: ("V", 1.0),
+        step: ("V", 1.0),
+        ..IMPLIED
+    },
+    Limit {
+        name: LimitName::Current,
+        key: "current_a",
+        design_key: "supply.current_max_a",
+        label: "the drivers' current",
+        unit: "A",
+        written: ("A", 1.0),
+        step: ("A", 1.0),
+        ..IMPLIED
+    },
+    Limit {
+        name: LimitName::OneLayer,
+        key: "one_layer_m",
+        design_key: "wire.diameter_mm",
+        label: "wire diameter",
+        direction: Direction::AtLeast,
+        ..IMPLIED
+    },
+    Limit {
+        name: LimitName::OneTurn,
+        key: "one_turn_m",
+        design_key: "wire.diameter_mm",
+        label: "wire diameter",
+        direction: Direction::AtLeast,
+        ..IMPLIED
+    },
+    Limit {
+        name: LimitName::Axis,
+        key: "axis_m",
+        design_key: "coil.inner_diameter_mm",
+        label: "axis",
+        direction: Direction::AtLeast,
+        ..IMPLIED
+    },
+    Limit {
+        name: LimitName::FixedInner,
+        key: "inner_diameter_m",
+        design_key: "coil.inner_diameter_mm",
+        label: "inner diameter",
+        direction: Direction::Equal,
+        ..IMPLIED
+    },
+    Limit {
+        name: LimitName::FixedOuter,
+        design_key: "coil.outer_diameter_mm",
+        direction: Direction::Equal,
+        ..IMPLIED
+    },
+    Limit {
+        name: LimitName::FixedLength,
+        key: "length_m",
+        design_key: "coil.length_mm",
+        label: "length",
+        direction: Direction::Equal,
+        ..IMPLIED
+    },
+];
+
+impl LimitName {
+    /// Its row of the table.
+    #[must_use]
+    pub fn limit(self) -> &'static Limit {
+        &LIMITS[self as usize]
+    }
+
+    /// The name that artefacts use.
+    #[must_use]
+    pub fn key(self) -> &'static str {
+        self.limit().key
+    }
+
+    /// Whether the value must stay above the limit.
+    #[must_use]
+    pub fn is_lower(self) -> bool {
+        self.limit().direction == Direction::AtLeast
+    }
+
+    /// Whether the value is given.
+    #[must_use]
+    pub fn is_equality(self) -> bool {
+        self.limit().direction == Direction::Equal
+    }
+
+    /// Whether it follows from geometry and cannot be blamed on a limit that was set.
+    #[must_use]
+    pub fn is_geometry(self) -> bool {
+        self.is_equality() || matches!(self, Self::OneLayer | Self::OneTurn | Self::Axis)
+    }
+}
+
+/// The limit that artefacts call `key`.
+#[must_use]
+pub fn by_key(key: &str) -> Option<&'static Limit> {
+    LIMITS.iter().find(|limit| limit.key == key)
+}
 
 /// A limit beside the value it bounds, SI.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -21,76 +377,31 @@ pub struct LimitCheck {
     pub met: bool,
 }
 
-/// Every limit the design names, by the names that artefacts use, and `winding_fill`, which
-/// always holds: turns over turns that fit.
-///
-/// `power_w` is the heat at the rated current, `mass_kg` the mass of wire and core,
-/// `core_field_t` the flux density in the core where there is one.
+/// Every limit that the coil's design names, by the names that artefacts use, and `winding_fill`.
 #[must_use]
-pub fn check(
-    design: &Design,
-    circuit: &Circuit,
-    power_w: f64,
-    mass_kg: f64,
-    core_field_t: Option<f64>,
-) -> BTreeMap<&'static str, LimitCheck> {
-    let limits = &design.limits;
-    let mut checks = BTreeMap::new();
-    let mut at_most = |name, value: f64, limit: Option<f64>| {
-        if let Some(limit) = limit {
-            checks.insert(
-                name,
-                LimitCheck {
-                    value,
-                    limit,
-                    met: value <= limit,
-                },
-            );
-        }
-    };
-    at_most(
-        "resistance_ohm",
-        circuit.resistance_ohm,
-        limits.resistance_max_ohm,
-    );
-    at_most("settling_s", circuit.settling_s(), limits.settling_max_s);
-    at_most("power_w", power_w, limits.power_max_w);
-    at_most("mass_kg", mass_kg, limits.mass_max_kg);
-    at_most(
-        "wire_length_m",
-        circuit.wire_length_m,
-        limits.wire_length_max_m,
-    );
-    if let Some(core_field_t) = core_field_t {
-        at_most("core_field_t", core_field_t, limits.core_field_max_t);
-    }
-    if let Some(coil) = &design.coil {
-        at_most(
-            "outer_diameter_m",
-            coil.outer_diameter_m,
-            limits.outer_diameter_max_m,
-        );
-        at_most("length_m", coil.length_m, limits.length_max_m);
-        let fits = turns_that_fit(coil, &design.wire);
-        let fill = circuit.turns / fits;
-        // A window of whole layers is full but for the rounding of its dimensions.
-        let fill = if (fill - 1.0).abs() <= FULL {
-            1.0
-        } else {
-            fill
+pub fn check(coil: &Evaluated<'_>) -> BTreeMap<&'static str, LimitCheck> {
+    let checked = LIMITS.iter().filter_map(|row| {
+        let limit = (row.of)(&coil.design.limits)?;
+        let value = (row.value)(coil)?;
+        let met = match row.direction {
+            Direction::AtMost => value <= limit,
+            Direction::AtLeast => value >= limit,
+            Direction::Equal => value == limit,
         };
-        at_most("winding_fill", fill, Some(1.0));
-        if let Some(limit) = limits.inner_diameter_min_m {
-            let value = coil.inner_diameter_m;
-            checks.insert(
-                "inner_diameter_m",
-                LimitCheck {
-                    value,
-                    limit,
-                    met: value >= limit,
-                },
-            );
+        Some((row.key, LimitCheck { value, limit, met }))
+    });
+    checked.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_limit_has_its_own_row() {
+        for (index, row) in LIMITS.iter().enumerate() {
+            assert_eq!(row.name as usize, index, "{}", row.key);
+            assert!(by_key(row.key).is_some_and(|first| first.key == row.key));
         }
     }
-    checks
 }

@@ -32,6 +32,7 @@ pub mod bh_table;
 mod checks;
 pub mod diagnostics;
 pub mod gauge;
+mod limits;
 pub mod model;
 pub mod named_file;
 pub mod parse;
@@ -46,5 +47,6 @@ pub mod words;
 pub use sections::{BODY_MM, SEED_SIDE_MM, axis_m};
 
 pub use diagnostics::{Fault, Faults, InvalidDocument, Severity};
+pub use limits::Limits;
 pub use model::*;
 pub use parse::Need;

@@ -1,5 +1,6 @@
 //! What a design file says, validated, in SI units.
 
+use super::limits::Limits;
 use std::path::{Path, PathBuf};
 
 use fluxform_numerics::axis::Axis;
@@ -177,29 +178,6 @@ pub struct Supply {
     pub total_current_max_a: Option<f64>,
     /// Supply voltage, V.
     pub voltage_v: Option<f64>,
-}
-
-/// Limits; `None` where the design names none.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Limits {
-    /// Resistance at the wire's temperature, ohm.
-    pub resistance_max_ohm: Option<f64>,
-    /// Five time constants, s.
-    pub settling_max_s: Option<f64>,
-    /// Outer diameter, m.
-    pub outer_diameter_max_m: Option<f64>,
-    /// Inner diameter (a lower limit), m.
-    pub inner_diameter_min_m: Option<f64>,
-    /// Length, m.
-    pub length_max_m: Option<f64>,
-    /// Heat at the rated current, W.
-    pub power_max_w: Option<f64>,
-    /// Mass of wire and core, kg.
-    pub mass_max_kg: Option<f64>,
-    /// Length of wire, m.
-    pub wire_length_max_m: Option<f64>,
-    /// Flux density in the core, T.
-    pub core_field_max_t: Option<f64>,
 }
 
 /// The workspace grid, m.

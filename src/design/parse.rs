@@ -4,9 +4,8 @@ use std::path::Path;
 
 use super::checks;
 use super::diagnostics::{Faults, InvalidDocument};
-use super::model::{
-    Array, Coil, Core, Coupling, Design, Limits, Magnet, Steel, Supply, Wire, Workspace,
-};
+use super::limits::{self, Limits};
+use super::model::{Array, Coil, Core, Coupling, Design, Magnet, Steel, Supply, Wire, Workspace};
 use super::reader::{Located, Section, Sink, read_document};
 use super::sections::{self, ArrayDraft, CoilDraft, CoreDraft, Layout, MagnetDraft};
 use super::sections::{SupplyDraft, WireDraft, WorkspaceDraft, axis_m};
@@ -140,7 +139,7 @@ impl Draft {
             array: sections::array(root.section("array")),
             magnet: sections::magnet(root.section("magnet")),
             supply: sections::supply(root.section("supply")),
-            limits: sections::limits(root.section("limits")),
+            limits: limits::read(root.section("limits")),
             target_height: sections::target_height_mm(root.section("target")),
             workspace: sections::workspace(root.section("workspace")),
         }

@@ -4,7 +4,7 @@
 //! check may speak of.
 
 use super::array::{COILS_MAX, grid_positions_m};
-use super::model::{ArrayGrid, Coupling, Limits, MagnetModel, Polarity};
+use super::model::{ArrayGrid, Coupling, MagnetModel, Polarity};
 use super::reader::{Located, Section};
 use super::rule::{Bound, Rule, Slip};
 use super::values::OneOrMany;
@@ -20,7 +20,7 @@ pub const LOW_CARBON_KNEE_T: f64 = 1.5;
 /// Resistivity of copper at 20 C, ohm m.
 const COPPER_RESISTIVITY_OHM_M: f64 = 1.68e-8;
 
-const fn slip(from: f64, to: f64, unit: &'static str, times: f64) -> Slip {
+pub(crate) const fn slip(from: f64, to: f64, unit: &'static str, times: f64) -> Slip {
     Slip {
         from,
         to,
@@ -43,7 +43,6 @@ const OFFSET_MM: Rule = Rule::any("mm").slips(&[metres_below(0.02)]);
 /// Wire diameters, mm: 8 mm is 0.008. A gauge is the bare wire's diameter: where no other
 /// conductor is named, it is taken as the diameter over the insulation too.
 const WIRE_MM: Rule = Rule::any("mm").slips(&[metres_below(0.008)]).gauges();
-const SETTLING_MS: Rule = Rule::any("ms").slips(&[slip(0.0, 0.5, "seconds", 1000.0)]);
 /// Metals lie between 1e-8 and 2e-6.
 const RESISTIVITY_OHM_M: Rule = Rule::any("ohm m").slips(&[
     slip(0.0, 1e-9, "a slip of the exponent", 1.0),
@@ -320,23 +319,6 @@ pub fn supply(mut s: Section<'_>) -> SupplyDraft {
     };
     s.finish();
     draft
-}
-
-pub fn limits(mut s: Section<'_>) -> Limits {
-    let mut limit = |key, rule: Rule| s.number(key, &rule.bound(Bound::Limit)).map(|l| l.value);
-    let limits = Limits {
-        resistance_max_ohm: limit("resistance_max_ohm", Rule::any("ohm")),
-        settling_max_s: limit("settling_max_ms", SETTLING_MS).map(|ms| ms / 1000.0),
-        outer_diameter_max_m: limit("outer_diameter_max_mm", BODY_MM).map(m_from_mm),
-        inner_diameter_min_m: limit("inner_diameter_min_mm", BODY_MM).map(m_from_mm),
-        length_max_m: limit("length_max_mm", BODY_MM).map(m_from_mm),
-        power_max_w: limit("power_max_w", Rule::any("W")),
-        mass_max_kg: limit("mass_max_kg", Rule::any("kg")),
-        wire_length_max_m: limit("wire_length_max_m", Rule::any("m")),
-        core_field_max_t: limit("core_field_max_t", Rule::any("T")),
-    };
-    s.finish();
-    limits
 }
 
 /// Height of the magnet's centre, mm.

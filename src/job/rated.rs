@@ -7,7 +7,7 @@ use super::scene::Scene;
 use super::single::{Single, TargetForce};
 use crate::accuracy::missed;
 use crate::coil::circuit::Circuit;
-use crate::coil::limits::{self, LimitCheck};
+use crate::coil::limits::{self, Evaluated, LimitCheck};
 use crate::units::STEEL_DENSITY_KG_PER_M3;
 
 /// One coil alone at its rated current, SI.
@@ -47,13 +47,13 @@ impl Rated {
             .map_or(0.0, |core| core.shape.volume_m3() * STEEL_DENSITY_KG_PER_M3);
         let mass_kg = circuit.wire_mass_kg + steel_kg;
         let force = single.force(scene, current_a)?;
-        let limits = limits::check(
-            scene.design,
-            &circuit,
+        let limits = limits::check(&Evaluated {
+            design: scene.design,
+            circuit: &circuit,
             power_w,
             mass_kg,
-            single.core.as_ref().map(|core| core.peak_field_t),
-        );
+            core_field_t: single.core.as_ref().map(|core| core.peak_field_t),
+        });
         Ok(Self {
             accuracy_missed: missed(&single.accuracy, single.tolerance),
             single,

@@ -31,12 +31,6 @@ const CIRCLES: &[&[&str]] = &[
         "cli::interrupt",
         "cli::printer",
     ],
-    &[
-        "coil::optimum::diagnosis",
-        "coil::optimum::search",
-        "coil::optimum::sharpen",
-        "coil::optimum::valley",
-    ],
     &["design::checks", "design::parse"],
     &["job::at_current", "job::scene", "job::steel"],
     &[

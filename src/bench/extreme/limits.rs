@@ -6,8 +6,8 @@ use super::check::{Outcome, close, holds, measured, off, refused, told, worst};
 use super::{Case, case};
 use crate::coil::optimum::air::AirCoil;
 use crate::coil::optimum::{
-    BestCoil, CertificateKind, Fixed, LimitName, Outcome as Optimum, Settings, Status, Strand,
-    Task, optimise,
+    BestCoil, CertificateKind, Fixed, LimitName, OptimumStatus, Outcome as Optimum, Settings,
+    Strand, Task, optimise,
 };
 use crate::design::{Design, Limits, Need, Wire};
 use crate::field::magnet::MagnetRule;
@@ -300,7 +300,7 @@ fn impossible() -> Vec<Case> {
                     7e-4,
                 )?;
                 match outcome.status {
-                    Status::Contradictory(c) => {
+                    OptimumStatus::Contradictory(c) => {
                         let named = c.between.contains(&LimitName::InnerDiameter)
                             && c.between.contains(&LimitName::OuterDiameter);
                         holds(named, c.message)
@@ -316,7 +316,7 @@ fn impossible() -> Vec<Case> {
             || {
                 let outcome = found(Limits::default(), 0.03, 7e-4)?;
                 match outcome.status {
-                    Status::Unbounded { missing } => {
+                    OptimumStatus::Unbounded { missing } => {
                         holds(!missing.is_empty(), format!("{missing:?}"))
                     }
                     other => Err(format!("{other:?}")),
@@ -334,13 +334,13 @@ fn impossible() -> Vec<Case> {
                 };
                 let outcome = found(limits, 0.03, 7e-4)?;
                 match (&outcome.status, &outcome.best) {
-                    (Status::Optimal, Some(coil)) => holds(
+                    (OptimumStatus::Optimal, Some(coil)) => holds(
                         coil.limits
                             .iter()
                             .all(|l| l.name.is_lower() || l.value <= l.limit * (1.0 + 1e-9)),
                         format!("{:.3e} N", coil.force_n),
                     ),
-                    (Status::Infeasible { .. } | Status::Contradictory(_), None) => {
+                    (OptimumStatus::Infeasible { .. } | OptimumStatus::Contradictory(_), None) => {
                         holds(true, format!("{:?}", outcome.status))
                     }
                     _ => Err(format!("{outcome:?}")),
@@ -362,7 +362,7 @@ fn impossible() -> Vec<Case> {
                 )?;
                 let nothing = outcome.best.as_ref().is_none_or(|b| b.force_n < 1e-9);
                 holds(
-                    nothing && outcome.status != Status::Optimal,
+                    nothing && outcome.status != OptimumStatus::Optimal,
                     format!("{:?}", outcome.status),
                 )
             },
@@ -377,7 +377,7 @@ fn impossible() -> Vec<Case> {
                     ..SEED
                 };
                 match found(limits, 0.03, 7e-4)?.status {
-                    Status::Contradictory(c) => holds(
+                    OptimumStatus::Contradictory(c) => holds(
                         c.message.contains("one layer of 0.700000 mm wire"),
                         c.message,
                     ),

@@ -8,7 +8,7 @@ use super::{Measured, curve, stage};
 use crate::bench::built_in::{AIR_ALL_LIMITS, BuiltIn, NLOPT, OPTIMUM_AIR, OPTIMUM_CORED};
 use crate::bench::pace::{Found, Pace};
 use crate::bundle::bench::{Curve, StageCurves};
-use crate::coil::optimum::branch::GAP;
+use crate::coil::optimum::branch_and_bound::GAP;
 use crate::coil::optimum::task;
 use crate::coil::optimum::{CoilModel, Fixed, Outcome, Settings, Task, optimise};
 use crate::design::Need;

@@ -10,6 +10,7 @@ use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
+use crate::cli::limits::{label, limit_row};
 use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{force, mass, mm, number, number_to, percent, si};
 use crate::cli::values::FileArgument;
@@ -70,7 +71,7 @@ impl Evaluate {
                 .limits
                 .iter()
                 .filter(|(_, check)| !check.met)
-                .map(|(name, _)| limit_name(name).0.to_owned())
+                .map(|(name, _)| label(name).to_owned())
                 .collect();
             let message = format!("limits that are not met: {}", unmet.join(", "));
             return Err(Failure::Unmet(Wish::Limits, message));
@@ -288,44 +289,11 @@ fn limits(result: &Evaluation) -> String {
         .map(str::to_owned)
         .to_vec();
     let row = |(name, check): (&&str, &crate::coil::limits::LimitCheck)| {
-        let (label, unit) = limit_name(name);
-        let told = |value: f64| match unit {
-            "mm" => mm(value),
-            "g" => mass(value),
-            "" => number(value),
-            unit => si(value, unit),
-        };
-        let sign = if *name == "inner_diameter_m" {
-            ">="
-        } else {
-            "<="
-        };
-        vec![
-            label.to_owned(),
-            told(check.value),
-            format!("{sign} {}", told(check.limit)),
-            if check.met { "met" } else { "NOT met" }.to_owned(),
-        ]
+        let state = if check.met { "met" } else { "NOT met" };
+        limit_row(name, check.value, check.limit, state)
     };
     let rows: Vec<Vec<String>> = std::iter::once(head)
         .chain(result.limits.iter().map(row))
         .collect();
     table(&[Side::Left, Side::Right, Side::Right, Side::Left], &rows)
-}
-
-/// A limit's name on screen and its unit.
-fn limit_name(key: &str) -> (&str, &'static str) {
-    match key {
-        "resistance_ohm" => ("resistance", "ohm"),
-        "settling_s" => ("settling", "s"),
-        "outer_diameter_m" => ("outer diameter", "mm"),
-        "inner_diameter_m" => ("inner diameter", "mm"),
-        "length_m" => ("length", "mm"),
-        "power_w" => ("heat", "W"),
-        "mass_kg" => ("mass", "g"),
-        "wire_length_m" => ("wire length", "m"),
-        "core_field_t" => ("core field", "T"),
-        "winding_fill" => ("winding fill", ""),
-        other => (other, ""),
-    }
 }

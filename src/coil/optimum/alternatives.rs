@@ -1,11 +1,11 @@
 //! Coils that are a little weaker than the best one, and shorter, lighter or cooler.
 
 use super::model::{CoilModel, Strand, Window};
+use super::near_optimal_bore::best_near;
 use super::outcome::BestCoil;
 use super::problem::{Problem, Task};
 use super::scalar;
-use super::sequential::Local;
-use super::valley::best_near;
+use super::sqp::Local;
 use fluxform_base::progress::{Interrupted, Progress};
 use fluxform_design::Limits;
 

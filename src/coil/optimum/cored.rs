@@ -3,7 +3,7 @@
 //! The core follows the winding: its radius is the bore's less the clearance, its ends stand
 //! `below` and `above` the winding's. What the steel adds, relative to the air coil's exact
 //! values, is smooth in (ln core radius, ln length, ln a2/a1) and does not depend on the wire: it
-//! is tabulated where the search comes ([`super::cells`]): roughly for the many starting points
+//! is tabulated where the search comes ([`super::lazy_table`]): roughly for the many starting points
 //! ([`CoilModel::draft`]), coarsely for the search, then finely about the best coil found
 //! ([`CoilModel::sharpened`]). Slopes are those of the table's
 //! polynomials, consistent with its values. All depths around one core share one factorisation.
@@ -12,8 +12,8 @@ use std::sync::Arc;
 
 use super::air::{AirCoil, NoAirCoil};
 use super::axis_gradient::axis_gradient;
-use super::cells::{Cells, Interpolated, Lattice, Line, Values};
-use super::model::{CoilModel, NoResponse, Response, Sloped, Window};
+use super::lazy_table::{COUNT, Cells, Interpolated, Lattice, Line, Values};
+use super::model::{CoilModel, Doubts, NoResponse, Response, Sloped, Window};
 use super::neighbours::Neighbours;
 use crate::inductance::self_inductance_h;
 use crate::section_integrals;
@@ -111,6 +111,8 @@ pub struct CoredModel {
     sharp_peaks: Option<Arc<Cells>>,
     /// Whether it has been sharpened.
     sharp: bool,
+    /// Whether it is the draft.
+    is_draft: bool,
     /// The search's table and the draft's, kept beside the sharp one.
     coarse: Arc<Cells>,
     rough: Arc<Cells>,
@@ -208,6 +210,7 @@ impl CoredModel {
             with_peak,
             sharp_peaks: None,
             sharp: false,
+            is_draft: false,
             relative_error: COARSE,
         })
     }
@@ -234,6 +237,9 @@ impl CoredModel {
         depths_m: &[f64],
         resolution: &Resolution,
     ) -> Option<Vec<(CoredCoil, Direct)>> {
+        if depths_m.iter().any(|depth_m| *depth_m <= 0.0) {
+            return None;
+        }
         let inner_radius_m = radius_m + self.rule.clearance_m;
         let shape = CoreShape {
             radius_m,
@@ -563,6 +569,29 @@ impl CoilModel for CoredModel {
         self.relative_error
     }
 
+    /// The draft's errors are those measured in the table's cell of `window` and its solutions',
+    /// doubled.
+    fn doubts(&self, window: &Window) -> Doubts {
+        let doubled = |[force, _, field]: Values, solved: f64| Doubts {
+            force_ln: 2.0 * (force + solved),
+            core_field_ln: 2.0 * (field + solved),
+        };
+        if !self.is_draft {
+            let solved = 2.5 * self.relative_error;
+            return doubled([0.0; COUNT], solved);
+        }
+        let errors = |value: &Values, exact: &Values| -> Values {
+            let ratio = ((1.0 + value[0]) / (1.0 + exact[0])).ln().abs();
+            let ratio = if ratio.is_nan() { f64::INFINITY } else { ratio };
+            [ratio, 0.0, (value[2] - exact[2]).abs()]
+        };
+        let measured = || {
+            let at = self.coordinates(window).ok()?;
+            self.added.errors(at, |x, y, z| self.line(x, y, z), errors)
+        };
+        doubled(measured().unwrap_or([f64::INFINITY; COUNT]), DRAFT)
+    }
+
     fn length_scale_m(&self) -> f64 {
         self.air.length_scale_m()
     }
@@ -624,6 +653,7 @@ impl CoilModel for CoredModel {
                 resolution: Resolution::for_tolerance(DRAFT),
                 added: Arc::clone(&self.rough),
                 relative_error: DRAFT,
+                is_draft: true,
                 ..self.clone()
             });
             draft

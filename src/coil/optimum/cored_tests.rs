@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::cored::{CoreRule, CoredModel, NoCoredCoil};
 use super::problem::Problem;
-use super::sequential::Smooth;
+use super::sqp::Smooth;
 use super::*;
 use crate::inductance::self_inductance_h;
 use fluxform_base::progress::Silent;
@@ -373,7 +373,8 @@ fn what_cannot_be_is_told() {
         ..seed().limits
     };
     let outcome = optimise(&model, &task_of(impossible), &quick(), &Silent);
-    let Status::Infeasible { violations, .. } = outcome.expect("not interrupted").status else {
+    let OptimumStatus::Infeasible { violations, .. } = outcome.expect("not interrupted").status
+    else {
         panic!("no coil settles so fast");
     };
     assert_eq!(violations[0].name, LimitName::Settling);
@@ -411,6 +412,35 @@ fn slopes_of_a_thin_winding_around_a_thick_core() {
     );
 }
 
+/// Regression: moved to a thick winding, the table's cells reached depths below zero, and a thin
+/// winding's force was half of what it is; wound coils half as strong as the best were the answer.
+#[test]
+fn a_table_moved_to_a_thick_winding_serves_thin_ones() {
+    let coarse = model(rule(), true);
+    coarse.focus(&Window {
+        inner_radius_m: 0.008,
+        depth_m: 0.0026,
+        length_m: 0.029,
+    });
+    for depth_m in [0.0004, 0.0012, 0.006] {
+        let window = Window {
+            inner_radius_m: 0.0086,
+            depth_m,
+            length_m: 0.029,
+        };
+        let response = coarse
+            .response(&window, 1.0 / 0.49e-6, 1.0, true)
+            .expect("in the domain");
+        let (force_n, inductance_h) = direct(&window, &rule());
+        let force = response.force_n.value / force_n - 1.0;
+        let inductance = response.inductance_h.value / inductance_h - 1.0;
+        assert!(
+            force.abs() < 3e-3 && inductance.abs() < 3e-3,
+            "{depth_m}: {force:e} {inductance:e}"
+        );
+    }
+}
+
 /// Rules and windows of a fixed sequence, of every kind that a design may ask for.
 fn drawn(count: usize) -> Vec<(CoreRule, Window)> {
     let mut state = 7_u64;
@@ -438,21 +468,25 @@ fn drawn(count: usize) -> Vec<(CoreRule, Window)> {
         .collect()
 }
 
-/// What the search drops on the draft's word is far below what it may be wrong by.
+/// What the search drops on the draft's word is what its measured error rules out.
 #[test]
-fn the_draft_is_far_better_than_it_is_trusted() {
-    for (rule, window) in drawn(16) {
+fn the_draft_is_as_good_as_it_measures() {
+    let mut widest = 0.0_f64;
+    for (rule, window) in drawn(24) {
         let draft = model(rule, false).draft().expect("a rough table");
         let response = draft
             .response(&window, 1.0 / 0.49e-6, 1.0, false)
             .expect("in the domain");
         let (force_n, _) = direct(&window, &rule);
         let wrong = (response.force_n.value / force_n).ln();
+        let doubt = draft.doubts(&window).force_ln;
         assert!(
-            wrong.abs() < 0.1 * search::DRAFT_DOUBT,
-            "{wrong:e} {rule:?} {window:?}"
+            wrong.abs() <= doubt,
+            "{wrong:e} {doubt:e} {rule:?} {window:?}"
         );
+        widest = widest.max(doubt);
     }
+    assert!(widest < 0.3, "{widest}");
 }
 
 #[test]
@@ -478,5 +512,40 @@ fn the_limited_flux_density_is_what_an_evaluation_prints() {
         let wrong = response.core_field_t.value / told_t - 1.0;
         // What a written design gives way by is ten times that.
         assert!(wrong.abs() < 1e-6, "{wrong:e} {rule:?} {window:?}");
+    }
+}
+
+/// Regression: with no limit on the outer diameter and a thin winding as the optimum, the answer was a
+/// coil of six tenths of its force; and a coil may have been named that breaks a limit.
+#[test]
+fn a_wound_coil_beside_a_thin_continuous_optimum_is_nearly_as_strong() {
+    let limits = Limits {
+        length_max_m: Some(0.058),
+        inner_diameter_min_m: Some(0.0064),
+        core_field_max_t: Some(0.174),
+        ..Limits::default()
+    };
+    let task = Task {
+        current_max_a: 3.93,
+        voltage_v: Some(11.4),
+        strands: Strand::choices(&tests::wire(0.000_26)),
+        ..task_of(limits)
+    };
+    let rule = CoreRule {
+        below_m: 0.0,
+        ..rule()
+    };
+    let outcome = optimise_wound(&model(rule, true), &task, &quick(), &Silent);
+    let outcome = outcome.expect("not interrupted");
+    let (best, continuous_n) = (outcome.best.expect("a coil"), outcome.continuous_n);
+    let share = best.force_n / continuous_n.expect("an optimum");
+    assert!(share > 0.95 && share < 1.0 + 1e-6, "{share} {best:?}");
+    for limit in &best.limits {
+        let over = if limit.name.is_lower() {
+            limit.limit / limit.value
+        } else {
+            limit.value / limit.limit
+        };
+        assert!(over <= 1.0 + 1e-9, "{limit:?}");
     }
 }

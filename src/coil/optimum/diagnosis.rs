@@ -1,11 +1,11 @@
 //! Why there is no coil, and which limit is nearest to blame.
 
 use super::domain::Domain;
+use super::local_searches::{self, Settings, Solved};
 use super::model::Window;
-use super::outcome::{Status, Violation};
+use super::outcome::{OptimumStatus, Violation};
 use super::problem::{LimitName, Problem, Regime};
-use super::search::{self, Settings, Solved};
-use super::sequential::{FEASIBLE, Local, Point, Smooth};
+use super::sqp::{FEASIBLE, Local, Point, Smooth};
 use super::starts;
 use fluxform_base::progress::{Interrupted, Progress};
 
@@ -51,7 +51,7 @@ pub(super) fn why_none(
     problems: &[Solved<'_>],
     settings: &Settings,
     progress: &dyn Progress,
-) -> Result<Status, Interrupted> {
+) -> Result<OptimumStatus, Interrupted> {
     let mut least: Option<(f64, Window, Vec<Violation>)> = None;
     for solved in problems.iter().filter(|s| s.contradiction.is_none()) {
         let problem = &solved.problem;
@@ -68,16 +68,12 @@ pub(super) fn why_none(
         let ends = match problem.model.draft() {
             Some(draft) => {
                 let draft = problem.with_model(&*draft);
-                let draft = Violated(&draft);
-                let ends = search::locals(&draft, points, 0, progress)?;
-                search::locals(
-                    &Violated(problem),
-                    search::promising(&draft, ends),
-                    0,
-                    progress,
-                )?
+                let ends = local_searches::locals(&Violated(&draft), points, 0, progress)?;
+                // Violations are sums of squares, whose errors no model states.
+                let starts = local_searches::promising(&Violated(&draft), |_| f64::INFINITY, ends);
+                local_searches::locals(&Violated(problem), starts, 0, progress)?
             }
-            None => search::locals(&Violated(problem), points, 0, progress)?,
+            None => local_searches::locals(&Violated(problem), points, 0, progress)?,
         };
         for local in ends {
             if local.violation(&Violated(problem)) > 1e3 * FEASIBLE {
@@ -95,7 +91,7 @@ pub(super) fn why_none(
         }
     }
     if let Some((_, window, violations)) = least {
-        return Ok(Status::Infeasible {
+        return Ok(OptimumStatus::Infeasible {
             violations,
             least: window,
         });
@@ -106,8 +102,8 @@ pub(super) fn why_none(
         .find(|s| s.contradiction.is_some() && s.problem.regime == Regime::Driver)
         .or(problems.iter().find(|s| s.contradiction.is_some()));
     Ok(match told.and_then(|s| s.contradiction.clone()) {
-        Some(contradiction) => Status::Contradictory(contradiction),
-        None => Status::Infeasible {
+        Some(contradiction) => OptimumStatus::Contradictory(contradiction),
+        None => OptimumStatus::Infeasible {
             violations: Vec::new(),
             least: Window {
                 inner_radius_m: 0.0,

@@ -1,7 +1,11 @@
 //! The box that limits span, contradictions among them, and limits whose absence leaves the
 //! force without a maximum.
 
+use std::f64::consts::PI;
+
 use super::problem::{LimitName, Problem, Regime};
+use crate::circuit::SETTLING_TIME_CONSTANTS;
+use fluxform_base::units::MU_0_T_M_PER_A;
 
 /// Ranges that every coil within the limits keeps; infinite where nothing bounds them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -211,12 +215,12 @@ impl Domain {
     /// Limits of which one is missing so that the force has a maximum; empty where it has one.
     ///
     /// At a given current a longer or wider coil always pulls harder. Any limit on the amount of
-    /// wire ends that, as do the supply's voltage and the settling time; without those it takes
-    /// both an outer diameter and a length.
+    /// wire ends that, as does the supply's voltage; so does the settling time, unless the widest
+    /// coil meets it at any length. Without those it takes both an outer diameter and a length.
     #[must_use]
     pub fn missing(&self, problem: &Problem<'_>) -> Vec<LimitName> {
         let ends = self.volume_m3[1].is_finite()
-            || self.settling_max_s.is_finite()
+            || self.settling_max_s < self.longest_settling_s(problem)
             || problem.regime == Regime::Supply;
         if ends || (self.outer_m[1].is_finite() && self.length_m[1].is_finite()) {
             return Vec::new();
@@ -229,6 +233,23 @@ impl Domain {
             missing.push(LimitName::Length);
         }
         missing
+    }
+
+    /// Settling time, s, that the widest coil in air approaches as its length grows: per length
+    /// L = mu_0 J^2 2 pi int r^2 (a2 - r) dr. Infinite without a limit on the outer diameter, where
+    /// the length is limited, and with a core, whose flux is not counted here.
+    fn longest_settling_s(&self, problem: &Problem<'_>) -> f64 {
+        let (inner, outer) = (self.inner_m[0], self.outer_m[1]);
+        let is_air = problem.model.air_dipoles().is_some();
+        if !(is_air && outer.is_finite() && self.length_m[1].is_infinite()) {
+            return f64::INFINITY;
+        }
+        let density = problem.strand.turns_per_m2();
+        let area_m4 = outer.powi(4) - 4.0 * outer * inner.powi(3) + 3.0 * inner.powi(4);
+        let inductance_h_per_m = MU_0_T_M_PER_A * density * density * PI / 6.0 * area_m4;
+        let resistance_ohm_per_m =
+            problem.strand.resistance_per_volume() * (outer * outer - inner * inner);
+        SETTLING_TIME_CONSTANTS * inductance_h_per_m / resistance_ohm_per_m
     }
 
     /// A wide but finite box to start from, in scaled coordinates: ln of mean radius, depth and

@@ -153,6 +153,15 @@ pub struct Response {
     pub core_field_t: Sloped,
 }
 
+/// Errors of a response, in logarithms.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Doubts {
+    /// Of the force.
+    pub force_ln: f64,
+    /// Of the flux density in the core.
+    pub core_field_ln: f64,
+}
+
 /// A window whose response cannot be computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("the coil cannot be computed: {0}")]
@@ -174,6 +183,16 @@ pub trait CoilModel: Sync {
 
     /// Relative error of a response; what the optimiser need not resolve.
     fn relative_error(&self) -> f64;
+
+    /// How far the response at `window` may be from that of a better model.
+    fn doubts(&self, _window: &Window) -> Doubts {
+        const DOUBT: f64 = 5.0;
+        let ln = DOUBT * self.relative_error();
+        Doubts {
+            force_ln: ln,
+            core_field_ln: ln,
+        }
+    }
 
     /// Heights of the dipoles that stand for the magnet and their moments, m and A m^2, where
     /// the coil has no core and the magnet lies on the axis: global bounds exist for those.

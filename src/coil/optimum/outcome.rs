@@ -7,7 +7,7 @@ pub use fluxform_base::accuracy::CertificateKind;
 
 /// How an optimisation ended.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Status {
+pub enum OptimumStatus {
     /// The best coil within the limits.
     Optimal,
     /// No coil meets the limits: those that the least violating coil breaks, worst first.
@@ -89,7 +89,7 @@ pub struct Certificate {
 }
 
 impl Certificate {
-    /// What `starts` local searches say; `cells` were bounded in vain.
+    /// What `starts` local searches say; `lazy_table` were bounded in vain.
     #[must_use]
     pub fn of_searches(starts: usize, cells: usize) -> Self {
         Self {
@@ -114,8 +114,8 @@ pub struct WireOutcome {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
     /// How it ended.
-    pub status: Status,
-    /// The best coil; present with [`Status::Optimal`].
+    pub status: OptimumStatus,
+    /// The best coil; present with [`OptimumStatus::Optimal`].
     pub best: Option<BestCoil>,
     /// What is proven about it.
     pub certificate: Certificate,
@@ -125,7 +125,7 @@ pub struct Outcome {
     pub evaluations: usize,
     /// Local searches.
     pub starts: usize,
-    /// Bores between which a coil within [`super::valley::SHARE`] of the best force exists,
+    /// Bores between which a coil within [`super::near_optimal_bore::SHARE`] of the best force exists,
     /// inner diameters in m.
     pub valley_m: Option<[f64; 2]>,
 }

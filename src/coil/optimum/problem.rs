@@ -6,8 +6,10 @@
 //! voltage falls with the resistance: either side of the kink is a smooth problem of its own.
 
 use super::model::{CoilModel, Sloped, Strand, Window};
-use super::sequential::{Local, Point, Smooth};
+use super::sqp::{Local, Point, Smooth};
 use crate::circuit::SETTLING_TIME_CONSTANTS;
+use crate::limits::LIMITS;
+pub use crate::limits::LimitName;
 use fluxform_design::Limits;
 
 /// Dimensions that are given, not sought; diameters and length in m.
@@ -21,7 +23,23 @@ pub struct Fixed {
     pub length_m: Option<f64>,
 }
 
-/// What is asked, for one coil.
+impl Fixed {
+    /// Whether nothing is left of the limit `name` to hold: a size that is given, and turns, which are
+    /// what fits.
+    fn settles(&self, name: LimitName) -> bool {
+        let given = [
+            (LimitName::OuterDiameter, self.outer_diameter_m),
+            (LimitName::InnerDiameter, self.inner_diameter_m),
+            (LimitName::Length, self.length_m),
+            (LimitName::WindingFill, Some(1.0)),
+        ];
+        given
+            .iter()
+            .any(|(size, value)| *size == name && value.is_some())
+    }
+}
+
+/// What is requested, for one coil.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Task {
     /// The limits.
@@ -34,92 +52,6 @@ pub struct Task {
     pub voltage_v: Option<f64>,
     /// The wires to choose among.
     pub strands: Vec<Strand>,
-}
-
-/// What bounds a coil. The first nine are the design file's.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum LimitName {
-    /// R, ohm.
-    Resistance,
-    /// Five time constants, s.
-    Settling,
-    /// Outer diameter, m.
-    OuterDiameter,
-    /// Inner diameter, m; a lower limit.
-    InnerDiameter,
-    /// Length, m.
-    Length,
-    /// Heat, W.
-    Power,
-    /// Mass of wire and core, kg.
-    Mass,
-    /// Length of wire, m.
-    WireLength,
-    /// Flux density in the core, T.
-    CoreField,
-    /// The supply's voltage, V, where the driver's current is the rated one.
-    Voltage,
-    /// The driver's current, A, where the supply's voltage sets the rated one.
-    Current,
-    /// One layer of wire must fit.
-    OneLayer,
-    /// One turn a layer must fit.
-    OneTurn,
-    /// The inner radius is not negative.
-    Axis,
-    /// A given inner diameter.
-    FixedInner,
-    /// A given outer diameter.
-    FixedOuter,
-    /// A given length.
-    FixedLength,
-}
-
-impl LimitName {
-    /// The name that artefacts use.
-    #[must_use]
-    pub fn key(self) -> &'static str {
-        match self {
-            Self::Resistance => "resistance_ohm",
-            Self::Settling => "settling_s",
-            Self::OuterDiameter | Self::FixedOuter => "outer_diameter_m",
-            Self::InnerDiameter | Self::FixedInner => "inner_diameter_m",
-            Self::Length | Self::FixedLength => "length_m",
-            Self::Power => "power_w",
-            Self::Mass => "mass_kg",
-            Self::WireLength => "wire_length_m",
-            Self::CoreField => "core_field_t",
-            Self::Voltage => "voltage_v",
-            Self::Current => "current_a",
-            Self::OneLayer => "one_layer_m",
-            Self::OneTurn => "one_turn_m",
-            Self::Axis => "axis_m",
-        }
-    }
-
-    /// Whether the value must stay above the limit.
-    #[must_use]
-    pub fn is_lower(self) -> bool {
-        matches!(
-            self,
-            Self::InnerDiameter | Self::OneLayer | Self::OneTurn | Self::Axis
-        )
-    }
-
-    /// Whether the value is given.
-    #[must_use]
-    pub fn is_equality(self) -> bool {
-        matches!(
-            self,
-            Self::FixedInner | Self::FixedOuter | Self::FixedLength
-        )
-    }
-
-    /// Whether it follows from geometry and cannot be blamed on a wish.
-    #[must_use]
-    pub fn is_geometry(self) -> bool {
-        self.is_equality() || matches!(self, Self::OneLayer | Self::OneTurn | Self::Axis)
-    }
 }
 
 /// A limit and its size, SI.
@@ -194,24 +126,11 @@ impl<'a> Problem<'a> {
         add(LimitName::FixedInner, fixed.inner_diameter_m);
         add(LimitName::FixedOuter, fixed.outer_diameter_m);
         add(LimitName::FixedLength, fixed.length_m);
-        let free = |given: Option<f64>, limit: Option<f64>| limit.filter(|_| given.is_none());
-        add(
-            LimitName::OuterDiameter,
-            free(fixed.outer_diameter_m, limits.outer_diameter_max_m),
-        );
-        // A limit of zero is the axis.
-        let inner = limits.inner_diameter_min_m.filter(|&limit| limit > 0.0);
-        add(
-            LimitName::InnerDiameter,
-            free(fixed.inner_diameter_m, inner),
-        );
-        add(LimitName::Length, free(fixed.length_m, limits.length_max_m));
-        add(LimitName::Resistance, limits.resistance_max_ohm);
-        add(LimitName::Settling, limits.settling_max_s);
-        add(LimitName::Power, limits.power_max_w);
-        add(LimitName::Mass, limits.mass_max_kg);
-        add(LimitName::WireLength, limits.wire_length_max_m);
-        add(LimitName::CoreField, limits.core_field_max_t);
+        for limit in &LIMITS {
+            // A least bore of zero is the axis.
+            let set = (limit.of)(limits).filter(|&value| value > 0.0 || !limit.name.is_lower());
+            add(limit.name, set.filter(|_| !fixed.settles(limit.name)));
+        }
         match regime {
             Regime::Driver => add(LimitName::Voltage, task.voltage_v),
             Regime::Supply => add(LimitName::Current, Some(task.current_max_a)),
@@ -256,17 +175,15 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The problem without its limit on the settling time; `None` where it has none.
+    /// The problem without the limits `names`; `None` where it has none of them.
     #[must_use]
-    pub fn without_settling(&self) -> Option<Problem<'a>> {
-        self.with_inductance.then(|| {
-            let mut bounds = self.bounds.clone();
-            bounds.retain(|bound| bound.name != LimitName::Settling);
-            Problem {
-                bounds,
-                with_inductance: false,
-                ..*self
-            }
+    pub fn without(&self, names: &[LimitName]) -> Option<Problem<'a>> {
+        let mut bounds = self.bounds.clone();
+        bounds.retain(|bound| !names.contains(&bound.name));
+        (bounds.len() < self.bounds.len()).then(|| Problem {
+            with_inductance: bounds.iter().any(|b| b.name == LimitName::Settling),
+            bounds,
+            ..*self
         })
     }
 
@@ -337,6 +254,7 @@ impl<'a> Problem<'a> {
                     along(window.length_m, [0.0, 0.0, 1.0])
                 }
                 LimitName::OneLayer => along(window.depth_m, [0.0, 1.0, 0.0]),
+                LimitName::WindingFill => along(1.0, [0.0; 3]),
                 LimitName::Power => product(product(current, current), resistance),
                 LimitName::Mass => {
                     let wire = volume.times(self.strand.mass_per_volume());

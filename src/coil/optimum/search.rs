@@ -1,66 +1,20 @@
 //! The best coil: local searches from many starts, all wires, either side of the supply's kink.
 
-use rayon::prelude::*;
-
-use super::branch::{self, GAP};
+use super::branch_and_bound::{self, GAP};
 use super::diagnosis;
-use super::domain::{Contradiction, Domain};
-use super::enclosure::{Bounding, Multipliers};
+use super::domain::Domain;
+use super::interval_bounds::{Bounding, Multipliers};
+use super::local_searches::{Settings, Solved, best_of, keep_better, locals, promising, starts_of};
 use super::model::{CoilModel, Window};
+use super::near_optimal_bore;
 use super::outcome::{
-    BestCoil, Certificate, CertificateKind, LimitUse, Outcome, Status, WireOutcome,
+    BestCoil, Certificate, CertificateKind, LimitUse, OptimumStatus, Outcome, WireOutcome,
 };
 use super::problem::{LimitName, Problem, Task};
-use super::sequential::{self, FEASIBLE, Local, Smooth};
-use super::sharpen;
+use super::sqp::{self, FEASIBLE, Local};
 use super::starts;
-use super::valley;
+use super::surrogate;
 use fluxform_base::progress::{Interrupted, Progress};
-
-/// How the search is carried out.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
-    /// Local searches for each wire and regime.
-    pub starts: usize,
-    /// Shifts the sequence of starts.
-    pub seed: u64,
-    /// Boxes that a certificate may take; 0 for none.
-    pub cells: usize,
-    /// A coil to start from besides.
-    pub initial: Option<Window>,
-    /// Whether the range of nearly equal bores is wanted.
-    pub valley: bool,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            starts: 24,
-            seed: 1,
-            cells: 4_000_000,
-            initial: None,
-            valley: true,
-        }
-    }
-}
-
-/// One problem and the best local optimum known of it.
-pub(super) struct Solved<'a> {
-    pub problem: Problem<'a>,
-    pub best: Option<Local>,
-    pub contradiction: Option<Contradiction>,
-    pub missing: Vec<LimitName>,
-    pub evaluations: usize,
-    pub starts: usize,
-}
-
-impl Solved<'_> {
-    pub fn force_n(&self) -> Option<f64> {
-        self.best
-            .as_ref()
-            .map(|local| (-local.point.objective).exp())
-    }
-}
 
 /// Maximises |force| over the coils that `task` admits.
 ///
@@ -76,9 +30,9 @@ pub fn optimise(
         Ok(problems) => problems,
         Err((status, problems)) => return Ok(without_coil(status, &problems)),
     };
-    let sharp = sharpen::sharpened(model, task, &problems, progress)?;
+    let sharp = surrogate::sharpened(model, task, &problems, progress)?;
     if let Some(sharp) = &sharp {
-        let restated = sharpen::restated(&**sharp, task, &problems);
+        let restated = surrogate::restated(&**sharp, task, &problems);
         if best_of(&restated).is_some() {
             problems = restated;
         }
@@ -90,18 +44,18 @@ pub fn optimise(
     let Some(winner) = winner else {
         // best_n > 0 means one has been found.
         return Ok(without_coil(
-            Status::Unbounded { missing: vec![] },
+            OptimumStatus::Unbounded { missing: vec![] },
             &problems,
         ));
     };
     let best = describe(winner);
     let valley_m = if settings.valley {
-        valley::bores_m(winner, progress)?
+        near_optimal_bore::bores_m(winner, progress)?
     } else {
         None
     };
     Ok(Outcome {
-        status: Status::Optimal,
+        status: OptimumStatus::Optimal,
         best,
         certificate,
         wires: wires(&problems),
@@ -112,7 +66,7 @@ pub fn optimise(
 }
 
 /// Why there is no coil, and the problems that have none.
-type NoCoil<'a> = (Status, Vec<Solved<'a>>);
+type NoCoil<'a> = (OptimumStatus, Vec<Solved<'a>>);
 
 /// How many times more starts are tried where none found a coil.
 const PATIENCE: usize = 3;
@@ -143,7 +97,7 @@ pub(super) fn solve_all<'a>(
         .find(|s| s.contradiction.is_none() && !s.missing.is_empty())
         .map(|s| s.missing.clone());
     if let Some(missing) = unbounded {
-        return Ok(Err((Status::Unbounded { missing }, problems)));
+        return Ok(Err((OptimumStatus::Unbounded { missing }, problems)));
     }
     let rounds = if task.limits.settling_max_s.is_some() {
         2
@@ -180,22 +134,6 @@ pub(super) fn solve_all<'a>(
     Ok(Ok(problems))
 }
 
-pub(super) fn best_of<'b, 'a>(problems: &'b [Solved<'a>]) -> Option<&'b Solved<'a>> {
-    let mut winner: Option<&Solved<'_>> = None;
-    for solved in problems {
-        let force = solved.force_n().unwrap_or(0.0);
-        if force > winner.and_then(Solved::force_n).unwrap_or(0.0) {
-            winner = Some(solved);
-        }
-    }
-    winner
-}
-
-/// Local searches of all problems together.
-pub(super) fn starts_of(problems: &[Solved<'_>]) -> usize {
-    problems.iter().map(|solved| solved.starts).sum()
-}
-
 fn wires(problems: &[Solved<'_>]) -> Vec<WireOutcome> {
     let mut wires: Vec<WireOutcome> = Vec::new();
     for solved in problems {
@@ -216,7 +154,7 @@ fn wires(problems: &[Solved<'_>]) -> Vec<WireOutcome> {
     wires
 }
 
-fn without_coil(status: Status, problems: &[Solved<'_>]) -> Outcome {
+fn without_coil(status: OptimumStatus, problems: &[Solved<'_>]) -> Outcome {
     Outcome {
         status,
         best: None,
@@ -236,7 +174,7 @@ fn multistart(
 ) -> Result<(), Interrupted> {
     // The inductance costs most. Without the settling time the force can only be higher: a coil
     // that is best without it and meets it is best with it.
-    if let Some(relaxed) = solved.problem.without_settling() {
+    if let Some(relaxed) = solved.problem.without(&[LimitName::Settling]) {
         let (best, evaluations) = search(&relaxed, settings, progress)?;
         solved.evaluations += evaluations;
         solved.starts += settings.starts;
@@ -273,7 +211,8 @@ fn search(
             let draft = problem.with_model(&*draft);
             let found = locals(&draft, points, 1, progress)?;
             evaluations += found.iter().map(|local| local.evaluations).sum::<usize>();
-            let starts = promising(&draft, found);
+            let doubt = |x| draft.model.doubts(&Problem::window(x)).force_ln;
+            let starts = promising(&draft, doubt, found);
             if let Some(best) = starts.first() {
                 problem.model.focus(&Problem::window(*best));
             }
@@ -302,7 +241,7 @@ fn search(
         && problem.task.fixed.inner_diameter_m.is_none()
     {
         let bored = bored(&Problem::window(local.x)).map(|window| Problem::coordinates(&window));
-        if let Some(local) = bored.and_then(|x| sequential::solve(problem, x)) {
+        if let Some(local) = bored.and_then(|x| sqp::solve(problem, x)) {
             evaluations += local.evaluations;
             keep_better(problem, &mut best, local);
         }
@@ -310,60 +249,9 @@ fn search(
     Ok((best, evaluations))
 }
 
-/// Where local searches from `points` end, each `items` of progress.
-pub(super) fn locals(
-    problem: &(impl Smooth + Sync),
-    points: Vec<[f64; 3]>,
-    items: u64,
-    progress: &dyn Progress,
-) -> Result<Vec<Local>, Interrupted> {
-    let found: Vec<Result<Option<Local>, Interrupted>> = points
-        .into_par_iter()
-        .map(|x| {
-            progress.check()?;
-            let local = sequential::solve(problem, x);
-            progress.advance(items);
-            Ok(local)
-        })
-        .collect();
-    let mut ends = Vec::new();
-    for local in found {
-        ends.extend(local?);
-    }
-    Ok(ends)
-}
-
-/// Most ends of a draft's searches that are searched from again.
-const PROMISING: usize = 6;
-/// How far below the draft's best objective the true best may be.
-pub(super) const DRAFT_DOUBT: f64 = 0.3;
 /// How much smaller, relatively, coils are tried in turn where a draft's do not lead to one that
 /// meets the limits.
 const SMALLER: [f64; 3] = [0.0, 0.04, 0.15];
-/// Ends closer than this in every coordinate are one.
-const SAME: f64 = 0.03;
-
-/// The different ends of searches on a draft that may be the best one: of those that meet the
-/// limits, or else those that violate them least.
-pub(super) fn promising(draft: &impl Smooth, mut ends: Vec<Local>) -> Vec<[f64; 3]> {
-    let met = |local: &Local| local.violation(draft) <= 1e3 * FEASIBLE;
-    if ends.iter().any(met) {
-        ends.retain(met);
-        ends.sort_by(|a, b| a.point.objective.total_cmp(&b.point.objective));
-        let best = ends[0].point.objective;
-        ends.retain(|local| local.point.objective <= best + DRAFT_DOUBT);
-    } else {
-        ends.sort_by(|a, b| a.violation(draft).total_cmp(&b.violation(draft)));
-    }
-    let mut kept: Vec<[f64; 3]> = Vec::new();
-    for local in ends {
-        let is_same = |x: &[f64; 3]| (0..3).all(|i| (x[i] - local.x[i]).abs() < SAME);
-        if kept.len() < PROMISING && !kept.iter().any(is_same) {
-            kept.push(local.x);
-        }
-    }
-    kept
-}
 
 /// The same winding with a bore; `None` where it has one. On the axis the force's slope vanishes:
 /// a bore may be better and not be seen from there.
@@ -373,16 +261,6 @@ fn bored(window: &Window) -> Option<Window> {
         depth_m: 0.95 * window.depth_m,
         ..*window
     })
-}
-
-pub(super) fn keep_better(problem: &Problem<'_>, best: &mut Option<Local>, local: Local) {
-    let feasible = local.violation(problem) <= FEASIBLE;
-    let better = best
-        .as_ref()
-        .is_none_or(|best| local.point.objective < best.point.objective);
-    if feasible && better {
-        *best = Some(local);
-    }
 }
 
 /// Bounds every problem against the best force; searches again where a box shows a better coil.
@@ -407,13 +285,14 @@ fn certify(
             if solved.contradiction.is_some() {
                 continue;
             }
-            let Some(domain) = branch::finite_domain(&solved.problem, best_ln.exp()) else {
+            let Some(domain) = branch_and_bound::finite_domain(&solved.problem, best_ln.exp())
+            else {
                 return Ok(unproven(cells));
             };
             let (bound, better) = bound(solved, domain, best_ln, settings, &mut cells, progress)?;
             upper_ln = upper_ln.max(bound);
             if let Some(window) = better {
-                let local = sequential::solve(&solved.problem, Problem::coordinates(&window));
+                let local = sqp::solve(&solved.problem, Problem::coordinates(&window));
                 if let Some(local) = local {
                     solved.evaluations += local.evaluations;
                     keep_better(&solved.problem, &mut solved.best, local);
@@ -485,8 +364,9 @@ fn bound(
             (true, false) => settings.cells / 16,
             (true, true) => settings.cells / 32,
         };
-        let cell = branch::whole(&domain);
-        let proof = branch::prove(&bounding, &solved.problem, cell, best_ln, budget, progress)?;
+        let cell = branch_and_bound::whole(&domain);
+        let proof =
+            branch_and_bound::prove(&bounding, &solved.problem, cell, best_ln, budget, progress)?;
         *cells += proof.cells;
         if proof.better.is_some() {
             return Ok((f64::INFINITY, proof.better));
@@ -538,7 +418,13 @@ pub(super) fn describe(solved: &Solved<'_>) -> Option<BestCoil> {
 
 #[cfg(test)]
 mod tests {
+    use super::surrogate::{STANDS, best_x, restated, sharpened};
     use super::*;
+    use crate::optimum::air::AirCoil;
+    use crate::optimum::model::{NoResponse, Response};
+    use crate::optimum::tests::{HEIGHT_M, air, quick, seed_limits, task};
+    use fluxform_base::progress::Silent;
+    use fluxform_design::Limits;
 
     #[test]
     fn next_to_no_bore_is_none_at_any_size() {
@@ -557,5 +443,85 @@ mod tests {
                 assert_eq!(bored(&window(bore)), None);
             }
         }
+    }
+
+    /// What an air coil's ln F lacks, as a function of the length, is not known to the coarse
+    /// model; to the sharp one as a straight line about one length; to the exact one throughout.
+    enum Known {
+        Nothing,
+        About(f64),
+        All,
+    }
+
+    struct Bent(AirCoil, Known);
+
+    const BEND: f64 = 0.02;
+    const MIDDLE_M: f64 = 0.02;
+
+    impl CoilModel for Bent {
+        fn response(
+            &self,
+            window: &Window,
+            turns_per_m2: f64,
+            current_a: f64,
+            with_inductance: bool,
+        ) -> Result<Response, NoResponse> {
+            let mut response = self
+                .0
+                .response(window, turns_per_m2, current_a, with_inductance)?;
+            let t = (window.length_m / MIDDLE_M).ln();
+            let (ln, slope) = match self.1 {
+                Known::Nothing => (0.0, 0.0),
+                Known::About(p) => (-BEND * (2.0 * p * t - p * p), -2.0 * BEND * p),
+                Known::All => (-BEND * t * t, -2.0 * BEND * t),
+            };
+            let mut force = response.force_n.times(ln.exp());
+            force.slope[2] += force.value * slope / window.length_m;
+            response.force_n = force;
+            Ok(response)
+        }
+
+        fn relative_error(&self) -> f64 {
+            self.0.relative_error()
+        }
+
+        fn length_scale_m(&self) -> f64 {
+            self.0.length_scale_m()
+        }
+
+        fn sharpened(&self, window: &Window) -> Option<Box<dyn CoilModel>> {
+            let about = Known::About((window.length_m / MIDDLE_M).ln());
+            Some(Box::new(Self(self.0.clone(), about)))
+        }
+    }
+
+    #[test]
+    fn sharpening_goes_on_until_the_optimum_stands() {
+        let limits = Limits {
+            settling_max_s: None,
+            length_max_m: None,
+            ..seed_limits()
+        };
+        let task = task(limits, None);
+        let settings = Settings {
+            starts: 4,
+            ..quick()
+        };
+        let [coarse, exact] = [Known::Nothing, Known::All].map(|known| Bent(air(HEIGHT_M), known));
+        let Ok(wanted) = solve_all(&exact, &task, &settings, &Silent).expect("runs") else {
+            panic!("bounded");
+        };
+        let Ok(found) = solve_all(&coarse, &task, &settings, &Silent).expect("runs") else {
+            panic!("bounded");
+        };
+        let wanted = best_x(&wanted).expect("an optimum");
+        let away = |x: [f64; 3]| (0..3).fold(0.0_f64, |s, i| s.max((x[i] - wanted[i]).abs()));
+        let before = away(best_x(&found).expect("an optimum"));
+        assert!(before > 0.01, "{before:e}");
+        let sharp = sharpened(&coarse, &task, &found, &Silent).expect("runs");
+        let sharp = sharp.expect("can be sharpened");
+        let at = best_x(&restated(&*sharp, &task, &found)).expect("an optimum");
+        // A single sharpening ends 3e-5 away.
+        assert!(away(at) < STANDS, "{:e}", away(at));
     }
 }

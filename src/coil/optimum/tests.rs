@@ -1,6 +1,6 @@
 use super::air::AirCoil;
 use super::problem::{Problem, Regime};
-use super::sequential::Smooth;
+use super::sqp::Smooth;
 use super::*;
 use crate::circuit::Circuit;
 use fluxform_base::progress::Silent;
@@ -115,7 +115,7 @@ fn best_random(task: &Task, count: usize, outer_m: f64, length_m: f64) -> f64 {
                 met.then_some(rated.force_n.value)
             };
             let screened = problem
-                .without_settling()
+                .without(&[LimitName::Settling])
                 .map_or(Some(f64::MAX), |p| met(&p));
             if screened.is_some_and(|force_n| force_n > best)
                 && let Some(force_n) = met(&problem)
@@ -393,7 +393,8 @@ fn extremes_are_solved_or_told() {
         resistance_max_ohm: Some(1e-6),
         ..seed_limits()
     };
-    let Status::Infeasible { violations, .. } = solved(&task(tiny, Some(36.0))).status else {
+    let OptimumStatus::Infeasible { violations, .. } = solved(&task(tiny, Some(36.0))).status
+    else {
         panic!("no coil has a microohm");
     };
     assert_eq!(violations[0].name, LimitName::Resistance);
@@ -418,7 +419,10 @@ fn extremes_are_solved_or_told() {
         },
     ] {
         let status = solved(&task(limits, Some(36.0))).status;
-        assert!(matches!(status, Status::Contradictory(_)), "{status:?}");
+        assert!(
+            matches!(status, OptimumStatus::Contradictory(_)),
+            "{status:?}"
+        );
     }
 }
 
@@ -431,16 +435,44 @@ fn a_missing_limit_is_named() {
     let status = solved(&task(limits, None)).status;
     assert_eq!(
         status,
-        Status::Unbounded {
+        OptimumStatus::Unbounded {
             missing: vec![LimitName::OuterDiameter]
         }
     );
     let status = solved(&task(Limits::default(), None)).status;
     let both = vec![LimitName::OuterDiameter, LimitName::Length];
-    assert_eq!(status, Status::Unbounded { missing: both });
+    assert_eq!(status, OptimumStatus::Unbounded { missing: both });
     // The supply's voltage alone bounds the coil.
     let outcome = solved(&task(Limits::default(), Some(36.0)));
     is_global(&outcome, outcome.best.as_ref().expect("optimal"));
+}
+
+/// Regression: a coil of kilometres was the answer, and winding it did not end.
+#[test]
+fn a_settling_time_that_any_length_meets_leaves_the_length_without_an_end() {
+    let of = |settling_max_s: f64, inner_diameter_min_m: Option<f64>| {
+        let limits = Limits {
+            outer_diameter_max_m: Some(0.0326),
+            settling_max_s: Some(settling_max_s),
+            inner_diameter_min_m,
+            ..Limits::default()
+        };
+        let settings = Settings {
+            starts: 6,
+            cells: 0,
+            ..quick()
+        };
+        let outcome = optimise(&air(HEIGHT_M), &task(limits, None), &settings, &Silent);
+        outcome.expect("runs")
+    };
+    // What a solid coil of 32.6 mm approaches: 5 mu_0 a^2 pi / 24 over the resistivity.
+    for (inner_m, approached_s) in [(None, 0.013_008), (Some(0.02), 0.010_457)] {
+        let status = of(1.02 * approached_s, inner_m).status;
+        let missing = vec![LimitName::Length];
+        assert_eq!(status, OptimumStatus::Unbounded { missing });
+        let best = of(0.9 * approached_s, inner_m).best.expect("an end");
+        assert!(best.window.length_m < 1.0, "{best:?}");
+    }
 }
 
 #[test]
@@ -546,7 +578,9 @@ fn winding_equals_brute_force() {
     assert_eq!(outcome.certificate.kind, CertificateKind::Global);
     let best = outcome.best.expect("optimal");
     let problem = &Problem::of_wire(&model, &task, task.strands[0])[0];
-    let relaxed = problem.without_settling().expect("a settling time");
+    let relaxed = problem
+        .without(&[LimitName::Settling])
+        .expect("a settling time");
     let d = 0.0007;
     let (mut brute, mut which) = (0.0, (0, 0));
     for n in 1..=14 {

@@ -6,7 +6,7 @@ use super::{NeededMap, recorded};
 use crate::bundle::lambda_file::LambdaFile;
 use crate::bundle::manifest::Manifest;
 use crate::bundle::table::{Column, write_columns};
-use crate::coil::limits;
+use crate::coil::limits::{self, Evaluated};
 use crate::job::lambda::LambdaReport;
 use crate::job::scene::Scene;
 use crate::map::FieldMap;
@@ -138,13 +138,13 @@ fn limit_facts(seen: &Seen) -> (Vec<LimitFacts>, Vec<&'static str>) {
         .map_or(0.0, |core| core.shape.volume_m3() * STEEL_DENSITY_KG_PER_M3);
     let peak = file.working_point.as_ref();
     let peak = peak.map(|at| at.peak_field_t.iter().copied().fold(0.0, f64::max));
-    let checks = limits::check(
-        scene.design,
-        &circuit,
-        circuit.power_w(scene.rated_current_a()),
-        circuit.wire_mass_kg + steel_kg,
-        peak,
-    );
+    let checks = limits::check(&Evaluated {
+        design: scene.design,
+        circuit: &circuit,
+        power_w: circuit.power_w(scene.rated_current_a()),
+        mass_kg: circuit.wire_mass_kg + steel_kg,
+        core_field_t: peak,
+    });
     let facts = checks.iter().map(|(name, check)| LimitFacts {
         name,
         value: check.value,

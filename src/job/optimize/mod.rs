@@ -24,8 +24,8 @@ use crate::coil::optimum::neighbours::Neighbours;
 use crate::coil::optimum::problem::{LimitName, Regime};
 use crate::coil::optimum::task::Surroundings;
 use crate::coil::optimum::{
-    BestCoil, Certificate, Fixed, LimitUse, Settings, Status, Window, optimise, optimise_wound,
-    task, valley,
+    BestCoil, Certificate, Fixed, LimitUse, OptimumStatus, Settings, Window, near_optimal_bore,
+    optimise, optimise_wound, task,
 };
 use crate::design::Design;
 use crate::progress::{Progress, Silent};
@@ -93,7 +93,7 @@ impl Default for OptimizeRequest {
 
 /// What either search found.
 struct Search {
-    status: Status,
+    status: OptimumStatus,
     best: Option<BestCoil>,
     whole: Option<[u64; 2]>,
     /// The coil whose turns need not be whole.
@@ -146,7 +146,7 @@ pub fn optimize(
         starts: search.starts,
         seed: request.seed,
         valley: search.valley_m.map(|inner_diameter_m| ValleyFacts {
-            force_share: valley::SHARE,
+            force_share: near_optimal_bore::SHARE,
             inner_diameter_m,
         }),
         wires: search.wires.clone(),

@@ -6,32 +6,33 @@ use super::{
     ALTERNATIVES_MAX, AlternativeFacts, FixedFacts, NoCoil, Search, SizeFacts, ViolationFacts,
     WireFacts,
 };
+use crate::coil::limits::LIMITS;
 use crate::coil::optimum::alternatives::{Alternative, Reduced};
 use crate::coil::optimum::outcome::Violation;
 use crate::coil::optimum::problem::Regime;
 use crate::coil::optimum::{
-    BestCoil, Fixed, LimitName, Outcome, Status, Window, WoundCoil, WoundOutcome,
+    BestCoil, Fixed, LimitName, OptimumStatus, Outcome, Window, WoundCoil, WoundOutcome,
 };
 
-pub(super) fn status(status: &Status) -> &'static str {
+pub(super) fn status(status: &OptimumStatus) -> &'static str {
     match status {
-        Status::Optimal => "optimal",
-        Status::Infeasible { .. } | Status::Contradictory(_) => "infeasible",
-        Status::Unbounded { .. } => "unbounded",
+        OptimumStatus::Optimal => "optimal",
+        OptimumStatus::Infeasible { .. } | OptimumStatus::Contradictory(_) => "infeasible",
+        OptimumStatus::Unbounded { .. } => "unbounded",
     }
 }
 
 /// Why there is no coil; `None` where there is one.
-pub(super) fn no_coil(status: &Status, wound: bool) -> Option<NoCoil> {
+pub(super) fn no_coil(status: &OptimumStatus, wound: bool) -> Option<NoCoil> {
     match status {
-        Status::Optimal => None,
-        Status::Contradictory(found) => Some(NoCoil {
+        OptimumStatus::Optimal => None,
+        OptimumStatus::Contradictory(found) => Some(NoCoil {
             message: format!("no coil meets the limits: {}", found.message),
             violations: Vec::new(),
             least: None,
             missing: Vec::new(),
         }),
-        Status::Infeasible { violations, least } => Some(NoCoil {
+        OptimumStatus::Infeasible { violations, least } => Some(NoCoil {
             message: infeasible(violations, wound),
             violations: violations
                 .iter()
@@ -45,17 +46,18 @@ pub(super) fn no_coil(status: &Status, wound: bool) -> Option<NoCoil> {
             least: Some(size(least)).filter(|size| size.length_m > 0.0),
             missing: Vec::new(),
         }),
-        Status::Unbounded { missing } => {
-            let keys: Vec<&str> = missing.iter().map(|name| design_key(*name)).collect();
+        OptimumStatus::Unbounded { missing } => {
+            let keys: Vec<&str> = missing.iter().map(|name| name.limit().design_key).collect();
             let sizes = match keys.as_slice() {
                 [] => "limits on outer diameter and length".to_owned(),
                 keys => keys.join(" and "),
             };
+            let ending = LIMITS.iter().filter(|limit| limit.ends_growth);
+            let ending: Vec<&str> = ending.map(|limit| limit.design_key).collect();
             Some(NoCoil {
                 message: format!(
-                    "the force grows without end: set {sizes}, or one of \
-                     limits.resistance_max_ohm, power_max_w, mass_max_kg, wire_length_max_m and \
-                     settling_max_ms"
+                    "the force grows without end: set {sizes}, or one of {}",
+                    ending.join(", ")
                 ),
                 violations: Vec::new(),
                 least: None,
@@ -74,9 +76,9 @@ fn infeasible(violations: &[Violation], wound: bool) -> String {
     let Some(worst) = violations.first() else {
         return format!("no {kind} meets the limits");
     };
-    let (value, unit) = people(worst.name, worst.value);
-    let (limit, _) = people(worst.name, worst.limit);
-    let [value, limit] = apart(value, limit);
+    let blamed = worst.name.limit();
+    let (unit, scale) = blamed.written;
+    let [value, limit] = apart(worst.value * scale, worst.limit * scale);
     let others = violations.len() - 1;
     let besides = match others {
         0 => String::new(),
@@ -86,7 +88,7 @@ fn infeasible(violations: &[Violation], wound: bool) -> String {
     format!(
         "no {kind} meets the limits: nearest to blame is {}; even the coil that misses least has \
          {value} {unit} where {limit} {unit} are allowed, {:.1} % off{besides}",
-        design_key(worst.name),
+        blamed.design_key,
         worst.excess.exp_m1().abs() * 100.0
     )
 }
@@ -112,42 +114,6 @@ fn apart(a: f64, b: f64) -> [String; 2] {
         .map(with)
         .find(|[a, b]| a != b)
         .unwrap_or_else(|| with(17))
-}
-
-/// A limit's value in the unit of its key.
-fn people(name: LimitName, value: f64) -> (f64, &'static str) {
-    match name {
-        LimitName::Resistance => (value, "ohm"),
-        LimitName::Settling => (value * 1e3, "ms"),
-        LimitName::Power => (value, "W"),
-        LimitName::Mass => (value, "kg"),
-        LimitName::WireLength => (value, "m"),
-        LimitName::CoreField => (value, "T"),
-        LimitName::Voltage => (value, "V"),
-        LimitName::Current => (value, "A"),
-        _ => (value * 1e3, "mm"),
-    }
-}
-
-/// Where a limit stands in the design file.
-fn design_key(name: LimitName) -> &'static str {
-    match name {
-        LimitName::Resistance => "limits.resistance_max_ohm",
-        LimitName::Settling => "limits.settling_max_ms",
-        LimitName::OuterDiameter => "limits.outer_diameter_max_mm",
-        LimitName::InnerDiameter => "limits.inner_diameter_min_mm",
-        LimitName::Length => "limits.length_max_mm",
-        LimitName::Power => "limits.power_max_w",
-        LimitName::Mass => "limits.mass_max_kg",
-        LimitName::WireLength => "limits.wire_length_max_m",
-        LimitName::CoreField => "limits.core_field_max_t",
-        LimitName::Voltage => "supply.voltage_v",
-        LimitName::Current => "supply.current_max_a",
-        LimitName::OneLayer | LimitName::OneTurn => "wire.diameter_mm",
-        LimitName::Axis | LimitName::FixedInner => "coil.inner_diameter_mm",
-        LimitName::FixedOuter => "coil.outer_diameter_mm",
-        LimitName::FixedLength => "coil.length_mm",
-    }
 }
 
 pub(super) fn fixed(fixed: &Fixed, best: Option<&BestCoil>) -> BTreeMap<&'static str, FixedFacts> {

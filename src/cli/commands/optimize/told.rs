@@ -3,8 +3,10 @@
 use crate::accuracy::CertificateKind;
 use crate::cli::commands::describe;
 use crate::cli::layout::{Sheet, Side, table};
+use crate::cli::limits::{label, limit_row, limit_value};
 use crate::cli::quantity::{count, error, force, mass, mm, number, number_to, percent, si};
 use crate::cli::values::FileArgument;
+use crate::coil::limits::by_key;
 use crate::job::optimize::{
     AlternativeFacts, BestFacts, GivenFacts, LimitFacts, ObjectiveFacts, Optimization,
 };
@@ -212,8 +214,8 @@ fn misses(given: &GivenFacts) -> Option<String> {
             format!(
                 "{} {}, allowed {}",
                 label(name),
-                told(name, check.value),
-                told(name, check.limit)
+                limit_value(name, check.value),
+                limit_value(name, check.limit)
             )
         })
         .collect();
@@ -222,17 +224,8 @@ fn misses(given: &GivenFacts) -> Option<String> {
 
 /// `1 ohm more gives 12 mN`.
 fn sensitivity(name: &str, used: &LimitFacts) -> String {
-    let (unit, size) = match name {
-        "settling_s" => ("ms", 1e-3),
-        "mass_kg" => ("g", 1e-3),
-        "resistance_ohm" => ("ohm", 1.0),
-        "power_w" => ("W", 1.0),
-        "wire_length_m" => ("m of wire", 1.0),
-        "core_field_t" => ("mT", 1e-3),
-        "voltage_v" => ("V", 1.0),
-        "current_a" => ("A", 1.0),
-        _ => ("mm", 1e-3),
-    };
+    let (unit, per_si) = by_key(name).map_or(("mm", 1e3), |limit| limit.step);
+    let size = 1.0 / per_si;
     // A unit that is not small against the limit is no slope.
     let scale = if size > 0.3 * used.limit { 1e-3 } else { 1.0 };
     let gain = used.sensitivity_n_per_unit * size * scale;
@@ -297,22 +290,12 @@ fn limits(result: &Optimization) -> String {
     let head = ["limit", "value", "allowed", ""].map(str::to_owned);
     let mut rows = vec![head.to_vec()];
     for (name, used) in &result.limits {
-        let sign = if *name == "inner_diameter_m" {
-            ">="
-        } else {
-            "<="
-        };
         let state = match (used.met, used.active) {
             (false, _) => "NOT met",
             (true, true) => "active",
             (true, false) => "met",
         };
-        rows.push(vec![
-            label(name).to_owned(),
-            told(name, used.value),
-            format!("{sign} {}", told(name, used.limit)),
-            state.to_owned(),
-        ]);
+        rows.push(limit_row(name, used.value, used.limit, state));
     }
     table(&[Side::Left, Side::Right, Side::Right, Side::Left], &rows)
 }
@@ -358,47 +341,4 @@ fn alternatives(list: &[AlternativeFacts]) -> String {
 fn shown(list: &[AlternativeFacts]) -> impl Iterator<Item = &AlternativeFacts> {
     let told = list.len().min(SHOWN);
     (0..told).map(move |k| &list[k * (list.len() - 1) / (told - 1).max(1)])
-}
-
-fn told(name: &str, value: f64) -> String {
-    match unit(name) {
-        "mm" => mm(value),
-        "g" => mass(value),
-        "" => number(value),
-        unit => si(value, unit),
-    }
-}
-
-fn label(name: &str) -> &str {
-    match name {
-        "resistance_ohm" => "resistance",
-        "settling_s" => "settling",
-        "outer_diameter_m" => "outer diameter",
-        "inner_diameter_m" => "inner diameter",
-        "length_m" => "length",
-        "power_w" => "heat",
-        "mass_kg" => "mass",
-        "wire_length_m" => "wire length",
-        "core_field_t" => "core field",
-        "winding_fill" => "winding fill",
-        "voltage_v" => "the supply's voltage",
-        "current_a" => "the drivers' current",
-        "one_layer_m" | "one_turn_m" => "wire diameter",
-        other => other,
-    }
-}
-
-fn unit(name: &str) -> &'static str {
-    match name {
-        "resistance_ohm" => "ohm",
-        "settling_s" => "s",
-        "power_w" => "W",
-        "mass_kg" => "g",
-        "wire_length_m" => "m",
-        "core_field_t" => "T",
-        "voltage_v" => "V",
-        "current_a" => "A",
-        "winding_fill" => "",
-        _ => "mm",
-    }
 }

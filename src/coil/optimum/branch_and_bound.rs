@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use rayon::prelude::*;
 
 use super::domain::Domain;
-use super::enclosure::{Bounding, Cell};
+use super::interval_bounds::{Bounding, Cell};
 use super::model::Window;
 use super::problem::{Problem, Regime};
 use fluxform_base::progress::{Interrupted, Progress};
@@ -248,7 +248,7 @@ fn halves(cell: &Cell) -> Option<[Cell; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::optimum::enclosure::Multipliers;
+    use crate::optimum::interval_bounds::Multipliers;
     use crate::optimum::tests::{HEIGHT_M, air, seed_limits, task, wire};
     use crate::optimum::{Strand, Task};
     use fluxform_base::progress::Silent;

@@ -1,11 +1,11 @@
 //! The flat valley: bores that cost next to no force, all else re-optimised.
 
 use super::domain::Domain;
+use super::local_searches::{Solved, keep_better};
 use super::model::Window;
 use super::problem::{Fixed, LimitName, Problem, Task};
 use super::scalar;
-use super::search::{Solved, keep_better};
-use super::sequential::{self, FEASIBLE, Local};
+use super::sqp::{self, FEASIBLE, Local};
 use fluxform_base::progress::{Interrupted, Progress};
 
 /// Share of the best force that a coil in the valley may lack.
@@ -91,7 +91,7 @@ fn best_ln_at(problem: &Problem<'_>, near: &Window, inner_m: f64) -> f64 {
 /// The best coil of `problem` that local searches from `starts` find.
 pub(super) fn best_near(problem: &Problem<'_>, starts: &[[f64; 3]]) -> Option<Local> {
     // The settling time is costly to know and often holds nothing back.
-    if let Some(relaxed) = problem.without_settling()
+    if let Some(relaxed) = problem.without(&[LimitName::Settling])
         && let Some(local) = best_from(&relaxed, starts)
         && let Some(adopted) = problem.adopted(&relaxed, &local)
         && adopted.violation(problem) <= FEASIBLE
@@ -104,7 +104,7 @@ pub(super) fn best_near(problem: &Problem<'_>, starts: &[[f64; 3]]) -> Option<Lo
 fn best_from(problem: &Problem<'_>, starts: &[[f64; 3]]) -> Option<Local> {
     let mut best = None;
     for &start in starts {
-        if let Some(local) = sequential::solve(problem, start) {
+        if let Some(local) = sqp::solve(problem, start) {
             keep_better(problem, &mut best, local);
         }
     }

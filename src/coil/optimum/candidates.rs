@@ -1,13 +1,12 @@
-//! Coils that can be wound: what is told about them, and which are worth telling about.
-
-use std::collections::BTreeMap;
+//! Coils that can be wound: what is reported of them, and which are worth a look.
 
 use super::diagnosis;
 use super::domain::Domain;
+use super::local_searches::{self, Solved};
 use super::model::{Strand, Window};
-use super::outcome::{BestCoil, Certificate, LimitUse, Status, Violation};
+use super::outcome::{BestCoil, Certificate, LimitUse, OptimumStatus, Violation};
 use super::problem::{LimitName, Problem};
-use super::search::{self, Solved};
+use super::search;
 
 /// Share of the best force that a listed coil may lack.
 pub const SHARE: f64 = 0.01;
@@ -41,8 +40,8 @@ pub struct WoundCoil {
 #[derive(Debug, Clone, PartialEq)]
 pub struct WoundOutcome {
     /// How it ended.
-    pub status: Status,
-    /// The best; present with [`Status::Optimal`].
+    pub status: OptimumStatus,
+    /// The best; present with [`OptimumStatus::Optimal`].
     pub best: Option<WoundCoil>,
     /// Coils within [`SHARE`] of its force that are shorter, lighter or cooler, none of them
     /// beaten by another in force, length, mass and heat together; strongest first.
@@ -70,16 +69,16 @@ pub(super) struct Leaf {
 
 impl WoundOutcome {
     /// No coil that can be wound, beside what `problems` found of those that cannot.
-    pub(super) fn none(status: Status, problems: &[Solved<'_>]) -> Self {
+    pub(super) fn none(status: OptimumStatus, problems: &[Solved<'_>]) -> Self {
         Self {
             status,
             best: None,
             alternatives: Vec::new(),
-            certificate: Certificate::of_searches(search::starts_of(problems), 0),
-            continuous_n: search::best_of(problems).and_then(Solved::force_n),
-            continuous: search::best_of(problems).and_then(search::describe),
+            certificate: Certificate::of_searches(local_searches::starts_of(problems), 0),
+            continuous_n: local_searches::best_of(problems).and_then(Solved::force_n),
+            continuous: local_searches::best_of(problems).and_then(search::describe),
             evaluations: problems.iter().map(|s| s.evaluations).sum(),
-            starts: search::starts_of(problems),
+            starts: local_searches::starts_of(problems),
         }
     }
 }
@@ -95,7 +94,7 @@ pub(super) fn around_optimum(solved: &Solved<'_>) -> Option<Domain> {
 }
 
 /// Why no coil can be wound though coils of any turns exist: what the nearest whole one breaks.
-pub(super) fn rounded_status(open: &[&Solved<'_>]) -> Status {
+pub(super) fn rounded_status(open: &[&Solved<'_>]) -> OptimumStatus {
     let mut least: Option<(Vec<Violation>, Window)> = None;
     for solved in open {
         let Some(local) = &solved.best else { continue };
@@ -117,19 +116,7 @@ pub(super) fn rounded_status(open: &[&Solved<'_>]) -> Status {
             length_m: 0.0,
         },
     ));
-    Status::Infeasible { violations, least }
-}
-
-/// The best leaf of every coil, in order of layers and turns.
-pub(super) fn once_each(leaves: Vec<Leaf>) -> Vec<Leaf> {
-    let mut best: BTreeMap<(u64, u64), Leaf> = BTreeMap::new();
-    for leaf in leaves {
-        let slot = best.entry((leaf.layers, leaf.turns)).or_insert(leaf);
-        if leaf.ln_force > slot.ln_force {
-            *slot = leaf;
-        }
-    }
-    best.into_values().collect()
+    OptimumStatus::Infeasible { violations, least }
 }
 
 /// The coil of a leaf in SI units.
@@ -169,33 +156,47 @@ pub(super) fn describe(problem: &Problem<'_>, leaf: &Leaf) -> Option<WoundCoil> 
     })
 }
 
-/// Of coils sorted by force: the strongest [`LISTED`] of those better than `best` in length, mass or heat, and not beaten
-/// by a stronger one in all three.
-pub(super) fn worth_a_look(best: &WoundCoil, sorted: &[WoundCoil]) -> Vec<WoundCoil> {
-    let traits = |coil: &WoundCoil| [coil.window.length_m, coil.wire_mass_kg, coil.power_w];
-    let mut kept: Vec<WoundCoil> = Vec::new();
-    for coil in sorted.iter().skip(1) {
+/// The strongest coil and, of those that follow, the ones better than it in length, mass or heat and
+/// not beaten by a stronger one in all three.
+#[derive(Debug, Default)]
+pub(super) struct Listed {
+    best: Option<WoundCoil>,
+    others: Vec<WoundCoil>,
+}
+
+impl Listed {
+    /// Takes the next coil in the order of force.
+    pub fn add(&mut self, coil: WoundCoil) {
+        let traits = |coil: &WoundCoil| [coil.window.length_m, coil.wire_mass_kg, coil.power_w];
+        let ours = traits(&coil);
         // Rounding is no advantage.
         let beaten = |other: &WoundCoil| {
-            traits(other)
-                .iter()
-                .zip(traits(coil))
-                .all(|(theirs, ours)| *theirs <= ours * (1.0 + 1e-9))
+            let pairs = traits(other).into_iter().zip(ours);
+            pairs.fold(true, |all, (theirs, ours)| {
+                all && theirs <= ours * (1.0 + 1e-9)
+            })
         };
-        if kept.len() == LISTED {
-            break;
-        }
-        if !beaten(best) && !kept.iter().any(beaten) {
-            kept.push(coil.clone());
+        if self.best.is_none() {
+            self.best = Some(coil);
+        } else if !self.best.iter().chain(&self.others).any(beaten) {
+            self.others.push(coil);
         }
     }
-    kept
+
+    /// Whether no more are listed.
+    pub fn is_full(&self) -> bool {
+        self.others.len() >= LISTED
+    }
+
+    pub fn finish(self) -> (Option<WoundCoil>, Vec<WoundCoil>) {
+        (self.best, self.others)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::optimum::sequential::{Local, Smooth};
+    use crate::optimum::sqp::{Local, Smooth};
     use crate::optimum::tests::{air, task};
     use fluxform_design::Limits;
 

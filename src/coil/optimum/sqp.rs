@@ -3,7 +3,7 @@
 //! argmin has no solver for nonlinear limits, and an augmented Lagrangian around its BFGS needs
 //! hundreds of evaluations for six digits where the active set gives all of them in a dozen: with
 //! three unknowns each step's quadratic programme is solved exactly. argmin does the searches in
-//! one variable (`wound`, `valley`).
+//! one variable (`wound`, `near_optimal_bore`).
 
 use nalgebra::{DMatrix, DVector};
 

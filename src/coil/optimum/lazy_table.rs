@@ -39,8 +39,18 @@ pub struct Interpolated {
     pub slope: [f64; 3],
 }
 
-/// One cell's values at its nodes, first axis slowest; `None` where the cell cannot be filled.
-type Cell = Option<Vec<Values>>;
+/// A cell's values at its nodes, first axis slowest, and the errors met off them.
+struct Filled {
+    values: Vec<Values>,
+    errors: OnceLock<Values>,
+}
+
+/// `None` where the cell cannot be filled.
+type Cell = Option<Filled>;
+
+/// Places off the nodes where a cell's polynomial is compared with the functions, on -1..1. Along the
+/// first two axes next to the corners, where the polynomial of the nodes is largest.
+const CORNER: f64 = 0.98;
 
 /// The table.
 pub struct Cells {
@@ -66,6 +76,20 @@ impl Axis {
             derivative: basis.derivative(),
             basis,
         }
+    }
+
+    /// The polynomial that vanishes at the nodes, over its value at the edge, no less than its
+    /// highest arch inside.
+    fn height(&self, x: f64) -> f64 {
+        let product = |x: f64| {
+            self.nodes
+                .iter()
+                .map(|node| x - node)
+                .product::<f64>()
+                .abs()
+        };
+        let arches = self.nodes.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));
+        arches.map(product).fold(product(x), f64::max) / product(CORNER)
     }
 
     /// Weights of value and derivative at `x` of -1..1.
@@ -94,10 +118,14 @@ impl Cells {
         }
     }
 
-    /// Moves the cells so that one of them has `at` in its middle. Without effect once a point
+    /// Moves the cells along the first two axes so that one of them has `at` in its middle: the
+    /// third variable's origin is a border of the functions' domain. Without effect once a point
     /// has been asked for. Not for use within a parallel loop.
     pub fn focus(&self, at: [f64; 3]) {
-        let origin = std::array::from_fn(|i| at[i] - 0.5 * self.lattice.width[i]);
+        let mut origin = self.lattice.origin;
+        for i in 0..2 {
+            origin[i] = at[i] - 0.5 * self.lattice.width[i];
+        }
         // Later points find the cells where the first one did.
         let _ = self.origin.set(origin);
     }
@@ -174,7 +202,51 @@ impl Cells {
             let pairs = self.pairs(key).into_iter();
             joined(pairs.map(|(x, y)| line(x, y, &thirds)).collect())
         });
-        Some(self.interpolate(cell.as_ref()?, key, at))
+        Some(self.interpolate(&cell.as_ref()?.values, key, at))
+    }
+
+    /// What the functions may be off by at `at`: the largest errors met in its cell, in terms of
+    /// `error` of a value and an exact one, next to the edges along the third axis and between the nodes
+    /// there; less off the edges, as the polynomial of the nodes is. `None` where the cell is
+    /// not filled, infinite where the functions are not defined beside its nodes.
+    pub fn errors(
+        &self,
+        at: [f64; 3],
+        line: impl Fn(f64, f64, &[f64]) -> Line,
+        error: impl Fn(&Values, &Values) -> Values,
+    ) -> Option<Values> {
+        let key = self.key(at);
+        let slot = self.slot(key);
+        let filled = slot.get()?.as_ref()?;
+        let errors = filled.errors.get_or_init(|| {
+            let [first, second, third] = [0, 1, 2].map(|axis| {
+                let low = self.origin()[axis] + self.lattice.width[axis] * key[axis] as f64;
+                move |x: f64| low + 0.5 * self.lattice.width[axis] * (1.0 + x)
+            });
+            let nodes = &self.axes[2].nodes;
+            let between = nodes.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));
+            let thirds: Vec<f64> = between.chain([-CORNER, CORNER]).map(third).collect();
+            let mut errors = [0.0_f64; COUNT];
+            for (x, y) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
+                let (x, y) = (first(CORNER * x), second(CORNER * y));
+                let Some(exact) = line(x, y, &thirds) else {
+                    return [f64::INFINITY; COUNT];
+                };
+                for (z, exact) in thirds.iter().zip(exact) {
+                    let values = self.interpolate(&filled.values, key, [x, y, *z]);
+                    let met = error(&values.map(|value| value.value), &exact);
+                    for (largest, met) in errors.iter_mut().zip(met) {
+                        *largest = largest.max(met);
+                    }
+                }
+            }
+            errors
+        });
+        let share = (0..3).fold(0.0_f64, |share, i| {
+            let place = (at[i] - self.origin()[i]) / self.lattice.width[i] - key[i] as f64;
+            share.max(self.axes[i].height(2.0 * place - 1.0))
+        });
+        Some(errors.map(|error| error * share))
     }
 
     fn interpolate(&self, values: &[Values], key: [i64; 3], at: [f64; 3]) -> [Interpolated; COUNT] {
@@ -222,7 +294,10 @@ fn joined(lines: Vec<Line>) -> Cell {
     for line in lines {
         values.extend(line?);
     }
-    Some(values)
+    Some(Filled {
+        values,
+        errors: OnceLock::new(),
+    })
 }
 
 #[cfg(test)]
@@ -269,8 +344,9 @@ mod tests {
     #[test]
     fn a_focus_is_in_the_middle_of_its_cell_and_stays() {
         let cells = cells();
-        let at = [0.45, -0.29, 0.8];
+        let at = [0.45, -0.29, 0.5];
         cells.focus(at);
+        // Along the third axis the cells are where they were: 0.2 to 0.8.
         let half = [0.35, 0.4, 0.3];
         for side in [-0.99, 0.99] {
             let beside = std::array::from_fn(|i| at[i] + side * half[i]);
@@ -280,6 +356,38 @@ mod tests {
         cells.focus([7.0, -1.3, 0.1]);
         assert!(cells.at(at, line).is_some());
         assert_eq!(cells.count(), 1);
+    }
+
+    /// With fewer nodes, so that there are errors: those stated cover what is met elsewhere.
+    #[test]
+    fn errors_met_beside_the_nodes_cover_those_throughout_the_cell() {
+        let cells = Cells::new(Lattice {
+            order: [4, 4, 4],
+            ..cells().lattice
+        });
+        let error = |value: &Values, exact: &Values| -> Values {
+            std::array::from_fn(|f| (value[f] - exact[f]).abs())
+        };
+        let mut stated = [0.0; COUNT];
+        for step in 0..343 {
+            let place = |i: i32, axis: usize| {
+                let width = cells.lattice.width[axis];
+                cells.lattice.origin[axis] + width * (0.02 + 0.16 * f64::from(i))
+            };
+            let at = [
+                place(step % 7, 0),
+                place(step / 7 % 7, 1),
+                place(step / 49, 2),
+            ];
+            let values = cells.at(at, line).expect("defined");
+            let exact = line(at[0], at[1], &at[2..]).expect("defined")[0];
+            stated = cells.errors(at, line, error).expect("filled");
+            let met = error(&values.map(|value| value.value), &exact);
+            for (met, stated) in met.into_iter().zip(stated) {
+                assert!(met <= 1.3 * stated + 1e-14, "{at:?}: {met:e} {stated:e}");
+            }
+        }
+        assert!(stated[0] > 1e-6 && stated[0] < 0.1, "{stated:?}");
     }
 
     #[test]

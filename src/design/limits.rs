@@ -1,0 +1,49 @@
+//! `[limits]`: what a coil may be, each optional.
+
+use super::reader::Section;
+use super::rule::{Bound, Rule};
+use super::sections::{BODY_MM, slip};
+use fluxform_base::units::m_from_mm;
+
+/// Limits; `None` where the design names none.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Limits {
+    /// Resistance at the wire's temperature, ohm.
+    pub resistance_max_ohm: Option<f64>,
+    /// Five time constants, s.
+    pub settling_max_s: Option<f64>,
+    /// Outer diameter, m.
+    pub outer_diameter_max_m: Option<f64>,
+    /// Inner diameter (a lower limit), m.
+    pub inner_diameter_min_m: Option<f64>,
+    /// Length, m.
+    pub length_max_m: Option<f64>,
+    /// Heat at the rated current, W.
+    pub power_max_w: Option<f64>,
+    /// Mass of wire and core, kg.
+    pub mass_max_kg: Option<f64>,
+    /// Length of wire, m.
+    pub wire_length_max_m: Option<f64>,
+    /// Flux density in the core, T.
+    pub core_field_max_t: Option<f64>,
+}
+
+const SETTLING_MS: Rule = Rule::any("ms").slips(&[slip(0.0, 0.5, "seconds", 1000.0)]);
+
+/// Reads the section.
+pub(crate) fn read(mut s: Section<'_>) -> Limits {
+    let mut limit = |key, rule: Rule| s.number(key, &rule.bound(Bound::Limit)).map(|l| l.value);
+    let limits = Limits {
+        resistance_max_ohm: limit("resistance_max_ohm", Rule::any("ohm")),
+        settling_max_s: limit("settling_max_ms", SETTLING_MS).map(|ms| ms / 1000.0),
+        outer_diameter_max_m: limit("outer_diameter_max_mm", BODY_MM).map(m_from_mm),
+        inner_diameter_min_m: limit("inner_diameter_min_mm", BODY_MM).map(m_from_mm),
+        length_max_m: limit("length_max_mm", BODY_MM).map(m_from_mm),
+        power_max_w: limit("power_max_w", Rule::any("W")),
+        mass_max_kg: limit("mass_max_kg", Rule::any("kg")),
+        wire_length_max_m: limit("wire_length_max_m", Rule::any("m")),
+        core_field_max_t: limit("core_field_max_t", Rule::any("T")),
+    };
+    s.finish();
+    limits
+}
