@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 
 use super::scene::Scene;
-use super::steel::{EVALUATION_SHARE, Material, Solved, Steel};
+use super::steel::{Material, Solved};
 use super::{JobError, KERNEL_ERROR, steel};
 use crate::accuracy::{StageAccuracy, missed};
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
@@ -125,7 +125,7 @@ pub fn compare(
         field_t,
         progress,
     )?;
-    let relative_error = claimed(&solved);
+    let relative_error = solved.point_error();
     let task = explain::Task {
         design,
         model: &model,
@@ -274,26 +274,11 @@ fn weights(scan: &Scan, request: &ScanRequest) -> Vec<f64> {
     row.repeat(scan.rows())
 }
 
-/// The claimed relative error of the computed field.
-fn claimed(solved: &Solved) -> f64 {
-    match solved.steel {
-        Steel::None => KERNEL_ERROR,
-        Steel::Alone(_) | Steel::Coupled(_) => {
-            solved.steel_estimate() + EVALUATION_SHARE * solved.tolerance
-        }
-    }
-}
-
 fn accuracy(solved: &Solved, estimate: f64) -> StageAccuracy {
-    let method = if matches!(solved.steel, Steel::None) {
-        "a-priori quadrature bound; rounding sampled against 40-digit values"
-    } else {
-        "steel by two resolutions, a-priori bound of its evaluation"
-    };
     StageAccuracy {
         estimate,
         relative_to: "the largest field and gradient of the scan".to_owned(),
-        method: method.to_owned(),
+        method: solved.point_method(),
     }
 }
 
