@@ -98,7 +98,9 @@ pub fn compare(
     if let Some(hint) = units::coordinates(design, scan) {
         return Err(refused(hint));
     }
-    let solved = steel::solve(&scene, request.tolerance, KERNEL_ERROR, lowest_m(scan))?;
+    // For any place, as `probe` does: a fit moves the places, and what `probe` printed must be found
+    // again to the last digits.
+    let solved = steel::solve(&scene, request.tolerance, KERNEL_ERROR, f64::NEG_INFINITY)?;
     let model = Model::new(&scene, &solved, scan);
     progress.begin("scan", 0);
     let places = model.places(Pose::default())?;
