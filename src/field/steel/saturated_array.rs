@@ -43,6 +43,8 @@ const MOST_STEPS: usize = 60;
 /// Change of the potentials, relative to the largest on any core and in units of the linear
 /// solver's residual, at which the iteration ends.
 const SETTLED: f64 = 3.0;
+/// Times what the other modes' permeability changes is stated, for places between those compared.
+const MODES_SAFETY: f64 = 2.0;
 /// Share of the tolerance that the outlines are allowed where the linear modes take most of it.
 const MODES_LEAVE: f64 = 0.3;
 /// Share of a try's aim that the outlines aim at: they are the cheap part.
@@ -102,8 +104,8 @@ pub struct SaturatedArray {
     /// of one coil along its curve, or what the caps on resolution cost where that is more, plus
     /// [`SaturatedArray::modes_error`]; infinite where the iteration stalled at any.
     pub relative_error: f64,
-    /// The part of it that is due to the other modes being linear: what they change when their
-    /// permeability is the initial one.
+    /// The part of it that is due to the other modes being linear: twice what they change
+    /// when their permeability is the initial one.
     pub modes_error: f64,
     /// Change of the potentials in every step of the iteration, relative to the largest.
     pub steps: Vec<f64>,
@@ -184,7 +186,8 @@ impl SaturatedArray {
         let initial = sequence.at(&linear, None);
         sequence.reference = initial.least_secant(&linear.core, law);
         let coarsest = sequence.at(&linear, Some(&initial.state));
-        let modes_error = coarsest.difference(&initial, sequence.lowest_m, tolerance)?;
+        let modes_error =
+            MODES_SAFETY * coarsest.difference(&initial, sequence.lowest_m, tolerance)?;
         // What the modes do wrong, no resolution mends.
         let left = tolerance - modes_error;
         let left = if left > 0.0 {
