@@ -9,9 +9,9 @@ use self::feedback::{FeedbackOptions, Rendering};
 use self::picture::Seen;
 use self::points::WantedPoints;
 use self::points_effect::Moved;
-use super::air_sample::{self, PLACES, Sample, spread};
 use super::discretize::scattered::{self, Sampling, ScatteredSummary};
 use super::discretize::{self, PointsReport};
+use super::evaluation_sample::{Evaluation, PLACES, Sample, sharper, spread};
 use super::kept::ShapeField;
 use super::scene::{AIR_SHARE, MAGNET_FINEST, MAGNET_SHARE, Scene};
 use super::single::above_knee;
@@ -582,11 +582,11 @@ fn forces_accuracy(
     points_m: &[[f64; 3]],
     forces_n_per_a: &[f64],
 ) -> StageAccuracy {
-    let proven = proven_accuracy(scene, solved);
+    let proven = evaluation(scene, solved);
     let [m_x, m_y, m_z] = scene.moment_a_m2;
     let dipole = scene.design.magnet.model == MagnetModel::Dipole;
-    if !matches!(solved.steel, Steel::None) || !dipole || m_x != 0.0 || m_y != 0.0 || m_z == 0.0 {
-        return proven;
+    if !dipole || m_x != 0.0 || m_y != 0.0 || m_z == 0.0 {
+        return accuracy_of(scene, solved, proven);
     }
     let coils = scene.coils.len();
     let samples = spread(forces_n_per_a.len(), PLACES)
@@ -599,36 +599,39 @@ fn forces_accuracy(
                 gz: forces_n_per_a[index] / (coil.gain * m_z),
             })
         });
-    air_sample::sharper(&scene.winding, samples, proven)
+    accuracy_of(scene, solved, sharper(scene, solved, samples, proven))
 }
 
-/// What is proven of the forces' error, or told by two resolutions of the steel.
+/// What is proven of the forces' error, and estimated of the steel.
 pub(super) fn proven_accuracy(scene: &Scene, solved: &Solved) -> StageAccuracy {
+    accuracy_of(scene, solved, evaluation(scene, solved))
+}
+
+/// What is proven of evaluating the forces, the steel's solution left out.
+fn evaluation(scene: &Scene, solved: &Solved) -> Evaluation {
     let rules = solved.tolerance.max(KERNEL_ERROR);
-    let magnet = match scene.design.magnet.model {
-        MagnetModel::Dipole => 0.0,
-        MagnetModel::Cylinder => MAGNET_SHARE * rules.max(MAGNET_FINEST),
-    };
-    let method = match solved.steel {
-        Steel::None => "a-priori quadrature bound, evaluated at the points directly",
-        Steel::Alone(_) => {
-            "steel by two resolutions, a-priori quadrature bound, evaluated at the points directly"
-        }
-        Steel::Coupled(_) => {
-            "coupled steel by two resolutions, a-priori quadrature bound, evaluated at the points \
-             directly"
-        }
-    };
-    let estimate = match solved.steel {
-        Steel::None if magnet == 0.0 => rules,
+    let cylinder = scene.design.magnet.model == MagnetModel::Cylinder;
+    let field = match solved.steel {
+        Steel::None if !cylinder => rules,
         Steel::None => (AIR_SHARE * rules).max(KERNEL_ERROR),
         // The winding's rule and the steel's.
-        Steel::Alone(_) | Steel::Coupled(_) => {
-            2.0 * EVALUATION_SHARE * rules + solved.steel_estimate()
-        }
+        Steel::Alone(_) | Steel::Coupled(_) => 2.0 * EVALUATION_SHARE * rules,
     };
+    let magnet = if cylinder {
+        MAGNET_SHARE * rules.max(MAGNET_FINEST)
+    } else {
+        0.0
+    };
+    Evaluation {
+        estimate: field + magnet,
+        method: "a-priori quadrature bound, evaluated at the points directly".to_owned(),
+    }
+}
+
+fn accuracy_of(scene: &Scene, solved: &Solved, evaluation: Evaluation) -> StageAccuracy {
+    let Evaluation { estimate, method } = evaluation;
     StageAccuracy {
-        estimate: estimate + magnet,
+        estimate: estimate + solved.steel_error,
         relative_to: match (&solved.steel, scene.design.magnet.model) {
             (Steel::Alone(_) | Steel::Coupled(_), MagnetModel::Cylinder) => {
                 "the largest |grad B| at each height of the magnet, averaged over it"
@@ -638,7 +641,10 @@ pub(super) fn proven_accuracy(scene: &Scene, solved: &Solved) -> StageAccuracy {
             }
         }
         .to_owned(),
-        method: method.to_owned(),
+        method: match solved.steel_method() {
+            None => method,
+            Some(steel) => format!("{steel}; {method}"),
+        },
     }
 }
 

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::JobError;
-use super::air_sample::{self, PLACES, Sample, spread};
+use super::evaluation_sample::{Evaluation, PLACES, Sample, sharper, spread};
 use super::scene::{AIR_SHARE, Scene};
 use super::steel::{EVALUATION_SHARE, Solved, Steel, SteelField, clearance_m, coupled};
 use crate::accuracy::StageAccuracy;
@@ -139,10 +139,11 @@ impl SceneMap {
             }
         };
         progress.end();
-        let mut accuracy = accuracy(&map, solved, felt.bound);
-        if matches!(solved.steel, Steel::None) && felt.is_field() {
-            accuracy = air_sample::sharper(&scene.winding, samples(&map, coils), accuracy);
+        let mut evaluation = evaluation(&map, solved);
+        if felt.is_field() {
+            evaluation = sharper(scene, solved, samples(&map, coils), evaluation);
         }
+        let accuracy = accuracy(evaluation, solved, felt.bound);
         Ok(Self {
             map,
             between,
@@ -477,30 +478,39 @@ fn samples(map: &FieldMap, coils: &[PlacedCoil]) -> Vec<Sample> {
         .collect()
 }
 
-/// The map's own error at its nodes.
-fn accuracy(map: &FieldMap, solved: &Solved, magnet: f64) -> StageAccuracy {
-    let rules = match solved.steel {
+/// What is proven of the map's error at its nodes, the steel's solution and the magnet left out.
+fn evaluation(map: &FieldMap, solved: &Solved) -> Evaluation {
+    let estimate = match solved.steel {
         Steel::None => map.relative_error.max(super::KERNEL_ERROR),
         // The winding's rule, the steel's evaluation and its table.
         Steel::Alone(_) | Steel::Coupled(_) => {
             (2.0 * MAP_SHARE + EVALUATION_SHARE) * solved.tolerance
         }
     };
-    let winding = if map.tabulated {
+    let method = if map.tabulated {
         "a-priori bounds of the radial quadrature and of the tables"
     } else {
         "a-priori bound of the radial quadrature"
     };
-    let method = match solved.steel {
-        Steel::None => winding.to_owned(),
-        Steel::Alone(_) => format!("steel by two resolutions; {winding}"),
-        Steel::Coupled(_) => format!(
-            "coupled steel by two resolutions, its table by comparison with direct values; {winding}"
-        ),
+    Evaluation {
+        estimate,
+        method: method.to_owned(),
+    }
+}
+
+/// The map's own error at its nodes.
+fn accuracy(evaluation: Evaluation, solved: &Solved, magnet: f64) -> StageAccuracy {
+    let Evaluation { estimate, method } = evaluation;
+    let table = match solved.steel {
+        Steel::None | Steel::Alone(_) => "",
+        Steel::Coupled(_) => ", its table by comparison with direct values",
     };
     StageAccuracy {
-        estimate: rules + solved.steel_estimate() + magnet,
+        estimate: estimate + solved.steel_error + magnet,
         relative_to: "the largest |grad B| at the node's height".to_owned(),
-        method,
+        method: match solved.steel_method() {
+            None => method,
+            Some(steel) => format!("{steel}{table}; {method}"),
+        },
     }
 }

@@ -1,12 +1,12 @@
 //! What a command does, from documents to results and artefacts. No screens, no clocks.
 
-mod air_sample;
 pub mod at_current;
 pub mod calibrate;
 pub mod compare;
 pub mod cost;
 pub mod discretize;
 pub mod evaluate;
+mod evaluation_sample;
 mod kept;
 pub mod lambda;
 pub mod map;

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::scene::Scene;
 use super::single::above_knee;
-use super::steel::{COUPLED_TOLERANCE, Solved, Steel};
+use super::steel::{COUPLED_TOLERANCE, Solved, Steel, TWO_OF_COUPLED_CORES};
 use super::working_point::{WorkingPoint, relative_difference};
 use super::{JobError, KERNEL_ERROR, steel};
 use crate::accuracy::{StageAccuracy, missed};
@@ -167,7 +167,7 @@ pub(super) fn inductances(
             }
             estimate += array.relative_error;
             relative_to = "the largest self inductance";
-            method = "coupled cores by two resolutions";
+            method = TWO_OF_COUPLED_CORES;
         }
     }
     let stage = StageAccuracy {

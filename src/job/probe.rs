@@ -41,6 +41,8 @@ pub struct ProbeTable {
     forces: Vec<[f64; 6]>,
     /// Estimated error relative to |grad B| at the point; with steel, to the largest at its height.
     pub relative_error: f64,
+    /// How it is known.
+    pub method: String,
     /// Whether it is relative to the largest at the height.
     pub relative_to_height: bool,
     /// Estimated error of the forces, relative to |m| times the largest |grad B| at the height.
@@ -152,6 +154,7 @@ pub fn probe(
         forces,
         points_m,
         relative_error: solved.point_error(),
+        method: solved.point_method(),
         relative_to_height: !matches!(solved.steel, Steel::None),
         force_error: request.force.then_some(magnet_error),
         accuracy_missed: missed([(&"field", &stage)], solved.tolerance),

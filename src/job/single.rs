@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::at_current::{self, SATURATED_TOLERANCE};
 use super::evaluate::CoreFacts;
 use super::scene::{MAGNET_SHARE, Scene};
-use super::steel::{CORED_TOLERANCE, Material, SceneCore};
+use super::steel::{ALONG_CURVE, CORED_TOLERANCE, Material, SceneCore, TWO_OF_ONE_CORE};
 use super::{JobError, KERNEL_ERROR, passive};
 use crate::accuracy::StageAccuracy;
 use crate::coil::inductance;
@@ -123,16 +123,12 @@ impl Single {
                 stage(
                     coil.relative_error,
                     "the largest |grad B| (|B|) at the target's height",
-                    "the difference of two resolutions of the core's surface",
+                    TWO_OF_ONE_CORE,
                 ),
             ),
             (
                 "inductance",
-                stage(
-                    coil.relative_error,
-                    "the inductance",
-                    "the difference of two resolutions of the core's surface",
-                ),
+                stage(coil.relative_error, "the inductance", TWO_OF_ONE_CORE),
             ),
             (
                 "core_field",
@@ -205,18 +201,19 @@ impl Single {
         let initial = core.relative_permeability();
         let linear = CoredCoil::new(&scene.winding, shape, initial, tolerance, height_m)?;
         let linear = linear.field(0.0, height_m)?;
-        let method = "the larger difference among three resolutions of the core's surface and inside, times a \
-                      safety factor";
         let accuracy = BTreeMap::from([
             (
                 "field",
-                stage(error, "|grad B| (|B|) at the target", method),
+                stage(error, "|grad B| (|B|) at the target", ALONG_CURVE),
             ),
-            ("inductance", stage(error, "the flux linkage", method)),
-            ("core_field", stage(state.peak_error, "the peak", method)),
+            ("inductance", stage(error, "the flux linkage", ALONG_CURVE)),
+            (
+                "core_field",
+                stage(state.peak_error, "the peak", ALONG_CURVE),
+            ),
             (
                 "core_field_mean",
-                stage(state.mean_error, "the mean", method),
+                stage(state.mean_error, "the mean", ALONG_CURVE),
             ),
         ]);
         let mean_t = state.inside.mean_b_t;

@@ -27,6 +27,15 @@ pub const CORED_TOLERANCE: f64 = 1e-6;
 pub const COUPLED_TOLERANCE: f64 = 1e-4;
 /// Share of the tolerance given to evaluating a solution.
 pub(super) const EVALUATION_SHARE: f64 = 0.1;
+/// How the error of one core's solution is known.
+pub(super) const TWO_OF_ONE_CORE: &str =
+    "twice the difference of two resolutions of the core's surface";
+/// The same of cores that magnetise each other.
+pub(super) const TWO_OF_COUPLED_CORES: &str =
+    "the difference of two resolutions of the coupled cores";
+/// The same of one core along a B-H curve.
+pub(super) const ALONG_CURVE: &str = "the larger difference among three resolutions of the core's surface and inside, times a \
+     safety factor";
 /// Heights above a core, in radii, from which on places are far from the steel.
 const FAR: f64 = 0.5;
 /// Share of the tolerance given to what is claimed of the steel's solution.
@@ -154,25 +163,37 @@ pub struct Solved {
     pub steel: Steel,
     /// The tolerance asked for, relative to the largest |grad B| at a height.
     pub tolerance: f64,
-    /// Difference of the steel's solution from that of the next coarser resolution, relative to
-    /// the same; 0 without steel. An estimate of its error that is too large as a rule, and by
-    /// chance a little too small: see [`Solved::steel_estimate`].
+    /// The error that is claimed of the steel's solution, relative to the same; 0 without steel.
     pub steel_error: f64,
     /// Permeability of the linear solution. With a B-H curve the cores of coils that are not
     /// coupled follow the curve at the rated current; those that are coupled are linear, of the
     /// permeability at the mean |B| of one coil alone at the rated current.
     pub relative_permeability: f64,
+    /// Whether the cores follow their B-H curve.
+    pub along_curve: bool,
 }
 
-/// Twice what two resolutions differ by covers those that lie close to each other by chance.
-const CHANCE: f64 = 2.0;
-
 impl Solved {
-    /// The error that is claimed of the steel's solution, relative to the largest |grad B| at a
-    /// height.
+    /// How [`Solved::steel_error`] is known; `None` without steel.
     #[must_use]
-    pub fn steel_estimate(&self) -> f64 {
-        CHANCE * self.steel_error
+    pub fn steel_method(&self) -> Option<&'static str> {
+        match self.steel {
+            Steel::None => None,
+            Steel::Alone(_) if self.along_curve => Some(ALONG_CURVE),
+            Steel::Alone(_) => Some(TWO_OF_ONE_CORE),
+            Steel::Coupled(_) => Some(TWO_OF_COUPLED_CORES),
+        }
+    }
+
+    /// How [`Solved::point_error`] is known.
+    #[must_use]
+    pub fn point_method(&self) -> String {
+        match self.steel_method() {
+            None => {
+                "a-priori quadrature bound; rounding sampled against 40-digit values".to_owned()
+            }
+            Some(steel) => format!("{steel}; a-priori bound of its evaluation"),
+        }
     }
 
     /// What is claimed of the field at points: the steel's solution and its evaluation; in air the
@@ -182,7 +203,7 @@ impl Solved {
         match self.steel {
             Steel::None => KERNEL_ERROR,
             Steel::Alone(_) | Steel::Coupled(_) => {
-                self.steel_estimate() + EVALUATION_SHARE * self.tolerance
+                self.steel_error + EVALUATION_SHARE * self.tolerance
             }
         }
     }
@@ -196,7 +217,7 @@ impl Solved {
             Steel::None => 0.0,
             Steel::Alone(_) | Steel::Coupled(_) => EVALUATION_SHARE * self.tolerance,
         };
-        self.steel_estimate() * growth + evaluation + KERNEL_ERROR * amplification + bound
+        self.steel_error * growth + evaluation + KERNEL_ERROR * amplification + bound
     }
 
     /// Whether the field at points is within the tolerance.
@@ -367,13 +388,14 @@ pub fn solve(
             tolerance: tolerance.unwrap_or(air_default),
             steel_error: 0.0,
             relative_permeability: 1.0,
+            along_curve: false,
         });
     };
     let current_a = scene.rated_current_a();
     let at_current = match &core.material {
         Material::Curve(curve) if current_a > 0.0 => {
             let tolerance = tolerance.unwrap_or(SATURATED_TOLERANCE);
-            let aim = STEEL_SHARE / CHANCE * tolerance;
+            let aim = STEEL_SHARE * tolerance;
             let state = at_current::solve(scene, core, curve, current_a, aim, lowest_m)?;
             let secant = curve.relative_permeability(state.inside.mean_b_t).max(1.0);
             Some((state, secant, tolerance))
@@ -391,7 +413,7 @@ pub fn solve(
             core.shape,
             relative_permeability,
             &scene.design.array.positions_m,
-            STEEL_SHARE / CHANCE * tolerance,
+            STEEL_SHARE * tolerance,
             lowest_m,
         )?;
         return Ok(Solved {
@@ -399,8 +421,10 @@ pub fn solve(
             steel_error: array.relative_error,
             steel: Steel::Coupled(Box::new(array)),
             relative_permeability,
+            along_curve: false,
         });
     }
+    let along_curve = at_current.is_some();
     let (alone, steel_error, tolerance) = match at_current {
         Some((state, _, tolerance)) => (
             AloneCore {
@@ -412,8 +436,7 @@ pub fn solve(
         ),
         None => {
             let tolerance = tolerance.unwrap_or(CORED_TOLERANCE);
-            let (winding, shape, aim) =
-                (&scene.winding, core.shape, STEEL_SHARE / CHANCE * tolerance);
+            let (winding, shape, aim) = (&scene.winding, core.shape, STEEL_SHARE * tolerance);
             // Far from the steel a solution does that is several times cheaper to evaluate.
             let coil = if lowest_m > shape.top_m.max(0.0) + FAR * shape.radius_m {
                 CoredCoil::new(winding, shape, relative_permeability, aim, lowest_m)?
@@ -435,6 +458,7 @@ pub fn solve(
         steel_error,
         steel: Steel::Alone(Box::new(alone)),
         relative_permeability,
+        along_curve,
     })
 }
 

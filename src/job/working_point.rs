@@ -5,7 +5,8 @@ use super::at_current::{self, no_state};
 use super::maps::lowest_plane;
 use super::scene::{MAGNET_SHARE, Scene, upward_n};
 use super::steel::{
-    EVALUATION_SHARE, Material, SceneCore, Solved, Steel, SteelField, clearance_m, coupled,
+    ALONG_CURVE, EVALUATION_SHARE, Material, SceneCore, Solved, Steel, SteelField, clearance_m,
+    coupled,
 };
 use crate::accuracy::StageAccuracy;
 use crate::field::steel::axial_table::AxialTable;
@@ -184,9 +185,12 @@ impl WorkingPoint {
         StageAccuracy {
             estimate: self.relative_error + EVALUATION_SHARE * self.tolerance,
             relative_to: "the largest |grad B| at a height".to_owned(),
-            method: "two resolutions of cores that follow their B-H curve, the modes across the \
-                     axis taken as linear and this varied"
-                .to_owned(),
+            method: match self.cores {
+                Cores::Alone(_) => ALONG_CURVE.to_owned(),
+                Cores::Coupled(_) => format!(
+                    "{ALONG_CURVE}; the modes across the axis taken as linear and this varied"
+                ),
+            },
         }
     }
 
@@ -278,6 +282,7 @@ impl WorkingPoint {
             tolerance: EVALUATION_SHARE * self.tolerance,
             steel_error: 0.0,
             relative_permeability: 1.0,
+            along_curve: false,
         };
         let per_ampere = scene.forces_n_per_a(&air, points_m, progress)?;
         let mut total: Vec<f64> = per_ampere

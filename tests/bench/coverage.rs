@@ -32,7 +32,7 @@ use crate::search;
 const SCENES: u64 = 100;
 /// A true error below this is the reference's own rounding and counts as so much.
 const ROUNDING: f64 = 2.2e-16;
-const MOST_MEDIAN: f64 = 150.0;
+const MOST_MEDIAN: f64 = 100.0;
 /// What stands in the bore.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Kind {

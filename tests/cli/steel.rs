@@ -315,3 +315,63 @@ fn a_probe_tells_the_force_on_the_magnet() {
         .ends(3)
         .says(&["magnet"]);
 }
+
+/// Two coils of the shipped design, as `design.toml`.
+fn two_coils(place: &Place) {
+    let text = String::from_utf8(place.read(CORED)).unwrap();
+    let two = text
+        .replace("rows = 3", "rows = 1")
+        .replace("columns = 3", "columns = 2");
+    assert_ne!(two, text);
+    place.write("design.toml", &two);
+}
+
+/// Broke: 1.1e-6 and 2e-6 were stated for a tolerance of 1e-6, and the exit code was 0.
+#[test]
+fn a_probe_reaches_its_tolerance_or_says_that_it_does_not() {
+    let place = Place::new();
+    two_coils(&place);
+    place.write("points.csv", "x_m,y_m,z_m\n0,0,0.01\n0.01,0,0.03\n");
+    let told = |tolerance: &str| {
+        let arguments = [
+            "probe",
+            "design.toml",
+            "points.csv",
+            "--tolerance",
+            tolerance,
+            "--format",
+            "json",
+        ];
+        place.run(&arguments)
+    };
+    for tolerance in [1e-5, 1e-6] {
+        let ran = told(&format!("{tolerance:e}"));
+        let json = ran.ends(0).json();
+        let stated = json["accuracy"]["field"]["estimate"].as_f64().unwrap();
+        assert!(stated <= tolerance, "{stated:e} for {tolerance:e}");
+    }
+}
+
+/// Broke: the array's inductances were left at 4.3e-6 and the tolerance called reached.
+#[test]
+fn inductances_of_an_array_reach_the_tolerance_or_say_that_they_do_not() {
+    let place = Place::new();
+    two_coils(&place);
+    for tolerance in [1e-6, 1e-7] {
+        let given = format!("{tolerance:e}");
+        let arguments = [
+            "evaluate",
+            "design.toml",
+            "--tolerance",
+            &given,
+            "--format",
+            "json",
+        ];
+        let json = place.run(&arguments).json();
+        let stated = json["accuracy"]["mutual_inductance"]["estimate"]
+            .as_f64()
+            .unwrap();
+        let reached = json["accuracy_reached"].as_bool().unwrap();
+        assert!(!reached || stated <= tolerance, "{stated:e} for {given}");
+    }
+}

@@ -204,19 +204,12 @@ fn accuracy(table: &ProbeTable) -> BTreeMap<&'static str, StageAccuracy> {
         relative_to: relative_to.to_owned(),
         method: method.to_owned(),
     };
-    let field = if table.relative_to_height {
-        stage(
-            table.relative_error,
-            "the largest |grad B| at the point's height",
-            "steel by two resolutions, a-priori bound of its evaluation",
-        )
+    let relative_to = if table.relative_to_height {
+        "the largest |grad B| at the point's height"
     } else {
-        stage(
-            table.relative_error,
-            "|grad B| at the point",
-            "a-priori quadrature bound; rounding sampled against 40-digit values",
-        )
+        "|grad B| at the point"
     };
+    let field = stage(table.relative_error, relative_to, &table.method);
     let force = table.force_error.map(|estimate| {
         let to = "the moment times the largest |grad B| at the point's height";
         let method = "the field's error and the a-priori bound of the magnet's dipoles";

@@ -160,8 +160,8 @@ pub struct CoupledArray {
     /// What the steel adds to self and mutual inductances, [coil, drive], H.
     pub added_inductance_h: DMatrix<f64>,
     /// Estimated error: of the gradients above, relative to the largest |grad B| at the height,
-    /// and of the inductances, relative to the largest; the larger. Half the difference from the
-    /// next coarser resolution.
+    /// and of the inductances, relative to the largest; the larger. The difference from the next
+    /// coarser resolution, or twice what is known of the exchange between the cores.
     pub relative_error: f64,
     /// Relative residual of the linear solver.
     pub relative_residual: f64,
@@ -172,7 +172,7 @@ pub struct CoupledArray {
 /// Refinements after which a tolerance that is not reached is given up, with its estimate.
 const MOST_REFINEMENTS: usize = 4;
 /// The first resolution's aim, in tolerances: resolutions do better than they aim at as a rule.
-const FIRST_AIM: f64 = 4.0;
+const FIRST_AIM: f64 = 2.0;
 /// Distance above the cores, in radii, below which no error is estimated.
 const CLOSEST: f64 = 0.1;
 /// Heights above the cores, in radii, below which the outline is resolved for places close to it.
@@ -229,9 +229,8 @@ impl CoupledArray {
             let coarse = solve(&coarse)?;
             let mut fine = solve(&resolution)?;
             // Where the caps bind, two wrong solutions may agree by chance.
-            let exchange = resolution.exchange_error(shape, closest_m);
-            fine.relative_error =
-                exchange.max(0.5 * fine.difference(&coarse, lowest_m, tolerance)?);
+            let exchange = 2.0 * resolution.exchange_error(shape, closest_m);
+            fine.relative_error = exchange.max(fine.difference(&coarse, lowest_m, tolerance)?);
             let better = best
                 .as_ref()
                 .is_none_or(|b| fine.relative_error < b.relative_error);
@@ -252,7 +251,7 @@ impl CoupledArray {
         let drives = self.positions_m.len();
         let distance_m = lowest_m - shape.top_m;
         let sources =
-            |array: &Self| ArraySources::of_array(array, lowest_m, distance_m, 0.1 * tolerance);
+            |array: &Self| ArraySources::of_array(array, lowest_m, distance_m, 0.05 * tolerance);
         let (fine, coarse) = (sources(self), sources(other));
         let parts = Parts::Gradient;
         let mut worst = 0.0_f64;

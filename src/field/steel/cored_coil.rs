@@ -116,8 +116,9 @@ pub struct CoredCoil {
     /// What the core adds to the winding's inductance, H.
     pub added_inductance_h: f64,
     /// Estimated error: of the gradient above, relative to the largest |grad B| at its height,
-    /// and of the added inductance; the larger. The difference from the next coarser resolution,
-    /// whose error is three to eight times larger as a rule, and nearly as small by chance.
+    /// and of the added inductance; the larger. Twice the difference from the next coarser
+    /// resolution, whose error is three to eight times larger as a rule, and nearly as small by
+    /// chance.
     pub relative_error: f64,
     /// The core by the next coarser resolution, of a coil whose error is estimated.
     pub(super) coarser: Option<Box<MagnetizedCore>>,
@@ -125,6 +126,9 @@ pub struct CoredCoil {
 
 /// Refinements after which a tolerance that is not reached is given up, with its estimate.
 const MAX_REFINEMENTS: usize = 5;
+/// Times the difference of two resolutions an error is stated, for those that lie close to each
+/// other by chance.
+const CHANCE: f64 = 2.0;
 /// Distance above the core, in radii, below which [`CoredCoil::new`] estimates no error.
 const CLOSEST_ABOVE: f64 = 0.1;
 /// Distances from the steel, in units of [`CLOSEST`] times its radius, at which errors are compared.
@@ -235,7 +239,7 @@ impl CoredCoil {
         planes: &[Vec<[f64; 2]>],
         pair: impl Fn(f64) -> [Resolution; 2],
     ) -> Result<Self, OnEdge> {
-        let mut aim = tolerance;
+        let mut aim = tolerance / CHANCE;
         let mut best: Option<Self> = None;
         for _ in 0..=MAX_REFINEMENTS {
             let [fine, coarse] = pair(aim);
@@ -243,7 +247,7 @@ impl CoredCoil {
                 |r: &Resolution| Self::at_resolution(winding, shape, relative_permeability, r);
             let coarse = solve(&coarse)?;
             let mut fine = solve(&fine)?;
-            fine.relative_error = fine.difference(&coarse, planes);
+            fine.relative_error = CHANCE * fine.difference(&coarse, planes);
             fine.coarser = Some(Box::new(coarse.core));
             let better = best
                 .as_ref()

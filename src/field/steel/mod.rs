@@ -9,6 +9,7 @@ pub mod bore;
 pub mod condensation;
 pub mod cored_coil;
 pub mod coupling;
+mod curve_refinement;
 pub mod double_layer;
 pub mod exchange;
 pub mod generatrix;

@@ -24,7 +24,8 @@ use super::CoreShape;
 use super::array::{ArrayResolution, closest_m};
 use super::cored_coil::Excitation;
 use super::coupling::{Coupling, different_offsets};
-use super::generatrix::Generatrix;
+use super::curve_refinement::{AlongCurve, Level, Try, refined};
+use super::generatrix::{Generatrix, Resolution};
 use super::interior::MeshError;
 use super::permeability::Permeability;
 use super::response::{Response, Rings, mean};
@@ -42,12 +43,25 @@ const MOST_STEPS: usize = 60;
 /// Change of the potentials, relative to the largest on any core and in units of the linear
 /// solver's residual, at which the iteration ends.
 const SETTLED: f64 = 3.0;
-/// Refinements after which a tolerance that is not reached is given up, with its estimate.
-const MOST_REFINEMENTS: usize = 2;
+/// Times what the other modes' permeability changes is stated, for places between those compared.
+const MODES_SAFETY: f64 = 2.0;
+/// Share of the tolerance that the outlines are allowed where the linear modes take most of it.
+const MODES_LEAVE: f64 = 0.3;
+/// Share of a try's aim that the outlines aim at: they are the cheap part.
+const OUTLINE_SHARE: f64 = 0.3;
 /// Distance above the cores, in radii, below which no error is estimated.
 const CLOSEST: f64 = 0.1;
 /// Places about every coil at which two solutions are compared, in units of its outer radius.
-const PLACES: [[f64; 2]; 4] = [[0.0, 0.0], [0.7, 0.2], [-0.4, 1.1], [1.5, -1.2]];
+const PLACES: [[f64; 2]; 8] = [
+    [0.0, 0.0],
+    [0.7, 0.2],
+    [-0.7, -0.1],
+    [0.1, 0.6],
+    [-0.2, -0.6],
+    [-0.4, 1.1],
+    [-0.6, 0.9],
+    [1.5, -1.2],
+];
 
 /// Why an array cannot be solved.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -86,13 +100,12 @@ pub struct SaturatedArray {
     /// Flux of all cores through every coil, Wb; the windings' own flux is not in it.
     pub flux_linkage_wb: Vec<f64>,
     /// Estimated error: of the total gradient above, relative to the largest |grad B| at the
-    /// height, and of the flux, relative to the largest; the larger. The difference from the next
-    /// coarser resolution (elements across the knee converge too unevenly for half of it to be
-    /// enough), or what the caps on resolution cost where that is more, plus
-    /// [`SaturatedArray::modes_error`]; infinite where the iteration stalled at either.
+    /// height, and of the flux, relative to the largest; the larger. What three solutions state as
+    /// of one coil along its curve, or what the caps on resolution cost where that is more, plus
+    /// [`SaturatedArray::modes_error`]; infinite where the iteration stalled at any.
     pub relative_error: f64,
-    /// The part of it that is due to the other modes being linear: what they change when their
-    /// permeability is the initial one.
+    /// The part of it that is due to the other modes being linear: twice what they change
+    /// when their permeability is the initial one.
     pub modes_error: f64,
     /// Change of the potentials in every step of the iteration, relative to the largest.
     pub steps: Vec<f64>,
@@ -158,72 +171,40 @@ impl SaturatedArray {
         lowest_m: f64,
     ) -> Result<Self, SaturatedArrayError> {
         check(positions_m, currents_a)?;
-        let closest_m = closest_m(positions_m);
-        let offsets = different_offsets(positions_m);
-        let lowest_m = lowest_m.max(shape.top_m.max(0.0) + CLOSEST * shape.radius_m);
-        let initial = law.response(0.0).relative;
-        let mut aim = tolerance;
-        let mut best: Option<Self> = None;
-        let mut modes_error = None;
-        for _ in 0..=MOST_REFINEMENTS {
-            let resolution = ArrayResolution::for_tolerance(aim, shape, closest_m).within_memory(
-                shape,
-                winding.length_m,
-                offsets,
-            );
-            // Where the caps bind, two wrong solutions may agree by chance.
-            let exchange_error = resolution.exchange_error(shape, closest_m);
-            let solve = |setup: &Setup, reference: f64, start: Option<&State>| {
-                Self::solve(
-                    winding,
-                    setup,
-                    law,
-                    positions_m,
-                    currents_a,
-                    reference,
-                    start,
-                )
-            };
-            let setup = Setup::new(winding, shape, &resolution.coarser())?;
-            let first = solve(&setup, initial, None);
-            let reference = first.least_secant(&setup.core, law);
-            let coarse = solve(&setup, reference, Some(&first.state));
-            let modes_error = match modes_error {
-                Some(known) => known,
-                None => *modes_error.insert(coarse.difference(&first, lowest_m, tolerance)?),
-            };
-            let setup = Setup::new(winding, shape, &resolution)?;
-            let mut fine = solve(&setup, reference, None);
-            let outline_error = exchange_error.max(fine.difference(&coarse, lowest_m, tolerance)?);
-            fine.modes_error = modes_error;
-            let all_found = [&first, &coarse, &fine]
-                .iter()
-                .all(|solved| solved.status == Status::Converged);
-            fine.relative_error = if all_found {
-                outline_error + modes_error
+        let mut sequence = Sequence {
+            winding,
+            shape,
+            law,
+            positions_m,
+            currents_a,
+            reference: law.response(0.0).relative,
+            tolerance,
+            lowest_m: lowest_m.max(shape.top_m.max(0.0) + CLOSEST * shape.radius_m),
+        };
+        let first = Try::first(tolerance);
+        let linear = sequence.setup(&first, Level::Coarsest)?;
+        let initial = sequence.at(&linear, None);
+        sequence.reference = initial.least_secant(&linear.core, law);
+        let coarsest = sequence.at(&linear, Some(&initial.state));
+        let modes_error =
+            MODES_SAFETY * coarsest.difference(&initial, sequence.lowest_m, tolerance)?;
+        // What the modes do wrong, no resolution mends.
+        let left = tolerance - modes_error;
+        let left = if left > 0.0 {
+            left.max(MODES_LEAVE * tolerance)
+        } else {
+            tolerance
+        };
+        let found = refined(&sequence, first, left, Some(coarsest))?;
+        Ok(Self {
+            modes_error,
+            relative_error: if initial.status == Status::Converged {
+                found.error + modes_error
             } else {
                 f64::INFINITY
-            };
-            let better = best
-                .as_ref()
-                .is_none_or(|b| fine.relative_error < b.relative_error);
-            // What the modes do wrong, no resolution mends.
-            let left = tolerance - modes_error;
-            let reached = outline_error
-                <= if left > 0.0 {
-                    left.max(0.3 * tolerance)
-                } else {
-                    tolerance
-                };
-            if better {
-                best = Some(fine);
-            }
-            if reached || !better || exchange_error > tolerance {
-                break;
-            }
-            aim *= 0.3;
-        }
-        Ok(best.expect("at least one resolution was solved"))
+            },
+            ..found.fine
+        })
     }
 
     /// Solves at one resolution, with a given permeability of the modes that are not
@@ -426,6 +407,90 @@ impl ArraySources {
                 winding: &array.winding,
             },
         )
+    }
+}
+
+/// One array at its currents, compared from a height up.
+struct Sequence<'a, L> {
+    winding: &'a Winding,
+    shape: CoreShape,
+    law: &'a L,
+    positions_m: &'a [[f64; 2]],
+    currents_a: &'a [f64],
+    /// Permeability of the modes that are not axisymmetric.
+    reference: f64,
+    tolerance: f64,
+    lowest_m: f64,
+}
+
+impl<L: Permeability + Sync> Sequence<'_, L> {
+    /// How finely the finest solution of a try is cut, but for its outline.
+    fn finest(&self, aim: f64) -> ArrayResolution {
+        let offsets = different_offsets(self.positions_m);
+        ArrayResolution::for_tolerance(aim, self.shape, closest_m(self.positions_m)).within_memory(
+            self.shape,
+            self.winding.length_m,
+            offsets,
+        )
+    }
+
+    /// The exchange between the cores converges as its order says, so that both coarser solutions
+    /// share theirs.
+    fn setup(&self, of: &Try, level: Level) -> Result<Setup, SaturatedArrayError> {
+        let finest = self.finest(of.aim);
+        let exchange = match level {
+            Level::Fine => finest,
+            Level::Coarse | Level::Coarsest => finest.coarser(),
+        };
+        let of_aim = Resolution::for_tolerance(OUTLINE_SHARE * of.aim);
+        let resolution = ArrayResolution {
+            outline: of.outline(level, of_aim),
+            ..exchange
+        };
+        Setup::new(self.winding, self.shape, &resolution)
+    }
+
+    fn at(&self, setup: &Setup, start: Option<&State>) -> SaturatedArray {
+        SaturatedArray::solve(
+            self.winding,
+            setup,
+            self.law,
+            self.positions_m,
+            self.currents_a,
+            self.reference,
+            start,
+        )
+    }
+}
+
+impl<L: Permeability + Sync> AlongCurve for Sequence<'_, L> {
+    type Solution = SaturatedArray;
+    type Error = SaturatedArrayError;
+
+    fn solve(
+        &self,
+        of: &Try,
+        level: Level,
+        _start: Option<&SaturatedArray>,
+    ) -> Result<SaturatedArray, SaturatedArrayError> {
+        Ok(self.at(&self.setup(of, level)?, None))
+    }
+
+    fn difference(
+        &self,
+        a: &SaturatedArray,
+        b: &SaturatedArray,
+    ) -> Result<f64, SaturatedArrayError> {
+        if a.status == Status::Stalled || b.status == Status::Stalled {
+            return Ok(f64::INFINITY);
+        }
+        Ok(a.difference(b, self.lowest_m, self.tolerance)?)
+    }
+
+    /// Where the caps bind, wrong solutions may agree by chance.
+    fn floor(&self, of: &Try) -> f64 {
+        let finest = self.finest(of.aim);
+        finest.exchange_error(self.shape, closest_m(self.positions_m))
     }
 }
 

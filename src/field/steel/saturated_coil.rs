@@ -4,6 +4,7 @@ use nalgebra::DVector;
 
 use super::CoreShape;
 use super::cored_coil::Excitation;
+use super::curve_refinement::{AlongCurve, Level, Refined, Try, refined};
 use super::generatrix::{Generatrix, Resolution};
 use super::interior::MeshError;
 use super::magnetized::MagnetizedCore;
@@ -12,14 +13,6 @@ use super::saturated::{CoreField, SaturatedCore, Status};
 use crate::winding::{OnEdge, Winding};
 use fluxform_numerics::refinement::error_of_finest;
 
-/// How much smaller a panel is than its neighbour away from the edge, from try to try: the curve's
-/// kinks cross the elements inside, where shorter ones help and higher degrees hardly do. After
-/// the last a tolerance that is not reached is given up, with its estimate.
-const RATIOS: [f64; 4] = [0.2, 0.35, 0.5, 0.5];
-/// The coarsest of three solutions needs two nodes a panel.
-const LEAST_ORDER: usize = 4;
-/// The outline's aim from one try to the next.
-const FINER: f64 = 0.3;
 /// How much more the differences of |B| inside count, of which the largest is seen at samples:
 /// kinks reach it undamped. By the table of
 /// `cargo test --test field steel -- --ignored --nocapture along_curves_in_full`.
@@ -88,72 +81,13 @@ impl<L: Permeability> CoilWithCurve<'_, L> {
         lowest_m: f64,
     ) -> Result<SaturatedCoil, SaturatedCoilError> {
         let lowest_m = lowest_m.max(self.shape.top_m.max(0.0) + CLOSEST * self.shape.radius_m);
-        let mut aim = tolerance;
-        let mut best: Option<SaturatedCoil> = None;
-        for (index, ratio) in RATIOS.into_iter().enumerate() {
-            let aimed = Resolution::for_tolerance(aim);
-            let resolution = Resolution {
-                ratio,
-                order: aimed.order.max(LEAST_ORDER),
-                ..aimed
-            };
-            let coarser = resolution.coarser();
-            let of_lower_degree = Resolution {
-                order: coarser.order - 1,
-                ..coarser
-            };
-            let coarsest = self.from(current_a, &of_lower_degree, None)?;
-            let coarse = self.from(current_a, &coarser, Some(&coarsest))?;
-            let before = self.difference(&coarse, &coarsest, lowest_m)?;
-            // Whatever the finest solution is, the tolerance would not be reached.
-            if error_of_finest(0.0, before) > tolerance && index + 1 < RATIOS.len() {
-                aim *= FINER;
-                continue;
-            }
-            let fine = self.from(current_a, &resolution, Some(&coarse))?;
-            let found = self.estimated(fine, [&coarse, &coarsest], before, lowest_m)?;
-            let better = best
-                .as_ref()
-                .is_none_or(|best| found.relative_error < best.relative_error);
-            if better {
-                best = Some(found);
-            }
-            if best
-                .as_ref()
-                .is_some_and(|best| best.relative_error <= tolerance)
-            {
-                break;
-            }
-            aim *= FINER;
-        }
-        best.ok_or(SaturatedCoilError::Stalled)
-    }
-
-    /// `fine` with its errors, from two coarser solutions that differ by their degree alone, in
-    /// what [`CoilWithCurve::difference`] compares by `before`; see [`error_of_finest`].
-    ///
-    /// Edges converge as their grading says. Where the curve's kinks cross the elements, which
-    /// wander with the state, errors of consecutive degrees are of one size and of either sign.
-    fn estimated(
-        &self,
-        fine: SaturatedCoil,
-        [coarse, coarsest]: [&SaturatedCoil; 2],
-        before: f64,
-        lowest_m: f64,
-    ) -> Result<SaturatedCoil, OnEdge> {
-        let last = self.difference(&fine, coarse, lowest_m)?;
-        let relative_error = error_of_finest(last, before);
-        let field = |pick: fn(&CoreField) -> f64| {
-            let [a, b, c] = [&fine.inside, &coarse.inside, &coarsest.inside].map(pick);
-            let size = if a > 0.0 { a } else { 1.0 };
-            INSIDE * error_of_finest((a - b).abs(), (b - c).abs()) / size + relative_error
+        let problem = AtCurrent {
+            coil: self,
+            current_a,
+            lowest_m,
         };
-        Ok(SaturatedCoil {
-            relative_error,
-            peak_error: field(|inside| inside.peak_b_t),
-            mean_error: field(|inside| inside.mean_b_t),
-            ..fine
-        })
+        let first = Try::first(tolerance);
+        Ok(stated(refined(&problem, first, tolerance, None)?))
     }
 
     /// Solves at one resolution; no error is estimated.
@@ -229,5 +163,55 @@ impl<L: Permeability> CoilWithCurve<'_, L> {
             worst = worst.max(differs / size);
         }
         Ok(worst)
+    }
+}
+
+/// A coil at one current, compared from a height up.
+struct AtCurrent<'a, L> {
+    coil: &'a CoilWithCurve<'a, L>,
+    current_a: f64,
+    lowest_m: f64,
+}
+
+impl<L: Permeability> AlongCurve for AtCurrent<'_, L> {
+    type Solution = SaturatedCoil;
+    type Error = SaturatedCoilError;
+
+    fn solve(
+        &self,
+        of: &Try,
+        level: Level,
+        start: Option<&SaturatedCoil>,
+    ) -> Result<SaturatedCoil, SaturatedCoilError> {
+        let resolution = of.outline(level, Resolution::for_tolerance(of.aim));
+        self.coil.from(self.current_a, &resolution, start)
+    }
+
+    fn difference(&self, a: &SaturatedCoil, b: &SaturatedCoil) -> Result<f64, SaturatedCoilError> {
+        Ok(self.coil.difference(a, b, self.lowest_m)?)
+    }
+
+    fn floor(&self, _of: &Try) -> f64 {
+        0.0
+    }
+}
+
+/// The finest solution with its errors.
+fn stated(solutions: Refined<SaturatedCoil>) -> SaturatedCoil {
+    let Refined {
+        fine,
+        coarser: [coarse, coarsest],
+        error,
+    } = solutions;
+    let field = |pick: fn(&CoreField) -> f64| {
+        let [a, b, c] = [&fine.inside, &coarse.inside, &coarsest.inside].map(pick);
+        let size = if a > 0.0 { a } else { 1.0 };
+        INSIDE * error_of_finest((a - b).abs(), (b - c).abs()) / size + error
+    };
+    SaturatedCoil {
+        relative_error: error,
+        peak_error: field(|inside| inside.peak_b_t),
+        mean_error: field(|inside| inside.mean_b_t),
+        ..fine
     }
 }

@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 
 use super::scene::Scene;
-use super::steel::{EVALUATION_SHARE, Material, Solved, Steel};
+use super::steel::{Material, Solved};
 use super::{JobError, KERNEL_ERROR, steel};
 use crate::accuracy::{StageAccuracy, missed};
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
@@ -98,7 +98,9 @@ pub fn compare(
     if let Some(hint) = units::coordinates(design, scan) {
         return Err(refused(hint));
     }
-    let solved = steel::solve(&scene, request.tolerance, KERNEL_ERROR, lowest_m(scan))?;
+    // For any place, as `probe` does: a fit moves the places, and what `probe` printed must be found
+    // again to the last digits.
+    let solved = steel::solve(&scene, request.tolerance, KERNEL_ERROR, f64::NEG_INFINITY)?;
     let model = Model::new(&scene, &solved, scan);
     progress.begin("scan", 0);
     let places = model.places(Pose::default())?;
@@ -125,7 +127,7 @@ pub fn compare(
         field_t,
         progress,
     )?;
-    let relative_error = claimed(&solved);
+    let relative_error = solved.point_error();
     let task = explain::Task {
         design,
         model: &model,
@@ -274,26 +276,11 @@ fn weights(scan: &Scan, request: &ScanRequest) -> Vec<f64> {
     row.repeat(scan.rows())
 }
 
-/// The claimed relative error of the computed field.
-fn claimed(solved: &Solved) -> f64 {
-    match solved.steel {
-        Steel::None => KERNEL_ERROR,
-        Steel::Alone(_) | Steel::Coupled(_) => {
-            solved.steel_estimate() + EVALUATION_SHARE * solved.tolerance
-        }
-    }
-}
-
 fn accuracy(solved: &Solved, estimate: f64) -> StageAccuracy {
-    let method = if matches!(solved.steel, Steel::None) {
-        "a-priori quadrature bound; rounding sampled against 40-digit values"
-    } else {
-        "steel by two resolutions, a-priori bound of its evaluation"
-    };
     StageAccuracy {
         estimate,
         relative_to: "the largest field and gradient of the scan".to_owned(),
-        method: method.to_owned(),
+        method: solved.point_method(),
     }
 }
 

@@ -1,6 +1,6 @@
 //! The force constant, the currents and their errors.
 
-use super::super::air_sample::spread;
+use super::super::evaluation_sample::spread;
 use super::super::steel::{self, Steel};
 use super::super::{JobError, KERNEL_ERROR};
 use super::passive::offset_n;

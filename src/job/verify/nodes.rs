@@ -1,6 +1,6 @@
 //! The map, on its nodes and between them.
 
-use super::super::air_sample::spread;
+use super::super::evaluation_sample::spread;
 use super::super::{JobError, KERNEL_ERROR};
 use super::route::Route;
 use super::{Bounds, Check, check, ratio};

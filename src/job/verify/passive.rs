@@ -1,7 +1,7 @@
 //! The unpowered steel's pull.
 
 use super::super::JobError;
-use super::super::air_sample::spread;
+use super::super::evaluation_sample::spread;
 use super::super::passive::{self, PASSIVE_TOLERANCE};
 use super::super::passive_map::PassiveMap;
 use super::super::scene::Scene;

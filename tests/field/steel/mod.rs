@@ -13,3 +13,4 @@ mod near;
 mod oracle;
 mod saturation;
 mod support;
+mod working_points;

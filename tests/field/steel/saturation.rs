@@ -11,7 +11,7 @@ use rayon::prelude::*;
 const SEED: u64 = 20_261_123;
 
 /// The committed table, one of cobalt-iron that ends high, and a coarse one whose kinks are sharp.
-fn curves() -> Vec<BhCurve> {
+pub fn curves() -> Vec<BhCurve> {
     let text = include_str!("../../../designs/steel_1010.csv");
     let (b_t, h): (Vec<f64>, Vec<f64>) = text
         .lines()

@@ -1,10 +1,12 @@
-//! How exact the quadratures in air turned out to be, by values of the elliptic integrals.
+//! How exact the quadratures of coils that answer to themselves alone turned out to be, by direct
+//! values.
 //!
 //! The rules' a-priori bounds hold everywhere and are careful: what they are at a few places is
-//! some hundred times better. Both are told, the sampled one as the estimate.
+//! some hundred times better. Both are stated, the sampled one as the estimate.
 
-use crate::accuracy::StageAccuracy;
-use crate::field::winding::Winding;
+use super::scene::Scene;
+use super::steel::{Solved, Steel};
+use crate::field::winding::{AxialField, OnEdge};
 
 /// The estimate is this multiple of the largest difference that was found.
 const SAFETY: f64 = 30.0;
@@ -23,17 +25,38 @@ pub(super) struct Sample {
     pub(super) gz: f64,
 }
 
+/// The error of evaluating a solved field, and how it is known.
+pub(super) struct Evaluation {
+    /// Relative to the largest |grad B| at the height.
+    pub(super) estimate: f64,
+    /// A bound a priori, or samples beside it.
+    pub(super) method: String,
+}
+
 /// `proven`, a bound a priori, with what samples say in its place; itself where they cannot be
-/// compared (on the edge of a winding).
+/// compared: on the edge of a winding, or where cores answer to other windings.
 pub(super) fn sharper(
-    winding: &Winding,
+    scene: &Scene,
+    solved: &Solved,
     samples: impl IntoIterator<Item = Sample>,
-    proven: StageAccuracy,
-) -> StageAccuracy {
+    proven: Evaluation,
+) -> Evaluation {
+    let (layer, direct) = match &solved.steel {
+        Steel::None => (None, "elliptic integrals"),
+        Steel::Alone(core) => (
+            Some(&core.layer),
+            "elliptic integrals over the core's layer",
+        ),
+        Steel::Coupled(_) => return proven,
+    };
+    let field = |r_m: f64, z_m: f64| -> Result<AxialField, OnEdge> {
+        let air = scene.winding.field(r_m, z_m)?;
+        Ok(layer.map_or(air, |layer| air + layer.field(r_m, z_m)))
+    };
     let (mut count, mut largest) = (0, 0.0_f64);
     for Sample { r_m, z_m, gz } in samples {
         // The largest |grad B| at a height is no less than that on the axis.
-        let (Ok(here), Ok(on_axis)) = (winding.field(r_m, z_m), winding.field(0.0, z_m)) else {
+        let (Ok(here), Ok(on_axis)) = (field(r_m, z_m), field(0.0, z_m)) else {
             return proven;
         };
         count += 1;
@@ -44,14 +67,13 @@ pub(super) fn sharper(
     if count == 0 || estimate.is_nan() || estimate >= proven.estimate {
         return proven;
     }
-    StageAccuracy {
+    Evaluation {
         estimate,
         method: format!(
-            "{SAFETY} times the largest difference from elliptic integrals at {count} places; \
-             proven below {:e}: {}",
+            "{SAFETY} times the largest difference from {direct} at {count} places; proven below \
+             {:e}: {}",
             proven.estimate, proven.method
         ),
-        ..proven
     }
 }
 
