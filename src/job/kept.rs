@@ -8,6 +8,7 @@ use std::sync::OnceLock;
 
 use super::JobError;
 use super::maps::{Felt, SceneMap};
+use super::passive;
 use super::scene::Scene;
 use super::steel::{self, Solved};
 use crate::bundle::artefact::Input;
@@ -139,6 +140,29 @@ impl<'a> ShapeField<'a> {
             .clone()
             .and_numbers(points_m.iter().flatten().copied());
         store.remember(&format!("{shape}.{what}"), &origin, compute)
+    }
+
+    /// Vertical pull of the unpowered steel at an object's points where a design leaves it out, N, to
+    /// [`passive::LEFT_OUT_TOLERANCE`]; empty without steel.
+    ///
+    /// # Errors
+    /// A magnet that touches the steel.
+    pub fn pull_left_out_n(
+        self,
+        scene: &Scene,
+        points_m: &[[f64; 3]],
+    ) -> Result<Vec<f64>, JobError> {
+        let compute = || {
+            let pull = passive::pull_to(scene, points_m, false, passive::LEFT_OUT_TOLERANCE)?;
+            Ok(pull.map_or_else(Vec::new, |pull| pull.forces_z_n(points_m)))
+        };
+        let Some((FieldStore { store, field, .. }, shape)) = self.kept else {
+            return compute();
+        };
+        let origin = field
+            .clone()
+            .and_numbers(points_m.iter().flatten().copied());
+        store.remember(&format!("{shape}.pull"), &origin, compute)
     }
 
     /// The largest |B| in any core of the design's `array` at these currents, T, as

@@ -17,6 +17,9 @@ use crate::field::steel::passive::{NoPull, PassivePull, Pulled, Region};
 /// Tolerance of the pull, relative to its own length: a small force beside the coils'.
 pub const PASSIVE_TOLERANCE: f64 = 1e-3;
 
+/// The same where the pull is left out: how large it is matters to some digits only.
+pub const LEFT_OUT_TOLERANCE: f64 = 1e-2;
+
 /// The pull wherever the magnet's centre is among `places_m`; `None` without steel. With `alone`
 /// it is that of one core at the origin.
 ///
