@@ -142,20 +142,16 @@ impl<'a> ShapeField<'a> {
         store.remember(&format!("{shape}.{what}"), &origin, compute)
     }
 
-    /// Vertical pull of the unpowered steel at an object's points where a design leaves it out, N, to
-    /// [`passive::LEFT_OUT_TOLERANCE`]; empty without steel.
+    /// As [`passive::left_out_z_n`].
     ///
     /// # Errors
-    /// A magnet that touches the steel.
+    /// As [`passive::left_out_z_n`].
     pub fn pull_left_out_n(
         self,
         scene: &Scene,
         points_m: &[[f64; 3]],
     ) -> Result<Vec<f64>, JobError> {
-        let compute = || {
-            let pull = passive::pull_to(scene, points_m, false, passive::LEFT_OUT_TOLERANCE)?;
-            Ok(pull.map_or_else(Vec::new, |pull| pull.forces_z_n(points_m)))
-        };
+        let compute = || passive::left_out_z_n(scene, points_m);
         let Some((FieldStore { store, field, .. }, shape)) = self.kept else {
             return compute();
         };

@@ -173,18 +173,16 @@ impl Kernel for Scattered<'_> {
         let (terms, last) = (first.terms, first.coefficients.len() / first.terms - 1);
         for (group, points_here) in points.chunks(LANES).enumerate() {
             let place = (Lanes::load(points_here) - first.from) * (1.0 / first.width);
-            let mut starts = [0; LANES];
+            let panels = place.0.map(|at| (at.max(0.0) as usize).min(last));
             let mut x = place;
-            for lane in 0..LANES {
-                let panel = (place.0[lane].max(0.0) as usize).min(last);
-                starts[lane] = panel * terms;
-                x.0[lane] = 2.0 * (place.0[lane] - panel as f64) - 1.0;
+            for (x, panel) in x.0.iter_mut().zip(panels) {
+                *x = 2.0 * (*x - panel as f64) - 1.0;
             }
             let twice = x * 2.0;
             for (table, out) in tables.iter().zip(out.chunks_exact_mut(points.len())) {
                 let mut series = [&table.coefficients[..0]; LANES];
-                for lane in 0..LANES {
-                    series[lane] = &table.coefficients[starts[lane]..starts[lane] + terms];
+                for (series, panel) in series.iter_mut().zip(panels) {
+                    *series = &table.coefficients[panel * terms..(panel + 1) * terms];
                 }
                 let (mut newer, mut older) = (Lanes::splat(0.0), Lanes::splat(0.0));
                 for k in (1..terms).rev() {

@@ -4,7 +4,9 @@ use crate::bundle::manifest::LeftOut;
 use crate::job::JobError;
 use crate::job::kept::ShapeField;
 use crate::job::lambda::LambdaReport;
+use crate::job::passive::couples_left_out;
 use crate::job::scene::Scene;
+use crate::job::steel::coupled;
 use crate::units::DETECTION_THRESHOLD_N;
 
 /// The pull at an object's points.
@@ -21,6 +23,8 @@ pub(crate) struct Measured {
     largest_n: f64,
     /// The largest wanted force, N; 0 where there is no force constant.
     wanted_n: f64,
+    /// Whether coupled cores were taken one by one, being many.
+    one_by_one: bool,
     /// Where its share of the wanted force is largest; `None` where no force is wanted.
     weakest: Option<Share>,
 }
@@ -56,11 +60,9 @@ impl IgnoredPull {
             Err(fault) => return Ok(Some(Self::Unknown(fault.to_string()))),
         };
         let constant = lambda.file.lambda_n_per_m.unwrap_or(0.0);
-        Ok(Some(Self::Measured(Measured::new(
-            &forces_n,
-            constant,
-            &points.height_m,
-        ))))
+        let mut measured = Measured::new(&forces_n, constant, &points.height_m);
+        measured.one_by_one = coupled(scene.design) && !couples_left_out(scene);
+        Ok(Some(Self::Measured(measured)))
     }
 
     /// The manifest's entry.
@@ -100,6 +102,7 @@ impl Measured {
         Self {
             largest_n: forces_n.iter().fold(0.0, |most, f| most.max(f.abs())),
             wanted_n: lambda_n_per_m * height_m.iter().copied().fold(0.0, f64::max),
+            one_by_one: false,
             weakest: shares.reduce(|a, b| if b.share > a.share { b } else { a }),
         }
     }
