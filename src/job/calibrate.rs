@@ -378,7 +378,7 @@ fn compute(
     )?;
     let passive = passive_map(scene, &needed.made.map, progress)?;
     progress.begin("passive force", 1);
-    let ignored = IgnoredPull::new(scene, &lambda)?;
+    let ignored = IgnoredPull::new(scene, &lambda, field)?;
     progress.end();
     if let Some(ignored) = ignored {
         lambda.warnings.extend(ignored.warning(lambda.file.jnd));

@@ -8,6 +8,7 @@ use std::sync::OnceLock;
 
 use super::JobError;
 use super::maps::{Felt, SceneMap};
+use super::passive;
 use super::scene::Scene;
 use super::steel::{self, Solved};
 use crate::bundle::artefact::Input;
@@ -139,6 +140,25 @@ impl<'a> ShapeField<'a> {
             .clone()
             .and_numbers(points_m.iter().flatten().copied());
         store.remember(&format!("{shape}.{what}"), &origin, compute)
+    }
+
+    /// As [`passive::left_out_z_n`].
+    ///
+    /// # Errors
+    /// As [`passive::left_out_z_n`].
+    pub fn pull_left_out_n(
+        self,
+        scene: &Scene,
+        points_m: &[[f64; 3]],
+    ) -> Result<Vec<f64>, JobError> {
+        let compute = || passive::left_out_z_n(scene, points_m);
+        let Some((FieldStore { store, field, .. }, shape)) = self.kept else {
+            return compute();
+        };
+        let origin = field
+            .clone()
+            .and_numbers(points_m.iter().flatten().copied());
+        store.remember(&format!("{shape}.pull"), &origin, compute)
     }
 
     /// The largest |B| in any core of the design's `array` at these currents, T, as

@@ -17,6 +17,36 @@ use crate::field::steel::passive::{NoPull, PassivePull, Pulled, Region};
 /// Tolerance of the pull, relative to its own length: a small force beside the coils'.
 pub const PASSIVE_TOLERANCE: f64 = 1e-3;
 
+/// The same where the pull is left out: how large it is matters to some digits only.
+pub const LEFT_OUT_TOLERANCE: f64 = 1e-2;
+/// Most cores whose coupling is worth its memory and time where the pull is left out: both grow as
+/// powers of their number.
+const MOST_COUPLED: usize = 36;
+
+/// Whether [`left_out_z_n`] counts that cores magnetise each other.
+#[must_use]
+pub fn couples_left_out(scene: &Scene) -> bool {
+    coupled(scene.design) && scene.coils.len() <= MOST_COUPLED
+}
+
+/// Vertical pull at `places_m` where a design leaves it out, N, to [`LEFT_OUT_TOLERANCE`]; empty
+/// without steel.
+///
+/// # Errors
+/// A magnet that touches the steel.
+pub fn left_out_z_n(scene: &Scene, places_m: &[[f64; 3]]) -> Result<Vec<f64>, JobError> {
+    let Some(pulled) = pulled(scene, places_m, false) else {
+        return Ok(Vec::new());
+    };
+    let pulled = Pulled {
+        coupled: couples_left_out(scene),
+        ..pulled
+    };
+    let pull = PassivePull::new(&pulled, LEFT_OUT_TOLERANCE);
+    let pull = pull.map_err(|fault| too_close(&pulled, fault))?;
+    Ok(pull.forces_z_n(places_m))
+}
+
 /// The pull wherever the magnet's centre is among `places_m`; `None` without steel. With `alone`
 /// it is that of one core at the origin.
 ///

@@ -15,7 +15,7 @@ use super::tabulate::{Components, FieldMap, Grid, MapError, PlacedCoil};
 use fluxform_base::progress::Progress;
 use fluxform_field::batch::Wanted;
 use fluxform_field::source::AxialSource;
-use fluxform_numerics::chebyshev::{Evaluation, Layout, Table};
+use fluxform_numerics::chebyshev::{Evaluation, Layout, Scattered, Table};
 use fluxform_numerics::dispatch;
 
 /// Places of a mean, m from its centre, and their weights.
@@ -173,8 +173,18 @@ impl<'a> MeanField<'a> {
             return Ok(None);
         };
         let radii = layout.nodes();
+        let mut means: Vec<f64> = Vec::new();
+        let mut before = 0;
         for azimuths in AZIMUTHS {
-            let means = self.means(shares, z_m, &radii, azimuths)?;
+            // Every second azimuth is one of the attempt before.
+            let step = azimuths / (azimuths - before);
+            let angles: Vec<f64> = (0..azimuths)
+                .filter(|k| step == 1 || k % step == 1)
+                .map(|k| TAU * k as f64 / azimuths as f64)
+                .collect();
+            let more = self.means(shares, z_m, &radii, &angles)?;
+            means = interleaved(&means, &more, (before, angles.len(), radii.len()));
+            before = azimuths;
             let series = modes(&means, azimuths, radii.len());
             let size = means.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
             let largest = |mode: &[f64]| mode.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
@@ -201,26 +211,27 @@ impl<'a> MeanField<'a> {
         Ok(None)
     }
 
-    /// Means about the axis, [component][azimuth][radius].
+    /// Means about the axis at `angles`, [component][azimuth][radius].
     fn means(
         &self,
         shares: &Shares,
         z_m: f64,
         radii: &[f64],
-        azimuths: usize,
+        angles: &[f64],
     ) -> Result<Vec<f64>, MapError> {
+        let size = self.count * angles.len() * radii.len();
         let sums = shares
             .par_chunks(PORTION)
             .map(|shares| {
-                let mut sum = vec![0.0; self.count * azimuths * radii.len()];
+                let mut sum = vec![0.0; size];
                 for (offset_m, share) in shares {
                     fluxform_base::progress::poll();
-                    self.add(*offset_m, *share, z_m, (radii, azimuths), &mut sum)?;
+                    self.add(*offset_m, *share, z_m, (radii, angles), &mut sum)?;
                 }
                 Ok(sum)
             })
             .collect::<Result<Vec<Vec<f64>>, MapError>>()?;
-        let mut total = vec![0.0; self.count * azimuths * radii.len()];
+        let mut total = vec![0.0; size];
         for sum in sums {
             for (total, value) in total.iter_mut().zip(sum) {
                 *total += value;
@@ -235,7 +246,7 @@ impl<'a> MeanField<'a> {
         [ox, oy, oz]: [f64; 3],
         share: f64,
         z_m: f64,
-        (radii, azimuths): (&[f64], usize),
+        (radii, angles): (&[f64], &[f64]),
         sum: &mut [f64],
     ) -> Result<(), MapError> {
         let z_m = z_m + oz;
@@ -254,25 +265,35 @@ impl<'a> MeanField<'a> {
         let nodes = layout.nodes();
         let heights = vec![z_m; nodes.len()];
         let values = self.source.gradients(&nodes, &heights, aim, wanted)?;
-        let zz = layout.table(&values.dbz_dz);
-        let rest = (self.count > 1).then(|| {
-            (
-                layout.table(&values.dbr_dz_over_r),
-                layout.table(&values.br_over_r),
-            )
-        });
-        let size = azimuths * radii.len();
-        for azimuth in 0..azimuths {
-            let (sine, cosine) = (TAU * azimuth as f64 / azimuths as f64).sin_cos();
+        let mut tables = vec![layout.table(&values.dbz_dz)];
+        if self.count > 1 {
+            tables.push(layout.table(&values.dbr_dz_over_r));
+            tables.push(layout.table(&values.br_over_r));
+        }
+        let size = angles.len() * radii.len();
+        let mut distances = vec![0.0; radii.len()];
+        let mut found = vec![0.0; tables.len() * radii.len()];
+        for (azimuth, angle) in angles.iter().enumerate() {
+            let (sine, cosine) = angle.sin_cos();
+            let place_of = |radius: f64| (radius * cosine + ox, radius * sine + oy);
+            for (distance, radius) in distances.iter_mut().zip(radii) {
+                let (x, y) = place_of(*radius);
+                *distance = (x * x + y * y).sqrt();
+            }
+            dispatch::run(Scattered {
+                tables: &tables,
+                points: &distances,
+                out: &mut found,
+            });
             for (place, radius) in radii.iter().enumerate() {
-                let (x, y) = (radius * cosine + ox, radius * sine + oy);
-                let square = x * x + y * y;
-                let r = square.sqrt();
                 let at = azimuth * radii.len() + place;
-                let zz = zz.at(r);
+                let zz = found[place];
                 sum[at] += share * zz;
-                if let Some((slope, ratio)) = &rest {
-                    let (slope, ratio) = (slope.at(r), ratio.at(r));
+                if self.count > 1 {
+                    let (x, y) = place_of(*radius);
+                    let square = x * x + y * y;
+                    let slope = found[radii.len() + place];
+                    let ratio = found[2 * radii.len() + place];
                     let turn = if square > 0.0 {
                         -(2.0 * ratio + zz) / square
                     } else {
@@ -287,6 +308,27 @@ impl<'a> MeanField<'a> {
         }
         Ok(())
     }
+}
+
+/// Rows of both, [component][azimuth][radius], taken in turns: those of `first`, if it has any, before
+/// those of `second`.
+fn interleaved(
+    first: &[f64],
+    second: &[f64],
+    (rows, more, radii): (usize, usize, usize),
+) -> Vec<f64> {
+    if rows == 0 {
+        return second.to_vec();
+    }
+    let mut out = Vec::with_capacity(first.len() + second.len());
+    let components = first.chunks_exact(rows * radii);
+    for (first, second) in components.zip(second.chunks_exact(more * radii)) {
+        for (a, b) in first.chunks_exact(radii).zip(second.chunks_exact(radii)) {
+            out.extend_from_slice(a);
+            out.extend_from_slice(b);
+        }
+    }
+    out
 }
 
 /// Number of components that a map's means have; `None` with the field.

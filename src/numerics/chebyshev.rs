@@ -72,14 +72,13 @@ impl Layout {
     #[must_use]
     pub fn table(&self, values: &[f64]) -> Table {
         let n = self.terms;
+        let cosines: Vec<f64> = (0..n * n)
+            .map(|place| (PI * (place / n) as f64 * ((place % n) as f64 + 0.5) / n as f64).cos())
+            .collect();
         let mut coefficients = Vec::with_capacity(values.len());
         for panel in values.chunks_exact(n) {
-            for j in 0..n {
-                let sum: f64 = panel
-                    .iter()
-                    .enumerate()
-                    .map(|(k, f)| f * (PI * j as f64 * (k as f64 + 0.5) / n as f64).cos())
-                    .sum();
+            for (j, cosines) in cosines.chunks_exact(n).enumerate() {
+                let sum: f64 = panel.iter().zip(cosines).map(|(f, c)| f * c).sum();
                 coefficients.push(sum * if j == 0 { 1.0 } else { 2.0 } / n as f64);
             }
         }
@@ -148,6 +147,66 @@ impl Kernel for Evaluation<'_> {
     }
 }
 
+/// Evaluates tables of one [`Layout`] at points in any order.
+pub struct Scattered<'a> {
+    /// The tables, of one layout.
+    pub tables: &'a [Table],
+    /// Points within the tables' interval.
+    pub points: &'a [f64],
+    /// Values, [table][point].
+    pub out: &'a mut [f64],
+}
+
+impl Kernel for Scattered<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<const FMA: bool>(self) {
+        let Self {
+            tables,
+            points,
+            out,
+        } = self;
+        let Some(first) = tables.first() else {
+            return;
+        };
+        let (terms, last) = (first.terms, first.coefficients.len() / first.terms - 1);
+        for (group, points_here) in points.chunks(LANES).enumerate() {
+            let place = (Lanes::load(points_here) - first.from) * (1.0 / first.width);
+            let panels = place.0.map(|at| (at.max(0.0) as usize).min(last));
+            let mut x = place;
+            for (x, panel) in x.0.iter_mut().zip(panels) {
+                *x = 2.0 * (*x - panel as f64) - 1.0;
+            }
+            let twice = x * 2.0;
+            for (table, out) in tables.iter().zip(out.chunks_exact_mut(points.len())) {
+                let mut series = [&table.coefficients[..0]; LANES];
+                for (series, panel) in series.iter_mut().zip(panels) {
+                    *series = &table.coefficients[panel * terms..(panel + 1) * terms];
+                }
+                let (mut newer, mut older) = (Lanes::splat(0.0), Lanes::splat(0.0));
+                for k in (1..terms).rev() {
+                    let next = twice.mul_add::<FMA>(newer, coefficients(&series, k) - older);
+                    (newer, older) = (next, newer);
+                }
+                let value = x.mul_add::<FMA>(newer, coefficients(&series, 0) - older);
+                let range = group * LANES..(group * LANES + points_here.len());
+                value.store(&mut out[range]);
+            }
+        }
+    }
+}
+
+/// Coefficient `k` of every lane's series.
+#[inline(always)]
+fn coefficients(series: &[&[f64]; LANES], k: usize) -> Lanes {
+    let mut out = Lanes::splat(0.0);
+    for (value, series) in out.0.iter_mut().zip(series) {
+        *value = series[k];
+    }
+    out
+}
+
 /// Sum of c_k T_k(x) by Clenshaw's recurrence.
 #[inline(always)]
 fn clenshaw<const FMA: bool>(series: &[f64], x: Lanes) -> Lanes {
@@ -188,6 +247,17 @@ mod tests {
                 .map(|(x, y)| (f(*x) - y).abs() * 0.09)
                 .fold(0.0, f64::max);
             assert!(worst < tolerance, "{tolerance:e}: {worst:e}");
+            let mut scattered = vec![0.0; 2 * points.len()];
+            let backwards: Vec<f64> = points.iter().rev().copied().collect();
+            dispatch::run(Scattered {
+                tables: &[table.clone(), table.clone()],
+                points: &backwards,
+                out: &mut scattered,
+            });
+            for half in scattered.chunks_exact(points.len()) {
+                let pairs = half.iter().rev().zip(&out);
+                assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-13 / 0.09));
+            }
             let single = points.iter().zip(&out);
             assert!(
                 single

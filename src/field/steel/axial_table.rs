@@ -13,10 +13,12 @@ use std::f64::consts::{PI, SQRT_2};
 use std::sync::{Arc, OnceLock, PoisonError, RwLock};
 
 use super::magnetized::MagnetizedCore;
+use super::magnetized::loops::{LoopFields, Rectangle};
 use super::sources::Parts;
 use crate::batch::{Gradients, Wanted};
 use crate::source::AxialSource;
 use crate::winding::{AxialField, OnEdge, Winding};
+use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::dispatch::{self, Kernel};
 
 /// Points closer to a source than this multiple of the core's radius get the exact field.
@@ -25,8 +27,13 @@ const NEAREST: f64 = 0.01;
 const SCALE: f64 = 100.0;
 /// Terms beyond which the exact field is cheaper.
 const MOST_TERMS: usize = 24;
-/// Quantities that a cell holds: b_z, dB_z/dz, (dB_r/dz)/r, B_r/r.
-const QUANTITIES: usize = 4;
+/// Share of the tolerance given to a cell's values: of the loops that stand for the core, and of the
+/// winding.
+const SHARE: f64 = 0.1;
+/// Rounding of a loop's field, relative to its own size, in units of its radius over its distance.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+/// The gradient's components, in the order in which cells hold them.
+const GRADIENT: [Quantity; 3] = [Quantity::DbzDz, Quantity::DbrDzOverR, Quantity::BrOverR];
 
 /// What a table gives at a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,6 +53,7 @@ pub enum Quantity {
 pub struct AxialTable {
     winding: Option<Winding>,
     core: MagnetizedCore,
+    tolerance: f64,
     terms: usize,
     cells: RwLock<HashMap<Key, Arc<Cell>>>,
 }
@@ -53,8 +61,13 @@ pub struct AxialTable {
 /// Exponent of the cell's size and the cell's place along r and z.
 type Key = (i32, i64, i64);
 
-/// Coefficients [quantity][degree in z][degree in r], once they are computed.
-type Cell = OnceLock<Result<Vec<f64>, OnEdge>>;
+/// Coefficients [quantity][degree in z][degree in r], once they are computed: B_z apart, which few
+/// ask for.
+#[derive(Debug, Default)]
+struct Cell {
+    gradient: OnceLock<Result<Vec<f64>, OnEdge>>,
+    b_z: OnceLock<Result<Vec<f64>, OnEdge>>,
+}
 
 /// A point's cell and its place there, -1 to 1 along r and z.
 struct Place {
@@ -72,6 +85,7 @@ impl AxialTable {
         Self {
             winding,
             core,
+            tolerance,
             terms,
             cells: RwLock::default(),
         }
@@ -118,16 +132,11 @@ impl AxialTable {
                 Some((key, cell)) if *key == place.key => cell,
                 Some(_) | None => &last.insert((place.key, self.cell(place.key))).1,
             };
-            let cell = cell
-                .get_or_init(|| self.computed(place.key))
-                .as_ref()
-                .map_err(|on_edge| *on_edge)?;
             let (along_r, along_z) = (polynomials(place.x), polynomials(place.y));
             let rows = &mut room[..self.terms];
             for (values, quantity) in out.iter_mut().zip(wanted) {
-                let size = self.terms * self.terms;
                 values.push(dispatch::run(Series {
-                    coefficients: &cell[*quantity as usize * size..][..size],
+                    coefficients: self.series(place.key, cell, *quantity)?,
                     along_r: &along_r[..self.terms],
                     along_z: &along_z[..self.terms],
                     rows,
@@ -161,7 +170,7 @@ impl AxialTable {
                 out.copy_from_slice(&values[0]);
                 return Ok(());
             }
-            Parts::Gradient => &Quantity::ALL[1..],
+            Parts::Gradient => &GRADIENT,
             Parts::All => &[
                 Quantity::DbzDz,
                 Quantity::DbrDzOverR,
@@ -229,20 +238,87 @@ impl AxialTable {
         Arc::clone(cells.entry(key).or_default())
     }
 
-    fn computed(&self, (exponent, i, j): Key) -> Result<Vec<f64>, OnEdge> {
+    /// The coefficients of one quantity in a cell.
+    fn series<'a>(
+        &self,
+        key: Key,
+        cell: &'a Cell,
+        quantity: Quantity,
+    ) -> Result<&'a [f64], OnEdge> {
+        let (series, place) = match quantity {
+            Quantity::Bz => (&cell.b_z, 0),
+            Quantity::DbzDz => (&cell.gradient, 0),
+            Quantity::DbrDzOverR => (&cell.gradient, 1),
+            Quantity::BrOverR => (&cell.gradient, 2),
+        };
+        let held = if quantity == Quantity::Bz {
+            &[Quantity::Bz][..]
+        } else {
+            &GRADIENT
+        };
+        let series = series.get_or_init(|| self.computed(key, held));
+        let size = self.terms * self.terms;
+        let series = series.as_ref().map_err(|on_edge| *on_edge)?;
+        Ok(&series[place * size..][..size])
+    }
+
+    /// Values of `held` at points of a rectangle, `[quantity][point]`.
+    fn values(
+        &self,
+        rectangle: Rectangle,
+        (r_m, z_m): (&[f64], &[f64]),
+        held: &[Quantity],
+    ) -> Result<Vec<f64>, OnEdge> {
+        let size_m = rectangle.r_m[1] - rectangle.r_m[0];
+        let tolerance = SHARE * self.tolerance;
+        let rounding = ROUNDING * (self.core.outline().shape.radius_m / size_m).max(1.0);
+        let loops = if rounding <= 0.1 * self.tolerance {
+            self.core.loops(rectangle, tolerance)
+        } else {
+            None
+        };
+        let Some(loops) = loops else {
+            let fields = r_m.iter().zip(z_m).map(|(r, z)| self.exact(*r, *z));
+            let fields: Vec<AxialField> = fields.collect::<Result<_, _>>()?;
+            let of =
+                |quantity: &Quantity| fields.iter().map(|f| quantity.of(f)).collect::<Vec<_>>();
+            return Ok(held.iter().flat_map(of).collect());
+        };
+        let core = loops.fields(r_m, z_m);
+        let mut values: Vec<f64> = held
+            .iter()
+            .flat_map(|q| q.of_loops(&core))
+            .copied()
+            .collect();
+        values.iter_mut().for_each(|value| *value *= MU_0_T_M_PER_A);
+        let Some(winding) = &self.winding else {
+            return Ok(values);
+        };
+        let own = if held.contains(&Quantity::Bz) {
+            winding.axial_fields(r_m, z_m, tolerance)?
+        } else {
+            let own = winding.gradients(r_m, z_m, tolerance, Wanted::Gradient)?;
+            [own.dbz_dz, own.dbr_dz_over_r, own.br_over_r].concat()
+        };
+        for (value, own) in values.iter_mut().zip(own) {
+            *value += own;
+        }
+        Ok(values)
+    }
+
+    fn computed(&self, (exponent, i, j): Key, held: &[Quantity]) -> Result<Vec<f64>, OnEdge> {
         let n = self.terms;
         let size_m = 2.0_f64.powi(exponent);
         let node = |k: usize| (PI * (k as f64 + 0.5) / n as f64).cos();
         let at = |place: i64, k: usize| size_m * (place as f64 + 0.5 * (1.0 + node(k)));
-        let mut values = vec![0.0; QUANTITIES * n * n];
-        for row in 0..n {
-            for column in 0..n {
-                let field = self.exact(at(i, column), at(j, row))?;
-                for quantity in Quantity::ALL {
-                    values[(quantity as usize * n + row) * n + column] = quantity.of(&field);
-                }
-            }
-        }
+        let nodes = (0..n * n).map(|place| (at(i, place % n), at(j, place / n)));
+        let (r_m, z_m): (Vec<f64>, Vec<f64>) = nodes.unzip();
+        let range = |place: i64| [size_m * place as f64, size_m * (place + 1) as f64];
+        let rectangle = Rectangle {
+            r_m: range(i),
+            z_m: range(j),
+        };
+        let values = self.values(rectangle, (&r_m, &z_m), held)?;
         // Values to coefficients, along r and then along z.
         let transform: Vec<f64> = (0..n * n)
             .map(|index| {
@@ -307,14 +383,21 @@ impl Kernel for Series<'_> {
 }
 
 impl Quantity {
-    const ALL: [Self; QUANTITIES] = [Self::Bz, Self::DbzDz, Self::DbrDzOverR, Self::BrOverR];
-
     fn of(self, field: &AxialField) -> f64 {
         match self {
             Self::Bz => field.b_z,
             Self::DbzDz => field.dbz_dz,
             Self::DbrDzOverR => field.dbr_dz_over_r,
             Self::BrOverR => field.br_over_r,
+        }
+    }
+
+    fn of_loops(self, fields: &LoopFields) -> &[f64] {
+        match self {
+            Self::Bz => &fields.b_z,
+            Self::DbzDz => &fields.dbz_dz,
+            Self::DbrDzOverR => &fields.dbr_dz_over_r,
+            Self::BrOverR => &fields.br_over_r,
         }
     }
 }
@@ -339,7 +422,7 @@ impl AxialSource for AxialTable {
     ) -> Result<Gradients, OnEdge> {
         let quantities: &[Quantity] = match wanted {
             Wanted::Gz => &[Quantity::DbzDz],
-            Wanted::Gradient => &[Quantity::DbzDz, Quantity::DbrDzOverR, Quantity::BrOverR],
+            Wanted::Gradient => &GRADIENT,
         };
         let mut values = self.sample(r_m, z_m, quantities)?.into_iter();
         let mut next = || values.next().unwrap_or_default();

@@ -1,12 +1,12 @@
 //! What sources send to the exchange grid of a core some way off, and the cores of an array
 //! coupled by it.
 
-use nalgebra::{DMatrix, Dyn};
+use nalgebra::{DMatrix, DMatrixViewMut, Dyn};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 
-use super::exchange::{LEAST_GAP, Stretched};
+use super::exchange::LEAST_GAP;
 use super::response::{Response, Ring};
 use crate::winding::Winding;
 use fluxform_base::units::MU_0_T_M_PER_A;
@@ -220,14 +220,28 @@ pub(super) fn between_cores(
             *value = scale * dipole([x[0] + offset_m[0], x[1] + offset_m[1], x[2]], *from);
         }
     }
-    for stretched in &response.exchange.stretched {
-        integrate_stretched(&mut matrix, points, response, offset_m, stretched);
+    for sender_angle in 0..response.angles {
+        let rings = response.exchange.rings.len();
+        let mut columns = matrix.columns_mut(sender_angle * rings, rings);
+        let kernel = |at: GridPoint, from| scale * dipole(at.0, from);
+        integrate_stretched(
+            &mut columns,
+            points,
+            response,
+            (offset_m, sender_angle),
+            kernel,
+        );
     }
     matrix
 }
 
 /// A place on a core's surface and the outer normal there.
-type GridPoint = ([f64; 3], [f64; 3]);
+pub(super) type GridPoint = ([f64; 3], [f64; 3]);
+
+/// The point of another core's grid, as seen from the sender.
+pub(super) fn shifted((x, n): GridPoint, [dx, dy]: [f64; 2]) -> GridPoint {
+    ([x[0] + dx, x[1] + dy, x[2]], n)
+}
 
 /// n.(x - y)/|x - y|^3 of the dipole n at y, 1/m^2.
 fn dipole(x: [f64; 3], (y, n): GridPoint) -> f64 {
@@ -236,52 +250,50 @@ fn dipole(x: [f64; 3], (y, n): GridPoint) -> f64 {
     (n[0] * d[0] + n[1] * d[1] + n[2] * d[2]) / (square * square.sqrt())
 }
 
-/// The columns of [`between_cores`] of one long panel: the kernel is integrated over parts of it,
-/// short beside each receiver, against the polynomial that is one at one ring.
-fn integrate_stretched(
-    matrix: &mut DMatrix<f64>,
+/// The columns of one angle of a sender's grid, one a ring, where its panels are long: `kernel`, of a
+/// receiver's point and a sender's, is integrated over parts of a panel, short beside each receiver,
+/// against the polynomial that is one at one ring. The receiver is at `offset_m` from the sender.
+pub(super) fn integrate_stretched(
+    columns: &mut DMatrixViewMut<'_, f64>,
     points: &[GridPoint],
     response: &Response,
-    offset_m: [f64; 2],
-    stretched: &Stretched,
+    (offset_m, sender_angle): ([f64; 2], usize),
+    kernel: impl Fn(GridPoint, GridPoint) -> f64,
 ) {
     let (rings, order) = (response.exchange.rings.len(), response.exchange.order);
     let radius_m = response.outline.shape.radius_m;
     let gap_m = (offset_m[0].hypot(offset_m[1]) - 2.0 * radius_m).max(LEAST_GAP * radius_m);
-    let scale = -TAU / response.angles as f64 / (4.0 * PI);
     let rule = gauss::rule(order);
     let basis = Basis::new(rule);
-    let (from, to) = stretched.panel.range_m();
     let mut values = vec![0.0; order];
-    for (ring, receiver) in response.exchange.rings.iter().enumerate() {
-        fluxform_base::progress::poll();
-        // Heights, and the weight of every ring there.
-        let mut nodes: Vec<(f64, Vec<f64>)> = Vec::new();
-        for (lo, hi) in stretched.parts(receiver.z_m, gap_m) {
-            for (x, weight) in rule.nodes.iter().zip(&rule.weights) {
-                let z_m = lo + 0.5 * (hi - lo) * (1.0 + x);
-                basis.weights(2.0 * (z_m - from) / (to - from) - 1.0, &mut values);
-                let share = weight * (hi - lo) / (to - from);
-                let weights = values.iter().zip(&rule.weights);
-                nodes.push((z_m, weights.map(|(v, w)| share * v / w).collect()));
+    for stretched in &response.exchange.stretched {
+        let (from, to) = stretched.panel.range_m();
+        let (place, normal) = points[sender_angle * rings + stretched.first];
+        for (ring, receiver) in response.exchange.rings.iter().enumerate() {
+            fluxform_base::progress::poll();
+            // Heights, and the weight of every ring there.
+            let mut nodes: Vec<(f64, Vec<f64>)> = Vec::new();
+            for (lo, hi) in stretched.parts(receiver.z_m, gap_m) {
+                for (x, weight) in rule.nodes.iter().zip(&rule.weights) {
+                    let z_m = lo + 0.5 * (hi - lo) * (1.0 + x);
+                    basis.weights(2.0 * (z_m - from) / (to - from) - 1.0, &mut values);
+                    let share = weight * (hi - lo) / (to - from);
+                    let weights = values.iter().zip(&rule.weights);
+                    nodes.push((z_m, weights.map(|(v, w)| share * v / w).collect()));
+                }
             }
-        }
-        for sender_angle in 0..response.angles {
-            let first = sender_angle * rings + stretched.first;
-            let (place, normal) = points[first];
             for receiver_angle in 0..response.angles {
                 let row = receiver_angle * rings + ring;
-                let (x, _) = points[row];
-                let x = [x[0] + offset_m[0], x[1] + offset_m[1], x[2]];
+                let at = shifted(points[row], offset_m);
                 values.fill(0.0);
                 for (z_m, weights) in &nodes {
-                    let kernel = scale * dipole(x, ([place[0], place[1], *z_m], normal));
+                    let kernel = kernel(at, ([place[0], place[1], *z_m], normal));
                     for (value, weight) in values.iter_mut().zip(weights) {
                         *value += kernel * weight;
                     }
                 }
                 for (k, value) in values.iter().enumerate() {
-                    matrix[(row, first + k)] = *value;
+                    columns[(row, stretched.first + k)] = *value;
                 }
             }
         }
@@ -357,10 +369,11 @@ pub(super) fn different_offsets(positions_m: &[[f64; 2]]) -> usize {
 
 /// The pairs of cores by their offset: many share one.
 #[derive(Debug)]
-struct Links {
-    offsets_m: Vec<[f64; 2]>,
+pub(super) struct Links {
+    /// Of the receiver from the sender, m.
+    pub(super) offsets_m: Vec<[f64; 2]>,
     /// [receiver, sender]; meaningless on the diagonal.
-    index: Vec<usize>,
+    pub(super) index: Vec<usize>,
     /// The pairs of every offset, receivers ascending.
     pairs: Vec<Vec<Pair>>,
 }
@@ -373,7 +386,7 @@ struct Pair {
 }
 
 impl Links {
-    fn new(positions_m: &[[f64; 2]]) -> Self {
+    pub(super) fn new(positions_m: &[[f64; 2]]) -> Self {
         let cores = positions_m.len();
         let mut offsets_m: Vec<[f64; 2]> = Vec::new();
         let mut index = vec![usize::MAX; cores * cores];

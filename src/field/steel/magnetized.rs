@@ -4,6 +4,8 @@
 //! outline: what the magnetisation M = -grad v bounds. Its loops give mu_0 (H + M) everywhere,
 //! outside and inside, with no difference of large terms.
 
+pub(super) mod loops;
+
 use serde::{Deserialize, Serialize};
 
 use super::generatrix::{Face, Generatrix, Panel};

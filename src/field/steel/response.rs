@@ -139,9 +139,21 @@ impl Rings {
     /// The rings by which the cores of an array exchange potentials: panels graded by `grading`.
     #[must_use]
     pub fn graded(outline: &Generatrix, order: usize, grading: &Grading) -> Self {
-        let mut rings = Self::new(outline, order, |z_m| grading.length_m(z_m));
+        Self::graded_within(outline, order, grading, |_| f64::INFINITY)
+    }
+
+    /// The same, panels at z being no longer than `most_m(z)` either.
+    #[must_use]
+    pub fn graded_within(
+        outline: &Generatrix,
+        order: usize,
+        grading: &Grading,
+        most_m: impl Fn(f64) -> f64,
+    ) -> Self {
+        let length_m = |z_m: f64| grading.length_m(z_m).min(most_m(z_m));
+        let mut rings = Self::new(outline, order, length_m);
         // The side's panels come last.
-        let side = side_panels(outline.shape, |z_m| grading.length_m(z_m));
+        let side = side_panels(outline.shape, length_m);
         let ends = rings.rings.len() - order * side.len();
         rings.stretched = side
             .into_iter()

@@ -2,9 +2,11 @@
 
 use crate::bundle::manifest::LeftOut;
 use crate::job::JobError;
+use crate::job::kept::ShapeField;
 use crate::job::lambda::LambdaReport;
-use crate::job::passive;
+use crate::job::passive::couples_left_out;
 use crate::job::scene::Scene;
+use crate::job::steel::coupled;
 use crate::units::DETECTION_THRESHOLD_N;
 
 /// The pull at an object's points.
@@ -21,6 +23,8 @@ pub(crate) struct Measured {
     largest_n: f64,
     /// The largest wanted force, N; 0 where there is no force constant.
     wanted_n: f64,
+    /// Whether coupled cores were taken one by one, being many.
+    one_by_one: bool,
     /// Where its share of the wanted force is largest; `None` where no force is wanted.
     weakest: Option<Share>,
 }
@@ -38,7 +42,11 @@ impl IgnoredPull {
     ///
     /// # Errors
     /// Interruption.
-    pub(crate) fn new(scene: &Scene, lambda: &LambdaReport) -> Result<Option<Self>, JobError> {
+    pub(crate) fn new(
+        scene: &Scene,
+        lambda: &LambdaReport,
+        field: ShapeField,
+    ) -> Result<Option<Self>, JobError> {
         if scene.design.magnet.passive_force || scene.core.is_none() {
             return Ok(None);
         }
@@ -46,16 +54,15 @@ impl IgnoredPull {
         let places: Vec<[f64; 3]> = (0..points.len())
             .map(|j| [points.x_m[j], points.y_m[j], points.height_m[j]])
             .collect();
-        let pull = match passive::pull(scene, &places, false) {
-            Ok(pull) => pull,
+        let forces_n = match field.pull_left_out_n(scene, &places) {
+            Ok(forces_n) => forces_n,
             Err(JobError::Interrupted(stop)) => return Err(stop.into()),
             Err(fault) => return Ok(Some(Self::Unknown(fault.to_string()))),
         };
-        Ok(pull.map(|pull| {
-            let constant = lambda.file.lambda_n_per_m.unwrap_or(0.0);
-            let forces_n = pull.forces_z_n(&places);
-            Self::Measured(Measured::new(&forces_n, constant, &points.height_m))
-        }))
+        let constant = lambda.file.lambda_n_per_m.unwrap_or(0.0);
+        let mut measured = Measured::new(&forces_n, constant, &points.height_m);
+        measured.one_by_one = coupled(scene.design) && !couples_left_out(scene);
+        Ok(Some(Self::Measured(measured)))
     }
 
     /// The manifest's entry.
@@ -95,6 +102,7 @@ impl Measured {
         Self {
             largest_n: forces_n.iter().fold(0.0, |most, f| most.max(f.abs())),
             wanted_n: lambda_n_per_m * height_m.iter().copied().fold(0.0, f64::max),
+            one_by_one: false,
             weakest: shares.reduce(|a, b| if b.share > a.share { b } else { a }),
         }
     }
@@ -102,14 +110,17 @@ impl Measured {
     fn size(&self) -> String {
         let share = self.weakest.map_or_else(String::new, |at| {
             format!(
-                ", up to {} of the wanted force ({:.3} mN at point {}); the cost is relative to \
+                ", up to {} of the wanted force ({} at point {}); the cost is relative to \
                  the largest wanted force",
                 percent(at.share),
-                at.pull_n * 1e3,
+                millinewtons(at.pull_n),
                 at.point
             )
         });
-        format!("up to {:.3} mN at the points{share}", self.largest_n * 1e3)
+        format!(
+            "up to {} at the points{share}",
+            millinewtons(self.largest_n)
+        )
     }
 
     /// Relative to the largest wanted force.
@@ -125,16 +136,23 @@ impl Measured {
         let at = self.weakest?;
         (at.share > jnd && at.pull_n > DETECTION_THRESHOLD_N).then(|| {
             format!(
-                "the unpowered steel pulls the magnet with {:.3} mN at point {}, {} of the force \
+                "the unpowered steel pulls the magnet with {} at point {}, {} of the force \
                  wanted there, and that is left out (magnet.passive_force = false): more than the \
                  just-noticeable {}; set it to true to count it",
-                at.pull_n * 1e3,
+                millinewtons(at.pull_n),
                 at.point,
                 percent(at.share),
                 percent(jnd)
             )
         })
     }
+}
+
+/// As many digits as are known.
+fn millinewtons(force_n: f64) -> String {
+    let force_mn = force_n * 1e3;
+    let decimals = if force_mn >= 10.0 { 1 } else { 2 };
+    format!("{force_mn:.decimals$} mN")
 }
 
 fn percent(share: f64) -> String {
@@ -151,7 +169,7 @@ mod tests {
         let pull = IgnoredPull::Measured(Measured::new(&[-0.013, -0.0275], 0.9, &[0.07, 0.031]));
         let entry = pull.left_out();
         assert_eq!(entry.what, "pull of the unpowered steel");
-        for part in ["27.500 mN", "98.6 %", "point 1"] {
+        for part in ["27.5 mN", "98.6 %", "point 1"] {
             assert!(entry.why.contains(part), "{}", entry.why);
         }
         assert!((entry.error_cost - 0.0275 / 0.063).abs() < 1e-12);

@@ -19,7 +19,8 @@ use std::f64::consts::{PI, TAU};
 use super::reaction::{Dipole, dot, minus};
 use crate::steel::CoreShape;
 use crate::steel::array::ArrayResolution;
-use crate::steel::coupling::grid_points;
+use crate::steel::coupling::{GridPoint, Links, grid_points, integrate_stretched, shifted};
+use crate::steel::exchange::Grading;
 use crate::steel::generatrix::Generatrix;
 use crate::steel::response::{Response, Rings};
 use fluxform_base::units::MU_0_T_M_PER_A;
@@ -31,7 +32,7 @@ const SHORTEST: f64 = 0.2;
 /// Most angles of the exchange grid.
 const MOST_ANGLES: f64 = 48.0;
 
-type Points = Vec<([f64; 3], [f64; 3])>;
+type Points = Vec<GridPoint>;
 
 /// The quadratic form of an array.
 #[derive(Debug, Clone)]
@@ -65,11 +66,13 @@ impl Neighbours {
         let outline = Generatrix::new(shape, &[], &resolution.outline);
         // The magnet's field is sampled on the same rings: shorter panels close to it, and
         // angles enough for its modes not to pass for lower ones.
-        let exchange = Rings::new(&outline, resolution.order, |z_m| {
+        let grading = Grading {
+            shortest_m: resolution.panel_m,
+            ends_m: [shape.top_m, shape.top_m, shape.bottom_m, shape.bottom_m],
+        };
+        let exchange = Rings::graded_within(&outline, resolution.order, &grading, |z_m| {
             let near_m = PANEL * (gap_m + shape.top_m - z_m);
-            resolution
-                .panel_m
-                .min(near_m.max(SHORTEST * shape.radius_m))
+            near_m.max(SHORTEST * shape.radius_m)
         });
         let near = gap_m / shape.radius_m;
         let eta = (1.0 + 0.5 * near * near).acosh();
@@ -89,24 +92,38 @@ impl Neighbours {
         let basis = Basis::new(&response, &points, closest_m, tolerance);
         let (kept, cores) = (basis.potentials.ncols(), positions_m.len());
         let turn = TAU / angles as f64;
-        // Half of the pairs: the other half is their transpose.
+        // Half of the pairs, of which many share an offset: the other half is their transpose.
+        let coupling = Links::new(positions_m);
         let pairs: Vec<(usize, usize)> = (0..cores)
             .flat_map(|i| (0..i).map(move |j| (i, j)))
             .collect();
-        let blocks: Vec<DMatrix<f64>> = pairs
+        let number = |(i, j): (usize, usize)| coupling.index[i * cores + j];
+        let mut offsets: Vec<usize> = pairs.iter().map(|pair| number(*pair)).collect();
+        offsets.sort_unstable();
+        offsets.dedup();
+        let blocks: Vec<DMatrix<f64>> = offsets
             .par_iter()
-            .map(|(i, j)| {
-                let offset: [f64; 2] =
-                    std::array::from_fn(|k| positions_m[*i][k] - positions_m[*j][k]);
-                let sent = inverse_distances(&points, offset);
-                basis.potentials.tr_mul(&(sent * &basis.potentials)) * -turn
+            .map(|number| {
+                let offset_m = coupling.offsets_m[*number];
+                let mut sent = DMatrix::zeros(points.len(), kept);
+                let rings = response.exchange.rings.len();
+                for angle in 0..angles {
+                    let columns = columns(&response, &points, (offset_m, angle), inverse_distance);
+                    let potentials = basis.potentials.rows(angle * rings, rings);
+                    sent.gemm(1.0, &columns, &potentials, 1.0);
+                }
+                basis.potentials.tr_mul(&sent) * -turn
             })
             .collect();
         let size = kept * cores;
         let mut links = DMatrix::zeros(size, size);
         let mut system = DMatrix::identity(size, size);
-        for ((i, j), block) in pairs.iter().zip(&blocks) {
-            for (i, j, block) in [(*i, *j, block.clone()), (*j, *i, block.transpose())] {
+        for (i, j) in pairs {
+            let Ok(place) = offsets.binary_search(&number((i, j))) else {
+                continue;
+            };
+            let block = &blocks[place];
+            for (i, j, block) in [(i, j, block.clone()), (j, i, block.transpose())] {
                 let place = (i * kept, j * kept);
                 let mut view = system.view_mut(place, (kept, kept));
                 view -= &block * &basis.reaction;
@@ -187,39 +204,50 @@ struct Basis {
 impl Basis {
     fn new(response: &Response, points: &Points, closest_m: f64, cut: f64) -> Self {
         let (rings, angles) = (response.exchange.rings.len(), response.angles);
-        let offset = [closest_m, 0.0];
-        let sent = inverse_distances(points, offset);
-        let normal = normal_derivatives(points, offset);
+        // Of every mode, with a potential's columns and its normal derivatives' on the rings.
+        let mut products = vec![
+            (DMatrix::zeros(rings, rings), DMatrix::zeros(rings, rings));
+            response.layers.len()
+        ];
+        let norm_of = |mode: usize| (if mode == 0 { 1.0 } else { 2.0 } / angles as f64).sqrt();
+        let waves_of =
+            |mode: usize| -> &'static [bool] { if mode == 0 { &[false] } else { &[false, true] } };
+        for sender_angle in 0..angles {
+            let at = ([closest_m, 0.0], sender_angle);
+            let sent = columns(response, points, at, inverse_distance);
+            let normal = columns(response, points, at, normal_derivative);
+            products
+                .par_iter_mut()
+                .enumerate()
+                .for_each(|(mode, (gram, cross))| {
+                    for sine in waves_of(mode) {
+                        let project = |matrix: &DMatrix<f64>| {
+                            let mut out = DMatrix::zeros(rings, rings);
+                            for k in 0..angles {
+                                let turn = TAU * ((mode * k) % angles) as f64 / angles as f64;
+                                let (s, c) = turn.sin_cos();
+                                let share = norm_of(mode) * if *sine { s } else { c };
+                                out += matrix.rows(k * rings, rings) * share;
+                            }
+                            out
+                        };
+                        let mut potential = project(&sent);
+                        if mode == 0 {
+                            // A constant is no field.
+                            for mut column in potential.column_iter_mut() {
+                                let mean = column.mean();
+                                column.add_scalar_mut(-mean);
+                            }
+                        }
+                        *gram += &potential * potential.transpose();
+                        *cross += project(&normal) * potential.transpose();
+                    }
+                });
+        }
         // (singular value squared, wave, potential, moments, normal derivative) on the rings.
         let mut found = Vec::new();
-        for (mode, layers) in response.layers.iter().enumerate() {
-            let waves: &[bool] = if mode == 0 { &[false] } else { &[false, true] };
-            let norm = (if mode == 0 { 1.0 } else { 2.0 } / angles as f64).sqrt();
-            let mut gram = DMatrix::zeros(rings, rings);
-            let mut cross = DMatrix::zeros(rings, rings);
-            for sine in waves {
-                let wave = DVector::from_fn(angles, |k, _| {
-                    let (s, c) = (TAU * ((mode * k) % angles) as f64 / angles as f64).sin_cos();
-                    norm * if *sine { s } else { c }
-                });
-                let project = |matrix: &DMatrix<f64>| {
-                    let mut out = DMatrix::zeros(rings, matrix.ncols());
-                    for (k, share) in wave.iter().enumerate() {
-                        out += matrix.rows(k * rings, rings) * *share;
-                    }
-                    out
-                };
-                let mut potential = project(&sent);
-                if mode == 0 {
-                    // A constant is no field.
-                    for mut column in potential.column_iter_mut() {
-                        let mean = column.mean();
-                        column.add_scalar_mut(-mean);
-                    }
-                }
-                gram += &potential * potential.transpose();
-                cross += project(&normal) * potential.transpose();
-            }
+        for ((mode, layers), (gram, cross)) in response.layers.iter().enumerate().zip(products) {
+            let (waves, norm) = (waves_of(mode), norm_of(mode));
             let moments = response.exchange.moments(layers);
             let eigen = gram.symmetric_eigen();
             for (place, square) in eigen.eigenvalues.iter().enumerate() {
@@ -265,25 +293,34 @@ impl Basis {
     }
 }
 
-/// 1/(4 pi |x - y|) from the grid of one core to that of a core at `offset_m` from it.
-fn inverse_distances(points: &Points, offset_m: [f64; 2]) -> DMatrix<f64> {
-    fluxform_base::progress::poll();
-    DMatrix::from_fn(points.len(), points.len(), |row, column| {
-        let (x, y) = (points[row].0, points[column].0);
-        let d = minus([x[0] + offset_m[0], x[1] + offset_m[1], x[2]], y);
-        1.0 / (4.0 * PI * dot(d, d).sqrt())
-    })
+/// 1/(4 pi |x - y|).
+fn inverse_distance((x, _): GridPoint, (y, _): GridPoint) -> f64 {
+    let d = minus(x, y);
+    1.0 / (4.0 * PI * dot(d, d).sqrt())
 }
 
-/// The normal derivative of [`inverse_distances`] by the receiver.
-fn normal_derivatives(points: &Points, offset_m: [f64; 2]) -> DMatrix<f64> {
+/// The normal derivative of [`inverse_distance`] by the receiver.
+fn normal_derivative((x, n): GridPoint, (y, _): GridPoint) -> f64 {
+    let d = minus(x, y);
+    let square = dot(d, d);
+    -dot(n, d) / (4.0 * PI * square * square.sqrt())
+}
+
+/// `kernel` from the rings at one angle of a core's grid to the grid of a core at `offset_m` from it.
+fn columns(
+    response: &Response,
+    points: &Points,
+    (offset_m, angle): ([f64; 2], usize),
+    kernel: impl Fn(GridPoint, GridPoint) -> f64,
+) -> DMatrix<f64> {
     fluxform_base::progress::poll();
-    DMatrix::from_fn(points.len(), points.len(), |row, column| {
-        let ((x, n), y) = (points[row], points[column].0);
-        let d = minus([x[0] + offset_m[0], x[1] + offset_m[1], x[2]], y);
-        let square = dot(d, d);
-        -dot(n, d) / (4.0 * PI * square * square.sqrt())
-    })
+    let rings = response.exchange.rings.len();
+    let mut columns = DMatrix::from_fn(points.len(), rings, |row, ring| {
+        kernel(shifted(points[row], offset_m), points[angle * rings + ring])
+    });
+    let mut view = columns.as_view_mut();
+    integrate_stretched(&mut view, points, response, (offset_m, angle), kernel);
+    columns
 }
 
 #[cfg(test)]
@@ -364,6 +401,44 @@ mod tests {
                 );
             }
             assert!((added.force_z_n(at) - force[2]).abs() < 1e-12 * size);
+        }
+    }
+
+    /// Rings an even gap apart grew with a core's length: 100 panels for 4 m, and matrices as their
+    /// square.
+    #[test]
+    fn long_cores_have_few_rings_and_the_same_pull() {
+        let shape = |length_m: f64| CoreShape {
+            radius_m: 0.012,
+            bottom_m: -length_m,
+            top_m: 0.0,
+        };
+        let positions = [[0.0, 0.0], [0.043, 0.0]];
+        let magnet = vec![Dipole {
+            at_m: [0.0; 3],
+            moment_a_m2: [0.2, -0.1, 0.9],
+        }];
+        let of = |length_m: f64, tolerance: f64| {
+            let magnet = magnet.clone();
+            Neighbours::new(
+                shape(length_m),
+                500.0,
+                &positions,
+                0.043,
+                0.02,
+                tolerance,
+                magnet,
+            )
+        };
+        let counts = [0.3, 3.0, 30.0].map(|length_m| of(length_m, 0.1).points.len());
+        assert!(counts[2] < 3 * counts[0], "{counts:?}");
+        // The layer far down is smooth: a finer solution agrees as it does for a short core.
+        let at = [0.011, 0.007, 0.021];
+        for length_m in [0.1, 1.3] {
+            let [coarse, fine] = [5e-3, 1e-3].map(|tolerance| of(length_m, tolerance).force_n(at));
+            let miss = dot(minus(coarse, fine), minus(coarse, fine)).sqrt();
+            let size = dot(fine, fine).sqrt();
+            assert!(miss < 1e-2 * size, "{length_m}: {miss:e} of {size:e}");
         }
     }
 }
