@@ -10,7 +10,7 @@ use super::dir::{Dir, Kind, Status};
 use super::made::{MadeFolders, made_in};
 use super::names::{check_name, parent_of};
 use super::overwrite::{Permit, real};
-use super::record::{Record, ReplacedNote, present};
+use super::record::{ReplacedNote, present};
 use super::temporary::{TemporaryFile, clean_leftovers};
 use super::{Overwrite, WriteError};
 
@@ -233,7 +233,10 @@ impl FileSet {
         for file in &mut self.staged {
             file.permit = file.overwrite.permit(&file.shown, Some(&file.written))?;
         }
-        let note = self.note_replaced()?;
+        let note = self.note();
+        if let Some((dir, name)) = &note {
+            self.note_replaced(dir, name)?;
+        }
         for path in &self.outdated {
             if let Ok((dir, name)) = Dir::of(path)
                 && self.overwrite.owns(path)
@@ -254,7 +257,10 @@ impl FileSet {
                 dirs.push(file.dir);
             }
         }
-        if let Some((dir, name)) = note {
+        // Also that of a run which was killed after its last rename.
+        if let Some((dir, name)) = note
+            && ReplacedNote::read_in(&dir, &name).is_some()
+        {
             let _ = dir.remove_file(&name);
         }
         for dir in dirs {
@@ -265,35 +271,35 @@ impl FileSet {
         Ok(())
     }
 
+    /// Where the note beside the record is, or would be.
+    fn note(&self) -> Option<(Dir, OsString)> {
+        Dir::of(&ReplacedNote::path(self.overwrite.record_path()?)).ok()
+    }
+
     /// Notes beside the record which files are about to be replaced, as they are now.
-    fn note_replaced(&self) -> Result<Option<(Dir, OsString)>, WriteError> {
-        let Some(record) = self.overwrite.record_path() else {
-            return Ok(None);
+    fn note_replaced(&self, dir: &Dir, name: &OsStr) -> Result<(), WriteError> {
+        let record = self.overwrite.record_path();
+        let replaced = |file: &&Staged| {
+            file.permit == Permit::Replace && record.is_none_or(|record| file.target != record)
         };
-        let replaced = |file: &&Staged| file.permit == Permit::Replace && file.target != record;
         let mut files = Vec::new();
         for file in self.staged.iter().filter(replaced) {
             let entry = present(&file.dir, &file.name)
                 .map_err(|error| WriteError::from_io("read", &file.target, error))?;
             files.extend(entry);
         }
-        if files.is_empty() {
-            return Ok(None);
-        }
-        let path = ReplacedNote::path(record);
+        let fail = |error| WriteError::from_io("write", &dir.path().join(name), error);
         // Somebody else's file of that name stays; then a kill at the wrong moment costs a --force.
-        if path.symlink_metadata().is_ok() && Record::read(&path).is_none() {
-            return Ok(None);
+        let foreign =
+            dir.status(name).map_err(fail)?.is_some() && ReplacedNote::read_in(dir, name).is_none();
+        if files.is_empty() || foreign {
+            return Ok(());
         }
-        let fail = |error| WriteError::from_io("write", &path, error);
-        let (dir, name) = Dir::of(&path).map_err(fail)?;
         let bytes = ReplacedNote::new(files).bytes().map_err(fail)?;
-        match put(&dir, &name.to_string_lossy(), true, |out| {
+        put(dir, &name.to_string_lossy(), true, |out| {
             out.write_all(&bytes)
-        }) {
-            Ok(()) => Ok(Some((dir, name))),
-            Err(error) => Err(fail(error)),
-        }
+        })
+        .map_err(fail)
     }
 }
 
@@ -370,6 +376,39 @@ mod tests {
         std::fs::write(ReplacedNote::path(&sidecar), note.bytes().unwrap()).unwrap();
         put_both(folder.path(), "plate.csv", "22", false).unwrap();
         assert_eq!(folder.path().read_dir().unwrap().count(), 2);
+    }
+
+    #[test]
+    fn the_note_of_a_run_killed_after_its_last_rename_goes_and_a_users_file_of_its_name_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        put_both(folder.path(), "plate.csv", "22", false).unwrap();
+        let note = ReplacedNote::path(&folder.path().join("plate.json"));
+        let ours = ReplacedNote::new(vec![FileEntry {
+            path: "plate.csv".to_owned(),
+            bytes: 1,
+            sha256: crate::artefact::sha256_hex(b"1"),
+        }]);
+        let ours = ours.bytes().unwrap();
+        // Nothing is replaced, and then something.
+        for text in ["22", "333"] {
+            std::fs::write(&note, &ours).unwrap();
+            put_both(folder.path(), "plate.csv", text, false).unwrap();
+            assert!(!note.exists(), "left over");
+        }
+        let edited = [&ours[..], b"\n"].concat();
+        let record = record(&inputs(), &[]).into_bytes();
+        for theirs in [&b"mine"[..], &edited, &record] {
+            std::fs::write(&note, theirs).unwrap();
+            for text in ["333", "4444", "333"] {
+                put_both(folder.path(), "plate.csv", text, false).unwrap();
+                assert_eq!(std::fs::read(&note).unwrap(), theirs);
+            }
+        }
+        std::fs::rename(&note, folder.path().join("elsewhere")).unwrap();
+        std::fs::write(folder.path().join("elsewhere"), &ours).unwrap();
+        std::os::unix::fs::symlink("elsewhere", &note).unwrap();
+        put_both(folder.path(), "plate.csv", "4444", false).unwrap();
+        assert!(note.is_symlink() && folder.path().join("elsewhere").is_file());
     }
 
     #[test]

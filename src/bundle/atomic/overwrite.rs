@@ -212,15 +212,16 @@ impl Overwrite {
         if is(record) || is_timing(dir, name) {
             return Ok(());
         }
-        let note = Record::read(&ReplacedNote::path(record));
+        let note = Dir::of(&ReplacedNote::path(record))
+            .ok()
+            .and_then(|(dir, name)| ReplacedNote::read_in(&dir, &name));
+        let replaced = note.map(ReplacedNote::replaced).unwrap_or_default();
         let mut lists = false;
-        for list in std::iter::once(found).chain(note) {
-            for (listed, entry) in list.listed() {
-                if is(&parent_of(record).join(listed)) {
-                    lists = true;
-                    if unchanged(dir, name, &entry).unwrap_or(false) {
-                        return Ok(());
-                    }
+        for entry in found.files().into_iter().chain(replaced) {
+            if is(&parent_of(record).join(&entry.path)) {
+                lists = true;
+                if unchanged(dir, name, &entry).unwrap_or(false) {
+                    return Ok(());
                 }
             }
         }

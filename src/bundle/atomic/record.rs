@@ -14,6 +14,7 @@ use super::names::OLD;
 use crate::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION, parse_version};
 use crate::json::to_json;
 use crate::plain::read_plain;
+use crate::seal;
 use crate::timing;
 
 /// Records larger than this are not read: ours are a few kilobytes to a few megabytes.
@@ -25,7 +26,6 @@ pub(super) struct Record {
     schema_version: String,
     #[serde(rename = "fluxform_version")]
     _fluxform_version: String,
-    /// Absent from a note of files that are about to be replaced.
     #[serde(default)]
     inputs: Vec<Input>,
     #[serde(default)]
@@ -47,11 +47,7 @@ impl Record {
 
     /// The record `name` in `dir`; a link is none.
     pub fn read_in(dir: &Dir, name: &str) -> Option<Self> {
-        let file = dir.file(name).ok()?;
-        let mut text = Vec::new();
-        let read = file.take(RECORD_MAX_BYTES + 1).read_to_end(&mut text);
-        let whole = read.is_ok_and(|bytes| bytes as u64 <= RECORD_MAX_BYTES);
-        whole.then(|| Self::parse(&text)).flatten()
+        Self::parse(&bounded(dir, name)?)
     }
 
     /// Whether it was made from inputs of these digests, in this order.
@@ -60,6 +56,11 @@ impl Record {
             inputs.iter().map(|input| input.sha256.clone()).collect()
         };
         digests(&self.inputs) == digests(inputs)
+    }
+
+    /// What it lists.
+    pub fn files(self) -> Vec<FileEntry> {
+        self.files
     }
 
     /// What it lists, by name.
@@ -120,21 +121,27 @@ pub(super) fn is_timing(dir: &Dir, name: &OsStr) -> bool {
 }
 
 /// The note beside a record on files that are about to be replaced: a run that is killed between two
-/// renames leaves both states told.
-#[derive(Debug, Serialize)]
+/// renames leaves both states listed. The next finished one removes it.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct ReplacedNote {
-    schema_version: &'static str,
-    fluxform_version: &'static str,
-    files: Vec<FileEntry>,
+    schema_version: String,
+    fluxform_version: String,
+    replaced: Vec<FileEntry>,
+    /// Its own digest; see [`seal`].
+    #[serde(skip_serializing)]
+    #[serde(rename = "record_sha256")]
+    _record_sha256: String,
 }
 
 impl ReplacedNote {
     /// Of these files as they are now.
-    pub fn new(files: Vec<FileEntry>) -> Self {
+    pub fn new(replaced: Vec<FileEntry>) -> Self {
         Self {
-            schema_version: SCHEMA_VERSION,
-            fluxform_version: FLUXFORM_VERSION,
-            files,
+            schema_version: SCHEMA_VERSION.to_owned(),
+            fluxform_version: FLUXFORM_VERSION.to_owned(),
+            replaced,
+            _record_sha256: String::new(),
         }
     }
 
@@ -144,8 +151,29 @@ impl ReplacedNote {
         record.with_file_name(format!(".{name}{}", OLD))
     }
 
+    /// The note `name` in `dir`; `None` for anything that this program did not write as it is.
+    pub fn read_in(dir: &Dir, name: &OsStr) -> Option<Self> {
+        let text = bounded(dir, name)?;
+        let note = serde_json::from_slice(&text).ok();
+        note.filter(|_| seal::is_sealed(&text))
+    }
+
     /// Its bytes.
     pub fn bytes(&self) -> io::Result<Vec<u8>> {
-        to_json(self).map_err(io::Error::other)
+        to_json(self).map(seal::sealed).map_err(io::Error::other)
     }
+
+    /// The files.
+    pub fn replaced(self) -> Vec<FileEntry> {
+        self.replaced
+    }
+}
+
+/// The bytes of the regular file `name` in `dir`, unless they are too many for a record.
+fn bounded(dir: &Dir, name: impl AsRef<OsStr>) -> Option<Vec<u8>> {
+    let file = dir.file(name).ok()?;
+    let mut text = Vec::new();
+    let read = file.take(RECORD_MAX_BYTES + 1).read_to_end(&mut text);
+    let whole = read.is_ok_and(|bytes| bytes as u64 <= RECORD_MAX_BYTES);
+    whole.then_some(text)
 }
