@@ -5,7 +5,10 @@
 //! It is the last line of a JSON object, `"record_sha256": "<64 digits>"`, over the text as it is
 //! without that line and the comma before it.
 
+use serde::Serialize;
+
 use super::artefact::sha256_hex;
+use super::json::{JsonError, to_json};
 
 /// The key of the seal.
 pub const SEAL: &str = "record_sha256";
@@ -13,7 +16,15 @@ pub const SEAL: &str = "record_sha256";
 /// How the text of an object ends.
 const END: &[u8] = b"\n}\n";
 
-/// The text of a JSON object, as `to_json` gives it, with its seal. Any other text stays as it is.
+/// The value, an object, as [`to_json`] gives it, and its seal.
+///
+/// # Errors
+/// Those of [`to_json`].
+pub fn to_record<T: Serialize + ?Sized>(value: &T) -> Result<Vec<u8>, JsonError> {
+    to_json(value).map(sealed)
+}
+
+/// The text of a JSON object, as [`to_json`] gives it, with its seal. Any other text stays as it is.
 #[must_use]
 pub fn sealed(text: Vec<u8>) -> Vec<u8> {
     match text.strip_suffix(END) {

@@ -9,6 +9,7 @@ pub mod discretize;
 pub mod evaluate;
 mod kept;
 pub mod lambda;
+pub mod made_with;
 pub mod map;
 pub mod maps;
 pub mod neighbours;

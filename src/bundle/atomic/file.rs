@@ -309,9 +309,9 @@ mod tests {
     use crate::artefact::{FileEntry, Input};
 
     fn record(inputs: &[Input], files: &[FileEntry]) -> String {
-        serde_json::json!({ "schema_version": "1.2.0", "fluxform_version": "0.1.0",
-            "inputs": inputs, "files": files })
-        .to_string()
+        let value = serde_json::json!({ "schema_version": "1.4.0", "fluxform_version": "0.1.0",
+            "inputs": inputs, "files": files });
+        String::from_utf8(crate::seal::to_record(&value).unwrap()).unwrap()
     }
 
     fn inputs() -> Vec<Input> {
@@ -352,6 +352,94 @@ mod tests {
         assert_eq!(std::fs::read(path("plate.csv")).unwrap(), b"edited");
         put_both(folder.path(), "plate.csv", "3", true).unwrap();
         assert_eq!(folder.path().read_dir().unwrap().count(), 3);
+    }
+
+    #[test]
+    fn a_sidecar_that_somebody_edited_is_no_permission() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        put_both(folder.path(), "plate.csv", "1", false).unwrap();
+        std::fs::write(path("plate.txt"), "mine").unwrap();
+        let mine = FileEntry {
+            path: "plate.txt".to_owned(),
+            bytes: 4,
+            sha256: crate::artefact::sha256_hex(b"mine"),
+        };
+        let mine = serde_json::to_string(&mine).unwrap();
+        let text = std::fs::read_to_string(path("plate.json")).unwrap();
+        let edited = text.replacen("\"files\": [", &format!("\"files\": [{mine},"), 1);
+        std::fs::write(path("plate.json"), edited).unwrap();
+        for table in ["plate.txt", "plate.csv"] {
+            let refused = put_both(folder.path(), table, "2", false).unwrap_err();
+            let refused = refused.to_string();
+            assert!(
+                refused.contains("plate.json, which states"),
+                "{table}: {refused}"
+            );
+        }
+        assert_eq!(std::fs::read(path("plate.txt")).unwrap(), b"mine");
+        assert_eq!(std::fs::read(path("plate.csv")).unwrap(), b"1");
+    }
+
+    /// A table and its record, made with one option.
+    fn put_with(folder: &Path, jnd: f64, extra: bool, force: bool) -> Result<(), WriteError> {
+        let options = crate::artefact::Options::of(&serde_json::json!({ "jnd": jnd }));
+        let overwrite = Overwrite::new(force, folder.join("a.json"), &inputs()).made_with(&options);
+        let mut set = FileSet::begin(folder, overwrite);
+        let mut files = Vec::new();
+        for name in ["a.csv", "a.vti"] {
+            if name == "a.csv" || extra {
+                let text = format!("{name} {jnd}");
+                let written = set.write(name, |out| out.write_all(text.as_bytes()))?;
+                files.push(FileEntry::new(name, written));
+            } else {
+                set.outdate(name)?;
+            }
+        }
+        let told = serde_json::json!({ "schema_version": "1.4.0", "fluxform_version": "0.1.0",
+            "inputs": inputs(), "made_with": options, "files": files });
+        let told = crate::seal::to_record(&told).unwrap();
+        set.write("a.json", |out| out.write_all(&told))?;
+        set.commit()
+    }
+
+    #[test]
+    fn output_of_other_options_is_replaced_with_force_alone_and_then_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let table = || std::fs::read_to_string(folder.path().join("a.csv")).unwrap();
+        put_with(folder.path(), 0.07, true, false).unwrap();
+        put_with(folder.path(), 0.07, true, false).unwrap();
+        let refused = put_with(folder.path(), 7.0, true, false).unwrap_err();
+        let refused = refused.to_string();
+        assert!(
+            refused.contains("other options: jnd 0.07, now 7.0"),
+            "{refused}"
+        );
+        assert_eq!(table(), "a.csv 0.07");
+        put_with(folder.path(), 7.0, false, true).unwrap();
+        assert_eq!(table(), "a.csv 7");
+        // Of the earlier options nothing stays beside it.
+        assert_eq!(folder.path().read_dir().unwrap().count(), 2);
+    }
+
+    #[test]
+    fn a_record_of_an_older_schema_has_no_seal_and_makes_way_with_force() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        put_both(folder.path(), "plate.csv", "1", false).unwrap();
+        let text = std::fs::read_to_string(path("plate.json")).unwrap();
+        let refused = |text: String| {
+            std::fs::write(path("plate.json"), text).unwrap();
+            let refused = put_both(folder.path(), "plate.csv", "2", false);
+            refused.unwrap_err().to_string()
+        };
+        let edited = refused(text.replace("1.4.0", "1.3.0"));
+        assert!(edited.contains("was changed since"), "{edited}");
+        let (bare, _) = text.rsplit_once(',').unwrap();
+        let older = refused(format!("{bare}\n}}\n").replace("1.4.0", "1.3.0"));
+        assert!(older.contains("older version"), "{older}");
+        put_both(folder.path(), "plate.csv", "2", true).unwrap();
+        put_both(folder.path(), "plate.csv", "3", false).unwrap();
     }
 
     #[test]
@@ -458,6 +546,37 @@ mod tests {
         put_both(folder.path(), "plate.csv", "2", false).unwrap();
         assert!(path("plate.csv").is_symlink());
         assert_eq!(std::fs::read(path("folder/real.csv")).unwrap(), b"2");
+    }
+
+    #[test]
+    fn force_reaches_no_users_file_through_a_linked_folder() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        std::fs::create_dir(path("theirs")).unwrap();
+        symlink(path("theirs"), path("out")).unwrap();
+        for name in ["plan.json", "plate.csv", "a.svg"] {
+            std::fs::write(path("theirs").join(name), "years").unwrap();
+        }
+        let put = |name: &str, overwrite: Overwrite| {
+            write(&path("out").join(name), &overwrite, |out| {
+                out.write_all(b"<!-- fluxform, drawn of b -->")
+            })
+        };
+        let drawn = |mark: &str| Overwrite::beginning(true, mark, &[]);
+        put("plan.json", Overwrite::force()).unwrap_err();
+        put("a.svg", drawn("<!-- fluxform, drawn of b")).unwrap_err();
+        put_both(&path("out"), "plate.csv", "2", true).unwrap_err();
+        for name in ["plan.json", "plate.csv", "a.svg"] {
+            assert_eq!(std::fs::read(path("theirs").join(name)).unwrap(), b"years");
+        }
+        // What is new or ours is written there.
+        put_both(&path("out"), "new.csv", "1", false).unwrap();
+        put_both(&path("out"), "new.csv", "2", true).unwrap();
+        let ours = path("theirs").join("b.svg");
+        std::fs::write(&ours, "<!-- fluxform, drawn of a -->").unwrap();
+        put("b.svg", drawn("<!-- fluxform, drawn of b")).unwrap();
+        assert!(std::fs::read(ours).unwrap().ends_with(b"b -->"));
     }
 
     #[test]

@@ -11,14 +11,16 @@ use sha2::{Digest, Sha256};
 use super::digest::hex;
 use super::dir::{Dir, Kind};
 use super::names::OLD;
-use crate::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION, parse_version};
-use crate::json::to_json;
+use crate::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION, parse_version};
 use crate::plain::read_plain;
 use crate::seal;
 use crate::timing;
 
 /// Records larger than this are not read: ours are a few kilobytes to a few megabytes.
 const RECORD_MAX_BYTES: u64 = 64 << 20;
+
+/// Records of this schema version and later carry a seal.
+const SEALED_FROM: [u32; 3] = [1, 4, 0];
 
 /// What a manifest or sidecar states, as far as it decides what may be replaced.
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -29,25 +31,60 @@ pub(super) struct Record {
     #[serde(default)]
     inputs: Vec<Input>,
     #[serde(default)]
+    made_with: Options,
+    #[serde(default)]
     files: Vec<FileEntry>,
+    #[serde(default)]
+    record_sha256: Option<String>,
+    #[serde(skip)]
+    state: State,
+}
+
+/// Whether a record is as this program wrote it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) enum State {
+    /// Its seal holds.
+    Sealed,
+    /// Of a schema without seals, which states no options.
+    Older,
+    /// Changed since.
+    #[default]
+    Changed,
 }
 
 impl Record {
-    /// The record at `path`; `None` where none is, or one that this program did not write.
+    /// The record at `path`; `None` where none is, or one of another program.
     pub fn read(path: &Path) -> Option<Self> {
         let text = read_plain(path, RECORD_MAX_BYTES).ok()?;
         Self::parse(&text)
     }
 
     fn parse(text: &[u8]) -> Option<Self> {
-        let record: Self = serde_json::from_slice(text).ok()?;
-        parse_version(&record.schema_version)?;
+        let mut record: Self = serde_json::from_slice(text).ok()?;
+        let version = parse_version(&record.schema_version)?;
+        record.state = if seal::is_sealed(text) {
+            State::Sealed
+        } else if version < SEALED_FROM && record.record_sha256.is_none() {
+            State::Older
+        } else {
+            State::Changed
+        };
         Some(record)
     }
 
-    /// The record `name` in `dir`; a link is none.
+    /// The record `name` in `dir`, unless it was changed; a link is none.
     pub fn read_in(dir: &Dir, name: &str) -> Option<Self> {
-        Self::parse(&bounded(dir, name)?)
+        Self::parse(&bounded(dir, name)?).filter(|record| record.state != State::Changed)
+    }
+
+    /// Whether it is as this program wrote it.
+    pub fn state(&self) -> State {
+        self.state
+    }
+
+    /// The options in which `now` differs, in words.
+    pub fn differs_in(&self, now: &Options) -> Option<String> {
+        self.made_with.difference(now)
     }
 
     /// Whether it was made from inputs of these digests, in this order.
@@ -160,7 +197,7 @@ impl ReplacedNote {
 
     /// Its bytes.
     pub fn bytes(&self) -> io::Result<Vec<u8>> {
-        to_json(self).map(seal::sealed).map_err(io::Error::other)
+        seal::to_record(self).map_err(io::Error::other)
     }
 
     /// The files.
