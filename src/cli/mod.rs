@@ -71,6 +71,12 @@ pub fn main(args: impl Iterator<Item = OsString>) -> ExitCode {
     }
 }
 
+/// The command line as clap knows it.
+#[must_use]
+pub fn command() -> clap::Command {
+    Arguments::command()
+}
+
 /// What can be known of the common options before the arguments are parsed.
 fn told_early(args: &[OsString]) -> Common {
     Common {
@@ -92,7 +98,7 @@ fn told_early(args: &[OsString]) -> Common {
 /// Options alone do nothing.
 fn without_command() -> clap::Error {
     let message = "'fluxform' requires a subcommand but one was not provided";
-    Arguments::command().error(ErrorKind::MissingSubcommand, message)
+    command().error(ErrorKind::MissingSubcommand, message)
 }
 
 /// Whether a panic is caught where it happens and told as what it means.

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::calibrate::{CalibrateOptions, ShapeSource};
 use super::discretize::PointsOptions;
 use super::discretize::scattered::Sampling;
-use super::lambda::{LambdaOptions, criterion_name};
+use super::lambda::LambdaOptions;
 use super::map::mag_manip::MagManipRequest;
 use super::map::{MapRequest, components_name};
 use super::replay::synthesize::Synthesis;
@@ -48,7 +48,7 @@ pub(super) fn calibrate(options: &CalibrateOptions, shape: &ShapeSource) -> Made
         at_n_per_m,
     } = *settings;
     let mut made_with = MadeWith {
-        criterion: Some(criterion_name(criterion).to_owned()),
+        criterion: Some(criterion),
         jnd: Some(jnd_weight),
         at_n_per_m,
         tolerance: *tolerance,
