@@ -1,8 +1,11 @@
 //! The page of a calibrated object.
 
+use fluxform_bundle::artefact::Input;
+use fluxform_bundle::lambda_file::LambdaFile;
+use fluxform_bundle::manifest::LeftOut;
 use serde_json::{Map, Value, json};
 
-use super::data::{BundleFacts, Chosen};
+use super::data::BundleFacts;
 use super::frame::{Page, Section};
 use super::html::{Cell, Html, Table};
 use super::number::{count, figures, force, percent};
@@ -24,14 +27,14 @@ pub fn page(facts: &BundleFacts) -> String {
     ];
     Page {
         kind: "Calibration",
-        title: format!("{} on {}", facts.shape, facts.design),
+        title: format!("{} on {}", facts.lambda.shape, facts.lambda.design),
         lead: lead(facts),
         sections,
         data: Value::Object(data),
         foot: format!(
             "fluxform {}. This page needs nothing but itself; all its numbers come from the files \
              of this bundle.",
-            facts.version
+            facts.lambda.fluxform_version
         ),
     }
     .html()
@@ -53,15 +56,16 @@ fn coils(facts: &BundleFacts) -> Value {
 
 fn lead(facts: &BundleFacts) -> Html {
     let mut html = Html::default();
-    match &facts.chosen {
-        Some(chosen) => html.element(
+    match facts.lambda.lambda_n_per_m {
+        Some(lambda) => html.element(
             "p class=\"lead\"",
             &format!(
                 "A finger at height h above the coils is to feel the force \u{3bb}h. With one set \
                  of static currents for the whole object \u{3bb} is {} N/m, and the force is off by \
-                 {}.",
-                figures(chosen.lambda_n_per_m, 5),
-                off(chosen)
+                 {} rms{}.",
+                figures(lambda, 5),
+                force(facts.lambda.rms_error_n.unwrap_or(0.0)),
+                relative(facts.lambda, ", ")
             ),
         ),
         None => html.element(
@@ -72,12 +76,11 @@ fn lead(facts: &BundleFacts) -> Html {
     html
 }
 
-fn off(chosen: &Chosen) -> String {
-    let error = force(chosen.rms_error_n);
-    match chosen.relative_rms_error {
-        Some(part) => format!("{error} rms, {} of the rms force", percent(part)),
-        None => format!("{error} rms"),
-    }
+/// The relative error in words, after `before`; nothing where no force is wanted.
+fn relative(file: &LambdaFile, before: &str) -> String {
+    file.relative_rms_error.map_or_else(String::new, |part| {
+        format!("{before}{} of the rms force", percent(part))
+    })
 }
 
 fn tile(html: &mut Html, name: &str, value: &str, more: &str) {
@@ -93,26 +96,22 @@ fn tile(html: &mut Html, name: &str, value: &str, more: &str) {
 fn answer(facts: &BundleFacts) -> Section {
     let mut body = Html::default();
     body.raw("<dl class=\"tiles\">");
-    let by = facts.criterion.described(&percent(facts.jnd));
+    let file = facts.lambda;
+    let by = file.criterion.described(&percent(file.jnd));
     let by = format!("chosen by {by}");
-    match &facts.chosen {
+    match file.lambda_n_per_m {
         None => tile(&mut body, "force constant \u{3bb}", "none", &by),
-        Some(chosen) => {
-            let lambda = format!("{} N/m", figures(chosen.lambda_n_per_m, 5));
+        Some(lambda) => {
+            let lambda = format!("{} N/m", figures(lambda, 5));
             tile(&mut body, "force constant \u{3bb}", &lambda, &by);
-            let relative = chosen.relative_rms_error.map_or_else(String::new, |part| {
-                format!("{} of the rms force", percent(part))
-            });
-            tile(
-                &mut body,
-                "rms error",
-                &force(chosen.rms_error_n),
-                &relative,
-            );
-            let at = chosen.worst_at.map_or_else(String::new, |at| {
+            let error = |n: Option<f64>| force(n.unwrap_or(0.0));
+            let rms = error(file.rms_error_n);
+            tile(&mut body, "rms error", &rms, &relative(file, ""));
+            let at = facts.worst_at.map_or_else(String::new, |at| {
                 format!("of {} wanted there", force(at.wanted_n))
             });
-            tile(&mut body, "worst error", &force(chosen.worst_error_n), &at);
+            let worst = error(file.worst_error_n);
+            tile(&mut body, "worst error", &worst, &at);
             let bound = facts.coils.iter().filter(|coil| coil.at_limit()).count();
             let sum: f64 = facts.coils.iter().map(|coil| coil.current_a).sum();
             tile(
@@ -124,7 +123,7 @@ fn answer(facts: &BundleFacts) -> Section {
         }
     }
     body.raw("</dl>");
-    if facts.chosen.is_some() {
+    if file.lambda_n_per_m.is_some() {
         body.table(&limits::currents(&facts.coils));
     }
     Section {
@@ -136,27 +135,33 @@ fn answer(facts: &BundleFacts) -> Section {
 
 fn sources(facts: &BundleFacts) -> Section {
     let mut body = Html::default();
-    let input =
-        |(path, sha256): &(&str, &str)| -> Vec<Cell> { vec![(*path).into(), (*sha256).into()] };
+    let input = |input: &Input| -> Vec<Cell> {
+        vec![input.path.clone().into(), input.sha256.clone().into()]
+    };
     body.table(&Table {
         caption: "Files and their digests".to_owned(),
         head: vec![("file", false), ("sha256", false)],
-        rows: facts.inputs.iter().map(input).collect(),
+        rows: facts.lambda.inputs.iter().map(input).collect(),
         prose: true,
     });
-    if !facts.left_out.is_empty() {
-        let row = |(what, why, cost): &(&str, &str, f64)| -> Vec<Cell> {
-            let cost = if *cost > 0.0 {
-                percent(*cost)
+    let left_out = &facts.manifest.left_out;
+    if !left_out.is_empty() {
+        let row = |left: &LeftOut| -> Vec<Cell> {
+            let cost = if left.error_cost > 0.0 {
+                percent(left.error_cost)
             } else {
                 "none".to_owned()
             };
-            vec![(*what).into(), cost.into(), (*why).into()]
+            vec![
+                left.what.clone().into(),
+                cost.into(),
+                left.why.clone().into(),
+            ]
         };
         body.table(&Table {
             caption: "What was left out because the object does not need it".to_owned(),
             head: vec![("what", false), ("error it costs", true), ("why", false)],
-            rows: facts.left_out.iter().map(row).collect(),
+            rows: left_out.iter().map(row).collect(),
             prose: true,
         });
     }
