@@ -127,7 +127,7 @@ fn the_table_has_the_keys_it_must_have() {
         ],
         &Silent,
     );
-    let json = serde_json::to_value(catalogue_file(&rows)).unwrap();
+    let json = serde_json::to_value(catalogue_file(&rows, Default::default())).unwrap();
     let keys = |row: usize| -> Vec<&str> {
         let row = json["cases"][row].as_object().unwrap();
         row.keys().map(String::as_str).collect()

@@ -70,7 +70,8 @@ fn inputs(request: &BenchRequest) -> Vec<Input> {
 /// # Errors
 /// Files that must not be replaced; a stage that fails; interruption.
 pub fn run(request: &BenchRequest, progress: &dyn Progress) -> Result<BenchFile, JobError> {
-    written::check(&inputs(request), &request.out, request.force)?;
+    let of = (&*inputs(request), &written::made_with(request));
+    written::check(of, &request.out, request.force)?;
     let mut file = measure(request, progress)?;
     written::write(&mut file, &request.out, request.force)?;
     Ok(file)
@@ -111,6 +112,7 @@ pub fn measure(request: &BenchRequest, progress: &dyn Progress) -> Result<BenchF
         schema_version: SCHEMA_VERSION.to_owned(),
         fluxform_version: FLUXFORM_VERSION.to_owned(),
         inputs: inputs(request),
+        made_with: written::made_with(request),
         units: UNITS.to_owned(),
         quick: request.pace.quick,
         stages,

@@ -2,31 +2,76 @@
 
 use std::path::Path;
 
-use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION, UNITS};
+use serde::Serialize;
+
+use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION, UNITS};
 use crate::bundle::atomic::{FileSet, Overwrite};
 use crate::bundle::bench::{BenchFile, StageCurves, write_laws, write_rows};
 use crate::bundle::catalogue::{CaseRow, CatalogueFile, write_cases};
-use crate::bundle::json::to_json;
+use crate::bundle::seal::to_record;
 use crate::job::JobError;
 use crate::plot::curves::{CurvesPlot, Line};
 
+use super::BenchRequest;
 use super::page::{self, PAGE};
 use super::summary::markdown;
 
 /// Name of the JSON file.
 pub const JSON: &str = "bench.json";
 
+/// The options of a run as its record states them.
+#[must_use]
+pub fn made_with(request: &BenchRequest) -> Options {
+    #[derive(Serialize)]
+    struct Asked<'a> {
+        quick: bool,
+        stages: &'a [String],
+        peers: bool,
+        scaling: bool,
+    }
+    let BenchRequest {
+        pace,
+        stages,
+        peers,
+        scaling,
+        out: _,
+        force: _,
+    } = request;
+    Options::of(&Asked {
+        quick: pace.quick,
+        stages,
+        peers: *peers,
+        scaling: *scaling,
+    })
+}
+
+/// As [`made_with`], of the catalogue: the part of it and the text in the cases' names.
+#[must_use]
+pub fn catalogue_made_with(quick: bool, case: Option<&str>) -> Options {
+    #[derive(Serialize)]
+    struct Asked<'a> {
+        quick: bool,
+        case: Option<&'a str>,
+    }
+    Options::of(&Asked { quick, case })
+}
+
 /// When files of an earlier run may be replaced.
-fn overwrite(inputs: &[Input], folder: &Path, record: &str, force: bool) -> Overwrite {
-    Overwrite::new(force, folder.join(record), inputs)
+fn overwrite(
+    (inputs, made_with): (&[Input], &Options),
+    folder: &Path,
+    record: &str,
+    force: bool,
+) -> Overwrite {
+    Overwrite::new(force, folder.join(record), inputs).made_with(made_with)
 }
 
 /// Refuses before a long run when its files must not replace those in `folder`.
 ///
 /// # Errors
 /// An output of something else.
-pub fn check(inputs: &[Input], folder: &Path, force: bool) -> Result<(), JobError> {
-    Ok(overwrite(inputs, folder, JSON, force).check(&folder.join(JSON))?)
+pub fn check(of: (&[Input], &Options), folder: &Path, force: bool) -> Result<(), JobError> {
+    Ok(overwrite(of, folder, JSON, force).check(&folder.join(JSON))?)
 }
 
 /// Writes all files; `files` lists them but for the JSON itself.
@@ -34,7 +79,7 @@ pub fn check(inputs: &[Input], folder: &Path, force: bool) -> Result<(), JobErro
 /// # Errors
 /// Files that cannot be written or must not be replaced.
 pub fn write(file: &mut BenchFile, folder: &Path, force: bool) -> Result<(), JobError> {
-    let overwrite = overwrite(&file.inputs, folder, JSON, force);
+    let overwrite = overwrite((&file.inputs, &file.made_with), folder, JSON, force);
     let mut set = FileSet::begin(folder, overwrite);
     let mut entries = Vec::new();
     let table = set.write("bench.csv", |out| write_rows(out, &file.stages))?;
@@ -56,7 +101,7 @@ pub fn write(file: &mut BenchFile, folder: &Path, force: bool) -> Result<(), Job
     let shown = set.write(PAGE, |out| out.write_all(html.as_bytes()))?;
     entries.push(FileEntry::new(PAGE, shown));
     file.files = entries;
-    let json = to_json(file).map_err(|fault| JobError::Input(fault.to_string()))?;
+    let json = to_record(file).map_err(|fault| JobError::Input(fault.to_string()))?;
     set.write(JSON, |out| out.write_all(&json))?;
     Ok(set.commit()?)
 }
@@ -68,9 +113,15 @@ pub const CATALOGUE: &str = "extreme.json";
 ///
 /// # Errors
 /// Files that cannot be written or must not be replaced.
-pub fn write_catalogue(cases: &[CaseRow], folder: &Path, force: bool) -> Result<(), JobError> {
-    let mut set = FileSet::begin(folder, overwrite(&[], folder, CATALOGUE, force));
-    let mut file = catalogue_file(cases);
+pub fn write_catalogue(
+    cases: &[CaseRow],
+    made_with: Options,
+    folder: &Path,
+    force: bool,
+) -> Result<(), JobError> {
+    let overwrite = overwrite((&[], &made_with), folder, CATALOGUE, force);
+    let mut set = FileSet::begin(folder, overwrite);
+    let mut file = catalogue_file(cases, made_with);
     let table = set.write("extreme.csv", |out| write_cases(out, cases))?;
     let html = page::catalogue(cases);
     let shown = set.write(PAGE, |out| out.write_all(html.as_bytes()))?;
@@ -78,18 +129,19 @@ pub fn write_catalogue(cases: &[CaseRow], folder: &Path, force: bool) -> Result<
         FileEntry::new("extreme.csv", table),
         FileEntry::new(PAGE, shown),
     ];
-    let json = to_json(&file).map_err(|fault| JobError::Input(fault.to_string()))?;
+    let json = to_record(&file).map_err(|fault| JobError::Input(fault.to_string()))?;
     set.write(CATALOGUE, |out| out.write_all(&json))?;
     Ok(set.commit()?)
 }
 
 /// The catalogue as `extreme.json` and standard output tell it.
 #[must_use]
-pub fn catalogue_file(cases: &[CaseRow]) -> CatalogueFile {
+pub fn catalogue_file(cases: &[CaseRow], made_with: Options) -> CatalogueFile {
     CatalogueFile {
         schema_version: SCHEMA_VERSION.to_owned(),
         fluxform_version: FLUXFORM_VERSION.to_owned(),
         inputs: Vec::new(),
+        made_with,
         units: UNITS.to_owned(),
         cases: cases.to_vec(),
         files: Vec::new(),
@@ -100,8 +152,9 @@ pub fn catalogue_file(cases: &[CaseRow]) -> CatalogueFile {
 ///
 /// # Errors
 /// An output of something else.
-pub fn check_catalogue(folder: &Path, force: bool) -> Result<(), JobError> {
-    Ok(overwrite(&[], folder, CATALOGUE, force).check(&folder.join(CATALOGUE))?)
+pub fn check_catalogue(made_with: &Options, folder: &Path, force: bool) -> Result<(), JobError> {
+    let overwrite = overwrite((&[], made_with), folder, CATALOGUE, force);
+    Ok(overwrite.check(&folder.join(CATALOGUE))?)
 }
 
 /// One stage's curves in one plane.

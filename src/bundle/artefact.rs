@@ -1,15 +1,18 @@
 //! What every artefact says about itself: versions, inputs, files.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Read};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::atomic::Written;
+use super::json::to_json;
 
 /// Version of the artefacts' layout, `major.minor.patch`. A reader refuses another major; a new
 /// minor only adds keys, arrays or files.
-pub const SCHEMA_VERSION: &str = "1.3.0";
+pub const SCHEMA_VERSION: &str = "1.4.0";
 
 /// Version of the program that wrote an artefact.
 pub const FLUXFORM_VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -59,6 +62,57 @@ impl FileEntry {
             path: path.into(),
             bytes: written.bytes,
             sha256: written.sha256,
+        }
+    }
+}
+
+/// The options of a run by name, the unit in the name, as its record states them in `made_with`: with
+/// the inputs they decide what is written.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct Options(BTreeMap<String, Value>);
+
+impl Options {
+    /// In `made_with`, but no reason to refuse: the platform, the digest of the others, and whether pages
+    /// are written too.
+    const NOT_COMPARED: [&str; 3] = ["arithmetic", "sha256", "report"];
+
+    /// The fields of `options` by name; none where it is no struct, or holds a number that is not finite.
+    #[must_use]
+    pub fn of<T: Serialize + ?Sized>(options: &T) -> Self {
+        let text = to_json(options).unwrap_or_default();
+        serde_json::from_slice(&text).unwrap_or_default()
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The options that `now` has otherwise, in words; `None` where there are none.
+    #[must_use]
+    pub fn difference(&self, now: &Self) -> Option<String> {
+        let names: BTreeSet<&String> = self.0.keys().chain(now.0.keys()).collect();
+        let differing = names.into_iter().filter_map(|name| {
+            let [was, is] = [self, now].map(|options| options.0.get(name).unwrap_or(&Value::Null));
+            let compared = !Self::NOT_COMPARED.contains(&name.as_str());
+            (compared && was != is).then(|| format!("{name} {}, now {}", shown(was), shown(is)))
+        });
+        let all = differing.collect::<Vec<_>>().join("; ");
+        (!all.is_empty()).then_some(all)
+    }
+}
+
+/// The value of an option in a message.
+fn shown(value: &Value) -> String {
+    const LONGEST: usize = 60;
+    match value {
+        Value::Null => "not given".to_owned(),
+        value => {
+            let text = value.to_string();
+            let short = text.chars().count() <= LONGEST;
+            if short { text } else { "otherwise".to_owned() }
         }
     }
 }
@@ -131,7 +185,22 @@ pub fn check_version(version: &str) -> Result<(), String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{check_version, parse_version};
+    use super::{Options, check_version, parse_version};
+    use serde_json::json;
+
+    #[test]
+    fn options_that_differ_are_named_and_the_platform_is_none() {
+        let of = |jnd: f64, arithmetic: &str| {
+            Options::of(&json!({ "jnd": jnd, "tolerance": null, "arithmetic": arithmetic }))
+        };
+        assert_eq!(of(0.07, "x86").difference(&of(0.07, "arm")), None);
+        let told = of(0.07, "x86").difference(&of(7.0, "x86"));
+        assert_eq!(told.as_deref(), Some("jnd 0.07, now 7.0"));
+        let none = Options::default();
+        let told = none.difference(&of(0.7, "x86"));
+        assert_eq!(told.as_deref(), Some("jnd not given, now 0.7"));
+        assert!(Options::of(&f64::NAN).is_empty());
+    }
 
     #[test]
     fn another_major_is_refused_another_minor_is_read() {

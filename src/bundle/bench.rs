@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::artefact::{FileEntry, Input};
+use super::artefact::{FileEntry, Input, Options};
 use super::number::push_number;
 use fluxform_base::accuracy::StageAccuracy;
 
@@ -19,6 +19,9 @@ pub struct BenchFile {
     pub fluxform_version: String,
     /// Designs and reference values, all built into the program.
     pub inputs: Vec<Input>,
+    /// The options of the run.
+    #[serde(default, skip_serializing_if = "Options::is_empty")]
+    pub made_with: Options,
     /// The sentence on units.
     pub units: String,
     /// Whether the finest and slowest rows were left out.

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 
-use super::artefact::{FileEntry, Input};
+use super::artefact::{FileEntry, Input, Options};
 use super::bench::{push_cell, push_text};
 
 /// `extreme.json`. Seconds in it differ from run to run.
@@ -17,6 +17,9 @@ pub struct CatalogueFile {
     pub fluxform_version: String,
     /// None: the cases are part of the program.
     pub inputs: Vec<Input>,
+    /// The options of the run.
+    #[serde(skip_serializing_if = "Options::is_empty")]
+    pub made_with: Options,
     /// The sentence on units.
     pub units: String,
     /// One entry a case.

@@ -37,6 +37,7 @@ pub mod rendering;
 pub mod replay;
 pub mod scan;
 pub mod schema;
+pub mod seal;
 pub mod store;
 mod stored;
 pub mod sweep;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::artefact::{FileEntry, Input, sha256_hex};
+use super::artefact::{FileEntry, Input, Options, sha256_hex};
 use super::json::to_json;
 use fluxform_base::accuracy::StageAccuracy;
 use fluxform_base::force_constant::Criterion;
@@ -58,10 +58,18 @@ pub struct Manifest {
     pub files: Vec<FileEntry>,
 }
 
-/// The options of the run that made a bundle. Criterion and just-noticeable difference are in
-/// `lambda.json`.
+/// The options of the run that made a bundle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MadeWith {
+    /// `--criterion`; absent from bundles of schema 1.3 and before, as the next two.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub criterion: Option<Criterion>,
+    /// `--jnd`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub jnd: Option<f64>,
+    /// `--at`, N/m; absent without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at_n_per_m: Option<f64>,
     /// `--tolerance`; null for the default.
     pub tolerance: Option<f64>,
     /// How far from the object's points the map reaches, m.
@@ -120,6 +128,9 @@ pub struct MapSidecar {
     pub design: String,
     /// What went in, paths as given on the command line.
     pub inputs: Vec<Input>,
+    /// The options of the run; absent from maps of schema 1.3 and before.
+    #[serde(default, skip_serializing_if = "Options::is_empty")]
+    pub made_with: Options,
     /// A sentence on units.
     pub units: String,
     /// Where the coils stand.

@@ -283,6 +283,9 @@ pub fn to_npz(map: &MapArrays) -> Result<Vec<u8>, NpzError> {
         .map_err(|error| NpzError::Archive(error.to_string()))
 }
 
+/// Arrays go into the archive in blocks of this size.
+const BLOCK_BYTES: usize = 1 << 20;
+
 struct Archive(ZipWriter<Cursor<Vec<u8>>>);
 
 impl Archive {
@@ -376,7 +379,12 @@ impl Archive {
             .start_file(format!("{name}.npy"), options)
             .map_err(io::Error::other)?;
         self.0.write_all(header)?;
-        self.0.write_all(data)
+        for block in data.chunks(BLOCK_BYTES) {
+            // An archive of gigabytes is no reason to let a request to stop wait.
+            fluxform_base::progress::poll();
+            self.0.write_all(block)?;
+        }
+        Ok(())
     }
 }
 

@@ -1,12 +1,14 @@
 //! The JSON Schemas of the artefacts, generated from the structs and committed in `schema/`.
 
 use schemars::{JsonSchema, schema_for};
+use serde_json::json;
 
 use super::bench::BenchFile;
 use super::catalogue::CatalogueFile;
 use super::lambda_file::LambdaFile;
 use super::manifest::{Manifest, MapSidecar};
 use super::scan::ScanFile;
+use super::seal::SEAL;
 use super::sweep::{MergeSummary, PlanFile, PointFile};
 
 /// The committed schemas: file name and text.
@@ -47,20 +49,32 @@ pub const SCHEMAS: [(&str, &str); 9] = [
 #[must_use]
 pub fn generated() -> [String; 9] {
     [
-        text::<Manifest>(),
-        text::<MapSidecar>(),
+        record::<Manifest>(),
+        record::<MapSidecar>(),
         text::<LambdaFile>(),
         text::<PlanFile>(),
         text::<PointFile>(),
-        text::<MergeSummary>(),
-        text::<BenchFile>(),
+        record::<MergeSummary>(),
+        record::<BenchFile>(),
         text::<ScanFile>(),
-        text::<CatalogueFile>(),
+        record::<CatalogueFile>(),
     ]
 }
 
 fn text<T: JsonSchema>() -> String {
     format!("{:#}\n", schema_for!(T).as_value())
+}
+
+/// The schema of a value that is written with its seal.
+fn record<T: JsonSchema>() -> String {
+    let mut schema = schema_for!(T).to_value();
+    schema["properties"][SEAL] = json!({
+        "type": "string",
+        "description": "SHA-256 of this text without this line and the comma before it, 64 lower-case \
+                        hexadecimal digits; absent from files of schema 1.3 and before. A checksum, no \
+                        signature.",
+    });
+    format!("{schema:#}\n")
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::artefact::{FileEntry, Input, sha256_hex};
+use super::artefact::{FileEntry, Input, Options, sha256_hex};
 use super::atomic::{
     FileSet, FolderDraft, Overwrite, WriteError, Written, check_distinct, listed_files, write,
 };
@@ -13,8 +13,9 @@ use super::consistent;
 use super::json::to_json;
 use super::lambda_file::LambdaFile;
 use super::mag_manip::{HEAD, Multipoles, VectorField, write_multipoles, write_vector_field};
-use super::manifest::{Manifest, MapSidecar};
+use super::manifest::{MadeWith, Manifest, MapSidecar};
 use super::npz::{MapArrays, to_npz};
+use super::seal::to_record;
 use super::table::{CurrentRow, PointRow, write_currents, write_map, write_points};
 use super::timing::StageSeconds;
 use super::vtk::write_vti;
@@ -41,8 +42,13 @@ pub struct BundleContent<'a> {
 ///
 /// # Errors
 /// [`WriteError`].
-pub fn check_bundle_target(target: &Path, force: bool, inputs: &[Input]) -> Result<(), WriteError> {
-    let overwrite = overwrite_bundle(target, force, inputs);
+pub fn check_bundle_target(
+    target: &Path,
+    force: bool,
+    inputs: &[Input],
+    made_with: Option<&MadeWith>,
+) -> Result<(), WriteError> {
+    let overwrite = overwrite_bundle(target, force, inputs, made_with);
     FolderDraft::check(target, &overwrite, &BUNDLE_FILES)
 }
 
@@ -69,13 +75,15 @@ pub fn write_bundle(
 ) -> Result<Manifest, WriteError> {
     let mut manifest = content.manifest.clone();
     check_content(content, target)?;
-    let mut draft = FolderDraft::begin(target, overwrite_bundle(target, force, &manifest.inputs))?;
+    let (inputs, made_with) = (&manifest.inputs, manifest.made_with.as_ref());
+    let overwrite = overwrite_bundle(target, force, inputs, made_with);
+    let mut draft = FolderDraft::begin(target, overwrite)?;
     manifest.files = put_files(content, &mut |name, fill| draft.write(name, fill))?;
     draft.write("timing.json", |out| {
         out.write_all(&to_json(timing).map_err(invalid)?)
     })?;
     draft.write("manifest.json", |out| {
-        out.write_all(&to_json(&manifest).map_err(invalid)?)
+        out.write_all(&to_record(&manifest).map_err(invalid)?)
     })?;
     draft.commit()?;
     Ok(manifest)
@@ -141,8 +149,14 @@ fn put_files(
     Ok(files)
 }
 
-fn overwrite_bundle(target: &Path, force: bool, inputs: &[Input]) -> Overwrite {
-    Overwrite::new(force, target.join("manifest.json"), inputs)
+fn overwrite_bundle(
+    target: &Path,
+    force: bool,
+    inputs: &[Input],
+    made_with: Option<&MadeWith>,
+) -> Overwrite {
+    let options = made_with.map(Options::of).unwrap_or_default();
+    Overwrite::new(force, target.join("manifest.json"), inputs).made_with(&options)
 }
 
 /// Which formats of a map are wanted beside `map.npz`.
@@ -183,12 +197,12 @@ pub enum BesideContent<'a> {
 pub fn check_map_files(
     folder: &Path,
     force: bool,
-    inputs: &[Input],
+    (inputs, made_with): (&[Input], &Options),
     protected: &[PathBuf],
     formats: MapFormats,
     besides: &[&Path],
 ) -> Result<(), WriteError> {
-    let overwrite = overwrite_map(folder, force, inputs, protected);
+    let overwrite = overwrite_map(folder, force, (inputs, made_with), protected);
     let csv = formats.csv.then_some("map.csv");
     let vti = formats.vtk.then_some("map.vti");
     for name in ["map.npz", "map.json"].into_iter().chain(csv).chain(vti) {
@@ -202,8 +216,15 @@ pub fn check_map_files(
     Ok(())
 }
 
-fn overwrite_map(folder: &Path, force: bool, inputs: &[Input], protected: &[PathBuf]) -> Overwrite {
-    Overwrite::new(force, folder.join("map.json"), inputs).protecting(protected)
+fn overwrite_map(
+    folder: &Path,
+    force: bool,
+    (inputs, made_with): (&[Input], &Options),
+    protected: &[PathBuf],
+) -> Overwrite {
+    Overwrite::new(force, folder.join("map.json"), inputs)
+        .made_with(made_with)
+        .protecting(protected)
 }
 
 /// Of files in the map's folder its sidecar tells; others are replaced by the same bytes alone.
@@ -272,7 +293,8 @@ pub fn write_map_and(
 ) -> Result<MapSidecar, WriteError> {
     let mut sidecar = sidecar.clone();
     let earlier = listed_files(&folder.join("map.json"));
-    let overwrite = overwrite_map(folder, force, &sidecar.inputs, protected);
+    let of = (&*sidecar.inputs, &sidecar.made_with);
+    let overwrite = overwrite_map(folder, force, of, protected);
     let mut set = FileSet::begin(folder, overwrite.clone());
     let mut put =
         |set: &mut FileSet, name: &str, content: &dyn Fn(&mut dyn io::Write) -> io::Result<()>| {
@@ -307,7 +329,7 @@ pub fn write_map_and(
         }
     }
     set.write("map.json", |out| {
-        out.write_all(&to_json(&sidecar).map_err(invalid)?)
+        out.write_all(&to_record(&sidecar).map_err(invalid)?)
     })?;
     set.commit()?;
     Ok(sidecar)

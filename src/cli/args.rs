@@ -124,8 +124,8 @@ pub struct Tolerance {
 /// Where what is written may replace what is there.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Writing {
-    /// Replace existing files too that are not known to be output of the same inputs, unchanged since;
-    /// never what is read
+    /// Replace existing files too that are not known to be output of the same inputs and options,
+    /// unchanged since; never what is read
     #[arg(long)]
     pub force: bool,
 }

@@ -13,13 +13,12 @@ use super::passive::PASSIVE_TOLERANCE;
 use super::passive_map::PassiveMap;
 use super::scene::{MAGNET_SHARE, Scene};
 use super::steel::{Solved, Steel};
-use super::{JobError, steel};
+use super::{JobError, made_with, steel};
 use crate::accuracy::StageAccuracy;
-use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS, arithmetic};
+use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
 use crate::bundle::atomic::WriteError;
 use crate::bundle::manifest::{
-    AxisSummary, CircuitSummary, Interpolation, LambdaSummary, LeftOut, MadeWith, Manifest,
-    PassiveForce, SurfaceOptions,
+    AxisSummary, CircuitSummary, Interpolation, LambdaSummary, LeftOut, Manifest, PassiveForce,
 };
 use crate::bundle::npz::PASSIVE;
 use crate::bundle::rendering::{HeightGrid, Rendering};
@@ -31,7 +30,7 @@ use crate::design::{Design, source};
 use crate::map::tabulate::{Grid, PlacedCoil};
 use crate::map::{Components, FieldMap};
 use crate::progress::Progress;
-use crate::shape::document::{AxisRequest, ShapeDocument, SurfaceSource};
+use crate::shape::document::ShapeDocument;
 use crate::shape::points::ConstraintPoints;
 
 pub(super) mod again;
@@ -162,7 +161,9 @@ pub fn run(
     for shape in shapes {
         let inputs = inputs(source, curve.as_ref(), shape);
         let inputs = discretize::with_surface(&shape.document, inputs);
-        check_bundle_target(&folder_of(&scene, shape, options), options.force, &inputs)?;
+        let made_with = made_with::calibrate(options, shape);
+        let folder = folder_of(&scene, shape, options);
+        check_bundle_target(&folder, options.force, &inputs, Some(&made_with))?;
     }
     if !options.keep {
         store_of(&scene, options).clear();
@@ -317,7 +318,9 @@ fn calibrate_one(
     progress.take_seconds();
     let folder = folder_of(scene, shape, options);
     let points = kept.points(shape, progress)?;
-    check_bundle_target(&folder, options.force, &points.summary.inputs)?;
+    let made_with = made_with::calibrate(options, shape);
+    let inputs = &points.summary.inputs;
+    check_bundle_target(&folder, options.force, inputs, Some(&made_with))?;
     let write = |content: &BundleContent| {
         let timing: Vec<StageSeconds> = progress
             .take_seconds()
@@ -385,7 +388,7 @@ fn compute(
         needed.left_out.push(ignored.left_out());
     }
     let mut manifest = manifest(scene, &lambda, &needed, passive.as_ref());
-    manifest.made_with = Some(made_with(options, shape));
+    manifest.made_with = Some(made_with::calibrate(options, shape));
     manifest.circuit = Some(circuit.circuit.clone());
     let stage = circuit.accuracy.clone();
     manifest.accuracy.insert("inductances".to_owned(), stage);
@@ -429,40 +432,6 @@ fn compute(
         extra: &extra,
     })?;
     Ok((manifest, lambda))
-}
-
-/// What `verify` needs beside the inputs to compute the same bundle again.
-fn made_with(options: &CalibrateOptions, shape: &ShapeSource) -> MadeWith {
-    let document = &shape.document;
-    let surface = match (&shape.input, &document.source) {
-        (None, SurfaceSource::File { unit_m, .. }) => {
-            let (x, y) = (document.grid.x, document.grid.y);
-            let parts = |axis: AxisRequest| match axis {
-                AxisRequest::Given(axis) => (axis.samples, Some([axis.from, axis.to])),
-                AxisRequest::Extent(samples) => (samples, None),
-            };
-            Some(SurfaceOptions {
-                unit_m: *unit_m,
-                scale: document.scale,
-                translate_m: document.placement.translate_m,
-                rotate_deg: document.placement.rotate_deg,
-                samples: [parts(x).0, parts(y).0],
-                x_m: parts(x).1,
-                y_m: parts(y).1,
-            })
-        }
-        (Some(_), _) | (None, SurfaceSource::Primitive(_)) => None,
-    };
-    let mut made_with = MadeWith {
-        tolerance: options.lambda.tolerance,
-        reach_m: options.reach_m,
-        report: options.page,
-        arithmetic: arithmetic(),
-        surface,
-        sha256: String::new(),
-    };
-    made_with.sha256 = made_with.digest();
-    made_with
 }
 
 /// The unpowered steel's pull on the map's nodes, where the design asks for it.

@@ -8,11 +8,12 @@ use serde::Serialize;
 
 use super::JobError;
 use super::kept::ShapeField;
+use super::made_with;
 use crate::accuracy::StageAccuracy;
-use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION};
+use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION};
 use crate::bundle::atomic::{FileSet, Overwrite};
-use crate::bundle::json::to_json;
 use crate::bundle::manifest::{AxisSummary, PointsGrid};
+use crate::bundle::seal::to_record;
 use crate::bundle::table::PointRow;
 use crate::plot::plane::PlanePlot;
 use crate::progress::Progress;
@@ -52,6 +53,9 @@ pub struct PointsSummary {
     pub shape: String,
     /// What went in.
     pub inputs: Vec<Input>,
+    /// The options of the run.
+    #[serde(skip_serializing_if = "Options::is_empty")]
+    pub made_with: Options,
     /// Number of points.
     pub points: usize,
     /// Grid points without surface, skipped.
@@ -217,8 +221,11 @@ pub fn run_with(
     options: &PointsOptions,
     progress: &dyn Progress,
 ) -> Result<PointsReport, JobError> {
+    let made_with = made_with::points(options, document, inputs.first());
     let inputs = with_surface(document, inputs);
-    discretized_as(document, inputs, options, None, progress)
+    let mut report = discretized_as(document, inputs, options, None, progress)?;
+    report.summary.made_with = made_with;
+    Ok(report)
 }
 
 /// As [`run`], with what an earlier run found of these points and this surface.
@@ -282,6 +289,7 @@ fn discretized_as(
         fluxform_version: FLUXFORM_VERSION,
         shape: document.name.clone(),
         inputs,
+        made_with: Options::default(),
         points: facts.points,
         outside: facts.outside,
         holes: discretized.points.holes,
@@ -391,6 +399,7 @@ impl PointsReport {
     /// [`JobError::Write`].
     pub fn write(&mut self, path: &Path, force: bool) -> Result<(), JobError> {
         let files = TableFiles::new(path, force, &self.summary.inputs)?;
+        let files = files.made_with(&self.summary.made_with);
         let (table, set) = files.table(|out| self.write_csv(out))?;
         self.summary.files = vec![table];
         files.summary(set, &self.summary)
@@ -442,6 +451,13 @@ impl TableFiles {
         })
     }
 
+    /// The options of the run.
+    #[must_use]
+    pub fn made_with(mut self, options: &Options) -> Self {
+        self.overwrite = self.overwrite.made_with(options);
+        self
+    }
+
     /// Where they go.
     #[must_use]
     pub fn paths(&self) -> [PathBuf; 2] {
@@ -470,7 +486,7 @@ impl TableFiles {
 
     fn summary(&self, mut set: FileSet, summary: &impl Serialize) -> Result<(), JobError> {
         set.write(&self.summary, |out| {
-            let json = to_json(summary).map_err(io::Error::other)?;
+            let json = to_record(summary).map_err(io::Error::other)?;
             out.write_all(&json)
         })?;
         Ok(set.commit()?)

@@ -12,7 +12,7 @@ use self::mag_manip::{MULTIPOLE_TOLERANCE, MagManipRequest, MultipolesMade, Vect
 use super::maps::{Felt, SceneMap};
 use super::scene::Scene;
 use super::working_point::{WorkingPoint, relative_difference, superposition_ends};
-use super::{JobError, steel};
+use super::{JobError, made_with, steel};
 use crate::accuracy::missed;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
 use crate::bundle::manifest::{
@@ -120,10 +120,11 @@ pub fn run(
         .map(Path::to_path_buf)
         .into_iter()
         .collect();
+    let made_with = made_with::map(request);
     check_map_files(
         &request.out,
         request.force,
-        &inputs,
+        (&inputs, &made_with),
         &protected,
         request.formats,
         &besides,
@@ -216,6 +217,7 @@ pub fn run(
         fluxform_version: FLUXFORM_VERSION.to_owned(),
         design: design.name.clone(),
         inputs,
+        made_with,
         units: UNITS.to_owned(),
         array: scene.array_geometry(),
         magnet: scene.magnet_summary(),
@@ -278,6 +280,15 @@ pub(super) fn workspace_grid(design: &Design) -> Grid {
     }
 }
 
+/// How artefacts and the command line call the components.
+pub(super) fn components_name(components: Components) -> &'static str {
+    match components {
+        Components::Gz => "gz",
+        Components::Gradient => "gradient",
+        Components::All => "all",
+    }
+}
+
 /// The map's grid, coils and interpolation as artefacts tell them.
 pub(super) fn summary(
     map: &FieldMap,
@@ -295,12 +306,7 @@ pub(super) fn summary(
         y_m: AxisSummary::of_nodes(&map.y_m),
         z_m: AxisSummary::of_nodes(&map.z_m),
         coil: indices(map),
-        components: match components {
-            Components::Gz => "gz",
-            Components::Gradient => "gradient",
-            Components::All => "all",
-        }
-        .to_owned(),
+        components: components_name(components).to_owned(),
         interpolation: Interpolation::tricubic(between.largest, definition),
         passive_force: None,
         working_point: None,

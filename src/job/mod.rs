@@ -9,6 +9,7 @@ pub mod evaluate;
 mod evaluation_sample;
 mod kept;
 pub mod lambda;
+pub mod made_with;
 pub mod map;
 pub mod maps;
 pub mod neighbours;

@@ -4,6 +4,10 @@
 #![allow(clippy::print_stdout)] // the table
 #![allow(clippy::disallowed_methods)] // own files, and wall time
 
+#[allow(dead_code)]
+#[path = "../shape/samples.rs"]
+mod samples;
+
 use std::collections::BTreeSet;
 use std::fs;
 use std::io::Read;
@@ -131,7 +135,7 @@ const CASES: &[(&str, &[&str])] = &[
         &[
             "sweep",
             "merge",
-            "plan.json",
+            "large.json",
             "t",
             "--partial",
             "--out",
@@ -143,9 +147,7 @@ const CASES: &[(&str, &[&str])] = &[
         "discretize, STEP",
         &[
             "discretize",
-            "box.step",
-            "--unit",
-            "mm",
+            "boxes.step",
             "--grid",
             "500x500",
             "--out",
@@ -189,7 +191,16 @@ const CASES: &[(&str, &[&str])] = &[
             "--force",
         ],
     ),
+    (
+        "waiting for another run",
+        &["map", "designs/seed_air.toml", "--out", LOCKED, "--force"],
+    ),
 ];
+
+/// A folder whose lock is held all the time.
+const LOCKED: &str = "locked";
+/// Bodies of the STEP file.
+const BODIES: usize = 600;
 
 fn main() {
     let binary = std::env::var("FLUXFORM_OTHER")
@@ -197,6 +208,9 @@ fn main() {
     let only = std::env::args().skip(1).find(|arg| !arg.starts_with("--"));
     let folder = tempfile::tempdir().unwrap();
     prepare(&binary, folder.path());
+    fs::create_dir(folder.path().join(LOCKED)).unwrap();
+    let lock = fs::File::open(folder.path().join(LOCKED)).unwrap();
+    lock.lock().unwrap();
     println!("| stage | signals | longest answer, ms | by the guard | peak MB | exit codes |");
     println!("|---|---|---|---|---|---|");
     for (stage, args) in CASES {
@@ -228,6 +242,7 @@ fn main() {
         let codes = codes.join(", ");
         println!("| {stage} | {sent} | {ms:.0} | {guarded} | {mb:.0} | {codes} |");
     }
+    drop(lock);
 }
 
 fn run(binary: &str, folder: &Path, args: &[&str]) -> Child {
@@ -268,6 +283,44 @@ fn peak(child: &Child) -> u64 {
         .unwrap_or(0)
 }
 
+/// The sample of a box in STEP many times in a row, as the bodies of one part.
+fn boxes() -> String {
+    let text = String::from_utf8(samples::step()).unwrap();
+    let (head, rest) = text.split_once("DATA;\n").unwrap();
+    let (data, tail) = rest.split_once("ENDSEC;").unwrap();
+    let lines: Vec<&str> = data.lines().collect();
+    let (last, of_one) = lines.split_last().unwrap();
+    let mut all = String::new();
+    let mut solids = Vec::new();
+    for body in 0..BODIES {
+        for line in of_one {
+            let mut parts = line.split('#');
+            let mut moved = parts.next().unwrap().to_owned();
+            for part in parts {
+                let digits = part.chars().take_while(char::is_ascii_digit).count();
+                let number: usize = part[..digits].parse().unwrap();
+                moved += &format!("#{}{}", number + body * lines.len(), &part[digits..]);
+            }
+            if let Some((start, coordinates)) = moved.split_once("CARTESIAN_POINT('',(") {
+                let (x, others) = coordinates.split_once(',').unwrap();
+                let x = x.parse::<f64>().unwrap() + body as f64;
+                moved = format!("{start}CARTESIAN_POINT('',({x:.3},{others}");
+            }
+            if moved.contains("MANIFOLD_SOLID_BREP") {
+                solids.push(moved.split('=').next().unwrap().to_owned());
+            }
+            all += &format!("{moved}\n");
+        }
+    }
+    let (start, others) = last.split_once("(#").unwrap();
+    let (_, context) = others.split_once(')').unwrap();
+    // After the numbers of all bodies; the context is that of the first one.
+    let start = start.split_once('=').unwrap().1;
+    let number = BODIES * lines.len() + 1;
+    let solids = solids.join(",");
+    format!("{head}DATA;\n{all}#{number}={start}({solids}){context}\nENDSEC;{tail}")
+}
+
 fn prepare(binary: &str, folder: &Path) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     for name in ["designs", "shapes"] {
@@ -296,6 +349,7 @@ fn prepare(binary: &str, folder: &Path) {
         walk += &format!("{},{x},0.001,0.05\n", f64::from(k) * 1e-3);
     }
     write("walk.csv", &walk);
+    write("boxes.step", &boxes());
     for args in [
         &[
             "calibrate",
@@ -314,6 +368,26 @@ fn prepare(binary: &str, folder: &Path) {
             "target.height_mm=20:40:0.5",
             "--out",
             "plan.json",
+        ],
+        &[
+            "sweep",
+            "plan",
+            "designs/seed_air.toml",
+            "--set",
+            "wire.diameter_mm=0.5:0.999:0.001",
+            "--set",
+            "target.height_mm=20:39.99:0.01",
+            "--out",
+            "large.json",
+        ],
+        &[
+            "sweep",
+            "run",
+            "large.json",
+            "--shard",
+            "1/500",
+            "--out",
+            "t",
         ],
     ] {
         assert!(

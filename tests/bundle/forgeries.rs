@@ -11,6 +11,7 @@ use fluxform::bundle::load::Bundle;
 use fluxform::bundle::manifest::{LeftOut, MadeWith, Manifest};
 use fluxform::bundle::npz::{MapArrays, to_npz};
 use fluxform::bundle::rendering::HeightGrid;
+use fluxform::bundle::seal::to_record;
 use fluxform::bundle::table::{CurrentRow, PointRow, write_currents, write_points};
 use fluxform::design::{Design, Need};
 use fluxform::job::calibrate::{self, CalibrateOptions, DesignSource, ShapeSource};
@@ -122,7 +123,7 @@ impl Parts {
                 }),
             }
         }
-        files.insert("manifest.json".to_owned(), to_json(&manifest).unwrap());
+        files.insert("manifest.json".to_owned(), to_record(&manifest).unwrap());
         fs::create_dir_all(folder.join("plots")).unwrap();
         for (name, bytes) in &files {
             fs::write(folder.join(name), bytes).unwrap();

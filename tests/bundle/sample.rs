@@ -293,6 +293,7 @@ impl Sample {
 
 pub fn sidecar(manifest: &Manifest) -> MapSidecar {
     MapSidecar {
+        made_with: Default::default(),
         schema_version: manifest.schema_version.clone(),
         fluxform_version: manifest.fluxform_version.clone(),
         design: manifest.design.clone(),

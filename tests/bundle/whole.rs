@@ -7,6 +7,7 @@ use std::process::{Command, Stdio};
 use fluxform::bundle::artefact::{Input, sha256_hex};
 use fluxform::bundle::atomic::{Overwrite, WriteError, write};
 use fluxform::bundle::load::Bundle;
+use fluxform::bundle::seal::to_record;
 use fluxform::lambda::Criterion;
 use serde_json::json;
 
@@ -86,10 +87,11 @@ fn single_files_are_whole_or_absent() {
         error.contains("points.json tells what it was made from"),
         "{error}"
     );
-    let sidecar = json!({ "schema_version": "1.2.0", "fluxform_version": "0.1.0",
+    let sidecar = json!({ "schema_version": "1.4.0", "fluxform_version": "0.1.0",
         "inputs": [{ "path": "other/name.stl", "sha256": sha256_hex(b"solid") }],
         "files": [{ "path": "points.csv", "bytes": 4, "sha256": sha256_hex(b"x_m\n") }] });
-    fs::write(folder.path().join("new/points.json"), sidecar.to_string()).unwrap();
+    let sidecar = to_record(&sidecar).unwrap();
+    fs::write(folder.path().join("new/points.json"), sidecar).unwrap();
     write(&path, &ours(&inputs), put("y_m\n")).unwrap();
     let other = [Input::of_bytes("a.stl", b"other")];
     assert!(matches!(

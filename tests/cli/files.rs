@@ -340,3 +340,129 @@ fn a_sweep_follows_no_link_below_its_folder() {
     assert_eq!(place.read("victim/000/000000.json"), b"mine");
     assert!(!place.path("victim/000/000001.json").exists());
 }
+
+/// Every command with a record: the same options again, others, others with force.
+#[test]
+fn what_other_options_made_is_replaced_with_force_alone() {
+    let place = Place::new();
+    let bundle = "results/seed_air/flat";
+    let calibrate = ["calibrate", SEED, "shapes/flat.toml", "--no-report"];
+    let discretize = ["discretize", "shapes/wedge.toml", "--out", "p.csv"];
+    let stl = [
+        "discretize",
+        "shapes/wedge.stl",
+        "--unit=mm",
+        "--translate=0,0,30",
+        "--grid=9x9",
+        "--out=s.csv",
+    ];
+    let replay = ["replay", bundle, "--synthesize", "circle", "--out", "r.csv"];
+    for (line, other, named, file) in [
+        (
+            &calibrate[..],
+            &["--jnd", "0.01"][..],
+            "jnd 0.07, now 0.01",
+            "results/seed_air/flat/lambda.json",
+        ),
+        (
+            &calibrate,
+            &["--criterion", "linear"],
+            "criterion \"jnd\", now \"linear\"",
+            "results/seed_air/flat/lambda.json",
+        ),
+        (
+            &calibrate,
+            &["--reach", "7"],
+            "reach_m 0.02, now 0.007",
+            "results/seed_air/flat/map.npz",
+        ),
+        (
+            &calibrate,
+            &["--at", "3"],
+            "at_n_per_m not given, now 3.0",
+            "results/seed_air/flat/lambda.json",
+        ),
+        (
+            &["map", SEED, "--out", "maps"],
+            &["--components", "gradient"],
+            "components \"gz\", now \"gradient\"",
+            "maps/map.npz",
+        ),
+        (
+            &["map", SEED, "--out", "maps2"],
+            &["--tolerance", "1e-6"],
+            "tolerance not given, now 1e-6",
+            "maps2/map.json",
+        ),
+        (
+            &discretize,
+            &["--certify", "no"],
+            "certify \"vertical\", now \"no\"",
+            "p.json",
+        ),
+        (
+            &discretize,
+            &["--poisson", "3mm"],
+            "spacing_m not given, now 0.003",
+            "p.csv",
+        ),
+        (
+            &stl,
+            &["--scale", "0.7"],
+            "surface otherwise, now otherwise",
+            "s.csv",
+        ),
+        (
+            &replay,
+            &["--dynamics"],
+            "dynamics false, now true",
+            "r.csv",
+        ),
+        (
+            &replay,
+            &["--rate", "70"],
+            "rate_hz 50.0, now 70.0",
+            "r.csv",
+        ),
+    ] {
+        place.run(&[line, &["--force"]].concat()).ends(0);
+        let before = place.read(file);
+        place.run(line).ends(0);
+        let changed = [line, other].concat();
+        place.run(&changed).ends(4).says(&["other options", named]);
+        assert!(place.read(file) == before, "{changed:?}");
+        place.run(&[&changed[..], &["--force"]].concat()).ends(0);
+        assert!(place.read(file) != before, "{changed:?}");
+        place.run(&changed).ends(0);
+    }
+}
+
+/// Of two that begin at once and differ in an option one is refused, whichever is faster.
+#[test]
+fn of_two_runs_at_once_with_other_options_one_is_refused() {
+    let place = Place::new();
+    for round in 0..3 {
+        let out = format!("results{round}");
+        let start = |criterion: &str| {
+            let args = [
+                "calibrate",
+                SEED,
+                "shapes/wedge.toml",
+                "--no-report",
+                "--out",
+                &out,
+            ];
+            place
+                .command(&[&args[..], &["--criterion", criterion]].concat())
+                .stderr(std::process::Stdio::piped())
+                .stdout(std::process::Stdio::null())
+                .spawn()
+                .unwrap()
+        };
+        let mut codes = ["jnd", "linear"]
+            .map(start)
+            .map(|child| child.wait_with_output().unwrap().status.code());
+        codes.sort();
+        assert_eq!(codes, [Some(0), Some(4)]);
+    }
+}

@@ -24,7 +24,20 @@ const CALIBRATE: &[&str] = &[
     "--out",
     "out",
 ];
+/// What other options made is replaced with force alone.
+const CALIBRATE_OVER: &[&str] = &[
+    "calibrate",
+    "two.toml",
+    "bump.toml",
+    "ramp.toml",
+    "--out",
+    "out",
+    "--force",
+];
 const MAP: &[&str] = &["map", "air.toml", "--csv", "--vtk", "--out", "out"];
+const MAP_OVER: &[&str] = &[
+    "map", "air.toml", "--csv", "--vtk", "--out", "out", "--force",
+];
 const PLAN: &[&str] = &[
     "sweep",
     "plan",
@@ -57,7 +70,7 @@ pub const MAIN: &[Scenario] = &[
             "--criterion",
             "linear",
         ]],
-        args: CALIBRATE,
+        args: CALIBRATE_OVER,
     },
     Scenario {
         name: "sweep run",
@@ -80,7 +93,7 @@ pub const MAIN: &[Scenario] = &[
             "--components",
             "all",
         ]],
-        args: MAP,
+        args: MAP_OVER,
     },
 ];
 
@@ -322,7 +335,7 @@ impl Prepared {
         Ok(bundles.len())
     }
 
-    /// The same command again, not told to replace anything, ends well and leaves what an undisturbed
+    /// The same command again ends well and leaves what an undisturbed
     /// run leaves, to the byte and to the last file.
     pub fn runs_again(&self, place: &Place) -> Result<(), String> {
         let ran = place.run(self.scenario.args);

@@ -18,7 +18,7 @@ pub struct Writes {
     pub before: &'static [&'static str],
     /// Words, separated by blanks.
     pub line: &'static str,
-    /// Flags that make an earlier run of the same inputs leave something else.
+    /// Flags that make an earlier run of the same inputs leave something else, or with other options.
     pub earlier: &'static str,
     /// An input that can be spoilt, so that the command is refused.
     pub spoils: &'static str,
@@ -43,7 +43,7 @@ const fn writes(name: &'static str, line: &'static str) -> Writes {
 
 pub const COMMANDS: &[Writes] = &[
     Writes {
-        earlier: "--no-report --criterion linear",
+        earlier: "--no-report",
         bundle: true,
         ..writes("calibrate", "calibrate air.toml bump.toml --out out")
     },

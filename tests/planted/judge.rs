@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use crate::cases::{Case, LISTED, Laid, Plant, Prepared, Role};
+use crate::cases::{Case, Laid, Plant, Prepared, Role};
 use crate::commands::{Ran, run, words};
 use crate::snapshot::{Kind, Snapshot, change, snapshot};
 
@@ -118,26 +118,19 @@ fn may_change(prepared: &Prepared, case: &Case, laid: &Laid, ran: &Ran, path: &s
     if case.refused {
         return false;
     }
-    if case.plant == Plant::OwnManifestWithMore && writes.bundle {
-        // What our list has of the folder's own files, with their digests, is the program's.
-        let (folder, _) = case.name.path.rsplit_once('/').unwrap();
-        let mut listed = LISTED.iter().map(|name| format!("{folder}/{name}"));
-        if is_manifest(&case.name.path) && listed.any(|listed| listed == path) {
-            return true;
-        }
-    }
     if path != case.name.path {
-        return case.force && is_output_through(prepared, case, path);
+        return false;
     }
     let replaceable = case.name.role == Role::Output && case.force && ran.code != Some(2);
     match case.plant {
         // A plain file at a name that the user gave makes way when asked to; in a bundle it is kept.
-        Plant::File | Plant::PrivateFile | Plant::HardLink | Plant::Manifest | Plant::Inside => {
-            replaceable && !writes.bundle
-        }
-        Plant::Edited => replaceable || is_made_again(path),
-        // A record is known by its inputs: it has no digest of itself.
-        Plant::OwnManifestWithMore => true,
+        Plant::File
+        | Plant::PrivateFile
+        | Plant::HardLink
+        | Plant::Manifest
+        | Plant::OwnManifestWithMore
+        | Plant::Inside => replaceable && !writes.bundle,
+        Plant::Edited => (replaceable && !writes.bundle) || is_made_again(path),
         // Its mode is looked at apart.
         Plant::Closed => true,
         Plant::LinkToFile
@@ -147,26 +140,6 @@ fn may_change(prepared: &Prepared, case: &Case, laid: &Laid, ran: &Ran, path: &s
         | Plant::Folder
         | Plant::Pipe => false,
     }
-}
-
-fn is_manifest(path: &str) -> bool {
-    path.ends_with("/manifest.json")
-}
-
-/// Whether a victim is a plain file at an output's name: folders above it may be links, as in any path
-/// that a user gives. A bundle's folder is replaced as a whole, so a link in its place is not followed.
-fn is_output_through(prepared: &Prepared, case: &Case, path: &str) -> bool {
-    let Some(name) = path.strip_prefix("victims/folder/") else {
-        return false;
-    };
-    let output = format!("{}/{name}", case.name.path);
-    case.plant == Plant::LinkToFolder
-        && case.name.role == Role::Folder
-        && !prepared.writes.bundle
-        && prepared
-            .names
-            .iter()
-            .any(|it| it.path == output && it.role == Role::Output)
 }
 
 /// Files of the program's that no list has with a digest: seconds, what is cached, and the points of

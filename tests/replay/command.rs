@@ -108,7 +108,7 @@ fn a_table_with_facts_seconds_and_a_picture() {
     assert!((wanted / (0.05 * lambda) - 1.0).abs() < 1e-12);
     assert!(lines[3].starts_with("0.04,0.3,0,0.05,0,0,0,0,") && lines[3].ends_with(",outside"));
     let facts: Value = serde_json::from_str(&place.read("replay.json")).unwrap();
-    assert_eq!(facts["schema_version"], "1.3.0");
+    assert_eq!(facts["schema_version"], "1.4.0");
     assert_eq!(facts["inputs"][0]["path"], "flat/manifest.json");
     assert_eq!(facts["inputs"][1]["path"], "finger.csv");
     assert_eq!(facts["trajectory"]["positions"], 3);

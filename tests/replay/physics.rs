@@ -14,6 +14,7 @@ fn told() -> Told {
     Told {
         source: "a test".to_owned(),
         input: None,
+        synthesis: None,
     }
 }
 

@@ -10,7 +10,7 @@ use super::dir::{Dir, Kind, Status};
 use super::made::{MadeFolders, made_in};
 use super::names::{check_name, parent_of};
 use super::overwrite::{Permit, real};
-use super::record::{Record, ReplacedNote, present};
+use super::record::{ReplacedNote, present};
 use super::temporary::{TemporaryFile, clean_leftovers};
 use super::{Overwrite, WriteError};
 
@@ -233,7 +233,10 @@ impl FileSet {
         for file in &mut self.staged {
             file.permit = file.overwrite.permit(&file.shown, Some(&file.written))?;
         }
-        let note = self.note_replaced()?;
+        let note = self.note();
+        if let Some((dir, name)) = &note {
+            self.note_replaced(dir, name)?;
+        }
         for path in &self.outdated {
             if let Ok((dir, name)) = Dir::of(path)
                 && self.overwrite.owns(path)
@@ -254,7 +257,10 @@ impl FileSet {
                 dirs.push(file.dir);
             }
         }
-        if let Some((dir, name)) = note {
+        // Also that of a run which was killed after its last rename.
+        if let Some((dir, name)) = note
+            && ReplacedNote::read_in(&dir, &name).is_some()
+        {
             let _ = dir.remove_file(&name);
         }
         for dir in dirs {
@@ -265,35 +271,35 @@ impl FileSet {
         Ok(())
     }
 
+    /// Where the note beside the record is, or would be.
+    fn note(&self) -> Option<(Dir, OsString)> {
+        Dir::of(&ReplacedNote::path(self.overwrite.record_path()?)).ok()
+    }
+
     /// Notes beside the record which files are about to be replaced, as they are now.
-    fn note_replaced(&self) -> Result<Option<(Dir, OsString)>, WriteError> {
-        let Some(record) = self.overwrite.record_path() else {
-            return Ok(None);
+    fn note_replaced(&self, dir: &Dir, name: &OsStr) -> Result<(), WriteError> {
+        let record = self.overwrite.record_path();
+        let replaced = |file: &&Staged| {
+            file.permit == Permit::Replace && record.is_none_or(|record| file.target != record)
         };
-        let replaced = |file: &&Staged| file.permit == Permit::Replace && file.target != record;
         let mut files = Vec::new();
         for file in self.staged.iter().filter(replaced) {
             let entry = present(&file.dir, &file.name)
                 .map_err(|error| WriteError::from_io("read", &file.target, error))?;
             files.extend(entry);
         }
-        if files.is_empty() {
-            return Ok(None);
-        }
-        let path = ReplacedNote::path(record);
+        let fail = |error| WriteError::from_io("write", &dir.path().join(name), error);
         // Somebody else's file of that name stays; then a kill at the wrong moment costs a --force.
-        if path.symlink_metadata().is_ok() && Record::read(&path).is_none() {
-            return Ok(None);
+        let foreign =
+            dir.status(name).map_err(fail)?.is_some() && ReplacedNote::read_in(dir, name).is_none();
+        if files.is_empty() || foreign {
+            return Ok(());
         }
-        let fail = |error| WriteError::from_io("write", &path, error);
-        let (dir, name) = Dir::of(&path).map_err(fail)?;
         let bytes = ReplacedNote::new(files).bytes().map_err(fail)?;
-        match put(&dir, &name.to_string_lossy(), true, |out| {
+        put(dir, &name.to_string_lossy(), true, |out| {
             out.write_all(&bytes)
-        }) {
-            Ok(()) => Ok(Some((dir, name))),
-            Err(error) => Err(fail(error)),
-        }
+        })
+        .map_err(fail)
     }
 }
 
@@ -303,9 +309,9 @@ mod tests {
     use crate::artefact::{FileEntry, Input};
 
     fn record(inputs: &[Input], files: &[FileEntry]) -> String {
-        serde_json::json!({ "schema_version": "1.2.0", "fluxform_version": "0.1.0",
-            "inputs": inputs, "files": files })
-        .to_string()
+        let value = serde_json::json!({ "schema_version": "1.4.0", "fluxform_version": "0.1.0",
+            "inputs": inputs, "files": files });
+        String::from_utf8(crate::seal::to_record(&value).unwrap()).unwrap()
     }
 
     fn inputs() -> Vec<Input> {
@@ -349,6 +355,94 @@ mod tests {
     }
 
     #[test]
+    fn a_sidecar_that_somebody_edited_is_no_permission() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        put_both(folder.path(), "plate.csv", "1", false).unwrap();
+        std::fs::write(path("plate.txt"), "mine").unwrap();
+        let mine = FileEntry {
+            path: "plate.txt".to_owned(),
+            bytes: 4,
+            sha256: crate::artefact::sha256_hex(b"mine"),
+        };
+        let mine = serde_json::to_string(&mine).unwrap();
+        let text = std::fs::read_to_string(path("plate.json")).unwrap();
+        let edited = text.replacen("\"files\": [", &format!("\"files\": [{mine},"), 1);
+        std::fs::write(path("plate.json"), edited).unwrap();
+        for table in ["plate.txt", "plate.csv"] {
+            let refused = put_both(folder.path(), table, "2", false).unwrap_err();
+            let refused = refused.to_string();
+            assert!(
+                refused.contains("plate.json, which states"),
+                "{table}: {refused}"
+            );
+        }
+        assert_eq!(std::fs::read(path("plate.txt")).unwrap(), b"mine");
+        assert_eq!(std::fs::read(path("plate.csv")).unwrap(), b"1");
+    }
+
+    /// A table and its record, made with one option.
+    fn put_with(folder: &Path, jnd: f64, extra: bool, force: bool) -> Result<(), WriteError> {
+        let options = crate::artefact::Options::of(&serde_json::json!({ "jnd": jnd }));
+        let overwrite = Overwrite::new(force, folder.join("a.json"), &inputs()).made_with(&options);
+        let mut set = FileSet::begin(folder, overwrite);
+        let mut files = Vec::new();
+        for name in ["a.csv", "a.vti"] {
+            if name == "a.csv" || extra {
+                let text = format!("{name} {jnd}");
+                let written = set.write(name, |out| out.write_all(text.as_bytes()))?;
+                files.push(FileEntry::new(name, written));
+            } else {
+                set.outdate(name)?;
+            }
+        }
+        let told = serde_json::json!({ "schema_version": "1.4.0", "fluxform_version": "0.1.0",
+            "inputs": inputs(), "made_with": options, "files": files });
+        let told = crate::seal::to_record(&told).unwrap();
+        set.write("a.json", |out| out.write_all(&told))?;
+        set.commit()
+    }
+
+    #[test]
+    fn output_of_other_options_is_replaced_with_force_alone_and_then_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let table = || std::fs::read_to_string(folder.path().join("a.csv")).unwrap();
+        put_with(folder.path(), 0.07, true, false).unwrap();
+        put_with(folder.path(), 0.07, true, false).unwrap();
+        let refused = put_with(folder.path(), 7.0, true, false).unwrap_err();
+        let refused = refused.to_string();
+        assert!(
+            refused.contains("other options: jnd 0.07, now 7.0"),
+            "{refused}"
+        );
+        assert_eq!(table(), "a.csv 0.07");
+        put_with(folder.path(), 7.0, false, true).unwrap();
+        assert_eq!(table(), "a.csv 7");
+        // Of the earlier options nothing stays beside it.
+        assert_eq!(folder.path().read_dir().unwrap().count(), 2);
+    }
+
+    #[test]
+    fn a_record_of_an_older_schema_has_no_seal_and_makes_way_with_force() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        put_both(folder.path(), "plate.csv", "1", false).unwrap();
+        let text = std::fs::read_to_string(path("plate.json")).unwrap();
+        let refused = |text: String| {
+            std::fs::write(path("plate.json"), text).unwrap();
+            let refused = put_both(folder.path(), "plate.csv", "2", false);
+            refused.unwrap_err().to_string()
+        };
+        let edited = refused(text.replace("1.4.0", "1.3.0"));
+        assert!(edited.contains("was changed since"), "{edited}");
+        let (bare, _) = text.rsplit_once(',').unwrap();
+        let older = refused(format!("{bare}\n}}\n").replace("1.4.0", "1.3.0"));
+        assert!(older.contains("older version"), "{older}");
+        put_both(folder.path(), "plate.csv", "2", true).unwrap();
+        put_both(folder.path(), "plate.csv", "3", false).unwrap();
+    }
+
+    #[test]
     fn a_run_killed_between_two_renames_is_not_refused_by_its_own_files() {
         let folder = tempfile::tempdir().unwrap();
         put_both(folder.path(), "plate.csv", "1", false).unwrap();
@@ -370,6 +464,39 @@ mod tests {
         std::fs::write(ReplacedNote::path(&sidecar), note.bytes().unwrap()).unwrap();
         put_both(folder.path(), "plate.csv", "22", false).unwrap();
         assert_eq!(folder.path().read_dir().unwrap().count(), 2);
+    }
+
+    #[test]
+    fn the_note_of_a_run_killed_after_its_last_rename_goes_and_a_users_file_of_its_name_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        put_both(folder.path(), "plate.csv", "22", false).unwrap();
+        let note = ReplacedNote::path(&folder.path().join("plate.json"));
+        let ours = ReplacedNote::new(vec![FileEntry {
+            path: "plate.csv".to_owned(),
+            bytes: 1,
+            sha256: crate::artefact::sha256_hex(b"1"),
+        }]);
+        let ours = ours.bytes().unwrap();
+        // Nothing is replaced, and then something.
+        for text in ["22", "333"] {
+            std::fs::write(&note, &ours).unwrap();
+            put_both(folder.path(), "plate.csv", text, false).unwrap();
+            assert!(!note.exists(), "left over");
+        }
+        let edited = [&ours[..], b"\n"].concat();
+        let record = record(&inputs(), &[]).into_bytes();
+        for theirs in [&b"mine"[..], &edited, &record] {
+            std::fs::write(&note, theirs).unwrap();
+            for text in ["333", "4444", "333"] {
+                put_both(folder.path(), "plate.csv", text, false).unwrap();
+                assert_eq!(std::fs::read(&note).unwrap(), theirs);
+            }
+        }
+        std::fs::rename(&note, folder.path().join("elsewhere")).unwrap();
+        std::fs::write(folder.path().join("elsewhere"), &ours).unwrap();
+        std::os::unix::fs::symlink("elsewhere", &note).unwrap();
+        put_both(folder.path(), "plate.csv", "4444", false).unwrap();
+        assert!(note.is_symlink() && folder.path().join("elsewhere").is_file());
     }
 
     #[test]
@@ -419,6 +546,37 @@ mod tests {
         put_both(folder.path(), "plate.csv", "2", false).unwrap();
         assert!(path("plate.csv").is_symlink());
         assert_eq!(std::fs::read(path("folder/real.csv")).unwrap(), b"2");
+    }
+
+    #[test]
+    fn force_reaches_no_users_file_through_a_linked_folder() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        std::fs::create_dir(path("theirs")).unwrap();
+        symlink(path("theirs"), path("out")).unwrap();
+        for name in ["plan.json", "plate.csv", "a.svg"] {
+            std::fs::write(path("theirs").join(name), "years").unwrap();
+        }
+        let put = |name: &str, overwrite: Overwrite| {
+            write(&path("out").join(name), &overwrite, |out| {
+                out.write_all(b"<!-- fluxform, drawn of b -->")
+            })
+        };
+        let drawn = |mark: &str| Overwrite::beginning(true, mark, &[]);
+        put("plan.json", Overwrite::force()).unwrap_err();
+        put("a.svg", drawn("<!-- fluxform, drawn of b")).unwrap_err();
+        put_both(&path("out"), "plate.csv", "2", true).unwrap_err();
+        for name in ["plan.json", "plate.csv", "a.svg"] {
+            assert_eq!(std::fs::read(path("theirs").join(name)).unwrap(), b"years");
+        }
+        // What is new or ours is written there.
+        put_both(&path("out"), "new.csv", "1", false).unwrap();
+        put_both(&path("out"), "new.csv", "2", true).unwrap();
+        let ours = path("theirs").join("b.svg");
+        std::fs::write(&ours, "<!-- fluxform, drawn of a -->").unwrap();
+        put("b.svg", drawn("<!-- fluxform, drawn of b")).unwrap();
+        assert!(std::fs::read(ours).unwrap().ends_with(b"b -->"));
     }
 
     #[test]

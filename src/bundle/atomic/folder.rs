@@ -26,7 +26,7 @@ use super::dir::{Dir, Kind, short_identity};
 use super::made::{MadeFolders, made_in};
 use super::names::{MANIFEST, OLD, check_name, parent_of};
 use super::overwrite::real;
-use super::record::Record;
+use super::record::{Record, State};
 use super::temporary::{TemporaryFolder, clean_leftovers, is_temporary};
 use super::{Overwrite, WriteError};
 use crate::artefact::FileEntry;
@@ -406,8 +406,9 @@ fn check_not_our_own(target: &Path) -> Result<(), WriteError> {
 
 /// The files that the manifest or sidecar at `path` lists; none where it is none of ours.
 pub(crate) fn listed_files(path: &Path) -> Vec<String> {
-    let listed = Record::read(path).map(Record::listed).unwrap_or_default();
-    listed.into_keys().collect()
+    let record = Record::read(path).filter(|record| record.state() != State::Changed);
+    let files = record.map(Record::files).unwrap_or_default();
+    files.into_iter().map(|file| file.path).collect()
 }
 
 /// Makes the names in a folder and its subfolders durable (their files are already).

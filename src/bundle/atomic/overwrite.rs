@@ -1,5 +1,6 @@
 //! When an existing output may be replaced: the one policy for files and folders alike.
 
+use std::ffi::OsStr;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
@@ -7,8 +8,11 @@ use super::WriteError;
 use super::digest::Written;
 use super::dir::{Dir, Kind, Status, followed};
 use super::names::parent_of;
-use super::record::{Record, ReplacedNote, digest, is_timing, unchanged};
-use crate::artefact::Input;
+use super::record::{Record, ReplacedNote, State, digest, is_timing, unchanged};
+use crate::artefact::{Input, Options};
+
+/// So many bytes at the beginning of a mark tell the kind of file, whatever it was made from.
+const KIND_BYTES: usize = 16;
 
 /// The policy for outputs that exist already.
 ///
@@ -27,8 +31,8 @@ pub struct Overwrite {
 /// What shows that an existing file is this program's own.
 #[derive(Debug, Clone)]
 enum Evidence {
-    /// A JSON artefact with the same inputs, or a file that it lists, unchanged since.
-    Record(PathBuf),
+    /// A sealed JSON artefact of the same inputs and options, or a file that it lists, unchanged since.
+    Record { path: PathBuf, options: Options },
     /// The same bytes; what begins otherwise than this is refused before they are known.
     SameBytes(Vec<u8>),
 }
@@ -54,11 +58,23 @@ impl Overwrite {
         }
     }
 
-    /// `force`, or what the record at `path` lists: a JSON artefact with top-level `inputs[]`, which
-    /// must be this run's, and `files[]`, which must be on the disk as listed.
+    /// `force`, or what the record at `path` lists: a JSON artefact that is as this program sealed it,
+    /// with top-level `inputs[]`, which must be this run's, and `files[]`, which must be on the disk as
+    /// listed.
     #[must_use]
     pub fn new(force: bool, path: impl Into<PathBuf>, inputs: &[Input]) -> Self {
-        Self::with(force, Evidence::Record(path.into()), inputs)
+        let (path, options) = (path.into(), Options::default());
+        Self::with(force, Evidence::Record { path, options }, inputs)
+    }
+
+    /// The options of this run, which must be those in the record's `made_with`; without them that must
+    /// be empty or absent.
+    #[must_use]
+    pub fn made_with(mut self, asked: &Options) -> Self {
+        if let Evidence::Record { options, .. } = &mut self.evidence {
+            options.clone_from(asked);
+        }
+        self
     }
 
     /// `force`, or a file that has the very bytes which are to be written.
@@ -95,10 +111,17 @@ impl Overwrite {
         self
     }
 
-    /// Whether the regular file at `path` is known to be ours and is not read by this run.
+    /// Whether the regular file at `path` is known to be ours and is not read by this run. With force
+    /// it may be of other inputs and options.
     pub(super) fn owns(&self, path: &Path) -> bool {
-        let unforced = self.unforced();
-        !path.is_symlink() && matches!(unforced.permit(path, None), Ok(Permit::Replace))
+        let owned = || -> io::Result<bool> {
+            let (dir, name) = Dir::of(path)?;
+            let Some(status) = dir.status(&name)?.filter(|it| it.kind == Kind::File) else {
+                return Ok(false);
+            };
+            Ok(!self.reads(path)? && self.own(&dir, path, &status, false).is_ok())
+        };
+        owned().unwrap_or(false)
     }
 
     /// The same without force.
@@ -112,7 +135,7 @@ impl Overwrite {
     /// The record that lists what is ours.
     pub(super) fn record_path(&self) -> Option<&Path> {
         match &self.evidence {
-            Evidence::Record(path) => Some(path),
+            Evidence::Record { path, .. } => Some(path),
             Evidence::SameBytes(_) => None,
         }
     }
@@ -176,12 +199,13 @@ impl Overwrite {
         {
             return Ok(Permit::Same);
         }
-        if self.force && !linked {
+        // Force does not reach through a link at the file's name or in place of its folder.
+        if self.force && !linked && !parent_of(shown).is_symlink() {
             return Ok(Permit::Replace);
         }
         match self.own(&dir, &real, &status, written.is_some()) {
             Ok(()) => Ok(Permit::Replace),
-            Err(_) if self.force => protected(shown, "is a link to a file that is not ours"),
+            Err(_) if self.force => protected(shown, "is behind a link and not known to be ours"),
             Err(reason) => Err(WriteError::OutputExists {
                 path: shown.to_path_buf(),
                 reason,
@@ -193,18 +217,21 @@ impl Overwrite {
     fn own(&self, dir: &Dir, target: &Path, status: &Status, last: bool) -> Result<(), String> {
         let name = target.file_name().unwrap_or_default();
         let record = match &self.evidence {
+            Evidence::SameBytes(mark) if self.force => {
+                let kind = &mark[..mark.len().min(KIND_BYTES)];
+                return match begins_with(dir, name, kind) {
+                    true if !kind.is_empty() => Ok(()),
+                    _ => Err("and is of another kind".to_owned()),
+                };
+            }
             Evidence::SameBytes(mark) if !last => {
-                let mut head = vec![0; mark.len()];
-                let read = dir
-                    .file(name)
-                    .and_then(|mut file| file.read_exact(&mut head));
-                return match read {
-                    Ok(()) if head == *mark => Ok(()),
-                    _ => Err("and was not made from these inputs".to_owned()),
+                return match begins_with(dir, name, mark) {
+                    true => Ok(()),
+                    false => Err("and was not made from these inputs".to_owned()),
                 };
             }
             Evidence::SameBytes(_) => return Err("and differs".to_owned()),
-            Evidence::Record(path) => path,
+            Evidence::Record { path, .. } => path,
         };
         let shown = record.display();
         let found = self.record(record)?;
@@ -212,15 +239,16 @@ impl Overwrite {
         if is(record) || is_timing(dir, name) {
             return Ok(());
         }
-        let note = Record::read(&ReplacedNote::path(record));
+        let note = Dir::of(&ReplacedNote::path(record))
+            .ok()
+            .and_then(|(dir, name)| ReplacedNote::read_in(&dir, &name));
+        let replaced = note.map(ReplacedNote::replaced).unwrap_or_default();
         let mut lists = false;
-        for list in std::iter::once(found).chain(note) {
-            for (listed, entry) in list.listed() {
-                if is(&parent_of(record).join(listed)) {
-                    lists = true;
-                    if unchanged(dir, name, &entry).unwrap_or(false) {
-                        return Ok(());
-                    }
+        for entry in found.files().into_iter().chain(replaced) {
+            if is(&parent_of(record).join(&entry.path)) {
+                lists = true;
+                if unchanged(dir, name, &entry).unwrap_or(false) {
+                    return Ok(());
                 }
             }
         }
@@ -231,16 +259,41 @@ impl Overwrite {
         })
     }
 
-    /// The record at `path` if it is of this run's inputs or need not be, else the reason why it is not.
+    /// The record at `path` if it is ours, and of this run's inputs and options or need not be; else the
+    /// reason why it is not.
     pub(super) fn record(&self, path: &Path) -> Result<Record, String> {
         let name = path.display();
         if followed(path).map_or(true, |there| there.is_none()) {
             return Err(format!("and no {name} tells what it was made from"));
         }
-        match Record::read(path) {
-            None => Err(format!("and {name} does not tell what it was made from")),
-            Some(record) if self.force || record.is_of(&self.inputs) => Ok(record),
-            Some(_) => Err(format!("and was made from other inputs (says {name})")),
+        let Some(record) = Record::read(path) else {
+            return Err(format!("and {name} does not tell what it was made from"));
+        };
+        let state = record.state();
+        if state == State::Changed {
+            return Err(format!(
+                "and {name}, which states what it was made from, was changed since"
+            ));
+        }
+        if self.force {
+            return Ok(record);
+        }
+        if !record.is_of(&self.inputs) {
+            return Err(format!("and was made from other inputs (says {name})"));
+        }
+        if state == State::Older {
+            let why = "is of an older version, which states no options";
+            return Err(format!("and {name} {why}"));
+        }
+        let differences = match &self.evidence {
+            Evidence::Record { options, .. } => record.differs_in(options),
+            Evidence::SameBytes(_) => None,
+        };
+        match differences {
+            None => Ok(record),
+            Some(differences) => Err(format!(
+                "and was made with other options: {differences} (says {name})"
+            )),
         }
     }
 
@@ -315,6 +368,15 @@ fn lies_in(target: &Path, folder: &Path) -> bool {
         (Ok(parent), Ok(folder)) => parent.starts_with(folder),
         _ => false,
     }
+}
+
+/// Whether the regular file `name` in `dir` begins with `mark`.
+fn begins_with(dir: &Dir, name: &OsStr, mark: &[u8]) -> bool {
+    let mut head = vec![0; mark.len()];
+    let read = dir
+        .file(name)
+        .and_then(|mut file| file.read_exact(&mut head));
+    read.is_ok() && head == mark
 }
 
 /// Where the file at `target` is: a link leads elsewhere.

@@ -11,13 +11,16 @@ use sha2::{Digest, Sha256};
 use super::digest::hex;
 use super::dir::{Dir, Kind};
 use super::names::OLD;
-use crate::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION, parse_version};
-use crate::json::to_json;
+use crate::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION, parse_version};
 use crate::plain::read_plain;
+use crate::seal;
 use crate::timing;
 
 /// Records larger than this are not read: ours are a few kilobytes to a few megabytes.
 const RECORD_MAX_BYTES: u64 = 64 << 20;
+
+/// Records of this schema version and later carry a seal.
+const SEALED_FROM: [u32; 3] = [1, 4, 0];
 
 /// What a manifest or sidecar states, as far as it decides what may be replaced.
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -25,33 +28,63 @@ pub(super) struct Record {
     schema_version: String,
     #[serde(rename = "fluxform_version")]
     _fluxform_version: String,
-    /// Absent from a note of files that are about to be replaced.
     #[serde(default)]
     inputs: Vec<Input>,
     #[serde(default)]
+    made_with: Options,
+    #[serde(default)]
     files: Vec<FileEntry>,
+    #[serde(default)]
+    record_sha256: Option<String>,
+    #[serde(skip)]
+    state: State,
+}
+
+/// Whether a record is as this program wrote it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) enum State {
+    /// Its seal holds.
+    Sealed,
+    /// Of a schema without seals, which states no options.
+    Older,
+    /// Changed since.
+    #[default]
+    Changed,
 }
 
 impl Record {
-    /// The record at `path`; `None` where none is, or one that this program did not write.
+    /// The record at `path`; `None` where none is, or one of another program.
     pub fn read(path: &Path) -> Option<Self> {
         let text = read_plain(path, RECORD_MAX_BYTES).ok()?;
         Self::parse(&text)
     }
 
     fn parse(text: &[u8]) -> Option<Self> {
-        let record: Self = serde_json::from_slice(text).ok()?;
-        parse_version(&record.schema_version)?;
+        let mut record: Self = serde_json::from_slice(text).ok()?;
+        let version = parse_version(&record.schema_version)?;
+        record.state = if seal::is_sealed(text) {
+            State::Sealed
+        } else if version < SEALED_FROM && record.record_sha256.is_none() {
+            State::Older
+        } else {
+            State::Changed
+        };
         Some(record)
     }
 
-    /// The record `name` in `dir`; a link is none.
+    /// The record `name` in `dir`, unless it was changed; a link is none.
     pub fn read_in(dir: &Dir, name: &str) -> Option<Self> {
-        let file = dir.file(name).ok()?;
-        let mut text = Vec::new();
-        let read = file.take(RECORD_MAX_BYTES + 1).read_to_end(&mut text);
-        let whole = read.is_ok_and(|bytes| bytes as u64 <= RECORD_MAX_BYTES);
-        whole.then(|| Self::parse(&text)).flatten()
+        Self::parse(&bounded(dir, name)?).filter(|record| record.state != State::Changed)
+    }
+
+    /// Whether it is as this program wrote it.
+    pub fn state(&self) -> State {
+        self.state
+    }
+
+    /// The options in which `now` differs, in words.
+    pub fn differs_in(&self, now: &Options) -> Option<String> {
+        self.made_with.difference(now)
     }
 
     /// Whether it was made from inputs of these digests, in this order.
@@ -60,6 +93,11 @@ impl Record {
             inputs.iter().map(|input| input.sha256.clone()).collect()
         };
         digests(&self.inputs) == digests(inputs)
+    }
+
+    /// What it lists.
+    pub fn files(self) -> Vec<FileEntry> {
+        self.files
     }
 
     /// What it lists, by name.
@@ -120,21 +158,27 @@ pub(super) fn is_timing(dir: &Dir, name: &OsStr) -> bool {
 }
 
 /// The note beside a record on files that are about to be replaced: a run that is killed between two
-/// renames leaves both states told.
-#[derive(Debug, Serialize)]
+/// renames leaves both states listed. The next finished one removes it.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct ReplacedNote {
-    schema_version: &'static str,
-    fluxform_version: &'static str,
-    files: Vec<FileEntry>,
+    schema_version: String,
+    fluxform_version: String,
+    replaced: Vec<FileEntry>,
+    /// Its own digest; see [`seal`].
+    #[serde(skip_serializing)]
+    #[serde(rename = "record_sha256")]
+    _record_sha256: String,
 }
 
 impl ReplacedNote {
     /// Of these files as they are now.
-    pub fn new(files: Vec<FileEntry>) -> Self {
+    pub fn new(replaced: Vec<FileEntry>) -> Self {
         Self {
-            schema_version: SCHEMA_VERSION,
-            fluxform_version: FLUXFORM_VERSION,
-            files,
+            schema_version: SCHEMA_VERSION.to_owned(),
+            fluxform_version: FLUXFORM_VERSION.to_owned(),
+            replaced,
+            _record_sha256: String::new(),
         }
     }
 
@@ -144,8 +188,29 @@ impl ReplacedNote {
         record.with_file_name(format!(".{name}{}", OLD))
     }
 
+    /// The note `name` in `dir`; `None` for anything that this program did not write as it is.
+    pub fn read_in(dir: &Dir, name: &OsStr) -> Option<Self> {
+        let text = bounded(dir, name)?;
+        let note = serde_json::from_slice(&text).ok();
+        note.filter(|_| seal::is_sealed(&text))
+    }
+
     /// Its bytes.
     pub fn bytes(&self) -> io::Result<Vec<u8>> {
-        to_json(self).map_err(io::Error::other)
+        seal::to_record(self).map_err(io::Error::other)
     }
+
+    /// The files.
+    pub fn replaced(self) -> Vec<FileEntry> {
+        self.replaced
+    }
+}
+
+/// The bytes of the regular file `name` in `dir`, unless they are too many for a record.
+fn bounded(dir: &Dir, name: impl AsRef<OsStr>) -> Option<Vec<u8>> {
+    let file = dir.file(name).ok()?;
+    let mut text = Vec::new();
+    let read = file.take(RECORD_MAX_BYTES + 1).read_to_end(&mut text);
+    let whole = read.is_ok_and(|bytes| bytes as u64 <= RECORD_MAX_BYTES);
+    whole.then_some(text)
 }

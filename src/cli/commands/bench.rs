@@ -9,7 +9,9 @@ use super::{begin, folder};
 use crate::bench::extreme::{self, Case};
 use crate::bench::pace::Pace;
 use crate::bench::stages::STAGES;
-use crate::bench::written::{catalogue_file, check_catalogue, write_catalogue};
+use crate::bench::written::{
+    catalogue_file, catalogue_made_with, check_catalogue, write_catalogue,
+};
 use crate::bench::{BenchRequest, run, scaling};
 use crate::bundle::bench::{BenchFile, Row};
 use crate::bundle::catalogue::CaseRow;
@@ -167,17 +169,18 @@ impl Bench {
             )));
         }
         let out = self.out.as_ref().map(folder).transpose()?;
+        let made_with = catalogue_made_with(self.quick, self.case.as_deref());
         if let Some(out) = &out {
-            check_catalogue(out, self.writing.force)?;
+            check_catalogue(&made_with, out, self.writing.force)?;
         }
         let bar = begin(printer);
         let rows = extreme::run(&cases, &bar);
         bar.check().map_err(JobError::from)?;
         drop(bar);
         if let Some(out) = &out {
-            write_catalogue(&rows, out, self.writing.force)?;
+            write_catalogue(&rows, made_with.clone(), out, self.writing.force)?;
         }
-        let table = catalogue_file(&rows);
+        let table = catalogue_file(&rows, made_with);
         printer.summary(Place::Output, &table, || told_cases(&table.cases))?;
         let failed: Vec<&str> = (table.cases.iter())
             .filter(|row| !row.pass)

@@ -45,8 +45,8 @@ use crate::lambda::{Criterion, ForceConstants};
      "a surface given directly; its bundle is called wedge"),
     ("fluxform calibrate designs/seed_air.toml shapes/flat.toml --explain",
      "tell first what will be computed, what left out, and what that costs"),
-    ("fluxform calibrate designs/seed.toml shapes/flat.toml --criterion linear --force",
-     "another criterion, replacing what is there"),
+    ("fluxform calibrate designs/seed.toml shapes/flat.toml --criterion linear --out linear",
+     "another criterion beside it; --force would replace what is there"),
 ]))]
 pub struct Calibrate {
     /// Design file (TOML), `-` for standard input

@@ -16,6 +16,7 @@ use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{count, error, force, number, percent, si};
 use crate::cli::values::{self, FileArgument};
 use crate::job::JobError;
+use crate::job::made_with;
 use crate::job::replay::summary::{ErrorFacts, ReplaySummary, Told};
 use crate::job::replay::synthesize::{Kind, Synthesis};
 use crate::job::replay::written::{ReplayFiles, write_trajectory};
@@ -134,7 +135,15 @@ impl Replay {
                 let (trajectory, input) = documents::trajectory(file)?;
                 let source = input.path.clone();
                 let input = Some(input);
-                (trajectory, Told { source, input })
+                let synthesis = None;
+                (
+                    trajectory,
+                    Told {
+                        source,
+                        input,
+                        synthesis,
+                    },
+                )
             }
             (None, Some((synthesis, source))) => {
                 let trajectory = opened.synthesize(&synthesis);
@@ -143,6 +152,7 @@ impl Replay {
                     Told {
                         source,
                         input: None,
+                        synthesis: Some(synthesis),
                     },
                 )
             }
@@ -159,7 +169,9 @@ impl Replay {
         let force = self.writing.force;
         let reads = opened.files();
         let of_table = |files: &ReplayFiles| {
-            Overwrite::new(force, files.record(), &inputs).protecting(reads.iter())
+            Overwrite::new(force, files.record(), &inputs)
+                .made_with(&made_with::replay(told.synthesis.as_ref(), self.dynamics))
+                .protecting(reads.iter())
         };
         let of_table = files.as_ref().map(of_table);
         if let (Some(files), Some(overwrite)) = (&files, &of_table) {

@@ -8,8 +8,9 @@ use serde::Serialize;
 
 use super::{MarkCounts, TableFiles, shape_error, table, with_surface};
 use crate::accuracy::StageAccuracy;
-use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION};
+use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION};
 use crate::job::JobError;
+use crate::job::made_with;
 use crate::progress::Progress;
 use crate::shape::document::ShapeDocument;
 use crate::shape::points::requested_grid;
@@ -57,6 +58,8 @@ pub struct ScatteredSummary {
     pub shape: String,
     /// What went in.
     pub inputs: Vec<Input>,
+    /// The options of the run.
+    pub made_with: Options,
     /// `adaptive` or `poisson`.
     pub sampling: &'static str,
     /// Number of points.
@@ -97,6 +100,7 @@ pub fn run(
     sampling: Sampling,
     progress: &dyn Progress,
 ) -> Result<ScatteredReport, JobError> {
+    let made_with = made_with::scattered(sampling, document, inputs.first());
     let inputs = with_surface(document, inputs);
     let failed = |source: ShapeError| shape_error(document, source);
     let (surface, warnings) = Surface::open(document).map_err(failed)?;
@@ -160,6 +164,7 @@ pub fn run(
         fluxform_version: FLUXFORM_VERSION,
         shape: document.name.clone(),
         inputs,
+        made_with,
         sampling: name,
         points: points.len(),
         area_m2: points.weight_m2.iter().sum(),
@@ -191,6 +196,7 @@ impl ScatteredReport {
     /// [`JobError::Write`].
     pub fn write(&mut self, path: &Path, force: bool) -> Result<(), JobError> {
         let files = TableFiles::new(path, force, &self.summary.inputs)?;
+        let files = files.made_with(&self.summary.made_with);
         let (table, set) = files.table(|out| self.write_csv(out))?;
         self.summary.files = vec![table];
         files.summary(set, &self.summary)

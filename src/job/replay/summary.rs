@@ -5,12 +5,14 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::Opened;
+use super::synthesize::Synthesis;
 use crate::accuracy::StageAccuracy;
-use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION};
+use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION};
 use crate::bundle::load::Bundle;
 use crate::bundle::replay::{Answer, ReplayRows};
 use crate::bundle::trajectory::Trajectory;
 use crate::coil::drive::Drive;
+use crate::job::made_with;
 
 /// Where a trajectory is from.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +21,8 @@ pub struct Told {
     pub source: String,
     /// The file's entry among the inputs.
     pub input: Option<Input>,
+    /// What was made up.
+    pub synthesis: Option<Synthesis>,
 }
 
 /// The facts of a replay.
@@ -34,6 +38,8 @@ pub struct ReplaySummary {
     pub shape: String,
     /// The bundle's manifest and the trajectory.
     pub inputs: Vec<Input>,
+    /// The options of the run.
+    pub made_with: Options,
     /// The bundle's force constant, N/m.
     pub lambda_n_per_m: f64,
     /// The trajectory.
@@ -257,6 +263,7 @@ impl ReplaySummary {
             inputs: std::iter::once(opened.input.clone())
                 .chain(told.input)
                 .collect(),
+            made_with: made_with::replay(told.synthesis.as_ref(), dynamics.is_some()),
             lambda_n_per_m: opened.renderer.lambda_n_per_m(),
             trajectory: TrajectoryFacts {
                 source: told.source,

@@ -30,6 +30,18 @@ pub enum Kind {
     Explore,
 }
 
+impl Kind {
+    /// Its name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Scan => "scan",
+            Self::Circle => "circle",
+            Self::Explore => "explore",
+        }
+    }
+}
+
 /// What is made up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Synthesis {

@@ -3,13 +3,12 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
-
 use super::ReplayReport;
 use crate::bundle::artefact::FileEntry;
 use crate::bundle::atomic::{self, FileSet, Overwrite};
 use crate::bundle::json::to_json;
 use crate::bundle::replay::Answer;
+use crate::bundle::seal::to_record;
 use crate::bundle::timing::{ReplayTiming, StageSeconds};
 use crate::bundle::trajectory::Trajectory;
 use crate::job::JobError;
@@ -108,8 +107,12 @@ impl ReplayReport {
         let mut set = FileSet::begin(&files.folder, overwrite.clone());
         let table = set.write(&files.table, |out| self.rows.write(out))?;
         self.summary.files = vec![FileEntry::new(&files.table, table)];
-        set.write(&files.timing, |out| out.write_all(&json(&timing)?))?;
-        set.write(&files.facts, |out| out.write_all(&json(&self.summary)?))?;
+        set.write(&files.timing, |out| {
+            out.write_all(&to_json(&timing).map_err(io::Error::other)?)
+        })?;
+        set.write(&files.facts, |out| {
+            out.write_all(&to_record(&self.summary).map_err(io::Error::other)?)
+        })?;
         Ok(set.commit()?)
     }
 
@@ -135,10 +138,6 @@ impl ReplayReport {
             current_a: &rows.current_a,
         }
     }
-}
-
-fn json<T: Serialize>(value: &T) -> io::Result<Vec<u8>> {
-    to_json(value).map_err(io::Error::other)
 }
 
 /// Writes a trajectory.

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::front::front;
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION};
 use crate::bundle::atomic::{FileSet, Overwrite, WriteError};
-use crate::bundle::json::to_json;
+use crate::bundle::seal::to_record;
 use crate::bundle::sweep::{Found, MergeSummary, PlanFile, PointFile, PointStore, TableWriter};
 use crate::job::JobError;
 use crate::plot::pareto::{Panel, ParetoPlot};
@@ -183,8 +183,8 @@ pub fn merge(
     tell(&mut summary, &gathered, best.len() as u64, among_met);
     summary.files = listed;
     set.write(&name("_merge.json"), |out| {
-        let bytes =
-            to_json(&summary).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))?;
+        let bytes = to_record(&summary)
+            .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))?;
         out.write_all(&bytes)
     })?;
     set.commit()?;

@@ -495,7 +495,7 @@ pub fn hostile() -> Vec<(String, Input)> {
             input.put("lambda.json", Content::Bytes(b"[".repeat(1 << 20)));
         }),
         with("a deep manifest", |input| {
-            let text = b"{\"schema_version\":\"1.3.0\",\"x\":".repeat(20_000);
+            let text = b"{\"schema_version\":\"1.4.0\",\"x\":".repeat(20_000);
             input.put(MANIFEST, Content::Bytes(text));
         }),
         with("many coils in few bytes", |input| {
@@ -591,6 +591,7 @@ fn give(input: &Input, folder: &Path) -> Result<bool, String> {
         let told = Told {
             source: "made up".into(),
             input: None,
+            synthesis: None,
         };
         let report = match replay::run(&opened, &trajectory, told, dynamics, &Silent) {
             Err(error) => {

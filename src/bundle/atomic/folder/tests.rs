@@ -24,9 +24,9 @@ fn a_bundle_named_like_a_temporary_folder_is_refused_not_lost() {
 /// A manifest of ours that lists these files, made from `a.toml`.
 fn manifest(files: &[FileEntry]) -> String {
     let inputs = [Input::of_bytes("a.toml", b"a")];
-    serde_json::json!({ "schema_version": "1.2.0", "fluxform_version": "0.1.0",
-        "inputs": inputs, "files": files })
-    .to_string()
+    let value = serde_json::json!({ "schema_version": "1.4.0", "fluxform_version": "0.1.0",
+        "inputs": inputs, "files": files });
+    String::from_utf8(crate::seal::to_record(&value).unwrap()).unwrap()
 }
 
 fn ours(target: &Path) -> Overwrite {
@@ -51,6 +51,37 @@ fn put_files(
         .collect::<Result<_, _>>()?;
     draft.write(MANIFEST, |out| out.write_all(manifest(&entries).as_bytes()))?;
     draft.commit()
+}
+
+#[test]
+fn a_manifest_into_which_somebody_wrote_a_users_file_is_no_permission() {
+    let place = tempfile::tempdir().unwrap();
+    let target = place.path().join("bump");
+    put(&target, "ours").unwrap();
+    fs::write(target.join("thesis.tex"), "years").unwrap();
+    let thesis = FileEntry {
+        path: "thesis.tex".to_owned(),
+        bytes: 5,
+        sha256: crate::artefact::sha256_hex(b"years"),
+    };
+    let text = fs::read_to_string(target.join(MANIFEST)).unwrap();
+    let entry = serde_json::to_string(&thesis).unwrap();
+    let edited = text.replacen("\"files\": [", &format!("\"files\": [{entry},"), 1);
+    fs::write(target.join(MANIFEST), &edited).unwrap();
+    let refused = put(&target, "more").unwrap_err().to_string();
+    assert!(refused.contains("was changed since"), "{refused}");
+    assert_eq!(fs::read(target.join("a.txt")).unwrap(), b"ours");
+    // With force all that was there stays beside the new.
+    let forced = Overwrite::new(
+        true,
+        target.join(MANIFEST),
+        &[Input::of_bytes("a.toml", b"a")],
+    );
+    put_files(&target, forced, &[("a.txt", "more")]).unwrap();
+    assert_eq!(fs::read(target.join("thesis.tex")).unwrap(), b"years");
+    assert_eq!(fs::read(target.join("a.txt.kept-1")).unwrap(), b"ours");
+    let kept = fs::read_to_string(target.join("manifest.json.kept-1")).unwrap();
+    assert_eq!(kept, edited);
 }
 
 /// Every file below with its bytes, links by where they lead.
