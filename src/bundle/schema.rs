@@ -2,15 +2,13 @@
 
 use schemars::{JsonSchema, schema_for};
 
-use super::bench::BenchFile;
-use super::catalogue::CatalogueFile;
 use super::lambda_file::LambdaFile;
 use super::manifest::{Manifest, MapSidecar};
 use super::scan::ScanFile;
 use super::sweep::{MergeSummary, PlanFile, PointFile};
 
 /// The committed schemas: file name and text.
-pub const SCHEMAS: [(&str, &str); 9] = [
+pub const SCHEMAS: [(&str, &str); 7] = [
     (
         "manifest.schema.json",
         include_str!("schema/manifest.schema.json"),
@@ -32,20 +30,12 @@ pub const SCHEMAS: [(&str, &str); 9] = [
         "sweep_merge.schema.json",
         include_str!("schema/sweep_merge.schema.json"),
     ),
-    (
-        "bench.schema.json",
-        include_str!("schema/bench.schema.json"),
-    ),
     ("scan.schema.json", include_str!("schema/scan.schema.json")),
-    (
-        "extreme.schema.json",
-        include_str!("schema/extreme.schema.json"),
-    ),
 ];
 
 /// The schemas as the structs have them now, in the order of [`SCHEMAS`].
 #[must_use]
-pub fn generated() -> [String; 9] {
+pub fn generated() -> [String; 7] {
     [
         text::<Manifest>(),
         text::<MapSidecar>(),
@@ -53,13 +43,13 @@ pub fn generated() -> [String; 9] {
         text::<PlanFile>(),
         text::<PointFile>(),
         text::<MergeSummary>(),
-        text::<BenchFile>(),
         text::<ScanFile>(),
-        text::<CatalogueFile>(),
     ]
 }
 
-fn text<T: JsonSchema>() -> String {
+/// The schema of `T`, as it is committed.
+#[must_use]
+pub fn text<T: JsonSchema>() -> String {
     format!("{:#}\n", schema_for!(T).as_value())
 }
 

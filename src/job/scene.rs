@@ -28,7 +28,7 @@ pub(super) const MAGNET_FINEST: f64 = 1e-9;
 pub(super) const AIR_SHARE: f64 = 0.6;
 
 /// The magnet's moment, A m^2.
-pub(crate) fn moment_a_m2(design: &Design) -> [f64; 3] {
+pub fn moment_a_m2(design: &Design) -> [f64; 3] {
     let magnet = &design.magnet;
     let moment = dipole::cylinder_moment_a_m2(
         magnet.diameter_m,

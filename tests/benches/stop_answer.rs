@@ -169,14 +169,6 @@ const CASES: &[(&str, &[&str])] = &[
             "--force",
         ],
     ),
-    (
-        "bench --quick",
-        &["bench", "--quick", "--out", "b", "--force"],
-    ),
-    (
-        "bench --extreme",
-        &["bench", "--extreme", "--out", "e", "--force"],
-    ),
     ("verify", &["verify", "bundle/seed/wedge"]),
     (
         "replay, 1e6 positions",

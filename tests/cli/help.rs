@@ -4,7 +4,7 @@ use fluxform::bundle::artefact::SCHEMA_VERSION;
 
 use crate::support::Place;
 
-const COMMANDS: [&str; 13] = [
+const COMMANDS: [&str; 12] = [
     "evaluate",
     "probe",
     "map",
@@ -15,7 +15,6 @@ const COMMANDS: [&str; 13] = [
     "verify",
     "replay",
     "sweep",
-    "bench",
     "completions",
     "man",
 ];

@@ -140,10 +140,7 @@ pub const COMMANDS: &[Writes] = &[
 ];
 
 /// Measures, which take seconds: only in the whole run.
-pub const MEASURES: &[Writes] = &[Writes {
-    spoils: "",
-    ..writes("bench", "bench --quick --stage inductance --out out")
-}];
+pub const MEASURES: &[Writes] = &[];
 
 /// Lays the inputs.
 pub fn lay_inputs(place: &Path) {
