@@ -19,6 +19,7 @@
 pub mod artefact;
 #[allow(clippy::disallowed_methods)] // the one place that writes files
 pub mod atomic;
+pub mod bench;
 mod consistent;
 pub mod force_map;
 pub mod json;

@@ -2,13 +2,14 @@
 
 use schemars::{JsonSchema, schema_for};
 
+use super::bench::BenchFile;
 use super::lambda_file::LambdaFile;
 use super::manifest::{Manifest, MapSidecar};
 use super::scan::ScanFile;
 use super::sweep::{MergeSummary, PlanFile, PointFile};
 
 /// The committed schemas: file name and text.
-pub const SCHEMAS: [(&str, &str); 7] = [
+pub const SCHEMAS: [(&str, &str); 8] = [
     (
         "manifest.schema.json",
         include_str!("schema/manifest.schema.json"),
@@ -30,12 +31,16 @@ pub const SCHEMAS: [(&str, &str); 7] = [
         "sweep_merge.schema.json",
         include_str!("schema/sweep_merge.schema.json"),
     ),
+    (
+        "bench.schema.json",
+        include_str!("schema/bench.schema.json"),
+    ),
     ("scan.schema.json", include_str!("schema/scan.schema.json")),
 ];
 
 /// The schemas as the structs have them now, in the order of [`SCHEMAS`].
 #[must_use]
-pub fn generated() -> [String; 7] {
+pub fn generated() -> [String; 8] {
     [
         text::<Manifest>(),
         text::<MapSidecar>(),
@@ -43,6 +48,7 @@ pub fn generated() -> [String; 7] {
         text::<PlanFile>(),
         text::<PointFile>(),
         text::<MergeSummary>(),
+        text::<BenchFile>(),
         text::<ScanFile>(),
     ]
 }

@@ -5,8 +5,8 @@ use std::sync::LazyLock;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::commands::{
-    calibrate, compare, completions, discretize, evaluate, lambda, man, map, optimize, probe,
-    replay, sweep, verify,
+    bench, calibrate, compare, completions, discretize, evaluate, lambda, man, map, optimize,
+    probe, replay, sweep, verify,
 };
 use super::{explain, help, values};
 use crate::bundle::artefact::SCHEMA_VERSION;
@@ -106,6 +106,7 @@ pub enum Command {
     Optimize(optimize::Optimize),
     Sweep(sweep::Sweep),
     Replay(replay::Replay),
+    Bench(bench::Bench),
     Completions(completions::Completions),
     Man(man::Man),
 }

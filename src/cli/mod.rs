@@ -72,6 +72,7 @@ fn run(command: &Command, printer: &Printer) -> Result<(), Failure> {
         Command::Optimize(command) => command.run(printer),
         Command::Sweep(command) => command.run(printer),
         Command::Replay(command) => command.run(printer),
+        Command::Bench(command) => command.run(printer),
         Command::Completions(command) => command.run(printer),
         Command::Man(command) => command.run(printer),
     }

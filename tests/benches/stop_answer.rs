@@ -169,6 +169,17 @@ const CASES: &[(&str, &[&str])] = &[
             "--force",
         ],
     ),
+    (
+        "bench",
+        &[
+            "bench",
+            "designs/seed.toml",
+            "shapes/wedge.toml",
+            "--out",
+            "b",
+            "--force",
+        ],
+    ),
     ("verify", &["verify", "bundle/seed/wedge"]),
     (
         "replay, 1e6 positions",

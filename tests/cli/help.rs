@@ -4,7 +4,7 @@ use fluxform::bundle::artefact::SCHEMA_VERSION;
 
 use crate::support::Place;
 
-const COMMANDS: [&str; 12] = [
+const COMMANDS: [&str; 13] = [
     "evaluate",
     "probe",
     "map",
@@ -15,6 +15,7 @@ const COMMANDS: [&str; 12] = [
     "verify",
     "replay",
     "sweep",
+    "bench",
     "completions",
     "man",
 ];

@@ -140,7 +140,10 @@ pub const COMMANDS: &[Writes] = &[
 ];
 
 /// Measures, which take seconds: only in the whole run.
-pub const MEASURES: &[Writes] = &[];
+pub const MEASURES: &[Writes] = &[writes(
+    "bench",
+    "bench air.toml bump.toml --quick --out out",
+)];
 
 /// Lays the inputs.
 pub fn lay_inputs(place: &Path) {

@@ -1,5 +1,6 @@
 //! One file a command: its arguments, and its summary for people.
 
+pub mod bench;
 pub mod calibrate;
 pub mod compare;
 pub mod completions;
