@@ -5,6 +5,7 @@ use std::process::{Command, Output};
 
 use fluxform::bundle::bench::{BenchFile, KnobName, Run, ShapeBench};
 use fluxform::bundle::schema::SCHEMAS;
+use fluxform::lambda::Criterion;
 use serde_json::Value;
 
 const REST: &str = r#"
@@ -108,7 +109,11 @@ fn errors_fall(parts: &str) {
         "{:?}",
         shape.reference
     );
-    for constant in shape.constants.iter().filter(|c| c.criterion == "jnd") {
+    for constant in shape
+        .constants
+        .iter()
+        .filter(|c| c.criterion == Criterion::Jnd)
+    {
         assert_eq!(constant.lambda_n_per_m, present.lambda_n_per_m);
         assert_eq!(constant.error, present.lambda_error);
     }

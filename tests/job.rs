@@ -78,7 +78,7 @@ fn the_seed_shapes_are_calibrated_and_verified() {
     for bundle in &report.bundles {
         let file = &bundle.lambda.file;
         let lambda = file.lambda_n_per_m.expect("a force constant");
-        let linear = file.lambda_linear_n_per_m.expect("linear");
+        let linear = file.constants.lambda_linear_n_per_m.expect("linear");
         assert!(lambda > linear && linear > 0.0, "{lambda} {linear}");
         let verified = verify::run(&bundle.folder, &Silent).expect("opens");
         for check in &verified.checks {
@@ -98,7 +98,7 @@ fn the_jnd_is_what_the_limits_may_add_to_the_error() {
     options.settings.at_n_per_m = Some(at);
     let report = lambda::run(&design, &document, Vec::new(), &options, &Silent).expect("solves");
     let file = &report.file;
-    assert!(at < file.lambda_linear_n_per_m.expect("linear"));
+    assert!(at < file.constants.lambda_linear_n_per_m.expect("linear"));
     let floor = file.at.as_ref().expect("asked for").rms_error_n / (at * 0.05);
     let chosen = file.relative_rms_error.expect("a force constant");
     let added = chosen * chosen - floor * floor;

@@ -1,6 +1,7 @@
 //! What every room uses: physical constants and the millimetre border, progress and interruption,
-//! and the error statement that every stage attaches to its numbers.
+//! the error statement that every stage attaches to its numbers, and the force constants' names.
 
 pub mod accuracy;
+pub mod force_constant;
 pub mod progress;
 pub mod units;

@@ -26,7 +26,7 @@ use crate::bundle::lambda_file::LambdaFile;
 use crate::design::{Design, MagnetModel};
 use crate::job::calibrate::ShapeSource;
 use crate::job::discretize::with_surface;
-use crate::job::lambda::{LambdaOptions, criterion_name};
+use crate::job::lambda::LambdaOptions;
 use crate::job::scene::Scene;
 use crate::job::{JobError, steel};
 use crate::lambda::{Criterion, Solution};
@@ -157,7 +157,7 @@ fn measure(
         design: request.design.name.clone(),
         inputs,
         units: UNITS.to_owned(),
-        criterion: criterion_name(request.lambda.settings.criterion).to_owned(),
+        criterion: request.lambda.settings.criterion,
         quick: request.quick,
         error_of: "lambda: relative to the refined run's. Felt force: what the currents give by the \
                    interpolated map against what they give directly in the refined field, at places \
@@ -290,32 +290,18 @@ fn cheapest(
 
 /// Every force constant of one path against the refined one.
 fn constants(file: &LambdaFile, refined: &Solution) -> Vec<ConstantError> {
-    let row = |criterion: Criterion| {
-        let (lambda_n_per_m, reference_n_per_m) = match criterion {
-            Criterion::Jnd => (file.lambda_jnd_n_per_m, refined.lambda_jnd_n_per_m),
-            Criterion::Linear => (file.lambda_linear_n_per_m, refined.lambda_linear_n_per_m),
-            Criterion::Saturation => (
-                file.lambda_saturation_n_per_m,
-                refined.lambda_saturation_n_per_m,
-            ),
-            Criterion::Maxmin => (file.lambda_maxmin_n_per_m, refined.lambda_maxmin_n_per_m),
-        };
+    let row = |criterion: &Criterion| {
+        let lambda_n_per_m = file.constants.of(*criterion);
+        let reference_n_per_m = refined.constants.of(*criterion);
         let both = lambda_n_per_m.zip(reference_n_per_m);
         ConstantError {
-            criterion: criterion_name(criterion).to_owned(),
+            criterion: *criterion,
             lambda_n_per_m,
             reference_n_per_m,
             error: both.filter(|(_, r)| *r != 0.0).map(|(l, r)| off(l, r)),
         }
     };
-    [
-        Criterion::Jnd,
-        Criterion::Linear,
-        Criterion::Saturation,
-        Criterion::Maxmin,
-    ]
-    .map(row)
-    .to_vec()
+    Criterion::ALL.iter().map(row).collect()
 }
 
 /// Knobs that change nothing here, and why.

@@ -174,7 +174,7 @@ fn answer(file: &BenchFile) -> Section {
                     .into()
             };
             vec![
-                format!("{}: {}", shape.shape, constant.criterion).into(),
+                format!("{}: {}", shape.shape, constant.criterion.name()).into(),
                 lambda(constant.lambda_n_per_m),
                 lambda(constant.reference_n_per_m),
                 cell(constant.error),

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::artefact::{FileEntry, Input};
 use super::number::{push_cell, push_number, push_text};
 use fluxform_base::accuracy::StageAccuracy;
+use fluxform_base::force_constant::Criterion;
 
 /// `bench.json`. Seconds in it differ from run to run; errors do not.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -23,8 +24,8 @@ pub struct BenchFile {
     pub inputs: Vec<Input>,
     /// The sentence on units.
     pub units: String,
-    /// Which force constant `lambda` stands for: `jnd`, `linear`, `saturation` or `maxmin`.
-    pub criterion: String,
+    /// Which force constant `lambda` stands for.
+    pub criterion: Criterion,
     /// Whether ladders and reference were shortened by `--quick`.
     pub quick: bool,
     /// What the errors are and what they are relative to.
@@ -176,7 +177,7 @@ pub struct Cheapest {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ConstantError {
     /// Its criterion.
-    pub criterion: String,
+    pub criterion: Criterion,
     /// N/m; null where it does not exist.
     pub lambda_n_per_m: Option<f64>,
     /// Of the reference, N/m.

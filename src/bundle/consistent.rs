@@ -111,7 +111,6 @@ fn check_names(manifest: &Manifest) -> Result<(), String> {
     let names = [
         ("design", &manifest.design),
         ("shape", &manifest.shape),
-        ("lambda.criterion", &manifest.lambda.criterion),
         ("fluxform_version", &manifest.fluxform_version),
     ];
     let paths = manifest.inputs.iter().map(|input| ("inputs", &input.path));

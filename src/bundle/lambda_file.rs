@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::artefact::Input;
 use fluxform_base::accuracy::StageAccuracy;
+use fluxform_base::force_constant::{Criterion, ForceConstants};
 
 /// The path of e*(lambda) and the constants read off it. `null` where a limit never binds or
 /// nothing can be rendered.
@@ -22,21 +23,13 @@ pub struct LambdaFile {
     pub shape: String,
     /// What went in, paths as given on the command line.
     pub inputs: Vec<Input>,
-    /// Where the first limit binds, N/m.
-    pub lambda_linear_n_per_m: Option<f64>,
-    /// The largest lambda at which saturation adds less than a just-noticeable difference, N/m.
-    pub lambda_jnd_n_per_m: Option<f64>,
-    /// The last breakpoint, N/m.
-    pub lambda_saturation_n_per_m: Option<f64>,
-    /// The largest at which no point is too weak, N/m.
-    #[serde(default)]
-    pub lambda_maxmin_n_per_m: Option<f64>,
-    /// Below it the weakest point is not felt, N/m; null for a surface that touches z = 0.
-    pub lambda_floor_n_per_m: Option<f64>,
+    /// What eq. 10 reads off the path.
+    #[serde(flatten)]
+    pub constants: ForceConstants,
     /// The one chosen, N/m.
     pub lambda_n_per_m: Option<f64>,
-    /// How it was chosen: `jnd`, `linear`, `saturation` or `maxmin`.
-    pub criterion: String,
+    /// How it was chosen.
+    pub criterion: Criterion,
     /// The relative error that `jnd` allows to be added.
     pub jnd: f64,
     /// Static currents at the chosen lambda, A, one a coil of the array: those of the least mean
@@ -254,14 +247,9 @@ pub struct LambdaVariant {
     pub passive_force: bool,
     /// Whether any coil may carry a negative current.
     pub pulls: bool,
-    /// N/m.
-    pub lambda_linear_n_per_m: Option<f64>,
-    /// N/m.
-    pub lambda_jnd_n_per_m: Option<f64>,
-    /// N/m.
-    pub lambda_saturation_n_per_m: Option<f64>,
-    /// N/m.
-    pub lambda_maxmin_n_per_m: Option<f64>,
+    /// What eq. 10 reads off the path.
+    #[serde(flatten)]
+    pub constants: ForceConstants,
     /// N/m.
     pub worst_point_lambda_jnd_n_per_m: Option<f64>,
     /// The one chosen, N/m.

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::artefact::{FileEntry, Input, sha256_hex};
 use super::json::to_json;
 use fluxform_base::accuracy::StageAccuracy;
+use fluxform_base::force_constant::Criterion;
 use fluxform_numerics::axis::Axis;
 
 /// The interpolation between nodes that every loader implements.
@@ -184,8 +185,8 @@ pub struct MagnetSummary {
 pub struct LambdaSummary {
     /// N/m; null when there is none.
     pub lambda_n_per_m: Option<f64>,
-    /// How it was chosen: `jnd`, `linear`, `saturation` or `maxmin`.
-    pub criterion: String,
+    /// How it was chosen.
+    pub criterion: Criterion,
 }
 
 /// Equally spaced nodes: node i is ((n - 1 - i) from + i to) / (n - 1), n the samples.

@@ -79,6 +79,22 @@ pub fn table(sides: &[Side], rows: &[Vec<String>]) -> String {
     text
 }
 
+/// Rows of named cells under their names; the first column keeps to the left, the others to the
+/// right. Every row names the same columns.
+#[must_use]
+pub fn headed_table<'a>(rows: impl IntoIterator<Item = Vec<(&'a str, String)>>) -> String {
+    let mut lines: Vec<Vec<String>> = Vec::new();
+    for row in rows {
+        if lines.is_empty() {
+            lines.push(row.iter().map(|(name, _)| (*name).to_owned()).collect());
+        }
+        lines.push(row.into_iter().map(|(_, cell)| cell).collect());
+    }
+    let mut sides = vec![Side::Right; lines.first().map_or(0, Vec::len)];
+    sides.iter_mut().take(1).for_each(|side| *side = Side::Left);
+    table(&sides, &lines)
+}
+
 /// `values` as a grid of `columns`, numbers right-aligned, without indentation.
 #[must_use]
 pub fn grid(values: &[String], columns: usize) -> String {

@@ -59,6 +59,12 @@ impl Program for Arguments {
     }
 }
 
+/// The command line as clap knows it.
+#[must_use]
+pub fn command() -> clap::Command {
+    Arguments::command()
+}
+
 fn run(command: &Command, printer: &Printer) -> Result<(), Failure> {
     match command {
         Command::Evaluate(command) => command.run(printer),

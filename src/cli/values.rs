@@ -3,8 +3,21 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+
+use crate::lambda::Criterion;
 use crate::shape::document::parse_unit;
 use crate::units::m_from_mm;
+
+/// Any criterion by its name.
+pub fn criterion() -> impl TypedValueParser<Value = Criterion> {
+    let of = |criterion: &Criterion| PossibleValue::new(criterion.name()).help(criterion.meaning());
+    PossibleValuesParser::new(Criterion::ALL.iter().map(of)).map(|name| {
+        let mut all = Criterion::ALL.iter().copied();
+        all.find(|criterion| criterion.name() == name)
+            .unwrap_or_default()
+    })
+}
 
 /// Most threads that may be asked for.
 const THREADS_MAX: usize = 1024;

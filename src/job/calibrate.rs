@@ -696,7 +696,7 @@ fn manifest(
         magnet: scene.magnet_summary(),
         lambda: LambdaSummary {
             lambda_n_per_m: file.lambda_n_per_m,
-            criterion: file.criterion.clone(),
+            criterion: file.criterion,
         },
         points: points_grid(&lambda.points.discretized.points),
         map,

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::calibrate::ShapeSource;
 use super::discretize::{self, PointsReport, point_rows, points_grid};
-use super::lambda::{criterion_name, proven_accuracy};
+use super::lambda::proven_accuracy;
 use super::scene::Scene;
 use super::steel::{Material, Solved};
 use super::{JobError, passive, steel};
@@ -240,7 +240,7 @@ pub fn run(
         threshold_n: DETECTION_THRESHOLD_N,
         criterion: match options.lambda_n_per_m {
             Some(_) => "given",
-            None => criterion_name(Criterion::Jnd),
+            None => Criterion::Jnd.name(),
         },
         shapes: told.collect(),
         pairs,

@@ -26,7 +26,7 @@ use crate::bundle::lambda_file::{
 };
 use crate::design::{Design, MagnetModel};
 use crate::lambda::worst::{WorstSolution, worst_point};
-use crate::lambda::{self, Criterion, ForceProblem, Precision, Settings, Solution, Status, Wiring};
+use crate::lambda::{self, ForceProblem, Precision, Settings, Solution, Status, Wiring};
 use crate::plot::lambda::LambdaPlot;
 use crate::progress::Progress;
 use crate::shape::document::ShapeDocument;
@@ -193,9 +193,9 @@ fn against_grid(sampled: &ScatteredSummary, file: &LambdaFile, grid: &LambdaFile
         sampling: sampled.sampling.to_owned(),
         area_m2: sampled.area_m2,
         grid_points: grid.points,
-        grid_lambda_linear_n_per_m: grid.lambda_linear_n_per_m,
-        grid_lambda_jnd_n_per_m: grid.lambda_jnd_n_per_m,
-        grid_lambda_saturation_n_per_m: grid.lambda_saturation_n_per_m,
+        grid_lambda_linear_n_per_m: grid.constants.lambda_linear_n_per_m,
+        grid_lambda_jnd_n_per_m: grid.constants.lambda_jnd_n_per_m,
+        grid_lambda_saturation_n_per_m: grid.constants.lambda_saturation_n_per_m,
         grid_lambda_n_per_m: grid.lambda_n_per_m,
         relative_change: change,
     }
@@ -478,31 +478,6 @@ fn at_working_point(
     Ok(Some((facts, point.accuracy())))
 }
 
-/// How artefacts and the command line call a criterion.
-#[must_use]
-pub fn criterion_name(criterion: Criterion) -> &'static str {
-    match criterion {
-        Criterion::Jnd => "jnd",
-        Criterion::Linear => "linear",
-        Criterion::Saturation => "saturation",
-        Criterion::Maxmin => "maxmin",
-    }
-}
-
-/// The criterion of that name in artefacts and on the command line.
-#[must_use]
-pub fn criterion_named(name: &str) -> Option<Criterion> {
-    // A criterion without its place in this row does not compile.
-    let next = |criterion: &Criterion| match criterion {
-        Criterion::Jnd => Some(Criterion::Linear),
-        Criterion::Linear => Some(Criterion::Saturation),
-        Criterion::Saturation => Some(Criterion::Maxmin),
-        Criterion::Maxmin => None,
-    };
-    std::iter::successors(Some(Criterion::Jnd), next)
-        .find(|criterion| criterion_name(*criterion) == name)
-}
-
 fn file(
     scene: &Scene,
     solved: &Solved,
@@ -524,13 +499,9 @@ fn file(
         design: scene.design.name.clone(),
         shape: points.shape.clone(),
         inputs: points.inputs.clone(),
-        lambda_linear_n_per_m: solution.lambda_linear_n_per_m,
-        lambda_jnd_n_per_m: solution.lambda_jnd_n_per_m,
-        lambda_saturation_n_per_m: solution.lambda_saturation_n_per_m,
-        lambda_maxmin_n_per_m: solution.lambda_maxmin_n_per_m,
-        lambda_floor_n_per_m: solution.lambda_floor_n_per_m,
+        constants: solution.constants,
         lambda_n_per_m: chosen.map(|point| point.lambda_n_per_m),
-        criterion: criterion_name(options.settings.criterion).to_owned(),
+        criterion: options.settings.criterion,
         jnd: options.settings.jnd_weight,
         currents_a: chosen.map(|point| point.currents_a.clone()),
         rms_error_n: chosen.map(|point| point.rms_error_n),

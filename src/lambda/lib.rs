@@ -22,7 +22,7 @@
 //!     resistance_ohm: &[6.0, 6.0],
 //! };
 //! let solution = solve(&problem, &Settings::default())?;
-//! let linear = solution.lambda_linear_n_per_m.unwrap_or(f64::INFINITY);
+//! let linear = solution.constants.lambda_linear_n_per_m.unwrap_or(f64::INFINITY);
 //! let chosen = solution.chosen.as_ref().map_or(0.0, |chosen| chosen.lambda_n_per_m);
 //! assert!(linear > 0.0 && linear <= chosen);
 //!
@@ -42,7 +42,7 @@
 //!
 //! // Drivers of twice the current render twice the stiffness.
 //! let stronger = ForceProblem { upper_a: &[4.0, 2.6], ..problem };
-//! let twice = solve(&stronger, &Settings::default())?.lambda_linear_n_per_m;
+//! let twice = solve(&stronger, &Settings::default())?.constants.lambda_linear_n_per_m;
 //! assert!((twice.unwrap_or(0.0) / linear - 2.0).abs() < 1e-12);
 //! # Ok(())
 //! # }
@@ -65,7 +65,8 @@ mod wiring;
 pub mod worst;
 
 pub use allocate::{Allocation, Allocator, AllocatorError, Reach};
+pub use fluxform_base::force_constant::{Criterion, ForceConstants, NamedConstant};
 pub use path::{Breakpoint, Event, Path};
-pub use problem::{Criterion, ForceProblem, ProblemError, Settings};
+pub use problem::{ForceProblem, ProblemError, Settings};
 pub use solve::{OperatingPoint, Precision, Solution, Status, solve};
 pub use wiring::{Rewired, Wiring, WiringError};

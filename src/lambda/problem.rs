@@ -1,5 +1,6 @@
 //! What is solved: forces per ampere at the points, heights and limits.
 
+use fluxform_base::force_constant::Criterion;
 use rayon::prelude::*;
 
 /// Forces, heights and limits of one object (eq. 9 and 10). Borrowed, never copied.
@@ -36,20 +37,6 @@ pub(super) struct Directions {
 /// A coil whose largest force is a smaller share of the strongest coil's is refused: what it adds
 /// is lost in the rounding of the worst-point form, and far below that in the range of doubles.
 const LEAST_REACH: f64 = 1e-20;
-
-/// Which force constant is chosen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Criterion {
-    /// The largest whose error, added by the limits, stays below the just-noticeable difference.
-    #[default]
-    Jnd,
-    /// Where the first limit binds.
-    Linear,
-    /// The smallest beyond which the currents no longer change.
-    Saturation,
-    /// The largest with no point too weak.
-    Maxmin,
-}
 
 /// How the problem is solved.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,7 @@
 //! The whole of eq. 9 and 10 for one object: precision, path, criteria, certificate.
 
 use fluxform_base::accuracy::StageAccuracy;
+use fluxform_base::force_constant::{Criterion, ForceConstants};
 use fluxform_base::units::DETECTION_THRESHOLD_N;
 use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
@@ -10,7 +11,7 @@ use super::criteria::Comparison;
 use super::follow::{Bounds, Follower, Piece, Trace};
 use super::model::Model;
 use super::path::Path;
-use super::problem::{Criterion, ForceProblem, ProblemError, Settings};
+use super::problem::{ForceProblem, ProblemError, Settings};
 use super::reduce::{Reduced, largest_entries, times_power};
 use super::rest;
 use super::worst;
@@ -64,21 +65,10 @@ pub struct OperatingPoint {
 /// The path, the force constants and the currents of one object.
 #[derive(Debug, Clone)]
 pub struct Solution {
-    /// Where the first limit binds, N/m; `None`: none ever does.
-    pub lambda_linear_n_per_m: Option<f64>,
-    /// The largest with `e* - e_0 <= w^2 lambda^2 mean(h^2)`, N/m; `None`: all are.
-    pub lambda_jnd_n_per_m: Option<f64>,
-    /// The smallest, N/m, beyond which the currents no longer change: the last breakpoint. A change
-    /// that is worth less than 1e-15 of `lambda^2 mean(h^2)` at every lambda is none: where the sum
-    /// binds, rounding of the forces alone decides among coils that tie. `None` where nothing ever
-    /// binds.
-    pub lambda_saturation_n_per_m: Option<f64>,
-    /// The largest with no point too weak, N/m; `None`: none, or nothing can be rendered.
-    pub lambda_maxmin_n_per_m: Option<f64>,
-    /// The points that decide it: no currents within the limits give all of them more.
+    /// What eq. 10 reads off the path.
+    pub constants: ForceConstants,
+    /// The points that decide maxmin: no currents within the limits give all of them more.
     pub maxmin_points: Vec<usize>,
-    /// Below it the lowest point is not felt, N/m; `None` where that height is not positive.
-    pub lambda_floor_n_per_m: Option<f64>,
     /// The force constant that the criterion chooses, with its currents.
     pub chosen: Option<OperatingPoint>,
     /// The same at the force constant asked for besides.
@@ -306,12 +296,6 @@ fn finish<T: Real>(
     let si = |lambda: Num| times_power(lambda.to_f64(), solved.reduced.lambda_scale);
     let (linear, jnd) = (linear.map(si), jnd.map(si));
     let saturation = path.last_turn().or(linear.filter(|&lambda| lambda == 0.0));
-    let chosen = match settings.criterion {
-        Criterion::Linear => linear,
-        Criterion::Jnd => jnd,
-        Criterion::Saturation => saturation,
-        Criterion::Maxmin => None,
-    };
     let unmoved = |trace: &Trace| {
         let all = |piece: &Piece| piece.x.iter().chain(&piece.x_rate).all(|&x| x == Num::ZERO);
         trace.pieces.iter().all(all)
@@ -347,23 +331,26 @@ fn finish<T: Real>(
     let evaluate =
         |lambda: f64| given(lambda, path.currents_a(lambda), Some(path.error_n2(lambda)));
     let maxmin = worst::largest(problem, largest).filter(|_| status != Status::NothingRendered);
-    let chosen = match &maxmin {
-        Some(maxmin) if settings.criterion == Criterion::Maxmin => Some(given(
-            maxmin.lambda_n_per_m,
-            maxmin.currents_a.clone(),
-            None,
-        )),
-        _ => chosen.map(evaluate),
-    };
-    Solution {
+    let constants = ForceConstants {
         lambda_linear_n_per_m: linear,
         lambda_jnd_n_per_m: jnd,
         lambda_saturation_n_per_m: saturation,
         lambda_maxmin_n_per_m: maxmin.as_ref().map(|maxmin| maxmin.lambda_n_per_m),
+        lambda_floor_n_per_m: (lowest > 0.0).then(|| DETECTION_THRESHOLD_N / lowest),
+    };
+    let chosen = match (&maxmin, settings.criterion) {
+        // These currents are not those of the path.
+        (Some(maxmin), Criterion::Maxmin) => {
+            let currents_a = maxmin.currents_a.clone();
+            Some(given(maxmin.lambda_n_per_m, currents_a, None))
+        }
+        (_, criterion) => constants.of(criterion).map(evaluate),
+    };
+    Solution {
+        constants,
         maxmin_points: maxmin.map_or_else(Vec::new, |maxmin| {
             maxmin.active.iter().map(|active| active.point).collect()
         }),
-        lambda_floor_n_per_m: (lowest > 0.0).then(|| DETECTION_THRESHOLD_N / lowest),
         chosen,
         at: settings.at_n_per_m.map(evaluate),
         rank,

@@ -129,6 +129,7 @@ fn measure(name: &str, case: &Case) -> Result<Value, Failure> {
     let problem = case.problem();
     let settings = Settings::default();
     let jnd = lambda::solve(&problem, &settings)?
+        .constants
         .lambda_jnd_n_per_m
         .ok_or("no lambda_jnd")?;
     let curve: Vec<f64> = (1..=CURVE)

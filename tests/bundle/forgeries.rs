@@ -15,6 +15,7 @@ use fluxform::bundle::table::{CurrentRow, PointRow, write_currents, write_points
 use fluxform::design::{Design, Need};
 use fluxform::job::calibrate::{self, CalibrateOptions, DesignSource, ShapeSource};
 use fluxform::job::verify::{Verifier, VerifyOptions};
+use fluxform::lambda::Criterion;
 use fluxform::progress::Silent;
 use fluxform::shape::document::ShapeDocument;
 
@@ -342,19 +343,19 @@ const FORGERIES: &[Forgery] = &[
         p.same_lambda();
     }),
     ("lambda by linear", Noticed, |p| {
-        twice(&mut p.lambda.lambda_linear_n_per_m)
+        twice(&mut p.lambda.constants.lambda_linear_n_per_m)
     }),
     ("lambda by jnd", Noticed, |p| {
-        twice(&mut p.lambda.lambda_jnd_n_per_m)
+        twice(&mut p.lambda.constants.lambda_jnd_n_per_m)
     }),
     ("lambda by saturation", Noticed, |p| {
-        twice(&mut p.lambda.lambda_saturation_n_per_m)
+        twice(&mut p.lambda.constants.lambda_saturation_n_per_m)
     }),
     ("lambda by maxmin", Noticed, |p| {
-        p.lambda.lambda_maxmin_n_per_m = Some(3.3)
+        p.lambda.constants.lambda_maxmin_n_per_m = Some(3.3)
     }),
     ("lambda's floor", Noticed, |p| {
-        twice(&mut p.lambda.lambda_floor_n_per_m)
+        twice(&mut p.lambda.constants.lambda_floor_n_per_m)
     }),
     ("lambda by the worst point", Noticed, |p| {
         twice(&mut p.lambda.worst_point.as_mut().unwrap().lambda_linear_n_per_m);
@@ -363,12 +364,8 @@ const FORGERIES: &[Forgery] = &[
         p.lambda.tolerance.as_mut().unwrap().lambda_n_per_m = Some(7.7);
     }),
     ("the criterion's name", Noticed, |p| {
-        p.lambda.criterion = "linear".into();
-        p.manifest.lambda.criterion = "linear".into();
-    }),
-    ("a criterion that is none", Noticed, |p| {
-        p.lambda.criterion = "best".into();
-        p.manifest.lambda.criterion = "best".into();
+        p.lambda.criterion = Criterion::Linear;
+        p.manifest.lambda.criterion = Criterion::Linear;
     }),
     ("the just-noticeable difference", Noticed, |p| {
         p.lambda.jnd = 0.08

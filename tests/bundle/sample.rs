@@ -14,6 +14,7 @@ use fluxform::bundle::rendering::{HeightGrid, Rendering};
 use fluxform::bundle::table::{CurrentRow, PointRow};
 use fluxform::bundle::timing::StageSeconds;
 use fluxform::bundle::write::{BundleContent, write_bundle};
+use fluxform::lambda::{Criterion, ForceConstants};
 use fluxform::numerics::axis::Axis;
 
 /// A small bundle of an analytic field: a magnetic charge below each coil.
@@ -144,13 +145,15 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
         design: "a".to_owned(),
         shape: "b".to_owned(),
         inputs: inputs.clone(),
-        lambda_linear_n_per_m: Some(4.9429),
-        lambda_jnd_n_per_m: Some(6.007),
-        lambda_saturation_n_per_m: Some(5.9878),
-        lambda_maxmin_n_per_m: Some(6.1),
-        lambda_floor_n_per_m: None,
+        constants: ForceConstants {
+            lambda_linear_n_per_m: Some(4.9429),
+            lambda_jnd_n_per_m: Some(6.007),
+            lambda_saturation_n_per_m: Some(5.9878),
+            lambda_maxmin_n_per_m: Some(6.1),
+            lambda_floor_n_per_m: None,
+        },
         lambda_n_per_m: Some(5.9878),
-        criterion: "saturation".to_owned(),
+        criterion: Criterion::Saturation,
         jnd: 0.07,
         currents_a: Some(currents_a),
         rms_error_n: Some(0.0071),
@@ -212,7 +215,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
         },
         lambda: LambdaSummary {
             lambda_n_per_m: Some(5.9878),
-            criterion: "saturation".to_owned(),
+            criterion: Criterion::Saturation,
         },
         points: points_grid,
         map: MapSummary {

@@ -7,6 +7,7 @@ use std::process::{Command, Stdio};
 use fluxform::bundle::artefact::{Input, sha256_hex};
 use fluxform::bundle::atomic::{Overwrite, WriteError, write};
 use fluxform::bundle::load::Bundle;
+use fluxform::lambda::Criterion;
 use serde_json::json;
 
 use crate::sample::*;
@@ -20,11 +21,11 @@ fn a_bundle_is_replaced_only_when_it_is_ours_and_the_users_files_stay() {
     fs::create_dir(target.join("notes")).unwrap();
     fs::write(target.join("notes/mine.txt"), "felt good").unwrap();
     fs::write(target.join("scan.csv"), "x_m\n").unwrap();
-    sample.manifest.lambda.criterion = "linear".to_owned();
+    sample.manifest.lambda.criterion = Criterion::Linear;
     sample.write(&target, false).unwrap();
     assert_eq!(
         Bundle::open(&target).unwrap().manifest.lambda.criterion,
-        "linear"
+        Criterion::Linear
     );
     assert_eq!(
         fs::read_to_string(target.join("notes/mine.txt")).unwrap(),

@@ -4,29 +4,37 @@ use fluxform::bundle::artefact::SCHEMA_VERSION;
 
 use crate::support::Place;
 
-const COMMANDS: [&str; 13] = [
-    "evaluate",
-    "probe",
-    "map",
-    "discretize",
-    "lambda",
-    "calibrate",
-    "compare",
-    "verify",
-    "replay",
-    "sweep",
-    "bench",
-    "completions",
-    "man",
-];
+/// Every command that the program takes, with the commands below it: `sweep`, `sweep plan`.
+fn commands() -> Vec<Vec<String>> {
+    fn below(command: &clap::Command, path: &[String], all: &mut Vec<Vec<String>>) {
+        for next in command.get_subcommands() {
+            let mut path = path.to_vec();
+            path.push(next.get_name().to_owned());
+            all.push(path.clone());
+            below(next, &path, all);
+        }
+    }
+    let mut all = Vec::new();
+    below(&fluxform::cli::command(), &[], &mut all);
+    assert!(all.len() > 15, "{all:?}");
+    all
+}
+
+fn help_of(place: &Place, path: &[String]) -> String {
+    let mut arguments: Vec<&str> = path.iter().map(String::as_str).collect();
+    arguments.push("--help");
+    place.run(&arguments).ends(0).out
+}
 
 #[test]
 fn every_command_explains_itself() {
     let place = Place::new();
     let main = place.run(&["--help"]).ends(0).out;
-    for command in COMMANDS {
-        assert!(main.contains(&format!("\n  {command} ")), "{main}");
-        let page = place.run(&[command, "--help"]).ends(0).out;
+    for path in commands() {
+        let (command, page) = (path.join(" "), help_of(&place, &path));
+        if path.len() == 1 {
+            assert!(main.contains(&format!("\n  {command} ")), "{main}");
+        }
         for part in ["Usage:", "Exit codes:", "Examples:", "--quiet"] {
             assert!(page.contains(part), "{command}: {part}");
         }
@@ -49,9 +57,16 @@ fn every_command_explains_itself() {
 #[test]
 fn every_example_works() {
     let place = Place::new();
-    for command in COMMANDS {
-        let page = place.run(&[command, "--help"]).ends(0).out;
+    for path in commands() {
+        let page = help_of(&place, &path);
         let examples = page.split("Examples:").nth(1).unwrap();
+        for line in examples.lines() {
+            assert!(
+                line.trim().len() < 98,
+                "wrapped on a usual terminal: {line}"
+            );
+        }
+        let examples = examples.replace("\\\n", "");
         let lines: Vec<&str> = examples
             .lines()
             .map(str::trim)
@@ -59,7 +74,6 @@ fn every_example_works() {
             .collect();
         assert!(lines.len() >= 2, "{examples}");
         for line in lines {
-            assert!(line.len() < 98, "wrapped on a usual terminal: {line}");
             let ran = place.shell(line);
             assert_eq!(ran.code, Some(0), "{line}: {ran:#?}");
         }
@@ -85,8 +99,8 @@ fn completions_and_manual_pages() {
     place.run(&["completions", "csh"]).ends(2);
     assert!(place.run(&["man"]).ends(0).out.contains(".TH fluxform 1"));
     place.run(&["man", "--out", "man1"]).ends(0);
-    let steps = ["sweep-plan", "sweep-run", "sweep-merge"];
-    for command in COMMANDS.into_iter().chain(steps) {
+    for path in commands() {
+        let command = path.join("-");
         let page = place.read(&format!("man1/fluxform-{command}.1"));
         let page = String::from_utf8(page).unwrap();
         assert!(

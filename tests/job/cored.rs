@@ -147,9 +147,9 @@ fn flat(text: &str) -> [f64; 3] {
         .expect("solves")
         .file;
     [
-        file.lambda_linear_n_per_m,
-        file.lambda_jnd_n_per_m,
-        file.lambda_saturation_n_per_m,
+        file.constants.lambda_linear_n_per_m,
+        file.constants.lambda_jnd_n_per_m,
+        file.constants.lambda_saturation_n_per_m,
     ]
     .map(|lambda| lambda.expect("a limit binds"))
 }

@@ -150,7 +150,7 @@ fn the_symmetric_array_changes_four_coils_at_once() {
     assert_eq!(path[0].events.len(), 9);
     assert_eq!(path[0].events[3].to_string(), "coil 3 leaves zero");
     let last = path[path.len() - 1].lambda_n_per_m;
-    assert_eq!(solution.lambda_saturation_n_per_m, Some(last));
+    assert_eq!(solution.constants.lambda_saturation_n_per_m, Some(last));
 }
 
 #[test]
@@ -158,9 +158,9 @@ fn force_constants_scale_as_the_equations_do() {
     let base = array_case(&square_array(3, 0.05), &flat_points(15, 0.05));
     let all = |s: &Solution| {
         [
-            s.lambda_linear_n_per_m,
-            s.lambda_jnd_n_per_m,
-            s.lambda_saturation_n_per_m,
+            s.constants.lambda_linear_n_per_m,
+            s.constants.lambda_jnd_n_per_m,
+            s.constants.lambda_saturation_n_per_m,
         ]
         .map(|v| v.expect("limits bind"))
     };
@@ -271,7 +271,7 @@ fn thousands_of_points_do_not_wear_the_sums_down() {
             point.rms_error_n,
             point.worst_error_n,
             point.duality_gap_n2,
-            s.lambda_jnd_n_per_m,
+            s.constants.lambda_jnd_n_per_m,
         )
     };
     assert_eq!(

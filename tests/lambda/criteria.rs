@@ -232,9 +232,18 @@ fn broken_coils_and_pairs_are_the_problems_without_and_with_sums() {
         let worst = [&wired, &by_hand.problem()]
             .map(|problem| worst_point(problem, &settings).expect("well formed"));
         let pairs = [
-            (a.lambda_linear_n_per_m, b.lambda_linear_n_per_m),
-            (a.lambda_jnd_n_per_m, b.lambda_jnd_n_per_m),
-            (a.lambda_maxmin_n_per_m, b.lambda_maxmin_n_per_m),
+            (
+                a.constants.lambda_linear_n_per_m,
+                b.constants.lambda_linear_n_per_m,
+            ),
+            (
+                a.constants.lambda_jnd_n_per_m,
+                b.constants.lambda_jnd_n_per_m,
+            ),
+            (
+                a.constants.lambda_maxmin_n_per_m,
+                b.constants.lambda_maxmin_n_per_m,
+            ),
             (worst[0].lambda_jnd_n_per_m, worst[1].lambda_jnd_n_per_m),
         ];
         for (a, b) in pairs {
@@ -319,7 +328,7 @@ fn bad_inputs_have_answers_in_every_form() {
         let close = |found: f64, expected: f64| {
             assert!((found / expected - 1.0).abs() < 1e-13, "{found} {expected}");
         };
-        close(mean.lambda_linear_n_per_m.expect("binds"), most);
+        close(mean.constants.lambda_linear_n_per_m.expect("binds"), most);
         close(worst.lambda_linear_n_per_m.expect("binds"), most);
         close(worst.lambda_jnd_n_per_m.expect("binds"), most / 0.93);
         close(least.expect("possible").lambda_n_per_m, most);

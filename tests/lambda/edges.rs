@@ -19,9 +19,9 @@ fn plain_case() -> Case {
 
 fn all_lambdas(s: &Solution) -> [Option<f64>; 3] {
     [
-        s.lambda_linear_n_per_m,
-        s.lambda_jnd_n_per_m,
-        s.lambda_saturation_n_per_m,
+        s.constants.lambda_linear_n_per_m,
+        s.constants.lambda_jnd_n_per_m,
+        s.constants.lambda_saturation_n_per_m,
     ]
 }
 
@@ -40,7 +40,10 @@ fn nothing_to_render_and_nothing_wanted_are_results() {
     let solution = flat.solve();
     assert_eq!(solution.status, Status::NothingWanted);
     assert_eq!(
-        (all_lambdas(&solution), solution.lambda_floor_n_per_m),
+        (
+            all_lambdas(&solution),
+            solution.constants.lambda_floor_n_per_m
+        ),
         ([None; 3], None)
     );
     assert_eq!(solution.path.error_n2(7.0), 0.0);
@@ -73,7 +76,10 @@ fn no_noticeable_difference_at_all_is_the_linear_constant() {
     for seed in 0..400 {
         let case = small_case(seed);
         let all = solve(&case.problem(), &settings).unwrap();
-        assert_eq!(all.lambda_jnd_n_per_m, all.lambda_linear_n_per_m, "{seed}");
+        assert_eq!(
+            all.constants.lambda_jnd_n_per_m, all.constants.lambda_linear_n_per_m,
+            "{seed}"
+        );
         let worst = worst_point(&case.problem(), &settings).unwrap();
         let pair = (worst.lambda_jnd_n_per_m, worst.lambda_linear_n_per_m);
         assert_eq!(pair.0, pair.1, "{seed}");
@@ -111,16 +117,21 @@ fn one_point_and_one_coil_have_closed_forms() {
     let solution = point.solve();
     assert_eq!(solution.rank, 1);
     let close = |a: Option<f64>, b: f64| (a.expect("binds") / b - 1.0).abs() < 1e-14;
-    assert!(close(solution.lambda_linear_n_per_m, most / 0.05));
-    assert!(close(solution.lambda_saturation_n_per_m, most / 0.05));
+    assert!(close(solution.constants.lambda_linear_n_per_m, most / 0.05));
+    assert!(close(
+        solution.constants.lambda_saturation_n_per_m,
+        most / 0.05
+    ));
     // (lambda h - most)^2 = w^2 lambda^2 h^2.
     assert!(close(
-        solution.lambda_jnd_n_per_m,
+        solution.constants.lambda_jnd_n_per_m,
         most / 0.05 / (1.0 - 0.07)
     ));
     let chosen = solution.chosen.expect("binds");
     assert!((chosen.relative_rms_error.expect("positive") / 0.07 - 1.0).abs() < 1e-12);
-    assert!((solution.lambda_floor_n_per_m.expect("positive") - 0.8e-3 / 0.05).abs() < 1e-16);
+    assert!(
+        (solution.constants.lambda_floor_n_per_m.expect("positive") - 0.8e-3 / 0.05).abs() < 1e-16
+    );
     // Least power at one point: currents as force over resistance.
     let currents = solution.path.currents_a(4.0);
     assert!(
@@ -150,7 +161,7 @@ fn the_criterion_chooses() {
             Criterion::Jnd => jnd,
             Criterion::Linear => linear,
             Criterion::Saturation => saturation,
-            Criterion::Maxmin => solution.lambda_maxmin_n_per_m,
+            Criterion::Maxmin => solution.constants.lambda_maxmin_n_per_m,
         };
         assert_eq!(Some(chosen.lambda_n_per_m), expected);
         let at = solution.at.expect("asked for");
@@ -162,7 +173,10 @@ fn the_criterion_chooses() {
         ..Settings::default()
     };
     let solution = solve(&case.problem(), &strict).expect("well formed");
-    assert_eq!(solution.lambda_jnd_n_per_m, solution.lambda_linear_n_per_m);
+    assert_eq!(
+        solution.constants.lambda_jnd_n_per_m,
+        solution.constants.lambda_linear_n_per_m
+    );
 }
 
 #[test]
@@ -220,7 +234,13 @@ fn a_gain_beyond_what_can_be_computed_is_refused() {
         case.forces.iter_mut().step_by(2).for_each(|g| *g *= gain);
         case
     };
-    let linear = |gain: f64| weak(gain).solve().lambda_linear_n_per_m.expect("binds");
+    let linear = |gain: f64| {
+        weak(gain)
+            .solve()
+            .constants
+            .lambda_linear_n_per_m
+            .expect("binds")
+    };
     let unit = linear(1e-3) / 1e-3;
     for gain in [1e-6, 1e-12, 1e-18] {
         let off = (linear(gain) / gain / unit - 1.0).abs();

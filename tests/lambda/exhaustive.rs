@@ -54,10 +54,13 @@ fn check_criteria(seed: u64, case: &Case, search: &Search, solution: &Solution) 
     let turns = telling_lambdas(solution);
     let far = turns[turns.len() - 1] * 1e3;
     if case.mean_square() == 0.0 {
-        assert!(solution.lambda_jnd_n_per_m.is_none() && solution.lambda_linear_n_per_m.is_none());
+        assert!(
+            solution.constants.lambda_jnd_n_per_m.is_none()
+                && solution.constants.lambda_linear_n_per_m.is_none()
+        );
         return;
     }
-    match solution.lambda_linear_n_per_m {
+    match solution.constants.lambda_linear_n_per_m {
         None => assert!(
             search.excess(far) < 1e-13,
             "{seed}: a limit binds; {case:?}"
@@ -82,7 +85,7 @@ fn check_criteria(seed: u64, case: &Case, search: &Search, solution: &Solution) 
             );
         }
     }
-    match solution.lambda_jnd_n_per_m {
+    match solution.constants.lambda_jnd_n_per_m {
         None => assert!(search.excess(far) <= 0.0049 + 1e-12, "{seed}: {case:?}"),
         Some(jnd) => {
             if jnd > 0.0 {
@@ -101,8 +104,8 @@ fn check_criteria(seed: u64, case: &Case, search: &Search, solution: &Solution) 
             }
         }
     }
-    match solution.lambda_saturation_n_per_m {
-        None => assert!(solution.lambda_linear_n_per_m.is_none(), "{seed}"),
+    match solution.constants.lambda_saturation_n_per_m {
+        None => assert!(solution.constants.lambda_linear_n_per_m.is_none(), "{seed}"),
         Some(last) => {
             // Beyond it the same currents stay best.
             let currents: Vec<D> = solution
@@ -157,13 +160,13 @@ fn an_offset_is_compensated_exactly() {
             let scale = lambda * lambda * case.mean_square() + offset_square;
             (search.least_error(lambda, true) - search.least_error(lambda, false)) / scale
         };
-        if let Some(linear) = solution.lambda_linear_n_per_m {
+        if let Some(linear) = solution.constants.lambda_linear_n_per_m {
             assert!(
                 excess(linear * (1.0 - 1e-9)) < 1e-14 || linear == 0.0,
                 "{seed}: {case:?}"
             );
         }
-        if let Some(jnd) = solution.lambda_jnd_n_per_m {
+        if let Some(jnd) = solution.constants.lambda_jnd_n_per_m {
             let over = |lambda: f64| search.excess(lambda) - 0.0049;
             assert!(jnd == 0.0 || over(jnd) < 1e-12, "{seed}: {case:?}");
             assert!(

@@ -47,16 +47,29 @@ fn turned_magnets_and_reversed_drivers_mirror_every_constant() {
         let other = mirrored(&case);
         let (a, b) = (case.solve(), other.solve());
         assert_eq!((a.status, a.rank), (b.status, b.rank), "{seed}: {case:?}");
-        found += usize::from(a.lambda_linear_n_per_m.is_some() && a.status == Status::Solved);
+        found +=
+            usize::from(a.constants.lambda_linear_n_per_m.is_some() && a.status == Status::Solved);
         let compare = |a, b, what| close(a, b, seed, what, &case);
-        compare(a.lambda_linear_n_per_m, b.lambda_linear_n_per_m, "linear");
-        compare(a.lambda_jnd_n_per_m, b.lambda_jnd_n_per_m, "jnd");
         compare(
-            a.lambda_saturation_n_per_m,
-            b.lambda_saturation_n_per_m,
+            a.constants.lambda_linear_n_per_m,
+            b.constants.lambda_linear_n_per_m,
+            "linear",
+        );
+        compare(
+            a.constants.lambda_jnd_n_per_m,
+            b.constants.lambda_jnd_n_per_m,
+            "jnd",
+        );
+        compare(
+            a.constants.lambda_saturation_n_per_m,
+            b.constants.lambda_saturation_n_per_m,
             "saturation",
         );
-        compare(a.lambda_maxmin_n_per_m, b.lambda_maxmin_n_per_m, "maxmin");
+        compare(
+            a.constants.lambda_maxmin_n_per_m,
+            b.constants.lambda_maxmin_n_per_m,
+            "maxmin",
+        );
         let largest = |case: &Case| maxmin(&case.problem()).unwrap().map(|m| m.lambda_n_per_m);
         compare(largest(&case), largest(&other), "maxmin alone");
         if let (Some(x), Some(y), true) = (&a.chosen, &b.chosen, a.rank == case.coils()) {

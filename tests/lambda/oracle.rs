@@ -65,8 +65,14 @@ fn nine_coils_match_exact_rational_solutions() {
             );
         }
         for (found, exact_value) in [
-            (solution.lambda_linear_n_per_m, exact.lambda_linear_n_per_m),
-            (solution.lambda_jnd_n_per_m, exact.lambda_jnd_n_per_m),
+            (
+                solution.constants.lambda_linear_n_per_m,
+                exact.lambda_linear_n_per_m,
+            ),
+            (
+                solution.constants.lambda_jnd_n_per_m,
+                exact.lambda_jnd_n_per_m,
+            ),
         ] {
             if let Some(text) = exact_value {
                 let error = found.expect("limits bind") / number(&text) - 1.0;

@@ -82,7 +82,10 @@ fn coincident_coils_share_the_current_by_their_resistance() {
     let small = solution.path.currents_a(0.1);
     assert!((small[0] / small[2] - 3.0).abs() < 1e-13, "{small:?}");
     // The shared coil's limit costs nothing as long as its twin can take over.
-    let linear = solution.lambda_linear_n_per_m.expect("limits bind");
+    let linear = solution
+        .constants
+        .lambda_linear_n_per_m
+        .expect("limits bind");
     let currents = solution.path.currents_a(linear);
     assert!(
         (currents[2] - 0.01).abs() < 1e-13 && (currents[0] - 2.0).abs() < 1e-10
@@ -97,7 +100,7 @@ fn coincident_coils_share_the_current_by_their_resistance() {
     assert_eq!(again.rank, 2);
     let close = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-12;
     assert!(close(
-        again.lambda_linear_n_per_m.expect("limits bind"),
+        again.constants.lambda_linear_n_per_m.expect("limits bind"),
         linear
     ));
     assert!(

@@ -47,6 +47,7 @@ fn largest_change(a: &[f64], b: &[f64]) -> f64 {
 fn check(case: &Case, what: &str) -> Option<f64> {
     let solution = case.solve();
     let last = solution
+        .constants
         .lambda_saturation_n_per_m
         .filter(|&last| last > 0.0)?;
     let search = Search::new(case);
@@ -156,6 +157,7 @@ fn a_small_true_difference_still_counts() {
         };
         let last = case
             .solve()
+            .constants
             .lambda_saturation_n_per_m
             .expect("the sum binds");
         assert!(last > far, "{difference}: {last}");

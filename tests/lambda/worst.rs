@@ -399,8 +399,14 @@ fn weights_count_points_as_often_as_they_say() {
             "{seed}"
         );
         let pairs = [
-            (weighted.lambda_linear_n_per_m, plain.lambda_linear_n_per_m),
-            (weighted.lambda_jnd_n_per_m, plain.lambda_jnd_n_per_m),
+            (
+                weighted.constants.lambda_linear_n_per_m,
+                plain.constants.lambda_linear_n_per_m,
+            ),
+            (
+                weighted.constants.lambda_jnd_n_per_m,
+                plain.constants.lambda_jnd_n_per_m,
+            ),
         ];
         for (a, b) in pairs {
             assert_eq!(a.is_some(), b.is_some(), "{seed}: {case:?}");

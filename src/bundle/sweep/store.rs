@@ -22,6 +22,9 @@ const FOLDER: u64 = 1000;
 /// Larger files are no point of a sweep.
 const POINT_MAX_BYTES: u64 = 1 << 20;
 
+/// How often other runs may take a folder away before a point is in it.
+const FOLDER_ATTEMPTS: usize = 100;
+
 /// A sweep's folder.
 #[derive(Debug, Clone)]
 pub struct PointStore {
@@ -134,6 +137,22 @@ impl PointStore {
                 path: path.clone(),
                 message: error.to_string(),
             })?;
+        let mut folders = SharedFolders::default();
+        for _ in 0..FOLDER_ATTEMPTS {
+            match self.place(point, &bytes, force) {
+                // Another run that stopped took the empty folder away.
+                Err(WriteError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => {
+                    folders.make(&self.folder, &[POINTS, &subfolder(point.index)])?;
+                }
+                outcome => return outcome,
+            }
+        }
+        self.place(point, &bytes, force)
+    }
+
+    /// Writes the point's `bytes` into its folder, which must be there.
+    fn place(&self, point: &PointFile, bytes: &[u8], force: bool) -> Result<(), WriteError> {
+        let path = self.path(point.index);
         let fail = |error| WriteError::from_io("write", &path, error);
         let (dir, name) = (self.open(point.index).map_err(fail)?, name(point.index));
         match dir.status(&name).map_err(fail)?.map(|there| there.kind) {
@@ -149,7 +168,7 @@ impl PointStore {
                 return Err(WriteError::Protected { path, reason });
             }
         }
-        put(&dir, &name, false, |out| out.write_all(&bytes)).map_err(fail)
+        put(&dir, &name, false, |out| out.write_all(bytes)).map_err(fail)
     }
 }
 
@@ -181,6 +200,15 @@ fn name(index: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_folder_that_another_run_took_away_is_made_again() {
+        let place = tempfile::tempdir().unwrap();
+        let store = PointStore::new(place.path());
+        let point = PointFile::new("00", 7, Err("too small".to_owned()));
+        store.write(&point, false).unwrap();
+        assert!(store.path(7).is_file());
+    }
 
     #[test]
     fn a_thousand_points_to_a_folder() {

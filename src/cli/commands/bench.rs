@@ -136,7 +136,8 @@ fn said(estimate: Estimate) -> String {
 fn summary(file: &BenchFile, folder: &str) -> String {
     let mut sheet = Sheet::new(&format!(
         "{}: error against processor time (lambda by the criterion {})",
-        file.design, file.criterion
+        file.design,
+        file.criterion.name()
     ));
     for shape in &file.shapes {
         of_shape(&mut sheet, shape);

@@ -16,7 +16,7 @@ use crate::cli::budget::{allow, asked, costs};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
-use crate::cli::layout::{Sheet, Side, table};
+use crate::cli::layout::{Sheet, headed_table};
 use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{
     bytes, count, error, force, length_error, mm, number, number_to, percent,
@@ -28,6 +28,7 @@ use crate::job::calibrate::{
 };
 use crate::job::cost::{Components, of_map};
 use crate::job::plan::{Cost, Done, Plan, plan};
+use crate::lambda::{Criterion, ForceConstants};
 
 /// The main job: maps, points, force constant and currents, one bundle a shape
 ///
@@ -99,11 +100,9 @@ struct BundleSummary<'a> {
     folder: String,
     points: usize,
     outside: usize,
-    criterion: &'a str,
-    lambda_linear_n_per_m: Option<f64>,
-    lambda_jnd_n_per_m: Option<f64>,
-    lambda_saturation_n_per_m: Option<f64>,
-    lambda_floor_n_per_m: Option<f64>,
+    criterion: Criterion,
+    #[serde(flatten)]
+    constants: ForceConstants,
     lambda_n_per_m: Option<f64>,
     currents_a: Option<&'a [f64]>,
     rms_error_n: Option<f64>,
@@ -249,11 +248,8 @@ fn bundle_summary(bundle: &BundleReport) -> BundleSummary<'_> {
         folder: bundle.folder.display().to_string(),
         points: file.points,
         outside: bundle.lambda.points.summary.outside,
-        criterion: &file.criterion,
-        lambda_linear_n_per_m: file.lambda_linear_n_per_m,
-        lambda_jnd_n_per_m: file.lambda_jnd_n_per_m,
-        lambda_saturation_n_per_m: file.lambda_saturation_n_per_m,
-        lambda_floor_n_per_m: file.lambda_floor_n_per_m,
+        criterion: file.criterion,
+        constants: file.constants,
         lambda_n_per_m: file.lambda_n_per_m,
         currents_a: file.currents_a.as_deref(),
         rms_error_n: file.rms_error_n,
@@ -278,6 +274,8 @@ fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> String {
     sheet.gap();
     sheet.raw(&shapes_table(report));
     sheet.gap();
+    sheet.raw(&constants_table(report));
+    sheet.gap();
     let Some(first) = report.bundles.first() else {
         return sheet.finish();
     };
@@ -286,7 +284,7 @@ fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> String {
         "lambda",
         &format!(
             "chosen by {}; errors are of the force, relative to the rms force",
-            describe::criterion(&file.criterion, file.jnd)
+            file.criterion.described(&percent(file.jnd))
         ),
     );
     sheet.line("accuracy", &accuracies(report));
@@ -334,39 +332,44 @@ fn told_of(shape: &str, part: &str, report: &CalibrateReport) -> String {
     }
 }
 
+/// What was chosen, one row per shape.
 fn shapes_table(report: &CalibrateReport) -> String {
-    let head = [
-        "shape",
-        "points",
-        "lambda N/m",
-        "linear",
-        "saturation",
-        "rms mN",
-        "relative",
-        "worst mN",
-        "at limit",
-    ];
     let or_none = |value: Option<String>| value.unwrap_or_else(|| "none".to_owned());
     let row = |bundle: &BundleReport| {
         let file = &bundle.lambda.file;
         vec![
-            file.shape.clone(),
-            file.points.to_string(),
-            or_none(file.lambda_n_per_m.map(number)),
-            or_none(file.lambda_linear_n_per_m.map(number)),
-            or_none(file.lambda_saturation_n_per_m.map(number)),
-            or_none(file.rms_error_n.map(|n| number(n * 1000.0))),
-            or_none(file.relative_rms_error.map(percent)),
-            or_none(file.worst_error_n.map(|n| number(n * 1000.0))),
-            or_none(at_limit(bundle)),
+            ("shape", file.shape.clone()),
+            ("points", file.points.to_string()),
+            ("lambda N/m", or_none(file.lambda_n_per_m.map(number))),
+            (
+                "rms mN",
+                or_none(file.rms_error_n.map(|n| number(n * 1000.0))),
+            ),
+            ("relative", or_none(file.relative_rms_error.map(percent))),
+            (
+                "worst mN",
+                or_none(file.worst_error_n.map(|n| number(n * 1000.0))),
+            ),
+            ("at limit", or_none(at_limit(bundle))),
         ]
     };
-    let rows: Vec<Vec<String>> = std::iter::once(head.map(str::to_owned).to_vec())
-        .chain(report.bundles.iter().map(row))
-        .collect();
-    let mut sides = [Side::Right; 9];
-    sides[0] = Side::Left;
-    table(&sides, &rows)
+    headed_table(report.bundles.iter().map(row))
+}
+
+/// Every force constant, one row per shape.
+fn constants_table(report: &CalibrateReport) -> String {
+    let row = |bundle: &BundleReport| {
+        let file = &bundle.lambda.file;
+        let named = file.constants.named().into_iter().map(|one| {
+            let lambda = one.lambda_n_per_m.map_or_else(|| "none".to_owned(), number);
+            (one.name, lambda)
+        });
+        [("lambda N/m", file.shape.clone())]
+            .into_iter()
+            .chain(named)
+            .collect()
+    };
+    headed_table(report.bundles.iter().map(row))
 }
 
 /// How many coils carry all they may, and whether their sum does.

@@ -3,7 +3,7 @@
 use crate::accuracy::StageAccuracy;
 use crate::bundle::manifest::{AxisSummary, LeftOut};
 use crate::cli::layout::grid;
-use crate::cli::quantity::{count, error, length_error, mm, number, percent};
+use crate::cli::quantity::{count, error, length_error, mm, number};
 use crate::design::Design;
 
 /// Coils beyond this many are told in sum, not one by one.
@@ -126,13 +126,4 @@ pub fn force_constant(lambda_n_per_m: Option<f64>) -> String {
         || "none".to_owned(),
         |lambda| format!("{} N/m", number(lambda)),
     )
-}
-
-/// How the force constant was chosen.
-pub fn criterion(name: &str, jnd: f64) -> String {
-    if name == "jnd" {
-        format!("jnd at {}", percent(jnd))
-    } else {
-        name.to_owned()
-    }
 }

@@ -2,7 +2,7 @@
 
 use std::slice::from_ref;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::{accuracy_check, begin, describe};
 use crate::bundle::lambda_file::{
@@ -14,7 +14,7 @@ use crate::cli::budget::{allow, asked, costs};
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
-use crate::cli::layout::{Sheet, Side, table};
+use crate::cli::layout::{Sheet, headed_table};
 use crate::cli::pictures::Picture;
 use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{count, force, mm, number, number_to, percent};
@@ -106,8 +106,9 @@ struct FeedbackFlags {
 #[derive(Debug, Clone, Copy, Args)]
 pub struct CriterionFlags {
     /// Which force constant is chosen
-    #[arg(long, value_enum, default_value_t = Wanted::Jnd)]
-    criterion: Wanted,
+    #[arg(long, value_name = "NAME", default_value = Criterion::default().name(),
+          value_parser = values::criterion())]
+    criterion: Criterion,
     /// Just-noticeable difference: the error that saturation may add, relative to the rms force
     #[arg(long, value_name = "PART", default_value_t = crate::units::FORCE_JND,
           value_parser = values::jnd, allow_hyphen_values = true)]
@@ -118,31 +119,13 @@ pub struct CriterionFlags {
     at: Option<f64>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Wanted {
-    /// The largest at which saturation adds less than a just-noticeable difference
-    Jnd,
-    /// The largest at which no limit binds
-    Linear,
-    /// The largest at which a current still changes
-    Saturation,
-    /// The largest with no point too weak; its currents may push too much elsewhere
-    Maxmin,
-}
-
 impl CriterionFlags {
     /// The settings that the flags ask for.
     #[must_use]
     pub fn options(self, tolerance: Option<f64>) -> LambdaOptions {
-        let criterion = match self.criterion {
-            Wanted::Jnd => Criterion::Jnd,
-            Wanted::Linear => Criterion::Linear,
-            Wanted::Saturation => Criterion::Saturation,
-            Wanted::Maxmin => Criterion::Maxmin,
-        };
         LambdaOptions {
             settings: Settings {
-                criterion,
+                criterion: self.criterion,
                 jnd_weight: self.jnd,
                 at_n_per_m: self.at,
             },
@@ -255,19 +238,13 @@ fn summary(design: &Design, report: &LambdaReport) -> String {
         file.design,
         describe::force_constant(file.lambda_n_per_m)
     ));
-    let constants = [
-        ("linear", file.lambda_linear_n_per_m),
-        ("jnd", file.lambda_jnd_n_per_m),
-        ("saturation", file.lambda_saturation_n_per_m),
-        ("maxmin", file.lambda_maxmin_n_per_m),
-        ("floor", file.lambda_floor_n_per_m),
-    ];
-    let constants = constants.map(|(name, lambda)| {
-        let told = lambda.map_or_else(|| "none".to_owned(), number);
-        format!("{name} {told}")
+    let constants = file.constants.named().into_iter().map(|one| {
+        let lambda = one.lambda_n_per_m.map_or_else(|| "none".to_owned(), number);
+        format!("{} {lambda}", one.name)
     });
+    let constants: Vec<String> = constants.collect();
     sheet.line("lambda", &format!("{} N/m", constants.join(", ")));
-    sheet.line("chosen by", &describe::criterion(&file.criterion, file.jnd));
+    sheet.line("chosen by", &file.criterion.described(&percent(file.jnd)));
     operating_point(&mut sheet, report);
     if let Some(worst) = &file.worst_point {
         sheet.line("worst point", &worst_point(worst));
@@ -436,42 +413,30 @@ fn not_felt(told: &TolerancePoint) -> String {
     }
 }
 
-/// One line a variant.
+/// One row per variant.
 fn table_of(variants: &[LambdaVariant]) -> String {
-    let head = [
-        "N/m, W",
-        "lambda",
-        "change",
-        "linear",
-        "jnd",
-        "saturation",
-        "maxmin",
-        "worst-point jnd",
-        "rms error",
-        "worst error",
-        "power",
-    ];
-    let told = |value: Option<f64>| value.map_or_else(|| "none".to_owned(), |v| number_to(v, 4));
-    let mut rows = vec![head.map(str::to_owned).to_vec()];
-    rows.extend(variants.iter().map(|v| {
-        vec![
-            v.name.clone(),
-            told(v.lambda_n_per_m),
-            v.relative_change.map_or_else(|| "none".to_owned(), percent),
-            told(v.lambda_linear_n_per_m),
-            told(v.lambda_jnd_n_per_m),
-            told(v.lambda_saturation_n_per_m),
-            told(v.lambda_maxmin_n_per_m),
-            told(v.worst_point_lambda_jnd_n_per_m),
-            v.relative_rms_error
-                .map_or_else(|| "none".to_owned(), percent),
-            v.worst_error_n.map_or_else(|| "none".to_owned(), force),
-            told(v.power_w),
-        ]
-    }));
-    let mut sides = [Side::Right; 11];
-    sides[0] = Side::Left;
-    table(&sides, &rows)
+    let or_none =
+        |value: Option<f64>, show: fn(f64) -> String| value.map_or_else(|| "none".to_owned(), show);
+    let lambda = |value| or_none(value, |v| number_to(v, 4));
+    let row = |v: &LambdaVariant| {
+        let constants = Criterion::ALL
+            .iter()
+            .map(|&criterion| (criterion.name(), lambda(v.constants.of(criterion))));
+        let mut row = vec![
+            ("N/m, W", v.name.clone()),
+            ("lambda", lambda(v.lambda_n_per_m)),
+            ("change", or_none(v.relative_change, percent)),
+        ];
+        row.extend(constants);
+        row.extend([
+            ("worst-point jnd", lambda(v.worst_point_lambda_jnd_n_per_m)),
+            ("rms error", or_none(v.relative_rms_error, percent)),
+            ("worst error", or_none(v.worst_error_n, force)),
+            ("power", lambda(v.power_w)),
+        ]);
+        row
+    };
+    headed_table(variants.iter().map(row))
 }
 
 /// What currents for the worst point would do instead.

@@ -9,13 +9,14 @@ use crate::bundle::table::{Column, write_columns};
 use crate::coil::limits;
 use crate::job::lambda::LambdaReport;
 use crate::job::scene::Scene;
+use crate::lambda::NamedConstant;
 use crate::map::FieldMap;
 use crate::plot::lambda::LambdaPlot;
 use crate::plot::plane::{Cells, Panel, PlanePlot, Together};
 use crate::report::bundle::page;
 use crate::report::data::{
-    Breakpoint, BudgetPart, BundleFacts, Chosen, CoilFacts, Constant, Deciding, LimitFacts,
-    StageFacts, WorstPlace,
+    Breakpoint, BudgetPart, BundleFacts, Chosen, CoilFacts, Deciding, LimitFacts, StageFacts,
+    WorstPlace,
 };
 use crate::report::field::{Field, Layer};
 use crate::report::surface::Surface;
@@ -87,7 +88,7 @@ fn facts<'a>(seen: &'a Seen, files: Vec<&'a str>) -> BundleFacts<'a> {
             .iter()
             .map(|input| (input.path.as_str(), input.sha256.as_str()))
             .collect(),
-        criterion: &file.criterion,
+        criterion: file.criterion,
         jnd: file.jnd,
         chosen: chosen(seen),
         rank: file.rank,
@@ -163,58 +164,31 @@ fn chosen(seen: &Seen) -> Option<Chosen> {
     })
 }
 
-fn constants(file: &LambdaFile) -> Vec<Constant> {
+fn constants(file: &LambdaFile) -> Vec<NamedConstant> {
     let worst = file.worst_point.as_ref();
-    let named = [
-        (
-            "linear",
-            "where the first limit binds",
-            file.lambda_linear_n_per_m,
-        ),
-        (
-            "jnd",
-            "the largest at which limits add less than a just-noticeable difference",
-            file.lambda_jnd_n_per_m,
-        ),
-        (
-            "saturation",
-            "where no coil can follow any more",
-            file.lambda_saturation_n_per_m,
-        ),
-        (
-            "maxmin",
-            "the largest with no point too weak",
-            file.lambda_maxmin_n_per_m,
-        ),
-        (
-            "floor",
-            "below it the weakest point is not felt",
-            file.lambda_floor_n_per_m,
-        ),
+    let more = [
         (
             "tolerance",
-            "the largest whose errors are not felt at any point",
+            "The largest whose errors are not felt at any point",
             file.tolerance.as_ref().and_then(|t| t.lambda_n_per_m),
         ),
         (
             "linear, worst point",
-            "where the first limit binds if the largest error is to be least",
+            "Where the first limit binds if the largest error is to be least",
             worst.and_then(|worst| worst.lambda_linear_n_per_m),
         ),
         (
             "jnd, worst point",
-            "the same as jnd if the largest error is to be least",
+            "The same as jnd if the largest error is to be least",
             worst.and_then(|worst| worst.lambda_jnd_n_per_m),
         ),
     ];
-    named
-        .into_iter()
-        .map(|(name, meaning, lambda_n_per_m)| Constant {
-            name,
-            meaning,
-            lambda_n_per_m,
-        })
-        .collect()
+    let more = more.map(|(name, meaning, lambda_n_per_m)| NamedConstant {
+        name,
+        meaning,
+        lambda_n_per_m,
+    });
+    file.constants.named().into_iter().chain(more).collect()
 }
 
 fn coils(scene: &Scene, file: &LambdaFile) -> Vec<CoilFacts> {

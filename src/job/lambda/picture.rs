@@ -1,7 +1,7 @@
 //! `lambda --plot`: what is drawn of a solved object.
 
 use crate::bundle::lambda_file::LambdaFile;
-use crate::lambda::{ForceProblem, Solution};
+use crate::lambda::{Criterion, ForceProblem, Solution};
 use crate::plot::lambda::{ChosenForces, Constant, ErrorMap, LambdaPlot};
 use crate::plot::plane::{Cells, Together};
 
@@ -31,20 +31,13 @@ pub(super) struct Seen<'a> {
 
 pub(super) fn picture(seen: Seen<'_>) -> LambdaPlot {
     let (file, path) = (seen.file, &seen.solution.path);
-    let named = [
-        ("linear", file.lambda_linear_n_per_m),
-        ("jnd", file.lambda_jnd_n_per_m),
-        ("saturation", file.lambda_saturation_n_per_m),
-        ("maxmin", file.lambda_maxmin_n_per_m),
-        (
-            "feedback",
-            file.feedback.as_ref().and_then(|told| told.lambda_n_per_m),
-        ),
-    ];
-    let constants: Vec<Constant> = named
-        .into_iter()
-        .filter_map(|(name, lambda)| {
-            lambda.map(|lambda_n_per_m| Constant {
+    let feedback = file.feedback.as_ref().and_then(|told| told.lambda_n_per_m);
+    let constants: Vec<Constant> = Criterion::ALL
+        .iter()
+        .map(|&criterion| (criterion.name(), file.constants.of(criterion)))
+        .chain([("feedback", feedback)])
+        .filter_map(|(name, lambda_n_per_m)| {
+            lambda_n_per_m.map(|lambda_n_per_m| Constant {
                 name,
                 lambda_n_per_m,
             })

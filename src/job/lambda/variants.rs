@@ -166,10 +166,7 @@ fn solved(
         series: change.wiring.series.clone(),
         passive_force: change.offset,
         pulls: wired.lower_a.iter().any(|&lower| lower < 0.0),
-        lambda_linear_n_per_m: solution.lambda_linear_n_per_m,
-        lambda_jnd_n_per_m: solution.lambda_jnd_n_per_m,
-        lambda_saturation_n_per_m: solution.lambda_saturation_n_per_m,
-        lambda_maxmin_n_per_m: solution.lambda_maxmin_n_per_m,
+        constants: solution.constants,
         worst_point_lambda_jnd_n_per_m: worst
             .lambda_jnd_n_per_m
             .filter(|_| worst.complete && solution.status != Status::NothingRendered),

@@ -1,7 +1,7 @@
 //! Warnings about a force constant: why there is none, why it is zero, who does not feel it.
 
+use super::LambdaOptions;
 use super::points::WantedPoints;
-use super::{LambdaOptions, criterion_name};
 use crate::lambda::feedback::reachable;
 use crate::lambda::{Criterion, ForceProblem, Solution, Status};
 
@@ -24,19 +24,20 @@ pub(super) fn all(
             Criterion::Jnd | Criterion::Linear | Criterion::Saturation => format!(
                 "the limits never bind by the criterion {}: lambda is null; choose another with \
                  --criterion",
-                criterion_name(criterion)
+                criterion.name()
             ),
         }),
         Some(chosen) if chosen.lambda_n_per_m == 0.0 => warnings.push(match criterion {
             Criterion::Maxmin => maxmin_is_zero(points, problem, &solution.maxmin_points),
             Criterion::Jnd | Criterion::Linear | Criterion::Saturation => format!(
                 "lambda is 0 by the criterion {}: {}",
-                criterion_name(criterion),
+                criterion.name(),
                 binds_at_zero(problem)
             ),
         }),
         Some(chosen) => warnings.extend(
             solution
+                .constants
                 .lambda_floor_n_per_m
                 .filter(|floor| chosen.lambda_n_per_m < *floor)
                 .map(|floor| {

@@ -1,7 +1,6 @@
 //! The force constant, the currents and their errors.
 
 use super::super::air_sample::spread;
-use super::super::lambda::criterion_named;
 use super::super::steel::{self, Steel};
 use super::super::{JobError, KERNEL_ERROR};
 use super::passive::offset_n;
@@ -61,33 +60,19 @@ pub(super) fn checks(
         total_max_a: scene.design.supply.total_current_max_a,
         resistance_ohm: &resistance_ohm,
     };
-    let Some(criterion) = criterion_named(&stored.criterion) else {
-        let how = format!("unknown criterion {:?}", stored.criterion);
-        checks.push(check("lambda", f64::MAX, agrees, how));
-        return Ok(checks);
-    };
+    let criterion = stored.criterion;
     let settings = Settings {
         criterion,
         jnd_weight: stored.jnd,
         at_n_per_m: stored.lambda_n_per_m,
     };
     let again = lambda::solve(&problem, &settings)?;
-    let constants = [
-        (stored.lambda_linear_n_per_m, again.lambda_linear_n_per_m),
-        (stored.lambda_jnd_n_per_m, again.lambda_jnd_n_per_m),
-        (
-            stored.lambda_saturation_n_per_m,
-            again.lambda_saturation_n_per_m,
-        ),
-        (stored.lambda_maxmin_n_per_m, again.lambda_maxmin_n_per_m),
-        (stored.lambda_floor_n_per_m, again.lambda_floor_n_per_m),
-        (
-            stored.lambda_n_per_m,
-            again.chosen.as_ref().map(|c| c.lambda_n_per_m),
-        ),
-    ];
-    let worst = constants
-        .iter()
+    let stored_constants = stored.constants.named().into_iter();
+    let chosen = again.chosen.as_ref().map(|c| c.lambda_n_per_m);
+    let worst = stored_constants
+        .zip(again.constants.named())
+        .map(|(stored, again)| (stored.lambda_n_per_m, again.lambda_n_per_m))
+        .chain([(stored.lambda_n_per_m, chosen)])
         .map(|(told, found)| difference(told.as_slice(), found.as_slice()))
         .fold(0.0, f64::max);
     let how = "all force constants solved for again";
@@ -161,7 +146,7 @@ fn passive_slack(
     let rms = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>().sqrt();
     let told = [
         bundle.lambda.lambda_n_per_m,
-        bundle.lambda.lambda_linear_n_per_m,
+        bundle.lambda.constants.lambda_linear_n_per_m,
     ];
     let least = told
         .into_iter()

@@ -4,7 +4,7 @@ use std::io;
 use std::path::Path;
 
 use super::super::calibrate::{CURVE_FILE, CalibrateOptions, DESIGN_FILE, ShapeSource};
-use super::super::lambda::{LambdaOptions, criterion_named};
+use super::super::lambda::LambdaOptions;
 use super::JobError;
 use crate::bundle::artefact::Input;
 use crate::bundle::load::{Bundle, BundleError};
@@ -131,10 +131,8 @@ impl Sources {
 /// The options of the run that made the bundle; faults where they are none.
 pub(super) fn options(bundle: &Bundle) -> Result<CalibrateOptions, String> {
     let told = &bundle.lambda;
-    let named = criterion_named(&told.criterion);
-    let criterion = named.ok_or_else(|| format!("unknown criterion {:?}", told.criterion))?;
     let settings = Settings {
-        criterion,
+        criterion: told.criterion,
         jnd_weight: told.jnd,
         at_n_per_m: told.at.as_ref().map(|at| at.lambda_n_per_m),
     };

@@ -93,10 +93,8 @@ fn tile(html: &mut Html, name: &str, value: &str, more: &str) {
 fn answer(facts: &BundleFacts) -> Section {
     let mut body = Html::default();
     body.raw("<dl class=\"tiles\">");
-    let by = match facts.criterion {
-        "jnd" => format!("chosen by jnd at {}", percent(facts.jnd)),
-        other => format!("chosen by {other}"),
-    };
+    let by = facts.criterion.described(&percent(facts.jnd));
+    let by = format!("chosen by {by}");
     match &facts.chosen {
         None => tile(&mut body, "force constant \u{3bb}", "none", &by),
         Some(chosen) => {

@@ -1,5 +1,7 @@
 //! What a bundle's page is told, SI.
 
+use fluxform_base::force_constant::{Criterion, NamedConstant};
+
 use crate::plot::lambda::LambdaPlot;
 
 use super::field::Field;
@@ -18,7 +20,7 @@ pub struct BundleFacts<'a> {
     /// Path and digest of what went in.
     pub inputs: Vec<(&'a str, &'a str)>,
     /// How lambda was chosen, and its weight.
-    pub criterion: &'a str,
+    pub criterion: Criterion,
     /// The relative error that `jnd` allows to be added.
     pub jnd: f64,
     /// At the chosen lambda, if there is one.
@@ -28,7 +30,7 @@ pub struct BundleFacts<'a> {
     /// Number of constraint points.
     pub points: usize,
     /// The named constants and what each means.
-    pub constants: Vec<Constant>,
+    pub constants: Vec<NamedConstant>,
     /// The coils of the array.
     pub coils: Vec<CoilFacts>,
     /// Limit of the sum of the currents, A.
@@ -89,17 +91,6 @@ pub struct WorstPlace {
     pub wanted_n: f64,
     /// N.
     pub given_n: f64,
-}
-
-/// A force constant with a name.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Constant {
-    /// Such as `jnd`.
-    pub name: &'static str,
-    /// In words.
-    pub meaning: &'static str,
-    /// N/m; `None` where it never binds.
-    pub lambda_n_per_m: Option<f64>,
 }
 
 /// A coil of the array.

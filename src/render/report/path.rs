@@ -1,5 +1,6 @@
 //! Error and currents over lambda.
 
+use fluxform_base::force_constant::NamedConstant;
 use serde_json::{Map, Value, json};
 
 use super::data::BundleFacts;
@@ -73,7 +74,7 @@ fn curves(facts: &BundleFacts) -> Value {
 }
 
 fn constants(facts: &BundleFacts) -> Table {
-    let row = |one: &super::data::Constant| -> Vec<Cell> {
+    let row = |one: &NamedConstant| -> Vec<Cell> {
         vec![
             one.name.into(),
             lambda(one.lambda_n_per_m).into(),

@@ -76,12 +76,14 @@ pub fn generic(points: usize, coils: usize, seed: u64) -> Problem {
 
 fn linear_of(solution: &Solution) -> Result<f64, String> {
     solution
+        .constants
         .lambda_linear_n_per_m
         .ok_or_else(|| "no limit binds".to_owned())
 }
 
 fn jnd_of(solution: &Solution) -> Result<f64, String> {
     solution
+        .constants
         .lambda_jnd_n_per_m
         .ok_or_else(|| "no limit binds".to_owned())
 }
@@ -110,8 +112,11 @@ fn rational(name: &str) -> Outcome {
     }
     // Force constants are told to 1e-11, errors to 1e-13.
     for (found, key) in [
-        (solution.lambda_linear_n_per_m, "lambda_linear_n_per_m"),
-        (solution.lambda_jnd_n_per_m, "lambda_jnd_n_per_m"),
+        (
+            solution.constants.lambda_linear_n_per_m,
+            "lambda_linear_n_per_m",
+        ),
+        (solution.constants.lambda_jnd_n_per_m, "lambda_jnd_n_per_m"),
     ] {
         if exact[key] != Value::Null {
             errors.push(1e-2 * off(found.ok_or("no limit binds")?, number(&exact[key])?));
@@ -119,7 +124,7 @@ fn rational(name: &str) -> Outcome {
     }
     worst(
         errors,
-        &format!("lambda_jnd {:?} N/m", solution.lambda_jnd_n_per_m),
+        &format!("lambda_jnd {:?} N/m", solution.constants.lambda_jnd_n_per_m),
     )
 }
 
@@ -156,7 +161,7 @@ fn closed_forms() -> Vec<Case> {
                 let most = 0.7 * 1.3 / 0.05;
                 worst(
                     [off(linear_of(&s)?, most), off(jnd_of(&s)?, most / 0.93)],
-                    &format!("{:?} N/m", s.lambda_linear_n_per_m),
+                    &format!("{:?} N/m", s.constants.lambda_linear_n_per_m),
                 )
             },
         ),
@@ -211,7 +216,8 @@ fn closed_forms() -> Vec<Case> {
                 let mut p = generic(17, 4, 5);
                 p.heights = vec![0.0; 17];
                 let s = p.solve()?;
-                let none = s.lambda_jnd_n_per_m.is_none() && s.lambda_linear_n_per_m.is_none();
+                let none = s.constants.lambda_jnd_n_per_m.is_none()
+                    && s.constants.lambda_linear_n_per_m.is_none();
                 holds(
                     s.status == Status::NothingWanted && none && s.path.error_n2(7.0) == 0.0,
                     format!("{:?}", s.status),
@@ -302,7 +308,10 @@ fn closed_forms() -> Vec<Case> {
                 let mut forces = vec![0.0; 49];
                 (0..7).for_each(|i| forces[8 * i] = 0.3);
                 let s = Problem::new(forces, vec![0.05; 7], upper).solve()?;
-                let found = s.lambda_saturation_n_per_m.ok_or("nothing saturates")?;
+                let found = s
+                    .constants
+                    .lambda_saturation_n_per_m
+                    .ok_or("nothing saturates")?;
                 close(found, 2.0 * 0.3 / 0.05, "N/m")
             },
         ),
@@ -339,7 +348,10 @@ fn ties_and_twins() -> Vec<Case> {
             || {
                 let s = square().solve()?;
                 let wanted = 1.3 * (0.31 + 0.07 + 0.02 + 0.07) / 0.05;
-                let last = s.lambda_saturation_n_per_m.ok_or("nothing saturates")?;
+                let last = s
+                    .constants
+                    .lambda_saturation_n_per_m
+                    .ok_or("nothing saturates")?;
                 worst(
                     [off(linear_of(&s)?, wanted), off(last, wanted)],
                     &format!("{last:.12} N/m"),

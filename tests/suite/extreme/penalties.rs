@@ -283,7 +283,10 @@ fn parallel() -> Vec<Case> {
                         &Settings::default(),
                     )
                     .map_err(told)?;
-                    let found = solution.lambda_linear_n_per_m.ok_or("no limit binds")?;
+                    let found = solution
+                        .constants
+                        .lambda_linear_n_per_m
+                        .ok_or("no limit binds")?;
                     errors.push(off(found, 0.13 * total.min(4.0) / 0.05));
                 }
                 worst(errors, "lambda_linear against n u G / h")

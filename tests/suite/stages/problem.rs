@@ -72,7 +72,7 @@ fn general(given: &Forces, form: &str, lambda_n_per_m: f64, least: f64) -> Value
 pub fn lambda_path() -> Result<Value, JobError> {
     let given = forces(&SEED_AIR, 3, SAMPLES, dome_m)?;
     let solution = lambda::solve(&given.problem(), &Settings::default())?;
-    let jnd = solution.lambda_jnd_n_per_m.unwrap_or(1.0);
+    let jnd = solution.constants.lambda_jnd_n_per_m.unwrap_or(1.0);
     Ok(general(&given, "mean", jnd, solution.path.error_n2(jnd)))
 }
 

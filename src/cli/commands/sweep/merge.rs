@@ -31,7 +31,7 @@ use crate::job::sweep::merge::{MergeFiles, MergeReport, MergeRequest, merge, mer
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Writing, &[
     ("fluxform sweep merge wires.json wires --out wires.csv", "all points of one folder"),
-    ("fluxform sweep merge limits.json here there --partial --out - > limits.csv",
+    ("fluxform sweep merge wires.json wires more --partial --out - > so_far.csv",
      "what there is so far, from two folders"),
 ]))]
 pub struct Merge {

@@ -34,7 +34,7 @@ use crate::job::sweep::plan::{PlanRequest, plan};
     ("fluxform sweep plan designs/seed_air.toml --set coil.length_mm=50:100:25 \\\n    \
       --set limits.resistance_max_ohm=4,6,8 --out - > limits.json",
      "three lengths, each under three limits"),
-    ("fluxform sweep plan designs/seed_air.toml --optimize --set limits.resistance_max_ohm=3:9:0.5",
+    ("fluxform sweep plan designs/seed_air.toml --optimize \\\n    --set limits.resistance_max_ohm=3:9:0.5 --out best.json",
      "the best coil of each resistance"),
 ]))]
 pub struct Plan {

@@ -26,7 +26,7 @@ use crate::job::sweep::run::{Part, RunReport, run};
     ("fluxform sweep run wires.json --out wires", "all points, on all cores"),
     ("fluxform sweep run wires.json --out wires --shard 1/3 --threads 1",
      "the first of three parts"),
-    ("fluxform sweep run wires.json --out wires --index 7 --force", "one point, anew"),
+    ("fluxform sweep run wires.json --out more --index 7", "one point, into a folder of its own"),
 ]))]
 pub struct Run {
     /// Plan (JSON), `-` for standard input

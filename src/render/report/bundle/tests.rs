@@ -1,10 +1,12 @@
 //! A page of made-up facts with names that want to be more than names.
 
+use fluxform_base::force_constant::{Criterion, NamedConstant};
+
 use super::page;
 use crate::plot::lambda::LambdaPlot;
 use crate::report::data::{
-    Breakpoint, BudgetPart, BundleFacts, Chosen, CoilFacts, Constant, Deciding, ErrorTime,
-    LimitFacts, StageFacts, WorstPlace,
+    Breakpoint, BudgetPart, BundleFacts, Chosen, CoilFacts, Deciding, ErrorTime, LimitFacts,
+    StageFacts, WorstPlace,
 };
 use crate::report::field::{Field, Layer};
 use crate::report::measured::{MeasuredCurve, MeasuredRow};
@@ -50,7 +52,7 @@ fn facts<'a>(plot: &'a LambdaPlot, rows: &[(f64, f64)], notes: &'a [String]) -> 
         shape: HOSTILE,
         version: "0.1.0",
         inputs: vec![(HOSTILE, "00")],
-        criterion: "jnd",
+        criterion: Criterion::Jnd,
         jnd: 0.07,
         chosen: Some(Chosen {
             lambda_n_per_m: 0.7,
@@ -66,7 +68,7 @@ fn facts<'a>(plot: &'a LambdaPlot, rows: &[(f64, f64)], notes: &'a [String]) -> 
         }),
         rank: 2,
         points: 4,
-        constants: vec![Constant {
+        constants: vec![NamedConstant {
             name: "jnd",
             meaning: "the chosen one",
             lambda_n_per_m: None,

@@ -313,7 +313,7 @@ fn lambda_claims(scene: &Scene, exact: &Solved, document: &ShapeDocument) -> Vec
     };
     let problem: ForceProblem = case.problem();
     let solution = lambda::solve(&problem, &Settings::default()).unwrap();
-    let reach = solution.lambda_jnd_n_per_m.unwrap_or(1.0);
+    let reach = solution.constants.lambda_jnd_n_per_m.unwrap_or(1.0);
     let search = search::Search::new(&case);
     let found = [0.7, 1.0, 1.3].iter().fold(0.0_f64, |most, part| {
         let at = part * reach;
