@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Copies the tables of results/bench into tests/README.md and src/DESIGN.md.
 
-    fluxform bench --peers --out results/bench
-    FLUXFORM_COVERAGE=results/bench/coverage.md cargo test --locked --test bench a_hundred
-    fluxform bench --stage inductance --scaling --out results/bench/scaling
+    cargo run --release -p fluxform-bench -- --peers --out results/bench
+    FLUXFORM_COVERAGE=results/bench/coverage.md cargo test --locked -p fluxform-bench --test stages a_hundred
+    cargo run --release -p fluxform-bench -- --stage inductance --scaling --out results/bench/scaling
     python3 scripts/bench_pages.py
 
 Between the lines `<!-- bench: NAME -->` and `<!-- bench: end -->` of a page stands what the summary

@@ -128,7 +128,7 @@
 //! [`numerics`] < [`design`] < [`field`] < [`coil`] < [`map`]; [`shape`] beside them;
 //! [`lambda`] on numbers alone; [`bundle`] writes and reads artefacts, [`plot`] draws,
 //! [`report`] makes pages; [`job`] joins them into what a command does; [`bench`](mod@bench) measures error
-//! against time; [`cli`] is the only room that talks.
+//! against time of a scene; [`cli`] is the only room that talks.
 
 pub use fluxform_base::accuracy;
 pub use fluxform_base::progress;

@@ -1,21 +1,299 @@
-//! The measurements themselves: rows fall along their knobs, tables and JSON are as promised, and
-//! what stages claim of their errors holds on scenes that nobody chose.
+//! `bench`: errors fall with their knobs, files are as promised, bad input is refused.
 
-// Figures are printed, and a script is put where the command looks for one.
-#![allow(clippy::print_stdout, clippy::disallowed_methods)]
+use std::path::Path;
+use std::process::{Command, Output};
 
-#[path = "bench/command.rs"]
-mod command;
-#[path = "bench/coverage.rs"]
-mod coverage;
-#[path = "bench/page.rs"]
-mod page;
-#[path = "bench/rows.rs"]
-mod rows;
+use fluxform::bundle::bench::{BenchFile, KnobName, Run, ShapeBench};
+use fluxform::bundle::schema::SCHEMAS;
+use fluxform::lambda::Criterion;
+use serde_json::Value;
 
-#[path = "lambda/case.rs"]
-#[allow(dead_code)]
-mod case;
-#[path = "lambda/search.rs"]
-#[allow(dead_code)]
-mod search;
+const REST: &str = r#"
+wire = { diameter_mm = 0.7 }
+magnet = { diameter_mm = 4.0, length_mm = 4.0, magnetization_a_per_m = 1.1579e6, polarity = "repel" }
+supply = { current_max_a = 2.0 }
+[workspace]
+x_mm = [-24.0, 24.0, 49]
+y_mm = [-22.0, 22.0, 45]
+z_mm = [9.0, 31.0, 23]
+"#;
+const COIL: &str =
+    "coil = { inner_diameter_mm = 13.0, outer_diameter_mm = 29.0, length_mm = 37.0 }\n";
+const CORE: &str = "core = { clearance_mm = 0.3, above_mm = -1.0, below_mm = 7.0, \
+                    relative_permeability = 700.0 }\n";
+const ARRAY: &str = "array = { rows = 1, columns = 2, pitch_mm = 31.0 }\n";
+const DOME: &str = r#"
+name = "dome"
+primitive = "half-sphere"
+radius_mm = 31.0
+base_mm = -7.0
+[points]
+x_mm = [-19.0, 19.0, 33]
+y_mm = [-17.0, 17.0, 29]
+"#;
+
+/// A folder with a design and an object.
+fn place(parts: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let design = format!("name = \"small\"\n{parts}{COIL}{REST}");
+    lay(folder.path(), "small.toml", &design);
+    lay(folder.path(), "dome.toml", DOME);
+    folder
+}
+
+#[allow(clippy::disallowed_methods)] // the test's own folder
+fn lay(folder: &Path, name: &str, text: &str) {
+    std::fs::write(folder.join(name), text).unwrap();
+}
+
+fn command(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fluxform"));
+    command.arg("bench").args(arguments).current_dir(folder);
+    command
+}
+
+fn bench(folder: &Path, arguments: &[&str]) -> Output {
+    command(folder, arguments).output().unwrap()
+}
+
+const ASKED: [&str; 7] = [
+    "small.toml",
+    "dome.toml",
+    "--quick",
+    "--out",
+    "b",
+    "--format",
+    "json",
+];
+
+fn json(output: &Output) -> Value {
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn measured(folder: &Path, arguments: &[&str]) -> BenchFile {
+    serde_json::from_value(json(&bench(folder, arguments))).unwrap()
+}
+
+/// The errors along the knob, the others at their finest.
+fn along(shape: &ShapeBench, name: KnobName, error: fn(&Run) -> Option<f64>) -> Vec<f64> {
+    let knob = shape.knobs.iter().position(|knob| knob.name == name);
+    let runs = shape.along(knob.unwrap());
+    assert!(runs.len() > 2, "{name:?} has {} settings", runs.len());
+    runs.into_iter().map(|run| error(run).unwrap()).collect()
+}
+
+fn falls(errors: &[f64], by: f64) {
+    let (first, last) = (errors[0], errors[errors.len() - 1]);
+    assert!(last < first / by, "{errors:?}");
+    // Never up by more than what is left in the end.
+    let rises = errors.windows(2).any(|pair| pair[1] > pair[0] + 2.0 * last);
+    assert!(!rises, "{errors:?}");
+}
+
+fn errors_fall(parts: &str) {
+    let folder = place(parts);
+    let file = measured(folder.path(), &ASKED);
+    let shape = &file.shapes[0];
+    falls(&along(shape, KnobName::Points, |run| run.lambda_error), 4.0);
+    falls(&along(shape, KnobName::Nodes, |run| run.felt_error), 30.0);
+    falls(
+        &along(shape, KnobName::Tolerance, |run| run.felt_error),
+        2.0,
+    );
+    let present = shape.present().expect("the present settings are a run");
+    assert!(present.error() < 0.05, "{present:?}");
+    assert!(
+        shape.reference.lambda_error.unwrap() < 0.01,
+        "{:?}",
+        shape.reference
+    );
+    for constant in shape
+        .constants
+        .iter()
+        .filter(|c| c.criterion == Criterion::Jnd)
+    {
+        assert_eq!(constant.lambda_n_per_m, present.lambda_n_per_m);
+        assert_eq!(constant.error, present.lambda_error);
+    }
+    assert_eq!(shape.constants.len(), 4);
+}
+
+#[test]
+fn errors_of_an_air_array_fall_with_their_knobs() {
+    errors_fall(ARRAY);
+}
+
+#[test]
+fn errors_of_a_cored_coil_fall_with_their_knobs() {
+    errors_fall(CORE);
+}
+
+#[test]
+fn the_cheapest_settings_meet_their_target_and_can_be_pasted() {
+    let folder = place(ARRAY);
+    let file = measured(folder.path(), &ASKED);
+    let shape = &file.shapes[0];
+    let own = shape.reference.lambda_error.unwrap();
+    assert_eq!(shape.cheapest.len(), 3);
+    for cheapest in &shape.cheapest {
+        let run = &shape.runs[cheapest.run as usize];
+        let meets = |run: &&Run| run.error() + own <= cheapest.target;
+        assert_eq!(cheapest.met, shape.runs.iter().any(|run| meets(&run)));
+        if cheapest.met {
+            assert!(meets(&run));
+            let dearer = shape
+                .runs
+                .iter()
+                .filter(meets)
+                .all(|other| other.cpu_s >= run.cpu_s);
+            assert!(dearer, "{cheapest:?}");
+        }
+    }
+    let loose = &shape.cheapest[0];
+    assert!(loose.met && loose.paste[0].starts_with("--tolerance "));
+    // The keys, pasted, are what the run was measured with: the same force constant.
+    let run = &shape.runs[loose.run as usize];
+    let mut design = format!("name = \"pasted\"\n{ARRAY}{COIL}{REST}");
+    let mut dome = DOME.to_owned();
+    for key in &loose.paste[1..] {
+        let (name, value) = key.split_once(" = ").unwrap();
+        let (section, name) = name.split_once('.').unwrap();
+        let text = if section == "points" {
+            &mut dome
+        } else {
+            &mut design
+        };
+        let old = text
+            .lines()
+            .find(|line| line.starts_with(name))
+            .unwrap()
+            .to_owned();
+        *text = text.replace(&old, &format!("{name} = {value}"));
+    }
+    lay(folder.path(), "pasted.toml", &design);
+    lay(folder.path(), "coarse.toml", &dome);
+    let tolerance = loose.paste[0].split_once(' ').unwrap().1;
+    let lambda = Command::new(env!("CARGO_BIN_EXE_fluxform"))
+        .args(["lambda", "pasted.toml", "coarse.toml", "--format", "json"])
+        .args(["--tolerance", tolerance])
+        .current_dir(folder.path())
+        .output();
+    let lambda = json(&lambda.unwrap())["lambda_n_per_m"].as_f64().unwrap();
+    assert!((lambda / run.lambda_n_per_m.unwrap() - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn the_files_hold_every_run_and_fit_their_schema() {
+    let folder = place(ARRAY);
+    let told = json(&bench(folder.path(), &ASKED));
+    let read = |name: &str| std::fs::read_to_string(folder.path().join("b").join(name)).unwrap();
+    let written: Value = serde_json::from_str(&read("bench.json")).unwrap();
+    assert_eq!(written["shapes"], told["shapes"]);
+    let schema = SCHEMAS
+        .iter()
+        .find(|(name, _)| *name == "bench.schema.json");
+    let schema = serde_json::from_str(schema.unwrap().1).unwrap();
+    let validator = jsonschema::validator_for(&schema).unwrap();
+    let faults: Vec<_> = validator.iter_errors(&written).collect();
+    assert!(faults.is_empty(), "{faults:?}");
+    let runs = written["shapes"][0]["runs"].as_array().unwrap().len();
+    let table = read("bench.csv");
+    assert_eq!(table.lines().count(), 1 + runs);
+    let columns = table.lines().next().unwrap().split(',').count();
+    assert!(table.lines().all(|line| line.split(',').count() == columns));
+    assert_eq!(
+        table.matches(",true\n").count(),
+        1,
+        "one run is the present one"
+    );
+    for name in ["dome_lambda.svg", "dome_felt.svg"] {
+        assert!(read(name).contains("present settings"), "{name}");
+    }
+    let page = read("report.html");
+    for part in [
+        "The cheapest settings within an error",
+        "id=\"draw-stage-1\"",
+        "--tolerance",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+    // What the scene does not have is said.
+    let why = told["left_out"].to_string();
+    assert!(
+        why.contains("steel resolution") && why.contains("no [core]"),
+        "{why}"
+    );
+    // The same inputs may replace their files, others may not.
+    assert!(bench(folder.path(), &ASKED).status.success());
+    lay(folder.path(), "dome.toml", &DOME.replace("31.0", "32.0"));
+    assert_eq!(bench(folder.path(), &ASKED).status.code(), Some(4));
+}
+
+#[test]
+fn points_graded_to_a_deviation_are_swept_instead() {
+    let folder = place(ARRAY);
+    let arguments = [&ASKED[..], &["--max-deviation", "0.05mm"]].concat();
+    let file = measured(folder.path(), &arguments);
+    let shape = &file.shapes[0];
+    let errors = along(shape, KnobName::MaxDeviation, |run| run.lambda_error);
+    assert!(errors.iter().all(|error| *error < 0.1), "{errors:?}");
+    let paste = &shape.knobs[1].settings.last().unwrap().paste;
+    assert_eq!(paste, &["--max-deviation 0.05mm"]);
+    assert!(
+        file.left_out
+            .iter()
+            .any(|left| left.knob == "grid of points")
+    );
+}
+
+#[test]
+fn bad_input_is_refused_before_anything_is_measured() {
+    let folder = place(ARRAY);
+    assert_eq!(bench(folder.path(), &["small.toml"]).status.code(), Some(2));
+    let missing = bench(folder.path(), &["small.toml", "gone.toml"]);
+    assert_eq!(missing.status.code(), Some(3), "{missing:?}");
+    assert!(String::from_utf8_lossy(&missing.stderr).contains("gone.toml"));
+    let narrow = REST.replace("[-24.0, 24.0, 49]", "[-15.0, 15.0, 49]");
+    let design = format!("name = \"small\"\n{ARRAY}{COIL}{narrow}");
+    lay(folder.path(), "small.toml", &design);
+    let outside = bench(folder.path(), &ASKED);
+    assert_eq!(outside.status.code(), Some(3), "{outside:?}");
+    let said = String::from_utf8_lossy(&outside.stderr);
+    assert!(
+        said.contains("outside") && said.contains("[workspace]"),
+        "{said}"
+    );
+    assert!(!folder.path().join("b").exists());
+}
+
+#[test]
+#[cfg(unix)]
+fn a_signal_ends_a_run_without_a_file() {
+    let folder = place(ARRAY);
+    // Coils that are coupled and points that are many: seconds, whatever the machine.
+    let cored = format!("name = \"small\"\n{ARRAY}{CORE}{COIL}{REST}");
+    lay(
+        folder.path(),
+        "small.toml",
+        &cored.replace("columns = 2", "columns = 5"),
+    );
+    lay(
+        folder.path(),
+        "dome.toml",
+        &DOME.replace("33]", "133]").replace("29]", "129]"),
+    );
+    let mut run = command(folder.path(), &["small.toml", "dome.toml", "--out", "b"])
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(800));
+    let asked = Command::new("kill")
+        .args(["-INT", &run.id().to_string()])
+        .status();
+    assert!(asked.unwrap().success());
+    assert_eq!(run.wait().unwrap().code(), Some(130));
+    assert!(!folder.path().join("b").exists());
+}

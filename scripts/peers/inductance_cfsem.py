@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Self inductances of thick windings by cfsem, for `fluxform bench --peers`.
+"""Self inductances of thick windings by cfsem, for `fluxform-bench --peers`.
 
     python3 scripts/peers/inductance_cfsem.py --rows PROBLEM.json
 

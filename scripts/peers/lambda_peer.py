@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""General solvers at one force constant, their tolerance swept, for `fluxform bench --peers`.
+"""General solvers at one force constant, their tolerance swept, for `fluxform-bench --peers`.
 
     python3 scripts/peers/lambda_peer.py --rows PROBLEM.json
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""NLopt on equation 11, from more and more starts, for `fluxform bench --peers`.
+"""NLopt on equation 11, from more and more starts, for `fluxform-bench --peers`.
 
     python3 scripts/peers/optimum_nlopt.py --rows PROBLEM.json
 

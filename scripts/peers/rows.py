@@ -1,8 +1,8 @@
-"""What every script here shares when `fluxform bench --peers` runs it.
+"""What every script here shares when `fluxform-bench --peers` runs it.
 
     python3 SCRIPT --rows PROBLEM.json
 
-reads a problem (numbers, places, reference values: src/bench/stages/problem.rs) and prints one
+reads a problem (numbers, places, reference values: tests/suite/stages/problem.rs) and prints one
 JSON object: `curves`, each with `curve` (the name of fluxform's on the same problem), `peer`,
 `version`, `knob` and `rows` (`knob`, `items`, `error`, `seconds`, `seconds_low`, `seconds_high`,
 `repeats`); and `missing`, a sentence for every peer whose packages are not installed. An error is

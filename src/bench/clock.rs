@@ -33,6 +33,12 @@ impl Effort {
         enough_s: 0.25,
         samples: 7,
     };
+    /// For many stages in little time.
+    pub const GLANCE: Self = Self {
+        sample_s: 1e-3,
+        enough_s: 0.05,
+        samples: 3,
+    };
     /// One sample after the warm-up: for tests.
     pub const ONCE: Self = Self {
         sample_s: 0.0,

@@ -1,103 +1,357 @@
-//! The pages of a run: its numbers as `report` is told them.
+//! The page and the pictures of a run: both errors over processor time, and the cheapest settings.
 
-use super::summary::ratios;
-use super::written::unit_of;
-use crate::bundle::artefact::FLUXFORM_VERSION;
-use crate::bundle::bench::{BenchFile, Curve, Law, StageCurves};
-use crate::bundle::catalogue::CaseRow;
-use crate::report::bench::{BenchFacts, LawFacts, StageFacts, page};
-use crate::report::catalogue::{self, CaseFacts};
+use serde_json::{Map, Value, json};
+
+use crate::bundle::bench::{BenchFile, Cheapest, Run, ShapeBench};
+use crate::plot::curves::{CurvesPlot, Line};
+use crate::report::frame::{Page, Section, figure};
+use crate::report::html::{Cell, Html, Table};
 use crate::report::measured::{MeasuredCurve, MeasuredRow};
+use crate::report::number::{count, figures, percent, si};
+use crate::report::optimum::sources;
 
-/// Name of a page.
+/// Name of the page.
 pub const PAGE: &str = "report.html";
 
-/// The page of `file`.
-#[must_use]
-pub fn html(file: &BenchFile) -> String {
-    page(&BenchFacts {
-        version: &file.fluxform_version,
-        quick: file.quick,
-        inputs: (file.inputs.iter())
-            .map(|input| (input.path.as_str(), input.sha256.as_str()))
-            .collect(),
-        stages: file.stages.iter().map(stage).collect(),
-        laws: file.scaling.iter().map(law).collect(),
-        missing: &file.peers_missing,
-    })
+/// Which of the two errors.
+struct Shown {
+    /// In names of files.
+    name: &'static str,
+    /// For people.
+    label: &'static str,
+    of: fn(&Run) -> Option<f64>,
 }
 
-/// The page of the stability catalogue.
+const SHOWN: [Shown; 2] = [
+    Shown {
+        name: "lambda",
+        label: "relative error of lambda",
+        of: |run| run.lambda_error,
+    },
+    Shown {
+        name: "felt",
+        label: "largest error of the felt force, relative to the force to be felt",
+        of: |run| run.felt_error,
+    },
+];
+
+/// The pictures: name of the file and SVG.
 #[must_use]
-pub fn catalogue(rows: &[CaseRow]) -> String {
-    let cases: Vec<CaseFacts> = rows
-        .iter()
-        .map(|row| CaseFacts {
-            name: &row.name,
-            expected: &row.expected,
-            got: &row.got,
-            error: row.error,
-            bound: row.bound,
-            seconds: row.seconds,
-            pass: row.pass,
+pub fn pictures(file: &BenchFile) -> Vec<(String, String)> {
+    let shapes = file.shapes.iter();
+    shapes
+        .flat_map(|shape| SHOWN.iter().map(move |shown| (shape, shown)))
+        .map(|(shape, shown)| {
+            let name = format!("{}_{}.svg", shape.shape, shown.name);
+            (name, picture(shape, shown).svg())
+        })
+        .collect()
+}
+
+fn picture(shape: &ShapeBench, shown: &Shown) -> CurvesPlot {
+    let curves = shape.curves(shown.of).into_iter();
+    let mut lines: Vec<Line> = curves
+        .map(|curve| Line {
+            name: curve.name,
+            points: (curve.runs.iter())
+                .filter_map(|(_, run)| Some((run.cpu_s, (shown.of)(run)?)))
+                .collect(),
+            defaults: Vec::new(),
         })
         .collect();
-    catalogue::page(FLUXFORM_VERSION, &cases)
-}
-
-fn stage(stage: &StageCurves) -> StageFacts<'_> {
-    StageFacts {
-        name: &stage.stage,
-        timed: &stage.timed,
-        error_of: &stage.error_of,
-        // What it is relative to stands below the drawing.
-        label: if unit_of(&stage.error_of).starts_with("error / m") {
-            "error / m"
-        } else {
-            "relative error"
-        },
-        default: &stage.default,
-        curves: stage.curves.iter().map(curve).collect(),
-        ratios: ratios(stage),
+    let present = shape.present();
+    lines.extend(present.and_then(|run| {
+        Some(Line {
+            name: "present settings".to_owned(),
+            points: vec![(run.cpu_s, (shown.of)(run)?)],
+            defaults: vec![0],
+        })
+    }));
+    CurvesPlot {
+        title: format!("{}: error against processor time", shape.shape),
+        across: "processor time / s".to_owned(),
+        up: shown.label.to_owned(),
+        lines,
     }
 }
 
-fn curve(curve: &Curve) -> (MeasuredCurve<'_>, &str, f64) {
-    let peer = curve.program != "fluxform";
-    let rows = curve.rows.iter().map(|row| MeasuredRow {
-        knob: row.knob,
-        marked: row.default,
-        error: row.error,
-        stated: row.stated_error,
-        seconds: row.seconds,
-        quartiles_s: [row.seconds_low, row.seconds_high],
+/// The page.
+#[must_use]
+pub fn html(file: &BenchFile) -> String {
+    let mut data = Map::new();
+    let drawn = file.shapes.iter().flat_map(|shape| {
+        let curves = move |shown| drawn(shape, shown);
+        SHOWN.iter().map(curves)
     });
-    let measured = MeasuredCurve {
-        name: if peer {
-            format!("{}: {}", curve.program, curve.name)
-        } else {
-            curve.name.clone()
-        },
-        knob: &curve.knob,
-        peer,
-        rows: rows.collect(),
-    };
-    (measured, &curve.reference, curve.reference_error)
+    data.insert("stages".to_owned(), drawn.collect());
+    let mut lead = Html::default();
+    for shape in &file.shapes {
+        lead.element("p class=\"lead\"", &sentence(shape));
+    }
+    let inputs = file.inputs.iter();
+    let inputs: Vec<(&str, &str)> = inputs
+        .map(|input| (input.path.as_str(), input.sha256.as_str()))
+        .collect();
+    Page {
+        kind: "Measurement",
+        title: format!("{}: error against processor time", file.design),
+        lead,
+        sections: vec![answer(file), curves(file), method(file), sources(&inputs)],
+        data: Value::Object(data),
+        foot: format!(
+            "fluxform {}. This page needs nothing but itself; its numbers are those of bench.csv and \
+             bench.json beside it. Seconds differ from run to run, errors do not.",
+            file.fluxform_version
+        ),
+    }
+    .html()
 }
 
-fn law(law: &Law) -> LawFacts<'_> {
-    let size = |row: &crate::bundle::bench::SizeRow| {
-        (row.size, row.threads, row.seconds, row.peak_bytes as f64)
-    };
-    LawFacts {
-        stage: &law.stage,
-        axis: &law.axis,
-        time: [law.seconds_slope, law.seconds_slope_error],
-        memory: [law.memory_slope, law.memory_slope_error],
-        seed: law.seed_size,
-        sizes: law.sizes.iter().map(size).collect(),
-        outlook: (law.outlook.iter())
-            .map(|at| (at.factor, at.seconds, at.bytes, at.breaks.as_deref()))
-            .collect(),
+/// What the present settings give.
+fn sentence(shape: &ShapeBench) -> String {
+    let error = |error: Option<f64>| error.map_or_else(|| "no number".to_owned(), percent);
+    match shape.present() {
+        Some(run) => format!(
+            "{}: at the present settings lambda is off by {}, the felt force by at most {} of what is \
+             to be felt, in {} of processor time.",
+            shape.shape,
+            error(run.lambda_error),
+            error(run.felt_error),
+            si(run.cpu_s, "s")
+        ),
+        None => format!("{}: the present settings were not measured.", shape.shape),
     }
+}
+
+fn cell(error: Option<f64>) -> Cell {
+    error
+        .map_or_else(|| "\u{2013}".to_owned(), |error| figures(error, 2))
+        .into()
+}
+
+fn cheapest_row(shape: &ShapeBench, cheapest: &Cheapest) -> Vec<Cell> {
+    let run = &shape.runs[cheapest.run as usize];
+    let verdict = if cheapest.met {
+        percent(cheapest.target)
+    } else {
+        format!(
+            "\u{25b2} {} is not reached; closest",
+            percent(cheapest.target)
+        )
+    };
+    vec![
+        format!("{}: {verdict}", shape.shape).into(),
+        si(run.cpu_s, "s").into(),
+        cell(run.lambda_error),
+        cell(run.felt_error),
+        cheapest.paste.join("   ").into(),
+    ]
+}
+
+fn answer(file: &BenchFile) -> Section {
+    let mut body = Html::default();
+    let rows = file.shapes.iter().flat_map(|shape| {
+        let row = move |cheapest| cheapest_row(shape, cheapest);
+        shape.cheapest.iter().map(row)
+    });
+    body.table(&Table {
+        caption: "The cheapest settings within an error".to_owned(),
+        head: vec![
+            ("both errors within", false),
+            ("CPU time", true),
+            ("lambda", true),
+            ("felt force", true),
+            ("flags and keys", false),
+        ],
+        rows: rows.collect(),
+        prose: true,
+    });
+    let constants = file.shapes.iter().flat_map(|shape| {
+        shape.constants.iter().map(move |constant| {
+            let lambda = |value: Option<f64>| -> Cell {
+                value
+                    .map_or_else(|| "none".to_owned(), |v| figures(v, 6))
+                    .into()
+            };
+            vec![
+                format!("{}: {}", shape.shape, constant.criterion.name()).into(),
+                lambda(constant.lambda_n_per_m),
+                lambda(constant.reference_n_per_m),
+                cell(constant.error),
+            ]
+        })
+    });
+    body.folded_table(&Table {
+        caption: "Every force constant at the present settings".to_owned(),
+        head: vec![
+            ("constant", false),
+            ("N/m", true),
+            ("refined, N/m", true),
+            ("error", true),
+        ],
+        rows: constants.collect(),
+        prose: false,
+    });
+    Section {
+        id: "answer",
+        title: "The answer",
+        body,
+    }
+}
+
+fn curves(file: &BenchFile) -> Section {
+    let mut body = Html::default();
+    body.element(
+        "p class=\"note\"",
+        "A knob's curve has the others at their finest, so that its own error shows; ringed are the \
+         present settings. Both axes are logarithmic.",
+    );
+    body.raw("<div class=\"pair\">");
+    let drawings = file
+        .shapes
+        .iter()
+        .flat_map(|s| SHOWN.iter().map(move |e| (s, e)));
+    for (number, (shape, shown)) in drawings.enumerate() {
+        body.raw("<div>")
+            .element("h3", &format!("{}: {}", shape.shape, shown.name));
+        figure(
+            &mut body,
+            &format!("stage-{number}"),
+            &format!("{} of {} against processor time", shown.label, shape.shape),
+            shown.label,
+        );
+        body.raw("</div>");
+    }
+    body.raw("</div>");
+    for shape in &file.shapes {
+        body.folded_table(&numbers(shape));
+    }
+    Section {
+        id: "curves",
+        title: "Error against time",
+        body,
+    }
+}
+
+/// Every run in a row.
+fn numbers(shape: &ShapeBench) -> Table {
+    let row = |run: &Run| -> Vec<Cell> {
+        let chosen = shape.knobs.iter().zip(&run.settings);
+        let values = chosen.map(|(knob, at)| figures(knob.settings[*at as usize].value, 6));
+        let mark = if shape.is_present(run) {
+            " (present)"
+        } else {
+            ""
+        };
+        vec![
+            format!("{}{mark}", values.collect::<Vec<_>>().join(", ")).into(),
+            si(run.cpu_s, "s").into(),
+            si(run.map_s, "s").into(),
+            si(run.lambda_s, "s").into(),
+            cell(run.lambda_error),
+            cell(run.felt_error),
+        ]
+    };
+    Table {
+        caption: format!(
+            "{}: all {}; {}",
+            shape.shape,
+            count(shape.runs.len(), "run"),
+            shape
+                .knobs
+                .iter()
+                .map(|k| k.name.label())
+                .collect::<Vec<_>>()
+                .join(", ")
+        ),
+        head: vec![
+            ("settings", false),
+            ("CPU time", true),
+            ("of the map", true),
+            ("of lambda", true),
+            ("lambda", true),
+            ("felt force", true),
+        ],
+        rows: shape.runs.iter().map(row).collect(),
+        prose: false,
+    }
+}
+
+fn method(file: &BenchFile) -> Section {
+    let mut body = Html::default();
+    body.element("p", &format!("Errors: {}.", file.error_of))
+        .element("p", &format!("Times: {}.", file.timed))
+        .raw("<ul class=\"said\">");
+    for shape in &file.shapes {
+        let reference = &shape.reference;
+        body.element(
+            "li",
+            &format!(
+                "{}, held against: {}; lambda itself good to {}; {}, {}, {} of processor time",
+                shape.shape,
+                reference.how,
+                reference
+                    .lambda_error
+                    .map_or_else(|| "an unknown part".to_owned(), percent),
+                count(reference.points as usize, "point"),
+                count(reference.places as usize, "place"),
+                si(reference.cpu_s, "s")
+            ),
+        );
+    }
+    for left_out in &file.left_out {
+        body.element(
+            "li",
+            &format!("Not swept, {}: {}", left_out.knob, left_out.why),
+        );
+    }
+    body.raw("</ul>");
+    Section {
+        id: "method",
+        title: "How it was measured",
+        body,
+    }
+}
+
+fn drawn(shape: &ShapeBench, shown: &Shown) -> Value {
+    let curves = shape.curves(shown.of);
+    let all = curves.iter().map(|curve| {
+        let rows = curve.runs.iter().filter_map(|(knob, run)| {
+            Some(MeasuredRow {
+                knob: *knob,
+                marked: shape.is_present(run),
+                error: (shown.of)(run)?,
+                stated: None,
+                seconds: run.cpu_s,
+                quartiles_s: [run.cpu_s; 2],
+            })
+        });
+        MeasuredCurve {
+            name: curve.name.clone(),
+            knob: curve.knob.map_or("rank", |knob| knob.label()),
+            peer: curve.knob.is_none(),
+            rows: rows.collect(),
+        }
+        .json("", "present settings")
+    });
+    let mut all: Vec<Value> = all.collect();
+    let present = shape.present().and_then(|run| {
+        let row = MeasuredRow {
+            knob: 0.0,
+            marked: true,
+            error: (shown.of)(run)?,
+            stated: None,
+            seconds: run.cpu_s,
+            quartiles_s: [run.cpu_s; 2],
+        };
+        let curve = MeasuredCurve {
+            name: "present settings".to_owned(),
+            knob: "as they are",
+            peer: false,
+            rows: vec![row],
+        };
+        Some(curve.json("", "present settings"))
+    });
+    all.extend(present);
+    json!({ "label": shown.label, "curves": all })
 }

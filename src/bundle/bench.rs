@@ -1,4 +1,4 @@
-//! `bench.json` and `bench.csv`: error against seconds of every numerical stage.
+//! `bench.json` and `bench.csv`: error against processor time of one design's objects.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -7,290 +7,337 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::artefact::{FileEntry, Input, Options};
-use super::number::push_number;
+use super::number::{push_cell, push_number, push_text};
 use fluxform_base::accuracy::StageAccuracy;
+use fluxform_base::force_constant::Criterion;
 
 /// `bench.json`. Seconds in it differ from run to run; errors do not.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BenchFile {
     /// Layout, `major.minor.patch`.
     pub schema_version: String,
-    /// Program that was measured.
+    /// Program that measured.
     pub fluxform_version: String,
-    /// Designs and reference values, all built into the program.
+    /// Name of the design.
+    pub design: String,
+    /// Designs, shapes and surfaces.
     pub inputs: Vec<Input>,
     /// The options of the run.
     #[serde(default, skip_serializing_if = "Options::is_empty")]
     pub made_with: Options,
     /// The sentence on units.
     pub units: String,
-    /// Whether the finest and slowest rows were left out.
+    /// Which force constant `lambda` stands for.
+    pub criterion: Criterion,
+    /// Whether ladders and reference were shortened by `--quick`.
     pub quick: bool,
-    /// One entry a stage.
-    pub stages: Vec<StageCurves>,
-    /// Time and memory against size, where asked for.
-    pub scaling: Vec<Law>,
-    /// Why peers that were asked for have no curve.
-    pub peers_missing: Vec<String>,
-    /// What every stage says of its error at the default knob.
+    /// What the errors are and what they are relative to.
+    pub error_of: String,
+    /// What the seconds are.
+    pub timed: String,
+    /// One entry per object.
+    pub shapes: Vec<ShapeBench>,
+    /// Knobs that this scene does not have or that change nothing here.
+    pub left_out: Vec<LeftOutKnob>,
+    /// The errors at the present settings, the largest of all objects.
     pub accuracy: BTreeMap<String, StageAccuracy>,
-    /// Table, plots and summary.
+    /// Table, plots and page.
     pub files: Vec<FileEntry>,
 }
 
-/// One numerical stage.
+/// One object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct StageCurves {
-    /// Name on the command line.
-    pub stage: String,
-    /// What is timed.
-    pub timed: String,
-    /// What the error is relative to, or its unit.
-    pub error_of: String,
-    /// What the program does by default, and why, in words.
-    pub default: String,
-    /// Curves: of each knob, route or problem, and of peers.
-    pub curves: Vec<Curve>,
+pub struct ShapeBench {
+    /// Its name.
+    pub shape: String,
+    /// What the errors are held against.
+    pub reference: Reference,
+    /// The knobs, each from its coarsest setting to its finest.
+    pub knobs: Vec<Knob>,
+    /// Every combination of the knobs' settings.
+    pub runs: Vec<Run>,
+    /// For each target the cheapest combination that meets it.
+    pub cheapest: Vec<Cheapest>,
+    /// All force constants at the present settings: they come from one path and cost nothing more.
+    pub constants: Vec<ConstantError>,
 }
 
-/// Rows along one knob.
+/// The refined run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Curve {
-    /// What is computed how.
-    pub name: String,
-    /// `fluxform`, or the peer's name and version.
-    pub program: String,
-    /// What is swept, with its unit.
-    pub knob: String,
-    /// What the error is measured against.
-    pub reference: String,
-    /// The reference's own error, like the rows'.
-    pub reference_error: f64,
+pub struct Reference {
+    /// How it was refined, in words.
+    pub how: String,
+    /// Tolerance of the field.
+    pub tolerance: f64,
+    /// Constraint points.
+    pub points: u64,
+    /// Places at which the felt force was compared.
+    pub places: u64,
+    /// The force constant, N/m.
+    pub lambda_n_per_m: f64,
+    /// Its own error, about: what half as many points along each axis change; null where they are
+    /// on no grid. It is added to a run's error before that is held against a target.
+    pub lambda_error: Option<f64>,
+    /// Processor time, s.
+    pub cpu_s: f64,
+}
+
+/// What can be set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum KnobName {
+    /// Allowed error of the field of windings and steel.
+    Tolerance,
+    /// Constraint points on a grid.
+    Points,
+    /// Constraint points graded to a deviation.
+    MaxDeviation,
+    /// Nodes of the map.
+    Nodes,
+}
+
+impl KnobName {
+    /// What it is, for people, with its unit.
+    #[must_use]
+    pub const fn label(self) -> &'static str {
+        match self {
+            Self::Tolerance => "field tolerance",
+            Self::Points => "points along x",
+            Self::MaxDeviation => "largest deviation / m",
+            Self::Nodes => "map nodes along x",
+        }
+    }
+}
+
+/// A knob and the settings that were measured.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Knob {
+    /// Which.
+    pub name: KnobName,
     /// From coarse to fine.
-    pub rows: Vec<Row>,
+    pub settings: Vec<Setting>,
 }
 
 /// One setting of a knob.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Row {
-    /// The knob.
-    pub knob: f64,
-    /// Whether it is the program's default.
-    pub default: bool,
-    /// Points, coils or steps that the seconds are for.
-    pub items: u64,
-    /// Largest error found.
-    pub error: f64,
-    /// Error that the stage itself states; `None` where it states none for this row.
-    pub stated_error: Option<f64>,
-    /// Processor time, the median of the repeats, s.
-    pub seconds: f64,
-    /// Their lower quartile, s.
-    pub seconds_low: f64,
-    /// Their upper quartile, s.
-    pub seconds_high: f64,
-    /// Repeats after a warm-up.
-    pub repeats: u64,
+pub struct Setting {
+    /// Tolerance, samples along x, or deviation in m.
+    pub value: f64,
+    /// Flag or keys to paste.
+    pub paste: Vec<String>,
+    /// Whether the design, the shape or the flags ask for it now.
+    pub present: bool,
 }
 
-/// Time and memory of one stage against one size: `seconds = a size^slope`.
+/// One combination of settings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Law {
-    /// What is computed.
-    pub stage: String,
-    /// What grows.
-    pub axis: String,
-    /// Its value on the seed.
-    pub seed_size: f64,
-    /// From small to large; each in a process of its own.
-    pub sizes: Vec<SizeRow>,
-    /// Exponent of the processor time, over the larger half of the sizes.
-    pub seconds_slope: f64,
-    /// Its standard error.
-    pub seconds_slope_error: f64,
-    /// Exponent of the memory beyond what the program takes without work.
-    pub memory_slope: f64,
-    /// Its standard error.
-    pub memory_slope_error: f64,
-    /// At a hundred and ten thousand times the seed's size, by these exponents.
-    pub outlook: Vec<Outlook>,
+pub struct Run {
+    /// Index into each knob's settings, in the order of the knobs.
+    pub settings: Vec<u64>,
+    /// Processor time of the whole run, s: the sum of the four below.
+    pub cpu_s: f64,
+    /// Solving the steel, s.
+    pub steel_s: f64,
+    /// Sampling the surface, s.
+    pub points_s: f64,
+    /// Forces at the points and the force constants, s.
+    pub lambda_s: f64,
+    /// The maps, s.
+    pub map_s: f64,
+    /// Constraint points.
+    pub points: u64,
+    /// The force constant, N/m; null where none can be rendered.
+    pub lambda_n_per_m: Option<f64>,
+    /// |lambda / that of the reference - 1|.
+    pub lambda_error: Option<f64>,
+    /// Largest error of the felt force, relative to the force that is to be felt.
+    pub felt_error: Option<f64>,
 }
 
-/// One size.
+impl Run {
+    /// The larger of both errors; infinite where there is no force constant.
+    #[must_use]
+    pub fn error(&self) -> f64 {
+        let both = self.lambda_error.zip(self.felt_error);
+        both.map_or(f64::INFINITY, |(lambda, felt)| lambda.max(felt))
+    }
+}
+
+/// The cheapest settings for a target.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct SizeRow {
-    /// The size.
-    pub size: f64,
-    /// Threads.
-    pub threads: u64,
-    /// Processor time of all threads, the median of the repeats, s.
-    pub seconds: f64,
-    /// Lower quartile, s.
-    pub seconds_low: f64,
-    /// Upper quartile, s.
-    pub seconds_high: f64,
-    /// Time by the clock, the least, s.
-    pub elapsed_s: f64,
-    /// Most memory that the process held, bytes; 0 where the system does not tell.
-    pub peak_bytes: u64,
+pub struct Cheapest {
+    /// Largest error that either may have.
+    pub target: f64,
+    /// Whether any combination meets it.
+    pub met: bool,
+    /// Index into the runs: the cheapest that meets it, else the one that comes closest.
+    pub run: u64,
+    /// Flags and keys to paste, in the order of the knobs.
+    pub paste: Vec<String>,
 }
 
-/// What a law says of a size that was not measured.
+/// A force constant at the present settings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Outlook {
-    /// Times the seed's size.
-    pub factor: f64,
-    /// s.
-    pub seconds: f64,
-    /// Bytes.
-    pub bytes: f64,
-    /// What gives way first: `time` (an hour), `memory` (24 GiB), or nothing.
-    pub breaks: Option<String>,
+pub struct ConstantError {
+    /// Its criterion.
+    pub criterion: Criterion,
+    /// N/m; null where it does not exist.
+    pub lambda_n_per_m: Option<f64>,
+    /// Of the reference, N/m.
+    pub reference_n_per_m: Option<f64>,
+    /// Relative error; null where either is.
+    pub error: Option<f64>,
 }
 
-/// Columns of `bench.csv`.
-pub const BENCH_COLUMNS: [&str; 14] = [
-    "stage",
-    "curve",
-    "program",
-    "knob_name",
-    "knob",
-    "default",
-    "items",
-    "error",
-    "stated_error",
-    "seconds",
-    "seconds_low",
-    "seconds_high",
-    "repeats",
-    "reference",
+/// A knob that is not swept.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LeftOutKnob {
+    /// Its name.
+    pub knob: String,
+    /// Why.
+    pub why: String,
+}
+
+/// Runs in the order in which they are drawn as one curve.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve<'a> {
+    /// What is swept, and where the others are.
+    pub name: String,
+    /// The knob; `None` for the cheapest of all.
+    pub knob: Option<KnobName>,
+    /// Value of the knob, the error of the run as `error` gives it, and the run.
+    pub runs: Vec<(f64, &'a Run)>,
+}
+
+impl ShapeBench {
+    /// The run at the present settings.
+    #[must_use]
+    pub fn present(&self) -> Option<&Run> {
+        self.runs.iter().find(|run| self.is_present(run))
+    }
+
+    /// Whether `run` has the present settings.
+    #[must_use]
+    pub fn is_present(&self, run: &Run) -> bool {
+        let mut chosen = self.knobs.iter().zip(&run.settings);
+        chosen.all(|(knob, at)| {
+            let setting = knob.settings.get(*at as usize);
+            setting.is_some_and(|setting| setting.present)
+        })
+    }
+
+    /// The runs along one knob from coarse to fine, the others at their finest: what that knob
+    /// alone costs in error.
+    #[must_use]
+    pub fn along(&self, knob: usize) -> Vec<&Run> {
+        let finest = |other: usize| self.knobs[other].settings.len() - 1;
+        let alone = |run: &&Run| {
+            let mut at = run.settings.iter().enumerate();
+            at.all(|(other, at)| other == knob || *at as usize == finest(other))
+        };
+        let mut runs: Vec<&Run> = self.runs.iter().filter(alone).collect();
+        runs.sort_by_key(|run| run.settings[knob]);
+        runs
+    }
+
+    /// The curves of one error: a curve a knob, and the runs that no cheaper one beats.
+    #[must_use]
+    pub fn curves(&self, error: fn(&Run) -> Option<f64>) -> Vec<Curve<'_>> {
+        let mut curves: Vec<Curve> = (0..self.knobs.len())
+            .map(|at| {
+                let knob = &self.knobs[at];
+                let value = |run: &Run| knob.settings[run.settings[at] as usize].value;
+                let runs = self.along(at).into_iter();
+                Curve {
+                    name: format!("{} alone, the others at their finest", knob.name.label()),
+                    knob: Some(knob.name),
+                    runs: runs.map(|run| (value(run), run)).collect(),
+                }
+            })
+            .collect();
+        let mut all: Vec<&Run> = self.runs.iter().filter(|r| error(r).is_some()).collect();
+        all.sort_by(|a, b| a.cpu_s.total_cmp(&b.cpu_s));
+        let mut least = f64::INFINITY;
+        all.retain(|run| {
+            let here = error(run).unwrap_or(f64::INFINITY);
+            let better = here < least;
+            least = least.min(here);
+            better
+        });
+        let runs = all.into_iter().enumerate();
+        curves.push(Curve {
+            name: "cheapest combinations".to_owned(),
+            knob: None,
+            runs: runs.map(|(at, run)| (at as f64, run)).collect(),
+        });
+        curves
+    }
+}
+
+/// A column of `bench.csv`: its name and its value.
+type Column = (&'static str, fn(&Run) -> Option<f64>);
+
+/// The columns of `bench.csv` behind the shape and the knobs.
+const COLUMNS: [Column; 9] = [
+    ("points", |run| Some(run.points as f64)),
+    ("cpu_s", |run| Some(run.cpu_s)),
+    ("steel_s", |run| Some(run.steel_s)),
+    ("points_s", |run| Some(run.points_s)),
+    ("lambda_s", |run| Some(run.lambda_s)),
+    ("map_s", |run| Some(run.map_s)),
+    ("lambda_n_per_m", |run| run.lambda_n_per_m),
+    ("lambda_error", |run| run.lambda_error),
+    ("felt_error", |run| run.felt_error),
 ];
 
-/// Writes every row of every curve; the reference with its own error stands in each.
+/// The knobs as columns; a knob that a scene does not have is empty.
+const KNOBS: [(&str, KnobName); 4] = [
+    ("tolerance", KnobName::Tolerance),
+    ("points_x", KnobName::Points),
+    ("max_deviation_m", KnobName::MaxDeviation),
+    ("nodes_x", KnobName::Nodes),
+];
+
+/// Writes `bench.csv`: a row for every run.
 ///
 /// # Errors
 /// The writer's.
-pub fn write_rows(out: &mut dyn Write, stages: &[StageCurves]) -> io::Result<()> {
-    writeln!(out, "{},reference_error", BENCH_COLUMNS.join(","))?;
-    for stage in stages {
-        for curve in &stage.curves {
-            for row in &curve.rows {
-                let mut line = Vec::new();
-                for text in [&stage.stage, &curve.name, &curve.program, &curve.knob] {
-                    push_text(&mut line, text);
+pub fn write_runs(out: &mut dyn Write, shapes: &[ShapeBench]) -> io::Result<()> {
+    let knobs = KNOBS.iter().map(|(name, _)| *name);
+    let columns = COLUMNS.iter().map(|(name, _)| *name);
+    let names: Vec<&str> = std::iter::once("shape")
+        .chain(knobs)
+        .chain(columns)
+        .chain(["present"])
+        .collect();
+    writeln!(out, "{}", names.join(","))?;
+    for shape in shapes {
+        for run in &shape.runs {
+            let mut line = Vec::new();
+            push_text(&mut line, &shape.shape);
+            for (_, name) in KNOBS {
+                let at = shape.knobs.iter().position(|knob| knob.name == name);
+                if let Some(at) = at {
+                    let setting = run.settings[at] as usize;
+                    push_number(&mut line, shape.knobs[at].settings[setting].value);
                 }
-                push_cell(&mut line, row.knob);
-                push_text(&mut line, if row.default { "true" } else { "false" });
-                push_text(&mut line, &row.items.to_string());
-                push_cell(&mut line, row.error);
-                match row.stated_error {
-                    Some(stated) => push_cell(&mut line, stated),
+                line.push(b',');
+            }
+            for (_, value) in COLUMNS {
+                match value(run) {
+                    Some(value) => push_cell(&mut line, value),
                     None => line.push(b','),
                 }
-                for seconds in [row.seconds, row.seconds_low, row.seconds_high] {
-                    push_cell(&mut line, seconds);
-                }
-                push_text(&mut line, &row.repeats.to_string());
-                push_text(&mut line, &curve.reference);
-                push_number(&mut line, curve.reference_error);
-                line.push(b'\n');
-                out.write_all(&line)?;
             }
-        }
-    }
-    Ok(())
-}
-
-/// Writes every size of every law.
-///
-/// # Errors
-/// The writer's.
-pub fn write_laws(out: &mut dyn Write, laws: &[Law]) -> io::Result<()> {
-    writeln!(
-        out,
-        "stage,axis,size,threads,seconds,seconds_low,seconds_high,elapsed_s,peak_bytes"
-    )?;
-    for law in laws {
-        for row in &law.sizes {
-            let mut line = Vec::new();
-            push_text(&mut line, &law.stage);
-            push_text(&mut line, &law.axis);
-            push_cell(&mut line, row.size);
-            push_text(&mut line, &row.threads.to_string());
-            for value in [
-                row.seconds,
-                row.seconds_low,
-                row.seconds_high,
-                row.elapsed_s,
-            ] {
-                push_cell(&mut line, value);
-            }
-            line.extend_from_slice(row.peak_bytes.to_string().as_bytes());
+            let present: &[u8] = if shape.is_present(run) {
+                b"true"
+            } else {
+                b"false"
+            };
+            line.extend_from_slice(present);
             line.push(b'\n');
             out.write_all(&line)?;
         }
     }
     Ok(())
-}
-
-/// Appends a number and a comma.
-pub(crate) fn push_cell(line: &mut Vec<u8>, value: f64) {
-    push_number(line, value);
-    line.push(b',');
-}
-
-/// Appends a text, quoted where it must be, and a comma.
-pub(crate) fn push_text(line: &mut Vec<u8>, text: &str) {
-    if text.contains([',', '"', '\n', '\r']) {
-        let quoted = text.replace('"', "\"\"");
-        line.extend_from_slice(format!("\"{quoted}\"").as_bytes());
-    } else {
-        line.extend_from_slice(text.as_bytes());
-    }
-    line.push(b',');
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rows_have_a_cell_for_every_column() {
-        let row = Row {
-            knob: 1e-6,
-            default: true,
-            items: 7,
-            error: 1.3e-7,
-            stated_error: None,
-            seconds: 0.7,
-            seconds_low: 0.6,
-            seconds_high: 1.3,
-            repeats: 3,
-        };
-        let stage = StageCurves {
-            stage: "air-field".to_owned(),
-            timed: "a point".to_owned(),
-            error_of: "|grad B|".to_owned(),
-            default: "as it is".to_owned(),
-            curves: vec![Curve {
-                name: "a, b".to_owned(),
-                program: "fluxform".to_owned(),
-                knob: "tolerance".to_owned(),
-                reference: "40 digits".to_owned(),
-                reference_error: 1e-16,
-                rows: vec![row],
-            }],
-        };
-        let mut text = Vec::new();
-        write_rows(&mut text, &[stage]).unwrap();
-        let text = String::from_utf8(text).unwrap();
-        assert_eq!(
-            text.lines().nth(1).unwrap(),
-            "air-field,\"a, b\",fluxform,tolerance,1e-6,true,7,1.3e-7,,0.7,0.6,1.3,3,40 digits,1e-16"
-        );
-        assert_eq!(
-            text.lines().next().unwrap().split(',').count(),
-            BENCH_COLUMNS.len() + 1
-        );
-    }
 }

@@ -20,7 +20,6 @@ pub mod artefact;
 #[allow(clippy::disallowed_methods)] // the one place that writes files
 pub mod atomic;
 pub mod bench;
-pub mod catalogue;
 mod consistent;
 pub mod force_map;
 pub mod json;

@@ -21,6 +21,23 @@ pub fn push_index(text: &mut Vec<u8>, value: i64) {
     let _ = write!(text, "{value}");
 }
 
+/// Appends a number and a comma.
+pub fn push_cell(line: &mut Vec<u8>, value: f64) {
+    push_number(line, value);
+    line.push(b',');
+}
+
+/// Appends a text, quoted where it must be, and a comma.
+pub fn push_text(line: &mut Vec<u8>, text: &str) {
+    if text.contains([',', '"', '\n', '\r']) {
+        let quoted = text.replace('"', "\"\"");
+        line.extend_from_slice(format!("\"{quoted}\"").as_bytes());
+    } else {
+        line.extend_from_slice(text.as_bytes());
+    }
+    line.push(b',');
+}
+
 #[cfg(test)]
 mod tests {
     use super::{push_index, push_number};

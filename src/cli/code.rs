@@ -45,7 +45,7 @@ pub enum Code {
     Sweep,
     /// A measurement that could not be made.
     Measurement,
-    /// A check of `verify` or a case of `bench --extreme` failed.
+    /// A check of `verify` or a case of `fluxform-bench --extreme` failed.
     Check,
     /// A bundle that was changed or damaged.
     Damaged,

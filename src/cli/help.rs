@@ -13,6 +13,8 @@ pub enum Codes {
     Verifying,
     /// Writes files that need no input.
     Pages,
+    /// Measures, writes files, reads nothing.
+    Measuring,
 }
 
 impl Codes {
@@ -31,6 +33,11 @@ impl Codes {
             }
             Self::Verifying => "\n  3    not a bundle\n  5    a check failed\n  130  interrupted",
             Self::Pages => "\n  4    an output exists or cannot be written",
+            Self::Measuring => {
+                "\n  4    an output exists or cannot be written; or a measurement failed\n  \
+                 5    a case of the catalogue failed\n  \
+                 130  interrupted"
+            }
         }
     }
 }

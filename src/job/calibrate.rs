@@ -207,7 +207,7 @@ fn store_of(scene: &Scene, options: &CalibrateOptions) -> Store {
 }
 
 /// The table of the design's magnetisation curve: its entry among the inputs and its text.
-pub(super) fn curve_table(design: &Design) -> Result<Option<(Input, String)>, JobError> {
+pub(crate) fn curve_table(design: &Design) -> Result<Option<(Input, String)>, JobError> {
     let Some(path) = design.curve_file() else {
         return Ok(None);
     };
@@ -508,7 +508,7 @@ impl NeededMap {
 }
 
 /// The coils that may carry current.
-pub(super) fn needed_coils(scene: &Scene) -> Vec<PlacedCoil> {
+pub(crate) fn needed_coils(scene: &Scene) -> Vec<PlacedCoil> {
     let coils = scene.coils.iter();
     coils
         .filter(|coil| largest_current_a(scene, coil.number) > 0.0)
@@ -582,7 +582,7 @@ fn drop_weak_coils(
 }
 
 /// The nodes of the workspace within reach of the object's points, one cell beyond.
-pub(super) fn needed_nodes(design: &Design, points: &ConstraintPoints, reach_m: f64) -> Grid {
+pub(crate) fn needed_nodes(design: &Design, points: &ConstraintPoints, reach_m: f64) -> Grid {
     let whole = workspace_grid(design);
     let part = |nodes: &[f64], values: &[f64]| -> Vec<f64> {
         let lowest = values.iter().copied().fold(f64::INFINITY, f64::min) - reach_m;

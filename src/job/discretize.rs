@@ -325,7 +325,7 @@ fn shape_error(document: &ShapeDocument, source: ShapeError) -> JobError {
 }
 
 /// `inputs` and the surface file that `document` names, paths as given.
-pub(super) fn with_surface(document: &ShapeDocument, mut inputs: Vec<Input>) -> Vec<Input> {
+pub(crate) fn with_surface(document: &ShapeDocument, mut inputs: Vec<Input>) -> Vec<Input> {
     if let SurfaceSource::File { path, .. } = &document.source {
         // What cannot be read is told, with the reason, by the reader that comes next.
         if let Ok(bytes) = read_file(path) {

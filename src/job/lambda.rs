@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use self::feedback::{FeedbackOptions, Rendering};
 use self::picture::Seen;
-use self::points::WantedPoints;
+pub(crate) use self::points::WantedPoints;
 use self::points_effect::Moved;
 use super::discretize::scattered::{self, Sampling, ScatteredSummary};
 use super::discretize::{self, PointsReport};
@@ -145,7 +145,7 @@ pub fn run(
 }
 
 /// Patches of the points over which forces change little, where no width is asked for.
-fn resolving(how: Sampling, lowest_m: f64) -> Sampling {
+pub(crate) fn resolving(how: Sampling, lowest_m: f64) -> Sampling {
     match how {
         Sampling::Adaptive {
             max_deviation_m,
@@ -219,6 +219,25 @@ pub(super) fn solve(
         progress,
     )?;
     Ok(found.with(points))
+}
+
+/// The result for points of any kind, as `lambda` computes it.
+pub(crate) fn solve_points(
+    scene: &Scene,
+    solved: &Solved,
+    points: &WantedPoints,
+    options: &LambdaOptions,
+    progress: &dyn Progress,
+) -> Result<LambdaFile, JobError> {
+    let found = solve_at(
+        scene,
+        solved,
+        ShapeField::default(),
+        points,
+        options,
+        progress,
+    )?;
+    Ok(found.file)
 }
 
 /// A report, but for the grid.

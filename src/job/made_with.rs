@@ -63,7 +63,8 @@ pub(super) fn calibrate(options: &CalibrateOptions, shape: &ShapeSource) -> Made
 }
 
 /// What the command line says of a surface; `None` where a shape file says it.
-fn surface(document: &ShapeDocument, file: Option<&Input>) -> Option<SurfaceOptions> {
+#[must_use]
+pub fn surface(document: &ShapeDocument, file: Option<&Input>) -> Option<SurfaceOptions> {
     let (None, SurfaceSource::File { unit_m, .. }) = (file, &document.source) else {
         return None;
     };

@@ -22,13 +22,13 @@ use crate::progress::Progress;
 /// Points handed to one thread at a time; fixed, so that bytes do not depend on threads.
 const PORTION: usize = 4096;
 /// Share of the tolerance given to the magnet's dipoles, and the finest asked of them.
-pub(super) const MAGNET_SHARE: f64 = 0.3;
+pub(crate) const MAGNET_SHARE: f64 = 0.3;
 pub(super) const MAGNET_FINEST: f64 = 1e-9;
 /// Share of the tolerance given to the windings' field where the magnet takes its own.
 pub(super) const AIR_SHARE: f64 = 0.6;
 
 /// The magnet's moment, A m^2.
-pub(crate) fn moment_a_m2(design: &Design) -> [f64; 3] {
+pub fn moment_a_m2(design: &Design) -> [f64; 3] {
     let magnet = &design.magnet;
     let moment = dipole::cylinder_moment_a_m2(
         magnet.diameter_m,

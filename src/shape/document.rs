@@ -105,3 +105,23 @@ pub enum AxisRequest {
     /// This many samples over the surface's own extent.
     Extent(usize),
 }
+
+impl AxisRequest {
+    /// Samples along it.
+    #[must_use]
+    pub fn samples(self) -> usize {
+        match self {
+            Self::Given(axis) => axis.samples,
+            Self::Extent(samples) => samples,
+        }
+    }
+
+    /// The same with other samples.
+    #[must_use]
+    pub fn with_samples(self, samples: usize) -> Self {
+        match self {
+            Self::Given(axis) => Self::Given(Axis { samples, ..axis }),
+            Self::Extent(_) => Self::Extent(samples),
+        }
+    }
+}

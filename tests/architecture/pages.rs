@@ -47,7 +47,7 @@ fn the_design_page_has_one_line_for_every_dependency() {
     let table = manifest["workspace"]["dependencies"].as_table().unwrap();
     let tree = table
         .keys()
-        .filter(|name| !name.starts_with("fluxform-"))
+        .filter(|name| !name.starts_with("fluxform"))
         .cloned()
         .collect();
     let page = names(&entries("src/DESIGN.md", "Dependencies"));
@@ -102,8 +102,8 @@ fn every_dependency_is_used() {
     for path in manifests() {
         let manifest: toml::Table = read(&path).parse().unwrap();
         let room = path
-            .strip_prefix("src/")
-            .and_then(|path| path.split('/').next());
+            .strip_suffix("/Cargo.toml")
+            .and_then(|folder| folder.split('/').next_back());
         let inside = |source: &&Source| match room {
             Some(room) => source.room() == room,
             None => !members.contains(source.room()),
@@ -143,7 +143,8 @@ fn every_test_is_a_target() {
             let parts: Vec<&str> = path.split('/').collect();
             match parts[..] {
                 ["tests", file] => file.ends_with(".rs"),
-                ["tests", _, file] => file == "main.rs",
+                // The measuring suite's own lie where Cargo finds them.
+                ["tests", folder, file] => file == "main.rs" && folder != "suite",
                 _ => false,
             }
         })

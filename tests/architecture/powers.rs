@@ -90,28 +90,29 @@ const POWERS: &[Power] = &[
             "env :: home_dir",
         ],
         holders: &[
-            "bench/peers/mod.rs",
-            "bench/scaling/mod.rs",
             "cli/printer.rs",
             "main.rs",
+            "suite/main.rs",
+            "suite/peers/mod.rs",
+            "suite/scaling/mod.rs",
         ],
     },
     Power {
         name: "reading files",
         marks: &["fs ::", "File ::", "stdin ("],
         holders: &[
-            "bench/memory.rs",
             "bundle/",
             "cli/budget.rs",
             "cli/documents.rs",
             "design/named_file.rs",
             "design/source.rs",
+            "suite/memory.rs",
         ],
     },
     Power {
         name: "the command line's crates",
         marks: &["clap", "clap_complete", "clap_mangen"],
-        holders: &["cli/"],
+        holders: &["cli/", "suite/arguments.rs"],
     },
     Power {
         name: "the plotting crate",

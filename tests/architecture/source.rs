@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// A source file of the crate, as the checks see it.
 pub struct Source {
-    /// Relative to `src`, with `/`.
+    /// Relative to `src` (the measuring suite's to `tests`), with `/`.
     pub path: String,
     /// Identifiers, `::` and single characters; no comment, no text, no `#[cfg(test)] mod`.
     pub tokens: Vec<String>,
@@ -270,22 +270,28 @@ fn past_group(tokens: &[String], mut i: usize, open: &str, close: &str) -> usize
     i
 }
 
-/// The members of the workspace under `src`.
-pub fn members() -> BTreeSet<String> {
+/// The folders of the workspace's members.
+fn folders() -> Vec<String> {
     let manifest: toml::Table = read("Cargo.toml").parse().unwrap();
     let members = manifest["workspace"]["members"].as_array().unwrap();
-    members
-        .iter()
-        .filter_map(|path| path.as_str().unwrap().strip_prefix("src/"))
-        .map(str::to_owned)
-        .collect()
+    let folders = members.iter().map(|path| path.as_str().unwrap().to_owned());
+    folders.collect()
+}
+
+/// The members of the workspace, by their folders' names.
+pub fn members() -> BTreeSet<String> {
+    let name = |folder: &String| folder.rsplit('/').next().unwrap().to_owned();
+    folders().iter().map(name).collect()
 }
 
 /// The manifests of all packages.
 pub fn manifests() -> Vec<String> {
-    let members = members().into_iter();
     let mut all = vec!["Cargo.toml".to_owned()];
-    all.extend(members.map(|member| format!("src/{member}/Cargo.toml")));
+    all.extend(
+        folders()
+            .iter()
+            .map(|folder| format!("{folder}/Cargo.toml")),
+    );
     all
 }
 
@@ -319,13 +325,18 @@ pub fn files() -> Vec<String> {
     found
 }
 
-/// Every Rust file under `src`.
+/// Every Rust file under `src`, and the measuring suite's but for its own tests.
 pub fn sources() -> Vec<Source> {
     files()
         .iter()
-        .filter_map(|path| path.strip_prefix("src/"))
-        .filter(|path| path.ends_with(".rs"))
-        .map(|path| Source::new(path, &read(&format!("src/{path}"))))
+        .filter(|path| path.ends_with(".rs") && !path.starts_with("tests/suite/tests/"))
+        .filter_map(|path| {
+            let suite = path
+                .strip_prefix("tests/")
+                .filter(|p| p.starts_with("suite/"));
+            let within = path.strip_prefix("src/").or(suite)?;
+            Some(Source::new(within, &read(path)))
+        })
         .collect()
 }
 

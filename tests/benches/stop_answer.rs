@@ -172,12 +172,15 @@ const CASES: &[(&str, &[&str])] = &[
         ],
     ),
     (
-        "bench --quick",
-        &["bench", "--quick", "--out", "b", "--force"],
-    ),
-    (
-        "bench --extreme",
-        &["bench", "--extreme", "--out", "e", "--force"],
+        "bench",
+        &[
+            "bench",
+            "designs/seed.toml",
+            "shapes/wedge.toml",
+            "--out",
+            "b",
+            "--force",
+        ],
     ),
     ("verify", &["verify", "bundle/seed/wedge"]),
     (

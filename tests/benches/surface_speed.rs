@@ -20,7 +20,6 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use fluxform::bench::clock::Watch;
-use fluxform::bench::memory::peak_bytes;
 use fluxform::numerics::axis::Axis;
 use fluxform::progress::Silent;
 use fluxform::shape::document::Placement;
@@ -28,6 +27,7 @@ use fluxform::shape::height::{Grid, Sample, heights};
 use fluxform::shape::mesh::Mesh;
 use fluxform::shape::placement::Transform;
 use fluxform::shape::stl;
+use fluxform_bench::memory::peak_bytes;
 
 type Failure = Box<dyn Error + Send + Sync>;
 

@@ -16,7 +16,6 @@ use std::path::Path;
 use std::process::Command;
 
 use fluxform::bench::clock::Watch;
-use fluxform::bench::memory::peak_bytes;
 use fluxform::design::{Design, Need};
 use fluxform::job::scene::Scene;
 use fluxform::job::steel;
@@ -24,6 +23,7 @@ use fluxform::lambda::worst::worst_point;
 use fluxform::lambda::{self, ForceProblem, Settings};
 use fluxform::numerics::axis::Axis;
 use fluxform::progress::Silent;
+use fluxform_bench::memory::peak_bytes;
 
 const TOLERANCE: f64 = 1e-12;
 type Failure = Box<dyn Error + Send + Sync>;

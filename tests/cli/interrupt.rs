@@ -207,12 +207,7 @@ fn a_signal_ends_points_paths_searches_and_stages() {
         &[600, 2500],
     );
     stops(&place, &["optimize", "designs/seed.toml"], &[300, 900]);
-    stops(
-        &place,
-        &["bench", "--quick", "--out", "bench"],
-        &[200, 1200],
-    );
-    assert!(!place.path("p.csv").exists() && !place.path("bench").exists());
+    assert!(!place.path("p.csv").exists());
 }
 
 #[test]

@@ -115,6 +115,34 @@ fn one_command_of_a_section_prints_what_is_shown() {
     }
 }
 
+/// The lines up to the cheapest settings, which depend on the machine, without the seconds.
+fn untimed(text: &str) -> Vec<String> {
+    let errors = text.lines().take_while(|line| !line.starts_with("  10 %"));
+    let without = |line: &str| {
+        let mut words: Vec<&str> = line.split_whitespace().collect();
+        if words
+            .last()
+            .is_some_and(|unit| ["s", "ms", "us"].contains(unit))
+        {
+            words.truncate(words.len() - 2);
+        }
+        words.join(" ")
+    };
+    errors.map(without).collect()
+}
+
+#[test]
+fn the_errors_of_a_scene_are_those_shown() {
+    let (command, shown) = command_and_output("Error against time of a scene");
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out").display().to_string();
+    let mut asked = arguments(&command, &[], Path::new(""));
+    asked.extend(["--out".to_owned(), out]);
+    let printed = untimed(&printed(&asked));
+    assert!(printed.len() > 12, "{printed:?}");
+    assert_eq!(untimed(&shown), printed);
+}
+
 #[test]
 fn the_sweep_prints_what_is_shown() {
     let (commands, shown) = command_and_output("Sweep designs");

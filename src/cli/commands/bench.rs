@@ -1,114 +1,73 @@
-//! Arguments and summary of `bench`.
+//! `bench`: error against run time of the user's own scene.
 
 use std::path::PathBuf;
 
 use clap::Args;
-use clap::builder::PossibleValuesParser;
 
+use super::lambda::CriterionFlags;
 use super::{begin, folder};
-use crate::bench::extreme::{self, Case};
-use crate::bench::pace::Pace;
-use crate::bench::stages::STAGES;
-use crate::bench::written::{
-    catalogue_file, catalogue_made_with, check_catalogue, write_catalogue,
-};
-use crate::bench::{BenchRequest, run, scaling};
-use crate::bundle::bench::{BenchFile, Row};
-use crate::bundle::catalogue::CaseRow;
-use crate::bundle::json::to_json;
-use crate::cli::args::Writing;
+use crate::bench::{BenchRequest, Estimate, run};
+use crate::bundle::bench::{BenchFile, Cheapest, ShapeBench};
+use crate::cli::args::{SurfaceFlags, Tolerance, Writing};
+use crate::cli::budget::{allow, asked, costs};
+use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::printer::{Place, Printer};
-use crate::cli::quantity::{bytes, count, error, number_to, si};
-use crate::cli::values::FileArgument;
-use crate::job::JobError;
-use crate::progress::Progress;
+use crate::cli::quantity::{count, error, number, number_to, percent, si};
+use crate::cli::values::{self, FileArgument};
+use crate::design::Need;
+use crate::job::calibrate::curve_table;
+use crate::job::cost::{Components, of_map};
 
-/// Error against run time of every numerical stage
+/// Error against run time of a design and its objects
 ///
-/// Sweeps the knob of every stage from coarse to fine (where a stage is exact: the size or the
-/// hardness of its problem) and measures the error against a reference of another kind and the
-/// processor time on one thread: a warm-up, repeats, their median and quartiles. Nothing is read:
-/// designs and reference values are part of the program. Writes bench.csv, bench.json, a picture
-/// a stage, summary.md and report.html, a page to look at. --peers measures other programs on the same problems, run by the Python
-/// that FLUXFORM_PYTHON names (several as in PATH), from the repository's root. --scaling measures
-/// time and memory against size, and says where a stage would break.
-///
-/// --extreme runs the stability catalogue instead: named cases at the limits of what may be asked,
-/// each with what must come out and a bound; --out writes extreme.csv, extreme.json and
-/// report.html. Code 5 if one fails.
+/// Sweeps what can be set in this scene: the field's tolerance, the grid of points (or, with
+/// --max-deviation, points graded to it) and the nodes of the map, in every combination, and holds
+/// each against a run that is finer in all of them. Reports the relative error of lambda, the error
+/// of the felt force (what the currents give by the interpolated map against what they give in the
+/// refined field, at places that are neither nodes nor points) and the processor time; names the
+/// cheapest settings within 10, 1 and 0.1 %, to paste. Writes bench.json, bench.csv, two pictures per
+/// object and report.html. How long it takes is said before it begins: with --quick within a minute
+/// of processor time, else within ten, where settings can be spared for it.
 #[derive(Debug, Args)]
-#[command(after_help = page(Codes::Pages, &[
-    ("fluxform bench --quick --stage air-field --out air", "one stage, in a second"),
-    ("fluxform bench --quick --stage air-field --stage inductance --out two --format json",
-     "two stages, for a program"),
-    ("fluxform bench --extreme --case wires", "the catalogue's cases about wires"),
+#[command(after_help = page(Codes::Writing, &[
+    ("fluxform bench designs/seed_air.toml shapes/flat.toml --quick",
+     "in a few seconds; files go to results/bench-scene/seed_air/"),
+    ("fluxform bench designs/seed_air.toml shapes/flat.toml --quick --out f --format json",
+     "for a program"),
+    ("fluxform bench designs/seed_air.toml shapes/wedge.toml --quick --tolerance 1e-4 --out w",
+     "around another tolerance than the default"),
 ]))]
 pub struct Bench {
-    /// Leave out the slowest rows: all stages in less than a minute on one core
+    /// Design file (TOML), `-` for standard input
+    #[arg(value_name = "DESIGN")]
+    design: FileArgument,
+    /// Shape files (TOML) or surfaces (STL, OBJ, PLY, 3MF, STEP, ...)
+    #[arg(value_name = "SHAPE", required = true)]
+    shapes: Vec<FileArgument>,
+    /// Shorter ladders, a coarser reference and fewer repeats
     #[arg(long)]
     quick: bool,
-    /// Measure this stage alone; may be repeated
-    #[arg(long, value_name = "NAME", value_parser = stage_names())]
-    stage: Vec<String>,
-    /// Measure other programs too, where their Python packages are installed
-    #[arg(long)]
-    peers: bool,
-    /// Measure time and memory against numbers of coils, points, triangles, nodes and threads
-    #[arg(long)]
-    scaling: bool,
-    /// Run the stability catalogue; with --quick the part of it that every change runs
-    #[arg(long, conflicts_with_all = ["stage", "peers", "scaling"])]
-    extreme: bool,
-    /// Of the catalogue only cases whose name holds this
-    #[arg(long, value_name = "TEXT", requires = "extreme")]
-    case: Option<String>,
-    /// Folder of the results; without it results/bench for a whole run, results/bench-part for
-    /// one with --quick, --stage, --peers or --scaling, and none with --extreme
+    /// Sweep points graded to a deviation, from this one to coarser ones, instead of the grid's
+    #[arg(long, value_name = "LENGTH", value_parser = values::length_with_unit)]
+    max_deviation: Option<f64>,
+    /// Folder of the results [default: results/bench-scene/<design>]
     #[arg(long, value_name = "DIR")]
     out: Option<FileArgument>,
     #[command(flatten)]
+    criterion: CriterionFlags,
+    #[command(flatten)]
     writing: Writing,
-    /// One row of --scaling, as STAGE:AXIS:SETTING:THREADS, in this process
-    #[arg(long, hide = true, value_name = "ROW", value_parser = size_row)]
-    size_row: Option<SizeRowArgument>,
+    #[command(flatten)]
+    tolerance: Tolerance,
+    #[command(flatten)]
+    surface: SurfaceFlags,
 }
 
-/// Where a whole run goes without `--out`, and any other.
-const WHOLE: &str = "results/bench";
-const PART: &str = "results/bench-part";
-
-/// What a process of its own measures.
-#[derive(Debug, Clone)]
-struct SizeRowArgument {
-    stage: String,
-    axis: String,
-    setting: usize,
-    threads: usize,
-}
-
-fn size_row(text: &str) -> Result<SizeRowArgument, String> {
-    let parts: Vec<&str> = text.split(':').collect();
-    let whole = |text: &str| {
-        text.parse()
-            .map_err(|_| format!("{text:?} is no whole number"))
-    };
-    match parts[..] {
-        [stage, axis, setting, threads] => Ok(SizeRowArgument {
-            stage: stage.to_owned(),
-            axis: axis.to_owned(),
-            setting: whole(setting)?,
-            threads: whole(threads)?.max(1),
-        }),
-        _ => Err("expected STAGE:AXIS:SETTING:THREADS".to_owned()),
-    }
-}
-
-fn stage_names() -> PossibleValuesParser {
-    PossibleValuesParser::new(STAGES.map(|stage| stage.name))
-}
+/// Where results go without `--out`, a folder per design.
+const OUT: &str = "results/bench-scene";
 
 impl Bench {
     /// Runs the command.
@@ -116,168 +75,163 @@ impl Bench {
     /// # Errors
     /// See [`Failure`].
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
-        if let Some(asked) = &self.size_row {
-            let row = scaling::size_row(&asked.stage, &asked.axis, asked.setting, asked.threads)?;
-            let json = to_json(&row)?;
-            return printer.data(|out| out.write_all(&json));
-        }
-        if self.extreme {
-            return self.catalogue(printer);
-        }
+        let (document, shapes) = documents::design_and_shapes(
+            &self.design,
+            Need::CALIBRATE,
+            &self.shapes,
+            &self.surface,
+            printer,
+        )?;
+        let design = &document.design;
+        let out = match &self.out {
+            Some(out) => folder(out)?,
+            None => PathBuf::from(OUT).join(&design.name),
+        };
+        let tolerance = self.tolerance.tolerance;
+        allow(
+            costs(design, &shapes, tolerance)
+                .into_iter()
+                .chain([of_map(design, Components::Gz)]),
+            asked(&shapes),
+            printer,
+        )?;
+        let mut inputs = vec![document.input.clone()];
+        inputs.extend(curve_table(design)?.map(|(input, _)| input));
         let request = BenchRequest {
-            pace: if self.quick { Pace::QUICK } else { Pace::FULL },
-            stages: self.stage.clone(),
-            peers: self.peers,
-            scaling: self.scaling,
-            out: self.folder()?,
+            design,
+            inputs,
+            shapes: &shapes,
+            lambda: self.criterion.options(tolerance),
+            max_deviation_m: self.max_deviation,
+            quick: self.quick,
+            out,
             force: self.writing.force,
         };
         let bar = begin(printer);
-        let file = run(&request, &bar)?;
+        let file = run(&request, &|estimate| printer.notice(&said(estimate)), &bar)?;
         drop(bar);
-        for missing in &file.peers_missing {
-            printer.warning(&format!("peer not measured: {missing}"));
-        }
-        let folder = request.out.display().to_string();
+        let to = request.out.display().to_string();
         printer.summary(Place::Output, &printer.with_warnings(&file), || {
-            summary(&file, &folder)
+            summary(&file, &to)
         })
     }
 }
 
-impl Bench {
-    /// Tables of a whole run are kept and compared: what measures less, or more, goes elsewhere
-    /// unless `--out` says where.
-    fn folder(&self) -> Result<PathBuf, Failure> {
-        let whole = !(self.quick || self.peers || self.scaling) && self.stage.is_empty();
-        match &self.out {
-            Some(out) => folder(out),
-            None => Ok(PathBuf::from(if whole { WHOLE } else { PART })),
-        }
-    }
-
-    fn catalogue(&self, printer: &Printer) -> Result<(), Failure> {
-        let named = |name: &str| self.case.as_ref().is_none_or(|text| name.contains(text));
-        let cases: Vec<Case> = extreme::cases()
-            .into_iter()
-            .filter(|case| named(case.name) && (case.in_ci || !self.quick))
-            .collect();
-        if cases.is_empty() {
-            let text = self.case.as_deref().unwrap_or_default();
-            return Err(Failure::Usage(format!(
-                "no case of the catalogue is called {text:?}; without --case all are run"
-            )));
-        }
-        let out = self.out.as_ref().map(folder).transpose()?;
-        let made_with = catalogue_made_with(self.quick, self.case.as_deref());
-        if let Some(out) = &out {
-            check_catalogue(&made_with, out, self.writing.force)?;
-        }
-        let bar = begin(printer);
-        let rows = extreme::run(&cases, &bar);
-        bar.check().map_err(JobError::from)?;
-        drop(bar);
-        if let Some(out) = &out {
-            write_catalogue(&rows, made_with.clone(), out, self.writing.force)?;
-        }
-        let table = catalogue_file(&rows, made_with);
-        printer.summary(Place::Output, &table, || told_cases(&table.cases))?;
-        let failed: Vec<&str> = (table.cases.iter())
-            .filter(|row| !row.pass)
-            .map(|row| row.name.as_str())
-            .collect();
-        if failed.is_empty() {
-            return Ok(());
-        }
-        Err(Failure::Verification(format!(
-            "{} of {} failed: {}",
-            failed.len(),
-            count(cases.len(), "case"),
-            failed.join(", ")
-        )))
-    }
-}
-
-/// Every case in a line, what was expected and what came out where they differ.
-fn told_cases(rows: &[CaseRow]) -> String {
-    let passed = rows.iter().filter(|row| row.pass).count();
-    let mut sheet = Sheet::new(&format!(
-        "the stability catalogue: {passed} of {} as expected",
-        count(rows.len(), "case")
-    ));
-    let mut lines = vec![
-        ["verdict", "case", "error", "bound", "s"]
-            .map(str::to_owned)
-            .to_vec(),
-    ];
-    lines.extend(rows.iter().map(|row| {
-        vec![
-            if row.pass { "ok" } else { "FAILED" }.to_owned(),
-            row.name.clone(),
-            error(row.error),
-            error(row.bound),
-            number_to(row.seconds, 2),
-        ]
-    }));
-    let sides = [
-        Side::Left,
-        Side::Left,
-        Side::Right,
-        Side::Right,
-        Side::Right,
-    ];
-    sheet.raw(&table(&sides, &lines));
-    for row in rows.iter().filter(|row| !row.pass) {
-        sheet.gap();
-        sheet.line("failed", &row.name);
-        sheet.line("expected", &row.expected);
-        sheet.line("got", &row.got);
-    }
-    sheet.finish()
+/// How long it will take.
+fn said(estimate: Estimate) -> String {
+    let verdict = if estimate.cpu_s > estimate.bound_s {
+        "; no setting can be spared to stay within"
+    } else {
+        ", within"
+    };
+    format!(
+        "{} from {} will take about {} of processor time{verdict} {}; Ctrl-C stops it",
+        count(estimate.runs, "run"),
+        count(estimate.computations, "computation"),
+        si(estimate.cpu_s.ceil(), "s"),
+        si(estimate.bound_s, "s"),
+    )
 }
 
 fn summary(file: &BenchFile, folder: &str) -> String {
-    let mut sheet = Sheet::new("error against processor time, one thread");
-    let mut rows = vec![
-        [
-            "stage", "curve", "knob", "coarsest", "", "default", "", "finest", "",
-        ]
-        .map(str::to_owned)
-        .to_vec(),
-    ];
-    for stage in &file.stages {
-        for curve in &stage.curves {
-            let default = curve.rows.iter().find(|row| row.default);
-            let mut cells = vec![
-                stage.stage.clone(),
-                format!("{}: {}", curve.program, curve.name),
-                curve.knob.clone(),
-            ];
-            for row in [curve.rows.first(), default, curve.rows.last()] {
-                cells.extend(told(row));
-            }
-            rows.push(cells);
-        }
+    let mut sheet = Sheet::new(&format!(
+        "{}: error against processor time (lambda by the criterion {})",
+        file.design,
+        file.criterion.name()
+    ));
+    for shape in &file.shapes {
+        of_shape(&mut sheet, shape);
+        sheet.gap();
     }
-    let mut sides = [Side::Right; 9];
-    sides[..3].fill(Side::Left);
-    sheet.raw(&table(&sides, &rows));
-    sheet.gap();
-    let files: Vec<String> = file
-        .files
-        .iter()
-        .map(|entry| format!("{} ({})", entry.path, bytes(entry.bytes)))
-        .collect();
-    sheet.line(
-        "written to",
-        &format!("{folder}: {}, bench.json", files.join(", ")),
-    );
+    for left_out in &file.left_out {
+        sheet.line("not swept", &format!("{}: {}", left_out.knob, left_out.why));
+    }
+    let files = file.files.iter().map(|entry| entry.path.as_str());
+    let files: Vec<&str> = files.chain(["bench.json"]).collect();
+    sheet.line("written to", &format!("{folder}: {}", files.join(", ")));
     sheet.finish()
 }
 
-/// Error and time of a row.
-fn told(row: Option<&Row>) -> [String; 2] {
-    row.map_or_else(<[String; 2]>::default, |row| {
-        [number_to(row.error, 2), si(row.seconds, "s")]
-    })
+fn of_shape(sheet: &mut Sheet, shape: &ShapeBench) {
+    let reference = &shape.reference;
+    sheet.line(
+        "object",
+        &format!(
+            "{}; refined lambda {} N/m{} from {}, {} between them",
+            shape.shape,
+            number(reference.lambda_n_per_m),
+            reference
+                .lambda_error
+                .map_or_else(String::new, |own| format!(" +/- {}", percent(own))),
+            count(reference.points as usize, "point"),
+            count(reference.places as usize, "place"),
+        ),
+    );
+    sheet.line("refined", &reference.how);
+    let mut rows = vec![head(shape)];
+    // Knob by knob, each alone; then what is in force now.
+    for (at, knob) in shape.knobs.iter().enumerate() {
+        rows.extend(shape.along(at).into_iter().map(|run| {
+            let setting = &knob.settings[run.settings[at] as usize];
+            let mark = if setting.present { "*" } else { "" };
+            row(
+                &format!(
+                    "{} {}{mark}",
+                    knob.name.label(),
+                    number_to(setting.value, 4)
+                ),
+                run,
+            )
+        }));
+    }
+    rows.extend(shape.present().map(|run| row("present settings", run)));
+    let sides = [Side::Left, Side::Right, Side::Right, Side::Right];
+    sheet.raw(&table(&sides, &rows));
+    for cheapest in &shape.cheapest {
+        let text = named(shape, cheapest);
+        sheet.line(&percent(cheapest.target), &text);
+    }
+}
+
+fn head(shape: &ShapeBench) -> Vec<String> {
+    let title = format!("{}, one knob at a time (* present)", shape.shape);
+    vec![
+        title,
+        "lambda".into(),
+        "felt force".into(),
+        "CPU time".into(),
+    ]
+}
+
+fn row(name: &str, run: &crate::bundle::bench::Run) -> Vec<String> {
+    let error = |value: Option<f64>| value.map_or_else(|| "none".to_owned(), error);
+    vec![
+        name.to_owned(),
+        error(run.lambda_error),
+        error(run.felt_error),
+        seconds(run.cpu_s),
+    ]
+}
+
+fn seconds(value: f64) -> String {
+    let three = format!("{value:.2e}").parse();
+    si(three.unwrap_or(value), "s")
+}
+
+/// The cheapest settings for one target.
+fn named(shape: &ShapeBench, cheapest: &Cheapest) -> String {
+    let run = &shape.runs[cheapest.run as usize];
+    let verdict = if cheapest.met {
+        String::new()
+    } else {
+        format!(
+            "not reached; the closest is off by {}: ",
+            percent(run.error())
+        )
+    };
+    format!(
+        "{verdict}{} of processor time\n{}",
+        seconds(run.cpu_s),
+        cheapest.paste.join("\n")
+    )
 }

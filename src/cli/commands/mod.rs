@@ -26,7 +26,7 @@ use super::printer::Printer;
 use super::values::FileArgument;
 
 /// A job begins: Ctrl-C asks it to stop, a bar shows how far it is.
-fn begin(printer: &Printer) -> Bar {
+pub fn begin(printer: &Printer) -> Bar {
     interrupt::working();
     Bar::new(printer.draws())
 }
@@ -35,7 +35,7 @@ fn begin(printer: &Printer) -> Bar {
 ///
 /// # Errors
 /// Wrong usage: a folder cannot be a standard stream.
-fn folder(file: &FileArgument) -> Result<PathBuf, Failure> {
+pub fn folder(file: &FileArgument) -> Result<PathBuf, Failure> {
     match file {
         FileArgument::Path(path) => Ok(path.clone()),
         FileArgument::Standard => Err(Failure::Usage(

@@ -9,11 +9,15 @@ use crate::bundle::table::{Column, write_columns};
 use crate::coil::limits::{self, Evaluated};
 use crate::job::lambda::LambdaReport;
 use crate::job::scene::Scene;
+use crate::lambda::NamedConstant;
 use crate::map::FieldMap;
 use crate::plot::lambda::LambdaPlot;
 use crate::plot::plane::{Cells, Panel, PlanePlot, Together};
 use crate::report::bundle::page;
-use crate::report::data::{BudgetPart, BundleFacts, CoilFacts, Deciding, LimitFacts, WorstPlace};
+use crate::report::data::{
+    Breakpoint, BudgetPart, BundleFacts, Chosen, CoilFacts, Deciding, LimitFacts, StageFacts,
+    WorstPlace,
+};
 use crate::report::field::{Field, Layer};
 use crate::report::surface::Surface;
 use crate::shape::points::ConstraintPoints;
@@ -76,15 +80,56 @@ fn facts<'a>(seen: &'a Seen, files: Vec<&'a str>) -> BundleFacts<'a> {
     let points = &seen.lambda.points.discretized.points;
     let (limits, unchecked) = limit_facts(seen);
     BundleFacts {
-        lambda: file,
-        manifest,
-        worst_at: worst_place(seen),
+        design: &file.design,
+        shape: &file.shape,
+        version: &file.fluxform_version,
+        inputs: file
+            .inputs
+            .iter()
+            .map(|input| (input.path.as_str(), input.sha256.as_str()))
+            .collect(),
+        criterion: file.criterion,
+        jnd: file.jnd,
+        chosen: chosen(seen),
+        rank: file.rank,
+        points: file.points,
+        constants: constants(file),
         coils: coils(scene, file),
+        total_max_a: scene.design.supply.total_current_max_a,
         limits,
         unchecked,
         deciding: deciding(file, points),
+        accuracy: manifest
+            .accuracy
+            .iter()
+            .map(|(name, stage)| StageFacts {
+                name,
+                estimate: stage.estimate,
+                relative_to: &stage.relative_to,
+                method: &stage.method,
+            })
+            .collect(),
         budget: budget(seen),
+        left_out: manifest
+            .left_out
+            .iter()
+            .map(|left| (left.what.as_str(), left.why.as_str(), left.error_cost))
+            .collect(),
+        breakpoints: file
+            .path
+            .iter()
+            .map(|step| Breakpoint {
+                lambda_n_per_m: step.lambda_n_per_m,
+                event: &step.event,
+            })
+            .collect(),
         curves: seen.picture,
+        worst_turns: file.worst_point.as_ref().map_or_else(Vec::new, |worst| {
+            let turns = worst.path.iter();
+            turns
+                .map(|turn| (turn.lambda_n_per_m, turn.worst_error_n))
+                .collect()
+        }),
         surface: surface(points, seen.picture),
         field: field(seen),
         warnings: &seen.lambda.warnings,
@@ -97,16 +142,53 @@ fn place_m(points: &ConstraintPoints, at: usize) -> [f64; 3] {
     [points.x_m[at], points.y_m[at], points.height_m[at]]
 }
 
-fn worst_place(seen: &Seen) -> Option<WorstPlace> {
+fn chosen(seen: &Seen) -> Option<Chosen> {
+    let file = &seen.lambda.file;
     let points = &seen.lambda.points.discretized.points;
-    let forces = seen.picture.chosen.as_ref()?;
-    let error = |at: usize| (forces.static_n[at] - forces.wanted_n[at]).abs();
-    let worst = (0..points.len()).reduce(|a, b| if error(b) > error(a) { b } else { a })?;
-    Some(WorstPlace {
-        position_m: place_m(points, worst),
-        wanted_n: forces.wanted_n[worst],
-        given_n: forces.static_n[worst],
+    let worst_at = seen.picture.chosen.as_ref().and_then(|forces| {
+        let error = |at: usize| (forces.static_n[at] - forces.wanted_n[at]).abs();
+        let worst = (0..points.len()).reduce(|a, b| if error(b) > error(a) { b } else { a })?;
+        Some(WorstPlace {
+            position_m: place_m(points, worst),
+            wanted_n: forces.wanted_n[worst],
+            given_n: forces.static_n[worst],
+        })
+    });
+    Some(Chosen {
+        lambda_n_per_m: file.lambda_n_per_m?,
+        rms_error_n: file.rms_error_n?,
+        worst_error_n: file.worst_error_n?,
+        relative_rms_error: file.relative_rms_error,
+        duality_gap_n2: file.duality_gap_n2?,
+        worst_at,
     })
+}
+
+fn constants(file: &LambdaFile) -> Vec<NamedConstant> {
+    let worst = file.worst_point.as_ref();
+    let more = [
+        (
+            "tolerance",
+            "The largest whose errors are not felt at any point",
+            file.tolerance.as_ref().and_then(|t| t.lambda_n_per_m),
+        ),
+        (
+            "linear, worst point",
+            "Where the first limit binds if the largest error is to be least",
+            worst.and_then(|worst| worst.lambda_linear_n_per_m),
+        ),
+        (
+            "jnd, worst point",
+            "The same as jnd if the largest error is to be least",
+            worst.and_then(|worst| worst.lambda_jnd_n_per_m),
+        ),
+    ];
+    let more = more.map(|(name, meaning, lambda_n_per_m)| NamedConstant {
+        name,
+        meaning,
+        lambda_n_per_m,
+    });
+    file.constants.named().into_iter().chain(more).collect()
 }
 
 fn coils(scene: &Scene, file: &LambdaFile) -> Vec<CoilFacts> {

@@ -83,6 +83,28 @@ impl WantedPoints {
         }
     }
 
+    /// Plan area of each point against an inner one's, where they are those of a grid: on its border
+    /// half, in its corners a quarter. What a rim cuts off inside counts as whole: on average it is.
+    pub(crate) fn area_weights(&self) -> Option<Vec<f64>> {
+        let grid = self.grid.as_ref()?;
+        let part = |at: usize, count: usize| if at == 0 || at + 1 == count { 0.5 } else { 1.0 };
+        let weight = |k: &usize| {
+            let (column, row) = (k % grid.columns, k / grid.columns);
+            part(column, grid.columns) * part(row, grid.rows)
+        };
+        Some(grid.index.iter().map(weight).collect())
+    }
+
+    /// Every second point along both axes of a grid, its ends among them.
+    pub(crate) fn every_second(&self) -> Option<Vec<usize>> {
+        let grid = self.grid.as_ref()?;
+        let even =
+            |k: usize| (k % grid.columns).is_multiple_of(2) && (k / grid.columns).is_multiple_of(2);
+        let places = grid.index.iter().enumerate();
+        let chosen = places.filter(|(_, k)| even(**k));
+        Some(chosen.map(|(row, _)| row).collect())
+    }
+
     /// The lowest of the points, m.
     pub(crate) fn lowest_m(&self) -> f64 {
         self.height_m.iter().copied().fold(f64::INFINITY, f64::min)

@@ -1,11 +1,8 @@
 //! The page of a calibrated object.
 
-use fluxform_bundle::artefact::Input;
-use fluxform_bundle::lambda_file::LambdaFile;
-use fluxform_bundle::manifest::LeftOut;
 use serde_json::{Map, Value, json};
 
-use super::data::BundleFacts;
+use super::data::{BundleFacts, Chosen};
 use super::frame::{Page, Section};
 use super::html::{Cell, Html, Table};
 use super::number::{count, figures, force, percent};
@@ -27,14 +24,14 @@ pub fn page(facts: &BundleFacts) -> String {
     ];
     Page {
         kind: "Calibration",
-        title: format!("{} on {}", facts.lambda.shape, facts.lambda.design),
+        title: format!("{} on {}", facts.shape, facts.design),
         lead: lead(facts),
         sections,
         data: Value::Object(data),
         foot: format!(
             "fluxform {}. This page needs nothing but itself; all its numbers come from the files \
              of this bundle.",
-            facts.lambda.fluxform_version
+            facts.version
         ),
     }
     .html()
@@ -56,16 +53,15 @@ fn coils(facts: &BundleFacts) -> Value {
 
 fn lead(facts: &BundleFacts) -> Html {
     let mut html = Html::default();
-    match facts.lambda.lambda_n_per_m {
-        Some(lambda) => html.element(
+    match &facts.chosen {
+        Some(chosen) => html.element(
             "p class=\"lead\"",
             &format!(
                 "A finger at height h above the coils is to feel the force \u{3bb}h. With one set \
                  of static currents for the whole object \u{3bb} is {} N/m, and the force is off by \
-                 {} rms{}.",
-                figures(lambda, 5),
-                force(facts.lambda.rms_error_n.unwrap_or(0.0)),
-                relative(facts.lambda, ", ")
+                 {}.",
+                figures(chosen.lambda_n_per_m, 5),
+                off(chosen)
             ),
         ),
         None => html.element(
@@ -76,11 +72,12 @@ fn lead(facts: &BundleFacts) -> Html {
     html
 }
 
-/// The relative error in words, after `before`; nothing where no force is wanted.
-fn relative(file: &LambdaFile, before: &str) -> String {
-    file.relative_rms_error.map_or_else(String::new, |part| {
-        format!("{before}{} of the rms force", percent(part))
-    })
+fn off(chosen: &Chosen) -> String {
+    let error = force(chosen.rms_error_n);
+    match chosen.relative_rms_error {
+        Some(part) => format!("{error} rms, {} of the rms force", percent(part)),
+        None => format!("{error} rms"),
+    }
 }
 
 fn tile(html: &mut Html, name: &str, value: &str, more: &str) {
@@ -96,22 +93,26 @@ fn tile(html: &mut Html, name: &str, value: &str, more: &str) {
 fn answer(facts: &BundleFacts) -> Section {
     let mut body = Html::default();
     body.raw("<dl class=\"tiles\">");
-    let file = facts.lambda;
-    let by = file.criterion.described(&percent(file.jnd));
+    let by = facts.criterion.described(&percent(facts.jnd));
     let by = format!("chosen by {by}");
-    match file.lambda_n_per_m {
+    match &facts.chosen {
         None => tile(&mut body, "force constant \u{3bb}", "none", &by),
-        Some(lambda) => {
-            let lambda = format!("{} N/m", figures(lambda, 5));
+        Some(chosen) => {
+            let lambda = format!("{} N/m", figures(chosen.lambda_n_per_m, 5));
             tile(&mut body, "force constant \u{3bb}", &lambda, &by);
-            let error = |n: Option<f64>| force(n.unwrap_or(0.0));
-            let rms = error(file.rms_error_n);
-            tile(&mut body, "rms error", &rms, &relative(file, ""));
-            let at = facts.worst_at.map_or_else(String::new, |at| {
+            let relative = chosen.relative_rms_error.map_or_else(String::new, |part| {
+                format!("{} of the rms force", percent(part))
+            });
+            tile(
+                &mut body,
+                "rms error",
+                &force(chosen.rms_error_n),
+                &relative,
+            );
+            let at = chosen.worst_at.map_or_else(String::new, |at| {
                 format!("of {} wanted there", force(at.wanted_n))
             });
-            let worst = error(file.worst_error_n);
-            tile(&mut body, "worst error", &worst, &at);
+            tile(&mut body, "worst error", &force(chosen.worst_error_n), &at);
             let bound = facts.coils.iter().filter(|coil| coil.at_limit()).count();
             let sum: f64 = facts.coils.iter().map(|coil| coil.current_a).sum();
             tile(
@@ -123,7 +124,7 @@ fn answer(facts: &BundleFacts) -> Section {
         }
     }
     body.raw("</dl>");
-    if file.lambda_n_per_m.is_some() {
+    if facts.chosen.is_some() {
         body.table(&limits::currents(&facts.coils));
     }
     Section {
@@ -135,33 +136,27 @@ fn answer(facts: &BundleFacts) -> Section {
 
 fn sources(facts: &BundleFacts) -> Section {
     let mut body = Html::default();
-    let input = |input: &Input| -> Vec<Cell> {
-        vec![input.path.clone().into(), input.sha256.clone().into()]
-    };
+    let input =
+        |(path, sha256): &(&str, &str)| -> Vec<Cell> { vec![(*path).into(), (*sha256).into()] };
     body.table(&Table {
         caption: "Files and their digests".to_owned(),
         head: vec![("file", false), ("sha256", false)],
-        rows: facts.lambda.inputs.iter().map(input).collect(),
+        rows: facts.inputs.iter().map(input).collect(),
         prose: true,
     });
-    let left_out = &facts.manifest.left_out;
-    if !left_out.is_empty() {
-        let row = |left: &LeftOut| -> Vec<Cell> {
-            let cost = if left.error_cost > 0.0 {
-                percent(left.error_cost)
+    if !facts.left_out.is_empty() {
+        let row = |(what, why, cost): &(&str, &str, f64)| -> Vec<Cell> {
+            let cost = if *cost > 0.0 {
+                percent(*cost)
             } else {
                 "none".to_owned()
             };
-            vec![
-                left.what.clone().into(),
-                cost.into(),
-                left.why.clone().into(),
-            ]
+            vec![(*what).into(), cost.into(), (*why).into()]
         };
         body.table(&Table {
             caption: "What was left out because the object does not need it".to_owned(),
             head: vec![("what", false), ("error it costs", true), ("why", false)],
-            rows: left_out.iter().map(row).collect(),
+            rows: facts.left_out.iter().map(row).collect(),
             prose: true,
         });
     }

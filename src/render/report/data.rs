@@ -1,7 +1,6 @@
 //! What a bundle's page is told, SI.
 
-use fluxform_bundle::lambda_file::LambdaFile;
-use fluxform_bundle::manifest::Manifest;
+use fluxform_base::force_constant::{Criterion, NamedConstant};
 
 use crate::plot::lambda::LambdaPlot;
 
@@ -12,24 +11,48 @@ use super::surface::Surface;
 /// A calibrated object.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BundleFacts<'a> {
-    /// `lambda.json`.
-    pub lambda: &'a LambdaFile,
-    /// `manifest.json`, but for the page and the plots.
-    pub manifest: &'a Manifest,
-    /// Where the force is most wrong at the chosen lambda.
-    pub worst_at: Option<WorstPlace>,
+    /// Name of the design.
+    pub design: &'a str,
+    /// Name of the shape.
+    pub shape: &'a str,
+    /// Program that made it.
+    pub version: &'a str,
+    /// Path and digest of what went in.
+    pub inputs: Vec<(&'a str, &'a str)>,
+    /// How lambda was chosen, and its weight.
+    pub criterion: Criterion,
+    /// The relative error that `jnd` allows to be added.
+    pub jnd: f64,
+    /// At the chosen lambda, if there is one.
+    pub chosen: Option<Chosen>,
+    /// Rank of the force matrix.
+    pub rank: usize,
+    /// Number of constraint points.
+    pub points: usize,
+    /// The named constants and what each means.
+    pub constants: Vec<NamedConstant>,
     /// The coils of the array.
     pub coils: Vec<CoilFacts>,
+    /// Limit of the sum of the currents, A.
+    pub total_max_a: Option<f64>,
     /// The design's limits.
     pub limits: Vec<LimitFacts>,
     /// Limits that are not looked at here.
     pub unchecked: Vec<&'static str>,
     /// The points that decide the least largest error, and their shares.
     pub deciding: Vec<Deciding>,
+    /// Each stage's estimated error.
+    pub accuracy: Vec<StageFacts<'a>>,
     /// The errors that a force gathers on its way.
     pub budget: Vec<BudgetPart>,
+    /// What was left out: what, why, what it costs.
+    pub left_out: Vec<(&'a str, &'a str, f64)>,
+    /// Where the path turns.
+    pub breakpoints: Vec<Breakpoint<'a>>,
     /// Error and currents over lambda.
     pub curves: &'a LambdaPlot,
+    /// Where the least largest error turns: lambda, N/m, and error, N.
+    pub worst_turns: Vec<(f64, f64)>,
     /// The points as a surface.
     pub surface: Surface,
     /// Maps at a few heights.
@@ -40,6 +63,23 @@ pub struct BundleFacts<'a> {
     pub files: Vec<&'a str>,
     /// Error against run time of the program, measured beforehand.
     pub error_time: Option<ErrorTime<'a>>,
+}
+
+/// The chosen force constant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Chosen {
+    /// N/m.
+    pub lambda_n_per_m: f64,
+    /// Root mean square of the force error, N.
+    pub rms_error_n: f64,
+    /// Largest force error, N.
+    pub worst_error_n: f64,
+    /// The first over the rms force.
+    pub relative_rms_error: Option<f64>,
+    /// Bound on the error of the mean squared error, N^2.
+    pub duality_gap_n2: f64,
+    /// Where the force is most wrong.
+    pub worst_at: Option<WorstPlace>,
 }
 
 /// The point whose force is most wrong.
@@ -98,6 +138,19 @@ pub struct Deciding {
     pub share: f64,
 }
 
+/// A stage's estimated error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StageFacts<'a> {
+    /// Its key in the manifest.
+    pub name: &'a str,
+    /// Relative to what `relative_to` names.
+    pub estimate: f64,
+    /// What that is.
+    pub relative_to: &'a str,
+    /// How it was made.
+    pub method: &'a str,
+}
+
 /// A part of the error that a force gathers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BudgetPart {
@@ -107,6 +160,15 @@ pub struct BudgetPart {
     pub part: f64,
     /// How it follows from the stages' estimates.
     pub basis: &'static str,
+}
+
+/// A turn of the path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Breakpoint<'a> {
+    /// N/m.
+    pub lambda_n_per_m: f64,
+    /// What happens.
+    pub event: &'a str,
 }
 
 /// Error against run time, from a table that is shipped.

@@ -110,7 +110,7 @@ fn digest(text: &str) -> String {
 }
 
 /// A drawing's place: an empty box that the script fills, with what it shows.
-pub(super) fn figure(html: &mut Html, id: &str, what: &str, caption: &str) {
+pub fn figure(html: &mut Html, id: &str, what: &str, caption: &str) {
     html.raw("<figure><div class=\"draw\" id=\"draw-")
         .raw(id)
         .raw("\" data-what=\"")

@@ -5,7 +5,6 @@ use super::frame::{Section, figure};
 use super::html::{Cell, Html, Table};
 use super::measured::MeasuredRow;
 use super::number::{figures, force, percent, si};
-use fluxform_base::accuracy::StageAccuracy;
 use serde_json::{Map, Value, json};
 
 /// The axis of the budget: from ten to this power up to the whole force.
@@ -44,24 +43,24 @@ fn told(body: &mut Html, facts: &BundleFacts) {
              force. A finger notices {}.",
             largest.name,
             percent(largest.part),
-            percent(facts.lambda.jnd)
+            percent(facts.jnd)
         );
         body.element("li", &text);
     }
-    if let (Some(gap_n2), Some(rms_n)) = (facts.lambda.duality_gap_n2, facts.lambda.rms_error_n) {
+    if let Some(chosen) = &facts.chosen {
         let text = format!(
             "No currents within the limits give a smaller mean square error at this lambda: the \
              duality gap is {} N\u{b2}, the mean square error {} N\u{b2}.",
-            figures(gap_n2, 2),
-            figures(rms_n * rms_n, 3)
+            figures(chosen.duality_gap_n2, 2),
+            figures(chosen.rms_error_n * chosen.rms_error_n, 3)
         );
         body.element("li", &text);
     }
     let text = format!(
         "The forces of {} coils at {} points have rank {}.",
         facts.coils.len(),
-        facts.lambda.points,
-        facts.lambda.rank
+        facts.points,
+        facts.rank
     );
     body.element("li", &text).raw("</ul>");
 }
@@ -71,7 +70,7 @@ fn budget(facts: &BundleFacts) -> Table {
     let row = |part: &BudgetPart, class: &str| -> Vec<Cell> {
         vec![
             part.name.into(),
-            Cell::Markup(bar(part.part, facts.lambda.jnd, class)),
+            Cell::Markup(bar(part.part, facts.jnd, class)),
             if part.part > 0.0 {
                 percent(part.part)
             } else {
@@ -82,10 +81,10 @@ fn budget(facts: &BundleFacts) -> Table {
         ]
     };
     let mut rows: Vec<Vec<Cell>> = facts.budget.iter().map(|p| row(p, "numeric")).collect();
-    if facts.lambda.lambda_n_per_m.is_some() {
+    if let Some(chosen) = &facts.chosen {
         let finger = BudgetPart {
             name: "static currents",
-            part: facts.lambda.relative_rms_error.unwrap_or(0.0),
+            part: chosen.relative_rms_error.unwrap_or(0.0),
             basis: "rms force error over the rms force: the coils, not the computation",
         };
         rows.push(row(&finger, "physical"));
@@ -128,12 +127,12 @@ fn bar(part: f64, jnd: f64, class: &str) -> String {
 }
 
 fn stages(facts: &BundleFacts) -> Table {
-    let row = |(name, stage): (&String, &StageAccuracy)| -> Vec<Cell> {
+    let row = |stage: &super::data::StageFacts| -> Vec<Cell> {
         vec![
-            name.replace('_', " ").into(),
+            stage.name.replace('_', " ").into(),
             figures(stage.estimate, 3).into(),
-            stage.relative_to.clone().into(),
-            stage.method.clone().into(),
+            stage.relative_to.to_owned().into(),
+            stage.method.to_owned().into(),
         ]
     };
     Table {
@@ -144,7 +143,7 @@ fn stages(facts: &BundleFacts) -> Table {
             ("relative to", false),
             ("how it was found", false),
         ],
-        rows: facts.manifest.accuracy.iter().map(row).collect(),
+        rows: facts.accuracy.iter().map(row).collect(),
         prose: true,
     }
 }
@@ -197,7 +196,8 @@ fn error_time(body: &mut Html, shipped: &ErrorTime, data: &mut Map<String, Value
 
 /// The worst point in words.
 pub(super) fn worst(facts: &BundleFacts) -> Option<String> {
-    let at = facts.worst_at?;
+    let chosen = facts.chosen?;
+    let at = chosen.worst_at?;
     let [x, y, z] = at.position_m.map(super::number::mm);
     let way = if at.given_n < at.wanted_n {
         "too weak"

@@ -49,7 +49,7 @@ pub(super) fn section(facts: &BundleFacts) -> Section {
 
 /// Which coils carry all they may.
 fn coils(facts: &BundleFacts) -> String {
-    if facts.lambda.lambda_n_per_m.is_none() {
+    if facts.chosen.is_none() {
         return "No lambda is chosen, so no coil carries a current.".to_owned();
     }
     let bound: Vec<String> = (0..facts.coils.len())
@@ -67,7 +67,7 @@ fn coils(facts: &BundleFacts) -> String {
         )
     };
     let sum: f64 = facts.coils.iter().map(|coil| coil.current_a).sum();
-    if let Some(most) = facts.manifest.limits.total_current_max_a {
+    if let Some(most) = facts.total_max_a {
         text += &format!(
             " Their sum is {} A of {} A.",
             figures(sum, 4),

@@ -36,7 +36,8 @@ pub struct MeasuredRow {
 
 impl MeasuredCurve<'_> {
     /// For the script: `unit` is the error's, or what it is relative to; `marked` names the rings.
-    pub(super) fn json(&self, unit: &str, marked: &str) -> Value {
+    #[must_use]
+    pub fn json(&self, unit: &str, marked: &str) -> Value {
         let column = |value: fn(&MeasuredRow) -> f64| f32s(self.rows.iter().map(value));
         let rings: Vec<usize> = (0..self.rows.len())
             .filter(|at| self.rows[*at].marked)

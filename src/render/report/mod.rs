@@ -4,9 +4,7 @@
 //! security policy names both by their digests. Every text that comes from an input is escaped
 //! ([`html`]). The same data give the same bytes.
 
-pub mod bench;
 pub mod bundle;
-pub mod catalogue;
 pub mod data;
 pub mod field;
 pub mod frame;
@@ -14,7 +12,7 @@ mod good;
 pub mod html;
 mod limits;
 pub mod measured;
-mod number;
+pub mod number;
 pub mod optimum;
 pub mod pack;
 mod path;

@@ -12,7 +12,8 @@ const PREFIXES: [(i32, &str); 8] = [
 ];
 
 /// `value` rounded to `digits` significant digits, without zeros at its end.
-pub(super) fn figures(value: f64, digits: usize) -> String {
+#[must_use]
+pub fn figures(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
@@ -38,7 +39,8 @@ fn trimmed(text: &str) -> &str {
 }
 
 /// `value` in `unit` with the prefix that suits it, four digits.
-pub(super) fn si(value: f64, unit: &str) -> String {
+#[must_use]
+pub fn si(value: f64, unit: &str) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{} {unit}", figures(value, 4));
     }
@@ -57,7 +59,8 @@ pub(super) fn si(value: f64, unit: &str) -> String {
 }
 
 /// A force, in mN below one newton.
-pub(super) fn force(force_n: f64) -> String {
+#[must_use]
+pub fn force(force_n: f64) -> String {
     if force_n.abs() < 1.0 {
         format!("{} mN", figures(force_n * 1e3, 4))
     } else {
@@ -66,7 +69,8 @@ pub(super) fn force(force_n: f64) -> String {
 }
 
 /// A part of a whole.
-pub(super) fn percent(part: f64) -> String {
+#[must_use]
+pub fn percent(part: f64) -> String {
     if part != 0.0 && part.abs() < 1e-3 {
         figures(part, 2)
     } else {
@@ -75,7 +79,8 @@ pub(super) fn percent(part: f64) -> String {
 }
 
 /// A length, in mm; what no machine makes is none.
-pub(super) fn mm(length_m: f64) -> String {
+#[must_use]
+pub fn mm(length_m: f64) -> String {
     if length_m.abs() < 1e-9 {
         return "0".to_owned();
     }
@@ -83,12 +88,14 @@ pub(super) fn mm(length_m: f64) -> String {
 }
 
 /// `count` of a thing.
-pub(super) fn count(count: usize, thing: &str) -> String {
+#[must_use]
+pub fn count(count: usize, thing: &str) -> String {
     format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
 }
 
 /// A force constant, or that there is none.
-pub(super) fn lambda(value: Option<f64>) -> String {
+#[must_use]
+pub fn lambda(value: Option<f64>) -> String {
     value.map_or_else(|| "none".to_owned(), |l| format!("{} N/m", figures(l, 5)))
 }
 

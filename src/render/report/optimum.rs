@@ -257,7 +257,9 @@ fn sure(facts: &OptimumFacts) -> Section {
     }
 }
 
-pub(super) fn sources(inputs: &[(&str, &str)]) -> Section {
+/// Path and digest of every input.
+#[must_use]
+pub fn sources(inputs: &[(&str, &str)]) -> Section {
     let mut body = Html::default();
     let row =
         |(path, sha256): &(&str, &str)| -> Vec<Cell> { vec![(*path).into(), (*sha256).into()] };

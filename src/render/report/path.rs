@@ -1,7 +1,6 @@
 //! Error and currents over lambda.
 
 use fluxform_base::force_constant::NamedConstant;
-use fluxform_bundle::lambda_file::PathStep;
 use serde_json::{Map, Value, json};
 
 use super::data::BundleFacts;
@@ -54,23 +53,19 @@ fn curves(facts: &BundleFacts) -> Value {
         .iter()
         .map(|one| json!({ "name": one.name, "lambda": one.lambda_n_per_m }))
         .collect();
-    let worst = facts.lambda.worst_point.as_ref();
-    let worst = worst.map_or(&[][..], |worst| &worst.path);
+    let turns_on = |(lambda, _): &&(f64, f64)| *lambda <= plot.end_n_per_m;
     // One beyond the end, so that the line reaches it.
-    let on_plot = worst
-        .iter()
-        .filter(|turn| turn.lambda_n_per_m <= plot.end_n_per_m)
-        .count();
-    let worst = &worst[..worst.len().min(on_plot + 1)];
+    let shown = facts.worst_turns.iter().filter(turns_on).count() + 1;
+    let worst: Vec<(f64, f64)> = facts.worst_turns.iter().take(shown).copied().collect();
     json!({
         "end": plot.end_n_per_m,
-        "chosen": facts.lambda.lambda_n_per_m,
+        "chosen": facts.chosen.map(|chosen| chosen.lambda_n_per_m),
         "lambda": f32s(plot.lambda_n_per_m.iter().copied()),
         "rms": f32s(plot.rms_error_n.iter().map(|e| e * 1e3)),
         "relative": f32s(plot.relative_error.iter().map(|p| p.map_or(f64::NAN, |p| p * 100.0))),
         "worst": {
-            "lambda": f32s(worst.iter().map(|turn| turn.lambda_n_per_m)),
-            "error": f32s(worst.iter().map(|turn| turn.worst_error_n * 1e3)),
+            "lambda": f32s(worst.iter().map(|turn| turn.0)),
+            "error": f32s(worst.iter().map(|turn| turn.1 * 1e3)),
         },
         "currents": currents,
         "turns": turns,
@@ -86,45 +81,20 @@ fn constants(facts: &BundleFacts) -> Table {
             one.meaning.into(),
         ]
     };
-    let file = facts.lambda;
-    let worst = file.worst_point.as_ref();
-    let more = [
-        NamedConstant {
-            name: "tolerance",
-            meaning: "The largest whose errors are not felt at any point",
-            lambda_n_per_m: file.tolerance.as_ref().and_then(|t| t.lambda_n_per_m),
-        },
-        NamedConstant {
-            name: "linear, worst point",
-            meaning: "Where the first limit binds if the largest error is to be least",
-            lambda_n_per_m: worst.and_then(|worst| worst.lambda_linear_n_per_m),
-        },
-        NamedConstant {
-            name: "jnd, worst point",
-            meaning: "The same as jnd if the largest error is to be least",
-            lambda_n_per_m: worst.and_then(|worst| worst.lambda_jnd_n_per_m),
-        },
-    ];
     Table {
         caption: "The named force constants".to_owned(),
         head: vec![("name", false), ("lambda", true), ("what it is", false)],
-        rows: file
-            .constants
-            .named()
-            .iter()
-            .chain(&more)
-            .map(row)
-            .collect(),
+        rows: facts.constants.iter().map(row).collect(),
         prose: true,
     }
 }
 
 fn breakpoints(facts: &BundleFacts) -> Table {
-    let all = facts.lambda.path.len();
-    let row = |one: &PathStep| -> Vec<Cell> {
+    let all = facts.breakpoints.len();
+    let row = |one: &super::data::Breakpoint| -> Vec<Cell> {
         vec![
             figures(one.lambda_n_per_m, 6).into(),
-            one.event.clone().into(),
+            one.event.to_owned().into(),
         ]
     };
     let more = if all > LISTED {
@@ -135,7 +105,7 @@ fn breakpoints(facts: &BundleFacts) -> Table {
     Table {
         caption: format!("{} of the path{more}", count(all, "breakpoint")),
         head: vec![("lambda / N/m", true), ("what happens", false)],
-        rows: facts.lambda.path.iter().take(LISTED).map(row).collect(),
+        rows: facts.breakpoints.iter().take(LISTED).map(row).collect(),
         prose: true,
     }
 }

@@ -107,10 +107,10 @@ pub(super) fn section(facts: &BundleFacts, data: &mut serde_json::Map<String, Va
             "The surface that the finger's magnet follows, its {} and the coils below; \
              the ring is where the force is most wrong. Drag, use the arrow keys or the buttons \
              to turn it.{thinned}",
-            count(facts.lambda.points, "constraint point")
+            count(facts.points, "constraint point")
         ),
     );
-    if facts.lambda.lambda_n_per_m.is_some() {
+    if facts.chosen.is_some() {
         figure(
             &mut body,
             "errors",

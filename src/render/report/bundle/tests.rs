@@ -1,13 +1,12 @@
 //! A page of made-up facts with names that want to be more than names.
 
-use fluxform_bundle::lambda_file::LambdaFile;
-use fluxform_bundle::manifest::Manifest;
-use serde_json::{Value, from_value, json};
+use fluxform_base::force_constant::{Criterion, NamedConstant};
 
 use super::page;
 use crate::plot::lambda::LambdaPlot;
 use crate::report::data::{
-    BudgetPart, BundleFacts, CoilFacts, Deciding, ErrorTime, LimitFacts, WorstPlace,
+    Breakpoint, BudgetPart, BundleFacts, Chosen, CoilFacts, Deciding, ErrorTime, LimitFacts,
+    StageFacts, WorstPlace,
 };
 use crate::report::field::{Field, Layer};
 use crate::report::measured::{MeasuredCurve, MeasuredRow};
@@ -40,61 +39,7 @@ fn measured((error, seconds): &(f64, f64)) -> MeasuredRow {
     }
 }
 
-/// Both documents of a bundle, with a force constant or without.
-fn documents(lambda_n_per_m: Option<f64>) -> (LambdaFile, Manifest) {
-    let stage = json!({ "estimate": 3e-5, "relative_to": HOSTILE, "method": HOSTILE });
-    let head = json!({
-        "schema_version": "1.3.0", "fluxform_version": "0.1.0", "design": HOSTILE, "shape": HOSTILE,
-        "inputs": [{ "path": HOSTILE, "sha256": "00" }], "accuracy": { HOSTILE: stage },
-    });
-    let with_head = |mut own: Value| {
-        let keys = own.as_object_mut().unwrap();
-        keys.extend(head.as_object().unwrap().clone());
-        own
-    };
-    let lambda = json!({
-        "lambda_linear_n_per_m": 0.6, "lambda_jnd_n_per_m": lambda_n_per_m,
-        "lambda_saturation_n_per_m": null, "lambda_floor_n_per_m": null,
-        "lambda_n_per_m": lambda_n_per_m, "criterion": "jnd", "jnd": 0.07, "currents_a": [0.7, 1.3],
-        "rms_error_n": 1e-3, "worst_error_n": 3e-3, "relative_rms_error": 0.13,
-        "duality_gap_n2": 1e-18, "rank": 2, "points": 4,
-        "path": [{ "lambda_n_per_m": 0.7, "currents_a": [0.7, 1.3], "event": HOSTILE }],
-    });
-    let axis = json!({ "from_m": -0.05, "to_m": 0.05, "samples": 2 });
-    let manifest = json!({
-        "units": "SI",
-        "array": { "positions_m": [[-0.025, 0.0], [0.025, 0.0]], "coupling": "none", "gain": [1.0, 1.0] },
-        "limits": {
-            "current_min_a": [0.0, 0.0], "current_max_a": [1.3, 1.3], "total_current_max_a": 2.6
-        },
-        "resistance_ohm": [6.0, 6.0],
-        "magnet": {
-            "moment_a_m2": [0.0, 0.0, -0.909], "model": "dipole", "polarity": "repel",
-            "diameter_m": 0.01, "length_m": 0.01
-        },
-        "lambda": { "lambda_n_per_m": lambda_n_per_m, "criterion": "jnd" },
-        "points": { "x_m": axis, "y_m": axis, "count": 3, "present": ["10", "11"] },
-        "map": {
-            "x_m": axis, "y_m": axis, "z_m": axis, "coil": [0, 1], "components": "gz",
-            "interpolation": {
-                "name": "tricubic-lagrange", "order": 3, "borders": "", "largest_error": 1e-4,
-                "largest_error_definition": ""
-            }
-        },
-        "left_out": [{ "what": HOSTILE, "why": HOSTILE, "error_cost": 0.0 }], "files": [],
-    });
-    (
-        from_value(with_head(lambda)).unwrap(),
-        from_value(with_head(manifest)).unwrap(),
-    )
-}
-
-fn facts<'a>(
-    (file, manifest): &'a (LambdaFile, Manifest),
-    plot: &'a LambdaPlot,
-    rows: &[(f64, f64)],
-    notes: &'a [String],
-) -> BundleFacts<'a> {
+fn facts<'a>(plot: &'a LambdaPlot, rows: &[(f64, f64)], notes: &'a [String]) -> BundleFacts<'a> {
     let coil = |x: f64, current_a: f64| CoilFacts {
         axis_m: [x, 0.0],
         radius_m: 0.019,
@@ -103,14 +48,33 @@ fn facts<'a>(
         max_a: 1.3,
     };
     BundleFacts {
-        lambda: file,
-        manifest,
-        worst_at: Some(WorstPlace {
-            position_m: [0.01, -0.02, 0.03],
-            wanted_n: 0.02,
-            given_n: 0.017,
+        design: HOSTILE,
+        shape: HOSTILE,
+        version: "0.1.0",
+        inputs: vec![(HOSTILE, "00")],
+        criterion: Criterion::Jnd,
+        jnd: 0.07,
+        chosen: Some(Chosen {
+            lambda_n_per_m: 0.7,
+            rms_error_n: 1e-3,
+            worst_error_n: 3e-3,
+            relative_rms_error: Some(0.13),
+            duality_gap_n2: 1e-18,
+            worst_at: Some(WorstPlace {
+                position_m: [0.01, -0.02, 0.03],
+                wanted_n: 0.02,
+                given_n: 0.017,
+            }),
         }),
+        rank: 2,
+        points: 4,
+        constants: vec![NamedConstant {
+            name: "jnd",
+            meaning: "the chosen one",
+            lambda_n_per_m: None,
+        }],
         coils: vec![coil(-0.025, 0.7), coil(0.025, 1.3)],
+        total_max_a: Some(2.6),
         limits: vec![LimitFacts {
             name: "resistance_ohm",
             value: 6.075,
@@ -122,12 +86,24 @@ fn facts<'a>(
             position_m: [0.0, 0.0, 0.03],
             share: -0.7,
         }],
+        accuracy: vec![StageFacts {
+            name: HOSTILE,
+            estimate: 3e-5,
+            relative_to: HOSTILE,
+            method: HOSTILE,
+        }],
         budget: vec![BudgetPart {
             name: "field",
             part: 3e-5,
             basis: "made up",
         }],
+        left_out: vec![(HOSTILE, HOSTILE, 0.0)],
+        breakpoints: vec![Breakpoint {
+            lambda_n_per_m: 0.7,
+            event: HOSTILE,
+        }],
         curves: plot,
+        worst_turns: vec![(0.0, 0.0), (1.3, 7e-3)],
         surface: Surface {
             x_m: [-0.05, 0.05],
             y_m: [-0.05, 0.05],
@@ -169,13 +145,7 @@ fn facts<'a>(
 #[test]
 fn names_stay_names_everywhere() {
     let (plot, notes) = (plot(), [HOSTILE.to_owned()]);
-    let documents = documents(Some(0.7));
-    let html = page(&facts(
-        &documents,
-        &plot,
-        &[(1e-3, 0.01), (1e-6, 0.1)],
-        &notes,
-    ));
+    let html = page(&facts(&plot, &[(1e-3, 0.01), (1e-6, 0.1)], &notes));
     assert_eq!(html.matches("<script").count(), 2);
     assert_eq!(html.matches("</script>").count(), 2);
     assert!(!html.contains("<img") && !html.contains("<!--"));
@@ -186,10 +156,9 @@ fn names_stay_names_everywhere() {
 #[test]
 fn the_same_facts_give_the_same_bytes_with_every_part() {
     let (plot, rows) = (plot(), [(1e-3, 0.01), (1e-6, 0.1)]);
-    let documents_of = documents(Some(0.7));
-    let given = facts(&documents_of, &plot, &rows, &[]);
-    let html = page(&given);
-    assert!(html == page(&given));
+    let facts = facts(&plot, &rows, &[]);
+    let html = page(&facts);
+    assert!(html == page(&facts));
     for told in [
         "draw-cost",
         "too weak",
@@ -202,10 +171,10 @@ fn the_same_facts_give_the_same_bytes_with_every_part() {
     ] {
         assert!(html.contains(told), "{told}");
     }
-    let none = documents(None);
     let without = BundleFacts {
         error_time: None,
-        ..facts(&none, &plot, &rows, &[])
+        chosen: None,
+        ..facts
     };
     let html = page(&without);
     assert!(!html.contains("draw-cost") && html.contains("There is no force constant"));

@@ -1,0 +1,189 @@
+//! What programs of this workspace share on the command line: common options, messages, exit
+//! codes, the progress bar, interruption.
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use clap::error::ErrorKind;
+use clap::{ArgMatches, ColorChoice, CommandFactory, FromArgMatches};
+
+pub use super::args::{Colour, Common, Format, Writing};
+pub use super::bar::Bar;
+pub use super::commands::{begin, folder};
+pub use super::exit::Exit;
+pub use super::failure::Failure;
+pub use super::help::{Codes, page};
+pub use super::layout::{Sheet, Side, table};
+pub use super::printer::{Place, Printer};
+pub use super::quantity::{bytes, count, error, number_to, si};
+pub use super::values::FileArgument;
+use super::{budget, interrupt};
+use crate::job::JobError;
+use crate::progress::interruptible;
+
+/// Arguments that were understood, and what is done with them.
+pub trait Program: CommandFactory + FromArgMatches {
+    /// From what clap read.
+    ///
+    /// # Errors
+    /// Arguments that do not go together.
+    fn parse(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        Self::from_arg_matches(matches)
+    }
+
+    /// What every command takes.
+    fn common(&self) -> &Common;
+
+    /// Runs it.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    fn run(&self, printer: &Printer) -> Result<(), Failure>;
+}
+
+/// Runs a program and returns the process's exit code.
+pub fn main<P: Program>(args: impl Iterator<Item = OsString>) -> ExitCode {
+    let args: Vec<OsString> = args.collect();
+    let early = told_early(&args);
+    std::panic::set_hook(Box::new(move |panic| {
+        if !caught() {
+            Printer::new(&early).mistake(&panic_message(panic));
+        }
+    }));
+    let parsed = P::command()
+        .color(colour_of(&args))
+        .try_get_matches_from(&args)
+        .and_then(|matches| P::parse(&matches));
+    let program = match parsed {
+        Ok(program) => program,
+        Err(error) => return not_parsed(&error, &args).into(),
+    };
+    let printer = Printer::new(program.common());
+    interrupt::listen(program.common());
+    let ran = interruptible(|| prepare(program.common()).and_then(|()| program.run(&printer)))
+        .unwrap_or_else(|stop| Err(JobError::from(stop).into()));
+    interrupt::end();
+    match ran {
+        Ok(()) => {
+            printer.finish();
+            Exit::Done.into()
+        }
+        Err(failure) => {
+            printer.failure(&failure);
+            failure.exit().into()
+        }
+    }
+}
+
+/// Threads and memory, as asked for.
+fn prepare(common: &Common) -> Result<(), Failure> {
+    if let Some(threads) = common.threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global()
+            .map_err(|error| Failure::Usage(format!("--threads {threads}: {error}")))?;
+    }
+    budget::grant(common.memory);
+    Ok(())
+}
+
+/// What can be known of the common options before the arguments are parsed.
+fn told_early(args: &[OsString]) -> Common {
+    Common {
+        format: match value_of(args, "--format") {
+            Some("json") => Format::Json,
+            _ => Format::Human,
+        },
+        quiet: false,
+        threads: None,
+        memory: None,
+        color: match value_of(args, "--color") {
+            Some("always") => Colour::Always,
+            Some("never") => Colour::Never,
+            _ => Colour::Auto,
+        },
+    }
+}
+
+/// Whether a panic is caught where it happens and told as what it means.
+fn caught() -> bool {
+    #[cfg(feature = "step")]
+    return crate::shape::step::guards_panics();
+    #[cfg(not(feature = "step"))]
+    false
+}
+
+/// What clap has to say: help, the version, or wrong usage.
+fn not_parsed(error: &clap::Error, args: &[OsString]) -> Exit {
+    // Help is asked for, or shown where nothing was.
+    let help = matches!(
+        error.kind(),
+        ErrorKind::DisplayHelp
+            | ErrorKind::DisplayVersion
+            | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
+    );
+    let printer = Printer::new(&told_early(args));
+    if !help || (error.use_stderr() && printer.json()) {
+        printer.usage(error);
+    } else {
+        // A closed pipe: nobody is left to read the help.
+        let _ = error.print();
+    }
+    if error.use_stderr() {
+        Exit::Usage
+    } else {
+        Exit::Done
+    }
+}
+
+/// The colours of help and usage errors, which are told before the arguments are known.
+fn colour_of(args: &[OsString]) -> ColorChoice {
+    match value_of(args, "--color") {
+        Some("always") => ColorChoice::Always,
+        Some("never") => ColorChoice::Never,
+        _ => ColorChoice::Auto,
+    }
+}
+
+/// The last value of a long option among raw arguments.
+fn value_of<'a>(args: &'a [OsString], option: &str) -> Option<&'a str> {
+    let mut value = None;
+    for (i, arg) in args.iter().enumerate() {
+        let Some(arg) = arg.to_str() else { continue };
+        if arg == option {
+            value = args.get(i + 1).and_then(|next| next.to_str());
+        } else if let Some(rest) = arg.strip_prefix(option)
+            && let Some(rest) = rest.strip_prefix('=')
+        {
+            value = Some(rest);
+        }
+    }
+    value
+}
+
+fn panic_message(panic: &std::panic::PanicHookInfo) -> String {
+    let what = panic.payload_as_str().unwrap_or("no message");
+    let place = panic
+        .location()
+        .map_or_else(String::new, |place| format!(" at {place}"));
+    format!(
+        "fluxform {} stopped on a mistake of its own{place}: {what}\n\
+         Please report this line with the command and its input files.",
+        env!("CARGO_PKG_VERSION")
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_option_is_found_in_either_spelling() {
+        let args: Vec<OsString> = ["fluxform", "--format=human", "--format", "json"]
+            .map(OsString::from)
+            .to_vec();
+        assert_eq!(value_of(&args, "--format"), Some("json"));
+        assert_eq!(value_of(&args[..2], "--format"), Some("human"));
+        assert_eq!(value_of(&args, "--color"), None);
+    }
+}

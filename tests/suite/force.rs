@@ -1,0 +1,95 @@
+//! Force problems over a square plan.
+
+use super::built_in::BuiltIn;
+use super::wave::HALF_M;
+use fluxform::design::{Design, Need};
+use fluxform::job::scene::Scene;
+use fluxform::job::{JobError, KERNEL_ERROR, steel};
+use fluxform::lambda::ForceProblem;
+use fluxform::numerics::axis::Axis;
+use fluxform::progress::Silent;
+
+/// A force problem that owns its numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Forces {
+    /// N/A, a row a point.
+    pub forces_n_per_a: Vec<f64>,
+    /// m.
+    pub height_m: Vec<f64>,
+    lower_a: Vec<f64>,
+    /// A.
+    pub upper_a: Vec<f64>,
+    /// A.
+    pub total_max_a: Option<f64>,
+    resistance_ohm: Vec<f64>,
+}
+
+impl Forces {
+    /// Borrowed.
+    #[must_use]
+    pub fn problem(&self) -> ForceProblem<'_> {
+        ForceProblem {
+            forces_n_per_a: &self.forces_n_per_a,
+            height_m: &self.height_m,
+            offset_n: None,
+            weights: None,
+            lower_a: &self.lower_a,
+            upper_a: &self.upper_a,
+            total_max_a: self.total_max_a,
+            resistance_ohm: &self.resistance_ohm,
+        }
+    }
+}
+
+/// `design` with `side` coils along either axis, at its own pitch.
+///
+/// # Errors
+/// A built-in design that cannot be read.
+pub fn with_coils(design: &BuiltIn, side: usize) -> Result<Design, JobError> {
+    const PITCH_M: f64 = 0.05;
+    let mut design = design.design(Need::CALIBRATE)?;
+    let middle = 0.5 * (side.max(1) - 1) as f64;
+    let coils = side * side;
+    design.array.positions_m = (0..coils)
+        .map(|k| [(k % side) as f64, (k / side) as f64].map(|i| (i - middle) * PITCH_M))
+        .collect();
+    design.array.grid = None;
+    design.array.gain = vec![1.0; coils];
+    design.supply.current_max_a = vec![2.0; coils];
+    design.supply.current_min_a = vec![0.0; coils];
+    design.supply.total_current_max_a = Some(2.0 * coils as f64);
+    Ok(design)
+}
+
+/// Forces of `side` by `side` coils of an air design at `samples` by `samples` points of a surface.
+///
+/// # Errors
+/// A built-in design that cannot be read.
+pub fn forces(
+    design: &BuiltIn,
+    side: usize,
+    samples: usize,
+    height_m: fn(f64, f64) -> f64,
+) -> Result<Forces, JobError> {
+    let design = with_coils(design, side)?;
+    let scene = Scene::new(&design)?;
+    let solved = steel::solve(&scene, None, KERNEL_ERROR, 0.03)?;
+    let line = Axis {
+        from: -HALF_M,
+        to: HALF_M,
+        samples,
+    }
+    .nodes();
+    let points: Vec<[f64; 3]> = line
+        .iter()
+        .flat_map(|&y| line.iter().map(move |&x| [x, y, height_m(x, y)]))
+        .collect();
+    Ok(Forces {
+        forces_n_per_a: scene.forces_n_per_a(&solved, &points, &Silent)?,
+        height_m: points.iter().map(|p| p[2]).collect(),
+        lower_a: scene.lower_a.clone(),
+        upper_a: scene.upper_a.clone(),
+        total_max_a: design.supply.total_current_max_a,
+        resistance_ohm: scene.resistances_ohm(),
+    })
+}

@@ -1,0 +1,17 @@
+//! The measurements themselves: rows fall along their knobs, tables and JSON are as promised, and
+//! what stages claim of their errors holds on scenes that nobody chose.
+
+// Figures are printed, and a script is put where the command looks for one.
+#![allow(clippy::print_stdout, clippy::disallowed_methods)]
+
+mod command;
+mod coverage;
+mod page;
+mod rows;
+
+#[path = "../../../lambda/case.rs"]
+#[allow(dead_code)]
+mod case;
+#[path = "../../../lambda/search.rs"]
+#[allow(dead_code)]
+mod search;
