@@ -383,7 +383,7 @@ def _between(nodes, positions):
 
 
 # Currents of least power: I_i = clip((mu (g_i - center) + nu) / R_i). The algorithm is told in
-# src/lambda/allocate.rs; here it is written for clearness, not for speed.
+# src/lambda/allocation.rs; here it is written for clearness, not for speed.
 ROUNDING = 1e-14
 TIED = 1e-13
 FAR = 1e3

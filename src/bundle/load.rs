@@ -14,12 +14,12 @@ use serde::Deserialize;
 
 use super::artefact::{FileEntry, check_version, sha256_hex};
 use super::atomic::check_name;
-use super::consistent;
+use super::cross_check;
 use super::json::fault;
 use super::lambda_file::LambdaFile;
 use super::manifest::Manifest;
 use super::npz::{MapArrays, from_npz};
-use super::plain::{FILE_MAX_BYTES, check_plain, digest_plain, read_plain};
+use super::read_bounded::{FILE_MAX_BYTES, check_plain, digest_plain, read_plain};
 use super::read_table::{read_currents, read_points};
 use super::table::{CurrentRow, PointRow};
 use fluxform_numerics::lagrange::{Cell, locate};
@@ -168,7 +168,7 @@ impl Bundle {
             manifest,
             manifest_sha256,
         };
-        consistent::check(
+        cross_check::check(
             &bundle.manifest,
             &bundle.map,
             &bundle.points,

@@ -9,7 +9,7 @@ use super::artefact::{FileEntry, Input, Options, sha256_hex};
 use super::atomic::{
     FileSet, FolderDraft, Overwrite, WriteError, Written, check_distinct, listed_files, write,
 };
-use super::consistent;
+use super::cross_check;
 use super::json::to_json;
 use super::lambda_file::LambdaFile;
 use super::mag_manip::{HEAD, Multipoles, VectorField, write_multipoles, write_vector_field};
@@ -112,7 +112,7 @@ pub fn sealed_manifest(content: &BundleContent) -> Result<Manifest, WriteError> 
 }
 
 fn check_content(content: &BundleContent, target: &Path) -> Result<(), WriteError> {
-    consistent::check(
+    cross_check::check(
         &content.manifest,
         content.map,
         content.points,

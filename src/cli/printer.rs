@@ -16,7 +16,7 @@ use super::code::Code;
 use super::failure::{Failure, FaultEntry};
 use crate::bundle::json::to_json;
 use crate::design::Faults;
-use crate::design::words::{shown_path, visible};
+use crate::design::message_text::{shown_path, visible};
 
 /// Bytes gathered before standard output is written to.
 const BUFFER_BYTES: usize = 1 << 16;

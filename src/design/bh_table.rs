@@ -8,8 +8,8 @@ use std::path::Path;
 use csv::{ReaderBuilder, StringRecord, Trim};
 
 use super::diagnostics::{Fault, Faults, InvalidDocument, place_of};
+use super::message_text::{number, token};
 use super::source;
-use super::words::{number, token};
 
 /// The columns, in the order of the usual header.
 const COLUMNS: [&str; 2] = ["b_t", "h_a_per_m"];

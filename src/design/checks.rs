@@ -6,11 +6,11 @@ use std::ops::Range;
 
 use super::array::{TOUCHING, overlaps};
 use super::diagnostics::Fault;
+use super::message_text::{number, twelve_digits};
 use super::parse::{Draft, Need};
 use super::reader::{Located, Sink};
 use super::sections::{CoilDraft, CoreDraft, Layout, WireDraft};
 use super::values::OneOrMany;
-use super::words::{number, twelve_digits};
 use fluxform_base::units::{COPPER_TEMPERATURE_COEFFICIENT_PER_K, REFERENCE_TEMPERATURE_C};
 use fluxform_numerics::axis::Axis;
 

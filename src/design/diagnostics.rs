@@ -9,7 +9,7 @@ use miette::{
     MietteSpanContents, SourceCode, SourceSpan, SpanContents,
 };
 
-use super::words::{commands, escaped, shown_path, visible};
+use super::message_text::{commands, escaped, shown_path, visible};
 
 /// Faults beyond this many are counted, not shown.
 const SHOWN_MAX: usize = 100;

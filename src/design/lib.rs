@@ -33,6 +33,7 @@ mod checks;
 pub mod diagnostics;
 pub mod gauge;
 mod limits;
+pub mod message_text;
 pub mod model;
 pub mod named_file;
 pub mod parse;
@@ -42,7 +43,6 @@ mod sections;
 pub mod source;
 pub mod template;
 pub mod values;
-pub mod words;
 
 pub use sections::{BODY_MM, SEED_SIDE_MM, axis_m};
 

@@ -5,7 +5,7 @@
 //! length and holds exactly that: not a folder, a device, a pipe or a socket, and not a file that
 //! the system makes up while it is read (`/proc/self/environ` states 0 bytes, files of `/sys` state
 //! a page). What a file contains that does not fit is quoted by
-//! [`words::token`](super::words::token) alone.
+//! [`message_text::token`](super::message_text::token) alone.
 
 use std::fs::{self, File};
 use std::io::{self, Read};

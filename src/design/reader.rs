@@ -15,7 +15,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::diagnostics::{Fault, Faults, InvalidDocument, Severity};
-use super::words::{QUOTED_MAX, escaped, nearest, quoted};
+use super::message_text::{QUOTED_MAX, escaped, nearest, quoted};
 
 /// A value and the bytes it stands at (those of its section where it is a default).
 #[derive(Debug, Clone, PartialEq)]

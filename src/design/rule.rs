@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::diagnostics::Fault;
-use super::words::{number, quantity, twelve_digits};
+use super::message_text::{number, quantity, twelve_digits};
 
 /// The values a key accepts.
 #[derive(Debug, Clone, Copy, PartialEq)]

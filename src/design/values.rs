@@ -5,9 +5,9 @@ use toml::de::DeValue;
 
 use super::diagnostics::Fault;
 use super::gauge::awg_mm;
+use super::message_text::{axis_fault, nearest, number, quoted};
 use super::reader::{Found, Located, Section};
 use super::rule::{Bound, Rule};
-use super::words::{axis_fault, nearest, number, quoted};
 use fluxform_numerics::axis::Axis;
 
 /// Longest name of a document, bytes.

@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
+use super::cached_field::{FieldStore, STORE_FOLDER, ShapeField};
 use super::discretize::{self, PointsReport, point_rows, points_grid};
-use super::kept::{FieldStore, STORE_FOLDER, ShapeField};
 use super::lambda::{LambdaOptions, LambdaReport, solve};
 use super::map::{MAP_TOLERANCE, arrays, runtime, summary, workspace_grid};
 use super::maps::{Felt, SceneMap};
@@ -22,7 +22,7 @@ use crate::bundle::manifest::{
 };
 use crate::bundle::npz::PASSIVE;
 use crate::bundle::rendering::{HeightGrid, Rendering};
-use crate::bundle::store::Store;
+use crate::bundle::cache::Store;
 use crate::bundle::table::CurrentRow;
 use crate::bundle::timing::StageSeconds;
 use crate::bundle::write::{BundleContent, check_bundle_target, write_bundle};

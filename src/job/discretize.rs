@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::JobError;
-use super::kept::ShapeField;
+use super::cached_field::ShapeField;
 use super::made_with;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION};
@@ -20,7 +20,7 @@ use crate::progress::Progress;
 use crate::shape::certificate::{Certificate, Certify, stated_tessellation};
 use crate::shape::document::{ShapeDocument, SurfaceSource};
 use crate::shape::holes::Holes;
-use crate::shape::marks::Marks;
+use crate::shape::point_flags::Marks;
 use crate::shape::surface::read_file;
 use crate::shape::{ConstraintPoints, Discretized, Settings, ShapeError, discretize_with};
 

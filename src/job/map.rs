@@ -21,7 +21,7 @@ use crate::bundle::manifest::{
 use crate::bundle::npz::{MapArrays, Runtime, WORKING_POINT};
 use crate::bundle::write::{Beside, BesideContent, MapFormats, check_map_files, write_map_and};
 use crate::design::Design;
-use crate::map::sampled::TableReport;
+use crate::map::coupled_map::TableReport;
 use crate::map::tabulate::Grid;
 use crate::map::{Components, FieldMap, InterpolationError};
 use crate::progress::Progress;

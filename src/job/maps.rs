@@ -9,8 +9,8 @@ use super::steel::{EVALUATION_SHARE, Solved, Steel, SteelField, clearance_m, cou
 use crate::accuracy::StageAccuracy;
 use crate::field::magnet::MagnetRule;
 use crate::field::steel::axial_table::AxialTable;
+use crate::map::coupled_map::{SampledField, TableReport};
 use crate::map::mean::MeanField;
-use crate::map::sampled::{SampledField, TableReport};
 
 use crate::map::tabulate::{Grid, MapError, PlacedCoil};
 use crate::map::{

@@ -1,13 +1,13 @@
 //! What a command does, from documents to results and artefacts. No screens, no clocks.
 
 pub mod at_current;
+mod cached_field;
 pub mod calibrate;
 pub mod compare;
 pub mod cost;
 pub mod discretize;
 pub mod evaluate;
 mod evaluation_sample;
-mod kept;
 pub mod lambda;
 pub mod made_with;
 pub mod map;

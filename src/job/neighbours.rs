@@ -12,8 +12,8 @@ use super::{JobError, KERNEL_ERROR, steel};
 use crate::accuracy::{StageAccuracy, missed};
 use crate::coil::mutual;
 use crate::field::batch::Wanted;
-use crate::field::steel::inside::peak_depth_m;
-use crate::field::steel::sources::Parts;
+use crate::field::steel::core_flux_density::peak_depth_m;
+use crate::field::steel::equivalent_dipoles::Parts;
 
 /// The array's inductances.
 #[derive(Debug, Clone, Serialize)]

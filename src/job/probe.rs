@@ -14,7 +14,7 @@ use crate::design::Design;
 use crate::field::frame::{CartesianField, to_cartesian};
 use crate::field::magnet::MagnetRule;
 use crate::field::steel::CLOSEST;
-use crate::field::steel::sources::Parts;
+use crate::field::steel::equivalent_dipoles::Parts;
 use crate::progress::Progress;
 
 /// What is asked at the points.

@@ -14,7 +14,7 @@ use crate::field::dipole;
 use crate::field::magnet::{Cylinder, MagnetRule, Sources};
 use crate::field::source::AxialSource;
 use crate::field::steel::axial_table::AxialTable;
-use crate::field::steel::sources::Parts;
+use crate::field::steel::equivalent_dipoles::Parts;
 use crate::field::winding::Winding;
 use crate::map::tabulate::PlacedCoil;
 use crate::progress::Progress;

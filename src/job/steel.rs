@@ -13,8 +13,8 @@ use crate::field::steel::array::CoupledArray;
 use crate::field::steel::axial_table::AxialTable;
 use crate::field::steel::bh_curve::BhCurve;
 use crate::field::steel::cored_coil::CoredCoil;
+use crate::field::steel::equivalent_dipoles::{ArraySources, Parts};
 use crate::field::steel::magnetized::MagnetizedCore;
-use crate::field::steel::sources::{ArraySources, Parts};
 use crate::field::steel::{CLOSEST, CoreShape};
 use crate::field::winding::Winding;
 

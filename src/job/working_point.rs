@@ -11,15 +11,15 @@ use super::steel::{
 use crate::accuracy::StageAccuracy;
 use crate::field::steel::axial_table::AxialTable;
 use crate::field::steel::bh_curve::BhCurve;
-use crate::field::steel::inside::peak_depth_m;
+use crate::field::steel::core_flux_density::peak_depth_m;
+use crate::field::steel::equivalent_dipoles::{ArraySources, Parts};
 use crate::field::steel::saturated::Status;
 use crate::field::steel::saturated_array::SaturatedArray;
 use crate::field::steel::saturated_coil::SaturatedCoil;
-use crate::field::steel::sources::{ArraySources, Parts};
 use crate::map::Components;
-use crate::map::sampled::SampledField;
-use crate::map::sampler::Sampler;
-use crate::map::sampler::parts_of;
+use crate::map::coupled_map::SampledField;
+use crate::map::map_source::Sampler;
+use crate::map::map_source::parts_of;
 use crate::map::tabulate::{Grid, MapError, PlacedCoil, tabulate};
 use crate::progress::Progress;
 

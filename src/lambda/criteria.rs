@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
-use super::follow::{Bounds, Piece, Trace};
+use super::homotopy::{Bounds, Piece, Trace};
 use super::model::Model;
 
 /// Above this share of `lambda^2 mean(h^2)` e* has left e_0 where currents are not unique.
@@ -231,7 +231,7 @@ fn upward_crossing(a: Num, b: Num, c: Num) -> Option<Num> {
 #[cfg(test)]
 mod tests {
     use super::{Comparison, Num, Real};
-    use crate::follow::{Bounds, Follower};
+    use crate::homotopy::{Bounds, Follower};
     use crate::model::Model;
 
     /// Two opposed coils whose currents cancel, all but what rounding leaves of them, under a limit

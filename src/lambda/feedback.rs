@@ -13,7 +13,7 @@
 
 use rayon::prelude::*;
 
-use super::allocate::{Allocator, AllocatorError};
+use super::allocation::{Allocator, AllocatorError};
 use super::certificate::best_within_limits;
 use super::problem::{ForceProblem, ProblemError, Settings};
 

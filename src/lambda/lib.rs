@@ -48,23 +48,23 @@
 //! # }
 //! ```
 
-mod allocate;
+mod allocation;
 mod certificate;
 mod cone;
 mod criteria;
 pub mod feedback;
-mod follow;
+mod homotopy;
 mod model;
 mod path;
 mod power;
 mod problem;
-mod reduce;
+mod qr_reduction;
 mod rest;
 mod solve;
 mod wiring;
 pub mod worst;
 
-pub use allocate::{Allocation, Allocator, AllocatorError, Reach};
+pub use allocation::{Allocation, Allocator, AllocatorError, Reach};
 pub use fluxform_base::force_constant::{Criterion, ForceConstants, NamedConstant};
 pub use path::{Breakpoint, Event, Path};
 pub use problem::{ForceProblem, ProblemError, Settings};

@@ -5,11 +5,11 @@ use std::fmt;
 use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
-use super::follow::{Bounds, Piece, Place, Trace};
+use super::homotopy::{Bounds, Piece, Place, Trace};
 use super::model::Model;
 use super::power;
 use super::problem::ForceProblem;
-use super::reduce::{Reduced, power_of_two, times_power};
+use super::qr_reduction::{Reduced, power_of_two, times_power};
 
 /// What changes at a breakpoint. Coils are numbered from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -9,7 +9,7 @@ use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
 use super::cone::{self, Role};
-use super::follow::{Bounds, Piece, Place};
+use super::homotopy::{Bounds, Piece, Place};
 use super::model::{Factor, Model};
 
 /// A variable that the dependences move by less than this share is not moved by them.

@@ -19,7 +19,7 @@
 use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
-use super::follow::{Piece, Trace};
+use super::homotopy::{Piece, Trace};
 
 /// Errors up to this share of `lambda^2 mean(h^2)` are rounding: a few roundings of e* in doubles.
 pub(super) const COST: f64 = 1e-15;

@@ -8,11 +8,11 @@ use fluxform_numerics::real::Real;
 
 use super::certificate;
 use super::criteria::Comparison;
-use super::follow::{Bounds, Follower, Piece, Trace};
+use super::homotopy::{Bounds, Follower, Piece, Trace};
 use super::model::Model;
 use super::path::Path;
 use super::problem::{ForceProblem, ProblemError, Settings};
-use super::reduce::{Reduced, largest_entries, times_power};
+use super::qr_reduction::{Reduced, largest_entries, times_power};
 use super::rest;
 use super::worst;
 

@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use super::sampler::{GRADIENT, Sampler, series};
+use super::map_source::{GRADIENT, Sampler, series};
 use super::tabulate::{Components, MapError};
 use fluxform_numerics::laplace::Laplace;
 use fluxform_numerics::matrix::{product, transpose};

@@ -36,14 +36,14 @@
 //! ```
 
 pub mod catmull_rom;
+pub mod coupled_map;
 pub mod harmonic;
 pub mod interpolation;
+pub mod map_source;
 pub mod mean;
 pub mod multipole;
 pub mod multipole_fit;
 pub mod radii;
-pub mod sampled;
-pub mod sampler;
 pub mod tabulate;
 
 pub use interpolation::{InterpolationError, interpolation_error, interpolation_error_by};

@@ -5,10 +5,10 @@ use std::collections::HashMap;
 use crate::archive::{Archive, text_of};
 use crate::assembly::{Affine, Body, corner, lay_out};
 use crate::document::parse_unit;
-use crate::fault::ReadError;
 use crate::mesh::FileMesh;
 use crate::number::Numbers;
 use crate::placement::sin_cos_deg;
+use crate::read_error::ReadError;
 use crate::xml::{Document, Element, Step};
 
 /// Reads an AMF file's bytes. Without a unit it is in millimetres.

@@ -6,7 +6,7 @@ use std::io::{Cursor, Read};
 
 use zip::ZipArchive;
 
-use crate::fault::{Place, ReadError};
+use crate::read_error::{Place, ReadError};
 
 /// So many bytes may be unpacked from any archive,
 const LEAST_BUDGET: u64 = 8 << 20;

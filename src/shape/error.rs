@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::document::SurfaceFormat;
-use crate::fault::ReadError;
+use crate::read_error::ReadError;
 use crate::stl::StlError;
 use fluxform_base::progress::Interrupted;
 

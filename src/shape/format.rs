@@ -4,8 +4,8 @@ use std::path::Path;
 
 use crate::document::SurfaceFormat;
 use crate::error::ShapeError;
-use crate::fault::ReadError;
 use crate::mesh::FileMesh;
+use crate::read_error::ReadError;
 use crate::{amf, obj, ply, sldprt, stl, three_dxml, three_mf};
 
 impl SurfaceFormat {

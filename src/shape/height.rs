@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use crate::mesh::{Mesh, Triangle};
-use crate::seen::{Contact, Seen, WALL_NORMAL_Z, upward_normal};
+use crate::vertical_hit::{Contact, Seen, WALL_NORMAL_Z, upward_normal};
 use fluxform_base::progress::{Interrupted, Progress};
 use fluxform_numerics::axis::Axis;
 

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use rayon::prelude::*;
 
 use crate::mesh::{Mesh, Triangle};
-use crate::seen::Seen;
+use crate::vertical_hit::Seen;
 
 /// Buckets a side, at most.
 const MOST_A_SIDE: usize = 2048;
@@ -167,7 +167,7 @@ mod tests {
     use crate::document::Placement;
     use crate::mesh::FileMesh;
     use crate::placement::Transform;
-    use crate::seen::Contact;
+    use crate::vertical_hit::Contact;
 
     fn index(triangles: Vec<Triangle>) -> (Mesh, Index) {
         let file = FileMesh {

@@ -3,11 +3,11 @@
 //! Indices count from 1, negative ones back from the last vertex so far. Colours after a vertex,
 //! texture and normal indices are not used. The file carries no unit.
 
-use crate::fault::{Place, ReadError};
 use crate::mesh::FileMesh;
 use crate::number::{Numbers, shown};
 use crate::polygon::{Cutter, MOST_CORNERS};
-use crate::words::Lines;
+use crate::read_error::{Place, ReadError};
+use crate::tokens::Lines;
 
 /// Reads an OBJ file's bytes; names may be in any encoding.
 ///

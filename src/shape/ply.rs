@@ -12,10 +12,10 @@ use ply_rs_bw::ply::{
     ScalarType,
 };
 
-use crate::fault::ReadError;
 use crate::mesh::FileMesh;
 use crate::number::{F32_ROUNDING, shown};
 use crate::polygon::{Cutter, MOST_CORNERS};
+use crate::read_error::ReadError;
 
 /// Elements that the parser makes at once: it allocates for each.
 const AT_ONCE: usize = 1 << 12;

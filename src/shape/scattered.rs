@@ -8,8 +8,8 @@ use crate::edges::{Edges, WELD_ROUNDINGS, weld};
 use crate::error::ShapeError;
 use crate::height::{Grid, Sample, reach_m};
 use crate::index::Index;
-use crate::marks::{self, Marks, Rules};
 use crate::mesh::Mesh;
+use crate::point_flags::{self, Marks, Rules};
 use crate::primitive::PlacedPrimitive;
 use crate::surface::Surface;
 
@@ -81,7 +81,7 @@ impl<'a> Probe<'a> {
             Surface::Mesh(mesh) => {
                 let reach = reach_m(mesh, grid);
                 // Most files write a vertex the same way each time: the quick answer first.
-                let closed = marks::is_closed(mesh.triangles()) || {
+                let closed = point_flags::is_closed(mesh.triangles()) || {
                     let rounding_m = mesh.facts().coordinate_rounding_m;
                     let names = weld(mesh.triangles(), WELD_ROUNDINGS * rounding_m);
                     Edges::new(&names).closed()
@@ -113,7 +113,7 @@ impl<'a> Probe<'a> {
         match &self.kind {
             Kind::Mesh {
                 mesh, index, rules, ..
-            } => marks::at(mesh.triangles(), index.at(p), p, *rules),
+            } => point_flags::at(mesh.triangles(), index.at(p), p, *rules),
             Kind::Primitive(primitive) => Some((primitive.sample(p[0], p[1])?, Marks::PLAIN)),
         }
     }

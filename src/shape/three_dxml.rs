@@ -9,9 +9,9 @@ use std::collections::HashMap;
 
 use crate::archive::Archive;
 use crate::assembly::{Affine, Body, corner, lay_out};
-use crate::fault::{Place, ReadError};
 use crate::mesh::{FileMesh, Triangle};
 use crate::number::Numbers;
+use crate::read_error::{Place, ReadError};
 use crate::three_mf::transform;
 use crate::xml::{Document, Element, Step};
 

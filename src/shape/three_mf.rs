@@ -9,9 +9,9 @@ use std::collections::{HashMap, HashSet};
 use crate::archive::Archive;
 use crate::assembly::{Affine, Body, corner, lay_out};
 use crate::document::parse_unit;
-use crate::fault::{Place, ReadError};
 use crate::mesh::FileMesh;
 use crate::number::Numbers;
+use crate::read_error::{Place, ReadError};
 use crate::xml::{Document, Element, Step};
 
 /// More model parts than this belong to no surface.

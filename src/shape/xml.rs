@@ -6,7 +6,7 @@ use quick_xml::XmlVersion;
 use quick_xml::escape::resolve_predefined_entity;
 use quick_xml::events::{BytesRef, BytesStart, Event};
 
-use crate::fault::{Place, ReadError};
+use crate::read_error::{Place, ReadError};
 
 /// Elements nested deeper than this belong to no surface.
 const DEEPEST: usize = 256;

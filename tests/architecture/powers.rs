@@ -40,7 +40,7 @@ const POWERS: &[Power] = &[
             "tempfile",
             "rustix",
         ],
-        holders: &["bundle/atomic/", "bundle/plain.rs"],
+        holders: &["bundle/atomic/", "bundle/read_bounded.rs"],
     },
     Power {
         name: "lifting the lint on writing and clocks",

@@ -3,9 +3,9 @@
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::{ArrayResolution, CoupledArray};
+use fluxform_field::steel::core_flux_density::{CoreField, Inspection, peak_depth_m};
 use fluxform_field::steel::cored_coil::CoredCoil;
 use fluxform_field::steel::generatrix::Face;
-use fluxform_field::steel::inside::{CoreField, Inspection, peak_depth_m};
 use fluxform_field::winding::{AxialField, Winding};
 use fluxform_numerics::gauss;
 use fluxform_numerics::lagrange_basis::Basis;

@@ -8,12 +8,12 @@ use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::{ArrayResolution, CoupledArray, closest_m};
 use fluxform_field::steel::bh_curve::BhCurve;
 use fluxform_field::steel::cored_coil::Excitation;
+use fluxform_field::steel::equivalent_dipoles::{ArraySources, Parts};
 use fluxform_field::steel::generatrix::{Generatrix, Resolution};
 use fluxform_field::steel::magnetized::MagnetizedCore;
 use fluxform_field::steel::permeability::{Constant, Permeability};
 use fluxform_field::steel::saturated::{CoreField, SaturatedCore, Status};
 use fluxform_field::steel::saturated_array::{SaturatedArray, SaturatedArrayError};
-use fluxform_field::steel::sources::{ArraySources, Parts};
 use fluxform_field::winding::Winding;
 use nalgebra::DMatrix;
 

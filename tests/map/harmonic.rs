@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 
 use fluxform_base::progress::Silent;
-use fluxform_map::sampled::{SampledField, TableReport};
-use fluxform_map::sampler::{Sampler, series};
+use fluxform_map::coupled_map::{SampledField, TableReport};
+use fluxform_map::map_source::{Sampler, series};
 use fluxform_map::tabulate::{Grid, MapError, PlacedCoil};
 use fluxform_map::{Components, FieldMap};
 

@@ -11,9 +11,9 @@ use fluxform_shape::document::{
 };
 use fluxform_shape::height::Grid;
 use fluxform_shape::holes::{Holes, fill, holes};
-use fluxform_shape::marks::Marks;
 use fluxform_shape::mesh::{Mesh, Triangle};
 use fluxform_shape::placement::Transform;
+use fluxform_shape::point_flags::Marks;
 use fluxform_shape::primitive::PlacedPrimitive;
 use fluxform_shape::scattered::Probe;
 use fluxform_shape::scattered::adaptive::{Adaptive, Grading, adaptive};

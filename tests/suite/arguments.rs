@@ -16,9 +16,9 @@ use fluxform::progress::Progress;
 use crate::catalogue::CaseRow;
 use crate::extreme::{self, Case};
 use crate::file::{BenchFile, Row};
-use crate::pace::Pace;
+use crate::effort::Pace;
 use crate::stages::STAGES;
-use crate::written::{catalogue_file, catalogue_made_with, check_catalogue, write_catalogue};
+use crate::output::{catalogue_file, catalogue_made_with, check_catalogue, write_catalogue};
 use crate::{BenchRequest, run, scaling};
 
 /// Error against run time of every numerical stage

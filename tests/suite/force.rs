@@ -1,7 +1,7 @@
 //! Force problems over a square plan.
 
-use super::built_in::BuiltIn;
-use super::wave::HALF_M;
+use super::inputs::BuiltIn;
+use super::test_surface::HALF_M;
 use fluxform::design::{Design, Need};
 use fluxform::job::scene::Scene;
 use fluxform::job::{JobError, KERNEL_ERROR, steel};

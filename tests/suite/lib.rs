@@ -8,7 +8,7 @@ pub mod catalogue;
 pub mod extreme;
 pub mod file;
 pub mod memory;
-pub mod pace;
+pub mod effort;
 pub mod page;
 pub mod peers;
 pub mod picture;
@@ -16,18 +16,18 @@ pub mod scaling;
 pub mod schema;
 pub mod stages;
 pub mod summary;
-pub mod written;
+pub mod output;
 
-mod built_in;
+mod inputs;
 mod catalogue_page;
 mod force;
 mod reference;
-mod wave;
+mod test_surface;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use self::pace::Pace;
+use self::effort::Pace;
 use self::stages::{Measured, STAGES, Stage};
 use crate::file::BenchFile;
 use fluxform::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
@@ -74,10 +74,10 @@ fn inputs(request: &BenchRequest) -> Vec<Input> {
 /// # Errors
 /// Files that must not be replaced; a stage that fails; interruption.
 pub fn run(request: &BenchRequest, progress: &dyn Progress) -> Result<BenchFile, JobError> {
-    let of = (&*inputs(request), &written::made_with(request));
-    written::check(of, &request.out, request.force)?;
+    let of = (&*inputs(request), &output::made_with(request));
+    output::check(of, &request.out, request.force)?;
     let mut file = measure(request, progress)?;
-    written::write(&mut file, &request.out, request.force)?;
+    output::write(&mut file, &request.out, request.force)?;
     Ok(file)
 }
 
@@ -116,7 +116,7 @@ pub fn measure(request: &BenchRequest, progress: &dyn Progress) -> Result<BenchF
         schema_version: SCHEMA_VERSION.to_owned(),
         fluxform_version: FLUXFORM_VERSION.to_owned(),
         inputs: inputs(request),
-        made_with: written::made_with(request),
+        made_with: output::made_with(request),
         units: UNITS.to_owned(),
         quick: request.pace.quick,
         stages,

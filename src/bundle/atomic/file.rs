@@ -5,9 +5,9 @@ use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use super::created_dirs::{MadeFolders, made_in};
 use super::digest::{Written, fill};
 use super::dir::{Dir, Kind, Status};
-use super::made::{MadeFolders, made_in};
 use super::names::{check_name, parent_of};
 use super::overwrite::{Permit, real};
 use super::record::{ReplacedNote, present};

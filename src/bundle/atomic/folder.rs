@@ -21,9 +21,9 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::absorb::{Owned, absorb, give_modes};
+use super::created_dirs::{MadeFolders, made_in};
 use super::digest::fill;
 use super::dir::{Dir, Kind, short_identity};
-use super::made::{MadeFolders, made_in};
 use super::names::{MANIFEST, OLD, check_name, parent_of};
 use super::overwrite::real;
 use super::record::{Record, State};

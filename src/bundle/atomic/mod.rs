@@ -14,11 +14,11 @@
 
 mod absorb;
 mod busy;
+mod created_dirs;
 mod digest;
 mod dir;
 mod file;
 mod folder;
-mod made;
 mod names;
 mod overwrite;
 mod record;
@@ -29,6 +29,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 pub use busy::{awaited_folder, is_writing};
+pub use created_dirs::SharedFolders;
+pub(crate) use created_dirs::open_made;
 pub use digest::Written;
 pub(crate) use digest::hex;
 pub(crate) use dir::{Dir, Kind};
@@ -36,8 +38,6 @@ pub(crate) use file::put;
 pub use file::{FileSet, is_stream, write};
 pub use folder::FolderDraft;
 pub(crate) use folder::listed_files;
-pub use made::SharedFolders;
-pub(crate) use made::open_made;
 pub(crate) use names::check_name;
 pub use overwrite::{Overwrite, check_distinct};
 pub use scratch::Scratch;

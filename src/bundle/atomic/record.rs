@@ -12,7 +12,7 @@ use super::digest::hex;
 use super::dir::{Dir, Kind};
 use super::names::OLD;
 use crate::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION, parse_version};
-use crate::plain::read_plain;
+use crate::read_bounded::read_plain;
 use crate::seal;
 use crate::timing;
 

@@ -12,7 +12,7 @@ use super::{PlanFile, PointFile};
 use crate::artefact::FLUXFORM_VERSION;
 use crate::atomic::{Dir, Kind, Overwrite, SharedFolders, WriteError, put};
 use crate::json::JsonError;
-use crate::plain::read_plain;
+use crate::read_bounded::read_plain;
 use crate::write::write_json;
 
 /// The folder of the points' folders.

@@ -22,7 +22,7 @@ use crate::job::cost;
 use crate::job::map::mag_manip::{FEWEST_NODES, MagManipRequest, MultipolesMade, VectorFieldMade};
 use crate::job::map::{MapReport, MapRequest, run};
 use crate::map::Components;
-use crate::map::sampled::TableReport;
+use crate::map::coupled_map::TableReport;
 
 /// Tabulate the gradient maps of every coil over the workspace
 ///

@@ -1,6 +1,6 @@
 //! `optimize`: the best coil within a design's limits.
 
-mod told;
+mod summary;
 
 use std::path::{Path, PathBuf};
 
@@ -151,7 +151,7 @@ impl Optimize {
             }
         }
         let json = printer.with_warnings(&result);
-        printer.summary(place, &json, || told::summary(&result, self.out.as_ref()))?;
+        printer.summary(place, &json, || summary::summary(&result, self.out.as_ref()))?;
         if let Some(none) = &result.no_coil {
             return Err(Failure::Unmet(Wish::Coil, none.message.clone()));
         }

@@ -19,7 +19,7 @@ use crate::job::JobError;
 use crate::job::made_with;
 use crate::job::replay::summary::{ErrorFacts, ReplaySummary, Told};
 use crate::job::replay::synthesize::{Kind, Synthesis};
-use crate::job::replay::written::{ReplayFiles, write_trajectory};
+use crate::job::replay::output::{ReplayFiles, write_trajectory};
 use crate::job::replay::{Opened, ReplayReport, run};
 
 /// Forces below this are rounding, N.

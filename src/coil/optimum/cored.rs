@@ -20,9 +20,9 @@ use crate::section_integrals;
 use fluxform_base::units::{MU_0_T_M_PER_A, STEEL_DENSITY_KG_PER_M3};
 use fluxform_field::magnet::MagnetRule;
 use fluxform_field::steel::CoreShape;
+use fluxform_field::steel::core_flux_density::{peak_depth_m, peaks_of_family_t};
 use fluxform_field::steel::cored_coil::CoredCoil;
 use fluxform_field::steel::generatrix::Resolution;
-use fluxform_field::steel::inside::{peak_depth_m, peaks_of_family_t};
 use fluxform_field::winding::Winding;
 use std::f64::consts::PI;
 

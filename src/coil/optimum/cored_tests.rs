@@ -316,7 +316,7 @@ fn a_limit_on_the_core_s_field_is_met_and_costs_force() {
         .shape(window.inner_radius_m, window.length_m)
         .expect("fits");
     let coil = CoredCoil::new(&winding, shape, 1000.0, 1e-5, HEIGHT_M).expect("off the edges");
-    let depth_m = fluxform_field::steel::inside::peak_depth_m(shape);
+    let depth_m = fluxform_field::steel::core_flux_density::peak_depth_m(shape);
     let peak_t = coil
         .core_field(limited.current_a, depth_m)
         .expect("inside")
@@ -507,7 +507,7 @@ fn the_limited_flux_density_is_what_an_evaluation_prints() {
             .expect("a core fits");
         let coil = CoredCoil::new(&winding, shape, rule.relative_permeability, 1e-6, HEIGHT_M)
             .expect("off the edges");
-        let depth_m = fluxform_field::steel::inside::peak_depth_m(shape);
+        let depth_m = fluxform_field::steel::core_flux_density::peak_depth_m(shape);
         let told_t = coil.core_field(1.3, depth_m).expect("inside").peak_t;
         let wrong = response.core_field_t.value / told_t - 1.0;
         // What a written design gives way by is ten times that.

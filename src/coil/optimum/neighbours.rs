@@ -7,7 +7,7 @@
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::CoupledArray;
 use fluxform_field::steel::cored_coil::CoredCoil;
-use fluxform_field::steel::sources::{ArraySources, Parts};
+use fluxform_field::steel::equivalent_dipoles::{ArraySources, Parts};
 use fluxform_field::winding::Winding;
 
 /// Relative accuracy of the coupled solution.

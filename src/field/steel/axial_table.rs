@@ -12,9 +12,9 @@ use std::collections::HashMap;
 use std::f64::consts::{PI, SQRT_2};
 use std::sync::{Arc, OnceLock, PoisonError, RwLock};
 
+use super::equivalent_dipoles::Parts;
 use super::magnetized::MagnetizedCore;
 use super::magnetized::loops::{LoopFields, Rectangle};
-use super::sources::Parts;
 use crate::batch::{Gradients, Wanted};
 use crate::source::AxialSource;
 use crate::winding::{AxialField, OnEdge, Winding};

@@ -27,8 +27,8 @@ use nalgebra::{DMatrix, DVector};
 use self::newton::State;
 use super::double_layer::operators;
 use super::generatrix::{Face, Generatrix};
-use super::interior::{Interior, MeshError, Sample};
 use super::permeability::Permeability;
+use super::spectral_fem::{Interior, MeshError, Sample};
 use super::trace::Trace;
 use fluxform_base::units::MU_0_T_M_PER_A;
 

@@ -6,10 +6,10 @@ use super::CoreShape;
 use super::cored_coil::Excitation;
 use super::curve_refinement::{AlongCurve, Level, Refined, Try, refined};
 use super::generatrix::{Generatrix, Resolution};
-use super::interior::MeshError;
 use super::magnetized::MagnetizedCore;
 use super::permeability::Permeability;
 use super::saturated::{CoreField, SaturatedCore, Status};
+use super::spectral_fem::MeshError;
 use crate::winding::{OnEdge, Winding};
 use fluxform_numerics::refinement::error_of_finest;
 

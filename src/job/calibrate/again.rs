@@ -6,11 +6,11 @@ use super::{
 use crate::bundle::artefact::Input;
 use crate::bundle::lambda_file::LambdaFile;
 use crate::bundle::manifest::Manifest;
-use crate::bundle::store::Store;
+use crate::bundle::cache::Store;
 use crate::bundle::table::PointRow;
 use crate::bundle::write::{BundleContent, sealed_manifest};
 use crate::job::JobError;
-use crate::job::kept::FieldStore;
+use crate::job::cached_field::FieldStore;
 use crate::job::scene::Scene;
 use crate::progress::Progress;
 

@@ -2,7 +2,7 @@
 
 use crate::bundle::manifest::LeftOut;
 use crate::job::JobError;
-use crate::job::kept::ShapeField;
+use crate::job::cached_field::ShapeField;
 use crate::job::lambda::LambdaReport;
 use crate::job::passive::couples_left_out;
 use crate::job::scene::Scene;

@@ -2,7 +2,7 @@
 
 use crate::plot::plane::{Cells, Mark, Panel, PlanePlot, Together};
 use crate::shape::height::Grid;
-use crate::shape::marks::Marks;
+use crate::shape::point_flags::Marks;
 
 /// A unit for people.
 #[derive(Debug, Clone, Copy)]

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use crate::bundle::table::{Column, POINT_COLUMNS, write_columns};
 use crate::shape::ConstraintPoints;
-use crate::shape::marks::Marks;
+use crate::shape::point_flags::Marks;
 use crate::shape::scattered::Scattered;
 
 /// The points of a grid.

@@ -5,7 +5,7 @@
 //! move, not a bound, because the errors of single points need not agree.
 
 use super::super::JobError;
-use super::super::kept::ShapeField;
+use super::super::cached_field::ShapeField;
 use super::super::scene::Scene;
 use super::super::steel::Solved;
 use super::points::WantedPoints;

@@ -1,17 +1,17 @@
 //! `optimize`: the best coil within a design's limits (eq. 11).
 
-mod facts;
+mod result;
 mod model;
 pub mod page;
-mod told;
-mod written;
+mod outcome_words;
+mod design_document;
 
 use std::collections::BTreeMap;
 
-pub use facts::*;
-pub use written::Document;
+pub use result::*;
+pub use design_document::Document;
 
-use self::written::{Chosen, RatedFacts};
+use self::design_document::{Chosen, RatedFacts};
 use super::JobError;
 use super::KERNEL_ERROR;
 use super::scene::Scene;
@@ -128,10 +128,10 @@ pub fn optimize(
         fluxform_version: FLUXFORM_VERSION,
         design: design.name.clone(),
         inputs,
-        status: told::status(&search.status),
-        no_coil: told::no_coil(&search.status, request.wound),
+        status: outcome_words::status(&search.status),
+        no_coil: outcome_words::no_coil(&search.status, request.wound),
         wound: request.wound,
-        fixed: told::fixed(&fixed, search.continuous.as_ref()),
+        fixed: outcome_words::fixed(&fixed, search.continuous.as_ref()),
         coil: None,
         objective: None,
         limits: BTreeMap::new(),
@@ -166,7 +166,7 @@ pub fn optimize(
             regime: best.regime,
             fixed,
         };
-        let (written, rated) = written::write(document, &chosen, request.tolerance)?;
+        let (written, rated) = design_document::write(document, &chosen, request.tolerance)?;
         result.take(&search, best, rated);
         if surroundings(design, request.neighbours) == Surroundings::Neighbours {
             result.among_neighbours(&written.design, best, request.tolerance)?;
@@ -417,14 +417,14 @@ fn search(
     };
     if request.wound {
         let found = optimise_wound(model, &task, &settings, progress)?;
-        return Ok(told::wound(found));
+        return Ok(outcome_words::wound(found));
     }
     let found = optimise(model, &task, &settings, progress)?;
     let around = match &found.best {
         Some(best) if request.around => alternatives(model, &task, best, progress)?,
         _ => Vec::new(),
     };
-    Ok(told::continuous(found, &around))
+    Ok(outcome_words::continuous(found, &around))
 }
 
 /// A coil that is wider than the array's pitch fits nowhere.

@@ -1,6 +1,6 @@
 //! The page of an optimisation.
 
-use super::facts::{CircuitFacts, Optimization, SizeFacts};
+use super::result::{CircuitFacts, Optimization, SizeFacts};
 use crate::report::optimum::{ActiveLimit, Alternative, OptimumFacts, page};
 
 /// What `optimize` tells as one HTML page.

@@ -8,7 +8,7 @@ mod plausible;
 pub mod renderer;
 pub mod summary;
 pub mod synthesize;
-pub mod written;
+pub mod output;
 
 use std::path::{Path, PathBuf};
 

@@ -9,7 +9,7 @@ use super::JobError;
 use crate::bundle::artefact::Input;
 use crate::bundle::load::{Bundle, BundleError};
 use crate::bundle::manifest::SurfaceOptions;
-use crate::bundle::plain::digest_plain;
+use crate::bundle::read_bounded::digest_plain;
 use crate::design::{Design, Need, Steel as Described, source};
 use crate::lambda::Settings;
 use crate::shape::document::{Placement, RawSurface, ShapeDocument, SurfaceSource};

@@ -8,7 +8,7 @@ use super::super::{JobError, KERNEL_ERROR};
 use super::Bounds;
 use crate::bundle::load::Bundle;
 use crate::field::magnet::MagnetRule;
-use crate::field::steel::sources::Parts;
+use crate::field::steel::equivalent_dipoles::Parts;
 
 /// Map nodes sampled, and force-matrix entries sampled.
 const SAMPLES: usize = 2000;

@@ -1,11 +1,11 @@
 //! The largest force constant with no point too weak.
 
-use super::generate::Search;
+use super::constraint_generation::Search;
 use super::path::{ActivePoint, active};
 use super::program::End;
 use super::scaled::{Form, Limits, NOTHING, Scaled};
 use crate::problem::{ForceProblem, ProblemError, Settings};
-use crate::reduce::{largest_entries, times_power};
+use crate::qr_reduction::{largest_entries, times_power};
 use fluxform_numerics::real::Real;
 
 /// The largest lambda with `G I + offset >= lambda h` at every point, and currents for it.

@@ -18,31 +18,31 @@
 //! with the least sum of currents.
 
 mod blocks;
+mod constraint_generation;
 mod criteria;
-mod felt;
 mod free;
-mod generate;
 mod maxmin;
 mod path;
+mod perceptual_tolerance;
 mod points;
 mod program;
 mod proof;
 mod scaled;
 
-pub use felt::{Felt, felt};
 pub(super) use maxmin::largest;
 pub use maxmin::{Maxmin, maxmin};
 pub use path::{ActivePoint, Turn, WorstPath};
+pub use perceptual_tolerance::{Felt, felt};
 pub use proof::lower_bound_n;
 
 use fluxform_base::accuracy::StageAccuracy;
 use fluxform_numerics::real::Real;
 
 use super::problem::{ForceProblem, ProblemError, Settings};
-use super::reduce::{largest_entries, times_power};
+use super::qr_reduction::{largest_entries, times_power};
+use constraint_generation::{Followed, Search};
 use criteria::Comparison;
 use free::FreeProblem;
-use generate::{Followed, Search};
 use program::End;
 use scaled::{Form, Limits, Scaled};
 

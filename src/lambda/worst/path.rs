@@ -1,11 +1,11 @@
 //! The worst-point path in SI units: the least largest error and its currents at any lambda.
 
-use super::generate::Followed;
+use super::constraint_generation::Followed;
 use super::program::Piece;
 use super::scaled::Scaled;
 use crate::path::{Event, Limits, Standing};
 use crate::problem::ForceProblem;
-use crate::reduce::times_power;
+use crate::qr_reduction::times_power;
 use fluxform_numerics::real::Real;
 
 /// Slopes of t* that differ by less, relative to max h, are one.

@@ -8,7 +8,7 @@ use fluxform_numerics::real::Real;
 
 use super::program::Program;
 use crate::problem::ForceProblem;
-use crate::reduce::{exponent_of, times_power};
+use crate::qr_reduction::{exponent_of, times_power};
 
 /// What rounding leaves of a scaled current, or force per ampere, of zero.
 pub(super) const NOTHING: f64 = 1e-24;

@@ -6,7 +6,7 @@ use super::data::{BundleFacts, Chosen};
 use super::frame::{Page, Section};
 use super::html::{Cell, Html, Table};
 use super::number::{count, figures, force, percent};
-use super::{field, good, limits, path, surface};
+use super::{error_budget, field, limits, path, surface};
 
 /// The page.
 #[must_use]
@@ -15,7 +15,7 @@ pub fn page(facts: &BundleFacts) -> String {
     data.insert("coils".to_owned(), coils(facts));
     let sections = vec![
         answer(facts),
-        good::section(facts, &mut data),
+        error_budget::section(facts, &mut data),
         limits::section(facts),
         path::section(facts, &mut data),
         surface::section(facts, &mut data),

@@ -1,8 +1,8 @@
 //! What limits a result: coils, points, the design's own limits.
 
 use super::data::{BundleFacts, CoilFacts, LimitFacts};
+use super::error_budget::worst;
 use super::frame::Section;
-use super::good::worst;
 use super::html::{Cell, Html, Table};
 use super::number::{count, figures, force, mm, percent, si};
 

@@ -6,9 +6,9 @@
 
 pub mod bundle;
 pub mod data;
+mod error_budget;
 pub mod field;
 pub mod frame;
-mod good;
 pub mod html;
 mod limits;
 pub mod measured;

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use crate::height::{Grid, heights, reach_m};
 use crate::index::Buckets;
 use crate::mesh::Mesh;
-use crate::seen::is_wall;
+use crate::vertical_hit::is_wall;
 use fluxform_base::progress::{Interrupted, Progress};
 use fluxform_numerics::axis::Axis;
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::format::{SurfaceFormat, unit_names};
 use super::{AxisRequest, GridRequest, Placement, ShapeDocument, SurfaceSource};
-use fluxform_design::words::axis_fault;
+use fluxform_design::message_text::axis_fault;
 use fluxform_numerics::axis::Axis;
 
 /// What the command line says of a surface.

@@ -6,11 +6,11 @@ use super::format::{SurfaceFormat, parse_unit, unit_names};
 use super::{AxisRequest, GridRequest, Placement, Primitive, ShapeDocument, SurfaceSource};
 use fluxform_base::units::m_from_mm;
 use fluxform_design::diagnostics::{Faults, InvalidDocument};
+use fluxform_design::message_text::{nearest, quoted};
 use fluxform_design::reader::{Section, read_document};
 use fluxform_design::rule::{Bound, Rule};
 use fluxform_design::source;
 use fluxform_design::values::OneOrMany;
-use fluxform_design::words::{nearest, quoted};
 use fluxform_design::{BODY_MM, SEED_SIDE_MM, axis_m};
 
 /// Most grid points of one shape.

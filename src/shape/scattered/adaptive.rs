@@ -10,7 +10,7 @@ use super::{MOST_POINTS, Probe, Scattered, too_many};
 use crate::deviation::{Patch, Rect};
 use crate::error::ShapeError;
 use crate::height::Sample;
-use crate::marks::Marks;
+use crate::point_flags::Marks;
 use fluxform_base::progress::Progress;
 
 /// Rectangles along the longer side to begin with.

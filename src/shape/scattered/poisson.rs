@@ -8,7 +8,7 @@
 use super::{MOST_POINTS, Probe, Scattered, too_many};
 use crate::error::ShapeError;
 use crate::height::Sample;
-use crate::marks::Marks;
+use crate::point_flags::Marks;
 use fluxform_base::progress::Progress;
 
 /// Darts into every free cell.

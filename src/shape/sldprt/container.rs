@@ -9,7 +9,7 @@ use std::io::Read;
 use flate2::read::DeflateDecoder;
 
 use super::ADVICE;
-use crate::fault::{Place, ReadError};
+use crate::read_error::{Place, ReadError};
 
 const SIGN: [u8; 4] = [0, 0, 0, 4];
 const MARKER: [u8; 6] = [0x14, 0, 0x06, 0, 0x08, 0];

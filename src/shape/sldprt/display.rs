@@ -4,8 +4,8 @@
 //! f32. The lengths add up to n, which no table of another kind does by chance.
 
 use super::ADVICE;
-use crate::fault::{Place, ReadError};
 use crate::mesh::Triangle;
+use crate::read_error::{Place, ReadError};
 
 const LENGTHS: [u32; 3] = [4, 8, 2];
 const POINT_BYTES: u32 = 12;

@@ -7,9 +7,9 @@
 mod container;
 mod display;
 
-use crate::fault::ReadError;
 use crate::mesh::{FileMesh, Triangle};
 use crate::number::F32_ROUNDING;
+use crate::read_error::ReadError;
 
 /// What to do instead, for messages.
 const ADVICE: &str = "open it in SOLIDWORKS and save the body as STL (binary, fine resolution) \

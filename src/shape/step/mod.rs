@@ -16,8 +16,8 @@ use monstertruck_io::step::load::Table;
 use monstertruck_meshing::prelude::*;
 
 use crate::assembly::{Affine, Body, lay_out};
-use crate::fault::ReadError;
 use crate::mesh::{FileMesh, Triangle};
+use crate::read_error::ReadError;
 use fluxform_base::progress::pass_interruption;
 
 /// Readings under way whose panics are caught and told as faults of the file.

@@ -3,8 +3,8 @@
 use super::support::{Design, Lcg};
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::CoupledArray;
+use fluxform_field::steel::core_flux_density::{CoreField, peak_depth_m};
 use fluxform_field::steel::cored_coil::CoredCoil;
-use fluxform_field::steel::inside::{CoreField, peak_depth_m};
 use fluxform_field::winding::Winding;
 use std::f64::consts::PI;
 

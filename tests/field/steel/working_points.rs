@@ -7,11 +7,11 @@ use super::support::{Design, Lcg};
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::{ArrayResolution, closest_m};
 use fluxform_field::steel::bh_curve::BhCurve;
+use fluxform_field::steel::equivalent_dipoles::{ArraySources, Parts};
 use fluxform_field::steel::generatrix::Resolution;
 use fluxform_field::steel::permeability::Permeability;
 use fluxform_field::steel::saturated::Status;
 use fluxform_field::steel::saturated_array::SaturatedArray;
-use fluxform_field::steel::sources::{ArraySources, Parts};
 use fluxform_field::winding::Winding;
 use rayon::prelude::*;
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use fluxform::bundle::store::{Origin, Store};
+use fluxform::bundle::cache::{Origin, Store};
 use sha2::{Digest, Sha256};
 
 use super::limits;

@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use super::check::{Outcome, close, holds, measured, number, numbers, off, oracle, told, worst};
 use super::{Case, case};
-use crate::pace::Numbers;
+use crate::effort::Numbers;
 use fluxform::lambda::{ForceProblem, Settings, Solution, Status, solve};
 
 pub fn cases() -> Vec<Case> {

@@ -2,7 +2,7 @@
 
 use super::check::{Outcome, apart, holds, measured, number, off, oracle, refused, told, worst};
 use super::{Case, case};
-use crate::pace::Numbers;
+use crate::effort::Numbers;
 use fluxform::coil::transient::VoltageStep;
 use fluxform::lambda::{ForceProblem, Settings, solve};
 use fluxform::numerics::small_quadratic::{Row, minimise};

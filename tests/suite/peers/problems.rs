@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::built_in::{NLOPT, OPTIMUM_AIR};
+use crate::inputs::{NLOPT, OPTIMUM_AIR};
 use crate::file::Curve;
 use crate::stages::{Measured, problem};
 use fluxform::job::JobError;

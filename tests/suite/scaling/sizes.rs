@@ -1,11 +1,11 @@
 //! What grows, how far, and the work that is measured at each size.
 
 use super::THREADS;
-use crate::built_in::{OPTIMUM_AIR, SEED, SEED_AIR};
+use crate::inputs::{OPTIMUM_AIR, SEED, SEED_AIR};
 use crate::force::{forces, with_coils};
-use crate::pace::Numbers;
+use crate::effort::Numbers;
 use crate::stages::posed;
-use crate::wave::{dome_m, grid, known, mesh};
+use crate::test_surface::{dome_m, grid, known, mesh};
 use fluxform::bench::clock::{Effort, Timing, measure};
 use fluxform::coil::inductance::self_inductance_h;
 use fluxform::coil::mutual::inductance_matrix_h;

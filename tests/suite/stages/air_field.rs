@@ -6,9 +6,9 @@
 use serde::Deserialize;
 
 use super::curve;
-use crate::built_in::{AIR_COIL, SEED};
+use crate::inputs::{AIR_COIL, SEED};
 use crate::file::{Curve, StageCurves};
-use crate::pace::{Found, Numbers, Pace};
+use crate::effort::{Found, Numbers, Pace};
 use crate::reference::{AXIAL_ERROR, axial_gradient};
 use crate::stages::Measured;
 use fluxform::design::Need;

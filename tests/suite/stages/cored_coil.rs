@@ -3,9 +3,9 @@
 use serde::Deserialize;
 
 use super::{Measured, curve, stage};
-use crate::built_in::{CORES, SEED};
+use crate::inputs::{CORES, SEED};
 use crate::file::{Curve, StageCurves};
-use crate::pace::{Found, Pace};
+use crate::effort::{Found, Pace};
 use fluxform::coil::inductance::self_inductance_h;
 use fluxform::design::Need;
 use fluxform::field::steel::CoreShape;

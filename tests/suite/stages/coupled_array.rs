@@ -1,12 +1,12 @@
 //! Nine cored coils whose cores answer to each other.
 
 use super::{Measured, curve, stage};
-use crate::built_in::SEED;
+use crate::inputs::SEED;
 use crate::file::{Curve, StageCurves};
-use crate::pace::{Found, Pace};
+use crate::effort::{Found, Pace};
 use fluxform::design::Need;
 use fluxform::field::steel::array::{ArrayResolution, CoupledArray, closest_m};
-use fluxform::field::steel::sources::{ArraySources, Parts};
+use fluxform::field::steel::equivalent_dipoles::{ArraySources, Parts};
 use fluxform::job::JobError;
 use fluxform::job::scene::Scene;
 use fluxform::job::steel::COUPLED_TOLERANCE;

@@ -5,8 +5,8 @@
 
 use super::{Measured, curve, stage};
 use crate::file::{Curve, StageCurves};
-use crate::pace::{Found, Numbers, Pace};
-use crate::wave::{grid, height_m, mesh};
+use crate::effort::{Found, Numbers, Pace};
+use crate::test_surface::{grid, height_m, mesh};
 use fluxform::job::JobError;
 use fluxform::numerics::double_double::DoubleDouble as Num;
 use fluxform::progress::{Progress, Silent};

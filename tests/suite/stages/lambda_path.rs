@@ -4,11 +4,11 @@
 use serde::Deserialize;
 
 use super::{Measured, curve, stage};
-use crate::built_in::{LAMBDA, SEED_AIR};
+use crate::inputs::{LAMBDA, SEED_AIR};
 use crate::file::{Curve, StageCurves};
 use crate::force::{Forces, forces};
-use crate::pace::{Found, Pace};
-use crate::wave::dome_m;
+use crate::effort::{Found, Pace};
+use crate::test_surface::dome_m;
 use fluxform::job::JobError;
 use fluxform::lambda::{self, ForceProblem, Settings, Solution};
 use fluxform::progress::Progress;

@@ -1,18 +1,18 @@
 //! Maps over the workspace: the error of their nodes, and the error between them.
 
 use super::{Measured, curve, stage};
-use crate::built_in::{SEED, SEED_AIR};
+use crate::inputs::{SEED, SEED_AIR};
 use crate::file::{Curve, StageCurves};
-use crate::pace::{Found, Numbers, Pace};
+use crate::effort::{Found, Numbers, Pace};
 use crate::reference::{AXIAL_ERROR, axial_gradient};
 use fluxform::design::{Design, Need};
-use fluxform::field::steel::sources::{ArraySources, Parts};
+use fluxform::field::steel::equivalent_dipoles::{ArraySources, Parts};
 use fluxform::job::JobError;
 use fluxform::job::map::MAP_TOLERANCE;
 use fluxform::job::maps::{Felt, SceneMap};
 use fluxform::job::scene::Scene;
 use fluxform::job::steel::{self, COUPLED_TOLERANCE, Steel};
-use fluxform::map::sampled::SampledField;
+use fluxform::map::coupled_map::SampledField;
 use fluxform::map::tabulate::{Grid, tabulate};
 use fluxform::map::{Components, FieldMap};
 use fluxform::numerics::axis::Axis;

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use super::{Measured, curve, stage};
-use crate::built_in::{AIR_ALL_LIMITS, BuiltIn, NLOPT, OPTIMUM_AIR, OPTIMUM_CORED};
+use crate::inputs::{AIR_ALL_LIMITS, BuiltIn, NLOPT, OPTIMUM_AIR, OPTIMUM_CORED};
 use crate::file::{Curve, StageCurves};
-use crate::pace::{Found, Pace};
+use crate::effort::{Found, Pace};
 use fluxform::coil::optimum::branch_and_bound::GAP;
 use fluxform::coil::optimum::task;
 use fluxform::coil::optimum::{CoilModel, Fixed, Outcome, Settings, Task, optimise};

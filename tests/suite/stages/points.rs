@@ -2,8 +2,8 @@
 
 use super::{Measured, curve, stage};
 use crate::file::{Curve, StageCurves};
-use crate::pace::{Found, Pace};
-use crate::wave::{HALF_M, grid, known, mesh, shape};
+use crate::effort::{Found, Pace};
+use crate::test_surface::{HALF_M, grid, known, mesh, shape};
 use fluxform::job::JobError;
 use fluxform::numerics::axis::Axis;
 use fluxform::progress::{Progress, Silent};

@@ -3,9 +3,9 @@
 use serde_json::{Value, json};
 
 use super::{cored_coil, height_map, inductance as own_inductance, map_table as maps, section};
-use crate::built_in::SEED_AIR;
+use crate::inputs::SEED_AIR;
 use crate::force::{Forces, forces};
-use crate::wave::dome_m;
+use crate::test_surface::dome_m;
 use fluxform::job::JobError;
 use fluxform::lambda::worst::worst_point as solve_worst;
 use fluxform::lambda::{self, Settings};

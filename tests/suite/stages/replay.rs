@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use super::{Measured, curve, stage};
-use crate::built_in::{FLAT, SEED_AIR};
+use crate::inputs::{FLAT, SEED_AIR};
 use crate::file::{Curve, StageCurves};
-use crate::pace::{Found, Pace};
+use crate::effort::{Found, Pace};
 use fluxform::bundle::artefact::Input;
 use fluxform::bundle::atomic::Scratch;
 use fluxform::bundle::replay::Answer;

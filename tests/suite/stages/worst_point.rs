@@ -1,11 +1,11 @@
 //! The least largest error over lambda. Exact, without a knob: what is swept is its size.
 
 use super::{Measured, curve, stage};
-use crate::built_in::SEED_AIR;
+use crate::inputs::SEED_AIR;
 use crate::file::{Curve, StageCurves};
 use crate::force::forces;
-use crate::pace::{Found, Pace};
-use crate::wave::dome_m;
+use crate::effort::{Found, Pace};
+use crate::test_surface::dome_m;
 use fluxform::job::JobError;
 use fluxform::lambda::Settings;
 use fluxform::lambda::worst::worst_point;

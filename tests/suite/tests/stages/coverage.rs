@@ -24,7 +24,7 @@ use fluxform::progress::Silent;
 use fluxform::shape::Surface;
 use fluxform::shape::document::ShapeDocument;
 use fluxform::shape::height::Grid as Plan;
-use fluxform_bench::pace::Numbers;
+use fluxform_bench::effort::Numbers;
 
 use crate::case::Case;
 use crate::search;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use rayon::prelude::*;
 
 use super::harmonic::{Extent, Table, kind};
-use super::sampler::{GRADIENT, Sampler, gz, series, tensor};
+use super::map_source::{GRADIENT, Sampler, gz, series, tensor};
 use super::tabulate::{Components, FieldMap, Grid, MapError, PlacedCoil};
 use fluxform_base::progress::Progress;
 

@@ -12,7 +12,7 @@ use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::qr::{Triangle, triangular_factor};
 use fluxform_numerics::real::Real;
 
-use super::follow::Bounds;
+use super::homotopy::Bounds;
 use super::model::{Factor, Model};
 use super::problem::ForceProblem;
 

@@ -12,13 +12,13 @@ use super::passive;
 use super::scene::Scene;
 use super::steel::{self, Solved};
 use crate::bundle::artefact::Input;
-use crate::bundle::store::{Origin, Store};
+use crate::bundle::cache::{Origin, Store};
 
 /// Digest of the sources of this build.
 const BUILD: &str = env!("FLUXFORM_BUILD");
 use crate::design::Steel as Described;
 use crate::field::steel::array::CoupledArray;
-use crate::field::steel::inside::{Inspection, peak_depth_m};
+use crate::field::steel::core_flux_density::{Inspection, peak_depth_m};
 use crate::field::winding::OnEdge;
 use crate::map::Components;
 use crate::map::tabulate::{Grid, PlacedCoil};

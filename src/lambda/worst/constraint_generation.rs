@@ -11,7 +11,7 @@ use super::blocks::{Blocks, misses};
 use super::points::{Course, Held, Points, Probe, bit, first_missed};
 use super::program::{End, Piece, Program, Stand};
 use super::scaled::{Form, Scaled};
-use crate::reduce::times_power;
+use crate::qr_reduction::times_power;
 use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
@@ -331,7 +331,7 @@ mod tests {
     use super::super::scaled::Limits;
     use super::*;
     use crate::problem::ForceProblem;
-    use crate::reduce::largest_entries;
+    use crate::qr_reduction::largest_entries;
 
     /// Of a followed path no point is missed at any turn, at rest least of all.
     #[test]

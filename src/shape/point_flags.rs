@@ -2,7 +2,7 @@
 
 use crate::height::{Sample, sample_of};
 use crate::mesh::{Triangle, dot, minus};
-use crate::seen::{Contact, Seen, WALL_NORMAL_Z, upward_normal};
+use crate::vertical_hit::{Contact, Seen, WALL_NORMAL_Z, upward_normal};
 
 /// Faces that turn by less are neighbours on a curved surface, degrees.
 pub const CREASE_DEG: f64 = 20.0;

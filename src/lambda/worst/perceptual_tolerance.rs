@@ -11,7 +11,7 @@
 
 use super::maxmin::{Maxmin, largest};
 use crate::problem::{ForceProblem, ProblemError, Settings};
-use crate::reduce::largest_entries;
+use crate::qr_reduction::largest_entries;
 
 /// More programs than there are choices worth making.
 const PROGRAMS: usize = 200;

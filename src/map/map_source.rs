@@ -1,6 +1,6 @@
 //! What a map needs of a source without symmetry: an array whose cores all answer to every coil.
 
-use fluxform_field::steel::sources::{ArraySources, Parts};
+use fluxform_field::steel::equivalent_dipoles::{ArraySources, Parts};
 
 use super::tabulate::{Components, MapError};
 
