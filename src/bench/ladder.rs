@@ -408,7 +408,8 @@ mod tests {
         };
         assert_eq!(values(1e-4), [1e-1, 1e-2, 1e-3, 1e-4]);
         assert_eq!(values(1e-6), [1e-1, 1e-3, 1e-4, 1e-6]);
-        assert_eq!(values(0.07), [1e-1, 0.07]);
+        assert_eq!(values(0.06), [1e-1, 0.06]);
+        assert_eq!(values(0.07), [0.07]);
         assert_eq!(values(0.1), [0.1]);
     }
 

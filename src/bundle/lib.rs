@@ -20,6 +20,7 @@ pub mod artefact;
 #[allow(clippy::disallowed_methods)] // the one place that writes files
 pub mod atomic;
 pub mod bench;
+pub mod cache;
 mod cross_check;
 pub mod force_map;
 pub mod json;
@@ -37,7 +38,6 @@ pub mod replay;
 pub mod scan;
 pub mod schema;
 pub mod seal;
-pub mod cache;
 mod stored;
 pub mod sweep;
 pub mod table;

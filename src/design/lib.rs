@@ -44,7 +44,8 @@ pub mod source;
 pub mod template;
 pub mod values;
 
-pub use sections::{BODY_MM, SEED_SIDE_MM, axis_m};
+pub use rule::BODY_MM;
+pub use sections::{SEED_SIDE_MM, axis_m};
 
 pub use diagnostics::{Fault, Faults, InvalidDocument, Severity};
 pub use limits::Limits;

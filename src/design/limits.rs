@@ -1,8 +1,7 @@
 //! `[limits]`: what a coil may be, each optional.
 
 use super::reader::Section;
-use super::rule::{Bound, Rule};
-use super::sections::{BODY_MM, slip};
+use super::rule::{BODY_MM, Bound, Rule, slip};
 use fluxform_base::units::m_from_mm;
 
 /// Limits; `None` where the design names none.

@@ -199,3 +199,21 @@ fn spaced(unit: &str) -> String {
         format!(" of {unit}")
     }
 }
+
+/// A slip: values between `from` and `to` are likely in `unit`, `times` too small.
+pub(crate) const fn slip(from: f64, to: f64, unit: &'static str, times: f64) -> Slip {
+    Slip {
+        from,
+        to,
+        unit,
+        times,
+    }
+}
+
+/// A millimetre key whose value is metres below this size.
+pub(crate) const fn metres_below(size: f64) -> Slip {
+    slip(0.0, size, "metres", 1000.0)
+}
+
+/// Sizes of coils, arrays and workspaces, mm: half a metre is 0.5.
+pub const BODY_MM: Rule = Rule::any("mm").slips(&[metres_below(0.5)]);

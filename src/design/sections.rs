@@ -6,7 +6,7 @@
 use super::array::{COILS_MAX, grid_positions_m};
 use super::model::{ArrayGrid, Coupling, MagnetModel, Polarity};
 use super::reader::{Located, Section};
-use super::rule::{Bound, Rule, Slip};
+use super::rule::{BODY_MM, Bound, Rule, metres_below, slip};
 use super::values::OneOrMany;
 use fluxform_base::units::{MU_0_T_M_PER_A, REFERENCE_TEMPERATURE_C, m_from_mm};
 use fluxform_numerics::axis::Axis;
@@ -20,22 +20,6 @@ pub const LOW_CARBON_KNEE_T: f64 = 1.5;
 /// Resistivity of copper at 20 C, ohm m.
 const COPPER_RESISTIVITY_OHM_M: f64 = 1.68e-8;
 
-pub(crate) const fn slip(from: f64, to: f64, unit: &'static str, times: f64) -> Slip {
-    Slip {
-        from,
-        to,
-        unit,
-        times,
-    }
-}
-
-/// A millimetre key whose value is metres below this size.
-const fn metres_below(size: f64) -> Slip {
-    slip(0.0, size, "metres", 1000.0)
-}
-
-/// Sizes of coils, arrays and workspaces, mm: half a metre is 0.5.
-pub const BODY_MM: Rule = Rule::any("mm").slips(&[metres_below(0.5)]);
 /// Sizes of magnets, mm.
 const MAGNET_MM: Rule = Rule::any("mm").slips(&[metres_below(0.1)]);
 /// Gaps and overhangs, mm.

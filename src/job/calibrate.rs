@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::cached_field::{FieldStore, STORE_FOLDER, ShapeField};
 use super::discretize::{self, PointsReport, point_rows, points_grid};
 use super::lambda::{LambdaOptions, LambdaReport, solve};
+use super::made_with::surface;
 use super::map::{MAP_TOLERANCE, arrays, runtime, summary, workspace_grid};
 use super::maps::{Felt, SceneMap};
 use super::neighbours;
@@ -13,20 +14,22 @@ use super::passive::PASSIVE_TOLERANCE;
 use super::passive_map::PassiveMap;
 use super::scene::{MAGNET_SHARE, Scene};
 use super::steel::{Solved, Steel};
-use super::{JobError, made_with, steel};
+use super::{JobError, steel};
 use crate::accuracy::StageAccuracy;
-use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
+use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS, arithmetic};
 use crate::bundle::atomic::WriteError;
+use crate::bundle::cache::Store;
 use crate::bundle::manifest::{
-    AxisSummary, CircuitSummary, Interpolation, LambdaSummary, LeftOut, Manifest, PassiveForce,
+    AxisSummary, CircuitSummary, Interpolation, LambdaSummary, LeftOut, MadeWith, Manifest,
+    PassiveForce,
 };
 use crate::bundle::npz::PASSIVE;
 use crate::bundle::rendering::{HeightGrid, Rendering};
-use crate::bundle::cache::Store;
 use crate::bundle::table::CurrentRow;
 use crate::bundle::timing::StageSeconds;
 use crate::bundle::write::{BundleContent, check_bundle_target, write_bundle};
 use crate::design::{Design, source};
+use crate::lambda::Settings;
 use crate::map::tabulate::{Grid, PlacedCoil};
 use crate::map::{Components, FieldMap};
 use crate::progress::Progress;
@@ -82,6 +85,47 @@ impl CalibrateOptions {
             keep: true,
             page: true,
         }
+    }
+
+    /// What `verify` needs beside the inputs to compute the same bundle again. A new option does not
+    /// compile before it is recorded or left out on purpose.
+    pub(super) fn made_with(&self, shape: &ShapeSource) -> MadeWith {
+        let CalibrateOptions {
+            out: _,
+            force: _,
+            lambda,
+            reach_m,
+            keep: _,
+            page,
+        } = self;
+        let LambdaOptions {
+            settings,
+            tolerance,
+            // Of `lambda` alone.
+            sampling: _,
+            wiring: _,
+            variants: _,
+            feedback: _,
+            picture: _,
+        } = lambda;
+        let Settings {
+            criterion,
+            jnd_weight,
+            at_n_per_m,
+        } = *settings;
+        let mut made_with = MadeWith {
+            criterion: Some(criterion),
+            jnd: Some(jnd_weight),
+            at_n_per_m,
+            tolerance: *tolerance,
+            reach_m: *reach_m,
+            report: *page,
+            arithmetic: arithmetic(),
+            surface: surface(&shape.document, shape.input.as_ref()),
+            sha256: String::new(),
+        };
+        made_with.sha256 = made_with.digest();
+        made_with
     }
 }
 
@@ -161,7 +205,7 @@ pub fn run(
     for shape in shapes {
         let inputs = inputs(source, curve.as_ref(), shape);
         let inputs = discretize::with_surface(&shape.document, inputs);
-        let made_with = made_with::calibrate(options, shape);
+        let made_with = options.made_with(shape);
         let folder = folder_of(&scene, shape, options);
         check_bundle_target(&folder, options.force, &inputs, Some(&made_with))?;
     }
@@ -318,7 +362,7 @@ fn calibrate_one(
     progress.take_seconds();
     let folder = folder_of(scene, shape, options);
     let points = kept.points(shape, progress)?;
-    let made_with = made_with::calibrate(options, shape);
+    let made_with = options.made_with(shape);
     let inputs = &points.summary.inputs;
     check_bundle_target(&folder, options.force, inputs, Some(&made_with))?;
     let write = |content: &BundleContent| {
@@ -388,7 +432,7 @@ fn compute(
         needed.left_out.push(ignored.left_out());
     }
     let mut manifest = manifest(scene, &lambda, &needed, passive.as_ref());
-    manifest.made_with = Some(made_with::calibrate(options, shape));
+    manifest.made_with = Some(options.made_with(shape));
     manifest.circuit = Some(circuit.circuit.clone());
     let stage = circuit.accuracy.clone();
     manifest.accuracy.insert("inductances".to_owned(), stage);

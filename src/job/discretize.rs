@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::JobError;
 use super::cached_field::ShapeField;
-use super::made_with;
+use super::made_with::{PointsAsked, surface};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION};
 use crate::bundle::atomic::{FileSet, Overwrite};
@@ -188,6 +188,36 @@ pub struct PointsOptions {
     pub picture: bool,
 }
 
+impl PointsOptions {
+    /// As the record states them; `file` is the shape file's entry among the inputs.
+    fn made_with(&self, document: &ShapeDocument, file: Option<&Input>) -> Options {
+        let PointsOptions {
+            holes,
+            certify,
+            picture: _,
+        } = *self;
+        let holes = match holes {
+            Holes::Skip => "skip",
+            Holes::Fill => "fill",
+            Holes::Error => "error",
+        };
+        let certify = match certify {
+            Certify::No => "no",
+            Certify::Vertical => "vertical",
+            Certify::Distance => "distance",
+        };
+        Options::of(&PointsAsked {
+            holes: Some(holes),
+            certify: Some(certify),
+            max_deviation_m: None,
+            widest_m: None,
+            spacing_m: None,
+            seed: None,
+            surface: surface(document, file),
+        })
+    }
+}
+
 impl Default for PointsOptions {
     fn default() -> Self {
         Self {
@@ -221,7 +251,7 @@ pub fn run_with(
     options: &PointsOptions,
     progress: &dyn Progress,
 ) -> Result<PointsReport, JobError> {
-    let made_with = made_with::points(options, document, inputs.first());
+    let made_with = options.made_with(document, inputs.first());
     let inputs = with_surface(document, inputs);
     let mut report = discretized_as(document, inputs, options, None, progress)?;
     report.summary.made_with = made_with;

@@ -8,13 +8,15 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
+
 use self::mag_manip::{MULTIPOLE_TOLERANCE, MagManipRequest, MultipolesMade, VectorFieldMade};
 use super::maps::{Felt, SceneMap};
 use super::scene::Scene;
 use super::working_point::{WorkingPoint, relative_difference, superposition_ends};
-use super::{JobError, made_with, steel};
+use super::{JobError, steel};
 use crate::accuracy::missed;
-use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
+use crate::bundle::artefact::{FLUXFORM_VERSION, Input, Options, SCHEMA_VERSION, UNITS};
 use crate::bundle::manifest::{
     AxisSummary, Interpolation, MapSidecar, MapSummary, WorkingPointMap,
 };
@@ -47,6 +49,42 @@ pub struct MapRequest {
     pub mag_manip: MagManipRequest,
     /// Replace what is there, whatever it is.
     pub force: bool,
+}
+
+impl MapRequest {
+    /// As the record states them: what they change in the map's files.
+    fn made_with(&self) -> Options {
+        #[derive(Serialize)]
+        struct Asked<'a> {
+            components: &'static str,
+            tolerance: Option<f64>,
+            currents_a: Option<&'a [f64]>,
+            vfield_nodes: Option<usize>,
+            mpem_tolerance: Option<f64>,
+        }
+        let MapRequest {
+            components,
+            tolerance,
+            currents_a,
+            out: _,
+            formats: _,
+            mag_manip,
+            force: _,
+        } = self;
+        let MagManipRequest {
+            vector_field: _,
+            nodes,
+            multipoles: _,
+            tolerance: mpem_tolerance,
+        } = mag_manip;
+        Options::of(&Asked {
+            components: components_name(*components),
+            tolerance: *tolerance,
+            currents_a: currents_a.as_deref(),
+            vfield_nodes: *nodes,
+            mpem_tolerance: *mpem_tolerance,
+        })
+    }
 }
 
 /// What was made.
@@ -120,7 +158,7 @@ pub fn run(
         .map(Path::to_path_buf)
         .into_iter()
         .collect();
-    let made_with = made_with::map(request);
+    let made_with = request.made_with();
     check_map_files(
         &request.out,
         request.force,

@@ -141,7 +141,7 @@ fn arguments_are_validated_with_their_meaning() {
     lambda(&["--jnd", "0"]).says(&["greater than 0"]);
     lambda(&["--at", "-2"]).says(&["-2 is no force constant"]);
     lambda(&["--threads", "0"]).says(&["from 1 to 1024"]);
-    lambda(&["--criterion", "best"]).says(&["jnd, linear, saturation"]);
+    lambda(&["--criterion", "best"]).says(&["linear, jnd, saturation, maxmin"]);
     let raw = |more: &[&str]| {
         let base = ["discretize", "shapes/wedge.stl", "--unit", "mm"];
         place.run(&[&base[..], more].concat()).ends(2)

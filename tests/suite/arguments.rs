@@ -14,11 +14,11 @@ use fluxform::job::JobError;
 use fluxform::progress::Progress;
 
 use crate::catalogue::CaseRow;
+use crate::effort::Pace;
 use crate::extreme::{self, Case};
 use crate::file::{BenchFile, Row};
-use crate::effort::Pace;
-use crate::stages::STAGES;
 use crate::output::{catalogue_file, catalogue_made_with, check_catalogue, write_catalogue};
+use crate::stages::STAGES;
 use crate::{BenchRequest, run, scaling};
 
 /// Error against run time of every numerical stage

@@ -5,10 +5,11 @@
 
 pub mod arguments;
 pub mod catalogue;
+pub mod effort;
 pub mod extreme;
 pub mod file;
 pub mod memory;
-pub mod effort;
+pub mod output;
 pub mod page;
 pub mod peers;
 pub mod picture;
@@ -16,11 +17,10 @@ pub mod scaling;
 pub mod schema;
 pub mod stages;
 pub mod summary;
-pub mod output;
 
-mod inputs;
 mod catalogue_page;
 mod force;
+mod inputs;
 mod reference;
 mod test_surface;
 

@@ -151,7 +151,9 @@ impl Optimize {
             }
         }
         let json = printer.with_warnings(&result);
-        printer.summary(place, &json, || summary::summary(&result, self.out.as_ref()))?;
+        printer.summary(place, &json, || {
+            summary::summary(&result, self.out.as_ref())
+        })?;
         if let Some(none) = &result.no_coil {
             return Err(Failure::Unmet(Wish::Coil, none.message.clone()));
         }

@@ -16,10 +16,10 @@ use crate::cli::printer::{Place, Printer};
 use crate::cli::quantity::{count, error, force, number, percent, si};
 use crate::cli::values::{self, FileArgument};
 use crate::job::JobError;
-use crate::job::made_with;
-use crate::job::replay::summary::{ErrorFacts, ReplaySummary, Told};
-use crate::job::replay::synthesize::{Kind, Synthesis};
 use crate::job::replay::output::{ReplayFiles, write_trajectory};
+use crate::job::replay::summary::{ErrorFacts, ReplaySummary, Told};
+use crate::job::replay::synthesize;
+use crate::job::replay::synthesize::{Kind, Synthesis};
 use crate::job::replay::{Opened, ReplayReport, run};
 
 /// Forces below this are rounding, N.
@@ -170,7 +170,10 @@ impl Replay {
         let reads = opened.files();
         let of_table = |files: &ReplayFiles| {
             Overwrite::new(force, files.record(), &inputs)
-                .made_with(&made_with::replay(told.synthesis.as_ref(), self.dynamics))
+                .made_with(&synthesize::made_with(
+                    told.synthesis.as_ref(),
+                    self.dynamics,
+                ))
                 .protecting(reads.iter())
         };
         let of_table = files.as_ref().map(of_table);

@@ -4,9 +4,9 @@ use super::{
     BothSolved, CalibrateOptions, DesignSource, Inductances, Kept, ShapeSource, compute, point_rows,
 };
 use crate::bundle::artefact::Input;
+use crate::bundle::cache::Store;
 use crate::bundle::lambda_file::LambdaFile;
 use crate::bundle::manifest::Manifest;
-use crate::bundle::cache::Store;
 use crate::bundle::table::PointRow;
 use crate::bundle::write::{BundleContent, sealed_manifest};
 use crate::job::JobError;

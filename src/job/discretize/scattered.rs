@@ -10,7 +10,7 @@ use super::{MarkCounts, TableFiles, shape_error, table, with_surface};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION};
 use crate::job::JobError;
-use crate::job::made_with;
+use crate::job::made_with::{PointsAsked, surface};
 use crate::progress::Progress;
 use crate::shape::document::ShapeDocument;
 use crate::shape::points::requested_grid;
@@ -36,6 +36,28 @@ pub enum Sampling {
         /// Decides which points are chosen.
         seed: u64,
     },
+}
+
+impl Sampling {
+    /// As the record states them; `file` is the shape file's entry among the inputs.
+    fn made_with(self, document: &ShapeDocument, file: Option<&Input>) -> Options {
+        let (adaptive, poisson) = match self {
+            Sampling::Adaptive {
+                max_deviation_m,
+                widest_m,
+            } => (Some((max_deviation_m, widest_m)), None),
+            Sampling::Poisson { spacing_m, seed } => (None, Some((spacing_m, seed))),
+        };
+        Options::of(&PointsAsked {
+            holes: None,
+            certify: None,
+            max_deviation_m: adaptive.map(|(deviation_m, _)| deviation_m),
+            widest_m: adaptive.and_then(|(_, widest_m)| widest_m),
+            spacing_m: poisson.map(|(spacing_m, _)| spacing_m),
+            seed: poisson.map(|(_, seed)| seed),
+            surface: surface(document, file),
+        })
+    }
 }
 
 /// The points and what is to be told about them.
@@ -100,7 +122,7 @@ pub fn run(
     sampling: Sampling,
     progress: &dyn Progress,
 ) -> Result<ScatteredReport, JobError> {
-    let made_with = made_with::scattered(sampling, document, inputs.first());
+    let made_with = sampling.made_with(document, inputs.first());
     let inputs = with_surface(document, inputs);
     let failed = |source: ShapeError| shape_error(document, source);
     let (surface, warnings) = Surface::open(document).map_err(failed)?;

@@ -1,15 +1,15 @@
 //! `optimize`: the best coil within a design's limits (eq. 11).
 
-mod result;
-mod model;
-pub mod page;
-mod outcome_words;
 mod design_document;
+mod model;
+mod outcome_words;
+pub mod page;
+mod result;
 
 use std::collections::BTreeMap;
 
-pub use result::*;
 pub use design_document::Document;
+pub use result::*;
 
 use self::design_document::{Chosen, RatedFacts};
 use super::JobError;

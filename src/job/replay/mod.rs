@@ -4,11 +4,11 @@
 //! with `dynamics` the currents are then as far as their circuit has let them come, and without
 //! they are the commanded ones.
 
+pub mod output;
 mod plausible;
 pub mod renderer;
 pub mod summary;
 pub mod synthesize;
-pub mod output;
 
 use std::path::{Path, PathBuf};
 

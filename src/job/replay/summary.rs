@@ -5,14 +5,13 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::Opened;
-use super::synthesize::Synthesis;
+use super::synthesize::{Synthesis, made_with};
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION};
 use crate::bundle::load::Bundle;
 use crate::bundle::replay::{Answer, ReplayRows};
 use crate::bundle::trajectory::Trajectory;
 use crate::coil::drive::Drive;
-use crate::job::made_with;
 
 /// Where a trajectory is from.
 #[derive(Debug, Clone, PartialEq)]
@@ -263,7 +262,7 @@ impl ReplaySummary {
             inputs: std::iter::once(opened.input.clone())
                 .chain(told.input)
                 .collect(),
-            made_with: made_with::replay(told.synthesis.as_ref(), dynamics.is_some()),
+            made_with: made_with(told.synthesis.as_ref(), dynamics.is_some()),
             lambda_n_per_m: opened.renderer.lambda_n_per_m(),
             trajectory: TrajectoryFacts {
                 source: told.source,

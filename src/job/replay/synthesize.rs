@@ -2,6 +2,9 @@
 
 use std::f64::consts::TAU;
 
+use serde::Serialize;
+
+use crate::bundle::artefact::Options;
 use crate::bundle::force_map::ForceMap;
 use crate::bundle::rendering::HeightGrid;
 use crate::bundle::trajectory::Trajectory;
@@ -187,4 +190,33 @@ impl Random {
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
+}
+
+/// The options of `replay` as its record states them.
+#[must_use]
+pub fn made_with(synthesis: Option<&Synthesis>, dynamics: bool) -> Options {
+    #[derive(Serialize)]
+    struct Asked {
+        dynamics: bool,
+        synthesize: Option<&'static str>,
+        seed: Option<u64>,
+        duration_s: Option<f64>,
+        rate_hz: Option<f64>,
+    }
+    let made_up = synthesis.map(|synthesis| {
+        let Synthesis {
+            kind,
+            seed,
+            duration_s,
+            rate_hz,
+        } = *synthesis;
+        (kind.name(), seed, duration_s, rate_hz)
+    });
+    Options::of(&Asked {
+        dynamics,
+        synthesize: made_up.map(|(kind, ..)| kind),
+        seed: made_up.map(|(_, seed, ..)| seed),
+        duration_s: made_up.map(|(_, _, duration_s, _)| duration_s),
+        rate_hz: made_up.map(|(.., rate_hz)| rate_hz),
+    })
 }

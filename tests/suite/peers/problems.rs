@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use crate::inputs::{NLOPT, OPTIMUM_AIR};
 use crate::file::Curve;
+use crate::inputs::{NLOPT, OPTIMUM_AIR};
 use crate::stages::{Measured, problem};
 use fluxform::job::JobError;
 

@@ -1,9 +1,9 @@
 //! What grows, how far, and the work that is measured at each size.
 
 use super::THREADS;
-use crate::inputs::{OPTIMUM_AIR, SEED, SEED_AIR};
-use crate::force::{forces, with_coils};
 use crate::effort::Numbers;
+use crate::force::{forces, with_coils};
+use crate::inputs::{OPTIMUM_AIR, SEED, SEED_AIR};
 use crate::stages::posed;
 use crate::test_surface::{dome_m, grid, known, mesh};
 use fluxform::bench::clock::{Effort, Timing, measure};

@@ -6,9 +6,9 @@
 use serde::Deserialize;
 
 use super::curve;
-use crate::inputs::{AIR_COIL, SEED};
-use crate::file::{Curve, StageCurves};
 use crate::effort::{Found, Numbers, Pace};
+use crate::file::{Curve, StageCurves};
+use crate::inputs::{AIR_COIL, SEED};
 use crate::reference::{AXIAL_ERROR, axial_gradient};
 use crate::stages::Measured;
 use fluxform::design::Need;

@@ -3,9 +3,9 @@
 use serde::Deserialize;
 
 use super::{Measured, curve, stage};
-use crate::inputs::{CORES, SEED};
-use crate::file::{Curve, StageCurves};
 use crate::effort::{Found, Pace};
+use crate::file::{Curve, StageCurves};
+use crate::inputs::{CORES, SEED};
 use fluxform::coil::inductance::self_inductance_h;
 use fluxform::design::Need;
 use fluxform::field::steel::CoreShape;

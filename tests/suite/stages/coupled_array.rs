@@ -1,9 +1,9 @@
 //! Nine cored coils whose cores answer to each other.
 
 use super::{Measured, curve, stage};
-use crate::inputs::SEED;
-use crate::file::{Curve, StageCurves};
 use crate::effort::{Found, Pace};
+use crate::file::{Curve, StageCurves};
+use crate::inputs::SEED;
 use fluxform::design::Need;
 use fluxform::field::steel::array::{ArrayResolution, CoupledArray, closest_m};
 use fluxform::field::steel::equivalent_dipoles::{ArraySources, Parts};

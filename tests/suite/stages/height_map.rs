@@ -4,8 +4,8 @@
 //! the surface meant is the file's, and its price is their number.
 
 use super::{Measured, curve, stage};
-use crate::file::{Curve, StageCurves};
 use crate::effort::{Found, Numbers, Pace};
+use crate::file::{Curve, StageCurves};
 use crate::test_surface::{grid, height_m, mesh};
 use fluxform::job::JobError;
 use fluxform::numerics::double_double::DoubleDouble as Num;

@@ -9,9 +9,9 @@ use serde::Deserialize;
 
 use super::air_field::{Section, number};
 use super::{Measured, curve, stage};
-use crate::inputs::{AIR_COIL, SEED};
-use crate::file::{Curve, StageCurves};
 use crate::effort::{Found, Pace};
+use crate::file::{Curve, StageCurves};
+use crate::inputs::{AIR_COIL, SEED};
 use fluxform::coil::inductance::{RELATIVE_ERROR, self_inductance_h};
 use fluxform::coil::mutual::{self, mutual_inductance_h};
 use fluxform::coil::section_integrals::{FINE, ROUGH, section_integrals};

@@ -4,10 +4,10 @@
 use serde::Deserialize;
 
 use super::{Measured, curve, stage};
-use crate::inputs::{LAMBDA, SEED_AIR};
+use crate::effort::{Found, Pace};
 use crate::file::{Curve, StageCurves};
 use crate::force::{Forces, forces};
-use crate::effort::{Found, Pace};
+use crate::inputs::{LAMBDA, SEED_AIR};
 use crate::test_surface::dome_m;
 use fluxform::job::JobError;
 use fluxform::lambda::{self, ForceProblem, Settings, Solution};

@@ -1,9 +1,9 @@
 //! Maps over the workspace: the error of their nodes, and the error between them.
 
 use super::{Measured, curve, stage};
-use crate::inputs::{SEED, SEED_AIR};
-use crate::file::{Curve, StageCurves};
 use crate::effort::{Found, Numbers, Pace};
+use crate::file::{Curve, StageCurves};
+use crate::inputs::{SEED, SEED_AIR};
 use crate::reference::{AXIAL_ERROR, axial_gradient};
 use fluxform::design::{Design, Need};
 use fluxform::field::steel::equivalent_dipoles::{ArraySources, Parts};

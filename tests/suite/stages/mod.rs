@@ -15,11 +15,11 @@ mod worst_point;
 
 pub(super) use optimum::posed;
 
+use super::effort::Pace;
 use super::inputs::{
     AIR_ALL_LIMITS, AIR_COIL, BuiltIn, CORES, FLAT, LAMBDA, NLOPT, OPTIMUM_AIR, OPTIMUM_CORED,
     SEED, SEED_AIR,
 };
-use super::effort::Pace;
 use crate::file::{Curve, Row, StageCurves};
 use fluxform::accuracy::StageAccuracy;
 use fluxform::bundle::artefact::Input;

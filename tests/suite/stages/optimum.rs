@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use super::{Measured, curve, stage};
-use crate::inputs::{AIR_ALL_LIMITS, BuiltIn, NLOPT, OPTIMUM_AIR, OPTIMUM_CORED};
-use crate::file::{Curve, StageCurves};
 use crate::effort::{Found, Pace};
+use crate::file::{Curve, StageCurves};
+use crate::inputs::{AIR_ALL_LIMITS, BuiltIn, NLOPT, OPTIMUM_AIR, OPTIMUM_CORED};
 use fluxform::coil::optimum::branch_and_bound::GAP;
 use fluxform::coil::optimum::task;
 use fluxform::coil::optimum::{CoilModel, Fixed, Outcome, Settings, Task, optimise};

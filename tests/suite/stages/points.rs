@@ -1,8 +1,8 @@
 //! Constraint points against the surface between them.
 
 use super::{Measured, curve, stage};
-use crate::file::{Curve, StageCurves};
 use crate::effort::{Found, Pace};
+use crate::file::{Curve, StageCurves};
 use crate::test_surface::{HALF_M, grid, known, mesh, shape};
 use fluxform::job::JobError;
 use fluxform::numerics::axis::Axis;

@@ -3,8 +3,8 @@
 use serde_json::{Value, json};
 
 use super::{cored_coil, height_map, inductance as own_inductance, map_table as maps, section};
-use crate::inputs::SEED_AIR;
 use crate::force::{Forces, forces};
+use crate::inputs::SEED_AIR;
 use crate::test_surface::dome_m;
 use fluxform::job::JobError;
 use fluxform::lambda::worst::worst_point as solve_worst;

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use super::{Measured, curve, stage};
-use crate::inputs::{FLAT, SEED_AIR};
-use crate::file::{Curve, StageCurves};
 use crate::effort::{Found, Pace};
+use crate::file::{Curve, StageCurves};
+use crate::inputs::{FLAT, SEED_AIR};
 use fluxform::bundle::artefact::Input;
 use fluxform::bundle::atomic::Scratch;
 use fluxform::bundle::replay::Answer;

@@ -1,10 +1,10 @@
 //! The least largest error over lambda. Exact, without a knob: what is swept is its size.
 
 use super::{Measured, curve, stage};
-use crate::inputs::SEED_AIR;
+use crate::effort::{Found, Pace};
 use crate::file::{Curve, StageCurves};
 use crate::force::forces;
-use crate::effort::{Found, Pace};
+use crate::inputs::SEED_AIR;
 use crate::test_surface::dome_m;
 use fluxform::job::JobError;
 use fluxform::lambda::Settings;

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use fluxform::progress::Silent;
 use fluxform_bench::extreme::{Case, Got, cases, run};
-use fluxform_bench::schema::SCHEMAS;
 use fluxform_bench::output::catalogue_file;
+use fluxform_bench::schema::SCHEMAS;
 
 #[test]
 fn there_are_many_cases_with_names_of_their_own() {

@@ -2,8 +2,8 @@
 
 use fluxform::bundle::json::to_json;
 use fluxform::progress::Silent;
-use fluxform_bench::file::{BenchFile, Curve, write_rows};
 use fluxform_bench::effort::Pace;
+use fluxform_bench::file::{BenchFile, Curve, write_rows};
 use fluxform_bench::picture::picture;
 use fluxform_bench::schema::SCHEMAS;
 use fluxform_bench::stages::STAGES;
