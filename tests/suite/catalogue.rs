@@ -18,7 +18,7 @@ pub struct CatalogueFile {
     /// None: the cases are part of the program.
     pub inputs: Vec<Input>,
     /// The options of the run.
-    #[serde(skip_serializing_if = "Options::is_empty")]
+    #[serde(default, skip_serializing_if = "Options::is_empty")]
     pub made_with: Options,
     /// The sentence on units.
     pub units: String,

@@ -126,6 +126,9 @@ pub struct CoredCoil {
 
 /// Refinements after which a tolerance that is not reached is given up, with its estimate.
 const MAX_REFINEMENTS: usize = 5;
+/// Refinements in a row that bring no smaller error, after which no further one is tried: two
+/// solutions may differ more than coarser ones by chance.
+const NO_BETTER: usize = 2;
 /// Times the difference of two resolutions an error is stated, for those that lie close to each
 /// other by chance.
 const CHANCE: f64 = 2.0;
@@ -240,7 +243,7 @@ impl CoredCoil {
         pair: impl Fn(f64) -> [Resolution; 2],
     ) -> Result<Self, OnEdge> {
         let mut aim = tolerance / CHANCE;
-        let mut best: Option<Self> = None;
+        let (mut best, mut no_better) = (None::<Self>, 0);
         for _ in 0..=MAX_REFINEMENTS {
             let [fine, coarse] = pair(aim);
             let solve =
@@ -256,8 +259,11 @@ impl CoredCoil {
             let reached = error <= tolerance;
             if better {
                 best = Some(fine);
+                no_better = 0;
+            } else {
+                no_better += 1;
             }
-            if reached || !better {
+            if reached || no_better == NO_BETTER {
                 break;
             }
             aim *= (0.5 * tolerance / error).clamp(0.01, 0.5);
