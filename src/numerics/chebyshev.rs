@@ -153,7 +153,7 @@ pub struct Scattered<'a> {
     pub tables: &'a [Table],
     /// Points within the tables' interval.
     pub points: &'a [f64],
-    /// Values, [table][point].
+    /// Values, `[table][point]`.
     pub out: &'a mut [f64],
 }
 

@@ -619,7 +619,7 @@ impl CoilModel for CoredModel {
                 order,
             };
             sharp.sharp = true;
-            sharp.resolution = Resolution::for_tolerance(FINE);
+            sharp.resolution = CoredCoil::first_resolution(FINE);
             sharp.added = Arc::new(Cells::new(lattice(FINE_ORDER)));
             sharp.air = sharp.air.with_accuracy(&section_integrals::FINE);
             sharp.added.fill(at, |x, y, z| sharp.line(x, y, z));

@@ -168,6 +168,12 @@ fn planes_around(shape: CoreShape) -> Vec<Vec<[f64; 2]>> {
 }
 
 impl CoredCoil {
+    /// The resolution that [`CoredCoil::new`] tries first for `tolerance`, and ends with as a rule.
+    #[must_use]
+    pub fn first_resolution(tolerance: f64) -> Resolution {
+        Resolution::for_tolerance(tolerance / CHANCE)
+    }
+
     /// Solves to an estimated error below `tolerance` at heights from `lowest_m` up, or as far as
     /// doubles carry: [`CoredCoil::relative_error`] says what was reached.
     ///
