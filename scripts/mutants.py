@@ -3,7 +3,7 @@
 
     cargo install --locked cargo-mutants@27.1.0
     pip install tree-sitter==0.26.1 tree-sitter-rust==0.24.2
-    python3 scripts/mutants.py                  # the sample anew, with the table
+    python3 scripts/mutants.py                  # the sample again, with the table
     python3 scripts/mutants.py --survivors      # only those in mutants_survivors.csv
 
 `cargo mutants --list` names every mutant. A sample of each room, drawn with a fixed seed and

@@ -5,7 +5,7 @@
     python3 scripts/nlopt_reference.py --self-test     # the model against known numbers
     python3 scripts/nlopt_reference.py --all           # solve all problems, compare with the files
     python3 scripts/nlopt_reference.py --subset ci     # those marked `ci`
-    python3 scripts/nlopt_reference.py --all --write   # write the files anew
+    python3 scripts/nlopt_reference.py --all --write   # write the files again
     python3 scripts/nlopt_reference.py --models FILE   # compare fluxform's model, design by design
     python3 scripts/nlopt_reference.py --judge FILE    # judge fluxform's optima
     python3 scripts/nlopt_reference.py --mutants       # wrong models must fail --judge

@@ -73,7 +73,7 @@ const SHAPES: [&str; 4] = [
 fn the_seed_shapes_are_calibrated_and_verified() {
     let out = tempfile::tempdir().expect("a temporary folder");
     let report = calibrate_text(&seed_air(), &SHAPES, out.path()).expect("calibrates");
-    assert!(report.as_wished());
+    assert!(report.meets_request());
     assert_eq!(report.bundles.len(), 4);
     for bundle in &report.bundles {
         let file = &bundle.lambda.file;

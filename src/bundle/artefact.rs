@@ -178,7 +178,7 @@ pub fn check_version(version: &str) -> Result<(), String> {
             "{version} is newer than this program, which reads {ours}.x; update fluxform"
         )),
         Some(_) => Err(format!(
-            "{version} is older than this program, which reads {ours}.x; make the artefact anew"
+            "{version} is older than this program, which reads {ours}.x; make the artefact again"
         )),
     }
 }

@@ -271,7 +271,7 @@ mod tests {
         assert!(!received.holds("steel", &origin));
         let computed = received.remember::<_, ()>("steel", &origin, || Ok(vec![0.7, 1.3]));
         assert_eq!(computed, Ok(vec![0.7, 1.3]));
-        assert!(received.holds("steel", &origin), "written anew");
+        assert!(received.holds("steel", &origin), "written again");
         // A folder that is renamed stays the one it was.
         let (from, to) = (folder.path().join("sent"), folder.path().join("renamed"));
         std::fs::rename(from, &to).unwrap();

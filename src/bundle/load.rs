@@ -67,7 +67,7 @@ pub enum BundleError {
         message: String,
     },
     /// A file is not the one that was written.
-    #[error("{path} was changed or damaged: {message}; make the bundle anew")]
+    #[error("{path} was changed or damaged: {message}; make the bundle again")]
     Damaged {
         /// The file.
         path: PathBuf,

@@ -41,7 +41,7 @@ pub struct Arguments {
     /// What every command takes.
     #[command(flatten)]
     pub common: Common,
-    /// Tell more about an error code, like E301, or an exit code; `list` names all of them
+    /// Explain an error code, like E301, or an exit code; `list` names all of them
     #[arg(long, value_name = "CODE", value_parser = explain::asked)]
     pub explain: Option<explain::Asked>,
     /// The command.
@@ -53,7 +53,7 @@ pub struct Arguments {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Common options")]
 pub struct Common {
-    /// How results are told: a summary for people, or one JSON object in SI units
+    /// How results are printed: a summary for people, or one JSON object in SI units
     #[arg(long, global = true, value_enum, default_value_t = Format::Human)]
     pub format: Format,
     /// Say nothing but errors and the data asked for (JSON, CSV, `--out -`)

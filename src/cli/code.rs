@@ -9,7 +9,7 @@ use super::exit::Exit;
 /// A kind of failure. Scripts may rely on [`Code::name`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Code {
-    /// A mistake of the program itself.
+    /// An internal error.
     Internal,
     /// Arguments that are not understood or do not go together.
     Arguments,
@@ -83,7 +83,7 @@ impl Code {
     const fn row(self) -> (&'static str, Option<Exit>, &'static str) {
         use Exit::{Input, Interrupted, Unmet, Usage, Verification};
         match self {
-            Self::Internal => ("E101", None, "a mistake of the program itself"),
+            Self::Internal => ("E101", None, "an internal error"),
             Self::Arguments => (
                 "E201",
                 Some(Usage),
@@ -145,7 +145,7 @@ impl Code {
         self.row().0
     }
 
-    /// How the program ends; `None` for a mistake of its own, which ends as panics do.
+    /// How the program ends; `None` for an internal error, which ends as panics do.
     #[must_use]
     pub const fn exit(self) -> Option<Exit> {
         self.row().1

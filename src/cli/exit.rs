@@ -11,7 +11,7 @@ pub enum Exit {
     Usage,
     /// A bad input file.
     Input,
-    /// A result not as wished, or an output that is not ours or cannot be written.
+    /// A result that does not meet the request, or an output that is not ours or cannot be written.
     Unmet,
     /// A verification failed.
     Verification,

@@ -34,7 +34,7 @@ pub enum Failure {
     /// The job gave no result.
     #[error(transparent)]
     Job(#[from] JobError),
-    /// The result is there, but not as wished: why, and what is told.
+    /// The result is there, but does not meet the request: why, and what is reported.
     #[error("{1}")]
     Unmet(Wish, String),
     /// A verification failed.
@@ -66,7 +66,7 @@ pub enum Wish {
 }
 
 impl Failure {
-    /// What kind of failure it is; `None` where there is nothing to tell.
+    /// What kind of failure it is; `None` where there is nothing to report.
     #[must_use]
     pub fn code(&self) -> Option<Code> {
         Some(match self {
@@ -158,7 +158,7 @@ impl From<JsonError> for Failure {
     fn from(error: JsonError) -> Self {
         Self::Unmet(
             Wish::Json,
-            format!("the result cannot be told as JSON: {error}"),
+            format!("the result cannot be written as JSON: {error}"),
         )
     }
 }

@@ -22,13 +22,13 @@ impl Codes {
         match self {
             Self::None => "",
             Self::Reading => {
-                "\n  3    a bad input file: every fault is told with its place\n  \
-                 4    a result, but not as wished (see above)\n  \
+                "\n  3    a bad input file: every fault is reported with its place\n  \
+                 4    a result that does not meet the request (see above)\n  \
                  130  interrupted"
             }
             Self::Writing => {
-                "\n  3    a bad input file: every fault is told with its place\n  \
-                 4    a result, but not as wished; or an output that exists or cannot be written\n  \
+                "\n  3    a bad input file: every fault is reported with its place\n  \
+                 4    a result that does not meet the request; or an output that exists or cannot be written\n  \
                  130  interrupted; what was finished is kept"
             }
             Self::Verifying => "\n  3    not a bundle\n  5    a check failed\n  130  interrupted",
@@ -61,8 +61,8 @@ pub fn main() -> String {
     "Exit codes:
   0    done; also when the reader of a pipe goes away
   2    wrong usage; also a raw surface without --unit
-  3    a bad input file: every fault is told with its place
-  4    a result, but not as wished; or an output that exists or cannot be written
+  3    a bad input file: every fault is reported with its place
+  4    a result that does not meet the request; or an output that exists or cannot be written
   5    a verification failed
   130  interrupted; what was finished is kept
 

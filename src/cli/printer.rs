@@ -113,7 +113,7 @@ impl Printer {
         }
     }
 
-    /// Whether results are told as JSON.
+    /// Whether results are printed as JSON.
     #[must_use]
     pub fn json(&self) -> bool {
         self.format == Format::Json
@@ -131,7 +131,7 @@ impl Printer {
         !self.quiet && io::stderr().is_terminal()
     }
 
-    /// Tells a warning.
+    /// Prints a warning.
     pub fn warning(&self, message: &str) {
         if self.json() {
             self.warnings.borrow_mut().push(message.to_owned());
@@ -148,7 +148,7 @@ impl Printer {
         }
     }
 
-    /// Tells the warnings about a document that was read.
+    /// Prints the warnings about a document that was read.
     pub fn document_warnings(&self, faults: &Faults) {
         if faults.is_empty() {
         } else if self.json() {
@@ -175,7 +175,7 @@ impl Printer {
         }
     }
 
-    /// Tells a summary: `human` for people, `json` for programs.
+    /// Prints a summary: `human` for people, `json` for programs.
     ///
     /// # Errors
     /// Standard output that takes no more.
@@ -203,7 +203,7 @@ impl Printer {
         }
     }
 
-    /// Tells what waited for the end of the command.
+    /// Prints what waited for the end of the command.
     pub fn finish(&self) {
         if let Some(text) = self.pending.take() {
             say(&String::from_utf8_lossy(&text));
@@ -224,7 +224,7 @@ impl Printer {
         Ok(())
     }
 
-    /// Tells why the command did not end well.
+    /// Reports why the command did not end well.
     pub fn failure(&self, failure: &Failure) {
         let Some(code) = failure.code() else {
             return;
@@ -253,7 +253,7 @@ impl Printer {
         }
     }
 
-    /// Tells a mistake of the program itself.
+    /// Reports an internal error.
     pub fn mistake(&self, message: &str) {
         if self.json() {
             let error = ErrorFacts {
@@ -266,7 +266,7 @@ impl Printer {
         }
     }
 
-    /// Tells wrong usage as `error` words it, and its code.
+    /// Reports wrong usage as `error` words it, and its code.
     pub fn usage(&self, error: &clap::Error) {
         if self.json() {
             let told = error.render().to_string();

@@ -167,7 +167,7 @@ fn panic_message(panic: &std::panic::PanicHookInfo) -> String {
         .location()
         .map_or_else(String::new, |place| format!(" at {place}"));
     format!(
-        "fluxform {} stopped on a mistake of its own{place}: {what}\n\
+        "fluxform {} stopped on an internal error{place}: {what}\n\
          Please report this line with the command and its input files.",
         env!("CARGO_PKG_VERSION")
     )

@@ -238,7 +238,7 @@ pub fn length_with_unit(text: &str) -> Result<f64, String> {
         (Ok(value), Some(_)) if value > 0.0 && name.is_empty() => Ok(m_from_mm(value)),
         (Ok(value), Some(metres)) if value > 0.0 => Ok(value * metres),
         _ => Err(format!(
-            "{text:?} is no length: expected a number above 0 and a unit, like 0.1mm"
+            "invalid length {text:?}: expected a number above 0 and a unit, like 0.1mm"
         )),
     }
 }

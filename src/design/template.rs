@@ -9,7 +9,7 @@ use super::diagnostics::{Fault, InvalidDocument};
 /// Parts of a dotted key.
 const PARTS_MAX: usize = 8;
 
-/// A design document whose keys can be set anew, one variant after the other.
+/// A design document whose keys can be set again, one variant after the other.
 #[derive(Debug, Clone)]
 pub struct Template {
     table: Table,

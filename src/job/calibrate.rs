@@ -172,8 +172,10 @@ pub struct BundleReport {
 impl CalibrateReport {
     /// Whether every shape has a force constant and every tolerance was reached.
     #[must_use]
-    pub fn as_wished(&self) -> bool {
-        self.bundles.iter().all(|bundle| bundle.lambda.as_wished())
+    pub fn meets_request(&self) -> bool {
+        self.bundles
+            .iter()
+            .all(|bundle| bundle.lambda.meets_request())
     }
 }
 

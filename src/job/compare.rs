@@ -48,7 +48,7 @@ pub struct CompareOptions {
 pub struct CompareReport {
     /// The JSON result.
     pub file: CompareFile,
-    /// What a careful person would mention.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
     /// Whether the tolerance asked for was reached.
     pub accuracy_reached: bool,

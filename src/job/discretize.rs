@@ -89,7 +89,7 @@ pub struct PointsSummary {
     pub deviation: Option<DeviationSummary>,
     /// Each part of the heights' error: `points` (rounding), `grid`, `tessellation`.
     pub accuracy: BTreeMap<&'static str, StageAccuracy>,
-    /// What a careful person would mention.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
     /// The table beside it, as written.
     pub files: Vec<FileEntry>,

@@ -49,7 +49,7 @@ pub struct Evaluation {
     /// What misses it.
     #[serde(skip)]
     pub accuracy_missed: Vec<String>,
-    /// What a careful person would mention.
+    /// Warnings for the user.
     #[serde(skip)]
     pub notes: Vec<String>,
 }

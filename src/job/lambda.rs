@@ -61,7 +61,7 @@ pub struct LambdaOptions {
 impl LambdaReport {
     /// Whether a force can be rendered: a force constant above zero, to the tolerance asked for.
     #[must_use]
-    pub fn as_wished(&self) -> bool {
+    pub fn meets_request(&self) -> bool {
         self.file.lambda_n_per_m.is_some_and(|lambda| lambda > 0.0) && self.accuracy_reached
     }
 }
@@ -80,7 +80,7 @@ pub struct LambdaReport {
     pub status: Status,
     /// The arithmetic that was needed.
     pub precision: Precision,
-    /// What a careful person would mention.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
     /// Whether the tolerance asked for was reached.
     pub accuracy_reached: bool,

@@ -107,7 +107,7 @@ pub struct MapReport {
     pub vector_field: Option<VectorFieldMade>,
     /// The multipole sources for mag_manip, where asked for.
     pub multipoles: Option<MultipolesMade>,
-    /// What a careful person would mention.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
     /// Whether the tolerance asked for was reached.
     pub accuracy_reached: bool,

@@ -80,7 +80,7 @@ pub fn pull_to(
 
 /// Vertical pull at `places_m` by another route than [`pull`]'s, N; `None` without steel. There a
 /// core's share is the slope of a tabulated energy; here it is the gradient of the field that the
-/// core sends back, computed anew for every place. The cores' coupling is solved to `tolerance`.
+/// core sends back, computed again for every place. The cores' coupling is solved to `tolerance`.
 ///
 /// # Errors
 /// A magnet that touches the steel.

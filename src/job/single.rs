@@ -31,7 +31,7 @@ pub(super) struct Single {
     pub core: Option<CoreFacts>,
     /// Each stage's estimated error.
     pub accuracy: BTreeMap<&'static str, StageAccuracy>,
-    /// What a careful person would mention.
+    /// Warnings for the user.
     pub notes: Vec<String>,
     source: Source,
     /// The tolerance asked for, or the default.

@@ -52,7 +52,7 @@ pub struct SceneCore {
     pub knee_t: f64,
     /// S/m.
     pub conductivity_s_per_m: f64,
-    /// What a careful person would mention about the material.
+    /// Warnings about the material.
     pub warnings: Vec<String>,
 }
 

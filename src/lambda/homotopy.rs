@@ -2,7 +2,7 @@
 //!
 //! For the target `c0 + lambda c1` the minimiser of `|c0 + lambda c1 - A x|` over
 //! `lower <= x <= upper`, `sum w_i x_i = total` is piecewise linear in lambda. Every
-//! piece is solved anew from its active set, so that errors do not build up; at every
+//! piece is solved again from its active set, so that errors do not build up; at every
 //! breakpoint the next direction is itself a small minimisation over all constraints
 //! that are about to change, so that ties need no special case.
 

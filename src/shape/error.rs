@@ -79,7 +79,7 @@ pub enum ShapeError {
         /// Triangles in the file.
         triangles: usize,
     },
-    /// A coordinate that is no length of this world.
+    /// A coordinate that is no plausible length.
     #[error(
         "triangle {triangle} of the surface reaches {coordinate_m:e} m from the origin (limit \
          {limit_m:e} m): the file is damaged or its unit is wrong"

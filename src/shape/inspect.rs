@@ -71,7 +71,7 @@ pub struct MeshReport {
     /// consistent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub volume: Option<f64>,
-    /// What a careful person would mention.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 

@@ -202,7 +202,11 @@ const CASES: &[Case] = &[
     (
         "E502",
         &["verify", "cut"],
-        &["currents.csv", "changed or damaged", "make the bundle anew"],
+        &[
+            "currents.csv",
+            "changed or damaged",
+            "make the bundle again",
+        ],
     ),
 ];
 

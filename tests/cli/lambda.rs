@@ -236,10 +236,10 @@ fn shells_that_cannot_be_are_refused() {
     let run = |flags: &[&str]| place.run(&[&["lambda", AIR, FEW], flags].concat());
     run(&["--feedback", "--shell", "-3mm"])
         .ends(2)
-        .says(&["\"-3mm\" is no length", "like 0.1mm"]);
+        .says(&["invalid length \"-3mm\"", "like 0.1mm"]);
     run(&["--feedback", "--shell", "0"])
         .ends(2)
-        .says(&["is no length"]);
+        .says(&["invalid length"]);
     run(&["--shell", "14mm"]).ends(2).says(&["--feedback"]);
     run(&["--feedback", "--shell", "3m"])
         .ends(3)

@@ -220,7 +220,7 @@ fn two_shapes_of_one_name_are_an_error() {
 }
 
 #[test]
-fn a_result_not_as_wished_is_told_and_ends_with_4() {
+fn a_result_not_meets_request_is_told_and_ends_with_4() {
     let place = Place::new();
     let strict = place.run(&["evaluate", SEED, "--strict"]).ends(4);
     assert!(strict.out.contains("NOT met"), "{}", strict.out);

@@ -430,7 +430,7 @@ fn a_design_that_cannot_be_computed_is_a_row() {
         "coil.outer_diameter_mm",
     ];
     place.run(&run).ends(4).says(&said);
-    // Nothing is left to do, and that is still not as wished.
+    // Nothing is left to do, and that still does not meet the request.
     place.run(&run).ends(4).says(&said);
     place.run(&[&run[..], &["--allow-failed"]].concat()).ends(0);
     place.run(&["sweep", "merge", "plan.json", "p"]).ends(0);

@@ -95,7 +95,7 @@ fn the_table_of_numbers_is_what_the_commands_print() {
         (&coil, "6.0753 ohm"),
         (&coil, "778.87 mN"),
         (&coil, "151.51 ms"),
-        (&coil, "99.112 ms, give or take 5.41 %"),
+        (&coil, "99.112 ms, +/- 5.41 %"),
         (&flat, "3.2544 N/m"),
         (&air, "99.709 mN"),
         (&air, "11.935 ms"),

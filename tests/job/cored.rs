@@ -227,7 +227,7 @@ fn calibrated(changes: &[(&str, &str)], out: &Path) -> std::path::PathBuf {
     let text = seed(&[&COARSE[..], changes].concat());
     let shape = wedge(out);
     let report = calibrate_text(&text, &[&shape], out).expect("calibrates");
-    assert!(report.as_wished());
+    assert!(report.meets_request());
     report.bundles[0].folder.clone()
 }
 

@@ -36,7 +36,7 @@ use crate::lambda::{Criterion, ForceConstants};
 /// forces computed at its points, tabulates the part of the maps that the object needs, and writes
 /// all of it as one bundle, OUT/<design>/<shape>/, that a runtime loads. A bundle is whole before
 /// the next begins. What the object does not need is left out of the map, and what that costs is
-/// told.
+/// reported.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Writing, &[
     ("fluxform calibrate designs/seed.toml shapes/flat.toml shapes/half_sphere.toml",
@@ -44,7 +44,7 @@ use crate::lambda::{Criterion, ForceConstants};
     ("fluxform calibrate designs/seed.toml shapes/wedge.stl --unit mm --translate 0,0,30",
      "a surface given directly; its bundle is called wedge"),
     ("fluxform calibrate designs/seed_air.toml shapes/flat.toml --explain",
-     "tell first what will be computed, what left out, and what that costs"),
+     "report first what will be computed, what left out, and what that costs"),
     ("fluxform calibrate designs/seed.toml shapes/flat.toml --criterion linear --out linear",
      "another criterion beside it; --force would replace what is there"),
 ]))]
@@ -62,11 +62,11 @@ pub struct Calibrate {
     /// [default: 20]
     #[arg(long, value_name = "MM", value_parser = values::length, allow_hyphen_values = true)]
     reach: Option<f64>,
-    /// Compute the field of coils and steel anew, and remove what earlier runs kept of it in
+    /// Compute the field of coils and steel again, and remove what earlier runs kept of it in
     /// OUT/<design>/.fluxform-kept
     #[arg(long)]
     no_cache: bool,
-    /// Tell first what will be computed and what left out, why, and what leaving it out costs
+    /// Report first what will be computed and what left out, why, and what leaving it out costs
     #[arg(long)]
     explain: bool,
     /// Leave out report.html and the folder plots

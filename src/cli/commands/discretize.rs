@@ -72,13 +72,13 @@ pub struct Discretize {
     certify: CertifyFlag,
     #[command(flatten)]
     sampling: SamplingFlags,
-    /// Tell what the surface's file holds and make no points
+    /// Report what the surface's file holds and make no points
     #[arg(
         long,
         conflicts_with_all = ["holes", "certify", "max_deviation", "poisson", "out"]
     )]
     inspect: bool,
-    /// Draw heights, what the points are besides, and the deviation between them (SVG)
+    /// Draw heights, what each point is, and the deviation between them (SVG)
     #[arg(long, value_name = "FILE", conflicts_with_all = ["max_deviation", "poisson"])]
     plot: Option<FileArgument>,
     #[command(flatten)]

@@ -25,7 +25,7 @@ use crate::job::neighbours::{ArrayFacts, WorkingPointFacts};
 /// wire and heat, the field and the force on the magnet at the target height, and which of the
 /// design's [limits] it meets. With a steel core also the flux density in it at the rated current,
 /// and when current and force settle after a voltage step, eddy currents in the steel included. Of
-/// an array the inductance matrix is told besides, and the flux density in every core with all
+/// an array the inductance matrix is reported too, and the flux density in every core with all
 /// coils at their rated currents. A core above its steel's knee is warned of. Limits that are not
 /// met are part of the result; with --strict they end with exit code 4.
 #[derive(Debug, Args)]
@@ -194,7 +194,7 @@ fn steel_core(core: &CoreFacts, target: &TargetFacts) -> String {
 fn step(transient: &TransientFacts, stage: Option<&StageAccuracy>) -> String {
     let error = match stage {
         Some(stage) if stage.estimate > 0.0 => {
-            format!(", give or take {}", percent(stage.estimate))
+            format!(", +/- {}", percent(stage.estimate))
         }
         _ => String::new(),
     };

@@ -113,7 +113,7 @@ pub struct CriterionFlags {
     #[arg(long, value_name = "PART", default_value_t = crate::units::FORCE_JND,
           value_parser = values::jnd, allow_hyphen_values = true)]
     jnd: f64,
-    /// Tell currents and errors at this force constant too, N/m
+    /// Report currents and errors at this force constant too, N/m
     #[arg(long, value_name = "LAMBDA", value_parser = values::force_constant,
           allow_hyphen_values = true)]
     at: Option<f64>,

@@ -44,7 +44,7 @@ use crate::map::coupled_map::TableReport;
     ("fluxform map designs/seed.toml --out maps_mm --vfield maps_mm/nodes.yaml --mpem maps_mm/mpem.yaml",
      "for mag_manip"),
     ("fluxform tabulate designs/seed.toml --out maps --format json --force",
-     "replace what is there, and tell a program"),
+     "replace what is there, with a summary for programs"),
 ]))]
 pub struct Map {
     /// Design file (TOML), `-` for standard input
@@ -284,7 +284,7 @@ impl Map {
         }
     }
 
-    /// What is asked for mag_manip, its files told apart from the map's own in `out`.
+    /// What is asked for mag_manip, its files kept apart from the map's own in `out`.
     fn mag_manip(&self, out: &Path) -> Result<MagManipRequest, Failure> {
         let mut taken: Vec<PathBuf> = MAP_FILES.iter().map(|name| out.join(name)).collect();
         let mut path = |flag: &str, file: &Option<FileArgument>| match file {

@@ -51,7 +51,7 @@ const HEADER: &str = "x_m,y_m,z_m,coil,";
     ("printf 'x_m,y_m,z_m\\n0,0,0.03\\n' | fluxform probe designs/seed.toml - --components gz -q",
      "only dBz/dz, and no summary"),
     ("printf 'x_m,y_m,z_m\\n0,0.01,0.03\\n' | fluxform probe designs/seed.toml - --magnet-force",
-     "what the magnet feels there, besides"),
+     "the force on the magnet there too"),
     ("fluxform probe designs/seed_air.toml --compare designs/scan_example.csv --noise-t 2e-6",
      "a Gauss-meter's scan against the design"),
 ]))]
@@ -62,10 +62,10 @@ pub struct Probe {
     /// CSV table with the columns x_m, y_m, z_m; `-` for standard input
     #[arg(value_name = "POINTS", required_unless_present = "compare")]
     points: Option<FileArgument>,
-    /// What is told at each point
+    /// What is reported at each point
     #[arg(long, value_enum, default_value_t = Components::All, conflicts_with = "compare")]
     components: Components,
-    /// Tell force and torque on the magnet per ampere too: six columns
+    /// Report force and torque on the magnet per ampere too: six columns
     #[arg(long, conflicts_with = "compare")]
     magnet_force: bool,
     /// Where the table goes; `-` is standard output [default: -, with --compare nowhere]

@@ -56,7 +56,7 @@ pub(super) fn picture(seen: &Seen<'_>) -> PlanePlot {
             marks: Vec::new(),
         },
         Panel {
-            title: "what the points are besides".to_owned(),
+            title: "what each point is".to_owned(),
             cells: None,
             marks: marks(seen),
         },

@@ -105,7 +105,7 @@ pub struct ScatteredSummary {
     pub cover_m: Option<f64>,
     /// `points` (rounding), and for adaptive points `patches`.
     pub accuracy: BTreeMap<&'static str, StageAccuracy>,
-    /// What a careful person would mention.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
     /// The table beside it, as written.
     pub files: Vec<FileEntry>,

@@ -26,7 +26,7 @@ pub(crate) struct WantedPoints {
     pub(crate) budget_m: Option<f64>,
     /// Where the points lie in their grid, if they are those of one.
     pub(super) grid: Option<GridPlaces>,
-    /// What a careful person would mention.
+    /// Warnings for the user.
     pub(crate) warnings: Vec<String>,
 }
 

@@ -66,7 +66,7 @@ pub struct Optimization {
     /// The design with the best coil, TOML.
     #[serde(skip)]
     pub design_text: Option<String>,
-    /// What a careful person would mention.
+    /// Warnings for the user.
     #[serde(skip)]
     pub notes: Vec<String>,
 }
@@ -219,7 +219,7 @@ pub struct CertificateFacts {
 /// Bores that cost next to no force.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ValleyFacts {
-    /// Part of the force that is lost at most, all other dimensions chosen anew.
+    /// Part of the force that is lost at most, all other dimensions chosen again.
     pub force_share: f64,
     /// Smallest and largest inner diameter, m.
     pub inner_diameter_m: [f64; 2],

@@ -1,4 +1,4 @@
-//! What a careful person would say of a trajectory before believing a replay of it.
+//! Whether a trajectory is plausible, before a replay of it is believed.
 
 use crate::bundle::trajectory::Trajectory;
 

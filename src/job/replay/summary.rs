@@ -57,7 +57,7 @@ pub struct ReplaySummary {
     pub dynamics: Option<DynamicsFacts>,
     /// Each stage's estimated error.
     pub accuracy: BTreeMap<&'static str, StageAccuracy>,
-    /// What a careful person would mention.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
     /// The table beside it, as written.
     pub files: Vec<FileEntry>,

@@ -54,7 +54,7 @@ pub struct ScanReport {
     pub predicted: Vec<f64>,
     /// What the fit gives, [row, quantity].
     pub fitted: Vec<f64>,
-    /// What a careful person would mention.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
     /// Whether the tolerance asked for was reached.
     pub accuracy_reached: bool,

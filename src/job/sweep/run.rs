@@ -69,7 +69,7 @@ pub struct RunReport {
 }
 
 /// Computes the points `indices` of `plan` into `folder`, in parallel, each into its own file.
-/// Points that are there are kept, unless `force` asks for them anew.
+/// Points that are there are kept, unless `force` asks for them again.
 ///
 /// # Errors
 /// Inputs that have changed since the plan was made; a folder or file that belongs to something
@@ -163,7 +163,7 @@ fn check_inputs(plan: &PlanFile) -> Result<(), JobError> {
         let now = curve_input(&PathBuf::from(&input.path))?;
         if now.sha256 != input.sha256 {
             return Err(JobError::Input(format!(
-                "{}: the table has changed since the plan was made; make the plan anew with \
+                "{}: the table has changed since the plan was made; make the plan again with \
                  `fluxform sweep plan`",
                 input.path
             )));

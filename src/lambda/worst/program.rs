@@ -24,7 +24,7 @@ const SOUND: f64 = 1e-12;
 const STEEP: f64 = 1e4;
 /// Rows that are asked for before a step, at most: where one more ends it, the step is taken back.
 const TWINS: usize = 4;
-/// Exchanges after which the inverse is made anew.
+/// Exchanges after which the inverse is recomputed.
 const FRESH: usize = 16;
 
 /// What a row's left-hand side is.
@@ -380,7 +380,7 @@ impl Vertex {
         vertex.renew().then_some(vertex)
     }
 
-    /// Makes the inverse anew; false where the rows depend on each other.
+    /// Recomputes the inverse; false where the rows depend on each other.
     fn renew(&mut self) -> bool {
         let Some(fresh) = inverse(self.matrix.clone()) else {
             return false;

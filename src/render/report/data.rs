@@ -57,7 +57,7 @@ pub struct BundleFacts<'a> {
     pub surface: Surface,
     /// Maps at a few heights.
     pub field: Field,
-    /// What a careful person would mention.
+    /// Warnings for the user.
     pub warnings: &'a [String],
     /// The bundle's other files.
     pub files: Vec<&'a str>,

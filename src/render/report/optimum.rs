@@ -34,7 +34,7 @@ pub struct OptimumFacts<'a> {
     pub searched: [usize; 3],
     /// Other coils worth a look.
     pub alternatives: Vec<Alternative<'a>>,
-    /// What a careful person would mention.
+    /// Warnings for the user.
     pub notes: &'a [String],
 }
 

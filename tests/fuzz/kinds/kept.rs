@@ -120,7 +120,7 @@ fn give(input: &Input, folder: &Path) -> Result<bool, String> {
     {
         return Err("an entry of another origin is used".to_owned());
     }
-    // What is no entry is left alone; what is one is written anew.
+    // What is no entry is left alone; what is one is written again.
     store.keep(
         ENTRY,
         &origin(),

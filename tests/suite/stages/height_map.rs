@@ -18,7 +18,7 @@ const SIDES: [usize; 8] = [8, 16, 32, 64, 128, 256, 512, 1024];
 /// Points along either axis.
 const SAMPLES: [usize; 6] = [16, 31, 61, 121, 241, 481];
 const DEFAULT: usize = 61;
-/// Squares of the mesh whose heights are computed anew.
+/// Squares of the mesh whose heights are computed again.
 const SIDE: usize = 32;
 /// Points at which they are.
 const COMPARED: usize = 600;

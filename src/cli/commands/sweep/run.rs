@@ -44,7 +44,7 @@ pub struct Run {
     /// End with 0 even if designs cannot be computed or miss the accuracy: their rows say so
     #[arg(long)]
     allow_failed: bool,
-    /// Compute points anew that are there, and replace files of another plan
+    /// Compute points that are there again, and replace files of another plan
     #[arg(long)]
     force: bool,
 }
@@ -123,7 +123,7 @@ impl Run {
     }
 }
 
-/// The points are there, but not all as wished.
+/// The points are there, but not all meet the request.
 fn unmet(report: &RunReport) -> Result<(), Failure> {
     let mut parts = Vec::new();
     if let Some((index, message)) = &report.first_failure {
