@@ -16,7 +16,7 @@ use super::search;
 use fluxform_base::progress::{Interrupted, Progress};
 
 /// Maximises |force| over the coils that can be wound within `task`. Coils for which no bounds
-/// exist, cored ones, are examined one by one ([`super::screened_coils`]).
+/// exist, cored ones, are examined one by one (`screened_coils`).
 ///
 /// # Errors
 /// Interruption.
