@@ -3,7 +3,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use strum::{EnumMessage, IntoStaticStr, VariantArray};
+use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 /// Which force constant is chosen. Its name in artefacts and on the command line is the variant's
 /// in lower case, its meaning the first line of the variant's comment.
@@ -15,6 +15,7 @@ use strum::{EnumMessage, IntoStaticStr, VariantArray};
     Eq,
     Default,
     EnumMessage,
+    EnumString,
     IntoStaticStr,
     VariantArray,
     Serialize,
@@ -142,6 +143,9 @@ mod tests {
         for (one, value) in names.iter().zip([1.0, 2.0, 3.0, 4.0, 5.0]) {
             assert!(one.meaning.len() > 10, "{one:?}");
             assert_eq!(one.lambda_n_per_m, Some(value));
+        }
+        for criterion in Criterion::ALL {
+            assert_eq!(criterion.name().parse(), Ok(*criterion));
         }
     }
 }

@@ -12,11 +12,8 @@ use crate::units::m_from_mm;
 /// Any criterion by its name.
 pub fn criterion() -> impl TypedValueParser<Value = Criterion> {
     let of = |criterion: &Criterion| PossibleValue::new(criterion.name()).help(criterion.meaning());
-    PossibleValuesParser::new(Criterion::ALL.iter().map(of)).map(|name| {
-        let mut all = Criterion::ALL.iter().copied();
-        all.find(|criterion| criterion.name() == name)
-            .unwrap_or_default()
-    })
+    let names = PossibleValuesParser::new(Criterion::ALL.iter().map(of));
+    names.try_map(|name| name.parse::<Criterion>())
 }
 
 /// Most threads that may be asked for.

@@ -43,7 +43,8 @@ const MOST_STEPS: usize = 60;
 /// Change of the potentials, relative to the largest on any core and in units of the linear
 /// solver's residual, at which the iteration ends.
 const SETTLED: f64 = 3.0;
-/// Times what the other modes' permeability changes is stated, for places between those compared.
+/// Times what the other modes' permeability changes is stated: a margin for places between those
+/// compared, not a bound. Without it 9 of 40 random pairs of coils lay up to 1.3 times above.
 const MODES_SAFETY: f64 = 2.0;
 /// Share of the tolerance that the outlines are allowed where the linear modes take most of it.
 const MODES_LEAVE: f64 = 0.3;
