@@ -1,8 +1,6 @@
 //! The main job from documents to a verified bundle.
 
-#[path = "job/cored.rs"]
 mod cored;
-#[path = "job/near.rs"]
 mod near;
 
 use std::path::{Path, PathBuf};
