@@ -9,8 +9,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Output};
 
+use fluxform::commands::evaluate::evaluate;
 use fluxform::design::{Design, Need};
-use fluxform::job::evaluate::evaluate;
 use fluxform_testing::run::program;
 use fluxform_testing::{Random, needs, root, trials};
 use serde_json::{Value, json};

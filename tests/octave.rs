@@ -8,7 +8,7 @@ use std::process::{Command, ExitCode, Output};
 
 use fluxform::bundle::load::Bundle;
 use fluxform::bundle::replay::Answer;
-use fluxform::job::replay::renderer::Renderer;
+use fluxform::commands::replay::renderer::Renderer;
 
 use fluxform_testing::bundle::*;
 use fluxform_testing::{Random, needs, root, trials};

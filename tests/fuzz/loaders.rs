@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-use fluxform::job::replay::Opened;
+use fluxform::commands::replay::Opened;
 use fluxform_testing::loaders::c_loader;
 use fluxform_testing::needs::{self, SANITIZERS, Trial};
 use fluxform_testing::{Random, root, trials};
