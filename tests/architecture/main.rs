@@ -4,6 +4,7 @@
 mod source;
 
 mod dependencies;
+mod functions;
 mod harness;
 mod imports;
 mod outside;
