@@ -6,8 +6,8 @@ use std::ops::Range;
 
 use super::array::{TOUCHING, overlaps};
 use super::diagnostics::Fault;
+use super::draft::{Draft, Need};
 use super::message_text::{number, twelve_digits};
-use super::parse::{Draft, Need};
 use super::reader::{Located, Sink};
 use super::sections::{CoilDraft, CoreDraft, Layout, WireDraft};
 use super::values::OneOrMany;

@@ -31,6 +31,7 @@ pub mod array;
 pub mod bh_table;
 mod checks;
 pub mod diagnostics;
+mod draft;
 pub mod gauge;
 mod limits;
 pub mod message_text;
@@ -48,6 +49,6 @@ pub use rule::BODY_MM;
 pub use sections::{SEED_SIDE_MM, axis_m};
 
 pub use diagnostics::{Fault, Faults, InvalidDocument, Severity};
+pub use draft::Need;
 pub use limits::Limits;
 pub use model::*;
-pub use parse::Need;

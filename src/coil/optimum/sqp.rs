@@ -7,7 +7,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use fluxform_numerics::small_quadratic::{Row, dot, minimise};
+use fluxform_numerics::small_quadratic::{Row, minimise};
+use fluxform_numerics::vec3::dot;
 
 /// A smooth problem's values and slopes at a point: minimise `objective` with `rows` <= 0.
 #[derive(Debug, Clone, PartialEq)]

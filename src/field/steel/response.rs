@@ -147,7 +147,7 @@ impl Rings {
                 let add = |place: usize, ring: usize, share: f64| {
                     gather[(first + place, of * order + ring)] += share;
                 };
-                gather_shared(shape, (panel, &layer), (to_ring, &basis), &product, add);
+                gather_shared(shape, (panel, &layer), (to_ring, &basis), product, add);
             }
         }
         Self {

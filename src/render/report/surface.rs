@@ -2,7 +2,6 @@
 
 use serde_json::{Value, json};
 
-use super::data::BundleFacts;
 use super::frame::{Section, figure};
 use super::html::{Cell, Html, Table};
 use super::number::{count, figures, force};
@@ -89,8 +88,13 @@ impl Surface {
     }
 }
 
-pub(super) fn section(facts: &BundleFacts, data: &mut serde_json::Map<String, Value>) -> Section {
-    let surface = &facts.surface;
+/// The surface with `points` constraint points; with their errors where `lambda_is_known`.
+pub(super) fn section(
+    surface: &Surface,
+    points: usize,
+    lambda_is_known: bool,
+    data: &mut serde_json::Map<String, Value>,
+) -> Section {
     let mut body = Html::default();
     let step = surface.step();
     let thinned = if step > 1 {
@@ -107,10 +111,10 @@ pub(super) fn section(facts: &BundleFacts, data: &mut serde_json::Map<String, Va
             "The surface that the finger's magnet follows, its {} and the coils below; \
              the ring is where the force is most wrong. Drag, use the arrow keys or the buttons \
              to turn it.{thinned}",
-            count(facts.points, "constraint point")
+            count(points, "constraint point")
         ),
     );
-    if facts.chosen.is_some() {
+    if lambda_is_known {
         figure(
             &mut body,
             "errors",
