@@ -107,7 +107,7 @@ fn check_errors(manifest: &Manifest) -> Result<(), String> {
     Ok(())
 }
 
-/// Names are told to people and to terminals.
+/// Names are printed for people and on terminals.
 fn check_names(manifest: &Manifest) -> Result<(), String> {
     let names = [
         ("design", &manifest.design),

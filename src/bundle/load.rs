@@ -27,7 +27,7 @@ use fluxform_numerics::lagrange::{Cell, locate};
 /// Manifests larger than this are refused unread.
 const MANIFEST_MAX_BYTES: u64 = 64 << 20;
 
-/// Longer names are none of a bundle's files; of them so much is told.
+/// Longer names are none of a bundle's files; of them so much is shown.
 const NAME_BYTES: usize = 1024;
 const NAME_SHOWN: usize = 100;
 

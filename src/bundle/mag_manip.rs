@@ -7,7 +7,7 @@ use std::io::{self, Write};
 
 use super::number::push_number;
 
-/// How every such file begins: what tells ours from others'.
+/// How every such file begins: what distinguishes ours from others'.
 pub(super) const HEAD: &str = "# fluxform ";
 
 /// The field per ampere on equally spaced nodes, as many along every axis: mag_manip 3.0.0 finds
@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn nodes_are_listed_x_slowest() {
-        // B_x tells x, B_y tells y, B_z tells z.
+        // B_x shows x, B_y shows y, B_z shows z.
         let mut values = Vec::new();
         for (z, y, x) in [0, 1, 2]
             .iter()

@@ -52,7 +52,7 @@ fn check_holes(file: &File, metadata: &Metadata) -> io::Result<()> {
     Err(io::Error::new(io::ErrorKind::InvalidData, message))
 }
 
-/// Holes cannot be asked for here.
+/// Holes cannot be detected here.
 #[cfg(not(target_os = "linux"))]
 fn check_holes(_: &File, _: &Metadata) -> io::Result<()> {
     Ok(())

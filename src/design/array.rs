@@ -1,4 +1,4 @@
-//! Where the coils of an array stand, and whether they overlap.
+//! Where the coils of an array are, and whether they overlap.
 
 use fluxform_base::units::m_from_mm;
 

@@ -231,7 +231,7 @@ fn array_overlap(draft: &Draft, need: Need, sink: &Sink) {
         placed(sink, need.array, key, span, message, help);
     };
     match &draft.array.layout {
-        // The next coil stands in the next column, or in the next row of a single column.
+        // The next coil is in the next column, or in the next row of a single column.
         Layout::Grid(grid, pitch)
             if grid.rows * grid.columns > 1 && exceeds(outer, pitch.value) =>
         {
@@ -420,7 +420,7 @@ fn magnet_in_core(draft: &Draft, footprint: [&Axis; 2], z: &Located<Axis>, sink:
     }
 }
 
-/// The cores' top, where it stands above `lowest` within `margin` of the workspace's footprint.
+/// The cores' top, where it is above `lowest` within `margin` of the workspace's footprint.
 fn core_top_inside(draft: &Draft, [x, y]: [&Axis; 2], lowest: f64, margin: f64) -> Option<f64> {
     let core = draft.core.as_ref()?;
     let radius = draft.coil.as_ref()?.inner.value / 2.0 - core.clearance.value;

@@ -18,11 +18,11 @@
 //! assert_eq!(coil.length_m, 0.04);
 //! assert_eq!(design.array.positions_m, [[0.0, 0.0]]);
 //!
-//! // Both mistakes are told at once, each with the key that is at fault.
+//! // Both mistakes are reported at once, each with the key that is at fault.
 //! let wrong = text.replace("12.0", "32.0").replace("length_mm", "lenght_mm");
 //! let faults = Design::from_toml(&wrong, Path::new("one.toml"), Need::PROBE).unwrap_err();
-//! let told = faults.to_string();
-//! assert!(told.contains("lenght_mm") && told.contains("length_mm"), "{told}");
+//! let report = faults.to_string();
+//! assert!(report.contains("lenght_mm") && report.contains("length_mm"), "{report}");
 //! # Ok(())
 //! # }
 //! ```
@@ -33,6 +33,7 @@ mod checks;
 pub mod diagnostics;
 mod draft;
 pub mod gauge;
+pub mod keys;
 mod limits;
 pub mod message_text;
 pub mod model;

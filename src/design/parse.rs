@@ -32,7 +32,7 @@ impl Design {
     }
 
     /// Whether every key of `text` is known and every value of its kind and within its bounds;
-    /// whether the parts fit together is not asked.
+    /// whether the parts fit together is not checked.
     ///
     /// # Errors
     /// Every fault found.

@@ -138,7 +138,7 @@ pub enum NoRule {
     TooClose {
         /// Gap between magnet and source, m.
         gap_m: f64,
-        /// What was asked for.
+        /// What was requested.
         tolerance: f64,
     },
 }
@@ -318,7 +318,7 @@ impl MagnetRule {
 
     /// How much a rule of the next lower degree on the same nodes differs in `force_n`, as the
     /// length of the difference, N: an estimate of that rule's error, so more than this one's.
-    /// `None` where no lower rule is at hand; the bound then stands alone.
+    /// `None` where no lower rule is at hand; then there is the bound alone.
     #[must_use]
     pub fn force_of_orders_differs_n(&self, gradients_t_per_m: &[[[f64; 3]; 3]]) -> Option<f64> {
         self.expect(gradients_t_per_m.len());

@@ -1,4 +1,4 @@
-//! The allocation of eq. 8: at one position, the currents of least power that give a wanted force.
+//! The allocation of eq. 8: at one position, the currents of least power that give a requested force.
 //!
 //! With force per ampere `G_i`, resistance `R_i` and limits `l_i <= 0 <= u_i`:
 //!
@@ -18,7 +18,7 @@
 /// Residuals up to this share of the terms they are sums of are rounding.
 const ROUNDING: f64 = 1e-14;
 /// Forces per ampere that differ by no more than this share of the largest count as equal where
-/// only the largest force is asked for.
+/// only the largest force is requested.
 const TIED: f64 = 1e-13;
 /// Forces per ampere below this share of the largest are none.
 const NOTHING: f64 = 1e-60;
@@ -36,7 +36,7 @@ pub struct Allocator {
     conductance_s: Vec<f64>,
     /// Infinite where there is no such limit.
     total_a: f64,
-    /// Force per ampere, over the largest and turned so that the wanted force is upward.
+    /// Force per ampere, over the largest and turned so that the requested force is upward.
     row: Vec<f64>,
     /// Coefficients of a second row.
     ones: Vec<f64>,
@@ -44,7 +44,7 @@ pub struct Allocator {
     tail: Vec<f64>,
 }
 
-/// Whether the wanted force was within reach.
+/// Whether the requested force was within reach.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reach {
     /// The currents give it.
@@ -56,7 +56,7 @@ pub enum Reach {
 /// What an allocation says of itself: `I_i = clamp(mu (G_i - center) / R_i + nu / R_i)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Allocation {
-    /// Whether the wanted force was within reach.
+    /// Whether the requested force was within reach.
     pub reach: Reach,
     /// sum G_i I_i, N.
     pub force_n: f64,

@@ -24,7 +24,7 @@ pub(super) struct Bounds {
     pub total: Num,
 }
 
-/// Where a variable stands on a piece.
+/// The state of a variable on a piece.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Place {
     /// Both bounds are equal.

@@ -310,7 +310,7 @@ impl Factor {
             .collect()
     }
 
-    /// Size of a rate that rounding leaves where variable `i` should stand still; `blur` is
+    /// Size of a rate that rounding leaves where variable `i` should not move; `blur` is
     /// the same relative to the target.
     pub fn rate_noise(
         &self,

@@ -58,10 +58,10 @@ pub struct Breakpoint {
     pub events: Vec<Event>,
 }
 
-/// Relative differences up to this are rounding in a path that is told.
+/// Relative differences up to this are rounding in a path that is returned.
 const TIE: f64 = 1e-14;
 
-/// Where a coil or the sum stands between two breakpoints.
+/// The state of a coil or the sum between two breakpoints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Standing {
     Lower,
@@ -427,7 +427,7 @@ impl Limits {
     }
 }
 
-/// A free variable that rests on a bound stands there, although its multiplier is zero.
+/// A free variable that rests on a bound is at that bound, although its multiplier is zero.
 fn standing_of(place: Place, x: Num, rate: Num, lower: Num, upper: Num) -> Standing {
     let rests_on =
         |bound: Num| rate == Num::ZERO && (x - bound).abs() <= Num::of(1e-14) * (upper - lower);

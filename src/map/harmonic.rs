@@ -153,7 +153,7 @@ impl Table {
 
     /// The table of every drive of `sampler` in `extent`, whose lower end lies above the
     /// sampler's top, aiming at `tolerance` relative to the largest component at each height;
-    /// whether that is reached, a comparison must tell.
+    /// whether that is reached, only a comparison shows.
     ///
     /// # Errors
     /// The sampler's.

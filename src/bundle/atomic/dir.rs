@@ -23,7 +23,7 @@ use super::names::parent_of;
 /// Folders nested deeper than this are not entered.
 const DEPTH_MAX: usize = 64;
 
-/// What a name stands for.
+/// The kind of thing that a name refers to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// A regular file.
@@ -211,7 +211,7 @@ impl Dir {
         Ok(names)
     }
 
-    /// What `name` stands for; `None` where nothing is. A link is a link.
+    /// The kind of thing that `name` refers to; `None` where nothing is. A link is a link.
     ///
     /// # Errors
     /// What the system reports otherwise.
@@ -260,7 +260,7 @@ impl Dir {
         Ok(openat(&self.fd, name.as_ref(), flags, mode)?.into())
     }
 
-    /// Removes a name that stands for anything but a folder.
+    /// Removes a name that refers to anything but a folder.
     ///
     /// # Errors
     /// What the system reports.
@@ -339,7 +339,7 @@ impl Dir {
         self.rename(from, folder, to)
     }
 
-    /// Lets two names change places, so that each stands for one or the other at every moment.
+    /// Lets two names change places, so that each refers to one or the other at every moment.
     /// `false` where the kernel or the file system knows no exchange; all is then as it was.
     ///
     /// # Errors
@@ -356,7 +356,7 @@ impl Dir {
         }
     }
 
-    /// As above; only Linux is asked.
+    /// As above; on Linux alone.
     #[cfg(not(target_os = "linux"))]
     pub fn exchange(&self, _one: impl AsRef<OsStr>, _other: impl AsRef<OsStr>) -> io::Result<bool> {
         Ok(false)
@@ -403,7 +403,7 @@ impl Dir {
     }
 }
 
-/// What tells a file or folder from any other one, a copy of it included: its number on its disk and
+/// The identity of a file or folder, different from any other's, a copy of it included: its number on its disk and
 /// when it was made, as bytes. Nobody can choose them for one that is yet to be unpacked or copied
 /// elsewhere. A rename changes neither.
 #[cfg(target_os = "linux")]

@@ -31,7 +31,7 @@ use super::temporary::{TemporaryFolder, clean_leftovers, is_temporary};
 use super::{Overwrite, WriteError};
 use crate::artefact::FileEntry;
 
-/// Characters of the target's name that stand in the name of the folder that is put aside.
+/// Characters of the target's name in the name of the folder that is put aside.
 const NAME_MAX: usize = 100;
 
 /// A folder in the making; dropped without [`FolderDraft::commit`] it leaves nothing.
@@ -355,7 +355,7 @@ impl Place {
     }
 
     /// Moves what is not ours from the old folder, which is put aside, into the new one and removes the
-    /// rest. May be cut short anywhere and begun again: the old manifest, which tells what is ours,
+    /// rest. May be cut short anywhere and begun again: the old manifest, which states what is ours,
     /// goes last.
     fn absorb(&self, aside: &OsStr, old: &Dir, new: &Dir, overwrite: &Overwrite) -> io::Result<()> {
         let owned = Owned::new(old, overwrite);

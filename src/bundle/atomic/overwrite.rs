@@ -11,7 +11,7 @@ use super::names::parent_of;
 use super::record::{Record, ReplacedNote, State, digest, is_timing, unchanged};
 use crate::artefact::{Input, Options};
 
-/// So many bytes at the beginning of a mark tell the kind of file, whatever it was made from.
+/// So many bytes at the beginning of a mark give the kind of file, whatever it was made from.
 const KIND_BYTES: usize = 16;
 
 /// The policy for outputs that exist already.
@@ -159,7 +159,7 @@ impl Overwrite {
         self.permit(target, None).map(drop)
     }
 
-    /// How a file of these bytes takes its place at `target`; without bytes, as far as can be told.
+    /// How a file of these bytes takes its place at `target`; without bytes, as far as can be known.
     ///
     /// # Errors
     /// As [`Self::check`].

@@ -1,4 +1,4 @@
-//! What tells the program's own files from the user's: records that list them with their digests.
+//! How the program's own files are distinguished from the user's: records that list them with their digests.
 
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
@@ -141,7 +141,7 @@ pub(super) fn present(dir: &Dir, name: &OsStr) -> io::Result<Option<FileEntry>> 
     }))
 }
 
-/// Whether the file `name` in `dir` holds the seconds of a run, which no record lists: told by its
+/// Whether the file `name` in `dir` holds the seconds of a run, which no record lists: recognised by its
 /// content.
 pub(super) fn is_timing(dir: &Dir, name: &OsStr) -> bool {
     let named = name

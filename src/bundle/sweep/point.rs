@@ -25,7 +25,7 @@ pub enum Status {
 }
 
 impl Status {
-    /// As files tell it.
+    /// Its name in files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -37,7 +37,7 @@ impl Status {
         }
     }
 
-    /// Whether there is a coil to tell of.
+    /// Whether there is a coil.
     #[must_use]
     pub fn has_row(self) -> bool {
         matches!(self, Self::Done | Self::AccuracyNotReached)

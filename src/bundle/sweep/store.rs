@@ -31,7 +31,7 @@ pub struct PointStore {
     folder: PathBuf,
 }
 
-/// What stands where a point's file belongs.
+/// What is at the place of a point's file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Found {
     /// The point, by this version of the program.
@@ -98,7 +98,7 @@ impl PointStore {
         Ok(folders)
     }
 
-    /// What stands where point `index` of the plan with this digest belongs.
+    /// What is at the place of point `index` of the plan with this digest.
     ///
     /// # Errors
     /// A file that is there and cannot be read.

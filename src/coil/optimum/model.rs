@@ -145,7 +145,7 @@ impl Strand {
 pub struct Response {
     /// |force| on the magnet at the target, N.
     pub force_n: Sloped,
-    /// Self inductance, H; zero where it was not asked for.
+    /// Self inductance, H; zero where it was not requested.
     pub inductance_h: Sloped,
     /// Mass of the core, kg; zero without one.
     pub core_mass_kg: Sloped,
@@ -209,7 +209,7 @@ pub trait CoilModel: Sync {
         None
     }
 
-    /// Says about which window a model that tabulates will be asked most; the first time alone
+    /// Says about which window a model that tabulates will be evaluated at most; the first time alone
     /// counts. Not for use within a parallel loop.
     fn focus(&self, _window: &Window) {}
 

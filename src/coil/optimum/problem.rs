@@ -76,7 +76,7 @@ pub enum Regime {
 pub struct Problem<'a> {
     /// The coil's physics.
     pub model: &'a dyn CoilModel,
-    /// What is asked.
+    /// The request.
     pub task: &'a Task,
     /// The wire.
     pub strand: Strand,

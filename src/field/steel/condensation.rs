@@ -75,7 +75,7 @@ fn sharers(elements: &[Vec<usize>], kept: &[usize], unknowns: usize) -> Vec<usiz
 impl Plan {
     /// A plan for elements with the given unknowns, each `0..unknowns`. `merges` lists the fronts
     /// that each merge joins: elements by their index, then merges in the order of this list.
-    /// The last merge must join all; `kept` are the unknowns that remain, in the order wanted.
+    /// The last merge must join all; `kept` are the unknowns that remain, in the expected order.
     #[must_use]
     pub fn new(
         elements: &[Vec<usize>],
@@ -152,7 +152,7 @@ impl Plan {
         }
     }
 
-    /// Eliminates the inner unknowns of the sum of the elements that `element` makes, asked for
+    /// Eliminates the inner unknowns of the sum of the elements that `element` makes, requested
     /// once each in ascending order.
     ///
     /// # Errors

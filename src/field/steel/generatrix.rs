@@ -143,7 +143,7 @@ pub struct Generatrix {
 
 impl Generatrix {
     /// Cuts the outline of `shape`: graded to the edges, and on the side to `marks` =
-    /// (height, smallest length wanted there) m, where the source's own edges are close.
+    /// (height, smallest length requested there) m, where the source's own edges are close.
     #[must_use]
     pub fn new(shape: CoreShape, marks: &[(f64, f64)], resolution: &Resolution) -> Self {
         let CoreShape {

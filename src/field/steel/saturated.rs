@@ -114,7 +114,7 @@ impl SaturatedCore {
     /// Domain: an outline as [`Generatrix::new`] makes it, of two nodes a panel at least.
     ///
     /// # Errors
-    /// [`MeshError`] when panels are too small for their place to be told from their neighbours'.
+    /// [`MeshError`] when panels are too small for their place to be distinguished from their neighbours'.
     pub fn new(outline: &Generatrix, quadrature: f64) -> Result<Self, MeshError> {
         let breaks = |face: Face| -> Vec<f64> {
             let mut of_face = outline.panels.iter().filter(|panel| panel.face == face);
@@ -184,7 +184,7 @@ impl SaturatedCore {
             // A slope upwards is rounding: the correction is then as small as can be had.
             let correction = ((-slope).max(0.0) / energy).sqrt();
             // Where the permeability is very large u is the small difference of phi and W v, and
-            // its rounding may stand above the tolerance, though far below the source's work.
+            // its rounding may be above the tolerance, though far below the source's work.
             let settled = -slope <= TOLERANCE * TOLERANCE * state.v.dot(&source).abs()
                 && steps
                     .last()

@@ -56,7 +56,7 @@ pub struct SaturatedCoil {
     pub added_inductance_h: f64,
     /// |B| inside.
     pub inside: CoreField,
-    /// Estimated error: of the gradient at the height asked for and above, relative to the largest
+    /// Estimated error: of the gradient at the height requested and above, relative to the largest
     /// |grad B| there, and of the flux linkage; the larger.
     pub relative_error: f64,
     /// Estimated error of the largest |B| inside, relative to it.

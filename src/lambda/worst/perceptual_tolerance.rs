@@ -1,5 +1,5 @@
 //! The largest force constant whose errors nobody feels: at every point within a share of the
-//! wanted force there, or below what a finger feels at all.
+//! requested force there, or below what a finger feels at all.
 //!
 //! At fixed `lambda_k` every tolerance `max(w lambda h, c)` is one of its two terms, and with
 //! that choice the largest lambda is a linear program. Neither term is above the tolerance, so

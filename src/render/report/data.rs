@@ -1,4 +1,4 @@
-//! What a bundle's page is told, SI.
+//! The contents of a bundle's page, SI.
 
 use fluxform_base::force_constant::{Criterion, NamedConstant};
 
@@ -156,7 +156,7 @@ pub struct StageFacts<'a> {
 pub struct BudgetPart {
     /// What adds it.
     pub name: &'static str,
-    /// Relative to the force, as `basis` tells.
+    /// Relative to the force, as `basis` states.
     pub part: f64,
     /// How it follows from the stages' estimates.
     pub basis: &'static str,

@@ -6,7 +6,7 @@ use super::frame::Section;
 use super::html::{Cell, Html, Table};
 use super::number::{count, figures, force, mm, percent, si};
 
-/// Points that decide, told at most.
+/// Most deciding points that are listed.
 const TOLD: usize = 5;
 
 pub(super) fn section(facts: &BundleFacts) -> Section {

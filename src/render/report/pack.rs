@@ -1,4 +1,4 @@
-//! Arrays as text: base64 of small numbers, and JSON that may stand in a script element.
+//! Arrays as text: base64 of small numbers, and JSON that is safe inside a script element.
 
 use serde_json::{Value, json};
 

@@ -21,7 +21,7 @@ pub struct Surface {
     pub columns: usize,
     /// Heights, m.
     pub height_m: Vec<Option<f64>>,
-    /// Given minus wanted, N; empty without a force constant.
+    /// Given minus requested, N; empty without a force constant.
     pub error_n: Vec<Option<f64>>,
 }
 
@@ -71,7 +71,7 @@ impl Surface {
             )
         };
         let mm = |[from, to]: [f64; 2], samples: usize| {
-            // The first point of every block stands where the grid's ends tell.
+            // The first point of every block is where the grid's ends say.
             let last = samples.div_ceil(step).max(1) - 1;
             let share = (last * step) as f64 / (samples.max(2) - 1) as f64;
             [from * 1e3, (from + (to - from) * share) * 1e3]

@@ -286,7 +286,7 @@ fn any_constant_permeability() {
 }
 
 /// Its permeability grows without bound towards no current: u is then far below phi, and its
-/// rounding stands above the tolerance.
+/// rounding is above the tolerance.
 #[test]
 fn a_curve_that_starts_level() {
     let case = case(1e-5);
