@@ -12,7 +12,7 @@ use self::points_effect::Moved;
 use super::cached_field::ShapeField;
 use super::discretize::scattered::{self, Sampling, ScatteredSummary};
 use super::discretize::{self, PointsReport};
-use super::evaluation_sample::{Evaluation, PLACES, Sample, sharper, spread};
+use super::evaluation_sample::{Evaluation, PLACES, Sample, sharper, sharper_by_finer, spread};
 use super::scene::{AIR_SHARE, MAGNET_FINEST, MAGNET_SHARE, Scene};
 use super::single::above_knee;
 use super::steel::{EVALUATION_SHARE, Material, Solved, Steel};
@@ -604,7 +604,11 @@ fn forces_accuracy(
     let proven = evaluation(scene, solved);
     let [m_x, m_y, m_z] = scene.moment_a_m2;
     let dipole = scene.design.magnet.model == MagnetModel::Dipole;
-    if !dipole || m_x != 0.0 || m_y != 0.0 || m_z == 0.0 {
+    if !dipole {
+        let sampled = sharper_by_finer(scene, solved, points_m, forces_n_per_a, proven);
+        return accuracy_of(scene, solved, sampled);
+    }
+    if m_x != 0.0 || m_y != 0.0 || m_z == 0.0 {
         return accuracy_of(scene, solved, proven);
     }
     let coils = scene.coils.len();

@@ -16,6 +16,7 @@ pub mod neighbours;
 pub mod optimize;
 pub mod passive;
 pub mod passive_map;
+mod passive_table;
 pub mod plan;
 pub mod probe;
 mod rated;
