@@ -6,11 +6,11 @@ use std::sync::OnceLock;
 use super::failure::Failure;
 use super::printer::Printer;
 use super::quantity::bytes;
+use crate::RunError;
 use crate::design::Design;
-use crate::job::JobError;
-use crate::job::calibrate::ShapeSource;
-use crate::job::cost::{Cost, of_points, of_pull, of_steel};
-use crate::job::passive::PASSIVE_TOLERANCE;
+use crate::scene::cost::{Cost, of_points, of_pull, of_steel};
+use crate::scene::passive::PASSIVE_TOLERANCE;
+use crate::scene::sources::ShapeSource;
 
 /// Share of the free memory that a run takes unasked.
 const SHARE: f64 = 0.75;
@@ -70,7 +70,7 @@ pub fn allow(
     for cost in costs {
         within(&cost).map_err(|message| match asked {
             Asked::Flag => Failure::Usage(message),
-            Asked::Document => JobError::Input(message).into(),
+            Asked::Document => RunError::Input(message).into(),
         })?;
         if let Some((error, tolerance)) = cost.misses {
             printer.notice(&format!(

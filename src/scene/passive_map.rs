@@ -1,0 +1,227 @@
+//! The pull of the unpowered steel over a map's grid.
+//!
+//! One value costs half a millisecond and a grid has a hundred thousand nodes, so it is interpolated
+//! from a table (`passive_table`), and the error of that is measured at places off the table's nodes.
+
+use std::f64::consts::PI;
+
+use super::Scene;
+use super::passive;
+use super::passive_table::{Layout, Table, axial_m, symmetries};
+use crate::RunError;
+use crate::accuracy::StageAccuracy;
+use crate::field::steel::passive::PassivePull;
+use crate::map::tabulate::Grid;
+use crate::numerics::lagrange;
+
+/// Error of the table beside the pull's own, relative to the largest pull at the height.
+const TABLE_SHARE: f64 = 0.3;
+/// Attempts at the table, each with ten times less error aimed at.
+const ATTEMPTS: usize = 3;
+/// Places off the nodes at which the table is compared with the pull itself.
+const HELD_OUT: usize = 48;
+/// Places find the largest error but for this factor: for a tilted cylinder over a flat object at 50 mm a finer
+/// map differs somewhere by one and a half times what the places of both showed.
+const MISSED: f64 = 2.0;
+/// See `map::interpolation`: samples find the largest error but for this factor.
+const SAFETY: f64 = 1.25;
+/// Layers of cells in which the interpolation's error is looked for.
+const LOWEST: usize = 4;
+
+/// The pull on a grid, and what is known of it.
+#[derive(Debug, Clone)]
+pub struct PassiveMap {
+    /// Vertical force, N, [z, y, x].
+    pub force_z_n: Vec<f64>,
+    /// Largest pull on the lowest plane, N.
+    pub largest_n: f64,
+    /// Estimated error of the nodes.
+    pub accuracy: StageAccuracy,
+    /// Error of interpolating between nodes, relative to the largest pull at the height.
+    pub between: f64,
+    /// Places at which `between` was looked for.
+    pub samples: usize,
+    /// Evaluations of the pull that it took.
+    pub evaluations: usize,
+}
+
+impl PassiveMap {
+    /// The pull on the magnet with its centre on the nodes of `grid`, to about `tolerance`;
+    /// `None` without steel.
+    ///
+    /// # Errors
+    /// A magnet that touches the steel.
+    pub fn new(scene: &Scene, grid: &Grid, tolerance: f64) -> Result<Option<Self>, RunError> {
+        let Some(core) = &scene.core else {
+            return Ok(None);
+        };
+        let ends = |nodes: &[f64]| [nodes[0], nodes[nodes.len() - 1]];
+        let ranges = [ends(&grid.x_m), ends(&grid.y_m), ends(&grid.z_m)];
+        let corners = [0, 1].map(|end| ranges.map(|range| range[end]));
+        let Some(pull) = passive::pull_to(scene, &corners, false, tolerance)? else {
+            return Ok(None);
+        };
+        let below_m = [core.shape.top_m, axial_m(scene)];
+        let turns = symmetries(&scene.design.array.positions_m, scene.moment_a_m2, ranges);
+        let mut aim = TABLE_SHARE * tolerance;
+        let mut evaluations = 0;
+        let mut best: Option<(f64, Table, Vec<f64>)> = None;
+        for _ in 0..ATTEMPTS {
+            let layout = Layout::new(ranges, below_m, &turns, aim);
+            evaluations += layout.evaluations();
+            let table = layout.filled(&pull);
+            let values = table.on(grid);
+            let error = held_out_error(&pull, &table, grid, &values, core.shape.radius_m, scene);
+            if best.as_ref().is_none_or(|(least, ..)| error < *least) {
+                best = Some((error, table, values));
+            }
+            if error <= TABLE_SHARE * tolerance {
+                break;
+            }
+            aim *= 0.1;
+        }
+        let Some((error, table, force_z_n)) = best else {
+            return Ok(None);
+        };
+        let (between, samples) = between(&table, grid, &force_z_n);
+        let plane = grid.x_m.len() * grid.y_m.len();
+        Ok(Some(Self {
+            largest_n: largest(&force_z_n[..plane]),
+            force_z_n,
+            accuracy: StageAccuracy {
+                estimate: MISSED * (pull.relative_error + error),
+                relative_to: "the largest pull at the node's height".to_owned(),
+                method: format!(
+                    "{MISSED} times the sum of the pull's own error by finer solutions at places \
+                     spread over the grid, {:.1e}, and that of tabulating it by comparison at {HELD_OUT} places off the \
+                     table's nodes, {error:.1e}",
+                    pull.relative_error
+                ),
+            },
+            between,
+            samples,
+            evaluations,
+        }))
+    }
+
+    /// The sentence on [`PassiveMap::between`].
+    #[must_use]
+    pub fn definition(&self) -> String {
+        format!(
+            "of the pull, relative to the largest pull at that height: {SAFETY} times the largest \
+             difference from its table at {} places in the middles of cells, faces and edges, in the four \
+             lowest layers and the highest, where it is largest",
+            self.samples
+        )
+    }
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0_f64, |most, v| most.max(v.abs()))
+}
+
+/// Largest difference of the table from the pull, relative to the largest at that height of the
+/// grid: beside the first axes at the lowest height, and spread over the region, most of them low.
+fn held_out_error(
+    pull: &PassivePull,
+    table: &Table,
+    grid: &Grid,
+    values: &[f64],
+    radius_m: f64,
+    scene: &Scene,
+) -> f64 {
+    let plane = grid.x_m.len() * grid.y_m.len();
+    let ends = |nodes: &[f64]| [nodes[0], nodes[nodes.len() - 1]];
+    let (x, y) = (ends(&grid.x_m), ends(&grid.y_m));
+    let axes = &scene.design.array.positions_m;
+    let places: Vec<(usize, [f64; 3])> = (0..HELD_OUT)
+        .map(|k| {
+            let part = |step: f64| (0.5 + step * k as f64).fract();
+            let at = |[from, to]: [f64; 2], part: f64| from + part * (to - from);
+            let (u, v, w) = (
+                part(0.671_043_607),
+                part(0.549_700_478),
+                part(0.819_172_513),
+            );
+            if k % 3 == 0 {
+                let [cx, cy] = axes[(k / 3) % axes.len()];
+                let r_m = 1.5 * radius_m * w;
+                let (s, c) = (2.0 * PI * u).sin_cos();
+                let beside = [cx + r_m * c, cy + r_m * s];
+                let within = [beside[0].clamp(x[0], x[1]), beside[1].clamp(y[0], y[1])];
+                (0, [within[0], within[1], grid.z_m[0]])
+            } else {
+                let level = (w * w * grid.z_m.len() as f64) as usize;
+                (level, [at(x, u), at(y, v), grid.z_m[level]])
+            }
+        })
+        .collect();
+    let points: Vec<[f64; 3]> = places.iter().map(|(_, at)| *at).collect();
+    places
+        .iter()
+        .zip(pull.forces_z_n(&points))
+        .map(|((level, [x, y, z]), sure)| {
+            let found = table.at([*x, *y, *z]);
+            let size = largest(&values[level * plane..(level + 1) * plane]);
+            (found - sure).abs() / size.max(f64::MIN_POSITIVE)
+        })
+        .fold(0.0, f64::max)
+}
+
+/// Error of the tricubic interpolation against the table, and at how many places.
+fn between(table: &Table, grid: &Grid, values: &[f64]) -> (f64, usize) {
+    let middles = |nodes: &[f64]| -> Vec<f64> {
+        match nodes {
+            [single] => vec![*single],
+            _ => nodes
+                .windows(2)
+                .map(|pair| 0.5 * (pair[0] + pair[1]))
+                .collect(),
+        }
+    };
+    let layers = |heights: Vec<f64>| -> Vec<f64> {
+        let last = heights.len().saturating_sub(1);
+        let decides = |(k, _): &(usize, f64)| *k < LOWEST || *k == last;
+        heights
+            .into_iter()
+            .enumerate()
+            .filter(decides)
+            .map(|(_, z)| z)
+            .collect()
+    };
+    let [x, y, z] = [&grid.x_m, &grid.y_m, &grid.z_m];
+    let (mut worst, mut samples) = (0.0_f64, 0);
+    for (x_m, y_m, z_m) in [
+        (middles(x), middles(y), middles(z)),
+        (middles(x), y.clone(), z.clone()),
+        (x.clone(), middles(y), z.clone()),
+        (x.clone(), y.clone(), middles(z)),
+    ] {
+        let places = Grid {
+            x_m,
+            y_m,
+            z_m: layers(z_m),
+        };
+        let exact = table.on(&places);
+        let plane = places.x_m.len() * places.y_m.len();
+        for (z, exact) in places.z_m.iter().zip(exact.chunks(plane)) {
+            let mut error = 0.0_f64;
+            for (i, exact) in exact.iter().enumerate() {
+                let at = [
+                    places.x_m[i % places.x_m.len()],
+                    places.y_m[i / places.x_m.len()],
+                    *z,
+                ];
+                if let Some(cell) = lagrange::locate([x, y, &grid.z_m], at) {
+                    error = error.max((cell.value(values) - exact).abs());
+                }
+            }
+            samples += plane;
+            let size = largest(exact);
+            if size > 0.0 {
+                worst = worst.max(SAFETY * error / size);
+            }
+        }
+    }
+    (worst, samples)
+}
