@@ -125,7 +125,7 @@ pub struct Section<'a> {
 }
 
 /// A value of the document and its place.
-pub(super) type Found<'a> = &'a Spanned<DeValue<'a>>;
+pub(super) type ValueRef<'a> = &'a Spanned<DeValue<'a>>;
 
 impl<'a> Section<'a> {
     fn root(table: &'a DeTable<'a>, sink: &'a Sink) -> Self {
@@ -259,7 +259,7 @@ impl<'a> Section<'a> {
         })
     }
 
-    pub(super) fn found(&mut self, key: &'static str) -> Option<Found<'a>> {
+    pub(super) fn found(&mut self, key: &'static str) -> Option<ValueRef<'a>> {
         if !self.known.contains(&key) {
             self.known.push(key);
         }

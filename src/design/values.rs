@@ -7,7 +7,7 @@ use super::diagnostics::Fault;
 use super::gauge::awg_mm;
 use super::keys::Without;
 use super::message_text::{axis_fault, nearest, number, quoted};
-use super::reader::{Found, Located, Section};
+use super::reader::{Located, Section, ValueRef};
 use super::rule::{Bound, Rule};
 use fluxform_numerics::axis::Axis;
 
@@ -157,7 +157,7 @@ impl<'a> Section<'a> {
         &self,
         key: &str,
         index: usize,
-        item: Found<'a>,
+        item: ValueRef<'a>,
         rule: &Rule,
     ) -> Option<Located<[f64; 2]>> {
         let path = format!("{}[{index}]", self.path_of(key));
@@ -208,7 +208,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    fn axis_in(&self, key: &str, found: Found<'a>, rule: &Rule) -> Option<Located<Axis>> {
+    fn axis_in(&self, key: &str, found: ValueRef<'a>, rule: &Rule) -> Option<Located<Axis>> {
         let items = self.items(key, found, "[from, to, samples]");
         let [from, to, samples] = items else {
             if !items.is_empty() {
@@ -350,7 +350,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    fn items(&self, key: &str, found: Found<'a>, wanted: &str) -> &'a [Spanned<DeValue<'a>>] {
+    fn items(&self, key: &str, found: ValueRef<'a>, wanted: &str) -> &'a [Spanned<DeValue<'a>>] {
         match found.get_ref() {
             DeValue::Array(items) if items.is_empty() => {
                 self.fault(
@@ -379,7 +379,7 @@ impl<'a> Section<'a> {
     }
 
     /// The number, or NaN and a fault.
-    fn checked(&self, path: &str, found: Found<'a>, rule: &Rule) -> f64 {
+    fn checked(&self, path: &str, found: ValueRef<'a>, rule: &Rule) -> f64 {
         let value = match found.get_ref() {
             DeValue::String(text) if rule.gauges => awg_mm(text),
             other => float(other),
@@ -402,7 +402,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    fn whole(&self, path: &str, found: Found<'a>) -> Option<usize> {
+    fn whole(&self, path: &str, found: ValueRef<'a>) -> Option<usize> {
         let rule = Rule::any("").bound(Bound::AtLeast(1.0));
         let value = self.checked(path, found, &rule);
         if value.fract() == 0.0 && value <= COUNT_MAX {
@@ -418,7 +418,7 @@ impl<'a> Section<'a> {
     }
 
     /// Warns of the largest of `values`: a list in another unit is one slip.
-    fn warn_of_slip(&self, key: &str, values: &[f64], rule: &Rule, found: Found<'a>) {
+    fn warn_of_slip(&self, key: &str, values: &[f64], rule: &Rule, found: ValueRef<'a>) {
         let largest = values
             .iter()
             .copied()
@@ -428,7 +428,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    pub(super) fn add_wrong_type(&self, path: &str, found: Found<'a>, wanted: &str) {
+    pub(super) fn add_wrong_type(&self, path: &str, found: ValueRef<'a>, wanted: &str) {
         let message = format!("expected {wanted}, found {}", described(found.get_ref()));
         self.sink.add(Fault::error(path, message).at(&found.span()));
     }
@@ -453,7 +453,7 @@ fn choices<T>(options: &[(&'static str, T)]) -> String {
     names.join(" or ")
 }
 
-fn located<T>(value: T, found: Found<'_>) -> Located<T> {
+fn located<T>(value: T, found: ValueRef<'_>) -> Located<T> {
     Located {
         value,
         span: found.span(),

@@ -184,17 +184,17 @@ impl Allocator {
     }
 
     /// The allocation for `self.row` and a target above 0.
-    fn in_row(&mut self, target: f64, currents: &mut [f64]) -> Found {
+    fn in_row(&mut self, target: f64, currents: &mut [f64]) -> RowSolution {
         if let Some(mu) = self.sorted(Row::Force, target) {
             let sum = self.fill(Multipliers::of_force(mu), currents).sum;
             if sum <= self.total_a {
-                return Found::reached(Multipliers::of_force(mu));
+                return RowSolution::reached(Multipliers::of_force(mu));
             }
         }
         let (most, threshold) = self.most(currents);
         if target >= most * (1.0 - ROUNDING) {
             let beyond = target > most * (1.0 + ROUNDING);
-            return Found {
+            return RowSolution {
                 reach: if beyond {
                     Reach::Saturated
                 } else {
@@ -209,14 +209,14 @@ impl Allocator {
         // Within rounding of the largest force no piece may be found: then that force is nearer.
         if fault > 1.0 - target / most {
             self.most(currents);
-            return Found {
+            return RowSolution {
                 reach: Reach::Reached,
                 mu: f64::INFINITY,
                 center: threshold,
                 nu: 0.0,
             };
         }
-        Found::reached(found)
+        RowSolution::reached(found)
     }
 
     /// The multiplier at which a row's sum meets `target` > 0; `None` where it cannot.
@@ -649,14 +649,14 @@ impl Careful {
     }
 }
 
-struct Found {
+struct RowSolution {
     reach: Reach,
     mu: f64,
     center: f64,
     nu: f64,
 }
 
-impl Found {
+impl RowSolution {
     fn reached(at: Multipliers) -> Self {
         Self {
             reach: Reach::Reached,

@@ -5,7 +5,7 @@ use std::fmt;
 use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
-use super::homotopy::{Bounds, Piece, Place, Trace};
+use super::homotopy::{Bounds, Piece, Trace, VariableState};
 use super::model::Model;
 use super::power;
 use super::problem::ForceProblem;
@@ -428,14 +428,14 @@ impl Limits {
 }
 
 /// A free variable that rests on a bound is at that bound, although its multiplier is zero.
-fn standing_of(place: Place, x: Num, rate: Num, lower: Num, upper: Num) -> Standing {
+fn standing_of(place: VariableState, x: Num, rate: Num, lower: Num, upper: Num) -> Standing {
     let rests_on =
         |bound: Num| rate == Num::ZERO && (x - bound).abs() <= Num::of(1e-14) * (upper - lower);
     match place {
-        Place::Low | Place::Pinned => Standing::Lower,
-        Place::High => Standing::Upper,
-        Place::Free | Place::Held if rests_on(lower) => Standing::Lower,
-        Place::Free | Place::Held if rests_on(upper) => Standing::Upper,
-        Place::Free | Place::Held => Standing::Between,
+        VariableState::Low | VariableState::Pinned => Standing::Lower,
+        VariableState::High => Standing::Upper,
+        VariableState::Free | VariableState::Held if rests_on(lower) => Standing::Lower,
+        VariableState::Free | VariableState::Held if rests_on(upper) => Standing::Upper,
+        VariableState::Free | VariableState::Held => Standing::Between,
     }
 }

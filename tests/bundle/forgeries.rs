@@ -183,7 +183,7 @@ use fluxform_testing::trials;
 
 pub fn trials() -> Vec<Trial> {
     trials! {
-        None => [every_forgery_with_fitting_checksums_is_noticed, missing_and_changed_inputs_are_stated, every_single_byte_edit_of_a_bundle_is_noticed],
+        None => [every_forgery_with_fitting_checksums_is_noticed, a_bundle_of_an_older_schema_is_compared_as_far_as_it_goes, missing_and_changed_inputs_are_stated, every_single_byte_edit_of_a_bundle_is_noticed],
     }
 }
 
@@ -527,6 +527,65 @@ fn every_forgery_with_fitting_checksums_is_noticed() {
     );
     assert!(FORGERIES.len() >= 42);
     assert_eq!(missed, []);
+}
+
+/// A bundle as programs before schema 1.4 wrote it: without the run's options, in other words, and with
+/// another piece at the end of the path, as forces that differ within their errors give it.
+fn as_an_older_program_wrote_it(parts: &mut Parts) {
+    for version in [
+        &mut parts.manifest.schema_version,
+        &mut parts.lambda.schema_version,
+    ] {
+        *version = "1.2.0".to_owned();
+    }
+    parts.manifest.made_with = None;
+    for stage in parts.manifest.accuracy.values_mut() {
+        stage.method = "in other words".to_owned();
+        stage.estimate *= 30.0;
+    }
+    parts.lambda.path.pop();
+    parts.others.remove("plots/errors.csv");
+}
+
+/// `verify` once called every difference in wording a fault of the bundle, and the whole of it wrong.
+fn a_bundle_of_an_older_schema_is_compared_as_far_as_it_goes() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut honest = Parts::of(&calibrated(folder.path(), true));
+    as_an_older_program_wrote_it(&mut honest);
+    let run = |parts: &Parts, name: &str, accept_unchecked| {
+        let target = folder.path().join(name);
+        if !target.exists() {
+            parts.write(&target);
+        }
+        let options = VerifyOptions { accept_unchecked };
+        Verifier::default()
+            .verify(&target, options, &Silent)
+            .unwrap()
+    };
+    let report = run(&honest, "older", false);
+    assert!(report.checks.iter().all(|c| c.passed), "{report:?}");
+    assert!(report.checks.len() > 5 && !report.passed, "{report:?}");
+    let parts = report.unchecked.join("\n");
+    for part in ["schema 1.2.0 do not name", "lambda.json path", "method"] {
+        assert!(parts.contains(part), "{part}: {parts}");
+    }
+    assert!(run(&honest, "older", true).passed);
+    let mut forged = honest.clone();
+    forged.manifest.magnet.moment_a_m2[2] *= 1.01;
+    assert!(!run(&forged, "forged magnet", true).passed);
+    let mut forged = honest.clone();
+    forged.lambda.rms_error_n = forged.lambda.rms_error_n.map(|n| 2.0 * n);
+    assert!(!run(&forged, "forged error", true).passed);
+    // With which flags a surface was given it does not state either.
+    let surface = folder.path().join("slope.stl");
+    fs::write(&surface, SHAPE).unwrap();
+    let path = surface.display().to_string();
+    for inputs in [&mut honest.manifest.inputs, &mut honest.lambda.inputs] {
+        inputs[1].path.clone_from(&path);
+    }
+    let unplaced = run(&honest, "unplaced", true);
+    let parts = unplaced.unchecked.join("\n");
+    assert!(unplaced.passed && parts.contains("placed"), "{unplaced:?}");
 }
 
 fn missing_and_changed_inputs_are_stated() {

@@ -52,7 +52,7 @@ impl From<FileType> for Kind {
 
 /// A file or folder as the system describes it.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Status {
+pub(crate) struct EntryStatus {
     pub kind: Kind,
     pub bytes: u64,
     device: u64,
@@ -62,7 +62,7 @@ pub(crate) struct Status {
     group: u32,
 }
 
-impl From<rustix::fs::Stat> for Status {
+impl From<rustix::fs::Stat> for EntryStatus {
     #[allow(clippy::unnecessary_cast)] // the fields' types depend on the system
     fn from(stat: rustix::fs::Stat) -> Self {
         Self {
@@ -77,7 +77,7 @@ impl From<rustix::fs::Stat> for Status {
     }
 }
 
-impl Status {
+impl EntryStatus {
     /// Whether both are the same file or folder.
     pub fn is(&self, other: &Self) -> bool {
         (self.device, self.inode) == (other.device, other.inode)
@@ -104,11 +104,11 @@ impl Status {
 ///
 /// # Errors
 /// What the system reports otherwise.
-pub(super) fn followed(path: &Path) -> io::Result<Option<Status>> {
+pub(super) fn followed(path: &Path) -> io::Result<Option<EntryStatus>> {
     found(statat(CWD, path, AtFlags::empty()))
 }
 
-fn found(stat: rustix::io::Result<rustix::fs::Stat>) -> io::Result<Option<Status>> {
+fn found(stat: rustix::io::Result<rustix::fs::Stat>) -> io::Result<Option<EntryStatus>> {
     match stat {
         Ok(stat) => Ok(Some(stat.into())),
         Err(Errno::NOENT) => Ok(None),
@@ -215,7 +215,7 @@ impl Dir {
     ///
     /// # Errors
     /// What the system reports otherwise.
-    pub fn status(&self, name: impl AsRef<OsStr>) -> io::Result<Option<Status>> {
+    pub fn status(&self, name: impl AsRef<OsStr>) -> io::Result<Option<EntryStatus>> {
         found(statat(&self.fd, name.as_ref(), AtFlags::SYMLINK_NOFOLLOW))
     }
 
@@ -223,7 +223,7 @@ impl Dir {
     ///
     /// # Errors
     /// What the system reports.
-    pub fn own_status(&self) -> io::Result<Status> {
+    pub fn own_status(&self) -> io::Result<EntryStatus> {
         Ok(fstat(&self.fd)?.into())
     }
 
@@ -244,7 +244,7 @@ impl Dir {
         // Without waiting for the other end of a pipe.
         let flags = OFlags::RDONLY | OFlags::NOFOLLOW | OFlags::NONBLOCK | OFlags::CLOEXEC;
         let file = File::from(openat(&self.fd, name.as_ref(), flags, Mode::empty())?);
-        if Status::from(fstat(&file)?).kind != Kind::File {
+        if EntryStatus::from(fstat(&file)?).kind != Kind::File {
             return Err(io::ErrorKind::InvalidInput.into());
         }
         Ok(file)
@@ -426,7 +426,7 @@ pub(super) fn identity(file: impl AsFd) -> Vec<u8> {
     let Ok(found) = fstat(file) else {
         return Vec::new();
     };
-    let found = Status::from(found);
+    let found = EntryStatus::from(found);
     [found.device.to_le_bytes(), found.inode.to_le_bytes()].concat()
 }
 

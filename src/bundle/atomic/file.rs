@@ -6,8 +6,8 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::created_dirs::{MadeFolders, made_in};
-use super::digest::{Written, fill};
-use super::dir::{Dir, Kind, Status};
+use super::digest::{Durability, Written, fill};
+use super::dir::{Dir, EntryStatus, Kind};
 use super::names::{check_name, parent_of};
 use super::overwrite::{Permit, real};
 use super::record::{ReplacedNote, present};
@@ -30,7 +30,7 @@ pub fn write(
         return File::options()
             .write(true)
             .open(path)
-            .and_then(|mut device| fill(&mut device, content))
+            .and_then(|mut device| fill(&mut device, Durability::Cached, content))
             .map_err(|error| WriteError::from_io("write", path, error));
     }
     let mut set = FileSet::begin(parent_of(path), overwrite.clone());
@@ -66,7 +66,8 @@ pub(crate) fn put(
         return Err(io::Error::other("what is there is no regular file"));
     }
     let mut made = new_temporary(dir, earlier)?;
-    fill(&mut made.file, content)?;
+    // Small: one call at the end forces it.
+    fill(&mut made.file, Durability::Cached, content)?;
     finish(&made, earlier)?;
     if forced {
         made.file.sync_all()?;
@@ -76,12 +77,12 @@ pub(crate) fn put(
 }
 
 /// A temporary file that is to replace `earlier`: nobody else reads it before it has its mode.
-fn new_temporary(dir: &Dir, earlier: Option<Status>) -> io::Result<TemporaryFile> {
+fn new_temporary(dir: &Dir, earlier: Option<EntryStatus>) -> io::Result<TemporaryFile> {
     TemporaryFile::new(dir, if earlier.is_some() { 0o600 } else { 0o666 })
 }
 
 /// Gives it the owner and mode of the file that it replaces.
-fn finish(made: &TemporaryFile, earlier: Option<Status>) -> io::Result<()> {
+fn finish(made: &TemporaryFile, earlier: Option<EntryStatus>) -> io::Result<()> {
     earlier.map_or(Ok(()), |earlier| earlier.give(&made.file))
 }
 
@@ -194,7 +195,7 @@ impl FileSet {
         })
         .map_err(|error| error.of("write", &target))?;
         self.made.push(made);
-        let written = fill(&mut temporary.file, content).map_err(fail)?;
+        let written = fill(&mut temporary.file, Durability::Forced, content).map_err(fail)?;
         finish(&temporary, earlier)
             .and_then(|()| temporary.file.sync_all())
             .map_err(fail)?;

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 
 use super::absorb::{Owned, absorb, give_modes};
 use super::created_dirs::{MadeFolders, made_in};
-use super::digest::fill;
+use super::digest::{Durability, fill};
 use super::dir::{Dir, Kind, short_identity};
 use super::names::{MANIFEST, OLD, check_name, parent_of};
 use super::overwrite::real;
@@ -37,7 +37,7 @@ const NAME_MAX: usize = 100;
 /// A folder in the making; dropped without [`FolderDraft::commit`] it leaves nothing.
 #[derive(Debug)]
 pub struct FolderDraft {
-    place: Place,
+    place: TargetPlace,
     overwrite: Overwrite,
     draft: TemporaryFolder,
     /// What was written so far.
@@ -48,7 +48,7 @@ pub struct FolderDraft {
 
 /// Where the folder is to be.
 #[derive(Debug)]
-struct Place {
+struct TargetPlace {
     target: PathBuf,
     parent: Dir,
     name: OsString,
@@ -70,7 +70,7 @@ impl FolderDraft {
         match Dir::open(parent_of(&target)) {
             Ok(parent) => {
                 parent.writable().map_err(fail)?;
-                Place::of(&target, parent, linked)?.check(overwrite, &entries)
+                TargetPlace::of(&target, parent, linked)?.check(overwrite, &entries)
             }
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
             Err(error) => Err(fail(error)),
@@ -94,7 +94,7 @@ impl FolderDraft {
         .map_err(|error| error.of("write", &target))?;
         // Dropped in the reverse order: the draft goes before the folder that was made for it.
         let (made, draft) = (made, draft);
-        let place = Place::of(&target, parent, linked)?;
+        let place = TargetPlace::of(&target, parent, linked)?;
         {
             let _lock = place.parent.lock(parent_of(&place.target));
             place
@@ -130,7 +130,7 @@ impl FolderDraft {
                 dir = dir.child_or_new(part)?;
             }
             let mut file = dir.new_file(file, 0o666)?;
-            let written = fill(&mut file, content)?;
+            let written = fill(&mut file, Durability::Forced, content)?;
             file.sync_all()?;
             Ok(written)
         };
@@ -183,7 +183,7 @@ impl FolderDraft {
     }
 }
 
-impl Place {
+impl TargetPlace {
     fn of(target: &Path, parent: Dir, linked: bool) -> Result<Self, WriteError> {
         let name = target.file_name().ok_or_else(|| WriteError::BadName {
             name: target.display().to_string(),

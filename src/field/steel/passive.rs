@@ -104,6 +104,8 @@ const MOST_REFINEMENTS: usize = 7;
 const GROWTH: f64 = 1.35;
 /// Tolerance of what the coupling adds over that of the force.
 const COARSER: f64 = 10.0;
+/// Every solution of the coupling is to be better than the last by this factor.
+const FINER: f64 = 0.2;
 /// Refinements of the coupling.
 const MOST_COUPLINGS: usize = 3;
 /// Points a portion of work.
@@ -163,14 +165,14 @@ impl Added {
         let of = |n: &Neighbours| -> Vec<[f64; 3]> {
             places_m.par_iter().map(|at| n.force_n(*at)).collect()
         };
-        let mut aim = (COARSER * tolerance).clamp(1e-6, 0.1);
+        let mut aim = first_coupling(tolerance);
         let mut coarse = solve(aim);
         let mut added = Self {
             force_n: of(&coarse),
             error_n: vec![0.0; places_m.len()],
         };
         for _ in 0..MOST_COUPLINGS {
-            aim *= 0.2;
+            aim *= FINER;
             let fine = solve(aim);
             let finer = of(&fine);
             let mut worst = 0.0_f64;
@@ -332,6 +334,17 @@ fn check(pulled: &Pulled, tolerance: f64) -> Result<f64, NoPull> {
         });
     }
     Ok(closest_m)
+}
+
+/// What the coupling must be solved to at least where the force is asked for to `tolerance`: the
+/// first solution and one that judges it.
+#[must_use]
+pub fn coupling_tolerance(tolerance: f64) -> f64 {
+    FINER * first_coupling(tolerance)
+}
+
+fn first_coupling(tolerance: f64) -> f64 {
+    (COARSER * tolerance).clamp(1e-6, 0.1)
 }
 
 /// The part of the tolerance that the coupling may take.

@@ -32,7 +32,7 @@ mod scaled;
 pub(super) use maxmin::largest;
 pub use maxmin::{Maxmin, maxmin};
 pub use path::{ActivePoint, Turn, WorstPath};
-pub use perceptual_tolerance::{Felt, felt};
+pub use perceptual_tolerance::{WithinTolerance, felt};
 pub use proof::lower_bound_n;
 
 use fluxform_base::accuracy::StageAccuracy;

@@ -20,7 +20,7 @@ const NO_RAISE: f64 = 1e-13;
 
 /// The largest force constant within the tolerances, currents for it, and what limits it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Felt {
+pub struct WithinTolerance {
     /// Force constant, N/m.
     pub lambda_n_per_m: f64,
     /// Currents, A.
@@ -41,7 +41,7 @@ pub fn felt(
     problem: &ForceProblem,
     share: f64,
     threshold_n: f64,
-) -> Result<Option<Felt>, ProblemError> {
+) -> Result<Option<WithinTolerance>, ProblemError> {
     problem.validate(&Settings {
         jnd_weight: share,
         ..Settings::default()
@@ -90,7 +90,7 @@ pub fn felt(
     }
     Ok(best.map(|found| {
         let (point, part) = most_of_tolerance(problem, &found, share, threshold_n);
-        Felt {
+        WithinTolerance {
             lambda_n_per_m: found.lambda_n_per_m,
             currents_a: found.currents_a,
             point,
