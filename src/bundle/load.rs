@@ -190,7 +190,7 @@ impl Bundle {
     ///
     /// # Panics
     /// When `gz_t_per_m_per_a` is shorter than the array.
-    pub fn gz_per_ampere(&self, position_m: [f64; 3], gz_t_per_m_per_a: &mut [f64]) -> bool {
+    pub(crate) fn gz_per_ampere(&self, position_m: [f64; 3], gz_t_per_m_per_a: &mut [f64]) -> bool {
         let nodes = self.nodes();
         let gz = &self.map.gz_t_per_m_per_a;
         self.each_coil(position_m, gz_t_per_m_per_a, |cell, place| {

@@ -71,7 +71,7 @@ fn line(text: &mut Vec<u8>, start: &str, values: &[f64]) {
 ///
 /// # Errors
 /// The writer's.
-pub fn write_vector_field(out: &mut dyn Write, field: &VectorField) -> io::Result<()> {
+pub(crate) fn write_vector_field(out: &mut dyn Write, field: &VectorField) -> io::Result<()> {
     let n = field.nodes;
     let whole = 3 * n * n * n;
     let coils = field.field_t_per_a.len() / whole.max(1);
@@ -114,7 +114,7 @@ pub fn write_vector_field(out: &mut dyn Write, field: &VectorField) -> io::Resul
 ///
 /// # Errors
 /// The writer's.
-pub fn write_multipoles(out: &mut dyn Write, model: &Multipoles) -> io::Result<()> {
+pub(crate) fn write_multipoles(out: &mut dyn Write, model: &Multipoles) -> io::Result<()> {
     writeln!(
         out,
         "{HEAD}multipoles for mag_manip: per ampere, lengths in m, fields in T\n\

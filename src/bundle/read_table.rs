@@ -99,7 +99,7 @@ pub fn read_columns(
 ///
 /// # Errors
 /// As [`read_columns`].
-pub fn read_numbered(
+pub(crate) fn read_numbered(
     name: &str,
     source: impl Read,
     wanted: &[&str],
@@ -210,7 +210,7 @@ pub fn read_positions(name: &str, source: impl Read) -> Result<Vec<[f64; 3]>, Ta
 ///
 /// # Errors
 /// As [`read_columns`].
-pub fn read_points(name: &str, source: impl Read) -> Result<Vec<PointRow>, TableError> {
+pub(crate) fn read_points(name: &str, source: impl Read) -> Result<Vec<PointRow>, TableError> {
     let columns = read_columns(name, source, &POINT_COLUMNS)?;
     Ok((0..columns[0].len())
         .map(|row| PointRow {
@@ -226,7 +226,7 @@ pub fn read_points(name: &str, source: impl Read) -> Result<Vec<PointRow>, Table
 ///
 /// # Errors
 /// As [`read_columns`].
-pub fn read_currents(name: &str, source: impl Read) -> Result<Vec<CurrentRow>, TableError> {
+pub(crate) fn read_currents(name: &str, source: impl Read) -> Result<Vec<CurrentRow>, TableError> {
     let (columns, lines) = read_numbered(name, source, &CURRENT_COLUMNS)?;
     (0..columns[0].len())
         .map(|row| {

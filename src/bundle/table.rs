@@ -37,7 +37,7 @@ pub const FORCE_COLUMNS: [&str; 6] = [
 pub const POINT_COLUMNS: [&str; 6] = ["x_m", "y_m", "height_m", "normal_x", "normal_y", "normal_z"];
 
 /// Columns of `currents.csv`.
-pub const CURRENT_COLUMNS: [&str; 4] = ["coil", "x_m", "y_m", "current_a"];
+pub(crate) const CURRENT_COLUMNS: [&str; 4] = ["coil", "x_m", "y_m", "current_a"];
 
 /// A constraint point: a row of `points.csv`.
 #[derive(Debug, Clone, Copy, PartialEq)]

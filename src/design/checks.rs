@@ -15,7 +15,7 @@ use fluxform_base::units::{COPPER_TEMPERATURE_COEFFICIENT_PER_K, REFERENCE_TEMPE
 use fluxform_numerics::axis::Axis;
 
 /// Most map values, coils times workspace nodes: 8 GB of doubles.
-pub const MAP_VALUES_MAX: f64 = 1e9;
+pub(crate) const MAP_VALUES_MAX: f64 = 1e9;
 
 /// A core longer than this many times the coil's larger size is no plausible one.
 const CORE_LENGTH_PLAUSIBLE: f64 = 20.0;

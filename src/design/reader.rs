@@ -177,7 +177,7 @@ impl<'a> Section<'a> {
 
     /// The dotted path of `key`.
     #[must_use]
-    pub fn path_of(&self, key: &str) -> String {
+    pub(crate) fn path_of(&self, key: &str) -> String {
         if self.path.is_empty() {
             key.to_owned()
         } else {
@@ -187,7 +187,7 @@ impl<'a> Section<'a> {
 
     /// The bytes of `key`'s value, or of the section where it is absent.
     #[must_use]
-    pub fn span_of(&self, key: &str) -> Range<usize> {
+    pub(crate) fn span_of(&self, key: &str) -> Range<usize> {
         let found = self.table.and_then(|table| table.get(key));
         found.map_or(self.span.clone(), Spanned::span)
     }

@@ -15,7 +15,7 @@ use fluxform_numerics::axis::Axis;
 const ABSOLUTE_ZERO_C: f64 = -273.15;
 
 /// Knee of low-carbon steel that is described by its permeability alone, T.
-pub const LOW_CARBON_KNEE_T: f64 = 1.5;
+pub(crate) const LOW_CARBON_KNEE_T: f64 = 1.5;
 
 /// Resistivity of copper at 20 C, ohm m.
 const COPPER_RESISTIVITY_OHM_M: f64 = 1.68e-8;
@@ -298,7 +298,7 @@ pub fn supply(mut s: Section<'_>) -> SupplyDraft {
 }
 
 /// Height of the magnet's centre, mm.
-pub fn target_height_mm(mut s: Section<'_>) -> Located<f64> {
+pub(crate) fn target_height_mm(mut s: Section<'_>) -> Located<f64> {
     let height = s.number_or("height_mm", &BODY_MM, 30.0);
     s.finish();
     height

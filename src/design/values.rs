@@ -178,7 +178,7 @@ impl<'a> Section<'a> {
     }
 
     /// A whole number of at least 1 with a default; `None` where at fault.
-    pub fn count_or(&mut self, key: &'static str, default: usize) -> Option<usize> {
+    pub(crate) fn count_or(&mut self, key: &'static str, default: usize) -> Option<usize> {
         let value = || ("whole number".to_owned(), ">= 1".to_owned());
         self.list(key, value, || Without::Value(default.to_string()));
         match self.found(key) {
@@ -257,7 +257,11 @@ impl<'a> Section<'a> {
     }
 
     /// A required text; `None` where absent or at fault.
-    pub fn required_text(&mut self, key: &'static str, help: &str) -> Option<Located<String>> {
+    pub(crate) fn required_text(
+        &mut self,
+        key: &'static str,
+        help: &str,
+    ) -> Option<Located<String>> {
         self.list(
             key,
             || ("text".to_owned(), String::new()),

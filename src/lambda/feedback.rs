@@ -20,7 +20,7 @@ use super::problem::{ForceProblem, ProblemError, Settings};
 /// Points handled together: fixed, so that sums do not depend on the number of threads.
 const CHUNK_POINTS: usize = 4096;
 /// A coil is active above this share of its limit.
-pub const ACTIVE: f64 = 1e-6;
+pub(crate) const ACTIVE: f64 = 1e-6;
 /// Force errors below this share of the terms they are sums of are rounding.
 const ROUNDING: f64 = 1e-12;
 

@@ -92,17 +92,17 @@ fn norm(v: &[Num]) -> Num {
 
 impl Piece {
     /// Values of the variables at `lambda`.
-    pub fn x_at(&self, lambda: Num) -> Vec<Num> {
+    pub(crate) fn x_at(&self, lambda: Num) -> Vec<Num> {
         advance(&self.x, &self.x_rate, lambda - self.start)
     }
 
     /// Residual at `lambda`.
-    pub fn residual_at(&self, lambda: Num) -> Vec<Num> {
+    pub(crate) fn residual_at(&self, lambda: Num) -> Vec<Num> {
         advance(&self.residual, &self.residual_rate, lambda - self.start)
     }
 
     /// Reduced gradients at `lambda`.
-    pub fn gradient_at(&self, lambda: Num) -> Vec<Num> {
+    pub(crate) fn gradient_at(&self, lambda: Num) -> Vec<Num> {
         advance(&self.gradient, &self.gradient_rate, lambda - self.start)
     }
 }
@@ -443,7 +443,7 @@ impl Follower<'_> {
 
     /// Largest relative violation of the optimality conditions at the pieces' starts, and of
     /// the residual's continuity: its square is the error that it leaves in e*.
-    pub fn flaw(&self, trace: &Trace, offset: Option<&[Num]>, slope: &[Num]) -> f64 {
+    pub(crate) fn flaw(&self, trace: &Trace, offset: Option<&[Num]>, slope: &[Num]) -> f64 {
         let mut worst = Num::ZERO;
         for (k, piece) in trace.pieces.iter().enumerate() {
             let size = offset.map_or(Num::ZERO, norm) + piece.start * norm(slope);

@@ -357,7 +357,7 @@ impl Path {
 
 impl Limits {
     /// Standing of every coil, and of the sum if it is limited, without currents.
-    pub fn at_zero(&self) -> Vec<Standing> {
+    pub(crate) fn at_zero(&self) -> Vec<Standing> {
         let of_coil = |i: usize| match (self.lower_a[i] < 0.0, self.upper_a[i] > 0.0) {
             (true, true) => Standing::Between,
             (true, false) => Standing::Upper,

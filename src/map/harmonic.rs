@@ -136,7 +136,7 @@ fn rows(axis: &Spectral, points: &[f64]) -> Vec<f64> {
 impl Table {
     /// Number of points that a table of `extent` over sources below `top_m` would sample, about.
     #[must_use]
-    pub fn samples_needed(extent: Extent, top_m: f64, tolerance: f64) -> f64 {
+    pub(crate) fn samples_needed(extent: Extent, top_m: f64, tolerance: f64) -> f64 {
         let [bottom, top] = extent.z_m.map(|z| {
             let nodes = |[from, to]: [f64; 2]| {
                 Spectral::strip_nodes(from, to, z - top_m, tolerance).1 as f64

@@ -150,7 +150,7 @@ impl Search<'_> {
 
 /// Solves a 3 x 3 system by elimination with complete row scaling; `None` where singular.
 #[must_use]
-pub fn solve3(mut m: [[f64; 3]; 3], mut r: [f64; 3]) -> Option<[f64; 3]> {
+pub(crate) fn solve3(mut m: [[f64; 3]; 3], mut r: [f64; 3]) -> Option<[f64; 3]> {
     let scale = m.map(|row| row.iter().fold(0.0_f64, |s, v| s.max(v.abs())));
     for (k, &size) in scale.iter().enumerate() {
         if !(size > 0.0 && size.is_finite()) {

@@ -38,7 +38,7 @@ impl Owned {
     }
 
     /// Whether the folder's manifest is one of ours.
-    pub fn has_manifest(&self) -> bool {
+    pub(crate) fn has_manifest(&self) -> bool {
         self.listed.is_some()
     }
 

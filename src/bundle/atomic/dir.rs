@@ -178,7 +178,7 @@ impl Dir {
     ///
     /// # Errors
     /// As [`Dir::child`].
-    pub fn child_or_new(&self, name: impl AsRef<OsStr>) -> io::Result<Self> {
+    pub(crate) fn child_or_new(&self, name: impl AsRef<OsStr>) -> io::Result<Self> {
         match mkdirat(&self.fd, name.as_ref(), Mode::from_raw_mode(0o777)) {
             Ok(()) | Err(Errno::EXIST) => self.child(name),
             Err(error) => Err(error.into()),
@@ -223,7 +223,7 @@ impl Dir {
     ///
     /// # Errors
     /// What the system reports.
-    pub fn own_status(&self) -> io::Result<EntryStatus> {
+    pub(crate) fn own_status(&self) -> io::Result<EntryStatus> {
         Ok(fstat(&self.fd)?.into())
     }
 
@@ -254,7 +254,7 @@ impl Dir {
     ///
     /// # Errors
     /// What the system reports, also where something of that name is.
-    pub fn new_file(&self, name: impl AsRef<OsStr>, mode: u32) -> io::Result<File> {
+    pub(crate) fn new_file(&self, name: impl AsRef<OsStr>, mode: u32) -> io::Result<File> {
         let flags = OFlags::RDWR | OFlags::CREATE | OFlags::EXCL | OFlags::CLOEXEC;
         let mode = Mode::from_raw_mode(mode as _);
         Ok(openat(&self.fd, name.as_ref(), flags, mode)?.into())
@@ -272,7 +272,7 @@ impl Dir {
     ///
     /// # Errors
     /// What the system reports.
-    pub fn remove_empty(&self, name: impl AsRef<OsStr>) -> io::Result<()> {
+    pub(crate) fn remove_empty(&self, name: impl AsRef<OsStr>) -> io::Result<()> {
         Ok(unlinkat(&self.fd, name.as_ref(), AtFlags::REMOVEDIR)?)
     }
 
@@ -280,7 +280,7 @@ impl Dir {
     ///
     /// # Errors
     /// What the system reports; folders nested without end.
-    pub fn remove_content(&self) -> io::Result<()> {
+    pub(crate) fn remove_content(&self) -> io::Result<()> {
         self.remove_content_below(DEPTH_MAX)
     }
 
@@ -318,7 +318,7 @@ impl Dir {
     ///
     /// # Errors
     /// [`io::ErrorKind::AlreadyExists`]; what the system reports otherwise.
-    pub fn rename_new(
+    pub(crate) fn rename_new(
         &self,
         from: impl AsRef<OsStr>,
         folder: &Self,
@@ -377,7 +377,7 @@ impl Dir {
     ///
     /// # Errors
     /// What the system reports.
-    pub fn handle(&self) -> io::Result<File> {
+    pub(crate) fn handle(&self) -> io::Result<File> {
         Ok(self.fd.try_clone()?.into())
     }
 

@@ -149,7 +149,7 @@ impl FileSet {
     ///
     /// # Errors
     /// [`WriteError`]; nothing is left of it.
-    pub fn write_at(
+    pub(crate) fn write_at(
         &mut self,
         target: &Path,
         content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -161,7 +161,7 @@ impl FileSet {
     ///
     /// # Errors
     /// As [`Self::write_at`].
-    pub fn write_under(
+    pub(crate) fn write_under(
         &mut self,
         target: &Path,
         overwrite: Overwrite,
@@ -217,7 +217,7 @@ impl FileSet {
     ///
     /// # Errors
     /// A name that is none.
-    pub fn outdate(&mut self, name: &str) -> Result<(), WriteError> {
+    pub(crate) fn outdate(&mut self, name: &str) -> Result<(), WriteError> {
         check_name(name)?;
         self.outdated.push(self.folder.join(name));
         Ok(())

@@ -57,7 +57,7 @@ impl<'a> Bores<'a> {
     }
 
     /// ln F at a bore, limits that need an inductance apart; -infinity where the model fails.
-    pub fn ln_force(&self, window: Window) -> f64 {
+    pub(crate) fn ln_force(&self, window: Window) -> f64 {
         let problem = self.screen.as_ref().unwrap_or(self.problem);
         let rated = problem.rate(window);
         rated.map_or(f64::NEG_INFINITY, |rated| rated.force_n.value.ln())

@@ -13,7 +13,7 @@ use fluxform_numerics::gauss;
 use fluxform_numerics::lagrange_basis::Basis;
 
 /// Functions tabulated together.
-pub const COUNT: usize = 3;
+pub(crate) const COUNT: usize = 3;
 /// Their values at one place.
 pub type Values = [f64; COUNT];
 /// Values along the third variable's nodes; `None` where they are not defined.
@@ -121,7 +121,7 @@ impl Cells {
     /// Moves the cells along the first two axes so that one of them has `at` in its middle: the
     /// third variable's origin is a border of the functions' domain. Without effect once a point
     /// has been requested. Not for use within a parallel loop.
-    pub fn focus(&self, at: [f64; 3]) {
+    pub(crate) fn focus(&self, at: [f64; 3]) {
         let mut origin = self.lattice.origin;
         for i in 0..2 {
             origin[i] = at[i] - 0.5 * self.lattice.width[i];

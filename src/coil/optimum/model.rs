@@ -107,7 +107,7 @@ impl Strand {
 
     /// Turns a square metre of section holds, layers stacked squarely, 1/m^2.
     #[must_use]
-    pub fn turns_per_m2(&self) -> f64 {
+    pub(crate) fn turns_per_m2(&self) -> f64 {
         1.0 / (self.diameter_m * self.diameter_m)
     }
 
@@ -119,7 +119,7 @@ impl Strand {
 
     /// Wire length over the window's volume over pi, 1/m^2.
     #[must_use]
-    pub fn length_per_volume(&self) -> f64 {
+    pub(crate) fn length_per_volume(&self) -> f64 {
         PI * self.turns_per_m2()
     }
 

@@ -51,7 +51,7 @@ const LONGEST: f64 = 1.0;
 /// A step shorter than this ends the search.
 const SHORTEST: f64 = 1e-10;
 /// Rows above this are not met.
-pub const FEASIBLE: f64 = 1e-10;
+pub(crate) const FEASIBLE: f64 = 1e-10;
 /// Shares of a row's violation that a step is to remove, in turn.
 const REMOVE: [f64; 4] = [1.0, 0.5, 0.1, 0.0];
 

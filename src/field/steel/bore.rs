@@ -57,7 +57,7 @@ const SHORTEST: f64 = 1e-4;
 ///
 /// # Errors
 /// A point on a winding's edge.
-pub fn nested_bore_fields(
+pub(crate) fn nested_bore_fields(
     windings: &[Winding],
     r_m: f64,
     z_m: f64,

@@ -157,7 +157,7 @@ impl Plan {
     ///
     /// # Errors
     /// [`NotPositive`] when a pivot is not positive.
-    pub fn condense(
+    pub(crate) fn condense(
         &self,
         mut element: impl FnMut(usize) -> Element,
     ) -> Result<Condensed, NotPositive> {
@@ -192,7 +192,7 @@ impl Plan {
 
     /// All unknowns from the kept ones: the inner equations are satisfied.
     #[must_use]
-    pub fn expand(&self, condensed: &Condensed, kept: &DVector<f64>) -> DVector<f64> {
+    pub(crate) fn expand(&self, condensed: &Condensed, kept: &DVector<f64>) -> DVector<f64> {
         let mut all = DVector::zeros(self.unknowns);
         for (index, front) in self.fronts.iter().enumerate().rev() {
             let factor = &condensed.factors[index];

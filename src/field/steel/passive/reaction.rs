@@ -186,7 +186,7 @@ impl Reaction {
 
     /// The energy of `dipoles` and the layer they cause, J.
     #[must_use]
-    pub fn energy_j(&self, dipoles: &[Dipole]) -> f64 {
+    pub(crate) fn energy_j(&self, dipoles: &[Dipole]) -> f64 {
         fluxform_base::progress::poll();
         let (mut potential, mut normal) = (self.zeros(), self.zeros());
         for (((x, n), phi), slope) in self
