@@ -4,7 +4,7 @@
 //! inside the folder, reached without links, with the listed size and digest. All sizes are checked
 //! before any file is read; a file that is parsed is read once, so what is parsed is what was
 //! hashed, and the others are hashed block by block. Memory is bounded by the size that the parsed
-//! files take on the disk and by [`FILE_MAX_BYTES`] each.
+//! files take on the disk and by `FILE_MAX_BYTES` each.
 
 use std::collections::BTreeSet;
 use std::io;

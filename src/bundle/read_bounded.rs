@@ -84,7 +84,7 @@ pub(crate) fn read_plain(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
 /// Size and SHA-256 of the plain file at `path`, links followed, read block by block.
 ///
 /// # Errors
-/// As [`read_plain`].
+/// As `read_plain`.
 pub fn digest_plain(path: &Path, max_bytes: u64) -> io::Result<(u64, String)> {
     let (file, bytes) = open_plain(path, max_bytes)?;
     sha256_of(file.take(bytes))

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 /// Largest degree of an element that [`nodes`] is used with.
-pub(crate) const MAX_DEGREE: usize = 24;
+pub const MAX_DEGREE: usize = 24;
 
 /// Gauss-Lobatto nodes of degree `degree` on [-1, 1], ascending: the ends and the zeros of
 /// P'_degree; `degree + 1` of them. Error: a few units of the last digit.
