@@ -112,7 +112,7 @@ impl Neighbours {
                     let potentials = basis.potentials.rows(angle * rings, rings);
                     sent.gemm(1.0, &columns, &potentials, 1.0);
                 }
-                basis.potentials.tr_mul(&sent) * -turn
+                basis.potentials.transpose() * sent * -turn
             })
             .collect();
         let size = kept * cores;
