@@ -21,8 +21,6 @@ use fluxform::progress::Silent;
 use fluxform::scene::sources::{DesignSource, ShapeSource};
 use fluxform::shape::document::ShapeDocument;
 
-use crate::sample::temporary;
-
 const DESIGN: &str = "name = \"small\"\n[coil]\ninner_diameter_mm = 24\nouter_diameter_mm = 38\n\
                       length_mm = 70\n[wire]\ndiameter_mm = 0.7\n[array]\nrows = 1\ncolumns = 2\n\
                       pitch_mm = 50\n[supply]\ncurrent_max_a = 2\nvoltage_v = 36\n[workspace]\n\
@@ -180,6 +178,14 @@ enum Elsewhere {
     Unchecked,
 }
 use Elsewhere::{Noticed, Unchecked};
+use fluxform_testing::needs::Trial;
+use fluxform_testing::trials;
+
+pub fn trials() -> Vec<Trial> {
+    trials! {
+        None => [every_forgery_with_fitting_checksums_is_noticed, a_bundle_of_an_older_schema_is_compared_as_far_as_it_goes, missing_and_changed_inputs_are_stated, every_single_byte_edit_of_a_bundle_is_noticed],
+    }
+}
 
 type Forgery = (&'static str, Elsewhere, fn(&mut Parts));
 
@@ -480,9 +486,8 @@ fn passes(verifier: &mut Verifier, folder: &Path) -> (bool, bool) {
     }
 }
 
-#[test]
 fn every_forgery_with_fitting_checksums_is_noticed() {
-    let folder = temporary();
+    let folder = tempfile::tempdir().unwrap();
     let honest = Parts::of(&calibrated(folder.path(), true));
     let mut verifier = Verifier::default();
     let whole = folder.path().join("whole");
@@ -543,9 +548,8 @@ fn as_an_older_program_wrote_it(parts: &mut Parts) {
 }
 
 /// `verify` once called every difference in wording a fault of the bundle, and the whole of it wrong.
-#[test]
 fn a_bundle_of_an_older_schema_is_compared_as_far_as_it_goes() {
-    let folder = temporary();
+    let folder = tempfile::tempdir().unwrap();
     let mut honest = Parts::of(&calibrated(folder.path(), true));
     as_an_older_program_wrote_it(&mut honest);
     let run = |parts: &Parts, name: &str, accept_unchecked| {
@@ -584,9 +588,8 @@ fn a_bundle_of_an_older_schema_is_compared_as_far_as_it_goes() {
     assert!(unplaced.passed && parts.contains("placed"), "{unplaced:?}");
 }
 
-#[test]
 fn missing_and_changed_inputs_are_stated() {
-    let folder = temporary();
+    let folder = tempfile::tempdir().unwrap();
     let bundle = calibrated(folder.path(), false);
     let run = |accept_unchecked| {
         let options = VerifyOptions { accept_unchecked };
@@ -630,9 +633,8 @@ const SAMPLED: usize = 13;
 /// Bytes of every file changed; of the manifest, which no checksum covers, every byte: replaced,
 /// blanked, removed or doubled in turn. `FLUXFORM_EVERY_EDIT=1` tries all of these and all bits on
 /// every byte of every file.
-#[test]
 fn every_single_byte_edit_of_a_bundle_is_noticed() {
-    let folder = temporary();
+    let folder = tempfile::tempdir().unwrap();
     let bundle = calibrated(folder.path(), false);
     let manifest = Bundle::open(&bundle).unwrap().manifest;
     let mut names: Vec<&str> = manifest.files.iter().map(|f| f.path.as_str()).collect();

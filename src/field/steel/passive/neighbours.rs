@@ -90,46 +90,19 @@ impl Neighbours {
         );
         let points = grid_points(&response);
         let basis = Basis::new(&response, &points, closest_m, tolerance);
-        let (kept, cores) = (basis.potentials.ncols(), positions_m.len());
+        let kept = basis.potentials.ncols();
         let turn = TAU / angles as f64;
-        // Half of the pairs, of which many share an offset: the other half is their transpose.
-        let coupling = Links::new(positions_m);
-        let pairs: Vec<(usize, usize)> = (0..cores)
-            .flat_map(|i| (0..i).map(move |j| (i, j)))
-            .collect();
-        let number = |(i, j): (usize, usize)| coupling.index[i * cores + j];
-        let mut offsets: Vec<usize> = pairs.iter().map(|pair| number(*pair)).collect();
-        offsets.sort_unstable();
-        offsets.dedup();
-        let blocks: Vec<DMatrix<f64>> = offsets
-            .par_iter()
-            .map(|number| {
-                let offset_m = coupling.offsets_m[*number];
-                let mut sent = DMatrix::zeros(points.len(), kept);
-                let rings = response.exchange.rings.len();
-                for angle in 0..angles {
-                    let columns = columns(&response, &points, (offset_m, angle), inverse_distance);
-                    let potentials = basis.potentials.rows(angle * rings, rings);
-                    sent.gemm(1.0, &columns, &potentials, 1.0);
-                }
-                basis.potentials.transpose() * sent * -turn
-            })
-            .collect();
-        let size = kept * cores;
-        let mut links = DMatrix::zeros(size, size);
-        let mut system = DMatrix::identity(size, size);
-        for (i, j) in pairs {
-            let Ok(place) = offsets.binary_search(&number((i, j))) else {
-                continue;
-            };
-            let block = &blocks[place];
-            for (i, j, block) in [(i, j, block.clone()), (j, i, block.transpose())] {
-                let place = (i * kept, j * kept);
-                let mut view = system.view_mut(place, (kept, kept));
-                view -= &block * &basis.reaction;
-                links.view_mut(place, (kept, kept)).copy_from(&block);
+        let exchanged = |offset_m: [f64; 2]| {
+            let mut sent = DMatrix::zeros(points.len(), kept);
+            let rings = response.exchange.rings.len();
+            for angle in 0..angles {
+                let columns = columns(&response, &points, (offset_m, angle), inverse_distance);
+                let potentials = basis.potentials.rows(angle * rings, rings);
+                sent.gemm(1.0, &columns, &potentials, 1.0);
             }
-        }
+            basis.potentials.transpose() * sent * -turn
+        };
+        let (system, links) = exchange_system(positions_m, &basis.reaction, exchanged);
         let form = system.lu().solve(&links).unwrap_or(links) * turn;
         Self {
             positions_m: positions_m.to_vec(),
@@ -193,6 +166,99 @@ impl Neighbours {
     }
 }
 
+/// The system 1 - L R of all cores and its links L, of blocks that `exchanged` gives for an offset.
+fn exchange_system(
+    positions_m: &[[f64; 2]],
+    reaction: &DMatrix<f64>,
+    exchanged: impl Fn([f64; 2]) -> DMatrix<f64> + Sync,
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    let (kept, cores) = (reaction.ncols(), positions_m.len());
+    // Half of the pairs, of which many share an offset: the other half is their transpose.
+    let coupling = Links::new(positions_m);
+    let pairs: Vec<(usize, usize)> = (0..cores)
+        .flat_map(|i| (0..i).map(move |j| (i, j)))
+        .collect();
+    let number = |(i, j): (usize, usize)| coupling.index[i * cores + j];
+    let mut offsets: Vec<usize> = pairs.iter().map(|pair| number(*pair)).collect();
+    offsets.sort_unstable();
+    offsets.dedup();
+    let blocks: Vec<DMatrix<f64>> = offsets
+        .par_iter()
+        .map(|number| exchanged(coupling.offsets_m[*number]))
+        .collect();
+    let size = kept * cores;
+    let mut links = DMatrix::zeros(size, size);
+    let mut system = DMatrix::identity(size, size);
+    for (i, j) in pairs {
+        let Ok(place) = offsets.binary_search(&number((i, j))) else {
+            continue;
+        };
+        let block = &blocks[place];
+        for (i, j, block) in [(i, j, block.clone()), (j, i, block.transpose())] {
+            let place = (i * kept, j * kept);
+            let mut view = system.view_mut(place, (kept, kept));
+            view -= &block * reaction;
+            links.view_mut(place, (kept, kept)).copy_from(&block);
+        }
+    }
+    (system, links)
+}
+
+/// What a wave of azimuthal number `mode` on the grid's angles is divided by.
+fn norm_of(mode: usize, angles: usize) -> f64 {
+    (if mode == 0 { 1.0 } else { 2.0 } / angles as f64).sqrt()
+}
+
+/// Whether it is the sine, for every wave of that azimuthal number.
+fn waves_of(mode: usize) -> &'static [bool] {
+    if mode == 0 { &[false] } else { &[false, true] }
+}
+
+/// Of every azimuthal mode, the products with a potential's columns on the rings of the potentials
+/// that a neighbour at the closest distance sends, and of their normal derivatives.
+fn products_of_modes(
+    response: &Response,
+    points: &Points,
+    closest_m: f64,
+) -> Vec<(DMatrix<f64>, DMatrix<f64>)> {
+    let (rings, angles) = (response.exchange.rings.len(), response.angles);
+    let empty = (DMatrix::zeros(rings, rings), DMatrix::zeros(rings, rings));
+    let mut products = vec![empty; response.layers.len()];
+    for sender_angle in 0..angles {
+        let at = ([closest_m, 0.0], sender_angle);
+        let sent = columns(response, points, at, inverse_distance);
+        let normal = columns(response, points, at, normal_derivative);
+        let project = |matrix: &DMatrix<f64>, mode: usize, sine: bool| {
+            let mut out = DMatrix::zeros(rings, rings);
+            for k in 0..angles {
+                let turn = TAU * ((mode * k) % angles) as f64 / angles as f64;
+                let (s, c) = turn.sin_cos();
+                let share = norm_of(mode, angles) * if sine { s } else { c };
+                out += matrix.rows(k * rings, rings) * share;
+            }
+            out
+        };
+        products
+            .par_iter_mut()
+            .enumerate()
+            .for_each(|(mode, (gram, cross))| {
+                for sine in waves_of(mode) {
+                    let mut potential = project(&sent, mode, *sine);
+                    if mode == 0 {
+                        // A constant is no field.
+                        for mut column in potential.column_iter_mut() {
+                            let mean = column.mean();
+                            column.add_scalar_mut(-mean);
+                        }
+                    }
+                    *gram += &potential * potential.transpose();
+                    *cross += project(&normal, mode, *sine) * potential.transpose();
+                }
+            });
+    }
+    products
+}
+
 /// The potentials that neighbours send, and one core's response to them.
 struct Basis {
     /// On the grid, orthonormal, [grid, kept].
@@ -206,50 +272,11 @@ struct Basis {
 impl Basis {
     fn new(response: &Response, points: &Points, closest_m: f64, cut: f64) -> Self {
         let (rings, angles) = (response.exchange.rings.len(), response.angles);
-        // Of every mode, with a potential's columns and its normal derivatives' on the rings.
-        let mut products = vec![
-            (DMatrix::zeros(rings, rings), DMatrix::zeros(rings, rings));
-            response.layers.len()
-        ];
-        let norm_of = |mode: usize| (if mode == 0 { 1.0 } else { 2.0 } / angles as f64).sqrt();
-        let waves_of =
-            |mode: usize| -> &'static [bool] { if mode == 0 { &[false] } else { &[false, true] } };
-        for sender_angle in 0..angles {
-            let at = ([closest_m, 0.0], sender_angle);
-            let sent = columns(response, points, at, inverse_distance);
-            let normal = columns(response, points, at, normal_derivative);
-            products
-                .par_iter_mut()
-                .enumerate()
-                .for_each(|(mode, (gram, cross))| {
-                    for sine in waves_of(mode) {
-                        let project = |matrix: &DMatrix<f64>| {
-                            let mut out = DMatrix::zeros(rings, rings);
-                            for k in 0..angles {
-                                let turn = TAU * ((mode * k) % angles) as f64 / angles as f64;
-                                let (s, c) = turn.sin_cos();
-                                let share = norm_of(mode) * if *sine { s } else { c };
-                                out += matrix.rows(k * rings, rings) * share;
-                            }
-                            out
-                        };
-                        let mut potential = project(&sent);
-                        if mode == 0 {
-                            // A constant is no field.
-                            for mut column in potential.column_iter_mut() {
-                                let mean = column.mean();
-                                column.add_scalar_mut(-mean);
-                            }
-                        }
-                        *gram += &potential * potential.transpose();
-                        *cross += project(&normal) * potential.transpose();
-                    }
-                });
-        }
+        let products = products_of_modes(response, points, closest_m);
         // (singular value squared, wave, potential, moments, normal derivative) on the rings.
         let mut found = Vec::new();
         for ((mode, layers), (gram, cross)) in response.layers.iter().enumerate().zip(products) {
-            let (waves, norm) = (waves_of(mode), norm_of(mode));
+            let (waves, norm) = (waves_of(mode), norm_of(mode, angles));
             let moments = response.exchange.moments(layers);
             let eigen = gram.symmetric_eigen();
             for (place, square) in eigen.eigenvalues.iter().enumerate() {
