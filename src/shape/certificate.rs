@@ -34,7 +34,7 @@ pub enum Tessellation {
     None,
     /// A body was cut into facets here, to hold it.
     Known,
-    /// A program's own facets for the display, by the rule that program follows.
+    /// A program's own facets for the display, from the angles within each face.
     Display,
     /// Estimated from the angles between the facets.
     Angles,
@@ -68,7 +68,7 @@ impl Tessellation {
             Self::None => "exact: the surface is a formula",
             Self::Known => "known: the chord to which the file's body was cut into facets",
             Self::Display => {
-                "an estimate: the rule by which display facets are made, from their box"
+                "an estimate: the sagitta of display facets within each face, from their angles"
             }
             Self::Angles => {
                 "an estimate: the sagitta of facets that turn smoothly, from their angles"

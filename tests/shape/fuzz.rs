@@ -95,6 +95,9 @@ fn mutated_files_are_read_or_refused() {
     assert!(read > 2_000 && sampled > 30_000, "{read} {sampled}");
 }
 
+/// The display lists of parts up to 2014.
+const PACKED: &str = "Contents/DisplayLists__ZLB";
+
 /// Of every format the bytes as they are, and what they pack, mutated.
 #[test]
 fn mutated_files_of_every_format_are_read_or_refused() {
@@ -109,7 +112,7 @@ fn mutated_files_of_every_format_are_read_or_refused() {
             ("R.3DRep", representation),
         ])
     };
-    let seeds: [(SurfaceFormat, Vec<u8>, Pack); 9] = [
+    let seeds: [(SurfaceFormat, Vec<u8>, Pack); 13] = [
         (SurfaceFormat::Obj, samples::obj(), as_it_is),
         (SurfaceFormat::Ply, samples::ply_ascii(), as_it_is),
         (SurfaceFormat::Ply, samples::ply_binary(false), as_it_is),
@@ -131,6 +134,22 @@ fn mutated_files_of_every_format_are_read_or_refused() {
             samples::display_lists(),
             samples::sldprt_of,
         ),
+        (
+            SurfaceFormat::Sldprt,
+            samples::sldprt_compound(&[(PACKED, &samples::display_lists())]),
+            as_it_is,
+        ),
+        (SurfaceFormat::Sldprt, samples::display_lists(), |stream| {
+            samples::sldprt_compound(&[(PACKED, stream)])
+        }),
+        (
+            SurfaceFormat::Sldprt,
+            samples::assembly().0.into_bytes(),
+            |tree| samples::sldprt_assembly(tree, &samples::assembly().1),
+        ),
+        (SurfaceFormat::Sldprt, samples::assembly().1, |stream| {
+            samples::sldprt_assembly(samples::assembly().0.as_bytes(), stream)
+        }),
     ];
     let mut random = Random(7);
     let look = |format: SurfaceFormat, bytes: &[u8]| {

@@ -11,6 +11,7 @@ mod inspect;
 mod marks;
 mod points;
 mod samples;
+mod solidworks;
 #[cfg(feature = "step")]
 mod step;
 mod stl;

@@ -19,12 +19,12 @@ pub enum SurfaceFormat {
     ThreeDxml,
     /// STEP; carries its unit.
     Step,
-    /// A SolidWorks part; carries its unit.
+    /// A SOLIDWORKS part or assembly; carries its unit.
     Sldprt,
 }
 
 /// File endings, lower case.
-const ENDINGS: [(&str, SurfaceFormat); 9] = [
+const ENDINGS: [(&str, SurfaceFormat); 10] = [
     ("stl", SurfaceFormat::Stl),
     ("obj", SurfaceFormat::Obj),
     ("ply", SurfaceFormat::Ply),
@@ -34,6 +34,7 @@ const ENDINGS: [(&str, SurfaceFormat); 9] = [
     ("step", SurfaceFormat::Step),
     ("stp", SurfaceFormat::Step),
     ("sldprt", SurfaceFormat::Sldprt),
+    ("sldasm", SurfaceFormat::Sldprt),
 ];
 
 impl SurfaceFormat {
