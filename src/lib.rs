@@ -2,7 +2,7 @@
 //! a magnetic haptic display.
 //!
 //! The program `fluxform` is a thin shell around this crate: what a command does is a function in
-//! [`job`], and the rooms below it can be used on their own. This page goes once through all of
+//! [`commands`], and the rooms below it can be used on their own. This page goes once through all of
 //! them; each room's page has a smaller example.
 //!
 //! # From a design to a felt force
@@ -12,11 +12,12 @@
 //!
 //! use fluxform::bundle::load::Bundle;
 //! use fluxform::design::{Design, Need};
-//! use fluxform::job::calibrate::{self, CalibrateOptions, DesignSource, ShapeSource};
-//! use fluxform::job::probe::{ProbeRequest, probe};
-//! use fluxform::job::replay::renderer::Renderer;
-//! use fluxform::job::scene::Scene;
-//! use fluxform::job::{KERNEL_ERROR, steel};
+//! use fluxform::field::winding::KERNEL_ERROR;
+//! use fluxform::scene::sources::{DesignSource, ShapeSource};
+//! use fluxform::commands::calibrate::{self, CalibrateOptions};
+//! use fluxform::commands::probe::{ProbeRequest, probe};
+//! use fluxform::commands::replay::renderer::Renderer;
+//! use fluxform::scene::{Scene, steel};
 //! use fluxform::lambda::{ForceProblem, Settings, solve};
 //! use fluxform::map::{Components, Grid, tabulate};
 //! use fluxform::progress::Silent;
@@ -127,8 +128,9 @@
 //! In the direction of their imports:
 //! [`numerics`] < [`design`] < [`field`] < [`coil`] < [`map`]; [`shape`] beside them;
 //! [`lambda`] on numbers alone; [`bundle`] writes and reads artefacts, [`plot`] draws,
-//! [`report`] makes pages; [`job`] joins them into what a command does; [`bench`](mod@bench) measures error
-//! against time of a scene; [`cli`] is the only room that talks.
+//! [`report`] makes pages; [`scene`] makes sources, forces and maps of a design; [`cli`] prints, and
+//! holds what commands share of the command line; [`commands`] has a folder per command with what it
+//! computes, its arguments and its text.
 
 pub use fluxform_base::accuracy;
 pub use fluxform_base::progress;
@@ -151,11 +153,14 @@ pub use fluxform_bundle as bundle;
 pub use fluxform_render::plot;
 pub use fluxform_render::report;
 
-pub mod job;
+mod error;
+pub use error::RunError;
 
-pub mod bench;
+pub mod scene;
 
 pub mod cli;
+
+pub mod commands;
 
 /// The Rust of the page on results compiles.
 #[cfg(doctest)]

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use fluxform::bundle::artefact::Input;
+use fluxform::commands::compare::{CompareFile, CompareOptions, Pair, run};
 use fluxform::design::{Design, Need};
-use fluxform::job::calibrate::ShapeSource;
-use fluxform::job::compare::{CompareFile, CompareOptions, Pair, run};
 use fluxform::progress::Silent;
+use fluxform::scene::sources::ShapeSource;
 use fluxform::shape::document::ShapeDocument;
 use serde_json::Value;
 
@@ -99,7 +99,7 @@ fn the_order_does_not_matter() {
         }
         let (here, there) = (pair.static_at.as_ref(), turned.static_at.as_ref());
         let largest = |(a, b): (f64, f64)| (a - b).abs();
-        let of = |at: Option<&fluxform::job::compare::Place>| {
+        let of = |at: Option<&fluxform::commands::compare::Place>| {
             at.map(|at| largest((at.a_force_n, at.b_force_n))).unwrap()
         };
         assert!((of(here) / of(there) - 1.0).abs() < 1e-12);

@@ -12,8 +12,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Output};
 
+use fluxform::commands::evaluate::evaluate;
 use fluxform::design::{Design, Need};
-use fluxform::job::evaluate::evaluate;
 use needs::trials;
 use serde_json::{Value, json};
 

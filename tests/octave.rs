@@ -14,7 +14,7 @@ use std::process::{Command, ExitCode, Output};
 
 use fluxform::bundle::load::Bundle;
 use fluxform::bundle::replay::Answer;
-use fluxform::job::replay::renderer::Renderer;
+use fluxform::commands::replay::renderer::Renderer;
 
 use needs::trials;
 use sample::*;

@@ -1,53 +1,9 @@
 //! The arguments that commands share, and the command line as a whole.
 
-use std::sync::LazyLock;
+use clap::{Args, ValueEnum};
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
-
-use super::commands::{
-    bench, calibrate, compare, completions, discretize, evaluate, lambda, man, map, optimize,
-    probe, replay, sweep, verify,
-};
-use super::{explain, help, values};
-use crate::bundle::artefact::SCHEMA_VERSION;
-use crate::job::discretize::scattered::Sampling;
-
-/// The crate's version, and the revision of a release build.
-const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("FLUXFORM_REVISION"));
-
-/// The version with that of what is written.
-static LONG_VERSION: LazyLock<String> =
-    LazyLock::new(|| format!("{VERSION}\nwrites artefacts of schema {SCHEMA_VERSION}"));
-
-/// Design the coils of a magnetic haptic display, map their field gradients and solve the force
-/// constant of an object.
-///
-/// A design file describes coils, magnet and drivers; a shape file or a surface describes the
-/// object to be felt. `calibrate` joins them into a bundle that a runtime loads: gradient maps, the
-/// object's points, the largest force constant lambda that the currents can render, and the
-/// currents. Results go to standard output or to files, messages to standard error.
-#[derive(Debug, Parser)]
-#[command(
-    name = "fluxform",
-    version = VERSION,
-    long_version = LONG_VERSION.as_str(),
-    max_term_width = 100,
-    override_usage = "fluxform [OPTIONS] <COMMAND>\n       fluxform --explain <CODE>",
-    arg_required_else_help = true,
-    disable_help_subcommand = true,
-    after_help = help::main()
-)]
-pub struct Arguments {
-    /// What every command takes.
-    #[command(flatten)]
-    pub common: Common,
-    /// Explain an error code, like E301, or an exit code; `list` names all of them
-    #[arg(long, value_name = "CODE", value_parser = explain::asked)]
-    pub explain: Option<explain::Asked>,
-    /// The command.
-    #[command(subcommand)]
-    pub command: Option<Command>,
-}
+use super::values;
+use crate::scene::sources::Sampling;
 
 /// What every command takes.
 #[derive(Debug, Clone, Args)]
@@ -89,26 +45,6 @@ pub enum Colour {
     Always,
     /// Never
     Never,
-}
-
-/// The commands; each tells of itself in its own file.
-#[derive(Debug, Subcommand)]
-pub enum Command {
-    Evaluate(evaluate::Evaluate),
-    Probe(probe::Probe),
-    #[command(visible_alias = "tabulate")]
-    Map(map::Map),
-    Discretize(discretize::Discretize),
-    Lambda(lambda::Lambda),
-    Calibrate(calibrate::Calibrate),
-    Compare(compare::Compare),
-    Verify(verify::Verify),
-    Optimize(optimize::Optimize),
-    Sweep(sweep::Sweep),
-    Replay(replay::Replay),
-    Bench(bench::Bench),
-    Completions(completions::Completions),
-    Man(man::Man),
 }
 
 /// The allowed error.

@@ -6,10 +6,10 @@ use std::sync::OnceLock;
 use super::failure::Failure;
 use super::printer::Printer;
 use super::quantity::bytes;
+use crate::RunError;
 use crate::design::Design;
-use crate::job::JobError;
-use crate::job::calibrate::ShapeSource;
-use crate::job::cost::{Cost, of_points, of_steel};
+use crate::scene::cost::{Cost, of_points, of_steel};
+use crate::scene::sources::ShapeSource;
 
 /// Share of the free memory that a run takes unasked.
 const SHARE: f64 = 0.75;
@@ -82,7 +82,7 @@ pub fn allow(
             );
             return Err(match asked {
                 Asked::Flag => Failure::Usage(message),
-                Asked::Document => JobError::Input(message).into(),
+                Asked::Document => RunError::Input(message).into(),
             });
         }
         let seconds = cost.cpu_seconds / rayon::current_num_threads() as f64;

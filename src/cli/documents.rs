@@ -13,7 +13,7 @@ use crate::bundle::scan::Scan;
 use crate::bundle::sweep::PlanFile;
 use crate::bundle::trajectory::Trajectory;
 use crate::design::{Design, Faults, InvalidDocument, Need, source};
-use crate::job::calibrate::ShapeSource;
+use crate::scene::sources::ShapeSource;
 use crate::shape::document::{Placement, RawSurface, RawSurfaceError, ShapeDocument};
 
 /// Samples of a surface that says nothing of its grid.

@@ -6,12 +6,12 @@ use serde::Serialize;
 
 use super::code::Code;
 use super::exit::Exit;
+use crate::RunError;
 use crate::bundle::atomic::WriteError;
 use crate::bundle::json::JsonError;
 use crate::bundle::load::BundleError;
 use crate::bundle::read_table::TableError;
 use crate::design::{Faults, InvalidDocument};
-use crate::job::JobError;
 
 /// Why a command did not end well.
 #[derive(Debug, thiserror::Error)]
@@ -33,7 +33,7 @@ pub enum Failure {
     Input(String),
     /// The job gave no result.
     #[error(transparent)]
-    Job(#[from] JobError),
+    Job(#[from] RunError),
     /// The result is there, but does not meet the request: why, and what is reported.
     #[error("{1}")]
     Unmet(Wish, String),
@@ -101,7 +101,7 @@ impl Failure {
     #[must_use]
     pub fn message(&self) -> String {
         match self {
-            Self::Job(JobError::Interrupted(_)) => {
+            Self::Job(RunError::Interrupted(_)) => {
                 "interrupted; what was finished is kept, nothing is half written".to_owned()
             }
             _ => self.to_string(),
@@ -123,24 +123,24 @@ impl Failure {
     }
 }
 
-fn code_of(error: &JobError) -> Code {
+fn code_of(error: &RunError) -> Code {
     match error {
-        JobError::NotModelled(_)
-        | JobError::Input(_)
-        | JobError::OnEdge(_)
-        | JobError::Problem(_) => Code::Contradiction,
-        JobError::Scan(_) => Code::Scan,
-        JobError::Shape { .. } => Code::Surface,
-        JobError::Write(WriteError::OutputExists { .. }) => Code::OutputExists,
-        JobError::Write(_) => Code::Output,
-        JobError::Sweep(_) => Code::Sweep,
-        JobError::Bundle(BundleError::NoBundle { .. } | BundleError::Schema { .. }) => {
+        RunError::NotModelled(_)
+        | RunError::Input(_)
+        | RunError::OnEdge(_)
+        | RunError::Problem(_) => Code::Contradiction,
+        RunError::Scan(_) => Code::Scan,
+        RunError::Shape { .. } => Code::Surface,
+        RunError::Write(WriteError::OutputExists { .. }) => Code::OutputExists,
+        RunError::Write(_) => Code::Output,
+        RunError::Sweep(_) => Code::Sweep,
+        RunError::Bundle(BundleError::NoBundle { .. } | BundleError::Schema { .. }) => {
             Code::NotABundle
         }
-        JobError::Bundle(_) => Code::Damaged,
-        JobError::NoForceConstant(_) => Code::NoForceConstant,
-        JobError::Unmet(_) => Code::Measurement,
-        JobError::Interrupted(_) => Code::Interrupted,
+        RunError::Bundle(_) => Code::Damaged,
+        RunError::NoForceConstant(_) => Code::NoForceConstant,
+        RunError::Unmet(_) => Code::Measurement,
+        RunError::Interrupted(_) => Code::Interrupted,
     }
 }
 
@@ -277,17 +277,17 @@ mod tests {
     #[test]
     fn a_job_ends_with_the_exit_code_that_its_error_names() {
         for error in [
-            JobError::Input(String::new()),
-            JobError::Scan(String::new()),
-            JobError::Sweep(String::new()),
-            JobError::Unmet(String::new()),
-            JobError::NoForceConstant(String::new()),
-            JobError::Interrupted(Interrupted),
+            RunError::Input(String::new()),
+            RunError::Scan(String::new()),
+            RunError::Sweep(String::new()),
+            RunError::Unmet(String::new()),
+            RunError::NoForceConstant(String::new()),
+            RunError::Interrupted(Interrupted),
         ] {
             let code = error.exit_code();
             assert_eq!(Failure::Job(error).exit().code(), code);
         }
-        let measured = Failure::Job(JobError::Unmet(String::new()));
+        let measured = Failure::Job(RunError::Unmet(String::new()));
         assert_eq!(measured.code(), Some(Code::Measurement));
     }
 }

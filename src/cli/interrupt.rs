@@ -19,8 +19,8 @@ use super::args::Common;
 use super::exit::Exit;
 use super::failure::Failure;
 use super::printer::Printer;
+use crate::RunError;
 use crate::bundle::atomic::{awaited_folder, is_writing};
-use crate::job::JobError;
 use crate::progress::{Interrupted, stop_flag, stop_requested};
 
 /// Whether a signal ends the process at once: it was asked before, or no job polls.
@@ -88,7 +88,7 @@ fn guard(common: &Common) {
             }
             let printer = Printer::new(common);
             printer.warning(NO_POLL);
-            printer.failure(&Failure::Job(JobError::Interrupted(Interrupted)));
+            printer.failure(&Failure::Job(RunError::Interrupted(Interrupted)));
             std::process::exit(i32::from(Exit::Interrupted.code()));
         }
     }

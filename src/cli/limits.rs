@@ -1,6 +1,6 @@
 //! Limits on screen.
 
-use crate::cli::quantity::{mass, mm, number, si};
+use super::quantity::{mass, mm, number, si};
 use crate::coil::limits::{Direction, by_key};
 
 /// The name on screen of the limit that artefacts call `key`.

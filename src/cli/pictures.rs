@@ -8,9 +8,9 @@ use std::path::PathBuf;
 use super::failure::Failure;
 use super::printer::{Place, Printer};
 use super::values::FileArgument;
+use crate::RunError;
 use crate::bundle::artefact::Input;
 use crate::bundle::atomic::{self, Overwrite, write};
-use crate::job::JobError;
 
 /// How the first line of a drawing or a page begins.
 const MARK: &str = "<!-- fluxform, drawn of ";
@@ -48,7 +48,7 @@ impl<'a> Picture<'a> {
             FileArgument::Path(path) if atomic::is_stream(path) => Ok(()),
             FileArgument::Path(path) => {
                 let overwrite = self.overwrite(MARK, inputs);
-                Ok(overwrite.check(path).map_err(JobError::from)?)
+                Ok(overwrite.check(path).map_err(RunError::from)?)
             }
         }
     }
@@ -71,7 +71,7 @@ impl<'a> Picture<'a> {
             out.write_all(mark.as_bytes())?;
             out.write_all(text.as_bytes())
         })
-        .map_err(JobError::from)?;
+        .map_err(RunError::from)?;
         Ok(Place::Output)
     }
 

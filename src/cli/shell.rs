@@ -9,16 +9,16 @@ use clap::{ArgMatches, ColorChoice, CommandFactory, FromArgMatches};
 
 pub use super::args::{Colour, Common, Format, Writing};
 pub use super::bar::Bar;
-pub use super::commands::{begin, folder};
 pub use super::exit::Exit;
 pub use super::failure::Failure;
 pub use super::help::{Codes, page};
 pub use super::layout::{Sheet, Side, table};
 pub use super::printer::{Place, Printer};
 pub use super::quantity::{bytes, count, error, number_to, si};
+pub use super::start::{begin, folder};
 pub use super::values::FileArgument;
 use super::{budget, interrupt};
-use crate::job::JobError;
+use crate::RunError;
 use crate::progress::interruptible;
 
 /// Arguments that were understood, and what is done with them.
@@ -61,7 +61,7 @@ pub fn main<P: Program>(args: impl Iterator<Item = OsString>) -> ExitCode {
     let printer = Printer::new(program.common());
     interrupt::listen(program.common());
     let ran = interruptible(|| prepare(program.common()).and_then(|()| program.run(&printer)))
-        .unwrap_or_else(|stop| Err(JobError::from(stop).into()));
+        .unwrap_or_else(|stop| Err(RunError::from(stop).into()));
     interrupt::end();
     match ran {
         Ok(()) => {

@@ -27,6 +27,9 @@ use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::dual::Dual;
 use fluxform_numerics::gauss;
 
+/// Relative error of the exact kernel of an air coil, held by tests against 40-digit values.
+pub const KERNEL_ERROR: f64 = 1e-12;
+
 /// A winding of rectangular section, top face at z = 0.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Winding {

@@ -6,8 +6,8 @@
 
 use crate::source::{Source, manifests, read, sources};
 
-/// A power, the tokens that use it or lift its lint, and who has it: files, or rooms and
-/// folders, which end with `/`.
+/// A power, the tokens that use it or lift its lint, and who has it: files, rooms and folders, which
+/// end with `/`, or all files of an ending, which begins with `*`.
 struct Power {
     name: &'static str,
     marks: &'static [&'static str],
@@ -45,7 +45,7 @@ const POWERS: &[Power] = &[
     Power {
         name: "lifting the lint on writing and clocks",
         marks: &["disallowed_methods"],
-        holders: &["bench/clock.rs", "bundle/lib.rs", "cli/bar.rs"],
+        holders: &["commands/bench/clock.rs", "bundle/lib.rs", "cli/bar.rs"],
     },
     Power {
         name: "unsafe code",
@@ -69,7 +69,7 @@ const POWERS: &[Power] = &[
     Power {
         name: "reading a clock",
         marks: &["Instant", "SystemTime", "ProcessTime"],
-        holders: &["bench/clock.rs", "cli/bar.rs"],
+        holders: &["commands/bench/clock.rs", "cli/bar.rs"],
     },
     Power {
         name: "ending the process",
@@ -112,7 +112,14 @@ const POWERS: &[Power] = &[
     Power {
         name: "the command line's crates",
         marks: &["clap", "clap_complete", "clap_mangen"],
-        holders: &["cli/", "suite/arguments.rs"],
+        holders: &[
+            "cli/",
+            "*command.rs",
+            "commands/completions.rs",
+            "commands/man.rs",
+            "commands/mod.rs",
+            "suite/arguments.rs",
+        ],
     },
     Power {
         name: "the plotting crate",
@@ -122,7 +129,9 @@ const POWERS: &[Power] = &[
 ];
 
 fn covers(holder: &str, path: &str) -> bool {
-    if holder.ends_with('/') {
+    if let Some(ending) = holder.strip_prefix('*') {
+        path.ends_with(ending)
+    } else if holder.ends_with('/') {
         path.starts_with(holder)
     } else {
         path == holder

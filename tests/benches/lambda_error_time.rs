@@ -14,14 +14,14 @@
 use std::error::Error;
 use std::path::Path;
 
-use fluxform::bench::clock::{Effort, measure as repeated};
+use fluxform::commands::bench::clock::{Effort, measure as repeated};
 use fluxform::design::{Design, Need};
-use fluxform::job::scene::Scene;
-use fluxform::job::steel;
 use fluxform::lambda::worst::worst_point;
 use fluxform::lambda::{self, Settings};
 use fluxform::numerics::axis::Axis;
 use fluxform::progress::Silent;
+use fluxform::scene::Scene;
+use fluxform::scene::steel;
 use serde_json::{Value, json};
 
 #[path = "../lambda/case.rs"]

@@ -12,7 +12,7 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use fluxform::bench::clock::Watch;
+use fluxform::commands::bench::clock::Watch;
 use fluxform::numerics::axis::Axis;
 use fluxform::progress::Silent;
 use fluxform::shape::deviation::{Faces, Lattice, hausdorff, vertical};

@@ -16,18 +16,17 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use fluxform::bench::clock::Watch;
 use fluxform::bundle::artefact::Input;
 use fluxform::bundle::replay::Answer;
+use fluxform::commands::bench::clock::Watch;
+use fluxform::commands::calibrate::{self, CalibrateOptions, DEFAULT_REACH_M};
+use fluxform::commands::lambda::LambdaOptions;
+use fluxform::commands::replay::Opened;
+use fluxform::commands::replay::synthesize::{Kind, Synthesis};
 use fluxform::design::{Design, Need};
-use fluxform::job::calibrate::{
-    self, CalibrateOptions, DEFAULT_REACH_M, DesignSource, ShapeSource,
-};
-use fluxform::job::lambda::LambdaOptions;
-use fluxform::job::replay::Opened;
-use fluxform::job::replay::synthesize::{Kind, Synthesis};
 use fluxform::lambda::Allocator;
 use fluxform::progress::Silent;
+use fluxform::scene::sources::{DesignSource, ShapeSource};
 use fluxform::shape::document::ShapeDocument;
 
 type Failure = Box<dyn Error + Send + Sync>;

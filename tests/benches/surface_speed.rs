@@ -19,7 +19,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use fluxform::bench::clock::Watch;
+use fluxform::commands::bench::clock::Watch;
 use fluxform::numerics::axis::Axis;
 use fluxform::progress::Silent;
 use fluxform::shape::document::Placement;

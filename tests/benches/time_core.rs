@@ -14,16 +14,16 @@ use std::error::Error;
 use std::path::Path;
 use std::sync::Mutex;
 
-use fluxform::bench::clock::{Watch, quartiles};
 use fluxform::bundle::write::MapFormats;
+use fluxform::commands::bench::clock::{Watch, quartiles};
+use fluxform::commands::map::{self, MapRequest};
 use fluxform::design::{Design, Need};
-use fluxform::job::map::{self, MapRequest};
-use fluxform::job::scene::Scene;
-use fluxform::job::steel::{self, Solved};
 use fluxform::lambda::{self, ForceProblem, Settings};
 use fluxform::map::tabulate::{Components, Grid, tabulate};
 use fluxform::numerics::axis::Axis;
 use fluxform::progress::{Progress, Silent};
+use fluxform::scene::Scene;
+use fluxform::scene::steel::{self, Solved};
 
 const MAP_TOLERANCE: f64 = 1e-9;
 const FORCE_TOLERANCE: f64 = 1e-12;

@@ -15,14 +15,14 @@ use std::error::Error;
 use std::path::Path;
 use std::process::Command;
 
-use fluxform::bench::clock::Watch;
+use fluxform::commands::bench::clock::Watch;
 use fluxform::design::{Design, Need};
-use fluxform::job::scene::Scene;
-use fluxform::job::steel;
 use fluxform::lambda::worst::worst_point;
 use fluxform::lambda::{self, ForceProblem, Settings};
 use fluxform::numerics::axis::Axis;
 use fluxform::progress::Silent;
+use fluxform::scene::Scene;
+use fluxform::scene::steel;
 use fluxform_bench::memory::peak_bytes;
 
 const TOLERANCE: f64 = 1e-12;

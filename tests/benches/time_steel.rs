@@ -12,12 +12,12 @@
 use std::error::Error;
 use std::path::Path;
 
-use fluxform::bench::clock::Watch;
 use fluxform::coil::inductance::self_inductance_h;
+use fluxform::commands::bench::clock::Watch;
 use fluxform::design::{Design, Need};
 use fluxform::field::steel::array::CoupledArray;
 use fluxform::field::steel::cored_coil::CoredCoil;
-use fluxform::job::scene::Scene;
+use fluxform::scene::Scene;
 
 type Failure = Box<dyn Error + Send + Sync>;
 

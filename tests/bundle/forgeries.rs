@@ -13,11 +13,12 @@ use fluxform::bundle::npz::{MapArrays, to_npz};
 use fluxform::bundle::rendering::HeightGrid;
 use fluxform::bundle::seal::to_record;
 use fluxform::bundle::table::{CurrentRow, PointRow, write_currents, write_points};
+use fluxform::commands::calibrate::{self, CalibrateOptions};
+use fluxform::commands::verify::{Verifier, VerifyOptions};
 use fluxform::design::{Design, Need};
-use fluxform::job::calibrate::{self, CalibrateOptions, DesignSource, ShapeSource};
-use fluxform::job::verify::{Verifier, VerifyOptions};
 use fluxform::lambda::Criterion;
 use fluxform::progress::Silent;
+use fluxform::scene::sources::{DesignSource, ShapeSource};
 use fluxform::shape::document::ShapeDocument;
 
 use crate::sample::temporary;

@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use fluxform::bundle::load::Bundle;
 use fluxform::bundle::npz::MapArrays;
 use fluxform::bundle::replay::Answer;
-use fluxform::job::replay::renderer::Renderer;
+use fluxform::commands::replay::renderer::Renderer;
 
 use crate::sample::*;
 

@@ -15,7 +15,7 @@ fn commands() -> Vec<Vec<String>> {
         }
     }
     let mut all = Vec::new();
-    below(&fluxform::cli::command(), &[], &mut all);
+    below(&fluxform::commands::command(), &[], &mut all);
     assert!(all.len() > 15, "{all:?}");
     all
 }

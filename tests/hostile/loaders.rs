@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-use fluxform::job::replay::Opened;
+use fluxform::commands::replay::Opened;
 
 use crate::harness::Input;
 use crate::kinds::bundle::{hostile, mutate, seeds};

@@ -3,9 +3,9 @@
 use fluxform::bundle::replay::Answer;
 use fluxform::bundle::trajectory::Trajectory;
 use fluxform::bundle::write::{BundleContent, write_bundle};
-use fluxform::job::replay::summary::Told;
-use fluxform::job::replay::synthesize::{Kind, Synthesis};
-use fluxform::job::replay::{Opened, ReplayReport, run};
+use fluxform::commands::replay::summary::Told;
+use fluxform::commands::replay::synthesize::{Kind, Synthesis};
+use fluxform::commands::replay::{Opened, ReplayReport, run};
 use fluxform::progress::Silent;
 
 use crate::support::{Random, coupled, in_air};

@@ -4,13 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use fluxform::bundle::artefact::Input;
+use fluxform::commands::calibrate::{self, CalibrateOptions, DEFAULT_REACH_M};
+use fluxform::commands::lambda::LambdaOptions;
+use fluxform::commands::replay::Opened;
 use fluxform::design::{Design, Need};
-use fluxform::job::calibrate::{
-    self, CalibrateOptions, DEFAULT_REACH_M, DesignSource, ShapeSource,
-};
-use fluxform::job::lambda::LambdaOptions;
-use fluxform::job::replay::Opened;
 use fluxform::progress::Silent;
+use fluxform::scene::sources::{DesignSource, ShapeSource};
 use fluxform::shape::document::ShapeDocument;
 use tempfile::TempDir;
 

@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use clap::Parser;
 use clap::builder::PossibleValuesParser;
+use fluxform::RunError;
 use fluxform::bundle::json::to_json;
 use fluxform::cli::shell::{
     Codes, Common, Failure, FileArgument, Place, Printer, Program, Sheet, Side, Writing, begin,
     folder, page, table,
 };
 use fluxform::cli::shell::{bytes, count, error, number_to, si};
-use fluxform::job::JobError;
 use fluxform::progress::Progress;
 
 use crate::catalogue::CaseRow;
@@ -172,7 +172,7 @@ impl Arguments {
         }
         let bar = begin(printer);
         let rows = extreme::run(&cases, &bar);
-        bar.check().map_err(JobError::from)?;
+        bar.check().map_err(RunError::from)?;
         drop(bar);
         if let Some(out) = &out {
             write_catalogue(&rows, made_with.clone(), out, self.writing.force)?;

@@ -1,8 +1,8 @@
 //! How much of every curve is measured, and how carefully.
 
 use crate::file::Row;
-use fluxform::bench::clock::{Effort, Timing, measure};
-use fluxform::job::JobError;
+use fluxform::RunError;
+use fluxform::commands::bench::clock::{Effort, Timing, measure};
 use fluxform::progress::Progress;
 
 /// How much is measured.
@@ -54,8 +54,8 @@ impl Pace {
     pub fn time<T>(
         &self,
         progress: &dyn Progress,
-        work: impl FnMut() -> Result<T, JobError>,
-    ) -> Result<(T, Timing), JobError> {
+        work: impl FnMut() -> Result<T, RunError>,
+    ) -> Result<(T, Timing), RunError> {
         progress.check()?;
         let measured = measure(&self.effort, work)?;
         progress.advance(1);

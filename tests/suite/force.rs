@@ -2,12 +2,14 @@
 
 use super::inputs::BuiltIn;
 use super::test_surface::HALF_M;
+use fluxform::RunError;
 use fluxform::design::{Design, Need};
-use fluxform::job::scene::Scene;
-use fluxform::job::{JobError, KERNEL_ERROR, steel};
+use fluxform::field::winding::KERNEL_ERROR;
 use fluxform::lambda::ForceProblem;
 use fluxform::numerics::axis::Axis;
 use fluxform::progress::Silent;
+use fluxform::scene::Scene;
+use fluxform::scene::steel;
 
 /// A force problem that owns its numbers.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,7 +47,7 @@ impl Forces {
 ///
 /// # Errors
 /// A built-in design that cannot be read.
-pub fn with_coils(design: &BuiltIn, side: usize) -> Result<Design, JobError> {
+pub fn with_coils(design: &BuiltIn, side: usize) -> Result<Design, RunError> {
     const PITCH_M: f64 = 0.05;
     let mut design = design.design(Need::CALIBRATE)?;
     let middle = 0.5 * (side.max(1) - 1) as f64;
@@ -70,7 +72,7 @@ pub fn forces(
     side: usize,
     samples: usize,
     height_m: fn(f64, f64) -> f64,
-) -> Result<Forces, JobError> {
+) -> Result<Forces, RunError> {
     let design = with_coils(design, side)?;
     let scene = Scene::new(&design)?;
     let solved = steel::solve(&scene, None, KERNEL_ERROR, 0.03)?;

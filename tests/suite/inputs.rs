@@ -4,9 +4,9 @@ use std::path::Path;
 
 use serde::de::DeserializeOwned;
 
+use fluxform::RunError;
 use fluxform::bundle::artefact::Input;
 use fluxform::design::{Design, Need};
-use fluxform::job::JobError;
 
 /// A file of the repository that is part of the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,18 +60,18 @@ impl BuiltIn {
     ///
     /// # Errors
     /// A design that cannot be read: a mistake of the program, told like a user's.
-    pub fn design(&self, need: Need) -> Result<Design, JobError> {
+    pub fn design(&self, need: Need) -> Result<Design, RunError> {
         let read = Design::from_toml(self.text, Path::new(self.path), need);
         read.map(|(design, _)| design)
-            .map_err(|fault| JobError::Input(format!("{}: {fault}", self.path)))
+            .map_err(|fault| RunError::Input(format!("{}: {fault}", self.path)))
     }
 
     /// The values that it holds.
     ///
     /// # Errors
     /// As [`BuiltIn::design`].
-    pub fn values<T: DeserializeOwned>(&self) -> Result<T, JobError> {
+    pub fn values<T: DeserializeOwned>(&self) -> Result<T, RunError> {
         serde_json::from_str(self.text)
-            .map_err(|fault| JobError::Input(format!("{}: {fault}", self.path)))
+            .map_err(|fault| RunError::Input(format!("{}: {fault}", self.path)))
     }
 }

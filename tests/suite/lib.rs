@@ -30,8 +30,8 @@ use std::path::PathBuf;
 use self::effort::Pace;
 use self::stages::{Measured, STAGES, Stage};
 use crate::file::BenchFile;
+use fluxform::RunError;
 use fluxform::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
-use fluxform::job::JobError;
 use fluxform::progress::Progress;
 
 /// What is asked.
@@ -73,7 +73,7 @@ fn inputs(request: &BenchRequest) -> Vec<Input> {
 ///
 /// # Errors
 /// Files that must not be replaced; a stage that fails; interruption.
-pub fn run(request: &BenchRequest, progress: &dyn Progress) -> Result<BenchFile, JobError> {
+pub fn run(request: &BenchRequest, progress: &dyn Progress) -> Result<BenchFile, RunError> {
     let of = (&*inputs(request), &output::made_with(request));
     output::check(of, &request.out, request.force)?;
     let mut file = measure(request, progress)?;
@@ -85,11 +85,11 @@ pub fn run(request: &BenchRequest, progress: &dyn Progress) -> Result<BenchFile,
 ///
 /// # Errors
 /// As [`run`].
-pub fn measure(request: &BenchRequest, progress: &dyn Progress) -> Result<BenchFile, JobError> {
+pub fn measure(request: &BenchRequest, progress: &dyn Progress) -> Result<BenchFile, RunError> {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build()
-        .map_err(|error| JobError::Unmet(format!("no thread to measure on: {error}")))?;
+        .map_err(|error| RunError::Unmet(format!("no thread to measure on: {error}")))?;
     let mut measured: Vec<Measured> = Vec::new();
     for stage in chosen(request) {
         progress.begin(stage.name, 1);

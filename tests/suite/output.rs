@@ -7,12 +7,12 @@ use serde::Serialize;
 use crate::BenchRequest;
 use crate::catalogue::{CaseRow, CatalogueFile, write_cases};
 use crate::file::{BenchFile, write_laws, write_rows};
+use fluxform::RunError;
 use fluxform::bundle::artefact::{
     FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION, UNITS,
 };
 use fluxform::bundle::atomic::{FileSet, Overwrite};
 use fluxform::bundle::seal::to_record;
-use fluxform::job::JobError;
 
 use crate::catalogue_page;
 use crate::page::{self, PAGE};
@@ -73,7 +73,7 @@ fn overwrite(
 ///
 /// # Errors
 /// An output of something else.
-pub fn check(of: (&[Input], &Options), folder: &Path, force: bool) -> Result<(), JobError> {
+pub fn check(of: (&[Input], &Options), folder: &Path, force: bool) -> Result<(), RunError> {
     Ok(overwrite(of, folder, JSON, force).check(&folder.join(JSON))?)
 }
 
@@ -81,7 +81,7 @@ pub fn check(of: (&[Input], &Options), folder: &Path, force: bool) -> Result<(),
 ///
 /// # Errors
 /// Files that cannot be written or must not be replaced.
-pub fn write(file: &mut BenchFile, folder: &Path, force: bool) -> Result<(), JobError> {
+pub fn write(file: &mut BenchFile, folder: &Path, force: bool) -> Result<(), RunError> {
     let overwrite = overwrite((&file.inputs, &file.made_with), folder, JSON, force);
     let mut set = FileSet::begin(folder, overwrite);
     let mut entries = Vec::new();
@@ -104,7 +104,7 @@ pub fn write(file: &mut BenchFile, folder: &Path, force: bool) -> Result<(), Job
     let shown = set.write(PAGE, |out| out.write_all(html.as_bytes()))?;
     entries.push(FileEntry::new(PAGE, shown));
     file.files = entries;
-    let json = to_record(file).map_err(|fault| JobError::Input(fault.to_string()))?;
+    let json = to_record(file).map_err(|fault| RunError::Input(fault.to_string()))?;
     set.write(JSON, |out| out.write_all(&json))?;
     Ok(set.commit()?)
 }
@@ -121,7 +121,7 @@ pub fn write_catalogue(
     made_with: Options,
     folder: &Path,
     force: bool,
-) -> Result<(), JobError> {
+) -> Result<(), RunError> {
     let overwrite = overwrite((&[], &made_with), folder, CATALOGUE, force);
     let mut set = FileSet::begin(folder, overwrite);
     let mut file = catalogue_file(cases, made_with);
@@ -132,7 +132,7 @@ pub fn write_catalogue(
         FileEntry::new("extreme.csv", table),
         FileEntry::new(PAGE, shown),
     ];
-    let json = to_record(&file).map_err(|fault| JobError::Input(fault.to_string()))?;
+    let json = to_record(&file).map_err(|fault| RunError::Input(fault.to_string()))?;
     set.write(CATALOGUE, |out| out.write_all(&json))?;
     Ok(set.commit()?)
 }
@@ -155,7 +155,7 @@ pub fn catalogue_file(cases: &[CaseRow], made_with: Options) -> CatalogueFile {
 ///
 /// # Errors
 /// An output of something else.
-pub fn check_catalogue(made_with: &Options, folder: &Path, force: bool) -> Result<(), JobError> {
+pub fn check_catalogue(made_with: &Options, folder: &Path, force: bool) -> Result<(), RunError> {
     let overwrite = overwrite((&[], made_with), folder, CATALOGUE, force);
     Ok(overwrite.check(&folder.join(CATALOGUE))?)
 }

@@ -1,6 +1,6 @@
 //! A smooth surface without symmetry, as a formula and as triangles.
 
-use fluxform::job::JobError;
+use fluxform::RunError;
 use fluxform::numerics::axis::Axis;
 use fluxform::shape::document::Placement;
 use fluxform::shape::height::{Grid, Sample};
@@ -28,7 +28,7 @@ pub fn dome_m(x_m: f64, y_m: f64) -> f64 {
 ///
 /// # Errors
 /// None that this surface can give.
-pub fn mesh(side: usize) -> Result<Mesh, JobError> {
+pub fn mesh(side: usize) -> Result<Mesh, RunError> {
     let line = Axis {
         from: -HALF_MESH_M,
         to: HALF_MESH_M,
@@ -69,8 +69,8 @@ pub fn known(samples: &[Option<Sample>]) -> Vec<Option<f64>> {
 }
 
 /// A shape's error as a job's.
-pub fn shape(source: fluxform::shape::ShapeError) -> JobError {
-    JobError::Shape {
+pub fn shape(source: fluxform::shape::ShapeError) -> RunError {
+    RunError::Shape {
         name: "wave".to_owned(),
         source,
     }

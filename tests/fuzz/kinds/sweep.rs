@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use fluxform::bundle::artefact::{Input as Entry, sha256_hex};
 use fluxform::bundle::json::to_json;
 use fluxform::bundle::sweep::{Axis, Mode, PlanFile, PointFile, Row, Status, Value};
-use fluxform::job::sweep::merge::{MergeRequest, merge_table};
-use fluxform::job::sweep::run::run;
+use fluxform::commands::sweep::merge::{MergeRequest, merge_table};
+use fluxform::commands::sweep::run::run;
 use fluxform::progress::Silent;
 
 use super::{limits, refusal};

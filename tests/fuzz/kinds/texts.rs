@@ -5,10 +5,10 @@ use std::path::Path;
 use fluxform::bundle::json::to_json;
 use fluxform::bundle::read_table::read_positions;
 use fluxform::bundle::trajectory::Trajectory;
+use fluxform::commands::{discretize, evaluate};
 use fluxform::design::bh_table::read_bh_table;
 use fluxform::design::{Design, InvalidDocument, Need};
 use fluxform::field::steel::bh_curve::BhCurve;
-use fluxform::job::{discretize, evaluate};
 use fluxform::progress::Silent;
 use fluxform::shape::document::{AxisRequest, ShapeDocument, SurfaceSource};
 

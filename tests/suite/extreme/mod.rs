@@ -24,7 +24,7 @@ mod wires;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crate::catalogue::CaseRow;
-use fluxform::bench::clock::Watch;
+use fluxform::commands::bench::clock::Watch;
 use fluxform::progress::{Progress, pass_interruption};
 
 /// Seconds a case may take unless it says otherwise; unoptimised builds on busy machines included.

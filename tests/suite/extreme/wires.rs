@@ -8,10 +8,10 @@ use super::{Case, case};
 use fluxform::coil::circuit::{Circuit, turns_that_fit};
 use fluxform::coil::optimum::air::AirCoil;
 use fluxform::coil::optimum::{Fixed, Settings, Strand, Task, optimise_wound};
+use fluxform::commands::evaluate::{Evaluation, evaluate};
 use fluxform::design::gauge::awg_mm;
 use fluxform::design::{Coil, Design, Limits, Need, Wire};
 use fluxform::field::magnet::MagnetRule;
-use fluxform::job::evaluate::{Evaluation, evaluate};
 use fluxform::progress::Silent;
 
 pub fn cases() -> Vec<Case> {

@@ -13,9 +13,9 @@ use serde::Deserialize;
 
 use super::stages::Measured;
 use crate::file::{Curve, Row};
+use fluxform::RunError;
 use fluxform::bundle::atomic::{Overwrite, Scratch};
 use fluxform::bundle::write::write_json;
-use fluxform::job::JobError;
 use fluxform::progress::Progress;
 
 /// Names Python interpreters, separated as in PATH; the first that has a peer's packages runs it.
@@ -62,7 +62,7 @@ pub fn add(
     measured: &mut [Measured],
     quick: bool,
     progress: &dyn Progress,
-) -> Result<Vec<String>, JobError> {
+) -> Result<Vec<String>, RunError> {
     let mut missing = Vec::new();
     let pythons = interpreters();
     let scratch = Scratch::new()?;

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::file::Curve;
 use crate::inputs::{NLOPT, OPTIMUM_AIR};
 use crate::stages::{Measured, problem};
-use fluxform::job::JobError;
+use fluxform::RunError;
 
 /// A problem for one script.
 pub struct Posed {
@@ -22,7 +22,7 @@ pub struct Posed {
 }
 
 /// Stage, its curve's number, script, and the numbers of the problem.
-type Maker = fn() -> Result<Value, JobError>;
+type Maker = fn() -> Result<Value, RunError>;
 const MAKERS: [(&str, usize, &str, Maker); 6] = [
     ("inductance", 1, "inductance_cfsem.py", problem::inductance),
     ("cored-coil", 0, "core_ngsolve.py", problem::cored_coil),
@@ -36,7 +36,7 @@ const MAKERS: [(&str, usize, &str, Maker); 6] = [
 ///
 /// # Errors
 /// Built-in values that cannot be read.
-pub fn problems(measured: &[Measured], quick: bool) -> Result<Vec<Posed>, JobError> {
+pub fn problems(measured: &[Measured], quick: bool) -> Result<Vec<Posed>, RunError> {
     let mut posed = Vec::new();
     let mut add = |stage: &'static str, at: usize, script, content: Value| {
         let found = measured.iter().find(|m| m.curves.stage == stage);

@@ -10,8 +10,8 @@ pub use sizes::{LAWS, Spec};
 
 use super::memory::peak_bytes;
 use crate::file::{Law, Outlook, SizeRow};
-use fluxform::bench::clock::{Effort, Timing};
-use fluxform::job::JobError;
+use fluxform::RunError;
+use fluxform::commands::bench::clock::{Effort, Timing};
 use fluxform::progress::Progress;
 
 /// What a scene may take: an hour of processor time, and memory.
@@ -76,16 +76,16 @@ pub fn size_row(
     axis: &str,
     setting: usize,
     threads: usize,
-) -> Result<SizeRow, JobError> {
+) -> Result<SizeRow, RunError> {
     if stage == IDLE {
         return Ok(row(0.0, threads, &NOTHING));
     }
     let spec = LAWS.iter().find(|s| s.stage == stage && s.axis == axis);
-    let spec = spec.ok_or_else(|| JobError::Input(format!("no law of {stage} against {axis}")))?;
+    let spec = spec.ok_or_else(|| RunError::Input(format!("no law of {stage} against {axis}")))?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
-        .map_err(|error| JobError::Input(format!("{threads} threads: {error}")))?;
+        .map_err(|error| RunError::Input(format!("{threads} threads: {error}")))?;
     let (size, timing) = pool.install(|| (spec.run)(setting, &EFFORT))?;
     let size = if axis == THREADS {
         threads as f64
@@ -119,7 +119,7 @@ fn row(size: f64, threads: usize, timing: &Timing) -> SizeRow {
 ///
 /// # Errors
 /// A process that fails; interruption.
-pub fn laws(quick: bool, progress: &dyn Progress) -> Result<Vec<Law>, JobError> {
+pub fn laws(quick: bool, progress: &dyn Progress) -> Result<Vec<Law>, RunError> {
     let idle = child(IDLE, IDLE, 0, 1)?.peak_bytes;
     let most = std::thread::available_parallelism().map_or(1, usize::from);
     let count = LAWS.iter().map(|spec| spec.settings(quick, most).len());
@@ -139,9 +139,9 @@ pub fn laws(quick: bool, progress: &dyn Progress) -> Result<Vec<Law>, JobError> 
 }
 
 /// Runs this program once more for one row.
-fn child(stage: &str, axis: &str, setting: usize, threads: usize) -> Result<SizeRow, JobError> {
+fn child(stage: &str, axis: &str, setting: usize, threads: usize) -> Result<SizeRow, RunError> {
     let failed =
-        |what: String| JobError::Unmet(format!("{stage} against {axis} at {setting}: {what}"));
+        |what: String| RunError::Unmet(format!("{stage} against {axis} at {setting}: {what}"));
     let program = std::env::current_exe().map_err(|error| failed(error.to_string()))?;
     let row = format!("{stage}:{axis}:{setting}:{threads}");
     let output = Command::new(program)

@@ -6,26 +6,26 @@ use crate::force::{forces, with_coils};
 use crate::inputs::{OPTIMUM_AIR, SEED, SEED_AIR};
 use crate::stages::posed;
 use crate::test_surface::{dome_m, grid, known, mesh};
-use fluxform::bench::clock::{Effort, Timing, measure};
+use fluxform::RunError;
 use fluxform::coil::inductance::self_inductance_h;
 use fluxform::coil::mutual::inductance_matrix_h;
 use fluxform::coil::optimum::{Settings as Search, optimise};
+use fluxform::commands::bench::clock::{Effort, Timing, measure};
 use fluxform::design::Need;
 use fluxform::field::steel::array::CoupledArray;
-use fluxform::job::JobError;
-use fluxform::job::scene::Scene;
-use fluxform::job::steel::{self, COUPLED_TOLERANCE};
 use fluxform::lambda::worst::worst_point;
 use fluxform::lambda::{self, Allocator, Settings};
 use fluxform::map::Components;
 use fluxform::map::tabulate::{Grid, tabulate};
 use fluxform::numerics::axis::Axis;
 use fluxform::progress::Silent;
+use fluxform::scene::Scene;
+use fluxform::scene::steel::{self, COUPLED_TOLERANCE};
 use fluxform::shape::deviation::{Faces, Lattice, vertical};
 use fluxform::shape::height::heights;
 
 /// Size and seconds.
-type Sized = Result<(f64, Timing), JobError>;
+type Sized = Result<(f64, Timing), RunError>;
 
 /// One law: what is computed, against what, at which settings.
 #[derive(Debug, Clone, Copy)]
@@ -193,7 +193,7 @@ pub const LAWS: [Spec; 20] = [
     spec("height-map", THREADS, 1.0, &[512], map_triangles),
 ];
 
-fn workspace(samples: usize, along_z: usize) -> Result<Grid, JobError> {
+fn workspace(samples: usize, along_z: usize) -> Result<Grid, RunError> {
     let design = SEED_AIR.design(Need::CALIBRATE)?;
     let nodes = |axis: &Axis, samples: usize| Axis { samples, ..*axis }.nodes();
     Ok(Grid {
@@ -203,12 +203,12 @@ fn workspace(samples: usize, along_z: usize) -> Result<Grid, JobError> {
     })
 }
 
-fn map(side: usize, grid: &Grid, effort: &Effort) -> Result<Timing, JobError> {
+fn map(side: usize, grid: &Grid, effort: &Effort) -> Result<Timing, RunError> {
     let design = with_coils(&SEED_AIR, side)?;
     let scene = Scene::new(&design)?;
     let work = || {
         let (winding, coils) = (&scene.winding, &scene.coils);
-        Ok::<_, JobError>(tabulate(
+        Ok::<_, RunError>(tabulate(
             winding,
             coils,
             grid,
@@ -237,7 +237,7 @@ fn matrix(side: usize, effort: &Effort) -> Sized {
     let work = || {
         let own_h = self_inductance_h(&scene.winding);
         let axes_m = &design.array.positions_m;
-        Ok::<_, JobError>(inductance_matrix_h(&scene.winding, own_h, axes_m))
+        Ok::<_, RunError>(inductance_matrix_h(&scene.winding, own_h, axes_m))
     };
     Ok(((side * side) as f64, measure(effort, work)?.1))
 }
@@ -248,7 +248,7 @@ fn coupled(side: usize, effort: &Effort) -> Sized {
     let core = scene
         .core
         .as_ref()
-        .ok_or_else(|| JobError::Input("the built-in design has no [core]".to_owned()))?;
+        .ok_or_else(|| RunError::Input("the built-in design has no [core]".to_owned()))?;
     let work = || {
         let array = CoupledArray::new(
             &scene.winding,
@@ -258,7 +258,7 @@ fn coupled(side: usize, effort: &Effort) -> Sized {
             COUPLED_TOLERANCE,
             0.01,
         );
-        Ok::<_, JobError>(array?)
+        Ok::<_, RunError>(array?)
     };
     Ok(((side * side) as f64, measure(effort, work)?.1))
 }
@@ -289,10 +289,10 @@ fn coupled_points(samples: usize, effort: &Effort) -> Sized {
     Ok((points.len() as f64, measure(effort, work)?.1))
 }
 
-fn path(side: usize, samples: usize, effort: &Effort) -> Result<Timing, JobError> {
+fn path(side: usize, samples: usize, effort: &Effort) -> Result<Timing, RunError> {
     let given = forces(&SEED_AIR, side, samples, dome_m)?;
     let problem = given.problem();
-    let work = || Ok::<_, JobError>(lambda::solve(&problem, &Settings::default())?);
+    let work = || Ok::<_, RunError>(lambda::solve(&problem, &Settings::default())?);
     Ok(measure(effort, work)?.1)
 }
 
@@ -304,10 +304,10 @@ fn path_coils(side: usize, effort: &Effort) -> Sized {
     Ok(((side * side) as f64, path(side, SAMPLES, effort)?))
 }
 
-fn worst(side: usize, samples: usize, effort: &Effort) -> Result<Timing, JobError> {
+fn worst(side: usize, samples: usize, effort: &Effort) -> Result<Timing, RunError> {
     let given = forces(&SEED_AIR, side, samples, dome_m)?;
     let problem = given.problem();
-    let work = || Ok::<_, JobError>(worst_point(&problem, &Settings::default())?);
+    let work = || Ok::<_, RunError>(worst_point(&problem, &Settings::default())?);
     Ok(measure(effort, work)?.1)
 }
 
@@ -319,10 +319,10 @@ fn worst_coils(side: usize, effort: &Effort) -> Sized {
     Ok(((side * side) as f64, worst(side, 21, effort)?))
 }
 
-fn height_map(side: usize, samples: usize, effort: &Effort) -> Result<(usize, Timing), JobError> {
+fn height_map(side: usize, samples: usize, effort: &Effort) -> Result<(usize, Timing), RunError> {
     let mesh = mesh(side)?;
     let plan = grid(samples);
-    let work = || Ok::<_, JobError>(heights(&mesh, &plan, &Silent)?);
+    let work = || Ok::<_, RunError>(heights(&mesh, &plan, &Silent)?);
     Ok((mesh.triangles().len(), measure(effort, work)?.1))
 }
 
@@ -336,14 +336,14 @@ fn map_points(samples: usize, effort: &Effort) -> Sized {
     Ok(((samples * samples) as f64, timing))
 }
 
-fn deviation(side: usize, samples: usize, effort: &Effort) -> Result<(usize, Timing), JobError> {
+fn deviation(side: usize, samples: usize, effort: &Effort) -> Result<(usize, Timing), RunError> {
     let mesh = mesh(side)?;
     let plan = grid(samples);
     let work = || {
         let known = known(&heights(&mesh, &plan, &Silent)?);
         let faces = Faces::new(&mesh, &plan);
         let lattice = Lattice::new(&faces, &plan, &known);
-        Ok::<_, JobError>(vertical(&mesh, &plan, &lattice, &Silent)?)
+        Ok::<_, RunError>(vertical(&mesh, &plan, &lattice, &Silent)?)
     };
     Ok((mesh.triangles().len(), measure(effort, work)?.1))
 }
@@ -376,7 +376,7 @@ fn wires(count: usize, effort: &Effort) -> Sized {
         valley: false,
         ..Search::default()
     };
-    let work = || Ok::<_, JobError>(optimise(&*model, &task, &settings, &Silent)?);
+    let work = || Ok::<_, RunError>(optimise(&*model, &task, &settings, &Silent)?);
     Ok((count as f64, measure(effort, work)?.1))
 }
 
@@ -384,7 +384,7 @@ fn wires(count: usize, effort: &Effort) -> Sized {
 fn allocate(side: usize, effort: &Effort) -> Sized {
     const ROWS: usize = 1000;
     let coils = side * side;
-    let refused = |error: &dyn std::fmt::Display| JobError::Input(error.to_string());
+    let refused = |error: &dyn std::fmt::Display| RunError::Input(error.to_string());
     let (lower, upper) = (vec![0.0; coils], vec![2.0; coils]);
     let mut allocator = Allocator::new(&vec![6.0; coils], &lower, &upper, Some(coils as f64))
         .map_err(|error| refused(&error))?;
@@ -395,7 +395,7 @@ fn allocate(side: usize, effort: &Effort) -> Sized {
         for row in rows.chunks_exact(coils) {
             std::hint::black_box(allocator.allocate(row, 0.3 * coils as f64, &mut currents));
         }
-        Ok::<_, JobError>(())
+        Ok::<_, RunError>(())
     };
     let timing = measure(effort, work)?.1;
     let each = |seconds: f64| seconds / ROWS as f64;

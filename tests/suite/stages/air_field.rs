@@ -11,12 +11,13 @@ use crate::file::{Curve, StageCurves};
 use crate::inputs::{AIR_COIL, SEED};
 use crate::reference::{AXIAL_ERROR, axial_gradient};
 use crate::stages::Measured;
+use fluxform::RunError;
 use fluxform::design::Need;
 use fluxform::field::batch::Wanted;
+use fluxform::field::winding::KERNEL_ERROR;
 use fluxform::field::winding::{AxialField, Winding};
-use fluxform::job::scene::Scene;
-use fluxform::job::{JobError, KERNEL_ERROR};
 use fluxform::progress::Progress;
+use fluxform::scene::Scene;
 
 /// Points above the winding.
 const POINTS: usize = 1024;
@@ -56,13 +57,13 @@ struct Point {
     br_over_r: String,
 }
 
-pub(super) fn number(text: &str) -> Result<f64, JobError> {
+pub(super) fn number(text: &str) -> Result<f64, RunError> {
     text.parse()
-        .map_err(|_| JobError::Input(format!("{}: {text:?} is no number", AIR_COIL.path)))
+        .map_err(|_| RunError::Input(format!("{}: {text:?} is no number", AIR_COIL.path)))
 }
 
 impl Section {
-    pub(super) fn winding(&self) -> Result<Winding, JobError> {
+    pub(super) fn winding(&self) -> Result<Winding, RunError> {
         Ok(Winding {
             inner_radius_m: number(&self.inner_radius_m)?,
             outer_radius_m: number(&self.outer_radius_m)?,
@@ -73,9 +74,9 @@ impl Section {
 }
 
 /// Every point of the oracle, with its winding and the field there.
-fn exact_points() -> Result<Vec<(Winding, [f64; 2], AxialField)>, JobError> {
+fn exact_points() -> Result<Vec<(Winding, [f64; 2], AxialField)>, RunError> {
     let oracle: Oracle = AIR_COIL.values()?;
-    let unknown = |name: &str| JobError::Input(format!("{}: no winding {name}", AIR_COIL.path));
+    let unknown = |name: &str| RunError::Input(format!("{}: no winding {name}", AIR_COIL.path));
     let one = |point: &Point| {
         let section = oracle.windings.get(&point.winding);
         let winding = section.ok_or_else(|| unknown(&point.winding))?.winding()?;
@@ -106,7 +107,7 @@ fn gradient_error(found: &AxialField, exact: &AxialField) -> f64 {
 ///
 /// # Errors
 /// Interruption.
-pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
+pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, RunError> {
     let design = SEED.design(Need::CALIBRATE)?;
     let winding = Scene::new(&design)?.winding;
     Ok(Measured {
@@ -130,7 +131,7 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
 }
 
 /// The vectorised rule.
-fn batch(winding: &Winding, pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
+fn batch(winding: &Winding, pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
     let mut numbers = Numbers(7);
     let mut places: Vec<[f64; 2]> = (0..POINTS)
         .map(|_| [numbers.between(0.0, 0.14), numbers.between(LOWEST_M, 0.08)])
@@ -184,7 +185,7 @@ fn batch(winding: &Winding, pace: &Pace, progress: &dyn Progress) -> Result<Curv
 }
 
 /// The kernel at the oracle's points: near, far, inside, on singular lines.
-fn kernel(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
+fn kernel(pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
     let points = exact_points()?;
     // Inside thin discs the gradient's digits are lost to their size.
     let told = |winding: &Winding| {
@@ -193,7 +194,7 @@ fn kernel(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
     let points: Vec<_> = points.into_iter().filter(|(w, ..)| told(w)).collect();
     let (found, timing) = pace.time(progress, || {
         let fields = points.iter().map(|(w, [r, z], _)| Ok(w.field(*r, *z)?));
-        fields.collect::<Result<Vec<AxialField>, JobError>>()
+        fields.collect::<Result<Vec<AxialField>, RunError>>()
     })?;
     let error = found
         .iter()

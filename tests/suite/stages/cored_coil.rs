@@ -6,16 +6,16 @@ use super::{Measured, curve, stage};
 use crate::effort::{Found, Pace};
 use crate::file::{Curve, StageCurves};
 use crate::inputs::{CORES, SEED};
+use fluxform::RunError;
 use fluxform::coil::inductance::self_inductance_h;
 use fluxform::design::Need;
 use fluxform::field::steel::CoreShape;
 use fluxform::field::steel::cored_coil::CoredCoil;
 use fluxform::field::steel::generatrix::Resolution;
 use fluxform::field::winding::Winding;
-use fluxform::job::JobError;
-use fluxform::job::scene::Scene;
-use fluxform::job::steel::CORED_TOLERANCE;
 use fluxform::progress::Progress;
+use fluxform::scene::Scene;
+use fluxform::scene::steel::CORED_TOLERANCE;
 
 const TOLERANCES: [f64; 9] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
 /// Lowest height of the seed's maps, m.
@@ -64,7 +64,7 @@ struct Point {
 ///
 /// # Errors
 /// Interruption.
-pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
+pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, RunError> {
     Ok(Measured {
         curves: StageCurves {
             stage: "cored-coil".to_owned(),
@@ -83,7 +83,7 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
 }
 
 /// The seed's coil, against itself much finer.
-fn seed(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
+fn seed(pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
     let design = SEED.design(Need::CALIBRATE)?;
     let scene = Scene::new(&design)?;
     let core = scene.core.as_ref().ok_or_else(super::no_core)?;
@@ -119,7 +119,7 @@ fn seed(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
 
 /// The seed's coil for other programs: gradients on its axis relative to |grad B| there, and the
 /// inductance.
-pub(super) fn problem() -> Result<serde_json::Value, JobError> {
+pub(super) fn problem() -> Result<serde_json::Value, RunError> {
     let design = SEED.design(Need::CALIBRATE)?;
     let scene = Scene::new(&design)?;
     let core = scene.core.as_ref().ok_or_else(super::no_core)?;
@@ -149,7 +149,7 @@ pub(super) fn problem() -> Result<serde_json::Value, JobError> {
 }
 
 /// Largest difference of two solutions.
-fn apart(a: &CoredCoil, b: &CoredCoil) -> Result<f64, JobError> {
+fn apart(a: &CoredCoil, b: &CoredCoil) -> Result<f64, RunError> {
     let mut most = (a.added_inductance_h / b.added_inductance_h - 1.0).abs();
     for [r_m, z_m] in PLACES {
         // Over the winding |grad B| is as large as anywhere at that height, nearly.
@@ -166,7 +166,7 @@ fn apart(a: &CoredCoil, b: &CoredCoil) -> Result<f64, JobError> {
 }
 
 /// Seven generic coils, against another equation.
-fn generic(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
+fn generic(pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
     let oracle: Oracle = CORES.values()?;
     let coil = |case: &Case, tolerance: f64| {
         let winding = Winding {
@@ -189,7 +189,7 @@ fn generic(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
     for &tolerance in pace.settings(&TOLERANCES, TOLERANCES.len()) {
         let (coils, timing) = pace.time(progress, || {
             let coils = oracle.cases.iter().map(|case| coil(case, tolerance));
-            coils.collect::<Result<Vec<CoredCoil>, JobError>>()
+            coils.collect::<Result<Vec<CoredCoil>, RunError>>()
         })?;
         let mut error = 0.0_f64;
         for (coil, case) in coils.iter().zip(&oracle.cases) {

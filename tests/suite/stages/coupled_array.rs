@@ -4,13 +4,13 @@ use super::{Measured, curve, stage};
 use crate::effort::{Found, Pace};
 use crate::file::{Curve, StageCurves};
 use crate::inputs::SEED;
+use fluxform::RunError;
 use fluxform::design::Need;
 use fluxform::field::steel::array::{ArrayResolution, CoupledArray, closest_m};
 use fluxform::field::steel::equivalent_dipoles::{ArraySources, Parts};
-use fluxform::job::JobError;
-use fluxform::job::scene::Scene;
-use fluxform::job::steel::COUPLED_TOLERANCE;
 use fluxform::progress::Progress;
+use fluxform::scene::Scene;
+use fluxform::scene::steel::COUPLED_TOLERANCE;
 
 const TOLERANCES: [f64; 6] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
 /// Rows of a quick run.
@@ -38,7 +38,7 @@ const PLACES: [[f64; 3]; 8] = [
 ///
 /// # Errors
 /// Interruption.
-pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
+pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, RunError> {
     Ok(Measured {
         curves: StageCurves {
             stage: "coupled-array".to_owned(),
@@ -99,7 +99,7 @@ fn apart(a: &Values, b: &Values, air: &[f64]) -> f64 {
     worst.max(largest(&off) / largest(&b.added_inductance_h))
 }
 
-fn seed(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
+fn seed(pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
     let design = SEED.design(Need::CALIBRATE)?;
     let scene = Scene::new(&design)?;
     let core = scene.core.as_ref().ok_or_else(super::no_core)?;

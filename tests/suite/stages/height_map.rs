@@ -7,7 +7,7 @@ use super::{Measured, curve, stage};
 use crate::effort::{Found, Numbers, Pace};
 use crate::file::{Curve, StageCurves};
 use crate::test_surface::{grid, height_m, mesh};
-use fluxform::job::JobError;
+use fluxform::RunError;
 use fluxform::numerics::double_double::DoubleDouble as Num;
 use fluxform::progress::{Progress, Silent};
 use fluxform::shape::height::heights;
@@ -29,7 +29,7 @@ const ROUNDING_M: f64 = 1e-17;
 ///
 /// # Errors
 /// Interruption.
-pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
+pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, RunError> {
     Ok(Measured {
         curves: StageCurves {
             stage: "height-map".to_owned(),
@@ -47,7 +47,7 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
 }
 
 /// Against the surface that the triangles stand for.
-fn facets(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
+fn facets(pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
     let plan = grid(DEFAULT);
     let (x, y) = (plan.x_m.nodes(), plan.y_m.nodes());
     let mut rows = Vec::new();
@@ -77,7 +77,7 @@ fn facets(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
 }
 
 /// Against every triangle tried, in double-double.
-fn exactness(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
+fn exactness(pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
     let mesh = mesh(SIDE)?;
     let mut rows = Vec::new();
     for &samples in pace.settings(&SAMPLES, 5) {
@@ -116,7 +116,7 @@ fn exactness(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
 }
 
 /// The facets for other programs, and their heights at the points of the default grid.
-pub(super) fn problem() -> Result<serde_json::Value, JobError> {
+pub(super) fn problem() -> Result<serde_json::Value, RunError> {
     let mesh = mesh(SIDE)?;
     let plan = grid(DEFAULT);
     let (x, y) = (plan.x_m.nodes(), plan.y_m.nodes());

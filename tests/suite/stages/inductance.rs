@@ -12,15 +12,15 @@ use super::{Measured, curve, stage};
 use crate::effort::{Found, Pace};
 use crate::file::{Curve, StageCurves};
 use crate::inputs::{AIR_COIL, SEED};
+use fluxform::RunError;
 use fluxform::coil::inductance::{RELATIVE_ERROR, self_inductance_h};
 use fluxform::coil::mutual::{self, mutual_inductance_h};
 use fluxform::coil::section_integrals::{FINE, ROUGH, section_integrals};
 use fluxform::design::Need;
 use fluxform::field::winding::Winding;
-use fluxform::job::JobError;
-use fluxform::job::scene::Scene;
 use fluxform::numerics::gauss;
 use fluxform::progress::Progress;
+use fluxform::scene::Scene;
 use fluxform::units::MU_0_T_M_PER_A;
 
 /// From a winding to its inductance, H.
@@ -42,7 +42,7 @@ struct Inductance {
 ///
 /// # Errors
 /// Interruption.
-pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
+pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, RunError> {
     Ok(Measured {
         curves: StageCurves {
             stage: "inductance".to_owned(),
@@ -72,7 +72,7 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
 }
 
 /// Windings with their inductances, H.
-pub(super) fn cases() -> Result<Vec<(Winding, f64)>, JobError> {
+pub(super) fn cases() -> Result<Vec<(Winding, f64)>, RunError> {
     let oracle: Oracle = AIR_COIL.values()?;
     let mut cases = Vec::new();
     for exact in &oracle.inductances {
@@ -84,7 +84,7 @@ pub(super) fn cases() -> Result<Vec<(Winding, f64)>, JobError> {
 }
 
 /// The seed's alone.
-pub(super) fn seed() -> Result<Vec<(Winding, f64)>, JobError> {
+pub(super) fn seed() -> Result<Vec<(Winding, f64)>, RunError> {
     let design = SEED.design(Need::CALIBRATE)?;
     let winding = Scene::new(&design)?.winding;
     let all = cases()?.into_iter();
@@ -97,7 +97,7 @@ fn own(
     cases: &[(Winding, f64)],
     pace: &Pace,
     progress: &dyn Progress,
-) -> Result<Curve, JobError> {
+) -> Result<Curve, RunError> {
     let fast = |accuracy| {
         move |w: &Winding| {
             let depth = w.outer_radius_m - w.inner_radius_m;
@@ -139,7 +139,7 @@ fn own(
     ))
 }
 
-fn between(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
+fn between(pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
     let design = SEED.design(Need::CALIBRATE)?;
     let winding = Scene::new(&design)?.winding;
     let distance_m = 0.05;
@@ -169,7 +169,7 @@ fn between(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
 
 /// Flux of a winding's B_z through the turns of an equal one, per ampere: midpoints around the
 /// circle, Gauss-Legendre over turns, discs and length.
-fn flux_h(winding: &Winding, distance_m: f64, order: usize) -> Result<f64, JobError> {
+fn flux_h(winding: &Winding, distance_m: f64, order: usize) -> Result<f64, RunError> {
     let (turns, radial, axial) = (
         gauss::rule(order / 2),
         gauss::rule(order / 2),

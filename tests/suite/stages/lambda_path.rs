@@ -9,7 +9,7 @@ use crate::file::{Curve, StageCurves};
 use crate::force::{Forces, forces};
 use crate::inputs::{LAMBDA, SEED_AIR};
 use crate::test_surface::dome_m;
-use fluxform::job::JobError;
+use fluxform::RunError;
 use fluxform::lambda::{self, ForceProblem, Settings, Solution};
 use fluxform::progress::Progress;
 
@@ -43,7 +43,7 @@ struct Point {
 ///
 /// # Errors
 /// Interruption.
-pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
+pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, RunError> {
     let sizes = sizes(pace, progress)?;
     let stated = sizes.rows.iter().find(|row| row.default);
     let stated = stated.and_then(|row| row.stated_error).unwrap_or(2e-14);
@@ -80,7 +80,7 @@ fn error_of(case: &Case, solution: &Solution) -> f64 {
 }
 
 /// Nine coils whose forces are ever more alike.
-fn conditions(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
+fn conditions(pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
     let oracle: Oracle = LAMBDA.values()?;
     // Two kinds of problem a condition number, which ends their names.
     let conditions: Vec<f64> = oracle
@@ -112,7 +112,7 @@ fn conditions(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
             cases
                 .iter()
                 .map(solve)
-                .collect::<Result<Vec<_>, JobError>>()
+                .collect::<Result<Vec<_>, RunError>>()
         })?;
         let pairs = found.iter().zip(&cases);
         let error = pairs.fold(0.0_f64, |most, (found, case)| {
@@ -140,7 +140,7 @@ fn conditions(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
 }
 
 /// The seed's array in air under a dome.
-fn sizes(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
+fn sizes(pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
     let mut rows = Vec::new();
     for &samples in pace.settings(&SAMPLES, 5) {
         let given: Forces = forces(&SEED_AIR, 3, samples, dome_m)?;

@@ -5,19 +5,19 @@ use crate::effort::{Found, Numbers, Pace};
 use crate::file::{Curve, StageCurves};
 use crate::inputs::{SEED, SEED_AIR};
 use crate::reference::{AXIAL_ERROR, axial_gradient};
+use fluxform::RunError;
+use fluxform::commands::map::MAP_TOLERANCE;
 use fluxform::design::{Design, Need};
 use fluxform::field::steel::equivalent_dipoles::{ArraySources, Parts};
-use fluxform::job::JobError;
-use fluxform::job::map::MAP_TOLERANCE;
-use fluxform::job::maps::{Felt, SceneMap};
-use fluxform::job::scene::Scene;
-use fluxform::job::steel::{self, COUPLED_TOLERANCE, Steel};
 use fluxform::map::coupled_map::SampledField;
 use fluxform::map::tabulate::{Grid, tabulate};
 use fluxform::map::{Components, FieldMap};
 use fluxform::numerics::axis::Axis;
 use fluxform::numerics::lagrange::locate;
 use fluxform::progress::{Progress, Silent};
+use fluxform::scene::Scene;
+use fluxform::scene::maps::{Felt, SceneMap};
+use fluxform::scene::steel::{self, COUPLED_TOLERANCE, Steel};
 
 const AIR: [f64; 12] = [
     1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13,
@@ -36,7 +36,7 @@ const COMPARED: usize = 300;
 ///
 /// # Errors
 /// Interruption.
-pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
+pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, RunError> {
     let air = SEED_AIR.design(Need::CALIBRATE)?;
     let cored = SEED.design(Need::CALIBRATE)?;
     Ok(Measured {
@@ -103,7 +103,7 @@ fn node(map: &FieldMap, [coil, z, y, x]: [usize; 4]) -> f64 {
 }
 
 /// The array in air for other programs: axes, coils, and values at the nodes looked at.
-pub(super) fn problem() -> Result<serde_json::Value, JobError> {
+pub(super) fn problem() -> Result<serde_json::Value, RunError> {
     let design = SEED_AIR.design(Need::CALIBRATE)?;
     let scene = Scene::new(&design)?;
     let grid = grid(&design, None);
@@ -122,7 +122,7 @@ pub(super) fn problem() -> Result<serde_json::Value, JobError> {
 }
 
 /// dB_z/dz at the nodes, and the largest |grad B| at their heights.
-fn in_air(scene: &Scene, grid: &Grid, looked: &[[usize; 4]]) -> Result<Vec<(f64, f64)>, JobError> {
+fn in_air(scene: &Scene, grid: &Grid, looked: &[[usize; 4]]) -> Result<Vec<(f64, f64)>, RunError> {
     let mut exact = Vec::with_capacity(looked.len());
     for &[coil, z, y, x] in looked {
         let [ax, ay] = scene.coils[coil].axis_m;
@@ -140,7 +140,7 @@ fn in_air(scene: &Scene, grid: &Grid, looked: &[[usize; 4]]) -> Result<Vec<(f64,
     Ok(exact)
 }
 
-fn windings(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
+fn windings(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
     let scene = Scene::new(design)?;
     let grid = grid(design, None);
     let looked = looked_at(&grid, scene.coils.len());
@@ -182,7 +182,7 @@ fn windings(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Cur
     ))
 }
 
-fn coupled(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
+fn coupled(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
     let scene = Scene::new(design)?;
     let grid = grid(design, None);
     let lowest_m = grid.z_m[0];
@@ -239,7 +239,7 @@ fn coupled(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curv
 }
 
 /// Interpolation between the nodes, against their number.
-fn between(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
+fn between(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
     let scene = Scene::new(design)?;
     let solved = steel::solve(&scene, None, MAP_TOLERANCE, 0.0)?;
     let mut numbers = Numbers(13);

@@ -21,10 +21,10 @@ use super::inputs::{
     SEED, SEED_AIR,
 };
 use crate::file::{Curve, Row, StageCurves};
+use fluxform::RunError;
 use fluxform::accuracy::StageAccuracy;
 use fluxform::bundle::artefact::Input;
 use fluxform::field::winding::Winding;
-use fluxform::job::JobError;
 use fluxform::progress::Progress;
 use serde_json::{Value, json};
 
@@ -43,7 +43,7 @@ pub struct Stage {
     /// On the command line.
     pub name: &'static str,
     inputs: &'static [BuiltIn],
-    run: fn(&Pace, &dyn Progress) -> Result<Measured, JobError>,
+    run: fn(&Pace, &dyn Progress) -> Result<Measured, RunError>,
 }
 
 impl Stage {
@@ -57,7 +57,7 @@ impl Stage {
     ///
     /// # Errors
     /// Those of the stage; interruption.
-    pub fn run(&self, pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
+    pub fn run(&self, pace: &Pace, progress: &dyn Progress) -> Result<Measured, RunError> {
         (self.run)(pace, progress)
     }
 }
@@ -65,7 +65,7 @@ impl Stage {
 const fn named(
     name: &'static str,
     inputs: &'static [BuiltIn],
-    run: fn(&Pace, &dyn Progress) -> Result<Measured, JobError>,
+    run: fn(&Pace, &dyn Progress) -> Result<Measured, RunError>,
 ) -> Stage {
     Stage { name, inputs, run }
 }
@@ -110,8 +110,8 @@ fn stage(estimate: f64, relative_to: &str, method: &str) -> StageAccuracy {
 }
 
 /// The seed's design has a core; a copy that lost it is told like a user's.
-fn no_core() -> JobError {
-    JobError::Input("the built-in design has no [core]".to_owned())
+fn no_core() -> RunError {
+    RunError::Input("the built-in design has no [core]".to_owned())
 }
 
 /// A winding for other programs.

@@ -8,12 +8,12 @@ use super::{Measured, curve, stage};
 use crate::effort::{Found, Pace};
 use crate::file::{Curve, StageCurves};
 use crate::inputs::{AIR_ALL_LIMITS, BuiltIn, NLOPT, OPTIMUM_AIR, OPTIMUM_CORED};
+use fluxform::RunError;
 use fluxform::coil::optimum::branch_and_bound::GAP;
 use fluxform::coil::optimum::task;
 use fluxform::coil::optimum::{CoilModel, Fixed, Outcome, Settings, Task, optimise};
 use fluxform::design::Need;
 use fluxform::field::magnet::MagnetRule;
-use fluxform::job::JobError;
 use fluxform::progress::{Progress, Silent};
 
 const STARTS: [usize; 6] = [1, 2, 4, 8, 24, 72];
@@ -40,7 +40,7 @@ struct Best {
 ///
 /// # Errors
 /// Interruption.
-pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
+pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, RunError> {
     Ok(Measured {
         curves: StageCurves {
             stage: "coil-optimum".to_owned(),
@@ -62,20 +62,20 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
 }
 
 /// NLopt's best force for a problem, N, and what it is uncertain by.
-fn nlopt(name: &str) -> Result<[f64; 2], JobError> {
+fn nlopt(name: &str) -> Result<[f64; 2], RunError> {
     let reference: Reference = NLOPT.values()?;
     let found = reference.problems.get(name).and_then(|problem| {
         let best = problem.best.as_ref()?;
         Some([best.force_n, problem.objective_tolerance?])
     });
-    found.ok_or_else(|| JobError::Input(format!("{}: no best coil of {name}", NLOPT.path)))
+    found.ok_or_else(|| RunError::Input(format!("{}: no best coil of {name}", NLOPT.path)))
 }
 
 /// A design as a task for the optimiser, the magnet a dipole.
-pub fn posed(design: &BuiltIn) -> Result<(Task, Box<dyn CoilModel>), JobError> {
+pub fn posed(design: &BuiltIn) -> Result<(Task, Box<dyn CoilModel>), RunError> {
     let design = design.design(Need::OPTIMIZE)?;
-    let refused = |error: task::NoTask| JobError::Input(error.to_string());
-    let magnet = MagnetRule::dipole(fluxform::job::scene::moment_a_m2(&design));
+    let refused = |error: task::NoTask| RunError::Input(error.to_string());
+    let magnet = MagnetRule::dipole(fluxform::scene::moment_a_m2(&design));
     let model = task::coil_model(&design, &magnet).map_err(refused)?;
     let task = task::of_design(&design, Fixed::default()).map_err(refused)?;
     Ok((task, model))
@@ -92,7 +92,7 @@ fn starts(
     default: usize,
     pace: &Pace,
     progress: &dyn Progress,
-) -> Result<Curve, JobError> {
+) -> Result<Curve, RunError> {
     let [best_n, uncertain] = nlopt(name)?;
     let cored = name.contains("cored");
     let (task, _) = posed(design)?;
@@ -128,7 +128,7 @@ fn starts(
 }
 
 /// The proof for the coil in air.
-fn certificate(pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
+fn certificate(pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
     let (task, model) = posed(&OPTIMUM_AIR)?;
     let mut rows = Vec::new();
     for &cells in pace.settings(&CELLS, CELLS.len()) {

@@ -4,7 +4,7 @@ use super::{Measured, curve, stage};
 use crate::effort::{Found, Pace};
 use crate::file::{Curve, StageCurves};
 use crate::test_surface::{HALF_M, grid, known, mesh, shape};
-use fluxform::job::JobError;
+use fluxform::RunError;
 use fluxform::numerics::axis::Axis;
 use fluxform::progress::{Progress, Silent};
 use fluxform::shape::Surface;
@@ -27,7 +27,7 @@ const WITHIN: usize = 7;
 ///
 /// # Errors
 /// Interruption.
-pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
+pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, RunError> {
     let mesh = mesh(SIDE)?;
     let surface = Surface::Mesh(mesh);
     Ok(Measured {
@@ -55,7 +55,7 @@ fn looked_for_m(
     surface: &Surface,
     plan: &Grid,
     heights_m: &[Option<f64>],
-) -> Result<f64, JobError> {
+) -> Result<f64, RunError> {
     let samples = plan.x_m.samples;
     let step = plan.x_m.step();
     let mut worst = 0.0_f64;
@@ -95,9 +95,9 @@ fn looked_for_m(
     Ok(worst)
 }
 
-fn on_grid(surface: &Surface, pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
+fn on_grid(surface: &Surface, pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
     let Surface::Mesh(mesh) = surface else {
-        return Err(JobError::Input("the wave is a mesh".to_owned()));
+        return Err(RunError::Input("the wave is a mesh".to_owned()));
     };
     let mut rows = Vec::new();
     for &samples in pace.settings(&SAMPLES, 5) {
@@ -127,7 +127,7 @@ fn on_grid(surface: &Surface, pace: &Pace, progress: &dyn Progress) -> Result<Cu
     ))
 }
 
-fn graded(surface: &Surface, pace: &Pace, progress: &dyn Progress) -> Result<Curve, JobError> {
+fn graded(surface: &Surface, pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
     let plan = grid(DEFAULT);
     let mut rows = Vec::new();
     for &max_deviation_m in pace.settings(&DEVIATIONS_M, 5) {

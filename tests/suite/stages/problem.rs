@@ -6,7 +6,7 @@ use super::{cored_coil, height_map, inductance as own_inductance, map_table as m
 use crate::force::{Forces, forces};
 use crate::inputs::SEED_AIR;
 use crate::test_surface::dome_m;
-use fluxform::job::JobError;
+use fluxform::RunError;
 use fluxform::lambda::worst::worst_point as solve_worst;
 use fluxform::lambda::{self, Settings};
 
@@ -18,7 +18,7 @@ const WORST_SAMPLES: usize = 21;
 ///
 /// # Errors
 /// Built-in values that cannot be read.
-pub fn inductance() -> Result<Value, JobError> {
+pub fn inductance() -> Result<Value, RunError> {
     let cases = own_inductance::seed()?;
     let cases = cases.iter().map(|(winding, inductance_h)| {
         json!({"winding": section(winding), "inductance_h": inductance_h})
@@ -30,7 +30,7 @@ pub fn inductance() -> Result<Value, JobError> {
 ///
 /// # Errors
 /// As [`inductance`].
-pub fn cored_coil() -> Result<Value, JobError> {
+pub fn cored_coil() -> Result<Value, RunError> {
     cored_coil::problem()
 }
 
@@ -38,7 +38,7 @@ pub fn cored_coil() -> Result<Value, JobError> {
 ///
 /// # Errors
 /// As [`inductance`].
-pub fn map_table() -> Result<Value, JobError> {
+pub fn map_table() -> Result<Value, RunError> {
     maps::problem()
 }
 
@@ -46,7 +46,7 @@ pub fn map_table() -> Result<Value, JobError> {
 ///
 /// # Errors
 /// As [`inductance`].
-pub fn height_map() -> Result<Value, JobError> {
+pub fn height_map() -> Result<Value, RunError> {
     height_map::problem()
 }
 
@@ -69,7 +69,7 @@ fn general(given: &Forces, form: &str, lambda_n_per_m: f64, least: f64) -> Value
 ///
 /// # Errors
 /// As [`inductance`].
-pub fn lambda_path() -> Result<Value, JobError> {
+pub fn lambda_path() -> Result<Value, RunError> {
     let given = forces(&SEED_AIR, 3, SAMPLES, dome_m)?;
     let solution = lambda::solve(&given.problem(), &Settings::default())?;
     let jnd = solution.constants.lambda_jnd_n_per_m.unwrap_or(1.0);
@@ -80,7 +80,7 @@ pub fn lambda_path() -> Result<Value, JobError> {
 ///
 /// # Errors
 /// As [`inductance`].
-pub fn worst_point() -> Result<Value, JobError> {
+pub fn worst_point() -> Result<Value, RunError> {
     let given = forces(&SEED_AIR, 3, WORST_SAMPLES, dome_m)?;
     let problem = given.problem();
     let solution = solve_worst(&problem, &Settings::default())?;

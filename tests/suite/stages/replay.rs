@@ -6,19 +6,20 @@ use super::{Measured, curve, stage};
 use crate::effort::{Found, Pace};
 use crate::file::{Curve, StageCurves};
 use crate::inputs::{FLAT, SEED_AIR};
+use fluxform::RunError;
 use fluxform::bundle::artefact::Input;
 use fluxform::bundle::atomic::Scratch;
 use fluxform::bundle::replay::Answer;
+use fluxform::commands::calibrate::{self, CalibrateOptions, DEFAULT_REACH_M};
+use fluxform::commands::lambda::LambdaOptions;
+use fluxform::commands::replay::Opened;
+use fluxform::commands::replay::synthesize::{Kind, Synthesis};
 use fluxform::design::{Design, Need};
-use fluxform::job::calibrate::{
-    self, CalibrateOptions, DEFAULT_REACH_M, DesignSource, ShapeSource,
-};
-use fluxform::job::lambda::LambdaOptions;
-use fluxform::job::replay::Opened;
-use fluxform::job::replay::synthesize::{Kind, Synthesis};
-use fluxform::job::scene::Scene;
-use fluxform::job::{JobError, KERNEL_ERROR, steel};
+use fluxform::field::winding::KERNEL_ERROR;
 use fluxform::progress::{Progress, Silent};
+use fluxform::scene::Scene;
+use fluxform::scene::sources::{DesignSource, ShapeSource};
+use fluxform::scene::steel;
 use fluxform::shape::document::ShapeDocument;
 
 /// Nodes of the map along x and y; along z half as many.
@@ -34,7 +35,7 @@ const COMPARED: usize = 5;
 ///
 /// # Errors
 /// Interruption.
-pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
+pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, RunError> {
     let [map, currents] = curves(pace, progress)?;
     let stated = map.rows.iter().find(|row| row.default);
     let stated = stated.and_then(|row| row.stated_error).unwrap_or(1e-3);
@@ -56,9 +57,9 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
 }
 
 /// A bundle of the seed's array in air under its flat surface, with so many nodes.
-fn bundle(scratch: &Scratch, text: &str, name: &str) -> Result<Opened, JobError> {
+fn bundle(scratch: &Scratch, text: &str, name: &str) -> Result<Opened, RunError> {
     let out = scratch.path().join(name);
-    let fault = |error: &dyn std::fmt::Display| JobError::Input(error.to_string());
+    let fault = |error: &dyn std::fmt::Display| RunError::Input(error.to_string());
     let (design, _) = Design::from_toml(text, Path::new(SEED_AIR.path), Need::CALIBRATE)
         .map_err(|error| fault(&error))?;
     let (document, _) =
@@ -93,7 +94,7 @@ fn with_nodes(nodes: usize) -> String {
         .replace(", 29]", &format!(", {along_z}]"))
 }
 
-fn curves(pace: &Pace, progress: &dyn Progress) -> Result<[Curve; 2], JobError> {
+fn curves(pace: &Pace, progress: &dyn Progress) -> Result<[Curve; 2], RunError> {
     let design = SEED_AIR.design(Need::CALIBRATE)?;
     let scene = Scene::new(&design)?;
     let solved = steel::solve(&scene, None, KERNEL_ERROR, 0.03)?;

@@ -6,7 +6,7 @@ use crate::file::{Curve, StageCurves};
 use crate::force::forces;
 use crate::inputs::SEED_AIR;
 use crate::test_surface::dome_m;
-use fluxform::job::JobError;
+use fluxform::RunError;
 use fluxform::lambda::Settings;
 use fluxform::lambda::worst::worst_point;
 use fluxform::progress::Progress;
@@ -21,7 +21,7 @@ const PROVEN: [f64; 3] = [0.7, 1.0, 1.3];
 ///
 /// # Errors
 /// Interruption.
-pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
+pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, RunError> {
     let (sizes, stated) = sizes(pace, progress)?;
     Ok(Measured {
         curves: StageCurves {
@@ -40,7 +40,7 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, JobError> {
     })
 }
 
-fn sizes(pace: &Pace, progress: &dyn Progress) -> Result<(Curve, f64), JobError> {
+fn sizes(pace: &Pace, progress: &dyn Progress) -> Result<(Curve, f64), RunError> {
     let mut rows = Vec::new();
     let mut stated = 0.0_f64;
     for &samples in pace.settings(&SAMPLES, 4) {

@@ -3,7 +3,7 @@
 
 use std::convert::Infallible;
 
-use fluxform::bench::clock::{Effort, measure};
+use fluxform::commands::bench::clock::{Effort, measure};
 
 #[test]
 fn known_work_is_measured() {

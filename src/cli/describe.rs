@@ -1,0 +1,129 @@
+//! Pieces of summaries that several commands tell alike.
+
+use super::quantity::{count, error, length_error, mm, number};
+use crate::accuracy::StageAccuracy;
+use crate::bundle::manifest::{AxisSummary, LeftOut};
+use crate::cli::layout::grid;
+use crate::design::Design;
+
+/// Coils beyond this many are told in sum, not one by one.
+const COILS_SHOWN: usize = 100;
+/// Columns of coils that stand in no grid.
+const COLUMNS: usize = 8;
+/// Most columns that fit a screen.
+const COLUMNS_MAX: usize = 12;
+
+/// Each stage's estimated error, one line a stage.
+pub fn accuracy<'a>(stages: impl IntoIterator<Item = (&'a str, &'a StageAccuracy)>) -> String {
+    let lines: Vec<String> = stages
+        .into_iter()
+        .map(|(name, stage)| {
+            let (name, to) = (name.replace('_', " "), &stage.relative_to);
+            if to == "1 m" {
+                return format!("{name} {}", length_error(stage.estimate));
+            }
+            format!("{name} {} of {to}", error(stage.estimate))
+        })
+        .collect();
+    lines.join("\n")
+}
+
+/// The array in a few words.
+pub fn array(design: &Design) -> String {
+    let coils = count(design.array.positions_m.len(), "coil");
+    match design.array.grid {
+        Some(array) if array.rows * array.columns > 1 => format!(
+            "{coils}, {} x {} at a pitch of {} mm",
+            array.rows,
+            array.columns,
+            number(array.pitch_m * 1000.0)
+        ),
+        _ => coils,
+    }
+}
+
+/// Currents as the coils stand, seen from above: y grows upwards, x to the right.
+pub fn currents(design: &Design, currents_a: &[f64]) -> String {
+    per_coil(design, "A", currents_a, 4)
+}
+
+/// One value a coil, with so many decimals, as the coils stand.
+pub fn per_coil(design: &Design, unit: &str, values: &[f64], decimals: usize) -> String {
+    let cells: Vec<String> = values.iter().map(|v| format!("{v:.decimals$}")).collect();
+    if cells.len() == 1 {
+        return format!("{} {unit}", cells[0]);
+    }
+    if cells.len() <= COILS_SHOWN
+        && let Some(array) = design.array.grid.filter(|a| a.columns <= COLUMNS_MAX)
+        && array.rows * array.columns == cells.len()
+    {
+        let from_top: Vec<String> = cells
+            .chunks(array.columns)
+            .rev()
+            .flatten()
+            .cloned()
+            .collect();
+        return format!(
+            "{unit}, seen from above (x to the right, y up)\n{}",
+            grid(&from_top, array.columns)
+        );
+    }
+    if cells.len() <= COILS_SHOWN {
+        return format!("{unit}, coil 0 first\n{}", grid(&cells, COLUMNS));
+    }
+    let fold = |start, pick: fn(f64, f64) -> f64| values.iter().copied().fold(start, pick);
+    format!(
+        "{}, from {} to {} {unit}; all of them with --format json",
+        count(cells.len(), "coil"),
+        number(fold(f64::INFINITY, f64::min)),
+        number(fold(f64::NEG_INFINITY, f64::max))
+    )
+}
+
+/// An axis in millimetres.
+pub fn axis(name: &str, axis: &AxisSummary) -> String {
+    let mm = |length_m: f64| number(length_m * 1000.0);
+    format!(
+        "{name} {} to {} mm in {}",
+        mm(axis.from_m),
+        mm(axis.to_m),
+        count(axis.samples, "sample")
+    )
+}
+
+/// The heights that points have.
+pub fn heights(min_m: f64, max_m: f64) -> String {
+    if min_m == max_m {
+        mm(min_m)
+    } else {
+        format!("{} to {}", mm(min_m), mm(max_m))
+    }
+}
+
+/// What was left out and what it costs, one line each.
+pub fn left_out(parts: &[LeftOut]) -> String {
+    let lines: Vec<String> = parts
+        .iter()
+        .map(|part| {
+            let cost = if part.error_cost == 0.0 {
+                "costs no accuracy".to_owned()
+            } else {
+                format!("costs {}", error(part.error_cost))
+            };
+            format!("{}: {}; {cost}", part.what, part.why)
+        })
+        .collect();
+    if lines.is_empty() {
+        "nothing".to_owned()
+    } else {
+        lines.join("\n")
+    }
+}
+
+/// A force constant, or that there is none.
+pub fn force_constant(lambda_n_per_m: Option<f64>) -> String {
+    lambda_n_per_m.map_or_else(
+        || "none".to_owned(),
+        |lambda| format!("{} N/m", number(lambda)),
+    )
+}

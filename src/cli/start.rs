@@ -1,0 +1,42 @@
+//! How every command begins and ends: the stop signal, the bar, the folder it writes to, the accuracy reached.
+
+use std::path::PathBuf;
+
+use super::bar::Bar;
+use super::failure::{Failure, Wish};
+use super::interrupt;
+use super::printer::Printer;
+use super::values::FileArgument;
+
+/// A job begins: Ctrl-C asks it to stop, a bar shows how far it is.
+pub fn begin(printer: &Printer) -> Bar {
+    interrupt::working();
+    Bar::new(printer.draws())
+}
+
+/// The folder that `file` names.
+///
+/// # Errors
+/// Wrong usage: a folder cannot be a standard stream.
+pub fn folder(file: &FileArgument) -> Result<PathBuf, Failure> {
+    match file {
+        FileArgument::Path(path) => Ok(path.clone()),
+        FileArgument::Standard => Err(Failure::Usage(
+            "--out names a folder here, which standard output (-) is not; name a folder".to_owned(),
+        )),
+    }
+}
+
+/// The result is there, but `missed` names the stages whose accuracy misses the tolerance.
+pub fn accuracy_check(missed: &[String]) -> Result<(), Failure> {
+    if missed.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::Unmet(
+        Wish::Accuracy,
+        format!(
+            "the accuracy asked for with --tolerance was not reached by {}; the result itself is given",
+            missed.join("; ")
+        ),
+    ))
+}

@@ -1,0 +1,271 @@
+//! The run that all others are held against: finer in every knob.
+
+use super::clock::Watch;
+use super::ladder::Ladders;
+use super::stages::Bench;
+use crate::RunError;
+use crate::bundle::bench::Reference;
+use crate::lambda::{self, ForceProblem, Settings, Solution};
+use crate::map::FieldMap;
+use crate::numerics::axis::Axis;
+use crate::numerics::lagrange::locate;
+use crate::progress::Silent;
+use crate::scene::Scene;
+use crate::scene::passive;
+use crate::scene::sources::ShapeSource;
+use crate::scene::steel;
+use crate::shape::Surface;
+use crate::shape::height::Grid as Plan;
+
+/// Tolerance of the refined field in air: the kernel's own rounding.
+const AIR: f64 = 1e-15;
+/// The refined field's tolerance over steel against the tightest of the ladder.
+const STEEL: f64 = 0.1;
+/// The tightest that steel is asked for.
+const TIGHTEST_STEEL: f64 = 1e-9;
+/// Places compared along x and y. With these margins, parts of the plan's width that no grid of equal
+/// steps has, none of them is a node of the map or a point.
+const PLACES: [usize; 2] = [19, 17];
+const MARGINS: [f64; 2] = [0.0371, 0.0293];
+
+/// Where the felt force is compared, and the refined field there.
+pub struct Places {
+    position_m: Vec<[f64; 3]>,
+    /// N/A, [place, coil].
+    forces_n_per_a: Vec<f64>,
+    moment_a_m2: [f64; 3],
+    coils: usize,
+    shape: String,
+}
+
+/// The refined run.
+pub struct Refined {
+    /// Where forces are compared.
+    pub places: Places,
+    /// The chosen force constant, N/m.
+    pub lambda_n_per_m: f64,
+    /// All of them.
+    pub solution: Solution,
+    /// Its own error, about.
+    pub own_error: Option<f64>,
+    tolerance: f64,
+    points: usize,
+    cpu_s: f64,
+    in_air: bool,
+}
+
+/// The rows of a force problem.
+struct Rows {
+    forces_n_per_a: Vec<f64>,
+    height_m: Vec<f64>,
+    offset_n: Option<Vec<f64>>,
+    weights: Option<Vec<f64>>,
+}
+
+impl Rows {
+    fn solve(&self, scene: &Scene, settings: &Settings) -> Result<Solution, RunError> {
+        let problem = ForceProblem {
+            forces_n_per_a: &self.forces_n_per_a,
+            height_m: &self.height_m,
+            offset_n: self.offset_n.as_deref(),
+            weights: self.weights.as_deref(),
+            lower_a: &scene.lower_a,
+            upper_a: &scene.upper_a,
+            total_max_a: scene.design.supply.total_current_max_a,
+            resistance_ohm: &scene.resistances_ohm(),
+        };
+        Ok(lambda::solve(&problem, settings)?)
+    }
+
+    /// Some of the rows; areas keep their proportions, but for the border's.
+    fn only(&self, rows: &[usize], coils: usize) -> Self {
+        let pick = |values: &Vec<f64>| rows.iter().map(|row| values[*row]).collect();
+        let forces = rows.iter();
+        let forces = forces.flat_map(|row| &self.forces_n_per_a[row * coils..(row + 1) * coils]);
+        Self {
+            forces_n_per_a: forces.copied().collect(),
+            height_m: pick(&self.height_m),
+            offset_n: self.offset_n.as_ref().map(pick),
+            weights: self.weights.as_ref().map(pick),
+        }
+    }
+}
+
+fn chosen(solution: &Solution) -> Option<f64> {
+    let point = solution.chosen.as_ref()?;
+    Some(point.lambda_n_per_m).filter(|lambda| *lambda > 0.0)
+}
+
+/// Computes it.
+///
+/// # Errors
+/// A scene that cannot be computed; no force constant; interruption.
+pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<Refined, RunError> {
+    let watch = Watch::start();
+    let scene = bench.scene;
+    let tightest = bench.present_tolerance();
+    let in_air = scene.core.is_none();
+    let tolerance = if in_air {
+        AIR
+    } else {
+        (STEEL * tightest).max(TIGHTEST_STEEL.min(tightest))
+    };
+    let lowest_m = scene.design.workspace.z_m.from;
+    let solved = steel::solve(scene, Some(tolerance), tolerance, lowest_m)?;
+    bench.check()?;
+    let points = bench.points(&shape.document, ladders.refined_points(), &Silent)?;
+    let forces = scene.forces_n_per_a(&solved, &points.positions_m, &bench.within())?;
+    let pull = if scene.design.magnet.passive_force {
+        passive::pull(scene, &points.positions_m, false)?
+    } else {
+        None
+    };
+    let offset_n = pull.map(|pull| pull.forces_z_n(&points.positions_m));
+    let weights = points.weights.clone().or_else(|| points.area_weights());
+    let all = Rows {
+        forces_n_per_a: forces,
+        height_m: points.height_m.clone(),
+        offset_n,
+        weights,
+    };
+    let settings = &bench.request.lambda.settings;
+    let solution = all.solve(scene, settings)?;
+    let lambda_n_per_m = chosen(&solution).ok_or_else(|| {
+        RunError::NoForceConstant(format!(
+            "{:?} has no force constant in the refined run, so there is nothing to hold errors \
+             against; see `fluxform lambda` on it",
+            shape.document.name
+        ))
+    })?;
+    let half = points.every_second();
+    let half = half.map(|rows| all.only(&rows, scene.coils.len()).solve(scene, settings));
+    let half = half.transpose()?;
+    let half = half.as_ref().and_then(chosen);
+    let own_error = half.map(|half| (half / lambda_n_per_m - 1.0).abs());
+    let position_m = places(shape, ladders, bench)?;
+    let places = Places {
+        forces_n_per_a: scene.forces_n_per_a(&solved, &position_m, &bench.within())?,
+        position_m,
+        moment_a_m2: scene.moment_a_m2,
+        coils: scene.coils.len(),
+        shape: shape.document.name.clone(),
+    };
+    bench.advance();
+    Ok(Refined {
+        places,
+        lambda_n_per_m,
+        solution,
+        own_error,
+        tolerance,
+        points: points.height_m.len(),
+        cpu_s: watch.processor_s(),
+        in_air,
+    })
+}
+
+impl Refined {
+    /// As the result states it.
+    pub fn told(&self) -> Reference {
+        let field = if self.in_air {
+            "the windings' field to rounding"
+        } else {
+            "the field to a tenth of the present tolerance"
+        };
+        Reference {
+            how: format!(
+                "{field}; points twice as fine along each axis as the finest of the sweep, weighted by \
+                 the area they stand for; the felt force without a map, computed at the places directly"
+            ),
+            tolerance: self.tolerance,
+            points: self.points as u64,
+            places: self.places.position_m.len() as u64,
+            lambda_n_per_m: self.lambda_n_per_m,
+            lambda_error: self.own_error,
+            cpu_s: self.cpu_s,
+        }
+    }
+}
+
+/// Places of the surface that are neither nodes nor points.
+fn places(
+    shape: &ShapeSource,
+    ladders: &Ladders,
+    bench: &Bench,
+) -> Result<Vec<[f64; 3]>, RunError> {
+    let grid = ladders.points_present.grid;
+    let within = |axis: Axis, samples: usize| {
+        let width = axis.to - axis.from;
+        Axis {
+            from: axis.from + MARGINS[0] * width,
+            to: axis.to - MARGINS[1] * width,
+            samples,
+        }
+    };
+    let plan = Plan {
+        x_m: within(grid.x_m, PLACES[0]),
+        y_m: within(grid.y_m, PLACES[1]),
+    };
+    let fault = |source| RunError::Shape {
+        name: shape.document.name.clone(),
+        source,
+    };
+    let (surface, _) = Surface::open(&shape.document).map_err(fault)?;
+    let heights = surface.heights(&plan, &bench.within()).map_err(fault)?;
+    let seen = heights.iter().enumerate().filter_map(|(k, sample)| {
+        let z = sample.as_ref()?.height_m;
+        let (i, j) = (k % PLACES[0], k / PLACES[0]);
+        (z > 0.0).then(|| [plan.x_m.node(i), plan.y_m.node(j), z])
+    });
+    let places: Vec<[f64; 3]> = seen.collect();
+    if places.is_empty() {
+        return Err(RunError::Input(format!(
+            "shape {:?} has no surface at any of {} places between its points; make it wider",
+            shape.document.name,
+            PLACES[0] * PLACES[1]
+        )));
+    }
+    Ok(places)
+}
+
+impl Places {
+    /// Largest |force by the map - force directly| of the same currents, relative to the force that
+    /// is to be felt, lambda h.
+    ///
+    /// # Errors
+    /// A place outside the map.
+    pub fn felt_error(
+        &self,
+        map: &FieldMap,
+        lambda_n_per_m: f64,
+        currents_a: &[f64],
+    ) -> Result<f64, RunError> {
+        let nodes = map.x_m.len() * map.y_m.len() * map.z_m.len();
+        let mut largest = 0.0_f64;
+        for (place, direct) in self
+            .position_m
+            .iter()
+            .zip(self.forces_n_per_a.chunks(self.coils))
+        {
+            let cell = locate([&map.x_m, &map.y_m, &map.z_m], *place).ok_or_else(|| {
+                RunError::Input(format!(
+                    "shape {:?}: a place of its surface lies outside the map",
+                    self.shape
+                ))
+            })?;
+            let mut difference = 0.0;
+            for (at, coil) in map.coils.iter().enumerate() {
+                let gz = cell.value(&map.gz_t_per_m_per_a[at * nodes..(at + 1) * nodes]);
+                let [m_x, m_y, m_z] = self.moment_a_m2;
+                let mut force = m_z * gz;
+                if let Some(gradient) = &map.gradient_t_per_m_per_a {
+                    let own = &gradient[9 * at * nodes..9 * (at + 1) * nodes];
+                    force += m_x * cell.component(own, 9, 2) + m_y * cell.component(own, 9, 5);
+                }
+                difference += currents_a[*coil] * (force - direct[*coil]);
+            }
+            let wanted = lambda_n_per_m * place[2];
+            largest = largest.max((difference / wanted).abs());
+        }
+        Ok(largest)
+    }
+}

@@ -1,0 +1,263 @@
+//! The stages of a run, each measured on its own.
+
+use super::BenchRequest;
+use super::clock::{Effort, measure};
+use super::ladder::{Ladders, Points, Present, Seconds, present_samples};
+use crate::RunError;
+use crate::bundle::lambda_file::LambdaFile;
+use crate::commands::calibrate::DEFAULT_REACH_M;
+use crate::commands::calibrate::needed_coils;
+use crate::commands::calibrate::needed_nodes;
+use crate::commands::discretize::scattered;
+use crate::commands::discretize::{self, PointsReport};
+use crate::commands::lambda::{LambdaOptions, WantedPoints, resolving, solve_points};
+use crate::commands::map::MAP_TOLERANCE;
+use crate::design::Design;
+use crate::map::{Components, FieldMap};
+use crate::progress::Progress;
+use crate::scene::maps::{Felt, SceneMap};
+use crate::scene::sources::Sampling;
+use crate::scene::sources::ShapeSource;
+use crate::scene::steel::{self, Solved, Steel};
+use crate::scene::{MAGNET_SHARE, Scene};
+use crate::shape::document::ShapeDocument;
+use crate::shape::points::ConstraintPoints;
+
+/// Steel as forces and as maps ask for it.
+pub struct BothSolved {
+    /// For forces at points.
+    pub forces: Solved,
+    /// For maps.
+    pub map: Solved,
+}
+
+/// Passes on a request to stop, and nothing else: the bar shows the whole, not a stage of it.
+struct Within<'a>(&'a dyn Progress);
+
+impl Progress for Within<'_> {
+    fn interrupted(&self) -> bool {
+        self.0.interrupted()
+    }
+}
+
+/// What every stage needs.
+pub struct Bench<'a> {
+    /// The scene.
+    pub scene: &'a Scene<'a>,
+    /// What is asked.
+    pub request: &'a BenchRequest<'a>,
+    effort: Effort,
+    progress: &'a dyn Progress,
+}
+
+impl<'a> Bench<'a> {
+    /// For one scene.
+    pub fn new(
+        scene: &'a Scene<'a>,
+        request: &'a BenchRequest<'a>,
+        effort: Effort,
+        progress: &'a dyn Progress,
+    ) -> Self {
+        Self {
+            scene,
+            request,
+            effort,
+            progress,
+        }
+    }
+
+    /// Runs `work` as often as the effort says; its last result and the processor time of one call.
+    fn timed<T>(
+        &self,
+        work: impl Fn(&dyn Progress) -> Result<T, RunError>,
+    ) -> Result<(T, f64), RunError> {
+        self.progress.check()?;
+        let within = Within(self.progress);
+        let (result, timing) = measure(&self.effort, || work(&within))?;
+        self.progress.advance(1);
+        Ok((result, timing.seconds))
+    }
+
+    /// Whether the user asked to stop.
+    ///
+    /// # Errors
+    /// Where so.
+    pub fn check(&self) -> Result<(), RunError> {
+        Ok(self.progress.check()?)
+    }
+
+    /// One more computation is done.
+    pub fn advance(&self) {
+        self.progress.advance(1);
+    }
+
+    /// For computations inside this one.
+    pub fn within(&self) -> impl Progress {
+        Within(self.progress)
+    }
+
+    /// The tolerance of the present settings, whether asked for or not.
+    pub fn present_tolerance(&self) -> f64 {
+        steel::tolerance_of(self.scene, self.request.lambda.tolerance, MAP_TOLERANCE)
+    }
+
+    /// The steel, if there is any.
+    pub fn steel(&self, tolerance: Option<f64>) -> Result<(BothSolved, f64), RunError> {
+        let lowest_m = self.scene.design.workspace.z_m.from;
+        self.timed(|_| {
+            let map = steel::solve(self.scene, tolerance, MAP_TOLERANCE, lowest_m)?;
+            let forces = match map.steel {
+                Steel::None => {
+                    let air = self.scene.force_tolerance();
+                    steel::solve(self.scene, tolerance, air, lowest_m)?
+                }
+                Steel::Alone(_) | Steel::Coupled(_) => map.clone(),
+            };
+            Ok(BothSolved { forces, map })
+        })
+    }
+
+    /// The points of one setting.
+    pub fn points(
+        &self,
+        document: &ShapeDocument,
+        points: Points,
+        progress: &dyn Progress,
+    ) -> Result<WantedPoints, RunError> {
+        match points {
+            Points::Grid(samples) => {
+                let document = with_samples(document, samples);
+                let report = discretize::run(&document, Vec::new(), progress)?;
+                Ok(WantedPoints::of_grid(&report))
+            }
+            Points::Graded {
+                max_deviation_m,
+                lowest_m,
+                widest_m,
+            } => {
+                let asked = Sampling::Adaptive {
+                    max_deviation_m,
+                    widest_m,
+                };
+                let how = resolving(asked, lowest_m);
+                let report = scattered::run(document, Vec::new(), how, progress)?;
+                Ok(WantedPoints::of_scattered(&report))
+            }
+        }
+    }
+
+    /// The points of every setting.
+    pub fn all_points(
+        &self,
+        shape: &ShapeSource,
+        ladders: &Ladders,
+    ) -> Result<Vec<(WantedPoints, f64)>, RunError> {
+        let rungs = ladders.points.iter();
+        rungs
+            .map(|rung| self.timed(|within| self.points(&shape.document, rung.points, within)))
+            .collect()
+    }
+
+    /// Forces at the points, and the force constants.
+    pub fn lambda(
+        &self,
+        solved: &BothSolved,
+        points: &WantedPoints,
+    ) -> Result<(LambdaFile, f64), RunError> {
+        let options = LambdaOptions {
+            tolerance: Some(solved.forces.tolerance),
+            ..self.request.lambda.clone()
+        };
+        self.timed(|within| solve_points(self.scene, &solved.forces, points, &options, within))
+    }
+
+    /// The map of the coils that carry current, as far as the object's points need it.
+    pub fn map(
+        &self,
+        solved: &BothSolved,
+        points: &ConstraintPoints,
+        samples: [usize; 3],
+    ) -> Result<(FieldMap, f64), RunError> {
+        let design = with_nodes(self.scene.design, samples);
+        let grid = needed_nodes(&design, points, DEFAULT_REACH_M);
+        let coils = needed_coils(self.scene);
+        let components = if self.scene.tilted() {
+            Components::Gradient
+        } else {
+            Components::Gz
+        };
+        self.timed(|within| {
+            let solved = &solved.map;
+            let share = MAGNET_SHARE * solved.tolerance;
+            let felt = Felt::by_magnet(self.scene, &grid.z_m, share)?;
+            let made = SceneMap::new(self.scene, solved, &coils, &grid, components, &felt, within)?;
+            Ok(made.map)
+        })
+    }
+
+    /// One object at the present settings.
+    ///
+    /// # Errors
+    /// Points outside the workspace, and those of the stages.
+    pub fn present(&self, shape: &ShapeSource) -> Result<Present, RunError> {
+        let (report, points_s): (PointsReport, f64) =
+            self.timed(|within| discretize::run(&shape.document, Vec::new(), within))?;
+        let grid = report.discretized.points.clone();
+        self.inside(&shape.document.name, &grid)?;
+        let (solved, steel_s) = self.steel(self.request.lambda.tolerance)?;
+        let (_, lambda_s) = self.lambda(&solved, &WantedPoints::of_grid(&report))?;
+        let samples = present_samples(self.scene.design);
+        let (_, map_s) = self.map(&solved, &grid, samples)?;
+        Ok(Present {
+            seconds: Seconds {
+                steel_s,
+                points_s,
+                lambda_s,
+                map_s,
+            },
+            grid,
+        })
+    }
+
+    /// Refuses points where a runtime has no map.
+    fn inside(&self, shape: &str, points: &ConstraintPoints) -> Result<(), RunError> {
+        let workspace = &self.scene.design.workspace;
+        let axes = [workspace.x_m, workspace.y_m, workspace.z_m];
+        for k in 0..points.len() {
+            let place = [points.x_m[k], points.y_m[k], points.height_m[k]];
+            let within = axes.iter().zip(place);
+            if !within
+                .into_iter()
+                .all(|(axis, v)| axis.from <= v && v <= axis.to)
+            {
+                let [x, y, z] = place.map(|v| (v * 1e9).round() / 1e6);
+                return Err(RunError::Input(format!(
+                    "shape {shape:?}: the point x = {x} mm, y = {y} mm, z = {z} mm lies outside the \
+                     design's [workspace], where there is no map to compare with; enlarge \
+                     [workspace] or move the object"
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn with_nodes(design: &Design, samples: [usize; 3]) -> Design {
+    let mut design = design.clone();
+    let workspace = &mut design.workspace;
+    workspace.x_m.samples = samples[0];
+    workspace.y_m.samples = samples[1];
+    workspace.z_m.samples = samples[2];
+    design
+}
+
+fn with_samples(document: &ShapeDocument, samples: [usize; 2]) -> ShapeDocument {
+    let mut document = document.clone();
+    for (axis, samples) in [&mut document.grid.x, &mut document.grid.y]
+        .into_iter()
+        .zip(samples)
+    {
+        *axis = axis.with_samples(samples);
+    }
+    document
+}

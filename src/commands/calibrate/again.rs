@@ -1,0 +1,73 @@
+//! The bundle that inputs and options give, computed in memory: what `verify` compares with.
+
+use super::BothSolved;
+use super::CalibrateOptions;
+use super::Inductances;
+use super::Kept;
+use super::compute;
+use super::point_rows;
+use crate::RunError;
+use crate::bundle::artefact::Input;
+use crate::bundle::cache::Store;
+use crate::bundle::lambda_file::LambdaFile;
+use crate::bundle::manifest::Manifest;
+use crate::bundle::table::PointRow;
+use crate::bundle::write::{BundleContent, sealed_manifest};
+use crate::progress::Progress;
+use crate::scene::Scene;
+use crate::scene::cached_field::FieldStore;
+use crate::scene::sources::DesignSource;
+use crate::scene::sources::ShapeSource;
+
+/// What a bundle must hold. The digests in the manifest's list stand for the content of all files.
+#[derive(Debug, Clone)]
+pub struct Expected {
+    /// `manifest.json`.
+    pub manifest: Manifest,
+    /// `lambda.json`.
+    pub lambda: LambdaFile,
+    /// `points.csv`.
+    pub points: Vec<PointRow>,
+}
+
+/// Computes the bundle of `shape` on `scene` again. Nothing is written, and nothing that an
+/// earlier run cached is used.
+///
+/// # Errors
+/// As [`super::run`], but for what concerns the output.
+pub fn expected(
+    scene: &Scene,
+    source: DesignSource,
+    curve: Option<&(Input, String)>,
+    shape: &ShapeSource,
+    options: &CalibrateOptions,
+    progress: &dyn Progress,
+) -> Result<Expected, RunError> {
+    let tolerance = options.lambda.tolerance;
+    let table = curve.map(|(_, text)| text.as_str());
+    let field = FieldStore::new(scene, tolerance, table, Store::none());
+    let solved = BothSolved::new(scene, &field, tolerance, progress)?;
+    let circuit = Inductances::new(scene, &solved.map, progress);
+    let kept = Kept {
+        source,
+        curve,
+        circuit: &circuit,
+        field: field.of_shape(&shape.document.name),
+    };
+    let points = kept.points(shape, progress)?;
+    let seal = |content: &BundleContent| Ok(sealed_manifest(content)?);
+    let (manifest, lambda) = compute(
+        scene,
+        &solved,
+        kept,
+        (shape, points),
+        options,
+        progress,
+        seal,
+    )?;
+    Ok(Expected {
+        manifest,
+        points: point_rows(&lambda.points.discretized.points),
+        lambda: lambda.file,
+    })
+}

@@ -1,0 +1,446 @@
+//! `calibrate`: maps, points, force constant and currents of objects, one bundle each.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::BundleReport;
+use super::CalibrateOptions;
+use super::CalibrateReport;
+use super::DEFAULT_REACH_M;
+use super::plan::{Cost, Done, Plan, plan};
+use super::run;
+use crate::bundle::artefact::{FLUXFORM_VERSION, SCHEMA_VERSION};
+use crate::bundle::lambda_file::WorkingPointForces;
+use crate::bundle::manifest::Manifest;
+use crate::cli::args::{SurfaceFlags, Tolerance, Writing};
+use crate::cli::budget::{allow, asked, costs};
+use crate::cli::describe;
+use crate::cli::documents;
+use crate::cli::failure::Failure;
+use crate::cli::help::{Codes, page};
+use crate::cli::layout::{Sheet, headed_table};
+use crate::cli::printer::{Place, Printer};
+use crate::cli::quantity::{
+    bytes, count, error, force, length_error, mm, number, number_to, percent,
+};
+use crate::cli::start::accuracy_check;
+use crate::cli::start::begin;
+use crate::cli::start::folder;
+use crate::cli::values::{self, FileArgument};
+use crate::commands::lambda::command::{CriterionFlags, rendered};
+use crate::design::{Design, Need};
+use crate::lambda::{Criterion, ForceConstants};
+use crate::scene::cost::{Components, of_map};
+use crate::scene::sources::DesignSource;
+
+/// The main job: maps, points, force constant and currents, one bundle a shape
+///
+/// For every shape: samples its surface, finds the force constant and the static currents from
+/// forces computed at its points, tabulates the part of the maps that the object needs, and writes
+/// all of it as one bundle, OUT/<design>/<shape>/, that a runtime loads. A bundle is whole before
+/// the next begins. What the object does not need is left out of the map, and what that costs is
+/// reported.
+#[derive(Debug, Args)]
+#[command(after_help = page(Codes::Writing, &[
+    ("fluxform calibrate designs/seed.toml shapes/flat.toml shapes/half_sphere.toml",
+     "two objects; the bundles go to results/seed/"),
+    ("fluxform calibrate designs/seed.toml shapes/wedge.stl --unit mm --translate 0,0,30",
+     "a surface given directly; its bundle is called wedge"),
+    ("fluxform calibrate designs/seed_air.toml shapes/flat.toml --explain",
+     "report first what will be computed, what left out, and what that costs"),
+    ("fluxform calibrate designs/seed.toml shapes/flat.toml --criterion linear --out linear",
+     "another criterion beside it; --force would replace what is there"),
+]))]
+pub struct Calibrate {
+    /// Design file (TOML), `-` for standard input
+    #[arg(value_name = "DESIGN")]
+    design: FileArgument,
+    /// Shape files (TOML) or surfaces (STL, OBJ, PLY, 3MF, STEP, ...); no two of the same name
+    #[arg(value_name = "SHAPE", required = true)]
+    shapes: Vec<FileArgument>,
+    /// Folder under which <design>/<shape>/ is written
+    #[arg(long, value_name = "DIR", default_value = "results")]
+    out: FileArgument,
+    /// How far from the object's points the maps reach within the workspace, millimetres
+    /// [default: 20]
+    #[arg(long, value_name = "MM", value_parser = values::length, allow_hyphen_values = true)]
+    reach: Option<f64>,
+    /// Compute the field of coils and steel again, and remove what earlier runs kept of it in
+    /// OUT/<design>/.fluxform-kept
+    #[arg(long)]
+    no_cache: bool,
+    /// Report first what will be computed and what left out, why, and what leaving it out costs
+    #[arg(long)]
+    explain: bool,
+    /// Leave out report.html and the folder plots
+    #[arg(long)]
+    no_report: bool,
+    #[command(flatten)]
+    criterion: CriterionFlags,
+    #[command(flatten)]
+    writing: Writing,
+    #[command(flatten)]
+    tolerance: Tolerance,
+    #[command(flatten)]
+    surface: SurfaceFlags,
+}
+
+/// What is told to programs.
+#[derive(Serialize)]
+struct CalibrateSummary<'a> {
+    schema_version: &'static str,
+    fluxform_version: &'static str,
+    design: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    plan: Option<Plan>,
+    bundles: Vec<BundleSummary<'a>>,
+}
+
+/// One bundle; the keys are those of `lambda.json` and `manifest.json`.
+#[derive(Serialize)]
+struct BundleSummary<'a> {
+    shape: &'a str,
+    folder: String,
+    points: usize,
+    outside: usize,
+    criterion: Criterion,
+    #[serde(flatten)]
+    constants: ForceConstants,
+    lambda_n_per_m: Option<f64>,
+    currents_a: Option<&'a [f64]>,
+    rms_error_n: Option<f64>,
+    worst_error_n: Option<f64>,
+    relative_rms_error: Option<f64>,
+    rank: usize,
+    manifest: &'a Manifest,
+}
+
+impl Calibrate {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
+        let out = folder(&self.out)?;
+        let lambda = self.criterion.options(self.tolerance.tolerance);
+        let (document, shapes) = documents::design_and_shapes(
+            &self.design,
+            Need::CALIBRATE,
+            &self.shapes,
+            &self.surface,
+            printer,
+        )?;
+        let design = &document.design;
+        let source = DesignSource {
+            design,
+            text: &document.text,
+            input: &document.input,
+        };
+        let options = CalibrateOptions {
+            out,
+            force: self.writing.force,
+            lambda,
+            keep: !self.no_cache,
+            reach_m: self.reach.unwrap_or(DEFAULT_REACH_M),
+            page: !self.no_report,
+        };
+        let bar = begin(printer);
+        let plan = self
+            .explain
+            .then(|| plan(source, &shapes, &options, &bar))
+            .transpose()?;
+        drop(bar);
+        if let Some(plan) = plan.as_ref().filter(|_| !printer.json()) {
+            printer.summary(Place::Output, plan, || explained(plan))?;
+        }
+        allow(
+            costs(design, &shapes, self.tolerance.tolerance)
+                .into_iter()
+                .chain([of_map(design, Components::Gz)]),
+            asked(&shapes),
+            printer,
+        )?;
+        let bar = begin(printer);
+        let report = run(source, &shapes, &options, &bar)?;
+        drop(bar);
+        warn(&report, printer);
+        let json = CalibrateSummary {
+            schema_version: SCHEMA_VERSION,
+            fluxform_version: FLUXFORM_VERSION,
+            design: &design.name,
+            plan,
+            bundles: report.bundles.iter().map(bundle_summary).collect(),
+        };
+        let json = printer.with_warnings(&json);
+        let folder = options.out.join(&design.name);
+        printer.summary(Place::Output, &json, || summary(design, &report, &folder))?;
+        let missed = |b: &BundleReport| b.lambda.accuracy_missed.clone();
+        let missed: Vec<String> = report.bundles.iter().flat_map(missed).collect();
+        accuracy_check(&missed)?;
+        let constants: Vec<(&str, Option<f64>)> = report
+            .bundles
+            .iter()
+            .map(|b| (b.manifest.shape.as_str(), b.lambda.file.lambda_n_per_m))
+            .collect();
+        rendered(&constants)
+    }
+}
+
+fn explained(plan: &Plan) -> String {
+    let mut sheet = Sheet::new("plan");
+    for term in &plan.terms {
+        let (does, without) = match term.done {
+            Done::Computed => ("computed", "without it up to"),
+            Done::Kept => ("kept", ""),
+            Done::LeftOut => ("left out", "costs up to"),
+        };
+        let cost = match term.cost {
+            None if term.done == Done::LeftOut => "; what that costs is not known".to_owned(),
+            None => String::new(),
+            Some(Cost::OfTheForce(0.0)) => "; costs nothing".to_owned(),
+            Some(Cost::OfTheForce(part)) => format!(
+                "; {without} {} of the largest coil's force, where the tolerance is {}",
+                percent(part),
+                error(plan.tolerance)
+            ),
+            Some(Cost::ForceN(n)) => format!("; {without} {}", force(n)),
+        };
+        sheet.line(does, &format!("{}: {}{cost}", term.what, term.why));
+    }
+    if plan.cost_coils < plan.coils {
+        sheet.line(
+            "costs",
+            &format!(
+                "are those of the {} coils in the middle of the {}",
+                plan.cost_coils, plan.coils
+            ),
+        );
+    }
+    for shape in &plan.shapes {
+        let nodes = |n: [usize; 3]| format!("{} x {} x {}", n[0], n[1], n[2]);
+        sheet.line(
+            "map",
+            &format!(
+                "{}: {} of {} nodes, z {} to {}, for {}",
+                shape.shape,
+                nodes(shape.nodes),
+                nodes(shape.workspace_nodes),
+                mm(shape.z_m[0]),
+                mm(shape.z_m[1]),
+                count(shape.points, "point")
+            ),
+        );
+    }
+    sheet.gap();
+    sheet.finish()
+}
+
+fn warn(report: &CalibrateReport, printer: &Printer) {
+    for bundle in &report.bundles {
+        let shape = &bundle.manifest.shape;
+        for warning in &bundle.lambda.warnings {
+            printer.warning(&format!("{shape}: {warning}"));
+        }
+    }
+}
+
+fn bundle_summary(bundle: &BundleReport) -> BundleSummary<'_> {
+    let file = &bundle.lambda.file;
+    BundleSummary {
+        shape: &file.shape,
+        folder: bundle.folder.display().to_string(),
+        points: file.points,
+        outside: bundle.lambda.points.summary.outside,
+        criterion: file.criterion,
+        constants: file.constants,
+        lambda_n_per_m: file.lambda_n_per_m,
+        currents_a: file.currents_a.as_deref(),
+        rms_error_n: file.rms_error_n,
+        worst_error_n: file.worst_error_n,
+        relative_rms_error: file.relative_rms_error,
+        rank: file.rank,
+        manifest: &bundle.manifest,
+    }
+}
+
+fn size(manifest: &Manifest) -> u64 {
+    manifest.files.iter().map(|file| file.bytes).sum()
+}
+
+fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> String {
+    let mut sheet = Sheet::new(&format!(
+        "{} on {} ({})",
+        count(report.bundles.len(), "shape"),
+        design.name,
+        describe::array(design)
+    ));
+    sheet.gap();
+    sheet.raw(&shapes_table(report));
+    sheet.gap();
+    sheet.raw(&constants_table(report));
+    sheet.gap();
+    let Some(first) = report.bundles.first() else {
+        return sheet.finish();
+    };
+    let file = &first.lambda.file;
+    sheet.line(
+        "lambda",
+        &format!(
+            "chosen by {}; errors are of the force, relative to the rms force",
+            file.criterion.described(&percent(file.jnd))
+        ),
+    );
+    sheet.line("accuracy", &accuracies(report));
+    if let Some(told) = working_points(report) {
+        sheet.line("steel", &told);
+    }
+    let left_out: BTreeSet<String> = report
+        .bundles
+        .iter()
+        .flat_map(|bundle| {
+            let parts = describe::left_out(&bundle.manifest.left_out);
+            let shape = &bundle.manifest.shape;
+            parts
+                .lines()
+                .map(|part| told_of(shape, part, report))
+                .collect::<Vec<_>>()
+        })
+        .collect();
+    let left_out: Vec<String> = left_out.into_iter().collect();
+    sheet.line("left out", &left_out.join("\n"));
+    let total = report.bundles.iter().map(|b| size(&b.manifest)).sum();
+    sheet.line(
+        "written to",
+        &format!(
+            "{}: {}, {}",
+            folder.display(),
+            count(report.bundles.len(), "bundle"),
+            bytes(total)
+        ),
+    );
+    sheet.finish()
+}
+
+/// A line about every shape stands for itself; others begin with their shape.
+fn told_of(shape: &str, part: &str, report: &CalibrateReport) -> String {
+    let of_all = report.bundles.iter().all(|bundle| {
+        describe::left_out(&bundle.manifest.left_out)
+            .lines()
+            .any(|other| other == part)
+    });
+    if of_all {
+        part.to_owned()
+    } else {
+        format!("{shape}: {part}")
+    }
+}
+
+/// What was chosen, one row per shape.
+fn shapes_table(report: &CalibrateReport) -> String {
+    let or_none = |value: Option<String>| value.unwrap_or_else(|| "none".to_owned());
+    let row = |bundle: &BundleReport| {
+        let file = &bundle.lambda.file;
+        vec![
+            ("shape", file.shape.clone()),
+            ("points", file.points.to_string()),
+            ("lambda N/m", or_none(file.lambda_n_per_m.map(number))),
+            (
+                "rms mN",
+                or_none(file.rms_error_n.map(|n| number(n * 1000.0))),
+            ),
+            ("relative", or_none(file.relative_rms_error.map(percent))),
+            (
+                "worst mN",
+                or_none(file.worst_error_n.map(|n| number(n * 1000.0))),
+            ),
+            ("at limit", or_none(at_limit(bundle))),
+        ]
+    };
+    headed_table(report.bundles.iter().map(row))
+}
+
+/// Every force constant, one row per shape.
+fn constants_table(report: &CalibrateReport) -> String {
+    let row = |bundle: &BundleReport| {
+        let file = &bundle.lambda.file;
+        let named = file.constants.named().into_iter().map(|one| {
+            let lambda = one.lambda_n_per_m.map_or_else(|| "none".to_owned(), number);
+            (one.name, lambda)
+        });
+        [("lambda N/m", file.shape.clone())]
+            .into_iter()
+            .chain(named)
+            .collect()
+    };
+    headed_table(report.bundles.iter().map(row))
+}
+
+/// How many coils carry all they may, and whether their sum does.
+fn at_limit(bundle: &BundleReport) -> Option<String> {
+    let currents = bundle.lambda.file.currents_a.as_ref()?;
+    let limits = &bundle.manifest.limits;
+    let bound = currents
+        .iter()
+        .zip(limits.current_min_a.iter().zip(&limits.current_max_a))
+        .filter(|(current, (min, max))| current >= max || (current <= min && **min < 0.0))
+        .count();
+    // Rounding may leave the sum a few bits below its limit.
+    let sum: f64 = currents.iter().sum();
+    let total = limits.total_current_max_a;
+    let full = total.is_some_and(|total| sum >= total * (1.0 - 1e-12));
+    let coils = count(bound, "coil");
+    Some(if full { format!("{coils}, sum") } else { coils })
+}
+
+/// How far forces along the B-H curve are off those added up, where the design gives a curve.
+fn working_points(report: &CalibrateReport) -> Option<String> {
+    let points: Vec<&WorkingPointForces> = report
+        .bundles
+        .iter()
+        .filter_map(|bundle| bundle.lambda.file.working_point.as_ref())
+        .collect();
+    let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
+    (!points.is_empty()).then(|| {
+        format!(
+            "along its B-H curve forces {} off those added up at most; |B| up to {} T",
+            percent(largest(&mut points.iter().map(|p| p.deviation_from_linear))),
+            number_to(
+                largest(&mut points.iter().flat_map(|p| p.peak_field_t.iter().copied())),
+                4
+            )
+        )
+    })
+}
+
+/// The largest error of each stage over all shapes.
+fn accuracies(report: &CalibrateReport) -> String {
+    let largest = |stage: &str| {
+        let stages = report.bundles.iter();
+        stages
+            .filter_map(|bundle| bundle.manifest.accuracy.get(stage))
+            .map(|accuracy| accuracy.estimate)
+            .fold(0.0, f64::max)
+    };
+    let between = report
+        .bundles
+        .iter()
+        .map(|bundle| bundle.manifest.map.interpolation.largest_error)
+        .fold(0.0, f64::max);
+    let pull = largest("passive_force");
+    let pull = if pull > 0.0 {
+        format!("; steel's pull {} of itself", error(pull))
+    } else {
+        String::new()
+    };
+    format!(
+        "heights {}; forces {}, map nodes {}, between nodes {} of the largest gradient at their \
+         height{pull}",
+        length_error(largest("points")),
+        error(largest("forces")),
+        error(largest("map")),
+        error(between)
+    )
+}

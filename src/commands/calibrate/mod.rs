@@ -1,0 +1,740 @@
+//! `calibrate`: map, points and lambda for each shape, one bundle each.
+
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+use super::discretize::{self, PointsReport, point_rows, points_grid};
+use super::lambda::{LambdaOptions, LambdaReport, solve};
+use super::made_with::surface;
+use super::map::{MAP_TOLERANCE, arrays, runtime, summary, workspace_grid};
+use crate::RunError;
+use crate::accuracy::StageAccuracy;
+use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS, arithmetic};
+use crate::bundle::atomic::WriteError;
+use crate::bundle::cache::Store;
+use crate::bundle::manifest::{
+    AxisSummary, CircuitSummary, Interpolation, LambdaSummary, LeftOut, MadeWith, Manifest,
+    PassiveForce,
+};
+use crate::bundle::npz::PASSIVE;
+use crate::bundle::rendering::{HeightGrid, Rendering};
+use crate::bundle::table::CurrentRow;
+use crate::bundle::timing::StageSeconds;
+use crate::bundle::write::{BundleContent, check_bundle_target, write_bundle};
+use crate::design::{Design, source};
+use crate::lambda::Settings;
+use crate::map::tabulate::{Grid, PlacedCoil};
+use crate::map::{Components, FieldMap};
+use crate::progress::Progress;
+use crate::scene::cached_field::{FieldStore, STORE_FOLDER, ShapeField};
+use crate::scene::maps::{Felt, SceneMap};
+use crate::scene::neighbours;
+use crate::scene::passive::PASSIVE_TOLERANCE;
+use crate::scene::passive_map::PassiveMap;
+use crate::scene::sources::{DesignSource, ShapeSource};
+use crate::scene::steel;
+use crate::scene::steel::{Solved, Steel};
+use crate::scene::{MAGNET_SHARE, Scene};
+use crate::shape::points::ConstraintPoints;
+
+pub(crate) mod again;
+pub(crate) mod command;
+mod ignored_pull;
+mod page;
+pub mod plan;
+mod recorded;
+
+pub(crate) use ignored_pull::IgnoredPull;
+pub use page::PAGE_FILE;
+
+/// The name under which a bundle keeps the design it was made from.
+pub const DESIGN_FILE: &str = "design.toml";
+
+/// The name under which a bundle keeps the table of its design's magnetisation curve.
+pub const CURVE_FILE: &str = "bh_curve.csv";
+
+/// The stage of the map of the unpowered steel's pull among a bundle's accuracies.
+pub const PASSIVE_STAGE: &str = "passive_force_map";
+
+/// How far from the object's points the map still reaches by default, m: the seed's largest
+/// deviation between finger and surface is 14 mm.
+pub const DEFAULT_REACH_M: f64 = 0.020;
+
+/// What is asked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CalibrateOptions {
+    /// Folder under which `<design>/<shape>/` is written.
+    pub out: PathBuf,
+    /// Replace what is there, whatever it is.
+    pub force: bool,
+    /// The force constant's criterion; its `tolerance` is that of the forces.
+    pub lambda: LambdaOptions,
+    /// The map reaches this far from the object's points, within the workspace, m.
+    pub reach_m: f64,
+    /// Keep the design's field for the next run, and use what an earlier one kept.
+    pub keep: bool,
+    /// Whether a page and plots for people are written too.
+    pub page: bool,
+}
+
+impl CalibrateOptions {
+    /// What the command does by default, under the folder `out`.
+    pub fn new(out: impl Into<PathBuf>) -> Self {
+        Self {
+            out: out.into(),
+            force: false,
+            lambda: LambdaOptions::default(),
+            reach_m: DEFAULT_REACH_M,
+            keep: true,
+            page: true,
+        }
+    }
+
+    /// What `verify` needs beside the inputs to compute the same bundle again. A new option does not
+    /// compile before it is recorded or left out on purpose.
+    pub(crate) fn made_with(&self, shape: &ShapeSource) -> MadeWith {
+        let CalibrateOptions {
+            out: _,
+            force: _,
+            lambda,
+            reach_m,
+            keep: _,
+            page,
+        } = self;
+        let LambdaOptions {
+            settings,
+            tolerance,
+            // Of `lambda` alone.
+            sampling: _,
+            wiring: _,
+            variants: _,
+            feedback: _,
+            picture: _,
+        } = lambda;
+        let Settings {
+            criterion,
+            jnd_weight,
+            at_n_per_m,
+        } = *settings;
+        let mut made_with = MadeWith {
+            criterion: Some(criterion),
+            jnd: Some(jnd_weight),
+            at_n_per_m,
+            tolerance: *tolerance,
+            reach_m: *reach_m,
+            report: *page,
+            arithmetic: arithmetic(),
+            surface: surface(&shape.document, shape.input.as_ref()),
+            sha256: String::new(),
+        };
+        made_with.sha256 = made_with.digest();
+        made_with
+    }
+}
+
+/// What was made.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct CalibrateReport {
+    /// One entry a shape, in the order given.
+    pub bundles: Vec<BundleReport>,
+}
+
+/// One bundle.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct BundleReport {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// `manifest.json` as written.
+    pub manifest: Manifest,
+    /// The force constant.
+    pub lambda: LambdaReport,
+}
+
+impl CalibrateReport {
+    /// Whether every shape has a force constant and every tolerance was reached.
+    #[must_use]
+    pub fn meets_request(&self) -> bool {
+        self.bundles
+            .iter()
+            .all(|bundle| bundle.lambda.meets_request())
+    }
+}
+
+/// Calibrates `source` for every shape; each bundle is whole before the next begins.
+///
+/// # Errors
+/// Two shapes of one name; a design or shape that cannot be computed; an output that must not
+/// be replaced or cannot be written; interruption. Finished bundles are kept.
+pub fn run(
+    source: DesignSource,
+    shapes: &[ShapeSource],
+    options: &CalibrateOptions,
+    progress: &dyn Progress,
+) -> Result<CalibrateReport, RunError> {
+    for (i, shape) in shapes.iter().enumerate() {
+        if shapes[..i]
+            .iter()
+            .any(|other| other.document.name == shape.document.name)
+        {
+            return Err(RunError::Input(format!(
+                "two shapes are called {:?}: their bundles would share a folder; rename one",
+                shape.document.name
+            )));
+        }
+    }
+    let scene = Scene::new(source.design)?;
+    let curve = curve_table(source.design)?;
+    // Before anything is computed, cleared or kept: a run that is refused changes nothing.
+    for shape in shapes {
+        let inputs = inputs(source, curve.as_ref(), shape);
+        let inputs = discretize::with_surface(&shape.document, inputs);
+        let made_with = options.made_with(shape);
+        let folder = folder_of(&scene, shape, options);
+        check_bundle_target(&folder, options.force, &inputs, Some(&made_with))?;
+    }
+    if !options.keep {
+        store_of(&scene, options).clear();
+    }
+    let field = field_store(&scene, curve.as_ref(), options);
+    let solved = BothSolved::new(&scene, &field, options.lambda.tolerance, progress)?;
+    let circuit = Inductances::new(&scene, &solved.map, progress);
+    let bundles = shapes
+        .iter()
+        .map(|shape| {
+            let kept = Kept {
+                source,
+                curve: curve.as_ref(),
+                circuit: &circuit,
+                field: field.of_shape(&shape.document.name),
+            };
+            calibrate_one(&scene, &solved, kept, shape, options, progress)
+        })
+        .collect::<Result<_, _>>()?;
+    Ok(CalibrateReport { bundles })
+}
+
+/// What earlier runs kept of the field, as far as that is wanted.
+pub(crate) fn field_store(
+    scene: &Scene,
+    curve: Option<&(Input, String)>,
+    options: &CalibrateOptions,
+) -> FieldStore {
+    let store = if options.keep {
+        store_of(scene, options)
+    } else {
+        Store::none()
+    };
+    let table = curve.map(|(_, text)| text.as_str());
+    FieldStore::new(scene, options.lambda.tolerance, table, store)
+}
+
+/// Beside the design's bundles.
+fn store_of(scene: &Scene, options: &CalibrateOptions) -> Store {
+    Store::in_folder(options.out.join(&scene.design.name), STORE_FOLDER)
+}
+
+/// The table of the design's magnetisation curve: its entry among the inputs and its text.
+pub(crate) fn curve_table(design: &Design) -> Result<Option<(Input, String)>, RunError> {
+    let Some(path) = design.curve_file() else {
+        return Ok(None);
+    };
+    let text = source::table_text_of(path).map_err(|fault| RunError::Input(fault.to_string()))?;
+    let input = Input::of_bytes(path.display().to_string(), text.as_bytes());
+    Ok(Some((input, text)))
+}
+
+/// What a bundle keeps as it is.
+#[derive(Clone, Copy)]
+struct Kept<'a> {
+    source: DesignSource<'a>,
+    curve: Option<&'a (Input, String)>,
+    circuit: &'a Inductances,
+    field: ShapeField<'a>,
+}
+
+impl Kept<'_> {
+    /// The object's points; their inputs are those of the whole bundle.
+    fn points(
+        &self,
+        shape: &ShapeSource,
+        progress: &dyn Progress,
+    ) -> Result<PointsReport, RunError> {
+        let inputs = inputs(self.source, self.curve, shape);
+        discretize::run_kept(&shape.document, inputs, self.field, progress)
+    }
+}
+
+/// Finest tolerance asked of inductances in air, which decide how currents lag alone.
+const INDUCTANCE_TOLERANCE: f64 = 1e-6;
+
+/// How the coils' currents follow their voltages; the same for every shape.
+struct Inductances {
+    circuit: CircuitSummary,
+    accuracy: StageAccuracy,
+}
+
+impl Inductances {
+    fn new(scene: &Scene, solved: &Solved, progress: &dyn Progress) -> Self {
+        progress.begin("inductances", 1);
+        let wanted = solved.tolerance.max(INDUCTANCE_TOLERANCE);
+        let in_air = neighbours::in_air(scene, wanted);
+        let (inductance_h, accuracy) = neighbours::inductances(solved, in_air);
+        progress.end();
+        Self {
+            circuit: CircuitSummary {
+                inductance_h,
+                voltage_v: scene.design.supply.voltage_v,
+            },
+            accuracy,
+        }
+    }
+}
+
+/// The sources as forces and as maps ask for them: of steel one solution serves both.
+struct BothSolved {
+    forces: Solved,
+    map: Solved,
+}
+
+impl BothSolved {
+    fn new(
+        scene: &Scene,
+        field: &FieldStore,
+        tolerance: Option<f64>,
+        progress: &dyn Progress,
+    ) -> Result<Self, RunError> {
+        let lowest_m = scene.design.workspace.z_m.from;
+        progress.begin("steel", 1);
+        let map = field.steel(scene, tolerance, MAP_TOLERANCE)?;
+        let forces = match map.steel {
+            Steel::None => steel::solve(scene, tolerance, scene.force_tolerance(), lowest_m)?,
+            Steel::Alone(_) | Steel::Coupled(_) => map.clone(),
+        };
+        progress.end();
+        Ok(Self { forces, map })
+    }
+}
+
+/// Where the bundle of `shape` goes.
+fn folder_of(scene: &Scene, shape: &ShapeSource, options: &CalibrateOptions) -> PathBuf {
+    let design = options.out.join(&scene.design.name);
+    design.join(&shape.document.name)
+}
+
+/// What a bundle is made from, but for the surface that the shape's document names.
+fn inputs(
+    source: DesignSource,
+    curve: Option<&(Input, String)>,
+    shape: &ShapeSource,
+) -> Vec<Input> {
+    let curve = curve.map(|(input, _)| input);
+    let all = std::iter::once(source.input)
+        .chain(curve)
+        .chain(&shape.input);
+    all.cloned().collect()
+}
+
+fn calibrate_one(
+    scene: &Scene,
+    solved: &BothSolved,
+    kept: Kept,
+    shape: &ShapeSource,
+    options: &CalibrateOptions,
+    progress: &dyn Progress,
+) -> Result<BundleReport, RunError> {
+    progress.take_seconds();
+    let folder = folder_of(scene, shape, options);
+    let points = kept.points(shape, progress)?;
+    let made_with = options.made_with(shape);
+    let inputs = &points.summary.inputs;
+    check_bundle_target(&folder, options.force, inputs, Some(&made_with))?;
+    let write = |content: &BundleContent| {
+        let timing: Vec<StageSeconds> = progress
+            .take_seconds()
+            .into_iter()
+            .map(|(stage, seconds)| StageSeconds { stage, seconds })
+            .collect();
+        progress.check()?;
+        progress.begin("write", 1);
+        let manifest = write_bundle(&folder, options.force, content, &timing)?;
+        progress.end();
+        Ok(manifest)
+    };
+    let (manifest, lambda) = compute(
+        scene,
+        solved,
+        kept,
+        (shape, points),
+        options,
+        progress,
+        write,
+    )?;
+    Ok(BundleReport {
+        folder,
+        manifest,
+        lambda,
+    })
+}
+
+/// Computes everything that a bundle holds and hands it to `take`, which returns the manifest with
+/// its list of files.
+fn compute(
+    scene: &Scene,
+    solved: &BothSolved,
+    kept: Kept,
+    (shape, points): (&ShapeSource, PointsReport),
+    options: &CalibrateOptions,
+    progress: &dyn Progress,
+    take: impl FnOnce(&BundleContent) -> Result<Manifest, RunError>,
+) -> Result<(Manifest, LambdaReport), RunError> {
+    let Kept {
+        source,
+        curve,
+        circuit,
+        field,
+    } = kept;
+    let asked = LambdaOptions {
+        picture: options.page,
+        ..options.lambda.clone()
+    };
+    let mut lambda = solve(scene, &solved.forces, field, points, &asked, progress)?;
+    let mut needed = NeededMap::new(
+        scene,
+        &solved.map,
+        field,
+        &lambda,
+        options.reach_m,
+        progress,
+    )?;
+    let passive = passive_map(scene, &needed.made.map, progress)?;
+    progress.begin("passive force", 1);
+    let ignored = IgnoredPull::new(scene, &lambda, field)?;
+    progress.end();
+    if let Some(ignored) = ignored {
+        lambda.warnings.extend(ignored.warning(lambda.file.jnd));
+        needed.left_out.push(ignored.left_out());
+    }
+    let mut manifest = manifest(scene, &lambda, &needed, passive.as_ref());
+    manifest.made_with = Some(options.made_with(shape));
+    manifest.circuit = Some(circuit.circuit.clone());
+    let stage = circuit.accuracy.clone();
+    manifest.accuracy.insert("inductances".to_owned(), stage);
+    lambda.warnings.extend(outside_warning(&manifest, &lambda));
+    let currents = current_rows(scene, &lambda);
+    let rows = point_rows(&lambda.points.discretized.points);
+    let mut runtime = runtime(scene, lambda.file.lambda_n_per_m);
+    runtime.rendering = HeightGrid::of_points(&manifest.points, &rows).map(|heights| Rendering {
+        heights,
+        static_current_a: currents.iter().map(|row| row.current_a).collect(),
+        inductance_h: circuit.circuit.inductance_h.concat(),
+        voltage_v: circuit.circuit.voltage_v,
+    });
+    let mut map = arrays(&needed.made.map, runtime);
+    map.passive_force_n = passive.as_ref().map(|p| Cow::Borrowed(&*p.force_z_n));
+    let mut extra = vec![(DESIGN_FILE, source.text.as_bytes())];
+    extra.extend(curve.map(|(_, text)| (CURVE_FILE, text.as_bytes())));
+    let mut pages = Vec::new();
+    if let Some(picture) = &lambda.picture {
+        progress.begin("report", 1);
+        let seen = page::Seen {
+            scene,
+            lambda: &lambda,
+            picture,
+            needed: &needed,
+            manifest: &manifest,
+            tolerance: solved.map.tolerance,
+        };
+        let others: Vec<&str> = extra.iter().map(|(name, _)| *name).collect();
+        pages = page::files(&seen, &others)
+            .map_err(|error| WriteError::from_io("write", Path::new(PAGE_FILE), error))?;
+        progress.end();
+    }
+    extra.extend(pages.iter().map(|(name, bytes)| (*name, bytes.as_slice())));
+    let manifest = take(&BundleContent {
+        manifest,
+        map: &map,
+        points: &rows,
+        currents: &currents,
+        lambda: &lambda.file,
+        extra: &extra,
+    })?;
+    Ok((manifest, lambda))
+}
+
+/// The unpowered steel's pull on the map's nodes, where the design asks for it.
+fn passive_map(
+    scene: &Scene,
+    map: &FieldMap,
+    progress: &dyn Progress,
+) -> Result<Option<PassiveMap>, RunError> {
+    if !scene.design.magnet.passive_force || scene.core.is_none() {
+        return Ok(None);
+    }
+    progress.begin("passive force", 1);
+    let grid = Grid {
+        x_m: map.x_m.clone(),
+        y_m: map.y_m.clone(),
+        z_m: map.z_m.clone(),
+    };
+    let passive = PassiveMap::new(scene, &grid, PASSIVE_TOLERANCE)?;
+    progress.end();
+    Ok(passive)
+}
+
+/// The part of the maps that an object needs, and what was left out of it.
+struct NeededMap {
+    made: SceneMap,
+    components: Components,
+    left_out: Vec<LeftOut>,
+}
+
+impl NeededMap {
+    fn new(
+        scene: &Scene,
+        solved: &Solved,
+        field: ShapeField,
+        lambda: &LambdaReport,
+        reach_m: f64,
+        progress: &dyn Progress,
+    ) -> Result<Self, RunError> {
+        let mut left_out = Vec::new();
+        let grid = needed_grid(scene.design, lambda, reach_m, &mut left_out);
+        let components = if scene.tilted() {
+            Components::Gradient
+        } else {
+            left_out.push(LeftOut {
+                what: "field and transverse gradient".to_owned(),
+                why: "an upright dipole's vertical force needs dB_z/dz alone (eq. 5)".to_owned(),
+                error_cost: 0.0,
+            });
+            Components::Gz
+        };
+        let driven = needed_coils(scene);
+        if driven.len() < scene.coils.len() {
+            left_out.push(LeftOut {
+                what: format!("{} coils", scene.coils.len() - driven.len()),
+                why: "their current limits are zero".to_owned(),
+                error_cost: 0.0,
+            });
+        }
+        let felt = Felt::by_magnet(scene, &grid.z_m, MAGNET_SHARE * solved.tolerance)?;
+        let mut made = field.map(scene, solved, &driven, &grid, components, &felt, progress)?;
+        drop_weak_coils(
+            scene,
+            &mut made.map,
+            &driven,
+            solved.tolerance,
+            &mut left_out,
+        );
+        Ok(Self {
+            made,
+            components,
+            left_out,
+        })
+    }
+}
+
+/// The coils that may carry current.
+pub(crate) fn needed_coils(scene: &Scene) -> Vec<PlacedCoil> {
+    let coils = scene.coils.iter();
+    coils
+        .filter(|coil| largest_current_a(scene, coil.number) > 0.0)
+        .copied()
+        .collect()
+}
+
+fn largest_current_a(scene: &Scene, coil: usize) -> f64 {
+    scene.upper_a[coil].max(-scene.lower_a[coil])
+}
+
+/// Removes coils whose largest force anywhere on the map stays below `tolerance` of the largest
+/// that any coil can give.
+fn drop_weak_coils(
+    scene: &Scene,
+    map: &mut FieldMap,
+    coils: &[PlacedCoil],
+    tolerance: f64,
+    left_out: &mut Vec<LeftOut>,
+) {
+    let nodes = map.x_m.len() * map.y_m.len() * map.z_m.len();
+    let strength: Vec<f64> = coils
+        .iter()
+        .zip(map.gz_t_per_m_per_a.chunks_exact(nodes.max(1)))
+        .map(|(coil, gz)| {
+            let largest = gz.iter().fold(0.0_f64, |most, g| most.max(g.abs()));
+            largest * largest_current_a(scene, coil.number)
+        })
+        .collect();
+    let strongest = strength.iter().copied().fold(0.0, f64::max);
+    let keep: Vec<bool> = strength
+        .iter()
+        .map(|s| *s > tolerance * strongest)
+        .collect();
+    if keep.iter().all(|keep| *keep) || strongest == 0.0 {
+        return;
+    }
+    let weak: f64 = strength
+        .iter()
+        .zip(&keep)
+        .filter(|(_, keep)| !**keep)
+        .map(|(s, _)| s)
+        .sum();
+    left_out.push(LeftOut {
+        what: format!("{} coils", keep.iter().filter(|keep| !**keep).count()),
+        why: "at their largest currents together they change no force on the map by more than \
+              this part of the largest that one coil gives"
+            .to_owned(),
+        error_cost: weak / strongest,
+    });
+    let retain = |values: &mut Vec<f64>, components: usize| {
+        let size = (nodes * components).max(1);
+        let kept: Vec<f64> = values
+            .chunks_exact(size)
+            .zip(&keep)
+            .filter(|(_, keep)| **keep)
+            .flat_map(|(block, _)| block.iter().copied())
+            .collect();
+        *values = kept;
+    };
+    retain(&mut map.gz_t_per_m_per_a, 1);
+    if let Some(gradient) = &mut map.gradient_t_per_m_per_a {
+        retain(gradient, 9);
+    }
+    map.coils = coils
+        .iter()
+        .zip(&keep)
+        .filter(|(_, keep)| **keep)
+        .map(|(coil, _)| coil.number)
+        .collect();
+}
+
+/// The nodes of the workspace within reach of the object's points, one cell beyond.
+pub(crate) fn needed_nodes(design: &Design, points: &ConstraintPoints, reach_m: f64) -> Grid {
+    let whole = workspace_grid(design);
+    let part = |nodes: &[f64], values: &[f64]| -> Vec<f64> {
+        let lowest = values.iter().copied().fold(f64::INFINITY, f64::min) - reach_m;
+        let highest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max) + reach_m;
+        // The last node at or below the range, the first at or above it; four nodes at least,
+        // so that the interpolation keeps its degree.
+        let mut start = nodes
+            .partition_point(|node| *node <= lowest)
+            .saturating_sub(1);
+        let mut end = (nodes.partition_point(|node| *node < highest) + 1).min(nodes.len());
+        while end - start < 4.min(nodes.len()) {
+            start = start.saturating_sub(1);
+            end = (end + 1).min(nodes.len());
+        }
+        nodes[start..end].to_vec()
+    };
+    Grid {
+        x_m: part(&whole.x_m, &points.x_m),
+        y_m: part(&whole.y_m, &points.y_m),
+        z_m: part(&whole.z_m, &points.height_m),
+    }
+}
+
+fn needed_grid(
+    design: &Design,
+    lambda: &LambdaReport,
+    reach_m: f64,
+    left_out: &mut Vec<LeftOut>,
+) -> Grid {
+    let whole = workspace_grid(design);
+    let grid = needed_nodes(design, &lambda.points.discretized.points, reach_m);
+    let count = |grid: &Grid| grid.x_m.len() * grid.y_m.len() * grid.z_m.len();
+    if count(&grid) < count(&whole) {
+        left_out.push(LeftOut {
+            what: format!(
+                "{} of {} workspace nodes",
+                count(&whole) - count(&grid),
+                count(&whole)
+            ),
+            why: format!(
+                "farther than {} mm from every point of the object",
+                reach_m * 1000.0
+            ),
+            error_cost: 0.0,
+        });
+    }
+    grid
+}
+
+fn manifest(
+    scene: &Scene,
+    lambda: &LambdaReport,
+    needed: &NeededMap,
+    passive: Option<&PassiveMap>,
+) -> Manifest {
+    let file = &lambda.file;
+    let mut accuracies = file.accuracy.clone();
+    accuracies.insert("map".to_owned(), needed.made.accuracy.clone());
+    let mut map = summary(&needed.made.map, needed.components, needed.made.between);
+    if let Some(passive) = passive {
+        accuracies.insert(PASSIVE_STAGE.to_owned(), passive.accuracy.clone());
+        map.passive_force = Some(PassiveForce {
+            array: PASSIVE.to_owned(),
+            largest_n: passive.largest_n,
+            interpolation: Interpolation::tricubic(passive.between, passive.definition()),
+        });
+    }
+    Manifest {
+        schema_version: SCHEMA_VERSION.to_owned(),
+        fluxform_version: FLUXFORM_VERSION.to_owned(),
+        design: file.design.clone(),
+        shape: file.shape.clone(),
+        inputs: file.inputs.clone(),
+        made_with: None,
+        units: UNITS.to_owned(),
+        array: scene.array_geometry(),
+        limits: scene.current_limits(),
+        resistance_ohm: scene.resistances_ohm(),
+        circuit: None,
+        magnet: scene.magnet_summary(),
+        lambda: LambdaSummary {
+            lambda_n_per_m: file.lambda_n_per_m,
+            criterion: file.criterion,
+        },
+        points: points_grid(&lambda.points.discretized.points),
+        map,
+        left_out: needed.left_out.clone(),
+        accuracy: accuracies,
+        files: Vec::new(),
+    }
+}
+
+/// Static currents, zero where there is no force constant.
+fn current_rows(scene: &Scene, lambda: &LambdaReport) -> Vec<CurrentRow> {
+    let currents = lambda.file.currents_a.as_deref();
+    scene
+        .coils
+        .iter()
+        .map(|coil| CurrentRow {
+            coil: coil.number,
+            x_m: coil.axis_m[0],
+            y_m: coil.axis_m[1],
+            current_a: currents.map_or(0.0, |currents| currents[coil.number]),
+        })
+        .collect()
+}
+
+/// A sentence on the points that lie outside the map, where a runtime gives no force.
+fn outside_warning(manifest: &Manifest, lambda: &LambdaReport) -> Option<String> {
+    let inside = |axis: &AxisSummary, value: f64| axis.from_m <= value && value <= axis.to_m;
+    let points = &lambda.points.discretized.points;
+    let outside = (0..points.len())
+        .filter(|i| {
+            !(inside(&manifest.map.x_m, points.x_m[*i])
+                && inside(&manifest.map.y_m, points.y_m[*i])
+                && inside(&manifest.map.z_m, points.height_m[*i]))
+        })
+        .count();
+    (outside > 0).then(|| {
+        format!(
+            "{outside} of {} points lie outside the design's workspace: lambda counts them, but a \
+             runtime has no map there and gives no force; enlarge [workspace]",
+            points.len()
+        )
+    })
+}

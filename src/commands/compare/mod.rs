@@ -1,0 +1,507 @@
+//! `compare`: how differently the rendered forces of several objects feel.
+//!
+//! Two objects are compared where a finger would touch either of them: at the points of both
+//! surfaces. Both are rendered there, with the static currents of each, which give a force anywhere
+//! above the coils, and with position feedback, lambda h(x, y) by the currents of least power as in
+//! `replay`, zero beside the object, the nearest force where the limits bind.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::discretize::{self, PointsReport, point_rows, points_grid};
+use super::lambda::proven_accuracy;
+use crate::RunError;
+use crate::accuracy::{StageAccuracy, missed};
+use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
+use crate::bundle::rendering::HeightGrid;
+use crate::design::Design;
+use crate::lambda::{self, Allocator, Criterion, ForceProblem, Reach, Settings, Solution, Status};
+use crate::plot::matrix::{MatrixPlot, Panel};
+use crate::progress::Progress;
+use crate::scene::Scene;
+use crate::scene::passive;
+use crate::scene::sources::ShapeSource;
+use crate::scene::steel;
+use crate::scene::steel::{Material, Solved};
+use crate::units::DETECTION_THRESHOLD_N;
+
+pub(crate) mod command;
+pub mod difference;
+
+use difference::{Difference, Felt, Sides, difference};
+
+/// Places handed to one thread at a time; fixed, so that bytes do not depend on threads.
+const PORTION: usize = 4096;
+
+/// What is asked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CompareOptions {
+    /// One force constant for all objects, N/m; `None`: each at its own `lambda_jnd`.
+    pub lambda_n_per_m: Option<f64>,
+    /// The just-noticeable relative difference of force, > 0.
+    pub jnd: f64,
+    /// Tolerance of the forces; `None` for the default.
+    pub tolerance: Option<f64>,
+}
+
+/// The comparison and what is to be told with it.
+#[derive(Debug, Clone)]
+pub struct CompareReport {
+    /// The JSON result.
+    pub file: CompareFile,
+    /// Warnings for the user.
+    pub warnings: Vec<String>,
+    /// Whether the tolerance asked for was reached.
+    pub accuracy_reached: bool,
+    /// What misses it.
+    pub accuracy_missed: Vec<String>,
+}
+
+/// What `compare` prints; SI.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CompareFile {
+    /// Layout of the artefact.
+    pub schema_version: &'static str,
+    /// Program that wrote it.
+    pub fluxform_version: &'static str,
+    /// Name of the design.
+    pub design: String,
+    /// What went in, paths as given on the command line.
+    pub inputs: Vec<Input>,
+    /// Forces this part apart are just told apart.
+    pub jnd: f64,
+    /// Forces this much apart are, whatever their size, not told apart, N.
+    pub threshold_n: f64,
+    /// How each lambda was chosen: `jnd`, or `given`.
+    pub criterion: &'static str,
+    /// The objects, in the order given.
+    pub shapes: Vec<ComparedShape>,
+    /// Every two of them.
+    pub pairs: Vec<Pair>,
+    /// Errors of the forces and of the differences.
+    pub accuracy: BTreeMap<&'static str, StageAccuracy>,
+}
+
+/// One object as rendered.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ComparedShape {
+    /// Its name.
+    pub shape: String,
+    /// Number of its points.
+    pub points: usize,
+    /// Its force constant, N/m; null where nothing can be rendered or no limit binds.
+    pub lambda_n_per_m: Option<f64>,
+    /// Its static currents, A.
+    pub currents_a: Option<Vec<f64>>,
+    /// Share of its points at which the limits bind with position feedback.
+    pub saturated_share: Option<f64>,
+}
+
+/// Two objects. The differences are null where either has no force constant.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Pair {
+    /// Name of the first.
+    pub a: String,
+    /// Name of the second.
+    pub b: String,
+    /// Largest difference with static currents, in just-noticeable differences.
+    pub static_jnd: Option<f64>,
+    /// Largest difference with position feedback, in just-noticeable differences; at most 1/jnd.
+    pub feedback_jnd: Option<f64>,
+    /// Root mean square of the differences with static currents, each surface counting half.
+    pub static_rms_jnd: Option<f64>,
+    /// The same with position feedback.
+    pub feedback_rms_jnd: Option<f64>,
+    /// Share of the places where static currents differ by more than one.
+    pub static_felt_share: Option<f64>,
+    /// The same with position feedback.
+    pub feedback_felt_share: Option<f64>,
+    /// Where static currents differ most.
+    pub static_at: Option<Place>,
+    /// Where it is with position feedback.
+    pub feedback_at: Option<Place>,
+}
+
+/// A place and the forces there.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Place {
+    /// The object on whose surface it lies.
+    pub on: String,
+    /// m.
+    pub x_m: f64,
+    /// m.
+    pub y_m: f64,
+    /// m.
+    pub z_m: f64,
+    /// Upward force of the first object, N.
+    pub a_force_n: f64,
+    /// Upward force of the second, N.
+    pub b_force_n: f64,
+}
+
+/// An object made ready.
+struct Object {
+    points: PointsReport,
+    positions_m: Vec<[f64; 3]>,
+    heights: HeightGrid,
+    /// N/A, [point, coil].
+    forces_n_per_a: Vec<f64>,
+    /// The force without currents, N.
+    passive_n: Option<Vec<f64>>,
+    rendered: Option<Rendered>,
+}
+
+/// What an object is rendered with.
+struct Rendered {
+    lambda_n_per_m: f64,
+    currents_a: Vec<f64>,
+}
+
+/// Forces of one object at the places of another.
+#[derive(Debug, Clone, Default)]
+struct Field {
+    fixed: Vec<Felt>,
+    feedback: Vec<Felt>,
+    saturated: usize,
+}
+
+/// Compares every two of `shapes` on `design`.
+///
+/// # Errors
+/// Two shapes of one name; a design or shape that cannot be computed; interruption.
+pub fn run(
+    design: &Design,
+    shapes: &[ShapeSource],
+    design_input: &Input,
+    options: &CompareOptions,
+    progress: &dyn Progress,
+) -> Result<CompareReport, RunError> {
+    for (i, shape) in shapes.iter().enumerate() {
+        let name = &shape.document.name;
+        if shapes[..i].iter().any(|other| other.document.name == *name) {
+            let message = format!("two shapes are called {name:?}: rename one");
+            return Err(RunError::Input(message));
+        }
+    }
+    let scene = Scene::new(design)?;
+    let of_shapes = shapes.iter().filter_map(|shape| shape.input.clone());
+    let inputs: Vec<Input> = std::iter::once(design_input.clone())
+        .chain(of_shapes)
+        .collect();
+    let points = shapes
+        .iter()
+        .map(|shape| discretize::run(&shape.document, inputs.clone(), progress))
+        .collect::<Result<Vec<PointsReport>, RunError>>()?;
+    let lowest_m = points
+        .iter()
+        .fold(f64::INFINITY, |z, p| z.min(p.summary.min_height_m));
+    progress.begin("steel", 1);
+    let solved = steel::solve(&scene, options.tolerance, scene.force_tolerance(), lowest_m)?;
+    progress.end();
+    let mut warnings = Vec::new();
+    let objects = points
+        .into_iter()
+        .map(|points| Object::new(&scene, &solved, points, options, progress, &mut warnings))
+        .collect::<Result<Vec<Object>, RunError>>()?;
+    if let Some(core) = &scene.core {
+        warnings.extend(core.warnings.iter().cloned());
+        if matches!(core.material, Material::Curve(_)) {
+            warnings.push(
+                "the forces of several currents are added up, which holds as long as the steel is \
+                 linear; `lambda` tells what the B-H curve changes at its currents"
+                    .to_owned(),
+            );
+        }
+    }
+    let fields = fields(&scene, &objects, progress)?;
+    let stage = proven_accuracy(&scene, &solved);
+    let (pairs, error) = pairs(&objects, &fields, options.jnd, stage.estimate);
+    let told = objects.iter().enumerate().map(|(k, object)| {
+        let rendered = object.rendered.as_ref();
+        ComparedShape {
+            shape: object.name().to_owned(),
+            points: object.positions_m.len(),
+            lambda_n_per_m: rendered.map(|r| r.lambda_n_per_m),
+            currents_a: rendered.map(|r| r.currents_a.clone()),
+            saturated_share: rendered
+                .map(|_| fields[k][k].saturated as f64 / object.positions_m.len() as f64),
+        }
+    });
+    let difference = StageAccuracy {
+        estimate: error,
+        relative_to: "1 just-noticeable difference".to_owned(),
+        method: "first order: the error of every coil's force at the places told".to_owned(),
+    };
+    let file = CompareFile {
+        schema_version: SCHEMA_VERSION,
+        fluxform_version: FLUXFORM_VERSION,
+        design: design.name.clone(),
+        inputs,
+        jnd: options.jnd,
+        threshold_n: DETECTION_THRESHOLD_N,
+        criterion: match options.lambda_n_per_m {
+            Some(_) => "given",
+            None => Criterion::Jnd.name(),
+        },
+        shapes: told.collect(),
+        pairs,
+        accuracy: BTreeMap::from([("forces", stage), ("difference", difference)]),
+    };
+    let accuracy_missed = missed(&file.accuracy, solved.tolerance);
+    Ok(CompareReport {
+        file,
+        warnings,
+        accuracy_reached: accuracy_missed.is_empty(),
+        accuracy_missed,
+    })
+}
+
+impl Object {
+    fn new(
+        scene: &Scene,
+        solved: &Solved,
+        points: PointsReport,
+        options: &CompareOptions,
+        progress: &dyn Progress,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self, RunError> {
+        let found = &points.discretized.points;
+        let plan = found.x_m.iter().zip(&found.y_m).zip(&found.height_m);
+        let positions_m: Vec<[f64; 3]> = plan.map(|((x, y), z)| [*x, *y, *z]).collect();
+        let heights = HeightGrid::of_points(&points_grid(found), &point_rows(found));
+        let heights = heights.ok_or_else(|| {
+            RunError::Input("the shape's points do not fit their grid".to_owned())
+        })?;
+        let forces = scene.forces_n_per_a(solved, &positions_m, progress)?;
+        let passive_n = if scene.design.magnet.passive_force {
+            passive::pull(scene, &positions_m, false)?.map(|pull| pull.forces_z_n(&positions_m))
+        } else {
+            None
+        };
+        progress.begin("lambda", 1);
+        let problem = ForceProblem {
+            forces_n_per_a: &forces,
+            height_m: &found.height_m,
+            offset_n: passive_n.as_deref(),
+            weights: None,
+            lower_a: &scene.lower_a,
+            upper_a: &scene.upper_a,
+            total_max_a: scene.design.supply.total_current_max_a,
+            resistance_ohm: &scene.resistances_ohm(),
+        };
+        let settings = Settings {
+            criterion: Criterion::Jnd,
+            jnd_weight: options.jnd,
+            at_n_per_m: options.lambda_n_per_m,
+        };
+        let solution = lambda::solve(&problem, &settings)?;
+        progress.end();
+        let name = &points.summary.shape;
+        let told = points.summary.warnings.iter().map(String::as_str);
+        let told = told.chain(unusual(solution.status));
+        warnings.extend(told.map(|warning| format!("{name}: {warning}")));
+        let rendered = Rendered::of(solution, options);
+        Ok(Self {
+            rendered,
+            positions_m,
+            heights,
+            passive_n,
+            points,
+            forces_n_per_a: forces,
+        })
+    }
+
+    fn name(&self) -> &str {
+        &self.points.summary.shape
+    }
+
+    /// The field of `other` at this object's places.
+    fn feels(&self, other: &Self, allocator: &Allocator) -> Field {
+        let Some(rendered) = &other.rendered else {
+            return Field::default();
+        };
+        let coils = allocator.coils();
+        let portions: Vec<Field> = self
+            .positions_m
+            .par_chunks(PORTION)
+            .zip(self.forces_n_per_a.par_chunks(PORTION * coils))
+            .enumerate()
+            .map(|(portion, (places, rows))| {
+                let mut allocator = allocator.clone();
+                let mut currents = vec![0.0; coils];
+                let mut field = Field::default();
+                for (k, (place, row)) in places.iter().zip(rows.chunks_exact(coils)).enumerate() {
+                    let passive = self.passive_n.as_ref();
+                    let passive_n = passive.map_or(0.0, |passive| passive[portion * PORTION + k]);
+                    field
+                        .fixed
+                        .push(Felt::of(row, &rendered.currents_a, passive_n));
+                    let height_m = other.heights.height_m(place[0], place[1]).unwrap_or(0.0);
+                    let wanted_n = rendered.lambda_n_per_m * height_m - passive_n;
+                    let found = allocator.allocate(row, wanted_n, &mut currents);
+                    field.saturated += usize::from(found.reach == Reach::Saturated);
+                    field.feedback.push(Felt::of(row, &currents, passive_n));
+                }
+                field
+            })
+            .collect();
+        portions.into_iter().fold(Field::default(), Field::joined)
+    }
+}
+
+impl Field {
+    fn joined(mut self, more: Self) -> Self {
+        self.fixed.extend(more.fixed);
+        self.feedback.extend(more.feedback);
+        self.saturated += more.saturated;
+        self
+    }
+}
+
+impl Rendered {
+    fn of(solution: Solution, options: &CompareOptions) -> Option<Self> {
+        // A constant that was asked for is rendered as well as can be.
+        let point = match options.lambda_n_per_m {
+            Some(_) => solution.at,
+            None => solution.chosen,
+        };
+        let able = matches!(solution.status, Status::Solved | Status::Stalled);
+        point.filter(|_| able).map(|point| Self {
+            lambda_n_per_m: point.lambda_n_per_m,
+            currents_a: point.currents_a,
+        })
+    }
+}
+
+fn unusual(status: Status) -> Option<&'static str> {
+    match status {
+        Status::Solved => None,
+        Status::NothingWanted => Some("every height is zero: no force is wanted, lambda is null"),
+        Status::NothingRendered => {
+            Some("no current within the limits pushes the magnet up at its points: lambda is null")
+        }
+        Status::Stalled => Some(
+            "the path over lambda could not be followed to its end: its numbers are not the \
+             minimum; please report this design and shape",
+        ),
+    }
+}
+
+/// `[surface][object]`.
+fn fields(
+    scene: &Scene,
+    objects: &[Object],
+    progress: &dyn Progress,
+) -> Result<Vec<Vec<Field>>, RunError> {
+    let total_a = scene.design.supply.total_current_max_a;
+    let ohm = scene.resistances_ohm();
+    let allocator = Allocator::new(&ohm, &scene.lower_a, &scene.upper_a, total_a)
+        .map_err(|fault| RunError::Input(fault.to_string()))?;
+    progress.begin("rendering", (objects.len() * objects.len()) as u64);
+    let mut fields = Vec::with_capacity(objects.len());
+    for surface in objects {
+        let mut row = Vec::with_capacity(objects.len());
+        for object in objects {
+            progress.check()?;
+            row.push(surface.feels(object, &allocator));
+            progress.advance(1);
+        }
+        fields.push(row);
+    }
+    progress.end();
+    Ok(fields)
+}
+
+/// Every two objects, and the largest error of the differences told.
+fn pairs(objects: &[Object], fields: &[Vec<Field>], jnd: f64, part: f64) -> (Vec<Pair>, f64) {
+    let mut pairs = Vec::new();
+    let mut error = 0.0_f64;
+    for (i, a) in objects.iter().enumerate() {
+        for (j, b) in objects.iter().enumerate().skip(i + 1) {
+            let able = a.rendered.is_some() && b.rendered.is_some();
+            let both = |pick: fn(&Field) -> &[Felt]| {
+                let side = |surface: usize| Sides {
+                    a: pick(&fields[surface][i]),
+                    b: pick(&fields[surface][j]),
+                };
+                able.then(|| difference([side(i), side(j)], jnd))
+            };
+            let fixed = both(|field| &field.fixed);
+            let feedback = both(|field| &field.feedback);
+            let place = |found: &Difference| {
+                let (surface, row) = found.at;
+                let object = [a, b][surface];
+                let [x_m, y_m, z_m] = object.positions_m[row];
+                Place {
+                    on: object.name().to_owned(),
+                    x_m,
+                    y_m,
+                    z_m,
+                    a_force_n: found.a.force_n,
+                    b_force_n: found.b.force_n,
+                }
+            };
+            for found in [&fixed, &feedback].into_iter().flatten() {
+                error = error.max(found.error(part, jnd));
+            }
+            let told =
+                |found: &Option<Difference>, pick: fn(&Difference) -> f64| found.as_ref().map(pick);
+            pairs.push(Pair {
+                a: a.name().to_owned(),
+                b: b.name().to_owned(),
+                static_jnd: told(&fixed, |d| d.largest),
+                feedback_jnd: told(&feedback, |d| d.largest),
+                static_rms_jnd: told(&fixed, |d| d.rms),
+                feedback_rms_jnd: told(&feedback, |d| d.rms),
+                static_felt_share: told(&fixed, |d| d.felt_share),
+                feedback_felt_share: told(&feedback, |d| d.felt_share),
+                static_at: fixed.as_ref().map(place),
+                feedback_at: feedback.as_ref().map(place),
+            });
+        }
+    }
+    (pairs, error)
+}
+
+impl CompareFile {
+    /// Objects without a force constant.
+    #[must_use]
+    pub fn without_constant(&self) -> Vec<&str> {
+        let none = self.shapes.iter().filter(|s| s.lambda_n_per_m.is_none());
+        none.map(|shape| shape.shape.as_str()).collect()
+    }
+
+    /// The differences as matrices: largest and rms, static beside feedback.
+    #[must_use]
+    pub fn picture(&self) -> MatrixPlot {
+        let names: Vec<String> = self.shapes.iter().map(|s| s.shape.clone()).collect();
+        let panel = |title: &str, pick: fn(&Pair) -> Option<f64>| {
+            let mut values = vec![Some(0.0); names.len() * names.len()];
+            let at = |name: &str| names.iter().position(|n| n == name);
+            for pair in &self.pairs {
+                if let (Some(i), Some(j)) = (at(&pair.a), at(&pair.b)) {
+                    values[i * names.len() + j] = pick(pair);
+                    values[j * names.len() + i] = pick(pair);
+                }
+            }
+            Panel {
+                title: title.to_owned(),
+                values,
+            }
+        };
+        let panels = vec![
+            panel("largest, static currents", |p| p.static_jnd),
+            panel("largest, position feedback", |p| p.feedback_jnd),
+            panel("rms, static currents", |p| p.static_rms_jnd),
+            panel("rms, position feedback", |p| p.feedback_rms_jnd),
+        ];
+        MatrixPlot {
+            title: format!("{}: just-noticeable differences of force", self.design),
+            panels,
+            columns: 2,
+            names,
+        }
+    }
+}

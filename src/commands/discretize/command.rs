@@ -1,0 +1,341 @@
+//! `discretize`: a surface to its constraint points.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::scattered::{self, ScatteredSummary};
+use super::{DeviationSummary, PointsOptions, PointsSummary, TableFiles, run_with};
+use crate::RunError;
+use crate::bundle::artefact::Input;
+use crate::bundle::atomic::{self, Overwrite, check_distinct};
+use crate::cli::args::{SamplingFlags, SurfaceFlags, Writing};
+use crate::cli::budget::{allow, asked};
+use crate::cli::describe;
+use crate::cli::documents;
+use crate::cli::failure::Failure;
+use crate::cli::help::{Codes, page};
+use crate::cli::layout::Sheet;
+use crate::cli::pictures::Picture;
+use crate::cli::printer::{Place, Printer};
+use crate::cli::quantity::{count, length_error, mm, number};
+use crate::cli::start::begin;
+use crate::cli::values::FileArgument;
+use crate::scene::cost::of_points;
+use crate::shape::certificate::Certify;
+use crate::shape::holes::Holes;
+
+/// Turn a surface into constraint points with heights and normals
+///
+/// Samples a surface on a grid: the height of every point is the highest place where the vertical
+/// line through it meets the surface. The points go to a CSV table (x_m, y_m, height_m and the
+/// normal, x fastest, then y), their summary to a JSON file beside it. Grid points without surface
+/// are left out and counted. The surface is described by a shape file (TOML) or given directly with
+/// its unit and place.
+///
+/// How far the surface departs from bilinear interpolation between the points is certified. After
+/// the normal the table tells of walls, rims, creases (with the other face's normal) and overhangs.
+/// Instead of the grid's points, --max-deviation chooses as few as a deviation needs, --poisson
+/// points without a pattern; both give each point the area it stands for (weight_m2).
+///
+/// With --inspect nothing is made of the surface: what its file holds is told, in its own unit, with
+/// a guess at that unit, which is never used.
+#[derive(Debug, Args)]
+#[command(after_help = page(Codes::Writing, &[
+    ("fluxform discretize shapes/half_sphere.toml --out points.csv", "a shape file"),
+    ("fluxform discretize shapes/wedge.stl --unit mm --translate 0,0,30 --grid 31x31 --out -",
+     "a surface given directly; the table goes to standard output"),
+    ("fluxform discretize shapes/flat.stl --unit mm --translate 0,0,50 --x -20,20 --out flat.csv",
+     "a part of it"),
+    ("fluxform discretize shapes/half_sphere.toml --max-deviation 0.5mm --out graded.csv",
+     "as many points as the surface needs, and where it needs them"),
+    ("fluxform discretize shapes/half_cylinder.stl --inspect --plot from_above.svg",
+     "what a file holds: unit, size, holes, faults; and a picture from above"),
+]))]
+pub struct Discretize {
+    /// Shape file (TOML, `-` for standard input) or the surface itself: STL, OBJ, PLY, 3MF, AMF,
+    /// 3DXML, STEP, SLDPRT
+    #[arg(value_name = "SHAPE")]
+    pub(super) shape: FileArgument,
+    /// Where the points go; `-` is standard output, and then there is no JSON file
+    #[arg(long, value_name = "FILE", default_value = "points.csv")]
+    pub(super) out: FileArgument,
+    /// Grid points without surface inside the silhouette: leave them out, fill them from around,
+    /// or refuse the surface
+    #[arg(long, value_enum, default_value_t = HolesFlag::Skip)]
+    holes: HolesFlag,
+    /// Compare the points with the surface: vertically, by the Hausdorff distance too, or not
+    #[arg(long, value_enum, default_value_t = CertifyFlag::Vertical)]
+    certify: CertifyFlag,
+    #[command(flatten)]
+    pub(super) sampling: SamplingFlags,
+    /// Report what the surface's file holds and make no points
+    #[arg(
+        long,
+        conflicts_with_all = ["holes", "certify", "max_deviation", "poisson", "out"]
+    )]
+    pub(super) inspect: bool,
+    /// Draw heights, what each point is, and the deviation between them (SVG)
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["max_deviation", "poisson"])]
+    pub(super) plot: Option<FileArgument>,
+    #[command(flatten)]
+    pub(super) writing: Writing,
+    #[command(flatten)]
+    pub(super) surface: SurfaceFlags,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum HolesFlag {
+    Skip,
+    Fill,
+    Error,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum CertifyFlag {
+    No,
+    Vertical,
+    Distance,
+}
+
+impl Discretize {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
+        let both = self.plot.as_ref().is_some_and(FileArgument::is_standard);
+        if both && self.out.is_standard() {
+            return Err(Failure::Usage(
+                "--out and --plot both go to standard output (-); name a file for one of them"
+                    .to_owned(),
+            ));
+        }
+        if self.inspect {
+            return self.inspected(printer);
+        }
+        let shapes = documents::shapes(std::slice::from_ref(&self.shape), &self.surface, printer)?;
+        allow(
+            shapes.iter().map(|shape| of_points(&shape.document, 0)),
+            asked(&shapes),
+            printer,
+        )?;
+        let bar = begin(printer);
+        for shape in shapes {
+            let inputs: Vec<Input> = shape.input.into_iter().collect();
+            let plot = self.check_outputs(&inputs)?;
+            if let Some(sampling) = self.sampling.sampling() {
+                let mut report = scattered::run(&shape.document, inputs, sampling, &bar)?;
+                self.warn(&report.summary.warnings, printer);
+                let place = match self
+                    .table(printer, &report.summary.inputs, |out| report.write_csv(out))?
+                {
+                    Some(place) => place,
+                    None => {
+                        report.write(self.out.as_given(), self.writing.force)?;
+                        Place::Output
+                    }
+                };
+                report.summary.warnings = printer.warnings();
+                printer.summary(place, &report.summary, || {
+                    self.told_scattered(&report.summary)
+                })?;
+                continue;
+            }
+            let mut report = run_with(&shape.document, inputs, &self.options(), &bar)?;
+            self.warn(&report.summary.warnings, printer);
+            let place =
+                match self.table(printer, &report.summary.inputs, |out| report.write_csv(out))? {
+                    Some(place) => place,
+                    None => {
+                        report.write(self.out.as_given(), self.writing.force)?;
+                        Place::Output
+                    }
+                };
+            let place = match &plot {
+                None => place,
+                Some(plot) => {
+                    let (inputs, svg) = (&report.summary.inputs, report.picture().svg());
+                    let after = plot.write(inputs, &svg, printer)?;
+                    if after == Place::Error { after } else { place }
+                }
+            };
+            report.summary.warnings = printer.warnings();
+            printer.summary(place, &report.summary, || self.told(&report.summary))?;
+        }
+        Ok(())
+    }
+
+    fn options(&self) -> PointsOptions {
+        PointsOptions {
+            holes: match self.holes {
+                HolesFlag::Skip => Holes::Skip,
+                HolesFlag::Fill => Holes::Fill,
+                HolesFlag::Error => Holes::Error,
+            },
+            certify: match self.certify {
+                CertifyFlag::No => Certify::No,
+                CertifyFlag::Vertical => Certify::Vertical,
+                CertifyFlag::Distance => Certify::Distance,
+            },
+            picture: self.plot.is_some(),
+        }
+    }
+
+    fn warn(&self, warnings: &[String], printer: &Printer) {
+        for warning in warnings {
+            printer.warning(warning);
+        }
+    }
+
+    /// Refuses before anything is computed outputs that must not be replaced, as far as the inputs are
+    /// known, or that have the same name. The picture, where one is drawn.
+    fn check_outputs(&self, inputs: &[Input]) -> Result<Option<Picture<'_>>, Failure> {
+        let mut outputs: Vec<PathBuf> = Vec::new();
+        if let FileArgument::Path(path) = &self.out
+            && !atomic::is_stream(path)
+        {
+            let files = TableFiles::new(path, self.writing.force, inputs)?;
+            outputs.extend(files.paths());
+        }
+        let plot = self.plot.as_ref().map(|file| {
+            let written = outputs.clone();
+            Picture::new(file, self.writing.force, written)
+        });
+        if let Some(FileArgument::Path(path)) = &self.plot {
+            outputs.push(path.clone());
+        }
+        check_distinct(&outputs).map_err(RunError::from)?;
+        if let Some(plot) = &plot {
+            plot.check(inputs)?;
+        }
+        Ok(plot)
+    }
+
+    /// Writes the table where it has nothing beside it: to standard output, a device or a pipe.
+    fn table(
+        &self,
+        printer: &Printer,
+        inputs: &[Input],
+        csv: impl Fn(&mut dyn std::io::Write) -> std::io::Result<()>,
+    ) -> Result<Option<Place>, Failure> {
+        match &self.out {
+            FileArgument::Standard => {
+                printer.data(|out| csv(out))?;
+                Ok(Some(Place::Error))
+            }
+            FileArgument::Path(path) if atomic::is_stream(path) => {
+                let overwrite = Overwrite::same_bytes(self.writing.force, inputs);
+                atomic::write(path, &overwrite, |out| csv(out)).map_err(RunError::from)?;
+                Ok(Some(Place::Output))
+            }
+            FileArgument::Path(_) => Ok(None),
+        }
+    }
+
+    fn told_scattered(&self, summary: &ScatteredSummary) -> String {
+        let mut sheet = Sheet::new(&format!(
+            "{}: {}, {}",
+            summary.shape,
+            count(summary.points, "constraint point"),
+            summary.sampling
+        ));
+        sheet.line(
+            "heights",
+            &describe::heights(summary.min_height_m, summary.max_height_m),
+        );
+        sheet.line(
+            "area",
+            &format!("{} mm^2 in plan", number(summary.area_m2 * 1e6)),
+        );
+        if let Some(stage) = summary.accuracy.get("patches") {
+            sheet.line(
+                "deviation",
+                &format!("at most {} vertically", mm(stage.estimate)),
+            );
+        }
+        if let Some(cover_m) = summary.cover_m {
+            sheet.line(
+                "cover",
+                &format!("no place farther than {} from a point", mm(cover_m)),
+            );
+        }
+        if let FileArgument::Path(path) = &self.out {
+            sheet.line("written to", &path.display().to_string());
+        }
+        sheet.finish()
+    }
+
+    fn told(&self, summary: &PointsSummary) -> String {
+        let mut sheet = Sheet::new(&format!(
+            "{}: {}",
+            summary.shape,
+            count(summary.points, "constraint point")
+        ));
+        sheet.line(
+            "heights",
+            &format!(
+                "{}, rms {}",
+                describe::heights(summary.min_height_m, summary.max_height_m),
+                mm(summary.rms_height_m)
+            ),
+        );
+        let axes = [
+            describe::axis("x", &summary.grid_x_m),
+            describe::axis("y", &summary.grid_y_m),
+        ];
+        sheet.line("grid", &axes.join(", "));
+        if summary.outside > 0 {
+            let outside = count(summary.outside, "grid point");
+            sheet.line("left out", &format!("{outside} without surface"));
+        }
+        let corner = |c: &[f64; 3]| c.map(|v| number(v * 1000.0)).join(", ");
+        sheet.line(
+            "surface",
+            &format!(
+                "from ({}) to ({}) mm{}",
+                corner(&summary.bounds_min_m),
+                corner(&summary.bounds_max_m),
+                match (summary.triangles, summary.degenerate_triangles) {
+                    (Some(all), Some(0)) => format!(", {}", count(all, "triangle")),
+                    (Some(all), Some(flat)) =>
+                        format!(", {} ({flat} without area)", count(all, "triangle")),
+                    _ => ", a formula".to_owned(),
+                }
+            ),
+        );
+        if let Some(deviation) = &summary.deviation {
+            sheet.line("deviation", &between(deviation));
+        }
+        if let Some(stage) = summary.accuracy.get("points") {
+            sheet.line(
+                "accuracy",
+                &format!("heights to {}", length_error(stage.estimate)),
+            );
+        }
+        if let FileArgument::Path(path) = &self.out {
+            sheet.line("written to", &path.display().to_string());
+        }
+        if let Some(FileArgument::Path(path)) = &self.plot {
+            sheet.line("drawn in", &path.display().to_string());
+        }
+        sheet.finish()
+    }
+}
+
+/// How far bilinear interpolation departs from the surface.
+fn between(deviation: &DeviationSummary) -> String {
+    let (most_m, at_m) = if deviation.below_m > deviation.above_m {
+        (deviation.below_m, deviation.below_at_m)
+    } else {
+        (deviation.above_m, deviation.above_at_m)
+    };
+    let [x, y] = at_m.map(|c| number(c * 1000.0));
+    let mut text = format!("within {} vertically, worst at ({x}, {y}) mm", mm(most_m));
+    if let (Some(lower_m), Some(upper_m)) =
+        (deviation.hausdorff_lower_m, deviation.hausdorff_upper_m)
+    {
+        text += &format!("; {} to {} in distance", mm(lower_m), mm(upper_m));
+    }
+    text
+}

@@ -1,0 +1,118 @@
+//! `discretize --inspect`: what a surface file holds, before anything is made of it.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::picture::{Scale, Seen, picture};
+use super::{shape_error, with_surface};
+use crate::RunError;
+use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
+use crate::numerics::axis::Axis;
+use crate::plot::plane::PlanePlot;
+use crate::progress::Progress;
+use crate::shape::certificate::by_cell;
+use crate::shape::document::{
+    AxisRequest, GridRequest, Placement, ShapeDocument, SurfaceFormat, SurfaceSource,
+};
+use crate::shape::height::Grid;
+use crate::shape::scattered::Probe;
+use crate::shape::{MeshReport, ShapeError, Surface};
+
+/// Points along either side of the picture.
+const PICTURE_POINTS: usize = 100;
+
+/// The JSON of `discretize --inspect`.
+#[derive(Debug, Clone, Serialize)]
+pub struct Inspection {
+    /// Layout of the artefact.
+    pub schema_version: &'static str,
+    /// Program that wrote it.
+    pub fluxform_version: &'static str,
+    /// What went in.
+    pub inputs: Vec<Input>,
+    /// What the file holds; lengths in its own unit.
+    pub surface: MeshReport,
+}
+
+/// Looks at the file at `path`; `inputs` holds the document that names it, if there is one.
+///
+/// # Errors
+/// A file that is no surface.
+pub fn inspect(path: &Path, inputs: Vec<Input>) -> Result<Inspection, RunError> {
+    let document = as_it_is(path, 1.0);
+    let surface = MeshReport::of_file(path).map_err(|source| shape_error(&document, source))?;
+    Ok(Inspection {
+        schema_version: SCHEMA_VERSION,
+        fluxform_version: FLUXFORM_VERSION,
+        inputs: with_surface(&document, inputs),
+        surface,
+    })
+}
+
+/// The surface as the file has it, from above; in millimetres where its unit is known.
+///
+/// # Errors
+/// A file that is no surface; interruption.
+pub fn drawn(
+    path: &Path,
+    stated_m: Option<f64>,
+    progress: &dyn Progress,
+) -> Result<PlanePlot, RunError> {
+    let carries = SurfaceFormat::of(path).is_some_and(SurfaceFormat::carries_unit);
+    let scale = if carries || stated_m.is_some() {
+        Scale::MILLIMETRES
+    } else {
+        Scale::FILE
+    };
+    let mut document = as_it_is(path, stated_m.unwrap_or(1.0));
+    if let SurfaceSource::File { unit_m, .. } = &mut document.source
+        && carries
+    {
+        *unit_m = stated_m;
+    }
+    let failed = |source: ShapeError| shape_error(&document, source);
+    let (surface, _) = Surface::open(&document).map_err(failed)?;
+    let [x_m, y_m] = surface.extent().plan().map(|[from, to]| Axis {
+        from,
+        to,
+        samples: if to > from { PICTURE_POINTS } else { 1 },
+    });
+    let grid = Grid { x_m, y_m };
+    let samples = surface.heights(&grid, progress).map_err(failed)?;
+    let probe = Probe::new(&surface, &grid);
+    let (x, y) = (grid.x_m.nodes(), grid.y_m.nodes());
+    let at = |index: usize| probe.at([x[index % x.len()], y[index / x.len()]]);
+    let marks: Vec<_> = (0..grid.len())
+        .map(|index| at(index).map(|(_, marks)| marks))
+        .collect();
+    let heights: Vec<_> = samples.iter().map(|s| s.map(|s| s.height_m)).collect();
+    let cells = by_cell(&surface, &grid, &samples, progress)?;
+    Ok(picture(&Seen {
+        title: document.name.clone(),
+        scale,
+        grid: &grid,
+        heights: &heights,
+        marks: &marks,
+        cells: &cells,
+    }))
+}
+
+/// The surface, nowhere placed.
+fn as_it_is(path: &Path, unit_m: f64) -> ShapeDocument {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    let extent = AxisRequest::Extent(PICTURE_POINTS);
+    ShapeDocument {
+        name: name.to_string_lossy().into_owned(),
+        source: SurfaceSource::File {
+            path: path.to_owned(),
+            unit_m: Some(unit_m),
+        },
+        scale: [1.0; 3],
+        placement: Placement::default(),
+        grid: GridRequest {
+            x: extent,
+            y: extent,
+        },
+    }
+}

@@ -1,0 +1,526 @@
+//! `discretize`: a surface to its constraint points.
+
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::made_with::{PointsAsked, surface};
+use crate::RunError;
+use crate::accuracy::StageAccuracy;
+use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION};
+use crate::bundle::atomic::{FileSet, Overwrite};
+use crate::bundle::manifest::{AxisSummary, PointsGrid};
+use crate::bundle::seal::to_record;
+use crate::bundle::table::PointRow;
+use crate::plot::plane::PlanePlot;
+use crate::progress::Progress;
+use crate::scene::cached_field::ShapeField;
+use crate::shape::certificate::{Certificate, Certify, stated_tessellation};
+use crate::shape::document::{ShapeDocument, SurfaceSource};
+use crate::shape::holes::Holes;
+use crate::shape::point_flags::Marks;
+use crate::shape::surface::read_file;
+use crate::shape::{ConstraintPoints, Discretized, Settings, ShapeError, discretize_with};
+
+pub(crate) mod command;
+pub mod inspect;
+mod inspect_command;
+mod picture;
+pub mod scattered;
+mod table;
+
+use picture::{Scale, Seen};
+
+/// The points and what is to be told about them.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct PointsReport {
+    /// The points.
+    pub discretized: Discretized,
+    /// Figures, as the JSON summary tells them.
+    pub summary: PointsSummary,
+}
+
+/// The JSON summary of `discretize`; SI.
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
+pub struct PointsSummary {
+    /// Layout of the artefact.
+    pub schema_version: &'static str,
+    /// Program that wrote it.
+    pub fluxform_version: &'static str,
+    /// Name of the shape.
+    pub shape: String,
+    /// What went in.
+    pub inputs: Vec<Input>,
+    /// The options of the run.
+    #[serde(skip_serializing_if = "Options::is_empty")]
+    pub made_with: Options,
+    /// Number of points.
+    pub points: usize,
+    /// Grid points without surface, skipped.
+    pub outside: usize,
+    /// Of the grid points without surface those inside the silhouette, skipped or filled.
+    pub holes: usize,
+    /// How many points lie on a wall, a rim, a crease, or where sheets lie over each other.
+    pub marks: MarkCounts,
+    /// Lowest height, m.
+    pub min_height_m: f64,
+    /// Highest height, m.
+    pub max_height_m: f64,
+    /// Root mean square of the heights, m.
+    pub rms_height_m: f64,
+    /// The grid along x.
+    pub grid_x_m: AxisSummary,
+    /// The grid along y.
+    pub grid_y_m: AxisSummary,
+    /// Lower corner of the surface, m.
+    pub bounds_min_m: [f64; 3],
+    /// Upper corner of the surface, m.
+    pub bounds_max_m: [f64; 3],
+    /// Triangles read; absent for a primitive.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub triangles: Option<usize>,
+    /// Triangles without area, left out; absent for a primitive.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub degenerate_triangles: Option<usize>,
+    /// How far the interpolated points may lie from the surface.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub deviation: Option<DeviationSummary>,
+    /// Each part of the heights' error: `points` (rounding), `grid`, `tessellation`.
+    pub accuracy: BTreeMap<&'static str, StageAccuracy>,
+    /// Warnings for the user.
+    pub warnings: Vec<String>,
+    /// The table beside it, as written.
+    pub files: Vec<FileEntry>,
+}
+
+/// How many points are marked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct MarkCounts {
+    /// On a vertical wall.
+    pub wall: usize,
+    /// Where the surface ends.
+    pub rim: usize,
+    /// Where two faces meet at an angle.
+    pub crease: usize,
+    /// Where more sheets lie over each other than the two of a body.
+    pub overhang: usize,
+}
+
+/// How far the bilinear interpolation between the points may lie from the surface; SI. Over the
+/// cells of which all four corners are points.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct DeviationSummary {
+    /// The most by which the surface stands above the interpolation, m.
+    pub above_m: f64,
+    /// Where, x and y, m.
+    pub above_at_m: [f64; 2],
+    /// The most by which it lies below, m.
+    pub below_m: f64,
+    /// Where, x and y, m.
+    pub below_at_m: [f64; 2],
+    /// The Hausdorff distance is at least this, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hausdorff_lower_m: Option<f64>,
+    /// And at most this, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hausdorff_upper_m: Option<f64>,
+    /// Where the lower value was found, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hausdorff_at_m: Option<[f64; 3]>,
+    /// Cells with four points.
+    pub cells: usize,
+    /// Cells through which the silhouette passes; a runtime's force ends there.
+    pub silhouette_cells: usize,
+    /// So far in plan the silhouette is uncertain, m.
+    pub silhouette_m: f64,
+    /// Cells without a point that have surface all the same.
+    pub missed_cells: usize,
+    /// Grid, tessellation and rounding together, m.
+    pub budget_m: f64,
+}
+
+impl MarkCounts {
+    fn of(marks: &[Marks]) -> Self {
+        let count = |kind: fn(&Marks) -> bool| marks.iter().filter(|m| kind(m)).count();
+        Self {
+            wall: count(|m| m.wall),
+            rim: count(|m| m.rim),
+            crease: count(|m| m.crease.is_some()),
+            overhang: count(|m| m.overhang),
+        }
+    }
+}
+
+impl DeviationSummary {
+    fn new(certificate: &Certificate) -> Option<Self> {
+        let found = &certificate.vertical;
+        // Without a cell of four points there is nothing to tell.
+        (found.cells.inner > 0 && found.worst().value_m.is_finite()).then(|| {
+            let apart = certificate.hausdorff;
+            Self {
+                above_m: found.above.value_m.max(0.0),
+                above_at_m: found.above.at_m,
+                below_m: found.below.value_m.max(0.0),
+                below_at_m: found.below.at_m,
+                hausdorff_lower_m: apart.map(|apart| apart.lower_m),
+                hausdorff_upper_m: apart.map(|apart| apart.upper_m),
+                hausdorff_at_m: apart.map(|apart| apart.at_m),
+                cells: found.cells.inner,
+                silhouette_cells: found.cells.silhouette,
+                silhouette_m: certificate.silhouette_m,
+                missed_cells: found.cells.missed,
+                budget_m: certificate.budget_m(),
+            }
+        })
+    }
+}
+
+/// What is asked of a discretisation besides its points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PointsOptions {
+    /// What is done with holes.
+    pub holes: Holes,
+    /// How the points are compared with the surface.
+    pub certify: Certify,
+    /// Whether a picture will be drawn.
+    pub picture: bool,
+}
+
+impl PointsOptions {
+    /// As the record states them; `file` is the shape file's entry among the inputs.
+    fn made_with(&self, document: &ShapeDocument, file: Option<&Input>) -> Options {
+        let PointsOptions {
+            holes,
+            certify,
+            picture: _,
+        } = *self;
+        let holes = match holes {
+            Holes::Skip => "skip",
+            Holes::Fill => "fill",
+            Holes::Error => "error",
+        };
+        let certify = match certify {
+            Certify::No => "no",
+            Certify::Vertical => "vertical",
+            Certify::Distance => "distance",
+        };
+        Options::of(&PointsAsked {
+            holes: Some(holes),
+            certify: Some(certify),
+            max_deviation_m: None,
+            widest_m: None,
+            spacing_m: None,
+            seed: None,
+            surface: surface(document, file),
+        })
+    }
+}
+
+impl Default for PointsOptions {
+    fn default() -> Self {
+        Self {
+            holes: Holes::Skip,
+            certify: Certify::Vertical,
+            picture: false,
+        }
+    }
+}
+
+/// Discretises `document` as [`run_with`] does by default.
+///
+/// # Errors
+/// As [`run_with`].
+pub fn run(
+    document: &ShapeDocument,
+    inputs: Vec<Input>,
+    progress: &dyn Progress,
+) -> Result<PointsReport, RunError> {
+    run_with(document, inputs, &PointsOptions::default(), progress)
+}
+
+/// Discretises `document`. `inputs` holds the document's own entry, if it is a file; the surface's
+/// is added.
+///
+/// # Errors
+/// A surface that gives no points; interruption.
+pub fn run_with(
+    document: &ShapeDocument,
+    inputs: Vec<Input>,
+    options: &PointsOptions,
+    progress: &dyn Progress,
+) -> Result<PointsReport, RunError> {
+    let made_with = options.made_with(document, inputs.first());
+    let inputs = with_surface(document, inputs);
+    let mut report = discretized_as(document, inputs, options, None, progress)?;
+    report.summary.made_with = made_with;
+    Ok(report)
+}
+
+/// As [`run`], with what an earlier run found of these points and this surface.
+///
+/// # Errors
+/// As [`run_with`].
+pub(crate) fn run_kept(
+    document: &ShapeDocument,
+    inputs: Vec<Input>,
+    field: ShapeField,
+    progress: &dyn Progress,
+) -> Result<PointsReport, RunError> {
+    let inputs = with_surface(document, inputs);
+    let kept = field.certificate(document, &inputs);
+    let known = kept.known();
+    let new = known.is_none();
+    let options = PointsOptions::default();
+    let report = discretized_as(document, inputs, &options, known, progress)?;
+    if let (true, Some(found)) = (new, &report.discretized.certificate) {
+        kept.keep(found);
+    }
+    Ok(report)
+}
+
+fn discretized_as(
+    document: &ShapeDocument,
+    inputs: Vec<Input>,
+    options: &PointsOptions,
+    known: Option<Certificate>,
+    progress: &dyn Progress,
+) -> Result<PointsReport, RunError> {
+    let settings = Settings {
+        holes: options.holes,
+        certify: options.certify,
+        known,
+        marks: true,
+        cells: options.picture,
+    };
+    let discretized = discretize_with(document, &settings, progress)
+        .map_err(|source| shape_error(document, source))?;
+    let facts = discretized.points.facts();
+    let mut accuracy = BTreeMap::from([("points", discretized.accuracy.clone())]);
+    let mut warnings = discretized.warnings.clone();
+    let mut deviation = None;
+    let stated = discretized.mesh.as_ref().and_then(stated_tessellation);
+    accuracy.extend(stated.map(|stage| ("tessellation", stage)));
+    if let Some(certificate) = &discretized.certificate {
+        deviation = DeviationSummary::new(certificate);
+        if deviation.is_some() {
+            accuracy.extend(certificate.stages());
+        }
+        let missed = certificate.vertical.cells.missed;
+        if missed > 0 {
+            warnings.push(format!(
+                "{missed} cells of the grid have surface but no point: take more samples"
+            ));
+        }
+    }
+    let summary = PointsSummary {
+        schema_version: SCHEMA_VERSION,
+        fluxform_version: FLUXFORM_VERSION,
+        shape: document.name.clone(),
+        inputs,
+        made_with: Options::default(),
+        points: facts.points,
+        outside: facts.outside,
+        holes: discretized.points.holes,
+        marks: MarkCounts::of(&discretized.points.marks),
+        min_height_m: facts.min_height_m,
+        max_height_m: facts.max_height_m,
+        rms_height_m: facts.rms_height_m,
+        grid_x_m: discretized.points.grid.x_m.into(),
+        grid_y_m: discretized.points.grid.y_m.into(),
+        bounds_min_m: discretized.bounds.min_m,
+        bounds_max_m: discretized.bounds.max_m,
+        triangles: discretized.mesh.as_ref().map(|mesh| mesh.triangles),
+        degenerate_triangles: discretized.mesh.as_ref().map(|mesh| mesh.degenerate),
+        deviation,
+        accuracy,
+        warnings,
+        files: Vec::new(),
+    };
+    Ok(PointsReport {
+        discretized,
+        summary,
+    })
+}
+
+fn shape_error(document: &ShapeDocument, source: ShapeError) -> RunError {
+    match source {
+        ShapeError::Interrupted(interrupted) => RunError::from(interrupted),
+        source => RunError::Shape {
+            name: document.name.clone(),
+            source,
+        },
+    }
+}
+
+/// `inputs` and the surface file that `document` names, paths as given.
+pub(crate) fn with_surface(document: &ShapeDocument, mut inputs: Vec<Input>) -> Vec<Input> {
+    if let SurfaceSource::File { path, .. } = &document.source {
+        // What cannot be read is told, with the reason, by the reader that comes next.
+        if let Ok(bytes) = read_file(path) {
+            let input = Input::of_bytes(path.display().to_string(), &bytes);
+            if !inputs.iter().any(|known| known.path == input.path) {
+                inputs.push(input);
+            }
+        }
+    }
+    inputs
+}
+
+/// The rows of `points.csv`.
+#[must_use]
+pub fn point_rows(points: &ConstraintPoints) -> Vec<PointRow> {
+    (0..points.len())
+        .map(|i| PointRow {
+            x_m: points.x_m[i],
+            y_m: points.y_m[i],
+            height_m: points.height_m[i],
+            normal: points.normal[i],
+        })
+        .collect()
+}
+
+/// The grid of the points as a manifest tells it.
+#[must_use]
+pub fn points_grid(points: &ConstraintPoints) -> PointsGrid {
+    let present: Vec<bool> = points
+        .row_of_grid_point()
+        .iter()
+        .map(Option::is_some)
+        .collect();
+    PointsGrid::new(points.grid.x_m, points.grid.y_m, &present)
+}
+
+impl PointsReport {
+    /// Writes `points.csv`.
+    ///
+    /// # Errors
+    /// The writer's.
+    pub fn write_csv(&self, out: &mut dyn Write) -> io::Result<()> {
+        table::of_grid(out, &self.discretized.points)
+    }
+
+    /// The points' heights, what they are besides, and how far the surface departs between them.
+    #[must_use]
+    pub fn picture(&self) -> PlanePlot {
+        let points = &self.discretized.points;
+        let mut heights = vec![None; points.grid.len()];
+        let mut marks = vec![None; points.grid.len()];
+        for (row, &index) in points.grid_index.iter().enumerate() {
+            heights[index] = Some(points.height_m[row]);
+            marks[index] = Some(points.marks[row]);
+        }
+        picture::picture(&Seen {
+            title: format!("{}: constraint points", self.summary.shape),
+            scale: Scale::MILLIMETRES,
+            grid: &points.grid,
+            heights: &heights,
+            marks: &marks,
+            cells: self.discretized.cells_m.as_deref().unwrap_or(&[]),
+        })
+    }
+
+    /// Writes the points to `path` and the summary beside them, `points.csv` and `points.json`:
+    /// both or none. What is there is replaced only with `force` or when its summary is of the same
+    /// inputs and lists it unchanged.
+    ///
+    /// # Errors
+    /// [`RunError::Write`].
+    pub fn write(&mut self, path: &Path, force: bool) -> Result<(), RunError> {
+        let files = TableFiles::new(path, force, &self.summary.inputs)?;
+        let files = files.made_with(&self.summary.made_with);
+        let (table, set) = files.table(|out| self.write_csv(out))?;
+        self.summary.files = vec![table];
+        files.summary(set, &self.summary)
+    }
+}
+
+/// A table and its summary beside it, written both or none.
+pub struct TableFiles {
+    folder: PathBuf,
+    name: String,
+    summary: String,
+    overwrite: Overwrite,
+}
+
+impl TableFiles {
+    /// Those of the table at `path`, made from `inputs`.
+    ///
+    /// # Errors
+    /// A name that is none, or that ends as the summary does.
+    pub fn new(path: &Path, force: bool, inputs: &[Input]) -> Result<Self, RunError> {
+        let name = path
+            .file_name()
+            .map(|name| name.to_string_lossy().into_owned());
+        let name = name.ok_or_else(|| {
+            RunError::Input(format!(
+                "{}: name a file to write the points to",
+                path.display()
+            ))
+        })?;
+        let summary = Path::new(&name)
+            .with_extension("json")
+            .to_string_lossy()
+            .into_owned();
+        if summary == name {
+            return Err(RunError::Input(format!(
+                "{}: the summary takes the ending .json; name the points otherwise",
+                path.display()
+            )));
+        }
+        let folder = match path.parent() {
+            Some(parent) if parent != Path::new("") => parent,
+            _ => Path::new("."),
+        };
+        Ok(Self {
+            overwrite: Overwrite::new(force, folder.join(&summary), inputs),
+            folder: folder.to_path_buf(),
+            name,
+            summary,
+        })
+    }
+
+    /// The options of the run.
+    #[must_use]
+    pub fn made_with(mut self, options: &Options) -> Self {
+        self.overwrite = self.overwrite.made_with(options);
+        self
+    }
+
+    /// Where they go.
+    #[must_use]
+    pub fn paths(&self) -> [PathBuf; 2] {
+        [&self.name, &self.summary].map(|name| self.folder.join(name))
+    }
+
+    /// Refuses early when one of them must not be replaced.
+    ///
+    /// # Errors
+    /// [`RunError::Write`].
+    pub fn check(&self) -> Result<(), RunError> {
+        for path in self.paths() {
+            self.overwrite.check(&path)?;
+        }
+        Ok(())
+    }
+
+    fn table(
+        &self,
+        csv: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<(FileEntry, FileSet), RunError> {
+        let mut set = FileSet::begin(&self.folder, self.overwrite.clone());
+        let written = set.write(&self.name, |out| csv(out))?;
+        Ok((FileEntry::new(&self.name, written), set))
+    }
+
+    fn summary(&self, mut set: FileSet, summary: &impl Serialize) -> Result<(), RunError> {
+        set.write(&self.summary, |out| {
+            let json = to_record(summary).map_err(io::Error::other)?;
+            out.write_all(&json)
+        })?;
+        Ok(set.commit()?)
+    }
+}

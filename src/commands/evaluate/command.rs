@@ -1,0 +1,301 @@
+//! `evaluate`: one coil as given.
+
+use clap::Args;
+
+use super::{CoreFacts, Evaluation, TargetFacts, TransientFacts, evaluate};
+use crate::accuracy::StageAccuracy;
+use crate::cli::args::Tolerance;
+use crate::cli::budget::{Asked, allow};
+use crate::cli::describe;
+use crate::cli::documents;
+use crate::cli::failure::{Failure, Wish};
+use crate::cli::help::{Codes, page};
+use crate::cli::layout::{Sheet, Side, table};
+use crate::cli::limits::{label, limit_row};
+use crate::cli::printer::{Place, Printer};
+use crate::cli::quantity::{force, mass, mm, number, number_to, percent, si};
+use crate::cli::start::accuracy_check;
+use crate::cli::start::begin;
+use crate::cli::values::FileArgument;
+use crate::design::{Design, Need};
+use crate::scene::cost::of_steel;
+use crate::scene::neighbours::{ArrayFacts, WorkingPointFacts};
+
+/// Evaluate one coil as given: circuit, field and force at the target, limits
+///
+/// Evaluates the coil of a design as it is given: turns, resistance, inductance, time constant,
+/// wire and heat, the field and the force on the magnet at the target height, and which of the
+/// design's [limits] it meets. With a steel core also the flux density in it at the rated current,
+/// and when current and force settle after a voltage step, eddy currents in the steel included. Of
+/// an array the inductance matrix is reported too, and the flux density in every core with all
+/// coils at their rated currents. A core above its steel's knee is warned of. Limits that are not
+/// met are part of the result; with --strict they end with exit code 4.
+#[derive(Debug, Args)]
+#[command(after_help = page(Codes::Reading, &[
+    ("fluxform evaluate designs/seed.toml", "the seed's coil"),
+    ("fluxform evaluate designs/seed_1010.toml --format json",
+     "its steel by a magnetisation curve, for a program"),
+    ("fluxform evaluate - --strict < designs/seed.toml || echo \"limits are not met\"",
+     "from standard input, refusing limits that are not met"),
+]))]
+pub struct Evaluate {
+    /// Design file (TOML), `-` for standard input
+    #[arg(value_name = "DESIGN")]
+    design: FileArgument,
+    /// End with exit code 4 when a limit is not met
+    #[arg(long)]
+    strict: bool,
+    #[command(flatten)]
+    tolerance: Tolerance,
+}
+
+impl Evaluate {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
+        let document = documents::design(&self.design, Need::EVALUATE, printer)?;
+        let design = &document.design;
+        let steel = of_steel(design, self.tolerance.tolerance);
+        allow(steel, Asked::Document, printer)?;
+        let bar = begin(printer);
+        let result = evaluate(design, vec![document.input], self.tolerance.tolerance)?;
+        drop(bar);
+        for note in &result.notes {
+            printer.warning(note);
+        }
+        let json = printer.with_warnings(&result);
+        printer.summary(Place::Output, &json, || summary(design, &result))?;
+        accuracy_check(&result.accuracy_missed)?;
+        if self.strict && !result.limits_met() {
+            let unmet: Vec<String> = result
+                .limits
+                .iter()
+                .filter(|(_, check)| !check.met)
+                .map(|(name, _)| label(name).to_owned())
+                .collect();
+            let message = format!("limits that are not met: {}", unmet.join(", "));
+            return Err(Failure::Unmet(Wish::Limits, message));
+        }
+        Ok(())
+    }
+}
+
+fn summary(design: &Design, result: &Evaluation) -> String {
+    let (coil, target) = (&result.coil, &result.target);
+    let mut sheet = Sheet::new(&format!("{}: one coil as given", result.design));
+    sheet.line(
+        "coil",
+        &format!(
+            "{} turns of {} wire; {} to {} diameter, {} long",
+            number(coil.turns),
+            mm(design.wire.diameter_m),
+            mm(coil.inner_diameter_m),
+            mm(coil.outer_diameter_m),
+            mm(coil.length_m)
+        ),
+    );
+    let flux = coil.flux_linkage_wb.map_or_else(String::new, |flux| {
+        format!("; flux linkage {}", si(flux, "Wb"))
+    });
+    sheet.line(
+        "circuit",
+        &format!(
+            "{}, {}{flux}; time constant {}, settled after {}",
+            si(coil.resistance_ohm, "ohm"),
+            si(coil.inductance_h, "H"),
+            si(coil.time_constant_s, "s"),
+            si(coil.settling_s, "s")
+        ),
+    );
+    let steel_kg = result.core.as_ref().map_or(0.0, |core| core.mass_kg);
+    let steel = result.core.as_ref().map_or_else(String::new, |core| {
+        format!(" and {} of steel", mass(core.mass_kg))
+    });
+    sheet.line(
+        "wire",
+        &format!(
+            "{} long, {}{steel}; {} of heat at {}",
+            si(coil.wire_length_m, "m"),
+            mass(coil.mass_kg - steel_kg),
+            si(coil.power_w, "W"),
+            si(target.current_a, "A")
+        ),
+    );
+    if let Some(core) = &result.core {
+        sheet.line("core", &steel_core(core, target));
+    }
+    if let Some(transient) = &result.transient {
+        let stage = result.accuracy.get("transient");
+        sheet.line("step", &step(transient, stage));
+    }
+    sheet.line("target", &felt(target));
+    if let Some(array) = &result.array {
+        let matrix = &array.mutual_inductance_h;
+        let others = matrix.iter().enumerate().flat_map(|(i, row)| {
+            let other = move |(j, value): (usize, &f64)| (i != j).then_some(value.abs());
+            row.iter().enumerate().filter_map(other)
+        });
+        let largest = others.fold(0.0, f64::max);
+        sheet.line(
+            "array",
+            &format!(
+                "{}; largest mutual inductance {} ({} of a coil's own)",
+                describe::array(design),
+                si(largest, "H"),
+                percent(largest / coil.inductance_h)
+            ),
+        );
+        if let Some(point) = &array.working_point {
+            sheet.line("", &all_at_once(array, point));
+        }
+        cores(&mut sheet, design, array);
+    }
+    let stages = result.accuracy.iter().map(|(name, stage)| (*name, stage));
+    sheet.line("accuracy", &describe::accuracy(stages));
+    sheet.gap();
+    sheet.raw(&limits(result));
+    sheet.finish()
+}
+
+/// The steel of the coil alone.
+fn steel_core(core: &CoreFacts, target: &TargetFacts) -> String {
+    let material = if core.material == "curve" {
+        format!(
+            "a B-H curve, relative permeability {} at its origin",
+            number(core.relative_permeability)
+        )
+    } else {
+        format!(
+            "relative permeability {}",
+            number(core.relative_permeability)
+        )
+    };
+    let mut text = format!(
+        "{} diameter, {} long; {material}\n\
+         |B| up to {} T, {} T on average at {}; the knee is at {} T",
+        mm(2.0 * core.radius_m),
+        mm(core.length_m),
+        number_to(core.peak_field_t, 4),
+        number_to(core.mean_field_t, 4),
+        si(target.current_a, "A"),
+        number_to(core.knee_t, 4)
+    );
+    if let Some(deviation) = core.deviation_from_linear {
+        text.push_str(&format!(
+            "\nforce {} {} than with the steel's permeability at low fields",
+            percent(deviation.abs()),
+            if deviation < 0.0 { "less" } else { "more" }
+        ));
+    }
+    text
+}
+
+/// After a voltage step.
+fn step(transient: &TransientFacts, stage: Option<&StageAccuracy>) -> String {
+    let error = match stage {
+        Some(stage) if stage.estimate > 0.0 => {
+            format!(", +/- {}", percent(stage.estimate))
+        }
+        _ => String::new(),
+    };
+    format!(
+        "with eddy currents in the steel 95 % of the current after {}, of the force after {}{error}",
+        si(transient.current_95_s, "s"),
+        si(transient.force_95_s, "s")
+    )
+}
+
+/// What the magnet feels at the target.
+fn felt(target: &TargetFacts) -> String {
+    let way = |f: f64| match f {
+        f if f > 0.0 => " up",
+        f if f < 0.0 => " down",
+        _ => "",
+    };
+    let mut text = format!(
+        "{}{} on the magnet, {} above the coil at {}",
+        force(target.force_n.abs()),
+        way(target.force_n),
+        mm(target.height_m),
+        si(target.current_a, "A")
+    );
+    if let Some(pull) = target.passive_force_n {
+        text.push_str(&format!(
+            "\nof it {}{} by the unpowered steel",
+            force(pull.abs()),
+            way(pull)
+        ));
+    }
+    let [x, y, _] = target.force_vector_n;
+    if x != 0.0 || y != 0.0 {
+        let vector = |values: [f64; 3], unit: &str| {
+            // What rounding leaves of a zero is not worth its digits.
+            let largest = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+            let told = |v: f64| if v.abs() < 1e-12 * largest { 0.0 } else { v };
+            values.map(|v| si(told(v), unit)).join(", ")
+        };
+        text.push_str(&format!(
+            "\nforce along x, y, z {}\ntorque about x, y, z {}",
+            vector(target.force_vector_n, "N"),
+            vector(target.torque_n_m, "N m")
+        ));
+    }
+    text.push_str(&format!(
+        "\nfield {}, gradient {}",
+        si(target.field_t_per_a, "T/A"),
+        si(target.gradient_t_per_m_per_a, "T/m/A")
+    ));
+    text
+}
+
+/// All coils at their rated currents, along the B-H curve.
+fn all_at_once(array: &ArrayFacts, point: &WorkingPointFacts) -> String {
+    let linear = array
+        .relative_permeability
+        .map_or_else(String::new, |mu_r| {
+            format!("linear with relative permeability {}; ", number(mu_r))
+        });
+    let flux = |start, pick: fn(f64, f64) -> f64| {
+        si(
+            point.flux_linkage_wb.iter().copied().fold(start, pick),
+            "Wb",
+        )
+    };
+    format!(
+        "{linear}all coils at once {} off that along the B-H curve\n\
+         flux linkage then from {} to {}",
+        percent(point.deviation_from_linear),
+        flux(f64::INFINITY, f64::min),
+        flux(f64::NEG_INFINITY, f64::max)
+    )
+}
+
+/// Flux density in the cores of an array, where they are coupled.
+fn cores(sheet: &mut Sheet, design: &Design, array: &ArrayFacts) {
+    let peak: Option<Vec<f64>> = array.coils.iter().map(|coil| coil.peak_field_t).collect();
+    let mean: Option<Vec<f64>> = array.coils.iter().map(|coil| coil.mean_field_t).collect();
+    for (label, values) in [("core peak", peak), ("core mean", mean)] {
+        if let Some(values) = values {
+            let told = describe::per_coil(design, "T", &values, 3);
+            let (unit, rest) = told.split_once('\n').unwrap_or((&told, ""));
+            let head = format!("|B| with all coils at their rated currents, {unit}");
+            sheet.line(label, format!("{head}\n{rest}").trim_end());
+        }
+    }
+}
+
+fn limits(result: &Evaluation) -> String {
+    let head = ["limit", "value", "allowed", ""]
+        .map(str::to_owned)
+        .to_vec();
+    let row = |(name, check): (&&str, &crate::coil::limits::LimitCheck)| {
+        let state = if check.met { "met" } else { "NOT met" };
+        limit_row(name, check.value, check.limit, state)
+    };
+    let rows: Vec<Vec<String>> = std::iter::once(head)
+        .chain(result.limits.iter().map(row))
+        .collect();
+    table(&[Side::Left, Side::Right, Side::Right, Side::Left], &rows)
+}

@@ -1,0 +1,192 @@
+//! The field on equally spaced nodes, as mag_manip reads it, and the error of its interpolation.
+
+use std::path::PathBuf;
+
+use super::mag_manip::{SAFETY, VectorFieldMade, direct, largest, stages};
+use crate::RunError;
+use crate::map::Components;
+use crate::map::catmull_rom::{Nodes, Place, Stencil, stencil};
+use crate::map::multipole::{PARTS, magnitudes};
+use crate::map::tabulate::Grid;
+use crate::numerics::axis::Axis;
+use crate::progress::Progress;
+use crate::scene::Scene;
+use crate::scene::maps::{Felt, SceneMap};
+use crate::scene::steel::Solved;
+
+/// Fewest nodes along each axis.
+pub const FEWEST_NODES: usize = 6;
+/// Most nodes along each axis unless more are asked for: mag_manip takes minutes and gigabytes to
+/// read millions of vectors.
+pub const MOST_NODES_UNASKED: usize = 31;
+
+/// Cells looked at along x and along y.
+const CELLS: usize = 16;
+/// The lowest layers of cells, and the highest, are looked at: the error falls with the height.
+const LOWEST: usize = 3;
+/// How far into its cell, along every axis, a place lies: on a node, where the gradient is off
+/// most; where the cubic's error is largest; in the middle.
+const PARTS_OF_CELL: [f64; 3] = [0.0, 0.25, 0.5];
+
+/// The nodes: they span the workspace and one step more on every side, so that no place in it
+/// meets the one-sided slopes at the nodes' ends. Downwards they stay clear of `top_m`.
+///
+/// # Errors
+/// A workspace without extent along an axis.
+pub(super) fn nodes(scene: &Scene, asked: Option<usize>) -> Result<[Axis; 3], RunError> {
+    let workspace = &scene.design.workspace;
+    let axes = [workspace.x_m, workspace.y_m, workspace.z_m];
+    let top_m = scene.core.as_ref().map_or(0.0, |c| c.shape.top_m.max(0.0));
+    let most = axes.iter().map(|axis| axis.samples).max().unwrap_or(0);
+    let count = asked.unwrap_or(most.clamp(FEWEST_NODES, MOST_NODES_UNASKED));
+    for (name, axis) in ["x", "y", "z"].iter().zip(&axes) {
+        if axis.to <= axis.from {
+            return Err(RunError::Input(format!(
+                "--vfield needs a box, but [workspace] {name}_mm has no extent: give it two ends"
+            )));
+        }
+    }
+    let mut out = axes.map(|axis| {
+        let step = (axis.to - axis.from) / (count - 3) as f64;
+        Axis {
+            from: axis.from - step,
+            to: axis.to + step,
+            samples: count,
+        }
+    });
+    let z = axes[2];
+    if out[2].from - top_m < 0.25 * (z.from - top_m) {
+        out[2].from = z.from;
+        out[2].to = z.to + (z.to - z.from) / (count - 2) as f64;
+    }
+    Ok(out)
+}
+
+/// Tabulates the field and compares what mag_manip's interpolation makes of it.
+///
+/// # Errors
+/// A node on a winding's edge or on the steel; interruption.
+pub(super) fn make(
+    scene: &Scene,
+    solved: &Solved,
+    path: PathBuf,
+    axes: [Axis; 3],
+    progress: &dyn Progress,
+) -> Result<VectorFieldMade, RunError> {
+    let [x, y, z] = axes;
+    let count = x.samples;
+    let grid = Grid {
+        x_m: x.nodes(),
+        y_m: y.nodes(),
+        z_m: z.nodes(),
+    };
+    let felt = Felt::field();
+    let all = Components::All;
+    let made = SceneMap::new(scene, solved, &scene.coils, &grid, all, &felt, progress)?;
+    let field_t_per_a = made.map.field_t_per_a.unwrap_or_default();
+    let workspace = &scene.design.workspace;
+    let within = [workspace.x_m, workspace.y_m, workspace.z_m];
+    let places = places(axes, within);
+    let steps_m = axes.map(|axis| axis.step());
+    let at = |place: &[Place; 3]| -> [f64; 3] {
+        std::array::from_fn(|k| axes[k].node(place[k].cell) + place[k].part * steps_m[k])
+    };
+    let points_m = places.iter().map(at).collect();
+    let samples = direct(scene, solved, points_m, progress)?;
+    let heights = largest(&samples);
+    let mut errors = [0.0_f64; 2];
+    let whole = 3 * count * count * count;
+    for (values, parts) in field_t_per_a.chunks_exact(whole).zip(&samples.parts) {
+        let nodes = Nodes {
+            count,
+            steps_m,
+            values,
+        };
+        for ((place, at), direct) in places.iter().zip(&samples.points_m).zip(parts) {
+            let stencils: [Stencil; 3] = place.map(|place| stencil(count, place));
+            let [value, dx, dy, dz] = nodes.at([&stencils[0], &stencils[1], &stencils[2]]);
+            let [bx, by, bz] = value;
+            let read = [bx, by, bz, dx[0], dy[0], dz[0], dy[1], dz[1]];
+            let off: [f64; PARTS] = std::array::from_fn(|k| read[k] - direct[k]);
+            let height = heights.partition_point(|(z, _)| *z < at[2]);
+            let (found, sizes) = (magnitudes(&off), heights[height].1);
+            for k in 0..2 {
+                if sizes[k] > 0.0 {
+                    errors[k] = errors[k].max(found[k] / sizes[k]);
+                }
+            }
+        }
+    }
+    let method = format!(
+        "{SAFETY} times the largest difference of mag_manip's default interpolation (cubic, \
+         central slopes) from direct values at {} places on nodes, in the middles of cells and \
+         half way between, in the lowest layers and the highest, of every coil; and the nodes' own \
+         error",
+        samples.points_m.len()
+    );
+    Ok(VectorFieldMade {
+        path,
+        nodes: count,
+        ends_m: axes.map(|axis| [axis.from, axis.to]),
+        steps_m,
+        checks: samples.points_m.len(),
+        field_t_per_a,
+        accuracy: stages(errors, made.accuracy.estimate, &method),
+    })
+}
+
+/// Cells that are looked at along an axis of the nodes: those within the workspace, at most so
+/// many, evenly spread, both ends among them.
+fn spread(axis: Axis, within: Axis, most: usize) -> Vec<usize> {
+    let middle = |cell: usize| axis.node(cell) + 0.5 * axis.step();
+    let cells: Vec<usize> = (0..axis.samples - 1)
+        .filter(|cell| (within.from..=within.to).contains(&middle(*cell)))
+        .collect();
+    let taken = most.min(cells.len());
+    (0..taken)
+        .map(|k| cells[k * (cells.len() - 1) / (taken - 1).max(1)])
+        .collect()
+}
+
+fn places(axes: [Axis; 3], within: [Axis; 3]) -> Vec<[Place; 3]> {
+    let x = spread(axes[0], within[0], CELLS);
+    let y = spread(axes[1], within[1], CELLS);
+    let layers = spread(axes[2], within[2], axes[2].samples);
+    let highest = layers.len().saturating_sub(1);
+    let mut out = Vec::new();
+    for (k, z) in layers.iter().enumerate() {
+        if k >= LOWEST && k < highest {
+            continue;
+        }
+        for part in PARTS_OF_CELL {
+            let place = |cell: &usize| Place { cell: *cell, part };
+            for y in &y {
+                out.extend(x.iter().map(|x| [place(x), place(y), place(z)]));
+            }
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_in_the_workspace_are_looked_at() {
+        let within = Axis {
+            from: 0.0,
+            to: 1.0,
+            samples: 2,
+        };
+        let step = 1.0 / 28.0;
+        let axis = Axis {
+            from: -step,
+            to: 1.0 + step,
+            samples: 31,
+        };
+        assert_eq!(spread(axis, within, 3), [1, 14, 28]);
+        assert_eq!(spread(axis, within, 40).len(), 28);
+        assert_eq!(spread(axis, within, 1), [1]);
+    }
+}

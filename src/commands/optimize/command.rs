@@ -1,0 +1,213 @@
+//! `optimize`: the best coil within a design's limits.
+
+use super::text;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+
+use super::{Dimension, Document, Optimization, OptimizeRequest, optimize, page};
+use crate::RunError;
+use crate::bundle::artefact::sha256_hex;
+use crate::bundle::atomic::{Overwrite, check_distinct, write};
+use crate::cli::args::{Tolerance, Writing};
+use crate::cli::documents::{self, DesignDocument};
+use crate::cli::failure::{Failure, Wish};
+use crate::cli::help::{Codes, page};
+use crate::cli::pictures::Picture;
+use crate::cli::printer::{Place, Printer};
+use crate::cli::start::{accuracy_check, begin};
+use crate::cli::values::FileArgument;
+use crate::design::Need;
+
+/// Find the best coil within a design's limits
+///
+/// Seeks inner diameter, outer diameter and length of the winding, and the wire among
+/// wire.choices_mm, so that the force on the magnet at the target height is largest within the
+/// design's [limits], at the rated current: the driver's, or what the supply's voltage lets through
+/// if that is less. The winding is full; with --wound it has whole layers and whole turns a layer.
+/// The design's [coil], if it has one, is a starting point and is compared with what was found.
+/// A certificate says how sure it is that no coil within the limits is better. The sensitivity
+/// of a limit is the force that one unit more of it would give.
+#[derive(Debug, Args)]
+#[command(after_help = page(Codes::Writing, &[
+    ("fluxform optimize designs/seed_air.toml", "the best coil within the seed's limits, without steel"),
+    ("fluxform optimize designs/seed_air.toml --wound --out best.toml && fluxform evaluate best.toml",
+     "one that can be wound, as a design"),
+    ("fluxform optimize designs/seed_air.toml --fix inner_diameter_mm --format json",
+     "with the bore as it is, for a program"),
+]))]
+pub struct Optimize {
+    /// Design file (TOML), `-` for standard input
+    #[arg(value_name = "DESIGN")]
+    design: FileArgument,
+    /// Whole layers and whole turns a layer
+    #[arg(long)]
+    wound: bool,
+    /// Among the array's other coils: their unpowered cores count for force and settling of the
+    /// coil nearest to the centre, where the design couples them
+    #[arg(long)]
+    neighbours: bool,
+    /// Local searches for every wire, besides that from the design's own coil
+    #[arg(long, value_name = "N", default_value_t = 24, value_parser = starts)]
+    starts: usize,
+    /// Where the sequence of starting points begins
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    seed: u64,
+    /// Keep these dimensions of the design's [coil]
+    #[arg(long, value_name = "KEY", value_enum, num_args = 1.., value_delimiter = ',')]
+    fix: Vec<Key>,
+    /// Boxes of coils that proving the best may take; 0 for no proof
+    #[arg(long, value_name = "N", default_value_t = 4_000_000)]
+    certificate_cells: usize,
+    /// Write the design with the best coil here (TOML); `-` is standard output
+    #[arg(long, value_name = "FILE")]
+    out: Option<FileArgument>,
+    /// Write a page with the result here (HTML); `-` is standard output
+    #[arg(long, value_name = "FILE")]
+    report: Option<FileArgument>,
+    #[command(flatten)]
+    writing: Writing,
+    #[command(flatten)]
+    tolerance: Tolerance,
+}
+
+/// A dimension that is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Key {
+    /// The bore
+    #[value(name = "inner_diameter_mm")]
+    InnerDiameter,
+    /// The outer diameter
+    #[value(name = "outer_diameter_mm")]
+    OuterDiameter,
+    /// The length
+    #[value(name = "length_mm")]
+    Length,
+}
+
+fn starts(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(starts @ 1..=1_000_000) => Ok(starts),
+        _ => Err("expected a number of searches, 1 to 1000000".to_owned()),
+    }
+}
+
+impl Optimize {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
+        let document = documents::design(&self.design, Need::OPTIMIZE, printer)?;
+        let mark = self.mark(&document);
+        let protected: Vec<PathBuf> = document.also_read().map(Path::to_path_buf).collect();
+        let inputs = vec![document.input.clone()];
+        let overwrite =
+            Overwrite::beginning(self.writing.force, &mark, &inputs).protecting(protected.iter());
+        let mut outputs = Vec::new();
+        if let Some(FileArgument::Path(path)) = &self.out {
+            outputs.push(path);
+            overwrite.check(path).map_err(RunError::from)?;
+        }
+        let page = self.report.as_ref().map(|file| {
+            let written = outputs.iter().map(|path| path.to_path_buf());
+            Picture::new(
+                file,
+                self.writing.force,
+                protected.iter().cloned().chain(written),
+            )
+        });
+        if let Some(page) = &page {
+            page.check(&inputs)?;
+        }
+        outputs.extend(match &self.report {
+            Some(FileArgument::Path(path)) => Some(path),
+            Some(FileArgument::Standard) | None => None,
+        });
+        check_distinct(&outputs).map_err(RunError::from)?;
+        if self.out == Some(FileArgument::Standard) && self.report == self.out {
+            return Err(Failure::Usage(
+                "--out and --report cannot both go to standard output; give one of them a file"
+                    .to_owned(),
+            ));
+        }
+        let bar = begin(printer);
+        let source = Document {
+            design: &document.design,
+            text: &document.text,
+            path: self.design.as_given(),
+        };
+        let result = optimize(&source, inputs, &self.request(), &bar)?;
+        drop(bar);
+        for note in &result.notes {
+            printer.warning(note);
+        }
+        let mut place = self.write(&result, &mark, &overwrite, printer)?;
+        if let Some(page) = &page {
+            let after = page.write(&result.inputs, &page::html(&result), printer)?;
+            if after == Place::Error {
+                place = after;
+            }
+        }
+        let json = printer.with_warnings(&result);
+        printer.summary(place, &json, || text::summary(&result, self.out.as_ref()))?;
+        if let Some(none) = &result.no_coil {
+            return Err(Failure::Unmet(Wish::Coil, none.message.clone()));
+        }
+        let missed =
+            (!result.accuracy_reached).then(|| "the best coil: see its accuracy".to_owned());
+        accuracy_check(missed.as_slice())
+    }
+
+    fn request(&self) -> OptimizeRequest {
+        let dimension = |key: &Key| match key {
+            Key::InnerDiameter => Dimension::InnerDiameter,
+            Key::OuterDiameter => Dimension::OuterDiameter,
+            Key::Length => Dimension::Length,
+        };
+        OptimizeRequest {
+            wound: self.wound,
+            neighbours: self.neighbours,
+            fixed: self.fix.iter().map(dimension).collect(),
+            starts: self.starts,
+            seed: self.seed,
+            cells: self.certificate_cells,
+            around: true,
+            tolerance: self.tolerance.tolerance,
+        }
+    }
+
+    /// What tells a design that was made of this one from any other file.
+    fn mark(&self, document: &DesignDocument) -> String {
+        format!(
+            "# Made of {} (sha256 {}) by `fluxform optimize`.",
+            self.design.as_given().display(),
+            sha256_hex(document.text.as_bytes())
+        )
+    }
+
+    /// Writes the best coil's design where it was asked for; tells where the summary goes.
+    fn write(
+        &self,
+        result: &Optimization,
+        mark: &str,
+        overwrite: &Overwrite,
+        printer: &Printer,
+    ) -> Result<Place, Failure> {
+        let (Some(out), Some(text)) = (&self.out, &result.design_text) else {
+            return Ok(Place::Output);
+        };
+        let text = format!("{mark}\n{text}");
+        match out {
+            FileArgument::Standard => {
+                printer.data(|out| out.write_all(text.as_bytes()))?;
+                Ok(Place::Error)
+            }
+            FileArgument::Path(path) => {
+                write(path, overwrite, |out| out.write_all(text.as_bytes()))
+                    .map_err(RunError::from)?;
+                Ok(Place::Output)
+            }
+        }
+    }
+}

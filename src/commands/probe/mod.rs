@@ -1,0 +1,433 @@
+//! `probe`: field, gradient and force of every coil at given points.
+
+pub(crate) mod command;
+pub mod scan;
+
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+
+use rayon::prelude::*;
+
+use crate::RunError;
+use crate::accuracy::{StageAccuracy, missed};
+use crate::bundle::table::{FIELD_COLUMNS, FORCE_COLUMNS, GRADIENT_COLUMNS, write_samples};
+use crate::design::Design;
+use crate::field::frame::{CartesianField, to_cartesian};
+use crate::field::magnet::MagnetRule;
+use crate::field::steel::CLOSEST;
+use crate::field::steel::equivalent_dipoles::Parts;
+use crate::field::winding::KERNEL_ERROR;
+use crate::progress::Progress;
+use crate::scene::steel;
+use crate::scene::steel::{Solved, Steel, SteelField, clearance_of_m};
+use crate::scene::{MAGNET_FINEST, MAGNET_SHARE, Scene};
+
+/// What is asked at the points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ProbeComponents {
+    /// Field and gradient tensor.
+    All,
+    /// Gradient tensor.
+    Gradient,
+    /// dB_z/dz.
+    Gz,
+}
+
+/// Field and gradient per ampere, coil by coil within a point.
+#[derive(Debug, Clone)]
+pub struct ProbeTable {
+    components: ProbeComponents,
+    points_m: Vec<[f64; 3]>,
+    coils: usize,
+    /// [point, coil]
+    fields: Vec<CartesianField>,
+    /// [point, coil]: force (N/A) and torque about the centre (N m/A) of the magnet; where asked.
+    forces: Vec<[f64; 6]>,
+    /// Estimated error relative to |grad B| at the point; with steel, to the largest at its height.
+    pub relative_error: f64,
+    /// How it is known.
+    pub method: String,
+    /// Whether it is relative to the largest at the height.
+    pub relative_to_height: bool,
+    /// Estimated error of the forces, relative to |m| times the largest |grad B| at the height.
+    pub force_error: Option<f64>,
+    /// What misses the tolerance.
+    pub accuracy_missed: Vec<String>,
+}
+
+/// What is asked of [`probe`].
+#[derive(Debug, Clone, Copy)]
+pub struct ProbeRequest {
+    /// Parts of the field.
+    pub components: ProbeComponents,
+    /// Force and torque on the design's magnet besides, its centre at the points.
+    pub force: bool,
+    /// Tolerance; `None` for the default.
+    pub tolerance: Option<f64>,
+}
+
+impl Default for ProbeRequest {
+    /// Field and gradient, to the default tolerance, without the force.
+    fn default() -> Self {
+        Self {
+            components: ProbeComponents::All,
+            force: false,
+            tolerance: None,
+        }
+    }
+}
+
+/// Points between two looks at the interruption flag.
+const PORTION: usize = 256;
+
+/// Field and gradient of every coil of `design` at `points_m`: in air to 1e-12 of |grad B| at the
+/// point, with steel to the tolerance of the largest |grad B| at its height.
+///
+/// # Errors
+/// A design that cannot be computed; a point on a winding's edge or on the steel; a magnet that
+/// touches the array, where the force is asked for; interruption.
+pub fn probe(
+    design: &Design,
+    points_m: Vec<[f64; 3]>,
+    request: ProbeRequest,
+    progress: &dyn Progress,
+) -> Result<ProbeTable, RunError> {
+    let scene = Scene::new(design)?;
+    // A value depends on its own point alone: neither the solution nor how it is evaluated may
+    // depend on where the other points are.
+    let solved = steel::solve(&scene, request.tolerance, KERNEL_ERROR, f64::NEG_INFINITY)?;
+    let groups = groups(&scene, &points_m)?;
+    progress.begin("probe", points_m.len() as u64);
+    let coils = scene.coils.len();
+    let mut fields = vec![CartesianField::default(); points_m.len() * coils];
+    let mut forces = vec![[0.0; 6]; if request.force { fields.len() } else { 0 }];
+    let mut magnet_error = 0.0_f64;
+    let finest = MAGNET_SHARE * solved.tolerance.max(MAGNET_FINEST);
+    for group in groups.values() {
+        let rule = request
+            .force
+            .then(|| scene.magnet_rule(group.magnet_lowest_m, finest))
+            .transpose()?;
+        let own: Vec<[f64; 3]> = group.rows.iter().map(|row| points_m[*row]).collect();
+        let places = Places::of_group(&scene, &solved, group, &points_m, rule.as_ref())?;
+        let portions = own
+            .par_chunks(PORTION)
+            .zip(group.rows.par_chunks(PORTION))
+            .map(|(points, rows)| {
+                progress.check()?;
+                let number = |place: usize| rows[place] + 1;
+                let fields = places.numbered_fields(points, &number, &|_, _| true)?;
+                let forces = rule.as_ref().map_or_else(
+                    || Ok(Vec::new()),
+                    |rule| places.forces(points, &number, rule),
+                )?;
+                progress.advance(points.len() as u64);
+                Ok((rows, fields, forces))
+            })
+            .collect::<Result<Vec<_>, RunError>>()?;
+        for (rows, of_rows, felt) in portions {
+            for (place, row) in rows.iter().enumerate() {
+                let from = place * coils..(place + 1) * coils;
+                let to = row * coils..(row + 1) * coils;
+                fields[to.clone()].clone_from_slice(&of_rows[from.clone()]);
+                if request.force {
+                    forces[to].copy_from_slice(&felt[from]);
+                }
+            }
+        }
+        if let Some(rule) = &rule {
+            let growth = scene.magnet_growth(group.magnet_lowest_m);
+            let error = solved.force_error(growth, rule.amplification(), rule.bound());
+            magnet_error = magnet_error.max(error);
+        }
+    }
+    progress.end();
+    let stage = StageAccuracy {
+        estimate: solved.point_error(),
+        relative_to: match solved.steel {
+            Steel::None => "|grad B| at the point",
+            Steel::Alone(_) | Steel::Coupled(_) => "the largest |grad B| at the point's height",
+        }
+        .to_owned(),
+        method: String::new(),
+    };
+    Ok(ProbeTable {
+        components: request.components,
+        coils,
+        fields,
+        forces,
+        points_m,
+        relative_error: solved.point_error(),
+        method: solved.point_method(),
+        relative_to_height: !matches!(solved.steel, Steel::None),
+        force_error: request.force.then_some(magnet_error),
+        accuracy_missed: missed([(&"field", &stage)], solved.tolerance),
+    })
+}
+
+/// Rows that are evaluated alike, whatever other rows there are.
+struct Group {
+    rows: Vec<usize>,
+    /// Height that no row's point is below, for the steel and for the magnet.
+    lowest_m: f64,
+    magnet_lowest_m: f64,
+    /// Distance that no row's point is closer to a core than.
+    distance_m: f64,
+}
+
+/// The points by powers of two of their distance from the nearest core and of the gap between
+/// array and magnet.
+fn groups(scene: &Scene, points_m: &[[f64; 3]]) -> Result<BTreeMap<[i32; 2], Group>, RunError> {
+    let core = scene.core.as_ref();
+    let top_m = core.map_or(0.0, |core| core.shape.top_m.max(0.0));
+    let unit_m = CLOSEST * core.map_or(scene.winding.inner_radius_m, |core| core.shape.radius_m);
+    let depth_m = scene.magnet_depth_m();
+    let step = |length_m: f64| (length_m / unit_m).log2().floor();
+    let mut groups = BTreeMap::new();
+    for (row, point) in points_m.iter().enumerate() {
+        let distance_m = match core {
+            Some(core) => clearance_of_m(scene, core, row + 1, *point, 0.0)?,
+            None => unit_m,
+        };
+        let near = step(distance_m).max(0.0);
+        let gap_m = point[2] - top_m - depth_m;
+        let up = (gap_m > 0.0).then(|| step(gap_m));
+        let above_m = up.map(|up| top_m + depth_m + unit_m * up.exp2());
+        let key = [near as i32, up.map_or(i32::MIN, |up| up as i32)];
+        let group = groups.entry(key).or_insert_with(|| Group {
+            rows: Vec::new(),
+            lowest_m: above_m.unwrap_or(f64::NEG_INFINITY),
+            magnet_lowest_m: above_m.unwrap_or(top_m),
+            distance_m: unit_m * near.exp2(),
+        });
+        group.rows.push(row);
+    }
+    Ok(groups)
+}
+
+/// What gives the field at any place.
+pub(crate) struct Places<'a> {
+    scene: &'a Scene<'a>,
+    solved: &'a Solved,
+    sources: Option<SteelField>,
+}
+
+impl<'a> Places<'a> {
+    /// For places within `reach_m` of `points_m`.
+    ///
+    /// # Errors
+    /// A point on the steel's surface or hardly off it.
+    pub(crate) fn new(
+        scene: &'a Scene<'a>,
+        solved: &'a Solved,
+        points_m: &[[f64; 3]],
+        reach_m: f64,
+    ) -> Result<Self, RunError> {
+        Ok(Self {
+            scene,
+            solved,
+            sources: solved.sources(scene, points_m, reach_m, 1.0)?,
+        })
+    }
+
+    /// For the points of a group and the dipoles of the magnet about them.
+    fn of_group(
+        scene: &'a Scene<'a>,
+        solved: &'a Solved,
+        group: &Group,
+        points_m: &[[f64; 3]],
+        rule: Option<&MagnetRule>,
+    ) -> Result<Self, RunError> {
+        let reach_m = rule.map_or(0.0, MagnetRule::reach_m);
+        let amplification = rule.map_or(1.0, MagnetRule::amplification);
+        if let Some(core) = &scene.core {
+            for row in &group.rows {
+                clearance_of_m(scene, core, row + 1, points_m[*row], reach_m)?;
+            }
+        }
+        Ok(Self {
+            scene,
+            solved,
+            sources: solved.sources_at(
+                group.lowest_m - reach_m,
+                group.distance_m - reach_m,
+                amplification,
+            ),
+        })
+    }
+
+    /// Field and gradient per ampere, [point, coil]; the first of `points_m` is told as number
+    /// `first`.
+    ///
+    /// # Errors
+    /// A point on a winding's edge.
+    pub(crate) fn fields(
+        &self,
+        points_m: &[[f64; 3]],
+        first: usize,
+    ) -> Result<Vec<CartesianField>, RunError> {
+        self.driven_fields(points_m, first, &|_, _| true)
+    }
+
+    /// As [`Places::fields`], but only where `wanted` says so of a point and a coil; zero elsewhere.
+    ///
+    /// # Errors
+    /// As [`Places::fields`].
+    pub(crate) fn driven_fields(
+        &self,
+        points_m: &[[f64; 3]],
+        first: usize,
+        wanted: &dyn Fn(usize, usize) -> bool,
+    ) -> Result<Vec<CartesianField>, RunError> {
+        self.numbered_fields(points_m, &|row| first + row, wanted)
+    }
+
+    /// As [`Places::driven_fields`], with the numbers by which messages name the points.
+    fn numbered_fields(
+        &self,
+        points_m: &[[f64; 3]],
+        number: &dyn Fn(usize) -> usize,
+        wanted: &dyn Fn(usize, usize) -> bool,
+    ) -> Result<Vec<CartesianField>, RunError> {
+        let scene = self.scene;
+        let count = points_m.len();
+        let added = self.sources.as_ref().map_or_else(Vec::new, |sources| {
+            self.solved
+                .steel_fields(scene, sources, points_m, Parts::All)
+        });
+        let mut fields = Vec::with_capacity(count * scene.coils.len());
+        for (row, [x, y, z]) in points_m.iter().enumerate() {
+            for (column, coil) in scene.coils.iter().enumerate() {
+                if !wanted(row, column) {
+                    fields.push(CartesianField::default());
+                    continue;
+                }
+                let (dx, dy) = (x - coil.axis_m[0], y - coil.axis_m[1]);
+                let axial = scene.winding.field(dx.hypot(dy), *z).map_err(|on_edge| {
+                    RunError::Input(format!(
+                        "point {} ({x}, {y}, {z} m), coil {}: {on_edge}",
+                        number(row),
+                        coil.number
+                    ))
+                })?;
+                let mut field = to_cartesian(&axial, dx, dy);
+                if !added.is_empty() {
+                    let block = column * Parts::All.count();
+                    add(&mut field, |part| added[(block + part) * count + row]);
+                }
+                fields.push(scaled(field, coil.gain));
+            }
+        }
+        Ok(fields)
+    }
+
+    /// Force and torque per ampere on the magnet that `rule` stands for, [point, coil].
+    fn forces(
+        &self,
+        points_m: &[[f64; 3]],
+        number: &dyn Fn(usize) -> usize,
+        rule: &MagnetRule,
+    ) -> Result<Vec<[f64; 6]>, RunError> {
+        let mut felt = Vec::with_capacity(rule.nodes().len());
+        for node in rule.nodes() {
+            let moved: Vec<[f64; 3]> = points_m
+                .iter()
+                .map(|p| std::array::from_fn(|i| p[i] + node.offset_m[i]))
+                .collect();
+            felt.push(self.numbered_fields(&moved, number, &|_, _| true)?);
+        }
+        let pairs = points_m.len() * self.scene.coils.len();
+        Ok((0..pairs)
+            .map(|pair| {
+                let at_nodes = felt.iter().map(|fields| &fields[pair]);
+                let (fields, gradients): (Vec<_>, Vec<_>) = at_nodes
+                    .map(|field| (field.field_t_per_a, field.gradient_t_per_m_per_a))
+                    .unzip();
+                let [fx, fy, fz] = rule.force_n(&gradients);
+                let [tx, ty, tz] = rule.torque_n_m(&fields, &gradients);
+                [fx, fy, fz, tx, ty, tz]
+            })
+            .collect())
+    }
+}
+
+/// Adds what steel gives: five components of the gradient, then the field.
+fn add(field: &mut CartesianField, part: impl Fn(usize) -> f64) {
+    let [xx, xy, xz, yz, zz] = std::array::from_fn(&part);
+    let tensor = [[xx, xy, xz], [xy, -xx - zz, yz], [xz, yz, zz]];
+    for (sums, rows) in field.gradient_t_per_m_per_a.iter_mut().zip(tensor) {
+        for (sum, value) in sums.iter_mut().zip(rows) {
+            *sum += value;
+        }
+    }
+    for (axis, sum) in field.field_t_per_a.iter_mut().enumerate() {
+        *sum += part(5 + axis);
+    }
+}
+
+fn scaled(mut field: CartesianField, gain: f64) -> CartesianField {
+    field.field_t_per_a.iter_mut().for_each(|b| *b *= gain);
+    field
+        .gradient_t_per_m_per_a
+        .as_flattened_mut()
+        .iter_mut()
+        .for_each(|g| *g *= gain);
+    field
+}
+
+impl ProbeTable {
+    /// Number of rows.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.fields.len()
+    }
+
+    /// Field and gradient per ampere of one coil at one point, both counted from 0.
+    ///
+    /// # Panics
+    /// For a point or a coil that there is not.
+    #[must_use]
+    pub fn field(&self, point: usize, coil: usize) -> &CartesianField {
+        assert!(coil < self.coils, "coil {coil} of {}", self.coils);
+        &self.fields[point * self.coils + coil]
+    }
+
+    /// Writes the CSV table.
+    ///
+    /// # Errors
+    /// The writer's.
+    pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
+        let mut columns: Vec<&str> = Vec::new();
+        if self.components == ProbeComponents::All {
+            columns.extend(FIELD_COLUMNS);
+        }
+        let first = if self.components == ProbeComponents::Gz {
+            8
+        } else {
+            0
+        };
+        columns.extend(&GRADIENT_COLUMNS[first..]);
+        if !self.forces.is_empty() {
+            columns.extend(FORCE_COLUMNS);
+        }
+        let coils: Vec<i64> = (0..self.coils as i64).collect();
+        write_samples(
+            out,
+            &columns,
+            self.points_m.iter().copied(),
+            &coils,
+            |point, coil| {
+                let pair = point * self.coils + coil;
+                let field = &self.fields[pair];
+                let mut row = Vec::with_capacity(columns.len());
+                if self.components == ProbeComponents::All {
+                    row.extend(field.field_t_per_a);
+                }
+                row.extend(&field.gradient_t_per_m_per_a.as_flattened()[first..]);
+                row.extend(self.forces.get(pair).into_iter().flatten());
+                row
+            },
+        )
+    }
+}

@@ -1,0 +1,313 @@
+//! Scales, background and the sensor's frame, fitted to a scan all at once.
+//!
+//! Gauss-Newton steps: the scales and the background are linear, the frame is linearised by central
+//! differences of the computed field at every step. A step that leaves more is halved.
+
+use super::model::{Model, Pose, STEP_M};
+use crate::RunError;
+use crate::bundle::scan::{Measured, Scan};
+use crate::numerics::least_squares::{self, Solution};
+use crate::progress::Progress;
+
+/// Most linearisations.
+const ITERATIONS: usize = 30;
+/// A step that takes less than this part of what is left ends the iteration.
+const SETTLED: f64 = 1e-9;
+/// Most halvings of a step.
+const HALVINGS: usize = 8;
+
+/// What may be fitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Fitted {
+    /// A scale for each coil.
+    pub scale: bool,
+    /// A constant field.
+    pub background: bool,
+    /// Where the sensor's frame stands.
+    pub position: bool,
+    /// How it is turned.
+    pub rotation: bool,
+}
+
+/// A number that is fitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Parameter {
+    Scale(usize),
+    Background(usize),
+    Shift(usize),
+    Angle(usize),
+}
+
+impl Parameter {
+    pub(super) fn name(self) -> String {
+        let axis = |axis: usize| ["x", "y", "z"][axis];
+        match self {
+            Self::Scale(coil) => format!("scale of coil {coil}"),
+            Self::Background(i) => format!("background B{}", axis(i)),
+            Self::Shift(i) => format!("position {}", axis(i)),
+            Self::Angle(i) => format!("rotation about {}", axis(i)),
+        }
+    }
+
+    /// A change that is worth about as much as that of another parameter.
+    fn step(self, field_t: f64) -> f64 {
+        match self {
+            Self::Scale(_) | Self::Angle(_) => 0.01,
+            Self::Background(_) => 0.01 * field_t,
+            Self::Shift(_) => 1e-3,
+        }
+    }
+}
+
+/// What is fitted to this scan.
+pub(super) fn parameters(fitted: Fitted, scan: &Scan, coils: usize) -> Vec<Parameter> {
+    let mut list = Vec::new();
+    if fitted.scale {
+        let driven = |coil: &usize| scan.currents_a.iter().flatten().any(|(c, _)| c == coil);
+        list.extend((0..coils).filter(driven).map(Parameter::Scale));
+    }
+    if fitted.background {
+        let seen = |i: &usize| scan.quantities.contains(&Measured::Field(*i));
+        list.extend((0..3).filter(seen).map(Parameter::Background));
+    }
+    if fitted.position {
+        list.extend((0..3).map(Parameter::Shift));
+    }
+    if fitted.rotation {
+        list.extend((0..3).map(Parameter::Angle));
+    }
+    list
+}
+
+/// The fit.
+pub(super) struct Fit {
+    /// One a parameter.
+    pub(super) values: Vec<f64>,
+    /// The last linearisation, in steps of [`Parameter::step`].
+    pub(super) linear: Solution,
+    /// The steps.
+    pub(super) steps: Vec<f64>,
+    /// What the fit gives, [row, quantity].
+    pub(super) fitted: Vec<f64>,
+    /// Weighted sum of the squares that are left.
+    pub(super) left: f64,
+    pub(super) iterations: usize,
+    pub(super) converged: bool,
+}
+
+/// A state of the fit, and what it gives.
+struct State {
+    values: Vec<f64>,
+    contributions: Vec<f64>,
+    given: Vec<f64>,
+    left: f64,
+}
+
+/// Fits `parameters`; `weights` are those of the measured numbers, `field_t` the size of the field.
+///
+/// # Errors
+/// A scan on a winding's edge or the steel; interruption.
+pub(super) fn fit(
+    model: &Model,
+    scan: &Scan,
+    parameters: &[Parameter],
+    weights: &[f64],
+    field_t: f64,
+    progress: &dyn Progress,
+) -> Result<Fit, RunError> {
+    let task = Task {
+        model,
+        scan,
+        parameters,
+        weights,
+        progress,
+    };
+    let steps: Vec<f64> = parameters.iter().map(|p| p.step(field_t)).collect();
+    let mut state = task.state(start(parameters))?;
+    let measured: f64 = weighted_squares(&scan.values, weights);
+    let (mut iterations, mut converged) = (0, false);
+    let linear = loop {
+        iterations += 1;
+        let columns = task.columns(&state, &steps)?;
+        let linear = least_squares::solve(&columns, &task.weighted_residuals(&state.given));
+        let settled = linear.removed <= SETTLED * state.left + 1e-24 * measured;
+        if settled || iterations == ITERATIONS {
+            converged = settled;
+            break linear;
+        }
+        match task.stepped(&state, &linear, &steps)? {
+            Some(next) => state = next,
+            None => break linear,
+        }
+    };
+    Ok(Fit {
+        values: state.values,
+        linear,
+        steps,
+        fitted: state.given,
+        left: state.left,
+        iterations,
+        converged,
+    })
+}
+
+/// The design as it stands.
+fn start(parameters: &[Parameter]) -> Vec<f64> {
+    let value = |parameter: &Parameter| match parameter {
+        Parameter::Scale(_) => 1.0,
+        _ => 0.0,
+    };
+    parameters.iter().map(value).collect()
+}
+
+fn weighted_squares(values: &[f64], weights: &[f64]) -> f64 {
+    let terms = values.iter().zip(weights);
+    terms.map(|(value, weight)| (value * weight).powi(2)).sum()
+}
+
+struct Task<'a> {
+    model: &'a Model<'a>,
+    scan: &'a Scan,
+    parameters: &'a [Parameter],
+    weights: &'a [f64],
+    progress: &'a dyn Progress,
+}
+
+impl Task<'_> {
+    fn state(&self, values: Vec<f64>) -> Result<State, RunError> {
+        let pose = self.pose(&values);
+        let places = self.model.places(pose)?;
+        let contributions = self.model.contributions(&places, pose, self.progress)?;
+        let given = self.given(&values, &contributions);
+        let residuals: Vec<f64> = self
+            .scan
+            .values
+            .iter()
+            .zip(&given)
+            .map(|(m, g)| m - g)
+            .collect();
+        Ok(State {
+            left: weighted_squares(&residuals, self.weights),
+            values,
+            contributions,
+            given,
+        })
+    }
+
+    fn pose(&self, values: &[f64]) -> Pose {
+        let mut pose = Pose::default();
+        for (parameter, value) in self.parameters.iter().zip(values) {
+            match parameter {
+                Parameter::Shift(i) => pose.shift_m[*i] = *value,
+                Parameter::Angle(i) => pose.angles_rad[*i] = *value,
+                _ => {}
+            }
+        }
+        pose
+    }
+
+    fn scaled(&self, values: &[f64], contributions: &[f64]) -> Vec<f64> {
+        let scale = |coil: usize| {
+            let place = self
+                .parameters
+                .iter()
+                .position(|p| *p == Parameter::Scale(coil));
+            place.map_or(1.0, |place| values[place])
+        };
+        self.model.sum(contributions, scale)
+    }
+
+    fn given(&self, values: &[f64], contributions: &[f64]) -> Vec<f64> {
+        let mut given = self.scaled(values, contributions);
+        for (parameter, value) in self.parameters.iter().zip(values) {
+            if let Parameter::Background(i) = parameter {
+                for at in self.of_component(*i) {
+                    given[at] += value;
+                }
+            }
+        }
+        given
+    }
+
+    /// Where the measured numbers of a field component stand.
+    fn of_component(&self, component: usize) -> impl Iterator<Item = usize> {
+        let count = self.scan.quantities.len();
+        let wanted = Measured::Field(component);
+        let place = self.scan.quantities.iter().position(|q| *q == wanted);
+        let rows = self.scan.rows();
+        place
+            .into_iter()
+            .flat_map(move |k| (0..rows).map(move |row| row * count + k))
+    }
+
+    fn weighted_residuals(&self, given: &[f64]) -> Vec<f64> {
+        let pairs = self.scan.values.iter().zip(given).zip(self.weights);
+        pairs.map(|((m, g), w)| (m - g) * w).collect()
+    }
+
+    /// What a step of every parameter changes, weighted.
+    fn columns(&self, state: &State, steps: &[f64]) -> Result<Vec<Vec<f64>>, RunError> {
+        let pose = self.pose(&state.values);
+        let places = self.model.places(pose)?;
+        let turn_rad = STEP_M / self.model.extent_m().max(1e-2);
+        let moved = |change: &dyn Fn(&mut Pose, f64), step: f64| -> Result<Vec<f64>, RunError> {
+            let [up, down] = [step, -step].map(|step| {
+                let mut pose = pose;
+                change(&mut pose, step);
+                let contributions = self.model.contributions(&places, pose, self.progress)?;
+                Ok::<_, RunError>(self.scaled(&state.values, &contributions))
+            });
+            let (up, down) = (up?, down?);
+            Ok(up
+                .iter()
+                .zip(&down)
+                .map(|(u, d)| (u - d) / (2.0 * step))
+                .collect())
+        };
+        let columns = self.parameters.iter().zip(steps).map(|(parameter, step)| {
+            let mut column = match *parameter {
+                Parameter::Scale(coil) => self
+                    .model
+                    .sum(&state.contributions, |c| if c == coil { 1.0 } else { 0.0 }),
+                Parameter::Background(i) => {
+                    let mut column = vec![0.0; self.scan.values.len()];
+                    self.of_component(i).for_each(|at| column[at] = 1.0);
+                    column
+                }
+                Parameter::Shift(i) => moved(&|pose, step| pose.shift_m[i] += step, STEP_M)?,
+                Parameter::Angle(i) => moved(&|pose, step| pose.angles_rad[i] += step, turn_rad)?,
+            };
+            for (value, weight) in column.iter_mut().zip(self.weights) {
+                *value *= weight * step;
+            }
+            Ok(column)
+        });
+        columns.collect()
+    }
+
+    /// The state after the step, or after part of it; `None` where none leaves less.
+    fn stepped(
+        &self,
+        state: &State,
+        linear: &Solution,
+        steps: &[f64],
+    ) -> Result<Option<State>, RunError> {
+        let mut share = 1.0;
+        for _ in 0..HALVINGS {
+            let changes = linear.values.iter().zip(steps).map(|(v, s)| share * v * s);
+            let values = state
+                .values
+                .iter()
+                .zip(changes)
+                .map(|(v, c)| v + c)
+                .collect();
+            match self.state(values) {
+                Ok(next) if next.left < state.left => return Ok(Some(next)),
+                // Into a winding's edge or the steel is too far.
+                Ok(_) | Err(RunError::Input(_) | RunError::OnEdge(_)) => share *= 0.5,
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(None)
+    }
+}

@@ -1,0 +1,458 @@
+//! `probe --compare`: a Gauss-meter scan held against a design.
+//!
+//! The residuals of the design as it stands; scales of the coils, a background and the sensor's
+//! frame fitted all at once, with standard errors; and which single parameter would explain the
+//! residuals. What the scan does not determine is told and left open.
+
+use std::collections::BTreeMap;
+
+use crate::RunError;
+use crate::accuracy::{StageAccuracy, missed};
+use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
+use crate::bundle::scan::{
+    CoilScale, FieldLeft, FitFile, GradientLeft, Left, Measured, Residuals, Scan, ScanFile,
+    ScanPlace,
+};
+use crate::design::Design;
+use crate::field::winding::KERNEL_ERROR;
+use crate::numerics::least_squares::CUTOFF;
+use crate::progress::Progress;
+use crate::scene::Scene;
+use crate::scene::steel;
+use crate::scene::steel::{Material, Solved};
+
+pub(crate) mod command;
+mod explain;
+mod fit;
+mod keys;
+mod model;
+mod units;
+
+pub use fit::Fitted;
+use fit::{Fit, Parameter};
+use model::{Model, Pose};
+
+/// Measured numbers that must be there beyond those fitted, so that an error can be estimated.
+const SPARE: usize = 3;
+
+/// What is asked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScanRequest {
+    /// What is fitted.
+    pub fitted: Fitted,
+    /// The sensor's noise, T, where known.
+    pub noise_t: Option<f64>,
+    /// The noise of measured gradients, T/m, where known.
+    pub noise_t_per_m: Option<f64>,
+    /// Tolerance of the computed field; `None` for the default.
+    pub tolerance: Option<f64>,
+}
+
+/// The comparison.
+#[derive(Debug, Clone)]
+pub struct ScanReport {
+    /// The JSON result.
+    pub file: ScanFile,
+    /// What the design gives, [row, quantity].
+    pub predicted: Vec<f64>,
+    /// What the fit gives, [row, quantity].
+    pub fitted: Vec<f64>,
+    /// Warnings for the user.
+    pub warnings: Vec<String>,
+    /// Whether the tolerance asked for was reached.
+    pub accuracy_reached: bool,
+    /// What misses it.
+    pub accuracy_missed: Vec<String>,
+}
+
+/// Residuals of the design as it stands, and the weights of all measured numbers.
+struct Weighted {
+    predicted: Vec<f64>,
+    /// Measured minus predicted, times the weight.
+    values: Vec<f64>,
+    weights: Vec<f64>,
+}
+
+impl Weighted {
+    fn weighted(&self, mut values: Vec<f64>) -> Vec<f64> {
+        let pairs = values.iter_mut().zip(&self.weights);
+        pairs.for_each(|(value, weight)| *value *= weight);
+        values
+    }
+}
+
+/// Holds `scan`, read from the file `name`, against `design`.
+///
+/// # Errors
+/// A scan too small for what is to be fitted, without current or in other units; a design that
+/// cannot be computed; a point on a winding's edge or on the steel; interruption.
+pub fn compare(
+    design: &Design,
+    scan: &Scan,
+    name: &str,
+    inputs: Vec<Input>,
+    request: &ScanRequest,
+    progress: &dyn Progress,
+) -> Result<ScanReport, RunError> {
+    let refused = |why: String| RunError::Scan(format!("{name}: {why}"));
+    let scene = Scene::new(design)?;
+    let parameters = fit::parameters(request.fitted, scan, scene.coils.len());
+    large_enough(scan, &parameters).map_err(refused)?;
+    if let Some(hint) = units::coordinates(design, scan) {
+        return Err(refused(hint));
+    }
+    // For any place, as `probe` does: a fit moves the places, and what `probe` printed must be found
+    // again to the last digits.
+    let solved = steel::solve(&scene, request.tolerance, KERNEL_ERROR, f64::NEG_INFINITY)?;
+    let model = Model::new(&scene, &solved, scan);
+    progress.begin("scan", 0);
+    let places = model.places(Pose::default())?;
+    let contributions = model.contributions(&places, Pose::default(), progress)?;
+    let predicted = model.sum(&contributions, |_| 1.0);
+    if let Some(hint) = units::magnitudes(scan, &predicted) {
+        return Err(refused(hint));
+    }
+    let weights = weights(scan, request);
+    let residuals = scan.values.iter().zip(&predicted).map(|(m, p)| m - p);
+    let mut weighted = Weighted {
+        values: residuals.collect(),
+        predicted,
+        weights,
+    };
+    let residuals = std::mem::take(&mut weighted.values);
+    weighted.values = weighted.weighted(residuals);
+    let field_t = rms(scan, &scan.values, field).unwrap_or(1e-3).max(1e-9);
+    let fit = fit::fit(
+        &model,
+        scan,
+        &parameters,
+        &weighted.weights,
+        field_t,
+        progress,
+    )?;
+    let relative_error = solved.point_error();
+    let task = explain::Task {
+        design,
+        model: &model,
+        scan,
+        residuals: &weighted,
+        request,
+        relative_error,
+        field_t,
+        progress,
+    };
+    let (explanations, best_explanation) = explain::explain(&task)?;
+    progress.end();
+
+    let told = Told {
+        scan,
+        request,
+        model_errors: model_errors(scan, &weighted.predicted, relative_error),
+    };
+    let noise_known = noises(scan, request).is_some();
+    let mut warnings = Vec::new();
+    if let Some(core) = &scene.core
+        && matches!(core.material, Material::Curve(_))
+    {
+        warnings.push(
+            "the steel follows a B-H curve and was solved at the rated current: a scan at other \
+             currents may differ by what saturation changes"
+                .to_owned(),
+        );
+    }
+    let file = ScanFile {
+        schema_version: SCHEMA_VERSION.to_owned(),
+        fluxform_version: FLUXFORM_VERSION.to_owned(),
+        design: design.name.clone(),
+        inputs,
+        rows: scan.rows(),
+        values: scan.values.len(),
+        measured: scan.quantities.iter().map(|q| q.column()).collect(),
+        residuals: Residuals {
+            as_designed: told.left(&weighted.predicted),
+            fitted: told.left(&fit.fitted),
+        },
+        fit: fit_file(design, &parameters, &fit, noise_known, scan, &mut warnings),
+        explanations,
+        best_explanation,
+        accuracy: BTreeMap::from([("field".to_owned(), accuracy(&solved, relative_error))]),
+    };
+    let accuracy_missed = missed(&file.accuracy, solved.tolerance);
+    Ok(ScanReport {
+        file,
+        fitted: fit.fitted,
+        predicted: weighted.predicted,
+        warnings,
+        accuracy_reached: accuracy_missed.is_empty(),
+        accuracy_missed,
+    })
+}
+
+fn lowest_m(scan: &Scan) -> f64 {
+    let heights = scan.positions_m.iter().map(|p| p[2]);
+    heights.fold(f64::INFINITY, f64::min)
+}
+
+fn large_enough(scan: &Scan, parameters: &[Parameter]) -> Result<(), String> {
+    if scan.currents_a.iter().all(Vec::is_empty) {
+        return Err(
+            "the current is 0 in every row, so nothing of the coils was measured; scan with \
+             current in them"
+                .to_owned(),
+        );
+    }
+    let needed = parameters.len() + SPARE;
+    if scan.values.len() >= needed {
+        return Ok(());
+    }
+    let names: Vec<String> = parameters.iter().map(|p| p.name()).collect();
+    Err(format!(
+        "{} measured values do not determine {} numbers with their errors ({}); expected at least \
+         {needed}: measure at more points, or fit less with --fit",
+        scan.values.len(),
+        parameters.len(),
+        names.join(", ")
+    ))
+}
+
+fn field(quantity: &Measured) -> bool {
+    matches!(quantity, Measured::Field(_))
+}
+
+fn gradient(quantity: &Measured) -> bool {
+    !field(quantity)
+}
+
+/// The numbers of one kind, with their place.
+fn of_kind<'a>(
+    scan: &'a Scan,
+    values: &'a [f64],
+    kind: fn(&Measured) -> bool,
+) -> impl Iterator<Item = (usize, f64)> + 'a {
+    let count = scan.quantities.len();
+    let all = values.iter().copied().enumerate();
+    all.filter(move |(at, _)| kind(&scan.quantities[at % count]))
+}
+
+/// Root mean square of one kind; `None` where there is none.
+fn rms(scan: &Scan, values: &[f64], kind: fn(&Measured) -> bool) -> Option<f64> {
+    let (count, sum) = of_kind(scan, values, kind)
+        .fold((0_usize, 0.0), |(count, sum), (_, value)| {
+            (count + 1, sum + value * value)
+        });
+    (count > 0).then(|| (sum / count as f64).sqrt())
+}
+
+/// The stated noise of both kinds, where it is stated for all that was measured.
+fn noises(scan: &Scan, request: &ScanRequest) -> Option<[f64; 2]> {
+    let needed = |kind: fn(&Measured) -> bool, noise: Option<f64>| {
+        if scan.quantities.iter().any(kind) {
+            noise
+        } else {
+            Some(1.0)
+        }
+    };
+    Some([
+        needed(field, request.noise_t)?,
+        needed(gradient, request.noise_t_per_m)?,
+    ])
+}
+
+/// One over the noise; where it is not known, over the size of what was measured, so that field and
+/// gradient count alike.
+fn weights(scan: &Scan, request: &ScanRequest) -> Vec<f64> {
+    let size = |kind| {
+        rms(scan, &scan.values, kind)
+            .filter(|size| *size > 0.0)
+            .unwrap_or(1.0)
+    };
+    let [of_field, of_gradient] =
+        noises(scan, request).unwrap_or_else(|| [size(field), size(gradient)]);
+    let one = |quantity: &Measured| {
+        1.0 / if field(quantity) {
+            of_field
+        } else {
+            of_gradient
+        }
+    };
+    let row: Vec<f64> = scan.quantities.iter().map(one).collect();
+    row.repeat(scan.rows())
+}
+
+fn accuracy(solved: &Solved, estimate: f64) -> StageAccuracy {
+    StageAccuracy {
+        estimate,
+        relative_to: "the largest field and gradient of the scan".to_owned(),
+        method: solved.point_method(),
+    }
+}
+
+/// Errors claimed of the computed field and gradient.
+fn model_errors(scan: &Scan, predicted: &[f64], relative_error: f64) -> [f64; 2] {
+    [field, gradient].map(|kind| {
+        let values = of_kind(scan, predicted, kind);
+        relative_error * values.fold(0.0_f64, |most, (_, value)| most.max(value.abs()))
+    })
+}
+
+struct Told<'a> {
+    scan: &'a Scan,
+    request: &'a ScanRequest,
+    model_errors: [f64; 2],
+}
+
+impl Told<'_> {
+    /// What `given` leaves of the measurement.
+    fn left(&self, given: &[f64]) -> Left {
+        let scan = self.scan;
+        let left: Vec<f64> = scan.values.iter().zip(given).map(|(m, g)| m - g).collect();
+        let of = |kind: fn(&Measured) -> bool| {
+            let rms_left = rms(scan, &left, kind)?;
+            let first = of_kind(scan, &left, kind).next()?;
+            let (at, largest) = of_kind(scan, &left, kind).fold(first, |most, one| {
+                if one.1.abs() > most.1.abs() {
+                    one
+                } else {
+                    most
+                }
+            });
+            Some((
+                rms_left,
+                largest,
+                self.place(at),
+                rms(scan, &scan.values, kind)?,
+            ))
+        };
+        Left {
+            field: of(field).map(|(rms_t, largest_t, at, measured_rms_t)| FieldLeft {
+                rms_t,
+                largest_t,
+                at,
+                measured_rms_t,
+                model_error_t: self.model_errors[0],
+                noise_t: self.request.noise_t,
+            }),
+            gradient: of(gradient).map(|(rms_t_per_m, largest_t_per_m, at, measured)| {
+                GradientLeft {
+                    rms_t_per_m,
+                    largest_t_per_m,
+                    at,
+                    measured_rms_t_per_m: measured,
+                    model_error_t_per_m: self.model_errors[1],
+                    noise_t_per_m: self.request.noise_t_per_m,
+                }
+            }),
+        }
+    }
+
+    fn place(&self, at: usize) -> ScanPlace {
+        let count = self.scan.quantities.len();
+        let [x_m, y_m, z_m] = self.scan.positions_m[at / count];
+        ScanPlace {
+            line: self.scan.lines[at / count],
+            column: self.scan.quantities[at % count].column(),
+            x_m,
+            y_m,
+            z_m,
+        }
+    }
+}
+
+fn fit_file(
+    design: &Design,
+    parameters: &[Parameter],
+    fit: &Fit,
+    noise_known: bool,
+    scan: &Scan,
+    warnings: &mut Vec<String>,
+) -> FitFile {
+    let freedom = scan.values.len().saturating_sub(fit.linear.rank).max(1);
+    let chi_square = fit.left / freedom as f64;
+    // Stated noise is believed unless more is left.
+    let noise = if noise_known {
+        chi_square.max(1.0).sqrt()
+    } else {
+        chi_square.sqrt()
+    };
+    let found = |wanted: Parameter| -> (Option<f64>, Option<f64>) {
+        let place = parameters.iter().position(|p| *p == wanted);
+        let error = place.and_then(|k| fit.linear.unit_errors[k].map(|e| e * fit.steps[k] * noise));
+        let value = place.filter(|_| error.is_some()).map(|k| fit.values[k]);
+        (value, error)
+    };
+    let three = |wanted: fn(usize) -> Parameter, unit: f64| {
+        let fitted = (0..3).any(|i| parameters.contains(&wanted(i)));
+        let both: [_; 3] = std::array::from_fn(|i| found(wanted(i)));
+        let values = both.map(|(value, _)| value.map(|v| v * unit));
+        let errors = both.map(|(_, error)| error.map(|e| e * unit));
+        (fitted.then_some(values), fitted.then_some(errors))
+    };
+    let mut scales = Vec::new();
+    let mut gains = design.array.gain.clone();
+    for parameter in parameters {
+        let Parameter::Scale(coil) = *parameter else {
+            continue;
+        };
+        let (scale, standard_error) = found(*parameter);
+        let gain = scale.map(|scale| scale * design.array.gain[coil]);
+        if let Some(gain) = gain {
+            gains[coil] = gain;
+        }
+        warnings.extend(scale_warning(coil, scale, standard_error));
+        scales.push(CoilScale {
+            coil,
+            scale,
+            standard_error,
+            gain,
+        });
+    }
+    let any = scales.iter().any(|scale| scale.gain.is_some());
+    let listed: Vec<String> = gains.iter().map(|gain| format!("{gain:.6}")).collect();
+    if !fit.converged {
+        warnings.push(
+            "the fit did not settle: its numbers are those of the last step; fit less with --fit, \
+             or correct the scan's coordinates first"
+                .to_owned(),
+        );
+    }
+    let (background_t, background_error_t) = three(Parameter::Background, 1.0);
+    let (position_m, position_error_m) = three(Parameter::Shift, 1.0);
+    let (rotation_deg, rotation_error_deg) = three(Parameter::Angle, 1f64.to_degrees());
+    let alone = fit.linear.without_effect.iter().map(|k| vec![*k]);
+    let sets = alone.chain(fit.linear.degenerate.iter().cloned());
+    FitFile {
+        scales,
+        gain_toml: any.then(|| format!("gain = [{}]", listed.join(", "))),
+        background_t,
+        background_error_t,
+        position_m,
+        position_error_m,
+        rotation_deg,
+        rotation_error_deg,
+        undetermined: sets
+            .map(|set| set.into_iter().map(|k| parameters[k].name()).collect())
+            .collect(),
+        cutoff: CUTOFF,
+        degrees_of_freedom: freedom,
+        reduced_chi_square: noise_known.then_some(chi_square),
+        iterations: fit.iterations,
+        converged: fit.converged,
+    }
+}
+
+/// A scale that betrays a mistake of the set-up.
+fn scale_warning(coil: usize, scale: Option<f64>, error: Option<f64>) -> Option<String> {
+    let (scale, error) = (scale?, error?);
+    if scale.abs() <= 3.0 * error {
+        return Some(format!(
+            "coil {coil}: the scan shows no field of it beyond three standard errors; is it \
+             connected, and the number right?"
+        ));
+    }
+    (scale < 0.0).then(|| {
+        format!(
+            "coil {coil}: the measured field has the opposite sign; its leads may be swapped, or \
+             the sensor's axis may point down"
+        )
+    })
+}

@@ -1,0 +1,154 @@
+//! The files of a replay: its table, the facts beside it, the seconds, the picture.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::ReplayReport;
+use crate::RunError;
+use crate::bundle::artefact::FileEntry;
+use crate::bundle::atomic::{self, FileSet, Overwrite};
+use crate::bundle::json::to_json;
+use crate::bundle::replay::Answer;
+use crate::bundle::seal::to_record;
+use crate::bundle::timing::{ReplayTiming, StageSeconds};
+use crate::bundle::trajectory::Trajectory;
+use crate::plot::replay::ReplayPlot;
+
+/// Names of the files that go with a table.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ReplayFiles {
+    folder: PathBuf,
+    table: String,
+    facts: String,
+    timing: String,
+}
+
+impl ReplayFiles {
+    /// Those of the table at `path`: `replay.csv`, `replay.json` and `timing_replay.json`.
+    ///
+    /// # Errors
+    /// A name that is none, or that ends as the facts' file does.
+    pub fn new(path: &Path) -> Result<Self, RunError> {
+        let name = path
+            .file_name()
+            .map(|name| name.to_string_lossy().into_owned());
+        let stem = path
+            .file_stem()
+            .map(|stem| stem.to_string_lossy().into_owned());
+        let (Some(table), Some(stem)) = (name, stem) else {
+            let message = format!(
+                "--out {}: name a file to write the table to",
+                path.display()
+            );
+            return Err(RunError::Input(message));
+        };
+        let facts = format!("{stem}.json");
+        if facts == table {
+            return Err(RunError::Input(format!(
+                "--out {}: the facts beside the table take the ending .json; name it otherwise",
+                path.display()
+            )));
+        }
+        let folder = match path.parent() {
+            Some(parent) if parent != Path::new("") => parent,
+            _ => Path::new("."),
+        };
+        Ok(Self {
+            folder: folder.to_path_buf(),
+            table,
+            facts,
+            timing: format!("timing_{stem}.json"),
+        })
+    }
+
+    /// The file that tells what the others were made from.
+    #[must_use]
+    pub fn record(&self) -> PathBuf {
+        self.folder.join(&self.facts)
+    }
+
+    /// What is written, for people.
+    #[must_use]
+    pub fn names(&self) -> [&str; 3] {
+        [&self.table, &self.facts, &self.timing]
+    }
+
+    /// Their folder.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Their paths.
+    #[must_use]
+    pub fn paths(&self) -> [PathBuf; 3] {
+        self.names().map(|name| self.folder.join(name))
+    }
+}
+
+impl ReplayReport {
+    /// Writes table, facts and seconds, all or none.
+    ///
+    /// # Errors
+    /// [`RunError::Write`].
+    pub fn write(&mut self, files: &ReplayFiles, overwrite: &Overwrite) -> Result<(), RunError> {
+        let timing = ReplayTiming {
+            positions: self.rows.len(),
+            seconds_per_step: self.step_s,
+            stages: self
+                .seconds
+                .iter()
+                .map(|(stage, seconds)| StageSeconds {
+                    stage: stage.clone(),
+                    seconds: *seconds,
+                })
+                .collect(),
+        };
+        let mut set = FileSet::begin(&files.folder, overwrite.clone());
+        let table = set.write(&files.table, |out| self.rows.write(out))?;
+        self.summary.files = vec![FileEntry::new(&files.table, table)];
+        set.write(&files.timing, |out| {
+            out.write_all(&to_json(&timing).map_err(io::Error::other)?)
+        })?;
+        set.write(&files.facts, |out| {
+            out.write_all(&to_record(&self.summary).map_err(io::Error::other)?)
+        })?;
+        Ok(set.commit()?)
+    }
+
+    /// The picture.
+    #[must_use]
+    pub fn svg(&self) -> String {
+        self.plot().svg()
+    }
+
+    fn plot(&self) -> ReplayPlot<'_> {
+        let rows = &self.rows;
+        let summary = &self.summary;
+        ReplayPlot {
+            title: format!("{} on {}", summary.shape, summary.design),
+            t_s: &rows.t_s,
+            position_m: &rows.position_m,
+            surface_m: &rows.height_m,
+            inside: rows.answer.iter().map(|a| *a != Answer::Outside).collect(),
+            wanted_n: &rows.wanted_force_n,
+            given_n: &rows.force_n,
+            static_n: &rows.static_force_n,
+            coils: rows.coils,
+            current_a: &rows.current_a,
+        }
+    }
+}
+
+/// Writes a trajectory.
+///
+/// # Errors
+/// [`RunError::Write`].
+pub fn write_trajectory(
+    trajectory: &Trajectory,
+    path: &Path,
+    overwrite: &Overwrite,
+) -> Result<(), RunError> {
+    atomic::write(path, overwrite, |out| trajectory.write(out))?;
+    Ok(())
+}

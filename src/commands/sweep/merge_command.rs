@@ -1,0 +1,191 @@
+//! `sweep merge`: a plan's points as one table and one plot.
+
+use std::path::Path;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::merge::{MergeFiles, MergeReport, MergeRequest, merge, merge_table};
+use crate::RunError;
+use crate::bundle::atomic::check_distinct;
+use crate::bundle::sweep::MergeSummary;
+use crate::cli::args::Writing;
+use crate::cli::documents;
+use crate::cli::failure::Failure;
+use crate::cli::help::{Codes, page};
+use crate::cli::layout::Sheet;
+use crate::cli::pictures::Picture;
+use crate::cli::printer::{Place, Printer};
+use crate::cli::quantity::{bytes, count, force};
+use crate::cli::start::{begin, folder};
+use crate::cli::values::FileArgument;
+
+/// Join the points of a plan into one table, and plot the best designs
+///
+/// Writes one row a point, in the order of the plan, to a CSV table; beside it NAME.svg, force
+/// against resistance, mass and settling time with the designs that no other one beats,
+/// NAME_pareto.csv with those designs, and NAME_merge.json. The best are chosen among the designs that
+/// meet their limits, if any does. Missing points are named and end with exit code 4 and no table,
+/// unless --partial asks for what there is: then the exit code is 0 and the missing are told as a
+/// warning. Points of another plan are refused.
+#[derive(Debug, Args)]
+#[command(after_help = page(Codes::Writing, &[
+    ("fluxform sweep merge wires.json wires --out wires.csv", "all points of one folder"),
+    ("fluxform sweep merge wires.json wires more --partial --out - > so_far.csv",
+     "what there is so far, from two folders"),
+]))]
+pub struct Merge {
+    /// Plan (JSON), `-` for standard input
+    #[arg(value_name = "PLAN")]
+    plan: FileArgument,
+    /// Folders that `sweep run` wrote to
+    #[arg(value_name = "DIR", required = true)]
+    folders: Vec<FileArgument>,
+    /// Where the table goes; `-` is standard output, and then there is no plot
+    #[arg(long, value_name = "FILE", default_value = "sweep.csv")]
+    out: FileArgument,
+    /// Merge what there is, even if points are missing
+    #[arg(long)]
+    partial: bool,
+    /// Write a page with the result here (HTML)
+    #[arg(long, value_name = "FILE")]
+    report: Option<FileArgument>,
+    #[command(flatten)]
+    writing: Writing,
+}
+
+#[derive(Serialize)]
+struct Told<'a> {
+    #[serde(flatten)]
+    summary: &'a MergeSummary,
+    table: String,
+}
+
+impl Merge {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
+        let request = MergeRequest {
+            folders: self.folders.iter().map(folder).collect::<Result<_, _>>()?,
+            partial: self.partial,
+            page: self.report.is_some(),
+        };
+        if self.out == FileArgument::Standard && self.report.as_ref() == Some(&self.out) {
+            return Err(Failure::Usage(
+                "--out and --report cannot both go to standard output; give one of them a file"
+                    .to_owned(),
+            ));
+        }
+        let (plan, input) = documents::plan(&self.plan)?;
+        let points = request.folders.iter();
+        let points =
+            points.flat_map(|folder| ["points", "plan.json"].map(|name| folder.join(name)));
+        let (mut protected, mut outputs) = (points.collect::<Vec<_>>(), Vec::new());
+        if let FileArgument::Path(path) = &self.out {
+            outputs.extend(self.files(path).paths());
+            protected.extend(outputs.iter().cloned());
+        }
+        if let Some(FileArgument::Path(path)) = &self.report {
+            outputs.push(path.clone());
+        }
+        check_distinct(&outputs).map_err(RunError::from)?;
+        let page =
+            (self.report.as_ref()).map(|file| Picture::new(file, self.writing.force, protected));
+        if let Some(page) = &page {
+            page.check(std::slice::from_ref(&input))?;
+        }
+        let (report, mut place) = match &self.out {
+            FileArgument::Standard => {
+                let bar = begin(printer);
+                let (table, report) = merge_table(&plan, input, &request, &bar)?;
+                drop(bar);
+                printer.data(|out| out.write_all(&table))?;
+                (report, Place::Error)
+            }
+            FileArgument::Path(path) => {
+                let ending = path.extension().unwrap_or_default();
+                if ending == "json" || ending == "svg" {
+                    return Err(Failure::Usage(format!(
+                        "--out {}: expected the name of the table, like sweep.csv; plot and \
+                         summary get names of their own beside it",
+                        path.display()
+                    )));
+                }
+                let files = self.files(path);
+                let bar = begin(printer);
+                let report = merge(&plan, input, &request, &files, &bar)?;
+                drop(bar);
+                (report, Place::Output)
+            }
+        };
+        if report.summary.missing > 0 {
+            printer.warning(&format!(
+                "{} of {} points are missing: {}",
+                report.summary.missing, report.summary.points, report.missing
+            ));
+        }
+        if let (Some(page), Some(html)) = (&page, &report.page) {
+            let after = page.write(&report.summary.inputs, html, printer)?;
+            if after == Place::Error {
+                place = after;
+            }
+        }
+        let json = Told {
+            summary: &report.summary,
+            table: self.out.as_given().display().to_string(),
+        };
+        let json = printer.with_warnings(&json);
+        printer.summary(place, &json, || self.told(&report))
+    }
+
+    fn files(&self, table: &Path) -> MergeFiles {
+        MergeFiles {
+            table: table.to_path_buf(),
+            force: self.writing.force,
+        }
+    }
+
+    fn told(&self, report: &MergeReport) -> String {
+        let summary = &report.summary;
+        let rows = count(summary.rows as usize, "design");
+        let mut sheet = Sheet::new(&format!("{}: a sweep of {rows}", summary.design));
+        let mut line = format!("{} meet their limits", summary.limits_met);
+        if summary.failed > 0 {
+            line += &format!(", {} cannot be computed", summary.failed);
+        }
+        if summary.inaccurate > 0 {
+            line += &format!(", {} miss the accuracy asked for", summary.inaccurate);
+        }
+        sheet.line("designs", &line);
+        if let Some(largest_n) = summary.largest_force_n {
+            let among = if summary.front_meets_limits {
+                "those that meet their limits"
+            } else {
+                "all, because none meets its limits"
+            };
+            sheet.line(
+                "best",
+                &format!(
+                    "{} on the fronts among {among}; largest force {} of all",
+                    summary.front,
+                    force(largest_n)
+                ),
+            );
+        }
+        if let FileArgument::Path(path) = &self.out {
+            let files: Vec<String> = summary
+                .files
+                .iter()
+                .map(|file| format!("{} ({})", file.path, bytes(file.bytes)))
+                .collect();
+            let folder = path
+                .parent()
+                .filter(|folder| !folder.as_os_str().is_empty());
+            let folder = folder.map_or(".".to_owned(), |folder| folder.display().to_string());
+            sheet.line("written to", &format!("{folder}: {}", files.join(", ")));
+        }
+        sheet.finish()
+    }
+}

@@ -1,0 +1,253 @@
+//! `sweep plan`: which designs a sweep computes.
+
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+
+use super::point::toml_value;
+use crate::RunError;
+use crate::bundle::artefact::Input;
+use crate::bundle::sweep::{Axis, Mode, POINTS_MAX, PlanFile, Value};
+use crate::design::template::Template;
+use crate::design::{Design, Severity, Steel, source};
+
+/// Values at fault that are told one by one.
+const TOLD: usize = 20;
+/// The key of a B-H table.
+const CURVE_KEY: &str = "core.bh_curve";
+
+/// What is to be planned.
+#[derive(Debug, Clone)]
+pub struct PlanRequest {
+    /// What varies; the last is the fastest.
+    pub axes: Vec<Axis>,
+    /// What is done with each design.
+    pub mode: Mode,
+    /// Where randomness begins.
+    pub seed: u64,
+    /// Allowed error.
+    pub tolerance: Option<f64>,
+}
+
+impl PlanRequest {
+    /// How many designs the axes make.
+    ///
+    /// # Errors
+    /// Axes that do not go together: the same key twice, too many designs.
+    pub fn check(&self) -> Result<u64, String> {
+        let mut points = 1u64;
+        for (at, axis) in self.axes.iter().enumerate() {
+            let within = |a: &str, b: &str| a == b || a.starts_with(&format!("{b}."));
+            for other in &self.axes[..at] {
+                if within(&axis.key, &other.key) || within(&other.key, &axis.key) {
+                    return Err(format!(
+                        "{} and {} set the same key: give all its values in one --set",
+                        other.key, axis.key
+                    ));
+                }
+            }
+            points = points.saturating_mul(axis.values.len() as u64);
+        }
+        if points > POINTS_MAX {
+            return Err(format!(
+                "{points} designs are more than {POINTS_MAX}: make a STEP larger or leave values \
+                 out"
+            ));
+        }
+        Ok(points)
+    }
+}
+
+/// The plan for `design`, whose `text` came from `input`.
+///
+/// Every value of every axis is checked by itself; whether a design's parts fit together is found
+/// when it is computed.
+///
+/// # Errors
+/// Values that the design's keys do not take; B-H tables that cannot be read.
+pub fn plan(
+    design: &Design,
+    text: String,
+    input: Input,
+    request: &PlanRequest,
+) -> Result<PlanFile, RunError> {
+    let path = PathBuf::from(&input.path);
+    check_values(&text, &path, &request.axes)?;
+    let mut inputs = vec![input];
+    for curve in curves(design, &path, &request.axes) {
+        inputs.push(curve_input(&curve)?);
+    }
+    Ok(PlanFile::new(
+        design.name.clone(),
+        inputs,
+        request.mode,
+        request.seed,
+        request.tolerance,
+        request.axes.clone(),
+        text,
+    ))
+}
+
+/// A B-H table among the inputs.
+pub(super) fn curve_input(path: &Path) -> Result<Input, RunError> {
+    let text = source::table_text_of(path).map_err(|error| RunError::Input(error.to_string()))?;
+    Ok(Input::of_bytes(path.display().to_string(), text.as_bytes()))
+}
+
+/// The B-H tables that the variants name, in the order of the axis.
+fn curves(design: &Design, path: &Path, axes: &[Axis]) -> Vec<PathBuf> {
+    let beside = |file: &String| path.parent().unwrap_or(Path::new("")).join(file);
+    if let Some(axis) = axes.iter().find(|axis| axis.key == CURVE_KEY) {
+        let texts = axis.values.iter().filter_map(|value| match value {
+            Value::Text(file) => Some(beside(file)),
+            _ => None,
+        });
+        return texts.collect();
+    }
+    match design.core.as_ref().map(|core| &core.steel) {
+        Some(Steel::Curve(curve)) => vec![curve.clone()],
+        _ => Vec::new(),
+    }
+}
+
+fn check_values(text: &str, path: &Path, axes: &[Axis]) -> Result<(), RunError> {
+    let template = Template::new(text, path).map_err(|e| RunError::Input(e.to_string()))?;
+    let first: Vec<&Value> = axes.iter().map(|axis| &axis.values[0]).collect();
+    let mut faults: Vec<String> = Vec::new();
+    for (varied, axis) in axes.iter().enumerate() {
+        let mut found: Vec<String> = axis
+            .values
+            .par_iter()
+            .flat_map_iter(|value| {
+                let mut values = first.clone();
+                values[varied] = value;
+                fault_of(&template, path, axes, &values, varied)
+            })
+            .collect();
+        // What is wrong at the first value of every axis is found once for each axis.
+        found.retain(|fault| !faults.contains(fault));
+        faults.append(&mut found);
+    }
+    faults.dedup();
+    if faults.is_empty() {
+        return Ok(());
+    }
+    let more = faults.len().saturating_sub(TOLD);
+    faults.truncate(TOLD);
+    if more > 0 {
+        faults.push(format!("and {more} more values"));
+    }
+    Err(RunError::Input(faults.join("\n")))
+}
+
+/// The faults of the design with `values`, each with the setting that is to blame.
+fn fault_of(
+    template: &Template,
+    path: &Path,
+    axes: &[Axis],
+    values: &[&Value],
+    varied: usize,
+) -> Vec<String> {
+    let settings = axes
+        .iter()
+        .zip(values)
+        .map(|(axis, value)| (axis.key.as_str(), toml_value(value)));
+    let text = match template.with(settings) {
+        Ok(text) => text,
+        Err(message) => return vec![format!("{}: --set {message}", path.display())],
+    };
+    let Err(refused) = Design::check_keys(&text, path) else {
+        return Vec::new();
+    };
+    let faults = refused.faults.list().iter();
+    faults
+        .filter(|fault| fault.severity == Severity::Error)
+        .map(|fault| {
+            let blamed = axes
+                .iter()
+                .position(|axis| axis.key == fault.key)
+                .unwrap_or(varied);
+            let setting = format!("{} = {}", axes[blamed].key, toml_value(values[blamed]));
+            let help = fault
+                .help
+                .as_ref()
+                .map_or(String::new(), |h| format!(" ({h})"));
+            format!("{}: with --set {setting}: {fault}{help}", path.display())
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commands::sweep::axis;
+    use crate::design::Need;
+
+    const DESIGN: &str = "name = \"a\"\n[coil]\ninner_diameter_mm = 24.0\n\
+                          outer_diameter_mm = 38.0\nlength_mm = 70.0\n[wire]\ndiameter_mm = 0.7\n";
+
+    fn planned(settings: &[&str]) -> Result<PlanFile, String> {
+        let request = PlanRequest {
+            axes: settings.iter().map(|s| axis::parse(s).unwrap()).collect(),
+            mode: Mode::Evaluate,
+            seed: 0,
+            tolerance: None,
+        };
+        request.check()?;
+        let (design, _) = Design::from_toml(DESIGN, Path::new("a.toml"), Need::SWEEP).unwrap();
+        let input = Input::of_bytes("a.toml", DESIGN.as_bytes());
+        plan(&design, DESIGN.to_owned(), input, &request).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_value_that_its_key_does_not_take_is_named() {
+        let said = planned(&["wire.diameter_mm=-0.7,0.7", "array.rows=1:3:0.5"]).unwrap_err();
+        assert!(
+            said.contains("with --set wire.diameter_mm = -0.7: wire.diameter_mm:"),
+            "{said}"
+        );
+        assert!(
+            said.contains("with --set array.rows = 1.5: array.rows:"),
+            "{said}"
+        );
+        assert!(!said.contains("array.rows = 2:"), "{said}");
+        let said = planned(&["wire.diametre_mm=0.7,1.3"]).unwrap_err();
+        assert!(said.contains("did you mean diameter_mm?"), "{said}");
+        let said = planned(&["array.coupling=full,nine"]).unwrap_err();
+        assert!(said.contains("array.coupling = \"nine\""), "{said}");
+        let said = planned(&["wire.diameter_mm.x=1"]).unwrap_err();
+        assert!(said.contains("diameter_mm is not a section"), "{said}");
+        let said = planned(&["core.bh_curve=none.csv"]).unwrap_err();
+        assert!(said.contains("none.csv"), "{said}");
+    }
+
+    #[test]
+    fn parts_that_do_not_fit_together_are_found_when_they_are_computed() {
+        let plan = planned(&[
+            "coil.inner_diameter_mm=10:30:5",
+            "coil.outer_diameter_mm=12:38:2",
+        ]);
+        assert_eq!(plan.unwrap().points, 5 * 14);
+    }
+
+    #[test]
+    fn axes_that_do_not_go_together_are_refused() {
+        let said = planned(&["turns.a=1", "wire.diameter_mm=1", "turns.a=2"]).unwrap_err();
+        assert!(said.contains("set the same key"), "{said}");
+        let said = planned(&["core=1", "core.below_mm=2"]).unwrap_err();
+        assert!(said.contains("set the same key"), "{said}");
+        let many = "target.height_mm=1:1e5:1";
+        let said = planned(&[many, "coil.length_mm=1:1e5:1"]).unwrap_err();
+        assert!(said.contains("10000000000 designs are more than"), "{said}");
+    }
+
+    #[test]
+    fn the_same_request_makes_the_same_plan() {
+        let settings = ["wire.diameter_mm=0.5:1.0:0.05", "coil.turns=700,1300"];
+        let plan = planned(&settings).unwrap();
+        assert_eq!(Ok(&plan), planned(&settings).as_ref());
+        assert_eq!(plan.points, 22);
+        let other = planned(&settings[..1]).unwrap();
+        assert_ne!(plan.plan_sha256, other.plan_sha256);
+    }
+}

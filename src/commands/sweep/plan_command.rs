@@ -1,0 +1,150 @@
+//! `sweep plan`: which designs a sweep computes.
+
+use clap::Args;
+use serde::Serialize;
+
+use super::axis;
+use super::plan::{PlanRequest, plan};
+use crate::RunError;
+use crate::bundle::atomic::Overwrite;
+use crate::bundle::json::to_json;
+use crate::bundle::sweep::{Axis, Mode, PlanFile};
+use crate::bundle::write::write_json;
+use crate::cli::args::{Tolerance, Writing};
+use crate::cli::documents;
+use crate::cli::failure::Failure;
+use crate::cli::help::{Codes, page};
+use crate::cli::layout::Sheet;
+use crate::cli::printer::{Place, Printer};
+use crate::cli::quantity::count;
+use crate::cli::values::FileArgument;
+use crate::design::Need;
+
+/// Write down which designs a sweep computes
+///
+/// Every --set names a key of the design and its values, as FROM:TO:STEP or as a list; the sweep
+/// holds every combination, the last --set varying fastest. TO belongs to a range when it lies
+/// within 1e-9 STEP of a step; values are rounded to 12 digits. Texts and flags are listed like
+/// numbers, lists as [0,0],[5,0]. The plan carries the design's text and a digest of itself, so
+/// that nothing else is needed to run it but the B-H tables that the design names.
+#[derive(Debug, Args)]
+#[command(after_help = page(Codes::Writing, &[
+    ("fluxform sweep plan designs/seed_air.toml --set wire.diameter_mm=0.5:1.0:0.05 --out wires.json",
+     "eleven wires"),
+    ("fluxform sweep plan designs/seed_air.toml --set coil.length_mm=50:100:25 \\\n    \
+      --set limits.resistance_max_ohm=4,6,8 --out - > limits.json",
+     "three lengths, each under three limits"),
+    ("fluxform sweep plan designs/seed_air.toml --optimize \\\n    --set limits.resistance_max_ohm=3:9:0.5 --out best.json",
+     "the best coil of each resistance"),
+]))]
+pub struct Plan {
+    /// Design file (TOML), `-` for standard input
+    #[arg(value_name = "DESIGN")]
+    design: FileArgument,
+    /// A key and its values; may be given several times
+    #[arg(long = "set", value_name = "KEY=VALUES", required = true, value_parser = axis::parse)]
+    axes: Vec<Axis>,
+    /// Where the plan goes; `-` is standard output
+    #[arg(long, value_name = "FILE", default_value = "plan.json")]
+    out: FileArgument,
+    /// Find the best coil within each design's limits, as `optimize` does, instead of evaluating
+    /// the coil as given
+    #[arg(long)]
+    optimize: bool,
+    /// With --optimize: whole layers and whole turns a layer
+    #[arg(long, requires = "optimize")]
+    wound: bool,
+    /// Where random numbers begin, together with a point's index; evaluating draws none
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    #[command(flatten)]
+    writing: Writing,
+    #[command(flatten)]
+    tolerance: Tolerance,
+}
+
+#[derive(Serialize)]
+struct PlanSummary<'a> {
+    design: &'a str,
+    mode: Mode,
+    seed: u64,
+    points: u64,
+    axes: Vec<AxisSummary<'a>>,
+    plan: String,
+    plan_sha256: &'a str,
+}
+
+#[derive(Serialize)]
+struct AxisSummary<'a> {
+    key: &'a str,
+    values: usize,
+}
+
+impl Plan {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
+        let request = PlanRequest {
+            axes: self.axes.clone(),
+            mode: match (self.optimize, self.wound) {
+                (false, _) => Mode::Evaluate,
+                (true, false) => Mode::Optimize,
+                (true, true) => Mode::OptimizeWound,
+            },
+            seed: self.seed,
+            tolerance: self.tolerance.tolerance,
+        };
+        request
+            .check()
+            .map_err(|message| Failure::Usage(format!("--set: {message}")))?;
+        let document = documents::design(&self.design, Need::SWEEP, printer)?;
+        let plan = plan(&document.design, document.text, document.input, &request)?;
+        let place = match &self.out {
+            FileArgument::Standard => {
+                let text = to_json(&plan)?;
+                printer.data(|out| out.write_all(&text))?;
+                Place::Error
+            }
+            FileArgument::Path(path) => {
+                let overwrite = Overwrite::same_bytes(self.writing.force, &plan.inputs);
+                write_json(path, &overwrite, &plan).map_err(RunError::from)?;
+                Place::Output
+            }
+        };
+        let json = PlanSummary {
+            design: &plan.design,
+            mode: plan.mode,
+            seed: plan.seed,
+            points: plan.points,
+            axes: plan
+                .axes
+                .iter()
+                .map(|axis| AxisSummary {
+                    key: &axis.key,
+                    values: axis.values.len(),
+                })
+                .collect(),
+            plan: self.out.as_given().display().to_string(),
+            plan_sha256: &plan.plan_sha256,
+        };
+        let json = printer.with_warnings(&json);
+        printer.summary(place, &json, || self.told(&plan))
+    }
+
+    fn told(&self, plan: &PlanFile) -> String {
+        let designs = count(plan.points as usize, "design");
+        let mut sheet = Sheet::new(&format!("{}: a sweep of {designs}", plan.design));
+        let axes: Vec<String> = plan
+            .axes
+            .iter()
+            .map(|axis| format!("{}: {}", axis.key, count(axis.values.len(), "value")))
+            .collect();
+        sheet.line("varies", &axes.join("\n"));
+        if let FileArgument::Path(path) = &self.out {
+            sheet.line("written to", &path.display().to_string());
+        }
+        sheet.finish()
+    }
+}

@@ -1,0 +1,202 @@
+//! `sweep run`: computes points, keeps those that are there.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use rayon::prelude::*;
+
+use super::plan::curve_input;
+use super::point::Sweep;
+use crate::RunError;
+use crate::bundle::atomic::WriteError;
+use crate::bundle::sweep::{Found, PlanFile, PointFile, PointStore, Status};
+use crate::progress::Progress;
+
+/// Which points of a plan are computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// All of them.
+    Whole,
+    /// The `number`-th of `of` blocks, from 1; blocks differ by one point at most.
+    Shard {
+        /// From 1.
+        number: u64,
+        /// How many.
+        of: u64,
+    },
+    /// One point, from 0.
+    Index(u64),
+}
+
+impl Part {
+    /// Indices of the part's points among `points`. Blocks are contiguous, so that shards rarely
+    /// share a folder.
+    ///
+    /// # Errors
+    /// An index beyond the last point.
+    pub fn indices(self, points: u64) -> Result<Range<u64>, String> {
+        let start = |block: u64, of: u64| {
+            // No overflow, however many blocks.
+            (u128::from(points) * u128::from(block) / u128::from(of)) as u64
+        };
+        match self {
+            Self::Whole => Ok(0..points),
+            Self::Shard { number, of } => Ok(start(number - 1, of)..start(number, of)),
+            Self::Index(index) if index < points => Ok(index..index + 1),
+            Self::Index(index) => Err(format!(
+                "--index {index} is beyond the plan's last point, {}: they are counted from 0",
+                points - 1
+            )),
+        }
+    }
+}
+
+/// What was computed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunReport {
+    /// Points asked for.
+    pub points: u64,
+    /// Points that were there.
+    pub kept: u64,
+    /// Points whose design cannot be computed, those that were there included.
+    pub failed: u64,
+    /// Points that miss the accuracy asked for.
+    pub inaccurate: u64,
+    /// The first that failed, and why.
+    pub first_failure: Option<(u64, String)>,
+}
+
+/// Computes the points `indices` of `plan` into `folder`, in parallel, each into its own file.
+/// Points that are there are kept, unless `force` asks for them again.
+///
+/// # Errors
+/// Inputs that have changed since the plan was made; a folder or file that belongs to something
+/// else; a file that cannot be written; interruption, after which the same call goes on.
+pub fn run(
+    plan: &PlanFile,
+    folder: &Path,
+    indices: Range<u64>,
+    force: bool,
+    progress: &dyn Progress,
+) -> Result<RunReport, RunError> {
+    check_inputs(plan)?;
+    let sweep = Sweep::new(plan)?;
+    let store = PointStore::new(folder);
+    let _folders = store.claim(plan, force, indices.clone())?;
+    let points = indices.end - indices.start;
+    let (kept, failed, inaccurate) = (AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0));
+    let first_failure: Mutex<Option<(u64, String)>> = Mutex::new(None);
+    progress.begin("points", points);
+    indices
+        .into_par_iter()
+        .try_for_each(|index| -> Result<(), RunError> {
+            progress.check()?;
+            let there = if force {
+                None
+            } else {
+                finished(&store, plan, index)?
+            };
+            let point = match there {
+                Some(point) => {
+                    kept.fetch_add(1, Ordering::Relaxed);
+                    point
+                }
+                None => {
+                    let point = sweep.point(index);
+                    store.write(&point, force)?;
+                    point
+                }
+            };
+            match point.status {
+                Status::Done => {}
+                Status::AccuracyNotReached => {
+                    inaccurate.fetch_add(1, Ordering::Relaxed);
+                }
+                Status::Infeasible | Status::Unbounded | Status::Failed => {
+                    failed.fetch_add(1, Ordering::Relaxed);
+                    let message = point.message.unwrap_or_default();
+                    // Nothing under the lock leaves the value half changed.
+                    let mut first = first_failure
+                        .lock()
+                        .unwrap_or_else(std::sync::PoisonError::into_inner);
+                    if first.as_ref().is_none_or(|(other, _)| index < *other) {
+                        *first = Some((index, message));
+                    }
+                }
+            }
+            progress.advance(1);
+            Ok(())
+        })?;
+    progress.end();
+    Ok(RunReport {
+        points,
+        kept: kept.into_inner(),
+        failed: failed.into_inner(),
+        inaccurate: inaccurate.into_inner(),
+        first_failure: first_failure
+            .into_inner()
+            .unwrap_or_else(std::sync::PoisonError::into_inner),
+    })
+}
+
+fn finished(
+    store: &PointStore,
+    plan: &PlanFile,
+    index: u64,
+) -> Result<Option<PointFile>, RunError> {
+    match store.find(&plan.plan_sha256, index)? {
+        Found::Point(point) => Ok(Some(*point)),
+        Found::Nothing => Ok(None),
+        Found::Foreign(reason) => Err(WriteError::OutputExists {
+            path: store.path(index),
+            reason,
+        }
+        .into()),
+    }
+}
+
+/// The B-H tables are those the plan was made with.
+fn check_inputs(plan: &PlanFile) -> Result<(), RunError> {
+    for input in plan.inputs.iter().skip(1) {
+        let now = curve_input(&PathBuf::from(&input.path))?;
+        if now.sha256 != input.sha256 {
+            return Err(RunError::Input(format!(
+                "{}: the table has changed since the plan was made; make the plan again with \
+                 `fluxform sweep plan`",
+                input.path
+            )));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shards_are_disjoint_and_complete() {
+        for points in [1u64, 7, 10, 1000, 100_000_000] {
+            for of in [1u64, 2, 3, 7, 13, u64::MAX] {
+                let shard = |number| Part::Shard { number, of }.indices(points).unwrap();
+                assert_eq!(shard(1).start, 0);
+                assert_eq!(shard(of).end, points);
+                for number in 1..of.min(20) {
+                    let (one, two) = (shard(number), shard(number + 1));
+                    assert_eq!(one.end, two.start);
+                    let lengths = (one.end - one.start).abs_diff(two.end - two.start);
+                    assert!(lengths <= 1);
+                }
+            }
+        }
+        assert_eq!(Part::Index(6).indices(7), Ok(6..7));
+        assert!(
+            Part::Index(7)
+                .indices(7)
+                .unwrap_err()
+                .contains("last point, 6")
+        );
+    }
+}

@@ -1,0 +1,168 @@
+//! `sweep run`: computes a plan's points, or a part of them.
+
+use clap::Args;
+use serde::Serialize;
+
+use super::run::{Part, RunReport, run};
+use crate::cli::documents;
+use crate::cli::failure::{Failure, Wish};
+use crate::cli::help::{Codes, page};
+use crate::cli::layout::Sheet;
+use crate::cli::printer::{Place, Printer};
+use crate::cli::quantity::count;
+use crate::cli::start::{begin, folder};
+use crate::cli::values::FileArgument;
+
+/// Compute the points of a plan, or a part of them
+///
+/// Computes what `evaluate` tells of the coil alone for every design of the plan, each into a
+/// small file points/000/000123.json of the folder. Points that are there are kept, so a run that
+/// was killed or interrupted goes on where it stopped; several runs may share a folder, on one
+/// machine or many. A design that cannot be computed becomes a row that says why; the exit code is
+/// then 4 when all points are done, unless --allow-failed is given. A file of another plan is never
+/// touched without --force.
+#[derive(Debug, Args)]
+#[command(after_help = page(Codes::Writing, &[
+    ("fluxform sweep run wires.json --out wires", "all points, on all cores"),
+    ("fluxform sweep run wires.json --out wires --shard 1/3 --threads 1",
+     "the first of three parts"),
+    ("fluxform sweep run wires.json --out more --index 7", "one point, into a folder of its own"),
+]))]
+pub struct Run {
+    /// Plan (JSON), `-` for standard input
+    #[arg(value_name = "PLAN")]
+    plan: FileArgument,
+    /// Folder of the points
+    #[arg(long, value_name = "DIR")]
+    out: FileArgument,
+    /// Only part I of N, counted from 1
+    #[arg(long, value_name = "I/N", value_parser = shard)]
+    shard: Option<Part>,
+    /// Only the point with this index, counted from 0
+    #[arg(long, value_name = "K", conflicts_with = "shard")]
+    index: Option<u64>,
+    /// End with 0 even if designs cannot be computed or miss the accuracy: their rows say so
+    #[arg(long)]
+    allow_failed: bool,
+    /// Compute points that are there again, and replace files of another plan
+    #[arg(long)]
+    force: bool,
+}
+
+#[derive(Serialize)]
+struct RunSummary<'a> {
+    design: &'a str,
+    plan_sha256: &'a str,
+    folder: String,
+    first_index: u64,
+    points: u64,
+    computed: u64,
+    kept: u64,
+    failed: u64,
+    accuracy_not_reached: u64,
+}
+
+fn shard(text: &str) -> Result<Part, String> {
+    let numbers = text.split_once('/').and_then(|(number, of)| {
+        let (number, of) = (number.parse::<u64>().ok()?, of.parse::<u64>().ok()?);
+        (1..=of).contains(&number).then_some((number, of))
+    });
+    match numbers {
+        Some((number, of)) => Ok(Part::Shard { number, of }),
+        None => Err("expected I/N, I from 1 to N, like 1/3".to_owned()),
+    }
+}
+
+impl Run {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
+        let out = folder(&self.out)?;
+        let (plan, _) = documents::plan(&self.plan)?;
+        let part = match (self.shard, self.index) {
+            (Some(shard), _) => shard,
+            (None, Some(index)) => Part::Index(index),
+            (None, None) => Part::Whole,
+        };
+        let indices = part.indices(plan.points).map_err(Failure::Usage)?;
+        let bar = begin(printer);
+        let report = run(&plan, &out, indices.clone(), self.force, &bar)?;
+        drop(bar);
+        let json = RunSummary {
+            design: &plan.design,
+            plan_sha256: &plan.plan_sha256,
+            folder: out.display().to_string(),
+            first_index: indices.start,
+            points: report.points,
+            computed: report.points - report.kept,
+            kept: report.kept,
+            failed: report.failed,
+            accuracy_not_reached: report.inaccurate,
+        };
+        let json = printer.with_warnings(&json);
+        printer.summary(Place::Output, &json, || self.told(&plan.design, &report))?;
+        if self.allow_failed {
+            return Ok(());
+        }
+        unmet(&report)
+    }
+
+    fn told(&self, design: &str, report: &RunReport) -> String {
+        let points = count(report.points as usize, "point");
+        let mut sheet = Sheet::new(&format!("{design}: {points} of a sweep"));
+        let computed = report.points - report.kept;
+        let mut line = format!("{computed} now, {} before", report.kept);
+        if report.failed > 0 {
+            line += &format!("; {} cannot be computed", report.failed);
+        }
+        sheet.line("computed", &line);
+        sheet.line("written to", &self.out.as_given().display().to_string());
+        sheet.finish()
+    }
+}
+
+/// The points are there, but not all meet the request.
+fn unmet(report: &RunReport) -> Result<(), Failure> {
+    let mut parts = Vec::new();
+    if let Some((index, message)) = &report.first_failure {
+        parts.push(format!(
+            "{} of {} cannot be computed, and their rows say why; the first is point {index}: \
+             {message}",
+            report.failed,
+            count(report.points as usize, "design")
+        ));
+    }
+    if report.inaccurate > 0 {
+        parts.push(format!(
+            "{} of {} miss the accuracy asked for",
+            report.inaccurate,
+            count(report.points as usize, "design")
+        ));
+    }
+    if parts.is_empty() {
+        Ok(())
+    } else {
+        let wish = if report.failed > 0 {
+            Wish::Sweep
+        } else {
+            Wish::Accuracy
+        };
+        Err(Failure::Unmet(wish, parts.join("; ")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shards_are_counted_from_one() {
+        assert_eq!(shard("1/3"), Ok(Part::Shard { number: 1, of: 3 }));
+        assert_eq!(shard("3/3"), Ok(Part::Shard { number: 3, of: 3 }));
+        for bad in ["0/3", "4/3", "1", "1/0", "a/b", "1/3/5", "-1/3"] {
+            assert!(shard(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,231 @@
+//! The force constant, the currents and their errors.
+
+use super::passive::offset_n;
+use super::route::Route;
+use super::{Bounds, Check, check, difference, ratio, worst};
+use crate::RunError;
+use crate::bundle::load::Bundle;
+use crate::field::winding::KERNEL_ERROR;
+use crate::lambda::{self, Criterion, ForceProblem, Settings};
+use crate::progress::Progress;
+use crate::scene::evaluation_sample::spread;
+use crate::scene::steel::{self, Steel};
+
+/// Largest difference of a force constant that is solved for again, relative.
+const LAMBDA_AGREES: f64 = 1e-8;
+/// How much a force constant may move with the stated error of steel's forces.
+const FORCES_MOVE: f64 = 10.0;
+/// Largest duality gap, relative to the mean square of the wanted force.
+const GAP_ALLOWED: f64 = 1e-10;
+
+/// The force constant, the currents and their errors from forces computed again.
+pub(super) fn checks(
+    bundle: &Bundle,
+    route: &Route,
+    bounds: &Bounds,
+    progress: &dyn Progress,
+) -> Result<Vec<Check>, RunError> {
+    let scene = route.scene;
+    let positions: Vec<[f64; 3]> = bundle
+        .points
+        .iter()
+        .map(|p| [p.x_m, p.y_m, p.height_m])
+        .collect();
+    let lowest_m = bundle.map.z_m.first().copied().unwrap_or(0.0);
+    // Forces that differ by their stated error move force constants and errors by a few times it.
+    let slack = match route.solved.steel {
+        Steel::None => 0.0,
+        Steel::Alone(_) | Steel::Coupled(_) => FORCES_MOVE * bounds.forces,
+    };
+    let solved = match &route.solved.steel {
+        Steel::None => steel::solve(scene, None, scene.force_tolerance(), lowest_m)?,
+        Steel::Alone(_) | Steel::Coupled(_) => route.solved.clone(),
+    };
+    let forces = scene.forces_n_per_a(&solved, &positions, progress)?;
+    let coils = scene.coils.len();
+    let mut checks = vec![sampled_forces(route, bounds, &positions, &forces)?];
+
+    let heights: Vec<f64> = bundle.points.iter().map(|p| p.height_m).collect();
+    let stored = &bundle.lambda;
+    let offset_n = offset_n(scene, &positions)?;
+    let slack = slack + passive_slack(bundle, bounds, offset_n.as_deref(), &heights);
+    let agrees = slack.max(LAMBDA_AGREES);
+    let resistance_ohm = scene.resistances_ohm();
+    let problem = ForceProblem {
+        forces_n_per_a: &forces,
+        height_m: &heights,
+        offset_n: offset_n.as_deref(),
+        weights: None,
+        lower_a: &scene.lower_a,
+        upper_a: &scene.upper_a,
+        total_max_a: scene.design.supply.total_current_max_a,
+        resistance_ohm: &resistance_ohm,
+    };
+    let criterion = stored.criterion;
+    let settings = Settings {
+        criterion,
+        jnd_weight: stored.jnd,
+        at_n_per_m: stored.lambda_n_per_m,
+    };
+    let again = lambda::solve(&problem, &settings)?;
+    let stored_constants = stored.constants.named().into_iter();
+    let chosen = again.chosen.as_ref().map(|c| c.lambda_n_per_m);
+    let worst = stored_constants
+        .zip(again.constants.named())
+        .map(|(stored, again)| (stored.lambda_n_per_m, again.lambda_n_per_m))
+        .chain([(stored.lambda_n_per_m, chosen)])
+        .map(|(told, found)| difference(told.as_slice(), found.as_slice()))
+        .fold(0.0, f64::max);
+    let how = "all force constants solved for again";
+    checks.push(check("lambda", worst, agrees, how.to_owned()));
+
+    if let Some(told) = &stored.worst_point {
+        let lambda = stored.lambda_n_per_m;
+        let found = worst::checks(&problem, &settings, again.status, told, lambda, agrees)?;
+        checks.extend(found);
+    }
+    let (Some(lambda), Some(currents)) = (stored.lambda_n_per_m, &stored.currents_a) else {
+        return Ok(checks);
+    };
+    let residual: Vec<f64> = forces
+        .chunks_exact(coils)
+        .enumerate()
+        .map(|(point, row)| {
+            let pull = offset_n.as_ref().map_or(0.0, |offset| offset[point]);
+            let pushed: f64 = row.iter().zip(currents).map(|(g, i)| g * i).sum();
+            lambda * heights[point] - pull - pushed
+        })
+        .collect();
+    let n = heights.len() as f64;
+    let wanted = lambda * lambda * heights.iter().map(|h| h * h).sum::<f64>() / n;
+    let mean_square = residual.iter().map(|e| e * e).sum::<f64>() / n;
+    let rms = stored
+        .rms_error_n
+        .map_or(f64::INFINITY, |told| (told - mean_square.sqrt()).abs());
+    let how = "the mean square error summed over all points";
+    checks.push(check(
+        "rms error",
+        ratio(rms, wanted.sqrt()),
+        agrees,
+        how.to_owned(),
+    ));
+    let worst = residual.iter().fold(0.0_f64, |most, e| most.max(e.abs()));
+    let worst = stored
+        .worst_error_n
+        .map_or(f64::INFINITY, |told| (told - worst).abs());
+    let how = "the largest error over all points";
+    checks.push(check(
+        "worst error",
+        ratio(worst, wanted.sqrt()),
+        agrees,
+        how.to_owned(),
+    ));
+    if criterion == Criterion::Maxmin {
+        // These currents are for the weakest point, not for the mean square.
+        checks.push(worst::weakest_point(&residual, wanted.sqrt(), agrees));
+        return Ok(checks);
+    }
+    let gap = ratio(duality_gap(&problem, &residual, currents), wanted);
+    let how = "proof of optimality: no currents within the limits are better by more";
+    checks.push(check(
+        "duality gap",
+        gap,
+        slack.max(GAP_ALLOWED),
+        how.to_owned(),
+    ));
+    Ok(checks)
+}
+
+/// How much the pull's stated error may move force constants and errors, relative.
+fn passive_slack(
+    bundle: &Bundle,
+    bounds: &Bounds,
+    offset_n: Option<&[f64]>,
+    heights: &[f64],
+) -> f64 {
+    let Some(offset_n) = offset_n else { return 0.0 };
+    let rms = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let told = [
+        bundle.lambda.lambda_n_per_m,
+        bundle.lambda.constants.lambda_linear_n_per_m,
+    ];
+    let least = told
+        .into_iter()
+        .flatten()
+        .filter(|l| *l > 0.0)
+        .fold(f64::INFINITY, f64::min);
+    FORCES_MOVE * bounds.pull * ratio(rms(offset_n), least * rms(heights)).min(1.0)
+}
+
+fn sampled_forces(
+    route: &Route,
+    bounds: &Bounds,
+    positions: &[[f64; 3]],
+    forces: &[f64],
+) -> Result<Check, RunError> {
+    let coils = route.scene.coils.len();
+    let largest = forces.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
+    let moment = route.scene.moment_a_m2;
+    let places = spread(forces.len(), route.samples());
+    let wanted: Vec<(usize, [f64; 3])> = places
+        .iter()
+        .map(|index| (index % coils, positions[index / coils]))
+        .collect();
+    let exact = route.gradients(&wanted)?;
+    let worst = places
+        .iter()
+        .zip(&exact)
+        .map(|(index, gradient)| {
+            let exact: f64 = moment.iter().zip(gradient).map(|(m, g)| m * g).sum();
+            (forces[*index] - exact).abs()
+        })
+        .fold(0.0, f64::max);
+    let how = format!(
+        "{} entries of the force matrix by an independent route",
+        places.len()
+    );
+    // The estimate is relative to |grad B| at each height; the lowest points have the largest.
+    let allowed = bounds.forces.max(10.0 * KERNEL_ERROR);
+    Ok(check("forces", ratio(worst, largest), allowed, how))
+}
+
+/// 2 (max over the feasible z of s'z - s'x), s = G'r/n: a fractional knapsack (physics of the
+/// bound: the error is convex, so no feasible currents lie below its tangent).
+fn duality_gap(problem: &ForceProblem, residual: &[f64], currents: &[f64]) -> f64 {
+    let coils = currents.len();
+    let n = residual.len() as f64;
+    let mut slope = vec![0.0; coils];
+    for (row, r) in problem.forces_n_per_a.chunks_exact(coils).zip(residual) {
+        for (s, g) in slope.iter_mut().zip(row) {
+            *s += g * r / n;
+        }
+    }
+    // Start every coil at its better end, then give back the cheapest ones until the sum fits.
+    let mut z: Vec<f64> = slope
+        .iter()
+        .enumerate()
+        .map(|(i, s)| {
+            if *s > 0.0 {
+                problem.upper_a[i]
+            } else {
+                problem.lower_a[i]
+            }
+        })
+        .collect();
+    if let Some(total) = problem.total_max_a {
+        let mut excess = z.iter().sum::<f64>() - total;
+        let mut order: Vec<usize> = (0..coils).collect();
+        order.sort_by(|a, b| slope[*a].total_cmp(&slope[*b]));
+        for i in order {
+            let back = excess.min(z[i] - problem.lower_a[i]).max(0.0);
+            z[i] -= back;
+            excess -= back;
+        }
+    }
+    let gain: f64 = slope
+        .iter()
+        .zip(z.iter().zip(currents))
+        .map(|(s, (z, x))| s * (z - x))
+        .sum();
+    (2.0 * gain).max(0.0)
+}

@@ -1,0 +1,256 @@
+//! What a bundle was made from: the documents that it names, looked at again.
+
+use std::io;
+use std::path::Path;
+
+use super::RunError;
+use crate::bundle::artefact::Input;
+use crate::bundle::load::{Bundle, BundleError};
+use crate::bundle::manifest::SurfaceOptions;
+use crate::bundle::read_bounded::digest_plain;
+use crate::commands::calibrate::CURVE_FILE;
+use crate::commands::calibrate::CalibrateOptions;
+use crate::commands::calibrate::DESIGN_FILE;
+use crate::commands::lambda::LambdaOptions;
+use crate::design::{Design, Need, Steel as Described, source};
+use crate::lambda::Settings;
+use crate::scene::sources::ShapeSource;
+use crate::shape::document::{Placement, RawSurface, ShapeDocument, SurfaceSource};
+
+/// Inputs that are looked at again: a bundle names them, and is not trusted with any number or size.
+const INPUTS_MAX: usize = 16;
+/// The largest of them.
+const INPUT_MAX_BYTES: u64 = 1 << 30;
+/// Standard input among the inputs.
+const STANDARD: &str = "-";
+/// Tolerances that a run may have had.
+const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-15..=1e-1;
+
+/// Design and shape of a bundle, and how they differ from what it says.
+pub(super) struct Sources {
+    /// Of the copy that the bundle keeps; a magnetisation curve is read from its copy too.
+    pub(super) design: Design,
+    /// Its text.
+    pub(super) text: String,
+    /// The table of the design's magnetisation curve: its entry among the inputs and its text.
+    pub(super) curve: Option<(Input, String)>,
+    /// `None` where its file is not here.
+    pub(super) shape: Option<ShapeSource>,
+    /// Contradictions: the bundle is not of these inputs.
+    pub(super) faults: Vec<String>,
+    /// Files that are not here, their content known all the same.
+    pub(super) notes: Vec<String>,
+    /// Files of the shape that are not here.
+    pub(super) missing: Vec<String>,
+}
+
+impl Sources {
+    /// The sources of `bundle`, paths relative to the working directory.
+    ///
+    /// # Errors
+    /// A bundle without its design; documents that cannot be read.
+    pub(super) fn of(bundle: &Bundle) -> Result<Self, RunError> {
+        let inputs = &bundle.manifest.inputs;
+        let (mut faults, mut notes) = (Vec::new(), Vec::new());
+        let design = kept_text(bundle, DESIGN_FILE)?;
+        let given = inputs.first().map_or(STANDARD, |input| &input.path);
+        let (mut parsed, _) = Design::from_toml(&design, Path::new(given), Need::CALIBRATE)
+            .map_err(|invalid| RunError::Input(invalid.to_string()))?;
+        let mut kept = vec![(DESIGN_FILE, design.as_str())];
+        let mut curve_text = None;
+        if let Some(core) = &mut parsed.core
+            && let Described::Curve(curve) = &mut core.steel
+        {
+            curve_text = Some(kept_text(bundle, CURVE_FILE)?);
+            *curve = bundle.folder.join(CURVE_FILE);
+        }
+        kept.extend(curve_text.iter().map(|text| (CURVE_FILE, text.as_str())));
+        for (place, (name, text)) in kept.iter().enumerate() {
+            let own = Input::of_bytes("", text.as_bytes()).sha256;
+            match inputs.get(place) {
+                Some(input) if input.sha256 == own => {}
+                Some(input) => faults.push(format!(
+                    "inputs name {} with another digest than that of {name}",
+                    input.path
+                )),
+                None => faults.push(format!("inputs do not name the file of {name}")),
+            }
+        }
+        if inputs.len() > INPUTS_MAX {
+            faults.push(format!(
+                "{} inputs, expected at most {INPUTS_MAX}",
+                inputs.len()
+            ));
+        }
+        let mut missing = Vec::new();
+        for (place, input) in inputs.iter().take(INPUTS_MAX).enumerate() {
+            match found(input) {
+                Found::Same => {}
+                Found::Changed => faults.push(format!(
+                    "{} has changed since the bundle was made",
+                    input.path
+                )),
+                Found::Missing if place < kept.len() => {
+                    if input.path != STANDARD {
+                        let (name, path) = (kept[place].0, &input.path);
+                        notes.push(format!(
+                            "{path} is not here; {name} of the bundle stands for it"
+                        ));
+                    }
+                }
+                Found::Missing => missing.push(input.path.clone()),
+            }
+        }
+        let shape = match inputs.get(kept.len()..) {
+            Some(rest) if missing.is_empty() && faults.is_empty() => shape(bundle, rest)?,
+            _ => None,
+        };
+        let curve = inputs.get(1).cloned().zip(curve_text);
+        Ok(Self {
+            design: parsed,
+            curve,
+            text: design,
+            shape,
+            faults,
+            notes,
+            missing,
+        })
+    }
+
+    /// Why the shape cannot be read again, and what helps.
+    pub(super) fn without_shape(&self) -> String {
+        let named: Vec<&str> = self.missing.iter().map(String::as_str).collect();
+        match named[..] {
+            [] => "the manifest does not name the shape's files".to_owned(),
+            [STANDARD] => "calibrate read the shape from standard input".to_owned(),
+            _ => format!(
+                "{} not found; verify in the folder where calibrate ran",
+                named.join(", ")
+            ),
+        }
+    }
+}
+
+/// The options of the run that made the bundle; faults where they are none.
+pub(super) fn options(bundle: &Bundle) -> Result<CalibrateOptions, String> {
+    let told = &bundle.lambda;
+    let settings = Settings {
+        criterion: told.criterion,
+        jnd_weight: told.jnd,
+        at_n_per_m: told.at.as_ref().map(|at| at.lambda_n_per_m),
+    };
+    let made_with = bundle.manifest.made_with.as_ref();
+    let mut options = CalibrateOptions::new("");
+    options.lambda = LambdaOptions {
+        settings,
+        tolerance: made_with.and_then(|made| made.tolerance),
+        ..LambdaOptions::default()
+    };
+    if let Some(made) = made_with {
+        options.reach_m = made.reach_m;
+        options.page = made.report;
+    }
+    let sound = options.reach_m >= 0.0
+        && options.reach_m.is_finite()
+        && settings.jnd_weight > 0.0
+        && settings.jnd_weight.is_finite()
+        && settings
+            .at_n_per_m
+            .is_none_or(|at| at >= 0.0 && at.is_finite())
+        && options
+            .lambda
+            .tolerance
+            .is_none_or(|t| TOLERANCES.contains(&t));
+    sound
+        .then_some(options)
+        .ok_or_else(|| "the options that the bundle names are none that a run may have".to_owned())
+}
+
+/// A text that the bundle keeps; its digest was checked with the others'.
+fn kept_text(bundle: &Bundle, name: &str) -> Result<String, RunError> {
+    let path = bundle.folder.join(name);
+    if !bundle.manifest.files.iter().any(|file| file.path == name) {
+        let message = "is not listed in manifest.json: there is nothing to verify against; \
+                       calibrate again"
+            .to_owned();
+        return Err(BundleError::Content { path, message }.into());
+    }
+    let text = source::text_of(&path).map_err(|invalid| RunError::Input(invalid.to_string()))?;
+    let listed = bundle.manifest.files.iter().find(|file| file.path == name);
+    let own = Input::of_bytes("", text.as_bytes()).sha256;
+    if listed.is_some_and(|file| file.sha256 != own) {
+        let message = "changed while it was read".to_owned();
+        return Err(BundleError::Content { path, message }.into());
+    }
+    Ok(text)
+}
+
+enum Found {
+    Same,
+    Changed,
+    Missing,
+}
+
+/// Whether the input's file is still what it was.
+fn found(input: &Input) -> Found {
+    if input.path == STANDARD {
+        return Found::Missing;
+    }
+    match digest_plain(Path::new(&input.path), INPUT_MAX_BYTES) {
+        Ok((_, digest)) if digest == input.sha256 => Found::Same,
+        Err(error)
+            if matches!(
+                error.kind(),
+                io::ErrorKind::NotFound | io::ErrorKind::NotADirectory
+            ) =>
+        {
+            Found::Missing
+        }
+        Ok(_) | Err(_) => Found::Changed,
+    }
+}
+
+/// The shape of the inputs that follow the design's; `None` where they are none that a run has.
+fn shape(bundle: &Bundle, inputs: &[Input]) -> Result<Option<ShapeSource>, RunError> {
+    let Some(first) = inputs.first() else {
+        return Ok(None);
+    };
+    let path = Path::new(&first.path);
+    let made_with = bundle.manifest.made_with.as_ref();
+    if let Some(surface) = made_with.and_then(|made| made.surface.as_ref()) {
+        let document = ShapeDocument::raw(&raw(path, surface));
+        let document = document.map_err(|wrong| RunError::Input(wrong.to_string()))?;
+        return Ok((inputs.len() == 1).then_some(ShapeSource {
+            document,
+            input: None,
+        }));
+    }
+    let refuse = |invalid: crate::design::InvalidDocument| RunError::Input(invalid.to_string());
+    let text = source::text_of(path).map_err(refuse)?;
+    let (document, _) = ShapeDocument::from_toml(&text, path).map_err(refuse)?;
+    // A surface that the inputs do not name was not part of the run.
+    let named = match &document.source {
+        SurfaceSource::File { path, .. } => {
+            let path = path.display().to_string();
+            inputs.len() <= 2 && inputs.iter().any(|input| input.path == path)
+        }
+        SurfaceSource::Primitive(_) => inputs.len() == 1,
+    };
+    let input = Some(Input::of_bytes(first.path.clone(), text.as_bytes()));
+    Ok(named.then_some(ShapeSource { document, input }))
+}
+
+fn raw(path: &Path, surface: &SurfaceOptions) -> RawSurface {
+    RawSurface {
+        path: path.to_path_buf(),
+        unit_m: surface.unit_m,
+        scale: surface.scale,
+        placement: Placement {
+            translate_m: surface.translate_m,
+            rotate_deg: surface.rotate_deg,
+        },
+        samples: surface.samples,
+        x_m: surface.x_m,
+        y_m: surface.y_m,
+    }
+}

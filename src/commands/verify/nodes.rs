@@ -1,0 +1,107 @@
+//! The map, on its nodes and between them.
+
+use super::route::Route;
+use super::{Bounds, Check, check, ratio};
+use crate::RunError;
+use crate::bundle::load::Bundle;
+use crate::field::winding::KERNEL_ERROR;
+use crate::numerics::lagrange;
+use crate::scene::evaluation_sample::spread;
+
+/// Largest |dB_z/dz| at a height: on the axis or anywhere of the map's plane.
+fn largest_in_plane(bundle: &Bundle, level: usize) -> f64 {
+    let map = &bundle.map;
+    let plane = map.x_m.len() * map.y_m.len();
+    (0..map.coil.len())
+        .flat_map(|coil| {
+            let start = (coil * map.z_m.len() + level) * plane;
+            &map.gz_t_per_m_per_a[start..start + plane]
+        })
+        .fold(0.0, |most: f64, g| most.max(g.abs()))
+}
+
+/// Sampled nodes.
+pub(super) fn on(bundle: &Bundle, route: &Route, bounds: &Bounds) -> Result<Check, RunError> {
+    let map = &bundle.map;
+    let [coils, nz, ny, nx] = map.shape();
+    let sizes: Vec<f64> = (0..nz)
+        .map(|level| largest_in_plane(bundle, level))
+        .collect();
+    let places = spread(coils * nz * ny * nx, route.samples());
+    let wanted: Vec<(usize, [f64; 3])> = places
+        .iter()
+        .map(|index| {
+            let (x, y, z) = (index % nx, index / nx % ny, index / (nx * ny) % nz);
+            let coil = map.coil[index / (nx * ny * nz)] as usize;
+            (coil, [map.x_m[x], map.y_m[y], map.z_m[z]])
+        })
+        .collect();
+    let exact = route.gradients(&wanted)?;
+    let worst = places
+        .iter()
+        .zip(&exact)
+        .map(|(index, exact)| {
+            let error = (map.gz_t_per_m_per_a[*index] - exact[2]).abs();
+            ratio(error, sizes[index / (nx * ny) % nz])
+        })
+        .fold(0.0, f64::max);
+    let how = format!("{} nodes by an independent route", places.len());
+    Ok(check("map nodes", worst, bounds.map.max(KERNEL_ERROR), how))
+}
+
+/// Sampled places between nodes, interpolated.
+pub(super) fn between(bundle: &Bundle, route: &Route, bounds: &Bounds) -> Result<Check, RunError> {
+    let map = &bundle.map;
+    let [coils, nz, ny, nx] = map.shape();
+    let cells = [nx, ny, nz].map(|n| n.saturating_sub(1).max(1));
+    let nodes = nx * ny * nz;
+    let at = |nodes: &[f64], cell: usize, t: f64| match nodes.get(cell + 1) {
+        Some(next) => nodes[cell] + t * (next - nodes[cell]),
+        None => nodes[cell],
+    };
+    // (layer, coil's place in the map, point)
+    let places: Vec<(usize, usize, [f64; 3])> =
+        spread(coils * cells[0] * cells[1] * cells[2], route.samples())
+            .into_iter()
+            .map(|index| {
+                let (i, rest) = (index % cells[0], index / cells[0]);
+                let (j, rest) = (rest % cells[1], rest / cells[1]);
+                let (k, place) = (rest % cells[2], rest / cells[2]);
+                // Places inside the cells, different from cell to cell.
+                let t = |salt: usize| ((index * 7 + salt * 13) % 29) as f64 / 29.0;
+                let point = [
+                    at(&map.x_m, i, t(1)),
+                    at(&map.y_m, j, t(2)),
+                    at(&map.z_m, k, t(3)),
+                ];
+                (k, place, point)
+            })
+            .collect();
+    let wanted: Vec<(usize, [f64; 3])> = places
+        .iter()
+        .map(|(_, place, point)| (map.coil[*place] as usize, *point))
+        .collect();
+    let exact = route.gradients(&wanted)?;
+    let worst = places
+        .iter()
+        .zip(&exact)
+        .map(|((k, place, point), exact)| {
+            let Some(cell) = lagrange::locate([&map.x_m, &map.y_m, &map.z_m], *point) else {
+                return f64::INFINITY;
+            };
+            let value = cell.value(&map.gz_t_per_m_per_a[place * nodes..(place + 1) * nodes]);
+            // The lower of the two planes around the point has the larger values.
+            ratio((value - exact[2]).abs(), largest_in_plane(bundle, *k))
+        })
+        .fold(0.0, f64::max);
+    let how = format!(
+        "{} places between nodes, interpolated as the loaders do",
+        places.len()
+    );
+    Ok(check(
+        "map between nodes",
+        worst,
+        bounds.between.max(KERNEL_ERROR),
+        how,
+    ))
+}

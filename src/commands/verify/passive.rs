@@ -1,0 +1,131 @@
+//! The unpowered steel's pull.
+
+use super::route::FINER;
+use super::{Bounds, Check, check, ratio};
+use crate::RunError;
+use crate::bundle::load::Bundle;
+use crate::map::tabulate::Grid;
+use crate::scene::Scene;
+use crate::scene::evaluation_sample::spread;
+use crate::scene::passive::{self, PASSIVE_TOLERANCE};
+use crate::scene::passive_map::PassiveMap;
+
+/// The unpowered steel's pull at the points, finer than the bundle's; `None` where the design does
+/// not ask for it.
+pub(super) fn offset_n(
+    scene: &Scene,
+    positions: &[[f64; 3]],
+) -> Result<Option<Vec<f64>>, RunError> {
+    if !scene.design.magnet.passive_force {
+        return Ok(None);
+    }
+    let pull = passive::pull_to(scene, positions, false, FINER * PASSIVE_TOLERANCE)?;
+    Ok(pull.map(|pull| pull.forces_z_n(positions)))
+}
+
+/// Places at which the pull is computed by another route: on nodes, and as many between them.
+const PULL_SAMPLES: usize = 40;
+
+/// The map of the unpowered steel's pull: every node against a finer map, some of them and places
+/// between them against another route.
+pub(super) fn checks(
+    bundle: &Bundle,
+    scene: &Scene,
+    bounds: &Bounds,
+) -> Result<Vec<Check>, RunError> {
+    const NODES: &str = "passive force nodes";
+    let map = &bundle.map;
+    let wanted = scene.design.magnet.passive_force && scene.core.is_some();
+    let Some(values) = &map.passive_force_n else {
+        let how = "the design has passive_force, the bundle holds none: calibrate again".to_owned();
+        return Ok(wanted
+            .then(|| check(NODES, f64::MAX, 0.0, how))
+            .into_iter()
+            .collect());
+    };
+    if !wanted {
+        let how = "the bundle holds a passive force, the design has none".to_owned();
+        return Ok(vec![check(NODES, f64::MAX, 0.0, how)]);
+    }
+    let stated = bounds.pull_map;
+    let tolerance = FINER * PASSIVE_TOLERANCE;
+    let grid = Grid {
+        x_m: map.x_m.to_vec(),
+        y_m: map.y_m.to_vec(),
+        z_m: map.z_m.to_vec(),
+    };
+    let Some(finer) = PassiveMap::new(scene, &grid, tolerance)? else {
+        return Ok(Vec::new());
+    };
+    let [_, nz, ny, nx] = map.shape();
+    let sizes: Vec<f64> = finer
+        .force_z_n
+        .chunks_exact(nx * ny)
+        .map(|plane| plane.iter().fold(0.0_f64, |most, f| most.max(f.abs())))
+        .collect();
+    let worst = values
+        .iter()
+        .zip(&finer.force_z_n)
+        .enumerate()
+        .map(|(i, (told, found))| ratio((told - found).abs(), sizes[i / (nx * ny)]))
+        .fold(0.0, f64::max);
+    let allowed = stated + finer.accuracy.estimate;
+    let mut checks = vec![check(
+        NODES,
+        worst,
+        allowed,
+        "every node against a finer map of the pull".to_owned(),
+    )];
+
+    // The level below a place, and the place; the first half on nodes.
+    let cells = [nx, ny, nz].map(|n| n.saturating_sub(1).max(1));
+    let places: Vec<(usize, [f64; 3])> = spread(nx * ny * nz, PULL_SAMPLES)
+        .into_iter()
+        .map(|i| (i / (nx * ny), [i % nx, i / nx % ny, i / (nx * ny)], 0.0))
+        .chain(
+            spread(cells[0] * cells[1] * cells[2], PULL_SAMPLES)
+                .into_iter()
+                .map(|i| {
+                    let k = i / (cells[0] * cells[1]);
+                    (k, [i % cells[0], i / cells[0] % cells[1], k], 0.43)
+                }),
+        )
+        .map(|(level, cell, t)| {
+            let at = |nodes: &[f64], i: usize| match nodes.get(i + 1) {
+                Some(next) => nodes[i] + t * (next - nodes[i]),
+                None => nodes[i],
+            };
+            let [x, y, z] = cell;
+            (
+                level,
+                [at(&grid.x_m, x), at(&grid.y_m, y), at(&grid.z_m, z)],
+            )
+        })
+        .collect();
+    let points: Vec<[f64; 3]> = places.iter().map(|(_, at)| *at).collect();
+    let Some(sure) = passive::direct_z_n(scene, &points, tolerance)? else {
+        return Ok(checks);
+    };
+    let errors: Vec<f64> = places
+        .iter()
+        .zip(&sure)
+        .map(|((level, at), sure)| {
+            let found = bundle.passive_force_n(*at).unwrap_or(f64::INFINITY);
+            ratio((found - sure).abs(), sizes[*level])
+        })
+        .collect();
+    let (on, between) = errors.split_at(PULL_SAMPLES.min(nx * ny * nz));
+    let worst = |errors: &[f64]| errors.iter().copied().fold(0.0, f64::max);
+    let how = format!("{} nodes by the field that the steel sends back", on.len());
+    checks.push(check("passive force", worst(on), stated + tolerance, how));
+    checks.push(check(
+        "passive force between nodes",
+        worst(between),
+        bounds.pull_between + stated + tolerance,
+        format!(
+            "{} places between nodes, interpolated as the loaders do",
+            between.len()
+        ),
+    ));
+    Ok(checks)
+}

@@ -1,0 +1,256 @@
+//! A design's field, kept from run to run beside its bundles.
+//!
+//! What coils, steel and magnet give does not depend on current limits, criteria or the
+//! just-noticeable difference: as long as those alone change, steel, forces and maps are read and
+//! not computed. What is read is what was computed, to the bit.
+
+use std::sync::OnceLock;
+
+use super::Scene;
+use super::maps::{Felt, SceneMap};
+use super::passive;
+use super::steel::{self, Solved};
+use crate::RunError;
+use crate::bundle::artefact::Input;
+use crate::bundle::cache::{Origin, Store};
+
+/// Digest of the sources of this build.
+const BUILD: &str = env!("FLUXFORM_BUILD");
+use crate::design::Steel as Described;
+use crate::field::steel::array::CoupledArray;
+use crate::field::steel::core_flux_density::{Inspection, peak_depth_m};
+use crate::field::winding::OnEdge;
+use crate::map::Components;
+use crate::map::tabulate::{Grid, PlacedCoil};
+use crate::progress::Progress;
+use crate::shape::certificate::Certificate;
+use crate::shape::document::ShapeDocument;
+
+/// Name of the folder beside a design's bundles.
+pub const STORE_FOLDER: &str = ".fluxform-kept";
+/// Entry of the design's steel.
+const STEEL: &str = "steel";
+
+/// Where a design's field is kept.
+#[derive(Debug)]
+pub struct FieldStore {
+    store: Store,
+    /// The same, for what does not depend on the design: kept without steel too.
+    shapes: Store,
+    field: Origin,
+    /// Of the design's array, once a shape has asked for it.
+    inspection: OnceLock<Inspection>,
+}
+
+impl FieldStore {
+    /// The field of `scene` to `tolerance`, with the text of its magnetisation curve's table if it
+    /// has one, in `store`. Without steel nothing is kept: computing is faster than reading.
+    #[must_use]
+    pub fn new(scene: &Scene, tolerance: Option<f64>, curve: Option<&str>, store: Store) -> Self {
+        let design = scene.design;
+        let shapes = store.clone();
+        let store = if design.core.is_some() {
+            store
+        } else {
+            Store::none()
+        };
+        // Debug text tells every number to the last bit.
+        let parts = format!(
+            "{:?}",
+            (
+                &design.coil,
+                &design.wire,
+                &design.core,
+                &design.array,
+                &design.magnet,
+                design.workspace.z_m.from,
+                tolerance,
+            )
+        );
+        let mut field = Origin::of_build(BUILD).and(parts.as_bytes());
+        if let Some(Described::Curve(_)) = design.core.as_ref().map(|core| &core.steel) {
+            // Along a curve the rated current counts too.
+            let supply = format!("{:?}", design.supply);
+            let table = curve.unwrap_or_default();
+            field = field.and(supply.as_bytes()).and(table.as_bytes());
+        }
+        Self {
+            store,
+            shapes,
+            field,
+            inspection: OnceLock::new(),
+        }
+    }
+
+    /// Whether the steel's solution is there from an earlier run.
+    #[must_use]
+    pub fn holds_steel(&self) -> bool {
+        self.store.holds(STEEL, &self.field)
+    }
+
+    /// As [`steel::solve`].
+    ///
+    /// # Errors
+    /// As [`steel::solve`].
+    pub fn steel(
+        &self,
+        scene: &Scene,
+        tolerance: Option<f64>,
+        air_default: f64,
+    ) -> Result<Solved, RunError> {
+        let lowest_m = scene.design.workspace.z_m.from;
+        self.store.remember(STEEL, &self.field, || {
+            steel::solve(scene, tolerance, air_default, lowest_m)
+        })
+    }
+
+    /// The part that one shape needs.
+    #[must_use]
+    pub fn of_shape<'a>(&'a self, name: &'a str) -> ShapeField<'a> {
+        ShapeField {
+            kept: Some((self, name)),
+        }
+    }
+}
+
+/// What one shape needs of a design's field.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ShapeField<'a> {
+    kept: Option<(&'a FieldStore, &'a str)>,
+}
+
+impl<'a> ShapeField<'a> {
+    /// As [`Scene::forces_n_per_a`]; `what` tells these points from others of the shape.
+    ///
+    /// # Errors
+    /// As [`Scene::forces_n_per_a`].
+    pub fn forces_n_per_a(
+        self,
+        what: &str,
+        scene: &Scene,
+        solved: &Solved,
+        points_m: &[[f64; 3]],
+        progress: &dyn Progress,
+    ) -> Result<Vec<f64>, RunError> {
+        let compute = || scene.forces_n_per_a(solved, points_m, progress);
+        let Some((FieldStore { store, field, .. }, shape)) = self.kept else {
+            return compute();
+        };
+        let origin = field
+            .clone()
+            .and_numbers(points_m.iter().flatten().copied());
+        store.remember(&format!("{shape}.{what}"), &origin, compute)
+    }
+
+    /// As [`passive::left_out_z_n`].
+    ///
+    /// # Errors
+    /// As [`passive::left_out_z_n`].
+    pub fn pull_left_out_n(
+        self,
+        scene: &Scene,
+        points_m: &[[f64; 3]],
+    ) -> Result<Vec<f64>, RunError> {
+        let compute = || passive::left_out_z_n(scene, points_m);
+        let Some((FieldStore { store, field, .. }, shape)) = self.kept else {
+            return compute();
+        };
+        let origin = field
+            .clone()
+            .and_numbers(points_m.iter().flatten().copied());
+        store.remember(&format!("{shape}.pull"), &origin, compute)
+    }
+
+    /// The largest |B| in any core of the design's `array` at these currents, T, as
+    /// [`CoupledArray::core_fields`] has it.
+    ///
+    /// # Errors
+    /// As [`CoupledArray::core_fields`].
+    pub fn peak_t(self, array: &CoupledArray, currents_a: &[f64]) -> Result<f64, OnEdge> {
+        let depth_m = peak_depth_m(array.response.outline.shape);
+        let most = |peaks: Vec<f64>| peaks.into_iter().fold(0.0, f64::max);
+        let Some((kept, shape)) = self.kept else {
+            let inspection = Inspection::new(array, depth_m)?;
+            return inspection.peaks_t(array, currents_a).map(most);
+        };
+        let numbers = currents_a.iter().copied().chain([depth_m]);
+        let origin = kept.field.clone().and_numbers(numbers);
+        kept.store.remember(&format!("{shape}.peak"), &origin, || {
+            let inspection = match kept.inspection.get() {
+                Some(inspection) => inspection,
+                None => {
+                    let made = Inspection::new(array, depth_m)?;
+                    kept.inspection.get_or_init(|| made)
+                }
+            };
+            inspection.peaks_t(array, currents_a).map(most)
+        })
+    }
+
+    /// The entry of what is found of the points of `document`, read from `inputs`.
+    #[must_use]
+    pub fn certificate(self, document: &ShapeDocument, inputs: &[Input]) -> Entry<'a> {
+        let what = format!("{document:?}");
+        let origin = inputs.iter().fold(
+            Origin::of_build(BUILD).and(what.as_bytes()),
+            |origin, input| origin.and(input.sha256.as_bytes()),
+        );
+        Entry {
+            store: self.kept.map(|(field, _)| &field.shapes),
+            name: format!("{}.points", document.name),
+            origin,
+        }
+    }
+
+    /// As [`SceneMap::new`].
+    ///
+    /// # Errors
+    /// As [`SceneMap::new`].
+    #[expect(clippy::too_many_arguments, reason = "those of SceneMap::new")]
+    pub fn map(
+        self,
+        scene: &Scene,
+        solved: &Solved,
+        coils: &[PlacedCoil],
+        grid: &Grid,
+        components: Components,
+        felt: &Felt,
+        progress: &dyn Progress,
+    ) -> Result<SceneMap, RunError> {
+        let compute = || SceneMap::new(scene, solved, coils, grid, components, felt, progress);
+        let Some((FieldStore { store, field, .. }, shape)) = self.kept else {
+            return compute();
+        };
+        let coils: Vec<usize> = coils.iter().map(|coil| coil.number).collect();
+        let what = format!("{:?}", (coils, components, felt));
+        let origin = [&grid.x_m, &grid.y_m, &grid.z_m]
+            .into_iter()
+            .fold(field.clone().and(what.as_bytes()), |origin, nodes| {
+                origin.and_numbers(nodes.iter().copied())
+            });
+        store.remember(&format!("{shape}.map"), &origin, compute)
+    }
+}
+
+/// What is kept of a shape's points.
+#[derive(Debug)]
+pub struct Entry<'a> {
+    store: Option<&'a Store>,
+    name: String,
+    origin: Origin,
+}
+
+impl Entry<'_> {
+    /// What an earlier run found.
+    #[must_use]
+    pub fn known(&self) -> Option<Certificate> {
+        self.store?.recall(&self.name, &self.origin)
+    }
+
+    /// Keeps what was found.
+    pub fn keep(&self, found: &Certificate) {
+        if let Some(store) = self.store {
+            store.keep(&self.name, &self.origin, found);
+        }
+    }
+}

@@ -1,0 +1,516 @@
+//! Maps of a scene over a grid, whatever its sources, and their interpolation's error.
+
+use serde::{Deserialize, Serialize};
+
+use super::evaluation_sample::{Evaluation, PLACES, Sample, sharper, spread};
+use super::steel::{EVALUATION_SHARE, Solved, Steel, SteelField, clearance_m, coupled};
+use super::{AIR_SHARE, Scene};
+use crate::RunError;
+use crate::accuracy::StageAccuracy;
+use crate::field::magnet::MagnetRule;
+use crate::field::steel::axial_table::AxialTable;
+use crate::map::coupled_map::{SampledField, TableReport};
+use crate::map::mean::MeanField;
+
+use crate::map::tabulate::{Grid, MapError, PlacedCoil};
+use crate::map::{
+    Components, FieldMap, InterpolationError, interpolation_error, interpolation_error_by, tabulate,
+};
+use crate::progress::{Progress, Silent};
+
+/// A map and what is known of it.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct SceneMap {
+    /// The map.
+    pub map: FieldMap,
+    /// Error of interpolating it between its nodes.
+    pub between: InterpolationError,
+    /// The steel's compact form, where there was one.
+    pub table: Option<TableReport>,
+    /// Estimated error of its nodes.
+    pub accuracy: StageAccuracy,
+}
+
+/// Share of the tolerance given to the maps' own rules beside the steel's solution.
+const MAP_SHARE: f64 = 0.08;
+
+impl SceneMap {
+    /// Maps of `coils` of `scene` over `grid`: of the field itself, or of the mean that a magnet
+    /// feels, F_z / m_z being what the map gives.
+    ///
+    /// # Errors
+    /// A node on a winding's edge or on the steel; interruption.
+    pub fn new(
+        scene: &Scene,
+        solved: &Solved,
+        coils: &[PlacedCoil],
+        grid: &Grid,
+        components: Components,
+        felt: &Felt,
+        progress: &dyn Progress,
+    ) -> Result<Self, RunError> {
+        // A grid through every place that a node of the magnet can take.
+        let widest = widest(grid, felt);
+        let lowest = lowest_plane(grid);
+        let (table, map, between) = match &solved.steel {
+            Steel::None => {
+                let share = if felt.is_field() { 1.0 } else { AIR_SHARE };
+                let tolerance = share * solved.tolerance / felt.amplification;
+                let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
+                    tabulate(&scene.winding, coils, grid, components, tolerance, p)
+                };
+                let means = MeanField::new(
+                    &scene.winding,
+                    coils,
+                    grid,
+                    components,
+                    MEAN_SHARE * share * solved.tolerance,
+                    SOURCE_SHARE * tolerance,
+                );
+                let one = Maker {
+                    one: &one,
+                    means: means.as_ref(),
+                };
+                let map = mean(&one, felt, coils, grid, components, progress)?;
+                progress.begin("interpolation error", 1);
+                let between = if felt.is_field() {
+                    let gz = &map.gz_t_per_m_per_a;
+                    interpolation_error(&scene.winding, coils, grid, gz, tolerance)?
+                } else {
+                    between(&one, felt, coils, grid, &map)?
+                };
+                (None, map, between)
+            }
+            Steel::Alone(coil) => {
+                let tolerance = MAP_SHARE * solved.tolerance / felt.amplification;
+                if let Some(core) = &scene.core {
+                    clearance_m(scene, core, &lowest, felt.reach_m)?;
+                }
+                let own = EVALUATION_SHARE * tolerance;
+                let source = AxialTable::new(Some(scene.winding), coil.layer.clone(), own);
+                let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
+                    tabulate(&source, coils, grid, components, tolerance, p)
+                };
+                let means = MeanField::new(
+                    &source,
+                    coils,
+                    grid,
+                    components,
+                    MEAN_SHARE * MAP_SHARE * solved.tolerance,
+                    SOURCE_SHARE * tolerance,
+                );
+                let one = Maker {
+                    one: &one,
+                    means: means.as_ref(),
+                };
+                let map = mean(&one, felt, coils, grid, components, progress)?;
+                progress.begin("interpolation error", 1);
+                let between = between(&one, felt, coils, grid, &map)?;
+                (None, map, between)
+            }
+            Steel::Coupled(_) => {
+                let tolerance = MAP_SHARE * solved.tolerance / felt.amplification;
+                let steel = solved.sources(scene, &lowest, felt.reach_m, felt.amplification)?;
+                let Some(SteelField::Coupled(steel)) = steel else {
+                    return Err(no_steel());
+                };
+                let sampled = SampledField::new(
+                    &steel,
+                    &widest,
+                    components,
+                    tolerance,
+                    felt.visits(),
+                    progress,
+                )?;
+                let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
+                    let mut map =
+                        tabulate(&scene.winding, coils, grid, components, tolerance, &Silent)?;
+                    add(&mut map, &sampled.map(coils, grid, p)?, 1.0);
+                    Ok(map)
+                };
+                let one = Maker {
+                    one: &one,
+                    means: None,
+                };
+                let map = mean(&one, felt, coils, grid, components, progress)?;
+                progress.begin("interpolation error", 1);
+                let between = between(&one, felt, coils, grid, &map)?;
+                (Some(sampled.report), map, between)
+            }
+        };
+        progress.end();
+        let mut evaluation = evaluation(&map, solved);
+        if felt.is_field() {
+            evaluation = sharper(scene, solved, samples(&map, coils), evaluation);
+        }
+        let accuracy = accuracy(evaluation, solved, felt.bound);
+        Ok(Self {
+            map,
+            between,
+            table,
+            accuracy,
+        })
+    }
+}
+
+fn no_steel() -> RunError {
+    RunError::Input("the design has steel, but its solution holds none".to_owned())
+}
+
+/// Shares of a map's tolerance given to the series of means and to the field that they are of.
+const MEAN_SHARE: f64 = 0.5;
+const SOURCE_SHARE: f64 = 0.4;
+
+/// Maps the field of one source.
+type MapOne<'a> =
+    &'a dyn Fn(&[PlacedCoil], &Grid, Components, &dyn Progress) -> Result<FieldMap, MapError>;
+
+/// Makes maps of the field of one source.
+struct Maker<'a> {
+    one: MapOne<'a>,
+    /// Means of it, where coils are alike.
+    means: Option<&'a MeanField<'a>>,
+}
+
+/// Offsets of a magnet's dipoles from its centre, m, and their parts of its moment.
+type Shares = Vec<([f64; 3], f64)>;
+
+/// What a map's values are the mean of: offsets of the magnet's dipoles and their parts of its
+/// moment, fewer from greater heights up.
+#[derive(Debug, Clone)]
+pub struct Felt {
+    /// Height from which the offsets (m) and parts hold, ascending.
+    layers: Vec<(f64, Shares)>,
+    /// Largest sum of the parts' magnitudes.
+    amplification: f64,
+    /// A-priori error of the means, relative to the gradient at the place.
+    bound: f64,
+    reach_m: f64,
+}
+
+/// A rule whose parts cancel more than this is not worth its few dipoles.
+const MOST_AMPLIFICATION: f64 = 3.0;
+/// The same where a table gives the field, whose cost hardly grows with its digits.
+const MOST_AMPLIFICATION_OF_TABLES: f64 = 100.0;
+/// Growth of the distance from the sources at which a rule of fewer dipoles is sought.
+const FARTHER: f64 = 1.25;
+
+impl Felt {
+    /// The field itself.
+    #[must_use]
+    pub fn field() -> Self {
+        Self {
+            layers: vec![(f64::NEG_INFINITY, vec![([0.0; 3], 1.0)])],
+            amplification: 1.0,
+            bound: 0.0,
+            reach_m: 0.0,
+        }
+    }
+
+    /// What the magnet of `scene` feels at the heights `z_m`, ascending, to `tolerance`.
+    ///
+    /// # Errors
+    /// A magnet that touches what it is attracted by.
+    pub fn by_magnet(scene: &Scene, z_m: &[f64], tolerance: f64) -> Result<Self, RunError> {
+        let top_m = scene.core.as_ref().map_or(0.0, |c| c.shape.top_m.max(0.0));
+        let mut felt = Self {
+            layers: Vec::new(),
+            ..Self::field()
+        };
+        let most = if scene.core.is_some() && !coupled(scene.design) {
+            MOST_AMPLIFICATION_OF_TABLES
+        } else {
+            MOST_AMPLIFICATION
+        };
+        let mut sought_m = f64::NEG_INFINITY;
+        for z in z_m {
+            if z - top_m < FARTHER * (sought_m - top_m) {
+                continue;
+            }
+            sought_m = *z;
+            let rule = scene.magnet_rule(*z, tolerance)?;
+            let fewer = felt
+                .layers
+                .last()
+                .is_none_or(|(_, shares)| rule.nodes().len() < shares.len());
+            if fewer && (felt.layers.is_empty() || rule.amplification() <= most) {
+                felt.amplification = felt.amplification.max(rule.amplification());
+                felt.bound = felt.bound.max(rule.bound());
+                felt.reach_m = felt.reach_m.max(rule.reach_m());
+                felt.layers.push((*z, shares(&rule)));
+            }
+        }
+        Ok(felt)
+    }
+
+    /// Whether it is the field itself.
+    fn is_field(&self) -> bool {
+        self.layers.iter().all(|(_, shares)| shares.len() == 1)
+    }
+
+    /// Most places that a value is the mean of.
+    fn visits(&self) -> usize {
+        let counts = self.layers.iter().map(|(_, shares)| shares.len());
+        counts.max().unwrap_or(1)
+    }
+
+    /// The offsets and parts at height `z_m`.
+    fn at(&self, z_m: f64) -> &[([f64; 3], f64)] {
+        let above = self.layers.partition_point(|(from, _)| *from <= z_m);
+        &self.layers[above.saturating_sub(1)].1
+    }
+
+    /// Pieces of `z_m` with the same offsets.
+    fn pieces<'a>(&self, z_m: &'a [f64]) -> Vec<&'a [f64]> {
+        z_m.chunk_by(|a, b| std::ptr::eq(self.at(*a), self.at(*b)))
+            .collect()
+    }
+}
+
+/// Offsets of the magnet's dipoles and their parts of its moment.
+fn shares(rule: &MagnetRule) -> Shares {
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let moment = rule.nodes().iter().fold([0.0; 3], |sum, node| {
+        std::array::from_fn(|i| sum[i] + node.moment_a_m2[i])
+    });
+    let square = dot(moment, moment);
+    rule.nodes()
+        .iter()
+        .map(|node| (node.offset_m, dot(node.moment_a_m2, moment) / square))
+        .collect()
+}
+
+fn shifted(grid: &Grid, offset_m: [f64; 3]) -> Grid {
+    let move_by = |nodes: &[f64], by: f64| nodes.iter().map(|x| x + by).collect();
+    Grid {
+        x_m: move_by(&grid.x_m, offset_m[0]),
+        y_m: move_by(&grid.y_m, offset_m[1]),
+        z_m: move_by(&grid.z_m, offset_m[2]),
+    }
+}
+
+fn mean(
+    one: &Maker,
+    felt: &Felt,
+    coils: &[PlacedCoil],
+    grid: &Grid,
+    components: Components,
+    progress: &dyn Progress,
+) -> Result<FieldMap, MapError> {
+    let mut pieces = Vec::new();
+    for z_m in felt.pieces(&grid.z_m) {
+        let grid = Grid {
+            z_m: z_m.to_vec(),
+            ..grid.clone()
+        };
+        let shares = felt.at(z_m[0]);
+        pieces.push(mean_of(one, shares, coils, &grid, components, progress)?);
+    }
+    if pieces.is_empty() {
+        return (one.one)(coils, grid, components, progress);
+    }
+    Ok(stacked(pieces, coils.len()))
+}
+
+/// Maps over pieces of the z axis as one.
+fn stacked(mut pieces: Vec<FieldMap>, coils: usize) -> FieldMap {
+    if pieces.len() == 1 {
+        return pieces.swap_remove(0);
+    }
+    let stack = |pick: &dyn Fn(&FieldMap) -> Option<&Vec<f64>>| -> Option<Vec<f64>> {
+        let parts: Vec<&Vec<f64>> = pieces.iter().filter_map(pick).collect();
+        let mut out = Vec::with_capacity(parts.iter().map(|p| p.len()).sum());
+        for coil in 0..coils {
+            for part in &parts {
+                let size = part.len() / coils;
+                out.extend_from_slice(&part[coil * size..(coil + 1) * size]);
+            }
+        }
+        (!parts.is_empty()).then_some(out)
+    };
+    let gz = stack(&|m| Some(&m.gz_t_per_m_per_a)).unwrap_or_default();
+    let gradient = stack(&|m| m.gradient_t_per_m_per_a.as_ref());
+    let field = stack(&|m| m.field_t_per_a.as_ref());
+    let z_m = pieces.iter().flat_map(|m| m.z_m.iter().copied()).collect();
+    let tabulated = pieces.iter().any(|m| m.tabulated);
+    let distinct_radii = pieces.iter().map(|m| m.distinct_radii).max().unwrap_or(0);
+    let relative_error = pieces.iter().fold(0.0_f64, |e, m| e.max(m.relative_error));
+    FieldMap {
+        z_m,
+        gz_t_per_m_per_a: gz,
+        gradient_t_per_m_per_a: gradient,
+        field_t_per_a: field,
+        tabulated,
+        distinct_radii,
+        relative_error,
+        ..pieces.swap_remove(0)
+    }
+}
+
+fn mean_of(
+    one: &Maker,
+    shares: &[([f64; 3], f64)],
+    coils: &[PlacedCoil],
+    grid: &Grid,
+    components: Components,
+    progress: &dyn Progress,
+) -> Result<FieldMap, MapError> {
+    if let (Some(means), [_, _, ..]) = (one.means, shares)
+        && let Some(map) = means.map(shares, coils, grid, components, progress)?
+    {
+        return Ok(map);
+    }
+    let mut whole: Option<FieldMap> = None;
+    for (offset_m, share) in shares {
+        let mut part = (one.one)(coils, &shifted(grid, *offset_m), components, progress)?;
+        match &mut whole {
+            None => {
+                if *share != 1.0 {
+                    scale(&mut part, *share);
+                }
+                whole = Some(part);
+            }
+            Some(whole) => add(whole, &part, *share),
+        }
+    }
+    let mut map = match whole {
+        Some(map) => map,
+        None => (one.one)(coils, grid, components, progress)?,
+    };
+    (map.x_m, map.y_m, map.z_m) = (grid.x_m.clone(), grid.y_m.clone(), grid.z_m.clone());
+    Ok(map)
+}
+
+fn between(
+    one: &Maker,
+    felt: &Felt,
+    coils: &[PlacedCoil],
+    grid: &Grid,
+    map: &FieldMap,
+) -> Result<InterpolationError, MapError> {
+    let direct = |coils: &[PlacedCoil], places: &Grid| {
+        mean(one, felt, coils, places, Components::Gz, &Silent)
+    };
+    interpolation_error_by(&direct, coils, grid, &map.gz_t_per_m_per_a)
+}
+
+fn each(map: &mut FieldMap) -> impl Iterator<Item = &mut Vec<f64>> {
+    [
+        Some(&mut map.gz_t_per_m_per_a),
+        map.gradient_t_per_m_per_a.as_mut(),
+        map.field_t_per_a.as_mut(),
+    ]
+    .into_iter()
+    .flatten()
+}
+
+fn scale(map: &mut FieldMap, factor: f64) {
+    for values in each(map) {
+        values.iter_mut().for_each(|value| *value *= factor);
+    }
+}
+
+fn add(map: &mut FieldMap, other: &FieldMap, factor: f64) {
+    let others = [
+        Some(&other.gz_t_per_m_per_a),
+        other.gradient_t_per_m_per_a.as_ref(),
+        other.field_t_per_a.as_ref(),
+    ];
+    for (values, others) in each(map).zip(others.into_iter().flatten()) {
+        for (value, other) in values.iter_mut().zip(others) {
+            *value += factor * other;
+        }
+    }
+    map.tabulated |= other.tabulated;
+}
+
+/// The grid whose box holds every place of the magnet's dipoles: its ends moved outwards.
+fn widest(grid: &Grid, felt: &Felt) -> Grid {
+    let moved = |nodes: &[f64], axis: usize| {
+        let mut out = nodes.to_vec();
+        for (_, shares) in &felt.layers {
+            for (offset, _) in shares {
+                out.extend(nodes.first().map(|x| x + offset[axis]));
+                out.extend(nodes.last().map(|x| x + offset[axis]));
+            }
+        }
+        out.sort_by(f64::total_cmp);
+        out.dedup();
+        let (first, last) = (out.first().copied(), out.last().copied());
+        out.retain(|x| nodes.contains(x) || Some(*x) == first || Some(*x) == last);
+        out
+    };
+    Grid {
+        x_m: moved(&grid.x_m, 0),
+        y_m: moved(&grid.y_m, 1),
+        z_m: moved(&grid.z_m, 2),
+    }
+}
+
+/// Nodes of a grid's lowest plane: where it comes closest to the coils.
+pub(crate) fn lowest_plane(grid: &Grid) -> Vec<[f64; 3]> {
+    let z_m = grid.z_m.first().copied().unwrap_or(0.0);
+    grid.y_m
+        .iter()
+        .flat_map(|y| grid.x_m.iter().map(move |x| [*x, *y, z_m]))
+        .collect()
+}
+
+/// Nodes of a map to be compared: every second one of the lowest plane.
+fn samples(map: &FieldMap, coils: &[PlacedCoil]) -> Vec<Sample> {
+    let (nx, ny) = (map.x_m.len(), map.y_m.len());
+    let plane = nx * ny;
+    spread(map.gz_t_per_m_per_a.len(), PLACES)
+        .into_iter()
+        .enumerate()
+        .filter_map(|(sample, index)| {
+            let whole = plane * map.z_m.len();
+            let (coil, at) = (index / whole, index % whole);
+            let at = if sample % 2 == 0 { at % plane } else { at };
+            let (x_m, y_m) = (map.x_m[at % nx], map.y_m[at / nx % ny]);
+            let PlacedCoil { axis_m, gain, .. } = coils[coil];
+            (gain != 0.0).then(|| Sample {
+                r_m: (x_m - axis_m[0]).hypot(y_m - axis_m[1]),
+                z_m: map.z_m[at / plane],
+                gz: map.gz_t_per_m_per_a[coil * whole + at] / gain,
+            })
+        })
+        .collect()
+}
+
+/// What is proven of the map's error at its nodes, the steel's solution and the magnet left out.
+fn evaluation(map: &FieldMap, solved: &Solved) -> Evaluation {
+    let estimate = match solved.steel {
+        Steel::None => map.relative_error.max(crate::field::winding::KERNEL_ERROR),
+        // The winding's rule, the steel's evaluation and its table.
+        Steel::Alone(_) | Steel::Coupled(_) => {
+            (2.0 * MAP_SHARE + EVALUATION_SHARE) * solved.tolerance
+        }
+    };
+    let method = if map.tabulated {
+        "a-priori bounds of the radial quadrature and of the tables"
+    } else {
+        "a-priori bound of the radial quadrature"
+    };
+    Evaluation {
+        estimate,
+        method: method.to_owned(),
+    }
+}
+
+/// The map's own error at its nodes.
+fn accuracy(evaluation: Evaluation, solved: &Solved, magnet: f64) -> StageAccuracy {
+    let Evaluation { estimate, method } = evaluation;
+    let table = match solved.steel {
+        Steel::None | Steel::Alone(_) => "",
+        Steel::Coupled(_) => ", its table by comparison with direct values",
+    };
+    StageAccuracy {
+        estimate: estimate + solved.steel_error + magnet,
+        relative_to: "the largest |grad B| at the node's height".to_owned(),
+        method: match solved.steel_method() {
+            None => method,
+            Some(steel) => format!("{steel}{table}; {method}"),
+        },
+    }
+}

@@ -1,0 +1,448 @@
+//! What every command needs of a design: the source, the coils, the magnet, the currents.
+
+pub mod at_current;
+pub mod cached_field;
+pub mod cost;
+pub mod evaluation_sample;
+pub mod maps;
+pub mod neighbours;
+pub mod passive;
+pub mod passive_map;
+pub mod rated;
+pub mod single;
+pub mod sources;
+pub mod steel;
+pub mod working_point;
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use crate::RunError;
+use crate::bundle::manifest::{ArrayGeometry, CurrentLimits, MagnetSummary};
+use crate::coil::circuit::{self, Circuit};
+use crate::design::{Coil, Coupling, Design, MagnetModel, Polarity};
+use crate::field::batch::Wanted;
+use crate::field::dipole;
+use crate::field::magnet::{Cylinder, MagnetRule, Sources};
+use crate::field::source::AxialSource;
+use crate::field::steel::axial_table::AxialTable;
+use crate::field::steel::equivalent_dipoles::Parts;
+use crate::field::winding::KERNEL_ERROR;
+use crate::field::winding::Winding;
+use crate::map::tabulate::PlacedCoil;
+use crate::progress::Progress;
+use crate::scene::steel::{EVALUATION_SHARE, SceneCore, Solved, Steel, SteelField};
+
+/// Points handed to one thread at a time; fixed, so that bytes do not depend on threads.
+const PORTION: usize = 4096;
+/// Share of the tolerance given to the magnet's dipoles, and the finest asked of them.
+pub(crate) const MAGNET_SHARE: f64 = 0.3;
+pub(crate) const MAGNET_FINEST: f64 = 1e-9;
+/// Share of the tolerance given to the windings' field where the magnet takes its own.
+pub(crate) const AIR_SHARE: f64 = 0.6;
+
+/// The magnet's moment, A m^2.
+pub fn moment_a_m2(design: &Design) -> [f64; 3] {
+    let magnet = &design.magnet;
+    let moment = dipole::cylinder_moment_a_m2(
+        magnet.diameter_m,
+        magnet.length_m,
+        magnet.magnetization_a_per_m,
+    );
+    let along_z = match magnet.polarity {
+        Polarity::Repel => -moment,
+        Polarity::Attract => moment,
+    };
+    dipole::tilted_moment_a_m2(along_z, magnet.tilt_deg)
+}
+
+/// The dipoles that stand for the magnet at heights from `lowest_m` up, where nothing that
+/// attracts it lies above `top_m`.
+///
+/// # Errors
+/// A magnet that touches what it is attracted by.
+pub(crate) fn magnet_rule(
+    design: &Design,
+    lowest_m: f64,
+    top_m: f64,
+    tolerance: f64,
+) -> Result<MagnetRule, RunError> {
+    let magnet = &design.magnet;
+    let moment_a_m2 = moment_a_m2(design);
+    if magnet.model == MagnetModel::Dipole {
+        return Ok(MagnetRule::dipole(moment_a_m2));
+    }
+    let size = Cylinder {
+        diameter_m: magnet.diameter_m,
+        length_m: magnet.length_m,
+    };
+    let sources = Sources::Below {
+        height_m: lowest_m - top_m,
+    };
+    MagnetRule::cylinder(size, moment_a_m2, sources, tolerance).map_err(|fault| {
+        RunError::Input(format!(
+            "[magnet] model = \"cylinder\" with its centre {} mm above the windings' top face: \
+             {fault}; raise the magnet, or use model = \"dipole\"",
+            lowest_m * 1e3
+        ))
+    })
+}
+
+/// A design made ready for computing.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Scene<'a> {
+    /// The design.
+    pub design: &'a Design,
+    /// Its coil section.
+    pub coil: Coil,
+    /// The winding.
+    pub winding: Winding,
+    /// The steel of every core; `None` for air coils.
+    pub core: Option<SceneCore>,
+    /// Resistance, inductance without steel, wire.
+    pub circuit: Circuit,
+    /// The coils of the array.
+    pub coils: Vec<PlacedCoil>,
+    /// The magnet's moment, A m^2.
+    pub moment_a_m2: [f64; 3],
+    /// Lower current limit of each coil, A: the driver's or minus the supply's V/R.
+    pub lower_a: Vec<f64>,
+    /// Upper current limit of each coil, A: the lower of the driver's and the supply's V/R.
+    pub upper_a: Vec<f64>,
+}
+
+impl<'a> Scene<'a> {
+    /// Makes a design ready.
+    ///
+    /// # Errors
+    /// A design without a coil; a B-H table that cannot be used.
+    pub fn new(design: &'a Design) -> Result<Self, RunError> {
+        let coil = design.coil.ok_or_else(|| {
+            RunError::Input("the design has no [coil] section, which this command needs".to_owned())
+        })?;
+        let circuit = Circuit::of_air_coil(&coil, &design.wire);
+        let winding = circuit::winding(&coil, &design.wire);
+        let core = design
+            .core
+            .as_ref()
+            .map(|core| SceneCore::new(core, &winding))
+            .transpose()?;
+        let coils = design
+            .array
+            .positions_m
+            .iter()
+            .zip(&design.array.gain)
+            .enumerate()
+            .map(|(number, (axis_m, gain))| PlacedCoil {
+                number,
+                axis_m: *axis_m,
+                gain: *gain,
+            })
+            .collect();
+        let voltage_v = design.supply.voltage_v;
+        let rated = |limit: &f64| circuit.rated_current_a(*limit, voltage_v);
+        Ok(Self {
+            design,
+            coil,
+            winding,
+            core,
+            coils,
+            moment_a_m2: moment_a_m2(design),
+            upper_a: design.supply.current_max_a.iter().map(rated).collect(),
+            lower_a: design
+                .supply
+                .current_min_a
+                .iter()
+                .map(|l| -rated(&-l))
+                .collect(),
+            circuit,
+        })
+    }
+
+    /// The rated current of one coil: the largest of the array's upper limits, A.
+    #[must_use]
+    pub fn rated_current_a(&self) -> f64 {
+        self.upper_a.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// How far below its centre the magnet extends, m; 0 for a dipole.
+    #[must_use]
+    pub fn magnet_depth_m(&self) -> f64 {
+        let magnet = &self.design.magnet;
+        match magnet.model {
+            MagnetModel::Dipole => 0.0,
+            MagnetModel::Cylinder => Cylinder {
+                diameter_m: magnet.diameter_m,
+                length_m: magnet.length_m,
+            }
+            .depth_along_m(self.moment_a_m2),
+        }
+    }
+
+    /// Default tolerance of forces in air: that of the kernel for a dipole, of the finest rule for
+    /// a cylinder.
+    #[must_use]
+    pub fn force_tolerance(&self) -> f64 {
+        match self.design.magnet.model {
+            MagnetModel::Dipole => KERNEL_ERROR,
+            MagnetModel::Cylinder => MAGNET_FINEST,
+        }
+    }
+
+    /// Whether the moment is tilted, so that the force needs the whole gradient.
+    #[must_use]
+    pub fn tilted(&self) -> bool {
+        self.moment_a_m2[0] != 0.0 || self.moment_a_m2[1] != 0.0
+    }
+
+    /// Resistance of every coil, ohm.
+    #[must_use]
+    pub fn resistances_ohm(&self) -> Vec<f64> {
+        vec![self.circuit.resistance_ohm; self.coils.len()]
+    }
+
+    /// The dipoles that stand for the magnet at heights from `lowest_m` up.
+    ///
+    /// # Errors
+    /// A magnet that touches what it is attracted by.
+    pub fn magnet_rule(&self, lowest_m: f64, tolerance: f64) -> Result<MagnetRule, RunError> {
+        magnet_rule(self.design, lowest_m, self.sources_top_m(), tolerance)
+    }
+
+    /// How much larger the gradient's mean over the magnet may be than the gradient at its centre
+    /// `height_m` high; 1 for a dipole.
+    #[must_use]
+    pub fn magnet_growth(&self, height_m: f64) -> f64 {
+        let magnet = &self.design.magnet;
+        let top_m = self.sources_top_m();
+        match magnet.model {
+            MagnetModel::Dipole => 1.0,
+            MagnetModel::Cylinder => Cylinder {
+                diameter_m: magnet.diameter_m,
+                length_m: magnet.length_m,
+            }
+            .growth_along(height_m - top_m, self.moment_a_m2),
+        }
+    }
+
+    /// Height of the highest winding or core, m.
+    fn sources_top_m(&self) -> f64 {
+        self.core.as_ref().map_or(0.0, |c| c.shape.top_m.max(0.0))
+    }
+
+    /// Rows of points that share a rule for the magnet, with a height none of them is below: those
+    /// whose gap to the array lies between the same two steps of the square root of two.
+    fn by_gap(&self, points_m: &[[f64; 3]]) -> Vec<(f64, Vec<usize>)> {
+        let lowest_m = points_m.iter().fold(f64::INFINITY, |z, p| z.min(p[2]));
+        let depth_m = self.magnet_depth_m();
+        if depth_m == 0.0 {
+            return vec![(lowest_m, (0..points_m.len()).collect())];
+        }
+        let foot_m = self.sources_top_m() + depth_m;
+        let mut groups: BTreeMap<i32, Vec<usize>> = BTreeMap::new();
+        for (row, point) in points_m.iter().enumerate() {
+            let step = (2.0 * ((point[2] - foot_m) / depth_m).log2()).floor();
+            // Where the magnet touches, the least of all steps; the rule refuses.
+            let step = if step.is_nan() { i32::MIN } else { step as i32 };
+            groups.entry(step).or_default().push(row);
+        }
+        groups
+            .into_iter()
+            .map(|(step, rows)| {
+                let edge_m = foot_m + depth_m * (0.5 * f64::from(step)).exp2();
+                (edge_m.max(lowest_m), rows)
+            })
+            .collect()
+    }
+
+    /// Upward force per ampere of every coil at every point, N/A, [point, coil], to the tolerance
+    /// of `solved` relative to the largest |grad B| at the point's height: directly at the points,
+    /// not through a map.
+    ///
+    /// # Errors
+    /// A point on a winding's edge or on the steel; interruption.
+    pub fn forces_n_per_a(
+        &self,
+        solved: &Solved,
+        points_m: &[[f64; 3]],
+        progress: &dyn Progress,
+    ) -> Result<Vec<f64>, RunError> {
+        let coils = self.coils.len();
+        let finest = MAGNET_SHARE * solved.tolerance.max(MAGNET_FINEST);
+        let groups = self
+            .by_gap(points_m)
+            .into_iter()
+            .map(|(height_m, rows)| Ok((self.magnet_rule(height_m, finest)?, rows)))
+            .collect::<Result<Vec<_>, RunError>>()?;
+        let of_rules = |of: fn(&MagnetRule) -> f64| {
+            let values = groups.iter().map(|(rule, _)| of(rule));
+            values.fold(0.0, f64::max)
+        };
+        let (reach_m, amplification) = (
+            of_rules(MagnetRule::reach_m),
+            of_rules(MagnetRule::amplification),
+        );
+        let mut forces = vec![0.0; points_m.len() * coils];
+        progress.begin("forces", points_m.len() as u64);
+        // As fine as the nearest of all points needs, whatever the portion.
+        let sources = solved.sources(self, points_m, reach_m, amplification)?;
+        // Many dipoles take a winding and its own core from one table.
+        let table = match &solved.steel {
+            Steel::Alone(coil) if reach_m > 0.0 => Some(AxialTable::new(
+                Some(self.winding),
+                coil.layer.clone(),
+                EVALUATION_SHARE * solved.tolerance / amplification,
+            )),
+            Steel::None | Steel::Alone(_) | Steel::Coupled(_) => None,
+        };
+        let (own, sources): (&dyn AxialSource, _) = match &table {
+            Some(table) => (table, None),
+            None => (&self.winding, sources.as_ref()),
+        };
+        for (rule, rows) in &groups {
+            let portions = rows
+                .par_chunks(PORTION)
+                .map(|rows| {
+                    progress.check()?;
+                    let points: Vec<[f64; 3]> = rows.iter().map(|row| points_m[*row]).collect();
+                    let mut out = vec![0.0; rows.len() * coils];
+                    self.add_forces(solved, (own, sources), rule, &points, &mut out)?;
+                    progress.advance(rows.len() as u64);
+                    Ok((rows, out))
+                })
+                .collect::<Result<Vec<_>, RunError>>()?;
+            for (rows, values) in portions {
+                for (row, values) in rows.iter().zip(values.chunks_exact(coils)) {
+                    forces[row * coils..(row + 1) * coils].copy_from_slice(values);
+                }
+            }
+        }
+        progress.end();
+        Ok(forces)
+    }
+
+    /// Adds the forces by the field of each coil's own source and of what else there is.
+    fn add_forces(
+        &self,
+        solved: &Solved,
+        (own, sources): (&dyn AxialSource, Option<&SteelField>),
+        rule: &MagnetRule,
+        points_m: &[[f64; 3]],
+        rows: &mut [f64],
+    ) -> Result<(), RunError> {
+        let coils = self.coils.len();
+        let tilted = !rule.is_upright();
+        let (wanted, parts) = if tilted {
+            (Wanted::Gradient, Parts::Gradient)
+        } else {
+            (Wanted::Gz, Parts::Gz)
+        };
+        let share = match solved.steel {
+            Steel::None => AIR_SHARE,
+            Steel::Alone(_) | Steel::Coupled(_) => EVALUATION_SHARE,
+        };
+        let share = if rule.nodes().len() > 1 || sources.is_some() {
+            share
+        } else {
+            1.0
+        };
+        let tolerance = share * solved.tolerance / rule.amplification();
+        for node in rule.nodes() {
+            let [m_x, m_y, m_z] = node.moment_a_m2;
+            let places: Vec<[f64; 3]> = points_m
+                .iter()
+                .map(|p| std::array::from_fn(|i| p[i] + node.offset_m[i]))
+                .collect();
+            let steel = sources.map_or_else(Vec::new, |sources| {
+                solved.steel_fields(self, sources, &places, parts)
+            });
+            let count = places.len();
+            let z_m: Vec<f64> = places.iter().map(|p| p[2]).collect();
+            for (column, coil) in self.coils.iter().enumerate() {
+                let offset = |p: &[f64; 3]| (p[0] - coil.axis_m[0], p[1] - coil.axis_m[1]);
+                let r_m: Vec<f64> = places
+                    .iter()
+                    .map(|p| {
+                        let (dx, dy) = offset(p);
+                        dx.hypot(dy)
+                    })
+                    .collect();
+                let air = own.gradients(&r_m, &z_m, tolerance, wanted)?;
+                let block = parts.count() * count;
+                let steel = steel.get(column * block..(column + 1) * block);
+                for (row, place) in places.iter().enumerate() {
+                    let mut force = m_z * air.dbz_dz[row];
+                    if tilted {
+                        // dB_x/dz = (dx / r) dB_r/dz, and the same along y.
+                        let (dx, dy) = offset(place);
+                        force += air.dbr_dz_over_r[row] * (m_x * dx + m_y * dy);
+                    }
+                    if let Some(steel) = steel {
+                        force += upward_n(node.moment_a_m2, parts, steel, row);
+                    }
+                    rows[row * coils + column] += coil.gain * force;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The array as artefacts tell it.
+    #[must_use]
+    pub fn array_geometry(&self) -> ArrayGeometry {
+        ArrayGeometry {
+            positions_m: self.design.array.positions_m.clone(),
+            coupling: match self.design.array.coupling {
+                Coupling::Full => "full",
+                Coupling::None => "none",
+            }
+            .to_owned(),
+            gain: self.design.array.gain.clone(),
+        }
+    }
+
+    /// The current limits as artefacts tell them.
+    #[must_use]
+    pub fn current_limits(&self) -> CurrentLimits {
+        CurrentLimits {
+            current_min_a: self.lower_a.clone(),
+            current_max_a: self.upper_a.clone(),
+            total_current_max_a: self.design.supply.total_current_max_a,
+        }
+    }
+
+    /// The magnet as artefacts tell it.
+    #[must_use]
+    pub fn magnet_summary(&self) -> MagnetSummary {
+        let magnet = &self.design.magnet;
+        MagnetSummary {
+            moment_a_m2: self.moment_a_m2,
+            model: match magnet.model {
+                MagnetModel::Dipole => "dipole",
+                MagnetModel::Cylinder => "cylinder",
+            }
+            .to_owned(),
+            polarity: match magnet.polarity {
+                Polarity::Repel => "repel",
+                Polarity::Attract => "attract",
+            }
+            .to_owned(),
+            diameter_m: magnet.diameter_m,
+            length_m: magnet.length_m,
+        }
+    }
+}
+
+/// Upward force on a dipole at one of the points at which one drive's `parts` were sampled,
+/// [component, point]: m . dB/dz, N (per ampere if they are).
+pub(crate) fn upward_n(moment_a_m2: [f64; 3], parts: Parts, values: &[f64], row: usize) -> f64 {
+    let count = values.len() / parts.count();
+    let part = |component: usize| values[component * count + row];
+    let [m_x, m_y, m_z] = moment_a_m2;
+    match parts {
+        Parts::Gz => m_z * part(0),
+        Parts::Gradient | Parts::All => m_x * part(2) + m_y * part(3) + m_z * part(4),
+    }
+}

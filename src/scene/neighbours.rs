@@ -1,0 +1,248 @@
+//! The coils of an array among their neighbours: inductances, and the steel at the rated currents.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::Scene;
+use super::single::above_knee;
+use super::steel;
+use super::steel::{COUPLED_TOLERANCE, Solved, Steel, TWO_OF_COUPLED_CORES};
+use super::working_point::{WorkingPoint, relative_difference};
+use crate::RunError;
+use crate::accuracy::{StageAccuracy, missed};
+use crate::coil::mutual;
+use crate::field::batch::Wanted;
+use crate::field::steel::core_flux_density::peak_depth_m;
+use crate::field::steel::equivalent_dipoles::Parts;
+use crate::field::winding::KERNEL_ERROR;
+
+/// The array's inductances.
+#[derive(Debug, Clone, Serialize)]
+pub struct ArrayFacts {
+    /// One entry a coil.
+    pub coils: Vec<ArrayCoil>,
+    /// Inductance matrix, H: `[i][j]` is the flux through coil i for one ampere in coil j. With
+    /// a B-H curve that of the linear array whose permeability is `relative_permeability`.
+    pub mutual_inductance_h: Vec<Vec<f64>>,
+    /// With a B-H curve: permeability of the array's linear solution, that of one coil alone at
+    /// the mean |B| of its rated current.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relative_permeability: Option<f64>,
+    /// With a B-H curve: all coils at their rated currents.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub working_point: Option<WorkingPointFacts>,
+    /// What misses the tolerance.
+    #[serde(skip)]
+    pub(crate) accuracy_missed: Vec<String>,
+}
+
+/// All coils at their rated currents, along the B-H curve.
+#[derive(Debug, Clone, Serialize)]
+pub struct WorkingPointFacts {
+    /// A, one a coil.
+    pub currents_a: Vec<f64>,
+    /// Flux linkage of every coil, Wb.
+    pub flux_linkage_wb: Vec<f64>,
+    /// Largest difference of dB_z/dz from the sum of the coils' linear ones, over the coils' axes
+    /// at the target's height and the middles between them, relative to the largest.
+    pub deviation_from_linear: f64,
+}
+
+/// One coil among its neighbours.
+#[derive(Debug, Clone, Serialize)]
+pub struct ArrayCoil {
+    /// Index.
+    pub coil: usize,
+    /// Axis, m.
+    pub x_m: f64,
+    /// Axis, m.
+    pub y_m: f64,
+    /// Self inductance among its neighbours, H; without steel the same as alone.
+    pub inductance_h: f64,
+    /// Largest |B| in its core with all coils at their rated currents, T; absent for air coils.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub peak_field_t: Option<f64>,
+    /// Mean |B| there, T.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_field_t: Option<f64>,
+    /// Upper current limit, A.
+    pub current_max_a: f64,
+}
+
+/// The array among its neighbours; `None` for a single coil.
+pub(crate) fn array(
+    scene: &Scene,
+    tolerance: Option<f64>,
+    accuracy: &mut BTreeMap<&'static str, StageAccuracy>,
+    notes: &mut Vec<String>,
+) -> Result<Option<ArrayFacts>, RunError> {
+    if scene.coils.len() < 2 {
+        return Ok(None);
+    }
+    let axes = &scene.design.array.positions_m;
+    let lowest_m = scene.design.target_height_m;
+    let solved = steel::solve(scene, tolerance, KERNEL_ERROR, lowest_m)?;
+    let wanted = tolerance.unwrap_or(COUPLED_TOLERANCE);
+    let in_air = in_air(scene, wanted);
+    let air = in_air.0.clone();
+    let (matrix, stage) = inductances(&solved, in_air);
+    let accuracy_missed = missed([(&"mutual_inductance", &stage)], wanted);
+    accuracy.insert("mutual_inductance", stage);
+    let (mut peak_t, mut mean_t) = (Vec::new(), Vec::new());
+    let working_point = match WorkingPoint::new(scene, &solved, &scene.upper_a, None, lowest_m)? {
+        Some(point) => {
+            accuracy.insert("working_point", point.accuracy());
+            peak_t.clone_from(&point.peak_field_t);
+            mean_t.clone_from(&point.mean_field_t);
+            Some(working_point_facts(scene, &solved, &point, &air)?)
+        }
+        None => None,
+    };
+    if let (Steel::Coupled(array), None) = (&solved.steel, &working_point) {
+        let depth_m = peak_depth_m(array.response.outline.shape);
+        let inside = array.core_fields(&scene.upper_a, depth_m)?;
+        peak_t = inside.iter().map(|field| field.peak_t).collect();
+        mean_t = inside.iter().map(|field| field.mean_t).collect();
+        let most_t = peak_t.iter().copied().fold(0.0, f64::max);
+        let knee_t = scene.core.as_ref().map_or(f64::INFINITY, |c| c.knee_t);
+        notes.extend(above_knee(
+            most_t,
+            knee_t,
+            "a core of the array with all coils at their rated currents",
+        ));
+    }
+    let coils = axes
+        .iter()
+        .enumerate()
+        .map(|(coil, [x_m, y_m])| ArrayCoil {
+            coil,
+            x_m: *x_m,
+            y_m: *y_m,
+            inductance_h: matrix[coil][coil],
+            peak_field_t: peak_t.get(coil).copied(),
+            mean_field_t: mean_t.get(coil).copied(),
+            current_max_a: scene.upper_a[coil],
+        })
+        .collect();
+    Ok(Some(ArrayFacts {
+        coils,
+        mutual_inductance_h: matrix,
+        relative_permeability: working_point
+            .is_some()
+            .then_some(solved.relative_permeability),
+        working_point,
+        accuracy_missed,
+    }))
+}
+
+/// The windings' inductance matrix without steel, H, and the relative error of its entries, to
+/// `tolerance` if that can be had.
+pub(crate) fn in_air(scene: &Scene, tolerance: f64) -> (Vec<Vec<f64>>, f64) {
+    let axes = &scene.design.array.positions_m;
+    mutual::estimated_matrix_h(&scene.winding, scene.circuit.inductance_h, axes, tolerance)
+}
+
+/// The array's inductance matrix, H, from that of its windings `in_air` and its steel's solution.
+pub(crate) fn inductances(
+    solved: &Solved,
+    (in_air, error): (Vec<Vec<f64>>, f64),
+) -> (Vec<Vec<f64>>, StageAccuracy) {
+    let mut matrix = in_air;
+    let mut estimate = error;
+    let mut method = "two quadratures of the windings' mutual inductance";
+    let mut relative_to = "each mutual inductance";
+    match &solved.steel {
+        Steel::None => {}
+        Steel::Alone(coil) => {
+            for (i, row) in matrix.iter_mut().enumerate() {
+                row[i] += coil.added_inductance_h;
+            }
+            method = "neighbours' cores left out (coupling = \"none\"): mutual inductances are \
+                      those of the windings in air";
+        }
+        Steel::Coupled(array) => {
+            for (i, row) in matrix.iter_mut().enumerate() {
+                for (j, value) in row.iter_mut().enumerate() {
+                    *value += array.added_inductance_h[(i, j)];
+                }
+            }
+            estimate += array.relative_error;
+            relative_to = "the largest self inductance";
+            method = TWO_OF_COUPLED_CORES;
+        }
+    }
+    let stage = StageAccuracy {
+        estimate,
+        relative_to: relative_to.to_owned(),
+        method: method.to_owned(),
+    };
+    (matrix, stage)
+}
+
+/// What the cores do at a working point, beside the linear solution.
+fn working_point_facts(
+    scene: &Scene,
+    solved: &Solved,
+    point: &WorkingPoint,
+    air_inductance_h: &[Vec<f64>],
+) -> Result<WorkingPointFacts, RunError> {
+    let places = around(scene);
+    let sources = solved.sources(scene, &places, 0.0, 1.0)?;
+    let steel = sources.map_or_else(Vec::new, |sources| {
+        solved.steel_fields(scene, &sources, &places, Parts::Gz)
+    });
+    let (mut air, mut linear) = (vec![0.0; places.len()], vec![0.0; places.len()]);
+    let z_m: Vec<f64> = places.iter().map(|p| p[2]).collect();
+    for ((coil, current), steel) in scene
+        .coils
+        .iter()
+        .zip(&point.currents_a)
+        .zip(steel.chunks_exact(places.len()))
+    {
+        let [x, y] = coil.axis_m;
+        let r_m: Vec<f64> = places.iter().map(|p| (p[0] - x).hypot(p[1] - y)).collect();
+        let own = scene
+            .winding
+            .gradients(&r_m, &z_m, solved.tolerance, Wanted::Gz)?;
+        for (row, (air, linear)) in air.iter_mut().zip(&mut linear).enumerate() {
+            *air += current * coil.gain * own.dbz_dz[row];
+            *linear += current * coil.gain * steel[row];
+        }
+    }
+    let lowest_m = scene.design.target_height_m;
+    let top_m = scene.core.as_ref().map_or(0.0, |core| core.shape.top_m);
+    let total = point
+        .field(scene, lowest_m, lowest_m - top_m)
+        .at(&places, Parts::Gz);
+    let sum = |steel: &[f64]| -> Vec<f64> { air.iter().zip(steel).map(|(a, s)| a + s).collect() };
+    let flux_linkage_wb = air_inductance_h
+        .iter()
+        .zip(&point.steel_flux_linkage_wb)
+        .map(|(row, steel)| {
+            let air: f64 = row.iter().zip(&point.currents_a).map(|(l, i)| l * i).sum();
+            air + steel
+        })
+        .collect();
+    Ok(WorkingPointFacts {
+        currents_a: point.currents_a.clone(),
+        flux_linkage_wb,
+        deviation_from_linear: relative_difference(&sum(&total), &sum(&linear)),
+    })
+}
+
+/// The coils' axes at the target's height, and the middles between every two.
+fn around(scene: &Scene) -> Vec<[f64; 3]> {
+    let axes: Vec<[f64; 2]> = scene.coils.iter().map(|coil| coil.axis_m).collect();
+    let height_m = scene.design.target_height_m;
+    let mut places = Vec::new();
+    for (i, [x, y]) in axes.iter().enumerate() {
+        places.push([*x, *y, height_m]);
+        places.extend(
+            axes[..i]
+                .iter()
+                .map(|[a, b]| [0.5 * (a + x), 0.5 * (b + y), height_m]),
+        );
+    }
+    places
+}

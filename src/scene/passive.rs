@@ -1,0 +1,196 @@
+//! The pull of the unpowered steel on a scene's magnet.
+
+use rayon::prelude::*;
+
+use super::Scene;
+use super::steel::coupled;
+use crate::RunError;
+use crate::accuracy::StageAccuracy;
+use crate::design::MagnetModel;
+use crate::field::magnet::Cylinder;
+use crate::field::steel::passive::isolated::placed;
+use crate::field::steel::passive::magnet::{PassiveMagnet, dipoles};
+use crate::field::steel::passive::neighbours::Neighbours;
+use crate::field::steel::passive::reaction::{Reaction, ReactionResolution};
+use crate::field::steel::passive::{NoPull, PassivePull, Pulled, Region};
+
+/// Tolerance of the pull, relative to its own length: a small force beside the coils'.
+pub const PASSIVE_TOLERANCE: f64 = 1e-3;
+
+/// The same where the pull is left out: how large it is matters to some digits only.
+pub const LEFT_OUT_TOLERANCE: f64 = 1e-2;
+/// Most cores whose coupling is worth its memory and time where the pull is left out: both grow as
+/// powers of their number.
+const MOST_COUPLED: usize = 36;
+
+/// Whether [`left_out_z_n`] counts that cores magnetise each other.
+#[must_use]
+pub fn couples_left_out(scene: &Scene) -> bool {
+    coupled(scene.design) && scene.coils.len() <= MOST_COUPLED
+}
+
+/// Vertical pull at `places_m` where a design leaves it out, N, to [`LEFT_OUT_TOLERANCE`]; empty
+/// without steel.
+///
+/// # Errors
+/// A magnet that touches the steel.
+pub fn left_out_z_n(scene: &Scene, places_m: &[[f64; 3]]) -> Result<Vec<f64>, RunError> {
+    let Some(pulled) = pulled(scene, places_m, false) else {
+        return Ok(Vec::new());
+    };
+    let pulled = Pulled {
+        coupled: couples_left_out(scene),
+        ..pulled
+    };
+    let pull = PassivePull::new(&pulled, LEFT_OUT_TOLERANCE);
+    let pull = pull.map_err(|fault| too_close(&pulled, fault))?;
+    Ok(pull.forces_z_n(places_m))
+}
+
+/// The pull wherever the magnet's centre is among `places_m`; `None` without steel. With `alone`
+/// it is that of one core at the origin.
+///
+/// # Errors
+/// A magnet that touches the steel.
+pub fn pull(
+    scene: &Scene,
+    places_m: &[[f64; 3]],
+    alone: bool,
+) -> Result<Option<PassivePull>, RunError> {
+    pull_to(scene, places_m, alone, PASSIVE_TOLERANCE)
+}
+
+/// [`pull`] to another tolerance.
+///
+/// # Errors
+/// A magnet that touches the steel.
+pub fn pull_to(
+    scene: &Scene,
+    places_m: &[[f64; 3]],
+    alone: bool,
+    tolerance: f64,
+) -> Result<Option<PassivePull>, RunError> {
+    let Some(pulled) = pulled(scene, places_m, alone) else {
+        return Ok(None);
+    };
+    PassivePull::new(&pulled, tolerance)
+        .map(Some)
+        .map_err(|fault| too_close(&pulled, fault))
+}
+
+/// Vertical pull at `places_m` by another route than [`pull`]'s, N; `None` without steel. There a
+/// core's share is the slope of a tabulated energy; here it is the gradient of the field that the
+/// core sends back, computed again for every place. The cores' coupling is solved to `tolerance`.
+///
+/// # Errors
+/// A magnet that touches the steel.
+pub fn direct_z_n(
+    scene: &Scene,
+    places_m: &[[f64; 3]],
+    tolerance: f64,
+) -> Result<Option<Vec<f64>>, RunError> {
+    let Some(pulled) = pulled(scene, places_m, false) else {
+        return Ok(None);
+    };
+    let shape = pulled.shape;
+    let mu_r = pulled.relative_permeability;
+    let magnet = PassiveMagnet::new(
+        pulled.moment_a_m2,
+        pulled.size,
+        shape.top_m,
+        pulled.region.z_m[0],
+        0.5 * tolerance,
+    )
+    .map_err(|fault| too_close(&pulled, fault))?;
+    let resolution = ReactionResolution::for_tolerance(tolerance, shape, magnet.gap_m());
+    let core = Reaction::new(shape, mu_r, &resolution.finer());
+    let axes = pulled.positions_m;
+    let closest_m = axes
+        .iter()
+        .enumerate()
+        .flat_map(|(i, a)| {
+            axes[..i]
+                .iter()
+                .map(move |b| (a[0] - b[0]).hypot(a[1] - b[1]))
+        })
+        .fold(f64::INFINITY, f64::min);
+    let neighbours = (pulled.coupled && axes.len() > 1).then(|| {
+        let few = magnet.few_dipoles(tolerance);
+        let gap_m = magnet.gap_of_m(&few);
+        Neighbours::new(shape, mu_r, axes, closest_m, gap_m, tolerance, few)
+    });
+    Ok(Some(
+        places_m
+            .par_iter()
+            .map(|[x, y, z]| {
+                let rule = magnet.magnet_rule(*z);
+                let about_centre = dipoles(&rule);
+                let alone: f64 = axes
+                    .iter()
+                    .map(|axis| {
+                        let at = [x - axis[0], y - axis[1], *z];
+                        let back = core.induced(&placed(&about_centre, at));
+                        let gradients: Vec<_> = back.iter().map(|f| f.gradient_t_per_m).collect();
+                        rule.force_n(&gradients)[2]
+                    })
+                    .sum();
+                alone
+                    + neighbours
+                        .as_ref()
+                        .map_or(0.0, |n| n.force_z_n([*x, *y, *z]))
+            })
+            .collect(),
+    ))
+}
+
+/// What the pull's solvers need to know; `None` without steel.
+fn pulled<'a>(scene: &'a Scene, places_m: &[[f64; 3]], alone: bool) -> Option<Pulled<'a>> {
+    let core = scene.core.as_ref()?;
+    let range = |axis: usize| {
+        places_m
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], p| {
+                [lo.min(p[axis]), hi.max(p[axis])]
+            })
+    };
+    let magnet = &scene.design.magnet;
+    Some(Pulled {
+        shape: core.shape,
+        relative_permeability: core.relative_permeability(),
+        positions_m: if alone {
+            &[[0.0, 0.0]]
+        } else {
+            &scene.design.array.positions_m
+        },
+        coupled: !alone && coupled(scene.design),
+        moment_a_m2: scene.moment_a_m2,
+        size: (magnet.model == MagnetModel::Cylinder).then_some(Cylinder {
+            diameter_m: magnet.diameter_m,
+            length_m: magnet.length_m,
+        }),
+        region: Region {
+            x_m: range(0),
+            y_m: range(1),
+            z_m: range(2),
+        },
+    })
+}
+
+fn too_close(pulled: &Pulled, fault: NoPull) -> RunError {
+    RunError::Input(format!(
+        "[magnet] passive_force, with its centre from {} mm up: {fault}; raise the magnet or the \
+         workspace",
+        pulled.region.z_m[0] * 1e3
+    ))
+}
+
+/// The pull's estimated error.
+#[must_use]
+pub fn accuracy(pull: &PassivePull) -> StageAccuracy {
+    StageAccuracy {
+        estimate: pull.relative_error,
+        relative_to: "the pull at the place".to_owned(),
+        method: "largest difference from finer solutions at places spread over the region"
+            .to_owned(),
+    }
+}

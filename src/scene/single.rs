@@ -1,0 +1,349 @@
+//! One coil alone with its core, linear or along a B-H curve, at the rated current.
+
+use serde::Serialize;
+
+use std::collections::BTreeMap;
+
+use super::at_current::{self, SATURATED_TOLERANCE};
+use super::passive;
+use super::steel::{ALONG_CURVE, CORED_TOLERANCE, Material, SceneCore, TWO_OF_ONE_CORE};
+use super::{MAGNET_SHARE, Scene};
+use crate::RunError;
+use crate::accuracy::StageAccuracy;
+use crate::coil::inductance;
+use crate::field::frame::to_cartesian;
+use crate::field::steel::bh_curve::BhCurve;
+use crate::field::steel::core_flux_density::peak_depth_m;
+use crate::field::steel::cored_coil::CoredCoil;
+use crate::field::steel::magnetized::MagnetizedCore;
+use crate::field::winding::KERNEL_ERROR;
+use crate::field::winding::{AxialField, Winding};
+use crate::units::STEEL_DENSITY_KG_PER_M3;
+
+/// The steel of the coil.
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
+pub struct CoreFacts {
+    /// Radius, m.
+    pub radius_m: f64,
+    /// Length, m.
+    pub length_m: f64,
+    /// Mass, kg.
+    pub mass_kg: f64,
+    /// The permeability of linear steel; with a B-H curve that of its origin.
+    pub relative_permeability: f64,
+    /// `linear` or `curve`.
+    pub material: &'static str,
+    /// Largest |B| at the rated current, well inside the surface, T.
+    pub peak_field_t: f64,
+    /// Where: radius and height, m.
+    pub peak_at_m: [f64; 2],
+    /// Mean of |B| over the core, T.
+    pub mean_field_t: f64,
+    /// Flux density above which the steel is no longer linear, T.
+    pub knee_t: f64,
+    /// With a B-H curve: force at the rated current over that of the linear solution, less one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub deviation_from_linear: Option<f64>,
+}
+
+/// One coil alone, per ampere; with a B-H curve at the rated current, divided by it.
+pub(crate) struct Single {
+    /// Self inductance, H.
+    pub inductance_h: f64,
+    /// Flux linkage at the rated current, Wb; with a B-H curve.
+    pub flux_linkage_wb: Option<f64>,
+    /// Field at the target on the axis.
+    pub field: AxialField,
+    /// The permeability that the transient estimate uses.
+    pub relative_permeability: f64,
+    /// The steel.
+    pub core: Option<CoreFacts>,
+    /// Each stage's estimated error.
+    pub accuracy: BTreeMap<&'static str, StageAccuracy>,
+    /// Warnings for the user.
+    pub notes: Vec<String>,
+    source: Source,
+    /// The tolerance asked for, or the default.
+    pub tolerance: f64,
+}
+
+/// Where the field comes from.
+enum Source {
+    Air(Winding),
+    Cored(Box<CoredCoil>),
+    Saturated(Winding, Box<MagnetizedCore>),
+}
+
+/// The force on the magnet at the target.
+pub(crate) struct TargetForce {
+    /// N.
+    pub force_n: [f64; 3],
+    /// About the magnet's centre, N m.
+    pub torque_n_m: [f64; 3],
+    /// Upward pull of the unpowered steel, N.
+    pub passive_n: Option<f64>,
+}
+
+fn stage(estimate: f64, relative_to: &str, method: &str) -> StageAccuracy {
+    StageAccuracy {
+        estimate,
+        relative_to: relative_to.to_owned(),
+        method: method.to_owned(),
+    }
+}
+
+impl Single {
+    pub(crate) fn new(scene: &Scene, tolerance: Option<f64>) -> Result<Self, RunError> {
+        let height_m = scene.design.target_height_m;
+        let air_inductance_h = scene.circuit.inductance_h;
+        let Some(core) = &scene.core else {
+            let accuracy = BTreeMap::from([
+                (
+                    "field",
+                    stage(
+                        KERNEL_ERROR,
+                        "|grad B| (|B| for the field) at the target",
+                        "a-priori quadrature bound 1e-15; rounding sampled against 40-digit values",
+                    ),
+                ),
+                (
+                    "inductance",
+                    stage(
+                        inductance::RELATIVE_ERROR,
+                        "the inductance",
+                        "a-priori quadrature bound; sampled against 20-digit values",
+                    ),
+                ),
+            ]);
+            return Ok(Self {
+                inductance_h: air_inductance_h,
+                flux_linkage_wb: None,
+                field: scene.winding.field(0.0, height_m)?,
+                relative_permeability: 1.0,
+                core: None,
+                accuracy,
+                notes: Vec::new(),
+                source: Source::Air(scene.winding),
+                tolerance: tolerance.unwrap_or(KERNEL_ERROR),
+            });
+        };
+        let shape = core.shape;
+        if height_m <= shape.top_m {
+            return Err(RunError::Input(format!(
+                "target.height_mm = {}: the core's top is at {} mm; raise the target or lower the \
+                 core (core.above_mm)",
+                height_m * 1e3,
+                shape.top_m * 1e3
+            )));
+        }
+        if let Material::Curve(curve) = &core.material
+            && scene.rated_current_a() > 0.0
+        {
+            return Self::saturated(scene, core, curve, tolerance);
+        }
+        let tolerance = tolerance.unwrap_or(CORED_TOLERANCE);
+        let mu_r = core.relative_permeability();
+        let coil = CoredCoil::new(&scene.winding, shape, mu_r, tolerance, height_m)?;
+        let current_a = scene.rated_current_a();
+        let inside = coil.core_field(current_a, peak_depth_m(shape))?;
+        let accuracy = BTreeMap::from([
+            (
+                "field",
+                stage(
+                    coil.relative_error,
+                    "the largest |grad B| (|B|) at the target's height",
+                    TWO_OF_ONE_CORE,
+                ),
+            ),
+            (
+                "inductance",
+                stage(coil.relative_error, "the inductance", TWO_OF_ONE_CORE),
+            ),
+            (
+                "core_field",
+                stage(
+                    inside.peak_error,
+                    "the peak",
+                    "what the highest degrees of the core's surface and of the scan contribute",
+                ),
+            ),
+            (
+                "core_field_mean",
+                stage(
+                    inside.mean_error,
+                    "the mean",
+                    "two resolutions of the core's surface and of the volume's rule",
+                ),
+            ),
+        ]);
+        let facts = CoreFacts {
+            radius_m: shape.radius_m,
+            length_m: shape.length_m(),
+            mass_kg: shape.volume_m3() * STEEL_DENSITY_KG_PER_M3,
+            relative_permeability: mu_r,
+            material: "linear",
+            peak_field_t: inside.peak_t,
+            peak_at_m: [
+                inside.peak_at_m[0].hypot(inside.peak_at_m[1]),
+                inside.peak_at_m[2],
+            ],
+            mean_field_t: inside.mean_t,
+            knee_t: core.knee_t,
+            deviation_from_linear: None,
+        };
+        let mut notes = core.warnings.clone();
+        if matches!(core.material, Material::Linear(_)) {
+            notes.extend(above_knee(
+                inside.peak_t,
+                core.knee_t,
+                "the core at the rated current",
+            ));
+        }
+        Ok(Self {
+            inductance_h: air_inductance_h + coil.added_inductance_h,
+            flux_linkage_wb: None,
+            field: coil.field(0.0, height_m)?,
+            relative_permeability: mu_r,
+            core: Some(facts),
+            accuracy,
+            notes,
+            source: Source::Cored(Box::new(coil)),
+            tolerance,
+        })
+    }
+
+    /// The coil at its rated current along `curve`.
+    fn saturated(
+        scene: &Scene,
+        core: &SceneCore,
+        curve: &BhCurve,
+        tolerance: Option<f64>,
+    ) -> Result<Self, RunError> {
+        let tolerance = tolerance.unwrap_or(SATURATED_TOLERANCE);
+        let height_m = scene.design.target_height_m;
+        let current_a = scene.rated_current_a();
+        let state = at_current::solve(scene, core, curve, current_a, tolerance, height_m)?;
+        let field = scene.winding.field(0.0, height_m)? + state.layer.field(0.0, height_m);
+        let error = state.relative_error;
+        let inductance_h = scene.circuit.inductance_h + state.added_inductance_h;
+        let shape = core.shape;
+        let initial = core.relative_permeability();
+        let linear = CoredCoil::new(&scene.winding, shape, initial, tolerance, height_m)?;
+        let linear = linear.field(0.0, height_m)?;
+        let accuracy = BTreeMap::from([
+            (
+                "field",
+                stage(error, "|grad B| (|B|) at the target", ALONG_CURVE),
+            ),
+            ("inductance", stage(error, "the flux linkage", ALONG_CURVE)),
+            (
+                "core_field",
+                stage(state.peak_error, "the peak", ALONG_CURVE),
+            ),
+            (
+                "core_field_mean",
+                stage(state.mean_error, "the mean", ALONG_CURVE),
+            ),
+        ]);
+        let mean_t = state.inside.mean_b_t;
+        let facts = CoreFacts {
+            radius_m: shape.radius_m,
+            length_m: shape.length_m(),
+            mass_kg: shape.volume_m3() * STEEL_DENSITY_KG_PER_M3,
+            relative_permeability: initial,
+            material: "curve",
+            peak_field_t: state.inside.peak_b_t,
+            peak_at_m: [state.inside.peak_at_m.0, state.inside.peak_at_m.1],
+            mean_field_t: mean_t,
+            knee_t: core.knee_t,
+            deviation_from_linear: Some(field.dbz_dz / linear.dbz_dz - 1.0),
+        };
+        let mut notes = core.warnings.clone();
+        if state.inside.peak_b_t > core.knee_t {
+            notes.push(format!(
+                "the core at the rated current reaches {:.2} T, above the steel's knee at {:.2} T: \
+                 the force is {:.1} % off that of linear steel, and forces of several currents do \
+                 not add up",
+                state.inside.peak_b_t,
+                core.knee_t,
+                100.0 * (field.dbz_dz / linear.dbz_dz - 1.0)
+            ));
+        }
+        if curve.largest_b_t() < state.inside.peak_b_t {
+            notes.push(format!(
+                "the B-H table ends at {} T, below the core's {:.2} T: beyond its last point the \
+                 steel is taken as saturated (slope mu_0)",
+                curve.largest_b_t(),
+                state.inside.peak_b_t
+            ));
+        }
+        Ok(Self {
+            inductance_h,
+            flux_linkage_wb: Some(inductance_h * current_a),
+            field,
+            relative_permeability: curve.relative_permeability(mean_t).max(1.0),
+            core: Some(facts),
+            accuracy,
+            notes,
+            source: Source::Saturated(scene.winding, Box::new(state.layer)),
+            tolerance,
+        })
+    }
+
+    /// The force at the target on the axis at `current_a`.
+    pub(crate) fn force(&mut self, scene: &Scene, current_a: f64) -> Result<TargetForce, RunError> {
+        let height_m = scene.design.target_height_m;
+        let rule = scene.magnet_rule(height_m, MAGNET_SHARE * self.tolerance.max(1e-9))?;
+        let (mut fields, mut gradients) = (Vec::new(), Vec::new());
+        for node in rule.nodes() {
+            let [x, y, z] = node.offset_m;
+            let axial = self.at(x.hypot(y), height_m + z)?;
+            let mut field = to_cartesian(&axial, x, y);
+            field.field_t_per_a.iter_mut().for_each(|b| *b *= current_a);
+            for row in &mut field.gradient_t_per_m_per_a {
+                row.iter_mut().for_each(|g| *g *= current_a);
+            }
+            fields.push(field.field_t_per_a);
+            gradients.push(field.gradient_t_per_m_per_a);
+        }
+        let mut force_n = rule.force_n(&gradients);
+        // What a design does not ask for is not computed.
+        let mut passive_n = None;
+        if scene.design.magnet.passive_force {
+            let place = [0.0, 0.0, height_m];
+            if let Some(pull) = passive::pull(scene, &[place], true)? {
+                let pulled_n = pull.force_n(place);
+                for (force, pulled) in force_n.iter_mut().zip(pulled_n) {
+                    *force += pulled;
+                }
+                passive_n = Some(pulled_n[2]);
+                let stage = passive::accuracy(&pull);
+                self.accuracy.insert("passive_force", stage);
+            }
+        }
+        Ok(TargetForce {
+            force_n,
+            torque_n_m: rule.torque_n_m(&fields, &gradients),
+            passive_n,
+        })
+    }
+
+    fn at(&self, r_m: f64, z_m: f64) -> Result<AxialField, RunError> {
+        Ok(match &self.source {
+            Source::Air(winding) => winding.field(r_m, z_m)?,
+            Source::Cored(coil) => coil.field(r_m, z_m)?,
+            Source::Saturated(winding, core) => winding.field(r_m, z_m)? + core.field(r_m, z_m),
+        })
+    }
+}
+
+/// A sentence on steel that is taken as linear where it is not.
+pub(crate) fn above_knee(peak_t: f64, knee_t: f64, whose: &str) -> Option<String> {
+    (peak_t > knee_t).then(|| {
+        format!(
+            "{whose} reaches {peak_t:.2} T, above the steel's knee at {knee_t} T, but is taken as \
+             linear: the force will be smaller than told; give core.bh_curve, or lower the current"
+        )
+    })
+}

@@ -1,0 +1,407 @@
+//! The steel at given currents in all coils, along its B-H curve: what superposition leaves out.
+
+use super::at_current::{self, no_state};
+use super::maps::lowest_plane;
+use super::steel::{
+    ALONG_CURVE, EVALUATION_SHARE, Material, SceneCore, Solved, Steel, SteelField, clearance_m,
+    coupled,
+};
+use super::{MAGNET_SHARE, Scene, upward_n};
+use crate::RunError;
+use crate::accuracy::StageAccuracy;
+use crate::field::steel::axial_table::AxialTable;
+use crate::field::steel::bh_curve::BhCurve;
+use crate::field::steel::core_flux_density::peak_depth_m;
+use crate::field::steel::equivalent_dipoles::{ArraySources, Parts};
+use crate::field::steel::saturated::Status;
+use crate::field::steel::saturated_array::SaturatedArray;
+use crate::field::steel::saturated_coil::SaturatedCoil;
+use crate::map::Components;
+use crate::map::coupled_map::SampledField;
+use crate::map::map_source::Sampler;
+use crate::map::map_source::parts_of;
+use crate::map::tabulate::{Grid, MapError, PlacedCoil, tabulate};
+use crate::progress::Progress;
+
+/// Default tolerance of the steel at a working point, relative to the largest |grad B| at a
+/// height: what the modes that are taken as linear leave is of this order.
+pub const WORKING_POINT_TOLERANCE: f64 = 1e-3;
+
+/// Deviation from superposition above which a warning is due.
+const SUPERPOSITION_WARNING: f64 = 0.01;
+
+/// The cores at a working point.
+#[derive(Debug, Clone)]
+pub struct WorkingPoint {
+    /// Current in every coil, A.
+    pub currents_a: Vec<f64>,
+    /// Largest |B| in every core, T: of the axisymmetric mode along the curve, and what the other
+    /// modes add to it in the linear array.
+    pub peak_field_t: Vec<f64>,
+    /// Mean |B| in every core, of the axisymmetric mode, T.
+    pub mean_field_t: Vec<f64>,
+    /// Flux linkage of every coil, the neighbours' windings left out, Wb.
+    pub steel_flux_linkage_wb: Vec<f64>,
+    /// Estimated error of the total gradient above, relative to the largest |grad B| at the
+    /// height.
+    pub relative_error: f64,
+    tolerance: f64,
+    cores: Cores,
+}
+
+#[derive(Debug, Clone)]
+enum Cores {
+    /// Every core under its own winding: the coils' effective currents, A, and the states, of
+    /// which coils of the same current share one; `None` without current.
+    Alone(Vec<(f64, Option<SaturatedCoil>)>),
+    /// All under all.
+    Coupled(Box<SaturatedArray>),
+}
+
+impl WorkingPoint {
+    /// Solves the cores of `scene`, linear in `solved`, at `currents_a` for heights from `lowest_m` up; `None` where
+    /// superposition holds: without a B-H curve.
+    ///
+    /// A coil whose map has a measured gain counts with that much more current.
+    ///
+    /// # Errors
+    /// A core that cannot be solved.
+    pub fn new(
+        scene: &Scene,
+        solved: &Solved,
+        currents_a: &[f64],
+        tolerance: Option<f64>,
+        lowest_m: f64,
+    ) -> Result<Option<Self>, RunError> {
+        let Some((core, curve)) = curved(scene) else {
+            return Ok(None);
+        };
+        let tolerance = tolerance
+            .unwrap_or(WORKING_POINT_TOLERANCE)
+            .max(WORKING_POINT_TOLERANCE);
+        let effective_a: Vec<f64> = currents_a
+            .iter()
+            .zip(&scene.coils)
+            .map(|(current, coil)| current * coil.gain)
+            .collect();
+        let mut made = if coupled(scene.design) {
+            Self::coupled(scene, core, curve, &effective_a, tolerance, lowest_m)?
+        } else {
+            Self::alone(scene, core, curve, &effective_a, tolerance, lowest_m)?
+        };
+        if let Steel::Coupled(array) = &solved.steel {
+            let depth_m = peak_depth_m(core.shape);
+            let added = array.transverse_peaks_t(&effective_a, depth_m)?;
+            for (peak, added) in made.peak_field_t.iter_mut().zip(added) {
+                *peak += added;
+            }
+        }
+        made.currents_a = currents_a.to_vec();
+        Ok(Some(made))
+    }
+
+    fn coupled(
+        scene: &Scene,
+        core: &SceneCore,
+        curve: &BhCurve,
+        currents_a: &[f64],
+        tolerance: f64,
+        lowest_m: f64,
+    ) -> Result<Self, RunError> {
+        let array = SaturatedArray::new(
+            &scene.winding,
+            core.shape,
+            curve,
+            &scene.design.array.positions_m,
+            currents_a,
+            tolerance,
+            lowest_m,
+        )
+        .map_err(|fault| RunError::Input(format!("[core] with a B-H curve: {fault}")))?;
+        if array.status == Status::Stalled {
+            let most_a = currents_a.iter().fold(0.0_f64, |m, i| m.max(i.abs()));
+            return Err(no_state(most_a));
+        }
+        Ok(Self {
+            currents_a: Vec::new(),
+            peak_field_t: array.fields.iter().map(|f| f.peak_b_t).collect(),
+            mean_field_t: array.fields.iter().map(|f| f.mean_b_t).collect(),
+            steel_flux_linkage_wb: array.flux_linkage_wb.clone(),
+            relative_error: array.relative_error,
+            tolerance,
+            cores: Cores::Coupled(Box::new(array)),
+        })
+    }
+
+    fn alone(
+        scene: &Scene,
+        core: &SceneCore,
+        curve: &BhCurve,
+        currents_a: &[f64],
+        tolerance: f64,
+        lowest_m: f64,
+    ) -> Result<Self, RunError> {
+        let mut states: Vec<(f64, Option<SaturatedCoil>)> = Vec::new();
+        for current in currents_a {
+            let known = states
+                .iter()
+                .find(|(other, _)| other.abs() == current.abs());
+            let state = match known {
+                Some((_, state)) => state.clone(),
+                None if *current == 0.0 => None,
+                None => Some(at_current::solve(
+                    scene,
+                    core,
+                    curve,
+                    current.abs(),
+                    tolerance,
+                    lowest_m,
+                )?),
+            };
+            states.push((*current, state));
+        }
+        let of = |pick: &dyn Fn(f64, &SaturatedCoil) -> f64| -> Vec<f64> {
+            states
+                .iter()
+                .map(|(current, state)| state.as_ref().map_or(0.0, |state| pick(*current, state)))
+                .collect()
+        };
+        Ok(Self {
+            currents_a: Vec::new(),
+            peak_field_t: of(&|_, state| state.inside.peak_b_t),
+            mean_field_t: of(&|_, state| state.inside.mean_b_t),
+            steel_flux_linkage_wb: of(&|current, state| current * state.added_inductance_h),
+            relative_error: of(&|_, state| state.relative_error)
+                .into_iter()
+                .fold(0.0, f64::max),
+            tolerance,
+            cores: Cores::Alone(states),
+        })
+    }
+
+    /// The error of the steel's solution.
+    #[must_use]
+    pub fn accuracy(&self) -> StageAccuracy {
+        StageAccuracy {
+            estimate: self.relative_error + EVALUATION_SHARE * self.tolerance,
+            relative_to: "the largest |grad B| at a height".to_owned(),
+            method: match self.cores {
+                Cores::Alone(_) => ALONG_CURVE.to_owned(),
+                Cores::Coupled(_) => format!(
+                    "{ALONG_CURVE}; the modes across the axis taken as linear and this varied"
+                ),
+            },
+        }
+    }
+
+    /// The steel's total field for points no closer than `distance_m` to any core and no lower
+    /// than `lowest_m`.
+    #[must_use]
+    pub fn field(&self, scene: &Scene, lowest_m: f64, distance_m: f64) -> TotalField {
+        let tolerance = EVALUATION_SHARE * self.tolerance;
+        let parts = match &self.cores {
+            Cores::Coupled(array) => {
+                let sources = ArraySources::of_saturated(array, lowest_m, distance_m, tolerance);
+                vec![(1.0, [0.0, 0.0], SteelField::Coupled(sources))]
+            }
+            Cores::Alone(states) => states
+                .iter()
+                .zip(&scene.coils)
+                .filter_map(|((current, state), coil)| {
+                    let layer = &state.as_ref()?.layer;
+                    let table = AxialTable::new(None, layer.clone(), tolerance);
+                    Some((*current, coil.axis_m, SteelField::Alone(table.into())))
+                })
+                .collect(),
+        };
+        let top_m = scene.core.as_ref().map_or(0.0, |core| core.shape.top_m);
+        TotalField { parts, top_m }
+    }
+
+    /// dB_z/dz of all coils together at the nodes of `grid`, [z, y, x], T/m.
+    ///
+    /// # Errors
+    /// A node on a winding's edge or on the steel; interruption.
+    pub fn gz_t_per_m(
+        &self,
+        scene: &Scene,
+        grid: &Grid,
+        progress: &dyn Progress,
+    ) -> Result<Vec<f64>, RunError> {
+        let tolerance = EVALUATION_SHARE * self.tolerance;
+        let windings = tabulate(
+            &scene.winding,
+            &scene.coils,
+            grid,
+            Components::Gz,
+            tolerance,
+            progress,
+        )?;
+        let nodes = grid.x_m.len() * grid.y_m.len() * grid.z_m.len();
+        let mut whole = vec![0.0; nodes];
+        let mut add = |values: &[f64], factor: f64| {
+            for (whole, value) in whole.iter_mut().zip(values) {
+                *whole += factor * value;
+            }
+        };
+        // Gains stand in the maps already.
+        for (values, current) in windings
+            .gz_t_per_m_per_a
+            .chunks_exact(nodes.max(1))
+            .zip(&self.currents_a)
+        {
+            add(values, *current);
+        }
+        if let Some(core) = &scene.core {
+            let (lowest_m, distance_m) = clearance_m(scene, core, &lowest_plane(grid), 0.0)?;
+            let steel = self.field(scene, lowest_m, distance_m);
+            let sampled = SampledField::new(&steel, grid, Components::Gz, tolerance, 1, progress)?;
+            let all = PlacedCoil {
+                number: 0,
+                axis_m: [0.0, 0.0],
+                gain: 1.0,
+            };
+            add(&sampled.map(&[all], grid, progress)?.gz_t_per_m_per_a, 1.0);
+        }
+        Ok(whole)
+    }
+
+    /// Upward force on the magnet at every point, N, windings and steel, the pull of the
+    /// unpowered steel left out.
+    ///
+    /// # Errors
+    /// A point on the steel; interruption.
+    pub fn forces_n(
+        &self,
+        scene: &Scene,
+        points_m: &[[f64; 3]],
+        progress: &dyn Progress,
+    ) -> Result<Vec<f64>, RunError> {
+        let air = Solved {
+            steel: Steel::None,
+            tolerance: EVALUATION_SHARE * self.tolerance,
+            steel_error: 0.0,
+            relative_permeability: 1.0,
+            along_curve: false,
+        };
+        let per_ampere = scene.forces_n_per_a(&air, points_m, progress)?;
+        let mut total: Vec<f64> = per_ampere
+            .chunks_exact(scene.coils.len())
+            .map(|row| row.iter().zip(&self.currents_a).map(|(f, i)| f * i).sum())
+            .collect();
+        let lowest_m = points_m.iter().fold(f64::INFINITY, |z, p| z.min(p[2]));
+        let rule = scene.magnet_rule(lowest_m, MAGNET_SHARE * self.tolerance)?;
+        let Some(core) = &scene.core else {
+            return Ok(total);
+        };
+        let (lowest_m, distance_m) = clearance_m(scene, core, points_m, rule.reach_m())?;
+        let field = self.field(scene, lowest_m, distance_m);
+        let parts = if rule.is_upright() {
+            Parts::Gz
+        } else {
+            Parts::Gradient
+        };
+        for node in rule.nodes() {
+            let places: Vec<[f64; 3]> = points_m
+                .iter()
+                .map(|p| std::array::from_fn(|i| p[i] + node.offset_m[i]))
+                .collect();
+            let steel = field.at(&places, parts);
+            for (row, force) in total.iter_mut().enumerate() {
+                *force += upward_n(node.moment_a_m2, parts, &steel, row);
+            }
+        }
+        Ok(total)
+    }
+}
+
+/// A sentence on `what`, per ampere, that does not add up to the state at the working point.
+pub(crate) fn superposition_ends(
+    scene: &Scene,
+    deviation_from_linear: f64,
+    peak_field_t: &[f64],
+    what: &str,
+) -> Option<String> {
+    (deviation_from_linear > SUPERPOSITION_WARNING).then(|| {
+        let peak_t = peak_field_t.iter().copied().fold(0.0, f64::max);
+        let knee_t = scene
+            .core
+            .as_ref()
+            .map_or(f64::INFINITY, |core| core.knee_t);
+        format!(
+            "superposition ends along the B-H curve: at the working point's currents the state \
+             differs by up to {:.1} % of the largest from the sum of {what} (the cores reach \
+             {peak_t:.2} T, the knee is at {knee_t:.2} T); lower the currents until \
+             working_point.deviation_from_linear is small enough",
+            100.0 * deviation_from_linear
+        )
+    })
+}
+
+/// The steel's field at a working point: the sum of all cores'.
+#[derive(Debug, Clone)]
+pub struct TotalField {
+    /// Current, axis, and the field per ampere, their core at the origin.
+    parts: Vec<(f64, [f64; 2], SteelField)>,
+    top_m: f64,
+}
+
+impl TotalField {
+    /// The field at `points_m`, [component, point].
+    #[must_use]
+    pub fn at(&self, points_m: &[[f64; 3]], parts: Parts) -> Vec<f64> {
+        let mut total = vec![0.0; parts.count() * points_m.len()];
+        let mut one = total.clone();
+        for (current, [x, y], sources) in &self.parts {
+            let own: Vec<[f64; 3]> = points_m
+                .iter()
+                .map(|p| [p[0] - x, p[1] - y, p[2]])
+                .collect();
+            sources.sample(&own, parts, &mut one);
+            for (total, one) in total.iter_mut().zip(&one) {
+                *total += current * one;
+            }
+        }
+        total
+    }
+}
+
+impl Sampler for TotalField {
+    fn drives(&self) -> usize {
+        1
+    }
+
+    fn top_m(&self) -> f64 {
+        self.top_m
+    }
+
+    fn sample(
+        &self,
+        points_m: &[[f64; 3]],
+        components: Components,
+        out: &mut [f64],
+    ) -> Result<(), MapError> {
+        out.copy_from_slice(&self.at(points_m, parts_of(components)));
+        Ok(())
+    }
+}
+
+/// The core and its B-H curve; `None` for a design without one.
+fn curved<'a>(scene: &'a Scene) -> Option<(&'a SceneCore, &'a BhCurve)> {
+    let core = scene.core.as_ref()?;
+    match &core.material {
+        Material::Curve(curve) => Some((core, curve)),
+        Material::Linear(_) => None,
+    }
+}
+
+/// Largest difference of two lists, relative to the largest of the first.
+#[must_use]
+pub fn relative_difference(values: &[f64], others: &[f64]) -> f64 {
+    let size = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let worst = values
+        .iter()
+        .zip(others)
+        .fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+    if worst > 0.0 { worst / size } else { 0.0 }
+}
