@@ -51,7 +51,9 @@ const HANGS: Duration = Duration::from_secs(60);
 const LARGEST_SEED: u64 = 300_000;
 
 /// Endings, one for each format.
-const FORMATS: [&str; 8] = ["stl", "obj", "ply", "3mf", "amf", "3dxml", "step", "sldprt"];
+const FORMATS: [&str; 11] = [
+    "stl", "obj", "ply", "off", "glb", "png", "3mf", "amf", "3dxml", "step", "sldprt",
+];
 
 /// What the watch sees: milliseconds since the start when the input began, 0 between inputs.
 static BEGAN: AtomicU64 = AtomicU64::new(0);
@@ -74,7 +76,13 @@ fn seeds(format: SurfaceFormat) -> Vec<Seed> {
             text(samples::ply_ascii()),
             text(samples::ply_binary(false)),
             text(samples::ply_binary(true)),
+            text(samples::ply_strips()),
         ],
+        SurfaceFormat::Off => vec![text(samples::off())],
+        SurfaceFormat::Glb => vec![text(samples::glb())],
+        SurfaceFormat::HeightImage => [png::BitDepth::Eight, png::BitDepth::Sixteen]
+            .map(|depth| text(samples::height_image(5, &[17; 40], depth)))
+            .to_vec(),
         SurfaceFormat::ThreeMf => vec![text(samples::three_mf("inch"))],
         SurfaceFormat::Amf => vec![
             text(samples::amf("mm").into_bytes()),
@@ -85,6 +93,14 @@ fn seeds(format: SurfaceFormat) -> Vec<Seed> {
         SurfaceFormat::Sldprt => vec![
             Seed::Display(samples::display_lists()),
             Seed::Plain(samples::sldprt()),
+            Seed::Plain(samples::sldprt_compound(&[(
+                "Contents/DisplayLists__ZLB",
+                &samples::display_lists(),
+            )])),
+            Seed::Plain(samples::sldprt_assembly(
+                samples::assembly().0.as_bytes(),
+                &samples::assembly().1,
+            )),
         ],
     };
     let folder = support::corpus();

@@ -9,6 +9,7 @@ mod heights;
 mod hostile;
 mod inspect;
 mod marks;
+mod more_formats;
 mod points;
 mod samples;
 mod solidworks;

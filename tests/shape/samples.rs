@@ -281,6 +281,81 @@ pub fn assembly() -> (String, Vec<u8>) {
     (tree, stream)
 }
 
+/// The tetrahedron's faces as one strip and a triangle, -1 between them.
+pub fn ply_strips() -> Vec<u8> {
+    let mut bytes = b"ply\nformat binary_big_endian 1.0\nelement vertex 4\nproperty float x\n\
+                      property float y\nproperty float z\nelement tristrips 1\n\
+                      property list int int vertex_indices\nend_header\n"
+        .to_vec();
+    for c in VERTICES.as_flattened() {
+        bytes.extend(c.to_be_bytes());
+    }
+    let strip = [0i32, 2, 1, 3, -1, 0, 1, 3, -1, 0, 3, 2];
+    bytes.extend((strip.len() as i32).to_be_bytes());
+    bytes.extend(strip.iter().flat_map(|index| index.to_be_bytes()));
+    bytes
+}
+
+pub fn off() -> Vec<u8> {
+    let mut text = String::from("OFF # a body\n4 4 6\n\n");
+    for [x, y, z] in VERTICES {
+        text += &format!("{x} {y} {z}\n");
+    }
+    for [a, b, c] in TRIANGLES {
+        text += &format!("3 {a} {b} {c} 0.5 0.5 0.5\n");
+    }
+    text.into_bytes()
+}
+
+/// The tetrahedron, which glTF has with y upwards, in two primitives; its node doubles it.
+pub fn glb() -> Vec<u8> {
+    let mut blob = Vec::new();
+    for [x, y, z] in VERTICES {
+        for c in [x, z, -y] {
+            blob.extend((c / 2.0).to_le_bytes());
+        }
+    }
+    for index in TRIANGLES[..3].as_flattened().iter().chain(&TRIANGLES[3]) {
+        blob.extend((*index as u16).to_le_bytes());
+    }
+    let json = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],
+        "nodes":[{"children":[1]},{"mesh":0,"scale":[2,2,2]}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1},
+        {"attributes":{"POSITION":0},"indices":2,"mode":5}]}],
+        "buffers":[{"byteLength":72}],"bufferViews":[{"buffer":0,"byteLength":48},
+        {"buffer":0,"byteOffset":48,"byteLength":24}],"accessors":[
+        {"bufferView":0,"componentType":5126,"count":4,"type":"VEC3","min":[0,0,-1],"max":[1,2,0]},
+        {"bufferView":1,"componentType":5123,"count":9,"type":"SCALAR"},
+        {"bufferView":1,"byteOffset":18,"componentType":5123,"count":3,"type":"SCALAR"}]}"#;
+    let mut json = json.as_bytes().to_vec();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let mut bytes = b"glTF\x02\0\0\0".to_vec();
+    let length = 12 + 8 + json.len() + 8 + blob.len();
+    bytes.extend((length as u32).to_le_bytes());
+    for (kind, chunk) in [(b"JSON", &json), (b"BIN\0", &blob)] {
+        bytes.extend((chunk.len() as u32).to_le_bytes());
+        bytes.extend(kind);
+        bytes.extend(chunk);
+    }
+    bytes
+}
+
+/// A PNG of grey, its rows from the top; with one bit depth of 8 or 16.
+pub fn height_image(width: u32, levels: &[u16], depth: png::BitDepth) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, levels.len() as u32 / width);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(depth);
+    let mut writer = encoder.write_header().unwrap();
+    let data: Vec<u8> = match depth {
+        png::BitDepth::Sixteen => levels.iter().flat_map(|l| l.to_be_bytes()).collect(),
+        _ => levels.iter().map(|l| *l as u8).collect(),
+    };
+    writer.write_image_data(&data).unwrap();
+    writer.finish().unwrap();
+    bytes
+}
+
 /// The assembly of this document and these display lists.
 pub fn sldprt_assembly(tree: &[u8], lists: &[u8]) -> Vec<u8> {
     sldprt_blocks(&[

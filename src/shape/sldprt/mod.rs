@@ -56,7 +56,7 @@ impl<'a> Container<'a> {
 }
 
 /// True for bytes that begin as a SOLIDWORKS file does.
-pub(crate) fn is(bytes: &[u8]) -> bool {
+pub(crate) fn begins(bytes: &[u8]) -> bool {
     Blocks::is(bytes) || Compound::is(bytes)
 }
 
