@@ -1,7 +1,6 @@
 //! Surfaces: readers, exact heights, primitives, constraint points.
 #![allow(missing_docs)]
 
-mod corpus;
 mod deviation;
 mod formats;
 mod fuzz;
@@ -11,9 +10,7 @@ mod inspect;
 mod marks;
 mod more_formats;
 mod points;
-mod samples;
 mod solidworks;
 #[cfg(feature = "step")]
 mod step;
 mod stl;
-mod support;

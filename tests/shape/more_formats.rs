@@ -7,10 +7,10 @@ use fluxform_shape::document::SurfaceFormat;
 use fluxform_shape::{MeshReport, ShapeError, surface};
 
 use crate::formats::{read, refusal};
-use crate::samples::{
+use fluxform_testing::surface_files::{
     amf, glb, height_image, obj, off, ply_ascii, ply_strips, sldprt, step, three_dxml, three_mf,
 };
-use crate::support::binary;
+use fluxform_testing::surfaces::binary;
 
 const VOLUME: f64 = 0.7 * 1.3 * 2.9 / 6.0;
 

@@ -6,7 +6,7 @@ use fluxform_shape::document::SurfaceFormat;
 use fluxform_shape::mesh::FileMesh;
 
 use crate::formats::{read, refusal};
-use crate::samples::{
+use fluxform_testing::surface_files::{
     assembly, display_lists, sldprt, sldprt_assembly, sldprt_blocks, sldprt_compound, sldprt_of,
 };
 

@@ -103,7 +103,8 @@ impl Faces {
         let area: f64 = parts.iter().map(|part| part.area).sum();
         let [width, depth] = rect.sides();
         let ratio = area / (width * depth);
-        if !((ratio - ratio.round()).abs() <= RATIO * ratio.max(1.0)) {
+        let off = (ratio - ratio.round()).abs();
+        if off.is_nan() || off > RATIO * ratio.max(1.0) {
             return None;
         }
         // An edge along the border may have its other face outside.
