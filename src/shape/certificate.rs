@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::deviation::{
-    Effort, Faces, Interval, Lattice, Vertical, hausdorff, primitive, primitive_by_cell, vertical,
+    Faces, Interval, Lattice, Looks, Vertical, hausdorff, primitive, primitive_by_cell, vertical,
     vertical_by_cell,
 };
 use crate::error::ShapeError;
@@ -157,7 +157,7 @@ pub fn certify(
             (Tessellation::None, 0.0),
         ),
         Surface::Mesh(mesh) => {
-            let effort = Effort::usual();
+            let effort = Looks::usual();
             let faces = Faces::new(mesh, grid, Arc::clone(&effort));
             let lattice = Lattice::new(&faces, grid, &heights);
             let found = vertical(mesh, grid, &lattice, progress)?;
@@ -203,7 +203,7 @@ pub fn by_cell(
             Ok(Some(primitive_by_cell(shape, grid, &heights)))
         }
         Surface::Mesh(mesh) => {
-            let effort = Effort::usual();
+            let effort = Looks::usual();
             let faces = Faces::new(mesh, grid, Arc::clone(&effort));
             let cells = vertical_by_cell(&Lattice::new(&faces, grid, &heights), progress)?;
             Ok((!effort.is_spent()).then_some(cells))

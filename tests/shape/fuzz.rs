@@ -136,11 +136,6 @@ fn mutated_files_of_every_format_are_read_or_refused() {
         ),
         (
             SurfaceFormat::ThreeMf,
-            surface_files::three_mf("inch"),
-            as_it_is,
-        ),
-        (
-            SurfaceFormat::ThreeMf,
             surface_files::three_mf_model("inch"),
             |model| surface_files::three_mf_of(&String::from_utf8_lossy(model)),
         ),

@@ -96,7 +96,7 @@ pub struct Cells {
 pub struct Faces {
     list: Vec<piece::Face>,
     hair: Hair,
-    effort: Arc<Effort>,
+    effort: Arc<Looks>,
 }
 
 /// A part of a cell, and the faces of which something may be seen there.
@@ -110,7 +110,7 @@ struct Leaf<'a> {
 /// How much more is compared: a count of looks at faces, hence the same on every machine and with
 /// any number of threads.
 #[derive(Debug)]
-pub struct Effort {
+pub struct Looks {
     left: AtomicI64,
 }
 
@@ -119,7 +119,7 @@ const USUAL_LOOKS: i64 = 1 << 30;
 /// Looks that cutting a face to a part of a cell and sorting it among others takes.
 const LOOKS_A_LEAF: usize = 16;
 
-impl Effort {
+impl Looks {
     /// So many looks, and no more.
     #[must_use]
     pub fn new(looks: i64) -> Arc<Self> {
@@ -182,7 +182,7 @@ impl Worst {
 impl Faces {
     /// The mesh's triangles but for vertical walls, which have no height of their own.
     #[must_use]
-    pub fn new(mesh: &Mesh, grid: &Grid, effort: Arc<Effort>) -> Self {
+    pub fn new(mesh: &Mesh, grid: &Grid, effort: Arc<Looks>) -> Self {
         let reach = reach_m(mesh, grid);
         let bounds = mesh.facts().bounds;
         let largest = |corners: [&[f64]; 2]| {
@@ -694,7 +694,7 @@ mod tests {
         let grid = grid([31, 41]);
         let known = heights(mesh, &grid, &Silent).unwrap();
         let known: Vec<Option<f64>> = known.iter().map(|s| s.map(|s| s.height_m)).collect();
-        let effort = Effort::endless();
+        let effort = Looks::endless();
         let faces = Faces::new(mesh, &grid, Arc::clone(&effort));
         let lattice = Lattice::new(&faces, &grid, &known);
         let worst = vertical(mesh, &grid, &lattice, &Silent).unwrap();
@@ -720,7 +720,7 @@ mod tests {
         let known = heights(&mesh, &grid, &Silent).unwrap();
         let known: Vec<Option<f64>> = known.iter().map(|s| s.map(|s| s.height_m)).collect();
         let run = |looks: i64, threads: usize| {
-            let effort = Effort::new(looks);
+            let effort = Looks::new(looks);
             let faces = Faces::new(&mesh, &grid, Arc::clone(&effort));
             let lattice = Lattice::new(&faces, &grid, &known);
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
@@ -746,7 +746,7 @@ mod tests {
     fn sheets_over_the_whole_grid_share_their_lists() {
         let faces = placed((0..70_000).map(sheet).collect());
         let grid = grid([61, 51]);
-        let faces = Faces::new(&faces, &grid, Effort::usual());
+        let faces = Faces::new(&faces, &grid, Looks::usual());
         let heights = vec![None; grid.len()];
         let lattice = Lattice::new(&faces, &grid, &heights);
         let side = lattice.block;
@@ -771,7 +771,7 @@ mod tests {
         };
         let mesh = placed((0..40).map(bump).chain((0..3).map(sheet)).collect());
         let grid = grid([11, 8]);
-        let faces = Faces::new(&mesh, &grid, Effort::usual());
+        let faces = Faces::new(&mesh, &grid, Looks::usual());
         let known = heights(&mesh, &grid, &Silent).unwrap();
         let known: Vec<Option<f64>> = known.iter().map(|s| s.map(|s| s.height_m)).collect();
         let fine = Lattice::new(&faces, &grid, &known);
@@ -800,7 +800,7 @@ mod tests {
         let mesh = placed((0..3).map(sheet).collect());
         for samples in [[1, 7], [7, 1], [1, 1]] {
             let grid = grid(samples);
-            let faces = Faces::new(&mesh, &grid, Effort::usual());
+            let faces = Faces::new(&mesh, &grid, Looks::usual());
             let known = vec![Some(0.01); grid.len()];
             let lattice = Lattice::new(&faces, &grid, &known);
             assert_eq!(lattice.len(), 0);

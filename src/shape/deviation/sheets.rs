@@ -156,7 +156,7 @@ fn passes(a: Point, b: Point, rect: &Rect) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::deviation::Effort;
+    use crate::deviation::Looks;
     use crate::document::Placement;
     use crate::height::Grid;
     use crate::mesh::{FileMesh, Mesh, Triangle};
@@ -183,7 +183,7 @@ mod tests {
             x_m: axis,
             y_m: axis,
         };
-        let faces = Faces::new(&mesh, &grid, Effort::endless());
+        let faces = Faces::new(&mesh, &grid, Looks::endless());
         let sheets = faces.sheets(&RECT, &faces.all());
         (sheets.faces.len(), sheets.plain)
     }

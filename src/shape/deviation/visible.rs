@@ -5,7 +5,7 @@
 //! hiding regions' sides. Which parts, is decided on lines beside them, a hair inside the piece or
 //! outside the region, so that what is shared with a neighbour needs no exact arithmetic.
 
-use super::Effort;
+use super::Looks;
 use super::piece::{Extreme, Face, Point, Polygon, along};
 
 /// Lengths below which two places in plan are not told apart.
@@ -21,7 +21,7 @@ pub(super) struct Hair {
 #[derive(Clone, Copy)]
 pub(super) struct Look<'a> {
     pub(super) hair: Hair,
-    pub(super) effort: &'a Effort,
+    pub(super) effort: &'a Looks,
 }
 
 /// Looks that cutting one polygon by another takes.
