@@ -542,7 +542,8 @@ impl Targets {
                     DMatrix::from_fn(operator.nrows(), width * layers.len(), |node, place| {
                         MU_0_T_M_PER_A * layers[place / width][(node, mine.start + place % width)]
                     });
-                operator.tr_mul(&side_by_side)
+                // Blocked, unlike a product by a transpose in place.
+                operator.transpose() * side_by_side
             })
             .collect();
         currents_a

@@ -101,7 +101,7 @@ impl Neighbours {
                 let potentials = basis.potentials.rows(angle * rings, rings);
                 sent.gemm(1.0, &columns, &potentials, 1.0);
             }
-            basis.potentials.tr_mul(&sent) * -turn
+            basis.potentials.transpose() * sent * -turn
         };
         let (system, links) = exchange_system(positions_m, &basis.reaction, exchanged);
         let form = system.lu().solve(&links).unwrap_or(links) * turn;
