@@ -29,7 +29,6 @@ const LONG: &[(&str, &str)] = &[
     ("src/commands/replay/command.rs", "run"),
     ("src/commands/replay/command.rs", "told"),
     ("src/commands/sweep/merge.rs", "merge"),
-    ("src/commands/verify/compared.rs", "compare"),
     ("src/commands/verify/constant.rs", "checks"),
     ("src/commands/verify/passive.rs", "checks"),
     ("src/scene/maps.rs", "new"),
