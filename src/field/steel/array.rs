@@ -180,7 +180,7 @@ const FIRST_AIM: f64 = 2.0;
 const CLOSEST: f64 = 0.1;
 /// Heights above the cores, in radii, below which the outline is resolved for places close to it.
 const NEAR: f64 = 0.5;
-/// Modes that each refinement adds where places close to the cores are asked for.
+/// Modes that each refinement adds where places close to the cores are requested.
 const MODES_NEAR: usize = 2;
 /// Places about every coil at which two resolutions are compared, in units of its outer radius.
 const PLACES: [[f64; 2]; 5] = [[0.0, 0.0], [0.6, 0.2], [0.7, 0.2], [-0.4, 1.1], [1.5, -1.2]];
