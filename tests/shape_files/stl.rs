@@ -1,6 +1,6 @@
 //! STL: real and damaged files, and the messages.
 
-use fluxform_shape::document::{AxisRequest, GridRequest, Placement};
+use fluxform_shape::document::{AxisRequest, GridRequest, Placement, SurfaceFormat};
 use fluxform_shape::mesh::Mesh;
 use fluxform_shape::placement::Transform;
 use fluxform_shape::stl::read;
