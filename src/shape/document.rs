@@ -4,6 +4,8 @@ mod raw;
 mod read;
 mod unit;
 
+pub use read::keys;
+
 use std::path::PathBuf;
 
 use fluxform_numerics::axis::Axis;
