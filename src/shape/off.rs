@@ -86,9 +86,13 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
     }
     let mut all = Faces::default();
     for _ in 0..faces {
-        let (number, words) = next().ok_or_else(ends)?;
+        let (number, mut words) = next().ok_or_else(ends)?;
         let told = |what: String| ReadError::new(Place::Line(number), what);
         let corners = whole(words[0]).filter(|corners| *corners <= MOST_CORNERS);
+        // Some programs break a face over lines.
+        while corners.is_some_and(|corners| words.len() <= corners) {
+            words.extend(next().ok_or_else(ends)?.1);
+        }
         let indices = corners.and_then(|corners| words.get(1..=corners));
         let indices = indices.ok_or_else(|| {
             told(format!(

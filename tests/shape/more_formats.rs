@@ -28,8 +28,10 @@ fn every_further_format_gives_the_same_body() {
         "comment made here",
         "Created by Blender3D 247 - www.blender.org, source file: a.blend",
     );
-    let samples: [(SurfaceFormat, Vec<u8>, Option<f64>); 7] = [
+    let broken = String::from_utf8(off()).unwrap().replace("\n3 0", "\n3\n0");
+    let samples: [(SurfaceFormat, Vec<u8>, Option<f64>); 8] = [
         (Off, off(), None),
+        (Off, broken.into_bytes(), None),
         (Glb, glb(), Some(1.0)),
         (Ply, ply_strips(), None),
         (Ply, blender.into_bytes(), None),
