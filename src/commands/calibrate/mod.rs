@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 use super::discretize::{self, PointsReport, point_rows, points_grid};
 use super::lambda::{LambdaOptions, LambdaReport, WantedPoints, solve_at};
@@ -15,6 +15,7 @@ use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS, arithmetic};
 use crate::bundle::atomic::WriteError;
 use crate::bundle::cache::Store;
+use crate::bundle::json::displayed;
 use crate::bundle::manifest::{
     AxisSummary, CircuitSummary, Interpolation, LambdaSummary, LeftOut, MadeWith, Manifest,
     PassiveForce,
@@ -168,11 +169,6 @@ pub struct BundleReport {
     pub lambda: LambdaReport,
     /// `manifest.json` as written.
     pub manifest: Manifest,
-}
-
-/// A path that is no text is stated as nearly as it can be.
-fn displayed<S: Serializer>(path: &Path, out: S) -> Result<S::Ok, S::Error> {
-    out.collect_str(&path.display())
 }
 
 impl CalibrateReport {
