@@ -37,13 +37,13 @@ mod table;
 
 use picture::{Scale, Seen};
 
-/// The points and what is to be told about them.
+/// The points of a grid and their figures.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct PointsReport {
     /// The points.
     pub discretized: Discretized,
-    /// Figures, as the JSON summary tells them.
+    /// The JSON result.
     pub summary: PointsSummary,
 }
 
@@ -161,32 +161,32 @@ impl MarkCounts {
 
 impl DeviationSummary {
     fn new(certificate: &Certificate) -> Option<Self> {
-        let found = &certificate.vertical;
-        // Without a cell of four points there is nothing to tell.
-        (found.cells.inner > 0 && found.worst().value_m.is_finite()).then(|| {
+        let vertical = &certificate.vertical;
+        // Without a cell of four points there is no deviation.
+        (vertical.cells.inner > 0 && vertical.worst().value_m.is_finite()).then(|| {
             let apart = certificate.hausdorff;
             Self {
-                above_m: found.above.value_m.max(0.0),
-                above_at_m: found.above.at_m,
-                below_m: found.below.value_m.max(0.0),
-                below_at_m: found.below.at_m,
+                above_m: vertical.above.value_m.max(0.0),
+                above_at_m: vertical.above.at_m,
+                below_m: vertical.below.value_m.max(0.0),
+                below_at_m: vertical.below.at_m,
                 hausdorff_lower_m: apart.map(|apart| apart.lower_m),
                 hausdorff_upper_m: apart.map(|apart| apart.upper_m),
                 hausdorff_at_m: apart.map(|apart| apart.at_m),
-                cells: found.cells.inner,
-                silhouette_cells: found.cells.silhouette,
+                cells: vertical.cells.inner,
+                silhouette_cells: vertical.cells.silhouette,
                 silhouette_m: certificate.silhouette_m,
-                missed_cells: found.cells.missed,
+                missed_cells: vertical.cells.missed,
                 budget_m: certificate.budget_m(),
             }
         })
     }
 }
 
-/// What is asked of a discretisation besides its points.
+/// The options of `discretize` for the points of a grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PointsOptions {
-    /// What is done with holes.
+    /// The treatment of holes.
     pub holes: Holes,
     /// How the points are compared with the surface.
     pub certify: Certify,
@@ -444,7 +444,7 @@ pub fn point_rows(points: &ConstraintPoints) -> Vec<PointRow> {
         .collect()
 }
 
-/// The grid of the points as a manifest tells it.
+/// The grid of the points as a manifest states it.
 #[must_use]
 pub fn points_grid(points: &ConstraintPoints) -> PointsGrid {
     let present: Vec<bool> = points

@@ -12,7 +12,9 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use self::mag_manip::{MagManipRequest, MultipolesSummary, VectorFieldSummary};
+use self::mag_manip::{
+    MagManipRequest, MultipolesMade, MultipolesSummary, VectorFieldMade, VectorFieldSummary,
+};
 pub use self::multipoles::MULTIPOLE_TOLERANCE;
 use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed};
@@ -182,6 +184,7 @@ pub fn run(
         .map(Path::to_path_buf)
         .into_iter()
         .collect();
+    // Refused before anything is computed.
     let made_with = request.made_with();
     let beside = [&mag_manip.vector_field, &mag_manip.multipoles];
     let beside: Vec<&Path> = beside.into_iter().flatten().map(PathBuf::as_path).collect();
@@ -193,58 +196,13 @@ pub fn run(
         request.formats,
         &beside,
     )?;
-    let nodes = (mag_manip.vector_field.as_ref())
-        .map(|path| Ok::<_, RunError>((path, vector_field::nodes(&scene, mag_manip.nodes)?)))
-        .transpose()?;
-    // The steel is solved once, for the lowest of the workspace and of mag_manip's nodes.
-    let grid = workspace_grid(design);
-    let lowest_m = grid.z_m.first().copied().unwrap_or(0.0);
-    let lowest_m = (nodes.as_ref()).map_or(lowest_m, |(_, [_, _, z])| lowest_m.min(z.from));
-    progress.begin("steel", 1);
-    let solved = steel::solve(&scene, request.tolerance, MAP_TOLERANCE, lowest_m)?;
-    progress.end();
-    let made = SceneMap::new(
-        &scene,
-        &solved,
-        &scene.coils,
-        &grid,
-        request.components,
-        &Felt::field(),
-        progress,
-    )?;
-    let map = &made.map;
-    let together = Together::new(&scene, &solved, (&grid, map, lowest_m), request, progress)?;
-    progress.check()?;
-    let vector_field = nodes
-        .map(|(path, axes)| vector_field::make(&scene, &solved, path.clone(), axes, progress))
-        .transpose()?;
-    let multipoles = (mag_manip.multipoles.as_ref())
-        .map(|path| {
-            let tolerance = mag_manip.tolerance.unwrap_or(MULTIPOLE_TOLERANCE);
-            let (path, own_error) = (path.clone(), made.accuracy.estimate);
-            multipoles::make(&scene, &solved, path, tolerance, own_error, progress)
-        })
-        .transpose()?;
-    progress.check()?;
-    let mut accuracy = BTreeMap::from([("map".to_owned(), made.accuracy.clone())]);
-    let vfield = vector_field.as_ref().map(|made| &made.accuracy);
-    let mpem = multipoles.as_ref().map(|made| &made.accuracy);
-    for (names, stages) in [
-        (["vfield", "vfield_gradient"], vfield),
-        (["mpem", "mpem_gradient"], mpem),
-    ] {
-        let stages = stages.into_iter().flatten().cloned();
-        accuracy.extend(names.map(str::to_owned).into_iter().zip(stages));
-    }
-    let mut summary = summary(map, request.components, made.between);
+    let made = Made::new(&scene, request, progress)?;
+    let map = &made.map.map;
+    let mut summary = summary(map, request.components, made.map.between);
     let mut arrays = arrays(map, runtime(&scene, None));
-    let core = scene.core.as_ref();
-    let mut warnings = core.map_or_else(Vec::new, |core| core.warnings.clone());
-    if let Some(together) = together {
-        accuracy.insert("working_point".to_owned(), together.accuracy);
-        warnings.extend(together.warning);
-        summary.working_point = Some(together.summary);
-        arrays.working_point_gz_t_per_m = Some(Cow::Owned(together.gz_t_per_m));
+    if let Some(together) = &made.together {
+        summary.working_point = Some(together.summary.clone());
+        arrays.working_point_gz_t_per_m = Some(Cow::Borrowed(&together.gz_t_per_m));
     }
     let sidecar = MapSidecar {
         schema_version: SCHEMA_VERSION.to_owned(),
@@ -256,12 +214,12 @@ pub fn run(
         array: scene.array_geometry(),
         magnet: scene.magnet_summary(),
         map: summary,
-        accuracy,
+        accuracy: made.accuracy(),
         files: Vec::new(),
     };
     progress.begin("write", 1);
-    let nodes = (vector_field.as_ref()).map(|v| (&v.path, v.content(&design.name)));
-    let sources = (multipoles.as_ref()).map(|m| (&m.path, m.content(&design.name)));
+    let nodes = (made.vector_field.as_ref()).map(|v| (&v.path, v.content(&design.name)));
+    let sources = (made.multipoles.as_ref()).map(|m| (&m.path, m.content(&design.name)));
     let nodes = nodes.as_ref().map(|(path, content)| Beside {
         path,
         content: BesideContent::VectorField(content),
@@ -281,19 +239,99 @@ pub fn run(
         &protected,
     )?;
     progress.end();
-    Ok(MapReport {
-        accuracy_missed: missed(&sidecar.accuracy, solved.tolerance),
-        sidecar,
-        components: request.components,
-        folder: request.out.clone(),
-        point_coils: map.gz_t_per_m_per_a.len(),
-        distinct_radii: map.distinct_radii,
-        tabulated: map.tabulated,
-        table: made.table.map(CompactSteel::from),
-        vector_field: vector_field.map(|made| made.summary),
-        multipoles: multipoles.map(|made| made.summary),
-        warnings,
-    })
+    Ok(made.report(&scene, request, sidecar))
+}
+
+/// Everything that is computed for the files.
+struct Made {
+    solved: Solved,
+    map: SceneMap,
+    together: Option<Together>,
+    vector_field: Option<VectorFieldMade>,
+    multipoles: Option<MultipolesMade>,
+}
+
+impl Made {
+    fn new(scene: &Scene, request: &MapRequest, progress: &dyn Progress) -> Result<Self, RunError> {
+        let mag_manip = &request.mag_manip;
+        let nodes = (mag_manip.vector_field.as_ref())
+            .map(|path| Ok::<_, RunError>((path, vector_field::nodes(scene, mag_manip.nodes)?)))
+            .transpose()?;
+        // The steel is solved once, for the lowest of the workspace and of mag_manip's nodes.
+        let grid = workspace_grid(scene.design);
+        let lowest_m = grid.z_m.first().copied().unwrap_or(0.0);
+        let lowest_m = (nodes.as_ref()).map_or(lowest_m, |(_, [_, _, z])| lowest_m.min(z.from));
+        progress.begin("steel", 1);
+        let solved = steel::solve(scene, request.tolerance, MAP_TOLERANCE, lowest_m)?;
+        progress.end();
+        let map = SceneMap::new(
+            scene,
+            &solved,
+            &scene.coils,
+            &grid,
+            request.components,
+            &Felt::field(),
+            progress,
+        )?;
+        let tabulated = (&grid, &map.map, lowest_m);
+        let together = Together::new(scene, &solved, tabulated, request, progress)?;
+        progress.check()?;
+        let vector_field = nodes
+            .map(|(path, axes)| vector_field::make(scene, &solved, path.clone(), axes, progress))
+            .transpose()?;
+        let multipoles = (mag_manip.multipoles.as_ref())
+            .map(|path| {
+                let tolerance = mag_manip.tolerance.unwrap_or(MULTIPOLE_TOLERANCE);
+                let (path, own_error) = (path.clone(), map.accuracy.estimate);
+                multipoles::make(scene, &solved, path, tolerance, own_error, progress)
+            })
+            .transpose()?;
+        progress.check()?;
+        Ok(Self {
+            solved,
+            map,
+            together,
+            vector_field,
+            multipoles,
+        })
+    }
+
+    /// Each stage's estimated error.
+    fn accuracy(&self) -> BTreeMap<String, StageAccuracy> {
+        let mut accuracy = BTreeMap::from([("map".to_owned(), self.map.accuracy.clone())]);
+        let together = self.together.as_ref();
+        let stage = together.map(|t| ("working_point".to_owned(), t.accuracy.clone()));
+        accuracy.extend(stage);
+        let vfield = self.vector_field.as_ref().map(|made| &made.accuracy);
+        let mpem = self.multipoles.as_ref().map(|made| &made.accuracy);
+        for (names, stages) in [
+            (["vfield", "vfield_gradient"], vfield),
+            (["mpem", "mpem_gradient"], mpem),
+        ] {
+            let stages = stages.into_iter().flatten().cloned();
+            accuracy.extend(names.map(str::to_owned).into_iter().zip(stages));
+        }
+        accuracy
+    }
+
+    fn report(self, scene: &Scene, request: &MapRequest, sidecar: MapSidecar) -> MapReport {
+        let core = scene.core.as_ref();
+        let mut warnings = core.map_or_else(Vec::new, |core| core.warnings.clone());
+        warnings.extend(self.together.and_then(|together| together.warning));
+        MapReport {
+            accuracy_missed: missed(&sidecar.accuracy, self.solved.tolerance),
+            sidecar,
+            components: request.components,
+            folder: request.out.clone(),
+            point_coils: self.map.map.gz_t_per_m_per_a.len(),
+            distinct_radii: self.map.map.distinct_radii,
+            tabulated: self.map.map.tabulated,
+            table: self.map.table.map(CompactSteel::from),
+            vector_field: self.vector_field.map(|made| made.summary),
+            multipoles: self.multipoles.map(|made| made.summary),
+            warnings,
+        }
+    }
 }
 
 /// The map of all coils together at given currents, their steel along its B-H curve.

@@ -1,9 +1,10 @@
 //! Multipole sources of a scene: the fewest of a ladder of layouts that meet a tolerance.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::mag_manip::{MultipolesMade, MultipolesSummary, SAFETY, direct, largest, stages};
 use crate::RunError;
+use crate::accuracy::StageAccuracy;
 use crate::map::multipole_fit::{ALONE, COUPLED, Kind, Model, Samples, sources, terms};
 use crate::numerics::axis::Axis;
 use crate::progress::Progress;
@@ -99,28 +100,39 @@ pub(super) fn make(
          not see, of every coil; and the direct values' own error",
         checks.points_m.len()
     );
+    let counts = [samples.points_m.len(), checks.points_m.len()];
     let accuracy = stages(errors, own_error, &method);
-    let [field_error, gradient_error] = [0, 1].map(|k: usize| accuracy[k].estimate);
-    let orders = models.iter().flat_map(|model| &model.coefficients);
     Ok(MultipolesMade {
-        summary: MultipolesSummary {
-            file: path.display().to_string(),
-            sources: models.iter().map(|m| m.sources.len()).max().unwrap_or(0),
-            coefficients: orders.map(Vec::len).max().unwrap_or(0),
-            condition: models.iter().fold(1.0, |most, m| most.max(m.condition)),
-            points: samples.points_m.len(),
-            checks: checks.points_m.len(),
-            field_error,
-            gradient_error,
-            tolerance,
-            tolerance_met: accuracy.iter().all(|stage| stage.estimate <= tolerance),
-        },
+        summary: summary(&path, &models, counts, tolerance, &accuracy),
         path,
         coils,
         models,
         workspace_m: axes.map(|axis| [axis.from, axis.to]),
         accuracy,
     })
+}
+
+/// The figures of the fit; `counts` are of the points of fit and comparison.
+fn summary(
+    path: &Path,
+    models: &[Model],
+    [points, checks]: [usize; 2],
+    tolerance: f64,
+    accuracy: &[StageAccuracy; 2],
+) -> MultipolesSummary {
+    let orders = models.iter().flat_map(|model| &model.coefficients);
+    MultipolesSummary {
+        file: path.display().to_string(),
+        sources: models.iter().map(|m| m.sources.len()).max().unwrap_or(0),
+        coefficients: orders.map(Vec::len).max().unwrap_or(0),
+        condition: models.iter().fold(1.0, |most, m| most.max(m.condition)),
+        points,
+        checks,
+        field_error: accuracy[0].estimate,
+        gradient_error: accuracy[1].estimate,
+        tolerance,
+        tolerance_met: accuracy.iter().all(|stage| stage.estimate <= tolerance),
+    }
 }
 
 /// Where sources can be placed.

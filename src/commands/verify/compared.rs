@@ -66,7 +66,7 @@ pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
     let exact = same_program(bundle);
     let mut faults = Vec::new();
     let manifests = [&bundle.manifest, &expected.manifest].map(serde_json::to_value);
-    let [Ok(mut told), Ok(mut wanted)] = manifests else {
+    let [Ok(mut stored), Ok(mut again)] = manifests else {
         let how = "manifest.json cannot be written as it is".to_owned();
         return Compared {
             check: check("recomputed", 1.0, 0.0, how),
@@ -76,10 +76,10 @@ pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
     };
     if exact {
         differing_files(bundle, expected, &mut faults);
-        for side in [&mut told, &mut wanted] {
+        for side in [&mut stored, &mut again] {
             side["files"] = Value::Null;
         }
-        differing("manifest.json", &told, &wanted, None, &mut faults);
+        differing("manifest.json", &stored, &again, None, &mut faults);
         // Two numbers may be equal and not the same: 0.0 and -0.0.
         let bytes = to_record(&expected.manifest).map(|text| sha256_hex(&text));
         if faults.is_empty() && bytes.as_ref() != Ok(&bundle.manifest_sha256) {
@@ -99,7 +99,7 @@ pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
         made_on(bundle)
     )];
     kept_and_pages(bundle, expected, &mut faults, &mut unchecked);
-    for side in [&mut told, &mut wanted] {
+    for side in [&mut stored, &mut again] {
         for key in ["files", "schema_version", "fluxform_version"] {
             side[key] = Value::Null;
         }
@@ -112,19 +112,19 @@ pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
     }
     differing(
         "manifest.json",
-        &told,
-        &wanted,
+        &stored,
+        &again,
         Some(tolerance),
         &mut faults,
     );
     let lambdas = [&bundle.lambda, &expected.lambda].map(serde_json::to_value);
-    if let [Ok(mut told), Ok(mut wanted)] = lambdas {
-        for side in [&mut told, &mut wanted] {
+    if let [Ok(mut stored), Ok(mut again)] = lambdas {
+        for side in [&mut stored, &mut again] {
             for key in ["schema_version", "fluxform_version"] {
                 side[key] = Value::Null;
             }
         }
-        differing("lambda.json", &told, &wanted, Some(tolerance), &mut faults);
+        differing("lambda.json", &stored, &again, Some(tolerance), &mut faults);
     }
     if !same_points(&bundle.points, &expected.points) {
         faults.push("points.csv".to_owned());
@@ -139,21 +139,21 @@ pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
 }
 
 fn named(name: &'static str, faults: &[String], how: &str) -> Check {
-    let mut told = how.to_owned();
+    let mut stored = how.to_owned();
     if !faults.is_empty() {
         let first: Vec<&str> = faults.iter().take(NAMED).map(String::as_str).collect();
-        told = format!("not what the inputs give: {}", first.join(", "));
+        stored = format!("not what the inputs give: {}", first.join(", "));
         if faults.len() > NAMED {
-            told.push_str(&format!(" and {} more", faults.len() - NAMED));
+            stored.push_str(&format!(" and {} more", faults.len() - NAMED));
         }
     }
-    check(name, faults.len() as f64, 0.0, told)
+    check(name, faults.len() as f64, 0.0, stored)
 }
 
 /// Listed files with another name, place, size or digest.
 fn differing_files(bundle: &Bundle, expected: &Expected, faults: &mut Vec<String>) {
-    let (told, wanted) = (&bundle.manifest.files, &expected.manifest.files);
-    if told == wanted {
+    let (stored, again) = (&bundle.manifest.files, &expected.manifest.files);
+    if stored == again {
         return;
     }
     let before = faults.len();
@@ -163,10 +163,10 @@ fn differing_files(bundle: &Bundle, expected: &Expected, faults: &mut Vec<String
             .map(|file| (file.path.clone(), file.sha256.clone()))
             .collect()
     };
-    let (told, wanted) = (by_name(told), by_name(wanted));
-    let names: BTreeSet<&String> = told.keys().chain(wanted.keys()).collect();
+    let (stored, again) = (by_name(stored), by_name(again));
+    let names: BTreeSet<&String> = stored.keys().chain(again.keys()).collect();
     for name in names {
-        match (told.get(name), wanted.get(name)) {
+        match (stored.get(name), again.get(name)) {
             (Some(a), Some(b)) if a == b => {}
             (Some(_), Some(_)) => faults.push(name.clone()),
             (Some(_), None) => faults.push(format!("{name}, which is none of its files")),
@@ -185,15 +185,15 @@ fn kept_and_pages(
     faults: &mut Vec<String>,
     unchecked: &mut Vec<String>,
 ) {
-    let told: Vec<&str> = bundle
+    let stored: Vec<&str> = bundle
         .manifest
         .files
         .iter()
         .map(|f| f.path.as_str())
         .collect();
-    let wanted = expected.manifest.files.iter();
-    let wanted: Vec<&str> = wanted.map(|f| f.path.as_str()).collect();
-    if told != wanted {
+    let again = expected.manifest.files.iter();
+    let again: Vec<&str> = again.map(|f| f.path.as_str()).collect();
+    if stored != again {
         faults.push("the list of files".to_owned());
     }
     for (a, b) in bundle.manifest.files.iter().zip(&expected.manifest.files) {
@@ -210,10 +210,10 @@ fn kept_and_pages(
     }
 }
 
-fn same_points(told: &[PointRow], wanted: &[PointRow]) -> bool {
+fn same_points(stored: &[PointRow], again: &[PointRow]) -> bool {
     let near = |a: f64, b: f64| (a - b).abs() <= ROUNDING * a.abs().max(b.abs()).max(1e-3);
-    told.len() == wanted.len()
-        && told.iter().zip(wanted).all(|(a, b)| {
+    stored.len() == again.len()
+        && stored.iter().zip(again).all(|(a, b)| {
             let parts = a.normal.iter().zip(&b.normal);
             near(a.x_m, b.x_m)
                 && near(a.y_m, b.y_m)
@@ -239,15 +239,15 @@ fn tolerance(expected: &Expected) -> f64 {
 /// largest beside them, or not at all.
 fn differing(
     at: &str,
-    told: &Value,
-    wanted: &Value,
+    stored: &Value,
+    again: &Value,
     tolerance: Option<f64>,
     faults: &mut Vec<String>,
 ) {
-    if told == wanted {
+    if stored == again {
         return;
     }
-    match (told, wanted) {
+    match (stored, again) {
         (Value::Object(a), Value::Object(b)) if a.keys().eq(b.keys()) => {
             for (key, value) in a {
                 differing(&format!("{at} {key}"), value, &b[key], tolerance, faults);
@@ -261,7 +261,7 @@ fn differing(
         _ => {
             let key = at.rsplit(' ').next().unwrap_or(at);
             let estimate = ESTIMATED.contains(&key);
-            let close = tolerance.is_some_and(|tolerance| near(told, wanted, tolerance, estimate));
+            let close = tolerance.is_some_and(|tolerance| near(stored, again, tolerance, estimate));
             if !close {
                 faults.push(at.to_owned());
             }
@@ -275,7 +275,7 @@ fn numbers(list: &[Value]) -> bool {
 }
 
 /// Whether two numbers, or two lists of numbers, are the same but for rounding.
-fn near(told: &Value, wanted: &Value, tolerance: f64, estimate: bool) -> bool {
+fn near(stored: &Value, again: &Value, tolerance: f64, estimate: bool) -> bool {
     let list = |value: &Value| -> Option<Vec<f64>> {
         match value {
             Value::Array(parts) => parts.iter().map(Value::as_f64).collect(),
@@ -284,10 +284,10 @@ fn near(told: &Value, wanted: &Value, tolerance: f64, estimate: bool) -> bool {
         }
     };
     // Counts and indices are the same or not.
-    if told.is_u64() || told.is_i64() || wanted.is_u64() || wanted.is_i64() {
+    if stored.is_u64() || stored.is_i64() || again.is_u64() || again.is_i64() {
         return false;
     }
-    let (Some(a), Some(b)) = (list(told), list(wanted)) else {
+    let (Some(a), Some(b)) = (list(stored), list(again)) else {
         return false;
     };
     let largest = b.iter().fold(0.0_f64, |most, value| most.max(value.abs()));

@@ -11,7 +11,7 @@ use fluxform::bundle::npz::to_npz;
 use fluxform::bundle::table::{CurrentRow, PointRow, write_rows};
 use fluxform::bundle::trajectory::Trajectory;
 use fluxform::commands::calibrate::{self, CalibrateOptions};
-use fluxform::commands::replay::{self, Opened, summary::Told};
+use fluxform::commands::replay::{self, Opened, summary::TrajectorySource};
 use fluxform::commands::verify;
 use fluxform::design::{Design, Need};
 use fluxform::progress::Silent;
@@ -594,7 +594,7 @@ fn give(input: &Input, folder: &Path) -> Result<bool, String> {
         ],
     };
     for dynamics in [false, true] {
-        let told = Told {
+        let told = TrajectorySource {
             source: "made up".into(),
             input: None,
             synthesis: None,
