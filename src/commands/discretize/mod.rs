@@ -434,14 +434,16 @@ pub(crate) fn with_surface(document: &ShapeDocument, mut inputs: Vec<Input>) -> 
 /// The rows of `points.csv`.
 #[must_use]
 pub fn point_rows(points: &ConstraintPoints) -> Vec<PointRow> {
-    (0..points.len())
-        .map(|i| PointRow {
-            x_m: points.x_m[i],
-            y_m: points.y_m[i],
-            height_m: points.height_m[i],
-            normal: points.normal[i],
-        })
-        .collect()
+    (0..points.len()).map(|k| point_row(points, k)).collect()
+}
+
+fn point_row(points: &ConstraintPoints, k: usize) -> PointRow {
+    PointRow {
+        x_m: points.x_m[k],
+        y_m: points.y_m[k],
+        height_m: points.height_m[k],
+        normal: points.normal[k],
+    }
 }
 
 /// The grid of the points as a manifest states it.

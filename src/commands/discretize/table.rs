@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::point_rows;
+use super::point_row;
 use crate::bundle::table::{PointRow, RowColumn, write_joined_rows};
 use crate::shape::ConstraintPoints;
 use crate::shape::point_flags::Marks;
@@ -37,8 +37,7 @@ const COLUMNS: [RowColumn<Flags>; 10] = [
 
 /// The points of a grid.
 pub(super) fn of_grid(out: &mut dyn Write, points: &ConstraintPoints) -> io::Result<()> {
-    let rows = point_rows(points).into_iter().zip(&points.marks);
-    let rows = rows.map(|(point, marks)| with_flags(point, *marks, 0.0));
+    let rows = (0..points.len()).map(|k| with_flags(point_row(points, k), points.marks[k], 0.0));
     write_joined_rows(out, PointRow::COLUMNS, &COLUMNS[..COLUMNS.len() - 1], rows)
 }
 
