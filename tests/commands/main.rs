@@ -1,6 +1,7 @@
 //! The main job from documents to a verified bundle.
 
 mod cored;
+mod inputs;
 mod near;
 
 use std::path::{Path, PathBuf};

@@ -20,7 +20,7 @@ pub(crate) enum IgnoredPull {
     Unknown(String),
 }
 
-/// What it amounts to.
+/// Its size.
 pub(crate) struct Measured {
     /// The largest of its vertical force at a point, N.
     largest_n: f64,

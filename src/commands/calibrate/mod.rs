@@ -84,7 +84,7 @@ pub struct CalibrateOptions {
 }
 
 impl CalibrateOptions {
-    /// What the command does by default, under the folder `out`.
+    /// The command's defaults, under the folder `out`.
     pub fn new(out: impl Into<PathBuf>) -> Self {
         Self {
             out: out.into(),
@@ -96,7 +96,7 @@ impl CalibrateOptions {
         }
     }
 
-    /// What `verify` needs beside the inputs to compute the same bundle again. A new option does not
+    /// The options that `verify` needs beside the inputs to compute the same bundle again. A new option does not
     /// compile before it is recorded or left out on purpose.
     pub(crate) fn made_with(&self, shape: &ShapeSource) -> MadeWith {
         let CalibrateOptions {
@@ -148,7 +148,7 @@ pub struct CalibrateReport {
     pub fluxform_version: &'static str,
     /// Name of the design.
     pub design: String,
-    /// What was to be computed and what left out, where that was requested first.
+    /// The plan, where `--explain` requested it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plan: Option<Plan>,
     /// One entry a shape, in the order given.

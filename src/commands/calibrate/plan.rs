@@ -325,7 +325,7 @@ fn change(of: &[f64], other: &[f64], coils: usize) -> f64 {
     .fold(0.0, f64::max)
 }
 
-/// What changing the design by `edit` does to the forces at `places`.
+/// The change of the forces at `places` from one edit of the design to another.
 fn cost_of(
     design: &Design,
     tolerance: Option<f64>,

@@ -19,11 +19,11 @@ use crate::design::Need;
 
 /// How differently several objects feel, in just-noticeable differences of force
 ///
-/// Renders every object at its own force constant (lambda_jnd, as `lambda` tells it) and compares
+/// Renders every object at its own force constant (lambda_jnd, as `lambda` reports it) and compares
 /// every two of them wherever a finger would touch either: at the points of both surfaces. With
 /// static currents each object's currents give a force at any place. With position feedback the
 /// force is lambda h(x, y), by currents of least power, the nearest force where the limits bind and
-/// none beside the object. A difference of two forces is told in units of what a finger just
+/// none beside the object. A difference of two forces is stated in units of what a finger just
 /// notices: a part (--jnd) of the larger force, but at least 0.8 mN; where one object gives no force
 /// and the other a strong one it is 1/jnd, the most there is. A lambda that is null ends with exit
 /// code 4.

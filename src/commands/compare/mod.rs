@@ -56,11 +56,11 @@ pub struct CompareReport {
     pub fluxform_version: &'static str,
     /// Name of the design.
     pub design: String,
-    /// What went in, paths as given on the command line.
+    /// Input files, paths as given on the command line.
     pub inputs: Vec<Input>,
-    /// Forces this part apart are just told apart.
+    /// Forces that differ by this part are just distinguished.
     pub jnd: f64,
-    /// Forces this much apart are, whatever their size, not told apart, N.
+    /// Forces that differ by less are not distinguished, whatever their size, N.
     pub threshold_n: f64,
     /// How each lambda was chosen: `jnd`, or `given`.
     pub criterion: &'static str,
@@ -357,7 +357,7 @@ impl RenderedForces {
 
 impl Rendered {
     fn of(solution: Solution, options: &CompareOptions) -> Option<Self> {
-        // A constant that was asked for is rendered as well as can be.
+        // A constant that was given is rendered as well as can be.
         let point = match options.lambda_n_per_m {
             Some(_) => solution.at,
             None => solution.chosen,
@@ -409,7 +409,7 @@ fn fields(
     Ok(fields)
 }
 
-/// Every two objects, and the largest error of the differences told.
+/// Every two objects, and the largest error of their differences.
 fn pairs(
     objects: &[Object],
     fields: &[Vec<RenderedForces>],
@@ -446,17 +446,17 @@ fn pairs(
             for found in [&fixed, &feedback].into_iter().flatten() {
                 error = error.max(found.error(part, jnd));
             }
-            let told =
+            let of =
                 |found: &Option<Difference>, pick: fn(&Difference) -> f64| found.as_ref().map(pick);
             pairs.push(Pair {
                 a: a.name().to_owned(),
                 b: b.name().to_owned(),
-                static_jnd: told(&fixed, |d| d.largest),
-                feedback_jnd: told(&feedback, |d| d.largest),
-                static_rms_jnd: told(&fixed, |d| d.rms),
-                feedback_rms_jnd: told(&feedback, |d| d.rms),
-                static_felt_share: told(&fixed, |d| d.felt_share),
-                feedback_felt_share: told(&feedback, |d| d.felt_share),
+                static_jnd: of(&fixed, |d| d.largest),
+                feedback_jnd: of(&feedback, |d| d.largest),
+                static_rms_jnd: of(&fixed, |d| d.rms),
+                feedback_rms_jnd: of(&feedback, |d| d.rms),
+                static_felt_share: of(&fixed, |d| d.felt_share),
+                feedback_felt_share: of(&feedback, |d| d.felt_share),
                 static_at: fixed.as_ref().map(place),
                 feedback_at: feedback.as_ref().map(place),
             });

@@ -35,7 +35,7 @@ mod picture;
 pub mod scattered;
 mod table;
 
-use picture::{Scale, Seen};
+use picture::{PictureData, Scale};
 
 /// The points of a grid and their figures.
 #[derive(Debug, Clone)]
@@ -57,7 +57,7 @@ pub struct PointsSummary {
     pub fluxform_version: &'static str,
     /// Name of the shape.
     pub shape: String,
-    /// What went in.
+    /// Input files.
     pub inputs: Vec<Input>,
     /// The options of the run.
     #[serde(skip_serializing_if = "Options::is_empty")]
@@ -297,7 +297,7 @@ impl OpenedSurface {
     /// file.
     ///
     /// # Errors
-    /// A file that is no surface.
+    /// A file without a surface.
     fn new(document: &ShapeDocument, mut inputs: Vec<Input>) -> Result<Self, RunError> {
         let mut parsed = ParsedBytes::default();
         let (surface, warnings) = Surface::open_observed(document, &mut parsed)
@@ -466,7 +466,7 @@ impl PointsReport {
         table::of_grid(out, &self.discretized.points)
     }
 
-    /// The points' heights, what they are besides, and how far the surface departs between them.
+    /// The points' heights and flags, and how far the surface departs between them.
     #[must_use]
     pub fn picture(&self) -> PlanePlot {
         let points = &self.discretized.points;
@@ -476,7 +476,7 @@ impl PointsReport {
             heights[index] = Some(points.height_m[row]);
             marks[index] = Some(points.marks[row]);
         }
-        picture::picture(&Seen {
+        picture::picture(&PictureData {
             title: format!("{}: constraint points", self.summary.shape),
             scale: Scale::MILLIMETRES,
             grid: &points.grid,
@@ -487,7 +487,7 @@ impl PointsReport {
     }
 
     /// Writes the points to `path` and the summary beside them, `points.csv` and `points.json`:
-    /// both or none. What is there is replaced only with `force` or when its summary is of the same
+    /// both or none. Existing files are replaced only with `force` or when its summary is of the same
     /// inputs and lists it unchanged.
     ///
     /// # Errors
@@ -513,7 +513,7 @@ impl TableFiles {
     /// Those of the table at `path`, made from `inputs`.
     ///
     /// # Errors
-    /// A name that is none, or that ends as the summary does.
+    /// An invalid name, or one that ends as the summary does.
     pub fn new(path: &Path, force: bool, inputs: &[Input]) -> Result<Self, RunError> {
         let name = path
             .file_name()

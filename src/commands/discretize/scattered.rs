@@ -60,7 +60,7 @@ pub struct ScatteredSummary {
     pub fluxform_version: &'static str,
     /// Name of the shape.
     pub shape: String,
-    /// What went in.
+    /// Input files.
     pub inputs: Vec<Input>,
     /// The options of the run.
     pub made_with: Options,

@@ -1,4 +1,4 @@
-//! The table of constraint points, with what each point is besides a height.
+//! The table of constraint points with their flags.
 
 use std::io::{self, Write};
 

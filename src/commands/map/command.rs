@@ -28,13 +28,13 @@ use crate::scene::cost;
 /// Tabulates the gradient of every coil's field per ampere over the workspace grid of the design
 /// and writes map.npz (NumPy, little-endian doubles with axes and units) and map.json beside it;
 /// on request also map.csv and map.vti, which ParaView opens. The error at the nodes and the error
-/// of interpolating between them are told; of arrays with coupled steel cores also the compact form
-/// that stood for the steel, and how far it was seen to be off.
+/// of interpolating between them are stated; of arrays with coupled steel cores also the compact form
+/// that stood for the steel, and its largest error at samples.
 ///
 /// --vfield and --mpem write calibration files of mag_manip, ETH Zurich's runtime for magnetic
 /// manipulation: the field on nodes that span the workspace and one step more, whose error between
-/// the nodes is told, and sources on the coils' axes, whose error at places that the fit did not
-/// see is told; the latter ends with code 4 where it exceeds --mpem-tolerance.
+/// the nodes is stated, and sources on the coils' axes, whose error at places that the fit did not
+/// see is stated; the latter ends with code 4 where it exceeds --mpem-tolerance.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Writing, &[
     ("fluxform map designs/seed.toml --out maps", "dBz/dz of all coils"),
@@ -115,7 +115,7 @@ impl Map {
             );
         }
         if let Some(wrong) = self.currents.iter().find(|i| !i.is_finite()) {
-            return fault(format!("{wrong} is no current"));
+            return fault(format!("invalid current {wrong}"));
         }
         match self.currents.as_slice() {
             [all] => Ok(Some(vec![*all; coils])),
@@ -198,7 +198,7 @@ impl Map {
         {
             return Err(Failure::Unmet(
                 Wish::Accuracy,
-                "the accuracy asked for with --mpem-tolerance was not reached: see the accuracy of \
+                "the accuracy requested with --mpem-tolerance was not reached: see the accuracy of \
                  mpem and mpem_gradient; the files are written. A workspace that begins higher \
                  above the coils, or a larger tolerance, helps"
                     .to_owned(),

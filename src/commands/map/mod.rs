@@ -391,7 +391,7 @@ pub(crate) fn workspace_grid(design: &Design) -> Grid {
     }
 }
 
-/// The map's grid, coils and interpolation as artefacts tell them.
+/// The map's grid, coils and interpolation as artefacts state them.
 pub(crate) fn summary(
     map: &FieldMap,
     components: Components,

@@ -143,7 +143,7 @@ pub struct DynamicsSummary {
     pub time_constant_min_s: f64,
     /// The slowest, s.
     pub time_constant_max_s: f64,
-    /// What bounds the coils' voltages, V; null where nothing does.
+    /// The bound of the coils' voltages, V; null without one.
     pub voltage_v: Option<f64>,
 }
 

@@ -51,7 +51,7 @@ pub(super) struct Compared {
     pub(super) exact: bool,
 }
 
-/// What a bundle says of the program that made it.
+/// The program that made a bundle, as it says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum MadeBy {
     /// This program, with this platform's arithmetic: it writes the same bytes.
@@ -209,7 +209,7 @@ fn differing_files(bundle: &Bundle, expected: &Expected, faults: &mut Vec<String
         match (stored.get(name), again.get(name)) {
             (Some(a), Some(b)) if a == b => {}
             (Some(_), Some(_)) => faults.push(name.clone()),
-            (Some(_), None) => faults.push(format!("{name}, which is none of its files")),
+            (Some(_), None) => faults.push(format!("{name}, which is not one of its files")),
             (None, _) => faults.push(format!("{name}, which is not listed")),
         }
     }

@@ -154,11 +154,11 @@ fn passive_slack(
 ) -> f64 {
     let Some(offset_n) = offset_n else { return 0.0 };
     let rms = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>().sqrt();
-    let told = [
+    let stored = [
         bundle.lambda.lambda_n_per_m,
         bundle.lambda.constants.lambda_linear_n_per_m,
     ];
-    let least = told
+    let least = stored
         .into_iter()
         .flatten()
         .filter(|l| *l > 0.0)
