@@ -111,9 +111,7 @@ pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
     };
     if exact {
         differing_files(bundle, expected, &mut faults);
-        for side in [&mut stored, &mut again] {
-            side["files"] = Value::Null;
-        }
+        ignore([&mut stored, &mut again], &["files"]);
         let mut differences = Differences::new(made_by, None);
         differences.add("manifest.json", &stored, &again);
         faults.extend(differences.faults);
@@ -137,26 +135,21 @@ pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
     )];
     let same_list = made_by != MadeBy::Another;
     kept_and_pages(bundle, expected, same_list, &mut faults, &mut unchecked);
-    for side in [&mut stored, &mut again] {
-        for key in ["files", "schema_version", "fluxform_version"] {
-            side[key] = Value::Null;
-        }
-        if let Some(made_with) = side.get_mut("made_with") {
-            // Criterion and difference are compared in `lambda.json`; older bundles have them there alone.
-            for key in ["arithmetic", "sha256", "criterion", "jnd", "at_n_per_m"] {
-                made_with[key] = Value::Null;
-            }
+    let versions = ["schema_version", "fluxform_version"];
+    ignore([&mut stored, &mut again], &versions);
+    ignore([&mut stored, &mut again], &["files"]);
+    let sides = [&mut stored, &mut again];
+    for made_with in sides.into_iter().filter_map(|s| s.get_mut("made_with")) {
+        // Criterion and difference are compared in `lambda.json`; older bundles have them there alone.
+        for key in ["arithmetic", "sha256", "criterion", "jnd", "at_n_per_m"] {
+            made_with[key] = Value::Null;
         }
     }
     let mut differences = Differences::new(made_by, Some(tolerance));
     differences.add("manifest.json", &stored, &again);
     let lambdas = [&bundle.lambda, &expected.lambda].map(serde_json::to_value);
     if let [Ok(mut stored), Ok(mut again)] = lambdas {
-        for side in [&mut stored, &mut again] {
-            for key in ["schema_version", "fluxform_version"] {
-                side[key] = Value::Null;
-            }
-        }
+        ignore([&mut stored, &mut again], &versions);
         differences.add("lambda.json", &stored, &again);
     }
     faults.extend(differences.faults);
@@ -178,16 +171,25 @@ pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
     }
 }
 
-fn named(name: &'static str, faults: &[String], how: &str) -> Check {
-    let mut stored = how.to_owned();
-    if !faults.is_empty() {
-        let first: Vec<&str> = faults.iter().take(NAMED).map(String::as_str).collect();
-        stored = format!("not what the inputs give: {}", first.join(", "));
-        if faults.len() > NAMED {
-            stored.push_str(&format!(" and {} more", faults.len() - NAMED));
+/// Makes entries of two documents the same.
+fn ignore(sides: [&mut Value; 2], keys: &[&str]) {
+    for side in sides {
+        for key in keys {
+            side[*key] = Value::Null;
         }
     }
-    check(name, faults.len() as f64, 0.0, stored)
+}
+
+fn named(name: &'static str, faults: &[String], how: &str) -> Check {
+    let mut text = how.to_owned();
+    if !faults.is_empty() {
+        let first: Vec<&str> = faults.iter().take(NAMED).map(String::as_str).collect();
+        text = format!("not what the inputs give: {}", first.join(", "));
+        if faults.len() > NAMED {
+            text.push_str(&format!(" and {} more", faults.len() - NAMED));
+        }
+    }
+    check(name, faults.len() as f64, 0.0, text)
 }
 
 /// Listed files with another name, place, size or digest.
