@@ -4,7 +4,7 @@ use super::PosedProblem;
 use super::points::WantedPoints;
 use crate::lambda::feedback::reachable;
 use crate::lambda::worst::WorstSolution;
-use crate::lambda::{Criterion, ForceProblem, Solution, Status};
+use crate::lambda::{ForceProblem, Solution, Status};
 
 /// More deciding points than this are counted, not listed.
 const LISTED: usize = 3;
@@ -16,22 +16,28 @@ pub(super) fn all(posed: &PosedProblem, solution: &Solution, worst: &WorstSoluti
     warnings.extend(of_status(solution.status).map(str::to_owned));
     let criterion = posed.options.settings.criterion;
     match &solution.chosen {
-        None if solution.status == Status::Solved => warnings.push(match criterion {
-            Criterion::Maxmin => no_maxmin(points, problem),
-            Criterion::Jnd | Criterion::Linear | Criterion::Saturation => format!(
-                "the limits never bind by the criterion {}: lambda is null; choose another with \
-                 --criterion",
-                criterion.name()
-            ),
-        }),
-        Some(chosen) if chosen.lambda_n_per_m == 0.0 => warnings.push(match criterion {
-            Criterion::Maxmin => maxmin_is_zero(points, problem, &solution.maxmin_points),
-            Criterion::Jnd | Criterion::Linear | Criterion::Saturation => format!(
-                "lambda is 0 by the criterion {}: {}",
-                criterion.name(),
-                binds_at_zero(problem)
-            ),
-        }),
+        None if solution.status == Status::Solved => {
+            warnings.push(if criterion.is_least_mean_square() {
+                format!(
+                    "the limits never bind by the criterion {}: lambda is null; choose another \
+                     with --criterion",
+                    criterion.name()
+                )
+            } else {
+                no_maxmin(points, problem)
+            });
+        }
+        Some(chosen) if chosen.lambda_n_per_m == 0.0 => {
+            warnings.push(if criterion.is_least_mean_square() {
+                format!(
+                    "lambda is 0 by the criterion {}: {}",
+                    criterion.name(),
+                    binds_at_zero(problem)
+                )
+            } else {
+                maxmin_is_zero(points, problem, &solution.maxmin_points)
+            });
+        }
         Some(chosen) => warnings.extend(
             solution
                 .constants

@@ -7,7 +7,7 @@ use crate::RunError;
 use crate::bundle::lambda_file::LambdaFile;
 use crate::bundle::load::Bundle;
 use crate::field::winding::KERNEL_ERROR;
-use crate::lambda::{self, Criterion, ForceProblem, Settings};
+use crate::lambda::{self, ForceProblem, Settings};
 use crate::progress::Progress;
 use crate::scene::evaluation_sample::spread;
 use crate::scene::steel::{self, Steel};
@@ -119,14 +119,13 @@ fn currents_checks(
         let off = stored.map_or(f64::INFINITY, |stored| (stored - again).abs());
         check(name, ratio(off, rms_force), agrees, how.to_owned())
     };
-    let last = match stored.criterion {
-        Criterion::Linear | Criterion::Jnd | Criterion::Saturation => {
-            let gap = ratio(duality_gap(problem, &residual, currents), mean_square_force);
-            let how = "proof of optimality: no currents within the limits are better by more";
-            check("duality gap", gap, slack.max(GAP_ALLOWED), how.to_owned())
-        }
+    let last = if stored.criterion.is_least_mean_square() {
+        let gap = ratio(duality_gap(problem, &residual, currents), mean_square_force);
+        let how = "proof of optimality: no currents within the limits are better by more";
+        check("duality gap", gap, slack.max(GAP_ALLOWED), how.to_owned())
+    } else {
         // These currents are for the weakest point, not for the mean square.
-        Criterion::Maxmin => worst::weakest_point(&residual, rms_force, agrees),
+        worst::weakest_point(&residual, rms_force, agrees)
     };
     vec![
         against(
