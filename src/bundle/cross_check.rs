@@ -1,6 +1,6 @@
 //! A bundle says some things twice: for people, for C programs, for spreadsheets. They must agree.
 
-use super::array_checks::LARGEST;
+use super::array_check::LARGEST;
 use super::lambda_file::LambdaFile;
 use super::manifest::{AxisSummary, INTERPOLATION, Manifest};
 use super::npz::{MapArrays, PASSIVE};
@@ -107,7 +107,7 @@ fn check_errors(manifest: &Manifest) -> Result<(), String> {
     Ok(())
 }
 
-/// Names are told to people and to terminals.
+/// Names are printed for people and on terminals.
 fn check_names(manifest: &Manifest) -> Result<(), String> {
     let names = [
         ("design", &manifest.design),

@@ -16,7 +16,7 @@
 //! assert!(refused.to_string().contains("it has no manifest.json"));
 //! ```
 
-mod array_checks;
+mod array_check;
 pub mod artefact;
 #[allow(clippy::disallowed_methods)] // the one place that writes files
 pub mod atomic;

@@ -1,4 +1,4 @@
-//! `map.csv`: a map as a table of samples.
+//! A map as CSV: what `probe` gives at its nodes.
 
 use std::io::{self, Write};
 
@@ -9,7 +9,7 @@ use super::table::{FIELD_COLUMNS, GRADIENT_COLUMNS, write_samples};
 /// the map has them, else dB_z/dz alone.
 ///
 /// # Errors
-/// As [`write_columns`].
+/// As [`super::table::write_columns`].
 pub fn write_map(out: &mut dyn Write, map: &MapArrays) -> io::Result<()> {
     let [_, nz, ny, nx] = map.shape();
     let nodes = nz * ny * nx;

@@ -1,4 +1,4 @@
-//! `map.npz`: axes, coil indices, maps per ampere, and what a runtime needs besides.
+//! `map.npz`: axes, coil indices, maps per ampere, and what else a runtime needs.
 //!
 //! A stored zip of NPY 1.0 arrays with fixed time stamps: the same numbers give the same bytes.
 //! Besides the contract's arrays it holds the few numbers a runtime needs, so that C and MATLAB
@@ -6,8 +6,8 @@
 //! of the array: `current_min_a`, `current_max_a`, `resistance_ohm`; where there are such,
 //! `total_current_max_a` and `lambda_n_per_m` (no dimension). `coil` holds the indices of the
 //! coils whose maps were kept; the others give no force. `passive_force_n`, where it is there, is
-//! what the unpowered steel adds to the force. What a bundle's runtime needs besides to follow a
-//! finger is told in [`super::rendering`].
+//! what the unpowered steel adds to the force. What else a bundle's runtime needs to follow a
+//! finger is described in [`super::rendering`].
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -16,8 +16,7 @@ use std::io::{self, Cursor, Write};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
-pub use super::array_checks::NpzError;
-use super::array_checks::{BEYOND, LARGEST, all_finite, all_within, bad, check_nodes};
+use super::array_check::{BEYOND, LARGEST, all_finite, all_within, bad, check_nodes};
 use super::artefact::{SCHEMA_VERSION, check_version, parse_version};
 use super::npy;
 use super::rendering::{
@@ -25,6 +24,8 @@ use super::rendering::{
     VOLTAGE,
 };
 use super::stored;
+
+pub use super::array_check::NpzError;
 
 #[cfg(target_endian = "big")]
 compile_error!("arrays are written as they lie in memory, which must be little-endian");
@@ -50,7 +51,7 @@ pub struct MapArrays<'a> {
     pub passive_force_n: Option<Cow<'a, [f64]>>,
     /// dB_z/dz of all coils at the working point's currents, `[z, y, x]`, T/m.
     pub working_point_gz_t_per_m: Option<Cow<'a, [f64]>>,
-    /// What a runtime needs besides the maps.
+    /// What a runtime needs in addition to the maps.
     pub runtime: Runtime,
 }
 

@@ -1,4 +1,4 @@
-//! What rendering with position feedback needs besides the map, as arrays of `map.npz`: the
+//! What rendering with position feedback needs in addition to the map, as arrays of `map.npz`: the
 //! heights on their grid, the static currents, and the coils' circuit.
 //!
 //! `height_x_m`, `height_y_m`, `height_m` `[y, x]` and `has_height` `[y, x]` (1 where there is a
@@ -6,7 +6,7 @@
 //! `inductance_h` `[coil, coil]`, and `voltage_v` (no dimension) where the supply's is known. All
 //! are f64, the flags too, so that loaders of older bundles pass over them. New in schema 1.2.
 
-use super::array_checks::{BEYOND, LARGEST, NpzError, all_finite, all_within, bad, check_nodes};
+use super::array_check::{BEYOND, LARGEST, NpzError, all_within, bad, check_nodes};
 use super::manifest::PointsGrid;
 use super::table::PointRow;
 
@@ -55,7 +55,7 @@ impl Rendering {
                 let message = format!("must hold {count} numbers, holds {}", values.len());
                 return Err(bad(name, message));
             }
-            if !all_finite(values) {
+            if !values.iter().all(|value| value.is_finite()) {
                 return Err(bad(name, "holds a number that is not finite"));
             }
             if !all_within(values, LARGEST) {

@@ -164,7 +164,7 @@ fn overwrite_bundle(
     Overwrite::new(force, target.join("manifest.json"), inputs).made_with(&options)
 }
 
-/// Which formats of a map are wanted beside `map.npz`.
+/// Which formats of a map are requested beside `map.npz`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MapFormats {
     /// `map.csv`.
@@ -232,7 +232,7 @@ fn overwrite_map(
         .protecting(protected)
 }
 
-/// Of files in the map's folder its sidecar tells; others are replaced by the same bytes alone.
+/// Files in the map's folder are listed by its sidecar; others are replaced by the same bytes alone.
 fn overwrite_beside(path: &Path, folder: &Path, of_map: Overwrite) -> Overwrite {
     if name_in(folder, path).is_some() {
         of_map
@@ -340,7 +340,7 @@ pub fn write_map_and(
     Ok(sidecar)
 }
 
-/// Writes a JSON result that tells its own `inputs`.
+/// Writes a JSON result that states its own `inputs`.
 ///
 /// # Errors
 /// [`WriteError`].

@@ -51,7 +51,7 @@ pub(super) struct Compared {
     pub(super) exact: bool,
 }
 
-/// The program that made a bundle, as it says.
+/// What a bundle says of the program that made it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum MadeBy {
     /// This program, with this platform's arithmetic: it writes the same bytes.
@@ -98,35 +98,19 @@ pub(super) fn made_on(bundle: &Bundle) -> &str {
 /// Compares all that `bundle` holds with `expected`.
 pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
     let made_by = MadeBy::of(bundle);
-    let exact = made_by == MadeBy::Same;
-    let mut faults = Vec::new();
     let manifests = [&bundle.manifest, &expected.manifest].map(serde_json::to_value);
     let [Ok(mut stored), Ok(mut again)] = manifests else {
         let how = "manifest.json cannot be written as it is".to_owned();
         return Compared {
             check: check("recomputed", 1.0, 0.0, how),
             unchecked: Vec::new(),
-            exact,
+            exact: made_by == MadeBy::Same,
         };
     };
-    if exact {
-        differing_files(bundle, expected, &mut faults);
-        ignore([&mut stored, &mut again], &["files"]);
-        let mut differences = Differences::new(made_by, None);
-        differences.add("manifest.json", &stored, &again);
-        faults.extend(differences.faults);
-        // Two numbers may be equal and not the same: 0.0 and -0.0.
-        let bytes = to_record(&expected.manifest).map(|text| sha256_hex(&text));
-        if faults.is_empty() && bytes.as_ref() != Ok(&bundle.manifest_sha256) {
-            faults.push("manifest.json is not written as this program writes it".to_owned());
-        }
-        let how = "every byte of every file computed again from the inputs";
-        return Compared {
-            check: named("recomputed", &faults, how),
-            unchecked: Vec::new(),
-            exact,
-        };
+    if made_by == MadeBy::Same {
+        return exactly(bundle, expected, [stored, again]);
     }
+    let mut faults = Vec::new();
     let tolerance = tolerance(expected);
     let mut unchecked = vec![format!(
         "the last bits of numbers: made by fluxform {} on {}; verify there",
@@ -135,21 +119,26 @@ pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
     )];
     let same_list = made_by != MadeBy::Another;
     kept_and_pages(bundle, expected, same_list, &mut faults, &mut unchecked);
-    let versions = ["schema_version", "fluxform_version"];
-    ignore([&mut stored, &mut again], &versions);
-    ignore([&mut stored, &mut again], &["files"]);
-    let sides = [&mut stored, &mut again];
-    for made_with in sides.into_iter().filter_map(|s| s.get_mut("made_with")) {
-        // Criterion and difference are compared in `lambda.json`; older bundles have them there alone.
-        for key in ["arithmetic", "sha256", "criterion", "jnd", "at_n_per_m"] {
-            made_with[key] = Value::Null;
+    for side in [&mut stored, &mut again] {
+        for key in ["files", "schema_version", "fluxform_version"] {
+            side[key] = Value::Null;
+        }
+        if let Some(made_with) = side.get_mut("made_with") {
+            // Criterion and difference are compared in `lambda.json`; older bundles have them there alone.
+            for key in ["arithmetic", "sha256", "criterion", "jnd", "at_n_per_m"] {
+                made_with[key] = Value::Null;
+            }
         }
     }
     let mut differences = Differences::new(made_by, Some(tolerance));
     differences.add("manifest.json", &stored, &again);
     let lambdas = [&bundle.lambda, &expected.lambda].map(serde_json::to_value);
     if let [Ok(mut stored), Ok(mut again)] = lambdas {
-        ignore([&mut stored, &mut again], &versions);
+        for side in [&mut stored, &mut again] {
+            for key in ["schema_version", "fluxform_version"] {
+                side[key] = Value::Null;
+            }
+        }
         differences.add("lambda.json", &stored, &again);
     }
     faults.extend(differences.faults);
@@ -167,29 +156,44 @@ pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
     Compared {
         check: named("recomputed", &faults, how),
         unchecked,
-        exact,
+        exact: false,
     }
 }
 
-/// Makes entries of two documents the same.
-fn ignore(sides: [&mut Value; 2], keys: &[&str]) {
-    for side in sides {
-        for key in keys {
-            side[*key] = Value::Null;
-        }
+/// Every byte; `manifests` are the bundle's and the expected one.
+fn exactly(bundle: &Bundle, expected: &Expected, manifests: [Value; 2]) -> Compared {
+    let mut faults = Vec::new();
+    differing_files(bundle, expected, &mut faults);
+    let [stored, again] = manifests.map(|mut side| {
+        side["files"] = Value::Null;
+        side
+    });
+    let mut differences = Differences::new(MadeBy::Same, None);
+    differences.add("manifest.json", &stored, &again);
+    faults.extend(differences.faults);
+    // Two numbers may be equal and not the same: 0.0 and -0.0.
+    let bytes = to_record(&expected.manifest).map(|text| sha256_hex(&text));
+    if faults.is_empty() && bytes.as_ref() != Ok(&bundle.manifest_sha256) {
+        faults.push("manifest.json is not written as this program writes it".to_owned());
+    }
+    let how = "every byte of every file computed again from the inputs";
+    Compared {
+        check: named("recomputed", &faults, how),
+        unchecked: Vec::new(),
+        exact: true,
     }
 }
 
 fn named(name: &'static str, faults: &[String], how: &str) -> Check {
-    let mut text = how.to_owned();
+    let mut stored = how.to_owned();
     if !faults.is_empty() {
         let first: Vec<&str> = faults.iter().take(NAMED).map(String::as_str).collect();
-        text = format!("not what the inputs give: {}", first.join(", "));
+        stored = format!("not what the inputs give: {}", first.join(", "));
         if faults.len() > NAMED {
-            text.push_str(&format!(" and {} more", faults.len() - NAMED));
+            stored.push_str(&format!(" and {} more", faults.len() - NAMED));
         }
     }
-    check(name, faults.len() as f64, 0.0, text)
+    check(name, faults.len() as f64, 0.0, stored)
 }
 
 /// Listed files with another name, place, size or digest.
@@ -211,7 +215,7 @@ fn differing_files(bundle: &Bundle, expected: &Expected, faults: &mut Vec<String
         match (stored.get(name), again.get(name)) {
             (Some(a), Some(b)) if a == b => {}
             (Some(_), Some(_)) => faults.push(name.clone()),
-            (Some(_), None) => faults.push(format!("{name}, which is not one of its files")),
+            (Some(_), None) => faults.push(format!("{name}, which is none of its files")),
             (None, _) => faults.push(format!("{name}, which is not listed")),
         }
     }

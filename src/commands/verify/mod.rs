@@ -93,8 +93,8 @@ pub fn run(path: &Path, progress: &dyn Progress) -> Result<VerifyReport, RunErro
     Verifier::default().verify(path, VerifyOptions::default(), progress)
 }
 
-/// Refuses a cost beyond the memory that is granted.
-pub type MemoryCheck = fn(&Cost) -> Result<(), String>;
+/// Refuses, with the reason, a cost beyond what the machine grants.
+pub type Limit = fn(&Cost) -> Result<(), String>;
 
 /// Verifies one bundle after another. A bundle is computed from its inputs once for all in a row
 /// that name the same inputs and options.
@@ -102,7 +102,7 @@ pub type MemoryCheck = fn(&Cost) -> Result<(), String>;
 pub struct Verifier {
     last: Option<(Recipe, Arc<Expected>)>,
     /// Refuses what takes more memory than allowed.
-    within: Option<MemoryCheck>,
+    within: Option<Limit>,
 }
 
 /// All that decides the content of a bundle.
@@ -145,7 +145,7 @@ impl Judgement {
 impl Verifier {
     /// One that asks `within` before it computes whether a cost is allowed; a message refuses it.
     #[must_use]
-    pub fn limited(within: MemoryCheck) -> Self {
+    pub fn limited(within: Limit) -> Self {
         Self {
             last: None,
             within: Some(within),

@@ -1,6 +1,6 @@
-//! What the numbers of `map.npz` must satisfy, and the errors where they do not.
+//! What every array of a `map.npz` must be, and what is wrong with one that is not.
 
-/// A fault of a `map.npz`.
+/// What is wrong with a `map.npz`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NpzError {
     /// Not a zip archive, or cut short.
