@@ -111,9 +111,7 @@ impl MeshReport {
         path: &Path,
         observer: &mut dyn ByteObserver,
     ) -> Result<Self, ShapeError> {
-        let format =
-            SurfaceFormat::of(path).ok_or_else(|| ShapeError::Format { path: path.into() })?;
-        let file = read_mesh(format, path, observer)?;
+        let (format, file) = read_mesh(path, observer)?;
         let coordinates = file.triangles.as_flattened().as_flattened().iter();
         let largest = coordinates.fold(0.0, |m: f64, c| m.max(c.abs()));
         if largest > FARTHEST {
