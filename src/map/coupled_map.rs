@@ -28,6 +28,7 @@ pub struct TableReport {
     /// Points sampled for the table and its check, over all attempts.
     pub samples: usize,
     /// Nodes along x, y, z.
+    #[serde(rename = "nodes")]
     pub degrees: [usize; 3],
     /// Coefficients kept, over all drives and components.
     pub coefficients: usize,

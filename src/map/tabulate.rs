@@ -5,6 +5,7 @@
 //! the direct sums once it is the cheaper of the two.
 
 use serde::{Deserialize, Serialize};
+use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 use rayon::prelude::*;
 
@@ -17,15 +18,48 @@ use fluxform_field::winding::{AxialField, OnEdge};
 use fluxform_numerics::chebyshev::{Evaluation, Layout};
 use fluxform_numerics::dispatch;
 
-/// What a map holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// The components of a map. The name in artefacts and on the command line is the variant's in lower
+/// case, its meaning the first line of the variant's comment.
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Default,
+    EnumMessage,
+    EnumString,
+    IntoStaticStr,
+    VariantArray,
+    Serialize,
+)]
+#[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Components {
-    /// dB_z/dz.
+    /// dBz/dz
+    #[default]
     Gz,
-    /// dB_z/dz and the whole gradient tensor.
+    /// dBz/dz and the gradient tensor
     Gradient,
-    /// dB_z/dz, the gradient tensor and the field.
+    /// dBz/dz, the gradient tensor and the field
     All,
+}
+
+impl Components {
+    /// All of them.
+    pub const ALL: &[Self] = Self::VARIANTS;
+
+    /// The name in artefacts and on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+
+    /// The components in words.
+    #[must_use]
+    pub fn meaning(self) -> &'static str {
+        self.get_documentation().unwrap_or_default()
+    }
 }
 
 /// Maps per ampere of every coil over a grid, C order.

@@ -1,6 +1,6 @@
 //! A surface in metres, whether it is a mesh or a formula.
 
-use std::io;
+use std::io::{self, Read};
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -28,12 +28,50 @@ pub enum Surface {
     Primitive(PlacedPrimitive),
 }
 
+/// Sees the bytes of a surface file as they are parsed, so that a digest is of those bytes.
+pub trait ByteObserver {
+    /// The file is read from its beginning: earlier bytes do not count.
+    fn restart(&mut self);
+    /// The next bytes.
+    fn observe(&mut self, bytes: &[u8]);
+}
+
+impl ByteObserver for () {
+    fn restart(&mut self) {}
+    fn observe(&mut self, _: &[u8]) {}
+}
+
+/// A source whose bytes are observed as they are read.
+struct Observed<'a, R> {
+    source: R,
+    observer: &'a mut dyn ByteObserver,
+}
+
+impl<R: Read> Read for Observed<'_, R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.source.read(buffer)?;
+        self.observer.observe(&buffer[..count]);
+        Ok(count)
+    }
+}
+
 impl Surface {
     /// Opens, reads and places what a document names; the second value holds warnings.
     ///
     /// # Errors
     /// [`ShapeError`] with the path and the place.
     pub fn open(document: &ShapeDocument) -> Result<(Self, Vec<String>), ShapeError> {
+        Self::open_observed(document, &mut ())
+    }
+
+    /// As [`Surface::open`]; `observer` sees the bytes of the surface's file, if it has one.
+    ///
+    /// # Errors
+    /// As [`Surface::open`].
+    pub fn open_observed(
+        document: &ShapeDocument,
+        observer: &mut dyn ByteObserver,
+    ) -> Result<(Self, Vec<String>), ShapeError> {
         check_placement(&document.placement)?;
         let (path, unit_m) = match &document.source {
             SurfaceSource::Primitive(primitive) => {
@@ -42,7 +80,7 @@ impl Surface {
             }
             SurfaceSource::File { path, unit_m } => (path, unit_m),
         };
-        let (mut file, unit_m) = read(path, *unit_m)?;
+        let (mut file, unit_m) = read_observed(path, *unit_m, observer)?;
         let mut warnings = std::mem::take(&mut file.warnings);
         let transform = Transform::new(unit_m, &document.placement).scaled(document.scale);
         let mesh = Mesh::place(file, &transform)?;
@@ -111,6 +149,14 @@ impl Surface {
 /// # Errors
 /// [`ShapeError`]: no or another unit, a file that cannot be read.
 pub fn read(path: &Path, stated_m: Option<f64>) -> Result<(FileMesh, f64), ShapeError> {
+    read_observed(path, stated_m, &mut ())
+}
+
+fn read_observed(
+    path: &Path,
+    stated_m: Option<f64>,
+    observer: &mut dyn ByteObserver,
+) -> Result<(FileMesh, f64), ShapeError> {
     let missing = |format: SurfaceFormat| ShapeError::UnitMissing {
         path: path.into(),
         format: format.name(),
@@ -128,7 +174,7 @@ pub fn read(path: &Path, stated_m: Option<f64>) -> Result<(FileMesh, f64), Shape
             "the unit is {unit_m} m; it must be positive"
         )));
     }
-    let (format, file) = read_mesh(path)?;
+    let (format, file) = read_mesh(path, observer)?;
     match (file.unit_m, stated_m) {
         (Some(own), Some(stated)) if own != stated => Err(ShapeError::UnitDiffers {
             path: path.into(),
@@ -146,13 +192,16 @@ pub fn read(path: &Path, stated_m: Option<f64>) -> Result<(FileMesh, f64), Shape
 
 /// The triangles of the file at `path`, and its format: by the name's ending, or by the content
 /// where the name has none. Of a binary STL the bytes are not held beside the triangles.
-pub(super) fn read_mesh(path: &Path) -> Result<(SurfaceFormat, FileMesh), ShapeError> {
+pub(super) fn read_mesh(
+    path: &Path,
+    observer: &mut dyn ByteObserver,
+) -> Result<(SurfaceFormat, FileMesh), ShapeError> {
     let by_name = SurfaceFormat::of(path);
     if by_name.is_none() && path.extension().is_some() {
         return Err(ShapeError::Format { path: path.into() });
     }
     if by_name.is_none_or(|format| format == SurfaceFormat::Stl)
-        && let Some(result) = streamed(path)
+        && let Some(result) = streamed(path, observer)
     {
         let file = result.map_err(|source| ShapeError::Content {
             path: path.into(),
@@ -161,6 +210,8 @@ pub(super) fn read_mesh(path: &Path) -> Result<(SurfaceFormat, FileMesh), ShapeE
         return Ok((SurfaceFormat::Stl, file?));
     }
     let bytes = read_file(path)?;
+    observer.restart();
+    observer.observe(&bytes);
     let format = by_name.or_else(|| SurfaceFormat::of_content(&bytes));
     let format = format.ok_or_else(|| ShapeError::Format { path: path.into() })?;
     Ok((format, format.read(path, &bytes)?))
@@ -168,9 +219,10 @@ pub(super) fn read_mesh(path: &Path) -> Result<(SurfaceFormat, FileMesh), ShapeE
 
 /// `None` for what is no whole binary STL file, and where the file system fails: reading it
 /// otherwise tells why.
-fn streamed(path: &Path) -> Option<Result<FileMesh, ReadError>> {
-    let (file, length) = named_file::open(path, LARGEST_FILE).ok()?;
-    stl::stream(file, length).ok()?
+fn streamed(path: &Path, observer: &mut dyn ByteObserver) -> Option<Result<FileMesh, ReadError>> {
+    let (source, length) = named_file::open(path, LARGEST_FILE).ok()?;
+    observer.restart();
+    stl::stream(Observed { source, observer }, length).ok()?
 }
 
 fn check_placement(placement: &Placement) -> Result<(), ShapeError> {

@@ -107,7 +107,7 @@ impl Verify {
 
 fn checks_table(checks: &[Check]) -> String {
     let head = ["check", "measured", "allowed", "", "how"].map(str::to_owned);
-    let told = |value: f64| {
+    let shown = |value: f64| {
         if value == 0.0 {
             "0".to_owned()
         } else {
@@ -117,8 +117,8 @@ fn checks_table(checks: &[Check]) -> String {
     let row = |check: &Check| {
         vec![
             check.name.to_owned(),
-            told(check.measured),
-            told(check.allowed),
+            shown(check.measured),
+            shown(check.allowed),
             if check.passed { "ok" } else { "FAILED" }.to_owned(),
             check.how.clone(),
         ]

@@ -270,9 +270,10 @@ fn deviation_m(
 /// Points, forces and lambda, as `lambda` tells them.
 fn lambda_claims(scene: &Scene, exact: &Solved, document: &ShapeDocument) -> Vec<Claim> {
     let options = LambdaOptions::default();
-    let report = run(scene.design, document, Vec::new(), &options, &Silent).unwrap();
+    let solved = run(scene.design, document, Vec::new(), &options, &Silent);
+    let (points, report) = solved.unwrap();
     let claimed = |stage: &str| report.file.accuracy[stage].estimate;
-    let points = &report.points.discretized.points;
+    let points = &points.discretized.points;
     let plan = points.grid;
     let rows = points.row_of_grid_point();
     let height = |k: usize| rows[k].map(|row| points.height_m[row]);
