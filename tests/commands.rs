@@ -163,8 +163,8 @@ fn the_seed_air_coil() {
     let path = here("designs/seed_air.toml");
     let (design, _) = Design::read(&path, Need::EVALUATE).expect("a valid design");
     let result = evaluate::evaluate(&design, Vec::new(), None).expect("evaluates");
-    assert!((result.coil.resistance_ohm - 6.0753).abs() < 5e-5);
-    assert!((result.coil.inductance_h - 0.014_501_926_063_452_128).abs() < 1e-14);
+    assert!((result.coil.circuit.resistance_ohm - 6.0753).abs() < 5e-5);
+    assert!((result.coil.circuit.inductance_h - 0.014_501_926_063_452_128).abs() < 1e-14);
     assert!(
         (result.target.gradient_t_per_m_per_a / -0.054_820_592_063_778_707 - 1.0).abs() < 1e-12
     );

@@ -185,8 +185,8 @@ fn random_design(numbers: &mut Numbers, core: bool) -> Value {
         "current_a": told.target.current_a,
         "core": core,
         "force_n": told.target.force_n,
-        "resistance_ohm": told.coil.resistance_ohm,
-        "inductance_h": told.coil.inductance_h,
+        "resistance_ohm": told.coil.circuit.resistance_ohm,
+        "inductance_h": told.coil.circuit.inductance_h,
     })
 }
 

@@ -43,10 +43,10 @@ pub struct FieldStore {
 }
 
 impl FieldStore {
-    /// The field of `scene` to `tolerance`, with the text of its magnetisation curve's table if it
+    /// The field of `scene`, with the text of its magnetisation curve's table if it
     /// has one, in `store`. Without steel nothing is kept: computing is faster than reading.
     #[must_use]
-    pub fn new(scene: &Scene, tolerance: Option<f64>, curve: Option<&str>, store: Store) -> Self {
+    pub fn new(scene: &Scene, curve: Option<&str>, store: Store) -> Self {
         let design = scene.design;
         let shapes = store.clone();
         let store = if design.core.is_some() {
@@ -64,7 +64,7 @@ impl FieldStore {
                 &design.array,
                 &design.magnet,
                 design.workspace.z_m.from,
-                tolerance,
+                scene.tolerances,
             )
         );
         let mut field = Origin::of_build(BUILD).and(parts.as_bytes());
@@ -88,19 +88,14 @@ impl FieldStore {
         self.store.holds(STEEL, &self.field)
     }
 
-    /// As [`steel::solve`].
+    /// As [`steel::solve`], as finely as maps need it.
     ///
     /// # Errors
     /// As [`steel::solve`].
-    pub fn steel(
-        &self,
-        scene: &Scene,
-        tolerance: Option<f64>,
-        air_default: f64,
-    ) -> Result<Solved, RunError> {
+    pub fn steel(&self, scene: &Scene) -> Result<Solved, RunError> {
         let lowest_m = scene.design.workspace.z_m.from;
         self.store.remember(STEEL, &self.field, || {
-            steel::solve(scene, tolerance, air_default, lowest_m)
+            steel::solve(scene, scene.tolerances.map, lowest_m)
         })
     }
 

@@ -4,7 +4,8 @@
 //! proportional to the work.
 
 use super::Scene;
-use super::steel::{self, COUPLED_TOLERANCE};
+use super::coupled;
+use super::tolerances::Tolerances;
 use crate::design::Design;
 use crate::field::steel::array::closest_m;
 use crate::field::steel::array_cost::ArrayCost;
@@ -99,7 +100,7 @@ pub fn of_probe(design: &Design, points: usize, components: usize) -> Cost {
 /// The steel of a coupled array; `None` where the design has none, or does not say enough.
 #[must_use]
 pub fn of_steel(design: &Design, tolerance: Option<f64>) -> Option<Cost> {
-    if !steel::coupled(design) {
+    if !coupled(design) {
         return None;
     }
     let scene = Scene::new(design).ok()?;
@@ -109,7 +110,7 @@ pub fn of_steel(design: &Design, tolerance: Option<f64>) -> Option<Cost> {
         scene.winding.length_m,
         positions_m,
         closest_m(positions_m),
-        tolerance.unwrap_or(COUPLED_TOLERANCE),
+        Tolerances::of_inductances(tolerance),
     );
     Some(Cost {
         what: format!("the steel of {} coupled cores", positions_m.len()),

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::evaluation_sample::{Evaluation, PLACES, Sample, sharper, spread};
-use super::steel::{EVALUATION_SHARE, Solved, Steel, SteelField, clearance_m, coupled};
-use super::{AIR_SHARE, Scene};
+use super::steel::{EVALUATION_SHARE, Solved, Steel, SteelField, clearance_m};
+use super::{AIR_SHARE, Scene, coupled};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::field::magnet::MagnetRule;

@@ -2,6 +2,7 @@
 
 pub mod at_current;
 pub mod cached_field;
+pub mod core_material;
 pub mod cost;
 pub mod evaluation_sample;
 pub mod maps;
@@ -12,6 +13,7 @@ pub mod rated;
 pub mod single;
 pub mod sources;
 pub mod steel;
+pub mod tolerances;
 pub mod working_point;
 
 use std::collections::BTreeMap;
@@ -28,17 +30,17 @@ use crate::field::magnet::{Cylinder, MagnetRule, Sources};
 use crate::field::source::AxialSource;
 use crate::field::steel::axial_table::AxialTable;
 use crate::field::steel::equivalent_dipoles::Parts;
-use crate::field::winding::KERNEL_ERROR;
 use crate::field::winding::Winding;
 use crate::map::tabulate::PlacedCoil;
 use crate::progress::Progress;
-use crate::scene::steel::{EVALUATION_SHARE, SceneCore, Solved, Steel, SteelField};
+use crate::scene::core_material::SceneCore;
+use crate::scene::steel::{EVALUATION_SHARE, Solved, Steel, SteelField};
+use crate::scene::tolerances::{MAGNET_FINEST, Tolerances};
 
 /// Points handed to one thread at a time; fixed, so that bytes do not depend on threads.
 const PORTION: usize = 4096;
-/// Share of the tolerance given to the magnet's dipoles, and the finest asked of them.
+/// Share of the tolerance given to the magnet's dipoles.
 pub(crate) const MAGNET_SHARE: f64 = 0.3;
-pub(crate) const MAGNET_FINEST: f64 = 1e-9;
 /// Share of the tolerance given to the windings' field where the magnet takes its own.
 pub(crate) const AIR_SHARE: f64 = 0.6;
 
@@ -111,14 +113,24 @@ pub struct Scene<'a> {
     pub lower_a: Vec<f64>,
     /// Upper current limit of each coil, A: the lower of the driver's and the supply's V/R.
     pub upper_a: Vec<f64>,
+    /// To what accuracy each stage is computed.
+    pub tolerances: Tolerances,
 }
 
 impl<'a> Scene<'a> {
-    /// Makes a design ready.
+    /// Makes a design ready, to the default accuracy of its physics.
     ///
     /// # Errors
     /// A design without a coil; a B-H table that cannot be used.
     pub fn new(design: &'a Design) -> Result<Self, RunError> {
+        Self::with_tolerance(design, None)
+    }
+
+    /// As [`Scene::new`], every stage to the accuracy that was `requested`, if any was.
+    ///
+    /// # Errors
+    /// As [`Scene::new`].
+    pub fn with_tolerance(design: &'a Design, requested: Option<f64>) -> Result<Self, RunError> {
         let coil = design.coil.ok_or_else(|| {
             RunError::Input("the design has no [coil] section, which this command needs".to_owned())
         })?;
@@ -143,6 +155,8 @@ impl<'a> Scene<'a> {
             .collect();
         let voltage_v = design.supply.voltage_v;
         let rated = |limit: &f64| circuit.rated_current_a(*limit, voltage_v);
+        let upper_a: Vec<f64> = design.supply.current_max_a.iter().map(rated).collect();
+        let tolerances = Tolerances::new(design, core.as_ref(), largest(&upper_a), requested);
         Ok(Self {
             design,
             coil,
@@ -150,7 +164,7 @@ impl<'a> Scene<'a> {
             core,
             coils,
             moment_a_m2: moment_a_m2(design),
-            upper_a: design.supply.current_max_a.iter().map(rated).collect(),
+            upper_a,
             lower_a: design
                 .supply
                 .current_min_a
@@ -158,13 +172,24 @@ impl<'a> Scene<'a> {
                 .map(|l| -rated(&-l))
                 .collect(),
             circuit,
+            tolerances,
         })
+    }
+
+    /// The same scene, every stage to the accuracy that was `requested`, if any was.
+    #[must_use]
+    pub fn to_tolerance(&self, requested: Option<f64>) -> Self {
+        let rated_a = self.rated_current_a();
+        Self {
+            tolerances: Tolerances::new(self.design, self.core.as_ref(), rated_a, requested),
+            ..self.clone()
+        }
     }
 
     /// The rated current of one coil: the largest of the array's upper limits, A.
     #[must_use]
     pub fn rated_current_a(&self) -> f64 {
-        self.upper_a.iter().copied().fold(0.0, f64::max)
+        largest(&self.upper_a)
     }
 
     /// How far below its centre the magnet extends, m; 0 for a dipole.
@@ -178,16 +203,6 @@ impl<'a> Scene<'a> {
                 length_m: magnet.length_m,
             }
             .depth_along_m(self.moment_a_m2),
-        }
-    }
-
-    /// Default tolerance of forces in air: that of the kernel for a dipole, of the finest rule for
-    /// a cylinder.
-    #[must_use]
-    pub fn force_tolerance(&self) -> f64 {
-        match self.design.magnet.model {
-            MagnetModel::Dipole => KERNEL_ERROR,
-            MagnetModel::Cylinder => MAGNET_FINEST,
         }
     }
 
@@ -433,6 +448,18 @@ impl<'a> Scene<'a> {
             length_m: magnet.length_m,
         }
     }
+}
+
+/// Whether the design's cores are coupled.
+#[must_use]
+pub fn coupled(design: &Design) -> bool {
+    design.core.is_some()
+        && design.array.coupling == Coupling::Full
+        && design.array.positions_m.len() > 1
+}
+
+fn largest(currents_a: &[f64]) -> f64 {
+    currents_a.iter().copied().fold(0.0, f64::max)
 }
 
 /// Upward force on a dipole at one of the points at which one drive's `parts` were sampled,

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::Scene;
 use super::single::above_knee;
 use super::steel;
-use super::steel::{COUPLED_TOLERANCE, Solved, Steel, TWO_OF_COUPLED_CORES};
+use super::steel::{Solved, Steel, TWO_OF_COUPLED_CORES};
 use super::working_point::{WorkingPoint, relative_difference};
 use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed};
@@ -15,11 +15,10 @@ use crate::coil::mutual;
 use crate::field::batch::Wanted;
 use crate::field::steel::core_flux_density::peak_depth_m;
 use crate::field::steel::equivalent_dipoles::Parts;
-use crate::field::winding::KERNEL_ERROR;
 
 /// The array's inductances.
 #[derive(Debug, Clone, Serialize)]
-pub struct ArrayFacts {
+pub struct ArraySummary {
     /// One entry a coil.
     pub coils: Vec<ArrayCoil>,
     /// Inductance matrix, H: `[i][j]` is the flux through coil i for one ampere in coil j. With
@@ -31,7 +30,7 @@ pub struct ArrayFacts {
     pub relative_permeability: Option<f64>,
     /// With a B-H curve: all coils at their rated currents.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub working_point: Option<WorkingPointFacts>,
+    pub working_point: Option<WorkingPointSummary>,
     /// What misses the tolerance.
     #[serde(skip)]
     pub(crate) accuracy_missed: Vec<String>,
@@ -39,7 +38,7 @@ pub struct ArrayFacts {
 
 /// All coils at their rated currents, along the B-H curve.
 #[derive(Debug, Clone, Serialize)]
-pub struct WorkingPointFacts {
+pub struct WorkingPointSummary {
     /// A, one a coil.
     pub currents_a: Vec<f64>,
     /// Flux linkage of every coil, Wb.
@@ -73,29 +72,28 @@ pub struct ArrayCoil {
 /// The array among its neighbours; `None` for a single coil.
 pub(crate) fn array(
     scene: &Scene,
-    tolerance: Option<f64>,
     accuracy: &mut BTreeMap<&'static str, StageAccuracy>,
-    notes: &mut Vec<String>,
-) -> Result<Option<ArrayFacts>, RunError> {
+    warnings: &mut Vec<String>,
+) -> Result<Option<ArraySummary>, RunError> {
     if scene.coils.len() < 2 {
         return Ok(None);
     }
     let axes = &scene.design.array.positions_m;
     let lowest_m = scene.design.target_height_m;
-    let solved = steel::solve(scene, tolerance, KERNEL_ERROR, lowest_m)?;
-    let wanted = tolerance.unwrap_or(COUPLED_TOLERANCE);
-    let in_air = in_air(scene, wanted);
+    let solved = steel::solve(scene, scene.tolerances.field, lowest_m)?;
+    let tolerance = scene.tolerances.inductances;
+    let in_air = in_air(scene, tolerance);
     let air = in_air.0.clone();
     let (matrix, stage) = inductances(&solved, in_air);
-    let accuracy_missed = missed([(&"mutual_inductance", &stage)], wanted);
+    let accuracy_missed = missed([(&"mutual_inductance", &stage)], tolerance);
     accuracy.insert("mutual_inductance", stage);
     let (mut peak_t, mut mean_t) = (Vec::new(), Vec::new());
-    let working_point = match WorkingPoint::new(scene, &solved, &scene.upper_a, None, lowest_m)? {
+    let working_point = match WorkingPoint::new(scene, &solved, &scene.upper_a, lowest_m)? {
         Some(point) => {
             accuracy.insert("working_point", point.accuracy());
             peak_t.clone_from(&point.peak_field_t);
             mean_t.clone_from(&point.mean_field_t);
-            Some(working_point_facts(scene, &solved, &point, &air)?)
+            Some(working_point_summary(scene, &solved, &point, &air)?)
         }
         None => None,
     };
@@ -106,7 +104,7 @@ pub(crate) fn array(
         mean_t = inside.iter().map(|field| field.mean_t).collect();
         let most_t = peak_t.iter().copied().fold(0.0, f64::max);
         let knee_t = scene.core.as_ref().map_or(f64::INFINITY, |c| c.knee_t);
-        notes.extend(above_knee(
+        warnings.extend(above_knee(
             most_t,
             knee_t,
             "a core of the array with all coils at their rated currents",
@@ -125,7 +123,7 @@ pub(crate) fn array(
             current_max_a: scene.upper_a[coil],
         })
         .collect();
-    Ok(Some(ArrayFacts {
+    Ok(Some(ArraySummary {
         coils,
         mutual_inductance_h: matrix,
         relative_permeability: working_point
@@ -181,12 +179,12 @@ pub(crate) fn inductances(
 }
 
 /// What the cores do at a working point, beside the linear solution.
-fn working_point_facts(
+fn working_point_summary(
     scene: &Scene,
     solved: &Solved,
     point: &WorkingPoint,
     air_inductance_h: &[Vec<f64>],
-) -> Result<WorkingPointFacts, RunError> {
+) -> Result<WorkingPointSummary, RunError> {
     let places = around(scene);
     let sources = solved.sources(scene, &places, 0.0, 1.0)?;
     let steel = sources.map_or_else(Vec::new, |sources| {
@@ -224,7 +222,7 @@ fn working_point_facts(
             air + steel
         })
         .collect();
-    Ok(WorkingPointFacts {
+    Ok(WorkingPointSummary {
         currents_a: point.currents_a.clone(),
         flux_linkage_wb,
         deviation_from_linear: relative_difference(&sum(&total), &sum(&linear)),

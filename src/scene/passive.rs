@@ -2,8 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::Scene;
-use super::steel::coupled;
+use super::{Scene, coupled};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::design::MagnetModel;

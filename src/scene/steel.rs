@@ -1,31 +1,20 @@
-//! The steel of a design: its material, its solution, and the field it adds.
+//! The solved steel of a scene, and the field it adds.
 
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::Scene;
-use super::at_current::{self, SATURATED_TOLERANCE};
+use super::core_material::{Material, SceneCore};
+use super::{Scene, at_current, coupled};
 use crate::RunError;
-use crate::design::bh_table::read_bh_table;
-use crate::design::{Core, Coupling, Design, Steel as Described};
+use crate::field::steel::CLOSEST;
 use crate::field::steel::array::CoupledArray;
 use crate::field::steel::axial_table::AxialTable;
-use crate::field::steel::bh_curve::BhCurve;
 use crate::field::steel::cored_coil::CoredCoil;
 use crate::field::steel::equivalent_dipoles::{ArraySources, Parts};
 use crate::field::steel::magnetized::MagnetizedCore;
-use crate::field::steel::{CLOSEST, CoreShape};
 use crate::field::winding::KERNEL_ERROR;
-use crate::field::winding::Winding;
 
-/// More permeable steel changes no field by more than its inverse.
-const MOST_PERMEABLE: f64 = 1e9;
-
-/// Default tolerance of one cored coil and of its maps.
-pub const CORED_TOLERANCE: f64 = 1e-6;
-/// Default tolerance of a coupled array.
-pub const COUPLED_TOLERANCE: f64 = 1e-4;
 /// Share of the tolerance given to evaluating a solution.
 pub(crate) const EVALUATION_SHARE: f64 = 0.1;
 /// How the error of one core's solution is known.
@@ -41,76 +30,6 @@ pub(crate) const ALONG_CURVE: &str = "the larger difference among three resoluti
 const FAR: f64 = 0.5;
 /// Share of the tolerance given to what is claimed of the steel's solution.
 const STEEL_SHARE: f64 = 0.45;
-
-/// The steel of every core of a design.
-#[derive(Debug, Clone)]
-pub struct SceneCore {
-    /// Each core, its winding's axis at the origin.
-    pub shape: CoreShape,
-    /// How the steel magnetises.
-    pub material: Material,
-    /// Flux density above which a warning is due, T.
-    pub knee_t: f64,
-    /// S/m.
-    pub conductivity_s_per_m: f64,
-    /// Warnings about the material.
-    pub warnings: Vec<String>,
-}
-
-/// How the steel magnetises.
-#[derive(Debug, Clone)]
-#[non_exhaustive]
-pub enum Material {
-    /// A constant relative permeability.
-    Linear(f64),
-    /// A curve.
-    Curve(Box<BhCurve>),
-}
-
-impl SceneCore {
-    /// The core that `core` describes in the bore of `winding`.
-    ///
-    /// # Errors
-    /// A B-H table that cannot be read or cannot be a steel's.
-    pub fn new(core: &Core, winding: &Winding) -> Result<Self, RunError> {
-        let shape = CoreShape {
-            radius_m: winding.inner_radius_m - core.clearance_m,
-            bottom_m: -(winding.length_m + core.below_m),
-            top_m: core.above_m,
-        };
-        let mut warnings = Vec::new();
-        let (material, knee_t) = match &core.steel {
-            Described::Linear(mu_r) => (Material::Linear(*mu_r), core.knee_t),
-            Described::Curve(path) => {
-                let table =
-                    read_bh_table(path).map_err(|fault| RunError::Input(fault.to_string()))?;
-                let curve = BhCurve::new(&table.b_t, &table.h_a_per_m).map_err(|fault| {
-                    RunError::Input(format!("core.bh_curve {}: {fault}", path.display()))
-                })?;
-                warnings.extend(curve.warnings().iter().map(ToString::to_string));
-                let knee_t = core.knee_t.unwrap_or_else(|| curve.knee_t());
-                (Material::Curve(Box::new(curve)), Some(knee_t))
-            }
-        };
-        Ok(Self {
-            shape,
-            material,
-            knee_t: knee_t.unwrap_or(f64::INFINITY),
-            conductivity_s_per_m: core.conductivity_s_per_m,
-            warnings,
-        })
-    }
-
-    /// The permeability that linear solutions use: the constant one, or the curve's at the origin;
-    /// of a curve that starts level one at which they have come to their limit.
-    #[must_use]
-    pub fn relative_permeability(&self) -> f64 {
-        match &self.material {
-            Material::Linear(mu_r) => *mu_r,
-            Material::Curve(curve) => curve.initial_relative_permeability().min(MOST_PERMEABLE),
-        }
-    }
-}
 
 /// The solved steel of a scene.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -175,6 +94,18 @@ pub struct Solved {
 }
 
 impl Solved {
+    /// The sources as forces ask for them, where these are as maps do: of steel one solution serves
+    /// both.
+    ///
+    /// # Errors
+    /// As [`solve`].
+    pub fn for_forces(&self, scene: &Scene, lowest_m: f64) -> Result<Self, RunError> {
+        match self.steel {
+            Steel::None => solve(scene, scene.tolerances.forces, lowest_m),
+            Steel::Alone(_) | Steel::Coupled(_) => Ok(self.clone()),
+        }
+    }
+
     /// How [`Solved::steel_error`] is known; `None` without steel.
     #[must_use]
     pub fn steel_method(&self) -> Option<&'static str> {
@@ -358,35 +289,17 @@ pub(crate) fn clearance_of_m(
     Ok(distance_m)
 }
 
-/// The tolerance to which [`solve`] solves: `tolerance`, or the default of the scene's physics.
-#[must_use]
-pub fn tolerance_of(scene: &Scene, tolerance: Option<f64>, air_default: f64) -> f64 {
-    let default = match &scene.core {
-        None => air_default,
-        Some(_) if coupled(scene.design) => COUPLED_TOLERANCE,
-        Some(core) => match &core.material {
-            Material::Curve(_) if scene.rated_current_a() > 0.0 => SATURATED_TOLERANCE,
-            Material::Curve(_) | Material::Linear(_) => CORED_TOLERANCE,
-        },
-    };
-    tolerance.unwrap_or(default)
-}
-
-/// Solves the steel of `scene`, to `tolerance` or the default, for heights from `lowest_m` up; cores
-/// that are linear and answer to their own winding alone for all places, where `lowest_m` is close.
+/// Solves the steel of `scene` to `tolerance`, one of [`Scene::tolerances`], for heights from
+/// `lowest_m` up; cores that are linear and answer to their own winding alone for all places, where
+/// `lowest_m` is close.
 ///
 /// # Errors
 /// An outline that meets a winding's edge; a B-H curve along which no state is found.
-pub fn solve(
-    scene: &Scene,
-    tolerance: Option<f64>,
-    air_default: f64,
-    lowest_m: f64,
-) -> Result<Solved, RunError> {
+pub fn solve(scene: &Scene, tolerance: f64, lowest_m: f64) -> Result<Solved, RunError> {
     let Some(core) = &scene.core else {
         return Ok(Solved {
             steel: Steel::None,
-            tolerance: tolerance.unwrap_or(air_default),
+            tolerance,
             steel_error: 0.0,
             relative_permeability: 1.0,
             along_curve: false,
@@ -395,20 +308,18 @@ pub fn solve(
     let current_a = scene.rated_current_a();
     let at_current = match &core.material {
         Material::Curve(curve) if current_a > 0.0 => {
-            let tolerance = tolerance.unwrap_or(SATURATED_TOLERANCE);
             let aim = STEEL_SHARE * tolerance;
             let state = at_current::solve(scene, core, curve, current_a, aim, lowest_m)?;
             let secant = curve.relative_permeability(state.inside.mean_b_t).max(1.0);
-            Some((state, secant, tolerance))
+            Some((state, secant))
         }
         Material::Curve(_) | Material::Linear(_) => None,
     };
     let relative_permeability = match &at_current {
-        Some((_, secant, _)) => *secant,
+        Some((_, secant)) => *secant,
         None => core.relative_permeability(),
     };
     if coupled(scene.design) {
-        let tolerance = tolerance.unwrap_or(COUPLED_TOLERANCE);
         let array = CoupledArray::new(
             &scene.winding,
             core.shape,
@@ -426,17 +337,15 @@ pub fn solve(
         });
     }
     let along_curve = at_current.is_some();
-    let (alone, steel_error, tolerance) = match at_current {
-        Some((state, _, tolerance)) => (
+    let (alone, steel_error) = match at_current {
+        Some((state, _)) => (
             AloneCore {
                 layer: state.layer,
                 added_inductance_h: state.added_inductance_h,
             },
             state.relative_error,
-            tolerance,
         ),
         None => {
-            let tolerance = tolerance.unwrap_or(CORED_TOLERANCE);
             let (winding, shape, aim) = (&scene.winding, core.shape, STEEL_SHARE * tolerance);
             // Far from the steel a solution does that is several times cheaper to evaluate.
             let coil = if lowest_m > shape.top_m.max(0.0) + FAR * shape.radius_m {
@@ -450,7 +359,6 @@ pub fn solve(
                     added_inductance_h: coil.added_inductance_h,
                 },
                 coil.relative_error,
-                tolerance,
             )
         }
     };
@@ -461,12 +369,4 @@ pub fn solve(
         relative_permeability,
         along_curve,
     })
-}
-
-/// Whether the design's cores are coupled.
-#[must_use]
-pub fn coupled(design: &Design) -> bool {
-    design.core.is_some()
-        && design.array.coupling == Coupling::Full
-        && design.array.positions_m.len() > 1
 }

@@ -1,12 +1,10 @@
 //! The steel at given currents in all coils, along its B-H curve: what superposition leaves out.
 
 use super::at_current::{self, no_state};
+use super::core_material::{Material, SceneCore};
 use super::maps::lowest_plane;
-use super::steel::{
-    ALONG_CURVE, EVALUATION_SHARE, Material, SceneCore, Solved, Steel, SteelField, clearance_m,
-    coupled,
-};
-use super::{MAGNET_SHARE, Scene, upward_n};
+use super::steel::{ALONG_CURVE, EVALUATION_SHARE, Solved, Steel, SteelField, clearance_m};
+use super::{MAGNET_SHARE, Scene, coupled, upward_n};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::field::steel::axial_table::AxialTable;
@@ -22,10 +20,6 @@ use crate::map::map_source::Sampler;
 use crate::map::map_source::parts_of;
 use crate::map::tabulate::{Grid, MapError, PlacedCoil, tabulate};
 use crate::progress::Progress;
-
-/// Default tolerance of the steel at a working point, relative to the largest |grad B| at a
-/// height: what the modes that are taken as linear leave is of this order.
-pub const WORKING_POINT_TOLERANCE: f64 = 1e-3;
 
 /// Deviation from superposition above which a warning is due.
 const SUPERPOSITION_WARNING: f64 = 0.01;
@@ -70,15 +64,12 @@ impl WorkingPoint {
         scene: &Scene,
         solved: &Solved,
         currents_a: &[f64],
-        tolerance: Option<f64>,
         lowest_m: f64,
     ) -> Result<Option<Self>, RunError> {
         let Some((core, curve)) = curved(scene) else {
             return Ok(None);
         };
-        let tolerance = tolerance
-            .unwrap_or(WORKING_POINT_TOLERANCE)
-            .max(WORKING_POINT_TOLERANCE);
+        let tolerance = scene.tolerances.working_point;
         let effective_a: Vec<f64> = currents_a
             .iter()
             .zip(&scene.coils)

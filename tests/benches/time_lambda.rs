@@ -92,7 +92,7 @@ fn row(
     design.supply.current_min_a = vec![0.0; side * side];
     design.supply.total_current_max_a = Some(2.0 * (side * side) as f64);
     let scene = Scene::new(&design)?;
-    let solved = steel::solve(&scene, None, TOLERANCE, 0.03)?;
+    let solved = steel::solve(&scene, scene.tolerances.forces, 0.03)?;
     let side_m = Axis {
         from: -half_m,
         to: half_m,

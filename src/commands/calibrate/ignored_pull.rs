@@ -5,8 +5,8 @@ use crate::bundle::manifest::LeftOut;
 use crate::commands::lambda::LambdaReport;
 use crate::scene::Scene;
 use crate::scene::cached_field::ShapeField;
+use crate::scene::coupled;
 use crate::scene::passive::couples_left_out;
-use crate::scene::steel::coupled;
 use crate::units::DETECTION_THRESHOLD_N;
 
 /// The pull at an object's points.

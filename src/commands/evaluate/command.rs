@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::{CoreFacts, Evaluation, TargetFacts, TransientFacts, evaluate};
+use super::{Evaluation, Transient, evaluate};
 use crate::accuracy::StageAccuracy;
 use crate::cli::args::Tolerance;
 use crate::cli::budget::{Asked, allow};
@@ -19,7 +19,9 @@ use crate::cli::start::begin;
 use crate::cli::values::FileArgument;
 use crate::design::{Design, Need};
 use crate::scene::cost::of_steel;
-use crate::scene::neighbours::{ArrayFacts, WorkingPointFacts};
+use crate::scene::neighbours::{ArraySummary, WorkingPointSummary};
+use crate::scene::rated::TargetSummary;
+use crate::scene::single::{CoreSummary, MaterialKind};
 
 /// Evaluate one coil as given: circuit, field and force at the target, limits
 ///
@@ -62,8 +64,8 @@ impl Evaluate {
         let bar = begin(printer);
         let result = evaluate(design, vec![document.input], self.tolerance.tolerance)?;
         drop(bar);
-        for note in &result.notes {
-            printer.warning(note);
+        for warning in &result.warnings {
+            printer.warning(warning);
         }
         let json = printer.with_warnings(&result);
         printer.summary(Place::Output, &json, || summary(design, &result))?;
@@ -84,6 +86,7 @@ impl Evaluate {
 
 fn summary(design: &Design, result: &Evaluation) -> String {
     let (coil, target) = (&result.coil, &result.target);
+    let circuit = &coil.circuit;
     let mut sheet = Sheet::new(&format!("{}: one coil as given", result.design));
     sheet.line(
         "coil",
@@ -91,22 +94,22 @@ fn summary(design: &Design, result: &Evaluation) -> String {
             "{} turns of {} wire; {} to {} diameter, {} long",
             number(coil.turns),
             mm(design.wire.diameter_m),
-            mm(coil.inner_diameter_m),
-            mm(coil.outer_diameter_m),
-            mm(coil.length_m)
+            mm(coil.size.inner_diameter_m),
+            mm(coil.size.outer_diameter_m),
+            mm(coil.size.length_m)
         ),
     );
-    let flux = coil.flux_linkage_wb.map_or_else(String::new, |flux| {
+    let flux = circuit.flux_linkage_wb.map_or_else(String::new, |flux| {
         format!("; flux linkage {}", si(flux, "Wb"))
     });
     sheet.line(
         "circuit",
         &format!(
             "{}, {}{flux}; time constant {}, settled after {}",
-            si(coil.resistance_ohm, "ohm"),
-            si(coil.inductance_h, "H"),
-            si(coil.time_constant_s, "s"),
-            si(coil.settling_s, "s")
+            si(circuit.resistance_ohm, "ohm"),
+            si(circuit.inductance_h, "H"),
+            si(circuit.time_constant_s, "s"),
+            si(circuit.settling_s, "s")
         ),
     );
     let steel_kg = result.core.as_ref().map_or(0.0, |core| core.mass_kg);
@@ -117,9 +120,9 @@ fn summary(design: &Design, result: &Evaluation) -> String {
         "wire",
         &format!(
             "{} long, {}{steel}; {} of heat at {}",
-            si(coil.wire_length_m, "m"),
-            mass(coil.mass_kg - steel_kg),
-            si(coil.power_w, "W"),
+            si(circuit.wire_length_m, "m"),
+            mass(circuit.mass_kg - steel_kg),
+            si(circuit.power_w, "W"),
             si(target.current_a, "A")
         ),
     );
@@ -144,7 +147,7 @@ fn summary(design: &Design, result: &Evaluation) -> String {
                 "{}; largest mutual inductance {} ({} of a coil's own)",
                 describe::array(design),
                 si(largest, "H"),
-                percent(largest / coil.inductance_h)
+                percent(largest / circuit.inductance_h)
             ),
         );
         if let Some(point) = &array.working_point {
@@ -160,17 +163,13 @@ fn summary(design: &Design, result: &Evaluation) -> String {
 }
 
 /// The steel of the coil alone.
-fn steel_core(core: &CoreFacts, target: &TargetFacts) -> String {
-    let material = if core.material == "curve" {
-        format!(
-            "a B-H curve, relative permeability {} at its origin",
-            number(core.relative_permeability)
-        )
-    } else {
-        format!(
-            "relative permeability {}",
-            number(core.relative_permeability)
-        )
+fn steel_core(core: &CoreSummary, target: &TargetSummary) -> String {
+    let permeability = number(core.relative_permeability);
+    let material = match core.material {
+        MaterialKind::Curve => {
+            format!("a B-H curve, relative permeability {permeability} at its origin")
+        }
+        MaterialKind::Linear => format!("relative permeability {permeability}"),
     };
     let mut text = format!(
         "{} diameter, {} long; {material}\n\
@@ -193,7 +192,7 @@ fn steel_core(core: &CoreFacts, target: &TargetFacts) -> String {
 }
 
 /// After a voltage step.
-fn step(transient: &TransientFacts, stage: Option<&StageAccuracy>) -> String {
+fn step(transient: &Transient, stage: Option<&StageAccuracy>) -> String {
     let error = match stage {
         Some(stage) if stage.estimate > 0.0 => {
             format!(", +/- {}", percent(stage.estimate))
@@ -208,7 +207,7 @@ fn step(transient: &TransientFacts, stage: Option<&StageAccuracy>) -> String {
 }
 
 /// What the magnet feels at the target.
-fn felt(target: &TargetFacts) -> String {
+fn felt(target: &TargetSummary) -> String {
     let way = |f: f64| match f {
         f if f > 0.0 => " up",
         f if f < 0.0 => " down",
@@ -251,7 +250,7 @@ fn felt(target: &TargetFacts) -> String {
 }
 
 /// All coils at their rated currents, along the B-H curve.
-fn all_at_once(array: &ArrayFacts, point: &WorkingPointFacts) -> String {
+fn all_at_once(array: &ArraySummary, point: &WorkingPointSummary) -> String {
     let linear = array
         .relative_permeability
         .map_or_else(String::new, |mu_r| {
@@ -273,7 +272,7 @@ fn all_at_once(array: &ArrayFacts, point: &WorkingPointFacts) -> String {
 }
 
 /// Flux density in the cores of an array, where they are coupled.
-fn cores(sheet: &mut Sheet, design: &Design, array: &ArrayFacts) {
+fn cores(sheet: &mut Sheet, design: &Design, array: &ArraySummary) {
     let peak: Option<Vec<f64>> = array.coils.iter().map(|coil| coil.peak_field_t).collect();
     let mean: Option<Vec<f64>> = array.coils.iter().map(|coil| coil.mean_field_t).collect();
     for (label, values) in [("core peak", peak), ("core mean", mean)] {

@@ -27,14 +27,16 @@ use crate::lambda::{self, ForceProblem, Precision, Settings, Solution, Status, W
 use crate::plot::lambda::LambdaPlot;
 use crate::progress::Progress;
 use crate::scene::cached_field::ShapeField;
+use crate::scene::core_material::Material;
 use crate::scene::evaluation_sample::{Evaluation, PLACES, Sample, sharper, spread};
 use crate::scene::passive;
 use crate::scene::single::above_knee;
 use crate::scene::sources::Sampling;
 use crate::scene::steel;
-use crate::scene::steel::{EVALUATION_SHARE, Material, Solved, Steel};
+use crate::scene::steel::{EVALUATION_SHARE, Solved, Steel};
+use crate::scene::tolerances::MAGNET_FINEST;
 use crate::scene::working_point::{WorkingPoint, relative_difference, superposition_ends};
-use crate::scene::{AIR_SHARE, MAGNET_FINEST, MAGNET_SHARE, Scene};
+use crate::scene::{AIR_SHARE, MAGNET_SHARE, Scene};
 use crate::shape::document::ShapeDocument;
 
 mod picture;
@@ -105,7 +107,7 @@ pub fn run(
     options: &LambdaOptions,
     progress: &dyn Progress,
 ) -> Result<LambdaReport, RunError> {
-    let scene = Scene::new(design)?;
+    let scene = Scene::with_tolerance(design, options.tolerance)?;
     let points = discretize::run(document, inputs.clone(), progress)?;
     let of_grid = WantedPoints::of_grid(&points);
     let sampling = options
@@ -123,7 +125,7 @@ pub fn run(
         .feedback
         .map_or(lowest_m, |asked| asked.lowest_m(&scene, lowest_m));
     progress.begin("steel", 1);
-    let solved = steel::solve(&scene, options.tolerance, scene.force_tolerance(), lowest_m)?;
+    let solved = steel::solve(&scene, scene.tolerances.forces, lowest_m)?;
     progress.end();
     let Some(chosen) = chosen else {
         let field = ShapeField::default();
@@ -387,9 +389,7 @@ fn solve_at(
             forces_n_per_a: &forces,
             offset_n: offset_n.as_deref(),
         };
-        if let Some((facts, accuracy)) =
-            at_working_point(scene, solved, &asked, options.tolerance, progress)?
-        {
+        if let Some((facts, accuracy)) = at_working_point(scene, solved, &asked, progress)? {
             warnings.extend(superposition_ends(
                 scene,
                 facts.deviation_from_linear,
@@ -446,7 +446,6 @@ fn at_working_point(
     scene: &Scene,
     solved: &Solved,
     asked: &Asked,
-    tolerance: Option<f64>,
     progress: &dyn Progress,
 ) -> Result<Option<(WorkingPointForces, StageAccuracy)>, RunError> {
     let lowest_m = asked
@@ -455,8 +454,7 @@ fn at_working_point(
         .copied()
         .fold(f64::INFINITY, f64::min);
     progress.begin("working point", 1);
-    let Some(point) = WorkingPoint::new(scene, solved, asked.currents_a, tolerance, lowest_m)?
-    else {
+    let Some(point) = WorkingPoint::new(scene, solved, asked.currents_a, lowest_m)? else {
         progress.end();
         return Ok(None);
     };

@@ -30,15 +30,12 @@ use crate::scene::maps::{Felt, SceneMap};
 use crate::scene::steel;
 use crate::scene::working_point::{WorkingPoint, relative_difference, superposition_ends};
 
-/// Default tolerance of a map, relative to the largest |grad B| at each height.
-pub const MAP_TOLERANCE: f64 = 1e-9;
-
 /// What is asked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MapRequest {
     /// What the map holds.
     pub components: Components,
-    /// Tolerance; `None` for [`MAP_TOLERANCE`].
+    /// Tolerance; `None` for the default.
     pub tolerance: Option<f64>,
     /// Currents of the working point, A, one a coil; `None` for the rated ones. Without a B-H
     /// curve there is no working point.
@@ -147,7 +144,7 @@ pub fn run(
     request: &MapRequest,
     progress: &dyn Progress,
 ) -> Result<MapReport, RunError> {
-    let scene = Scene::new(design)?;
+    let scene = Scene::with_tolerance(design, request.tolerance)?;
     let asked = &request.mag_manip;
     let besides = [&asked.vector_field, &asked.multipoles];
     let besides: Vec<&Path> = besides
@@ -176,7 +173,7 @@ pub fn run(
     let lowest_m = grid.z_m.first().copied().unwrap_or(0.0);
     let lowest_m = (nodes.as_ref()).map_or(lowest_m, |(_, [_, _, z])| lowest_m.min(z.from));
     progress.begin("steel", 1);
-    let solved = steel::solve(&scene, request.tolerance, MAP_TOLERANCE, lowest_m)?;
+    let solved = steel::solve(&scene, scene.tolerances.map, lowest_m)?;
     progress.end();
     let made = SceneMap::new(
         &scene,
@@ -192,7 +189,7 @@ pub fn run(
     let mut accuracy = BTreeMap::from([("map".to_owned(), made.accuracy.clone())]);
     let currents_a = request.currents_a.as_deref().unwrap_or(&scene.upper_a);
     progress.begin("working point", 1);
-    let point = WorkingPoint::new(&scene, &solved, currents_a, request.tolerance, lowest_m)?;
+    let point = WorkingPoint::new(&scene, &solved, currents_a, lowest_m)?;
     let mut whole = None;
     let mut warnings = scene
         .core

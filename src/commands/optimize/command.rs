@@ -139,8 +139,8 @@ impl Optimize {
         };
         let result = optimize(&source, inputs, &self.request(), &bar)?;
         drop(bar);
-        for note in &result.notes {
-            printer.warning(note);
+        for warning in &result.warnings {
+            printer.warning(warning);
         }
         let mut place = self.write(&result, &mark, &overwrite, printer)?;
         if let Some(page) = &page {
@@ -177,7 +177,7 @@ impl Optimize {
         }
     }
 
-    /// What tells a design that was made of this one from any other file.
+    /// The line by which a design that was made of this one is known from any other file.
     fn mark(&self, document: &DesignDocument) -> String {
         format!(
             "# Made of {} (sha256 {}) by `fluxform optimize`.",
@@ -186,7 +186,7 @@ impl Optimize {
         )
     }
 
-    /// Writes the best coil's design where it was asked for; tells where the summary goes.
+    /// Writes the best coil's design where it was requested; returns where the summary goes.
     fn write(
         &self,
         result: &Optimization,

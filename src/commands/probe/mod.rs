@@ -16,11 +16,11 @@ use crate::field::frame::{CartesianField, to_cartesian};
 use crate::field::magnet::MagnetRule;
 use crate::field::steel::CLOSEST;
 use crate::field::steel::equivalent_dipoles::Parts;
-use crate::field::winding::KERNEL_ERROR;
 use crate::progress::Progress;
 use crate::scene::steel;
 use crate::scene::steel::{Solved, Steel, SteelField, clearance_of_m};
-use crate::scene::{MAGNET_FINEST, MAGNET_SHARE, Scene};
+use crate::scene::tolerances::MAGNET_FINEST;
+use crate::scene::{MAGNET_SHARE, Scene};
 
 /// What is asked at the points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,10 +93,10 @@ pub fn probe(
     request: ProbeRequest,
     progress: &dyn Progress,
 ) -> Result<ProbeTable, RunError> {
-    let scene = Scene::new(design)?;
+    let scene = Scene::with_tolerance(design, request.tolerance)?;
     // A value depends on its own point alone: neither the solution nor how it is evaluated may
     // depend on where the other points are.
-    let solved = steel::solve(&scene, request.tolerance, KERNEL_ERROR, f64::NEG_INFINITY)?;
+    let solved = steel::solve(&scene, scene.tolerances.field, f64::NEG_INFINITY)?;
     let groups = groups(&scene, &points_m)?;
     progress.begin("probe", points_m.len() as u64);
     let coils = scene.coils.len();

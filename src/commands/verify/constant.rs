@@ -9,7 +9,7 @@ use crate::field::winding::KERNEL_ERROR;
 use crate::lambda::{self, Criterion, ForceProblem, Settings};
 use crate::progress::Progress;
 use crate::scene::evaluation_sample::spread;
-use crate::scene::steel::{self, Steel};
+use crate::scene::steel::Steel;
 
 /// Largest difference of a force constant that is solved for again, relative.
 const LAMBDA_AGREES: f64 = 1e-8;
@@ -37,10 +37,7 @@ pub(super) fn checks(
         Steel::None => 0.0,
         Steel::Alone(_) | Steel::Coupled(_) => FORCES_MOVE * bounds.forces,
     };
-    let solved = match &route.solved.steel {
-        Steel::None => steel::solve(scene, None, scene.force_tolerance(), lowest_m)?,
-        Steel::Alone(_) | Steel::Coupled(_) => route.solved.clone(),
-    };
+    let solved = route.solved.for_forces(scene, lowest_m)?;
     let forces = scene.forces_n_per_a(&solved, &positions, progress)?;
     let coils = scene.coils.len();
     let mut checks = vec![sampled_forces(route, bounds, &positions, &forces)?];

@@ -37,7 +37,7 @@ impl<'a> Route<'a> {
         let tolerance = FINER * bounds.map.min(bounds.forces).max(KERNEL_ERROR);
         Ok(Self {
             scene,
-            solved: steel::solve(scene, Some(tolerance), KERNEL_ERROR, lowest_m)?,
+            solved: steel::solve(scene, tolerance, lowest_m)?,
             rule: scene.magnet_rule(lowest_m, tolerance)?,
         })
     }

@@ -10,7 +10,7 @@ use fluxform::field::steel::array::{ArrayResolution, CoupledArray, closest_m};
 use fluxform::field::steel::equivalent_dipoles::{ArraySources, Parts};
 use fluxform::progress::Progress;
 use fluxform::scene::Scene;
-use fluxform::scene::steel::COUPLED_TOLERANCE;
+use fluxform::scene::tolerances::COUPLED_TOLERANCE;
 
 const TOLERANCES: [f64; 6] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
 /// Rows of a quick run.

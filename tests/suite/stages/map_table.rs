@@ -6,7 +6,6 @@ use crate::file::{Curve, StageCurves};
 use crate::inputs::{SEED, SEED_AIR};
 use crate::reference::{AXIAL_ERROR, axial_gradient};
 use fluxform::RunError;
-use fluxform::commands::map::MAP_TOLERANCE;
 use fluxform::design::{Design, Need};
 use fluxform::field::steel::equivalent_dipoles::{ArraySources, Parts};
 use fluxform::map::coupled_map::SampledField;
@@ -17,7 +16,9 @@ use fluxform::numerics::lagrange::locate;
 use fluxform::progress::{Progress, Silent};
 use fluxform::scene::Scene;
 use fluxform::scene::maps::{Felt, SceneMap};
-use fluxform::scene::steel::{self, COUPLED_TOLERANCE, Steel};
+use fluxform::scene::steel::{self, Steel};
+use fluxform::scene::tolerances::COUPLED_TOLERANCE;
+use fluxform::scene::tolerances::MAP_TOLERANCE;
 
 const AIR: [f64; 12] = [
     1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13,
@@ -186,7 +187,7 @@ fn coupled(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curv
     let scene = Scene::new(design)?;
     let grid = grid(design, None);
     let lowest_m = grid.z_m[0];
-    let solved = steel::solve(&scene, None, MAP_TOLERANCE, lowest_m)?;
+    let solved = steel::solve(&scene, scene.tolerances.map, lowest_m)?;
     let Steel::Coupled(array) = &solved.steel else {
         return Err(super::no_core());
     };
@@ -241,7 +242,7 @@ fn coupled(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curv
 /// Interpolation between the nodes, against their number.
 fn between(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
     let scene = Scene::new(design)?;
-    let solved = steel::solve(&scene, None, MAP_TOLERANCE, 0.0)?;
+    let solved = steel::solve(&scene, scene.tolerances.map, 0.0)?;
     let mut numbers = Numbers(13);
     let whole = grid(design, None);
     let ends = |nodes: &[f64]| [nodes[0], nodes[nodes.len() - 1]];

@@ -15,7 +15,6 @@ use super::{ScanRequest, Weighted, noises};
 use crate::RunError;
 use crate::bundle::scan::{Explanation, Scan};
 use crate::design::Design;
-use crate::field::winding::KERNEL_ERROR;
 use crate::numerics::least_squares::{self, norm};
 use crate::progress::Progress;
 use crate::scene::Scene;
@@ -273,9 +272,9 @@ impl Task<'_> {
 
     /// What the scan would show of another design, [row, quantity].
     fn computed_for(&self, design: &Design) -> Result<Vec<f64>, RunError> {
-        let scene = Scene::new(design)?;
+        let scene = Scene::with_tolerance(design, self.request.tolerance)?;
         let lowest_m = super::lowest_m(self.scan);
-        let solved = steel::solve(&scene, self.request.tolerance, KERNEL_ERROR, lowest_m)?;
+        let solved = steel::solve(&scene, scene.tolerances.field, lowest_m)?;
         let model = Model::new(&scene, &solved, self.scan);
         let places = model.places(Pose::default())?;
         let contributions = model.contributions(&places, Pose::default(), self.progress)?;

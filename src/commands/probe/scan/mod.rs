@@ -14,12 +14,12 @@ use crate::bundle::scan::{
     ScanPlace,
 };
 use crate::design::Design;
-use crate::field::winding::KERNEL_ERROR;
 use crate::numerics::least_squares::CUTOFF;
 use crate::progress::Progress;
 use crate::scene::Scene;
+use crate::scene::core_material::Material;
 use crate::scene::steel;
-use crate::scene::steel::{Material, Solved};
+use crate::scene::steel::Solved;
 
 pub(crate) mod command;
 mod explain;
@@ -95,7 +95,7 @@ pub fn compare(
     progress: &dyn Progress,
 ) -> Result<ScanReport, RunError> {
     let refused = |why: String| RunError::Scan(format!("{name}: {why}"));
-    let scene = Scene::new(design)?;
+    let scene = Scene::with_tolerance(design, request.tolerance)?;
     let parameters = fit::parameters(request.fitted, scan, scene.coils.len());
     large_enough(scan, &parameters).map_err(refused)?;
     if let Some(hint) = units::coordinates(design, scan) {
@@ -103,7 +103,7 @@ pub fn compare(
     }
     // For any place, as `probe` does: a fit moves the places, and what `probe` printed must be found
     // again to the last digits.
-    let solved = steel::solve(&scene, request.tolerance, KERNEL_ERROR, f64::NEG_INFINITY)?;
+    let solved = steel::solve(&scene, scene.tolerances.field, f64::NEG_INFINITY)?;
     let model = Model::new(&scene, &solved, scan);
     progress.begin("scan", 0);
     let places = model.places(Pose::default())?;
