@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use rayon::prelude::*;
 
 use super::harmonic::{Extent, Table, kind};
-use super::map_source::{GRADIENT, Sampler, gz, series, tensor};
+use super::map_source::{GRADIENT, Sampler, gz, tensor};
 use super::tabulate::{Components, FieldMap, Grid, MapError, PlacedCoil};
 use fluxform_base::progress::Progress;
 
@@ -150,7 +150,7 @@ impl<'a> SampledField<'a> {
         progress: &dyn Progress,
     ) -> Result<FieldMap, MapError> {
         let (plane, heights) = (grid.x_m.len() * grid.y_m.len(), grid.z_m.len());
-        let count = series(self.components);
+        let count = self.components.count();
         let place: Vec<[f64; 2]> = grid
             .y_m
             .iter()
@@ -290,7 +290,7 @@ fn certify(
     let points: Vec<[f64; 3]> = (planes.iter().zip(&heights))
         .flat_map(|(plane, z)| plane.iter().map(move |[x, y]| [*x, *y, *z]))
         .collect();
-    let count = sampler.drives() * series(components);
+    let count = sampler.drives() * components.count();
     let mut exact = vec![0.0; count * points.len()];
     sampler.sample(&points, components, &mut exact)?;
     let mut certificate = 0.0_f64;

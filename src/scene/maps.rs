@@ -3,12 +3,14 @@
 use serde::{Deserialize, Serialize};
 
 use super::evaluation_sample::{Evaluation, PLACES, Sample, sharper, spread};
-use super::steel::{EVALUATION_SHARE, Solved, Steel, SteelField, clearance_m};
+use super::steel::{EVALUATION_SHARE, Solved, clearance_m};
 use super::{AIR_SHARE, Scene, coupled};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::field::magnet::MagnetRule;
-use crate::field::steel::axial_table::AxialTable;
+use crate::field::source::AxialSource;
+use crate::field::steel::array_steel::SteelField;
+use crate::field::winding::KERNEL_ERROR;
 use crate::map::coupled_map::{SampledField, TableReport};
 use crate::map::mean::MeanField;
 
@@ -49,94 +51,25 @@ impl SceneMap {
         felt: &Felt,
         progress: &dyn Progress,
     ) -> Result<Self, RunError> {
-        // A grid through every place that a node of the magnet can take.
-        let widest = widest(grid, felt);
-        let lowest = lowest_plane(grid);
-        let (table, map, between) = match &solved.steel {
-            Steel::None => {
-                let share = if felt.is_field() { 1.0 } else { AIR_SHARE };
-                let tolerance = share * solved.tolerance / felt.amplification;
-                let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
-                    tabulate(&scene.winding, coils, grid, components, tolerance, p)
-                };
-                let means = MeanField::new(
-                    &scene.winding,
-                    coils,
-                    grid,
-                    components,
-                    MEAN_SHARE * share * solved.tolerance,
-                    SOURCE_SHARE * tolerance,
-                );
-                let one = Maker {
-                    one: &one,
-                    means: means.as_ref(),
-                };
-                let map = mean(&one, felt, coils, grid, components, progress)?;
-                progress.begin("interpolation error", 1);
-                let between = if felt.is_field() {
-                    let gz = &map.gz_t_per_m_per_a;
-                    interpolation_error(&scene.winding, coils, grid, gz, tolerance)?
-                } else {
-                    between(&one, felt, coils, grid, &map)?
-                };
-                (None, map, between)
-            }
-            Steel::Alone(coil) => {
-                let tolerance = MAP_SHARE * solved.tolerance / felt.amplification;
-                if let Some(core) = &scene.core {
-                    clearance_m(scene, core, &lowest, felt.reach_m)?;
-                }
-                let own = EVALUATION_SHARE * tolerance;
-                let source = AxialTable::new(Some(scene.winding), coil.layer.clone(), own);
-                let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
-                    tabulate(&source, coils, grid, components, tolerance, p)
-                };
-                let means = MeanField::new(
-                    &source,
-                    coils,
-                    grid,
-                    components,
-                    MEAN_SHARE * MAP_SHARE * solved.tolerance,
-                    SOURCE_SHARE * tolerance,
-                );
-                let one = Maker {
-                    one: &one,
-                    means: means.as_ref(),
-                };
-                let map = mean(&one, felt, coils, grid, components, progress)?;
-                progress.begin("interpolation error", 1);
-                let between = between(&one, felt, coils, grid, &map)?;
-                (None, map, between)
-            }
-            Steel::Coupled(_) => {
-                let tolerance = MAP_SHARE * solved.tolerance / felt.amplification;
-                let steel = solved.sources(scene, &lowest, felt.reach_m, felt.amplification)?;
-                let Some(SteelField::Coupled(steel)) = steel else {
-                    return Err(no_steel());
-                };
-                let sampled = SampledField::new(
-                    &steel,
-                    &widest,
-                    components,
-                    tolerance,
-                    felt.visits(),
-                    progress,
-                )?;
-                let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
-                    let mut map =
-                        tabulate(&scene.winding, coils, grid, components, tolerance, &Silent)?;
-                    add(&mut map, &sampled.map(coils, grid, p)?, 1.0);
-                    Ok(map)
-                };
-                let one = Maker {
-                    one: &one,
-                    means: None,
-                };
-                let map = mean(&one, felt, coils, grid, components, progress)?;
-                progress.begin("interpolation error", 1);
-                let between = between(&one, felt, coils, grid, &map)?;
-                (Some(sampled.report), map, between)
-            }
+        let place = Place {
+            scene,
+            solved,
+            coils,
+            grid,
+            felt,
+        };
+        let share = if !solved.has_steel() && felt.is_field() {
+            1.0
+        } else if solved.has_steel() {
+            MAP_SHARE
+        } else {
+            AIR_SHARE
+        };
+        let tolerance = share * solved.tolerance / felt.amplification;
+        let own = EVALUATION_SHARE * tolerance;
+        let (table, map, between) = match solved.steel().axial_source(scene.winding, own) {
+            Some(source) => place.axial(&*source, share, tolerance, components, progress)?,
+            None => place.coupled(tolerance, components, progress)?,
         };
         progress.end();
         let mut evaluation = evaluation(&map, solved);
@@ -150,6 +83,103 @@ impl SceneMap {
             table,
             accuracy,
         })
+    }
+}
+
+/// What is mapped, and where.
+struct Place<'a> {
+    scene: &'a Scene<'a>,
+    solved: &'a Solved,
+    coils: &'a [PlacedCoil],
+    grid: &'a Grid,
+    felt: &'a Felt,
+}
+
+/// A map with what is known of it before its accuracy.
+type Mapped = (Option<TableReport>, FieldMap, InterpolationError);
+
+impl Place<'_> {
+    /// Coils each of which is a `source` about its own axis: a map over the distance from it.
+    fn axial(
+        &self,
+        source: &dyn AxialSource,
+        share: f64,
+        tolerance: f64,
+        components: Components,
+        progress: &dyn Progress,
+    ) -> Result<Mapped, RunError> {
+        let Self {
+            scene,
+            solved,
+            coils,
+            grid,
+            felt,
+        } = *self;
+        if let Some(core) = &scene.core {
+            clearance_m(scene, core, &lowest_plane(grid), felt.reach_m)?;
+        }
+        let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
+            tabulate(source, coils, grid, components, tolerance, p)
+        };
+        let means = MeanField::new(
+            source,
+            coils,
+            grid,
+            components,
+            MEAN_SHARE * share * solved.tolerance,
+            SOURCE_SHARE * tolerance,
+        );
+        let one = Maker {
+            one: &one,
+            means: means.as_ref(),
+        };
+        let map = mean(&one, felt, coils, grid, components, progress)?;
+        progress.begin("interpolation error", 1);
+        // In air the field between the nodes is had as finely as the map itself, at once.
+        let between = if felt.is_field() && !solved.has_steel() {
+            interpolation_error(source, coils, grid, &map.gz_t_per_m_per_a, tolerance)?
+        } else {
+            between(&one, felt, coils, grid, &map)?
+        };
+        Ok((None, map, between))
+    }
+
+    /// Coils whose cores all answer to every winding: the windings by distance, the steel from a
+    /// table of its harmonic field.
+    fn coupled(
+        &self,
+        tolerance: f64,
+        components: Components,
+        progress: &dyn Progress,
+    ) -> Result<Mapped, RunError> {
+        let Self {
+            scene,
+            solved,
+            coils,
+            grid,
+            felt,
+        } = *self;
+        let lowest = lowest_plane(grid);
+        let steel = solved.sources(scene, &lowest, felt.reach_m, felt.amplification)?;
+        let steel = steel.as_ref().and_then(SteelField::coupled);
+        let steel = steel.ok_or_else(no_steel)?;
+        // A grid through every place that a node of the magnet can take.
+        let widest = widest(grid, felt);
+        let visits = felt.visits();
+        let sampled = SampledField::new(steel, &widest, components, tolerance, visits, progress)?;
+        let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
+            let mut map = tabulate(&scene.winding, coils, grid, components, tolerance, &Silent)?;
+            add(&mut map, &sampled.map(coils, grid, p)?, 1.0);
+            Ok(map)
+        };
+        let one = Maker {
+            one: &one,
+            means: None,
+        };
+        let map = mean(&one, felt, coils, grid, components, progress)?;
+        progress.begin("interpolation error", 1);
+        let between = between(&one, felt, coils, grid, &map)?;
+        Ok((Some(sampled.report), map, between))
     }
 }
 
@@ -480,12 +510,11 @@ fn samples(map: &FieldMap, coils: &[PlacedCoil]) -> Vec<Sample> {
 
 /// What is proven of the map's error at its nodes, the steel's solution and the magnet left out.
 fn evaluation(map: &FieldMap, solved: &Solved) -> Evaluation {
-    let estimate = match solved.steel {
-        Steel::None => map.relative_error.max(crate::field::winding::KERNEL_ERROR),
+    let estimate = if solved.has_steel() {
         // The winding's rule, the steel's evaluation and its table.
-        Steel::Alone(_) | Steel::Coupled(_) => {
-            (2.0 * MAP_SHARE + EVALUATION_SHARE) * solved.tolerance
-        }
+        (2.0 * MAP_SHARE + EVALUATION_SHARE) * solved.tolerance
+    } else {
+        map.relative_error.max(KERNEL_ERROR)
     };
     let method = if map.tabulated {
         "a-priori bounds of the radial quadrature and of the tables"
@@ -501,9 +530,10 @@ fn evaluation(map: &FieldMap, solved: &Solved) -> Evaluation {
 /// The map's own error at its nodes.
 fn accuracy(evaluation: Evaluation, solved: &Solved, magnet: f64) -> StageAccuracy {
     let Evaluation { estimate, method } = evaluation;
-    let table = match solved.steel {
-        Steel::None | Steel::Alone(_) => "",
-        Steel::Coupled(_) => ", its table by comparison with direct values",
+    let table = if solved.steel().coupled().is_some() {
+        ", its table by comparison with direct values"
+    } else {
+        ""
     };
     StageAccuracy {
         estimate: estimate + solved.steel_error + magnet,

@@ -24,17 +24,16 @@ use crate::RunError;
 use crate::bundle::manifest::{ArrayGeometry, CurrentLimits, MagnetSummary};
 use crate::coil::circuit::{self, Circuit};
 use crate::design::{Coil, Coupling, Design, MagnetModel, Polarity};
-use crate::field::batch::Wanted;
+use crate::field::components::Components;
 use crate::field::dipole;
 use crate::field::magnet::{Cylinder, MagnetRule, Sources};
 use crate::field::source::AxialSource;
-use crate::field::steel::axial_table::AxialTable;
-use crate::field::steel::equivalent_dipoles::Parts;
+use crate::field::steel::array_steel::SteelField;
 use crate::field::winding::Winding;
 use crate::map::tabulate::PlacedCoil;
 use crate::progress::Progress;
 use crate::scene::core_material::SceneCore;
-use crate::scene::steel::{EVALUATION_SHARE, Solved, Steel, SteelField};
+use crate::scene::steel::{EVALUATION_SHARE, Solved};
 use crate::scene::tolerances::{MAGNET_FINEST, Tolerances};
 
 /// Points handed to one thread at a time; fixed, so that bytes do not depend on threads.
@@ -304,16 +303,14 @@ impl<'a> Scene<'a> {
         // As fine as the nearest of all points needs, whatever the portion.
         let sources = solved.sources(self, points_m, reach_m, amplification)?;
         // Many dipoles take a winding and its own core from one table.
-        let table = match &solved.steel {
-            Steel::Alone(coil) if reach_m > 0.0 => Some(AxialTable::new(
-                Some(self.winding),
-                coil.layer.clone(),
-                EVALUATION_SHARE * solved.tolerance / amplification,
-            )),
-            Steel::None | Steel::Alone(_) | Steel::Coupled(_) => None,
+        let table = if reach_m > 0.0 && solved.has_steel() {
+            let tolerance = EVALUATION_SHARE * solved.tolerance / amplification;
+            solved.steel().axial_source(self.winding, tolerance)
+        } else {
+            None
         };
         let (own, sources): (&dyn AxialSource, _) = match &table {
-            Some(table) => (table, None),
+            Some(table) => (&**table, None),
             None => (&self.winding, sources.as_ref()),
         };
         for (rule, rows) in &groups {
@@ -349,17 +346,13 @@ impl<'a> Scene<'a> {
     ) -> Result<(), RunError> {
         let coils = self.coils.len();
         let tilted = !rule.is_upright();
-        let (wanted, parts) = if tilted {
-            (Wanted::Gradient, Parts::Gradient)
+        let parts = if tilted {
+            Components::Gradient
         } else {
-            (Wanted::Gz, Parts::Gz)
-        };
-        let share = match solved.steel {
-            Steel::None => AIR_SHARE,
-            Steel::Alone(_) | Steel::Coupled(_) => EVALUATION_SHARE,
+            Components::Gz
         };
         let share = if rule.nodes().len() > 1 || sources.is_some() {
-            share
+            solved.evaluation_share()
         } else {
             1.0
         };
@@ -371,7 +364,7 @@ impl<'a> Scene<'a> {
                 .map(|p| std::array::from_fn(|i| p[i] + node.offset_m[i]))
                 .collect();
             let steel = sources.map_or_else(Vec::new, |sources| {
-                solved.steel_fields(self, sources, &places, parts)
+                self.steel_fields(sources, &places, parts)
             });
             let count = places.len();
             let z_m: Vec<f64> = places.iter().map(|p| p[2]).collect();
@@ -384,7 +377,7 @@ impl<'a> Scene<'a> {
                         dx.hypot(dy)
                     })
                     .collect();
-                let air = own.gradients(&r_m, &z_m, tolerance, wanted)?;
+                let air = own.gradients(&r_m, &z_m, tolerance, parts)?;
                 let block = parts.count() * count;
                 let steel = steel.get(column * block..(column + 1) * block);
                 for (row, place) in places.iter().enumerate() {
@@ -404,7 +397,20 @@ impl<'a> Scene<'a> {
         Ok(())
     }
 
-    /// The array as artefacts tell it.
+    /// The steel's part of the field per ampere of every coil at `points_m`, [coil, component,
+    /// point], gains not applied.
+    #[must_use]
+    pub fn steel_fields(
+        &self,
+        sources: &SteelField,
+        points_m: &[[f64; 3]],
+        parts: Components,
+    ) -> Vec<f64> {
+        let axes_m = self.coils.iter().map(|coil| coil.axis_m);
+        sources.of_windings(axes_m, points_m, parts)
+    }
+
+    /// The array as artefacts state it.
     #[must_use]
     pub fn array_geometry(&self) -> ArrayGeometry {
         ArrayGeometry {
@@ -418,7 +424,7 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// The current limits as artefacts tell them.
+    /// The current limits as artefacts state them.
     #[must_use]
     pub fn current_limits(&self) -> CurrentLimits {
         CurrentLimits {
@@ -428,7 +434,7 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// The magnet as artefacts tell it.
+    /// The magnet as artefacts state it.
     #[must_use]
     pub fn magnet_summary(&self) -> MagnetSummary {
         let magnet = &self.design.magnet;
@@ -464,12 +470,17 @@ fn largest(currents_a: &[f64]) -> f64 {
 
 /// Upward force on a dipole at one of the points at which one drive's `parts` were sampled,
 /// [component, point]: m . dB/dz, N (per ampere if they are).
-pub(crate) fn upward_n(moment_a_m2: [f64; 3], parts: Parts, values: &[f64], row: usize) -> f64 {
+pub(crate) fn upward_n(
+    moment_a_m2: [f64; 3],
+    parts: Components,
+    values: &[f64],
+    row: usize,
+) -> f64 {
     let count = values.len() / parts.count();
     let part = |component: usize| values[component * count + row];
     let [m_x, m_y, m_z] = moment_a_m2;
     match parts {
-        Parts::Gz => m_z * part(0),
-        Parts::Gradient | Parts::All => m_x * part(2) + m_y * part(3) + m_z * part(4),
+        Components::Gz => m_z * part(0),
+        Components::Gradient | Components::All => m_x * part(2) + m_y * part(3) + m_z * part(4),
     }
 }

@@ -7,14 +7,14 @@ use serde::Serialize;
 use super::Scene;
 use super::single::above_knee;
 use super::steel;
-use super::steel::{Solved, Steel, TWO_OF_COUPLED_CORES};
+use super::steel::Solved;
 use super::working_point::{WorkingPoint, relative_difference};
 use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed};
 use crate::coil::mutual;
-use crate::field::batch::Wanted;
+use crate::field::components::Components;
+use crate::field::steel::array_steel::TWO_OF_COUPLED_CORES;
 use crate::field::steel::core_flux_density::peak_depth_m;
-use crate::field::steel::equivalent_dipoles::Parts;
 
 /// The array's inductances.
 #[derive(Debug, Clone, Serialize)]
@@ -97,7 +97,7 @@ pub(crate) fn array(
         }
         None => None,
     };
-    if let (Steel::Coupled(array), None) = (&solved.steel, &working_point) {
+    if let (Some(array), None) = (solved.steel().coupled(), &working_point) {
         let depth_m = peak_depth_m(array.response.outline.shape);
         let inside = array.core_fields(&scene.upper_a, depth_m)?;
         peak_t = inside.iter().map(|field| field.peak_t).collect();
@@ -150,25 +150,18 @@ pub(crate) fn inductances(
     let mut estimate = error;
     let mut method = "two quadratures of the windings' mutual inductance";
     let mut relative_to = "each mutual inductance";
-    match &solved.steel {
-        Steel::None => {}
-        Steel::Alone(coil) => {
-            for (i, row) in matrix.iter_mut().enumerate() {
-                row[i] += coil.added_inductance_h;
-            }
-            method = "neighbours' cores left out (coupling = \"none\"): mutual inductances are \
-                      those of the windings in air";
+    for (i, row) in matrix.iter_mut().enumerate() {
+        for (j, value) in row.iter_mut().enumerate() {
+            *value += solved.steel().added_inductance_h(i, j);
         }
-        Steel::Coupled(array) => {
-            for (i, row) in matrix.iter_mut().enumerate() {
-                for (j, value) in row.iter_mut().enumerate() {
-                    *value += array.added_inductance_h[(i, j)];
-                }
-            }
-            estimate += array.relative_error;
-            relative_to = "the largest self inductance";
-            method = TWO_OF_COUPLED_CORES;
-        }
+    }
+    if solved.steel().coupled().is_some() {
+        estimate += solved.steel_error;
+        relative_to = "the largest self inductance";
+        method = TWO_OF_COUPLED_CORES;
+    } else if solved.has_steel() {
+        method = "neighbours' cores left out (coupling = \"none\"): mutual inductances are \
+                  those of the windings in air";
     }
     let stage = StageAccuracy {
         estimate,
@@ -188,7 +181,7 @@ fn working_point_summary(
     let places = around(scene);
     let sources = solved.sources(scene, &places, 0.0, 1.0)?;
     let steel = sources.map_or_else(Vec::new, |sources| {
-        solved.steel_fields(scene, &sources, &places, Parts::Gz)
+        scene.steel_fields(&sources, &places, Components::Gz)
     });
     let (mut air, mut linear) = (vec![0.0; places.len()], vec![0.0; places.len()]);
     let z_m: Vec<f64> = places.iter().map(|p| p[2]).collect();
@@ -202,7 +195,7 @@ fn working_point_summary(
         let r_m: Vec<f64> = places.iter().map(|p| (p[0] - x).hypot(p[1] - y)).collect();
         let own = scene
             .winding
-            .gradients(&r_m, &z_m, solved.tolerance, Wanted::Gz)?;
+            .gradients(&r_m, &z_m, solved.tolerance, Components::Gz)?;
         for (row, (air, linear)) in air.iter_mut().zip(&mut linear).enumerate() {
             *air += current * coil.gain * own.dbz_dz[row];
             *linear += current * coil.gain * steel[row];
@@ -212,7 +205,7 @@ fn working_point_summary(
     let top_m = scene.core.as_ref().map_or(0.0, |core| core.shape.top_m);
     let total = point
         .field(scene, lowest_m, lowest_m - top_m)
-        .at(&places, Parts::Gz);
+        .at(&places, Components::Gz);
     let sum = |steel: &[f64]| -> Vec<f64> { air.iter().zip(steel).map(|(a, s)| a + s).collect() };
     let flux_linkage_wb = air_inductance_h
         .iter()

@@ -6,13 +6,13 @@ use std::collections::BTreeMap;
 
 use super::core_material::{Material, SceneCore};
 use super::rated::TargetSummary;
-use super::steel::{ALONG_CURVE, TWO_OF_ONE_CORE};
 use super::tolerances::MAGNET_FINEST;
 use super::{MAGNET_SHARE, Scene, at_current, passive};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::coil::inductance;
 use crate::field::frame::to_cartesian;
+use crate::field::steel::array_steel::{ALONG_CURVE, TWO_OF_ONE_CORE};
 use crate::field::steel::bh_curve::BhCurve;
 use crate::field::steel::core_flux_density::peak_depth_m;
 use crate::field::steel::cored_coil::CoredCoil;
@@ -96,39 +96,9 @@ fn stage(estimate: f64, relative_to: &str, method: &str) -> StageAccuracy {
 
 impl Single {
     pub(crate) fn new(scene: &Scene) -> Result<Self, RunError> {
-        let tolerance = scene.tolerances.coil;
         let height_m = scene.design.target_height_m;
-        let air_inductance_h = scene.circuit.inductance_h;
         let Some(core) = &scene.core else {
-            let accuracy = BTreeMap::from([
-                (
-                    "field",
-                    stage(
-                        KERNEL_ERROR,
-                        "|grad B| (|B| for the field) at the target",
-                        "a-priori quadrature bound 1e-15; rounding sampled against 40-digit values",
-                    ),
-                ),
-                (
-                    "inductance",
-                    stage(
-                        inductance::RELATIVE_ERROR,
-                        "the inductance",
-                        "a-priori quadrature bound; sampled against 20-digit values",
-                    ),
-                ),
-            ]);
-            return Ok(Self {
-                inductance_h: air_inductance_h,
-                flux_linkage_wb: None,
-                field: scene.winding.field(0.0, height_m)?,
-                relative_permeability: 1.0,
-                core: None,
-                accuracy,
-                warnings: Vec::new(),
-                source: Source::Air(scene.winding),
-                tolerance,
-            });
+            return Self::in_air(scene);
         };
         let shape = core.shape;
         if height_m <= shape.top_m {
@@ -144,6 +114,46 @@ impl Single {
         {
             return Self::saturated(scene, core, curve);
         }
+        Self::linear(scene, core)
+    }
+
+    fn in_air(scene: &Scene) -> Result<Self, RunError> {
+        let height_m = scene.design.target_height_m;
+        let accuracy = BTreeMap::from([
+            (
+                "field",
+                stage(
+                    KERNEL_ERROR,
+                    "|grad B| (|B| for the field) at the target",
+                    "a-priori quadrature bound 1e-15; rounding sampled against 40-digit values",
+                ),
+            ),
+            (
+                "inductance",
+                stage(
+                    inductance::RELATIVE_ERROR,
+                    "the inductance",
+                    "a-priori quadrature bound; sampled against 20-digit values",
+                ),
+            ),
+        ]);
+        Ok(Self {
+            inductance_h: scene.circuit.inductance_h,
+            flux_linkage_wb: None,
+            field: scene.winding.field(0.0, height_m)?,
+            relative_permeability: 1.0,
+            core: None,
+            accuracy,
+            warnings: Vec::new(),
+            source: Source::Air(scene.winding),
+            tolerance: scene.tolerances.coil,
+        })
+    }
+
+    /// The coil with linear steel, or along a curve without current.
+    fn linear(scene: &Scene, core: &SceneCore) -> Result<Self, RunError> {
+        let (shape, tolerance) = (core.shape, scene.tolerances.coil);
+        let height_m = scene.design.target_height_m;
         let mu_r = core.relative_permeability();
         let coil = CoredCoil::new(&scene.winding, shape, mu_r, tolerance, height_m)?;
         let current_a = scene.rated_current_a();
@@ -202,7 +212,7 @@ impl Single {
             ));
         }
         Ok(Self {
-            inductance_h: air_inductance_h + coil.added_inductance_h,
+            inductance_h: scene.circuit.inductance_h + coil.added_inductance_h,
             flux_linkage_wb: None,
             field: coil.field(0.0, height_m)?,
             relative_permeability: mu_r,

@@ -1,31 +1,18 @@
 //! The solved steel of a scene, and the field it adds.
 
-use std::sync::Arc;
-
 use serde::{Deserialize, Serialize};
 
 use super::core_material::{Material, SceneCore};
-use super::{Scene, at_current, coupled};
+use super::{AIR_SHARE, Scene, at_current, coupled};
 use crate::RunError;
 use crate::field::steel::CLOSEST;
 use crate::field::steel::array::CoupledArray;
-use crate::field::steel::axial_table::AxialTable;
+use crate::field::steel::array_steel::{AloneCore, ArraySteel, NoSteel, SteelField};
 use crate::field::steel::cored_coil::CoredCoil;
-use crate::field::steel::equivalent_dipoles::{ArraySources, Parts};
-use crate::field::steel::magnetized::MagnetizedCore;
 use crate::field::winding::KERNEL_ERROR;
 
 /// Share of the tolerance given to evaluating a solution.
 pub(crate) const EVALUATION_SHARE: f64 = 0.1;
-/// How the error of one core's solution is known.
-pub(crate) const TWO_OF_ONE_CORE: &str =
-    "twice the difference of two resolutions of the core's surface";
-/// The same of cores that magnetise each other.
-pub(crate) const TWO_OF_COUPLED_CORES: &str =
-    "the difference of two resolutions of the coupled cores";
-/// The same of one core along a B-H curve.
-pub(crate) const ALONG_CURVE: &str = "the larger difference among three resolutions of the core's surface and inside, times a \
-     safety factor";
 /// Heights above a core, in radii, from which on places are far from the steel.
 const FAR: f64 = 0.5;
 /// Share of the tolerance given to what is claimed of the steel's solution.
@@ -43,35 +30,13 @@ pub enum Steel {
     Coupled(Box<CoupledArray>),
 }
 
-/// A core that answers to its own winding alone.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct AloneCore {
-    /// Its layer per ampere.
-    pub layer: MagnetizedCore,
-    /// What it adds to the winding's inductance, H.
-    pub added_inductance_h: f64,
-}
-
-/// The field that steel adds, ready to be evaluated.
-#[derive(Debug, Clone)]
-pub enum SteelField {
-    /// Of one core at the origin that answers to its own winding alone, per ampere.
-    Alone(Arc<AxialTable>),
-    /// Of all cores, per ampere of every winding.
-    Coupled(ArraySources),
-}
-
-impl SteelField {
-    /// The field at `points_m`, [drive, component, point].
-    ///
-    /// # Panics
-    /// When `out` has another length than drives x components x points.
-    pub fn sample(&self, points_m: &[[f64; 3]], parts: Parts, out: &mut [f64]) {
+impl Steel {
+    /// The steel as a source: what every other file knows of it.
+    fn source(&self) -> &dyn ArraySteel {
         match self {
-            Self::Alone(table) => table
-                .sample_parts(points_m, parts, out)
-                .expect("a table without a winding has no winding's edge"),
-            Self::Coupled(sources) => sources.sample(points_m, parts, out),
+            Self::None => &NoSteel,
+            Self::Alone(core) => &**core,
+            Self::Coupled(array) => &**array,
         }
     }
 }
@@ -79,8 +44,7 @@ impl SteelField {
 /// A scene's field sources, ready to be evaluated.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Solved {
-    /// The steel.
-    pub steel: Steel,
+    steel: Steel,
     /// The tolerance asked for, relative to the largest |grad B| at a height.
     pub tolerance: f64,
     /// The error that is claimed of the steel's solution, relative to the same; 0 without steel.
@@ -89,31 +53,57 @@ pub struct Solved {
     /// coupled follow the curve at the rated current; those that are coupled are linear, of the
     /// permeability at the mean |B| of one coil alone at the rated current.
     pub relative_permeability: f64,
-    /// Whether the cores follow their B-H curve.
-    pub along_curve: bool,
 }
 
 impl Solved {
+    /// Windings in air.
+    #[must_use]
+    pub fn in_air(tolerance: f64) -> Self {
+        Self {
+            steel: Steel::None,
+            tolerance,
+            steel_error: 0.0,
+            relative_permeability: 1.0,
+        }
+    }
+
+    /// The steel as a source.
+    #[must_use]
+    pub fn steel(&self) -> &dyn ArraySteel {
+        self.steel.source()
+    }
+
+    /// Whether there is steel.
+    #[must_use]
+    pub fn has_steel(&self) -> bool {
+        self.steel().is_present()
+    }
+
     /// The sources as forces ask for them, where these are as maps do: of steel one solution serves
     /// both.
     ///
     /// # Errors
     /// As [`solve`].
     pub fn for_forces(&self, scene: &Scene, lowest_m: f64) -> Result<Self, RunError> {
-        match self.steel {
-            Steel::None => solve(scene, scene.tolerances.forces, lowest_m),
-            Steel::Alone(_) | Steel::Coupled(_) => Ok(self.clone()),
+        if self.has_steel() {
+            Ok(self.clone())
+        } else {
+            solve(scene, scene.tolerances.forces, lowest_m)
         }
     }
 
     /// How [`Solved::steel_error`] is known; `None` without steel.
     #[must_use]
     pub fn steel_method(&self) -> Option<&'static str> {
-        match self.steel {
-            Steel::None => None,
-            Steel::Alone(_) if self.along_curve => Some(ALONG_CURVE),
-            Steel::Alone(_) => Some(TWO_OF_ONE_CORE),
-            Steel::Coupled(_) => Some(TWO_OF_COUPLED_CORES),
+        self.steel().method()
+    }
+
+    /// The share of the tolerance given to evaluating the windings' field beside other parts.
+    pub(crate) fn evaluation_share(&self) -> f64 {
+        if self.has_steel() {
+            EVALUATION_SHARE
+        } else {
+            AIR_SHARE
         }
     }
 
@@ -132,11 +122,10 @@ impl Solved {
     /// kernel's error.
     #[must_use]
     pub fn point_error(&self) -> f64 {
-        match self.steel {
-            Steel::None => KERNEL_ERROR,
-            Steel::Alone(_) | Steel::Coupled(_) => {
-                self.steel_error + EVALUATION_SHARE * self.tolerance
-            }
+        if self.has_steel() {
+            self.steel_error + EVALUATION_SHARE * self.tolerance
+        } else {
+            KERNEL_ERROR
         }
     }
 
@@ -145,9 +134,10 @@ impl Solved {
     /// [`Scene::magnet_growth`].
     #[must_use]
     pub fn force_error(&self, growth: f64, amplification: f64, bound: f64) -> f64 {
-        let evaluation = match self.steel {
-            Steel::None => 0.0,
-            Steel::Alone(_) | Steel::Coupled(_) => EVALUATION_SHARE * self.tolerance,
+        let evaluation = if self.has_steel() {
+            EVALUATION_SHARE * self.tolerance
+        } else {
+            0.0
         };
         self.steel_error * growth + evaluation + KERNEL_ERROR * amplification + bound
     }
@@ -187,47 +177,7 @@ impl Solved {
         amplification: f64,
     ) -> Option<SteelField> {
         let tolerance = EVALUATION_SHARE * self.tolerance / amplification;
-        match &self.steel {
-            Steel::None => None,
-            Steel::Alone(coil) => Some(SteelField::Alone(Arc::new(AxialTable::new(
-                None,
-                coil.layer.clone(),
-                tolerance,
-            )))),
-            Steel::Coupled(array) => {
-                let sources = ArraySources::of_array(array, lowest_m, distance_m, tolerance);
-                Some(SteelField::Coupled(sources))
-            }
-        }
-    }
-
-    /// The steel's part of the field per ampere of every coil at `points_m`, by what
-    /// [`Solved::sources`] gave for them: [coil, component, point], gains not applied.
-    #[must_use]
-    pub fn steel_fields(
-        &self,
-        scene: &Scene,
-        sources: &SteelField,
-        points_m: &[[f64; 3]],
-        parts: Parts,
-    ) -> Vec<f64> {
-        let block = parts.count() * points_m.len();
-        let mut out = vec![0.0; scene.coils.len() * block];
-        match &self.steel {
-            Steel::None => {}
-            Steel::Coupled(_) => sources.sample(points_m, parts, &mut out),
-            Steel::Alone(_) => {
-                for (coil, out) in scene.coils.iter().zip(out.chunks_exact_mut(block.max(1))) {
-                    let [x, y] = coil.axis_m;
-                    let own: Vec<[f64; 3]> = points_m
-                        .iter()
-                        .map(|p| [p[0] - x, p[1] - y, p[2]])
-                        .collect();
-                    sources.sample(&own, parts, out);
-                }
-            }
-        }
-        out
+        self.steel().field(lowest_m, distance_m, tolerance)
     }
 }
 
@@ -297,13 +247,7 @@ pub(crate) fn clearance_of_m(
 /// An outline that meets a winding's edge; a B-H curve along which no state is found.
 pub fn solve(scene: &Scene, tolerance: f64, lowest_m: f64) -> Result<Solved, RunError> {
     let Some(core) = &scene.core else {
-        return Ok(Solved {
-            steel: Steel::None,
-            tolerance,
-            steel_error: 0.0,
-            relative_permeability: 1.0,
-            along_curve: false,
-        });
+        return Ok(Solved::in_air(tolerance));
     };
     let current_a = scene.rated_current_a();
     let at_current = match &core.material {
@@ -333,15 +277,14 @@ pub fn solve(scene: &Scene, tolerance: f64, lowest_m: f64) -> Result<Solved, Run
             steel_error: array.relative_error,
             steel: Steel::Coupled(Box::new(array)),
             relative_permeability,
-            along_curve: false,
         });
     }
-    let along_curve = at_current.is_some();
     let (alone, steel_error) = match at_current {
         Some((state, _)) => (
             AloneCore {
                 layer: state.layer,
                 added_inductance_h: state.added_inductance_h,
+                along_curve: true,
             },
             state.relative_error,
         ),
@@ -357,6 +300,7 @@ pub fn solve(scene: &Scene, tolerance: f64, lowest_m: f64) -> Result<Solved, Run
                 AloneCore {
                     layer: coil.core,
                     added_inductance_h: coil.added_inductance_h,
+                    along_curve: false,
                 },
                 coil.relative_error,
             )
@@ -367,6 +311,5 @@ pub fn solve(scene: &Scene, tolerance: f64, lowest_m: f64) -> Result<Solved, Run
         steel_error,
         steel: Steel::Alone(Box::new(alone)),
         relative_permeability,
-        along_curve,
     })
 }

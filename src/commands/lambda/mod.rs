@@ -33,7 +33,7 @@ use crate::scene::passive;
 use crate::scene::single::above_knee;
 use crate::scene::sources::Sampling;
 use crate::scene::steel;
-use crate::scene::steel::{EVALUATION_SHARE, Solved, Steel};
+use crate::scene::steel::{EVALUATION_SHARE, Solved};
 use crate::scene::tolerances::MAGNET_FINEST;
 use crate::scene::working_point::{WorkingPoint, relative_difference, superposition_ends};
 use crate::scene::{AIR_SHARE, MAGNET_SHARE, Scene};
@@ -331,8 +331,8 @@ fn solve_at(
     if let Some(core) = &scene.core {
         warnings.extend(core.warnings.iter().cloned());
     }
-    if let (Some(chosen), Steel::Coupled(array), Some(core)) =
-        (&solution.chosen, &solved.steel, &scene.core)
+    if let (Some(chosen), Some(array), Some(core)) =
+        (&solution.chosen, solved.steel().coupled(), &scene.core)
         && matches!(core.material, Material::Linear(_))
     {
         let peak_t = field.peak_t(array, &chosen.currents_a)?;
@@ -634,11 +634,13 @@ pub(crate) fn proven_accuracy(scene: &Scene, solved: &Solved) -> StageAccuracy {
 fn evaluation(scene: &Scene, solved: &Solved) -> Evaluation {
     let rules = solved.tolerance.max(KERNEL_ERROR);
     let cylinder = scene.design.magnet.model == MagnetModel::Cylinder;
-    let field = match solved.steel {
-        Steel::None if !cylinder => rules,
-        Steel::None => (AIR_SHARE * rules).max(KERNEL_ERROR),
+    let field = if solved.has_steel() {
         // The winding's rule and the steel's.
-        Steel::Alone(_) | Steel::Coupled(_) => 2.0 * EVALUATION_SHARE * rules,
+        2.0 * EVALUATION_SHARE * rules
+    } else if cylinder {
+        (AIR_SHARE * rules).max(KERNEL_ERROR)
+    } else {
+        rules
     };
     let magnet = if cylinder {
         MAGNET_SHARE * rules.max(MAGNET_FINEST)
@@ -655,13 +657,11 @@ fn accuracy_of(scene: &Scene, solved: &Solved, evaluation: Evaluation) -> StageA
     let Evaluation { estimate, method } = evaluation;
     StageAccuracy {
         estimate: estimate + solved.steel_error,
-        relative_to: match (&solved.steel, scene.design.magnet.model) {
-            (Steel::Alone(_) | Steel::Coupled(_), MagnetModel::Cylinder) => {
+        relative_to: match (solved.has_steel(), scene.design.magnet.model) {
+            (true, MagnetModel::Cylinder) => {
                 "the largest |grad B| at each height of the magnet, averaged over it"
             }
-            (Steel::None, _) | (_, MagnetModel::Dipole) => {
-                "the largest |grad B| at the point's height"
-            }
+            (false, _) | (_, MagnetModel::Dipole) => "the largest |grad B| at the point's height",
         }
         .to_owned(),
         method: match solved.steel_method() {

@@ -27,7 +27,7 @@ use crate::coil::optimum::{
 use crate::design::Design;
 use crate::progress::{Progress, Silent};
 use crate::scene::rated::Rated;
-use crate::scene::steel::{self, Steel};
+use crate::scene::steel;
 use crate::scene::{Scene, coupled};
 
 /// How well the optimiser's force among neighbours agrees with a coupled solution: what the
@@ -269,12 +269,10 @@ impl Optimization {
                 best.force_n
             ));
         }
-        if let (Some(used), Steel::Coupled(array)) = (
-            self.limits.get_mut(LimitName::Settling.key()),
-            &solved.steel,
-        ) {
+        if let Some(used) = self.limits.get_mut(LimitName::Settling.key()) {
+            let added_h = solved.steel().added_inductance_h(coil, coil);
             let circuit = Circuit {
-                inductance_h: scene.circuit.inductance_h + array.added_inductance_h[(coil, coil)],
+                inductance_h: scene.circuit.inductance_h + added_h,
                 ..scene.circuit
             };
             used.value = circuit.settling_s();

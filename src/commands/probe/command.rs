@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::{ProbeComponents, ProbeRequest, ProbeTable, probe};
+use super::{ProbeRequest, ProbeTable, probe};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
@@ -26,6 +26,7 @@ use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
 use crate::cli::values::FileArgument;
 use crate::design::Need;
+use crate::field::components::Components;
 use crate::scene::cost::{of_probe, of_steel};
 
 /// How every table of points begins.
@@ -64,8 +65,8 @@ pub struct Probe {
     #[arg(value_name = "POINTS", required_unless_present = "compare")]
     pub(super) points: Option<FileArgument>,
     /// What is reported at each point
-    #[arg(long, value_enum, default_value_t = Components::All, conflicts_with = "compare")]
-    components: Components,
+    #[arg(long, value_enum, default_value_t = ComponentsArgument::All, conflicts_with = "compare")]
+    components: ComponentsArgument,
     /// Report force and torque on the magnet per ampere too: six columns
     #[arg(long, conflicts_with = "compare")]
     pub(super) magnet_force: bool,
@@ -81,7 +82,7 @@ pub struct Probe {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Components {
+enum ComponentsArgument {
     /// Field and gradient: twelve columns
     All,
     /// Gradient: nine columns
@@ -90,7 +91,7 @@ enum Components {
     Gz,
 }
 
-/// What is told about the table; with its columns where standard output holds nothing else.
+/// What is reported about the table; with its columns where standard output holds nothing else.
 #[derive(Serialize)]
 struct ProbeSummary {
     schema_version: &'static str,
@@ -120,9 +121,9 @@ impl Probe {
         let (points_m, points_input) = documents::points(points)?;
         let points = points_m.len();
         let components = match self.components {
-            Components::All => ProbeComponents::All,
-            Components::Gradient => ProbeComponents::Gradient,
-            Components::Gz => ProbeComponents::Gz,
+            ComponentsArgument::All => Components::All,
+            ComponentsArgument::Gradient => Components::Gradient,
+            ComponentsArgument::Gz => Components::Gz,
         };
         let protected: Vec<PathBuf> = document.also_read().map(Path::to_path_buf).collect();
         let inputs = vec![document.input, points_input];
@@ -135,7 +136,7 @@ impl Probe {
             overwrite.check(path).map_err(RunError::from)?;
         }
         let design = &document.design;
-        let parts = match self.components {
+        let parts = match components {
             Components::All => 12,
             Components::Gradient => 9,
             Components::Gz => 1,

@@ -7,7 +7,7 @@ use crate::inputs::{SEED, SEED_AIR};
 use crate::reference::{AXIAL_ERROR, axial_gradient};
 use fluxform::RunError;
 use fluxform::design::{Design, Need};
-use fluxform::field::steel::equivalent_dipoles::{ArraySources, Parts};
+use fluxform::field::steel::equivalent_dipoles::ArraySources;
 use fluxform::map::coupled_map::SampledField;
 use fluxform::map::tabulate::{Grid, tabulate};
 use fluxform::map::{Components, FieldMap};
@@ -16,7 +16,7 @@ use fluxform::numerics::lagrange::locate;
 use fluxform::progress::{Progress, Silent};
 use fluxform::scene::Scene;
 use fluxform::scene::maps::{Felt, SceneMap};
-use fluxform::scene::steel::{self, Steel};
+use fluxform::scene::steel;
 use fluxform::scene::tolerances::COUPLED_TOLERANCE;
 use fluxform::scene::tolerances::MAP_TOLERANCE;
 
@@ -188,7 +188,7 @@ fn coupled(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curv
     let grid = grid(design, None);
     let lowest_m = grid.z_m[0];
     let solved = steel::solve(&scene, scene.tolerances.map, lowest_m)?;
-    let Steel::Coupled(array) = &solved.steel else {
+    let Some(array) = solved.steel().coupled() else {
         return Err(super::no_core());
     };
     let looked = looked_at(&grid, scene.coils.len());
@@ -199,7 +199,7 @@ fn coupled(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curv
         .map(|[_, z, y, x]| [grid.x_m[*x], grid.y_m[*y], grid.z_m[*z]])
         .collect();
     let mut exact = vec![0.0; scene.coils.len() * points.len()];
-    finest.sample(&points, Parts::Gz, &mut exact);
+    finest.sample(&points, Components::Gz, &mut exact);
     let mut sizes = Vec::with_capacity(points.len());
     for (k, point) in points.iter().enumerate() {
         let column = exact.iter().skip(k).step_by(points.len());

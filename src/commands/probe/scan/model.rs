@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::RunError;
 use crate::bundle::scan::{Measured, Scan};
-use crate::commands::probe::Places;
+use crate::commands::probe::FieldAt;
 use crate::field::frame::CartesianField;
 use crate::progress::Progress;
 use crate::scene::Scene;
@@ -98,9 +98,9 @@ impl<'a> Model<'a> {
     ///
     /// # Errors
     /// A point on the steel.
-    pub(super) fn places(&self, pose: Pose) -> Result<Places<'a>, RunError> {
+    pub(super) fn places(&self, pose: Pose) -> Result<FieldAt<'a>, RunError> {
         let positions_m = self.positions_m(pose);
-        Places::new(self.scene, self.solved, &positions_m, 3.0 * STEP_M)
+        FieldAt::new(self.scene, self.solved, &positions_m, 3.0 * STEP_M)
     }
 
     /// What each driven coil adds to each measured number, [pair, quantity], T or T/m.
