@@ -144,7 +144,7 @@ pub enum Polarity {
 pub enum MagnetModel {
     /// A point dipole at the magnet's centre (eq. 5).
     Dipole,
-    /// The surface charges of the cylinder.
+    /// The uniformly magnetised cylinder: (M . grad) B integrated over its volume.
     Cylinder,
 }
 

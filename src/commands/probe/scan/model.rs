@@ -109,7 +109,7 @@ impl<'a> Model<'a> {
     /// A point on a winding's edge; interruption.
     pub(super) fn contributions(
         &self,
-        places: &Places,
+        places: &FieldAt,
         pose: Pose,
         progress: &dyn Progress,
     ) -> Result<Vec<f64>, RunError> {
