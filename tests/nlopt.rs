@@ -159,9 +159,9 @@ fn random_design(numbers: &mut Random, core: bool) -> Value {
     let told = evaluate(&design, Vec::new(), None).unwrap();
     json!({
         "name": text.replace('\n', " "),
-        "inner_diameter_m": told.coil.inner_diameter_m,
-        "outer_diameter_m": told.coil.outer_diameter_m,
-        "length_m": told.coil.length_m,
+        "inner_diameter_m": told.coil.size.inner_diameter_m,
+        "outer_diameter_m": told.coil.size.outer_diameter_m,
+        "length_m": told.coil.size.length_m,
         "wire_diameter_m": design.wire.diameter_m,
         "current_a": told.target.current_a,
         "core": core,

@@ -185,8 +185,8 @@ mod tests {
             assert!(Code::ALL[..i].iter().all(|c| c.name() != code.name()));
             let digits = &code.name()[1..];
             let exit = code.exit_code().to_string();
-            let told = if exit.len() == 3 { 3 } else { 1 };
-            assert_eq!(digits[..told], exit, "{}", code.name());
+            let width = if exit.len() == 3 { 3 } else { 1 };
+            assert_eq!(digits[..width], exit, "{}", code.name());
         }
     }
 

@@ -1,4 +1,4 @@
-//! Pieces of summaries that several commands tell alike.
+//! Pieces of summaries that several commands print alike.
 
 use super::quantity::{count, error, length_error, mm, number};
 use crate::accuracy::StageAccuracy;
@@ -6,7 +6,7 @@ use crate::bundle::manifest::{AxisSummary, LeftOut};
 use crate::cli::layout::grid;
 use crate::design::Design;
 
-/// Coils beyond this many are told in sum, not one by one.
+/// Coils beyond this many are summed up, not listed.
 const COILS_SHOWN: usize = 100;
 /// Columns of coils that stand in no grid.
 const COLUMNS: usize = 8;

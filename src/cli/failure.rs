@@ -163,7 +163,7 @@ impl From<JsonError> for Failure {
     }
 }
 
-/// One fault as `--format json` tells it; what is not known is absent.
+/// One fault as `--format json` states it; what is not known is absent.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct FaultEntry {
     /// `error` or `warning`.

@@ -13,7 +13,7 @@ pub use super::exit::Exit;
 pub use super::failure::Failure;
 pub use super::help::{Codes, page};
 pub use super::layout::{Sheet, Side, table};
-pub use super::printer::{Place, Printer};
+pub use super::printer::{Printer, Stream};
 pub use super::quantity::{bytes, count, error, number_to, si};
 pub use super::start::{begin, folder};
 pub use super::values::FileArgument;
@@ -105,7 +105,7 @@ fn told_early(args: &[OsString]) -> Common {
     }
 }
 
-/// Whether a panic is caught where it happens and told as what it means.
+/// Whether a panic is caught where it happens and reported as what it means.
 fn caught() -> bool {
     #[cfg(feature = "step")]
     return crate::shape::step::guards_panics();
@@ -136,7 +136,7 @@ fn not_parsed(error: &clap::Error, args: &[OsString]) -> Exit {
     }
 }
 
-/// The colours of help and usage errors, which are told before the arguments are known.
+/// The colours of help and usage errors, which are printed before the arguments are known.
 fn colour_of(args: &[OsString]) -> ColorChoice {
     match value_of(args, "--color") {
         Some("always") => ColorChoice::Always,

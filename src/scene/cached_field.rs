@@ -7,7 +7,7 @@
 use std::sync::OnceLock;
 
 use super::Scene;
-use super::maps::{Felt, SceneMap};
+use super::maps::{MagnetMean, SceneMap};
 use super::passive;
 use super::steel::{self, Solved};
 use crate::RunError;
@@ -54,7 +54,7 @@ impl FieldStore {
         } else {
             Store::none()
         };
-        // Debug text tells every number to the last bit.
+        // Debug text holds every number to the last bit.
         let parts = format!(
             "{:?}",
             (
@@ -115,7 +115,7 @@ pub struct ShapeField<'a> {
 }
 
 impl<'a> ShapeField<'a> {
-    /// As [`Scene::forces_n_per_a`]; `what` tells these points from others of the shape.
+    /// As [`Scene::forces_n_per_a`]; `what` is their name among the points of the shape.
     ///
     /// # Errors
     /// As [`Scene::forces_n_per_a`].
@@ -209,15 +209,15 @@ impl<'a> ShapeField<'a> {
         coils: &[PlacedCoil],
         grid: &Grid,
         components: Components,
-        felt: &Felt,
+        magnet: &MagnetMean,
         progress: &dyn Progress,
     ) -> Result<SceneMap, RunError> {
-        let compute = || SceneMap::new(scene, solved, coils, grid, components, felt, progress);
+        let compute = || SceneMap::new(scene, solved, coils, grid, components, magnet, progress);
         let Some((FieldStore { store, field, .. }, shape)) = self.kept else {
             return compute();
         };
         let coils: Vec<usize> = coils.iter().map(|coil| coil.number).collect();
-        let what = format!("{:?}", (coils, components, felt));
+        let what = format!("{:?}", (coils, components, magnet));
         let origin = [&grid.x_m, &grid.y_m, &grid.z_m]
             .into_iter()
             .fold(field.clone().and(what.as_bytes()), |origin, nodes| {

@@ -48,35 +48,35 @@ impl SceneMap {
         coils: &[PlacedCoil],
         grid: &Grid,
         components: Components,
-        felt: &Felt,
+        magnet: &MagnetMean,
         progress: &dyn Progress,
     ) -> Result<Self, RunError> {
-        let place = Place {
+        let task = MapTask {
             scene,
             solved,
             coils,
             grid,
-            felt,
+            magnet,
         };
-        let share = if !solved.has_steel() && felt.is_field() {
+        let share = if !solved.has_steel() && magnet.is_field() {
             1.0
         } else if solved.has_steel() {
             MAP_SHARE
         } else {
             AIR_SHARE
         };
-        let tolerance = share * solved.tolerance / felt.amplification;
+        let tolerance = share * solved.tolerance / magnet.amplification;
         let own = EVALUATION_SHARE * tolerance;
         let (table, map, between) = match solved.steel().axial_source(scene.winding, own) {
-            Some(source) => place.axial(&*source, share, tolerance, components, progress)?,
-            None => place.coupled(tolerance, components, progress)?,
+            Some(source) => task.axial(&*source, share, tolerance, components, progress)?,
+            None => task.coupled(tolerance, components, progress)?,
         };
         progress.end();
         let mut evaluation = evaluation(&map, solved);
-        if felt.is_field() {
+        if magnet.is_field() {
             evaluation = sharper(scene, solved, samples(&map, coils), evaluation);
         }
-        let accuracy = accuracy(evaluation, solved, felt.bound);
+        let accuracy = accuracy(evaluation, solved, magnet.bound);
         Ok(Self {
             map,
             between,
@@ -87,18 +87,18 @@ impl SceneMap {
 }
 
 /// What is mapped, and where.
-struct Place<'a> {
+struct MapTask<'a> {
     scene: &'a Scene<'a>,
     solved: &'a Solved,
     coils: &'a [PlacedCoil],
     grid: &'a Grid,
-    felt: &'a Felt,
+    magnet: &'a MagnetMean,
 }
 
 /// A map with what is known of it before its accuracy.
 type Mapped = (Option<TableReport>, FieldMap, InterpolationError);
 
-impl Place<'_> {
+impl MapTask<'_> {
     /// Coils each of which is a `source` about its own axis: a map over the distance from it.
     fn axial(
         &self,
@@ -113,10 +113,10 @@ impl Place<'_> {
             solved,
             coils,
             grid,
-            felt,
+            magnet,
         } = *self;
         if let Some(core) = &scene.core {
-            clearance_m(scene, core, &lowest_plane(grid), felt.reach_m)?;
+            clearance_m(scene, core, &lowest_plane(grid), magnet.reach_m)?;
         }
         let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
             tabulate(source, coils, grid, components, tolerance, p)
@@ -133,13 +133,13 @@ impl Place<'_> {
             one: &one,
             means: means.as_ref(),
         };
-        let map = mean(&one, felt, coils, grid, components, progress)?;
+        let map = mean(&one, magnet, coils, grid, components, progress)?;
         progress.begin("interpolation error", 1);
         // In air the field between the nodes is had as finely as the map itself, at once.
-        let between = if felt.is_field() && !solved.has_steel() {
+        let between = if magnet.is_field() && !solved.has_steel() {
             interpolation_error(source, coils, grid, &map.gz_t_per_m_per_a, tolerance)?
         } else {
-            between(&one, felt, coils, grid, &map)?
+            between(&one, magnet, coils, grid, &map)?
         };
         Ok((None, map, between))
     }
@@ -157,15 +157,15 @@ impl Place<'_> {
             solved,
             coils,
             grid,
-            felt,
+            magnet,
         } = *self;
         let lowest = lowest_plane(grid);
-        let steel = solved.sources(scene, &lowest, felt.reach_m, felt.amplification)?;
+        let steel = solved.sources(scene, &lowest, magnet.reach_m, magnet.amplification)?;
         let steel = steel.as_ref().and_then(SteelField::coupled);
         let steel = steel.ok_or_else(no_steel)?;
         // A grid through every place that a node of the magnet can take.
-        let widest = widest(grid, felt);
-        let visits = felt.visits();
+        let widest = widest(grid, magnet);
+        let visits = magnet.visits();
         let sampled = SampledField::new(steel, &widest, components, tolerance, visits, progress)?;
         let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
             let mut map = tabulate(&scene.winding, coils, grid, components, tolerance, &Silent)?;
@@ -176,9 +176,9 @@ impl Place<'_> {
             one: &one,
             means: None,
         };
-        let map = mean(&one, felt, coils, grid, components, progress)?;
+        let map = mean(&one, magnet, coils, grid, components, progress)?;
         progress.begin("interpolation error", 1);
-        let between = between(&one, felt, coils, grid, &map)?;
+        let between = between(&one, magnet, coils, grid, &map)?;
         Ok((Some(sampled.report), map, between))
     }
 }
@@ -208,7 +208,7 @@ type Shares = Vec<([f64; 3], f64)>;
 /// What a map's values are the mean of: offsets of the magnet's dipoles and their parts of its
 /// moment, fewer from greater heights up.
 #[derive(Debug, Clone)]
-pub struct Felt {
+pub struct MagnetMean {
     /// Height from which the offsets (m) and parts hold, ascending.
     layers: Vec<(f64, Shares)>,
     /// Largest sum of the parts' magnitudes.
@@ -225,7 +225,7 @@ const MOST_AMPLIFICATION_OF_TABLES: f64 = 100.0;
 /// Growth of the distance from the sources at which a rule of fewer dipoles is sought.
 const FARTHER: f64 = 1.25;
 
-impl Felt {
+impl MagnetMean {
     /// The field itself.
     #[must_use]
     pub fn field() -> Self {
@@ -243,7 +243,7 @@ impl Felt {
     /// A magnet that touches what it is attracted by.
     pub fn by_magnet(scene: &Scene, z_m: &[f64], tolerance: f64) -> Result<Self, RunError> {
         let top_m = scene.core.as_ref().map_or(0.0, |c| c.shape.top_m.max(0.0));
-        let mut felt = Self {
+        let mut magnet = Self {
             layers: Vec::new(),
             ..Self::field()
         };
@@ -259,18 +259,18 @@ impl Felt {
             }
             sought_m = *z;
             let rule = scene.magnet_rule(*z, tolerance)?;
-            let fewer = felt
+            let fewer = magnet
                 .layers
                 .last()
                 .is_none_or(|(_, shares)| rule.nodes().len() < shares.len());
-            if fewer && (felt.layers.is_empty() || rule.amplification() <= most) {
-                felt.amplification = felt.amplification.max(rule.amplification());
-                felt.bound = felt.bound.max(rule.bound());
-                felt.reach_m = felt.reach_m.max(rule.reach_m());
-                felt.layers.push((*z, shares(&rule)));
+            if fewer && (magnet.layers.is_empty() || rule.amplification() <= most) {
+                magnet.amplification = magnet.amplification.max(rule.amplification());
+                magnet.bound = magnet.bound.max(rule.bound());
+                magnet.reach_m = magnet.reach_m.max(rule.reach_m());
+                magnet.layers.push((*z, shares(&rule)));
             }
         }
-        Ok(felt)
+        Ok(magnet)
     }
 
     /// Whether it is the field itself.
@@ -321,19 +321,19 @@ fn shifted(grid: &Grid, offset_m: [f64; 3]) -> Grid {
 
 fn mean(
     one: &Maker,
-    felt: &Felt,
+    magnet: &MagnetMean,
     coils: &[PlacedCoil],
     grid: &Grid,
     components: Components,
     progress: &dyn Progress,
 ) -> Result<FieldMap, MapError> {
     let mut pieces = Vec::new();
-    for z_m in felt.pieces(&grid.z_m) {
+    for z_m in magnet.pieces(&grid.z_m) {
         let grid = Grid {
             z_m: z_m.to_vec(),
             ..grid.clone()
         };
-        let shares = felt.at(z_m[0]);
+        let shares = magnet.at(z_m[0]);
         pieces.push(mean_of(one, shares, coils, &grid, components, progress)?);
     }
     if pieces.is_empty() {
@@ -413,13 +413,13 @@ fn mean_of(
 
 fn between(
     one: &Maker,
-    felt: &Felt,
+    magnet: &MagnetMean,
     coils: &[PlacedCoil],
     grid: &Grid,
     map: &FieldMap,
 ) -> Result<InterpolationError, MapError> {
     let direct = |coils: &[PlacedCoil], places: &Grid| {
-        mean(one, felt, coils, places, Components::Gz, &Silent)
+        mean(one, magnet, coils, places, Components::Gz, &Silent)
     };
     interpolation_error_by(&direct, coils, grid, &map.gz_t_per_m_per_a)
 }
@@ -455,10 +455,10 @@ fn add(map: &mut FieldMap, other: &FieldMap, factor: f64) {
 }
 
 /// The grid whose box holds every place of the magnet's dipoles: its ends moved outwards.
-fn widest(grid: &Grid, felt: &Felt) -> Grid {
+fn widest(grid: &Grid, magnet: &MagnetMean) -> Grid {
     let moved = |nodes: &[f64], axis: usize| {
         let mut out = nodes.to_vec();
-        for (_, shares) in &felt.layers {
+        for (_, shares) in &magnet.layers {
             for (offset, _) in shares {
                 out.extend(nodes.first().map(|x| x + offset[axis]));
                 out.extend(nodes.last().map(|x| x + offset[axis]));

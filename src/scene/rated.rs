@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::Scene;
-use super::single::{CoreSummary, Single};
+use super::single::{CoreSummary, Single, TargetSummary};
 use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed};
 use crate::coil::circuit::{Circuit, CoilSize};
@@ -68,38 +68,6 @@ pub struct CircuitSummary {
     pub mass_kg: f64,
     /// Heat at the rated current, W.
     pub power_w: f64,
-}
-
-/// Field and force at the target, SI.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[non_exhaustive]
-pub struct TargetSummary {
-    /// Height of the magnet's centre, m.
-    pub height_m: f64,
-    /// The rated current: the largest of the drivers' limits, or the supply's V/R, A.
-    pub current_a: f64,
-    /// dB_z/dz on the axis, T/m/A.
-    pub gradient_t_per_m_per_a: f64,
-    /// B_z on the axis, T/A.
-    pub field_t_per_a: f64,
-    /// Upward force at the rated current, N; the unpowered steel's pull included where the
-    /// design asks for it.
-    pub force_n: f64,
-    /// Force vector at the rated current, N, as `force_n`.
-    pub force_vector_n: [f64; 3],
-    /// Torque on the magnet about its centre at the rated current, N m, the steel's pull left out.
-    pub torque_n_m: [f64; 3],
-    /// Upward force of the unpowered steel, N; where the design asks for it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub passive_force_n: Option<f64>,
-}
-
-impl TargetSummary {
-    /// Upward force of the rated current alone, N.
-    #[must_use]
-    pub fn current_force_n(&self) -> f64 {
-        self.force_n - self.passive_force_n.unwrap_or(0.0)
-    }
 }
 
 impl Rated {

@@ -5,7 +5,6 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 use super::core_material::{Material, SceneCore};
-use super::rated::TargetSummary;
 use super::tolerances::MAGNET_FINEST;
 use super::{MAGNET_SHARE, Scene, at_current, passive};
 use crate::RunError;
@@ -56,6 +55,38 @@ pub enum MaterialKind {
     Linear,
     /// Along a B-H curve.
     Curve,
+}
+
+/// Field and force at the target, SI.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct TargetSummary {
+    /// Height of the magnet's centre, m.
+    pub height_m: f64,
+    /// The rated current: the largest of the drivers' limits, or the supply's V/R, A.
+    pub current_a: f64,
+    /// dB_z/dz on the axis, T/m/A.
+    pub gradient_t_per_m_per_a: f64,
+    /// B_z on the axis, T/A.
+    pub field_t_per_a: f64,
+    /// Upward force at the rated current, N; the unpowered steel's pull included where the
+    /// design asks for it.
+    pub force_n: f64,
+    /// Force vector at the rated current, N, as `force_n`.
+    pub force_vector_n: [f64; 3],
+    /// Torque on the magnet about its centre at the rated current, N m, the steel's pull left out.
+    pub torque_n_m: [f64; 3],
+    /// Upward force of the unpowered steel, N; where the design asks for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub passive_force_n: Option<f64>,
+}
+
+impl TargetSummary {
+    /// Upward force of the rated current alone, N.
+    #[must_use]
+    pub fn current_force_n(&self) -> f64 {
+        self.force_n - self.passive_force_n.unwrap_or(0.0)
+    }
 }
 
 /// One coil alone, per ampere; with a B-H curve at the rated current, divided by it.
@@ -361,7 +392,7 @@ pub(crate) fn above_knee(peak_t: f64, knee_t: f64, whose: &str) -> Option<String
     (peak_t > knee_t).then(|| {
         format!(
             "{whose} reaches {peak_t:.2} T, above the steel's knee at {knee_t} T, but is taken as \
-             linear: the force will be smaller than told; give core.bh_curve, or lower the current"
+             linear: the force will be smaller than stated; give core.bh_curve, or lower the current"
         )
     })
 }

@@ -30,7 +30,6 @@ const CIRCLES: &[&[&str]] = &[
         "render::report::field",
         "render::report::surface",
     ],
-    &["scene::at_current", "scene::steel"],
     &["shape::error", "shape::mesh", "shape::stl"],
 ];
 

@@ -25,7 +25,6 @@ use fluxform::scene::Scene;
 use fluxform::scene::steel;
 use fluxform_bench::memory::peak_bytes;
 
-const TOLERANCE: f64 = 1e-12;
 type Failure = Box<dyn Error + Send + Sync>;
 
 /// Surfaces of the table: name, rows and columns of the array, its pitch, half the side of the

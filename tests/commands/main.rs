@@ -11,9 +11,10 @@ use fluxform::bundle::load::Bundle;
 use fluxform::bundle::npz::{from_npz, to_npz};
 use fluxform::commands::calibrate::{self, CalibrateOptions, CalibrateReport, DEFAULT_REACH_M};
 use fluxform::commands::lambda::LambdaOptions;
-use fluxform::commands::probe::{ProbeComponents, ProbeRequest};
+use fluxform::commands::probe::ProbeRequest;
 use fluxform::commands::{evaluate, lambda, probe, verify};
 use fluxform::design::{Design, Need};
+use fluxform::field::components::Components;
 use fluxform::progress::Silent;
 use fluxform::scene::sources::{DesignSource, ShapeSource};
 use fluxform::shape::document::ShapeDocument;
@@ -210,7 +211,7 @@ fn a_probe_on_an_edge_is_told_with_its_number_and_coil() {
     let (design, _) = Design::read(&here("designs/seed_air.toml"), Need::PROBE).expect("valid");
     let points = vec![[0.0, 0.0, 0.03], [0.012, 0.0, 0.0]];
     let request = ProbeRequest {
-        components: ProbeComponents::All,
+        components: Components::All,
         force: false,
         tolerance: None,
     };

@@ -1,7 +1,7 @@
 //! Maps against direct evaluation, and their interpolation error against other places.
 
 use fluxform_base::progress::Silent;
-use fluxform_field::batch::{Components, Gradients};
+use fluxform_field::batch::Gradients;
 use fluxform_field::frame::to_cartesian;
 use fluxform_field::source::AxialSource;
 use fluxform_field::winding::{OnEdge, Winding};

@@ -2,15 +2,12 @@
 
 use super::model::{CoilModel, Window};
 use super::near_optimal_bore::best_near;
-use super::outcome::{BestCoil, WholeTurns};
+use super::outcome::{Advantage, Alternative, BestCoil};
 use super::problem::{Problem, Task};
 use super::scalar;
 use super::sqp::Local;
 use fluxform_base::progress::{Interrupted, Progress};
 use fluxform_design::Limits;
-use serde::Serialize;
-
-use crate::circuit::CoilSize;
 
 /// Share of the best force that is given up.
 pub const SHARE: f64 = 0.01;
@@ -19,99 +16,8 @@ pub const SHARE: f64 = 0.01;
 const STEP: f64 = 0.97;
 const STEPS: i32 = 40;
 const TOLERANCE: f64 = 1e-4;
-
-/// In what a coil may be better than the strongest one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Advantage {
-    /// Its length.
-    Shorter,
-    /// Mass of wire and core.
-    Lighter,
-    /// Heat at the rated current.
-    Cooler,
-}
-
-impl Advantage {
-    /// Every one, in the order of [`Advantage::amounts`].
-    pub const ALL: [Self; 3] = [Self::Shorter, Self::Lighter, Self::Cooler];
-
-    /// The word in artefacts, on screen and on pages.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Shorter => "shorter",
-            Self::Lighter => "lighter",
-            Self::Cooler => "cooler",
-        }
-    }
-
-    /// Length, m, mass of the wire, kg, and heat, W, of `coil`.
-    pub(super) fn amounts(coil: &BestCoil) -> [f64; 3] {
-        [coil.window.length_m, coil.wire_mass_kg(), coil.power_w()]
-    }
-}
-
-/// A coil a little weaker than the best one, and better in something.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Alternative {
-    /// Its dimensions.
-    #[serde(flatten)]
-    pub size: CoilSize,
-    /// Number of turns.
-    pub turns: f64,
-    /// Layers and turns of a coil that can be wound.
-    #[serde(flatten)]
-    pub whole: Option<WholeTurns>,
-    /// Diameter of the wire over its insulation, m.
-    pub wire_diameter_m: f64,
-    /// |force| of the rated current, N.
-    pub force_n: f64,
-    /// Part of the best force that it lacks.
-    pub force_lost: f64,
-    /// Mass of the wire's metal, kg.
-    pub wire_mass_kg: f64,
-    /// Heat at the rated current, W.
-    pub power_w: f64,
-    /// In what it is better.
-    pub better: Vec<Advantage>,
-}
-
-impl Alternative {
-    /// `coil` beside `best`: better where it is so by more than rounding, and in `sought`.
-    pub(super) fn new(coil: &BestCoil, best: &BestCoil, sought: Option<Advantage>) -> Self {
-        let amounts = Advantage::amounts(coil)
-            .into_iter()
-            .zip(Advantage::amounts(best));
-        let better = Advantage::ALL
-            .into_iter()
-            .zip(amounts)
-            .filter(|(advantage, (ours, theirs))| {
-                *ours < theirs * (1.0 - 1e-9) || sought == Some(*advantage)
-            })
-            .map(|(advantage, _)| advantage)
-            .collect();
-        Self {
-            size: coil.size(),
-            turns: coil.turns,
-            whole: coil.whole,
-            wire_diameter_m: coil.strand.diameter_m,
-            force_n: coil.force_n,
-            force_lost: 1.0 - coil.force_n / best.force_n,
-            wire_mass_kg: coil.wire_mass_kg(),
-            power_w: coil.power_w(),
-            better,
-        }
-    }
-
-    /// Whether two coils differ by less than what alternatives are searched to.
-    fn is_near(&self, other: &Self) -> bool {
-        let near = |a: f64, b: f64| (a - b).abs() <= 10.0 * TOLERANCE * b;
-        near(self.size.length_m, other.size.length_m)
-            && near(self.size.outer_diameter_m, other.size.outer_diameter_m)
-            && near(self.wire_mass_kg, other.wire_mass_kg)
-    }
-}
+/// Relative difference of two coils that are one.
+const SAME: f64 = 1e-3;
 
 /// For each of length, mass and heat the coil of `best`'s wire that has least of it and lacks at
 /// most [`SHARE`] of the force, to about 1e-4 and as far as a local search can say; none where the
@@ -128,7 +34,7 @@ pub fn alternatives(
     let mut list: Vec<Alternative> = Vec::new();
     for (sought, coil) in reduced_coils(model, task, best, progress)? {
         let coil = Alternative::new(&coil, best, Some(sought));
-        if !list.iter().any(|known| known.is_near(&coil)) {
+        if !list.iter().any(|known| known.is_near(&coil, SAME)) {
             list.push(coil);
         }
     }

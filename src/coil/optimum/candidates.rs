@@ -1,12 +1,12 @@
 //! Coils that can be wound: what is reported of them, and which are worth a look.
 
-use super::alternatives::{Advantage, Alternative};
 use super::diagnosis;
 use super::domain::Domain;
 use super::local_searches::{self, Solved};
 use super::model::Window;
 use super::outcome::{
-    BestCoil, Certificate, LimitUse, OptimumStatus, Outcome, Violation, WholeTurns,
+    Advantage, Alternative, BestCoil, Certificate, LimitUse, OptimumStatus, Outcome, Violation,
+    WholeTurns,
 };
 use super::problem::{LimitName, Problem};
 use super::search;

@@ -62,8 +62,8 @@ pub mod wound;
 pub use local_searches::Settings;
 pub use model::{CoilModel, Strand, Window};
 pub use outcome::{
-    BestCoil, Certificate, CertificateKind, Ending, LimitUse, OptimumStatus, Outcome, Valley,
-    WholeTurns, WireOutcome,
+    Advantage, Alternative, BestCoil, Certificate, CertificateKind, Ending, LimitUse,
+    OptimumStatus, Outcome, Valley, WholeTurns, WireOutcome,
 };
 pub use problem::{Fixed, LimitName, Task};
 pub use search::optimise;

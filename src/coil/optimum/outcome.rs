@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 
-use super::alternatives::Alternative;
 use super::domain::Contradiction;
 use super::model::{Strand, Window};
 use super::problem::{LimitName, Regime};
@@ -173,6 +172,99 @@ impl BestCoil {
     #[must_use]
     pub fn limit(&self, name: LimitName) -> Option<&LimitUse> {
         self.limits.iter().find(|used| used.name == name)
+    }
+}
+
+/// In what a coil may be better than the strongest one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Advantage {
+    /// Its length.
+    Shorter,
+    /// Mass of wire and core.
+    Lighter,
+    /// Heat at the rated current.
+    Cooler,
+}
+
+impl Advantage {
+    /// Every one, in the order of [`Advantage::amounts`].
+    pub const ALL: [Self; 3] = [Self::Shorter, Self::Lighter, Self::Cooler];
+
+    /// The word in artefacts, on screen and on pages.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Shorter => "shorter",
+            Self::Lighter => "lighter",
+            Self::Cooler => "cooler",
+        }
+    }
+
+    /// Length, m, mass of the wire, kg, and heat, W, of `coil`.
+    pub(super) fn amounts(coil: &BestCoil) -> [f64; 3] {
+        [coil.window.length_m, coil.wire_mass_kg(), coil.power_w()]
+    }
+}
+
+/// A coil a little weaker than the best one, and better in something.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Alternative {
+    /// Its dimensions.
+    #[serde(flatten)]
+    pub size: CoilSize,
+    /// Number of turns.
+    pub turns: f64,
+    /// Layers and turns of a coil that can be wound.
+    #[serde(flatten)]
+    pub whole: Option<WholeTurns>,
+    /// Diameter of the wire over its insulation, m.
+    pub wire_diameter_m: f64,
+    /// |force| of the rated current, N.
+    pub force_n: f64,
+    /// Part of the best force that it lacks.
+    pub force_lost: f64,
+    /// Mass of the wire's metal, kg.
+    pub wire_mass_kg: f64,
+    /// Heat at the rated current, W.
+    pub power_w: f64,
+    /// In what it is better.
+    pub better: Vec<Advantage>,
+}
+
+impl Alternative {
+    /// `coil` beside `best`: better where it is so by more than rounding, and in `sought`.
+    pub(super) fn new(coil: &BestCoil, best: &BestCoil, sought: Option<Advantage>) -> Self {
+        let amounts = Advantage::amounts(coil)
+            .into_iter()
+            .zip(Advantage::amounts(best));
+        let better = Advantage::ALL
+            .into_iter()
+            .zip(amounts)
+            .filter(|(advantage, (ours, theirs))| {
+                *ours < theirs * (1.0 - 1e-9) || sought == Some(*advantage)
+            })
+            .map(|(advantage, _)| advantage)
+            .collect();
+        Self {
+            size: coil.size(),
+            turns: coil.turns,
+            whole: coil.whole,
+            wire_diameter_m: coil.strand.diameter_m,
+            force_n: coil.force_n,
+            force_lost: 1.0 - coil.force_n / best.force_n,
+            wire_mass_kg: coil.wire_mass_kg(),
+            power_w: coil.power_w(),
+            better,
+        }
+    }
+
+    /// Whether two coils differ by less than `relative`.
+    pub(super) fn is_near(&self, other: &Self, relative: f64) -> bool {
+        let near = |a: f64, b: f64| (a - b).abs() <= relative * b;
+        near(self.size.length_m, other.size.length_m)
+            && near(self.size.outer_diameter_m, other.size.outer_diameter_m)
+            && near(self.wire_mass_kg, other.wire_mass_kg)
     }
 }
 

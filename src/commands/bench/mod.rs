@@ -227,7 +227,7 @@ fn measure_shape(
     let constants = present.map_or_else(Vec::new, |file| constants(&file, &refined.solution));
     Ok(ShapeBench {
         shape: shape.document.name.clone(),
-        reference: refined.told(),
+        reference: refined.summary(),
         knobs,
         runs,
         cheapest,

@@ -165,7 +165,7 @@ pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<R
 
 impl Refined {
     /// As the result states it.
-    pub fn told(&self) -> Reference {
+    pub fn summary(&self) -> Reference {
         let field = if self.in_air {
             "the windings' field to rounding"
         } else {
@@ -263,8 +263,8 @@ impl Places {
                 }
                 difference += currents_a[*coil] * (force - direct[*coil]);
             }
-            let wanted = lambda_n_per_m * place[2];
-            largest = largest.max((difference / wanted).abs());
+            let target = lambda_n_per_m * place[2];
+            largest = largest.max((difference / target).abs());
         }
         Ok(largest)
     }

@@ -14,7 +14,7 @@ use crate::commands::lambda::{LambdaOptions, WantedPoints, resolving, solve_poin
 use crate::design::Design;
 use crate::map::{Components, FieldMap};
 use crate::progress::Progress;
-use crate::scene::maps::{Felt, SceneMap};
+use crate::scene::maps::{MagnetMean, SceneMap};
 use crate::scene::sources::Sampling;
 use crate::scene::sources::ShapeSource;
 use crate::scene::steel::{self, Solved};
@@ -178,7 +178,7 @@ impl<'a> Bench<'a> {
         self.timed(|within| {
             let solved = &solved.map;
             let share = MAGNET_SHARE * solved.tolerance;
-            let felt = Felt::by_magnet(self.scene, &grid.z_m, share)?;
+            let felt = MagnetMean::by_magnet(self.scene, &grid.z_m, share)?;
             let made = SceneMap::new(self.scene, solved, &coils, &grid, components, &felt, within)?;
             Ok(made.map)
         })

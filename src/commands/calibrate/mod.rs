@@ -27,7 +27,7 @@ use crate::map::tabulate::{Grid, PlacedCoil};
 use crate::map::{Components, FieldMap};
 use crate::progress::Progress;
 use crate::scene::cached_field::{FieldStore, STORE_FOLDER, ShapeField};
-use crate::scene::maps::{Felt, SceneMap};
+use crate::scene::maps::{MagnetMean, SceneMap};
 use crate::scene::neighbours;
 use crate::scene::passive::PASSIVE_TOLERANCE;
 use crate::scene::passive_map::PassiveMap;
@@ -510,7 +510,7 @@ impl NeededMap {
                 error_cost: 0.0,
             });
         }
-        let felt = Felt::by_magnet(scene, &grid.z_m, MAGNET_SHARE * solved.tolerance)?;
+        let felt = MagnetMean::by_magnet(scene, &grid.z_m, MAGNET_SHARE * solved.tolerance)?;
         let mut made = field.map(scene, solved, &driven, &grid, components, &felt, progress)?;
         drop_weak_coils(
             scene,

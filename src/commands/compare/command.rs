@@ -4,14 +4,14 @@ use clap::Args;
 
 use super::{CompareFile, CompareOptions, ComparedShape, Place, run};
 use crate::cli::args::{SurfaceFlags, Tolerance, Writing};
-use crate::cli::budget::{allow, asked, costs};
+use crate::cli::budget::{allow, cost_origin, costs};
 use crate::cli::describe;
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::pictures::Picture;
-use crate::cli::printer::{Place as Printed, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{count, force, number_to, percent};
 use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
@@ -90,7 +90,7 @@ impl Compare {
         }
         allow(
             costs(&document.design, &shapes, self.tolerance.tolerance),
-            asked(&shapes),
+            cost_origin(&shapes),
             printer,
         )?;
         let bar = begin(printer);
@@ -100,7 +100,7 @@ impl Compare {
             printer.warning(warning);
         }
         let file = &report.file;
-        let mut place = Printed::Output;
+        let mut place = Stream::Output;
         if let Some(plot) = &plot {
             place = plot.write(&file.inputs, &file.picture().svg(), printer)?;
         }

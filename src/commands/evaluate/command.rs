@@ -5,14 +5,14 @@ use clap::Args;
 use super::{Evaluation, Transient, evaluate};
 use crate::accuracy::StageAccuracy;
 use crate::cli::args::Tolerance;
-use crate::cli::budget::{Asked, allow};
+use crate::cli::budget::{CostOrigin, allow};
 use crate::cli::describe;
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::limits::{label, limit_row};
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{force, mass, mm, number, number_to, percent, si};
 use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
@@ -20,8 +20,7 @@ use crate::cli::values::FileArgument;
 use crate::design::{Design, Need};
 use crate::scene::cost::of_steel;
 use crate::scene::neighbours::{ArraySummary, WorkingPointSummary};
-use crate::scene::rated::TargetSummary;
-use crate::scene::single::{CoreSummary, MaterialKind};
+use crate::scene::single::{CoreSummary, MaterialKind, TargetSummary};
 
 /// Evaluate one coil as given: circuit, field and force at the target, limits
 ///
@@ -60,7 +59,7 @@ impl Evaluate {
         let document = documents::design(&self.design, Need::EVALUATE, printer)?;
         let design = &document.design;
         let steel = of_steel(design, self.tolerance.tolerance);
-        allow(steel, Asked::Document, printer)?;
+        allow(steel, CostOrigin::Document, printer)?;
         let bar = begin(printer);
         let result = evaluate(design, vec![document.input], self.tolerance.tolerance)?;
         drop(bar);
@@ -68,7 +67,7 @@ impl Evaluate {
             printer.warning(warning);
         }
         let json = printer.with_warnings(&result);
-        printer.summary(Place::Output, &json, || summary(design, &result))?;
+        printer.summary(Stream::Output, &json, || summary(design, &result))?;
         accuracy_check(&result.accuracy_missed)?;
         if self.strict && !result.limits_met() {
             let unmet: Vec<String> = result
@@ -133,7 +132,7 @@ fn summary(design: &Design, result: &Evaluation) -> String {
         let stage = result.accuracy.get("transient");
         sheet.line("step", &step(transient, stage));
     }
-    sheet.line("target", &felt(target));
+    sheet.line("target", &at_target(target));
     if let Some(array) = &result.array {
         let matrix = &array.mutual_inductance_h;
         let others = matrix.iter().enumerate().flat_map(|(i, row)| {
@@ -207,7 +206,7 @@ fn step(transient: &Transient, stage: Option<&StageAccuracy>) -> String {
 }
 
 /// What the magnet feels at the target.
-fn felt(target: &TargetSummary) -> String {
+fn at_target(target: &TargetSummary) -> String {
     let way = |f: f64| match f {
         f if f > 0.0 => " up",
         f if f < 0.0 => " down",
@@ -232,8 +231,8 @@ fn felt(target: &TargetSummary) -> String {
         let vector = |values: [f64; 3], unit: &str| {
             // What rounding leaves of a zero is not worth its digits.
             let largest = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-            let told = |v: f64| if v.abs() < 1e-12 * largest { 0.0 } else { v };
-            values.map(|v| si(told(v), unit)).join(", ")
+            let rounded = |v: f64| if v.abs() < 1e-12 * largest { 0.0 } else { v };
+            values.map(|v| si(rounded(v), unit)).join(", ")
         };
         text.push_str(&format!(
             "\nforce along x, y, z {}\ntorque about x, y, z {}",
@@ -277,8 +276,8 @@ fn cores(sheet: &mut Sheet, design: &Design, array: &ArraySummary) {
     let mean: Option<Vec<f64>> = array.coils.iter().map(|coil| coil.mean_field_t).collect();
     for (label, values) in [("core peak", peak), ("core mean", mean)] {
         if let Some(values) = values {
-            let told = describe::per_coil(design, "T", &values, 3);
-            let (unit, rest) = told.split_once('\n').unwrap_or((&told, ""));
+            let listed = describe::per_coil(design, "T", &values, 3);
+            let (unit, rest) = listed.split_once('\n').unwrap_or((&listed, ""));
             let head = format!("|B| with all coils at their rated currents, {unit}");
             sheet.line(label, format!("{head}\n{rest}").trim_end());
         }

@@ -14,8 +14,8 @@ use crate::coil::transient::{VoltageStep, core_energy_share};
 use crate::design::Design;
 use crate::scene::Scene;
 use crate::scene::neighbours::{self, ArraySummary};
-use crate::scene::rated::{CoilSummary, Rated, TargetSummary};
-use crate::scene::single::CoreSummary;
+use crate::scene::rated::{CoilSummary, Rated};
+use crate::scene::single::{CoreSummary, TargetSummary};
 
 /// The result of `evaluate`; all SI.
 #[derive(Debug, Clone, Serialize)]

@@ -11,14 +11,14 @@ use crate::bundle::lambda_file::{
     WiringFile, WorkingPointForces, WorstPointFile,
 };
 use crate::cli::args::{SamplingFlags, SurfaceFlags, Tolerance, Writing};
-use crate::cli::budget::{allow, asked, costs};
+use crate::cli::budget::{allow, cost_origin, costs};
 use crate::cli::describe;
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, headed_table};
 use crate::cli::pictures::Picture;
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{count, force, mm, number, number_to, percent};
 use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
@@ -171,7 +171,7 @@ impl Lambda {
         }
         allow(
             costs(design, &shapes, self.tolerance.tolerance),
-            asked(&shapes),
+            cost_origin(&shapes),
             printer,
         )?;
         let bar = begin(printer);
@@ -187,7 +187,7 @@ impl Lambda {
                 (Some(plot), Some(picture)) => {
                     plot.write(&report.file.inputs, &picture.svg(), printer)?
                 }
-                _ => Place::Output,
+                _ => Stream::Output,
             };
             let json = printer.with_warnings(&report.file);
             printer.summary(place, &json, || summary(design, &report))?;

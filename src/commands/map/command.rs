@@ -10,13 +10,13 @@ use super::{MapReport, MapRequest, run};
 use crate::bundle::manifest::MapSidecar;
 use crate::bundle::write::{MAP_FILES, MapFormats};
 use crate::cli::args::{Tolerance, Writing};
-use crate::cli::budget::{Asked, allow};
+use crate::cli::budget::{CostOrigin, allow};
 use crate::cli::describe;
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{bytes, count, error, mm, percent};
 use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
@@ -339,11 +339,11 @@ impl Map {
         };
         let wanted = request.mag_manip.nodes.filter(|_| self.vfield.is_some());
         let vector_field = wanted.map(|nodes| cost::of_vector_field(design, nodes));
-        allow(vector_field, Asked::Flag, printer)?;
+        allow(vector_field, CostOrigin::Flag, printer)?;
         allow(
             std::iter::once(cost::of_map(design, request.components))
                 .chain(cost::of_steel(design, request.tolerance)),
-            Asked::Document,
+            CostOrigin::Document,
             printer,
         )?;
         let bar = begin(printer);
@@ -363,7 +363,7 @@ impl Map {
             mpem: report.multipoles.as_ref().map(MultipolesSummary::of),
         };
         let json = printer.with_warnings(&json);
-        printer.summary(Place::Output, &json, || summary(design, &report))?;
+        printer.summary(Stream::Output, &json, || summary(design, &report))?;
         accuracy_check(&report.accuracy_missed)?;
         if report
             .multipoles

@@ -26,7 +26,7 @@ use crate::map::tabulate::Grid;
 use crate::map::{Components, FieldMap, InterpolationError};
 use crate::progress::Progress;
 use crate::scene::Scene;
-use crate::scene::maps::{Felt, SceneMap};
+use crate::scene::maps::{MagnetMean, SceneMap};
 use crate::scene::steel;
 use crate::scene::working_point::{WorkingPoint, relative_difference, superposition_ends};
 
@@ -181,7 +181,7 @@ pub fn run(
         &scene.coils,
         &grid,
         request.components,
-        &Felt::field(),
+        &MagnetMean::field(),
         progress,
     )?;
     let map = &made.map;

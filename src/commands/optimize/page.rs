@@ -5,7 +5,7 @@ use serde_json::{Map, Value};
 use super::result::{BestCoilSummary, GivenCoil, Objective, Optimization};
 use super::text::better;
 use crate::coil::optimum::LimitUse;
-use crate::coil::optimum::alternatives::Alternative;
+use crate::coil::optimum::outcome::Alternative;
 use crate::report::frame::{Page, Section};
 use crate::report::html::{Cell, Html, Table};
 use crate::report::inputs::sources;

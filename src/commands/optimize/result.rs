@@ -8,7 +8,7 @@ use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::Input;
 use crate::coil::circuit::CoilSize;
 use crate::coil::limits::{LimitCheck, LimitName};
-use crate::coil::optimum::alternatives::Alternative;
+use crate::coil::optimum::outcome::Alternative;
 use crate::coil::optimum::outcome::Violation;
 use crate::coil::optimum::problem::Regime;
 use crate::coil::optimum::{Certificate, Ending, LimitUse, Valley, WholeTurns, WireOutcome};

@@ -9,7 +9,7 @@ use crate::cli::quantity::{count, error, force, mass, mm, number, number_to, per
 use crate::cli::values::FileArgument;
 use crate::coil::circuit::CoilSize;
 use crate::coil::limits::LimitName;
-use crate::coil::optimum::alternatives::Alternative;
+use crate::coil::optimum::outcome::Alternative;
 use crate::coil::optimum::problem::Regime;
 use crate::coil::optimum::{LimitUse, WholeTurns};
 use crate::scene::rated::CircuitSummary;
@@ -25,7 +25,7 @@ pub fn summary(result: &Optimization, out: Option<&FileArgument>) -> String {
     };
     let mut sheet = Sheet::new(&format!("{}: {kind}", result.design));
     match (&result.coil, &result.objective) {
-        (Some(coil), Some(objective)) => found(&mut sheet, result, coil, objective),
+        (Some(coil), Some(objective)) => best(&mut sheet, result, coil, objective),
         _ => none(&mut sheet, result),
     }
     if let (Some(FileArgument::Path(path)), true) = (out, result.design_text.is_some()) {
@@ -64,59 +64,9 @@ fn none(sheet: &mut Sheet, result: &Optimization) {
     sheet.line("searched", &searched(result));
 }
 
-fn found(sheet: &mut Sheet, result: &Optimization, coil: &BestCoilSummary, objective: &Objective) {
-    let turns = match coil.whole {
-        Some(WholeTurns {
-            layers,
-            turns_per_layer,
-        }) => format!(
-            "{} of {turns_per_layer} turns, {} turns in all",
-            count(layers as usize, "layer"),
-            number(coil.turns)
-        ),
-        None => format!(
-            "{} {}",
-            number(coil.turns),
-            if coil.turns == 1.0 { "turn" } else { "turns" }
-        ),
-    };
-    sheet.line(
-        "coil",
-        &format!(
-            "{} to {} diameter, {} long; {turns} of {} wire",
-            mm(coil.size.inner_diameter_m),
-            mm(coil.size.outer_diameter_m),
-            mm(coil.size.length_m),
-            mm(coil.wire_diameter_m)
-        ),
-    );
-    let way = if objective.force_n < 0.0 {
-        "down"
-    } else {
-        "up"
-    };
-    sheet.line(
-        "force",
-        &format!(
-            "{} {way} on the magnet, {} above the coil at {}, the {} limit{}{}",
-            force(objective.force_n.abs()),
-            mm(objective.height_m),
-            si(objective.current_a, "A"),
-            match objective.current_set_by {
-                Regime::Supply => "supply's",
-                Regime::Driver => "driver's",
-            },
-            objective.alone_force_n.map_or_else(String::new, |alone| {
-                format!(
-                    "\namong its neighbours' cores; {} alone, as in the table below",
-                    force(alone.abs())
-                )
-            }),
-            objective.passive_force_n.map_or_else(String::new, |pull| {
-                format!("\nbesides, the unpowered steel pulls with {}", force(pull))
-            })
-        ),
-    );
+fn best(sheet: &mut Sheet, result: &Optimization, coil: &BestCoilSummary, objective: &Objective) {
+    sheet.line("coil", &dimensions(coil));
+    sheet.line("force", &force_at_target(objective));
     if let Some(misses) = result.given.as_ref().and_then(misses) {
         sheet.line("as given", &misses);
     }
@@ -165,6 +115,60 @@ fn found(sheet: &mut Sheet, result: &Optimization, coil: &BestCoilSummary, objec
     sheet.line("searched", &searched(result));
     let stages = result.accuracy.iter().map(|(name, stage)| (*name, stage));
     sheet.line("accuracy", &describe::accuracy(stages));
+}
+
+/// Dimensions, turns and wire.
+fn dimensions(coil: &BestCoilSummary) -> String {
+    let turns = match coil.whole {
+        Some(WholeTurns {
+            layers,
+            turns_per_layer,
+        }) => format!(
+            "{} of {turns_per_layer} turns, {} turns in all",
+            count(layers as usize, "layer"),
+            number(coil.turns)
+        ),
+        None => format!(
+            "{} {}",
+            number(coil.turns),
+            if coil.turns == 1.0 { "turn" } else { "turns" }
+        ),
+    };
+    format!(
+        "{} to {} diameter, {} long; {turns} of {} wire",
+        mm(coil.size.inner_diameter_m),
+        mm(coil.size.outer_diameter_m),
+        mm(coil.size.length_m),
+        mm(coil.wire_diameter_m)
+    )
+}
+
+/// The force, and whose current it is.
+fn force_at_target(objective: &Objective) -> String {
+    let way = if objective.force_n < 0.0 {
+        "down"
+    } else {
+        "up"
+    };
+    format!(
+        "{} {way} on the magnet, {} above the coil at {}, the {} limit{}{}",
+        force(objective.force_n.abs()),
+        mm(objective.height_m),
+        si(objective.current_a, "A"),
+        match objective.current_set_by {
+            Regime::Supply => "supply's",
+            Regime::Driver => "driver's",
+        },
+        objective.alone_force_n.map_or_else(String::new, |alone| {
+            format!(
+                "\namong its neighbours' cores; {} alone, as in the table below",
+                force(alone.abs())
+            )
+        }),
+        objective.passive_force_n.map_or_else(String::new, |pull| {
+            format!("\nalso, the unpowered steel pulls with {}", force(pull))
+        })
+    )
 }
 
 fn searched(result: &Optimization) -> String {

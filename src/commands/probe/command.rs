@@ -14,13 +14,13 @@ use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::bundle::atomic::{self, Overwrite};
 use crate::bundle::read_table::read_columns;
 use crate::cli::args::{Tolerance, Writing};
-use crate::cli::budget::{Asked, allow};
+use crate::cli::budget::{CostOrigin, allow};
 use crate::cli::describe;
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::count;
 use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
@@ -43,7 +43,7 @@ const HEADER: &str = "x_m,y_m,z_m,coil,";
 ///
 /// With --compare a Gauss-meter's scan takes the points' place: a CSV table with x_m, y_m, z_m, any of
 /// bx_t, by_t, bz_t, dbx_dx_t_per_m to dbz_dz_t_per_m, and the currents that flowed, either as coil
-/// and current_a or as current_0_a, current_1_a and so on. Told are the residuals, the scale of each
+/// and current_a or as current_0_a, current_1_a and so on. Reported are the residuals, the scale of each
 /// coil with the line for `[array] gain`, a constant background, where the sensor's frame stands, and
 /// which parameter of the design would explain the residuals; --out takes the residuals as a table.
 #[derive(Debug, Args)]
@@ -144,7 +144,7 @@ impl Probe {
         allow(
             std::iter::once(of_probe(design, points, parts))
                 .chain(of_steel(design, self.tolerance.tolerance)),
-            Asked::Document,
+            CostOrigin::Document,
             printer,
         )?;
         let bar = begin(printer);
@@ -168,23 +168,23 @@ impl Probe {
         let place = match out {
             FileArgument::Standard if printer.json() => {
                 summary.columns = Some(columns(&table)?);
-                Place::Output
+                Stream::Output
             }
             FileArgument::Standard => {
                 printer.data(|out| table.write(out))?;
-                Place::Error
+                Stream::Error
             }
             FileArgument::Path(path) => {
                 atomic::write(path, &overwrite, |out| table.write(out)).map_err(RunError::from)?;
-                Place::Output
+                Stream::Output
             }
         };
         let json = printer.with_warnings(&summary);
-        printer.summary(place, &json, || self.told(&summary))?;
+        printer.summary(place, &json, || self.text(&summary))?;
         accuracy_check(&table.accuracy_missed)
     }
 
-    fn told(&self, summary: &ProbeSummary) -> String {
+    fn text(&self, summary: &ProbeSummary) -> String {
         let mut sheet = Sheet::new(&format!(
             "{}: {} at {}",
             summary.design,

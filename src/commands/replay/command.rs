@@ -17,7 +17,7 @@ use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
 use crate::cli::pictures::Picture;
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{count, error, force, number, percent, si};
 use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
@@ -208,11 +208,11 @@ impl Replay {
         let place = match (&files, &of_table) {
             (Some(files), Some(overwrite)) => {
                 report.write(files, overwrite)?;
-                Place::Output
+                Stream::Output
             }
             _ => {
                 printer.data(|out| report.rows.write(out))?;
-                Place::Error
+                Stream::Error
             }
         };
         report.summary.warnings = printer.warnings();

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::front::front;
 use crate::RunError;
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION};
-use crate::bundle::atomic::{FileSet, Overwrite, WriteError};
+use crate::bundle::atomic::{FileSet, Overwrite, WriteError, Written};
 use crate::bundle::seal::to_record;
 use crate::bundle::sweep::{Found, MergeSummary, PlanFile, PointFile, PointStore, TableWriter};
 use crate::plot::pareto::{Panel, ParetoPlot};
@@ -35,7 +35,7 @@ pub struct MergeRequest {
     pub folders: Vec<PathBuf>,
     /// Merge what there is, even if points are missing.
     pub partial: bool,
-    /// Whether a page is wanted.
+    /// Whether a page is requested.
     pub page: bool,
 }
 
@@ -67,7 +67,7 @@ impl MergeFiles {
 /// A merged sweep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MergeReport {
-    /// What the sidecar tells.
+    /// The content of the sidecar.
     pub summary: MergeSummary,
     /// Which points are missing, as text; empty where none is.
     pub missing: String,
@@ -163,24 +163,10 @@ pub fn merge(
     let written = set.write(&plot_name, |out| out.write_all(plot.svg().as_bytes()))?;
     listed.push(FileEntry::new(plot_name, written));
     let best = rows_on(&gathered.briefs, &fronts);
-    let points = best
-        .iter()
-        .map(|(index, _)| found(plan, request, *index))
-        .collect::<Result<Vec<_>, _>>()?;
     let front_name = name("_pareto.csv");
-    let written = set.write(&front_name, |out| {
-        let keys = plan.axes.iter().map(|axis| axis.key.as_str());
-        let mut table =
-            TableWriter::begin(out, plan.mode, keys, &COSTS.map(|(_, _, column)| column))?;
-        for ((index, flags), point) in best.iter().zip(&points) {
-            // What was there a moment ago may be gone.
-            let point = point.as_ref().ok_or(io::ErrorKind::NotFound)?;
-            table.row(&plan.values_at(*index), point, flags)?;
-        }
-        Ok(())
-    })?;
+    let written = write_front(&mut set, &front_name, plan, request, &best)?;
     listed.push(FileEntry::new(front_name, written));
-    tell(&mut summary, &gathered, best.len() as u64, among_met);
+    count(&mut summary, &gathered, best.len() as u64, among_met);
     summary.files = listed;
     set.write(&name("_merge.json"), |out| {
         let bytes = to_record(&summary)
@@ -192,6 +178,32 @@ pub fn merge(
         .page
         .then(|| page::html(plan, &summary, &plot, &gathered.briefs, &best));
     Ok(report(summary, &gathered, page))
+}
+
+/// Writes the table of the designs on a front.
+fn write_front(
+    set: &mut FileSet,
+    name: &str,
+    plan: &PlanFile,
+    request: &MergeRequest,
+    best: &[(u64, [bool; 3])],
+) -> Result<Written, RunError> {
+    let points = best
+        .iter()
+        .map(|(index, _)| found(plan, request, *index))
+        .collect::<Result<Vec<_>, _>>()?;
+    let written = set.write(name, |out| {
+        let keys = plan.axes.iter().map(|axis| axis.key.as_str());
+        let mut table =
+            TableWriter::begin(out, plan.mode, keys, &COSTS.map(|(_, _, column)| column))?;
+        for ((index, flags), point) in best.iter().zip(&points) {
+            // What was there a moment ago may be gone.
+            let point = point.as_ref().ok_or(io::ErrorKind::NotFound)?;
+            table.row(&plan.values_at(*index), point, flags)?;
+        }
+        Ok(())
+    })?;
+    Ok(written)
 }
 
 /// Merges into a table alone; the summary lists no files.
@@ -212,7 +224,7 @@ pub fn merge_table(
     let (fronts, among_met) = fronts(&gathered.briefs);
     let best = rows_on(&gathered.briefs, &fronts);
     let mut summary = summary(plan, plan_input);
-    tell(&mut summary, &gathered, best.len() as u64, among_met);
+    count(&mut summary, &gathered, best.len() as u64, among_met);
     let page = request.page.then(|| {
         let plot = plot(plan, &gathered.briefs, &fronts, among_met);
         page::html(plan, &summary, &plot, &gathered.briefs, &best)
@@ -410,7 +422,8 @@ fn summary(plan: &PlanFile, plan_input: Input) -> MergeSummary {
     }
 }
 
-fn tell(summary: &mut MergeSummary, gathered: &Gathered, front: u64, among_met: bool) {
+/// Fills in what was gathered.
+fn count(summary: &mut MergeSummary, gathered: &Gathered, front: u64, among_met: bool) {
     summary.rows = gathered.rows;
     summary.missing = gathered.missing_count();
     summary.failed = gathered.failed;

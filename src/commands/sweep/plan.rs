@@ -11,7 +11,7 @@ use crate::bundle::sweep::{Axis, Mode, POINTS_MAX, PlanFile, Value};
 use crate::design::template::Template;
 use crate::design::{Design, Severity, Steel, source};
 
-/// Values at fault that are told one by one.
+/// Values at fault that are reported one by one.
 const TOLD: usize = 20;
 /// The key of a B-H table.
 const CURVE_KEY: &str = "core.bh_curve";

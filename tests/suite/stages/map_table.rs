@@ -16,7 +16,7 @@ use fluxform::numerics::lagrange::locate;
 use fluxform::numerics::random::Random;
 use fluxform::progress::{Progress, Silent};
 use fluxform::scene::Scene;
-use fluxform::scene::maps::{Felt, SceneMap};
+use fluxform::scene::maps::{MagnetMean, SceneMap};
 use fluxform::scene::steel;
 use fluxform::scene::tolerances::COUPLED_TOLERANCE;
 use fluxform::scene::tolerances::MAP_TOLERANCE;
@@ -283,7 +283,7 @@ fn between(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curv
                 &scene.coils,
                 &grid,
                 Components::Gz,
-                &Felt::field(),
+                &MagnetMean::field(),
                 &Silent,
             )
         })?;

@@ -5,7 +5,7 @@
 //! design computed again at every step. The share of the residuals' squares that it takes away is
 //! reported, and a standard error that holds where the field bends: the larger side of the interval in
 //! which the likelihood stays within the 95 % of one number, over 1.96. Candidates with as many free
-//! numbers whose likelihoods differ by less than [`DISTINCT`] cannot be told apart by this scan and are
+//! numbers whose likelihoods differ by less than [`DISTINCT`] cannot be distinguished by this scan and are
 //! named together.
 
 use super::fit::{self, Fitted, Parameter, parameters};
@@ -78,7 +78,7 @@ pub(super) fn explain(task: &Task) -> Result<(Vec<Explanation>, Option<String>),
     let candidates = task.candidates()?;
     let total = squares(&task.residuals.values);
     let count = task.residuals.values.len() as f64;
-    // Below the computed field's own error nothing is told apart.
+    // Below the computed field's own error nothing is distinguished.
     let floor = (task.relative_error * task.computed()).powi(2) + 1e-24 * task.measured().powi(2);
     let share = |c: &Settled| {
         if total > 0.0 {
@@ -182,8 +182,8 @@ impl Task<'_> {
             rotation: true,
         };
         let all = parameters(all, self.scan, coils);
-        let of = |wanted: &dyn Fn(&Parameter) -> bool| -> Vec<Parameter> {
-            all.iter().copied().filter(|p| wanted(p)).collect()
+        let of = |chosen: &dyn Fn(&Parameter) -> bool| -> Vec<Parameter> {
+            all.iter().copied().filter(|p| chosen(p)).collect()
         };
         let mut list = Vec::new();
         list.extend(self.scaled("scale", 1.0));

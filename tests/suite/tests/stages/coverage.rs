@@ -19,7 +19,7 @@ use fluxform::numerics::axis::Axis;
 use fluxform::numerics::lagrange::locate;
 use fluxform::progress::Silent;
 use fluxform::scene::Scene;
-use fluxform::scene::maps::{Felt, SceneMap};
+use fluxform::scene::maps::{MagnetMean, SceneMap};
 use fluxform::scene::steel::{self, Solved};
 use fluxform::shape::Surface;
 use fluxform::shape::document::ShapeDocument;
@@ -157,7 +157,7 @@ fn map_claims(scene: &Scene, solved: &Solved, exact: &Solved, n: &mut Random) ->
         y_m: workspace.y_m.nodes(),
         z_m: workspace.z_m.nodes(),
     };
-    let felt = Felt::field();
+    let felt = MagnetMean::field();
     let (coils, wanted) = (&scene.coils, Components::Gz);
     let made = SceneMap::new(scene, solved, coils, &grid, wanted, &felt, &Silent).unwrap();
     let (nx, ny, nz) = (grid.x_m.len(), grid.y_m.len(), grid.z_m.len());
