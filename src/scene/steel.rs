@@ -20,8 +20,7 @@ const STEEL_SHARE: f64 = 0.45;
 
 /// The solved steel of a scene.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-#[non_exhaustive]
-pub enum Steel {
+enum Steel {
     /// There is none.
     None,
     /// Every core answers to its own winding alone.

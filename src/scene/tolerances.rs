@@ -87,3 +87,67 @@ impl Tolerances {
         requested.unwrap_or(KERNEL_ERROR).max(MAGNET_FINEST)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::design::Need;
+    use crate::scene::Scene;
+
+    /// A design of two coils with `more` at its end.
+    fn of(more: &str, requested: Option<f64>) -> Tolerances {
+        let text = format!(
+            "name = \"two\"\n[coil]\ninner_diameter_mm = 7.0\nouter_diameter_mm = 13.0\n\
+             length_mm = 17.0\n[wire]\ndiameter_mm = 0.7\n[array]\npositions_mm = [[0.0, 0.0], \
+             [23.0, 0.0]]\n{more}"
+        );
+        let (design, _) =
+            Design::from_toml(&text, Path::new("two.toml"), Need::EVALUATE).expect("a design");
+        let scene = Scene::with_tolerance(&design, requested).expect("a scene");
+        scene.tolerances
+    }
+
+    #[test]
+    fn defaults_are_those_of_the_physics() {
+        let air = of("", None);
+        assert_eq!((air.coil, air.field), (KERNEL_ERROR, KERNEL_ERROR));
+        assert_eq!((air.forces, air.map), (KERNEL_ERROR, MAP_TOLERANCE));
+        let finite = of("[magnet]\nmodel = \"cylinder\"\n", None);
+        assert_eq!((finite.field, finite.forces), (KERNEL_ERROR, MAGNET_FINEST));
+        let coupled = of("coupling = \"full\"\n[core]\n", None);
+        assert_eq!(
+            (coupled.coil, coupled.field),
+            (CORED_TOLERANCE, COUPLED_TOLERANCE)
+        );
+        assert_eq!(
+            (coupled.forces, coupled.map),
+            (COUPLED_TOLERANCE, COUPLED_TOLERANCE)
+        );
+        let alone = of("coupling = \"none\"\n[core]\n", None);
+        assert_eq!((alone.coil, alone.map), (CORED_TOLERANCE, CORED_TOLERANCE));
+        assert_eq!(alone.inductances, COUPLED_TOLERANCE);
+    }
+
+    #[test]
+    fn a_requested_tolerance_reaches_every_stage() {
+        for more in ["", "coupling = \"full\"\n[core]\n"] {
+            let all = of(more, Some(7e-3));
+            let Tolerances {
+                coil,
+                field,
+                forces,
+                map,
+                inductances,
+                working_point,
+            } = all;
+            assert_eq!(
+                [coil, field, forces, map, inductances, working_point],
+                [7e-3; 6]
+            );
+        }
+        // What is taken as linear at a working point leaves more than a finer one.
+        assert_eq!(of("", Some(1.3e-7)).working_point, WORKING_POINT_TOLERANCE);
+    }
+}
