@@ -28,7 +28,7 @@ pub fn grant(memory: Option<u64>) {
     }
 }
 
-/// What the amount of work comes from.
+/// The origin of an amount of work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CostOrigin {
     /// A design or shape file.
@@ -37,7 +37,7 @@ pub enum CostOrigin {
     Flag,
 }
 
-/// What the points of `shapes` come from: the flags of a surface given directly, or a file.
+/// The origin of the points of `shapes`: the flags of a surface given directly, or a file.
 #[must_use]
 pub fn cost_origin(shapes: &[ShapeSource]) -> CostOrigin {
     if shapes.iter().any(|shape| shape.input.is_none()) {
@@ -95,7 +95,7 @@ pub fn allow(
 /// Whether `cost` is within the budget.
 ///
 /// # Errors
-/// What it would take, what there is, and what helps.
+/// The memory it would take, the memory there is, and what helps.
 pub fn within(cost: &Cost) -> Result<(), String> {
     let granted = GRANTED.get().copied();
     let budget = granted.map_or_else(|| SHARE * available_bytes(), |granted| granted as f64);

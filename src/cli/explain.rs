@@ -7,7 +7,7 @@ use super::failure::Failure;
 use super::layout::{Side, table};
 use super::printer::{Printer, Stream};
 
-/// What is to be explained.
+/// The codes to be explained.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ExplainTarget {
     /// Every code, a line each.

@@ -1,6 +1,6 @@
 //! The one place that talks: results to standard output, messages to standard error.
 //!
-//! With `--quiet` only errors and the data that was asked for (JSON, CSV, `--out -`) are left. With
+//! With `--quiet` only errors and the data that was requested (JSON, CSV, `--out -`) are left. With
 //! `--format json` warnings go into the JSON object, and a summary that belongs to standard error
 //! waits for the end of the command and goes into the error's object if there is an error, so that
 //! every stream holds one object at most.
@@ -60,9 +60,9 @@ struct ErrorFacts {
     code: &'static str,
     /// The process's exit code.
     exit_code: u8,
-    /// What the code means.
+    /// The code's meaning.
     meaning: &'static str,
-    /// What happened, one line a fault.
+    /// The message, one line per fault.
     message: String,
     faults: Vec<FaultEntry>,
     warnings: Vec<String>,
@@ -72,7 +72,7 @@ struct ErrorFacts {
 }
 
 impl ErrorFacts {
-    /// What is known of every failure of that kind.
+    /// The advice for every failure of that kind.
     fn of(code: Code) -> Self {
         Self {
             code: code.name(),
@@ -210,7 +210,7 @@ impl Printer {
         }
     }
 
-    /// Writes data that was asked for to standard output.
+    /// Writes requested data to standard output.
     ///
     /// # Errors
     /// Standard output that takes no more.

@@ -31,7 +31,7 @@ pub trait Program: CommandFactory + FromArgMatches {
         Self::from_arg_matches(matches)
     }
 
-    /// What every command takes.
+    /// The options of every command.
     fn common(&self) -> &Common;
 
     /// Runs it.
@@ -75,7 +75,7 @@ pub fn main<P: Program>(args: impl Iterator<Item = OsString>) -> ExitCode {
     }
 }
 
-/// Threads and memory, as asked for.
+/// Threads and memory, as requested.
 fn prepare(common: &Common) -> Result<(), Failure> {
     if let Some(threads) = common.threads {
         rayon::ThreadPoolBuilder::new()
@@ -113,9 +113,9 @@ fn caught() -> bool {
     false
 }
 
-/// What clap has to say: help, the version, or wrong usage.
+/// Clap's own output: help, the version, or wrong usage.
 fn not_parsed(error: &clap::Error, args: &[OsString]) -> Exit {
-    // Help is asked for, or shown where nothing was.
+    // Help is requested, or shown where nothing was.
     let help = matches!(
         error.kind(),
         ErrorKind::DisplayHelp

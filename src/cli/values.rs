@@ -16,7 +16,7 @@ pub fn criterion() -> impl TypedValueParser<Value = Criterion> {
     names.try_map(|name| name.parse::<Criterion>())
 }
 
-/// Most threads that may be asked for.
+/// Most threads that may be requested.
 const THREADS_MAX: usize = 1024;
 /// Tolerances that make sense, relative.
 const TOLERANCE: std::ops::RangeInclusive<f64> = 1e-15..=1e-1;

@@ -1,4 +1,4 @@
-//! A design's field, kept from run to run beside its bundles.
+//! A design's field, cached from run to run beside its bundles.
 //!
 //! What coils, steel and magnet give does not depend on current limits, criteria or the
 //! just-noticeable difference: as long as those alone change, steel, forces and maps are read and
@@ -31,20 +31,20 @@ pub const STORE_FOLDER: &str = ".fluxform-kept";
 /// Entry of the design's steel.
 const STEEL: &str = "steel";
 
-/// Where a design's field is kept.
+/// Where a design's field is cached.
 #[derive(Debug)]
 pub struct FieldStore {
     store: Store,
-    /// The same, for what does not depend on the design: kept without steel too.
+    /// The same, for what does not depend on the design: cached without steel too.
     shapes: Store,
     field: Origin,
-    /// Of the design's array, once a shape has asked for it.
+    /// Of the design's array, once a shape needs it.
     inspection: OnceLock<Inspection>,
 }
 
 impl FieldStore {
     /// The field of `scene`, with the text of its magnetisation curve's table if it
-    /// has one, in `store`. Without steel nothing is kept: computing is faster than reading.
+    /// has one, in `store`. Without steel nothing is cached: computing is faster than reading.
     #[must_use]
     pub fn new(scene: &Scene, curve: Option<&str>, store: Store) -> Self {
         let design = scene.design;
@@ -103,15 +103,15 @@ impl FieldStore {
     #[must_use]
     pub fn of_shape<'a>(&'a self, name: &'a str) -> ShapeField<'a> {
         ShapeField {
-            kept: Some((self, name)),
+            cached: Some((self, name)),
         }
     }
 }
 
-/// What one shape needs of a design's field.
+/// The part of a design's field that one shape needs.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ShapeField<'a> {
-    kept: Option<(&'a FieldStore, &'a str)>,
+    cached: Option<(&'a FieldStore, &'a str)>,
 }
 
 impl<'a> ShapeField<'a> {
@@ -128,7 +128,7 @@ impl<'a> ShapeField<'a> {
         progress: &dyn Progress,
     ) -> Result<Vec<f64>, RunError> {
         let compute = || scene.forces_n_per_a(solved, points_m, progress);
-        let Some((FieldStore { store, field, .. }, shape)) = self.kept else {
+        let Some((FieldStore { store, field, .. }, shape)) = self.cached else {
             return compute();
         };
         let origin = field
@@ -147,7 +147,7 @@ impl<'a> ShapeField<'a> {
         points_m: &[[f64; 3]],
     ) -> Result<Vec<f64>, RunError> {
         let compute = || passive::left_out_z_n(scene, points_m);
-        let Some((FieldStore { store, field, .. }, shape)) = self.kept else {
+        let Some((FieldStore { store, field, .. }, shape)) = self.cached else {
             return compute();
         };
         let origin = field
@@ -164,22 +164,24 @@ impl<'a> ShapeField<'a> {
     pub fn peak_t(self, array: &CoupledArray, currents_a: &[f64]) -> Result<f64, OnEdge> {
         let depth_m = peak_depth_m(array.response.outline.shape);
         let most = |peaks: Vec<f64>| peaks.into_iter().fold(0.0, f64::max);
-        let Some((kept, shape)) = self.kept else {
+        let Some((cached, shape)) = self.cached else {
             let inspection = Inspection::new(array, depth_m)?;
             return inspection.peaks_t(array, currents_a).map(most);
         };
         let numbers = currents_a.iter().copied().chain([depth_m]);
-        let origin = kept.field.clone().and_numbers(numbers);
-        kept.store.remember(&format!("{shape}.peak"), &origin, || {
-            let inspection = match kept.inspection.get() {
-                Some(inspection) => inspection,
-                None => {
-                    let made = Inspection::new(array, depth_m)?;
-                    kept.inspection.get_or_init(|| made)
-                }
-            };
-            inspection.peaks_t(array, currents_a).map(most)
-        })
+        let origin = cached.field.clone().and_numbers(numbers);
+        cached
+            .store
+            .remember(&format!("{shape}.peak"), &origin, || {
+                let inspection = match cached.inspection.get() {
+                    Some(inspection) => inspection,
+                    None => {
+                        let made = Inspection::new(array, depth_m)?;
+                        cached.inspection.get_or_init(|| made)
+                    }
+                };
+                inspection.peaks_t(array, currents_a).map(most)
+            })
     }
 
     /// The entry of what is found of the points of `document`, read from `inputs`.
@@ -191,7 +193,7 @@ impl<'a> ShapeField<'a> {
             |origin, input| origin.and(input.sha256.as_bytes()),
         );
         Entry {
-            store: self.kept.map(|(field, _)| &field.shapes),
+            store: self.cached.map(|(field, _)| &field.shapes),
             name: format!("{}.points", document.name),
             origin,
         }
@@ -213,7 +215,7 @@ impl<'a> ShapeField<'a> {
         progress: &dyn Progress,
     ) -> Result<SceneMap, RunError> {
         let compute = || SceneMap::new(scene, solved, coils, grid, components, magnet, progress);
-        let Some((FieldStore { store, field, .. }, shape)) = self.kept else {
+        let Some((FieldStore { store, field, .. }, shape)) = self.cached else {
             return compute();
         };
         let coils: Vec<usize> = coils.iter().map(|coil| coil.number).collect();
@@ -227,7 +229,7 @@ impl<'a> ShapeField<'a> {
     }
 }
 
-/// What is kept of a shape's points.
+/// The cached certificate of a shape's points.
 #[derive(Debug)]
 pub struct Entry<'a> {
     store: Option<&'a Store>,
@@ -236,7 +238,7 @@ pub struct Entry<'a> {
 }
 
 impl Entry<'_> {
-    /// What an earlier run found.
+    /// The result of an earlier run.
     #[must_use]
     pub fn known(&self) -> Option<Certificate> {
         self.store?.recall(&self.name, &self.origin)

@@ -25,7 +25,7 @@ const PROBE_VALUE_BYTES: f64 = 16.0;
 /// Operations a second of one thread on the products of a coupled array.
 const OPERATIONS_PER_S: f64 = 2e9;
 
-/// What a part of a job takes.
+/// Memory and time of a part of a job.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cost {
     /// The part, as messages name it.

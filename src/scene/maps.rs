@@ -86,7 +86,7 @@ impl SceneMap {
     }
 }
 
-/// What is mapped, and where.
+/// A map to be made: source, coils, grid and magnet.
 struct MapTask<'a> {
     scene: &'a Scene<'a>,
     solved: &'a Solved,
@@ -205,7 +205,7 @@ struct Maker<'a> {
 /// Offsets of a magnet's dipoles from its centre, m, and their parts of its moment.
 type Shares = Vec<([f64; 3], f64)>;
 
-/// What a map's values are the mean of: offsets of the magnet's dipoles and their parts of its
+/// The mean that a map's values are: offsets of the magnet's dipoles and their parts of its
 /// moment, fewer from greater heights up.
 #[derive(Debug, Clone)]
 pub struct MagnetMean {
@@ -237,7 +237,7 @@ impl MagnetMean {
         }
     }
 
-    /// What the magnet of `scene` feels at the heights `z_m`, ascending, to `tolerance`.
+    /// The mean over the magnet of `scene` at the heights `z_m`, ascending, to `tolerance`.
     ///
     /// # Errors
     /// A magnet that touches what it is attracted by.
@@ -508,7 +508,7 @@ fn samples(map: &FieldMap, coils: &[PlacedCoil]) -> Vec<Sample> {
         .collect()
 }
 
-/// What is proven of the map's error at its nodes, the steel's solution and the magnet left out.
+/// The proven bound of the map's error at its nodes, the steel's solution and the magnet left out.
 fn evaluation(map: &FieldMap, solved: &Solved) -> Evaluation {
     let estimate = if solved.has_steel() {
         // The winding's rule, the steel's evaluation and its table.

@@ -1,4 +1,4 @@
-//! What every command needs of a design: the source, the coils, the magnet, the currents.
+//! A design made ready for computing: sources, coils, magnet, currents, tolerances.
 
 pub mod at_current;
 pub mod cached_field;

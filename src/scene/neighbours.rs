@@ -19,7 +19,7 @@ use crate::field::steel::core_flux_density::peak_depth_m;
 /// The array's inductances.
 #[derive(Debug, Clone, Serialize)]
 pub struct ArraySummary {
-    /// One entry a coil.
+    /// One entry per coil.
     pub coils: Vec<ArrayCoil>,
     /// Inductance matrix, H: `[i][j]` is the flux through coil i for one ampere in coil j. With
     /// a B-H curve that of the linear array whose permeability is `relative_permeability`.
@@ -31,7 +31,7 @@ pub struct ArraySummary {
     /// With a B-H curve: all coils at their rated currents.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub working_point: Option<WorkingPointSummary>,
-    /// What misses the tolerance.
+    /// The stages that miss the tolerance.
     #[serde(skip)]
     pub(crate) accuracy_missed: Vec<String>,
 }
@@ -39,7 +39,7 @@ pub struct ArraySummary {
 /// All coils at their rated currents, along the B-H curve.
 #[derive(Debug, Clone, Serialize)]
 pub struct WorkingPointSummary {
-    /// A, one a coil.
+    /// A, one per coil.
     pub currents_a: Vec<f64>,
     /// Flux linkage of every coil, Wb.
     pub flux_linkage_wb: Vec<f64>,
@@ -171,7 +171,7 @@ pub(crate) fn inductances(
     (matrix, stage)
 }
 
-/// What the cores do at a working point, beside the linear solution.
+/// The cores at a working point, beside the linear solution.
 fn working_point_summary(
     scene: &Scene,
     solved: &Solved,

@@ -27,7 +27,7 @@ pub(crate) struct Rated {
     pub limits: BTreeMap<&'static str, LimitCheck>,
     /// Each stage's estimated error.
     pub accuracy: BTreeMap<&'static str, StageAccuracy>,
-    /// What misses the tolerance.
+    /// The stages that miss the tolerance.
     pub accuracy_missed: Vec<String>,
     /// Warnings for the user.
     pub warnings: Vec<String>,

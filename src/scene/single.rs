@@ -70,13 +70,13 @@ pub struct TargetSummary {
     /// B_z on the axis, T/A.
     pub field_t_per_a: f64,
     /// Upward force at the rated current, N; the unpowered steel's pull included where the
-    /// design asks for it.
+    /// design includes it.
     pub force_n: f64,
     /// Force vector at the rated current, N, as `force_n`.
     pub force_vector_n: [f64; 3],
     /// Torque on the magnet about its centre at the rated current, N m, the steel's pull left out.
     pub torque_n_m: [f64; 3],
-    /// Upward force of the unpowered steel, N; where the design asks for it.
+    /// Upward force of the unpowered steel, N; where the design includes it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub passive_force_n: Option<f64>,
 }

@@ -44,7 +44,7 @@ impl Steel {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Solved {
     steel: Steel,
-    /// The tolerance asked for, relative to the largest |grad B| at a height.
+    /// The tolerance it was solved to, relative to the largest |grad B| at a height.
     pub tolerance: f64,
     /// The error that is claimed of the steel's solution, relative to the same; 0 without steel.
     pub steel_error: f64,
@@ -117,7 +117,7 @@ impl Solved {
         }
     }
 
-    /// What is claimed of the field at points: the steel's solution and its evaluation; in air the
+    /// The claimed error of the field at points: the steel's solution and its evaluation; in air the
     /// kernel's error.
     #[must_use]
     pub fn point_error(&self) -> f64 {
@@ -128,7 +128,7 @@ impl Solved {
         }
     }
 
-    /// What is claimed of a magnet's force, relative to its moment and the gradient at its height:
+    /// The claimed error of a magnet's force, relative to its moment and the gradient at its height:
     /// by dipoles of a rule of this `amplification` and `bound`, `growth` being
     /// [`Scene::magnet_growth`].
     #[must_use]

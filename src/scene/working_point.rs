@@ -234,7 +234,7 @@ impl WorkingPoint {
                 *whole += factor * value;
             }
         };
-        // Gains stand in the maps already.
+        // The maps include the gains.
         for (values, current) in windings
             .gz_t_per_m_per_a
             .chunks_exact(nodes.max(1))

@@ -205,7 +205,7 @@ fn step(transient: &Transient, stage: Option<&StageAccuracy>) -> String {
     )
 }
 
-/// What the magnet feels at the target.
+/// Force and field at the target.
 fn at_target(target: &TargetSummary) -> String {
     let way = |f: f64| match f {
         f if f > 0.0 => " up",

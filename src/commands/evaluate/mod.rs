@@ -27,11 +27,11 @@ pub struct Evaluation {
     pub fluxform_version: &'static str,
     /// Name of the design.
     pub design: String,
-    /// What went in.
+    /// The files it was made from.
     pub inputs: Vec<Input>,
     /// The coil and its circuit.
     pub coil: CoilSummary,
-    /// What it does at the target.
+    /// Field and force at the target.
     pub target: TargetSummary,
     /// The steel; absent for air coils.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -48,7 +48,7 @@ pub struct Evaluation {
     pub accuracy: BTreeMap<&'static str, StageAccuracy>,
     /// Whether the requested tolerance was reached.
     pub accuracy_reached: bool,
-    /// What misses it.
+    /// The stages that miss it.
     #[serde(skip)]
     pub accuracy_missed: Vec<String>,
     /// Warnings for the user.

@@ -71,7 +71,7 @@ pub struct Optimize {
     tolerance: Tolerance,
 }
 
-/// A dimension that is kept.
+/// A dimension that keeps the design's value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Key {
     /// The bore

@@ -320,7 +320,7 @@ fn fixed(design: &Design, dimensions: &[Dimension]) -> Result<Fixed, RunError> {
     Ok(fixed)
 }
 
-/// What stands beside the coil: the neighbours' cores where they are asked for, are coupled and
+/// The coil's surroundings: the neighbours' cores where they are requested, are coupled and
 /// are there.
 fn surroundings(design: &Design, neighbours: bool) -> Surroundings {
     if neighbours && coupled(design) {
@@ -391,7 +391,7 @@ fn too_wide(design: &Design) -> Option<String> {
     }
     (coil.outer_diameter_m > nearest * (1.0 + 1e-12)).then(|| {
         format!(
-            "the best coil is {:.6} mm wide, but the array's coils stand {:.6} mm apart: set \
+            "the best coil is {:.6} mm wide, but the array's coils are {:.6} mm apart: set \
              limits.outer_diameter_max_mm, or the array wider",
             coil.outer_diameter_m * 1e3,
             nearest * 1e3

@@ -23,7 +23,7 @@ pub struct Optimization {
     pub fluxform_version: &'static str,
     /// Name of the design.
     pub design: String,
-    /// What went in.
+    /// The files it was made from.
     pub inputs: Vec<Input>,
     /// How it ended.
     pub status: Ending,
@@ -37,12 +37,12 @@ pub struct Optimization {
     /// The best coil.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coil: Option<BestCoilSummary>,
-    /// What it does.
+    /// Its force and current.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub objective: Option<Objective>,
     /// The design's limits by name.
     pub limits: BTreeMap<&'static str, LimitUse>,
-    /// What else bounds the coil: current and voltage, one layer, one turn.
+    /// Other bounds of the coil: current and voltage, one layer, one turn.
     pub bounds: BTreeMap<&'static str, LimitUse>,
     /// How sure it is that no coil is better.
     pub certificate: Certificate,
@@ -82,7 +82,7 @@ pub struct Optimization {
 pub struct NoCoil {
     /// In words, with what to do.
     pub message: String,
-    /// What the coil that breaks the limits least breaks, worst first.
+    /// The limits that the least violating coil breaks, worst first.
     pub violations: Vec<Violation>,
     /// That coil.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -125,7 +125,7 @@ pub struct BestCoilSummary {
     pub core_peak_field_t: Option<f64>,
 }
 
-/// What the best coil does.
+/// Force and current of the best coil.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Objective {
     /// Upward force on the magnet at the rated current, N.
@@ -141,7 +141,7 @@ pub struct Objective {
     /// With `--neighbours`, the coil without them: N.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub alone_force_n: Option<f64>,
-    /// The unpowered steel's pull, N, which is not part of `force_n`; where the design asks for it.
+    /// The unpowered steel's pull, N, which is not part of `force_n`; where the design includes it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub passive_force_n: Option<f64>,
 }

@@ -214,7 +214,7 @@ fn above(bound_n: f64) -> String {
     }
 }
 
-/// What the design's own coil misses.
+/// The limits that the design's own coil misses.
 fn misses(given: &GivenCoil) -> Option<String> {
     let unmet: Vec<String> = given
         .limits
@@ -256,7 +256,7 @@ fn sensitivity(used: &LimitUse) -> String {
 /// A row of the comparison: its name, its number of a coil and how it is shown.
 type Property = (&'static str, fn(&Column<'_>) -> String);
 
-/// What is compared of a coil.
+/// The numbers of a coil that are compared.
 struct Column<'a> {
     force_n: f64,
     size: &'a CoilSize,

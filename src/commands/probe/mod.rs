@@ -41,7 +41,7 @@ pub struct ProbeTable {
     pub relative_to_height: bool,
     /// Estimated error of the forces, relative to |m| times the largest |grad B| at the height.
     pub force_error: Option<f64>,
-    /// What misses the tolerance.
+    /// The stages that miss the tolerance.
     pub accuracy_missed: Vec<String>,
 }
 

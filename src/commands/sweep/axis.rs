@@ -14,7 +14,7 @@ const SLACK: f64 = 1e-9;
 /// make a text of what looks like a number.
 ///
 /// # Errors
-/// What was expected and found.
+/// The expected and the actual text.
 pub fn parse(text: &str) -> Result<Axis, String> {
     let (key, values) = text
         .split_once('=')
@@ -112,14 +112,14 @@ fn list(text: &str) -> Result<Vec<Value>, String> {
     for item in items(text)? {
         let value = value(item)?;
         if values.contains(&value) {
-            return Err(format!("{item} stands there twice"));
+            return Err(format!("{item} is there twice"));
         }
         values.push(value);
     }
     Ok(values)
 }
 
-/// The parts between the commas that stand in no bracket and no quotes.
+/// The parts between the commas that are in no bracket and no quotes.
 fn items(text: &str) -> Result<Vec<&str>, String> {
     let (mut depth, mut quoted, mut start) = (0i32, false, 0);
     let mut items = Vec::new();

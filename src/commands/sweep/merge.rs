@@ -21,14 +21,14 @@ mod page;
 const PORTION: u64 = 4096;
 /// Ranges of missing points that are named.
 const NAMED: usize = 10;
-/// What the force is held against: name, unit, column of the front's table.
+/// The costs that the force is compared with: name, unit, column of the front's table.
 const COSTS: [(&str, &str, &str); 3] = [
     ("resistance", "ohm", "front_resistance"),
     ("mass", "kg", "front_mass"),
     ("settling time", "s", "front_settling"),
 ];
 
-/// What is merged.
+/// The options of a merge.
 #[derive(Debug, Clone)]
 pub struct MergeRequest {
     /// Folders that `sweep run` wrote to; each point is taken from the first that has it.
@@ -42,7 +42,7 @@ pub struct MergeRequest {
 /// Where the files go.
 #[derive(Debug, Clone)]
 pub struct MergeFiles {
-    /// The table; plot, front and sidecar stand beside it under its name.
+    /// The table; plot, front and sidecar are beside it under its name.
     pub table: PathBuf,
     /// Replace what is there.
     pub force: bool,
@@ -71,11 +71,11 @@ pub struct MergeReport {
     pub summary: MergeSummary,
     /// Which points are missing, as text; empty where none is.
     pub missing: String,
-    /// The page, if one was asked for.
+    /// The page, if one was requested.
     pub page: Option<String>,
 }
 
-/// The few numbers of a point that are kept: index, force, costs, whether limits are met.
+/// The few numbers of a point that are held: index, force, costs, whether limits are met.
 struct Brief {
     index: u64,
     force_n: f64,
@@ -107,7 +107,7 @@ impl From<io::Error> for Stop {
 /// Merges into files: the table, the plot, the designs on the fronts, and the sidecar.
 ///
 /// # Errors
-/// Points that are missing, unless asked for what there is; points of another plan; files that are
+/// Points that are missing, unless a partial merge is requested; points of another plan; files that are
 /// not ours; interruption.
 pub fn merge(
     plan: &PlanFile,
@@ -232,7 +232,7 @@ pub fn merge_table(
     Ok((table, report(summary, &gathered, page)))
 }
 
-/// Writes the table's rows in the points' order and keeps what the fronts need.
+/// Writes the table's rows in the points' order and collects what the fronts need.
 fn gather(
     plan: &PlanFile,
     request: &MergeRequest,

@@ -85,7 +85,7 @@ impl<'a> Sweep<'a> {
     }
 }
 
-/// What one design comes to.
+/// The result of one design.
 enum Computed {
     Row(Row, Status),
     NoCoil(Status, String),

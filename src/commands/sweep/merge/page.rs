@@ -15,7 +15,7 @@ pub(super) fn html(
 ) -> String {
     let mut designs = Vec::new();
     for (index, on) in best {
-        // Briefs stand in the plan's order.
+        // Briefs are in the plan's order.
         let Ok(at) = briefs.binary_search_by_key(index, |brief| brief.index) else {
             continue;
         };
