@@ -8,7 +8,7 @@ use super::diagnostics::{Fault, InvalidDocument, place_of};
 use super::named_file::{self, NamedFileError};
 
 /// Largest document that is read, bytes (4 MiB): several times what ten thousand coils need.
-pub const DOCUMENT_MAX_BYTES: u64 = 4 << 20;
+pub(crate) const DOCUMENT_MAX_BYTES: u64 = 4 << 20;
 
 /// What a text is, for the messages about one that cannot be read.
 #[derive(Debug, Clone, Copy)]

@@ -12,7 +12,7 @@ use fluxform_numerics::dispatch::{self, Kernel, LANES, Lanes};
 use fluxform_numerics::gauss;
 
 /// Points that share one quadrature rule; fixed, so that results do not depend on threads.
-pub const CHUNK: usize = 256;
+pub(crate) const CHUNK: usize = 256;
 /// More nodes than this on one panel cost more than the graded exact path is worth.
 const MAX_NODES: usize = 24;
 /// Constant of the error bound, relative to the largest |grad B| at the height.
@@ -76,7 +76,7 @@ impl Winding {
     /// M = (1 + h rho / (2 c))^2 is the growth of a^2 on that ellipse about the panel's
     /// centre c and half-width h.
     #[must_use]
-    pub fn batch_rule(&self, extent: Extent, tolerance: f64) -> Option<BatchRule> {
+    pub(crate) fn batch_rule(&self, extent: Extent, tolerance: f64) -> Option<BatchRule> {
         let near_u = extent.z_m[0];
         if near_u <= 0.0 || !extent.z_m[1].is_finite() || !extent.r_m[1].is_finite() {
             return None;

@@ -184,10 +184,10 @@ pub fn tabulate(
 /// One height: the field at every distinct distance, per ampere.
 struct Level {
     dbz_dz: Vec<f64>,
-    /// Empty unless the gradient is wanted.
+    /// Empty unless the gradient is requested.
     dbr_dz_over_r: Vec<f64>,
     br_over_r: Vec<f64>,
-    /// Empty unless the field is wanted.
+    /// Empty unless the field is requested.
     b_z: Vec<f64>,
     tabulated: bool,
 }

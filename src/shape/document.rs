@@ -3,6 +3,7 @@
 mod format;
 mod raw;
 mod read;
+pub use read::keys;
 
 use std::path::PathBuf;
 

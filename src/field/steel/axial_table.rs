@@ -70,7 +70,7 @@ struct Cell {
 }
 
 /// A point's cell and its place there, -1 to 1 along r and z.
-struct Place {
+struct CellPosition {
     key: Key,
     x: f64,
     y: f64,
@@ -204,7 +204,7 @@ impl AxialTable {
     }
 
     /// The cell of a point; `None` where the exact field is due.
-    fn place(&self, r_m: f64, z_m: f64) -> Option<Place> {
+    fn place(&self, r_m: f64, z_m: f64) -> Option<CellPosition> {
         let shape = self.core.outline().shape;
         let mut distance_m = shape.distance_m(r_m, z_m);
         if let Some(winding) = &self.winding {
@@ -219,7 +219,7 @@ impl AxialTable {
         let exponent = (distance_m / (1.0 + SQRT_2)).log2().floor() as i32;
         let size_m = 2.0_f64.powi(exponent);
         let (i, j) = ((r_m / size_m).floor(), (z_m / size_m).floor());
-        Some(Place {
+        Some(CellPosition {
             key: (exponent, i as i64, j as i64),
             x: 2.0 * (r_m / size_m - i) - 1.0,
             y: 2.0 * (z_m / size_m - j) - 1.0,

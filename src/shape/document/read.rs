@@ -6,8 +6,9 @@ use super::format::{SurfaceFormat, parse_unit, unit_names};
 use super::{AxisRequest, GridRequest, Placement, Primitive, ShapeDocument, SurfaceSource};
 use fluxform_base::units::m_from_mm;
 use fluxform_design::diagnostics::{Faults, InvalidDocument};
+use fluxform_design::keys::{Key, with_meanings};
 use fluxform_design::message_text::{nearest, quoted};
-use fluxform_design::reader::{Section, read_document};
+use fluxform_design::reader::{Section, list_keys, read_document};
 use fluxform_design::rule::{Bound, Rule};
 use fluxform_design::source;
 use fluxform_design::values::OneOrMany;
@@ -69,12 +70,8 @@ fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
     };
     let scale = scale(root);
     let placement = Placement {
-        translate_m: root
-            .tuple("translate_mm", &BODY_MM)
-            .map_or([0.0; 3], |t| t.value.map(m_from_mm)),
-        rotate_deg: root
-            .tuple("rotate_deg", &Rule::any("degrees"))
-            .map_or([0.0; 3], |r| r.value),
+        translate_m: root.tuple("translate_mm", &BODY_MM).map(m_from_mm),
+        rotate_deg: root.tuple("rotate_deg", &Rule::any("degrees")),
     };
     let grid = points(root.section("points"));
     Some(ShapeDocument {
@@ -86,14 +83,65 @@ fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
     })
 }
 
+/// The keys of a shape: those of a surface file, then those of the primitives.
+#[must_use]
+pub fn keys() -> Vec<Key> {
+    let mut all: Vec<Key> = Vec::new();
+    let surface = std::iter::once("surface = \"a.stl\"\n[points]\n".to_owned());
+    let primitive = |(name, _): &(&str, Kind)| format!("primitive = {name:?}\n[points]\n");
+    for text in surface.chain(KINDS.iter().map(primitive)) {
+        let read = |root: &mut Section<'_>| {
+            document(root, Path::new(""));
+        };
+        for key in list_keys(&text, read) {
+            if !all.iter().any(|known| known.path() == key.path()) {
+                all.push(key);
+            }
+        }
+    }
+    // The top level before its section.
+    all.sort_by_key(|key| !key.section.is_empty());
+    with_meanings(all, MEANINGS)
+}
+
+const MEANINGS: &[(&str, &str)] = &[
+    ("name", "names the folder of results"),
+    (
+        "surface",
+        "a file from CAD, beside the shape; this or `primitive` is required",
+    ),
+    (
+        "unit",
+        "of the file's coordinates: mm, cm, m, um, in or ft; required where the format carries none",
+    ),
+    ("stretch", "whether `scale` may differ along the axes"),
+    (
+        "scale",
+        "factor on a surface's size, or one along each of x, y and z",
+    ),
+    ("translate_mm", "moves the surface, after its rotation"),
+    ("rotate_deg", "rotates it about x, then y, then z"),
+    ("primitive", "a body with a formula, instead of a file"),
+    ("side_mm", "of `flat` and `wedge`: length of a side"),
+    ("height_mm", "of `flat`: its height above the windings"),
+    ("radius_mm", "of `half-sphere` and `half-cylinder`"),
+    ("base_mm", "of both: height of the plane they rise from"),
+    ("length_mm", "of `half-cylinder`: its length"),
+    ("low_mm", "of `wedge`: its height at the low side"),
+    ("high_mm", "of `wedge`: its height at the high side"),
+    ("points.x_mm", "grid of constraint points along x"),
+    ("points.y_mm", "grid of constraint points along y"),
+    (
+        "points.outside",
+        "what becomes of grid points beside the surface: there is no point",
+    ),
+];
+
 /// Factors of size; `None` where they are at fault.
 fn scale(root: &mut Section<'_>) -> Option<[f64; 3]> {
     let rule = Rule::any("").bound(Bound::Positive);
     let stretch = root.flag_or("stretch", false);
-    let factors = match match root.one_or_many("scale", &rule) {
-        None => OneOrMany::One(1.0),
-        Some(given) => given.value,
-    } {
+    let factors = match root.one_or_many("scale", &rule, 1.0).value {
         OneOrMany::One(factor) => [factor; 3],
         OneOrMany::Many(factors) => match <[f64; 3]>::try_from(factors) {
             Ok(factors) => factors,
@@ -231,7 +279,7 @@ fn level(root: &mut Section<'_>, key: &'static str, default_mm: f64) -> f64 {
 fn points(mut s: Section<'_>) -> Option<GridRequest> {
     let x = s.axis_or("x_mm", &BODY_MM, SEED_SIDE_MM);
     let y = s.axis_or("y_mm", &BODY_MM, SEED_SIDE_MM);
-    s.choice("outside", &[("skip", ())]);
+    s.choice_or_first("outside", &[("skip", ())]);
     let grid = x.zip(y).map(|(x, y)| [x.value, y.value]);
     if let Some([x, y]) = &grid
         && x.samples

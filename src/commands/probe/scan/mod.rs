@@ -127,14 +127,8 @@ pub fn compare(
     }
     let weighted = Weighted::of(scan, predicted, weights(scan, request));
     let field_t = rms(scan, &scan.values, field).unwrap_or(1e-3).max(1e-9);
-    let fit = fit::fit(
-        &model,
-        scan,
-        &parameters,
-        &weighted.weights,
-        field_t,
-        progress,
-    )?;
+    let weights = &weighted.weights;
+    let fit = fit::fit(&model, scan, &parameters, weights, field_t, progress)?;
     let relative_error = solved.point_error();
     let task = explain::Task {
         design,
@@ -173,15 +167,33 @@ pub fn compare(
         best_explanation,
         accuracy: BTreeMap::from([("field".to_owned(), accuracy(&solved, relative_error))]),
     };
-    let accuracy_missed = missed(&file.accuracy, solved.tolerance);
-    Ok(ScanReport {
+    let predicted = weighted.predicted;
+    Ok(ScanReport::new(
         file,
-        fitted: fit.fitted,
-        predicted: weighted.predicted,
+        [fit.fitted, predicted],
         warnings,
-        accuracy_reached: accuracy_missed.is_empty(),
-        accuracy_missed,
-    })
+        solved.tolerance,
+    ))
+}
+
+impl ScanReport {
+    /// `file` and its warnings, with the values that were fitted and those of the design as it is.
+    fn new(
+        file: ScanFile,
+        [fitted, predicted]: [Vec<f64>; 2],
+        warnings: Vec<String>,
+        tolerance: f64,
+    ) -> Self {
+        let accuracy_missed = missed(&file.accuracy, tolerance);
+        Self {
+            file,
+            fitted,
+            predicted,
+            warnings,
+            accuracy_reached: accuracy_missed.is_empty(),
+            accuracy_missed,
+        }
+    }
 }
 
 /// Along a B-H curve the field per ampere depends on the current.
