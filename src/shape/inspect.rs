@@ -100,9 +100,7 @@ impl MeshReport {
     /// # Errors
     /// [`ShapeError`] with the path and the place.
     pub fn of_file(path: &Path) -> Result<Self, ShapeError> {
-        let format =
-            SurfaceFormat::of(path).ok_or_else(|| ShapeError::Format { path: path.into() })?;
-        let file = read_mesh(format, path)?;
+        let (format, file) = read_mesh(path)?;
         let coordinates = file.triangles.as_flattened().as_flattened().iter();
         let largest = coordinates.fold(0.0, |m: f64, c| m.max(c.abs()));
         if largest > FARTHEST {
