@@ -16,6 +16,9 @@ use crate::map::tabulate::Grid;
 
 /// Places at which a table for scattered places is compared with the pull itself.
 const COMPARED: usize = 24;
+/// What the nodes aim at beside what is wanted: the pull is a square of fields, whose singularities are
+/// strong.
+const NODES_AIM: f64 = 0.1;
 /// A table that is to be right to an aim may miss it by this factor where nothing else hangs on it.
 const MISSES: f64 = 3.0;
 /// Most nodes along one axis.
@@ -363,7 +366,7 @@ fn tabulated_z_n(
     let ranges = region(places_m);
     let below_m = [scene.core.as_ref()?.shape.top_m, axial_m(scene)];
     let turns = symmetries(&scene.design.array.positions_m, scene.moment_a_m2, ranges);
-    let layout = Layout::new(ranges, below_m, &turns, aim);
+    let layout = Layout::new(ranges, below_m, &turns, NODES_AIM * aim);
     if layout.evaluations() + 3 * COMPARED > places_m.len() / 2 {
         return None;
     }
@@ -496,7 +499,7 @@ mod tests {
         let path = std::path::Path::new("seed.toml");
         let (design, _) = Design::from_toml(&text, path, Need::CALIBRATE).unwrap();
         let scene = Scene::new(&design).unwrap();
-        let places: Vec<[f64; 3]> = (0..3000)
+        let places: Vec<[f64; 3]> = (0..4000)
             .map(|k| {
                 let part = |step: f64| (0.5 + step * f64::from(k)).fract();
                 let (u, v) = (part(0.754_877_666), part(0.569_840_291));
@@ -511,7 +514,7 @@ mod tests {
         let sure = pull.forces_z_n(&some.iter().map(|i| places[*i]).collect::<Vec<_>>());
         for (i, sure) in some.iter().zip(sure) {
             assert!(
-                (told[*i] / sure - 1.0).abs() < 2e-3,
+                (told[*i] / sure - 1.0).abs() < 5e-3,
                 "{i}: {} {sure}",
                 told[*i]
             );

@@ -1,6 +1,6 @@
 //! STL: real and damaged files, and the messages.
 
-use fluxform_shape::document::{AxisRequest, GridRequest, Placement};
+use fluxform_shape::document::{AxisRequest, GridRequest, Placement, SurfaceFormat};
 use fluxform_shape::mesh::Mesh;
 use fluxform_shape::placement::Transform;
 use fluxform_shape::stl::read;
@@ -122,8 +122,9 @@ fn damaged_files_get_a_message_that_says_where() {
         ("40_degenerate_point_tri", Ok(12)),
     ];
     for (name, expected) in cases {
-        let bytes = std::fs::read(folder.join(format!("bad_stl/{name}.stl"))).unwrap();
-        match (read(&bytes), expected) {
+        let path = folder.join(format!("bad_stl/{name}.stl"));
+        let bytes = std::fs::read(&path).unwrap();
+        match (SurfaceFormat::Stl.read(&path, &bytes), expected) {
             (Ok(mesh), Ok(count)) => {
                 assert_eq!(mesh.triangles.len(), count, "{name}");
                 let said = mesh.warnings.join(" ");
