@@ -20,7 +20,7 @@ pub fn number_to(value: f64, digits: i32) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
-    // Through the decimal digits: they tell the exponent after rounding.
+    // Through the decimal digits: they show the exponent after rounding.
     let rounded = format!("{:.*e}", (digits - 1).max(0) as usize, value);
     let exponent: i32 = rounded
         .split_once('e')

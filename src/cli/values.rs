@@ -114,7 +114,7 @@ pub fn noise(text: &str) -> Result<f64, String> {
     match number(text)? {
         noise if noise > 0.0 => Ok(noise),
         _ => Err(format!(
-            "{text} is no noise: expected a number greater than 0, like 1e-6"
+            "invalid noise {text}: expected a number greater than 0, like 1e-6"
         )),
     }
 }
@@ -176,7 +176,7 @@ pub fn tolerance(text: &str) -> Result<f64, String> {
         Ok(value)
     } else {
         Err(format!(
-            "{value:e} is no tolerance: expected {:e} to {:e}, the allowed error relative to the \
+            "invalid tolerance {value:e}: expected {:e} to {:e}, the allowed error relative to the \
              field gradient |grad B|, like 1e-9",
             TOLERANCE.start(),
             TOLERANCE.end()
@@ -191,7 +191,7 @@ pub fn jnd(text: &str) -> Result<f64, String> {
         Ok(value)
     } else {
         Err(format!(
-            "{value} is no just-noticeable difference: expected a part of the force greater than \
+            "invalid just-noticeable difference {value}: expected a part of the force greater than \
              0, like 0.07"
         ))
     }
@@ -204,7 +204,7 @@ pub fn force_constant(text: &str) -> Result<f64, String> {
         Ok(value)
     } else {
         Err(format!(
-            "{value} is no force constant: expected N/m, 0 or more, like 2.0"
+            "invalid force constant {value}: expected N/m, 0 or more, like 2.0"
         ))
     }
 }
@@ -214,7 +214,7 @@ pub fn pair(text: &str) -> Result<[usize; 2], String> {
     let coil = |text: &str| text.trim().parse::<usize>().ok();
     let coils = text.split_once('+');
     let found = coils.and_then(|(a, b)| Some([coil(a)?, coil(b)?]));
-    found.ok_or_else(|| format!("{text:?} is no pair of coils: expected two numbers, like 0+8"))
+    found.ok_or_else(|| format!("invalid pair of coils {text:?}: expected two numbers, like 0+8"))
 }
 
 /// A length in millimetres, 0 or more; m.
@@ -224,7 +224,7 @@ pub fn length(text: &str) -> Result<f64, String> {
         Ok(m_from_mm(value))
     } else {
         Err(format!(
-            "{value} is no distance: expected millimetres, 0 or more"
+            "invalid distance {value}: expected millimetres, 0 or more"
         ))
     }
 }

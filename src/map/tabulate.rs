@@ -5,62 +5,17 @@
 //! the direct sums once it is the cheaper of the two.
 
 use serde::{Deserialize, Serialize};
-use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 use rayon::prelude::*;
 
 use super::radii::Radii;
 use fluxform_base::progress::{Interrupted, Progress};
-use fluxform_field::batch::Quantities;
+pub use fluxform_field::components::Components;
 use fluxform_field::frame::to_cartesian;
 use fluxform_field::source::AxialSource;
 use fluxform_field::winding::{AxialField, OnEdge};
 use fluxform_numerics::chebyshev::{Evaluation, Layout};
 use fluxform_numerics::dispatch;
-
-/// The components of a map. The name in artefacts and on the command line is the variant's in lower
-/// case, its meaning the first line of the variant's comment.
-#[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    Default,
-    EnumMessage,
-    EnumString,
-    IntoStaticStr,
-    VariantArray,
-    Serialize,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum Components {
-    /// dBz/dz
-    #[default]
-    Gz,
-    /// dBz/dz and the gradient tensor
-    Gradient,
-    /// dBz/dz, the gradient tensor and the field
-    All,
-}
-
-impl Components {
-    /// All of them.
-    pub const ALL: &[Self] = Self::VARIANTS;
-
-    /// The name in artefacts and on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        self.into()
-    }
-
-    /// The components in words.
-    #[must_use]
-    pub fn meaning(self) -> &'static str {
-        self.get_documentation().unwrap_or_default()
-    }
-}
 
 /// Maps per ampere of every coil over a grid, C order.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -283,12 +238,8 @@ impl Level {
         components: Components,
         tolerance: f64,
     ) -> Result<Self, OnEdge> {
-        let wanted = match components {
-            Components::Gz => Quantities::Gz,
-            Components::Gradient | Components::All => Quantities::Gradient,
-        };
         let heights = vec![z_m; radii_m.len()];
-        let gradients = source.gradients(radii_m, &heights, tolerance, wanted)?;
+        let gradients = source.gradients(radii_m, &heights, tolerance, components)?;
         let b_z = if components == Components::All {
             source.axial_fields(radii_m, &heights, tolerance)?
         } else {

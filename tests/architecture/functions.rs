@@ -10,18 +10,7 @@ const MOST_LINES: usize = 80;
 const REASON: &str = "/// Long because ";
 
 /// Functions that are longer and give no reason, with their lines. The list may only shrink.
-const LONG: &[(&str, &str)] = &[
-    ("src/commands/optimize/mod.rs", "take"),
-    ("src/commands/optimize/text.rs", "found"),
-    ("src/commands/probe/scan/keys.rs", "keys"),
-    ("src/commands/probe/scan/mod.rs", "compare"),
-    ("src/commands/probe/scan/mod.rs", "fit_file"),
-    ("src/commands/sweep/merge.rs", "merge"),
-    ("src/scene/maps.rs", "new"),
-    ("src/scene/single.rs", "new"),
-    ("src/scene/steel.rs", "solve"),
-    ("src/shape/scattered/poisson.rs", "poisson"),
-];
+const LONG: &[(&str, &str)] = &[("src/shape/scattered/poisson.rs", "poisson")];
 
 /// Name and length of every function outside tests whose comment gives no reason; the text is as
 /// rustfmt leaves it.

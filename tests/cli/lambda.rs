@@ -114,7 +114,7 @@ fn wiring_that_cannot_be_is_refused() {
         ran.ends(3).says(&[words]);
     }
     let ran = place.run(&["lambda", AIR, WEDGE, "--series", "3-9"]);
-    ran.ends(2).says(&["\"3-9\" is no pair of coils"]);
+    ran.ends(2).says(&["invalid pair of coils \"3-9\""]);
 }
 
 #[test]

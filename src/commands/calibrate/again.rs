@@ -42,10 +42,10 @@ pub fn expected(
     options: &CalibrateOptions,
     progress: &dyn Progress,
 ) -> Result<Expected, RunError> {
-    let tolerance = options.lambda.tolerance;
+    let scene = &scene.to_tolerance(options.lambda.tolerance);
     let table = curve.map(|(_, text)| text.as_str());
-    let field = FieldStore::new(scene, tolerance, table, Store::none());
-    let solved = BothSolved::new(scene, &field, tolerance, progress)?;
+    let field = FieldStore::new(scene, table, Store::none());
+    let solved = BothSolved::new(scene, &field, progress)?;
     let circuit = Inductances::new(scene, &solved.map, progress);
     let calibration = Calibration {
         scene,

@@ -14,13 +14,13 @@ use super::run;
 use crate::bundle::lambda_file::WorkingPointForces;
 use crate::bundle::manifest::Manifest;
 use crate::cli::args::{SurfaceFlags, Tolerance, Writing};
-use crate::cli::budget::{allow, asked, costs};
+use crate::cli::budget::{allow, cost_origin, costs};
 use crate::cli::describe;
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, headed_table};
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{
     bytes, count, error, force, length_error, mm, number, number_to, percent,
 };
@@ -121,13 +121,13 @@ impl Calibrate {
             .transpose()?;
         drop(bar);
         if let Some(plan) = plan.as_ref().filter(|_| !printer.json()) {
-            printer.summary(Place::Output, plan, || explained(plan))?;
+            printer.summary(Stream::Output, plan, || explained(plan))?;
         }
         allow(
             costs(design, &shapes, self.tolerance.tolerance)
                 .into_iter()
                 .chain([of_map(design, Components::Gz)]),
-            asked(&shapes),
+            cost_origin(&shapes),
             printer,
         )?;
         let bar = begin(printer);
@@ -137,7 +137,7 @@ impl Calibrate {
         report.plan = plan;
         let json = printer.with_warnings(&report);
         let folder = options.out.join(&design.name);
-        printer.summary(Place::Output, &json, || summary(design, &report, &folder))?;
+        printer.summary(Stream::Output, &json, || summary(design, &report, &folder))?;
         let missed = |b: &BundleReport| b.lambda.accuracy_missed.clone();
         let missed: Vec<String> = report.bundles.iter().flat_map(missed).collect();
         accuracy_check(&missed)?;

@@ -5,8 +5,8 @@ use crate::bundle::manifest::LeftOut;
 use crate::commands::lambda::{LambdaReport, WantedPoints};
 use crate::scene::Scene;
 use crate::scene::cached_field::ShapeField;
+use crate::scene::coupled;
 use crate::scene::passive::couples_left_out;
-use crate::scene::steel::coupled;
 use crate::units::DETECTION_THRESHOLD_N;
 
 /// Shares that differ by no more than this factor are one.

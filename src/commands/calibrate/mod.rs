@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::discretize::{self, PointsReport, point_rows, points_grid};
 use super::lambda::{LambdaOptions, LambdaReport, WantedPoints, solve_at};
 use super::made_with::surface;
-use super::map::{MAP_TOLERANCE, arrays, runtime, summary, workspace_grid};
+use super::map::{arrays, runtime, summary, workspace_grid};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS, arithmetic};
@@ -32,13 +32,12 @@ use crate::map::{Components, FieldMap};
 use crate::progress::Progress;
 use crate::report::bundle_files;
 use crate::scene::cached_field::{FieldStore, STORE_FOLDER, ShapeField};
-use crate::scene::maps::{Felt, SceneMap};
+use crate::scene::maps::{MagnetMean, SceneMap};
 use crate::scene::neighbours;
 use crate::scene::passive::PASSIVE_TOLERANCE;
 use crate::scene::passive_map::PassiveMap;
 use crate::scene::sources::{DesignSource, ShapeSource};
-use crate::scene::steel;
-use crate::scene::steel::{Solved, Steel};
+use crate::scene::steel::Solved;
 use crate::scene::{MAGNET_SHARE, Scene};
 use crate::shape::points::ConstraintPoints;
 
@@ -193,7 +192,7 @@ pub fn run(
     progress: &dyn Progress,
 ) -> Result<CalibrateReport, RunError> {
     check_names(shapes)?;
-    let scene = Scene::new(source.design)?;
+    let scene = Scene::with_tolerance(source.design, options.lambda.tolerance)?;
     let curve = curve_table(&scene);
     // Before anything is computed, cleared or kept: a run that is refused changes nothing.
     for shape in shapes {
@@ -207,7 +206,7 @@ pub fn run(
         store_of(&scene, options).clear();
     }
     let field = field_store(&scene, curve.as_ref(), options);
-    let solved = BothSolved::new(&scene, &field, options.lambda.tolerance, progress)?;
+    let solved = BothSolved::new(&scene, &field, progress)?;
     let circuit = Inductances::new(&scene, &solved.map, progress);
     let bundles = shapes
         .iter()
@@ -259,7 +258,7 @@ pub(crate) fn field_store(
         Store::none()
     };
     let table = curve.map(|(_, text)| text.as_str());
-    FieldStore::new(scene, options.lambda.tolerance, table, store)
+    FieldStore::new(scene, table, store)
 }
 
 /// Beside the design's bundles.
@@ -309,19 +308,11 @@ struct BothSolved {
 }
 
 impl BothSolved {
-    fn new(
-        scene: &Scene,
-        field: &FieldStore,
-        tolerance: Option<f64>,
-        progress: &dyn Progress,
-    ) -> Result<Self, RunError> {
+    fn new(scene: &Scene, field: &FieldStore, progress: &dyn Progress) -> Result<Self, RunError> {
         let lowest_m = scene.design.workspace.z_m.from;
         progress.begin("steel", 1);
-        let map = field.steel(scene, tolerance, MAP_TOLERANCE)?;
-        let forces = match map.steel {
-            Steel::None => steel::solve(scene, tolerance, scene.force_tolerance(), lowest_m)?,
-            Steel::Alone(_) | Steel::Coupled(_) => map.clone(),
-        };
+        let map = field.steel(scene)?;
+        let forces = map.for_forces(scene, lowest_m)?;
         progress.end();
         Ok(Self { forces, map })
     }
@@ -597,7 +588,7 @@ impl NeededMap {
                 error_cost: 0.0,
             });
         }
-        let felt = Felt::by_magnet(scene, &grid.z_m, MAGNET_SHARE * solved.tolerance)?;
+        let felt = MagnetMean::by_magnet(scene, &grid.z_m, MAGNET_SHARE * solved.tolerance)?;
         let mut made = field.map(scene, solved, &driven, &grid, components, &felt, progress)?;
         drop_weak_coils(
             scene,

@@ -12,16 +12,17 @@ use super::needed_coils;
 use super::needed_nodes;
 use crate::RunError;
 use crate::commands::discretize::{PointsOptions, run_with};
-use crate::commands::map::{MAP_TOLERANCE, workspace_grid};
+use crate::commands::map::workspace_grid;
 use crate::design::{Coupling, Design, MagnetModel};
 use crate::field::winding::KERNEL_ERROR;
 use crate::progress::{Progress, Silent};
 use crate::scene::Scene;
+use crate::scene::core_material::Material;
+use crate::scene::coupled;
 use crate::scene::passive;
 use crate::scene::sources::DesignSource;
 use crate::scene::sources::ShapeSource;
 use crate::scene::steel;
-use crate::scene::steel::{Material, coupled};
 use crate::shape::certificate::Certify;
 use crate::shape::points::ConstraintPoints;
 
@@ -110,7 +111,7 @@ pub fn plan(
     options: &CalibrateOptions,
     progress: &dyn Progress,
 ) -> Result<Plan, RunError> {
-    let scene = Scene::new(source.design)?;
+    let scene = Scene::with_tolerance(source.design, options.lambda.tolerance)?;
     let curve = curve_table(&scene);
     let field = field_store(&scene, curve.as_ref(), options);
     let cached = field.holds_steel();
@@ -140,7 +141,7 @@ pub fn plan(
     Ok(Plan {
         coils,
         cost_coils: coils.min(MIDDLE_COILS),
-        tolerance: steel::tolerance_of(&scene, tolerance, MAP_TOLERANCE).max(KERNEL_ERROR),
+        tolerance: scene.tolerances.map.max(KERNEL_ERROR),
         terms: terms(&scene, cached, tolerance, &places, progress)?,
         shapes: planned,
     })
@@ -307,9 +308,9 @@ fn near(design: &Design, places: &[[f64; 3]]) -> Vec<[f64; 3]> {
 
 /// Forces per ampere at `places` with another design; `None` where it cannot be computed.
 fn forces(design: &Design, tolerance: Option<f64>, places: &[[f64; 3]]) -> Option<Vec<f64>> {
-    let scene = Scene::new(design).ok()?;
+    let scene = Scene::with_tolerance(design, tolerance).ok()?;
     let lowest_m = design.workspace.z_m.from;
-    let solved = steel::solve(&scene, tolerance, KERNEL_ERROR, lowest_m).ok()?;
+    let solved = steel::solve(&scene, scene.tolerances.field, lowest_m).ok()?;
     scene.forces_n_per_a(&solved, places, &Silent).ok()
 }
 

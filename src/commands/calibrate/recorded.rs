@@ -8,7 +8,7 @@ use serde::Deserialize;
 use crate::report::data::ErrorTime;
 use crate::report::measured::{MeasuredCurve, MeasuredRow};
 use crate::scene::Scene;
-use crate::scene::steel::coupled;
+use crate::scene::coupled;
 
 /// The table of a whole run of the measuring suite.
 const TABLE: &str = include_str!("../../../results/bench/bench.json");

@@ -5,12 +5,12 @@ use clap::Args;
 use super::text::summary;
 use super::{CompareOptions, run};
 use crate::cli::args::{SurfaceFlags, Tolerance, Writing};
-use crate::cli::budget::{allow, asked, costs};
+use crate::cli::budget::{allow, cost_origin, costs};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::pictures::Picture;
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
@@ -88,7 +88,7 @@ impl Compare {
         }
         allow(
             costs(&document.design, &shapes, self.tolerance.tolerance),
-            asked(&shapes),
+            cost_origin(&shapes),
             printer,
         )?;
         let bar = begin(printer);
@@ -97,7 +97,7 @@ impl Compare {
         for warning in &report.warnings {
             printer.warning(warning);
         }
-        let mut place = Place::Output;
+        let mut place = Stream::Output;
         if let Some(plot) = &plot {
             place = plot.write(&report.inputs, &report.picture().svg(), printer)?;
         }

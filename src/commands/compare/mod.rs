@@ -21,10 +21,11 @@ use crate::lambda::{self, Allocator, Criterion, ForceProblem, Reach, Settings, S
 use crate::plot::matrix::{MatrixPlot, Panel};
 use crate::progress::Progress;
 use crate::scene::Scene;
+use crate::scene::core_material::Material;
 use crate::scene::passive;
 use crate::scene::sources::ShapeSource;
 use crate::scene::steel;
-use crate::scene::steel::{Material, Solved};
+use crate::scene::steel::Solved;
 use crate::units::DETECTION_THRESHOLD_N;
 
 pub(crate) mod command;
@@ -179,7 +180,7 @@ pub fn run(
             return Err(RunError::Input(message));
         }
     }
-    let scene = Scene::new(design)?;
+    let scene = Scene::with_tolerance(design, options.tolerance)?;
     let of_shapes = shapes.iter().filter_map(|shape| shape.input.clone());
     let inputs: Vec<Input> = std::iter::once(design_input.clone())
         .chain(of_shapes)
@@ -192,7 +193,7 @@ pub fn run(
         .iter()
         .fold(f64::INFINITY, |z, p| z.min(p.summary.min_height_m));
     progress.begin("steel", 1);
-    let solved = steel::solve(&scene, options.tolerance, scene.force_tolerance(), lowest_m)?;
+    let solved = steel::solve(&scene, scene.tolerances.forces, lowest_m)?;
     progress.end();
     let mut warnings = Vec::new();
     let objects = points

@@ -10,14 +10,14 @@ use crate::RunError;
 use crate::bundle::artefact::Input;
 use crate::bundle::atomic::{self, Overwrite, check_distinct};
 use crate::cli::args::{SamplingFlags, SurfaceFlags, Writing};
-use crate::cli::budget::{allow, asked};
+use crate::cli::budget::{allow, cost_origin};
 use crate::cli::describe;
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
 use crate::cli::pictures::Picture;
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{count, extents, length_error, mm, number};
 use crate::cli::start::begin;
 use crate::cli::values::FileArgument;
@@ -117,7 +117,7 @@ impl Discretize {
         let shapes = documents::shapes(std::slice::from_ref(&self.shape), &self.surface, printer)?;
         allow(
             shapes.iter().map(|shape| of_points(&shape.document, 0)),
-            asked(&shapes),
+            cost_origin(&shapes),
             printer,
         )?;
         let bar = begin(printer);
@@ -133,7 +133,7 @@ impl Discretize {
                     Some(place) => place,
                     None => {
                         report.write(self.out.as_given(), self.writing.force)?;
-                        Place::Output
+                        Stream::Output
                     }
                 };
                 report.summary.warnings = printer.warnings();
@@ -149,7 +149,7 @@ impl Discretize {
                     Some(place) => place,
                     None => {
                         report.write(self.out.as_given(), self.writing.force)?;
-                        Place::Output
+                        Stream::Output
                     }
                 };
             let place = match &plot {
@@ -157,7 +157,7 @@ impl Discretize {
                 Some(plot) => {
                     let (inputs, svg) = (&report.summary.inputs, report.picture().svg());
                     let after = plot.write(inputs, &svg, printer)?;
-                    if after == Place::Error { after } else { place }
+                    if after == Stream::Error { after } else { place }
                 }
             };
             report.summary.warnings = printer.warnings();
@@ -218,16 +218,16 @@ impl Discretize {
         printer: &Printer,
         inputs: &[Input],
         csv: impl Fn(&mut dyn std::io::Write) -> std::io::Result<()>,
-    ) -> Result<Option<Place>, Failure> {
+    ) -> Result<Option<Stream>, Failure> {
         match &self.out {
             FileArgument::Standard => {
                 printer.data(|out| csv(out))?;
-                Ok(Some(Place::Error))
+                Ok(Some(Stream::Error))
             }
             FileArgument::Path(path) if atomic::is_stream(path) => {
                 let overwrite = Overwrite::same_bytes(self.writing.force, inputs);
                 atomic::write(path, &overwrite, |out| csv(out)).map_err(RunError::from)?;
-                Ok(Some(Place::Output))
+                Ok(Some(Stream::Output))
             }
             FileArgument::Path(_) => Ok(None),
         }

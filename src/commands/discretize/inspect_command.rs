@@ -9,7 +9,7 @@ use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::layout::Sheet;
 use crate::cli::pictures::Picture;
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{count, extents, mm, number};
 use crate::cli::start::begin;
 use crate::cli::values::FileArgument;
@@ -32,7 +32,7 @@ impl Discretize {
         for warning in &inspection.surface.warnings {
             printer.warning(warning);
         }
-        let mut place = Place::Output;
+        let mut place = Stream::Output;
         if let Some(file) = &self.plot {
             let plot = Picture::new(file, self.writing.force, [&path]);
             plot.check(&inspection.inputs)?;

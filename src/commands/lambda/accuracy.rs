@@ -4,8 +4,9 @@ use crate::accuracy::StageAccuracy;
 use crate::design::MagnetModel;
 use crate::field::winding::KERNEL_ERROR;
 use crate::scene::evaluation_sample::{Evaluation, PLACES, Sample, sharper, spread};
-use crate::scene::steel::{EVALUATION_SHARE, Solved, Steel};
-use crate::scene::{AIR_SHARE, MAGNET_FINEST, MAGNET_SHARE, Scene};
+use crate::scene::steel::{EVALUATION_SHARE, Solved};
+use crate::scene::tolerances::MAGNET_FINEST;
+use crate::scene::{AIR_SHARE, MAGNET_SHARE, Scene};
 
 /// The error of forces at some points: the proven bound, or a sharper estimate from samples.
 pub(super) fn forces_accuracy(
@@ -43,11 +44,13 @@ pub(crate) fn proven_accuracy(scene: &Scene, solved: &Solved) -> StageAccuracy {
 fn evaluation(scene: &Scene, solved: &Solved) -> Evaluation {
     let rules = solved.tolerance.max(KERNEL_ERROR);
     let cylinder = scene.design.magnet.model == MagnetModel::Cylinder;
-    let field = match solved.steel {
-        Steel::None if !cylinder => rules,
-        Steel::None => (AIR_SHARE * rules).max(KERNEL_ERROR),
+    let field = if solved.has_steel() {
         // The winding's rule and the steel's.
-        Steel::Alone(_) | Steel::Coupled(_) => 2.0 * EVALUATION_SHARE * rules,
+        2.0 * EVALUATION_SHARE * rules
+    } else if cylinder {
+        (AIR_SHARE * rules).max(KERNEL_ERROR)
+    } else {
+        rules
     };
     let magnet = if cylinder {
         MAGNET_SHARE * rules.max(MAGNET_FINEST)
@@ -64,13 +67,11 @@ fn accuracy_of(scene: &Scene, solved: &Solved, evaluation: Evaluation) -> StageA
     let Evaluation { estimate, method } = evaluation;
     StageAccuracy {
         estimate: estimate + solved.steel_error,
-        relative_to: match (&solved.steel, scene.design.magnet.model) {
-            (Steel::Alone(_) | Steel::Coupled(_), MagnetModel::Cylinder) => {
+        relative_to: match (solved.has_steel(), scene.design.magnet.model) {
+            (true, MagnetModel::Cylinder) => {
                 "the largest |grad B| at each height of the magnet, averaged over it"
             }
-            (Steel::None, _) | (_, MagnetModel::Dipole) => {
-                "the largest |grad B| at the point's height"
-            }
+            (false, _) | (_, MagnetModel::Dipole) => "the largest |grad B| at the point's height",
         }
         .to_owned(),
         method: match solved.steel_method() {

@@ -8,12 +8,12 @@ use super::feedback::FeedbackOptions;
 use super::text::summary;
 use super::{LambdaOptions, run};
 use crate::cli::args::{SamplingFlags, SurfaceFlags, Tolerance, Writing};
-use crate::cli::budget::{allow, asked, costs};
+use crate::cli::budget::{allow, cost_origin, costs};
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
 use crate::cli::pictures::Picture;
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
@@ -165,7 +165,7 @@ impl Lambda {
         }
         allow(
             costs(design, &shapes, self.tolerance.tolerance),
-            asked(&shapes),
+            cost_origin(&shapes),
             printer,
         )?;
         let bar = begin(printer);
@@ -181,7 +181,7 @@ impl Lambda {
                 (Some(plot), Some(picture)) => {
                     plot.write(&report.file.inputs, &picture.svg(), printer)?
                 }
-                _ => Place::Output,
+                _ => Stream::Output,
             };
             let json = printer.with_warnings(&report);
             printer.summary(place, &json, || summary(design, &points, &report))?;

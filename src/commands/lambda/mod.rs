@@ -31,11 +31,12 @@ use crate::plot::lambda::LambdaPlot;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::cached_field::ShapeField;
+use crate::scene::core_material::Material;
 use crate::scene::passive;
 use crate::scene::single::above_knee;
 use crate::scene::sources::Sampling;
 use crate::scene::steel;
-use crate::scene::steel::{Material, Solved, Steel};
+use crate::scene::steel::Solved;
 use crate::shape::document::ShapeDocument;
 
 /// Forces change over about the height above the coils: so many patches resolve them.
@@ -105,7 +106,7 @@ pub fn run(
     options: &LambdaOptions,
     progress: &dyn Progress,
 ) -> Result<(PointsReport, LambdaReport), RunError> {
-    let scene = Scene::new(design)?;
+    let scene = Scene::with_tolerance(design, options.tolerance)?;
     let points = discretize::run(document, inputs.clone(), progress)?;
     let of_grid = WantedPoints::of_grid(&points);
     let sampling = options
@@ -124,7 +125,7 @@ pub fn run(
         .feedback
         .map_or(lowest_m, |feedback| feedback.lowest_m(&scene, lowest_m));
     progress.begin("steel", 1);
-    let solved = steel::solve(&scene, options.tolerance, scene.force_tolerance(), lowest_m)?;
+    let solved = steel::solve(&scene, scene.tolerances.forces, lowest_m)?;
     progress.end();
     let none = ShapeField::default();
     let solve_with = |points: &WantedPoints, options: &LambdaOptions| {
@@ -343,7 +344,8 @@ impl PosedProblem<'_> {
             return Ok(Vec::new());
         };
         let mut warnings = core.warnings.clone();
-        if let (Some(chosen), Steel::Coupled(array)) = (&solution.chosen, &self.solved.steel)
+        let coupled = self.solved.steel().coupled();
+        if let (Some(chosen), Some(array)) = (&solution.chosen, coupled)
             && matches!(core.material, Material::Linear(_))
         {
             let peak_t = self.field.peak_t(array, &chosen.currents_a)?;

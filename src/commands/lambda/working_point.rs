@@ -26,13 +26,7 @@ impl PosedProblem<'_> {
         let (scene, points) = (self.scene, self.points);
         let currents_a = &chosen.currents_a;
         progress.begin("working point", 1);
-        let point = WorkingPoint::new(
-            scene,
-            self.solved,
-            currents_a,
-            self.options.tolerance,
-            points.lowest_m(),
-        )?;
+        let point = WorkingPoint::new(scene, self.solved, currents_a, points.lowest_m())?;
         let Some(point) = point else {
             progress.end();
             return Ok(None);

@@ -10,11 +10,11 @@ use super::vector_field::FEWEST_NODES;
 use super::{MapRequest, run};
 use crate::bundle::write::{MAP_FILES, MapFormats};
 use crate::cli::args::{Tolerance, Writing};
-use crate::cli::budget::{Asked, allow};
+use crate::cli::budget::{CostOrigin, allow};
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
 use crate::cli::start::folder;
@@ -175,11 +175,11 @@ impl Map {
         };
         let nodes = request.mag_manip.nodes.filter(|_| self.vfield.is_some());
         let vector_field = nodes.map(|nodes| cost::of_vector_field(design, nodes));
-        allow(vector_field, Asked::Flag, printer)?;
+        allow(vector_field, CostOrigin::Flag, printer)?;
         allow(
             std::iter::once(cost::of_map(design, request.components))
                 .chain(cost::of_steel(design, request.tolerance)),
-            Asked::Document,
+            CostOrigin::Document,
             printer,
         )?;
         let bar = begin(printer);
@@ -189,7 +189,7 @@ impl Map {
             printer.warning(warning);
         }
         let json = printer.with_warnings(&report);
-        printer.summary(Place::Output, &json, || summary(design, &report))?;
+        printer.summary(Stream::Output, &json, || summary(design, &report))?;
         accuracy_check(&report.accuracy_missed)?;
         if report
             .multipoles

@@ -8,7 +8,7 @@ use serde::Serialize;
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::mag_manip::{MultipoleSource, Multipoles, VectorField};
-use crate::commands::probe::Places;
+use crate::commands::probe::FieldAt;
 use crate::field::frame::CartesianField;
 use crate::map::multipole::{PARTS, magnitudes};
 use crate::map::multipole_fit::{Model, Samples};
@@ -161,7 +161,7 @@ pub(super) fn direct(
     points_m: Vec<[f64; 3]>,
     progress: &dyn Progress,
 ) -> Result<Samples, RunError> {
-    let places = Places::new(scene, solved, &points_m, 0.0)?;
+    let places = FieldAt::new(scene, solved, &points_m, 0.0)?;
     progress.begin("samples", points_m.len() as u64);
     let portions = (points_m.par_chunks(PORTION).enumerate())
         .map(|(portion, points)| {

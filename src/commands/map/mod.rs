@@ -31,19 +31,16 @@ use crate::map::tabulate::Grid;
 use crate::map::{Components, FieldMap, InterpolationError};
 use crate::progress::Progress;
 use crate::scene::Scene;
-use crate::scene::maps::{Felt, SceneMap};
+use crate::scene::maps::{MagnetMean, SceneMap};
 use crate::scene::steel::{self, Solved};
 use crate::scene::working_point::{WorkingPoint, relative_difference, superposition_ends};
-
-/// Default tolerance of a map, relative to the largest |grad B| at each height.
-pub const MAP_TOLERANCE: f64 = 1e-9;
 
 /// The options of `map`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MapRequest {
     /// The components of the map.
     pub components: Components,
-    /// Tolerance; `None` for [`MAP_TOLERANCE`].
+    /// Tolerance; `None` for the default.
     pub tolerance: Option<f64>,
     /// Currents of the working point, A, one a coil; `None` for the rated ones. Without a B-H
     /// curve there is no working point.
@@ -177,7 +174,7 @@ pub fn run(
     request: &MapRequest,
     progress: &dyn Progress,
 ) -> Result<MapReport, RunError> {
-    let scene = Scene::new(design)?;
+    let scene = Scene::with_tolerance(design, request.tolerance)?;
     let mag_manip = &request.mag_manip;
     let protected: Vec<PathBuf> = design
         .curve_file()
@@ -262,7 +259,7 @@ impl Made {
         let lowest_m = grid.z_m.first().copied().unwrap_or(0.0);
         let lowest_m = (nodes.as_ref()).map_or(lowest_m, |(_, [_, _, z])| lowest_m.min(z.from));
         progress.begin("steel", 1);
-        let solved = steel::solve(scene, request.tolerance, MAP_TOLERANCE, lowest_m)?;
+        let solved = steel::solve(scene, scene.tolerances.map, lowest_m)?;
         progress.end();
         let map = SceneMap::new(
             scene,
@@ -270,7 +267,7 @@ impl Made {
             &scene.coils,
             &grid,
             request.components,
-            &Felt::field(),
+            &MagnetMean::field(),
             progress,
         )?;
         let tabulated = (&grid, &map.map, lowest_m);
@@ -355,7 +352,7 @@ impl Together {
     ) -> Result<Option<Self>, RunError> {
         let currents_a = request.currents_a.as_deref().unwrap_or(&scene.upper_a);
         progress.begin("working point", 1);
-        let point = WorkingPoint::new(scene, solved, currents_a, request.tolerance, lowest_m)?;
+        let point = WorkingPoint::new(scene, solved, currents_a, lowest_m)?;
         let Some(point) = point else {
             progress.end();
             return Ok(None);

@@ -9,7 +9,7 @@ use crate::map::multipole_fit::{ALONE, COUPLED, Kind, Model, Samples, sources, t
 use crate::numerics::axis::Axis;
 use crate::progress::Progress;
 use crate::scene::Scene;
-use crate::scene::steel::{Solved, Steel};
+use crate::scene::steel::Solved;
 
 /// Default tolerance of the multipoles: of field and gradient, relative to the largest at each
 /// height.
@@ -64,7 +64,7 @@ pub(super) fn make(
     }
 
     let axes_m: Vec<[f64; 2]> = scene.coils.iter().map(|c| c.axis_m).collect();
-    let coupled = matches!(solved.steel, Steel::Coupled(_));
+    let coupled = solved.steel().coupled().is_some();
     // Coils with common sources: all of them, or each for itself.
     let every: Vec<usize> = (0..axes_m.len()).collect();
     let groups: Vec<&[usize]> = if coupled {

@@ -12,7 +12,7 @@ use crate::map::tabulate::Grid;
 use crate::numerics::axis::Axis;
 use crate::progress::Progress;
 use crate::scene::Scene;
-use crate::scene::maps::{Felt, SceneMap};
+use crate::scene::maps::{MagnetMean, SceneMap};
 use crate::scene::steel::Solved;
 
 /// Fewest nodes along each axis.
@@ -81,7 +81,7 @@ pub(super) fn make(
         y_m: y.nodes(),
         z_m: z.nodes(),
     };
-    let felt = Felt::field();
+    let felt = MagnetMean::field();
     let all = Components::All;
     let made = SceneMap::new(scene, solved, &scene.coils, &grid, all, &felt, progress)?;
     let field_t_per_a = made.map.field_t_per_a.unwrap_or_default();

@@ -19,7 +19,7 @@ use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::pictures::Picture;
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
 
@@ -164,11 +164,11 @@ impl Replay {
         let place = match (&files, &overwrite) {
             (Some(files), Some(overwrite)) => {
                 report.write(files, overwrite)?;
-                Place::Output
+                Stream::Output
             }
             (None, _) | (_, None) => {
                 printer.data(|out| report.rows.write(out))?;
-                Place::Error
+                Stream::Error
             }
         };
         report.summary.warnings = printer.warnings();

@@ -10,7 +10,6 @@ use crate::field::winding::KERNEL_ERROR;
 use crate::lambda::{self, ForceProblem, Settings};
 use crate::progress::Progress;
 use crate::scene::evaluation_sample::spread;
-use crate::scene::steel::{self, Steel};
 
 /// Largest difference of a force constant that is solved for again, relative.
 const LAMBDA_AGREES: f64 = 1e-8;
@@ -34,14 +33,12 @@ pub(super) fn checks(
         .collect();
     let lowest_m = bundle.map.z_m.first().copied().unwrap_or(0.0);
     // Forces that differ by their stated error move force constants and errors by a few times it.
-    let slack = match route.solved.steel {
-        Steel::None => 0.0,
-        Steel::Alone(_) | Steel::Coupled(_) => FORCES_MOVE * bounds.forces,
+    let slack = if route.solved.has_steel() {
+        FORCES_MOVE * bounds.forces
+    } else {
+        0.0
     };
-    let solved = match &route.solved.steel {
-        Steel::None => steel::solve(scene, None, scene.force_tolerance(), lowest_m)?,
-        Steel::Alone(_) | Steel::Coupled(_) => route.solved.clone(),
-    };
+    let solved = route.solved.for_forces(scene, lowest_m)?;
     let forces = scene.forces_n_per_a(&solved, &positions, progress)?;
     let mut checks = vec![sampled_forces(route, bounds, &positions, &forces)?];
 

@@ -38,7 +38,7 @@ use crate::scene::Scene;
 use crate::scene::cost::{self, Cost};
 use crate::scene::passive::PASSIVE_TOLERANCE;
 use crate::scene::sources::DesignSource;
-use crate::scene::steel::COUPLED_TOLERANCE;
+use crate::scene::tolerances::Tolerances;
 use crate::shape::document::ShapeDocument;
 
 /// Errors that a bundle claims are believed up to this where they cannot be computed again.
@@ -159,7 +159,7 @@ impl Verifier {
         let made_with = bundle.manifest.made_with.as_ref();
         let tolerance = made_with.and_then(|made| made.tolerance);
         // Solved again as the bundle was made, and to judge that a finer time.
-        let finer = tolerance.unwrap_or(COUPLED_TOLERANCE).min(CLAIMED_MAX) * FINER;
+        let finer = Tolerances::of_inductances(tolerance).min(CLAIMED_MAX) * FINER;
         let steel = cost::of_steel(design, Some(finer));
         let pull = cost::of_pull(design, FINER * PASSIVE_TOLERANCE);
         for cost in steel.iter().chain(&pull) {

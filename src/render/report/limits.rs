@@ -139,7 +139,8 @@ fn unmet(limits: &Checks) -> Option<String> {
 }
 
 /// A limit's name in words, and its unit.
-pub(super) fn words(name: &str) -> (String, &'static str) {
+#[must_use]
+pub fn words(name: &str) -> (String, &'static str) {
     let units = [
         ("_ohm", "\u{3a9}"),
         ("_kg", "kg"),
@@ -159,7 +160,8 @@ pub(super) fn words(name: &str) -> (String, &'static str) {
 }
 
 /// A value in its unit.
-pub(super) fn in_unit(value: f64, unit: &str) -> String {
+#[must_use]
+pub fn in_unit(value: f64, unit: &str) -> String {
     match unit {
         "" => figures(value, 6),
         "N" => force(value),
