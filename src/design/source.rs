@@ -61,7 +61,9 @@ fn not_a_table(error: &NamedFileError) -> Fault {
         NamedFileError::NoLength => {
             expected().help("begin with the line b_t,h_a_per_m, then one row a point")
         }
-        NamedFileError::OtherLength => expected().help("name a file on a disk"),
+        NamedFileError::Zeros | NamedFileError::OtherLength => {
+            expected().help("name a file on a disk")
+        }
         NamedFileError::TooLarge(_) => Fault::error("", error.to_string()).help(TABLE.too_large),
     }
 }

@@ -66,7 +66,9 @@ impl Tessellation {
     fn method(self) -> &'static str {
         match self {
             Self::None => "exact: the surface is a formula",
-            Self::Known => "known: the chord to which the file's body was cut into facets",
+            Self::Known => {
+                "measured: the farthest that a facet lies from the exact face it stands for"
+            }
             Self::Display => {
                 "an estimate: the rule by which display facets are made, from their box"
             }

@@ -6,7 +6,9 @@ use crate::document::SurfaceFormat;
 use crate::error::ShapeError;
 use crate::mesh::FileMesh;
 use crate::read_error::ReadError;
+use crate::step::{self, BodyOptions};
 use crate::{amf, obj, ply, sldprt, stl, three_dxml, three_mf};
+use fluxform_base::progress::Silent;
 
 impl SurfaceFormat {
     /// The triangles of a file's bytes, in the file's unit; `path` names it in messages.
@@ -27,10 +29,7 @@ impl SurfaceFormat {
             Self::Amf => amf::read,
             Self::ThreeDxml => three_dxml::read,
             Self::Sldprt => sldprt::read,
-            #[cfg(feature = "step")]
-            Self::Step => crate::step::read,
-            #[cfg(not(feature = "step"))]
-            Self::Step => step,
+            Self::Step => |bytes| step::read(bytes, &BodyOptions::default(), &Silent),
         };
         let mesh = if bytes.is_empty() {
             Err(ReadError::file(
@@ -44,12 +43,4 @@ impl SurfaceFormat {
             source,
         })
     }
-}
-
-#[cfg(not(feature = "step"))]
-fn step(_: &[u8]) -> Result<FileMesh, ReadError> {
-    Err(ReadError::file(
-        "STEP files are not read by this version: open it in the CAD program and save the body \
-         as 3MF or STL (binary, fine resolution)",
-    ))
 }

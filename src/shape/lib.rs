@@ -38,6 +38,7 @@ pub mod document;
 pub mod error;
 pub mod format;
 pub mod height;
+pub mod hidden;
 pub mod holes;
 pub mod inspect;
 pub mod mesh;
@@ -50,7 +51,6 @@ pub mod primitive;
 pub mod read_error;
 pub mod scattered;
 pub mod sldprt;
-#[cfg(feature = "step")]
 pub mod step;
 pub mod stl;
 pub mod surface;

@@ -2,6 +2,7 @@
 
 use crate::error::ShapeError;
 use crate::placement::Transform;
+use crate::step::NamedBody;
 
 /// Three vertices, x, y, z each.
 pub type Triangle = [[f64; 3]; 3];
@@ -25,6 +26,10 @@ pub struct FileMesh {
     pub deviation_is_known: bool,
     /// What a careful reader would mention.
     pub warnings: Vec<String>,
+    /// The bodies that the file names, in its order; empty where the format names none.
+    pub bodies: Vec<NamedBody>,
+    /// Another program that made the triangles of the file, with its version.
+    pub read_by: Option<String>,
 }
 
 /// Axis-aligned box, m.
@@ -37,6 +42,22 @@ pub struct Bounds {
 }
 
 impl Bounds {
+    /// The box around points; from infinity to minus infinity without any.
+    #[must_use]
+    pub fn of(points: impl Iterator<Item = [f64; 3]>) -> Self {
+        let none = Self {
+            min_m: [f64::INFINITY; 3],
+            max_m: [f64::NEG_INFINITY; 3],
+        };
+        points.fold(none, |mut bounds, point| {
+            for k in 0..3 {
+                bounds.min_m[k] = bounds.min_m[k].min(point[k]);
+                bounds.max_m[k] = bounds.max_m[k].max(point[k]);
+            }
+            bounds
+        })
+    }
+
     /// Range of x and of y.
     #[must_use]
     pub fn plan(&self) -> [[f64; 2]; 2] {

@@ -11,9 +11,10 @@ use crate::height::{self, Grid, Sample};
 use crate::mesh::{Bounds, FileMesh, Mesh, MeshFacts};
 use crate::placement::Transform;
 use crate::primitive::PlacedPrimitive;
+use crate::step::{self, BodyOptions};
 use crate::stl::{self, StlError};
 use fluxform_base::progress::Progress;
-use fluxform_design::named_file::{self, NamedFileError};
+use fluxform_design::named_file::{self, NamedFileError, ZeroGuard};
 
 /// Larger files fit no computer's memory together with what is made of them, bytes (8 GiB).
 const LARGEST_FILE: u64 = 8 << 30;
@@ -32,7 +33,10 @@ impl Surface {
     ///
     /// # Errors
     /// [`ShapeError`] with the path and the place.
-    pub fn open(document: &ShapeDocument) -> Result<(Self, Vec<String>), ShapeError> {
+    pub fn open(
+        document: &ShapeDocument,
+        progress: &dyn Progress,
+    ) -> Result<(Self, Vec<String>), ShapeError> {
         check_placement(&document.placement)?;
         let (path, unit_m) = match &document.source {
             SurfaceSource::Primitive(primitive) => {
@@ -41,9 +45,12 @@ impl Surface {
             }
             SurfaceSource::File { path, unit_m } => (path, unit_m),
         };
-        let (mut file, unit_m) = read(path, *unit_m)?;
+        let (mut file, unit_m) = read(path, *unit_m, &document.bodies, progress)?;
         let mut warnings = std::mem::take(&mut file.warnings);
-        let transform = Transform::new(unit_m, &document.placement).scaled(document.scale);
+        let (transform, overhang) = Transform::new(unit_m, &document.placement)
+            .scaled(document.scale)
+            .seated(&document.placement, &file.triangles);
+        warnings.extend(overhang);
         let mesh = Mesh::place(file, &transform)?;
         let MeshFacts {
             triangles,
@@ -109,7 +116,12 @@ impl Surface {
 ///
 /// # Errors
 /// [`ShapeError`]: no or another unit, a file that cannot be read.
-pub fn read(path: &Path, stated_m: Option<f64>) -> Result<(FileMesh, f64), ShapeError> {
+pub fn read(
+    path: &Path,
+    stated_m: Option<f64>,
+    bodies: &BodyOptions,
+    progress: &dyn Progress,
+) -> Result<(FileMesh, f64), ShapeError> {
     let format = SurfaceFormat::of(path).ok_or_else(|| ShapeError::Format { path: path.into() })?;
     if stated_m.is_none() && !format.carries_unit() {
         return Err(ShapeError::UnitMissing {
@@ -124,7 +136,7 @@ pub fn read(path: &Path, stated_m: Option<f64>) -> Result<(FileMesh, f64), Shape
             "the unit is {unit_m} m; it must be positive"
         )));
     }
-    let file = read_mesh(format, path)?;
+    let file = read_mesh(format, path, bodies, progress)?;
     match (file.unit_m, stated_m) {
         (Some(own), Some(stated)) if own != stated => Err(ShapeError::UnitDiffers {
             path: path.into(),
@@ -140,7 +152,25 @@ pub fn read(path: &Path, stated_m: Option<f64>) -> Result<(FileMesh, f64), Shape
 }
 
 /// The triangles of the file at `path`; of a binary STL the bytes are not held beside them.
-pub(super) fn read_mesh(format: SurfaceFormat, path: &Path) -> Result<FileMesh, ShapeError> {
+pub(super) fn read_mesh(
+    format: SurfaceFormat,
+    path: &Path,
+    bodies: &BodyOptions,
+    progress: &dyn Progress,
+) -> Result<FileMesh, ShapeError> {
+    if format == SurfaceFormat::Step {
+        let read = step::read(&read_file(path)?, bodies, progress);
+        return read.map_err(|source| ShapeError::Content {
+            path: path.into(),
+            source,
+        });
+    }
+    if !bodies.is_default() {
+        return Err(ShapeError::Document(format!(
+            "{}: a chord and a body can be chosen of STEP files alone",
+            path.display()
+        )));
+    }
     if format == SurfaceFormat::Stl
         && let Some(result) = streamed(path)
     {
@@ -156,13 +186,23 @@ pub(super) fn read_mesh(format: SurfaceFormat, path: &Path) -> Result<FileMesh, 
 /// otherwise tells why.
 fn streamed(path: &Path) -> Option<Result<FileMesh, StlError>> {
     let (file, length) = named_file::open(path, LARGEST_FILE).ok()?;
-    stl::stream(file, length).ok()?
+    stl::stream(ZeroGuard::new(file), length).ok()?
 }
 
 fn check_placement(placement: &Placement) -> Result<(), ShapeError> {
+    let seat = &placement.seat;
+    let fit = seat.fit.map_or([[0.0, 1.0]; 3], |fit| fit.box_m);
+    if fit.iter().any(|[from, to]| from >= to) {
+        return Err(ShapeError::Document(
+            "the box to fit must have its smaller ends first".into(),
+        ));
+    }
+    let rest_on_m = [seat.rest_on_m.unwrap_or(0.0)];
     let keys = [
-        ("translate_mm", placement.translate_m),
-        ("rotate_deg", placement.rotate_deg),
+        ("translate_mm", &placement.translate_m[..]),
+        ("rotate_deg", &placement.rotate_deg),
+        ("rest_on_mm", &rest_on_m),
+        ("fit_mm", fit.as_flattened()),
     ];
     for (key, values) in keys {
         if values.iter().any(|v| !v.is_finite()) {
@@ -195,6 +235,7 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
         NamedFileError::NoLength => {
             "the file is empty (0 bytes): the export or the download failed".into()
         }
+        NamedFileError::Zeros => error.to_string(),
         NamedFileError::OtherLength => format!("expected a surface, {error}"),
     };
     named_file::read(path, LARGEST_FILE).map_err(|error| ShapeError::Unreadable {

@@ -55,7 +55,7 @@ fn real_files_have_the_indexs_facts() {
         if entry["format"] == "step" {
             continue;
         }
-        let result = MeshReport::of_file(&folder.join(name));
+        let result = MeshReport::of_file(&folder.join(name), &BodyOptions::default(), &Silent);
         if let Some((_, said)) = REFUSED.iter().find(|(file, _)| *file == name) {
             let message = result.unwrap_err().to_string();
             assert!(message.contains(said), "{message}");
@@ -102,7 +102,7 @@ fn real_files_have_the_indexs_facts() {
 }
 
 fn report(name: &str) -> Option<MeshReport> {
-    Some(MeshReport::of_file(&corpus()?.join(name)).unwrap())
+    Some(MeshReport::of_file(&corpus()?.join(name), &BodyOptions::default(), &Silent).unwrap())
 }
 
 #[test]

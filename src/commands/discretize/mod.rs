@@ -19,6 +19,7 @@ use crate::progress::Progress;
 use crate::scene::cached_field::ShapeField;
 use crate::shape::certificate::{Certificate, Certify, stated_tessellation};
 use crate::shape::document::{ShapeDocument, SurfaceSource};
+use crate::shape::hidden::Hidden;
 use crate::shape::holes::Holes;
 use crate::shape::point_flags::Marks;
 use crate::shape::surface::read_file;
@@ -86,6 +87,9 @@ pub struct PointsSummary {
     /// Triangles without area, left out; absent for a primitive.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub degenerate_triangles: Option<usize>,
+    /// How much of the surface a height map cannot show; absent for a primitive.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hidden: Option<Hidden>,
     /// How far the interpolated points may lie from the surface.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub deviation: Option<DeviationSummary>,
@@ -335,6 +339,7 @@ fn discretized_as(
         bounds_max_m: discretized.bounds.max_m,
         triangles: discretized.mesh.as_ref().map(|mesh| mesh.triangles),
         degenerate_triangles: discretized.mesh.as_ref().map(|mesh| mesh.degenerate),
+        hidden: discretized.hidden,
         deviation,
         accuracy,
         warnings,
@@ -420,6 +425,7 @@ impl PointsReport {
             heights: &heights,
             marks: &marks,
             cells: self.discretized.cells_m.as_deref().unwrap_or(&[]),
+            over: None,
         })
     }
 

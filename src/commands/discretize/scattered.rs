@@ -107,7 +107,7 @@ pub fn run(
     let made_with = sampling.made_with(document, inputs.first());
     let inputs = with_surface(document, inputs);
     let failed = |source: ShapeError| shape_error(document, source);
-    let (surface, warnings) = Surface::open(document).map_err(failed)?;
+    let (surface, warnings) = Surface::open(document, progress).map_err(failed)?;
     let grid = requested_grid(document, &surface.extent()).map_err(failed)?;
     let probe = Probe::new(&surface, &grid);
     let stage = |estimate: f64, method: &str| StageAccuracy {

@@ -3,7 +3,10 @@
 use std::path::Path;
 
 use super::format::{SurfaceFormat, parse_unit, unit_names};
-use super::{AxisRequest, GridRequest, Placement, Primitive, ShapeDocument, SurfaceSource};
+use super::{
+    AxisRequest, Fit, GridRequest, Placement, Primitive, Seat, ShapeDocument, SurfaceSource, Up,
+};
+use crate::step::BodyOptions;
 use fluxform_base::units::m_from_mm;
 use fluxform_design::diagnostics::{Faults, InvalidDocument};
 use fluxform_design::message_text::{nearest, quoted};
@@ -75,15 +78,72 @@ fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
         rotate_deg: root
             .tuple("rotate_deg", &Rule::any("degrees"))
             .map_or([0.0; 3], |r| r.value),
+        seat: seat(root),
     };
+    let bodies = bodies(root);
     let grid = points(root.section("points"));
     Some(ShapeDocument {
         name: name?,
         source: source?,
+        bodies,
         scale: scale?,
         placement,
         grid: grid?,
     })
+}
+
+/// Where the surface goes by its own box.
+fn seat(root: &mut Section<'_>) -> Seat {
+    const KEYS: [&str; 5] = ["up", "center", "rest_on_mm", "fit_mm", "scale_to_fit"];
+    if root.has("primitive") {
+        for key in KEYS {
+            if root.has(key) {
+                let message = "a primitive lies where its base is";
+                root.fault(key, message, "use base_mm, height_mm or translate_mm");
+            }
+        }
+        root.ignore(&KEYS);
+        return Seat::default();
+    }
+    let up = root.choice("up", &Up::NAMES).unwrap_or_default();
+    let center = root.flag_or("center", false);
+    let rest_on = root.number("rest_on_mm", &BODY_MM);
+    let ends = root.tuple::<6>("fit_mm", &BODY_MM);
+    let scale = root.flag_or("scale_to_fit", false);
+    if scale && !root.has("fit_mm") {
+        let message = "there is no box to scale to";
+        root.fault("scale_to_fit", message, "add fit_mm, the ends of a box");
+    }
+    if center && root.has("fit_mm") {
+        let message = "fit_mm puts the surface into the middle of its box";
+        root.fault("center", message, "leave one of the two out");
+    }
+    let fit = ends.map(|ends| {
+        let [a, b, c, d, e, f] = ends.value.map(m_from_mm);
+        Fit {
+            box_m: [[a, b], [c, d], [e, f]],
+            scale,
+        }
+    });
+    if fit.is_some_and(|fit| fit.box_m.iter().any(|[from, to]| from >= to)) {
+        let message = "a side of the box ends before it begins";
+        root.fault("fit_mm", message, "write x, y and z, each FROM, TO, in mm");
+    }
+    Seat {
+        up,
+        center,
+        rest_on_m: rest_on.map(|length| m_from_mm(length.value)),
+        fit,
+    }
+}
+
+/// How bodies of STEP files are cut into facets, and which.
+fn bodies(root: &mut Section<'_>) -> BodyOptions {
+    let chord = root.number("chord_mm", &BODY_MM.positive());
+    BodyOptions {
+        chord_m: chord.map(|chord| m_from_mm(chord.value)),
+        body: root.text("body").map(|body| body.value),
+    }
 }
 
 /// Factors of size; `None` where they are at fault.

@@ -65,6 +65,7 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
         deviation,
         deviation_is_known: false,
         warnings,
+        ..FileMesh::default()
     })
 }
 
