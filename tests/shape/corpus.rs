@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use fluxform_base::progress::Silent;
 use fluxform_shape::MeshReport;
+use fluxform_shape::step::BodyOptions;
 
 use crate::support::corpus;
 

@@ -11,7 +11,5 @@ mod inspect;
 mod marks;
 mod points;
 mod samples;
-#[cfg(feature = "step")]
-mod step;
 mod stl;
 mod support;
