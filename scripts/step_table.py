@@ -23,11 +23,13 @@ import tempfile
 import time
 
 from OCP.BRep import BRep_Builder
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
+from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 from OCP.gp import gp_Dir, gp_Lin, gp_Pnt
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.IntCurvesFace import IntCurvesFace_ShapeIntersector
 from OCP.STEPControl import STEPControl_Reader
-from OCP.TopAbs import TopAbs_SOLID
+from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS_Compound
 
@@ -52,7 +54,7 @@ def exporter(data):
 
 
 class Exact:
-    """The solids of a file, and the heights of their faces over points; mm."""
+    """The solids of a file: heights of their faces over points, distances from them; mm."""
 
     def __init__(self, path):
         reader = STEPControl_Reader()
@@ -65,6 +67,10 @@ class Exact:
         while solids.More():
             builder.Add(bodies, solids.Current())
             solids.Next()
+        self.faces, faces = [], TopExp_Explorer(bodies, TopAbs_FACE)
+        while faces.More():
+            self.faces.append(faces.Current())
+            faces.Next()
         self.lines = IntCurvesFace_ShapeIntersector()
         self.lines.Load(bodies, 1e-7)
 
@@ -73,6 +79,11 @@ class Exact:
         self.lines.Perform(gp_Lin(gp_Pnt(x, y, 0.0), gp_Dir(0.0, 0.0, 1.0)), -1e6, 1e6)
         heights = [self.lines.Pnt(k).Z() for k in range(1, self.lines.NbPnt() + 1)]
         return max(heights, default=None)
+
+    def distance(self, x, y, z):
+        """Of a point from the faces."""
+        point = BRepBuilderAPI_MakeVertex(gp_Pnt(x, y, z)).Vertex()
+        return min(BRepExtrema_DistShapeShape(point, face).Value() for face in self.faces)
 
 
 def run(program, path, points, folder):
@@ -97,17 +108,21 @@ def worst(exact, rows, figures):
     stated = 1e3 * figures["accuracy"].get("tessellation", {}).get("estimate", 0.0)
     most = 0.0
     for x, y, lifted in rows:
-        height, met, off = lifted - 1e6, [], float("inf")
+        height, met, off, outline = lifted - 1e6, [], float("inf"), False
         for radius in (0.0, 0.05, 0.2, 0.5, 1.0, 1.5, 2.0):
             # The nearest are enough nearly everywhere but at edges.
             for k in range(8 if radius else 1):
                 angle, reach = k * math.pi / 4.0, radius * stated + (1e-4 if radius else 0.0)
                 at = exact.height(x + reach * math.cos(angle), y + reach * math.sin(angle))
                 met += [] if at is None else [at]
+                outline = outline or at is None
             if met:
                 off = max(0.0, min(met) - height, height - max(met))
             if off <= stated + 1e-3:
                 break
+        if off > stated and met and outline and height < max(met):
+            # Over the outline a line meets some place of a wall: it must be one of the wall's.
+            off = min(off, exact.distance(x, y, height))
         most = max(most, off)
     return most, stated
 

@@ -103,3 +103,64 @@ fn of_mesh(surface: &Surface, mesh: &Mesh) -> Hidden {
         of_upward: share(sums[3], sums[2]),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::document::Placement;
+    use crate::mesh::{FileMesh, Triangle};
+    use crate::placement::Transform;
+
+    /// A body of revolution: its outline's radii and heights, mm, counterclockwise about its inside.
+    fn turned(outline: &[[f64; 2]]) -> Surface {
+        const SECTORS: usize = 48;
+        let at = |[r, z]: [f64; 2], k: usize| {
+            let (sin, cos) =
+                (std::f64::consts::TAU * (k % SECTORS) as f64 / SECTORS as f64).sin_cos();
+            [r * cos, r * sin, z]
+        };
+        let mut triangles: Vec<Triangle> = Vec::new();
+        for (i, a) in outline.iter().enumerate() {
+            let b = outline[(i + 1) % outline.len()];
+            for k in 0..SECTORS {
+                let [p, q, r, s] = [at(*a, k), at(*a, k + 1), at(b, k + 1), at(b, k)];
+                triangles.extend([[p, q, r], [p, r, s]]);
+            }
+        }
+        let file = FileMesh {
+            triangles,
+            ..FileMesh::default()
+        };
+        let placed = Transform::new(1e-3, &Placement::default());
+        Surface::Mesh(Mesh::place(file, &placed).unwrap())
+    }
+
+    #[test]
+    fn what_lies_under_other_parts_is_hidden() {
+        // A washer countersunk from both ends: nothing that faces up is covered.
+        let washer = turned(&[
+            [6.5, 0.0],
+            [6.5, 5.3],
+            [4.1, 5.3],
+            [3.35, 4.55],
+            [3.35, 0.75],
+            [4.1, 0.0],
+        ]);
+        let found = Hidden::of(&washer).unwrap();
+        assert!(found.of_upward < 1e-3, "{found:?}");
+        // A mushroom: of the foot's upper side, from 2 to 5, all lies under the cap of radius 6.
+        let mushroom = turned(&[
+            [5.0, 0.0],
+            [5.0, 1.0],
+            [2.0, 1.0],
+            [2.0, 4.0],
+            [6.0, 4.0],
+            [6.0, 5.0],
+            [0.1, 5.0],
+            [0.1, 0.0],
+        ]);
+        let found = Hidden::of(&mushroom).unwrap();
+        let share = (25.0 - 4.0) / (25.0 - 4.0 + 36.0 - 0.01);
+        assert!((found.of_upward - share).abs() < 0.01, "{found:?} {share}");
+    }
+}

@@ -88,6 +88,7 @@ pub struct MeshFacts {
 pub struct Mesh {
     triangles: Vec<Triangle>,
     facts: MeshFacts,
+    read_by: Option<String>,
 }
 
 impl Mesh {
@@ -139,13 +140,23 @@ impl Mesh {
             deviation_m: transform.length_m(file.deviation),
             deviation_is_known: file.deviation_is_known,
         };
-        Ok(Self { triangles, facts })
+        Ok(Self {
+            triangles,
+            facts,
+            read_by: file.read_by,
+        })
     }
 
     /// The placed triangles that have an area, m.
     #[must_use]
     pub fn triangles(&self) -> &[Triangle] {
         &self.triangles
+    }
+
+    /// Another program that made the triangles of the file, with its version.
+    #[must_use]
+    pub fn read_by(&self) -> Option<&str> {
+        self.read_by.as_deref()
     }
 
     /// What the file holds.

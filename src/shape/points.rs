@@ -122,6 +122,8 @@ pub struct Discretized {
     pub bounds: Bounds,
     /// What the mesh file holds; `None` for a primitive.
     pub mesh: Option<MeshFacts>,
+    /// Another program that made the mesh file's triangles, with its version.
+    pub read_by: Option<String>,
     /// The stage's error, absolute, m.
     pub accuracy: StageAccuracy,
     /// How far the interpolated points may lie from the surface, where it was asked for.
@@ -255,6 +257,10 @@ pub fn discretize_with(
     } else {
         None
     };
+    let read_by = match &surface {
+        Surface::Mesh(mesh) => mesh.read_by().map(str::to_owned),
+        Surface::Primitive(_) => None,
+    };
     let (mesh, method) = match &surface {
         Surface::Mesh(mesh) => (
             Some(*mesh.facts()),
@@ -272,6 +278,7 @@ pub fn discretize_with(
         points,
         bounds,
         mesh,
+        read_by,
         accuracy,
         certificate,
         cells_m,

@@ -162,7 +162,7 @@ fn what_is_no_step_file_is_refused_before_python_is_asked() {
 #[cfg(unix)]
 fn a_reader_that_answers_nonsense_is_refused() {
     use std::os::unix::fs::PermissionsExt;
-    let part = r#"{"points":9,"triangles":3,"slivers":0,"deviation":0.1,"area":1,"volume":1}"#;
+    let part = r#"{"points":9,"triangles":3,"deviation":0.1,"area":1,"volume":1}"#;
     let body =
         r#"{"part":0,"place":[[1,0,0,0],[0,1,0,0],[0,0,1,0]],"name":"","within":[],"color":null}"#;
     let result = |part: &str, body: &str| {
@@ -228,30 +228,17 @@ fn a_chord_and_a_body_are_for_step_alone() {
 }
 
 fn a_box_is_a_box_in_its_own_unit() {
-    let inch = |text: String| {
-        text.replace(
-            "(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))",
-            "(CONVERSION_BASED_UNIT('INCH',#901)LENGTH_UNIT()NAMED_UNIT(#903))",
-        )
-        .replace(
-            "DATA;\n",
-            "DATA;\n#901=LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(25.4),#902);\n\
-             #902=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n\
-             #903=DIMENSIONAL_EXPONENTS(1.,0.,0.,0.,0.,0.,0.);\n",
-        )
-    };
-    for (folder, unit_m) in [(boxed(&|text| text), 1e-3), (boxed(&inch), 0.0254)] {
-        let report = inspected("part.step", &[], folder.path());
+    let folder = parts();
+    for (name, unit_mm) in [("box.step", 1.0), ("inch.step", 25.4)] {
+        let report = inspected(name, &[], folder.path());
         let surface = &report["surface"];
-        assert_eq!(surface["unit_m"].as_f64(), Some(unit_m));
+        assert_eq!(surface["unit_m"].as_f64(), Some(unit_mm / 1e3), "{name}");
         assert_eq!(surface["watertight"], true);
         assert_eq!(surface["triangles"], 12);
-        near(&numbers(&surface["bounds_max"]), &[0.7, 1.3, 2.9], 1e-12);
-        near(
-            &[surface["volume"].as_f64().unwrap()],
-            &[0.7 * 1.3 * 2.9],
-            1e-9,
-        );
+        let sides = [0.7, 1.3, 2.9].map(|side| side / unit_mm);
+        near(&numbers(&surface["bounds_max"]), &sides, 1e-9);
+        let volume = surface["volume"].as_f64().unwrap();
+        near(&[volume], &[sides.iter().product()], 1e-9);
         assert!(
             surface["read_by"]
                 .as_str()
@@ -388,17 +375,28 @@ fn angles_in_degrees_are_read() {
 
 /// A placement at the root was read past without a word.
 fn a_root_placement_is_applied() {
-    let folder = boxed(&|text| {
-        let start = text.find("ADVANCED_BREP_SHAPE_REPRESENTATION(").unwrap();
-        let items = start + text[start..].find(",(").unwrap() + 2;
-        format!("{}#911,{}", &text[..items], &text[items..]).replace(
-            "DATA;\n",
-            "DATA;\n#911=AXIS2_PLACEMENT3D('',#912,#913,#914);\n\
-             #912=CARTESIAN_POINT('',(1.5,2.5,3.5));\n#913=DIRECTION('',(0.,0.,1.));\n\
-             #914=DIRECTION('',(0.,1.,0.));\n",
-        )
-    });
-    let report = inspected("part.step", &[], folder.path());
+    let folder = parts();
+    let path = folder.path().join("box.step");
+    let text = std::fs::read_to_string(&path).unwrap();
+    // The first placement is that of the representation's own frame.
+    let of = |id: &str| {
+        let start = text.find(&format!("\n{id} = ")).unwrap() + 1;
+        start..start + text[start..].find(';').unwrap()
+    };
+    let items = text.find("ADVANCED_BREP_SHAPE_REPRESENTATION(").unwrap();
+    let first = text[items..].split_once("(#").unwrap().1;
+    let frame = format!("#{}", first.split(',').next().unwrap());
+    let frame = of(&frame);
+    let head = text[frame.clone()].split(" = ").next().unwrap();
+    let moved = format!(
+        "{}{head} = AXIS2_PLACEMENT3D('',#99912,#99913,#99914);\n\
+         #99912 = CARTESIAN_POINT('',(1.5,2.5,3.5));\n\
+         #99913 = DIRECTION('',(0.,0.,1.));\n#99914 = DIRECTION('',(0.,1.,0.)){}",
+        &text[..frame.start],
+        &text[frame.end..]
+    );
+    std::fs::write(&path, moved).unwrap();
+    let report = inspected("box.step", &[], folder.path());
     // Turned by a right angle about z, then moved.
     near(
         &numbers(&report["surface"]["bounds_min"]),

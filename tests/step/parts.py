@@ -12,6 +12,7 @@ from OCP.BRepPrimAPI import (
     BRepPrimAPI_MakeSphere,
     BRepPrimAPI_MakeTorus,
 )
+from OCP.Interface import Interface_Static
 from OCP.Quantity import Quantity_Color, Quantity_TOC_RGB
 from OCP.STEPCAFControl import STEPCAFControl_Writer
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
@@ -86,6 +87,14 @@ def assembly():
     writer.Write(f"{FOLDER}/assembly.step")
 
 
+def box(name, unit):
+    """0.7 x 1.3 x 2.9 mm, in a unit of the file's own."""
+    static(Interface_Static, "SetCVal")("write.step.unit", unit)
+    write(BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), gp_Pnt(0.7, 1.3, 2.9)).Shape(), name)
+
+
+box("inch", "INCH")
+box("box", "MM")
 write(nut(), "nut")
 write(dome(), "dome")
 assembly()

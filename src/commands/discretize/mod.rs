@@ -320,6 +320,9 @@ fn discretized_as(
             ));
         }
     }
+    if let (Some(reader), Some(stage)) = (&discretized.read_by, accuracy.get_mut("tessellation")) {
+        stage.method = format!("{}; read by {reader}", stage.method).into();
+    }
     let summary = PointsSummary {
         schema_version: SCHEMA_VERSION,
         fluxform_version: FLUXFORM_VERSION,

@@ -11,8 +11,10 @@ use crate::mesh::{Triangle, cross, dot, minus};
 pub(super) const WELD: f64 = 1e-7;
 /// What the exact volume and area may be wrong by: OpenCASCADE integrates numerically.
 const INTEGRATED: f64 = 2e-3;
-/// Facets of a curve turn by half a radian at most: so much less area than the curve's, or volume.
-const TURNED: f64 = 0.03;
+/// Bodies not much larger than the chord may lose so much of their volume and area.
+const MOST_APART: f64 = 0.15;
+/// Reaches, against the deviation, that are tried to close narrow gaps.
+const GAPS: [f64; 4] = [1e-3, 1e-2, 0.1, 1.0];
 
 /// One body's mesh and exact figures, mm.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -25,8 +27,6 @@ pub(super) struct Part {
     pub(super) area: f64,
     /// Exact volume.
     pub(super) volume: f64,
-    /// Faces narrower than the chord.
-    pub(super) slivers: usize,
 }
 
 /// What is known of a mesh that passed.
@@ -45,20 +45,16 @@ pub(super) fn check(part: &Part) -> Result<Verdict, String> {
     let reach = WELD_ROUNDINGS * 0.5 * WELD * size;
     let names = weld(&part.triangles, reach);
     let edges = Edges::new(&names);
-    if !edges.closed() {
-        // Where a face narrower than the chord is left out, the gap is as narrow.
-        let wide = if part.slivers > 0 {
-            let names = weld(&part.triangles, part.deviation);
-            !Edges::new(&names).closed()
-        } else {
-            true
-        };
-        if wide {
-            return Err(format!(
-                "its surface is not closed ({} open edges)",
-                edges.open + edges.crowded
-            ));
-        }
+    // A gap that closes when vertices nearer than the deviation are one is narrower than that.
+    let closes = |share: f64| {
+        let reach = (share * part.deviation).max(reach);
+        Edges::new(&weld(&part.triangles, reach)).closed()
+    };
+    if !edges.closed() && !GAPS.into_iter().any(closes) {
+        return Err(format!(
+            "its surface is not closed ({} open edges)",
+            edges.open + edges.crowded
+        ));
     }
     if edges.inconsistent > 0 {
         return Err("its facets do not look to one side".into());
@@ -73,13 +69,13 @@ pub(super) fn check(part: &Part) -> Result<Verdict, String> {
     }
     let bow = part.deviation * part.area;
     let apart = (volume - part.volume).abs();
-    if apart > (bow + INTEGRATED * part.volume).min(TURNED * part.volume + 1e-9 * bow) {
+    if apart > (bow + INTEGRATED * part.volume).min(MOST_APART * part.volume) {
         return Err(format!(
             "its mesh encloses {volume:.6} mm^3, the body {:.6} mm^3",
             part.volume
         ));
     }
-    if (area - part.area).abs() > TURNED * part.area {
+    if (area - part.area).abs() > MOST_APART * part.area {
         return Err(format!(
             "its mesh covers {area:.6} mm^2, the body {:.6} mm^2",
             part.area

@@ -114,7 +114,6 @@ struct PartFigures {
     points: usize,
     /// Indices of the triangles, three each.
     triangles: usize,
-    slivers: usize,
     deviation: f64,
     area: f64,
     volume: f64,
@@ -357,7 +356,6 @@ fn parts(from: &mut impl Read, figures: &Figures) -> Option<Vec<Part>> {
             deviation: part.deviation,
             area: part.area,
             volume: part.volume,
-            slivers: part.slivers,
         })
     };
     figures.parts.iter().map(one).collect()
