@@ -128,24 +128,8 @@ impl MapArrays<'_> {
         ]
     }
 
-    /// Checks lengths, order of the axes, coil indices, and that every number is finite.
-    ///
-    /// # Errors
-    /// The first array that is not as it must be.
-    pub fn validate(&self) -> Result<(), NpzError> {
-        for (name, nodes) in [(X, &self.x_m), (Y, &self.y_m), (Z, &self.z_m)] {
-            if nodes.is_empty() || !nodes.is_sorted_by(|a, b| a < b) {
-                return Err(bad(name, "must increase from node to node"));
-            }
-        }
-        let coils = self.runtime.current_max_a.len();
-        let ordered = self.coil.is_sorted_by(|a, b| a < b);
-        let known = |&index: &i64| usize::try_from(index).is_ok_and(|index| index < coils);
-        if !ordered || !self.coil.iter().all(known) {
-            let message =
-                format!("must hold increasing indices below {coils}, the number of coils");
-            return Err(bad(COIL, message));
-        }
+    /// Checks how many numbers every array holds, and that each is finite and in range.
+    fn validate_numbers(&self, coils: usize) -> Result<(), NpzError> {
         let nodes = self
             .shape()
             .iter()
@@ -205,9 +189,32 @@ impl MapArrays<'_> {
                 return Err(bad(name, BEYOND));
             }
         }
+        Ok(())
+    }
+
+    /// Checks lengths, order of the axes, coil indices, and that every number is finite.
+    ///
+    /// # Errors
+    /// The first array that is not as it must be.
+    pub fn validate(&self) -> Result<(), NpzError> {
+        for (name, nodes) in [(X, &self.x_m), (Y, &self.y_m), (Z, &self.z_m)] {
+            if nodes.is_empty() || !nodes.is_sorted_by(|a, b| a < b) {
+                return Err(bad(name, "must increase from node to node"));
+            }
+        }
+        let coils = self.runtime.current_max_a.len();
+        let ordered = self.coil.is_sorted_by(|a, b| a < b);
+        let known = |&index: &i64| usize::try_from(index).is_ok_and(|index| index < coils);
+        if !ordered || !self.coil.iter().all(known) {
+            let message =
+                format!("must hold increasing indices below {coils}, the number of coils");
+            return Err(bad(COIL, message));
+        }
+        self.validate_numbers(coils)?;
         for (name, nodes) in [(X, &self.x_m), (Y, &self.y_m), (Z, &self.z_m)] {
             check_nodes(name, nodes)?;
         }
+        let runtime = &self.runtime;
         let Some(rendering) = &runtime.rendering else {
             return Ok(());
         };
@@ -218,7 +225,7 @@ impl MapArrays<'_> {
         }
         let enclosed = |(low, high): (&f64, &f64)| *low <= 0.0 && *high >= 0.0;
         let mut limits = runtime.current_min_a.iter().zip(&runtime.current_max_a);
-        if !limits.all(enclosed) || total.iter().any(|&total| total < 0.0) {
+        if !limits.all(enclosed) || runtime.total_current_max_a.is_some_and(|total| total < 0.0) {
             return Err(bad(CURRENT_MAX, "limits must enclose 0"));
         }
         Ok(())
@@ -237,6 +244,7 @@ const CLOSEST_M: f64 = 1e-15;
 /// Whether no number is larger; in blocks, as [`all_finite`].
 pub(super) fn all_within(values: &[f64], largest: f64) -> bool {
     values.chunks(1024).all(|block| {
+        fluxform_base::progress::poll();
         block
             .iter()
             .fold(true, |all, value| all & (value.abs() <= largest))
@@ -257,6 +265,7 @@ pub(super) fn check_nodes(name: &'static str, nodes: &[f64]) -> Result<(), NpzEr
 /// Whether all numbers are finite; in blocks, so that it runs at memory speed.
 fn all_finite(values: &[f64]) -> bool {
     values.chunks(1024).all(|block| {
+        fluxform_base::progress::poll();
         block
             .iter()
             .fold(true, |all, value| all & value.is_finite())

@@ -67,19 +67,25 @@ pub struct CurrentRow {
 }
 
 /// A column of a table.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub enum Column<'a> {
     /// Real numbers.
     Number(&'a [f64]),
     /// Whole numbers.
     Index(&'a [i64]),
+    /// Real numbers by row, as many as the first column has.
+    NumberOf(&'a dyn Fn(usize) -> f64),
+    /// Whole numbers by row, as many as the first column has.
+    IndexOf(&'a dyn Fn(usize) -> i64),
 }
 
 impl Column<'_> {
-    fn len(&self) -> usize {
+    /// `None` for those that have as many rows as are asked of them.
+    fn len(&self) -> Option<usize> {
         match self {
-            Self::Number(values) => values.len(),
-            Self::Index(values) => values.len(),
+            Self::Number(values) => Some(values.len()),
+            Self::Index(values) => Some(values.len()),
+            Self::NumberOf(_) | Self::IndexOf(_) => None,
         }
     }
 }
@@ -89,9 +95,12 @@ impl Column<'_> {
 /// # Errors
 /// The writer's; `InvalidData` for columns of different lengths and for numbers that are not finite.
 pub fn write_columns(out: &mut dyn Write, columns: &[(&str, Column)]) -> io::Result<()> {
-    let rows = columns.first().map_or(0, |(_, column)| column.len());
-    if let Some((name, column)) = columns.iter().find(|(_, column)| column.len() != rows) {
-        let message = format!("column {name} has {} rows, expected {rows}", column.len());
+    let mut lengths = columns.iter().map(|(name, column)| (name, column.len()));
+    let rows = lengths.next().and_then(|(_, rows)| rows).unwrap_or(0);
+    if let Some((name, Some(length))) =
+        lengths.find(|(_, length)| length.is_some_and(|n| n != rows))
+    {
+        let message = format!("column {name} has {length} rows, expected {rows}");
         return Err(invalid(message));
     }
     let mut lines = Lines::begin(out, columns.iter().map(|(name, _)| *name))?;
@@ -100,6 +109,8 @@ pub fn write_columns(out: &mut dyn Write, columns: &[(&str, Column)]) -> io::Res
             match column {
                 Column::Number(values) => lines.number(values[row])?,
                 Column::Index(values) => lines.index(values[row]),
+                Column::NumberOf(value) => lines.number(value(row))?,
+                Column::IndexOf(value) => lines.index(value(row)),
             }
         }
         lines.end_row()?;

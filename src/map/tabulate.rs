@@ -93,6 +93,23 @@ const TABLE_GAIN: usize = 4;
 /// Share of the tolerance given to the direct sums; the table takes as much, rounding the rest.
 const SHARE: f64 = 0.4;
 
+/// `N` numbers of every node's field, times the coil's gain.
+fn spread<const N: usize>(
+    (planes, plane): (usize, usize),
+    of: impl Fn(usize, usize) -> (f64, [f64; N]) + Sync,
+) -> Vec<f64> {
+    let mut out = vec![0.0; planes * plane * N];
+    out.par_chunks_mut(N * plane.max(1))
+        .enumerate()
+        .for_each(|(piece, out)| {
+            for (place, values) in out.as_chunks_mut::<N>().0.iter_mut().enumerate() {
+                let (gain, numbers) = of(piece, place);
+                *values = numbers.map(|number| gain * number);
+            }
+        });
+    out
+}
+
 /// Maps of identical `coils`, each with `source` about its axis, over `grid`, every component to
 /// `tolerance` relative to the largest |grad B| at its height. The bytes do not depend on the
 /// number of threads.
@@ -147,22 +164,6 @@ pub fn tabulate(
             coils[coil].gain,
         )
     };
-    // `N` numbers of every node's field, times the coil's gain.
-    fn spread<const N: usize>(
-        (planes, plane): (usize, usize),
-        of: impl Fn(usize, usize) -> (f64, [f64; N]) + Sync,
-    ) -> Vec<f64> {
-        let mut out = vec![0.0; planes * plane * N];
-        out.par_chunks_mut(N * plane.max(1))
-            .enumerate()
-            .for_each(|(piece, out)| {
-                for (place, values) in out.as_chunks_mut::<N>().0.iter_mut().enumerate() {
-                    let (gain, numbers) = of(piece, place);
-                    *values = numbers.map(|number| gain * number);
-                }
-            });
-        out
-    }
     let size = (planes, plane);
     let gradient = (components != Components::Gz).then(|| {
         spread::<9>(size, |piece, place| {

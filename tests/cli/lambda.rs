@@ -1,6 +1,8 @@
 //! `lambda`: variants, wiring, and inputs with nothing to solve.
 
-use crate::support::Place;
+use fluxform_testing::place::Place;
+
+use crate::SEED;
 
 const AIR: &str = "designs/seed_air.toml";
 const WEDGE: &str = "shapes/wedge.toml";
@@ -317,7 +319,7 @@ fn a_picture_shows_the_path_and_is_not_written_over_a_stranger() {
 #[test]
 fn a_maxmin_of_zero_names_the_point_and_fails() {
     let place = Place::new();
-    let one = place.seed().replace("rows = 3", "rows = 1");
+    let one = place.text(SEED).replace("rows = 3", "rows = 1");
     let one = one.replace("columns = 3", "columns = 1");
     place.write("one.toml", &one);
     place.write(
@@ -342,7 +344,7 @@ fn attracted_and_repelled_magnets_mirror_each_other() {
     let both = ["repel", "attract"].map(|polarity| {
         let name = format!("{polarity}.toml");
         let design = place
-            .seed()
+            .text(SEED)
             .replace(
                 "polarity = \"repel\"",
                 &format!("polarity = \"{polarity}\""),

@@ -1,7 +1,6 @@
 //! Surfaces: readers, exact heights, primitives, constraint points.
 #![allow(missing_docs)]
 
-mod corpus;
 mod deviation;
 mod formats;
 mod fuzz;
@@ -10,6 +9,4 @@ mod hostile;
 mod inspect;
 mod marks;
 mod points;
-mod samples;
 mod stl;
-mod support;

@@ -30,8 +30,9 @@ def static(owner, name):
     return getattr(owner, name + "_s", None) or getattr(owner, name)
 
 
-def write(shape, name):
+def write(shape, name, unit="MM"):
     writer = STEPControl_Writer()
+    static(Interface_Static, "SetCVal")("write.step.unit", unit)
     writer.Transfer(shape, STEPControl_AsIs)
     writer.Write(f"{FOLDER}/{name}.step")
 
@@ -87,14 +88,9 @@ def assembly():
     writer.Write(f"{FOLDER}/assembly.step")
 
 
-def box(name, unit):
-    """0.7 x 1.3 x 2.9 mm, in a unit of the file's own."""
-    static(Interface_Static, "SetCVal")("write.step.unit", unit)
-    write(BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), gp_Pnt(0.7, 1.3, 2.9)).Shape(), name)
-
-
-box("inch", "INCH")
-box("box", "MM")
+box = BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), gp_Pnt(0.7, 1.3, 2.9)).Shape()
+write(box, "inch", "INCH")
+write(box, "box")
 write(nut(), "nut")
 write(dome(), "dome")
 assembly()

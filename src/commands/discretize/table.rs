@@ -34,56 +34,27 @@ fn write(
     marks: &[Marks],
     weight_m2: Option<&[f64]>,
 ) -> io::Result<()> {
-    let flag = |kind: fn(&Marks) -> bool| -> Vec<i64> {
-        marks.iter().map(|marks| i64::from(kind(marks))).collect()
-    };
-    let part = |k: usize| -> Vec<f64> { normals.iter().map(|normal| normal[k]).collect() };
-    let other = |k: usize| -> Vec<f64> {
-        let pairs = marks.iter().zip(normals);
-        pairs
-            .map(|(marks, normal)| marks.crease.unwrap_or(*normal)[k])
-            .collect()
-    };
-    let (normal, crease) = ([0, 1, 2].map(part), [0, 1, 2].map(other));
-    let flags = [
-        ("wall", flag(|m| m.wall)),
-        ("rim", flag(|m| m.rim)),
-        ("crease", flag(|m| m.crease.is_some())),
-    ];
-    let sheets = [
-        (
-            "layers",
-            marks
-                .iter()
-                .map(|marks| i64::from(marks.layers))
-                .collect::<Vec<i64>>(),
-        ),
-        ("overhang", flag(|m| m.overhang)),
-        ("filled", flag(|m| m.filled)),
-    ];
-    let numbers = positions
-        .into_iter()
-        .chain(normal.iter().map(Vec::as_slice));
-    let mut columns: Vec<(&str, Column)> = POINT_COLUMNS
-        .into_iter()
-        .zip(numbers.map(Column::Number))
-        .collect();
-    columns.extend(
-        flags
-            .iter()
-            .map(|(name, flag)| (*name, Column::Index(flag))),
-    );
-    let names = ["crease_normal_x", "crease_normal_y", "crease_normal_z"];
-    columns.extend(
-        names
-            .into_iter()
-            .zip(crease.iter().map(|part| Column::Number(part))),
-    );
-    columns.extend(
-        sheets
-            .iter()
-            .map(|(name, flag)| (*name, Column::Index(flag))),
-    );
+    let flag = |kind: fn(&Marks) -> bool| move |row: usize| i64::from(kind(&marks[row]));
+    let normal = [0, 1, 2].map(|k| move |row: usize| normals[row][k]);
+    let crease = [0, 1, 2].map(|k| move |row: usize| marks[row].crease.unwrap_or(normals[row])[k]);
+    let (wall, rim) = (flag(|m| m.wall), flag(|m| m.rim));
+    let on_crease = flag(|m| m.crease.is_some());
+    let (overhang, filled) = (flag(|m| m.overhang), flag(|m| m.filled));
+    let layers = |row: usize| i64::from(marks[row].layers);
+    let numbers = positions.into_iter().map(Column::Number);
+    let numbers = numbers.chain(normal.iter().map(|part| Column::NumberOf(part)));
+    let mut columns: Vec<(&str, Column)> = POINT_COLUMNS.into_iter().zip(numbers).collect();
+    columns.extend([
+        ("wall", Column::IndexOf(&wall)),
+        ("rim", Column::IndexOf(&rim)),
+        ("crease", Column::IndexOf(&on_crease)),
+        ("crease_normal_x", Column::NumberOf(&crease[0])),
+        ("crease_normal_y", Column::NumberOf(&crease[1])),
+        ("crease_normal_z", Column::NumberOf(&crease[2])),
+        ("layers", Column::IndexOf(&layers)),
+        ("overhang", Column::IndexOf(&overhang)),
+        ("filled", Column::IndexOf(&filled)),
+    ]);
     columns.extend(weight_m2.map(|weights| ("weight_m2", Column::Number(weights))));
     write_columns(out, &columns)
 }

@@ -8,6 +8,7 @@ use crate::bundle::artefact::Options;
 use crate::bundle::force_map::ForceMap;
 use crate::bundle::rendering::HeightGrid;
 use crate::bundle::trajectory::Trajectory;
+use crate::numerics::random::Random;
 
 /// Largest distance of the exploring finger from the surface, m: the seed's trial.
 const DEVIATION_M: f64 = 0.014;
@@ -101,10 +102,10 @@ impl Synthesis {
     }
 
     fn explore(&self, t_s: &[f64], surface: &Surface, border_m: f64) -> Vec<[f64; 3]> {
-        let mut random = Random(self.seed);
+        let mut random = Random::new(self.seed);
         // A slow wave and a faster one along x and y, three along z.
         let mut waves = |speeds: &[f64]| -> Vec<[f64; 2]> {
-            let wave = |hz: &f64| [hz * (0.8 + 0.4 * random.next()), random.next()];
+            let wave = |hz: &f64| [hz * (0.8 + 0.4 * random.unit()), random.unit()];
             speeds.iter().map(wave).collect()
         };
         let (x, y) = (waves(&[0.31, 0.83]), waves(&[0.23, 0.71]));
@@ -117,7 +118,7 @@ impl Synthesis {
         };
         let away: Vec<f64> = t_s.iter().map(|t| sum(&z, *t, &[1.0, 0.7, 0.3])).collect();
         let most = away.iter().fold(1e-9_f64, |most, a| most.max(a.abs()));
-        let noise = |random: &mut Random| NOISE_M * (2.0 * random.next() - 1.0);
+        let noise = |random: &mut Random| NOISE_M * (2.0 * random.unit() - 1.0);
         t_s.iter()
             .zip(&away)
             .map(|(&t, away)| {
@@ -175,20 +176,6 @@ impl<'a> Surface<'a> {
     fn on(&self, place: [f64; 2]) -> [f64; 3] {
         let [x, y] = [0, 1].map(|k| self.middle_m[k] + self.half_m[k] * place[k]);
         [x, y, self.height(x, y)]
-    }
-}
-
-/// SplitMix64.
-struct Random(u64);
-
-impl Random {
-    /// From 0 to 1.
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 }
 

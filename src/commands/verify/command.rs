@@ -3,6 +3,7 @@
 use clap::Args;
 
 use super::{Check, Verifier, VerifyOptions, VerifyReport};
+use crate::cli::budget::within;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
@@ -47,7 +48,7 @@ impl Verify {
         let options = VerifyOptions {
             accept_unchecked: self.accept_unchecked,
         };
-        let report = Verifier::default().verify(&self.bundle, options, &bar)?;
+        let report = Verifier::limited(within).verify(&self.bundle, options, &bar)?;
         drop(bar);
         for note in &report.notes {
             printer.warning(note);

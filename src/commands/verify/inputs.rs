@@ -11,6 +11,7 @@ use crate::bundle::read_bounded::digest_plain;
 use crate::commands::calibrate::CURVE_FILE;
 use crate::commands::calibrate::CalibrateOptions;
 use crate::commands::calibrate::DESIGN_FILE;
+use crate::commands::calibrate::PAGE_FILE;
 use crate::commands::lambda::LambdaOptions;
 use crate::design::{Design, Need, Steel as Described, source};
 use crate::lambda::Settings;
@@ -122,7 +123,8 @@ impl Sources {
     pub(super) fn without_shape(&self) -> String {
         let named: Vec<&str> = self.missing.iter().map(String::as_str).collect();
         match named[..] {
-            [] => "the manifest does not name the shape's files".to_owned(),
+            [] => "the manifest does not name the shape's files, or not how its surface was placed"
+                .to_owned(),
             [STANDARD] => "calibrate read the shape from standard input".to_owned(),
             _ => format!(
                 "{} not found; verify in the folder where calibrate ran",
@@ -147,9 +149,16 @@ pub(super) fn options(bundle: &Bundle) -> Result<CalibrateOptions, String> {
         tolerance: made_with.and_then(|made| made.tolerance),
         ..LambdaOptions::default()
     };
-    if let Some(made) = made_with {
-        options.reach_m = made.reach_m;
-        options.page = made.report;
+    match made_with {
+        Some(made) => {
+            options.reach_m = made.reach_m;
+            options.page = made.report;
+        }
+        // Older bundles do not name their options; what they hold states one of them.
+        None => {
+            let files = &bundle.manifest.files;
+            options.page = files.iter().any(|file| file.path == PAGE_FILE);
+        }
     }
     let sound = options.reach_m >= 0.0
         && options.reach_m.is_finite()
@@ -225,6 +234,10 @@ fn shape(bundle: &Bundle, inputs: &[Input]) -> Result<Option<ShapeSource>, RunEr
             document,
             input: None,
         }));
+    }
+    // An older bundle does not state with which flags a surface was given.
+    if made_with.is_none() && path.extension().is_none_or(|ending| ending != "toml") {
+        return Ok(None);
     }
     let refuse = |invalid: crate::design::InvalidDocument| RunError::Input(invalid.to_string());
     let text = source::text_of(path).map_err(refuse)?;

@@ -24,7 +24,7 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use self::inputs::Sources;
-use self::route::Route;
+use self::route::{FINER, Route};
 use super::calibrate::CalibrateOptions;
 use super::calibrate::PASSIVE_STAGE;
 use super::calibrate::again::{Expected, expected};
@@ -32,9 +32,13 @@ use crate::RunError;
 use crate::bundle::artefact::{Input, UNITS};
 use crate::bundle::load::Bundle;
 use crate::bundle::manifest::Manifest;
+use crate::design::Design;
 use crate::progress::Progress;
 use crate::scene::Scene;
+use crate::scene::cost::{self, Cost};
+use crate::scene::passive::PASSIVE_TOLERANCE;
 use crate::scene::sources::DesignSource;
+use crate::scene::steel::COUPLED_TOLERANCE;
 use crate::shape::document::ShapeDocument;
 
 /// Errors that a bundle claims are believed up to this where they cannot be computed again.
@@ -94,6 +98,8 @@ pub fn run(path: &Path, progress: &dyn Progress) -> Result<VerifyReport, RunErro
 #[derive(Debug, Default)]
 pub struct Verifier {
     last: Option<(Recipe, Arc<Expected>)>,
+    /// Refuses what takes more memory than allowed.
+    within: Option<fn(&Cost) -> Result<(), String>>,
 }
 
 /// What decides the content of a bundle.
@@ -134,6 +140,31 @@ impl Judgement {
 }
 
 impl Verifier {
+    /// One that asks `within` before it computes whether a cost is allowed; a message refuses it.
+    #[must_use]
+    pub fn limited(within: fn(&Cost) -> Result<(), String>) -> Self {
+        Self {
+            last: None,
+            within: Some(within),
+        }
+    }
+
+    fn check_costs(&self, design: &Design, bundle: &Bundle) -> Result<(), RunError> {
+        let Some(within) = self.within else {
+            return Ok(());
+        };
+        let made_with = bundle.manifest.made_with.as_ref();
+        let tolerance = made_with.and_then(|made| made.tolerance);
+        // Solved again as the bundle was made, and to judge that a finer time.
+        let finer = tolerance.unwrap_or(COUPLED_TOLERANCE).min(CLAIMED_MAX) * FINER;
+        let steel = cost::of_steel(design, Some(finer));
+        let pull = cost::of_pull(design, FINER * PASSIVE_TOLERANCE);
+        for cost in steel.iter().chain(&pull) {
+            within(cost).map_err(RunError::Input)?;
+        }
+        Ok(())
+    }
+
     /// As [`run`].
     ///
     /// # Errors
@@ -166,6 +197,7 @@ impl Verifier {
             progress.end();
             return Ok(all.report(options));
         }
+        self.check_costs(&sources.design, &all.bundle)?;
         let expected = self.expected(&mut all, &scene, &sources, progress)?;
         progress.advance(1);
         progress.check()?;
@@ -217,6 +249,13 @@ impl Verifier {
                 return Ok(None);
             }
         };
+        if all.bundle.manifest.made_with.is_none() {
+            all.unchecked.push(format!(
+                "the run's options: bundles of schema {} do not name them, so its tolerance and reach \
+                 are taken to be the defaults",
+                all.bundle.manifest.schema_version
+            ));
+        }
         let recipe = Recipe {
             inputs: all.bundle.manifest.inputs.clone(),
             shape: shape.document.clone(),

@@ -72,6 +72,8 @@ pub(super) struct Reply {
     pub(super) chord_mm: f64,
     /// Shells and faces that bound no body.
     pub(super) loose: usize,
+    /// Placements of the file's own, outside assemblies, that are not its frame itself.
+    pub(super) moved_roots: usize,
     pub(super) bodies: Vec<PlacedBody>,
     /// The different bodies; each is placed once or more often.
     pub(super) parts: Vec<Part>,
@@ -104,6 +106,7 @@ struct Figures {
     unit_mm: f64,
     chord_mm: f64,
     loose: usize,
+    moved_roots: usize,
     bodies: Vec<PlacedBody>,
     parts: Vec<PartFigures>,
 }
@@ -373,6 +376,7 @@ fn reply(version: String, figures: Figures, parts: Vec<Part>) -> Option<Reply> {
         unit_mm: figures.unit_mm,
         chord_mm: figures.chord_mm,
         loose: figures.loose,
+        moved_roots: figures.moved_roots,
         bodies: figures.bodies,
         parts,
     })

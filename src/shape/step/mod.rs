@@ -88,6 +88,7 @@ fn laid_out(reply: kernel::Reply, options: &BodyOptions) -> Result<FileMesh, Str
         unit_mm,
         chord_mm,
         loose,
+        moved_roots,
         bodies,
         parts,
     } = reply;
@@ -140,6 +141,12 @@ fn laid_out(reply: kernel::Reply, options: &BodyOptions) -> Result<FileMesh, Str
     if loose > 0 {
         warnings.push(format!(
             "{loose} faces or shells that bound no body (drawings, dimensions, surfaces) are left out"
+        ));
+    }
+    if moved_roots > 0 {
+        warnings.push(format!(
+            "the file states {moved_roots} placements at its root that move nothing by the standard; \
+             a program that applies them puts the part elsewhere: compare where it lies"
         ));
     }
     if crossing > 0 {

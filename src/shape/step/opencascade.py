@@ -147,6 +147,43 @@ def read(data):
     return document, unit_mm or 1.0
 
 
+STATEMENT = re.compile(
+    rb"#(\d+)\s*=\s*(AXIS2_PLACEMENT_?3D|CARTESIAN_POINT|DIRECTION|\w*SHAPE_REPRESENTATION)\s*\(([^;]*)\)\s*;"
+)
+
+
+def moved_roots(data):
+    """How many placements of the file's own, outside assemblies, are not its frame itself."""
+    if b"NEXT_ASSEMBLY_USAGE_OCCURRENCE" in data or b"MAPPED_ITEM" in data:
+        return 0
+    kinds = {}
+    for number, kind, body in STATEMENT.findall(data):
+        kinds.setdefault(kind.replace(b"_3D", b"3D"), {})[number] = body
+
+    def vector(kind, number, default):
+        body = kinds.get(kind, {}).get(number, b"").rpartition(b"(")[2].rstrip(b") \n\r")
+        try:
+            return [float(text) for text in body.split(b",")]
+        except ValueError:
+            return default
+
+    count = 0
+    frames = kinds.get(b"AXIS2_PLACEMENT3D", {})
+    for kind, items in kinds.items():
+        if not kind.endswith(b"SHAPE_REPRESENTATION"):
+            continue
+        for body in items.values():
+            listed = re.findall(rb"#(\d+)", body.partition(b"(")[2].partition(b")")[0])
+            for frame in (frames[number] for number in listed if number in frames):
+                parts = re.findall(rb"#(\d+)|\$", frame) + [b"", b""]
+                own = [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]
+                kinds_of = (b"CARTESIAN_POINT", b"DIRECTION", b"DIRECTION")
+                found = [vector(k, n, d) for k, n, d in zip(kinds_of, parts, own)]
+                off = (abs(a - b) for x, y in zip(found, own) for a, b in zip(x, y))
+                count += max(off) > 1e-9
+    return count
+
+
 def children(label):
     """The labels right below."""
     found = TDF_ChildIterator(label, False)
@@ -556,7 +593,8 @@ def chosen(bodies, which):
 
 def main():
     chord = float(sys.argv[1])
-    document, unit_mm = read(sys.stdin.buffer.read())
+    data = sys.stdin.buffer.read()
+    document, unit_mm = read(data)
     products = Products(document)
     bodies = chosen(products.bodies, sys.argv[4])
     if chord == 0.0:
@@ -584,7 +622,8 @@ def main():
     lists = ("points", "triangles")
     figures = [{k: len(v) if k in lists else v for k, v in part.items()} for part in parts.values()]
     send(result={
-        "unit_mm": unit_mm, "chord_mm": chord, "loose": products.loose, "bodies": stated, "parts": figures,
+        "unit_mm": unit_mm, "chord_mm": chord, "loose": products.loose,
+        "moved_roots": moved_roots(data), "bodies": stated, "parts": figures,
     })
     for part in parts.values():
         for name in lists:

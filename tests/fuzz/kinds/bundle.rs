@@ -23,9 +23,9 @@ use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 use super::{finite, limits, refusal};
 use crate::harness::{Content, Input, Kind};
-use crate::sample::{Sample, sample};
 use crate::structure::{damage_json, damage_text, extreme};
-use crate::support::Random;
+use fluxform_testing::Random;
+use fluxform_testing::bundle::{Sample, sample};
 
 pub fn kind() -> Kind {
     Kind {

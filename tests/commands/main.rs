@@ -1,8 +1,6 @@
 //! The main job from documents to a verified bundle.
 
-#[path = "commands/cored.rs"]
 mod cored;
-#[path = "commands/near.rs"]
 mod near;
 
 use std::path::{Path, PathBuf};
