@@ -18,8 +18,8 @@ const POINTS: usize = 20_000;
 const CELLS: usize = 101;
 /// Of a facet's area this share at least must show in plan for it to face up or down.
 const LEVEL: f64 = 1e-6;
-/// Depths below this share of the surface's height are rounding.
-const DEPTH: f64 = 1e-9;
+/// Depths below this share of the surface's height count as seen.
+const DEPTH: f64 = 1e-6;
 
 /// Shares of a surface's area, to about a hundredth.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
@@ -129,6 +129,7 @@ mod tests {
         }
         let file = FileMesh {
             triangles,
+            coordinate_rounding: 6.5e-7,
             ..FileMesh::default()
         };
         let placed = Transform::new(1e-3, &Placement::default());
