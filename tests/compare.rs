@@ -133,7 +133,7 @@ fn a_lifted_surface_is_apart_by_its_height_with_feedback() {
     let file = compared(&design(&[]), &shapes, &weak);
     let found = file.pairs[0].feedback_jnd.unwrap();
     assert!((found / (0.13 * 4e-3 / 0.8e-3) - 1.0).abs() < 1e-12);
-    // Static currents differ too, but by what they can do, not by what is wanted.
+    // Static currents differ too, but by what they can do, not by what is requested.
     let fixed = file.pairs[0].static_jnd.unwrap();
     assert!(fixed > 0.0 && (fixed / found - 1.0).abs() > 1e-3);
 }
@@ -191,7 +191,7 @@ fn the_unpowered_steel_pulls_on_both_alike() {
         compared(&design, &[flat("low", 50.0), flat("high", 56.0)], &options)
     };
     let (with, without) = (of(true), of(false));
-    // What is wanted includes the pull, so feedback does not differ; static currents leave some.
+    // The requested force includes the pull, so feedback does not differ; static currents leave some.
     let felt = |file: &CompareFile| file.pairs[0].feedback_jnd.unwrap();
     assert!((felt(&with) / felt(&without) - 1.0).abs() < 1e-9);
     let fixed = |file: &CompareFile| file.pairs[0].static_rms_jnd.unwrap();

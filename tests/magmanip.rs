@@ -2,7 +2,7 @@
 //!
 //! The latter needs a Python with the package mag-manip: what `FLUXFORM_MAGMANIP_PYTHON` names, or
 //! `python3.11` or `python3`. Without one that test is reported as ignored.
-#![allow(clippy::print_stderr, clippy::print_stdout)] // a test may tell what it compared
+#![allow(clippy::print_stderr, clippy::print_stdout)] // a test may print what it compared
 #![allow(clippy::disallowed_methods)] // a test writes where it likes
 
 use std::collections::BTreeMap;

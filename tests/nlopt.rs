@@ -3,7 +3,7 @@
 //! Needs a Python with numpy, scipy and nlopt: `python3`, or what `FLUXFORM_PYTHON` names. Without
 //! one the tests are reported as ignored. `FLUXFORM_NLOPT=all` judges all problems instead of those
 //! marked `ci`, and solves all of them again.
-#![allow(clippy::print_stderr, clippy::print_stdout)] // a test may tell what it compared
+#![allow(clippy::print_stderr, clippy::print_stdout)] // a test may print what it compared
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

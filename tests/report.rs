@@ -1,4 +1,4 @@
-//! Pages: what stands in them, that inputs stay texts, and that a browser draws them.
+//! Pages: their contents, that inputs stay texts, and that a browser draws them.
 
 use std::path::Path;
 use std::process::{Command, ExitCode, Output};
@@ -86,7 +86,7 @@ fn a_bundle_holds_its_page_and_verify_checks_it() {
     ] {
         assert!(html.contains(told), "{told}");
     }
-    // The shipped curve tells that it is not this run's.
+    // The shipped curve says that it is not this run's.
     assert!(html.contains("id=\"draw-cost\"") && html.contains("Not measured in this run"));
     run(&place, &["verify", bundle], 0);
     place.write(

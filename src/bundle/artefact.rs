@@ -139,7 +139,7 @@ pub fn sha256_hex(bytes: &[u8]) -> String {
 ///
 /// # Errors
 /// The reader's.
-pub fn sha256_of(mut stream: impl Read) -> io::Result<(u64, String)> {
+pub(crate) fn sha256_of(mut stream: impl Read) -> io::Result<(u64, String)> {
     use sha2::{Digest, Sha256};
     let mut digest = Sha256::new();
     let mut block = vec![0; BLOCK_BYTES];
@@ -159,7 +159,7 @@ pub fn sha256_of(mut stream: impl Read) -> io::Result<(u64, String)> {
 
 /// The three numbers of a schema version; `None` when it is not `major.minor.patch`.
 #[must_use]
-pub fn parse_version(version: &str) -> Option<[u32; 3]> {
+pub(crate) fn parse_version(version: &str) -> Option<[u32; 3]> {
     let mut parts = version.split('.').map(|part| part.parse().ok());
     let numbers = [parts.next()??, parts.next()??, parts.next()??];
     parts.next().is_none().then_some(numbers)
@@ -169,7 +169,7 @@ pub fn parse_version(version: &str) -> Option<[u32; 3]> {
 ///
 /// # Errors
 /// The end of a sentence that begins with what holds the version.
-pub fn check_version(version: &str) -> Result<(), String> {
+pub(crate) fn check_version(version: &str) -> Result<(), String> {
     let ours = parse_version(SCHEMA_VERSION).unwrap_or_default()[0];
     match parse_version(version) {
         None => Err(format!("{version:?} is not of the form major.minor.patch")),

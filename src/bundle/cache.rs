@@ -37,7 +37,7 @@ impl Origin {
             .and(dispatch::instructions().as_bytes())
     }
 
-    /// With `part` besides; the order counts.
+    /// With `part` added; the order counts.
     #[must_use]
     pub fn and(mut self, part: &[u8]) -> Self {
         self.0.update((part.len() as u64).to_le_bytes());
@@ -45,7 +45,7 @@ impl Origin {
         self
     }
 
-    /// With numbers besides.
+    /// With numbers added.
     #[must_use]
     pub fn and_numbers(mut self, numbers: impl IntoIterator<Item = f64>) -> Self {
         let mut count = 0_u64;
@@ -296,7 +296,7 @@ mod tests {
     #[test]
     fn what_killed_runs_left_is_cleared_with_the_entries() {
         let (folder, store, _file) = kept(&Origin::of_build("a"));
-        // Killed before the first byte was written: nothing tells whose it was but its name.
+        // Killed before the first byte was written: nothing but its name shows whose it was.
         lay(folder.path(), ".fluxform-7Xq.tmp", b"");
         store.clear();
         assert!(!folder.path().join("kept").exists());

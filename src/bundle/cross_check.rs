@@ -1,8 +1,9 @@
 //! A bundle says some things twice: for people, for C programs, for spreadsheets. They must agree.
 
+use super::array_check::LARGEST;
 use super::lambda_file::LambdaFile;
 use super::manifest::{AxisSummary, INTERPOLATION, Manifest};
-use super::npz::{LARGEST, MapArrays, PASSIVE};
+use super::npz::{MapArrays, PASSIVE};
 use super::rendering::HeightGrid;
 use super::table::{CurrentRow, PointRow};
 
@@ -106,7 +107,7 @@ fn check_errors(manifest: &Manifest) -> Result<(), String> {
     Ok(())
 }
 
-/// Names are told to people and to terminals.
+/// Names are printed for people and on terminals.
 fn check_names(manifest: &Manifest) -> Result<(), String> {
     let names = [
         ("design", &manifest.design),

@@ -11,7 +11,7 @@ pub enum JsonError {
     /// A NaN or an infinity; JSON would silently say `null`.
     #[error("{key} is not a finite number")]
     NotFinite {
-        /// Where it stands, such as `path[3].currents_a[0]`.
+        /// Its place, such as `path[3].currents_a[0]`.
         key: String,
     },
     /// The value cannot be serialised at all.
@@ -34,7 +34,7 @@ pub fn to_json<T: Serialize + ?Sized>(value: &T) -> Result<Vec<u8>, JsonError> {
 }
 
 /// What is wrong with JSON that was read. It may quote a text of any length: the middle of a long
-/// message is left out, its end tells line and column.
+/// message is left out, its end names line and column.
 pub(crate) fn fault(error: &serde_json::Error) -> String {
     const HALF: usize = 400;
     let text = error.to_string();

@@ -4,7 +4,7 @@
 //! inside the folder, reached without links, with the listed size and digest. All sizes are checked
 //! before any file is read; a file that is parsed is read once, so what is parsed is what was
 //! hashed, and the others are hashed block by block. Memory is bounded by the size that the parsed
-//! files take on the disk and by [`FILE_MAX_BYTES`] each.
+//! files take on the disk and by `FILE_MAX_BYTES` each.
 
 use std::collections::BTreeSet;
 use std::io;
@@ -27,7 +27,7 @@ use fluxform_numerics::lagrange::{Cell, locate};
 /// Manifests larger than this are refused unread.
 const MANIFEST_MAX_BYTES: u64 = 64 << 20;
 
-/// Longer names are none of a bundle's files; of them so much is told.
+/// Longer names are none of a bundle's files; of them so much is shown.
 const NAME_BYTES: usize = 1024;
 const NAME_SHOWN: usize = 100;
 
@@ -190,7 +190,7 @@ impl Bundle {
     ///
     /// # Panics
     /// When `gz_t_per_m_per_a` is shorter than the array.
-    pub fn gz_per_ampere(&self, position_m: [f64; 3], gz_t_per_m_per_a: &mut [f64]) -> bool {
+    pub(crate) fn gz_per_ampere(&self, position_m: [f64; 3], gz_t_per_m_per_a: &mut [f64]) -> bool {
         let nodes = self.nodes();
         let gz = &self.map.gz_t_per_m_per_a;
         self.each_coil(position_m, gz_t_per_m_per_a, |cell, place| {

@@ -7,7 +7,7 @@ use std::io::{self, Write};
 
 use super::number::push_number;
 
-/// How every such file begins: what tells ours from others'.
+/// How every such file begins: what distinguishes ours from others'.
 pub(super) const HEAD: &str = "# fluxform ";
 
 /// The field per ampere on equally spaced nodes, as many along every axis: mag_manip 3.0.0 finds
@@ -71,7 +71,7 @@ fn line(text: &mut Vec<u8>, start: &str, values: &[f64]) {
 ///
 /// # Errors
 /// The writer's.
-pub fn write_vector_field(out: &mut dyn Write, field: &VectorField) -> io::Result<()> {
+pub(crate) fn write_vector_field(out: &mut dyn Write, field: &VectorField) -> io::Result<()> {
     let n = field.nodes;
     let whole = 3 * n * n * n;
     let coils = field.field_t_per_a.len() / whole.max(1);
@@ -114,7 +114,7 @@ pub fn write_vector_field(out: &mut dyn Write, field: &VectorField) -> io::Resul
 ///
 /// # Errors
 /// The writer's.
-pub fn write_multipoles(out: &mut dyn Write, model: &Multipoles) -> io::Result<()> {
+pub(crate) fn write_multipoles(out: &mut dyn Write, model: &Multipoles) -> io::Result<()> {
     writeln!(
         out,
         "{HEAD}multipoles for mag_manip: per ampere, lengths in m, fields in T\n\
@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn nodes_are_listed_x_slowest() {
-        // B_x tells x, B_y tells y, B_z tells z.
+        // B_x shows x, B_y shows y, B_z shows z.
         let mut values = Vec::new();
         for (z, y, x) in [0, 1, 2]
             .iter()

@@ -12,7 +12,7 @@ use fluxform_base::force_constant::Criterion;
 use fluxform_numerics::axis::Axis;
 
 /// The interpolation between nodes that every loader implements.
-pub const INTERPOLATION: &str = "tricubic-lagrange";
+pub(crate) const INTERPOLATION: &str = "tricubic-lagrange";
 
 /// What a runtime reads first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

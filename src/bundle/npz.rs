@@ -1,4 +1,4 @@
-//! `map.npz`: axes, coil indices, maps per ampere, and what a runtime needs besides.
+//! `map.npz`: axes, coil indices, maps per ampere, and what else a runtime needs.
 //!
 //! A stored zip of NPY 1.0 arrays with fixed time stamps: the same numbers give the same bytes.
 //! Besides the contract's arrays it holds the few numbers a runtime needs, so that C and MATLAB
@@ -6,8 +6,8 @@
 //! of the array: `current_min_a`, `current_max_a`, `resistance_ohm`; where there are such,
 //! `total_current_max_a` and `lambda_n_per_m` (no dimension). `coil` holds the indices of the
 //! coils whose maps were kept; the others give no force. `passive_force_n`, where it is there, is
-//! what the unpowered steel adds to the force. What a bundle's runtime needs besides to follow a
-//! finger is told in [`super::rendering`].
+//! what the unpowered steel adds to the force. What else a bundle's runtime needs to follow a
+//! finger is described in [`super::rendering`].
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -16,6 +16,7 @@ use std::io::{self, Cursor, Write};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
+use super::array_check::{BEYOND, LARGEST, all_finite, all_within, bad, check_nodes};
 use super::artefact::{SCHEMA_VERSION, check_version, parse_version};
 use super::npy;
 use super::rendering::{
@@ -23,6 +24,8 @@ use super::rendering::{
     VOLTAGE,
 };
 use super::stored;
+
+pub use super::array_check::NpzError;
 
 #[cfg(target_endian = "big")]
 compile_error!("arrays are written as they lie in memory, which must be little-endian");
@@ -48,7 +51,7 @@ pub struct MapArrays<'a> {
     pub passive_force_n: Option<Cow<'a, [f64]>>,
     /// dB_z/dz of all coils at the working point's currents, `[z, y, x]`, T/m.
     pub working_point_gz_t_per_m: Option<Cow<'a, [f64]>>,
-    /// What a runtime needs besides the maps.
+    /// What a runtime needs in addition to the maps.
     pub runtime: Runtime,
 }
 
@@ -69,32 +72,6 @@ pub struct Runtime {
     pub lambda_n_per_m: Option<f64>,
     /// What position feedback needs; `None` for maps without an object and for older bundles.
     pub rendering: Option<Rendering>,
-}
-
-/// What is wrong with a `map.npz`.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum NpzError {
-    /// Not a zip archive, or cut short.
-    #[error("not a readable NPZ archive ({0})")]
-    Archive(String),
-    /// An array that must be there is not.
-    #[error("array {0} is missing")]
-    Missing(&'static str),
-    /// An array that is not as it must be.
-    #[error("array {name} {message}")]
-    Array {
-        /// Its name.
-        name: &'static str,
-        /// What was expected and found.
-        message: String,
-    },
-}
-
-pub(super) fn bad(name: &'static str, message: impl Into<String>) -> NpzError {
-    NpzError::Array {
-        name,
-        message: message.into(),
-    }
 }
 
 const X: &str = "x_m";
@@ -230,46 +207,6 @@ impl MapArrays<'_> {
         }
         Ok(())
     }
-}
-
-/// Numbers of a bundle are no larger, in their SI units: so many of them times each other, as eq. 8
-/// and the interpolation multiply them, are still numbers.
-pub(super) const LARGEST: f64 = 1e30;
-pub(super) const BEYOND: &str = "holds a number beyond 1e30, which no coil or magnet gives";
-/// Nodes lie no farther out, m, and are no closer to each other: nor are products of three such
-/// distances, by which the interpolation divides, nothing.
-const FARTHEST_M: f64 = 1e6;
-const CLOSEST_M: f64 = 1e-15;
-
-/// Whether no number is larger; in blocks, as [`all_finite`].
-pub(super) fn all_within(values: &[f64], largest: f64) -> bool {
-    values.chunks(1024).all(|block| {
-        fluxform_base::progress::poll();
-        block
-            .iter()
-            .fold(true, |all, value| all & (value.abs() <= largest))
-    })
-}
-
-/// Nodes, which increase, between which can be interpolated.
-pub(super) fn check_nodes(name: &'static str, nodes: &[f64]) -> Result<(), NpzError> {
-    if !all_within(nodes, FARTHEST_M) {
-        return Err(bad(name, "must lie within 1e6 m"));
-    }
-    if nodes.windows(2).any(|pair| pair[1] - pair[0] < CLOSEST_M) {
-        return Err(bad(name, "must have nodes at least 1e-15 m apart"));
-    }
-    Ok(())
-}
-
-/// Whether all numbers are finite; in blocks, so that it runs at memory speed.
-fn all_finite(values: &[f64]) -> bool {
-    values.chunks(1024).all(|block| {
-        fluxform_base::progress::poll();
-        block
-            .iter()
-            .fold(true, |all, value| all & value.is_finite())
-    })
 }
 
 /// The bytes of `map.npz`.

@@ -15,7 +15,7 @@ pub fn push_number(text: &mut Vec<u8>, value: f64) {
 }
 
 /// Appends a whole number.
-pub fn push_index(text: &mut Vec<u8>, value: i64) {
+pub(crate) fn push_index(text: &mut Vec<u8>, value: i64) {
     use std::io::Write;
     // Writing to memory cannot fail.
     let _ = write!(text, "{value}");

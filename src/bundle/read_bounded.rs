@@ -7,7 +7,7 @@ use std::path::Path;
 use super::artefact::sha256_of;
 
 /// The largest file of a bundle, 4 GiB: the archive's own limit without extensions.
-pub const FILE_MAX_BYTES: u64 = 1 << 32;
+pub(crate) const FILE_MAX_BYTES: u64 = 1 << 32;
 
 /// Files of up to this size may have holes.
 #[cfg(target_os = "linux")]
@@ -22,7 +22,7 @@ const HOLES_SHARE: u64 = 64;
 /// # Errors
 /// [`io::ErrorKind::InvalidData`] for anything else: a pipe would keep its reader waiting, a device
 /// may never end.
-pub fn check_plain(metadata: &Metadata, max_bytes: u64) -> io::Result<u64> {
+pub(crate) fn check_plain(metadata: &Metadata, max_bytes: u64) -> io::Result<u64> {
     let bytes = metadata.len();
     if metadata.is_file() && bytes <= max_bytes {
         return Ok(bytes);
@@ -52,7 +52,7 @@ fn check_holes(file: &File, metadata: &Metadata) -> io::Result<()> {
     Err(io::Error::new(io::ErrorKind::InvalidData, message))
 }
 
-/// Holes cannot be asked for here.
+/// Holes cannot be detected here.
 #[cfg(not(target_os = "linux"))]
 fn check_holes(_: &File, _: &Metadata) -> io::Result<()> {
     Ok(())
@@ -73,7 +73,7 @@ fn open_plain(path: &Path, max_bytes: u64) -> io::Result<(File, u64)> {
 ///
 /// # Errors
 /// What the system says; those of [`check_plain`]; a file of holes.
-pub fn read_plain(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
+pub(crate) fn read_plain(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     let (file, bytes) = open_plain(path, max_bytes)?;
     let mut content = Vec::new();
     content.try_reserve_exact(bytes as usize)?;
@@ -84,7 +84,7 @@ pub fn read_plain(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
 /// Size and SHA-256 of the plain file at `path`, links followed, read block by block.
 ///
 /// # Errors
-/// As [`read_plain`].
+/// As `read_plain`.
 pub fn digest_plain(path: &Path, max_bytes: u64) -> io::Result<(u64, String)> {
     let (file, bytes) = open_plain(path, max_bytes)?;
     sha256_of(file.take(bytes))

@@ -1,4 +1,4 @@
-//! Reading CSV tables: columns by name, every fault told with its line and column.
+//! Reading CSV tables: columns by name, every fault reported with its line and column.
 
 use std::io::Read;
 
@@ -6,7 +6,7 @@ use csv::{ByteRecord, ReaderBuilder, Trim};
 
 use super::table::{CURRENT_COLUMNS, CurrentRow, POINT_COLUMNS, PointRow};
 
-/// No more faults than this are told.
+/// No more faults than this are reported.
 const MAX_FAULTS: usize = 20;
 
 /// What is wrong with a table.
@@ -48,7 +48,7 @@ fn whole(name: &str, source: impl Read) -> Result<Vec<u8>, TableError> {
     Ok(text)
 }
 
-/// Lines of rows, from 1. The reader's own count stands before the blank lines above a row.
+/// Lines of rows, from 1. The reader's own count is that before the blank lines above a row.
 struct Line<'a> {
     text: &'a [u8],
     at: usize,
@@ -64,7 +64,7 @@ impl<'a> Line<'a> {
         }
     }
 
-    /// The line of the row that begins at `byte` or after the blank lines there; rows are asked for
+    /// The line of the row that begins at `byte` or after the blank lines there; rows are requested
     /// in order.
     fn of_row(&mut self, byte: u64) -> u64 {
         let byte = usize::try_from(byte).unwrap_or(usize::MAX);
@@ -82,7 +82,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Reads the wanted columns of a CSV file, in the wanted order; other columns are passed over.
+/// Reads the requested columns of a CSV file, in the requested order; other columns are passed over.
 /// A byte order mark, CRLF and blanks around cells are tolerated.
 ///
 /// # Errors
@@ -95,11 +95,11 @@ pub fn read_columns(
     read_numbered(name, source, wanted).map(|(columns, _)| columns)
 }
 
-/// As [`read_columns`]; besides the line of every row, for messages about what the numbers mean.
+/// As [`read_columns`], with the line of every row, for messages about what the numbers mean.
 ///
 /// # Errors
 /// As [`read_columns`].
-pub fn read_numbered(
+pub(crate) fn read_numbered(
     name: &str,
     source: impl Read,
     wanted: &[&str],
@@ -210,7 +210,7 @@ pub fn read_positions(name: &str, source: impl Read) -> Result<Vec<[f64; 3]>, Ta
 ///
 /// # Errors
 /// As [`read_columns`].
-pub fn read_points(name: &str, source: impl Read) -> Result<Vec<PointRow>, TableError> {
+pub(crate) fn read_points(name: &str, source: impl Read) -> Result<Vec<PointRow>, TableError> {
     let columns = read_columns(name, source, &POINT_COLUMNS)?;
     Ok((0..columns[0].len())
         .map(|row| PointRow {
@@ -226,7 +226,7 @@ pub fn read_points(name: &str, source: impl Read) -> Result<Vec<PointRow>, Table
 ///
 /// # Errors
 /// As [`read_columns`].
-pub fn read_currents(name: &str, source: impl Read) -> Result<Vec<CurrentRow>, TableError> {
+pub(crate) fn read_currents(name: &str, source: impl Read) -> Result<Vec<CurrentRow>, TableError> {
     let (columns, lines) = read_numbered(name, source, &CURRENT_COLUMNS)?;
     (0..columns[0].len())
         .map(|row| {

@@ -1,4 +1,4 @@
-//! What rendering with position feedback needs besides the map, as arrays of `map.npz`: the
+//! What rendering with position feedback needs in addition to the map, as arrays of `map.npz`: the
 //! heights on their grid, the static currents, and the coils' circuit.
 //!
 //! `height_x_m`, `height_y_m`, `height_m` `[y, x]` and `has_height` `[y, x]` (1 where there is a
@@ -6,8 +6,8 @@
 //! `inductance_h` `[coil, coil]`, and `voltage_v` (no dimension) where the supply's is known. All
 //! are f64, the flags too, so that loaders of older bundles pass over them. New in schema 1.2.
 
+use super::array_check::{BEYOND, LARGEST, NpzError, all_within, bad, check_nodes};
 use super::manifest::PointsGrid;
-use super::npz::{BEYOND, LARGEST, NpzError, all_within, bad, check_nodes};
 use super::table::PointRow;
 
 pub(super) const HEIGHT_X: &str = "height_x_m";

@@ -10,7 +10,7 @@ const BLOCK_BYTES: usize = 64 << 10;
 /// How a position was answered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Answer {
-    /// The force commanded is the wanted one.
+    /// The force commanded is the requested one.
     Ok,
     /// The limits of the currents allow only the nearest force.
     Saturated,

@@ -168,7 +168,7 @@ impl Scan {
     }
 }
 
-/// Which columns say what current flowed: the column, and its coil where the name tells it.
+/// Which columns say what current flowed: the column, and its coil where the name states it.
 fn drive_columns(header: &[&str], coils: usize) -> Result<Vec<(String, Option<usize>)>, String> {
     let numbered: Vec<(String, Option<usize>)> = header
         .iter()

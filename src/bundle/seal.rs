@@ -11,7 +11,7 @@ use super::artefact::sha256_hex;
 use super::json::{JsonError, to_json};
 
 /// The key of the seal.
-pub const SEAL: &str = "record_sha256";
+pub(crate) const SEAL: &str = "record_sha256";
 
 /// How the text of an object ends.
 const END: &[u8] = b"\n}\n";
@@ -35,7 +35,7 @@ pub fn sealed(text: Vec<u8>) -> Vec<u8> {
 
 /// Whether `text` ends with the seal of what is before it.
 #[must_use]
-pub fn is_sealed(text: &[u8]) -> bool {
+pub(crate) fn is_sealed(text: &[u8]) -> bool {
     let length = line(b"").len() + END.len();
     let Some(start) = text.len().checked_sub(length) else {
         return false;

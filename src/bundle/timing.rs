@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::json::to_json;
 
 /// Larger files hold no seconds.
-pub const BYTES_MAX: u64 = 1 << 20;
+pub(crate) const BYTES_MAX: u64 = 1 << 20;
 
 /// Seconds of one stage; `timing.json` of a bundle is a list of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -31,7 +31,7 @@ pub struct ReplayTiming {
 
 /// Whether these are the bytes of one of the above, to the last.
 #[must_use]
-pub fn is_ours(bytes: &[u8]) -> bool {
+pub(crate) fn is_ours(bytes: &[u8]) -> bool {
     fn same<T: Serialize>(read: serde_json::Result<T>, bytes: &[u8]) -> bool {
         read.is_ok_and(|value| to_json(&value).is_ok_and(|written| written == bytes))
     }

@@ -6,7 +6,7 @@ use super::read_table::{TableError, read_numbered};
 use super::table::{Column, write_columns};
 
 /// Columns of a trajectory.
-pub const TRAJECTORY_COLUMNS: [&str; 4] = ["t_s", "x_m", "y_m", "z_m"];
+pub(crate) const TRAJECTORY_COLUMNS: [&str; 4] = ["t_s", "x_m", "y_m", "z_m"];
 
 /// Positions of the magnet's centre over time; times never decrease.
 #[derive(Debug, Clone, PartialEq, Default)]

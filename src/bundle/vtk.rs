@@ -14,7 +14,7 @@ const EVEN: f64 = 1e-9;
 ///
 /// # Errors
 /// The writer's; `InvalidData` for an axis whose nodes are not equally spaced.
-pub fn write_vti(out: &mut dyn Write, map: &MapArrays) -> io::Result<()> {
+pub(crate) fn write_vti(out: &mut dyn Write, map: &MapArrays) -> io::Result<()> {
     let axes = [("x_m", &*map.x_m), ("y_m", &*map.y_m), ("z_m", &*map.z_m)];
     let mut steps = [0.0; 3];
     for (step, (name, nodes)) in steps.iter_mut().zip(axes) {

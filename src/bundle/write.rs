@@ -14,9 +14,10 @@ use super::json::to_json;
 use super::lambda_file::LambdaFile;
 use super::mag_manip::{HEAD, Multipoles, VectorField, write_multipoles, write_vector_field};
 use super::manifest::{MadeWith, Manifest, MapSidecar};
+use super::map_table::write_map;
 use super::npz::{MapArrays, to_npz};
 use super::seal::to_record;
-use super::table::{CurrentRow, PointRow, write_currents, write_map, write_points};
+use super::table::{CurrentRow, PointRow, write_currents, write_points};
 use super::timing::StageSeconds;
 use super::vtk::write_vti;
 
@@ -159,7 +160,7 @@ fn overwrite_bundle(
     Overwrite::new(force, target.join("manifest.json"), inputs).made_with(&options)
 }
 
-/// Which formats of a map are wanted beside `map.npz`.
+/// Which formats of a map are requested beside `map.npz`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MapFormats {
     /// `map.csv`.
@@ -227,7 +228,7 @@ fn overwrite_map(
         .protecting(protected)
 }
 
-/// Of files in the map's folder its sidecar tells; others are replaced by the same bytes alone.
+/// Files in the map's folder are listed by its sidecar; others are replaced by the same bytes alone.
 fn overwrite_beside(path: &Path, folder: &Path, of_map: Overwrite) -> Overwrite {
     if name_in(folder, path).is_some() {
         of_map
@@ -335,7 +336,7 @@ pub fn write_map_and(
     Ok(sidecar)
 }
 
-/// Writes a JSON result that tells its own `inputs`.
+/// Writes a JSON result that states its own `inputs`.
 ///
 /// # Errors
 /// [`WriteError`].

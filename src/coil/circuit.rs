@@ -10,7 +10,7 @@ use fluxform_design::{Coil, Wire};
 use fluxform_field::winding::Winding;
 
 /// Time constants after which a current counts as settled.
-pub const SETTLING_TIME_CONSTANTS: f64 = 5.0;
+pub(crate) const SETTLING_TIME_CONSTANTS: f64 = 5.0;
 
 /// Turns that fit, layers stacked squarely: (OD - ID)/2/d x L/d, not rounded.
 #[must_use]

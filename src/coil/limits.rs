@@ -355,7 +355,7 @@ impl LimitName {
 
     /// Whether it follows from geometry and cannot be blamed on a limit that was set.
     #[must_use]
-    pub fn is_geometry(self) -> bool {
+    pub(crate) fn is_geometry(self) -> bool {
         self.is_equality() || matches!(self, Self::OneLayer | Self::OneTurn | Self::Axis)
     }
 }

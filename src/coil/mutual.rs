@@ -67,7 +67,7 @@ pub fn mutual_inductance_h(winding: &Winding, distance_m: f64) -> f64 {
 /// As [`mutual_inductance_h`], with the estimate of its relative error: at most `tolerance`, or as
 /// far as the finest rule carries.
 #[must_use]
-pub fn estimated_mutual_inductance_h(
+pub(crate) fn estimated_mutual_inductance_h(
     winding: &Winding,
     distance_m: f64,
     tolerance: f64,

@@ -16,7 +16,7 @@ use std::sync::OnceLock;
 
 use fluxform_numerics::gauss;
 
-/// How exactly the integrals are wanted.
+/// How exact the integrals must be.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Accuracy {
     /// Relative error of every integral; held by the tests against `coil::inductance`.

@@ -1,9 +1,9 @@
-//! Where the coils of an array stand, and whether they overlap.
+//! Where the coils of an array are, and whether they overlap.
 
 use fluxform_base::units::m_from_mm;
 
 /// Most coils of an array.
-pub const COILS_MAX: usize = 10_000;
+pub(crate) const COILS_MAX: usize = 10_000;
 
 /// Relative slack within which two lengths are taken as equal: touching is not overlapping.
 pub const TOUCHING: f64 = 1e-9;

@@ -14,7 +14,7 @@ use super::source;
 /// The columns, in the order of the usual header.
 const COLUMNS: [&str; 2] = ["b_t", "h_a_per_m"];
 
-/// A table that is wrong throughout is told of no more often than this.
+/// At most so many faults of one table are reported.
 const FAULTS_MAX: usize = 20;
 /// After so many faults reading stops.
 const FOUND_MAX: usize = 1000;
@@ -137,7 +137,7 @@ fn span_of(text: &str, record: &StringRecord) -> Range<usize> {
     start..end
 }
 
-/// Where the two columns stand; none, and a fault, where the header is another one.
+/// The places of the two columns; none, and a fault, where the header is another one.
 fn header(
     record: &StringRecord,
     span: &Range<usize>,

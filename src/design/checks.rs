@@ -6,8 +6,8 @@ use std::ops::Range;
 
 use super::array::{TOUCHING, overlaps};
 use super::diagnostics::Fault;
+use super::draft::{Draft, Need};
 use super::message_text::{number, twelve_digits};
-use super::parse::{Draft, Need};
 use super::reader::{Located, Sink};
 use super::sections::{CoilDraft, CoreDraft, Layout, WireDraft};
 use super::values::OneOrMany;
@@ -15,7 +15,7 @@ use fluxform_base::units::{COPPER_TEMPERATURE_COEFFICIENT_PER_K, REFERENCE_TEMPE
 use fluxform_numerics::axis::Axis;
 
 /// Most map values, coils times workspace nodes: 8 GB of doubles.
-pub const MAP_VALUES_MAX: f64 = 1e9;
+pub(crate) const MAP_VALUES_MAX: f64 = 1e9;
 
 /// A core longer than this many times the coil's larger size is no plausible one.
 const CORE_LENGTH_PLAUSIBLE: f64 = 20.0;
@@ -231,7 +231,7 @@ fn array_overlap(draft: &Draft, need: Need, sink: &Sink) {
         placed(sink, need.array, key, span, message, help);
     };
     match &draft.array.layout {
-        // The next coil stands in the next column, or in the next row of a single column.
+        // The next coil is in the next column, or in the next row of a single column.
         Layout::Grid(grid, pitch)
             if grid.rows * grid.columns > 1 && exceeds(outer, pitch.value) =>
         {
@@ -420,7 +420,7 @@ fn magnet_in_core(draft: &Draft, footprint: [&Axis; 2], z: &Located<Axis>, sink:
     }
 }
 
-/// The cores' top, where it stands above `lowest` within `margin` of the workspace's footprint.
+/// The cores' top, where it is above `lowest` within `margin` of the workspace's footprint.
 fn core_top_inside(draft: &Draft, [x, y]: [&Axis; 2], lowest: f64, margin: f64) -> Option<f64> {
     let core = draft.core.as_ref()?;
     let radius = draft.coil.as_ref()?.inner.value / 2.0 - core.clearance.value;

@@ -46,7 +46,7 @@ pub struct Fault {
     pub message: String,
     /// What to do about it.
     pub help: Option<String>,
-    /// Bytes of the source text it stands at; `None` where there is no text.
+    /// Its bytes in the source text; `None` where there is no text.
     pub span: Option<Range<usize>>,
 }
 
@@ -157,7 +157,7 @@ impl Faults {
     pub fn new(path: &Path, source: &str, mut list: Vec<Fault>) -> Self {
         for fault in &mut list {
             fault.span = fault.span.take().map(|span| within(source, span));
-            // Names and values of the document stand in them.
+            // They contain names and values of the document.
             fault.key = escaped(&fault.key, usize::MAX);
             fault.message = visible(&fault.message).into_owned();
             fault.help = fault.help.take().map(|help| visible(&help).into_owned());
@@ -194,7 +194,7 @@ impl Faults {
         self.list.iter().any(|f| f.severity == Severity::Error)
     }
 
-    /// Where `fault` stands; `None` where it has no place in the text.
+    /// The place of `fault`; `None` where it has no place in the text.
     #[must_use]
     pub fn place(&self, fault: &Fault) -> Option<Place> {
         fault

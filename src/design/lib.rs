@@ -18,11 +18,11 @@
 //! assert_eq!(coil.length_m, 0.04);
 //! assert_eq!(design.array.positions_m, [[0.0, 0.0]]);
 //!
-//! // Both mistakes are told at once, each with the key that is at fault.
+//! // Both mistakes are reported at once, each with the key that is at fault.
 //! let wrong = text.replace("12.0", "32.0").replace("length_mm", "lenght_mm");
 //! let faults = Design::from_toml(&wrong, Path::new("one.toml"), Need::PROBE).unwrap_err();
-//! let told = faults.to_string();
-//! assert!(told.contains("lenght_mm") && told.contains("length_mm"), "{told}");
+//! let report = faults.to_string();
+//! assert!(report.contains("lenght_mm") && report.contains("length_mm"), "{report}");
 //! # Ok(())
 //! # }
 //! ```
@@ -31,7 +31,9 @@ pub mod array;
 pub mod bh_table;
 mod checks;
 pub mod diagnostics;
+mod draft;
 pub mod gauge;
+pub mod keys;
 mod limits;
 pub mod message_text;
 pub mod model;
@@ -48,6 +50,6 @@ pub use rule::BODY_MM;
 pub use sections::{SEED_SIDE_MM, axis_m};
 
 pub use diagnostics::{Fault, Faults, InvalidDocument, Severity};
+pub use draft::Need;
 pub use limits::Limits;
 pub use model::*;
-pub use parse::Need;

@@ -9,7 +9,7 @@ use fluxform_numerics::axis::Axis;
 const NEAR: f64 = 0.6;
 
 /// Longest piece of the user's text that a message repeats, characters.
-pub const QUOTED_MAX: usize = 60;
+pub(crate) const QUOTED_MAX: usize = 60;
 
 /// Longest piece of a file that another document names and that is no table, characters: enough to
 /// recognise a misspelt header, too little to publish a file that was named by mistake or malice.

@@ -16,7 +16,7 @@ pub struct Design {
     pub wire: Wire,
     /// The steel core; `None` for an air coil.
     pub core: Option<Core>,
-    /// Where the coils stand.
+    /// Where the coils are.
     pub array: Array,
     /// The finger's magnet.
     pub magnet: Magnet,

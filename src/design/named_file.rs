@@ -29,13 +29,6 @@ pub enum NamedFileError {
     /// States more bytes than are read of such a file.
     #[error("the file is larger than {0} bytes")]
     TooLarge(u64),
-    /// Holds very many zero bytes in a row.
-    #[error(
-        "the file holds more than {} MiB of zero bytes in a row: it was not written to its end, or \
-         its length is a lie; export or download it again",
-        MOST_ZEROS >> 20
-    )]
-    Zeros,
     /// Holds fewer or more bytes than it states.
     #[error("found a file that changes, or one that the system makes up (as in /sys)")]
     OtherLength,
@@ -68,13 +61,7 @@ pub fn read(path: &Path, max_bytes: u64) -> Result<Vec<u8>, NamedFileError> {
     bytes
         .try_reserve_exact(usize::try_from(stated).unwrap_or(usize::MAX))
         .map_err(io::Error::from)?;
-    let mut guarded = ZeroGuard::new(file).take(stated + 1);
-    if let Err(error) = guarded.read_to_end(&mut bytes) {
-        return Err(match guarded.get_ref().too_many() {
-            true => NamedFileError::Zeros,
-            false => error.into(),
-        });
-    }
+    file.take(stated + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 == stated {
         Ok(bytes)
     } else {
@@ -82,44 +69,46 @@ pub fn read(path: &Path, max_bytes: u64) -> Result<Vec<u8>, NamedFileError> {
     }
 }
 
-/// Ends a reading once [`MOST_ZEROS`] bytes in a row are 0: no format holds so many, but files do
-/// that were never written to their end, or whose length is a lie (sparse files).
-#[derive(Debug)]
-pub struct ZeroGuard<R> {
-    source: R,
-    zeros: usize,
-}
+/// Bytes that are read between two looks.
+const PIECE: u64 = 1 << 20;
 
-/// Most bytes in a row that may be 0.
-const MOST_ZEROS: usize = 16 << 20;
-
-impl<R> ZeroGuard<R> {
-    /// Around a source.
-    pub fn new(source: R) -> Self {
-        Self { source, zeros: 0 }
-    }
-
-    fn too_many(&self) -> bool {
-        self.zeros > MOST_ZEROS
-    }
-}
-
-impl<R: Read> Read for ZeroGuard<R> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        // Short enough that a part without zeros ends a run.
-        let most = buffer.len().min(1 << 20);
-        let count = self.source.read(&mut buffer[..most])?;
-        let zeros = buffer[..count].iter().rev().take_while(|byte| **byte == 0);
-        let zeros = zeros.count();
-        self.zeros = if zeros == count {
-            self.zeros + zeros
-        } else {
-            zeros
-        };
-        if self.too_many() {
-            return Err(io::Error::other(NamedFileError::Zeros));
+/// The same; `watch` sees every piece as it is read, and ends the reading by false: then there is
+/// no result.
+///
+/// # Errors
+/// [`NamedFileError`].
+pub fn read_watched(
+    path: &Path,
+    max_bytes: u64,
+    watch: &mut dyn FnMut(&[u8]) -> bool,
+) -> Result<Option<Vec<u8>>, NamedFileError> {
+    let (mut file, stated) = open(path, max_bytes)?;
+    let mut bytes = Vec::new();
+    loop {
+        let from = bytes.len();
+        // What is never read is never held: room is made as the file turns out to be one.
+        if bytes.capacity() == from {
+            let room = (stated + 1 - from as u64).min((from as u64).max(PIECE));
+            bytes
+                .try_reserve_exact(usize::try_from(room).unwrap_or(usize::MAX))
+                .map_err(io::Error::from)?;
         }
-        Ok(count)
+        let left = stated + 1 - from as u64;
+        (&mut file).take(left.min(PIECE)).read_to_end(&mut bytes)?;
+        if bytes.len() == from {
+            break;
+        }
+        if !watch(&bytes[from..]) {
+            return Ok(None);
+        }
+        if bytes.len() as u64 > stated {
+            break;
+        }
+    }
+    if bytes.len() as u64 == stated {
+        Ok(Some(bytes))
+    } else {
+        Err(NamedFileError::OtherLength)
     }
 }
 
@@ -150,38 +139,6 @@ mod tests {
         );
         assert_eq!(said(root, 9), "found a directory");
         assert!(said(&root.join("none"), 9).starts_with("cannot read the file: "));
-    }
-
-    /// Two gigabytes of nothing were read whole before they were refused.
-    #[test]
-    fn a_file_that_claims_gigabytes_of_nothing_is_left_after_a_few_megabytes() {
-        struct Endless(usize);
-        impl Read for Endless {
-            fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-                buffer.fill(0);
-                if self.0 == 0 {
-                    buffer[0] = b's';
-                }
-                self.0 += buffer.len();
-                Ok(buffer.len())
-            }
-        }
-        let mut guard = ZeroGuard::new(Endless(0));
-        let mut bytes = Vec::new();
-        let error = (&mut guard)
-            .take(2 << 30)
-            .read_to_end(&mut bytes)
-            .unwrap_err();
-        assert!(
-            error.to_string().contains("16 MiB of zero bytes"),
-            "{error}"
-        );
-        assert!(guard.source.0 < 2 * MOST_ZEROS);
-        let mut few = vec![0; MOST_ZEROS];
-        few.extend(b"end");
-        bytes.clear();
-        ZeroGuard::new(&few[..]).read_to_end(&mut bytes).unwrap();
-        assert_eq!(bytes.len(), few.len());
     }
 
     #[test]

@@ -4,69 +4,14 @@ use std::path::Path;
 
 use super::checks;
 use super::diagnostics::{Faults, InvalidDocument};
-use super::limits::{self, Limits};
+use super::draft::{Draft, Need};
 use super::model::{Array, Coil, Core, Coupling, Design, Magnet, Steel, Supply, Wire, Workspace};
-use super::reader::{Located, Section, Sink, read_document};
-use super::sections::{self, ArrayDraft, CoilDraft, CoreDraft, Layout, MagnetDraft};
+use super::reader::{Sink, read_document};
+use super::sections::{self, CoilDraft, CoreDraft, Layout, MagnetDraft};
 use super::sections::{SupplyDraft, WireDraft, WorkspaceDraft, axis_m};
 use super::source;
 use super::values::OneOrMany;
 use fluxform_base::units::m_from_mm;
-
-/// What a command needs of a design. What it does not place may overlap: then that is a warning.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Need {
-    /// The coil as given: `[coil]` is required.
-    pub coil: bool,
-    /// The coils beside each other: they must not overlap.
-    pub array: bool,
-    /// The magnet at the target height: it must not overlap winding or core.
-    pub target: bool,
-    /// The workspace grid: it must lie above the windings and the cores.
-    pub workspace: bool,
-}
-
-impl Need {
-    /// `evaluate`.
-    pub const EVALUATE: Self = Self {
-        coil: true,
-        array: true,
-        target: true,
-        workspace: false,
-    };
-    /// `probe`.
-    pub const PROBE: Self = Self {
-        coil: true,
-        array: true,
-        target: false,
-        workspace: false,
-    };
-    /// `map`.
-    pub const MAP: Self = Self {
-        coil: true,
-        array: true,
-        target: false,
-        workspace: true,
-    };
-    /// `lambda`.
-    pub const LAMBDA: Self = Self::PROBE;
-    /// `calibrate`.
-    pub const CALIBRATE: Self = Self::MAP;
-    /// `optimize`.
-    pub const OPTIMIZE: Self = Self {
-        coil: false,
-        array: false,
-        target: true,
-        workspace: false,
-    };
-    /// `sweep plan`: each design of the sweep is checked when it runs.
-    pub const SWEEP: Self = Self {
-        coil: false,
-        array: false,
-        target: false,
-        workspace: false,
-    };
-}
 
 impl Design {
     /// The design that `text` describes, and the warnings about it. `path` names it in messages
@@ -87,7 +32,7 @@ impl Design {
     }
 
     /// Whether every key of `text` is known and every value of its kind and within its bounds;
-    /// whether the parts fit together is not asked.
+    /// whether the parts fit together is not checked.
     ///
     /// # Errors
     /// Every fault found.
@@ -108,43 +53,7 @@ impl Design {
     }
 }
 
-/// The sections as read, in the file's units.
-#[derive(Debug)]
-pub(super) struct Draft {
-    name: Option<String>,
-    pub(super) coil: Option<CoilDraft>,
-    pub(super) wire: WireDraft,
-    pub(super) core: Option<CoreDraft>,
-    pub(super) array: ArrayDraft,
-    pub(super) magnet: MagnetDraft,
-    pub(super) supply: SupplyDraft,
-    limits: Limits,
-    pub(super) target_height: Located<f64>,
-    pub(super) workspace: WorkspaceDraft,
-}
-
 impl Draft {
-    fn read(root: &mut Section<'_>, need: Need) -> Self {
-        if need.coil && !root.has("coil") {
-            root.missing(
-                "coil",
-                "add [coil] with inner_diameter_mm, outer_diameter_mm, length_mm",
-            );
-        }
-        Self {
-            name: root.name(),
-            coil: sections::coil(root.section("coil")),
-            wire: sections::wire(root.section("wire")),
-            core: sections::core(root.section("core")),
-            array: sections::array(root.section("array")),
-            magnet: sections::magnet(root.section("magnet")),
-            supply: sections::supply(root.section("supply")),
-            limits: limits::read(root.section("limits")),
-            target_height: sections::target_height_mm(root.section("target")),
-            workspace: sections::workspace(root.section("workspace")),
-        }
-    }
-
     /// The design in SI; `None` where an error stands in the way.
     fn design(self, path: &Path, sink: &Sink) -> Option<Design> {
         if sink.has_errors() {

@@ -15,9 +15,10 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::diagnostics::{Fault, Faults, InvalidDocument, Severity};
+use super::keys::{Key, Keys, Without};
 use super::message_text::{QUOTED_MAX, escaped, nearest, quoted};
 
-/// A value and the bytes it stands at (those of its section where it is a default).
+/// A value and its bytes in the text (those of its section where it is a default).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Located<T> {
     /// The value.
@@ -26,27 +27,30 @@ pub struct Located<T> {
     pub span: Range<usize>,
 }
 
-/// The faults found so far.
+/// The faults so far, and the keys where they are listed.
 #[derive(Debug, Default)]
-pub struct Sink(RefCell<Vec<Fault>>);
+pub struct Sink {
+    faults: RefCell<Vec<Fault>>,
+    keys: Option<Keys>,
+}
 
 impl Sink {
     /// Adds a fault.
     pub fn add(&self, fault: Fault) {
-        self.0.borrow_mut().push(fault);
+        self.faults.borrow_mut().push(fault);
     }
 
     /// True when one of the faults is an error.
     #[must_use]
     pub fn has_errors(&self) -> bool {
-        self.0
+        self.faults
             .borrow()
             .iter()
             .any(|f| f.severity == Severity::Error)
     }
 }
 
-/// Of larger texts only the first syntax error is told.
+/// Of larger texts only the first syntax error is reported.
 const EVERY_ERROR_BYTES: usize = 64 << 10;
 
 /// Reads the document `text` with `read`, which takes the root section and the sink.
@@ -75,11 +79,22 @@ pub fn read_document<T>(
         root.finish();
     }
     let refused = sink.has_errors();
-    let faults = Faults::new(path, text, sink.0.into_inner());
+    let faults = Faults::new(path, text, sink.faults.into_inner());
     match value {
         Some(value) if !refused => Ok((value, faults)),
         _ => Err(InvalidDocument { faults }),
     }
+}
+
+/// The keys that `read` asks for when it reads `text`, in their order and without meanings.
+pub fn list_keys(text: &str, read: impl FnOnce(&mut Section<'_>)) -> Vec<Key> {
+    let (table, _) = parsed(text);
+    let sink = Sink {
+        keys: Some(Keys::default()),
+        ..Sink::default()
+    };
+    read(&mut Section::root(table.get_ref(), &sink));
+    sink.keys.map_or_else(Vec::new, Keys::into_inner)
 }
 
 /// The document's table and its errors: every one of a text of usual size, the first of a large one,
@@ -109,8 +124,8 @@ pub struct Section<'a> {
     known: Vec<&'static str>,
 }
 
-/// A value of the document and where it stands.
-pub(super) type Found<'a> = &'a Spanned<DeValue<'a>>;
+/// A value of the document and its place.
+pub(super) type ValueRef<'a> = &'a Spanned<DeValue<'a>>;
 
 impl<'a> Section<'a> {
     fn root(table: &'a DeTable<'a>, sink: &'a Sink) -> Self {
@@ -162,7 +177,7 @@ impl<'a> Section<'a> {
 
     /// The dotted path of `key`.
     #[must_use]
-    pub fn path_of(&self, key: &str) -> String {
+    pub(crate) fn path_of(&self, key: &str) -> String {
         if self.path.is_empty() {
             key.to_owned()
         } else {
@@ -172,7 +187,7 @@ impl<'a> Section<'a> {
 
     /// The bytes of `key`'s value, or of the section where it is absent.
     #[must_use]
-    pub fn span_of(&self, key: &str) -> Range<usize> {
+    pub(crate) fn span_of(&self, key: &str) -> Range<usize> {
         let found = self.table.and_then(|table| table.get(key));
         found.map_or(self.span.clone(), Spanned::span)
     }
@@ -190,6 +205,26 @@ impl<'a> Section<'a> {
     pub fn missing(&self, key: &str, help: &str) {
         let fault = Fault::error(self.path_of(key), "this key is required and missing");
         self.sink.add(fault.at(&self.span).help(help));
+    }
+
+    /// Lists a key, where keys are listed: what may be written, and what holds without it.
+    pub(super) fn list(
+        &self,
+        name: &'static str,
+        value: impl FnOnce() -> (String, String),
+        default: impl FnOnce() -> Without,
+    ) {
+        if let Some(keys) = &self.sink.keys {
+            let (value, range) = value();
+            keys.add(Key {
+                section: self.path.clone(),
+                name,
+                value,
+                range,
+                default: default(),
+                meaning: "",
+            });
+        }
     }
 
     /// Accepts `keys` without reading them.
@@ -224,7 +259,7 @@ impl<'a> Section<'a> {
         })
     }
 
-    pub(super) fn found(&mut self, key: &'static str) -> Option<Found<'a>> {
+    pub(super) fn found(&mut self, key: &'static str) -> Option<ValueRef<'a>> {
         if !self.known.contains(&key) {
             self.known.push(key);
         }

@@ -36,6 +36,18 @@ impl Bound {
         }
     }
 
+    /// In a table: `> 0`; empty where any number will do.
+    pub(crate) fn symbols(self) -> String {
+        match self {
+            Self::Any => String::new(),
+            Self::Positive | Self::Limit => "> 0".to_owned(),
+            Self::NotNegative => ">= 0".to_owned(),
+            Self::NotPositive => "<= 0".to_owned(),
+            Self::AtLeast(least) => format!(">= {}", number(least)),
+            Self::Within(least, most) => format!("{} to {}", number(least), number(most)),
+        }
+    }
+
     fn words(self, unit: &str) -> String {
         match self {
             Self::Any => format!("any number{}", spaced(unit)),

@@ -15,7 +15,7 @@ use fluxform_numerics::axis::Axis;
 const ABSOLUTE_ZERO_C: f64 = -273.15;
 
 /// Knee of low-carbon steel that is described by its permeability alone, T.
-pub const LOW_CARBON_KNEE_T: f64 = 1.5;
+pub(crate) const LOW_CARBON_KNEE_T: f64 = 1.5;
 
 /// Resistivity of copper at 20 C, ohm m.
 const COPPER_RESISTIVITY_OHM_M: f64 = 1.68e-8;
@@ -150,7 +150,7 @@ pub fn core(mut s: Section<'_>) -> Option<CoreDraft> {
 pub enum Layout {
     /// One coil at the origin.
     Single,
-    /// A grid, and where its pitch stands.
+    /// A grid, and the place of its pitch.
     Grid(ArrayGrid, Located<f64>),
     /// A list, mm.
     Listed(Vec<Located<[f64; 2]>>),
@@ -264,9 +264,9 @@ pub fn magnet(mut s: Section<'_>) -> MagnetDraft {
                 1.1579e6,
             )
             .value,
-        polarity: s.choice("polarity", &polarities).unwrap_or(Polarity::Repel),
-        model: s.choice("model", &models).unwrap_or(MagnetModel::Dipole),
-        tilt_deg: s.tuple("tilt_deg", &tilt).map_or([0.0; 2], |t| t.value),
+        polarity: s.choice_or_first("polarity", &polarities),
+        model: s.choice_or_first("model", &models),
+        tilt_deg: s.tuple("tilt_deg", &tilt),
         passive_force: s.flag_or("passive_force", false),
     };
     s.finish();
@@ -283,17 +283,9 @@ pub struct SupplyDraft {
 }
 
 pub fn supply(mut s: Section<'_>) -> SupplyDraft {
-    let or = |given: Option<Located<OneOrMany>>, default, span| {
-        given.unwrap_or(Located {
-            value: OneOrMany::One(default),
-            span,
-        })
-    };
-    let most = s.one_or_many("current_max_a", &AMPERE.bound(Bound::NotNegative));
-    let least = s.one_or_many("current_min_a", &AMPERE.bound(Bound::NotPositive));
     let draft = SupplyDraft {
-        current_max_a: or(most, 2.0, s.span()),
-        current_min_a: or(least, 0.0, s.span()),
+        current_max_a: s.one_or_many("current_max_a", &AMPERE.bound(Bound::NotNegative), 2.0),
+        current_min_a: s.one_or_many("current_min_a", &AMPERE.bound(Bound::NotPositive), 0.0),
         total_current_max_a: s
             .number("total_current_max_a", &AMPERE.bound(Bound::NotNegative))
             .map(|i| i.value),
@@ -306,7 +298,7 @@ pub fn supply(mut s: Section<'_>) -> SupplyDraft {
 }
 
 /// Height of the magnet's centre, mm.
-pub fn target_height_mm(mut s: Section<'_>) -> Located<f64> {
+pub(crate) fn target_height_mm(mut s: Section<'_>) -> Located<f64> {
     let height = s.number_or("height_mm", &BODY_MM, 30.0);
     s.finish();
     height

@@ -8,7 +8,7 @@ use super::diagnostics::{Fault, InvalidDocument, place_of};
 use super::named_file::{self, NamedFileError};
 
 /// Largest document that is read, bytes (4 MiB): several times what ten thousand coils need.
-pub const DOCUMENT_MAX_BYTES: u64 = 4 << 20;
+pub(crate) const DOCUMENT_MAX_BYTES: u64 = 4 << 20;
 
 /// What a text is, for the messages about one that cannot be read.
 #[derive(Debug, Clone, Copy)]
@@ -61,9 +61,7 @@ fn not_a_table(error: &NamedFileError) -> Fault {
         NamedFileError::NoLength => {
             expected().help("begin with the line b_t,h_a_per_m, then one row a point")
         }
-        NamedFileError::Zeros | NamedFileError::OtherLength => {
-            expected().help("name a file on a disk")
-        }
+        NamedFileError::OtherLength => expected().help("name a file on a disk"),
         NamedFileError::TooLarge(_) => Fault::error("", error.to_string()).help(TABLE.too_large),
     }
 }

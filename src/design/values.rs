@@ -5,8 +5,9 @@ use toml::de::DeValue;
 
 use super::diagnostics::Fault;
 use super::gauge::awg_mm;
+use super::keys::Without;
 use super::message_text::{axis_fault, nearest, number, quoted};
-use super::reader::{Found, Located, Section};
+use super::reader::{Located, Section, ValueRef};
 use super::rule::{Bound, Rule};
 use fluxform_numerics::axis::Axis;
 
@@ -31,6 +32,7 @@ pub enum OneOrMany {
 impl<'a> Section<'a> {
     /// A number; `None` where absent, NaN where at fault.
     pub fn number(&mut self, key: &'static str, rule: &Rule) -> Option<Located<f64>> {
+        self.list(key, || of_rule("number", rule), || Without::Nothing);
         let found = self.found(key)?;
         let value = self.checked(&self.path_of(key), found, rule);
         self.warn_of_slip(key, &[value], rule, found);
@@ -39,6 +41,8 @@ impl<'a> Section<'a> {
 
     /// A number with a default.
     pub fn number_or(&mut self, key: &'static str, rule: &Rule, default: f64) -> Located<f64> {
+        let without = || Without::Value(number(default));
+        self.list(key, || of_rule("number", rule), without);
         let span = self.span();
         self.number(key, rule).unwrap_or(Located {
             value: default,
@@ -48,6 +52,7 @@ impl<'a> Section<'a> {
 
     /// A number that must be given.
     pub fn required(&mut self, key: &'static str, rule: &Rule) -> Located<f64> {
+        self.list(key, || of_rule("number", rule), || Without::Refused);
         self.number(key, rule).unwrap_or_else(|| {
             let unit = if rule.unit.is_empty() {
                 "a number"
@@ -64,6 +69,11 @@ impl<'a> Section<'a> {
 
     /// A list of numbers, at least one; `None` where absent, empty where at fault.
     pub fn numbers(&mut self, key: &'static str, rule: &Rule) -> Option<Located<Vec<f64>>> {
+        self.list(
+            key,
+            || of_rule("list of numbers", rule),
+            || Without::Nothing,
+        );
         let found = self.found(key)?;
         let items = self.items(key, found, "a list of numbers");
         let values = self.checked_items(key, items, rule);
@@ -71,23 +81,36 @@ impl<'a> Section<'a> {
         Some(located(values, found))
     }
 
-    /// One number, or a list of numbers; `None` where absent, an empty list where at fault.
-    pub fn one_or_many(&mut self, key: &'static str, rule: &Rule) -> Option<Located<OneOrMany>> {
-        let found = self.found(key)?;
-        let value = match found.get_ref() {
-            DeValue::Array(_) => OneOrMany::Many(self.numbers(key, rule)?.value),
-            _ => OneOrMany::One(self.number(key, rule)?.value),
-        };
-        Some(located(value, found))
-    }
-
-    /// Exactly `N` numbers; NaN where at fault.
-    pub fn tuple<const N: usize>(
+    /// One number, or a list of numbers, with a default; an empty list where at fault.
+    pub fn one_or_many(
         &mut self,
         key: &'static str,
         rule: &Rule,
-    ) -> Option<Located<[f64; N]>> {
-        let found = self.found(key)?;
+        default: f64,
+    ) -> Located<OneOrMany> {
+        let value = || of_rule("number or list of numbers", rule);
+        self.list(key, value, || Without::Value(number(default)));
+        let given = self.found(key).and_then(|found| {
+            let value = match found.get_ref() {
+                DeValue::Array(_) => OneOrMany::Many(self.numbers(key, rule)?.value),
+                _ => OneOrMany::One(self.number(key, rule)?.value),
+            };
+            Some(located(value, found))
+        });
+        given.unwrap_or(Located {
+            value: OneOrMany::One(default),
+            span: self.span(),
+        })
+    }
+
+    /// Exactly `N` numbers, zeros where absent; NaN where at fault.
+    pub fn tuple<const N: usize>(&mut self, key: &'static str, rule: &Rule) -> [f64; N] {
+        let value = || of_rule(&format!("{N} numbers"), rule);
+        let zeros = || Without::Value(format!("[{}]", ["0"; N].join(", ")));
+        self.list(key, value, zeros);
+        let Some(found) = self.found(key) else {
+            return [0.0; N];
+        };
         let mut values = [f64::NAN; N];
         let wanted = format!("a list of {N} numbers");
         let items = self.items(key, found, &wanted);
@@ -98,7 +121,7 @@ impl<'a> Section<'a> {
             let message = format!("expected {wanted}, found {}", items.len());
             self.fault(key, message, "write them in square brackets, with commas");
         }
-        Some(located(values, found))
+        values
     }
 
     /// A list of at most `most` pairs `[a, b]`, each with its place; empty where at fault.
@@ -108,6 +131,11 @@ impl<'a> Section<'a> {
         rule: &Rule,
         most: usize,
     ) -> Option<Vec<Located<[f64; 2]>>> {
+        self.list(
+            key,
+            || of_rule("list of pairs [x, y]", rule),
+            || Without::Nothing,
+        );
         let found = self.found(key)?;
         let items = self.items(key, found, "a list of pairs [x, y]");
         if items.len() > most {
@@ -129,7 +157,7 @@ impl<'a> Section<'a> {
         &self,
         key: &str,
         index: usize,
-        item: Found<'a>,
+        item: ValueRef<'a>,
         rule: &Rule,
     ) -> Option<Located<[f64; 2]>> {
         let path = format!("{}[{index}]", self.path_of(key));
@@ -150,7 +178,9 @@ impl<'a> Section<'a> {
     }
 
     /// A whole number of at least 1 with a default; `None` where at fault.
-    pub fn count_or(&mut self, key: &'static str, default: usize) -> Option<usize> {
+    pub(crate) fn count_or(&mut self, key: &'static str, default: usize) -> Option<usize> {
+        let value = || ("whole number".to_owned(), ">= 1".to_owned());
+        self.list(key, value, || Without::Value(default.to_string()));
         match self.found(key) {
             Some(found) => self.whole(&self.path_of(key), found),
             None => Some(default),
@@ -164,6 +194,11 @@ impl<'a> Section<'a> {
         rule: &Rule,
         default: Axis,
     ) -> Option<Located<Axis>> {
+        let without = || {
+            let ends = [default.from, default.to].map(number).join(", ");
+            Without::Value(format!("[{ends}, {}]", default.samples))
+        };
+        self.list(key, || of_rule("[from, to, samples]", rule), without);
         match self.found(key) {
             Some(found) => self.axis_in(key, found, rule),
             None => Some(Located {
@@ -173,7 +208,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    fn axis_in(&self, key: &str, found: Found<'a>, rule: &Rule) -> Option<Located<Axis>> {
+    fn axis_in(&self, key: &str, found: ValueRef<'a>, rule: &Rule) -> Option<Located<Axis>> {
         let items = self.items(key, found, "[from, to, samples]");
         let [from, to, samples] = items else {
             if !items.is_empty() {
@@ -206,6 +241,11 @@ impl<'a> Section<'a> {
 
     /// A text; `None` where absent or at fault.
     pub fn text(&mut self, key: &'static str) -> Option<Located<String>> {
+        self.list(
+            key,
+            || ("text".to_owned(), String::new()),
+            || Without::Nothing,
+        );
         let found = self.found(key)?;
         match found.get_ref() {
             DeValue::String(text) => Some(located(text.to_string(), found)),
@@ -217,7 +257,16 @@ impl<'a> Section<'a> {
     }
 
     /// A required text; `None` where absent or at fault.
-    pub fn required_text(&mut self, key: &'static str, help: &str) -> Option<Located<String>> {
+    pub(crate) fn required_text(
+        &mut self,
+        key: &'static str,
+        help: &str,
+    ) -> Option<Located<String>> {
+        self.list(
+            key,
+            || ("text".to_owned(), String::new()),
+            || Without::Refused,
+        );
         if !self.has(key) {
             self.missing(key, help);
         }
@@ -245,12 +294,32 @@ impl<'a> Section<'a> {
         None
     }
 
+    /// One of `options` by name, the first where absent or at fault.
+    ///
+    /// # Panics
+    /// If there are no options.
+    pub fn choice_or_first<T: Copy>(
+        &mut self,
+        key: &'static str,
+        options: &[(&'static str, T)],
+    ) -> T {
+        let (first, value) = options[0];
+        let without = || Without::Value(format!("`{first:?}`"));
+        self.list(key, || (choices(options), String::new()), without);
+        self.choice(key, options).unwrap_or(value)
+    }
+
     /// One of `options` by name; `None` where absent or at fault.
     pub fn choice<T: Copy>(
         &mut self,
         key: &'static str,
         options: &[(&'static str, T)],
     ) -> Option<T> {
+        self.list(
+            key,
+            || (choices(options), String::new()),
+            || Without::Nothing,
+        );
         let text = self.text(key)?;
         if let Some((_, value)) = options.iter().find(|(name, _)| *name == text.value) {
             return Some(*value);
@@ -273,6 +342,8 @@ impl<'a> Section<'a> {
 
     /// True or false; the default where absent or at fault.
     pub fn flag_or(&mut self, key: &'static str, default: bool) -> bool {
+        let value = || ("true or false".to_owned(), String::new());
+        self.list(key, value, || Without::Value(default.to_string()));
         match self.found(key).map(|found| (found, found.get_ref())) {
             None => default,
             Some((_, DeValue::Boolean(value))) => *value,
@@ -283,7 +354,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    fn items(&self, key: &str, found: Found<'a>, wanted: &str) -> &'a [Spanned<DeValue<'a>>] {
+    fn items(&self, key: &str, found: ValueRef<'a>, wanted: &str) -> &'a [Spanned<DeValue<'a>>] {
         match found.get_ref() {
             DeValue::Array(items) if items.is_empty() => {
                 self.fault(
@@ -312,7 +383,7 @@ impl<'a> Section<'a> {
     }
 
     /// The number, or NaN and a fault.
-    fn checked(&self, path: &str, found: Found<'a>, rule: &Rule) -> f64 {
+    fn checked(&self, path: &str, found: ValueRef<'a>, rule: &Rule) -> f64 {
         let value = match found.get_ref() {
             DeValue::String(text) if rule.gauges => awg_mm(text),
             other => float(other),
@@ -335,7 +406,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    fn whole(&self, path: &str, found: Found<'a>) -> Option<usize> {
+    fn whole(&self, path: &str, found: ValueRef<'a>) -> Option<usize> {
         let rule = Rule::any("").bound(Bound::AtLeast(1.0));
         let value = self.checked(path, found, &rule);
         if value.fract() == 0.0 && value <= COUNT_MAX {
@@ -351,7 +422,7 @@ impl<'a> Section<'a> {
     }
 
     /// Warns of the largest of `values`: a list in another unit is one slip.
-    fn warn_of_slip(&self, key: &str, values: &[f64], rule: &Rule, found: Found<'a>) {
+    fn warn_of_slip(&self, key: &str, values: &[f64], rule: &Rule, found: ValueRef<'a>) {
         let largest = values
             .iter()
             .copied()
@@ -361,13 +432,32 @@ impl<'a> Section<'a> {
         }
     }
 
-    pub(super) fn add_wrong_type(&self, path: &str, found: Found<'a>, wanted: &str) {
+    pub(super) fn add_wrong_type(&self, path: &str, found: ValueRef<'a>, wanted: &str) {
         let message = format!("expected {wanted}, found {}", described(found.get_ref()));
         self.sink.add(Fault::error(path, message).at(&found.span()));
     }
 }
 
-fn located<T>(value: T, found: Found<'_>) -> Located<T> {
+/// What a rule accepts, in words, and its range.
+fn of_rule(what: &str, rule: &Rule) -> (String, String) {
+    let gauge = if rule.gauges { ", or a gauge" } else { "" };
+    let unit = if rule.unit.is_empty() {
+        String::new()
+    } else {
+        format!(", {}", rule.unit)
+    };
+    (format!("{what}{unit}{gauge}"), rule.bound.symbols())
+}
+
+fn choices<T>(options: &[(&'static str, T)]) -> String {
+    let names: Vec<String> = options
+        .iter()
+        .map(|(name, _)| format!("`{name:?}`"))
+        .collect();
+    names.join(" or ")
+}
+
+fn located<T>(value: T, found: ValueRef<'_>) -> Located<T> {
     Located {
         value,
         span: found.span(),

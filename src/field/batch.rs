@@ -11,7 +11,7 @@ use fluxform_numerics::dispatch::{self, Kernel, LANES, Lanes};
 use fluxform_numerics::gauss;
 
 /// Points that share one quadrature rule; fixed, so that results do not depend on threads.
-pub const CHUNK: usize = 256;
+pub(crate) const CHUNK: usize = 256;
 /// More nodes than this on one panel cost more than the graded exact path is worth.
 const MAX_NODES: usize = 24;
 /// Constant of the error bound, relative to the largest |grad B| at the height.
@@ -21,7 +21,7 @@ const ROUNDING_SHARE: f64 = 0.1;
 
 /// What the batch gives a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Wanted {
+pub enum Quantities {
     /// dB_z/dz only.
     Gz,
     /// dB_z/dz, (dB_r/dz)/r and B_r/r: the whole gradient outside the conductor.
@@ -33,9 +33,9 @@ pub enum Wanted {
 pub struct Gradients {
     /// dB_z/dz, T/m/A.
     pub dbz_dz: Vec<f64>,
-    /// (dB_r/dz)/r = (dB_z/dr)/r, T/m^2/A; empty for [`Wanted::Gz`].
+    /// (dB_r/dz)/r = (dB_z/dr)/r, T/m^2/A; empty for [`Quantities::Gz`].
     pub dbr_dz_over_r: Vec<f64>,
-    /// B_r/r, T/m/A; empty for [`Wanted::Gz`].
+    /// B_r/r, T/m/A; empty for [`Quantities::Gz`].
     pub br_over_r: Vec<f64>,
 }
 
@@ -84,7 +84,7 @@ impl Winding {
     /// M = (1 + h rho / (2 c))^2 is the growth of a^2 on that ellipse about the panel's
     /// centre c and half-width h.
     #[must_use]
-    pub fn batch_rule(&self, extent: Extent, tolerance: f64) -> Option<BatchRule> {
+    pub(crate) fn batch_rule(&self, extent: Extent, tolerance: f64) -> Option<BatchRule> {
         let near_u = extent.z_m[0];
         if near_u <= 0.0 || !extent.z_m[1].is_finite() || !extent.r_m[1].is_finite() {
             return None;
@@ -129,14 +129,14 @@ impl Winding {
         r_m: &[f64],
         z_m: &[f64],
         tolerance: f64,
-        wanted: Wanted,
+        wanted: Quantities,
     ) -> Result<Gradients, OnEdge> {
         assert_eq!(r_m.len(), z_m.len(), "one height a radius");
         let mut out = Gradients {
             dbz_dz: vec![0.0; r_m.len()],
             ..Gradients::default()
         };
-        if wanted == Wanted::Gradient {
+        if wanted == Quantities::Gradient {
             out.dbr_dz_over_r = vec![0.0; r_m.len()];
             out.br_over_r = vec![0.0; r_m.len()];
         }
@@ -154,8 +154,8 @@ impl Winding {
                         z_m: z,
                         dbz_dz: &mut out.dbz_dz[range.clone()],
                         rest: match wanted {
-                            Wanted::Gz => None,
-                            Wanted::Gradient => Some((
+                            Quantities::Gz => None,
+                            Quantities::Gradient => Some((
                                 &mut out.dbr_dz_over_r[range.clone()],
                                 &mut out.br_over_r[range],
                             )),
@@ -172,7 +172,7 @@ impl Winding {
                             ..
                         } = self.field(r_m[index], z_m[index])?;
                         out.dbz_dz[index] = dbz_dz;
-                        if wanted == Wanted::Gradient {
+                        if wanted == Quantities::Gradient {
                             out.dbr_dz_over_r[index] = dbr_dz_over_r;
                             out.br_over_r[index] = br_over_r;
                         }

@@ -31,6 +31,7 @@ mod solid;
 use thiserror::Error;
 
 use super::dipole;
+use fluxform_numerics::vec3::{cross, dot, plus};
 
 /// A cylinder's size.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -137,7 +138,7 @@ pub enum NoRule {
     TooClose {
         /// Gap between magnet and source, m.
         gap_m: f64,
-        /// What was asked for.
+        /// What was requested.
         tolerance: f64,
     },
 }
@@ -262,7 +263,7 @@ impl MagnetRule {
             .iter()
             .zip(gradients_t_per_m)
             .fold([0.0; 3], |sum, (node, gradient)| {
-                add(sum, dipole::force_n(node.moment_a_m2, *gradient))
+                plus(sum, dipole::force_n(node.moment_a_m2, *gradient))
             })
     }
 
@@ -280,7 +281,7 @@ impl MagnetRule {
             [0.0; 3],
             |sum, ((node, field), gradient)| {
                 let lever = cross(node.offset_m, dipole::force_n(node.moment_a_m2, *gradient));
-                add(sum, add(cross(node.moment_a_m2, *field), lever))
+                plus(sum, plus(cross(node.moment_a_m2, *field), lever))
             },
         )
     }
@@ -317,7 +318,7 @@ impl MagnetRule {
 
     /// How much a rule of the next lower degree on the same nodes differs in `force_n`, as the
     /// length of the difference, N: an estimate of that rule's error, so more than this one's.
-    /// `None` where no lower rule is at hand; the bound then stands alone.
+    /// `None` where no lower rule is at hand; then there is the bound alone.
     #[must_use]
     pub fn force_of_orders_differs_n(&self, gradients_t_per_m: &[[[f64; 3]; 3]]) -> Option<f64> {
         self.expect(gradients_t_per_m.len());
@@ -328,7 +329,7 @@ impl MagnetRule {
                 .zip(gradients_t_per_m)
                 .fold([0.0; 3], |sum, (factor, gradient)| {
                     let share = self.moment_a_m2.map(|m| factor * m);
-                    add(sum, dipole::force_n(share, *gradient))
+                    plus(sum, dipole::force_n(share, *gradient))
                 });
         let fine = self.force_n(gradients_t_per_m);
         let difference: [f64; 3] = std::array::from_fn(|i| fine[i] - coarse[i]);
@@ -357,20 +358,4 @@ fn direction(moment_a_m2: [f64; 3]) -> [f64; 3] {
     let scaled = moment_a_m2.map(|v| v / largest);
     let norm = dot(scaled, scaled).sqrt();
     scaled.map(|v| v / norm)
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn add(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| a[i] + b[i])
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
 }

@@ -1,6 +1,6 @@
 //! What a map needs of an axisymmetric source, be it a winding alone or one with its core.
 
-use super::batch::{Gradients, Wanted};
+use super::batch::{Gradients, Quantities};
 use super::winding::{OnEdge, Winding};
 
 /// A source that is symmetric about the z axis, per ampere. Outside its conductors and cores the
@@ -16,7 +16,7 @@ pub trait AxialSource: Sync {
         r_m: &[f64],
         z_m: &[f64],
         tolerance: f64,
-        wanted: Wanted,
+        wanted: Quantities,
     ) -> Result<Gradients, OnEdge>;
 
     /// B_z per ampere, T/A, to `tolerance` relative to the largest |B| at each point's height.
@@ -35,7 +35,7 @@ impl AxialSource for Winding {
         r_m: &[f64],
         z_m: &[f64],
         tolerance: f64,
-        wanted: Wanted,
+        wanted: Quantities,
     ) -> Result<Gradients, OnEdge> {
         Self::gradients(self, r_m, z_m, tolerance, wanted)
     }

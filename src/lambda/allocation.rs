@@ -1,4 +1,4 @@
-//! The allocation of eq. 8: at one position, the currents of least power that give a wanted force.
+//! The allocation of eq. 8: at one position, the currents of least power that give a requested force.
 //!
 //! With force per ampere `G_i`, resistance `R_i` and limits `l_i <= 0 <= u_i`:
 //!
@@ -18,7 +18,7 @@
 /// Residuals up to this share of the terms they are sums of are rounding.
 const ROUNDING: f64 = 1e-14;
 /// Forces per ampere that differ by no more than this share of the largest count as equal where
-/// only the largest force is asked for.
+/// only the largest force is requested.
 const TIED: f64 = 1e-13;
 /// Forces per ampere below this share of the largest are none.
 const NOTHING: f64 = 1e-60;
@@ -36,7 +36,7 @@ pub struct Allocator {
     conductance_s: Vec<f64>,
     /// Infinite where there is no such limit.
     total_a: f64,
-    /// Force per ampere, over the largest and turned so that the wanted force is upward.
+    /// Force per ampere, over the largest and turned so that the requested force is upward.
     row: Vec<f64>,
     /// Coefficients of a second row.
     ones: Vec<f64>,
@@ -44,7 +44,7 @@ pub struct Allocator {
     tail: Vec<f64>,
 }
 
-/// Whether the wanted force was within reach.
+/// Whether the requested force was within reach.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reach {
     /// The currents give it.
@@ -56,7 +56,7 @@ pub enum Reach {
 /// What an allocation says of itself: `I_i = clamp(mu (G_i - center) / R_i + nu / R_i)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Allocation {
-    /// Whether the wanted force was within reach.
+    /// Whether the requested force was within reach.
     pub reach: Reach,
     /// sum G_i I_i, N.
     pub force_n: f64,
@@ -184,17 +184,17 @@ impl Allocator {
     }
 
     /// The allocation for `self.row` and a target above 0.
-    fn in_row(&mut self, target: f64, currents: &mut [f64]) -> Found {
+    fn in_row(&mut self, target: f64, currents: &mut [f64]) -> RowSolution {
         if let Some(mu) = self.sorted(Row::Force, target) {
             let sum = self.fill(Multipliers::of_force(mu), currents).sum;
             if sum <= self.total_a {
-                return Found::reached(Multipliers::of_force(mu));
+                return RowSolution::reached(Multipliers::of_force(mu));
             }
         }
         let (most, threshold) = self.most(currents);
         if target >= most * (1.0 - ROUNDING) {
             let beyond = target > most * (1.0 + ROUNDING);
-            return Found {
+            return RowSolution {
                 reach: if beyond {
                     Reach::Saturated
                 } else {
@@ -209,14 +209,14 @@ impl Allocator {
         // Within rounding of the largest force no piece may be found: then that force is nearer.
         if fault > 1.0 - target / most {
             self.most(currents);
-            return Found {
+            return RowSolution {
                 reach: Reach::Reached,
                 mu: f64::INFINITY,
                 center: threshold,
                 nu: 0.0,
             };
         }
-        Found::reached(found)
+        RowSolution::reached(found)
     }
 
     /// The multiplier at which a row's sum meets `target` > 0; `None` where it cannot.
@@ -649,14 +649,14 @@ impl Careful {
     }
 }
 
-struct Found {
+struct RowSolution {
     reach: Reach,
     mu: f64,
     center: f64,
     nu: f64,
 }
 
-impl Found {
+impl RowSolution {
     fn reached(at: Multipliers) -> Self {
         Self {
             reach: Reach::Reached,

@@ -12,7 +12,7 @@ const CHUNK_POINTS: usize = 4096;
 /// What the forces at given currents are worth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Check {
-    /// Mean square of wanted minus given force, N^2.
+    /// Mean square of requested minus given force, N^2.
     pub mean_square_n2: f64,
     /// Largest absolute difference, N.
     pub worst_n: f64,

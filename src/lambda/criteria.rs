@@ -156,7 +156,7 @@ impl<'a> Comparison<'a> {
     }
 
     /// The same from the errors alone: the start of the first stretch on which e* leaves e_0.
-    pub fn linear_by_error(&self) -> Option<Num> {
+    pub(crate) fn linear_by_error(&self) -> Option<Num> {
         let visible = Num::of(VISIBLE) * self.mean_square;
         self.stretches().iter().find_map(|stretch| {
             let length = match stretch.end {

@@ -1,6 +1,6 @@
 //! A force constant rendered with position feedback: currents of their own at every point (eq. 8).
 //!
-//! Static currents serve all points at once; with feedback each point is asked alone. The forces
+//! Static currents serve all points at once; with feedback each point is solved alone. The forces
 //! within reach of the limits at a point are an interval, both ends of which are fractional
 //! knapsacks over box and sum:
 //!
@@ -20,7 +20,7 @@ use super::problem::{ForceProblem, ProblemError, Settings};
 /// Points handled together: fixed, so that sums do not depend on the number of threads.
 const CHUNK_POINTS: usize = 4096;
 /// A coil is active above this share of its limit.
-pub const ACTIVE: f64 = 1e-6;
+pub(crate) const ACTIVE: f64 = 1e-6;
 /// Force errors below this share of the terms they are sums of are rounding.
 const ROUNDING: f64 = 1e-12;
 
@@ -89,10 +89,10 @@ pub enum NoLambda {
     /// All heights are zero.
     #[error("no force is wanted at any point")]
     NothingWanted,
-    /// No force of the wanted sign.
+    /// No force of the requested sign.
     #[error("no force in the wanted direction is within reach at point {0}")]
     TooWeak(usize),
-    /// The least force exceeds what is wanted there at every lambda that another point allows.
+    /// The least force exceeds what is requested there at every lambda that another point allows.
     #[error(
         "point {strong} feels no less than lambda {least} N/m asks for, \
          and point {weak} no more than {most} N/m does"

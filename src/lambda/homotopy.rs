@@ -24,9 +24,9 @@ pub(super) struct Bounds {
     pub total: Num,
 }
 
-/// Where a variable stands on a piece.
+/// The state of a variable on a piece.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Place {
+pub(super) enum VariableState {
     /// Both bounds are equal.
     Pinned,
     /// At its lower bound.
@@ -43,7 +43,7 @@ pub(super) enum Place {
 #[derive(Debug, Clone)]
 pub(super) struct Piece {
     pub start: Num,
-    pub place: Vec<Place>,
+    pub place: Vec<VariableState>,
     pub x: Vec<Num>,
     pub x_rate: Vec<Num>,
     /// Target minus fit.
@@ -78,7 +78,7 @@ pub(super) struct Target {
 /// Values at one lambda, with the rates by which they were reached.
 struct State {
     lambda: Num,
-    place: Vec<Place>,
+    place: Vec<VariableState>,
     x: Vec<Num>,
     x_rate: Vec<Num>,
     gradient: Vec<Num>,
@@ -92,17 +92,17 @@ fn norm(v: &[Num]) -> Num {
 
 impl Piece {
     /// Values of the variables at `lambda`.
-    pub fn x_at(&self, lambda: Num) -> Vec<Num> {
+    pub(crate) fn x_at(&self, lambda: Num) -> Vec<Num> {
         advance(&self.x, &self.x_rate, lambda - self.start)
     }
 
     /// Residual at `lambda`.
-    pub fn residual_at(&self, lambda: Num) -> Vec<Num> {
+    pub(crate) fn residual_at(&self, lambda: Num) -> Vec<Num> {
         advance(&self.residual, &self.residual_rate, lambda - self.start)
     }
 
     /// Reduced gradients at `lambda`.
-    pub fn gradient_at(&self, lambda: Num) -> Vec<Num> {
+    pub(crate) fn gradient_at(&self, lambda: Num) -> Vec<Num> {
         advance(&self.gradient, &self.gradient_rate, lambda - self.start)
     }
 }
@@ -172,7 +172,7 @@ impl Follower<'_> {
         trace
     }
 
-    fn place_of_zero(&self, i: usize) -> Place {
+    fn place_of_zero(&self, i: usize) -> VariableState {
         let lower = self.bounds.lower[i];
         let value = if self.model.weight.is_some() && i + 1 == self.model.count() {
             self.bounds.total
@@ -180,10 +180,10 @@ impl Follower<'_> {
             Num::ZERO
         };
         match (lower, self.bounds.upper[i]) {
-            (Some(lower), Some(upper)) if upper <= lower => Place::Pinned,
-            (Some(lower), _) if value <= lower => Place::Low,
-            (_, Some(upper)) if value >= upper => Place::High,
-            _ => Place::Free,
+            (Some(lower), Some(upper)) if upper <= lower => VariableState::Pinned,
+            (Some(lower), _) if value <= lower => VariableState::Low,
+            (_, Some(upper)) if value >= upper => VariableState::High,
+            _ => VariableState::Free,
         }
     }
 
@@ -237,7 +237,8 @@ impl Follower<'_> {
                 .iter()
                 .zip(&state.place)
                 .map(|(role, place)| {
-                    *role != Role::Fixed && matches!(place, Place::Low | Place::High)
+                    *role != Role::Fixed
+                        && matches!(place, VariableState::Low | VariableState::High)
                 })
                 .collect();
             let direction = cone::solve(self.model, &roles, &likely, &target.slope);
@@ -270,10 +271,10 @@ impl Follower<'_> {
         let slack = self.model.weight.as_ref().map(|_| self.model.count() - 1);
         (0..self.model.count())
             .map(|i| match state.place[i] {
-                Place::Pinned => Role::Fixed,
-                Place::Low | Place::High => {
+                VariableState::Pinned => Role::Fixed,
+                VariableState::Low | VariableState::High => {
                     let (role, sign) = match state.place[i] {
-                        Place::Low => (Role::Rising, Num::ONE),
+                        VariableState::Low => (Role::Rising, Num::ONE),
                         _ => (Role::Falling, -Num::ONE),
                     };
                     let distance = -(sign * state.gradient[i]);
@@ -281,7 +282,7 @@ impl Follower<'_> {
                     let near = (grain * size * state.gradient_scale[i]).larger(soon * approach);
                     if distance <= near { role } else { Role::Fixed }
                 }
-                Place::Free | Place::Held => {
+                VariableState::Free | VariableState::Held => {
                     let down = self.bounds.lower[i].map(|l| state.x[i] - l);
                     let up = self.bounds.upper[i].map(|u| u - state.x[i]);
                     let both = up.zip(down).map(|(up, down)| size.smaller(up + down));
@@ -297,7 +298,7 @@ impl Follower<'_> {
                         Role::Falling
                     } else if down.is_some_and(|down| down <= near(-state.x_rate[i])) {
                         Role::Rising
-                    } else if state.place[i] == Place::Free {
+                    } else if state.place[i] == VariableState::Free {
                         Role::Free
                     } else {
                         Role::Held
@@ -316,23 +317,23 @@ impl Follower<'_> {
         direction: &cone::Direction,
     ) -> Piece {
         let factor = &direction.factor;
-        let place: Vec<Place> = (0..roles.len())
+        let place: Vec<VariableState> = (0..roles.len())
             .map(|i| match roles[i] {
                 Role::Fixed => state.place[i],
-                _ if factor.contains(i) => Place::Free,
-                Role::Free | Role::Held => Place::Held,
-                Role::Rising => Place::Low,
-                Role::Falling => Place::High,
+                _ if factor.contains(i) => VariableState::Free,
+                Role::Free | Role::Held => VariableState::Held,
+                Role::Rising => VariableState::Low,
+                Role::Falling => VariableState::High,
             })
             .collect();
         let still = |i: usize| match place[i] {
-            Place::Pinned => Num::ZERO,
-            Place::Low => self.bounds.lower[i].unwrap_or(state.x[i]),
-            Place::High => self.bounds.upper[i].unwrap_or(state.x[i]),
-            Place::Free | Place::Held => state.x[i],
+            VariableState::Pinned => Num::ZERO,
+            VariableState::Low => self.bounds.lower[i].unwrap_or(state.x[i]),
+            VariableState::High => self.bounds.upper[i].unwrap_or(state.x[i]),
+            VariableState::Free | VariableState::Held => state.x[i],
         };
         let fixed = (0..roles.len())
-            .filter(|&i| place[i] != Place::Free)
+            .filter(|&i| place[i] != VariableState::Free)
             .map(|i| (i, still(i)));
         let (rest, total) = self
             .model
@@ -341,7 +342,7 @@ impl Follower<'_> {
         let at = |base: Num, rate: Num| base + state.lambda * rate;
         let x = (0..roles.len())
             .map(|i| {
-                if place[i] == Place::Free {
+                if place[i] == VariableState::Free {
                     at(base.x[i], direction.rate[i])
                 } else {
                     still(i)
@@ -350,7 +351,7 @@ impl Follower<'_> {
             .collect();
         let x_rate = (0..roles.len())
             .map(|i| {
-                if place[i] == Place::Free {
+                if place[i] == VariableState::Free {
                     direction.rate[i]
                 } else {
                     Num::ZERO
@@ -403,7 +404,7 @@ impl Follower<'_> {
         };
         for (i, &role) in roles.iter().enumerate() {
             match piece.place[i] {
-                Place::Free => {
+                VariableState::Free => {
                     let rate = piece.x_rate[i];
                     let rates = &piece.x_rate;
                     let still = direction
@@ -422,9 +423,11 @@ impl Follower<'_> {
                         _ => {}
                     }
                 }
-                Place::Low | Place::High if role == Role::Fixed || !direction.blocked[i] => {
+                VariableState::Low | VariableState::High
+                    if role == Role::Fixed || !direction.blocked[i] =>
+                {
                     let (sign, role) = match piece.place[i] {
-                        Place::Low => (Num::ONE, Role::Rising),
+                        VariableState::Low => (Num::ONE, Role::Rising),
                         _ => (-Num::ONE, Role::Falling),
                     };
                     let rate = sign * piece.gradient_rate[i];
@@ -440,7 +443,7 @@ impl Follower<'_> {
 
     /// Largest relative violation of the optimality conditions at the pieces' starts, and of
     /// the residual's continuity: its square is the error that it leaves in e*.
-    pub fn flaw(&self, trace: &Trace, offset: Option<&[Num]>, slope: &[Num]) -> f64 {
+    pub(crate) fn flaw(&self, trace: &Trace, offset: Option<&[Num]>, slope: &[Num]) -> f64 {
         let mut worst = Num::ZERO;
         for (k, piece) in trace.pieces.iter().enumerate() {
             let size = offset.map_or(Num::ZERO, norm) + piece.start * norm(slope);
@@ -458,8 +461,8 @@ impl Follower<'_> {
                 }
                 let scale = piece.gradient_scale[i];
                 match piece.place[i] {
-                    Place::Low if scale > Num::ZERO => see(piece.gradient[i] / scale),
-                    Place::High if scale > Num::ZERO => see(-(piece.gradient[i] / scale)),
+                    VariableState::Low if scale > Num::ZERO => see(piece.gradient[i] / scale),
+                    VariableState::High if scale > Num::ZERO => see(-(piece.gradient[i] / scale)),
                     _ => {}
                 }
             }

@@ -55,7 +55,7 @@ impl Model {
     }
 
     /// Weight of variable `i` in the equality, 0 without one.
-    pub fn weight_of(&self, i: usize) -> Num {
+    pub(crate) fn weight_of(&self, i: usize) -> Num {
         self.weight.as_ref().map_or(Num::ZERO, |w| w[i])
     }
 
@@ -148,7 +148,7 @@ impl Factor {
 
     /// Takes the listed variables by the part of their columns that lies outside the span
     /// of those taken, largest share first, as long as it is above `share`.
-    pub fn pivoted(model: &Model, variables: &[usize], share: f64) -> Self {
+    pub(crate) fn pivoted(model: &Model, variables: &[usize], share: f64) -> Self {
         let mut taken = Vec::new();
         let mut factor = Self::new(model, &taken);
         // Each turn takes one more of them.
@@ -301,7 +301,7 @@ impl Factor {
     }
 
     /// Natural sizes of the reduced gradients per unit of residual.
-    pub fn gradient_scales(&self, model: &Model) -> Vec<Num> {
+    pub(crate) fn gradient_scales(&self, model: &Model) -> Vec<Num> {
         let shift = self
             .pivot
             .map_or(Num::ZERO, |p| model.norm[p] / model.weight_of(p));
@@ -310,9 +310,9 @@ impl Factor {
             .collect()
     }
 
-    /// Size of a rate that rounding leaves where variable `i` should stand still; `blur` is
+    /// Size of a rate that rounding leaves where variable `i` should not move; `blur` is
     /// the same relative to the target.
-    pub fn rate_noise(
+    pub(crate) fn rate_noise(
         &self,
         model: &Model,
         i: usize,
@@ -332,7 +332,7 @@ impl Factor {
 
     /// The same of the rates: a residual of the given share of the
     /// target is felt with the square of the condition.
-    pub fn blur(&self, model: &Model, residual_share: f64) -> f64 {
+    pub(crate) fn blur(&self, model: &Model, residual_share: f64) -> f64 {
         (self.noise(model) * (1.0 + residual_share / self.independence)).min(MOST_BLUR)
     }
 }

@@ -5,7 +5,7 @@ use std::fmt;
 use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
-use super::homotopy::{Bounds, Piece, Place, Trace};
+use super::homotopy::{Bounds, Piece, Trace, VariableState};
 use super::model::Model;
 use super::power;
 use super::problem::ForceProblem;
@@ -58,10 +58,10 @@ pub struct Breakpoint {
     pub events: Vec<Event>,
 }
 
-/// Relative differences up to this are rounding in a path that is told.
+/// Relative differences up to this are rounding in a path that is returned.
 const TIE: f64 = 1e-14;
 
-/// Where a coil or the sum stands between two breakpoints.
+/// The state of a coil or the sum between two breakpoints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Standing {
     Lower,
@@ -357,7 +357,7 @@ impl Path {
 
 impl Limits {
     /// Standing of every coil, and of the sum if it is limited, without currents.
-    pub fn at_zero(&self) -> Vec<Standing> {
+    pub(crate) fn at_zero(&self) -> Vec<Standing> {
         let of_coil = |i: usize| match (self.lower_a[i] < 0.0, self.upper_a[i] > 0.0) {
             (true, true) => Standing::Between,
             (true, false) => Standing::Upper,
@@ -427,15 +427,15 @@ impl Limits {
     }
 }
 
-/// A free variable that rests on a bound stands there, although its multiplier is zero.
-fn standing_of(place: Place, x: Num, rate: Num, lower: Num, upper: Num) -> Standing {
+/// A free variable that rests on a bound is at that bound, although its multiplier is zero.
+fn standing_of(place: VariableState, x: Num, rate: Num, lower: Num, upper: Num) -> Standing {
     let rests_on =
         |bound: Num| rate == Num::ZERO && (x - bound).abs() <= Num::of(1e-14) * (upper - lower);
     match place {
-        Place::Low | Place::Pinned => Standing::Lower,
-        Place::High => Standing::Upper,
-        Place::Free | Place::Held if rests_on(lower) => Standing::Lower,
-        Place::Free | Place::Held if rests_on(upper) => Standing::Upper,
-        Place::Free | Place::Held => Standing::Between,
+        VariableState::Low | VariableState::Pinned => Standing::Lower,
+        VariableState::High => Standing::Upper,
+        VariableState::Free | VariableState::Held if rests_on(lower) => Standing::Lower,
+        VariableState::Free | VariableState::Held if rests_on(upper) => Standing::Upper,
+        VariableState::Free | VariableState::Held => Standing::Between,
     }
 }

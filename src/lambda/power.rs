@@ -9,7 +9,7 @@ use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
 use super::cone::{self, Role};
-use super::homotopy::{Bounds, Piece, Place};
+use super::homotopy::{Bounds, Piece, VariableState};
 use super::model::{Factor, Model};
 
 /// A variable that the dependences move by less than this share is not moved by them.
@@ -37,9 +37,9 @@ pub(super) fn least_power(
     };
     let open: Vec<usize> = (0..coils)
         .filter(|&i| match piece.place[i] {
-            Place::Pinned => false,
-            Place::Free | Place::Held => true,
-            Place::Low | Place::High => !sure(i),
+            VariableState::Pinned => false,
+            VariableState::Free | VariableState::Held => true,
+            VariableState::Low | VariableState::High => !sure(i),
         })
         .collect();
     let columns = open.iter().flat_map(|&i| model.column(i)).copied();

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 pub struct ForceProblem<'a> {
     /// Force per ampere of every coil at every point, N/A: row by row, one row a point.
     pub forces_n_per_a: &'a [f64],
-    /// Height of each point, m: the wanted force there is lambda times it.
+    /// Height of each point, m: the requested force there is lambda times it.
     pub height_m: &'a [f64],
     /// Force at each point without any current, N; `None`: none.
     pub offset_n: Option<&'a [f64]>,
@@ -43,9 +43,9 @@ const LEAST_REACH: f64 = 1e-20;
 pub struct Settings {
     /// The chosen force constant.
     pub criterion: Criterion,
-    /// w of the just-noticeable difference, relative to the RMS of the wanted force.
+    /// w of the just-noticeable difference, relative to the RMS of the requested force.
     pub jnd_weight: f64,
-    /// A force constant at which currents and errors are wanted besides, N/m.
+    /// A force constant at which currents and errors are also computed, N/m.
     pub at_n_per_m: Option<f64>,
 }
 

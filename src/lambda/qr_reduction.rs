@@ -211,7 +211,7 @@ impl Reduced {
 
     /// The same problem with every dependence that only rounding hides made exact, or `None`
     /// where there is none.
-    pub fn with_clean_dependences(&self) -> Option<Self> {
+    pub(crate) fn with_clean_dependences(&self) -> Option<Self> {
         let model = self.model(None);
         let coils: Vec<usize> = (0..self.coils).collect();
         let factor = Factor::pivoted(&model, &coils, HIDDEN_IN_ROUNDING);
@@ -248,17 +248,17 @@ impl Reduced {
     }
 
     /// `x_i = I_i 2^(this)`.
-    pub fn current_scale(&self, i: usize) -> i32 {
+    pub(crate) fn current_scale(&self, i: usize) -> i32 {
         self.scale[i] - self.force_scale
     }
 
     /// One unit of force in newtons.
-    pub fn force_unit_n(&self) -> f64 {
+    pub(crate) fn force_unit_n(&self) -> f64 {
         power_of_two(self.force_scale)
     }
 
     /// One unit of the target's direction in metres.
-    pub fn height_unit_m(&self) -> f64 {
+    pub(crate) fn height_unit_m(&self) -> f64 {
         power_of_two(self.scale[self.coils])
     }
 
@@ -306,7 +306,7 @@ impl Reduced {
 
     /// The problem without the drivers' size: without a limit on the sum, and of every coil's
     /// limits only a zero that keeps the driver from reversing is left.
-    pub fn unlimited(&self, problem: &ForceProblem) -> (Model, Bounds) {
+    pub(crate) fn unlimited(&self, problem: &ForceProblem) -> (Model, Bounds) {
         let directions = (0..self.coils).map(|i| problem.directions(i));
         let zero_unless = |goes: bool| (!goes).then_some(Num::ZERO);
         let bounds = Bounds {

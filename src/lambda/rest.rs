@@ -4,7 +4,7 @@
 //! which `(G'h)'I` is largest, and to the point of that face where `|G I|` is least. Without a limit
 //! on the sum the face is almost always a vertex, with one it is a vertex of a knapsack; where coils
 //! tie (a symmetric array under a symmetric object, the sum shared among them) it is larger, and
-//! currents stand still in its interior. Forces are known to their rounding: what it leaves of a tie
+//! currents do not move in its interior. Forces are known to their rounding: what it leaves of a tie
 //! would move currents at a lambda of one over that rounding. So the path ends at the first
 //! breakpoint whose currents `I_k` are as good as the minimiser from there on,
 //!

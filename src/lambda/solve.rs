@@ -28,9 +28,9 @@ const FLAW: f64 = 1e-8;
 pub enum Status {
     /// The path is exact.
     Solved,
-    /// All heights are zero: no force is wanted, no limit binds.
+    /// All heights are zero: no force is requested, no limit binds.
     NothingWanted,
-    /// No current within the limits' signs brings the force nearer to the wanted one.
+    /// No current within the limits' signs brings the force nearer to the requested one.
     NothingRendered,
     /// The path could not be followed to its end; numbers beyond its last breakpoint are not the minimum.
     Stalled,
@@ -71,7 +71,7 @@ pub struct Solution {
     pub maxmin_points: Vec<usize>,
     /// The force constant that the criterion chooses, with its currents.
     pub chosen: Option<OperatingPoint>,
-    /// The same at the force constant asked for besides.
+    /// The same at the additional force constant.
     pub at: Option<OperatingPoint>,
     /// Number of independent columns of forces.
     pub rank: usize,
@@ -151,7 +151,7 @@ impl Solved {
         (Num::dot(&residual, &residual) / (lambda * lambda * Num::dot(heights, heights))).to_f64()
     }
 
-    /// Whether both describe the same e*, as far as it is asked for.
+    /// Whether both describe the same e*, as far as it is requested.
     fn agrees_with(&self, other: &Self) -> bool {
         let starts = self
             .limited

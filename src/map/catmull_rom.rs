@@ -3,7 +3,7 @@
 
 /// A place on an axis: a cell and how far into it, 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct AxisPosition {
     /// The node before it.
     pub cell: usize,
     /// Part of the step beyond that node.
@@ -23,7 +23,7 @@ pub struct Stencil {
 
 /// The stencil of a place on an axis of at least four nodes.
 #[must_use]
-pub fn stencil(nodes: usize, place: Place) -> Stencil {
+pub fn stencil(nodes: usize, place: AxisPosition) -> Stencil {
     let start = place.cell.saturating_sub(1).min(nodes.saturating_sub(4));
     let t = place.part;
     // Hermite: value at either node, slope at either node; then their derivatives.
@@ -104,7 +104,7 @@ impl Nodes<'_> {
 mod tests {
     use super::*;
 
-    fn along(nodes: usize, place: Place, f: impl Fn(f64) -> f64) -> [f64; 2] {
+    fn along(nodes: usize, place: AxisPosition, f: impl Fn(f64) -> f64) -> [f64; 2] {
         let stencil = stencil(nodes, place);
         let sum = |weights: [f64; 4]| -> f64 {
             (0..4)
@@ -119,12 +119,12 @@ mod tests {
         let parabola = |x: f64| 0.7 * x * x - 1.3 * x + 0.4;
         let line = |x: f64| 0.7 - 1.3 * x;
         for part in [0.0, 0.3, 0.5, 0.8] {
-            let [value, slope] = along(7, Place { cell: 3, part }, parabola);
+            let [value, slope] = along(7, AxisPosition { cell: 3, part }, parabola);
             let x = 3.0 + part;
             assert!((value - parabola(x)).abs() < 1e-13);
             assert!((slope - (1.4 * x - 1.3)).abs() < 1e-13);
             for cell in [0, 5] {
-                let [value, slope] = along(7, Place { cell, part }, line);
+                let [value, slope] = along(7, AxisPosition { cell, part }, line);
                 assert!((value - line(cell as f64 + part)).abs() < 1e-13);
                 assert!((slope + 1.3).abs() < 1e-13);
             }
@@ -139,7 +139,7 @@ mod tests {
             (2.75, 7.5625, 20.70312),
             (5.75, 33.20312, 192.54688),
         ] {
-            let place = Place {
+            let place = AxisPosition {
                 cell: x as usize,
                 part: f64::fract(x),
             };

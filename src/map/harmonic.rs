@@ -136,7 +136,7 @@ fn rows(axis: &Spectral, points: &[f64]) -> Vec<f64> {
 impl Table {
     /// Number of points that a table of `extent` over sources below `top_m` would sample, about.
     #[must_use]
-    pub fn samples_needed(extent: Extent, top_m: f64, tolerance: f64) -> f64 {
+    pub(crate) fn samples_needed(extent: Extent, top_m: f64, tolerance: f64) -> f64 {
         let [bottom, top] = extent.z_m.map(|z| {
             let nodes = |[from, to]: [f64; 2]| {
                 Spectral::strip_nodes(from, to, z - top_m, tolerance).1 as f64
@@ -153,7 +153,7 @@ impl Table {
 
     /// The table of every drive of `sampler` in `extent`, whose lower end lies above the
     /// sampler's top, aiming at `tolerance` relative to the largest component at each height;
-    /// whether that is reached, a comparison must tell.
+    /// whether that is reached, only a comparison shows.
     ///
     /// # Errors
     /// The sampler's.

@@ -142,7 +142,7 @@ pub fn interpolation_error_by(
 }
 
 /// The coils nearest to the grid's centre and farthest from it, by index: the coils are alike,
-/// and where one stands decides whether its peak falls on inner cells or on the border's.
+/// and its place decides whether its peak falls on inner cells or on the border's.
 fn innermost_and_outermost(coils: &[PlacedCoil], grid: &Grid) -> Vec<usize> {
     let middle = |nodes: &[f64]| 0.5 * (nodes[0] + nodes[nodes.len() - 1]);
     let (cx, cy) = (middle(&grid.x_m), middle(&grid.y_m));

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use super::tabulate::{Components, FieldMap, Grid, MapError, PlacedCoil};
 use fluxform_base::progress::Progress;
-use fluxform_field::batch::Wanted;
+use fluxform_field::batch::Quantities;
 use fluxform_field::source::AxialSource;
 use fluxform_numerics::chebyshev::{Evaluation, Layout, Scattered, Table};
 use fluxform_numerics::dispatch;
@@ -251,9 +251,9 @@ impl<'a> MeanField<'a> {
     ) -> Result<(), MapError> {
         let z_m = z_m + oz;
         let wanted = if self.count == 1 {
-            Wanted::Gz
+            Quantities::Gz
         } else {
-            Wanted::Gradient
+            Quantities::Gradient
         };
         // At one height the source, too, is a series in the radius.
         let farthest_m = self.radius_m + ox.hypot(oy);

@@ -1,7 +1,7 @@
-//! A field as point multipoles: where the sources stand, their coefficients by least squares, and
+//! A field as point multipoles: where the sources are, their coefficients by least squares, and
 //! how far the model is off elsewhere.
 //!
-//! Sources stand on the coils' axes below the top face, at depths that are multiples of the
+//! Sources lie on the coils' axes below the top face, at depths that are multiples of the
 //! windings' outer radius. Alone, a coil is axisymmetric and needs upright sources on its own axis.
 //! Among coupled cores the neighbours answer without that symmetry, so every axis carries upright
 //! sources of high order and tilted ones, whose directions share a cone: harmonics about the axis

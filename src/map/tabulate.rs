@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::radii::Radii;
 use fluxform_base::progress::{Interrupted, Progress};
-use fluxform_field::batch::Wanted;
+use fluxform_field::batch::Quantities;
 use fluxform_field::frame::to_cartesian;
 use fluxform_field::source::AxialSource;
 use fluxform_field::winding::{AxialField, OnEdge};
@@ -195,10 +195,10 @@ pub fn tabulate(
 /// One height: the field at every distinct distance, per ampere.
 struct Level {
     dbz_dz: Vec<f64>,
-    /// Empty unless the gradient is wanted.
+    /// Empty unless the gradient is requested.
     dbr_dz_over_r: Vec<f64>,
     br_over_r: Vec<f64>,
-    /// Empty unless the field is wanted.
+    /// Empty unless the field is requested.
     b_z: Vec<f64>,
     tabulated: bool,
 }
@@ -250,8 +250,8 @@ impl Level {
         tolerance: f64,
     ) -> Result<Self, OnEdge> {
         let wanted = match components {
-            Components::Gz => Wanted::Gz,
-            Components::Gradient | Components::All => Wanted::Gradient,
+            Components::Gz => Quantities::Gz,
+            Components::Gradient | Components::All => Quantities::Gradient,
         };
         let heights = vec![z_m; radii_m.len()];
         let gradients = source.gradients(radii_m, &heights, tolerance, wanted)?;

@@ -8,7 +8,7 @@
 pub trait Kernel {
     /// Result.
     type Output;
-    /// The computation. `FMA` tells whether fused multiply-add is an instruction here; without
+    /// The computation. `FMA`: whether fused multiply-add is an instruction here; without
     /// it `f64::mul_add` is a slow library call.
     fn run<const FMA: bool>(self) -> Self::Output;
 }

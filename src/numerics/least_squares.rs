@@ -1,4 +1,4 @@
-//! Linear least squares of few columns, by singular values, with degenerate directions told.
+//! Linear least squares of few columns, by singular values, with degenerate directions reported.
 //!
 //! Minimises |b - A x|. Columns are divided by their lengths first, so that units do not decide what
 //! counts as small; directions whose singular value is below [`CUTOFF`] of the largest are not

@@ -23,3 +23,4 @@ pub mod refinement;
 pub mod ring_functions;
 pub mod small_quadratic;
 pub mod spectral;
+pub mod vec3;

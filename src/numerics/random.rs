@@ -57,7 +57,8 @@ impl Random {
 
     /// Of the standard normal distribution (Box and Muller).
     pub fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.unit()).ln()).sqrt();
+        // Never the logarithm of zero.
+        let radius = (-2.0 * (self.unit() + 1e-17).ln()).sqrt();
         radius * (std::f64::consts::TAU * self.unit()).cos()
     }
 }

@@ -5,6 +5,8 @@
 //! the first that satisfies all optimality conditions is the solution, without a tolerance on
 //! progress and without cycling.
 
+use crate::vec3::dot;
+
 /// One row a'd <= b, or a'd = b.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
@@ -33,13 +35,6 @@ const SINGULAR: f64 = 1e-13;
 /// Solutions for the rows' remainders. Each wins back the digits that the first one lost where rows
 /// are nearly parallel: twice those of their angle.
 const ROUNDS: usize = 3;
-
-/// a'b.
-#[must_use]
-#[inline]
-pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
 
 /// The minimiser; `None` where the rows contradict each other, or B is not positive definite.
 #[must_use]
@@ -155,7 +150,7 @@ impl Search<'_> {
 
 /// Solves a 3 x 3 system by elimination with complete row scaling; `None` where singular.
 #[must_use]
-pub fn solve3(mut m: [[f64; 3]; 3], mut r: [f64; 3]) -> Option<[f64; 3]> {
+pub(crate) fn solve3(mut m: [[f64; 3]; 3], mut r: [f64; 3]) -> Option<[f64; 3]> {
     let scale = m.map(|row| row.iter().fold(0.0_f64, |s, v| s.max(v.abs())));
     for (k, &size) in scale.iter().enumerate() {
         if !(size > 0.0 && size.is_finite()) {

@@ -23,7 +23,7 @@ use crate::RunError;
 use crate::bundle::manifest::{ArrayGeometry, CurrentLimits, MagnetSummary};
 use crate::coil::circuit::{self, Circuit};
 use crate::design::{Coil, Coupling, Design, MagnetModel, Polarity};
-use crate::field::batch::Wanted;
+use crate::field::batch::Quantities;
 use crate::field::dipole;
 use crate::field::magnet::{Cylinder, MagnetRule, Sources};
 use crate::field::source::AxialSource;
@@ -336,9 +336,9 @@ impl<'a> Scene<'a> {
         let coils = self.coils.len();
         let tilted = !rule.is_upright();
         let (wanted, parts) = if tilted {
-            (Wanted::Gradient, Parts::Gradient)
+            (Quantities::Gradient, Parts::Gradient)
         } else {
-            (Wanted::Gz, Parts::Gz)
+            (Quantities::Gz, Parts::Gz)
         };
         let share = match solved.steel {
             Steel::None => AIR_SHARE,

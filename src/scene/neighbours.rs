@@ -12,7 +12,7 @@ use super::working_point::{WorkingPoint, relative_difference};
 use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed};
 use crate::coil::mutual;
-use crate::field::batch::Wanted;
+use crate::field::batch::Quantities;
 use crate::field::steel::core_flux_density::peak_depth_m;
 use crate::field::steel::equivalent_dipoles::Parts;
 use crate::field::winding::KERNEL_ERROR;
@@ -204,7 +204,7 @@ fn working_point_facts(
         let r_m: Vec<f64> = places.iter().map(|p| (p[0] - x).hypot(p[1] - y)).collect();
         let own = scene
             .winding
-            .gradients(&r_m, &z_m, solved.tolerance, Wanted::Gz)?;
+            .gradients(&r_m, &z_m, solved.tolerance, Quantities::Gz)?;
         for (row, (air, linear)) in air.iter_mut().zip(&mut linear).enumerate() {
             *air += current * coil.gain * own.dbz_dz[row];
             *linear += current * coil.gain * steel[row];

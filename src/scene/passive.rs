@@ -20,8 +20,8 @@ pub const PASSIVE_TOLERANCE: f64 = 1e-3;
 
 /// The same where the pull is left out: how large it is matters to some digits only.
 pub const LEFT_OUT_TOLERANCE: f64 = 1e-2;
-/// Of it what tabulating the pull may add: digits that are reported are those of the pull itself.
-const TABLE_SHARE: f64 = 0.01;
+/// Of it what tabulating the pull may add.
+const TABLE_SHARE: f64 = 0.1;
 /// Most cores whose coupling is worth its memory and time where the pull is left out: both grow as
 /// powers of their number.
 const MOST_COUPLED: usize = 36;

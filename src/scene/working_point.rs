@@ -13,7 +13,7 @@ use crate::field::steel::axial_table::AxialTable;
 use crate::field::steel::bh_curve::BhCurve;
 use crate::field::steel::core_flux_density::peak_depth_m;
 use crate::field::steel::equivalent_dipoles::{ArraySources, Parts};
-use crate::field::steel::saturated::Status;
+use crate::field::steel::saturated::Convergence;
 use crate::field::steel::saturated_array::SaturatedArray;
 use crate::field::steel::saturated_coil::SaturatedCoil;
 use crate::map::Components;
@@ -118,7 +118,7 @@ impl WorkingPoint {
             lowest_m,
         )
         .map_err(|fault| RunError::Input(format!("[core] with a B-H curve: {fault}")))?;
-        if array.status == Status::Stalled {
+        if array.status == Convergence::Stalled {
             let most_a = currents_a.iter().fold(0.0_f64, |m, i| m.max(i.abs()));
             return Err(no_state(most_a));
         }

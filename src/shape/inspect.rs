@@ -112,9 +112,7 @@ impl MeshReport {
         bodies: &BodyOptions,
         progress: &dyn Progress,
     ) -> Result<Self, ShapeError> {
-        let format =
-            SurfaceFormat::of(path).ok_or_else(|| ShapeError::Format { path: path.into() })?;
-        let file = read_mesh(format, path, bodies, progress)?;
+        let (format, file) = read_mesh(path, bodies, progress)?;
         let coordinates = file.triangles.as_flattened().as_flattened().iter();
         let largest = coordinates.fold(0.0, |m: f64, c| m.max(c.abs()));
         if largest > FARTHEST {

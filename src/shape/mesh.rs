@@ -1,5 +1,7 @@
 //! A triangle soup in metres and the facts about it.
 
+pub(super) use fluxform_numerics::vec3::{cross, dot, minus};
+
 use crate::error::ShapeError;
 use crate::placement::Transform;
 use crate::step::NamedBody;
@@ -168,26 +170,4 @@ impl Mesh {
 
 fn has_area(&[a, b, c]: &Triangle) -> bool {
     cross(minus(b, a), minus(c, a)) != [0.0; 3]
-}
-
-/// a - b.
-#[must_use]
-pub(super) fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-/// a . b.
-#[must_use]
-pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// a x b.
-#[must_use]
-pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
 }

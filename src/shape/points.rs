@@ -252,8 +252,16 @@ pub fn discretize_with(
         Some(known) if how != Certify::No => Some(known.clone()),
         _ => certify(&surface, &grid, &samples, how, progress)?,
     };
+    if how != Certify::No && certificate.is_none() {
+        warnings.push(
+            "the effort of a certificate is spent: so many triangles lie over each other that how \
+             far the points depart from the surface between them is not computed; the heights are \
+             exact all the same (repair or coarsen the mesh, or certify = no)"
+                .into(),
+        );
+    }
     let cells_m = if settings.cells && grid.len() <= MOST_CERTIFIED {
-        Some(by_cell(&surface, &grid, &samples, progress)?)
+        by_cell(&surface, &grid, &samples, progress)?
     } else {
         None
     };

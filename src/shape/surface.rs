@@ -11,10 +11,11 @@ use crate::height::{self, Grid, Sample};
 use crate::mesh::{Bounds, FileMesh, Mesh, MeshFacts};
 use crate::placement::Transform;
 use crate::primitive::PlacedPrimitive;
+use crate::read_error::ReadError;
 use crate::step::{self, BodyOptions};
-use crate::stl::{self, StlError};
+use crate::stl;
 use fluxform_base::progress::Progress;
-use fluxform_design::named_file::{self, NamedFileError, ZeroGuard};
+use fluxform_design::named_file::{self, NamedFileError};
 
 /// Larger files fit no computer's memory together with what is made of them, bytes (8 GiB).
 const LARGEST_FILE: u64 = 8 << 30;
@@ -122,12 +123,15 @@ pub fn read(
     bodies: &BodyOptions,
     progress: &dyn Progress,
 ) -> Result<(FileMesh, f64), ShapeError> {
-    let format = SurfaceFormat::of(path).ok_or_else(|| ShapeError::Format { path: path.into() })?;
-    if stated_m.is_none() && !format.carries_unit() {
-        return Err(ShapeError::UnitMissing {
-            path: path.into(),
-            format: format.name(),
-        });
+    let missing = |format: SurfaceFormat| ShapeError::UnitMissing {
+        path: path.into(),
+        format: format.name(),
+    };
+    let by_name = SurfaceFormat::of(path);
+    if let (Some(format), None) = (by_name, stated_m)
+        && !format.carries_unit()
+    {
+        return Err(missing(format));
     }
     if let Some(unit_m) = stated_m
         && !(unit_m > 0.0 && unit_m.is_finite())
@@ -136,13 +140,14 @@ pub fn read(
             "the unit is {unit_m} m; it must be positive"
         )));
     }
-    let file = read_mesh(format, path, bodies, progress)?;
+    let (format, file) = read_mesh(path, bodies, progress)?;
     match (file.unit_m, stated_m) {
         (Some(own), Some(stated)) if own != stated => Err(ShapeError::UnitDiffers {
             path: path.into(),
             file: unit_name(own),
             stated: unit_name(stated),
         }),
+        (None, None) => Err(missing(format)),
         (own, stated) => {
             // The reader of a format that carries its unit gives it.
             let unit_m = own.or(stated).unwrap_or(1.0);
@@ -151,19 +156,37 @@ pub fn read(
     }
 }
 
-/// The triangles of the file at `path`; of a binary STL the bytes are not held beside them.
+/// The triangles of the file at `path`, and its format: by the name's ending, or by the content
+/// where the name has none. Of a binary STL the bytes are not held beside the triangles.
 pub(super) fn read_mesh(
-    format: SurfaceFormat,
     path: &Path,
     bodies: &BodyOptions,
     progress: &dyn Progress,
-) -> Result<FileMesh, ShapeError> {
-    if format == SurfaceFormat::Step {
-        let read = step::read(&read_file(path)?, bodies, progress);
-        return read.map_err(|source| ShapeError::Content {
+) -> Result<(SurfaceFormat, FileMesh), ShapeError> {
+    let by_name = SurfaceFormat::of(path);
+    if by_name.is_none() && path.extension().is_some() {
+        return Err(ShapeError::Format { path: path.into() });
+    }
+    if bodies.is_default()
+        && by_name.is_none_or(|format| format == SurfaceFormat::Stl)
+        && let Some(result) = streamed(path)
+    {
+        let file = result.map_err(|source| ShapeError::Content {
             path: path.into(),
             source,
         });
+        return Ok((SurfaceFormat::Stl, file?));
+    }
+    let bytes = read_file(path)?;
+    let format = by_name.or_else(|| SurfaceFormat::of_content(&bytes));
+    let format = format.ok_or_else(|| ShapeError::Format { path: path.into() })?;
+    if format == SurfaceFormat::Step {
+        let read = step::read(&bytes, bodies, progress);
+        let file = read.map_err(|source| ShapeError::Content {
+            path: path.into(),
+            source,
+        })?;
+        return Ok((format, file));
     }
     if !bodies.is_default() {
         return Err(ShapeError::Document(format!(
@@ -171,22 +194,14 @@ pub(super) fn read_mesh(
             path.display()
         )));
     }
-    if format == SurfaceFormat::Stl
-        && let Some(result) = streamed(path)
-    {
-        return result.map_err(|source| ShapeError::Stl {
-            path: path.into(),
-            source,
-        });
-    }
-    format.read(path, &read_file(path)?)
+    Ok((format, format.read(path, &bytes)?))
 }
 
 /// `None` for what is no whole binary STL file, and where the file system fails: reading it
 /// otherwise tells why.
-fn streamed(path: &Path) -> Option<Result<FileMesh, StlError>> {
+fn streamed(path: &Path) -> Option<Result<FileMesh, ReadError>> {
     let (file, length) = named_file::open(path, LARGEST_FILE).ok()?;
-    stl::stream(ZeroGuard::new(file), length).ok()?
+    stl::stream(file, length).ok()?
 }
 
 fn check_placement(placement: &Placement) -> Result<(), ShapeError> {
@@ -235,11 +250,51 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
         NamedFileError::NoLength => {
             "the file is empty (0 bytes): the export or the download failed".into()
         }
-        NamedFileError::Zeros => error.to_string(),
         NamedFileError::OtherLength => format!("expected a surface, {error}"),
     };
-    named_file::read(path, LARGEST_FILE).map_err(|error| ShapeError::Unreadable {
+    let unreadable = |what: String| ShapeError::Unreadable {
         path: path.into(),
-        what: what(error),
-    })
+        what,
+    };
+    let mut zeros = Zeros::default();
+    let read = named_file::read_watched(path, LARGEST_FILE, &mut |piece| {
+        fluxform_base::progress::poll();
+        zeros.see(piece)
+    });
+    match read.map_err(|error| unreadable(what(error)))? {
+        Some(bytes) => Ok(bytes),
+        None => Err(unreadable(zeros.what())),
+    }
+}
+
+/// No surface file holds so many zeros in a row, bytes: a copy that broke off leaves them, and so
+/// does a file that is longer than what was written to it.
+const LONGEST_HOLE: u64 = 16 << 20;
+
+/// Looks for holes in a file that is read piece by piece.
+#[derive(Default)]
+pub(super) struct Zeros {
+    seen: u64,
+    run: u64,
+}
+
+impl Zeros {
+    /// Sees the next piece; false where a hole is too long.
+    pub(super) fn see(&mut self, piece: &[u8]) -> bool {
+        self.seen += piece.len() as u64;
+        match piece.iter().rposition(|byte| *byte != 0) {
+            None => self.run += piece.len() as u64,
+            Some(last) => self.run = (piece.len() - 1 - last) as u64,
+        }
+        self.run < LONGEST_HOLE
+    }
+
+    /// Where the hole is, and what to do.
+    pub(super) fn what(&self) -> String {
+        format!(
+            "from byte {} on there are zeros alone: the copy or the download broke off; copy it \
+             again",
+            self.seen - self.run
+        )
+    }
 }

@@ -101,7 +101,7 @@ fn every_exception_is_still_needed() {
     }
 }
 
-/// The gate runs what the README tells everybody to run, and on a bare machine.
+/// The gate runs the command that the README gives, and on a bare machine.
 #[test]
 fn the_gate_runs_the_readmes_tests_in_empty_folders() {
     let gate = read(".ci/run");

@@ -86,7 +86,7 @@ fn no_file_names_a_place_of_one_machine() {
     }
 }
 
-/// What a reader is told to type is what the gate runs.
+/// The command that the README gives is the one that the gate runs.
 #[test]
 fn the_readme_and_the_gate_run_the_same_tests() {
     let command = "cargo test --locked";

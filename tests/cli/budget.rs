@@ -57,6 +57,29 @@ fn too_large_a_job_is_refused_at_once() {
     run(&["evaluate", "dense.toml"], 3, "10000 coupled cores");
 }
 
+/// Dense matrices of all that hundreds of cores send each other: nothing stated what they take.
+#[test]
+fn the_pull_of_hundreds_of_coupled_cores_is_refused_before_it_is_computed() {
+    let place = Place::new();
+    let many = place
+        .text(SEED)
+        .replace("rows = 3", "rows = 20")
+        .replace("columns = 3", "columns = 20")
+        .replace("total_current_max_a = 18.0", "")
+        .replace("[magnet]", "[magnet]\npassive_force = true")
+        .replace(", 61]", ", 31]");
+    place.write("many.toml", &format!("{many}\n[core]\n"));
+    for command in ["calibrate", "lambda"] {
+        let args = [command, "many.toml", "shapes/flat.toml", "--memory", "6GB"];
+        let ran = place.run(&args).ends(3);
+        assert!(
+            ran.err.contains("the pull of 400 coupled cores"),
+            "{}",
+            ran.err
+        );
+    }
+}
+
 /// The plan of 100 x 100 cores solved the whole array, and said nothing for minutes.
 #[test]
 fn a_plan_solves_no_array() {

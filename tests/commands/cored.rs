@@ -283,7 +283,7 @@ fn the_bytes_of_a_cored_bundle_do_not_depend_on_the_threads() {
         let folder = pool.install(|| calibrated(&[cylinder], out.path()));
         ["map.npz", "currents.csv", "points.csv", "lambda.json"].map(|name| {
             let bytes = std::fs::read(folder.join(name)).expect("written");
-            // The shape's path tells of the temporary folder.
+            // The shape's path names the temporary folder.
             let text = String::from_utf8_lossy(&bytes).into_owned();
             let place = out.path().to_str().expect("a plain path").to_owned();
             if name.ends_with(".json") {

@@ -115,7 +115,7 @@ fn a_bundle_with_a_wrong_number_fails_its_checks() {
     assert_ne!(text, wrong);
     #[allow(clippy::disallowed_methods)]
     std::fs::write(&design, &wrong).expect("writable");
-    // The digest tells first.
+    // The digest is checked first.
     let error = verify::run(folder, &Silent).expect_err("a changed file");
     assert_eq!(error.exit_code(), 5);
     assert!(error.to_string().contains("design.toml"), "{error}");
@@ -261,7 +261,7 @@ fn small_shape(folder: &Path) -> String {
     path.to_str().expect("a plain path").to_owned()
 }
 
-/// Replaces a file of a bundle and the digest that its manifest tells of it.
+/// Replaces a file of a bundle and the digest that its manifest states.
 #[allow(clippy::disallowed_methods)]
 fn forge(folder: &Path, name: &str, bytes: &[u8]) {
     let before = std::fs::read(folder.join(name)).expect("a file of the bundle");
@@ -348,7 +348,7 @@ fn a_bundle_keeps_its_magnetisation_curve_wherever_it_goes() {
     let error = verify::run(&folder, &Silent).expect_err("a changed table");
     assert_eq!(error.exit_code(), 5);
     assert!(error.to_string().contains("bh_curve.csv"), "{error}");
-    // With the digest forged, the input itself tells.
+    // With the digest forged, the input itself decides.
     #[allow(clippy::disallowed_methods)]
     std::fs::write(&table, &text).expect("writable");
     forge(&folder, "bh_curve.csv", wrong.as_bytes());

@@ -10,7 +10,7 @@ use crate::scenario::{Found, Prepared};
 use crate::table::Row;
 use fluxform_testing::{Random, inputs::OUT, place::Place, run::Ran};
 
-/// Kills until `wanted` runs were killed; half of the moments are spread evenly over the run, half lie
+/// Kills until `wanted` runs have been killed; half of the moments are spread evenly over the run, half lie
 /// close behind a change in its folder.
 pub fn at_random(prepared: &Prepared, wanted: usize, random: &mut Random) -> Result<Row, String> {
     let mut row = Row::new(prepared.scenario.name, "SIGKILL at a random moment");

@@ -49,7 +49,7 @@ fn trials() -> Vec<Trial> {
     }
 }
 
-/// Does it with some of the scenarios and tells what failed and where.
+/// Runs `act` on some of the scenarios; a failure names the scenario.
 #[track_caller]
 fn with(
     names: &[&str],

@@ -39,7 +39,8 @@ fn a_surface_is_read_with_its_unit_and_placement() {
         shape.placement,
         Placement {
             translate_m: [0.0, -0.0007, 0.03],
-            rotate_deg: [0.0, 7.3, -90.0]..Placement::default()
+            rotate_deg: [0.0, 7.3, -90.0],
+            ..Placement::default()
         }
     );
     assert_eq!(

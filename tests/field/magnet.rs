@@ -12,6 +12,7 @@ use fluxform_field::magnet::{Cylinder, MagnetRule, NoRule, Sources};
 use fluxform_field::ring::mutual_over_mu_0;
 use fluxform_field::winding::Winding;
 use fluxform_numerics::gauss;
+use fluxform_numerics::vec3::{cross, minus, norm, plus};
 
 type Vector = [f64; 3];
 
@@ -41,20 +42,8 @@ fn at(p: Vector) -> CartesianField {
     to_cartesian(&axial, p[0], p[1])
 }
 
-fn add(a: Vector, b: Vector) -> Vector {
-    std::array::from_fn(|i| a[i] + b[i])
-}
-
-fn cross(a: Vector, b: Vector) -> Vector {
-    std::array::from_fn(|i| a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3])
-}
-
-fn norm(a: Vector) -> f64 {
-    a.iter().map(|v| v * v).sum::<f64>().sqrt()
-}
-
 fn distance(a: Vector, b: Vector) -> f64 {
-    norm(std::array::from_fn(|i| a[i] - b[i]))
+    norm(minus(a, b))
 }
 
 /// Force and torque by a rule in the seed coil's field, per ampere.
@@ -70,7 +59,7 @@ fn by_rule_in(
     let fields: Vec<_> = rule
         .nodes()
         .iter()
-        .map(|node| at(add(centre, node.offset_m)))
+        .map(|node| at(plus(centre, node.offset_m)))
         .collect();
     let b: Vec<_> = fields.iter().map(|f| f.field_t_per_a).collect();
     let g: Vec<_> = fields.iter().map(|f| f.gradient_t_per_m_per_a).collect();
@@ -105,9 +94,9 @@ fn by_current_sheet_in(
             let r = std::array::from_fn(|i| radius * outward[i] + 0.5 * size.length_m * x * m[i]);
             let area = 0.5 * size.length_m * weight * TAU * radius / f64::from(steps);
             let current = cross(m, outward).map(|v| v * MAGNETIZATION_A_PER_M * area);
-            let f = cross(current, at(add(centre, r)).field_t_per_a);
-            force = add(force, f);
-            torque = add(torque, cross(r, f));
+            let f = cross(current, at(plus(centre, r)).field_t_per_a);
+            force = plus(force, f);
+            torque = plus(torque, cross(r, f));
         }
     }
     (force, torque)
@@ -244,7 +233,7 @@ fn the_seeds_height_needs_few_nodes() {
     let gz: Vec<_> = rule
         .nodes()
         .iter()
-        .map(|node| at(add([0.0, 0.0, 0.03], node.offset_m)).gradient_t_per_m_per_a[2][2])
+        .map(|node| at(plus([0.0, 0.0, 0.03], node.offset_m)).gradient_t_per_m_per_a[2][2])
         .collect();
     let force = rule.vertical_force_n(&gz);
     assert!((force / expected - 1.0).abs() < 1e-10, "{force} {expected}");
@@ -386,7 +375,7 @@ fn tilted_magnets_need_the_row_of_b_z() {
     let rows: Vec<_> = rule
         .nodes()
         .iter()
-        .map(|node| at(add(centre, node.offset_m)).gradient_t_per_m_per_a[2])
+        .map(|node| at(plus(centre, node.offset_m)).gradient_t_per_m_per_a[2])
         .collect();
     let vertical = rule.vertical_force_of_rows_n(&rows);
     let force = by_rule(&rule, centre).0;
@@ -404,7 +393,7 @@ fn the_two_orders_bracket_the_error() {
         let gradients: Vec<_> = rule
             .nodes()
             .iter()
-            .map(|n| at(add(centre, n.offset_m)).gradient_t_per_m_per_a)
+            .map(|n| at(plus(centre, n.offset_m)).gradient_t_per_m_per_a)
             .collect();
         let estimate = rule
             .force_of_orders_differs_n(&gradients)

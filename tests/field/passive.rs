@@ -12,6 +12,7 @@ use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::cored_coil::CoredCoil;
 use fluxform_field::steel::passive::{NoPull, PassivePull, Pulled, Region};
 use fluxform_field::winding::Winding;
+use fluxform_numerics::vec3::norm;
 use serde_json::Value;
 
 const ORACLE: &str = include_str!("../oracles/steel/magnet_force.json");
@@ -60,10 +61,6 @@ fn oracle() -> Vec<(f64, Value)> {
         .collect();
     assert!(rows.len() >= 5);
     rows
-}
-
-fn length(v: [f64; 3]) -> f64 {
-    v.iter().map(|v| v * v).sum::<f64>().sqrt()
 }
 
 #[test]
@@ -180,7 +177,7 @@ fn it_grows_with_the_moment_squared_and_keeps_its_shape_with_size() {
         [0.03, 0.021, 0.037],
     ] {
         let (a, b) = (pull.force_n(at), larger.force_n(at.map(|v| s * v)));
-        let size = length(b);
+        let size = norm(b);
         for (a, b) in a.iter().zip(b) {
             let expected = a * k * k / s.powi(4);
             assert!((b - expected).abs() < 1e-9 * size, "{b} {expected}");
@@ -230,7 +227,7 @@ fn a_symmetric_array_pulls_symmetrically_and_the_force_has_no_curl() {
     assert!(pull.coupling_share > 0.03);
     let at = [0.013, 0.0071, 0.027];
     let [fx, fy, fz] = pull.force_n(at);
-    let size = length([fx, fy, fz]);
+    let size = norm([fx, fy, fz]);
     let turned = pull.force_n([-at[1], at[0], at[2]]);
     let mirrored = pull.force_n([at[0], -at[1], at[2]]);
     for (found, expected) in [(turned, [-fy, fx, fz]), (mirrored, [fx, -fy, fz])] {
@@ -278,8 +275,8 @@ fn the_estimate_holds_for_tilted_magnets_and_coupled_cores() {
                 0.021 + 0.029 * part(0.819),
             ];
             let (a, b) = (coarse.force_n(at), fine.force_n(at));
-            let miss = length(std::array::from_fn(|i| a[i] - b[i]));
-            worst = worst.max(miss / length(b));
+            let miss = norm(std::array::from_fn(|i| a[i] - b[i]));
+            worst = worst.max(miss / norm(b));
         }
         let allowed = 1.5 * coarse.relative_error + fine.relative_error;
         assert!(worst <= allowed, "{worst:e} {allowed:e}");

@@ -12,7 +12,7 @@ use fluxform_field::steel::equivalent_dipoles::{ArraySources, Parts};
 use fluxform_field::steel::generatrix::{Generatrix, Resolution};
 use fluxform_field::steel::magnetized::MagnetizedCore;
 use fluxform_field::steel::permeability::{Constant, Permeability};
-use fluxform_field::steel::saturated::{CoreField, SaturatedCore, Status};
+use fluxform_field::steel::saturated::{Convergence, CoreField, SaturatedCore};
 use fluxform_field::steel::saturated_array::{SaturatedArray, SaturatedArrayError};
 use fluxform_field::winding::Winding;
 use nalgebra::DMatrix;
@@ -83,7 +83,7 @@ fn solve_at(
         resolution,
     )
     .expect("a good design");
-    assert_eq!(found.status, Status::Converged, "{:?}", found.steps);
+    assert_eq!(found.status, Convergence::Converged, "{:?}", found.steps);
     found
 }
 
@@ -146,7 +146,7 @@ fn single(current_a: f64, points: &[[f64; 3]], outline: &Resolution) -> (Vec<f64
         Excitation::new(&WINDING, &generatrix, outline.quadrature).expect("off the edges");
     let core = SaturatedCore::new(&generatrix, outline.quadrature).expect("a good outline");
     let found = core.solve(&(&excitation.potential * current_a), &law, None);
-    assert_eq!(found.status, Status::Converged);
+    assert_eq!(found.status, Convergence::Converged);
     let flux_wb = core.flux_linkage_wb(&found, &excitation.potential);
     let layer = MagnetizedCore::new(generatrix, found.v_a.as_slice().to_vec());
     let slopes = points
@@ -307,7 +307,7 @@ fn no_current_no_field() {
         LOWEST_M,
     )
     .expect("a good design");
-    assert_eq!(array.status, Status::Converged);
+    assert_eq!(array.status, Convergence::Converged);
     assert!(array.relative_error < 1e-3);
     assert!(array.flux_linkage_wb.iter().all(|flux| *flux == 0.0));
     assert!(
@@ -413,7 +413,7 @@ fn the_stated_error_bounds_the_difference_from_a_finer_solution() {
             &WINDING, SHAPE, &law, positions, currents, tolerance, LOWEST_M,
         )
         .expect("a good design");
-        assert_eq!(array.status, Status::Converged);
+        assert_eq!(array.status, Convergence::Converged);
         // Shorter panels: the curve's kinks cross the elements.
         let outline = Resolution {
             ratio: 0.5,
@@ -435,7 +435,7 @@ fn the_stated_error_bounds_the_difference_from_a_finer_solution() {
                     &resolution,
                 )
                 .expect("a good design");
-                assert_eq!(finer.status, Status::Converged);
+                assert_eq!(finer.status, Convergence::Converged);
                 difference(&array, &finer)
             });
         let outline_error = array.relative_error - array.modes_error;
@@ -497,19 +497,19 @@ fn hopeless_cases_have_a_status() {
             found.flux_linkage_wb[0]
         );
         match found.status {
-            Status::Converged => {
+            Convergence::Converged => {
                 assert!(found.relative_error.is_finite(), "{name}");
                 assert!(
                     found.flux_linkage_wb.iter().all(|f| f.is_finite()),
                     "{name}"
                 );
             }
-            Status::Stalled => assert_eq!(found.relative_error, f64::INFINITY, "{name}"),
+            Convergence::Stalled => assert_eq!(found.relative_error, f64::INFINITY, "{name}"),
         }
     };
     let weak = new(&steel(), &[1e-9, 2e-9]).expect("a good design");
     said("1e-9 A", &weak);
-    assert_eq!(weak.status, Status::Converged);
+    assert_eq!(weak.status, Convergence::Converged);
     let usual = new(&steel(), &[1e-3, 2e-3]).expect("a good design");
     let inductance = |array: &SaturatedArray| array.flux_linkage_wb[0] / array.currents_a[0];
     assert!((inductance(&weak) / inductance(&usual) - 1.0).abs() < 1e-3);
@@ -531,7 +531,7 @@ fn hopeless_cases_have_a_status() {
     );
     let nan = new(&steel(), &[f64::NAN, 1.0]).expect("a good design");
     said("no number", &nan);
-    assert_eq!(nan.status, Status::Stalled);
+    assert_eq!(nan.status, Convergence::Stalled);
 
     let table = |b: &[f64], h: &[f64]| BhCurve::new(b, h).expect("a good curve");
     // All but air; all but infinite, then saturated at once; a knee at nothing.
@@ -585,7 +585,7 @@ fn a_gap_of_one_millimetre_is_solved_to_a_stated_error() {
             array.fields[0].mean_b_t,
             array.steps,
         );
-        assert_eq!(array.status, Status::Converged);
+        assert_eq!(array.status, Convergence::Converged);
         assert!(array.relative_error < 0.2);
         array
     };

@@ -11,7 +11,7 @@ use peak_alloc::PeakAlloc;
 
 use fluxform_testing::Random;
 
-/// What stands at a name of an input.
+/// What is at a name of an input.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Content {
     Bytes(Vec<u8>),

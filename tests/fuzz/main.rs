@@ -52,7 +52,7 @@ pub(crate) fn another(mutants: u64, start: Instant) -> bool {
     }
 }
 
-/// Ends the process when a reader hangs: nothing else would tell.
+/// Ends the process when a reader hangs: nothing else would report it.
 fn watch() {
     std::thread::spawn(|| {
         loop {

@@ -187,7 +187,7 @@ fn damage_bytes(bytes: &mut Vec<u8>, random: &mut Random) {
     }
 }
 
-/// Deletes, doubles, swaps or repeats what stands between line ends, `;` or `>`.
+/// Deletes, doubles, swaps or repeats the text between line ends, `;` or `>`.
 fn damage_lines(bytes: &mut Vec<u8>, random: &mut Random) {
     let line = |random: &mut Random| {
         let ends = |b: &u8| matches!(b, b'\n' | b'\r' | b';' | b'>');

@@ -273,7 +273,7 @@ fn names(made: &Snapshot) -> Vec<Name> {
     found
 }
 
-/// Whether a thing can be planted at a name and tells anything there.
+/// Whether a thing can be planted at a name and shows anything there.
 fn fits(plant: Plant, name: &Name) -> bool {
     let json = name.path.ends_with(".json");
     match plant {

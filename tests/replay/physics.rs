@@ -99,7 +99,7 @@ fn the_force_is_met_exactly_within_the_limits_and_the_nearest_is_given_beyond() 
         assert!(shape != "flat" || seen[1] > 20, "{shape}: {seen:?}");
         let allocation = &report.summary.accuracy["allocation"];
         assert!(allocation.estimate < 1e-12, "{}", allocation.estimate);
-        // Feedback is nearer to the wanted force than any fixed currents, and cooler.
+        // Feedback is nearer to the requested force than any fixed currents, and cooler.
         let force = &report.summary.force;
         assert!(force.feedback.rms_error_n < force.fixed.rms_error_n);
         assert!(report.summary.power.mean_w < report.summary.power.static_w);

@@ -8,5 +8,7 @@ mod heights;
 mod hostile;
 mod inspect;
 mod marks;
+mod more_formats;
 mod points;
+mod solidworks;
 mod stl;

@@ -3,7 +3,7 @@
 use fluxform_shape::document::{AxisRequest, GridRequest, Placement};
 use fluxform_shape::mesh::Mesh;
 use fluxform_shape::placement::Transform;
-use fluxform_shape::stl::{StlError, read};
+use fluxform_shape::stl::read;
 use fluxform_testing::needs::{self, Trial, corpus_folder};
 use fluxform_testing::{surfaces, trials};
 
@@ -23,7 +23,8 @@ fn good_files_have_the_indexs_facts() {
         }
         let bytes = std::fs::read(folder.join(name)).unwrap();
         if expected.starts_with("error") {
-            assert_eq!(read(&bytes), Err(StlError::NoTriangle), "{name}");
+            let message = read(&bytes).unwrap_err().to_string();
+            assert!(message.contains("holds no triangle"), "{name}: {message}");
             continue;
         }
         let file = read(&bytes).unwrap();

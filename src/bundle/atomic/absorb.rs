@@ -5,7 +5,7 @@ use std::ffi::{OsStr, OsString};
 use std::io;
 use std::path::Path;
 
-use super::dir::{Dir, Kind, Status, followed};
+use super::dir::{Dir, EntryStatus, Kind, followed};
 use super::names::MANIFEST;
 use super::record::{Record, digest, is_timing, unchanged};
 use super::{Overwrite, WriteError};
@@ -22,7 +22,7 @@ pub(super) struct Owned {
     /// Those of the manifest, where it is one of ours.
     listed: Option<BTreeMap<String, FileEntry>>,
     /// What this run reads.
-    inputs: Vec<Status>,
+    inputs: Vec<EntryStatus>,
 }
 
 impl Owned {
@@ -38,7 +38,7 @@ impl Owned {
     }
 
     /// Whether the folder's manifest is one of ours.
-    pub fn has_manifest(&self) -> bool {
+    pub(crate) fn has_manifest(&self) -> bool {
         self.listed.is_some()
     }
 
@@ -58,7 +58,7 @@ impl Owned {
         }
     }
 
-    fn reads(&self, status: Option<Status>) -> bool {
+    fn reads(&self, status: Option<EntryStatus>) -> bool {
         status.is_some_and(|status| self.inputs.iter().any(|input| input.is(&status)))
     }
 
@@ -214,7 +214,7 @@ fn absorb_below(old: &Dir, new: &Dir, owned: &Owned, below: &str) -> io::Result<
 }
 
 /// Whether the file `name` is the same in both.
-fn same_bytes(old: &Dir, new: &Dir, name: &OsStr, there: Option<Status>) -> io::Result<bool> {
+fn same_bytes(old: &Dir, new: &Dir, name: &OsStr, there: Option<EntryStatus>) -> io::Result<bool> {
     let (Some(there), Some(here)) = (there, old.status(name)?) else {
         return Ok(false);
     };

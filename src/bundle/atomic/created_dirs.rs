@@ -96,7 +96,7 @@ pub(crate) fn open_made(parent: &Path, name: &OsStr) -> io::Result<(Dir, impl Dr
 /// Why nothing could be made.
 #[derive(Debug)]
 pub(super) enum MadeError {
-    /// A file stands where a folder is wanted.
+    /// There is a file where a folder is needed.
     NotFolder(PathBuf),
     /// The folder cannot be made.
     Folder(PathBuf, io::Error),
@@ -105,7 +105,7 @@ pub(super) enum MadeError {
 }
 
 impl MadeError {
-    /// As told to the user, who was about to do `action` with `path`.
+    /// The error for a user who was about to do `action` with `path`.
     pub fn of(self, action: &'static str, path: &Path) -> WriteError {
         match self {
             Self::NotFolder(path) => WriteError::NotFolder { path },

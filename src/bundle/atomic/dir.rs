@@ -23,7 +23,7 @@ use super::names::parent_of;
 /// Folders nested deeper than this are not entered.
 const DEPTH_MAX: usize = 64;
 
-/// What a name stands for.
+/// The kind of thing that a name refers to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// A regular file.
@@ -52,7 +52,7 @@ impl From<FileType> for Kind {
 
 /// A file or folder as the system describes it.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Status {
+pub(crate) struct EntryStatus {
     pub kind: Kind,
     pub bytes: u64,
     device: u64,
@@ -62,7 +62,7 @@ pub(crate) struct Status {
     group: u32,
 }
 
-impl From<rustix::fs::Stat> for Status {
+impl From<rustix::fs::Stat> for EntryStatus {
     #[allow(clippy::unnecessary_cast)] // the fields' types depend on the system
     fn from(stat: rustix::fs::Stat) -> Self {
         Self {
@@ -77,7 +77,7 @@ impl From<rustix::fs::Stat> for Status {
     }
 }
 
-impl Status {
+impl EntryStatus {
     /// Whether both are the same file or folder.
     pub fn is(&self, other: &Self) -> bool {
         (self.device, self.inode) == (other.device, other.inode)
@@ -104,11 +104,11 @@ impl Status {
 ///
 /// # Errors
 /// What the system reports otherwise.
-pub(super) fn followed(path: &Path) -> io::Result<Option<Status>> {
+pub(super) fn followed(path: &Path) -> io::Result<Option<EntryStatus>> {
     found(statat(CWD, path, AtFlags::empty()))
 }
 
-fn found(stat: rustix::io::Result<rustix::fs::Stat>) -> io::Result<Option<Status>> {
+fn found(stat: rustix::io::Result<rustix::fs::Stat>) -> io::Result<Option<EntryStatus>> {
     match stat {
         Ok(stat) => Ok(Some(stat.into())),
         Err(Errno::NOENT) => Ok(None),
@@ -178,7 +178,7 @@ impl Dir {
     ///
     /// # Errors
     /// As [`Dir::child`].
-    pub fn child_or_new(&self, name: impl AsRef<OsStr>) -> io::Result<Self> {
+    pub(crate) fn child_or_new(&self, name: impl AsRef<OsStr>) -> io::Result<Self> {
         match mkdirat(&self.fd, name.as_ref(), Mode::from_raw_mode(0o777)) {
             Ok(()) | Err(Errno::EXIST) => self.child(name),
             Err(error) => Err(error.into()),
@@ -211,11 +211,11 @@ impl Dir {
         Ok(names)
     }
 
-    /// What `name` stands for; `None` where nothing is. A link is a link.
+    /// The kind of thing that `name` refers to; `None` where nothing is. A link is a link.
     ///
     /// # Errors
     /// What the system reports otherwise.
-    pub fn status(&self, name: impl AsRef<OsStr>) -> io::Result<Option<Status>> {
+    pub fn status(&self, name: impl AsRef<OsStr>) -> io::Result<Option<EntryStatus>> {
         found(statat(&self.fd, name.as_ref(), AtFlags::SYMLINK_NOFOLLOW))
     }
 
@@ -223,7 +223,7 @@ impl Dir {
     ///
     /// # Errors
     /// What the system reports.
-    pub fn own_status(&self) -> io::Result<Status> {
+    pub(crate) fn own_status(&self) -> io::Result<EntryStatus> {
         Ok(fstat(&self.fd)?.into())
     }
 
@@ -244,7 +244,7 @@ impl Dir {
         // Without waiting for the other end of a pipe.
         let flags = OFlags::RDONLY | OFlags::NOFOLLOW | OFlags::NONBLOCK | OFlags::CLOEXEC;
         let file = File::from(openat(&self.fd, name.as_ref(), flags, Mode::empty())?);
-        if Status::from(fstat(&file)?).kind != Kind::File {
+        if EntryStatus::from(fstat(&file)?).kind != Kind::File {
             return Err(io::ErrorKind::InvalidInput.into());
         }
         Ok(file)
@@ -254,13 +254,13 @@ impl Dir {
     ///
     /// # Errors
     /// What the system reports, also where something of that name is.
-    pub fn new_file(&self, name: impl AsRef<OsStr>, mode: u32) -> io::Result<File> {
+    pub(crate) fn new_file(&self, name: impl AsRef<OsStr>, mode: u32) -> io::Result<File> {
         let flags = OFlags::RDWR | OFlags::CREATE | OFlags::EXCL | OFlags::CLOEXEC;
         let mode = Mode::from_raw_mode(mode as _);
         Ok(openat(&self.fd, name.as_ref(), flags, mode)?.into())
     }
 
-    /// Removes a name that stands for anything but a folder.
+    /// Removes a name that refers to anything but a folder.
     ///
     /// # Errors
     /// What the system reports.
@@ -272,7 +272,7 @@ impl Dir {
     ///
     /// # Errors
     /// What the system reports.
-    pub fn remove_empty(&self, name: impl AsRef<OsStr>) -> io::Result<()> {
+    pub(crate) fn remove_empty(&self, name: impl AsRef<OsStr>) -> io::Result<()> {
         Ok(unlinkat(&self.fd, name.as_ref(), AtFlags::REMOVEDIR)?)
     }
 
@@ -280,7 +280,7 @@ impl Dir {
     ///
     /// # Errors
     /// What the system reports; folders nested without end.
-    pub fn remove_content(&self) -> io::Result<()> {
+    pub(crate) fn remove_content(&self) -> io::Result<()> {
         self.remove_content_below(DEPTH_MAX)
     }
 
@@ -318,7 +318,7 @@ impl Dir {
     ///
     /// # Errors
     /// [`io::ErrorKind::AlreadyExists`]; what the system reports otherwise.
-    pub fn rename_new(
+    pub(crate) fn rename_new(
         &self,
         from: impl AsRef<OsStr>,
         folder: &Self,
@@ -339,7 +339,7 @@ impl Dir {
         self.rename(from, folder, to)
     }
 
-    /// Lets two names change places, so that each stands for one or the other at every moment.
+    /// Lets two names change places, so that each refers to one or the other at every moment.
     /// `false` where the kernel or the file system knows no exchange; all is then as it was.
     ///
     /// # Errors
@@ -356,7 +356,7 @@ impl Dir {
         }
     }
 
-    /// As above; only Linux is asked.
+    /// As above; on Linux alone.
     #[cfg(not(target_os = "linux"))]
     pub fn exchange(&self, _one: impl AsRef<OsStr>, _other: impl AsRef<OsStr>) -> io::Result<bool> {
         Ok(false)
@@ -377,7 +377,7 @@ impl Dir {
     ///
     /// # Errors
     /// What the system reports.
-    pub fn handle(&self) -> io::Result<File> {
+    pub(crate) fn handle(&self) -> io::Result<File> {
         Ok(self.fd.try_clone()?.into())
     }
 
@@ -403,7 +403,7 @@ impl Dir {
     }
 }
 
-/// What tells a file or folder from any other one, a copy of it included: its number on its disk and
+/// The identity of a file or folder, different from any other's, a copy of it included: its number on its disk and
 /// when it was made, as bytes. Nobody can choose them for one that is yet to be unpacked or copied
 /// elsewhere. A rename changes neither.
 #[cfg(target_os = "linux")]
@@ -426,7 +426,7 @@ pub(super) fn identity(file: impl AsFd) -> Vec<u8> {
     let Ok(found) = fstat(file) else {
         return Vec::new();
     };
-    let found = Status::from(found);
+    let found = EntryStatus::from(found);
     [found.device.to_le_bytes(), found.inode.to_le_bytes()].concat()
 }
 

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::created_dirs::{MadeFolders, made_in};
 use super::digest::{Durability, Written, fill};
-use super::dir::{Dir, Kind, Status};
+use super::dir::{Dir, EntryStatus, Kind};
 use super::names::{check_name, parent_of};
 use super::overwrite::{Permit, real};
 use super::record::{ReplacedNote, present};
@@ -77,12 +77,12 @@ pub(crate) fn put(
 }
 
 /// A temporary file that is to replace `earlier`: nobody else reads it before it has its mode.
-fn new_temporary(dir: &Dir, earlier: Option<Status>) -> io::Result<TemporaryFile> {
+fn new_temporary(dir: &Dir, earlier: Option<EntryStatus>) -> io::Result<TemporaryFile> {
     TemporaryFile::new(dir, if earlier.is_some() { 0o600 } else { 0o666 })
 }
 
 /// Gives it the owner and mode of the file that it replaces.
-fn finish(made: &TemporaryFile, earlier: Option<Status>) -> io::Result<()> {
+fn finish(made: &TemporaryFile, earlier: Option<EntryStatus>) -> io::Result<()> {
     earlier.map_or(Ok(()), |earlier| earlier.give(&made.file))
 }
 
@@ -149,7 +149,7 @@ impl FileSet {
     ///
     /// # Errors
     /// [`WriteError`]; nothing is left of it.
-    pub fn write_at(
+    pub(crate) fn write_at(
         &mut self,
         target: &Path,
         content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -161,7 +161,7 @@ impl FileSet {
     ///
     /// # Errors
     /// As [`Self::write_at`].
-    pub fn write_under(
+    pub(crate) fn write_under(
         &mut self,
         target: &Path,
         overwrite: Overwrite,
@@ -217,7 +217,7 @@ impl FileSet {
     ///
     /// # Errors
     /// A name that is none.
-    pub fn outdate(&mut self, name: &str) -> Result<(), WriteError> {
+    pub(crate) fn outdate(&mut self, name: &str) -> Result<(), WriteError> {
         check_name(name)?;
         self.outdated.push(self.folder.join(name));
         Ok(())

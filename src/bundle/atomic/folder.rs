@@ -31,13 +31,13 @@ use super::temporary::{TemporaryFolder, clean_leftovers, is_temporary};
 use super::{Overwrite, WriteError};
 use crate::artefact::FileEntry;
 
-/// Characters of the target's name that stand in the name of the folder that is put aside.
+/// Characters of the target's name in the name of the folder that is put aside.
 const NAME_MAX: usize = 100;
 
 /// A folder in the making; dropped without [`FolderDraft::commit`] it leaves nothing.
 #[derive(Debug)]
 pub struct FolderDraft {
-    place: Place,
+    place: TargetPlace,
     overwrite: Overwrite,
     draft: TemporaryFolder,
     /// What was written so far.
@@ -48,7 +48,7 @@ pub struct FolderDraft {
 
 /// Where the folder is to be.
 #[derive(Debug)]
-struct Place {
+struct TargetPlace {
     target: PathBuf,
     parent: Dir,
     name: OsString,
@@ -70,7 +70,7 @@ impl FolderDraft {
         match Dir::open(parent_of(&target)) {
             Ok(parent) => {
                 parent.writable().map_err(fail)?;
-                Place::of(&target, parent, linked)?.check(overwrite, &entries)
+                TargetPlace::of(&target, parent, linked)?.check(overwrite, &entries)
             }
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
             Err(error) => Err(fail(error)),
@@ -94,7 +94,7 @@ impl FolderDraft {
         .map_err(|error| error.of("write", &target))?;
         // Dropped in the reverse order: the draft goes before the folder that was made for it.
         let (made, draft) = (made, draft);
-        let place = Place::of(&target, parent, linked)?;
+        let place = TargetPlace::of(&target, parent, linked)?;
         {
             let _lock = place.parent.lock(parent_of(&place.target));
             place
@@ -183,7 +183,7 @@ impl FolderDraft {
     }
 }
 
-impl Place {
+impl TargetPlace {
     fn of(target: &Path, parent: Dir, linked: bool) -> Result<Self, WriteError> {
         let name = target.file_name().ok_or_else(|| WriteError::BadName {
             name: target.display().to_string(),
@@ -355,7 +355,7 @@ impl Place {
     }
 
     /// Moves what is not ours from the old folder, which is put aside, into the new one and removes the
-    /// rest. May be cut short anywhere and begun again: the old manifest, which tells what is ours,
+    /// rest. May be cut short anywhere and begun again: the old manifest, which states what is ours,
     /// goes last.
     fn absorb(&self, aside: &OsStr, old: &Dir, new: &Dir, overwrite: &Overwrite) -> io::Result<()> {
         let owned = Owned::new(old, overwrite);

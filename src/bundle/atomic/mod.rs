@@ -4,7 +4,7 @@
 //! its folder fsynced: it is whole or absent whenever the program ends. [`FileSet`] does that for
 //! a file and its sidecar, [`FolderDraft`] for a whole folder (see there for the scheme).
 //! Temporary names are `.fluxform-*.tmp`; they hold the identity of what has them, and their writer
-//! holds a lock on it, so that the next run can tell a killed run's leftovers from another run's work
+//! holds a lock on it, so that the next run can distinguish a killed run's leftovers from another run's work
 //! and from anything else of that name.
 //!
 //! [`Overwrite`] decides what may be replaced. All that is removed, renamed or recovered is so by
@@ -54,7 +54,7 @@ pub enum WriteError {
         /// Why it is not ours to replace.
         reason: String,
     },
-    /// The target is none that may be replaced, whatever is asked for.
+    /// The target is none that may be replaced, whatever is requested.
     #[error("{path} {reason}; nothing replaces it, choose another output")]
     Protected {
         /// The target.
@@ -94,7 +94,7 @@ pub enum WriteError {
         /// What is wrong with it.
         message: String,
     },
-    /// A name that may not stand inside a bundle.
+    /// A name that is not allowed inside a bundle.
     #[error("{name:?} is not a plain file name inside the output folder")]
     BadName {
         /// The name.

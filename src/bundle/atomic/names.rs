@@ -24,7 +24,7 @@ pub(crate) fn check_name(name: &str) -> Result<(), WriteError> {
         .components()
         .all(|part| matches!(part, Component::Normal(_)));
     let odd = |c: char| c == '\\' || c == ':' || c.is_control();
-    // `components` folds "a//b", "a/./b" and "a/": their number tells.
+    // `components` folds "a//b", "a/./b" and "a/": their number shows.
     let parts = Path::new(name).components().count();
     if name.is_empty() || !plain || name.contains(odd) || parts != name.split('/').count() {
         return Err(WriteError::BadName {

@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 
 use super::WriteError;
 use super::digest::Written;
-use super::dir::{Dir, Kind, Status, followed};
+use super::dir::{Dir, EntryStatus, Kind, followed};
 use super::names::parent_of;
 use super::record::{Record, ReplacedNote, State, digest, is_timing, unchanged};
 use crate::artefact::{Input, Options};
 
-/// So many bytes at the beginning of a mark tell the kind of file, whatever it was made from.
+/// So many bytes at the beginning of a mark give the kind of file, whatever it was made from.
 const KIND_BYTES: usize = 16;
 
 /// The policy for outputs that exist already.
@@ -159,7 +159,7 @@ impl Overwrite {
         self.permit(target, None).map(drop)
     }
 
-    /// How a file of these bytes takes its place at `target`; without bytes, as far as can be told.
+    /// How a file of these bytes takes its place at `target`; without bytes, as far as can be known.
     ///
     /// # Errors
     /// As [`Self::check`].
@@ -214,7 +214,13 @@ impl Overwrite {
     }
 
     /// `Ok` when the file at `target` in `dir` is known to be ours, else the reason why it is not.
-    fn own(&self, dir: &Dir, target: &Path, status: &Status, last: bool) -> Result<(), String> {
+    fn own(
+        &self,
+        dir: &Dir,
+        target: &Path,
+        status: &EntryStatus,
+        last: bool,
+    ) -> Result<(), String> {
         let name = target.file_name().unwrap_or_default();
         let record = match &self.evidence {
             Evidence::SameBytes(mark) if self.force => {
@@ -302,7 +308,7 @@ impl Overwrite {
         let there = followed(target)?;
         for input in &self.inputs {
             if input.path == "-" {
-                let stream = Status::from(rustix::fs::fstat(io::stdin())?);
+                let stream = EntryStatus::from(rustix::fs::fstat(io::stdin())?);
                 let is_it = there.is_some_and(|it| it.kind == Kind::File && it.is(&stream));
                 if is_it {
                     return Ok(true);
@@ -344,7 +350,7 @@ pub fn check_distinct<P: AsRef<Path>>(
 
 /// Whether `path` is the file `there` at `target`, by what the system says where both exist, else by
 /// their names.
-fn same_place(path: &Path, target: &Path, there: Option<Status>) -> io::Result<bool> {
+fn same_place(path: &Path, target: &Path, there: Option<EntryStatus>) -> io::Result<bool> {
     let (one, other) = match (followed(path), there) {
         (Ok(Some(one)), Some(other)) => return Ok(one.is(&other)),
         (Ok(None), None) => (path, target),

@@ -1,4 +1,4 @@
-//! What tells the program's own files from the user's: records that list them with their digests.
+//! How the program's own files are distinguished from the user's: records that list them with their digests.
 
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
@@ -73,7 +73,7 @@ impl Record {
     }
 
     /// The record `name` in `dir`, unless it was changed; a link is none.
-    pub fn read_in(dir: &Dir, name: &str) -> Option<Self> {
+    pub(crate) fn read_in(dir: &Dir, name: &str) -> Option<Self> {
         Self::parse(&bounded(dir, name)?).filter(|record| record.state != State::Changed)
     }
 
@@ -83,12 +83,12 @@ impl Record {
     }
 
     /// The options in which `now` differs, in words.
-    pub fn differs_in(&self, now: &Options) -> Option<String> {
+    pub(crate) fn differs_in(&self, now: &Options) -> Option<String> {
         self.made_with.difference(now)
     }
 
     /// Whether it was made from inputs of these digests, in this order.
-    pub fn is_of(&self, inputs: &[Input]) -> bool {
+    pub(crate) fn is_of(&self, inputs: &[Input]) -> bool {
         let digests = |inputs: &[Input]| -> Vec<String> {
             inputs.iter().map(|input| input.sha256.clone()).collect()
         };
@@ -141,7 +141,7 @@ pub(super) fn present(dir: &Dir, name: &OsStr) -> io::Result<Option<FileEntry>> 
     }))
 }
 
-/// Whether the file `name` in `dir` holds the seconds of a run, which no record lists: told by its
+/// Whether the file `name` in `dir` holds the seconds of a run, which no record lists: recognised by its
 /// content.
 pub(super) fn is_timing(dir: &Dir, name: &OsStr) -> bool {
     let named = name
@@ -189,7 +189,7 @@ impl ReplacedNote {
     }
 
     /// The note `name` in `dir`; `None` for anything that this program did not write as it is.
-    pub fn read_in(dir: &Dir, name: &OsStr) -> Option<Self> {
+    pub(crate) fn read_in(dir: &Dir, name: &OsStr) -> Option<Self> {
         let text = bounded(dir, name)?;
         let note = serde_json::from_slice(&text).ok();
         note.filter(|_| seal::is_sealed(&text))

@@ -66,7 +66,7 @@ impl TemporaryFile {
     ///
     /// # Errors
     /// What the system reports; it is then removed.
-    pub fn persist(mut self, name: &OsStr) -> io::Result<()> {
+    pub(crate) fn persist(mut self, name: &OsStr) -> io::Result<()> {
         if let Some(from) = &self.name {
             self.dir.rename(from, &self.dir, name)?;
         }
@@ -78,7 +78,7 @@ impl TemporaryFile {
     ///
     /// # Errors
     /// Also [`io::ErrorKind::AlreadyExists`].
-    pub fn persist_new(mut self, name: &OsStr) -> io::Result<()> {
+    pub(crate) fn persist_new(mut self, name: &OsStr) -> io::Result<()> {
         if let Some(from) = &self.name {
             self.dir.rename_new(from, &self.dir, name)?;
         }

@@ -8,6 +8,6 @@ mod table;
 
 pub use plan::{Axis, Mode, POINTS_MAX, PlanFile, Value};
 pub use point::{OptimumRow, PointFile, Row, Status};
-pub use store::{Found, PointStore};
+pub use store::{PointStore, StoredPoint};
 pub use summary::MergeSummary;
 pub use table::{OPTIMUM_COLUMNS, ROW_COLUMNS, TableWriter, value_text};

@@ -10,7 +10,7 @@ use crate::json::fault;
 /// Most designs of one sweep.
 pub const POINTS_MAX: u64 = 100_000_000;
 /// Larger files are no plan.
-pub const PLAN_MAX_BYTES: u64 = 256 << 20;
+pub(crate) const PLAN_MAX_BYTES: u64 = 256 << 20;
 
 /// What is done with each design of a sweep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

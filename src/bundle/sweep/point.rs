@@ -25,7 +25,7 @@ pub enum Status {
 }
 
 impl Status {
-    /// As files tell it.
+    /// Its name in files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -37,9 +37,9 @@ impl Status {
         }
     }
 
-    /// Whether there is a coil to tell of.
+    /// Whether there is a coil.
     #[must_use]
-    pub fn has_row(self) -> bool {
+    pub(crate) fn has_row(self) -> bool {
         matches!(self, Self::Done | Self::AccuracyNotReached)
     }
 }
@@ -179,7 +179,7 @@ impl PointFile {
     /// Whether `bytes`, which are no whole point, may be what a lost system left of one: a beginning of
     /// ours, if any, then zeros, if any.
     #[must_use]
-    pub fn is_torn(bytes: &[u8]) -> bool {
+    pub(crate) fn is_torn(bytes: &[u8]) -> bool {
         let end = bytes
             .iter()
             .rposition(|byte| *byte != 0)

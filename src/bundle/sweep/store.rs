@@ -31,9 +31,9 @@ pub struct PointStore {
     folder: PathBuf,
 }
 
-/// What stands where a point's file belongs.
+/// What is at the place of a point's file.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Found {
+pub enum StoredPoint {
     /// The point, by this version of the program.
     Point(Box<PointFile>),
     /// Nothing, a torn file, or the point by another version.
@@ -98,29 +98,33 @@ impl PointStore {
         Ok(folders)
     }
 
-    /// What stands where point `index` of the plan with this digest belongs.
+    /// What is at the place of point `index` of the plan with this digest.
     ///
     /// # Errors
     /// A file that is there and cannot be read.
-    pub fn find(&self, plan_sha256: &str, index: u64) -> Result<Found, WriteError> {
+    pub fn find(&self, plan_sha256: &str, index: u64) -> Result<StoredPoint, WriteError> {
         let path = self.path(index);
         let bytes = match read_plain(&path, POINT_MAX_BYTES) {
-            Ok(_) if path.is_symlink() => return Ok(Found::Foreign("and is a link".to_owned())),
+            Ok(_) if path.is_symlink() => {
+                return Ok(StoredPoint::Foreign("and is a link".to_owned()));
+            }
             Ok(bytes) => bytes,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Found::Nothing),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                return Ok(StoredPoint::Nothing);
+            }
             Err(error) => return Err(WriteError::from_io("read", &path, error)),
         };
         Ok(match PointFile::parse(&bytes) {
             Some(point) if point.plan_sha256 != plan_sha256 => {
-                Found::Foreign("and belongs to another plan".to_owned())
+                StoredPoint::Foreign("and belongs to another plan".to_owned())
             }
             Some(point) if point.index != index => {
-                Found::Foreign(format!("and is point {} of the plan", point.index))
+                StoredPoint::Foreign(format!("and is point {} of the plan", point.index))
             }
-            Some(point) if point.fluxform_version != FLUXFORM_VERSION => Found::Nothing,
-            Some(point) => Found::Point(Box::new(point)),
-            None if PointFile::is_torn(&bytes) => Found::Nothing,
-            None => Found::Foreign("and is no point of a sweep".to_owned()),
+            Some(point) if point.fluxform_version != FLUXFORM_VERSION => StoredPoint::Nothing,
+            Some(point) => StoredPoint::Point(Box::new(point)),
+            None if PointFile::is_torn(&bytes) => StoredPoint::Nothing,
+            None => StoredPoint::Foreign("and is no point of a sweep".to_owned()),
         })
     }
 
@@ -159,7 +163,7 @@ impl PointStore {
             None => {}
             Some(Kind::File) if force => {}
             Some(Kind::File) => {
-                if let Found::Foreign(reason) = self.find(&point.plan_sha256, point.index)? {
+                if let StoredPoint::Foreign(reason) = self.find(&point.plan_sha256, point.index)? {
                     return Err(WriteError::OutputExists { path, reason });
                 }
             }

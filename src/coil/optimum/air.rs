@@ -70,7 +70,7 @@ impl AirCoil {
 
     /// The same coil, its inductance to another accuracy.
     #[must_use]
-    pub fn with_accuracy(self, accuracy: &'static Accuracy) -> Self {
+    pub(crate) fn with_accuracy(self, accuracy: &'static Accuracy) -> Self {
         Self { accuracy, ..self }
     }
 }

@@ -46,7 +46,7 @@ pub struct Alternative {
 }
 
 /// For each of length, mass and heat the coil of `best`'s wire that has least of it and lacks at
-/// most [`SHARE`] of the force, to about 1e-4 and as far as a local search tells; none where the
+/// most [`SHARE`] of the force, to about 1e-4 and as far as a local search goes; none where the
 /// force falls at once or where nothing is to be gained.
 ///
 /// # Errors

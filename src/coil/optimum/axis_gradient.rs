@@ -21,7 +21,7 @@ const TOLERANCE: f64 = 1e-15;
 /// One loop's field on the axis at the window's top less that at its bottom, over mu_0 I, 1/m:
 /// D(a) for a target `z_m` > 0 above the top face.
 #[must_use]
-pub fn loop_difference(a_m: f64, z_m: f64, length_m: f64) -> f64 {
+pub(crate) fn loop_difference(a_m: f64, z_m: f64, length_m: f64) -> f64 {
     let far = z_m + length_m;
     let (s1, s2) = (a_m.hypot(z_m), a_m.hypot(far));
     // s2^3 - s1^3 = (s2^2 - s1^2) (s1^2 + s1 s2 + s2^2) / (s1 + s2), in ratios that stay in range.
@@ -38,7 +38,7 @@ fn end_primitive(a_m: f64, u_m: f64) -> f64 {
 
 /// h and its derivatives by inner radius (depth held), depth and length. `z_m` > 0.
 #[must_use]
-pub fn axis_gradient(window: &Window, z_m: f64) -> Sloped {
+pub(crate) fn axis_gradient(window: &Window, z_m: f64) -> Sloped {
     let (a1, a2) = (window.inner_radius_m, window.outer_radius_m());
     let length = window.length_m;
     let mut value = 0.0;

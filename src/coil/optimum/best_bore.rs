@@ -1,7 +1,7 @@
 //! The best bore of a coil of given layers and turns.
 //!
 //! Limits on sizes and wire give a range of bores. It is scanned for the strongest bore, which is
-//! refined; where that breaks a limit that the model must be asked about, the edge of what meets it
+//! refined; where that breaks a limit that only the model knows, the edge of what meets it
 //! is looked for on both sides. One maximum between two samples is assumed.
 
 use super::candidates::Leaf;
@@ -57,7 +57,7 @@ impl<'a> Bores<'a> {
     }
 
     /// ln F at a bore, limits that need an inductance apart; -infinity where the model fails.
-    pub fn ln_force(&self, window: Window) -> f64 {
+    pub(crate) fn ln_force(&self, window: Window) -> f64 {
         let problem = self.screen.as_ref().unwrap_or(self.problem);
         let rated = problem.rate(window);
         rated.map_or(f64::NEG_INFINITY, |rated| rated.force_n.value.ln())
@@ -68,7 +68,7 @@ impl<'a> Bores<'a> {
         self.worst(window, |_| true)
     }
 
-    /// The worst of the limits that are `asked` for.
+    /// The worst of the limits in `asked`.
     fn worst(&self, window: Window, asked: impl Fn(LimitName) -> bool) -> f64 {
         let Some(rated) = self.problem.rate(window) else {
             return f64::INFINITY;

@@ -46,7 +46,7 @@ impl Proof {
 /// The box that holds every coil whose force reaches `force_n`; `None` where no finite one is
 /// known (a settling time alone bounds the coil).
 #[must_use]
-pub fn finite_domain(problem: &Problem<'_>, force_n: f64) -> Option<Domain> {
+pub(crate) fn finite_domain(problem: &Problem<'_>, force_n: f64) -> Option<Domain> {
     let mut domain = Domain::of(problem);
     if domain.outer_m[1].is_finite() && domain.length_m[1].is_finite() {
         return Some(domain);
@@ -98,7 +98,7 @@ pub fn whole(domain: &Domain) -> Cell {
 ///
 /// # Errors
 /// Interruption.
-pub fn prove(
+pub(crate) fn prove(
     bounding: &Bounding<'_>,
     problem: &Problem<'_>,
     cell: Cell,

@@ -184,7 +184,7 @@ impl Listed {
     }
 
     /// Whether no more are listed.
-    pub fn is_full(&self) -> bool {
+    pub(crate) fn is_full(&self) -> bool {
         self.others.len() >= LISTED
     }
 

@@ -1,6 +1,6 @@
 //! The coil with its linear core as the optimiser sees it.
 //!
-//! The core follows the winding: its radius is the bore's less the clearance, its ends stand
+//! The core follows the winding: its radius is the bore's less the clearance, its ends lie
 //! `below` and `above` the winding's. What the steel adds, relative to the air coil's exact
 //! values, is smooth in (ln core radius, ln length, ln a2/a1) and does not depend on the wire: it
 //! is tabulated where the search comes ([`super::lazy_table`]): roughly for the many starting points
@@ -63,12 +63,12 @@ pub enum NoCoredCoil {
     BelowTop,
 }
 
-/// Places closer to the core's top than this share of the core's radius are not asked about:
+/// Places closer to the core's top than this share of the core's radius are not examined:
 /// the field of the steel's edges is not resolved there.
 const CLOSEST: f64 = 0.1;
-/// Core radii below this share of the outer radius are not asked about: next to no steel.
+/// Core radii below this share of the outer radius are not examined: next to no steel.
 const THINNEST: f64 = 0.004;
-/// Shorter cores than this share of their radius are not asked about.
+/// Shorter cores than this share of their radius are not examined.
 const FLATTEST: f64 = 1e-3;
 
 /// Relative accuracy of the draft's solutions, of the search's and of those about the optimum.
@@ -609,7 +609,7 @@ impl CoilModel for CoredModel {
         }
         let mut sharp = self.clone();
         if !self.sharp {
-            // The best coil stands in its cell's middle, away from the borders; no winding in
+            // The best coil is in its cell's middle, away from the borders; no winding in
             // the cell is without depth.
             let mut width = FINE_WIDTH;
             width[2] = width[2].min(WITHIN * at[2]);

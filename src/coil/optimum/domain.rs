@@ -176,7 +176,7 @@ impl Domain {
     /// A wide but finite box to start from, in scaled coordinates: ln of mean radius, depth and
     /// length.
     #[must_use]
-    pub fn starting_box(&self, scale_m: f64) -> [[f64; 2]; 3] {
+    pub(crate) fn starting_box(&self, scale_m: f64) -> [[f64; 2]; 3] {
         const WIDE: f64 = 6.0;
         let volume = if self.volume_m3[1].is_finite() {
             self.volume_m3[1].cbrt()

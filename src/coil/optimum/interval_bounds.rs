@@ -113,7 +113,7 @@ impl<'a> Bounding<'a> {
 
     /// The cell without what the limits exclude; `None` where nothing is left.
     #[must_use]
-    pub fn contracted(&self, mut cell: Cell) -> Option<Cell> {
+    pub(crate) fn contracted(&self, mut cell: Cell) -> Option<Cell> {
         let domain = &self.domain;
         let meet = |interval: &mut Interval, lo: f64, hi: f64| {
             // Ends are kept where they are within rounding of each other.
@@ -171,7 +171,7 @@ impl<'a> Bounding<'a> {
 
     /// ln F of one window, whatever its limits.
     #[must_use]
-    pub fn ln_force_at(&self, window: &Window) -> f64 {
+    pub(crate) fn ln_force_at(&self, window: &Window) -> f64 {
         let (a, w, l) = (window.inner_radius_m, window.depth_m, window.length_m);
         (self.force_per_ampere(window) * self.current_a(self.resistance_ohm(a, w, l))).ln()
     }
@@ -194,7 +194,7 @@ impl<'a> Bounding<'a> {
     /// Upper bound of ln F over a contracted cell; `None` where it holds no coil within the
     /// limits. Bounds in their order of cost: as soon as one is at most `enough` it is returned.
     #[must_use]
-    pub fn ln_force(&self, cell: &Cell, enough: f64) -> Option<f64> {
+    pub(crate) fn ln_force(&self, cell: &Cell, enough: f64) -> Option<f64> {
         let (a, w, l) = (cell.inner, cell.depth, cell.length);
         // The largest window that holds every window of the cell.
         let outer_hi = (a.hi + w.hi).min(self.domain.outer_m[1] * (1.0 + SLACK));

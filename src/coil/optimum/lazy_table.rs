@@ -1,4 +1,4 @@
-//! Smooth functions of three variables, expensive to know, tabulated where they are asked for.
+//! Smooth functions of three variables, expensive to know, tabulated where they are requested.
 //!
 //! Space is cut into equal cells; a cell's tensor of Gauss nodes is filled when the first point
 //! falls into it. Values and slopes are those of the interpolating polynomial. Across a cell's
@@ -13,7 +13,7 @@ use fluxform_numerics::gauss;
 use fluxform_numerics::lagrange_basis::Basis;
 
 /// Functions tabulated together.
-pub const COUNT: usize = 3;
+pub(crate) const COUNT: usize = 3;
 /// Their values at one place.
 pub type Values = [f64; COUNT];
 /// Values along the third variable's nodes; `None` where they are not defined.
@@ -120,8 +120,8 @@ impl Cells {
 
     /// Moves the cells along the first two axes so that one of them has `at` in its middle: the
     /// third variable's origin is a border of the functions' domain. Without effect once a point
-    /// has been asked for. Not for use within a parallel loop.
-    pub fn focus(&self, at: [f64; 3]) {
+    /// has been requested. Not for use within a parallel loop.
+    pub(crate) fn focus(&self, at: [f64; 3]) {
         let mut origin = self.lattice.origin;
         for i in 0..2 {
             origin[i] = at[i] - 0.5 * self.lattice.width[i];
@@ -134,7 +134,7 @@ impl Cells {
         *self.origin.get_or_init(|| self.lattice.origin)
     }
 
-    /// How many cells have been asked for.
+    /// How many cells have been requested.
     #[must_use]
     pub fn count(&self) -> usize {
         self.lock().len()

@@ -17,9 +17,9 @@ pub struct Settings {
     pub seed: u64,
     /// Boxes that a certificate may take; 0 for none.
     pub cells: usize,
-    /// A coil to start from besides.
+    /// Another coil to start from.
     pub initial: Option<Window>,
-    /// Whether the range of nearly equal bores is wanted.
+    /// Whether the range of nearly equal bores is requested.
     pub valley: bool,
 }
 

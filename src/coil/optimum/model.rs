@@ -107,7 +107,7 @@ impl Strand {
 
     /// Turns a square metre of section holds, layers stacked squarely, 1/m^2.
     #[must_use]
-    pub fn turns_per_m2(&self) -> f64 {
+    pub(crate) fn turns_per_m2(&self) -> f64 {
         1.0 / (self.diameter_m * self.diameter_m)
     }
 
@@ -119,7 +119,7 @@ impl Strand {
 
     /// Wire length over the window's volume over pi, 1/m^2.
     #[must_use]
-    pub fn length_per_volume(&self) -> f64 {
+    pub(crate) fn length_per_volume(&self) -> f64 {
         PI * self.turns_per_m2()
     }
 
@@ -145,7 +145,7 @@ impl Strand {
 pub struct Response {
     /// |force| on the magnet at the target, N.
     pub force_n: Sloped,
-    /// Self inductance, H; zero where it was not asked for.
+    /// Self inductance, H; zero where it was not requested.
     pub inductance_h: Sloped,
     /// Mass of the core, kg; zero without one.
     pub core_mass_kg: Sloped,
@@ -209,7 +209,7 @@ pub trait CoilModel: Sync {
         None
     }
 
-    /// Says about which window a model that tabulates will be asked most; the first time alone
+    /// Says about which window a model that tabulates will be evaluated at most; the first time alone
     /// counts. Not for use within a parallel loop.
     fn focus(&self, _window: &Window) {}
 

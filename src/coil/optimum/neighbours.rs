@@ -2,7 +2,7 @@
 //!
 //! Factors vary slowly with the coil's dimensions. They are computed at one coil, with their slopes,
 //! and taken as powers of the dimensions while the coil alone is optimised; again at what comes
-//! out, until that stands: then values and slopes are those of the coupled array.
+//! out, until it no longer moves: then values and slopes are those of the coupled array.
 
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::CoupledArray;

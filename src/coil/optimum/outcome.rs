@@ -1,4 +1,4 @@
-//! What an optimisation tells.
+//! The result of an optimisation.
 
 use super::domain::Contradiction;
 use super::model::{Strand, Window};

@@ -76,7 +76,7 @@ pub enum Regime {
 pub struct Problem<'a> {
     /// The coil's physics.
     pub model: &'a dyn CoilModel,
-    /// What is asked.
+    /// The request.
     pub task: &'a Task,
     /// The wire.
     pub strand: Strand,
@@ -103,7 +103,7 @@ pub struct Rated {
 impl<'a> Problem<'a> {
     /// The regimes' problems for one wire.
     #[must_use]
-    pub fn of_wire(model: &'a dyn CoilModel, task: &'a Task, strand: Strand) -> Vec<Self> {
+    pub(crate) fn of_wire(model: &'a dyn CoilModel, task: &'a Task, strand: Strand) -> Vec<Self> {
         let regimes: &[Regime] = if task.voltage_v.is_some() {
             &[Regime::Driver, Regime::Supply]
         } else {
@@ -154,7 +154,7 @@ impl<'a> Problem<'a> {
 
     /// The same wire and regime under another task.
     #[must_use]
-    pub fn with_task<'b>(&self, task: &'b Task) -> Problem<'b>
+    pub(crate) fn with_task<'b>(&self, task: &'b Task) -> Problem<'b>
     where
         'a: 'b,
     {
@@ -163,7 +163,7 @@ impl<'a> Problem<'a> {
 
     /// The same problem on another model.
     #[must_use]
-    pub fn with_model<'b>(&self, model: &'b dyn CoilModel) -> Problem<'b>
+    pub(crate) fn with_model<'b>(&self, model: &'b dyn CoilModel) -> Problem<'b>
     where
         'a: 'b,
     {
@@ -189,7 +189,7 @@ impl<'a> Problem<'a> {
 
     /// The optimum of `relaxed`, this problem without one of its limits, as a point of this one.
     #[must_use]
-    pub fn adopted(&self, relaxed: &Problem<'_>, local: &Local) -> Option<Local> {
+    pub(crate) fn adopted(&self, relaxed: &Problem<'_>, local: &Local) -> Option<Local> {
         let multiplier = |bound: &Bounded| {
             let row = relaxed.bounds.iter().position(|b| b == bound);
             row.map_or(0.0, |row| local.multipliers[row])
@@ -370,7 +370,7 @@ impl<'a> Problem<'a> {
 
     /// The limit called `name`, where it applies.
     #[must_use]
-    pub fn limit_of(&self, name: LimitName) -> Option<f64> {
+    pub(crate) fn limit_of(&self, name: LimitName) -> Option<f64> {
         self.bounds
             .iter()
             .find(|bound| bound.name == name)

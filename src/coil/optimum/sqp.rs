@@ -7,7 +7,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use fluxform_numerics::small_quadratic::{Row, dot, minimise};
+use fluxform_numerics::small_quadratic::{Row, minimise};
+use fluxform_numerics::vec3::dot;
 
 /// A smooth problem's values and slopes at a point: minimise `objective` with `rows` <= 0.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,8 +51,8 @@ const LONGEST: f64 = 1.0;
 /// A step shorter than this ends the search.
 const SHORTEST: f64 = 1e-10;
 /// Rows above this are not met.
-pub const FEASIBLE: f64 = 1e-10;
-/// Shares of a row's violation that a step is asked to remove, in turn.
+pub(crate) const FEASIBLE: f64 = 1e-10;
+/// Shares of a row's violation that a step is to remove, in turn.
 const REMOVE: [f64; 4] = [1.0, 0.5, 0.1, 0.0];
 
 impl Local {

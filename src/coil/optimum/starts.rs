@@ -104,7 +104,7 @@ mod tests {
         }
         for x in starts {
             let window = Problem::window(x);
-            // One layer is the least, and may stand half out.
+            // One layer is the least, and may lie half outside.
             let layer_m = domain.depth_min_m;
             let out_m = if window.depth_m <= layer_m * (1.0 + 1e-12) {
                 0.5 * layer_m

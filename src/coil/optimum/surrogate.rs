@@ -8,7 +8,7 @@ use fluxform_base::progress::{Interrupted, Progress};
 
 /// Most sharpenings.
 const ROUNDS: usize = 8;
-/// Movement, in scaled coordinates, below which the optimum stands: its force is second order in
+/// Movement, in scaled coordinates, below which the optimum is taken as found: its force is second order in
 /// it.
 pub(super) const STANDS: f64 = 1e-5;
 /// Problems whose coarse optimum lacks more than this share of the best are not solved again.
@@ -16,7 +16,7 @@ const CLOSE: f64 = 0.01;
 /// How much smaller, relatively, a second start is.
 const SMALLER: f64 = 0.03;
 
-/// Sharpens `model` about the best of `problems` until the optimum stands; `None` where the
+/// Sharpens `model` about the best of `problems` until the optimum no longer moves; `None` where the
 /// model cannot be sharpened.
 ///
 /// # Errors
@@ -77,7 +77,7 @@ pub(super) fn restated<'a>(
             if !close {
                 solved.best = coarse.best.clone();
             } else if let Some(local) = &coarse.best {
-                // A coil a little smaller besides: the sharp model's limits may be tighter.
+                // Also a coil a little smaller: the sharp model's limits may be tighter.
                 for less in [0.0, SMALLER] {
                     let start = local.x.map(|x| x - less);
                     if let Some(local) = sqp::solve(&solved.problem, start) {

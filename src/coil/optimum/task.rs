@@ -58,7 +58,7 @@ pub fn of_design(design: &Design, fixed: Fixed) -> Result<Task, NoTask> {
     })
 }
 
-/// What stands beside the coil that is optimised.
+/// The neighbours of the coil that is optimised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Surroundings {
     /// Nothing: equation 11's coil.

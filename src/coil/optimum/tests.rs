@@ -500,7 +500,7 @@ fn searches_are_counted() {
     };
     assert_eq!(starts(None), 5);
     // A limit that holds nothing back is left out, and nothing searched again; one that does is
-    // searched with besides.
+    // also searched with.
     assert_eq!([starts(Some(0.1)), starts(Some(0.004))], [5, 10]);
 }
 

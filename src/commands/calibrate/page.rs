@@ -14,7 +14,7 @@ use crate::plot::lambda::LambdaPlot;
 use crate::plot::plane::{Cells, Panel, PlanePlot, Together};
 use crate::report::bundle::page;
 use crate::report::data::{
-    Breakpoint, BudgetPart, BundleFacts, Chosen, CoilFacts, Deciding, LimitFacts, StageFacts,
+    Breakpoint, BudgetPart, BundleFacts, Chosen, CoilFacts, Deciding, LimitRow, StageFacts,
     WorstPlace,
 };
 use crate::report::field::{Field, Layer};
@@ -207,7 +207,7 @@ fn coils(scene: &Scene, file: &LambdaFile) -> Vec<CoilFacts> {
 }
 
 /// The design's limits on one coil, and those whose value is not known here.
-fn limit_facts(seen: &Seen) -> (Vec<LimitFacts>, Vec<&'static str>) {
+fn limit_facts(seen: &Seen) -> (Vec<LimitRow>, Vec<&'static str>) {
     let (scene, file) = (seen.scene, &seen.lambda.file);
     let mut circuit = scene.circuit;
     if let Some(told) = &seen.manifest.circuit {
@@ -227,7 +227,7 @@ fn limit_facts(seen: &Seen) -> (Vec<LimitFacts>, Vec<&'static str>) {
         mass_kg: circuit.wire_mass_kg + steel_kg,
         core_field_t: peak,
     });
-    let facts = checks.iter().map(|(name, check)| LimitFacts {
+    let facts = checks.iter().map(|(name, check)| LimitRow {
         name,
         value: check.value,
         limit: check.limit,

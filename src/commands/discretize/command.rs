@@ -18,7 +18,7 @@ use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
 use crate::cli::pictures::Picture;
 use crate::cli::printer::{Place, Printer};
-use crate::cli::quantity::{count, length_error, mm, number};
+use crate::cli::quantity::{count, extents, length_error, mm, number};
 use crate::cli::start::begin;
 use crate::cli::values::FileArgument;
 use crate::scene::cost::of_points;
@@ -292,13 +292,14 @@ impl Discretize {
             let outside = count(summary.outside, "grid point");
             sheet.line("left out", &format!("{outside} without surface"));
         }
-        let corner = |c: &[f64; 3]| c.map(|v| number(v * 1000.0)).join(", ");
         sheet.line(
             "surface",
             &format!(
-                "from ({}) to ({}) mm{}",
-                corner(&summary.bounds_min_m),
-                corner(&summary.bounds_max_m),
+                "{} mm{}",
+                extents(
+                    summary.bounds_min_m.map(|c| c * 1000.0),
+                    summary.bounds_max_m.map(|c| c * 1000.0)
+                ),
                 match (summary.triangles, summary.degenerate_triangles) {
                     (Some(all), Some(0)) => format!(", {}", count(all, "triangle")),
                     (Some(all), Some(flat)) =>

@@ -203,7 +203,8 @@ fn drawn(
         .map(|index| at(index).map(|(_, marks)| marks))
         .collect();
     let heights: Vec<_> = samples.iter().map(|s| s.map(|s| s.height_m)).collect();
-    let cells = by_cell(surface, &grid, &samples, progress)?;
+    // Where its effort is spent the picture is without bounds.
+    let cells = by_cell(surface, &grid, &samples, progress)?.unwrap_or_default();
     Ok(picture(&Seen {
         title: document.name.clone(),
         scale,

@@ -10,7 +10,7 @@ use crate::cli::failure::Failure;
 use crate::cli::layout::Sheet;
 use crate::cli::pictures::Picture;
 use crate::cli::printer::{Place, Printer};
-use crate::cli::quantity::{count, mm, number};
+use crate::cli::quantity::{count, extents, mm, number};
 use crate::cli::start::begin;
 use crate::cli::values::FileArgument;
 use crate::design::Need;
@@ -98,13 +98,11 @@ impl Discretize {
             found.format,
             count(found.triangles, "triangle")
         ));
-        let corner = |c: &[f64; 3]| c.map(number).join(", ");
         sheet.line(
             "box",
             &format!(
-                "from ({}) to ({}) in the file's unit",
-                corner(&found.bounds_min),
-                corner(&found.bounds_max)
+                "{} in the file's unit",
+                extents(found.bounds_min, found.bounds_max)
             ),
         );
         sheet.line("unit", &unit(found));

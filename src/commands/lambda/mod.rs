@@ -27,9 +27,7 @@ use crate::lambda::{self, ForceProblem, Precision, Settings, Solution, Status, W
 use crate::plot::lambda::LambdaPlot;
 use crate::progress::Progress;
 use crate::scene::cached_field::ShapeField;
-use crate::scene::evaluation_sample::{
-    Evaluation, PLACES, Sample, sharper, sharper_by_finer, spread,
-};
+use crate::scene::evaluation_sample::{Evaluation, PLACES, Sample, sharper, spread};
 use crate::scene::passive;
 use crate::scene::single::above_knee;
 use crate::scene::sources::Sampling;
@@ -612,11 +610,7 @@ fn forces_accuracy(
     let proven = evaluation(scene, solved);
     let [m_x, m_y, m_z] = scene.moment_a_m2;
     let dipole = scene.design.magnet.model == MagnetModel::Dipole;
-    if !dipole {
-        let sampled = sharper_by_finer(scene, solved, points_m, forces_n_per_a, proven);
-        return accuracy_of(scene, solved, sampled);
-    }
-    if m_x != 0.0 || m_y != 0.0 || m_z == 0.0 {
+    if !dipole || m_x != 0.0 || m_y != 0.0 || m_z == 0.0 {
         return accuracy_of(scene, solved, proven);
     }
     let coils = scene.coils.len();

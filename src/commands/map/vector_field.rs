@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::mag_manip::{SAFETY, VectorFieldMade, direct, largest, stages};
 use crate::RunError;
 use crate::map::Components;
-use crate::map::catmull_rom::{Nodes, Place, Stencil, stencil};
+use crate::map::catmull_rom::{AxisPosition, Nodes, Stencil, stencil};
 use crate::map::multipole::{PARTS, magnitudes};
 use crate::map::tabulate::Grid;
 use crate::numerics::axis::Axis;
@@ -88,7 +88,7 @@ pub(super) fn make(
     let within = [workspace.x_m, workspace.y_m, workspace.z_m];
     let places = places(axes, within);
     let steps_m = axes.map(|axis| axis.step());
-    let at = |place: &[Place; 3]| -> [f64; 3] {
+    let at = |place: &[AxisPosition; 3]| -> [f64; 3] {
         std::array::from_fn(|k| axes[k].node(place[k].cell) + place[k].part * steps_m[k])
     };
     let points_m = places.iter().map(at).collect();
@@ -148,7 +148,7 @@ fn spread(axis: Axis, within: Axis, most: usize) -> Vec<usize> {
         .collect()
 }
 
-fn places(axes: [Axis; 3], within: [Axis; 3]) -> Vec<[Place; 3]> {
+fn places(axes: [Axis; 3], within: [Axis; 3]) -> Vec<[AxisPosition; 3]> {
     let x = spread(axes[0], within[0], CELLS);
     let y = spread(axes[1], within[1], CELLS);
     let layers = spread(axes[2], within[2], axes[2].samples);
@@ -159,7 +159,7 @@ fn places(axes: [Axis; 3], within: [Axis; 3]) -> Vec<[Place; 3]> {
             continue;
         }
         for part in PARTS_OF_CELL {
-            let place = |cell: &usize| Place { cell: *cell, part };
+            let place = |cell: &usize| AxisPosition { cell: *cell, part };
             for y in &y {
                 out.extend(x.iter().map(|x| [place(x), place(y), place(z)]));
             }

@@ -11,7 +11,9 @@ use crate::RunError;
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION};
 use crate::bundle::atomic::{FileSet, Overwrite, WriteError};
 use crate::bundle::seal::to_record;
-use crate::bundle::sweep::{Found, MergeSummary, PlanFile, PointFile, PointStore, TableWriter};
+use crate::bundle::sweep::{
+    MergeSummary, PlanFile, PointFile, PointStore, StoredPoint, TableWriter,
+};
 use crate::plot::pareto::{Panel, ParetoPlot};
 use crate::progress::Progress;
 
@@ -301,9 +303,9 @@ fn found(
     for folder in &request.folders {
         let store = PointStore::new(folder);
         match store.find(&plan.plan_sha256, index)? {
-            Found::Point(point) => return Ok(Some(*point)),
-            Found::Nothing => {}
-            Found::Foreign(reason) => {
+            StoredPoint::Point(point) => return Ok(Some(*point)),
+            StoredPoint::Nothing => {}
+            StoredPoint::Foreign(reason) => {
                 return Err(RunError::Sweep(format!(
                     "{} exists {reason}; merge the folder with the plan that it was run with, or \
                      run this plan into another folder",

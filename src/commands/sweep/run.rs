@@ -11,7 +11,7 @@ use super::plan::curve_input;
 use super::point::Sweep;
 use crate::RunError;
 use crate::bundle::atomic::WriteError;
-use crate::bundle::sweep::{Found, PlanFile, PointFile, PointStore, Status};
+use crate::bundle::sweep::{PlanFile, PointFile, PointStore, Status, StoredPoint};
 use crate::progress::Progress;
 
 /// Which points of a plan are computed.
@@ -147,9 +147,9 @@ fn finished(
     index: u64,
 ) -> Result<Option<PointFile>, RunError> {
     match store.find(&plan.plan_sha256, index)? {
-        Found::Point(point) => Ok(Some(*point)),
-        Found::Nothing => Ok(None),
-        Found::Foreign(reason) => Err(WriteError::OutputExists {
+        StoredPoint::Point(point) => Ok(Some(*point)),
+        StoredPoint::Nothing => Ok(None),
+        StoredPoint::Foreign(reason) => Err(WriteError::OutputExists {
             path: store.path(index),
             reason,
         }

@@ -98,37 +98,19 @@ pub(super) fn made_on(bundle: &Bundle) -> &str {
 /// Compares all that `bundle` holds with `expected`.
 pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
     let made_by = MadeBy::of(bundle);
-    let exact = made_by == MadeBy::Same;
-    let mut faults = Vec::new();
     let manifests = [&bundle.manifest, &expected.manifest].map(serde_json::to_value);
     let [Ok(mut told), Ok(mut wanted)] = manifests else {
         let how = "manifest.json cannot be written as it is".to_owned();
         return Compared {
             check: check("recomputed", 1.0, 0.0, how),
             unchecked: Vec::new(),
-            exact,
+            exact: made_by == MadeBy::Same,
         };
     };
-    if exact {
-        differing_files(bundle, expected, &mut faults);
-        for side in [&mut told, &mut wanted] {
-            side["files"] = Value::Null;
-        }
-        let mut differences = Differences::new(made_by, None);
-        differences.add("manifest.json", &told, &wanted);
-        faults.extend(differences.faults);
-        // Two numbers may be equal and not the same: 0.0 and -0.0.
-        let bytes = to_record(&expected.manifest).map(|text| sha256_hex(&text));
-        if faults.is_empty() && bytes.as_ref() != Ok(&bundle.manifest_sha256) {
-            faults.push("manifest.json is not written as this program writes it".to_owned());
-        }
-        let how = "every byte of every file computed again from the inputs";
-        return Compared {
-            check: named("recomputed", &faults, how),
-            unchecked: Vec::new(),
-            exact,
-        };
+    if made_by == MadeBy::Same {
+        return exactly(bundle, expected, [told, wanted]);
     }
+    let mut faults = Vec::new();
     let tolerance = tolerance(expected);
     let mut unchecked = vec![format!(
         "the last bits of numbers: made by fluxform {} on {}; verify there",
@@ -174,7 +156,31 @@ pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
     Compared {
         check: named("recomputed", &faults, how),
         unchecked,
-        exact,
+        exact: false,
+    }
+}
+
+/// Every byte; `manifests` are the bundle's and the expected one.
+fn exactly(bundle: &Bundle, expected: &Expected, manifests: [Value; 2]) -> Compared {
+    let mut faults = Vec::new();
+    differing_files(bundle, expected, &mut faults);
+    let [told, wanted] = manifests.map(|mut side| {
+        side["files"] = Value::Null;
+        side
+    });
+    let mut differences = Differences::new(MadeBy::Same, None);
+    differences.add("manifest.json", &told, &wanted);
+    faults.extend(differences.faults);
+    // Two numbers may be equal and not the same: 0.0 and -0.0.
+    let bytes = to_record(&expected.manifest).map(|text| sha256_hex(&text));
+    if faults.is_empty() && bytes.as_ref() != Ok(&bundle.manifest_sha256) {
+        faults.push("manifest.json is not written as this program writes it".to_owned());
+    }
+    let how = "every byte of every file computed again from the inputs";
+    Compared {
+        check: named("recomputed", &faults, how),
+        unchecked: Vec::new(),
+        exact: true,
     }
 }
 

@@ -93,13 +93,16 @@ pub fn run(path: &Path, progress: &dyn Progress) -> Result<VerifyReport, RunErro
     Verifier::default().verify(path, VerifyOptions::default(), progress)
 }
 
+/// Refuses, with the reason, what costs more than the machine grants.
+pub type Limit = fn(&Cost) -> Result<(), String>;
+
 /// Verifies one bundle after another. What inputs give is computed once for all bundles in a row
 /// that name the same inputs and options.
 #[derive(Debug, Default)]
 pub struct Verifier {
     last: Option<(Recipe, Arc<Expected>)>,
     /// Refuses what takes more memory than allowed.
-    within: Option<fn(&Cost) -> Result<(), String>>,
+    within: Option<Limit>,
 }
 
 /// What decides the content of a bundle.
@@ -142,7 +145,7 @@ impl Judgement {
 impl Verifier {
     /// One that asks `within` before it computes whether a cost is allowed; a message refuses it.
     #[must_use]
-    pub fn limited(within: fn(&Cost) -> Result<(), String>) -> Self {
+    pub fn limited(within: Limit) -> Self {
         Self {
             last: None,
             within: Some(within),

@@ -171,13 +171,16 @@ pub struct CoupledArray {
 
 /// Refinements after which a tolerance that is not reached is given up, with its estimate.
 const MOST_REFINEMENTS: usize = 4;
+/// An error so many times the aim is no beginning of a convergence: all refinements together aim at a
+/// hundredth of the first.
+const HOPELESS: f64 = 1e3;
 /// The first resolution's aim, in tolerances: resolutions do better than they aim at as a rule.
 const FIRST_AIM: f64 = 2.0;
 /// Distance above the cores, in radii, below which no error is estimated.
 const CLOSEST: f64 = 0.1;
 /// Heights above the cores, in radii, below which the outline is resolved for places close to it.
 const NEAR: f64 = 0.5;
-/// Modes that each refinement adds where places close to the cores are asked for.
+/// Modes that each refinement adds where places close to the cores are requested.
 const MODES_NEAR: usize = 2;
 /// Places about every coil at which two resolutions are compared, in units of its outer radius.
 const PLACES: [[f64; 2]; 5] = [[0.0, 0.0], [0.6, 0.2], [0.7, 0.2], [-0.4, 1.1], [1.5, -1.2]];
@@ -235,10 +238,11 @@ impl CoupledArray {
                 .as_ref()
                 .is_none_or(|b| fine.relative_error < b.relative_error);
             let reached = fine.relative_error <= tolerance;
+            let hopeless = fine.relative_error > HOPELESS * aim;
             if better {
                 best = Some(fine);
             }
-            if reached || !better || exchange > tolerance {
+            if reached || hopeless || !better || exchange > tolerance {
                 break;
             }
             aim *= 0.3;

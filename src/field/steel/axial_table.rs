@@ -15,7 +15,7 @@ use std::sync::{Arc, OnceLock, PoisonError, RwLock};
 use super::equivalent_dipoles::Parts;
 use super::magnetized::MagnetizedCore;
 use super::magnetized::loops::{LoopFields, Rectangle};
-use crate::batch::{Gradients, Wanted};
+use crate::batch::{Gradients, Quantities};
 use crate::source::AxialSource;
 use crate::winding::{AxialField, OnEdge, Winding};
 use fluxform_base::units::MU_0_T_M_PER_A;
@@ -70,7 +70,7 @@ struct Cell {
 }
 
 /// A point's cell and its place there, -1 to 1 along r and z.
-struct Place {
+struct CellPosition {
     key: Key,
     x: f64,
     y: f64,
@@ -204,7 +204,7 @@ impl AxialTable {
     }
 
     /// The cell of a point; `None` where the exact field is due.
-    fn place(&self, r_m: f64, z_m: f64) -> Option<Place> {
+    fn place(&self, r_m: f64, z_m: f64) -> Option<CellPosition> {
         let shape = self.core.outline().shape;
         let mut distance_m = shape.distance_m(r_m, z_m);
         if let Some(winding) = &self.winding {
@@ -219,7 +219,7 @@ impl AxialTable {
         let exponent = (distance_m / (1.0 + SQRT_2)).log2().floor() as i32;
         let size_m = 2.0_f64.powi(exponent);
         let (i, j) = ((r_m / size_m).floor(), (z_m / size_m).floor());
-        Some(Place {
+        Some(CellPosition {
             key: (exponent, i as i64, j as i64),
             x: 2.0 * (r_m / size_m - i) - 1.0,
             y: 2.0 * (z_m / size_m - j) - 1.0,
@@ -297,7 +297,7 @@ impl AxialTable {
         let own = if held.contains(&Quantity::Bz) {
             winding.axial_fields(r_m, z_m, tolerance)?
         } else {
-            let own = winding.gradients(r_m, z_m, tolerance, Wanted::Gradient)?;
+            let own = winding.gradients(r_m, z_m, tolerance, Quantities::Gradient)?;
             [own.dbz_dz, own.dbr_dz_over_r, own.br_over_r].concat()
         };
         for (value, own) in values.iter_mut().zip(own) {
@@ -418,11 +418,11 @@ impl AxialSource for AxialTable {
         r_m: &[f64],
         z_m: &[f64],
         _tolerance: f64,
-        wanted: Wanted,
+        wanted: Quantities,
     ) -> Result<Gradients, OnEdge> {
         let quantities: &[Quantity] = match wanted {
-            Wanted::Gz => &[Quantity::DbzDz],
-            Wanted::Gradient => &GRADIENT,
+            Quantities::Gz => &[Quantity::DbzDz],
+            Quantities::Gradient => &GRADIENT,
         };
         let mut values = self.sample(r_m, z_m, quantities)?.into_iter();
         let mut next = || values.next().unwrap_or_default();

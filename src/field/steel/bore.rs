@@ -13,7 +13,7 @@ const SHORT: f64 = 0.2;
 ///
 /// A winding is half-infinite current sheets that end at its two faces. In the bore, and within
 /// an outer radius of its ends, they are integrated over the radii to `tolerance` relative to
-/// one sheet's field; elsewhere [`Winding::field`] is asked.
+/// one sheet's field; elsewhere [`Winding::field`] is evaluated.
 ///
 /// # Errors
 /// A point on the winding's edge.
@@ -57,7 +57,7 @@ const SHORTEST: f64 = 1e-4;
 ///
 /// # Errors
 /// A point on a winding's edge.
-pub fn nested_bore_fields(
+pub(crate) fn nested_bore_fields(
     windings: &[Winding],
     r_m: f64,
     z_m: f64,

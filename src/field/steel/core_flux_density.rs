@@ -36,7 +36,7 @@ use fluxform_numerics::gauss;
 /// `cargo test --test field steel -- --ignored --nocapture claimed_in_full`.
 const LOST_BESIDE_DIFFERENCE: f64 = 0.1;
 const LOST_ALONE: f64 = 3.0;
-/// Depth below which the core's largest |B| is told, m.
+/// Depth below which the core's largest |B| is reported, m.
 const DEPTH_M: f64 = 1e-3;
 /// The same in radii, if that is less.
 const DEPTH_RADII: f64 = 0.1;
@@ -58,7 +58,7 @@ const AXIS: f64 = 1e-3;
 /// The flux density inside one core.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CoreField {
-    /// Largest |B| at the depth asked for or deeper, T.
+    /// Largest |B| at the depth requested or deeper, T.
     pub peak_t: f64,
     /// Where that is, m: in the array's coordinates, heights above the windings' top.
     pub peak_at_m: [f64; 3],
@@ -82,7 +82,7 @@ impl CoreField {
     }
 }
 
-/// The depth at which a core's peak is told: 1 mm, a tenth of the radius if that is less; a
+/// The depth at which a core's peak is reported: 1 mm, a tenth of the radius if that is less; a
 /// quarter of the length in flatter discs.
 ///
 /// At a sharp edge |B| of linear steel has no maximum.
@@ -309,7 +309,7 @@ impl Inspection {
     }
 
     /// The largest |B| in every core of the array that this was made for, T, as
-    /// [`CoupledArray::core_fields`] tells it, without mean and error.
+    /// As [`CoupledArray::core_fields`], without mean and error.
     ///
     /// # Errors
     /// As [`CoupledArray::core_fields`].
@@ -542,7 +542,8 @@ impl Targets {
                     DMatrix::from_fn(operator.nrows(), width * layers.len(), |node, place| {
                         MU_0_T_M_PER_A * layers[place / width][(node, mine.start + place % width)]
                     });
-                operator.tr_mul(&side_by_side)
+                // Blocked, unlike a product by a transpose in place.
+                operator.transpose() * side_by_side
             })
             .collect();
         currents_a

@@ -97,7 +97,7 @@ impl Excitation {
 impl Excitation {
     /// What a layer of one ampere on each node adds to the flux through the winding, Wb/A.
     #[must_use]
-    pub fn flux_weights_wb_per_a(&self, outline: &Generatrix) -> DVector<f64> {
+    pub(crate) fn flux_weights_wb_per_a(&self, outline: &Generatrix) -> DVector<f64> {
         let weights = outline
             .areas_m2()
             .zip(&self.normal_field_t_per_a)

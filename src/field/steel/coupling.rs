@@ -102,7 +102,7 @@ impl Coupling {
     /// Potentials at every core's grid, of `size` points, of the windings of all others with
     /// `currents_a`, A.
     #[must_use]
-    pub fn of_windings(&self, currents_a: &[f64], size: usize) -> DMatrix<f64> {
+    pub(crate) fn of_windings(&self, currents_a: &[f64], size: usize) -> DMatrix<f64> {
         let mut sum = DMatrix::zeros(size, self.cores);
         for (receiver, mut column) in sum.column_iter_mut().enumerate() {
             for (sender, current_a) in currents_a.iter().enumerate() {

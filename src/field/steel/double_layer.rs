@@ -14,7 +14,7 @@ use fluxform_numerics::log_rule::LOG_RULE;
 use fluxform_numerics::ring_functions::azimuthal_integrals;
 
 /// Most azimuthal modes, m = 0 to this minus one.
-pub const MAX_MODES: usize = 64;
+pub(crate) const MAX_MODES: usize = 64;
 /// Nodes on a piece of a panel close to the target.
 const PIECE_ORDER: usize = 12;
 /// Longest piece over which the ring kernel is a logarithm times a smooth function, in radii.

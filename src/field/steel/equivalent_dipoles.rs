@@ -23,7 +23,7 @@ const CLOSEST: f64 = 0.02;
 /// Most angles of a ring.
 const MOST_ANGLES: usize = 2000;
 
-/// Which components are wanted, in the order of [`ArraySources::sample`].
+/// Which components are requested, in the order of [`ArraySources::sample`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Parts {
     /// dB_z/dz.

@@ -58,7 +58,7 @@ impl Grading {
 /// (from, to) of the panels of a core's side from the top down; one that begins at z is at most
 /// about `length_m(z)` long.
 #[must_use]
-pub fn side_panels(shape: CoreShape, length_m: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
+pub(crate) fn side_panels(shape: CoreShape, length_m: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
     let mut panels = Vec::new();
     let mut top = shape.top_m;
     while top > shape.bottom_m {
@@ -115,7 +115,7 @@ impl Stretched {
 /// Length of a panel over which a kernel is smooth, in distances from where it is singular.
 pub const PART: f64 = 1.5;
 /// Gap between cores that touch, or nearly, in radii.
-pub const LEAST_GAP: f64 = 0.05;
+pub(crate) const LEAST_GAP: f64 = 0.05;
 
 #[cfg(test)]
 mod tests {

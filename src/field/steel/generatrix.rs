@@ -95,7 +95,7 @@ impl Resolution {
     /// Far away the layer's error is felt squared; close by it is felt as it is, and derivatives
     /// of it: half as many nodes again on each panel, and panels graded by less.
     #[must_use]
-    pub fn near_steel(tolerance: f64) -> Self {
+    pub(crate) fn near_steel(tolerance: f64) -> Self {
         let tolerance = tolerance.clamp(1e-12, 0.1);
         Self {
             order: (3.0 - 1.5 * tolerance.log10()).ceil() as usize,
@@ -108,7 +108,7 @@ impl Resolution {
     /// What [`Resolution::near_steel`] is compared with: its error is that of more than a node a
     /// panel, so that two may not lie close to each other by chance.
     #[must_use]
-    pub fn coarser_near_steel(&self) -> Self {
+    pub(crate) fn coarser_near_steel(&self) -> Self {
         Self {
             order: self.order - 2,
             tip: self.tip / self.ratio,
@@ -143,7 +143,7 @@ pub struct Generatrix {
 
 impl Generatrix {
     /// Cuts the outline of `shape`: graded to the edges, and on the side to `marks` =
-    /// (height, smallest length wanted there) m, where the source's own edges are close.
+    /// (height, smallest length requested there) m, where the source's own edges are close.
     #[must_use]
     pub fn new(shape: CoreShape, marks: &[(f64, f64)], resolution: &Resolution) -> Self {
         let CoreShape {

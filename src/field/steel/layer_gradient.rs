@@ -16,7 +16,7 @@ use fluxform_numerics::lagrange_basis::Basis;
 use fluxform_numerics::ring_functions::azimuthal_integrals;
 
 /// Components of the gradient: d/dr, d/dz and m/r.
-pub const COMPONENTS: usize = 3;
+pub(crate) const COMPONENTS: usize = 3;
 /// Targets that are one piece of work.
 const CHUNK: usize = 16;
 
@@ -28,7 +28,7 @@ const CHUNK: usize = 16;
 /// Error: each panel's quadrature below `tolerance` of the kernel's own size there; rounding
 /// grows like 1/r towards the axis.
 #[must_use]
-pub fn gradient_operators(
+pub(crate) fn gradient_operators(
     outline: &Generatrix,
     targets: &[(f64, f64)],
     modes: usize,
@@ -68,7 +68,7 @@ pub fn gradient_operators(
 /// grad D for mode 0 alone, as [`gradient_operators`] has it, on the calling thread: for callers
 /// that hold what another piece of parallel work may wait for.
 #[must_use]
-pub fn axial_gradient_operator(
+pub(crate) fn axial_gradient_operator(
     outline: &Generatrix,
     targets: &[(f64, f64)],
     tolerance: f64,

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-/// Largest degree of an element that [`nodes`] is asked for.
+/// Largest degree of an element that [`nodes`] is used with.
 pub const MAX_DEGREE: usize = 24;
 
 /// Gauss-Lobatto nodes of degree `degree` on [-1, 1], ascending: the ends and the zeros of

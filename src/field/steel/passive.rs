@@ -26,6 +26,8 @@ use neighbours::Neighbours;
 use reaction::{Reaction, ReactionResolution};
 use table::Grid;
 
+use fluxform_numerics::vec3::{minus, norm};
+
 /// Where the magnet's centre may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Region {
@@ -175,7 +177,7 @@ impl Added {
             let finer = of(&fine);
             let mut worst = 0.0_f64;
             for (k, error) in added.error_n.iter_mut().enumerate() {
-                *error = norm(reaction::minus(added.force_n[k], finer[k]));
+                *error = norm(minus(added.force_n[k], finer[k]));
                 let total: [f64; 3] = std::array::from_fn(|i| alone[k][i] + finer[k][i]);
                 worst = worst.max(*error / norm(total));
             }
@@ -386,10 +388,6 @@ fn spread(pulled: &Pulled) -> Vec<[f64; 3]> {
     over.chain(within).collect()
 }
 
-fn norm(v: [f64; 3]) -> f64 {
-    reaction::dot(v, v).sqrt()
-}
-
 /// Largest distance of the region from an axis, m.
 fn farthest(pulled: &Pulled) -> f64 {
     let away = |[from, to]: [f64; 2], at: f64| (from - at).abs().max((to - at).abs());
@@ -454,7 +452,7 @@ impl Checks {
             .zip(&self.forces_n)
             .map(|(at, sure)| {
                 let found = isolated.force_n(*at);
-                norm(reaction::minus(found, *sure)) / norm(*sure)
+                norm(minus(found, *sure)) / norm(*sure)
             })
             .fold(0.0, f64::max)
     }

@@ -147,7 +147,7 @@ impl Rings {
                 let add = |place: usize, ring: usize, share: f64| {
                     gather[(first + place, of * order + ring)] += share;
                 };
-                gather_shared(shape, (panel, &layer), (to_ring, &basis), &product, add);
+                gather_shared(shape, (panel, &layer), (to_ring, &basis), product, add);
             }
         }
         Self {
@@ -167,7 +167,7 @@ impl Rings {
 
     /// The same, panels at z being no longer than `most_m(z)` either.
     #[must_use]
-    pub fn graded_within(
+    pub(crate) fn graded_within(
         outline: &Generatrix,
         order: usize,
         grading: &Grading,
@@ -275,7 +275,7 @@ impl Response {
 
     /// The layer of mode 0 for a potential on the nodes, its mean zero.
     #[must_use]
-    pub fn axial_layer(&self, potential: &DVector<f64>) -> DVector<f64> {
+    pub(crate) fn axial_layer(&self, potential: &DVector<f64>) -> DVector<f64> {
         let centred = potential.add_scalar(-mean(&self.outline, potential.iter()));
         let rhs = centred * self.share;
         let mut layer = self.axial.solve(&rhs).unwrap_or(rhs);
@@ -316,7 +316,7 @@ impl Response {
     /// Azimuthal modes of a potential on the exchange grid: column 0 for mode 0, then cosine and
     /// sine of every mode; [ring, column].
     #[must_use]
-    pub fn modes_of(&self, potential: &[f64]) -> DMatrix<f64> {
+    pub(crate) fn modes_of(&self, potential: &[f64]) -> DMatrix<f64> {
         let rings = self.exchange.rings.len();
         let mut out = DMatrix::zeros(rings, 2 * self.layers.len() - 1);
         for (k, values) in potential.chunks(rings).enumerate() {
@@ -348,7 +348,7 @@ impl Response {
 
     /// Layers on the nodes for the modes that [`Response::modes_of`] gives, same columns.
     #[must_use]
-    pub fn layers_of(&self, modes: &DMatrix<f64>) -> DMatrix<f64> {
+    pub(crate) fn layers_of(&self, modes: &DMatrix<f64>) -> DMatrix<f64> {
         let mut out = DMatrix::zeros(self.outline.nodes.len(), modes.ncols());
         for column in 0..modes.ncols() {
             let mode = column.div_ceil(2);

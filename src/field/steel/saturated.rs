@@ -52,7 +52,7 @@ const SKIN_M: f64 = 1e-3;
 
 /// How the iteration ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Status {
+pub enum Convergence {
     /// The corrections fell below the tolerance, or to the rounding of the potential.
     Converged,
     /// They did not, within the allowed number, or the equations could not be solved (input or
@@ -73,7 +73,7 @@ pub struct Step {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
     /// Whether the numbers can be used.
-    pub status: Status,
+    pub status: Convergence,
     /// Density of the equivalent double layer at the surface's Gauss nodes, A.
     pub v_a: DVector<f64>,
     /// Total potential at the interior's nodes, A.
@@ -114,7 +114,7 @@ impl SaturatedCore {
     /// Domain: an outline as [`Generatrix::new`] makes it, of two nodes a panel at least.
     ///
     /// # Errors
-    /// [`MeshError`] when panels are too small for their place to be told from their neighbours'.
+    /// [`MeshError`] when panels are too small for their place to be distinguished from their neighbours'.
     pub fn new(outline: &Generatrix, quadrature: f64) -> Result<Self, MeshError> {
         let breaks = |face: Face| -> Vec<f64> {
             let mut of_face = outline.panels.iter().filter(|panel| panel.face == face);
@@ -147,7 +147,7 @@ impl SaturatedCore {
     /// from the layer `start` at the same nodes, of a similar problem or a coarser outline, or from
     /// a core of constant permeability.
     ///
-    /// Error: of the iteration, see [`Status`]; of the discretisation, the difference between two
+    /// Error: of the iteration, see [`Convergence`]; of the discretisation, the difference between two
     /// outlines' results. Sampled in the tests: on an outline for 1e-5 field and flux are within
     /// 4e-4 of those on one for 1e-7. A table's kinks, where they lie in the core, settle slowest.
     ///
@@ -174,8 +174,8 @@ impl SaturatedCore {
         };
         let source = self.interior.laplace_schur_m() * &phi;
         let mut steps: Vec<Step> = Vec::new();
-        let mut status = Status::Stalled;
-        while status == Status::Stalled && steps.len() < MAX_STEPS {
+        let mut status = Convergence::Stalled;
+        while status == Convergence::Stalled && steps.len() < MAX_STEPS {
             fluxform_base::progress::poll();
             let Some((change, slope)) = self.correction(&state, law, secant) else {
                 break;
@@ -184,7 +184,7 @@ impl SaturatedCore {
             // A slope upwards is rounding: the correction is then as small as can be had.
             let correction = ((-slope).max(0.0) / energy).sqrt();
             // Where the permeability is very large u is the small difference of phi and W v, and
-            // its rounding may stand above the tolerance, though far below the source's work.
+            // its rounding may be above the tolerance, though far below the source's work.
             let settled = -slope <= TOLERANCE * TOLERANCE * state.v.dot(&source).abs()
                 && steps
                     .last()
@@ -208,7 +208,7 @@ impl SaturatedCore {
                 length,
             });
             if done {
-                status = Status::Converged;
+                status = Convergence::Converged;
             }
         }
         Solution {

@@ -29,7 +29,7 @@ use super::equivalent_dipoles::{ArraySources, Near, Parts};
 use super::generatrix::{Generatrix, Resolution};
 use super::permeability::Permeability;
 use super::response::{Response, Rings, mean};
-use super::saturated::{CoreField, SaturatedCore, Solution, Status};
+use super::saturated::{Convergence, CoreField, SaturatedCore, Solution};
 use super::spectral_fem::MeshError;
 use super::symmetry::motions;
 use crate::winding::{OnEdge, Winding};
@@ -87,7 +87,7 @@ pub enum SaturatedArrayError {
 #[derive(Debug, Clone)]
 pub struct SaturatedArray {
     /// Whether the numbers can be used.
-    pub status: Status,
+    pub status: Convergence,
     /// Axes, m.
     pub positions_m: Vec<[f64; 2]>,
     /// Current in every coil, A.
@@ -199,7 +199,7 @@ impl SaturatedArray {
         let found = refined(&sequence, first, left, Some(coarsest))?;
         Ok(Self {
             modes_error,
-            relative_error: if initial.status == Status::Converged {
+            relative_error: if initial.status == Convergence::Converged {
                 found.error + modes_error
             } else {
                 f64::INFINITY
@@ -482,7 +482,7 @@ impl<L: Permeability + Sync> AlongCurve for Sequence<'_, L> {
         a: &SaturatedArray,
         b: &SaturatedArray,
     ) -> Result<f64, SaturatedArrayError> {
-        if a.status == Status::Stalled || b.status == Status::Stalled {
+        if a.status == Convergence::Stalled || b.status == Convergence::Stalled {
             return Ok(f64::INFINITY);
         }
         Ok(a.difference(b, self.lowest_m, self.tolerance)?)
@@ -516,7 +516,7 @@ struct Problem<'a> {
 
 /// What the iteration ends with.
 struct Solved {
-    status: Status,
+    status: Convergence,
     steps: Vec<f64>,
     layers_a: Vec<DMatrix<f64>>,
     moments: DMatrix<f64>,
@@ -552,10 +552,10 @@ impl Problem<'_> {
                 .fold(0.0, f64::max);
             let relative = if scale > 0.0 { change / scale } else { change };
             steps.push(relative);
-            let found = state
-                .cores
-                .iter()
-                .all(|c| c.as_ref().is_some_and(|c| c.status == Status::Converged));
+            let found = state.cores.iter().all(|c| {
+                c.as_ref()
+                    .is_some_and(|c| c.status == Convergence::Converged)
+            });
             let settled = relative <= SETTLED * residual;
             if settled || steps.len() >= MOST_STEPS || !relative.is_finite() {
                 let layers_a = modes
@@ -571,9 +571,9 @@ impl Problem<'_> {
                     .collect();
                 return Solved {
                     status: if settled && found {
-                        Status::Converged
+                        Convergence::Converged
                     } else {
-                        Status::Stalled
+                        Convergence::Stalled
                     },
                     steps,
                     layers_a,

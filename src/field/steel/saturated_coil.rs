@@ -8,7 +8,7 @@ use super::curve_refinement::{AlongCurve, Level, Refined, Try, refined};
 use super::generatrix::{Generatrix, Resolution};
 use super::magnetized::MagnetizedCore;
 use super::permeability::Permeability;
-use super::saturated::{CoreField, SaturatedCore, Status};
+use super::saturated::{Convergence, CoreField, SaturatedCore};
 use super::spectral_fem::MeshError;
 use crate::winding::{OnEdge, Winding};
 use fluxform_numerics::refinement::error_of_finest;
@@ -56,7 +56,7 @@ pub struct SaturatedCoil {
     pub added_inductance_h: f64,
     /// |B| inside.
     pub inside: CoreField,
-    /// Estimated error: of the gradient at the height asked for and above, relative to the largest
+    /// Estimated error: of the gradient at the height requested and above, relative to the largest
     /// |grad B| there, and of the flux linkage; the larger.
     pub relative_error: f64,
     /// Estimated error of the largest |B| inside, relative to it.
@@ -118,7 +118,7 @@ impl<L: Permeability> CoilWithCurve<'_, L> {
             start.map(|coarser| current_a * DVector::from_vec(coarser.layer.density_on(&outline)));
         let potential = &excitation.potential * current_a;
         let solution = solver.solve(&potential, self.law, start.as_ref());
-        if solution.status == Status::Stalled {
+        if solution.status == Convergence::Stalled {
             return Err(SaturatedCoilError::Stalled);
         }
         let flux_wb = solver.flux_linkage_wb(&solution, &excitation.potential);

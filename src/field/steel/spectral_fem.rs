@@ -39,7 +39,7 @@ pub enum MeshError {
     /// The degree is outside 1..=[`lobatto::MAX_DEGREE`].
     #[error("elements of degree {degree} are not made")]
     Degree {
-        /// As asked for.
+        /// As requested.
         degree: usize,
     },
 }
@@ -169,7 +169,7 @@ impl Interior {
     /// Time: about one Newton step.
     ///
     /// # Errors
-    /// [`MeshError`]; breakpoints too close for their elements' stiffness to be told from zero
+    /// [`MeshError`]; breakpoints too close for their elements' stiffness to be distinguished from zero
     /// count as breakpoints that do not increase.
     pub fn new(r_breaks_m: &[f64], z_breaks_m: &[f64], degree: usize) -> Result<Self, MeshError> {
         if !increasing(r_breaks_m) || r_breaks_m[0] != 0.0 {
@@ -368,7 +368,7 @@ impl Interior {
     }
 
     /// How well the elements resolve u: the part of u that polynomials of one degree less miss,
-    /// in the energy norm int mu |grad u|^2, relative to u's own. It tells a mesh that is too
+    /// in the energy norm int mu |grad u|^2, relative to u's own. It shows a mesh that is too
     /// coarse from one that is not; it is no bound.
     #[must_use]
     pub fn resolution(&self, u: &DVector<f64>, law: &impl Permeability) -> f64 {

@@ -39,13 +39,13 @@ impl Trace {
 
     /// Number of Gauss nodes.
     #[must_use]
-    pub fn gauss_count(&self) -> usize {
+    pub(crate) fn gauss_count(&self) -> usize {
         self.panels * self.order
     }
 
     /// Values along the boundary from values at the Gauss nodes.
     #[must_use]
-    pub fn to_boundary(&self, gauss: &DVector<f64>) -> DVector<f64> {
+    pub(crate) fn to_boundary(&self, gauss: &DVector<f64>) -> DVector<f64> {
         let columns = self.rows_to_boundary(&DMatrix::from_column_slice(
             gauss.len(),
             1,
@@ -56,7 +56,7 @@ impl Trace {
 
     /// Values at the Gauss nodes from values along the boundary.
     #[must_use]
-    pub fn to_gauss(&self, boundary: &DVector<f64>) -> DVector<f64> {
+    pub(crate) fn to_gauss(&self, boundary: &DVector<f64>) -> DVector<f64> {
         let mut gauss = DVector::zeros(self.gauss_count());
         for panel in 0..self.panels {
             gauss.rows_mut(panel * self.order, self.order).gemv(
@@ -71,7 +71,7 @@ impl Trace {
 
     /// An operator on values at the Gauss nodes as one on values along the boundary.
     #[must_use]
-    pub fn operator_on_boundary(&self, on_gauss: &DMatrix<f64>) -> DMatrix<f64> {
+    pub(crate) fn operator_on_boundary(&self, on_gauss: &DMatrix<f64>) -> DMatrix<f64> {
         let rows = self.rows_to_boundary(on_gauss);
         let mut operator = DMatrix::zeros(rows.nrows(), rows.nrows());
         for panel in 0..self.panels {

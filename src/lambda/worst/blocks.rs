@@ -117,7 +117,7 @@ impl Kernel for Enclose<'_> {
     }
 }
 
-/// What is asked at a few consecutive probes, or between.
+/// The condition at a few consecutive probes, or between.
 struct Node {
     /// First and last probe.
     from: usize,
@@ -289,7 +289,7 @@ impl Kernel for Search<'_> {
             let end = start + dot::<FMA>(&bounds[n..2 * n], vector);
             size(start).max(size(end)) - tree.limits[k]
         };
-        // The bar rises with every point found, so that few of neighbours are told.
+        // The bar rises with every point found, so that few of a neighbourhood are returned.
         let mut bar = tree.limits.clone();
         let mut found: Vec<usize> = Vec::new();
         let mut stack: Vec<(usize, f64, f64)> = Vec::new();
@@ -359,7 +359,7 @@ impl Kernel for Search<'_> {
 mod tests {
     use super::*;
 
-    /// Of the points above each probe's limit the furthest is told, and none below all limits.
+    /// Of the points above each probe's limit the furthest is returned, and none below all limits.
     #[test]
     fn the_point_furthest_above_each_limit_is_found() {
         let mut random = fluxform_numerics::random::Random::new(3);

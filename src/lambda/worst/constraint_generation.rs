@@ -245,7 +245,7 @@ fn solve(
     }
 }
 
-/// Where the program stands, in SI units.
+/// The state of the program, in SI units.
 fn course(scaled: &Scaled, form: Form, stand: &Stand) -> Course {
     let (lambda_unit, force_unit) = (scaled.lambda_unit(), scaled.force_unit());
     let last = |z: &[Num]| z[z.len() - 1].to_f64();
@@ -289,7 +289,7 @@ fn course(scaled: &Scaled, form: Form, stand: &Stand) -> Course {
     }
 }
 
-/// What the points are asked at every turn, and in the direction of the last piece.
+/// The conditions on the points at every turn, and in the direction of the last piece.
 fn probes(scaled: &Scaled, form: Form, followed: &mut Followed) -> (Vec<Probe>, Vec<Probe>) {
     let (lambda_unit, force_unit) = (scaled.lambda_unit(), scaled.force_unit());
     let mut doubt = 0.0_f64;

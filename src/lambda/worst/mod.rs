@@ -11,10 +11,10 @@
 //!   with `t* <= (w_0 + w) lambda max h`,
 //! - `lambda_maxmin` is the largest lambda with `G I + offset >= lambda h` at every point.
 //!
-//! Errors are judged by the largest wanted force, not by that of their own point, so a surface
+//! Errors are judged by the largest requested force, not by that of their own point, so a surface
 //! that comes down to `h = 0` needs no exception.
 //!
-//! Where several currents are equally good, a vertex is told: of coils that cannot pull, the one
+//! Where several currents are equally good, a vertex is returned: of coils that cannot pull, the one
 //! with the least sum of currents.
 
 mod blocks;
@@ -32,7 +32,7 @@ mod scaled;
 pub(super) use maxmin::largest;
 pub use maxmin::{Maxmin, maxmin};
 pub use path::{ActivePoint, Turn, WorstPath};
-pub use perceptual_tolerance::{Felt, felt};
+pub use perceptual_tolerance::{WithinTolerance, felt};
 pub use proof::lower_bound_n;
 
 use fluxform_base::accuracy::StageAccuracy;
@@ -47,7 +47,7 @@ use program::End;
 use scaled::{Form, Limits, Scaled};
 
 /// Shares of lambda max h by which points may be missed where rounding leads a path astray that
-/// misses none; the estimated error tells it.
+/// misses none; the estimated error states it.
 const LEEWAYS: [f64; 2] = [1e-12, 1e-10];
 
 /// Currents at one force constant by the worst-point form.

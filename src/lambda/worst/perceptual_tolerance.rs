@@ -1,5 +1,5 @@
 //! The largest force constant whose errors nobody feels: at every point within a share of the
-//! wanted force there, or below what a finger feels at all.
+//! requested force there, or below what a finger feels at all.
 //!
 //! At fixed `lambda_k` every tolerance `max(w lambda h, c)` is one of its two terms, and with
 //! that choice the largest lambda is a linear program. Neither term is above the tolerance, so
@@ -20,7 +20,7 @@ const NO_RAISE: f64 = 1e-13;
 
 /// The largest force constant within the tolerances, currents for it, and what limits it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Felt {
+pub struct WithinTolerance {
     /// Force constant, N/m.
     pub lambda_n_per_m: f64,
     /// Currents, A.
@@ -41,7 +41,7 @@ pub fn felt(
     problem: &ForceProblem,
     share: f64,
     threshold_n: f64,
-) -> Result<Option<Felt>, ProblemError> {
+) -> Result<Option<WithinTolerance>, ProblemError> {
     problem.validate(&Settings {
         jnd_weight: share,
         ..Settings::default()
@@ -90,7 +90,7 @@ pub fn felt(
     }
     Ok(best.map(|found| {
         let (point, part) = most_of_tolerance(problem, &found, share, threshold_n);
-        Felt {
+        WithinTolerance {
             lambda_n_per_m: found.lambda_n_per_m,
             currents_a: found.currents_a,
             point,

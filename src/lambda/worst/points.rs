@@ -1,4 +1,4 @@
-//! Points, what they are asked, and which of a few a path misses first.
+//! Points, the condition that each must meet, and which of a few a path misses first.
 
 use super::scaled::Form;
 use fluxform_numerics::dispatch::{self, Kernel, mul_add};
@@ -12,7 +12,7 @@ pub(super) struct Points<'a> {
     pub offset_n: Option<&'a [f64]>,
 }
 
-/// What is asked of the points: `lambda h - share offset - G I` at most `limit`.
+/// The condition on the points: `lambda h - share offset - G I` at most `limit`.
 #[derive(Debug, Clone)]
 pub(super) struct Probe {
     pub lambda_n_per_m: f64,
@@ -22,7 +22,7 @@ pub(super) struct Probe {
     pub limit_n: f64,
 }
 
-/// Where a path stands, in SI units, and how it goes on per unit of lambda.
+/// The state of a path, in SI units, and how it goes on per unit of lambda.
 pub(super) struct Course {
     pub at: Probe,
     /// Errors that rounding explains are no misses.
@@ -47,7 +47,7 @@ pub(super) fn bit(up: bool) -> Held {
 
 /// The point that a path misses first on its course: where it is missed already the one missed
 /// most, where several are at once the one that is left fastest. Rows that are `held` are not
-/// asked: those that the path rests on seem to be missed by what rounding leaves of their rates.
+/// considered: those that the path rests on seem to be missed by what rounding leaves of their rates.
 pub(super) fn first_missed(
     points: Points,
     held: &[Held],

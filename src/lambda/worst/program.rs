@@ -22,7 +22,7 @@ const EQUAL: f64 = 1e-22;
 const SOUND: f64 = 1e-12;
 /// Entries of an inverse above this size amplify rounding.
 const STEEP: f64 = 1e4;
-/// Rows that are asked for before a step, at most: where one more ends it, the step is taken back.
+/// Rows that are requested before a step, at most: where one more ends it, the step is taken back.
 const TWINS: usize = 4;
 /// Exchanges after which the inverse is recomputed.
 const FRESH: usize = 16;
@@ -153,7 +153,7 @@ impl Program {
 
     /// Follows the minimiser from `lambda = 0` on. The rows of `basis` must be independent and
     /// their multipliers, the second objective's where those are zero, not negative. Before the
-    /// minimiser moves on, `ask` is told where it stands, its rate, and the step to the next turn
+    /// minimiser moves on, `ask` is given its position, its rate, and the step to the next turn
     /// if there is one; it adds a row that seems to end the step earlier, or returns false.
     pub fn follow(
         &mut self,
@@ -266,7 +266,7 @@ impl Program {
         let met = self.met * size + MET_AT_ZERO;
         let sum = |z: &[Num]| z.iter().map(|v| v.to_f64().abs()).sum::<f64>();
         let rough = |z: &[Num]| z.iter().map(|v| v.to_f64()).collect::<Vec<f64>>();
-        // Doubles tell which rows may matter; entries of rows are at most about 2.
+        // Doubles show which rows may matter; entries of rows are at most about 2.
         let rounding = 4.0 * f64::EPSILON * (self.width + 4) as f64;
         let slack_error = rounding * (sum(&vertex.z) + size);
         let rate_error = rounding * (sum(&vertex.rate) + self.size[1]);
@@ -335,7 +335,7 @@ impl Program {
     }
 }
 
-/// Where the minimiser stands.
+/// The state of the minimiser.
 pub(super) struct Stand<'a> {
     pub lambda: Num,
     pub z: &'a [Num],
@@ -352,7 +352,7 @@ enum Exchange {
     Singular,
 }
 
-/// Where a step began before which more rows might have been asked for.
+/// Where a step began before which more rows might have been requested.
 struct Hasty {
     vertex: Vertex,
     lambda: Num,
@@ -619,7 +619,7 @@ fn inverse(mut left: Vec<Vec<Num>>) -> Option<Vec<Vec<Num>>> {
 mod tests {
     use super::*;
 
-    /// Doubles only tell which rows need a closer look: with rows that differ by less than their
+    /// Doubles only show which rows need a closer look: with rows that differ by less than their
     /// rounding, and a parameter of any size, the same are found as by looking at all of them.
     #[test]
     fn no_row_that_matters_is_passed_over() {

@@ -107,12 +107,12 @@ impl<'a> Scaled<'a> {
     }
 
     /// One unit of lambda', N/m.
-    pub fn lambda_unit(&self) -> i32 {
+    pub(crate) fn lambda_unit(&self) -> i32 {
         self.force - self.height()
     }
 
     /// One unit of force, N.
-    pub fn force_unit(&self) -> i32 {
+    pub(crate) fn force_unit(&self) -> i32 {
         self.force
     }
 
@@ -122,7 +122,7 @@ impl<'a> Scaled<'a> {
     }
 
     /// Size of the forces that currents sum up, N, or of their rates.
-    pub fn pushed_n(&self, amperes: &[f64]) -> f64 {
+    pub(crate) fn pushed_n(&self, amperes: &[f64]) -> f64 {
         let pairs = amperes.iter().zip(self.largest);
         pairs.map(|(ampere, most)| ampere.abs() * most).sum()
     }
@@ -195,7 +195,7 @@ impl<'a> Scaled<'a> {
     }
 
     /// Adds the row of point `j`: the force too weak (`up`), or too strong.
-    pub fn add_point(&self, program: &mut Program, form: Form, j: usize, up: bool) -> usize {
+    pub(crate) fn add_point(&self, program: &mut Program, form: Form, j: usize, up: bool) -> usize {
         let coils = self.problem.coils();
         let sign = if up { Num::ONE } else { -Num::ONE };
         let forces = &self.problem.forces_n_per_a[j * coils..(j + 1) * coils];
@@ -218,7 +218,7 @@ impl<'a> Scaled<'a> {
 
     /// A first set of active rows whose multipliers are not negative, for a program that has the
     /// rows `up` and `down` of the highest point.
-    pub fn first_basis(&self, form: Form, up: usize, down: Option<usize>) -> Vec<usize> {
+    pub(crate) fn first_basis(&self, form: Form, up: usize, down: Option<usize>) -> Vec<usize> {
         let coils = self.problem.coils();
         let j = self.highest;
         let force = |k: usize| self.problem.forces_n_per_a[j * coils + self.live[k]];

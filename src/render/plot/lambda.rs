@@ -54,7 +54,7 @@ pub enum ErrorMap {
     Scattered {
         /// Places.
         points_mm: Vec<(f64, f64)>,
-        /// Given minus wanted.
+        /// Given minus requested.
         errors_mn: Vec<f64>,
     },
 }
@@ -68,9 +68,9 @@ pub struct ChosenForces {
     pub wanted_n: Vec<f64>,
     /// With static currents, N.
     pub static_n: Vec<f64>,
-    /// With position feedback, N; empty where it was not asked for.
+    /// With position feedback, N; empty where it was not requested.
     pub feedback_n: Vec<f64>,
-    /// Given by static currents minus wanted.
+    /// Given by static currents minus requested.
     pub map: ErrorMap,
 }
 
@@ -85,7 +85,7 @@ pub struct LambdaPlot {
     pub lambda_n_per_m: Vec<f64>,
     /// Root mean square error there, N.
     pub rms_error_n: Vec<f64>,
-    /// The same over that of the wanted force; `None` where none is wanted.
+    /// The same over that of the requested force; `None` where none is requested.
     pub relative_error: Vec<Option<f64>>,
     /// Static currents there, A.
     pub currents_a: Vec<Vec<f64>>,

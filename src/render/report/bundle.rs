@@ -18,8 +18,13 @@ pub fn page(facts: &BundleFacts) -> String {
         error_budget::section(facts, &mut data),
         limits::section(facts),
         path::section(facts, &mut data),
-        surface::section(facts, &mut data),
-        field::section(facts, &mut data),
+        surface::section(
+            &facts.surface,
+            facts.points,
+            facts.chosen.is_some(),
+            &mut data,
+        ),
+        field::section(&facts.field, &mut data),
         sources(facts),
     ];
     Page {

@@ -1,4 +1,4 @@
-//! What a bundle's page is told, SI.
+//! The contents of a bundle's page, SI.
 
 use fluxform_base::force_constant::{Criterion, NamedConstant};
 
@@ -36,7 +36,7 @@ pub struct BundleFacts<'a> {
     /// Limit of the sum of the currents, A.
     pub total_max_a: Option<f64>,
     /// The design's limits.
-    pub limits: Vec<LimitFacts>,
+    pub limits: Vec<LimitRow>,
     /// Limits that are not looked at here.
     pub unchecked: Vec<&'static str>,
     /// The points that decide the least largest error, and their shares.
@@ -118,7 +118,7 @@ impl CoilFacts {
 
 /// A limit of the design beside the coil's value.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LimitFacts {
+pub struct LimitRow {
     /// Its name in artefacts, unit last.
     pub name: &'static str,
     /// The coil's value.
@@ -156,7 +156,7 @@ pub struct StageFacts<'a> {
 pub struct BudgetPart {
     /// What adds it.
     pub name: &'static str,
-    /// Relative to the force, as `basis` tells.
+    /// Relative to the force, as `basis` states.
     pub part: f64,
     /// How it follows from the stages' estimates.
     pub basis: &'static str,

@@ -2,7 +2,6 @@
 
 use serde_json::{Value, json};
 
-use super::data::BundleFacts;
 use super::frame::{Section, figure};
 use super::html::{Cell, Html, Table};
 use super::number::figures;
@@ -57,8 +56,7 @@ impl Layer {
     }
 }
 
-pub(super) fn section(facts: &BundleFacts, data: &mut serde_json::Map<String, Value>) -> Section {
-    let field = &facts.field;
+pub(super) fn section(field: &Field, data: &mut serde_json::Map<String, Value>) -> Section {
     let mut body = Html::default();
     body.raw("<div class=\"pair\">");
     figure(

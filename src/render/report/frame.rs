@@ -35,7 +35,7 @@ pub struct Page {
     pub kind: &'static str,
     /// Its title.
     pub title: String,
-    /// What is told before all else, markup.
+    /// Markup that comes before all else.
     pub lead: Html,
     /// Its parts.
     pub sections: Vec<Section>,

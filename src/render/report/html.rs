@@ -50,7 +50,7 @@ impl Html {
             self.element(open, head);
         }
         self.raw("</tr></thead><tbody>");
-        // Where several numbers stand in a row, each needs its name once the head is gone.
+        // Where several numbers follow each other, each needs its name once the head is gone.
         let named = table.prose && table.head.iter().filter(|(_, numeric)| *numeric).count() > 1;
         for row in &table.rows {
             self.raw("<tr>");
@@ -95,13 +95,13 @@ impl Html {
 /// A table.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Table {
-    /// What it tells.
+    /// Its subject.
     pub caption: String,
     /// Heads of the columns, and whether a column holds numbers.
     pub head: Vec<(&'static str, bool)>,
     /// Row by row.
     pub rows: Vec<Vec<Cell>>,
-    /// Whether the last column is prose, which stands below its row on a narrow screen.
+    /// Whether the last column is prose, which is placed below its row on a narrow screen.
     pub prose: bool,
 }
 
@@ -126,7 +126,7 @@ impl From<&str> for Cell {
     }
 }
 
-/// `text` as it may stand in an element or in a quoted attribute.
+/// `text` as it may appear in an element or in a quoted attribute.
 #[must_use]
 pub fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());

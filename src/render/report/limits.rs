@@ -1,12 +1,12 @@
 //! What limits a result: coils, points, the design's own limits.
 
-use super::data::{BundleFacts, CoilFacts, LimitFacts};
+use super::data::{BundleFacts, CoilFacts, LimitRow};
 use super::error_budget::worst;
 use super::frame::Section;
 use super::html::{Cell, Html, Table};
 use super::number::{count, figures, force, mm, percent, si};
 
-/// Points that decide, told at most.
+/// Most deciding points that are listed.
 const TOLD: usize = 5;
 
 pub(super) fn section(facts: &BundleFacts) -> Section {
@@ -105,7 +105,7 @@ fn deciding(facts: &BundleFacts) -> Option<String> {
     })
 }
 
-pub(super) fn unmet(limits: &[LimitFacts]) -> Option<String> {
+pub(super) fn unmet(limits: &[LimitRow]) -> Option<String> {
     let missed: Vec<String> = limits
         .iter()
         .filter(|limit| !limit.met)
@@ -157,8 +157,8 @@ pub(super) fn in_unit(value: f64, unit: &str) -> String {
     }
 }
 
-pub(super) fn table(limits: &[LimitFacts]) -> Table {
-    let row = |limit: &LimitFacts| -> Vec<Cell> {
+pub(super) fn table(limits: &[LimitRow]) -> Table {
+    let row = |limit: &LimitRow| -> Vec<Cell> {
         let (name, unit) = words(limit.name);
         let verdict = if limit.met {
             "<span class=\"met\">met</span>"

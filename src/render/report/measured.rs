@@ -22,7 +22,7 @@ pub struct MeasuredCurve<'a> {
 pub struct MeasuredRow {
     /// The knob.
     pub knob: f64,
-    /// Whether it stands out: the default, or what this run asked for.
+    /// Whether it is emphasised: the default, or what this run requested.
     pub marked: bool,
     /// Largest error found.
     pub error: f64,

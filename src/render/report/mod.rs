@@ -1,6 +1,6 @@
 //! Pages that people look at: plain data in, one self-contained HTML text out.
 //!
-//! A page loads nothing and sends nothing: style, script and numbers stand in it, and its content
+//! A page loads nothing and sends nothing: style, script and numbers are in it, and its content
 //! security policy names both by their digests. Every text that comes from an input is escaped
 //! ([`html`]). The same data give the same bytes.
 

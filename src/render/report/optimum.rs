@@ -7,7 +7,7 @@ use super::html::{Cell, Html, Table};
 use super::limits::{in_unit, words};
 use super::number::{count, figures, force, percent, si};
 
-/// What the page is told, SI.
+/// The contents of the page, SI.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OptimumFacts<'a> {
     /// Name of the design.

@@ -2,7 +2,6 @@
 
 use serde_json::{Value, json};
 
-use super::data::BundleFacts;
 use super::frame::{Section, figure};
 use super::html::{Cell, Html, Table};
 use super::number::{count, figures, force};
@@ -22,7 +21,7 @@ pub struct Surface {
     pub columns: usize,
     /// Heights, m.
     pub height_m: Vec<Option<f64>>,
-    /// Given minus wanted, N; empty without a force constant.
+    /// Given minus requested, N; empty without a force constant.
     pub error_n: Vec<Option<f64>>,
 }
 
@@ -72,7 +71,7 @@ impl Surface {
             )
         };
         let mm = |[from, to]: [f64; 2], samples: usize| {
-            // The first point of every block stands where the grid's ends tell.
+            // The first point of every block is where the grid's ends say.
             let last = samples.div_ceil(step).max(1) - 1;
             let share = (last * step) as f64 / (samples.max(2) - 1) as f64;
             [from * 1e3, (from + (to - from) * share) * 1e3]
@@ -89,8 +88,13 @@ impl Surface {
     }
 }
 
-pub(super) fn section(facts: &BundleFacts, data: &mut serde_json::Map<String, Value>) -> Section {
-    let surface = &facts.surface;
+/// The surface with `points` constraint points; with their errors where `lambda_is_known`.
+pub(super) fn section(
+    surface: &Surface,
+    points: usize,
+    lambda_is_known: bool,
+    data: &mut serde_json::Map<String, Value>,
+) -> Section {
     let mut body = Html::default();
     let step = surface.step();
     let thinned = if step > 1 {
@@ -107,10 +111,10 @@ pub(super) fn section(facts: &BundleFacts, data: &mut serde_json::Map<String, Va
             "The surface that the finger's magnet follows, its {} and the coils below; \
              the ring is where the force is most wrong. Drag, use the arrow keys or the buttons \
              to turn it.{thinned}",
-            count(facts.points, "constraint point")
+            count(points, "constraint point")
         ),
     );
-    if facts.chosen.is_some() {
+    if lambda_is_known {
         figure(
             &mut body,
             "errors",

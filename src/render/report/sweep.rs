@@ -12,7 +12,7 @@ use crate::plot::pareto::ParetoPlot;
 /// Designs that are listed; the table beside has all.
 const LISTED: usize = 200;
 
-/// What the page is told, SI.
+/// The contents of the page, SI.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SweepFacts<'a> {
     /// Name of the design.
@@ -48,7 +48,7 @@ pub struct BestDesign {
     pub force_n: f64,
     /// ohm, kg, s.
     pub costs: [f64; 3],
-    /// On which fronts it stands.
+    /// The fronts it belongs to.
     pub on: [bool; 3],
     /// Whether it is within its limits.
     pub met: bool,

@@ -2,15 +2,17 @@
 
 use std::path::Path;
 
-use super::format::{SurfaceFormat, parse_unit, unit_names};
+use super::unit::{parse_unit, unit_names};
 use super::{
     AxisRequest, Fit, GridRequest, Placement, Primitive, Seat, ShapeDocument, SurfaceSource, Up,
 };
+use crate::format::SurfaceFormat;
 use crate::step::BodyOptions;
 use fluxform_base::units::m_from_mm;
 use fluxform_design::diagnostics::{Faults, InvalidDocument};
+use fluxform_design::keys::{Key, with_meanings};
 use fluxform_design::message_text::{nearest, quoted};
-use fluxform_design::reader::{Section, read_document};
+use fluxform_design::reader::{Section, list_keys, read_document};
 use fluxform_design::rule::{Bound, Rule};
 use fluxform_design::source;
 use fluxform_design::values::OneOrMany;
@@ -72,12 +74,8 @@ fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
     };
     let scale = scale(root);
     let placement = Placement {
-        translate_m: root
-            .tuple("translate_mm", &BODY_MM)
-            .map_or([0.0; 3], |t| t.value.map(m_from_mm)),
-        rotate_deg: root
-            .tuple("rotate_deg", &Rule::any("degrees"))
-            .map_or([0.0; 3], |r| r.value),
+        translate_m: root.tuple("translate_mm", &BODY_MM).map(m_from_mm),
+        rotate_deg: root.tuple("rotate_deg", &Rule::any("degrees")),
         seat: seat(root),
     };
     let bodies = bodies(root);
@@ -118,8 +116,8 @@ fn seat(root: &mut Section<'_>) -> Seat {
         let message = "fit_mm puts the surface into the middle of its box";
         root.fault("center", message, "leave one of the two out");
     }
-    let fit = ends.map(|ends| {
-        let [a, b, c, d, e, f] = ends.value.map(m_from_mm);
+    let fit = root.has("fit_mm").then(|| {
+        let [a, b, c, d, e, f] = ends.map(m_from_mm);
         Fit {
             box_m: [[a, b], [c, d], [e, f]],
             scale,
@@ -145,15 +143,81 @@ fn bodies(root: &mut Section<'_>) -> BodyOptions {
         body: root.text("body").map(|body| body.value),
     }
 }
+/// The keys of a shape: those of a surface file, then those of the primitives.
+#[must_use]
+pub fn keys() -> Vec<Key> {
+    let mut all: Vec<Key> = Vec::new();
+    let surface = std::iter::once("surface = \"a.stl\"\n[points]\n".to_owned());
+    let primitive = |(name, _): &(&str, Kind)| format!("primitive = {name:?}\n[points]\n");
+    for text in surface.chain(KINDS.iter().map(primitive)) {
+        let read = |root: &mut Section<'_>| {
+            document(root, Path::new(""));
+        };
+        for key in list_keys(&text, read) {
+            if !all.iter().any(|known| known.path() == key.path()) {
+                all.push(key);
+            }
+        }
+    }
+    // The top level before its section.
+    all.sort_by_key(|key| !key.section.is_empty());
+    with_meanings(all, MEANINGS)
+}
+
+const MEANINGS: &[(&str, &str)] = &[
+    ("name", "names the folder of results"),
+    (
+        "surface",
+        "a file from CAD, beside the shape; this or `primitive` is required",
+    ),
+    (
+        "unit",
+        "of the file's coordinates: mm, cm, m, um, in or ft; required where the format carries none",
+    ),
+    ("stretch", "whether `scale` may differ along the axes"),
+    (
+        "scale",
+        "factor on a surface's size, or one along each of x, y and z",
+    ),
+    ("translate_mm", "moves the surface, after its rotation"),
+    ("rotate_deg", "rotates it about x, then y, then z"),
+    ("up", "the file's direction that points up"),
+    ("center", "whether the middle of its box comes to x = y = 0"),
+    ("rest_on_mm", "height of its lowest point"),
+    (
+        "fit_mm",
+        "box that it is moved into, from and to along x, y and z: to the middle, onto the lower end",
+    ),
+    ("scale_to_fit", "whether it is also scaled to fill that box"),
+    (
+        "chord_mm",
+        "STEP: how far a facet may lie from its face; without it a 4000th of the size",
+    ),
+    (
+        "body",
+        "STEP: the one body or assembly to read, by name or number",
+    ),
+    ("primitive", "a body with a formula, instead of a file"),
+    ("side_mm", "of `flat` and `wedge`: length of a side"),
+    ("height_mm", "of `flat`: its height above the windings"),
+    ("radius_mm", "of `half-sphere` and `half-cylinder`"),
+    ("base_mm", "of both: height of the plane they rise from"),
+    ("length_mm", "of `half-cylinder`: its length"),
+    ("low_mm", "of `wedge`: its height at the low side"),
+    ("high_mm", "of `wedge`: its height at the high side"),
+    ("points.x_mm", "grid of constraint points along x"),
+    ("points.y_mm", "grid of constraint points along y"),
+    (
+        "points.outside",
+        "what becomes of grid points beside the surface: there is no point",
+    ),
+];
 
 /// Factors of size; `None` where they are at fault.
 fn scale(root: &mut Section<'_>) -> Option<[f64; 3]> {
     let rule = Rule::any("").bound(Bound::Positive);
     let stretch = root.flag_or("stretch", false);
-    let factors = match match root.one_or_many("scale", &rule) {
-        None => OneOrMany::One(1.0),
-        Some(given) => given.value,
-    } {
+    let factors = match root.one_or_many("scale", &rule, 1.0).value {
         OneOrMany::One(factor) => [factor; 3],
         OneOrMany::Many(factors) => match <[f64; 3]>::try_from(factors) {
             Ok(factors) => factors,
@@ -202,16 +266,20 @@ fn surface(root: &mut Section<'_>, path: &Path) -> Option<SurfaceSource> {
     let unit = root.text("unit");
     let unit_m = unit.as_ref().and_then(|unit| unit_of(root, &unit.value));
     let file = file?;
-    let Some(format) = SurfaceFormat::of(Path::new(&file)) else {
+    let format = SurfaceFormat::of(Path::new(&file));
+    // The content of a file without an ending states its format once it is read.
+    if format.is_none() && Path::new(&file).extension().is_some() {
         let message = format!(
             "expected a file ending in {}, found {}",
             SurfaceFormat::endings(),
             quoted(&file)
         );
-        root.fault("surface", message, "convert the surface to one of these");
+        let advice = SurfaceFormat::advice(Path::new(&file));
+        let advice = advice.unwrap_or("convert the surface to one of these");
+        root.fault("surface", message, advice);
         return None;
-    };
-    if !format.carries_unit() && !root.has("unit") {
+    }
+    if format.is_some_and(|format| !format.carries_unit()) && !root.has("unit") {
         let help = format!(
             "add unit = \"mm\" or what it was drawn in ({})",
             unit_names().join(", ")
@@ -291,7 +359,7 @@ fn level(root: &mut Section<'_>, key: &'static str, default_mm: f64) -> f64 {
 fn points(mut s: Section<'_>) -> Option<GridRequest> {
     let x = s.axis_or("x_mm", &BODY_MM, SEED_SIDE_MM);
     let y = s.axis_or("y_mm", &BODY_MM, SEED_SIDE_MM);
-    s.choice("outside", &[("skip", ())]);
+    s.choice_or_first("outside", &[("skip", ())]);
     let grid = x.zip(y).map(|(x, y)| [x.value, y.value]);
     if let Some([x, y]) = &grid
         && x.samples

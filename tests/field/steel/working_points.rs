@@ -10,7 +10,7 @@ use fluxform_field::steel::bh_curve::BhCurve;
 use fluxform_field::steel::equivalent_dipoles::{ArraySources, Parts};
 use fluxform_field::steel::generatrix::Resolution;
 use fluxform_field::steel::permeability::Permeability;
-use fluxform_field::steel::saturated::Status;
+use fluxform_field::steel::saturated::Convergence;
 use fluxform_field::steel::saturated_array::SaturatedArray;
 use fluxform_field::winding::Winding;
 use fluxform_testing::Random;
@@ -146,7 +146,7 @@ fn errors(case: &Case) -> [(f64, f64); 2] {
         case.design.lowest_m(),
     )
     .expect("a good design");
-    assert_eq!(found.status, Status::Converged);
+    assert_eq!(found.status, Convergence::Converged);
     let finer = ArrayResolution {
         // Shorter panels of a higher degree: nothing of the solver's own sequence.
         outline: Resolution {
@@ -168,7 +168,7 @@ fn errors(case: &Case) -> [(f64, f64); 2] {
             &finer,
         )
         .expect("a good design");
-        assert_eq!(truth.status, Status::Converged);
+        assert_eq!(truth.status, Convergence::Converged);
         difference(case, &found, &truth)
     };
     let outline = truth(found.reference_permeability);

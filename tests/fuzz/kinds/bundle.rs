@@ -116,7 +116,7 @@ fn of_design(mut sample: Sample) -> (Sample, &'static str) {
 }
 
 /// The files of a bundle, with fitting digests. What the writer refuses is written all the same
-/// where it can be told.
+/// where it can be known.
 fn packed((sample, design): &(Sample, &str)) -> Option<Input> {
     let mut input = Input::default();
     let mut put = |name: &str, bytes: Vec<u8>| input.put(name, Content::Bytes(bytes));
@@ -199,7 +199,7 @@ pub fn seeds() -> Vec<Input> {
     samples.into_iter().chain(honest).collect()
 }
 
-/// The sample with numbers at the ends, told alike wherever they are told.
+/// The sample with numbers at the ends, the same wherever they are written.
 fn extremes(random: &mut Random) -> Option<Input> {
     let (mut sample, design) = of_design(sample(random.below(2) == 0, [4, 3, 4]));
     if random.below(2) == 0 {
@@ -321,7 +321,7 @@ fn damage_map(bytes: &mut Vec<u8>, random: &mut Random) {
         }
         3 => damage_text(&mut parts[at].1, random),
         4 | 5 => {
-            // Another shape is told.
+            // Another shape is reported.
             let header = parts[at].1.len().min(128);
             let text = String::from_utf8_lossy(&parts[at].1[10.min(header)..header]).into_owned();
             let shapes = [

@@ -24,7 +24,7 @@ pub fn kind() -> Kind {
 const ENTRY: &str = "flat.points";
 /// The magic, the digest of the origin, the digest of the value.
 const HEAD: usize = 8 + 2 * 32;
-/// The digest of the origin, which tells the folder too: zeros in an input stand for the right one.
+/// The digest of the origin, which depends on the folder too: zeros in an input stand for the right one.
 const ORIGIN: std::ops::Range<usize> = 8..40;
 
 /// What an entry holds here: as the forces are, and as solutions hold them.

@@ -38,7 +38,7 @@ pub fn refusal(words: &str, file: &str) -> Result<bool, String> {
     Ok(false)
 }
 
-/// What is accepted holds no number that is none, as `Debug` tells it.
+/// What is accepted holds finite numbers alone, as `Debug` prints it.
 pub fn finite(told: &str) -> Result<(), String> {
     for (at, _) in told.match_indices("NaN").chain(told.match_indices("inf")) {
         let before = told[..at].chars().next_back().unwrap_or(' ');

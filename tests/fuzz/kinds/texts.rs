@@ -192,7 +192,7 @@ fn hostile_designs() -> Vec<(String, Input)> {
         ("many samples", "61]", "1000000000000]".to_owned()),
         ("a tiny coil", "24.0", "1e-300".to_owned()),
         ("a huge coil", "38.0", "1e300".to_owned()),
-        // Broke: what was computed of these was no number, and so could not be told.
+        // Broke: what was computed of these was not a finite number, and so could not be reported.
         (
             "the thinnest wire",
             "diameter_mm = 0.7",
@@ -349,7 +349,7 @@ fn curve(_: &Input, folder: &Path) -> Result<bool, String> {
     };
     if let Ok(curve) = BhCurve::new(&table.b_t, &table.h_a_per_m) {
         finite(&format!("{curve:?}"))?;
-        // A curve that starts level is told with a warning; its permeability there is infinite.
+        // A curve that starts level is reported with a warning; its permeability there is infinite.
         let numbers = [curve.knee_t(), curve.relative_permeability(0.7)];
         if !numbers.iter().all(|number| number.is_finite()) {
             return Err(format!("a curve with {numbers:?}"));

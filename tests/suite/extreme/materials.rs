@@ -9,7 +9,7 @@ use fluxform::field::steel::bh_curve::BhCurve;
 use fluxform::field::steel::cored_coil::{CoredCoil, Excitation};
 use fluxform::field::steel::generatrix::{Generatrix, Resolution};
 use fluxform::field::steel::permeability::{Constant, Permeability, Response};
-use fluxform::field::steel::saturated::{SaturatedCore, Status};
+use fluxform::field::steel::saturated::{Convergence, SaturatedCore};
 use fluxform::field::winding::Winding;
 use fluxform::numerics::gauss;
 use fluxform::units::MU_0_T_M_PER_A;
@@ -417,7 +417,7 @@ fn fluxes(law: &impl Permeability, currents_a: &[f64]) -> Result<Vec<f64>, Strin
         .iter()
         .map(|&current_a| {
             let solution = core.solve(&(&excitation.potential * current_a), law, None);
-            if solution.status != Status::Converged {
+            if solution.status != Convergence::Converged {
                 return Err(format!("{:?} at {current_a:e} A", solution.status));
             }
             Ok(core.flux_linkage_wb(&solution, &excitation.potential))

@@ -21,7 +21,7 @@ use fluxform::numerics::random::Random;
 use fluxform::progress::Silent;
 use fluxform::scene::Scene;
 use fluxform::scene::steel::{self, COUPLED_TOLERANCE};
-use fluxform::shape::deviation::{Faces, Lattice, vertical};
+use fluxform::shape::deviation::{Faces, Lattice, Looks, vertical};
 use fluxform::shape::height::heights;
 
 /// Size and seconds.
@@ -341,7 +341,7 @@ fn deviation(side: usize, samples: usize, effort: &Effort) -> Result<(usize, Tim
     let plan = grid(samples);
     let work = || {
         let known = known(&heights(&mesh, &plan, &Silent)?);
-        let faces = Faces::new(&mesh, &plan);
+        let faces = Faces::new(&mesh, &plan, Looks::endless());
         let lattice = Lattice::new(&faces, &plan, &known);
         Ok::<_, RunError>(vertical(&mesh, &plan, &lattice, &Silent)?)
     };

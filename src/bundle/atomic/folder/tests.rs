@@ -157,7 +157,7 @@ fn a_folder_is_there_at_every_moment_while_it_is_replaced() {
 
 /// A run that was killed right after it renamed its draft, or right after the exchange.
 fn killed(target: &Path, text: &str, exchanged: bool) {
-    let place = Place::of(target, Dir::open(parent_of(target)).unwrap(), false).unwrap();
+    let place = TargetPlace::of(target, Dir::open(parent_of(target)).unwrap(), false).unwrap();
     let mut draft = FolderDraft::begin(target, ours(target)).unwrap();
     let entry = draft.write("a.txt", |out| out.write_all(text.as_bytes()));
     let manifest = manifest(&[entry.unwrap()]);
@@ -212,7 +212,7 @@ fn without_an_exchange_two_renames_do_and_a_kill_between_them_is_undone() {
     let target = folder.path().join("bump");
     put(&target, "old").unwrap();
     put(&folder.path().join("draft"), "new").unwrap();
-    let place = Place::of(&target, Dir::open(folder.path()).unwrap(), false).unwrap();
+    let place = TargetPlace::of(&target, Dir::open(folder.path()).unwrap(), false).unwrap();
     let new = place.parent.child("draft").unwrap();
     let aside = place.aside(&place.folder().unwrap().unwrap(), &new);
     // The second rename fails: there is nothing to rename.
@@ -243,7 +243,7 @@ fn a_link_or_a_folder_that_is_named_like_one_put_aside_is_left_alone() {
     put(&target, "old").unwrap();
     put(&victim, "theirs").unwrap();
     fs::write(victim.join("thesis.tex"), "years").unwrap();
-    let place = Place::of(&target, Dir::open(folder.path()).unwrap(), false).unwrap();
+    let place = TargetPlace::of(&target, Dir::open(folder.path()).unwrap(), false).unwrap();
     let own = place.folder().unwrap().unwrap();
     let identities = place.aside(&own, &own).into_string().unwrap();
     let plain = ".bump.fluxform-old".to_owned();

@@ -6,6 +6,7 @@ use crate::RunError;
 use crate::bundle::scan::{Measured, Scan};
 use crate::commands::probe::Places;
 use crate::field::frame::CartesianField;
+use crate::numerics::vec3::dot;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::steel::Solved;
@@ -168,8 +169,4 @@ fn turned(field: &CartesianField, turn: &Matrix) -> CartesianField {
             std::array::from_fn(|j| dot(column(i), [g_r[0][j], g_r[1][j], g_r[2][j]]))
         }),
     }
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

@@ -67,7 +67,7 @@ impl PassiveMagnet {
 
     /// Whether it is a point.
     #[must_use]
-    pub fn is_dipole(&self) -> bool {
+    pub(crate) fn is_dipole(&self) -> bool {
         self.size.is_none()
     }
 

@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
-use super::reaction::{Dipole, dot, minus};
+use super::reaction::Dipole;
 use crate::steel::CoreShape;
 use crate::steel::array::ArrayResolution;
 use crate::steel::coupling::{GridPoint, Links, grid_points, integrate_stretched, shifted};
@@ -24,6 +24,7 @@ use crate::steel::exchange::Grading;
 use crate::steel::generatrix::Generatrix;
 use crate::steel::response::{Response, Rings};
 use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_numerics::vec3::{dot, minus};
 
 /// Longest panel of the exchange grid, in distances from the magnet.
 const PANEL: f64 = 1.5;
@@ -100,7 +101,7 @@ impl Neighbours {
                 let potentials = basis.potentials.rows(angle * rings, rings);
                 sent.gemm(1.0, &columns, &potentials, 1.0);
             }
-            basis.potentials.tr_mul(&sent) * -turn
+            basis.potentials.transpose() * sent * -turn
         };
         let (system, links) = exchange_system(positions_m, &basis.reaction, exchanged);
         let form = system.lu().solve(&links).unwrap_or(links) * turn;

@@ -16,6 +16,7 @@ use crate::steel::double_layer::{MAX_MODES, operators};
 use crate::steel::generatrix::{Generatrix, Resolution};
 use crate::steel::response::{mean, system};
 use fluxform_base::units::MU_0_T_M_PER_A;
+use fluxform_numerics::vec3::{dot, minus};
 
 /// A point dipole in the frame of a core, whose axis is z.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -185,7 +186,7 @@ impl Reaction {
 
     /// The energy of `dipoles` and the layer they cause, J.
     #[must_use]
-    pub fn energy_j(&self, dipoles: &[Dipole]) -> f64 {
+    pub(crate) fn energy_j(&self, dipoles: &[Dipole]) -> f64 {
         fluxform_base::progress::poll();
         let (mut potential, mut normal) = (self.zeros(), self.zeros());
         for (((x, n), phi), slope) in self
@@ -276,18 +277,6 @@ impl Reaction {
         }
         layers * &self.from_modes
     }
-}
-
-/// a - b.
-#[must_use]
-pub fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-/// a . b.
-#[must_use]
-pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[cfg(test)]

@@ -62,7 +62,7 @@ fn constant_permeability_is_the_linear_equation() {
     let case = case(tolerance);
     for relative in [1.7, 40.0, 1300.0] {
         let found = case.core.solve(&case.phi, &Constant { relative }, None);
-        assert_eq!(found.status, Status::Converged);
+        assert_eq!(found.status, Convergence::Converged);
         assert!(found.steps.len() <= 2, "{:?}", found.steps);
         let resolution = Resolution::for_tolerance(tolerance);
         let linear = CoredCoil::at_resolution(&WINDING, SHAPE, relative, &resolution)
@@ -103,7 +103,7 @@ fn flux_linkage_by_volume_and_by_surface() {
     let case = case(1e-6);
     let current_a = 4.3;
     let found = case.core.solve(&(&case.phi * current_a), &steel(), None);
-    assert_eq!(found.status, Status::Converged);
+    assert_eq!(found.status, Convergence::Converged);
     let by_volume = case.core.flux_linkage_wb(&found, &case.phi);
     let by_surface: f64 = case
         .outline
@@ -134,7 +134,7 @@ fn coenergy_and_flux_linkage_agree() {
     let schur = core.interior.laplace_schur_m();
     let coenergy = |current_a: f64| {
         let found = core.solve(&(&case.phi * current_a), &law, None);
-        assert_eq!(found.status, Status::Converged);
+        assert_eq!(found.status, Convergence::Converged);
         let phi = &boundary_phi * current_a;
         let v = &found.v_boundary_a;
         let u = &phi - &core.w * v;
@@ -164,7 +164,7 @@ fn results_settle_with_the_resolution() {
     for current_a in [0.8, 6.1, 17.0] {
         let solve = |case: &Case| {
             let found = case.core.solve(&(&case.phi * current_a), &steel(), None);
-            assert_eq!(found.status, Status::Converged, "{:?}", found.steps);
+            assert_eq!(found.status, Convergence::Converged, "{:?}", found.steps);
             let linkage = case.core.flux_linkage_wb(&found, &case.phi);
             let field = case.core.field(&found, &steel());
             (case.gradients(&found), linkage, field)
@@ -194,7 +194,7 @@ fn far_in_saturation_the_core_is_a_permanent_magnet() {
     let h = 3e9;
     let phi = DVector::from_iterator(case.phi.len(), case.outline.nodes.iter().map(|n| h * n.z_m));
     let found = case.core.solve(&phi, &law, None);
-    assert_eq!(found.status, Status::Converged);
+    assert_eq!(found.status, Convergence::Converged);
     let mid = found.v_a[found.v_a.len() / 2];
     let mid_z = case.outline.nodes[found.v_a.len() / 2].z_m;
     for (v, node) in found.v_a.iter().zip(&case.outline.nodes) {
@@ -212,7 +212,7 @@ fn a_start_nearby_saves_steps_and_changes_nothing() {
     let onwards = case
         .core
         .solve(&(&case.phi * 5.1), &steel(), Some(&first.v_a));
-    assert!(onwards.status == Status::Converged && afresh.status == Status::Converged);
+    assert!(onwards.status == Convergence::Converged && afresh.status == Convergence::Converged);
     let (a, b) = (case.gradients(&afresh), case.gradients(&onwards));
     assert!((a[0] / b[0] - 1.0).abs() < 1e-9 && (a[1] / b[1] - 1.0).abs() < 1e-9);
     // Reversed current, reversed layer.
@@ -229,7 +229,7 @@ fn any_current_converges() {
         let found = case.core.solve(&(&case.phi * current_a), &steel(), None);
         assert_eq!(
             found.status,
-            Status::Converged,
+            Convergence::Converged,
             "{current_a}: {:?}",
             found.steps
         );
@@ -237,7 +237,7 @@ fn any_current_converges() {
         assert!(field.peak_b_t > 0.0 && field.mean_b_t <= 1.2 * field.peak_b_t);
     }
     let none = case.core.solve(&(&case.phi * 0.0), &steel(), None);
-    assert!(none.status == Status::Converged && none.v_a.amax() == 0.0);
+    assert!(none.status == Convergence::Converged && none.v_a.amax() == 0.0);
     assert!(case.core.field(&none, &steel()).peak_b_t < 1e-15);
 }
 
@@ -257,12 +257,12 @@ impl Permeability for Falling {
 fn what_has_no_solution_ends_as_stalled() {
     let case = case(1e-3);
     let found = case.core.solve(&(&case.phi * 300.0), &Falling, None);
-    assert_eq!(found.status, Status::Stalled);
+    assert_eq!(found.status, Convergence::Stalled);
     let mut phi = case.phi.clone();
     phi[7] = f64::NAN;
     assert_eq!(
         case.core.solve(&phi, &steel(), None).status,
-        Status::Stalled
+        Convergence::Stalled
     );
 }
 
@@ -273,7 +273,7 @@ fn any_constant_permeability() {
     let case = case(1e-5);
     let added_h = |relative: f64| {
         let found = case.core.solve(&case.phi, &Constant { relative }, None);
-        assert_eq!(found.status, Status::Converged, "{relative:e}");
+        assert_eq!(found.status, Convergence::Converged, "{relative:e}");
         case.core.flux_linkage_wb(&found, &case.phi)
     };
     let most_h = added_h(1.3e11);
@@ -286,7 +286,7 @@ fn any_constant_permeability() {
 }
 
 /// Its permeability grows without bound towards no current: u is then far below phi, and its
-/// rounding stands above the tolerance.
+/// rounding is above the tolerance.
 #[test]
 fn a_curve_that_starts_level() {
     let case = case(1e-5);
@@ -295,7 +295,7 @@ fn a_curve_that_starts_level() {
         .map(|exponent| {
             let current_a = 1.3 * 10f64.powi(exponent);
             let found = case.core.solve(&(&case.phi * current_a), &law, None);
-            assert_eq!(found.status, Status::Converged, "{current_a} A");
+            assert_eq!(found.status, Convergence::Converged, "{current_a} A");
             case.core.flux_linkage_wb(&found, &case.phi) / current_a
         })
         .collect();

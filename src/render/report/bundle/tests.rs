@@ -5,7 +5,7 @@ use fluxform_base::force_constant::{Criterion, NamedConstant};
 use super::page;
 use crate::plot::lambda::LambdaPlot;
 use crate::report::data::{
-    Breakpoint, BudgetPart, BundleFacts, Chosen, CoilFacts, Deciding, ErrorTime, LimitFacts,
+    Breakpoint, BudgetPart, BundleFacts, Chosen, CoilFacts, Deciding, ErrorTime, LimitRow,
     StageFacts, WorstPlace,
 };
 use crate::report::field::{Field, Layer};
@@ -75,7 +75,7 @@ fn facts<'a>(plot: &'a LambdaPlot, rows: &[(f64, f64)], notes: &'a [String]) -> 
         }],
         coils: vec![coil(-0.025, 0.7), coil(0.025, 1.3)],
         total_max_a: Some(2.6),
-        limits: vec![LimitFacts {
+        limits: vec![LimitRow {
             name: "resistance_ohm",
             value: 6.075,
             limit: 6.0,

@@ -1,0 +1,99 @@
+//! The sections of a design file as read, in the file's units, and which of them a command needs.
+
+use super::limits::{self, Limits};
+use super::reader::{Located, Section};
+use super::sections::{self, ArrayDraft, CoilDraft, CoreDraft, MagnetDraft};
+use super::sections::{SupplyDraft, WireDraft, WorkspaceDraft};
+
+/// What a command needs of a design. What it does not place may overlap: then that is a warning.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Need {
+    /// The coil as given: `[coil]` is required.
+    pub coil: bool,
+    /// The coils beside each other: they must not overlap.
+    pub array: bool,
+    /// The magnet at the target height: it must not overlap winding or core.
+    pub target: bool,
+    /// The workspace grid: it must lie above the windings and the cores.
+    pub workspace: bool,
+}
+
+impl Need {
+    /// `evaluate`.
+    pub const EVALUATE: Self = Self {
+        coil: true,
+        array: true,
+        target: true,
+        workspace: false,
+    };
+    /// `probe`.
+    pub const PROBE: Self = Self {
+        coil: true,
+        array: true,
+        target: false,
+        workspace: false,
+    };
+    /// `map`.
+    pub const MAP: Self = Self {
+        coil: true,
+        array: true,
+        target: false,
+        workspace: true,
+    };
+    /// `lambda`.
+    pub const LAMBDA: Self = Self::PROBE;
+    /// `calibrate`.
+    pub const CALIBRATE: Self = Self::MAP;
+    /// `optimize`.
+    pub const OPTIMIZE: Self = Self {
+        coil: false,
+        array: false,
+        target: true,
+        workspace: false,
+    };
+    /// `sweep plan`: each design of the sweep is checked when it runs.
+    pub const SWEEP: Self = Self {
+        coil: false,
+        array: false,
+        target: false,
+        workspace: false,
+    };
+}
+
+/// The sections as read, in the file's units.
+#[derive(Debug)]
+pub(super) struct Draft {
+    pub(super) name: Option<String>,
+    pub(super) coil: Option<CoilDraft>,
+    pub(super) wire: WireDraft,
+    pub(super) core: Option<CoreDraft>,
+    pub(super) array: ArrayDraft,
+    pub(super) magnet: MagnetDraft,
+    pub(super) supply: SupplyDraft,
+    pub(super) limits: Limits,
+    pub(super) target_height: Located<f64>,
+    pub(super) workspace: WorkspaceDraft,
+}
+
+impl Draft {
+    pub(super) fn read(root: &mut Section<'_>, need: Need) -> Self {
+        if need.coil && !root.has("coil") {
+            root.missing(
+                "coil",
+                "add [coil] with inner_diameter_mm, outer_diameter_mm, length_mm",
+            );
+        }
+        Self {
+            name: root.name(),
+            coil: sections::coil(root.section("coil")),
+            wire: sections::wire(root.section("wire")),
+            core: sections::core(root.section("core")),
+            array: sections::array(root.section("array")),
+            magnet: sections::magnet(root.section("magnet")),
+            supply: sections::supply(root.section("supply")),
+            limits: limits::read(root.section("limits")),
+            target_height: sections::target_height_mm(root.section("target")),
+            workspace: sections::workspace(root.section("workspace")),
+        }
+    }
+}

@@ -1,0 +1,262 @@
+//! The keys of a document as its reader asks for them: what each may hold, its default, its meaning.
+//!
+//! A key is declared where it is read, on one line. The list is made by letting the reader read a
+//! document in which every section is empty; what cannot follow from that is what a key means,
+//! which is written here and held against the reader by a test.
+
+use std::cell::RefCell;
+
+use super::draft::{Draft, Need};
+use super::reader::list_keys;
+
+/// A key of a document.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Key {
+    /// Its section; empty at the top level.
+    pub section: String,
+    /// Its name, the unit of a number last.
+    pub name: &'static str,
+    /// What may be written, in words.
+    pub value: String,
+    /// The range of its numbers in words; empty where any will do.
+    pub range: String,
+    /// What holds without it.
+    pub default: Without,
+    /// What it means.
+    pub meaning: &'static str,
+}
+
+/// What holds where a key is not given.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Without {
+    /// The document is refused.
+    Refused,
+    /// This value.
+    Value(String),
+    /// What the meaning says, or nothing.
+    Nothing,
+}
+
+impl Key {
+    /// The dotted path: section and name.
+    #[must_use]
+    pub fn path(&self) -> String {
+        if self.section.is_empty() {
+            self.name.to_owned()
+        } else {
+            format!("{}.{}", self.section, self.name)
+        }
+    }
+}
+
+/// Keys in the order in which a reader asks for them, each once.
+#[derive(Debug, Default)]
+pub(super) struct Keys(RefCell<Vec<Key>>);
+
+impl Keys {
+    /// Adds a key, or completes the one of the same path: of several requests for one the first
+    /// knows most, as it is the one of the outer reader.
+    pub(super) fn add(&self, key: Key) {
+        let mut keys = self.0.borrow_mut();
+        if !keys.iter().any(|known| known.path() == key.path()) {
+            keys.push(key);
+        }
+    }
+
+    pub(super) fn into_inner(self) -> Vec<Key> {
+        self.0.into_inner()
+    }
+}
+
+/// Gives every key its meaning.
+///
+/// # Panics
+/// If a key has none, or a meaning no key: then the table must be mended.
+#[must_use]
+pub fn with_meanings(mut keys: Vec<Key>, meanings: &[(&str, &'static str)]) -> Vec<Key> {
+    for key in &mut keys {
+        let path = key.path();
+        let known = meanings.iter().find(|(name, _)| *name == path);
+        key.meaning = known.unwrap_or_else(|| panic!("{path} has no meaning")).1;
+    }
+    for (name, _) in meanings {
+        let read = keys.iter().any(|key| key.path() == *name);
+        assert!(read, "{name} has a meaning, but no reader asks for it");
+    }
+    keys
+}
+
+/// The keys of a design.
+#[must_use]
+pub fn of_designs() -> Vec<Key> {
+    const SECTIONS: &str = "[coil]\n[wire]\n[core]\n[array]\n[magnet]\n[supply]\n[limits]\n\
+                            [target]\n[workspace]\n";
+    let keys = list_keys(SECTIONS, |root| {
+        Draft::read(root, Need::EVALUATE);
+    });
+    with_meanings(keys, MEANINGS)
+}
+
+const MEANINGS: &[(&str, &str)] = &[
+    ("name", "names the folder of results"),
+    ("coil.inner_diameter_mm", "the winding's bore"),
+    ("coil.outer_diameter_mm", "the winding's outer diameter"),
+    ("coil.length_mm", "the winding's length along its axis"),
+    (
+        "coil.turns",
+        "turns of the winding; without it as many as the window holds",
+    ),
+    (
+        "wire.diameter_mm",
+        "over the insulation; a gauge is the bare wire's",
+    ),
+    (
+        "wire.conductor_diameter_mm",
+        "of the bare conductor; without it `diameter_mm`",
+    ),
+    ("wire.resistivity_ohm_m", "of the conductor at 20 C"),
+    (
+        "wire.temperature_c",
+        "of the winding, for its resistance and heat",
+    ),
+    ("wire.choices_mm", "wires that `optimize` may choose from"),
+    (
+        "core.clearance_mm",
+        "between the core and the bore, in radius",
+    ),
+    (
+        "core.above_mm",
+        "how far the core's top is above the winding's",
+    ),
+    (
+        "core.below_mm",
+        "how far the core's bottom is below the winding's",
+    ),
+    (
+        "core.relative_permeability",
+        "of linear steel; not with `bh_curve`",
+    ),
+    (
+        "core.bh_curve",
+        "a table of the steel's magnetisation, beside the design",
+    ),
+    (
+        "core.knee_t",
+        "flux density from which the steel saturates; without it 1.5 T, or the curve's own",
+    ),
+    (
+        "core.conductivity_s_per_m",
+        "of the steel, for its eddy currents",
+    ),
+    ("array.positions_mm", "the coils' axes, instead of a grid"),
+    ("array.rows", "rows of the grid, along y"),
+    ("array.columns", "columns of the grid, along x"),
+    ("array.pitch_mm", "distance of neighbouring axes"),
+    (
+        "array.coupling",
+        "whether cores magnetise each other; without it `full` with cores, else `none`",
+    ),
+    (
+        "array.gain",
+        "factor on each coil's field, as measured; without it 1",
+    ),
+    ("magnet.diameter_mm", "the magnet's diameter"),
+    ("magnet.length_mm", "the magnet's length"),
+    (
+        "magnet.magnetization_a_per_m",
+        "its magnetisation, B_r / mu_0",
+    ),
+    (
+        "magnet.polarity",
+        "whether positive currents push the magnet away or pull it",
+    ),
+    (
+        "magnet.model",
+        "one dipole at its centre, or the whole cylinder",
+    ),
+    ("magnet.tilt_deg", "rotation about x, then about y"),
+    (
+        "magnet.passive_force",
+        "whether the pull of the unpowered cores is part of the force",
+    ),
+    (
+        "supply.current_max_a",
+        "largest current of every coil, or of each",
+    ),
+    (
+        "supply.current_min_a",
+        "least current of every coil, or of each",
+    ),
+    (
+        "supply.total_current_max_a",
+        "limit of the sum of the currents",
+    ),
+    (
+        "supply.voltage_v",
+        "limits the current by the resistance, and how fast it follows",
+    ),
+    (
+        "limits.resistance_max_ohm",
+        "resistance at the wire's temperature",
+    ),
+    ("limits.settling_max_ms", "five time constants of the coil"),
+    (
+        "limits.outer_diameter_max_mm",
+        "outer diameter of the winding",
+    ),
+    (
+        "limits.inner_diameter_min_mm",
+        "bore of the winding, at least",
+    ),
+    ("limits.length_max_mm", "length of the winding"),
+    ("limits.power_max_w", "heat at the rated current"),
+    ("limits.mass_max_kg", "mass of wire and core"),
+    ("limits.wire_length_max_m", "length of the wire"),
+    ("limits.core_field_max_t", "flux density in the core"),
+    (
+        "target.height_mm",
+        "height of the magnet's centre above the winding, for `evaluate` and `optimize`",
+    ),
+    ("workspace.x_mm", "nodes of the map along x"),
+    ("workspace.y_mm", "nodes of the map along y"),
+    (
+        "workspace.z_mm",
+        "nodes of the map along z, above the windings' top",
+    ),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_list_knows_what_the_reader_knows() {
+        let keys = of_designs();
+        let key = |path: &str| keys.iter().find(|key| key.path() == path).unwrap();
+        let length = key("coil.length_mm");
+        assert_eq!(length.value, "number, mm");
+        assert_eq!(length.range, "> 0");
+        assert_eq!(length.default, Without::Refused);
+        let polarity = key("magnet.polarity");
+        assert_eq!(polarity.value, "`\"repel\"` or `\"attract\"`");
+        assert_eq!(polarity.default, Without::Value("`\"repel\"`".to_owned()));
+        assert_eq!(
+            key("supply.current_max_a").default,
+            Without::Value("2".to_owned())
+        );
+        assert_eq!(key("coil.turns").default, Without::Nothing);
+        assert_eq!(
+            key("workspace.z_mm").default,
+            Without::Value("[10, 80, 29]".to_owned())
+        );
+    }
+
+    #[test]
+    #[should_panic(expected = "a key that is new")]
+    fn a_key_without_a_meaning_is_seen() {
+        let mut keys = of_designs();
+        keys.truncate(1);
+        keys[0].name = "a key that is new";
+        let _ = with_meanings(keys, &[]);
+    }
+}
