@@ -50,7 +50,9 @@ fn missing() -> Option<String> {
 
 fn fluxform(arguments: &[&str], folder: &Path) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_fluxform"));
-    command.arg("--python").arg(python());
+    if !arguments.contains(&"--python") {
+        command.arg("--python").arg(python());
+    }
     command
         .args(arguments)
         .current_dir(folder)
