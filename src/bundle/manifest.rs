@@ -115,6 +115,27 @@ pub struct SurfaceOptions {
     pub x_m: Option<[f64; 2]>,
     /// Ends of the grid along y, m; null for the surface's own extent.
     pub y_m: Option<[f64; 2]>,
+    /// The file's direction that points up; absent for z.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub up: Option<String>,
+    /// Whether the middle of the box comes to x = y = 0.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub center: bool,
+    /// The height of the lowest point, m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rest_on_m: Option<f64>,
+    /// The box that the surface is moved into, from and to along x, y and z, m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fit_m: Option<[[f64; 2]; 3]>,
+    /// Whether it is scaled to that box.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub scale_to_fit: bool,
+    /// The farthest that a facet of a STEP file's body may lie from its face, m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chord_m: Option<f64>,
+    /// The body that was chosen of a STEP file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body: Option<String>,
 }
 
 /// What lies in the `map.npz` beside it.

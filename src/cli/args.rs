@@ -2,8 +2,12 @@
 
 use clap::{Args, ValueEnum};
 
+use std::path::PathBuf;
+
 use super::values;
 use crate::scene::sources::Sampling;
+use crate::shape::document::Up;
+use crate::shape::step::STEP_SECONDS;
 
 /// What every command takes.
 #[derive(Debug, Clone, Args)]
@@ -22,6 +26,20 @@ pub struct Common {
     /// refused before anything is computed
     #[arg(long, global = true, value_name = "SIZE", value_parser = values::memory)]
     pub memory: Option<u64>,
+    /// Python that has OpenCASCADE (`pip install cadquery-ocp`), which reads STEP files [default:
+    /// python3]
+    #[arg(
+        long,
+        global = true,
+        value_name = "FILE",
+        env = "FLUXFORM_PYTHON",
+        hide_env_values = true
+    )]
+    pub python: Option<PathBuf>,
+    /// Processor time that reading a STEP file may take, in seconds
+    #[arg(long, global = true, value_name = "N", default_value_t = STEP_SECONDS,
+          value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    pub step_seconds: u64,
     /// Colours in messages; `auto` means on terminals, unless NO_COLOR is set
     #[arg(long, global = true, value_enum, default_value_t = Colour::Auto, value_name = "WHEN")]
     pub color: Colour,
@@ -87,6 +105,29 @@ pub struct SurfaceFlags {
     /// Move by so many millimetres
     #[arg(long, value_name = "X,Y,Z", value_parser = values::translation, allow_hyphen_values = true)]
     pub translate: Option<values::Translation>,
+    /// The file's direction that points up: x, y, z, -x, -y or -z [default: z]
+    #[arg(long, value_name = "AXIS", value_parser = values::up, allow_hyphen_values = true)]
+    pub up: Option<Up>,
+    /// Bring the middle of the surface's box to x = y = 0
+    #[arg(long, conflicts_with = "fit")]
+    pub center: bool,
+    /// Put the lowest point of the surface at this height above the windings, like 20mm
+    #[arg(long, value_name = "LENGTH", value_parser = values::height, allow_hyphen_values = true)]
+    pub rest_on: Option<f64>,
+    /// Move the surface into a box: to its middle in x and y, onto its lower end in z; a design
+    /// (TOML) for its workspace, or X0,X1,Y0,Y1,Z0,Z1 in millimetres
+    #[arg(long, value_name = "DESIGN|BOX", allow_hyphen_values = true)]
+    pub fit: Option<String>,
+    /// Also scale it to fill that box
+    #[arg(long, requires = "fit")]
+    pub scale_to_fit: bool,
+    /// STEP: farthest that a facet may lie from its face, like 0.01mm [default: a 4000th of the
+    /// diagonal of the bodies' box]
+    #[arg(long, value_name = "LENGTH", value_parser = values::length_with_unit)]
+    pub chord: Option<f64>,
+    /// STEP: the one body or assembly to read, by name or number (see --inspect)
+    #[arg(long, value_name = "N|NAME")]
+    pub body: Option<String>,
     /// Constraint points along x and y [default: 61x61]
     #[arg(long, value_name = "NxM", value_parser = values::grid_size)]
     pub grid: Option<values::GridSize>,
@@ -152,6 +193,12 @@ impl SurfaceFlags {
             (self.scale.is_some(), "--scale"),
             (self.rotate.is_some(), "--rotate"),
             (self.translate.is_some(), "--translate"),
+            (self.up.is_some(), "--up"),
+            (self.center, "--center"),
+            (self.rest_on.is_some(), "--rest-on"),
+            (self.fit.is_some(), "--fit"),
+            (self.chord.is_some(), "--chord"),
+            (self.body.is_some(), "--body"),
             (self.grid.is_some(), "--grid"),
             (self.x.is_some(), "--x"),
             (self.y.is_some(), "--y"),

@@ -1,12 +1,12 @@
 //! From the files on the command line to validated documents; every fault in one run.
 
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::args::SurfaceFlags;
 use super::failure::Failure;
 use super::printer::Printer;
-use super::values::{FileArgument, GridSize};
+use super::values::{self, FileArgument, GridSize};
 use crate::bundle::artefact::Input;
 use crate::bundle::read_table::{TABLE_MAX_BYTES, read_columns};
 use crate::bundle::scan::Scan;
@@ -14,7 +14,8 @@ use crate::bundle::sweep::PlanFile;
 use crate::bundle::trajectory::Trajectory;
 use crate::design::{Design, Faults, InvalidDocument, Need, source};
 use crate::scene::sources::ShapeSource;
-use crate::shape::document::{Placement, RawSurface, RawSurfaceError, ShapeDocument};
+use crate::shape::document::{Fit, Placement, RawSurface, RawSurfaceError, Seat, ShapeDocument};
+use crate::shape::step::BodyOptions;
 
 /// Samples of a surface that says nothing of its grid.
 const SAMPLES: GridSize = GridSize([61, 61]);
@@ -264,6 +265,45 @@ fn read_shapes(files: &[FileArgument], flags: &SurfaceFlags) -> Result<Vec<ReadS
     }
 }
 
+/// How the flags ask for the bodies of a STEP file.
+#[must_use]
+pub fn bodies(flags: &SurfaceFlags) -> BodyOptions {
+    BodyOptions {
+        chord_m: flags.chord,
+        body: flags.body.clone(),
+    }
+}
+
+/// Where the flags put a surface by its box.
+fn seat(flags: &SurfaceFlags) -> Result<Seat, Failure> {
+    let fit = flags.fit.as_deref().map(workspace).transpose()?;
+    Ok(Seat {
+        up: flags.up.unwrap_or_default(),
+        center: flags.center,
+        rest_on_m: flags.rest_on,
+        fit: fit.map(|box_m| Fit {
+            box_m,
+            scale: flags.scale_to_fit,
+        }),
+    })
+}
+
+/// The box that `--fit` names: a design's workspace, or its ends.
+fn workspace(text: &str) -> Result<[[f64; 2]; 3], Failure> {
+    let path = PathBuf::from(text);
+    let toml = path
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("toml"));
+    if !toml {
+        return values::box_of(text)
+            .map_err(|what| Failure::Usage(format!("--fit {text}: {what}")));
+    }
+    let (document, _) = read_design(&FileArgument::Path(path), Need::MAP)
+        .map_err(|fault| Failure::Documents(vec![fault]))?;
+    let workspace = document.design.workspace;
+    Ok([workspace.x_m, workspace.y_m, workspace.z_m].map(|axis| [axis.from, axis.to]))
+}
+
 fn raw_surface(path: &Path, flags: &SurfaceFlags) -> Result<ShapeSource, Failure> {
     if path.is_dir() {
         return Err(Failure::Input(format!(
@@ -284,9 +324,11 @@ fn raw_surface(path: &Path, flags: &SurfaceFlags) -> Result<ShapeSource, Failure
         scale,
         path: path.to_owned(),
         unit_m: flags.unit,
+        bodies: bodies(flags),
         placement: Placement {
             translate_m: flags.translate.map_or([0.0; 3], |t| t.0),
             rotate_deg: flags.rotate.map_or([0.0; 3], |r| r.0),
+            seat: seat(flags)?,
         },
         samples: flags.grid.unwrap_or(SAMPLES).0,
         x_m: flags.x.map(|ends| ends.0),

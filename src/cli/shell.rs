@@ -20,6 +20,7 @@ pub use super::values::FileArgument;
 use super::{budget, interrupt};
 use crate::RunError;
 use crate::progress::interruptible;
+use crate::shape::step::{self, Kernel, STEP_SECONDS};
 
 /// Arguments that were understood, and what is done with them.
 pub trait Program: CommandFactory + FromArgMatches {
@@ -46,9 +47,7 @@ pub fn main<P: Program>(args: impl Iterator<Item = OsString>) -> ExitCode {
     let args: Vec<OsString> = args.collect();
     let early = told_early(&args);
     std::panic::set_hook(Box::new(move |panic| {
-        if !caught() {
-            Printer::new(&early).mistake(&panic_message(panic));
-        }
+        Printer::new(&early).mistake(&panic_message(panic));
     }));
     let parsed = P::command()
         .color(colour_of(&args))
@@ -84,6 +83,11 @@ fn prepare(common: &Common) -> Result<(), Failure> {
             .map_err(|error| Failure::Usage(format!("--threads {threads}: {error}")))?;
     }
     budget::grant(common.memory);
+    step::configure(Kernel {
+        python: common.python.clone(),
+        cpu_seconds: common.step_seconds,
+        ..Kernel::default()
+    });
     Ok(())
 }
 
@@ -97,20 +101,14 @@ fn told_early(args: &[OsString]) -> Common {
         quiet: false,
         threads: None,
         memory: None,
+        python: None,
+        step_seconds: STEP_SECONDS,
         color: match value_of(args, "--color") {
             Some("always") => Colour::Always,
             Some("never") => Colour::Never,
             _ => Colour::Auto,
         },
     }
-}
-
-/// Whether a panic is caught where it happens and reported as what it means.
-fn caught() -> bool {
-    #[cfg(feature = "step")]
-    return crate::shape::step::guards_panics();
-    #[cfg(not(feature = "step"))]
-    false
 }
 
 /// Clap's own output: help, the version, or wrong usage.

@@ -7,7 +7,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::lambda::Criterion;
 use crate::map::Components;
-use crate::shape::document::parse_unit;
+use crate::shape::document::{Up, parse_unit};
 use crate::units::m_from_mm;
 
 /// Any criterion by its name.
@@ -245,6 +245,37 @@ pub fn length_with_unit(text: &str) -> Result<f64, String> {
         _ => Err(format!(
             "invalid length {text:?}: expected a number above 0 and a unit, like 0.1mm"
         )),
+    }
+}
+
+/// A height, m, of a number with its unit, or of millimetres; of either sign.
+pub fn height(text: &str) -> Result<f64, String> {
+    let (sign, size) = match text.strip_prefix('-') {
+        Some(size) => (-1.0, size),
+        None => (1.0, text),
+    };
+    let digits = size.trim_end_matches(|c: char| c.is_alphabetic());
+    match number(digits) {
+        Ok(zero) if zero == 0.0 => Ok(0.0),
+        _ => length_with_unit(size).map(|length_m| sign * length_m),
+    }
+}
+
+/// A direction that points up.
+pub fn up(text: &str) -> Result<Up, String> {
+    Up::of(text)
+        .ok_or_else(|| format!("invalid direction {text:?}: expected x, y, z, -x, -y or -z"))
+}
+
+/// `X0,X1,Y0,Y1,Z0,Z1` in millimetres, each smaller end first; m.
+pub fn box_of(text: &str) -> Result<[[f64; 2]; 3], String> {
+    let expected = "X0,X1,Y0,Y1,Z0,Z1 in millimetres, like -50,50,-50,50,20,70";
+    let [a, b, c, d, e, f] = numbers(text, expected)?.map(m_from_mm);
+    let ends = [[a, b], [c, d], [e, f]];
+    if ends.iter().all(|[from, to]| from < to) {
+        Ok(ends)
+    } else {
+        Err(format!("a side ends before it begins: expected {expected}"))
     }
 }
 

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::bundle::artefact::Input;
 use crate::bundle::manifest::SurfaceOptions;
-use crate::shape::document::{AxisRequest, ShapeDocument, SurfaceSource};
+use crate::shape::document::{AxisRequest, ShapeDocument, SurfaceSource, Up};
 
 /// What the command line says of a surface; `None` where a shape file says it.
 #[must_use]
@@ -21,6 +21,7 @@ pub fn surface(document: &ShapeDocument, file: Option<&Input>) -> Option<Surface
         AxisRequest::Given(axis) => (axis.samples, Some([axis.from, axis.to])),
         AxisRequest::Extent(samples) => (samples, None),
     };
+    let seat = &document.placement.seat;
     Some(SurfaceOptions {
         unit_m: *unit_m,
         scale: document.scale,
@@ -29,6 +30,13 @@ pub fn surface(document: &ShapeDocument, file: Option<&Input>) -> Option<Surface
         samples: [parts(x).0, parts(y).0],
         x_m: parts(x).1,
         y_m: parts(y).1,
+        up: (seat.up != Up::default()).then(|| seat.up.name().to_owned()),
+        center: seat.center,
+        rest_on_m: seat.rest_on_m,
+        fit_m: seat.fit.map(|fit| fit.box_m),
+        scale_to_fit: seat.fit.is_some_and(|fit| fit.scale),
+        chord_m: document.bodies.chord_m,
+        body: document.bodies.body.clone(),
     })
 }
 

@@ -67,7 +67,9 @@ impl Tessellation {
     fn method(self) -> &'static str {
         match self {
             Self::None => "exact: the surface is a formula",
-            Self::Known => "known: the chord to which the file's body was cut into facets",
+            Self::Known => {
+                "measured: the farthest that a facet lies from the exact face it stands for"
+            }
             Self::Display => {
                 "an estimate: the sagitta of display facets within each face, from their angles"
             }

@@ -8,6 +8,7 @@ pub use read::keys;
 
 use std::path::PathBuf;
 
+use crate::step::BodyOptions;
 use fluxform_numerics::axis::Axis;
 
 pub use crate::format::SurfaceFormat;
@@ -21,6 +22,8 @@ pub struct ShapeDocument {
     pub name: String,
     /// Where the surface comes from.
     pub source: SurfaceSource,
+    /// How bodies are cut into facets, and which of them.
+    pub bodies: BodyOptions,
     /// Factors along the file's own x, y and z, before anything else; positive.
     pub scale: [f64; 3],
     /// Applied to the surface after its unit: rotation about x, then y, then z, then translation.
@@ -82,13 +85,102 @@ pub enum Primitive {
     },
 }
 
-/// Rigid placement: rotate about x, then y, then z, then translate.
+/// Placement: turn up, rotate about x, then y, then z, seat by the box, then translate.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Placement {
     /// Translation, m.
     pub translate_m: [f64; 3],
     /// Rotation angles, degrees.
     pub rotate_deg: [f64; 3],
+    /// Which way the file has up, and where the surface's box goes.
+    pub seat: Seat,
+}
+
+/// Where a surface goes by its own box, before it is translated.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Seat {
+    /// Which of the file's directions points up.
+    pub up: Up,
+    /// The middle of the box comes to x = y = 0.
+    pub center: bool,
+    /// The lowest point comes to this height, m.
+    pub rest_on_m: Option<f64>,
+    /// The surface is moved into a box.
+    pub fit: Option<Fit>,
+}
+
+impl Seat {
+    /// Whether something of it depends on the surface's box.
+    #[must_use]
+    pub fn uses_box(&self) -> bool {
+        self.center || self.rest_on_m.is_some() || self.fit.is_some()
+    }
+}
+
+/// A box that a surface is moved into: to its middle in x and y, onto its lower end in z.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fit {
+    /// From and to along x, y and z, m.
+    pub box_m: [[f64; 2]; 3],
+    /// Whether the surface is scaled to fill it.
+    pub scale: bool,
+}
+
+/// A direction of a file that points up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Up {
+    /// +x.
+    X,
+    /// +y, as in many programs that draw.
+    Y,
+    /// +z.
+    #[default]
+    Z,
+    /// -x.
+    MinusX,
+    /// -y.
+    MinusY,
+    /// -z.
+    MinusZ,
+}
+
+impl Up {
+    /// Every direction and its name.
+    pub const NAMES: [(&str, Self); 6] = [
+        ("x", Self::X),
+        ("y", Self::Y),
+        ("z", Self::Z),
+        ("-x", Self::MinusX),
+        ("-y", Self::MinusY),
+        ("-z", Self::MinusZ),
+    ];
+
+    /// As flags, keys and records have it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        let known = Self::NAMES.iter().find(|(_, up)| *up == self);
+        known.map_or("z", |(name, _)| name)
+    }
+
+    /// The direction of a name.
+    #[must_use]
+    pub fn of(name: &str) -> Option<Self> {
+        let known = Self::NAMES.iter().find(|(known, _)| *known == name);
+        known.map(|(_, up)| *up)
+    }
+
+    /// The rotation about x, then y, then z that turns it to +z, degrees.
+    #[must_use]
+    pub(super) fn turn_deg(self) -> [f64; 3] {
+        match self {
+            Self::X => [0.0, -90.0, 0.0],
+            Self::Y => [90.0, 0.0, 0.0],
+            Self::Z => [0.0; 3],
+            Self::MinusX => [0.0, 90.0, 0.0],
+            Self::MinusY => [-90.0, 0.0, 0.0],
+            Self::MinusZ => [180.0, 0.0, 0.0],
+        }
+    }
 }
 
 /// Which grid of points is asked for.

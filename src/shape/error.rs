@@ -90,7 +90,8 @@ pub enum ShapeError {
     /// Surface and grid do not overlap.
     #[error(
         "the surface lies wholly outside the grid: the surface covers {}, the grid {}; \
-         change the translation, the unit or the grid",
+         --center (center = true) moves its middle to x = y = 0; or change the translation, the \
+         unit or the grid",
         extent_mm(surface),
         extent_mm(grid)
     )]
@@ -118,7 +119,8 @@ pub enum ShapeError {
     /// Heights are measured upwards from the windings' top face.
     #[error(
         "{below} of {points} points lie below z = 0, the windings' top face (lowest {:.6} mm); \
-         a translation of z by at least {:.6} mm more lifts them",
+         a translation of z by at least {:.6} mm more lifts them, or --rest-on 20mm \
+         (rest_on_mm = 20) puts the whole surface above",
         lowest_m * 1000.0,
         -lowest_m * 1000.0
     )]

@@ -5,7 +5,9 @@ use std::path::Path;
 use crate::error::ShapeError;
 use crate::mesh::FileMesh;
 use crate::read_error::ReadError;
+use crate::step::{self, BodyOptions};
 use crate::{amf, glb, height_image, obj, off, ply, sldprt, stl, three_dxml, three_mf};
+use fluxform_base::progress::Silent;
 
 /// What kind of file a surface is in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -128,10 +130,7 @@ const TABLE: [Row; 11] = [
         endings: &["step", "stp"],
         carries_unit: true,
         begins: |bytes| starts(bytes, b"ISO-10303-21"),
-        #[cfg(feature = "step")]
-        read: crate::step::read,
-        #[cfg(not(feature = "step"))]
-        read: step,
+        read: |bytes| step::read(bytes, &BodyOptions::default(), &Silent),
     },
     Row {
         format: SurfaceFormat::Sldprt,
@@ -309,14 +308,6 @@ pub(super) fn starts(bytes: &[u8], sign: &[u8]) -> bool {
     let body = body.trim_ascii_start();
     body.get(..sign.len())
         .is_some_and(|first| first.eq_ignore_ascii_case(sign))
-}
-
-#[cfg(not(feature = "step"))]
-fn step(_: &[u8]) -> Result<FileMesh, ReadError> {
-    Err(ReadError::file(
-        "STEP files are not read by this version: open it in the CAD program and save the body \
-         as 3MF or STL (binary, fine resolution)",
-    ))
 }
 
 #[cfg(test)]

@@ -16,7 +16,9 @@ use crate::height::Grid;
 use crate::mesh::{FileMesh, Mesh, Triangle, cross, minus};
 use crate::placement::Transform;
 use crate::scattered::Probe;
+use crate::step::{BodyOptions, NamedBody};
 use crate::surface::{ByteObserver, Surface, read_mesh};
+use fluxform_base::progress::Progress;
 use fluxform_numerics::axis::Axis;
 
 /// What a surface file holds. Lengths are in the file's unit.
@@ -71,6 +73,12 @@ pub struct MeshReport {
     /// consistent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub volume: Option<f64>,
+    /// The bodies that the file names, in its order; absent where the format names none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub named_bodies: Vec<NamedBody>,
+    /// Another program that made the triangles of the file, with its version.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub read_by: Option<String>,
     /// Warnings for the user.
     pub warnings: Vec<String>,
 }
@@ -99,8 +107,12 @@ impl MeshReport {
     ///
     /// # Errors
     /// [`ShapeError`] with the path and the place.
-    pub fn of_file(path: &Path) -> Result<Self, ShapeError> {
-        Self::of_file_observed(path, &mut ())
+    pub fn of_file(
+        path: &Path,
+        bodies: &BodyOptions,
+        progress: &dyn Progress,
+    ) -> Result<Self, ShapeError> {
+        Self::of_file_observed(path, bodies, &mut (), progress)
     }
 
     /// As [`MeshReport::of_file`]; `observer` sees the file's bytes.
@@ -109,9 +121,11 @@ impl MeshReport {
     /// As [`MeshReport::of_file`].
     pub fn of_file_observed(
         path: &Path,
+        bodies: &BodyOptions,
         observer: &mut dyn ByteObserver,
+        progress: &dyn Progress,
     ) -> Result<Self, ShapeError> {
-        let (format, file) = read_mesh(path, observer)?;
+        let (format, file) = read_mesh(path, bodies, observer, progress)?;
         let coordinates = file.triangles.as_flattened().as_flattened().iter();
         let largest = coordinates.fold(0.0, |m: f64, c| m.max(c.abs()));
         if largest > FARTHEST {
@@ -127,6 +141,8 @@ impl MeshReport {
     #[must_use]
     pub fn new(format: SurfaceFormat, mut file: FileMesh) -> Self {
         let warnings = std::mem::take(&mut file.warnings);
+        let named = std::mem::take(&mut file.bodies);
+        let read_by = file.read_by.take();
         let (mut report, names) = Self::with_names(format, &file);
         let reach = WELD_ROUNDINGS * file.coordinate_rounding;
         let crossings = crossings(&file.triangles, &names, reach);
@@ -135,15 +151,10 @@ impl MeshReport {
         report.self_intersection_first = crossings.first;
         report.layers = layers(file);
         report.warnings = warnings;
+        report.named_bodies = named;
+        report.read_by = read_by;
         report.warn();
         report
-    }
-
-    /// The same without self-intersections, layers and warnings.
-    #[must_use]
-    #[cfg(feature = "step")]
-    pub(super) fn of_edges(format: SurfaceFormat, file: &FileMesh) -> Self {
-        Self::with_names(format, file).0
     }
 
     fn with_names(format: SurfaceFormat, file: &FileMesh) -> (Self, Vec<[u32; 3]>) {
@@ -189,6 +200,8 @@ impl MeshReport {
             layers: None,
             area,
             volume: (watertight && edges.inconsistent == 0).then_some(volume),
+            named_bodies: Vec::new(),
+            read_by: None,
             warnings: Vec::new(),
         };
         (report, names)

@@ -40,6 +40,7 @@ pub mod format;
 pub mod glb;
 pub mod height;
 pub mod height_image;
+pub mod hidden;
 pub mod holes;
 pub mod inspect;
 pub mod mesh;
@@ -53,7 +54,6 @@ pub mod primitive;
 pub mod read_error;
 pub mod scattered;
 pub mod sldprt;
-#[cfg(feature = "step")]
 pub mod step;
 pub mod stl;
 pub mod surface;

@@ -4,6 +4,7 @@ pub(super) use fluxform_numerics::vec3::{cross, dot, minus};
 
 use crate::error::ShapeError;
 use crate::placement::Transform;
+use crate::step::NamedBody;
 
 /// Three vertices, x, y, z each.
 pub type Triangle = [[f64; 3]; 3];
@@ -27,6 +28,10 @@ pub struct FileMesh {
     pub deviation_is_known: bool,
     /// What a careful reader would mention.
     pub warnings: Vec<String>,
+    /// The bodies that the file names, in its order; empty where the format names none.
+    pub bodies: Vec<NamedBody>,
+    /// Another program that made the triangles of the file, with its version.
+    pub read_by: Option<String>,
 }
 
 /// Axis-aligned box, m.
@@ -39,6 +44,22 @@ pub struct Bounds {
 }
 
 impl Bounds {
+    /// The box around points; from infinity to minus infinity without any.
+    #[must_use]
+    pub fn of(points: impl Iterator<Item = [f64; 3]>) -> Self {
+        let none = Self {
+            min_m: [f64::INFINITY; 3],
+            max_m: [f64::NEG_INFINITY; 3],
+        };
+        points.fold(none, |mut bounds, point| {
+            for k in 0..3 {
+                bounds.min_m[k] = bounds.min_m[k].min(point[k]);
+                bounds.max_m[k] = bounds.max_m[k].max(point[k]);
+            }
+            bounds
+        })
+    }
+
     /// Range of x and of y.
     #[must_use]
     pub fn plan(&self) -> [[f64; 2]; 2] {
@@ -69,6 +90,7 @@ pub struct MeshFacts {
 pub struct Mesh {
     triangles: Vec<Triangle>,
     facts: MeshFacts,
+    read_by: Option<String>,
 }
 
 impl Mesh {
@@ -120,13 +142,23 @@ impl Mesh {
             deviation_m: transform.length_m(file.deviation),
             deviation_is_known: file.deviation_is_known,
         };
-        Ok(Self { triangles, facts })
+        Ok(Self {
+            triangles,
+            facts,
+            read_by: file.read_by,
+        })
     }
 
     /// The placed triangles that have an area, m.
     #[must_use]
     pub fn triangles(&self) -> &[Triangle] {
         &self.triangles
+    }
+
+    /// Another program that made the triangles of the file, with its version.
+    #[must_use]
+    pub fn read_by(&self) -> Option<&str> {
+        self.read_by.as_deref()
     }
 
     /// What the file holds.

@@ -1,8 +1,10 @@
-//! From a file's coordinates to metres: unit, rotation about x, then y, then z, translation.
+//! From a file's coordinates to metres: unit, rotation (what is up; about x, then y, then z), the
+//! seat by the surface's own box, translation.
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::document::Placement;
+use crate::document::{Fit, Placement};
+use crate::mesh::{Bounds, Triangle};
 
 /// Unit and placement as one map of points; right angles rotate exactly.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,6 +15,8 @@ pub struct Transform {
     scale: [f64; 3],
     /// `None` for the identity.
     rotation: Option<Matrix3<f64>>,
+    /// Factor of what was rotated.
+    growth: f64,
     translate_m: [f64; 3],
 }
 
@@ -27,13 +31,57 @@ impl Transform {
         } else {
             [unit_m, 1.0]
         };
-        let rotation = rotation(placement.rotate_deg);
+        let rotation = rotation(placement.rotate_deg) * rotation(placement.seat.up.turn_deg());
         Self {
             unit,
             scale: [1.0; 3],
             rotation: (rotation != Matrix3::identity()).then_some(rotation),
+            growth: 1.0,
             translate_m: placement.translate_m,
         }
+    }
+
+    /// The same for a surface of these triangles, seated as `placement` says; where it hangs over
+    /// the box that it is moved into, the second value says so.
+    #[must_use]
+    pub fn seated(self, placement: &Placement, triangles: &[Triangle]) -> (Self, Option<String>) {
+        let seat = &placement.seat;
+        if !seat.uses_box() || triangles.is_empty() {
+            return (self, None);
+        }
+        let bare = Self {
+            translate_m: [0.0; 3],
+            ..self.clone()
+        };
+        let mut bounds = Bounds::of(triangles.as_flattened().iter().map(|v| bare.apply(*v)));
+        let (mut growth, mut warning) = (1.0, None);
+        if let Some(fit) = &seat.fit {
+            (growth, warning) = growth_into(fit, &bounds);
+            bounds.min_m = bounds.min_m.map(|c| c * growth);
+            bounds.max_m = bounds.max_m.map(|c| c * growth);
+        }
+        let middle = |k: usize| 0.5 * (bounds.min_m[k] + bounds.max_m[k]);
+        let mut shift_m = [0.0; 3];
+        if let Some(fit) = &seat.fit {
+            let [x, y, z] = fit.box_m;
+            shift_m = [
+                0.5 * (x[0] + x[1]) - middle(0),
+                0.5 * (y[0] + y[1]) - middle(1),
+                z[0] - bounds.min_m[2],
+            ];
+        }
+        if seat.center {
+            (shift_m[0], shift_m[1]) = (-middle(0), -middle(1));
+        }
+        if let Some(rest_on_m) = seat.rest_on_m {
+            shift_m[2] = rest_on_m - bounds.min_m[2];
+        }
+        let seated = Self {
+            growth,
+            translate_m: [0, 1, 2].map(|k| self.translate_m[k] + shift_m[k]),
+            ..self
+        };
+        (seated, warning)
     }
 
     /// The same with factors along the file's axes, before anything else.
@@ -49,19 +97,42 @@ impl Transform {
         if let Some(rotation) = &self.rotation {
             p = (rotation * Vector3::from(p)).into();
         }
-        [0, 1, 2].map(|k| p[k] + self.translate_m[k])
+        [0, 1, 2].map(|k| p[k] * self.growth + self.translate_m[k])
     }
 
     /// A length of the file, m; the longest it may become in any direction.
     #[must_use]
     pub fn length_m(&self, length: f64) -> f64 {
         let [x, y, z] = self.scale;
-        self.metres(length * x.max(y).max(z))
+        self.metres(length * x.max(y).max(z)) * self.growth
     }
 
     fn metres(&self, length: f64) -> f64 {
         length * self.unit[0] / self.unit[1]
     }
+}
+
+/// The factor that a surface of these bounds takes into a box, and a warning where it hangs over.
+fn growth_into(fit: &Fit, bounds: &Bounds) -> (f64, Option<String>) {
+    let size: [f64; 3] = [0, 1, 2].map(|k| bounds.max_m[k] - bounds.min_m[k]);
+    let room = fit.box_m.map(|[from, to]| to - from);
+    let share = (0..3)
+        .map(|k| room[k] / size[k])
+        .fold(f64::INFINITY, f64::min);
+    if fit.scale && share.is_finite() && share > 0.0 {
+        return (share, None);
+    }
+    let text = |sides: [f64; 3]| sides.map(|s| format!("{:.4}", s * 1e3)).join(" x ");
+    let over = share < 1.0 - 1e-9;
+    let warning = over.then(|| {
+        format!(
+            "the surface is {} mm, the box that it is moved into {} mm: it hangs over; \
+             --scale-to-fit (scale_to_fit = true) shrinks it to {share:.4} of its size",
+            text(size),
+            text(room)
+        )
+    });
+    (1.0, warning)
 }
 
 /// Sine and cosine of an angle in degrees, exact at multiples of 90.
@@ -97,8 +168,8 @@ mod tests {
         Transform::new(
             1.0,
             &Placement {
-                translate_m: [0.0; 3],
                 rotate_deg,
+                ..Placement::default()
             },
         )
     }

@@ -6,6 +6,7 @@ use crate::certificate::{Certificate, Certify, by_cell, certify};
 use crate::document::{AxisRequest, ShapeDocument};
 use crate::error::ShapeError;
 use crate::height::{Grid, Sample};
+use crate::hidden::Hidden;
 use crate::holes::{self, Holes};
 use crate::mesh::{Bounds, MeshFacts};
 use crate::point_flags::Marks;
@@ -19,6 +20,8 @@ use fluxform_numerics::axis::Axis;
 const MOST_POINTS: usize = 100_000_000;
 /// Grids of more points than this are not compared with their surface: it would take minutes.
 const MOST_CERTIFIED: usize = 4_000_000;
+/// Shares of hidden area beyond this are worth a warning.
+const MOST_HIDDEN: f64 = 0.01;
 /// Points marked between two looks at the progress.
 const MARKED_BETWEEN_LOOKS: usize = 4096;
 
@@ -119,6 +122,8 @@ pub struct Discretized {
     pub bounds: Bounds,
     /// What the mesh file holds; `None` for a primitive.
     pub mesh: Option<MeshFacts>,
+    /// Another program that made the mesh file's triangles, with its version.
+    pub read_by: Option<String>,
     /// The stage's error, absolute, m.
     pub accuracy: StageAccuracy,
     /// How far the interpolated points may lie from the surface, where it was asked for.
@@ -126,6 +131,9 @@ pub struct Discretized {
     /// A bound of the vertical difference for every cell, m, where it was asked for; `None` where
     /// a corner has no surface.
     pub cells_m: Option<Vec<Option<f64>>>,
+    /// How much of the surface a height map cannot show; `None` for a formula and where points are
+    /// not marked.
+    pub hidden: Option<Hidden>,
     /// What the user should know though it stops nothing.
     pub warnings: Vec<String>,
 }
@@ -186,7 +194,7 @@ pub fn discretize_with(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Discretized, ShapeError> {
-    let (surface, warnings) = Surface::open(document)?;
+    let (surface, warnings) = Surface::open(document, progress)?;
     discretize_surface(document, (surface, warnings), settings, progress)
 }
 
@@ -234,6 +242,17 @@ pub fn discretize_surface(
     if settings.marks {
         mark(&mut points, &surface, &found, progress)?;
     }
+    let hidden = Hidden::of(&surface).filter(|_| settings.marks);
+    if let Some(share) = hidden
+        .map(|hidden| hidden.of_upward)
+        .filter(|s| *s > MOST_HIDDEN)
+    {
+        warnings.push(format!(
+            "{:.0} % of the area that faces up lies under other parts of the surface (undercuts, \
+             hollows): a height map shows the uppermost alone",
+            100.0 * share
+        ));
+    }
     let mut how = settings.certify;
     if how != Certify::No && grid.len() > MOST_CERTIFIED {
         how = Certify::No;
@@ -259,6 +278,10 @@ pub fn discretize_surface(
     } else {
         None
     };
+    let read_by = match &surface {
+        Surface::Mesh(mesh) => mesh.read_by().map(str::to_owned),
+        Surface::Primitive(_) => None,
+    };
     let (mesh, method) = match &surface {
         Surface::Mesh(mesh) => (
             Some(*mesh.facts()),
@@ -276,9 +299,11 @@ pub fn discretize_surface(
         points,
         bounds,
         mesh,
+        read_by,
         accuracy,
         certificate,
         cells_m,
+        hidden,
         warnings,
     })
 }

@@ -1,6 +1,6 @@
 //! The seed's four shapes as formulas: exact heights and normals, borders inclusive.
 
-use crate::document::{Placement, Primitive};
+use crate::document::{Placement, Primitive, Seat};
 use crate::error::ShapeError;
 use crate::height::Sample;
 use crate::mesh::Bounds;
@@ -36,6 +36,13 @@ impl PlacedPrimitive {
                 vec![("radius_mm", radius_m), ("length_mm", length_m)]
             }
         };
+        if placement.seat != Seat::default() {
+            return Err(ShapeError::Document(
+                "a primitive is not seated by its box: say where its base lies, or use \
+                 translate_mm"
+                    .into(),
+            ));
+        }
         for (key, length_m) in lengths {
             if !(length_m > 0.0 && length_m.is_finite()) {
                 return Err(ShapeError::Document(format!(
@@ -211,6 +218,7 @@ mod tests {
         let placement = Placement {
             translate_m,
             rotate_deg: [0.0, 0.0, about_z],
+            ..Placement::default()
         };
         PlacedPrimitive::new(primitive, &placement).unwrap()
     }
@@ -302,6 +310,7 @@ mod tests {
         let tilt = Placement {
             translate_m: [0.0; 3],
             rotate_deg: [30.0, 0.0, 0.0],
+            ..Placement::default()
         };
         let message = PlacedPrimitive::new(FLAT, &tilt).unwrap_err().to_string();
         assert!(

@@ -12,6 +12,7 @@ use crate::mesh::{Bounds, FileMesh, Mesh, MeshFacts};
 use crate::placement::Transform;
 use crate::primitive::PlacedPrimitive;
 use crate::read_error::ReadError;
+use crate::step::{self, BodyOptions};
 use crate::stl;
 use fluxform_base::progress::Progress;
 use fluxform_design::named_file::{self, NamedFileError};
@@ -60,8 +61,11 @@ impl Surface {
     ///
     /// # Errors
     /// [`ShapeError`] with the path and the place.
-    pub fn open(document: &ShapeDocument) -> Result<(Self, Vec<String>), ShapeError> {
-        Self::open_observed(document, &mut ())
+    pub fn open(
+        document: &ShapeDocument,
+        progress: &dyn Progress,
+    ) -> Result<(Self, Vec<String>), ShapeError> {
+        Self::open_observed(document, &mut (), progress)
     }
 
     /// As [`Surface::open`]; `observer` sees the bytes of the surface's file, if it has one.
@@ -71,6 +75,7 @@ impl Surface {
     pub fn open_observed(
         document: &ShapeDocument,
         observer: &mut dyn ByteObserver,
+        progress: &dyn Progress,
     ) -> Result<(Self, Vec<String>), ShapeError> {
         check_placement(&document.placement)?;
         let (path, unit_m) = match &document.source {
@@ -80,9 +85,13 @@ impl Surface {
             }
             SurfaceSource::File { path, unit_m } => (path, unit_m),
         };
-        let (mut file, unit_m) = read_observed(path, *unit_m, observer)?;
+        let (mut file, unit_m) =
+            read_observed(path, *unit_m, &document.bodies, observer, progress)?;
         let mut warnings = std::mem::take(&mut file.warnings);
-        let transform = Transform::new(unit_m, &document.placement).scaled(document.scale);
+        let (transform, overhang) = Transform::new(unit_m, &document.placement)
+            .scaled(document.scale)
+            .seated(&document.placement, &file.triangles);
+        warnings.extend(overhang);
         let mesh = Mesh::place(file, &transform)?;
         let MeshFacts {
             triangles,
@@ -148,14 +157,21 @@ impl Surface {
 ///
 /// # Errors
 /// [`ShapeError`]: no or another unit, a file that cannot be read.
-pub fn read(path: &Path, stated_m: Option<f64>) -> Result<(FileMesh, f64), ShapeError> {
-    read_observed(path, stated_m, &mut ())
+pub fn read(
+    path: &Path,
+    stated_m: Option<f64>,
+    bodies: &BodyOptions,
+    progress: &dyn Progress,
+) -> Result<(FileMesh, f64), ShapeError> {
+    read_observed(path, stated_m, bodies, &mut (), progress)
 }
 
 fn read_observed(
     path: &Path,
     stated_m: Option<f64>,
+    bodies: &BodyOptions,
     observer: &mut dyn ByteObserver,
+    progress: &dyn Progress,
 ) -> Result<(FileMesh, f64), ShapeError> {
     let missing = |format: SurfaceFormat| ShapeError::UnitMissing {
         path: path.into(),
@@ -174,7 +190,7 @@ fn read_observed(
             "the unit is {unit_m} m; it must be positive"
         )));
     }
-    let (format, file) = read_mesh(path, observer)?;
+    let (format, file) = read_mesh(path, bodies, observer, progress)?;
     match (file.unit_m, stated_m) {
         (Some(own), Some(stated)) if own != stated => Err(ShapeError::UnitDiffers {
             path: path.into(),
@@ -194,13 +210,16 @@ fn read_observed(
 /// where the name has none. Of a binary STL the bytes are not held beside the triangles.
 pub(super) fn read_mesh(
     path: &Path,
+    bodies: &BodyOptions,
     observer: &mut dyn ByteObserver,
+    progress: &dyn Progress,
 ) -> Result<(SurfaceFormat, FileMesh), ShapeError> {
     let by_name = SurfaceFormat::of(path);
     if by_name.is_none() && path.extension().is_some() {
         return Err(ShapeError::Format { path: path.into() });
     }
-    if by_name.is_none_or(|format| format == SurfaceFormat::Stl)
+    if bodies.is_default()
+        && by_name.is_none_or(|format| format == SurfaceFormat::Stl)
         && let Some(result) = streamed(path, observer)
     {
         let file = result.map_err(|source| ShapeError::Content {
@@ -214,6 +233,20 @@ pub(super) fn read_mesh(
     observer.observe(&bytes);
     let format = by_name.or_else(|| SurfaceFormat::of_content(&bytes));
     let format = format.ok_or_else(|| ShapeError::Format { path: path.into() })?;
+    if format == SurfaceFormat::Step {
+        let read = step::read(&bytes, bodies, progress);
+        let file = read.map_err(|source| ShapeError::Content {
+            path: path.into(),
+            source,
+        })?;
+        return Ok((format, file));
+    }
+    if !bodies.is_default() {
+        return Err(ShapeError::Document(format!(
+            "{}: a chord and a body can be chosen of STEP files alone",
+            path.display()
+        )));
+    }
     Ok((format, format.read(path, &bytes)?))
 }
 
@@ -226,9 +259,19 @@ fn streamed(path: &Path, observer: &mut dyn ByteObserver) -> Option<Result<FileM
 }
 
 fn check_placement(placement: &Placement) -> Result<(), ShapeError> {
+    let seat = &placement.seat;
+    let fit = seat.fit.map_or([[0.0, 1.0]; 3], |fit| fit.box_m);
+    if fit.iter().any(|[from, to]| from >= to) {
+        return Err(ShapeError::Document(
+            "the box to fit must have its smaller ends first".into(),
+        ));
+    }
+    let rest_on_m = [seat.rest_on_m.unwrap_or(0.0)];
     let keys = [
-        ("translate_mm", placement.translate_m),
-        ("rotate_deg", placement.rotate_deg),
+        ("translate_mm", &placement.translate_m[..]),
+        ("rotate_deg", &placement.rotate_deg),
+        ("rest_on_mm", &rest_on_m),
+        ("fit_mm", fit.as_flattened()),
     ];
     for (key, values) in keys {
         if values.iter().any(|v| !v.is_finite()) {

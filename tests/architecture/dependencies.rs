@@ -3,10 +3,7 @@
 use crate::source::read;
 
 /// Packages without a maintainer, and the only ones that may need them.
-const UNMAINTAINED: [(&str, &[&str]); 2] = [
-    ("paste", &["argmin", "simba"]),
-    ("proc-macro-error", &["monstertruck-derive"]),
-];
+const UNMAINTAINED: [(&str, &[&str]); 1] = [("paste", &["argmin", "simba"])];
 
 /// Every locked package with what it needs.
 fn packages() -> Vec<(String, Vec<String>)> {

@@ -109,6 +109,7 @@ fn main() -> Result<(), Failure> {
         let placement = Placement {
             translate_m: [0.0, 0.0, 0.03],
             rotate_deg: [0.0; 3],
+            ..Placement::default()
         };
         let mesh = Mesh::place(stl::read(&bytes)?, &Transform::new(0.001, &placement))?;
         let surface = Surface::Mesh(mesh.clone());

@@ -7,6 +7,7 @@ use fluxform_shape::document::{
     AxisRequest, Placement, Primitive, RawSurface, RawSurfaceError, ShapeDocument, SurfaceSource,
     parse_unit,
 };
+use fluxform_shape::step::BodyOptions;
 
 fn read(text: &str) -> (ShapeDocument, String) {
     match ShapeDocument::from_toml(text, Path::new("shapes/s.toml")) {
@@ -38,7 +39,8 @@ fn a_surface_is_read_with_its_unit_and_placement() {
         shape.placement,
         Placement {
             translate_m: [0.0, -0.0007, 0.03],
-            rotate_deg: [0.0, 7.3, -90.0]
+            rotate_deg: [0.0, 7.3, -90.0],
+            ..Placement::default()
         }
     );
     assert_eq!(
@@ -199,12 +201,14 @@ fn several_faults_are_reported_at_once() {
 
 fn raw(path: &str, unit: Option<&str>) -> RawSurface {
     RawSurface {
+        bodies: BodyOptions::default(),
         path: PathBuf::from(path),
         unit_m: unit.and_then(parse_unit),
         scale: [1.0; 3],
         placement: Placement {
             translate_m: [0.0, 0.0, 0.03],
             rotate_deg: [0.0; 3],
+            ..Placement::default()
         },
         samples: [61, 7],
         x_m: None,

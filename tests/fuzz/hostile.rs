@@ -1,7 +1,5 @@
 //! Inputs made to exhaust a reader: bombs, deep nesting, enormous counts, quadratic work.
 
-use std::collections::BTreeMap;
-
 use fluxform::shape::document::SurfaceFormat;
 
 use crate::mutation::zipped;
@@ -32,7 +30,8 @@ pub fn inputs(format: SurfaceFormat) -> Vec<Hostile> {
         SurfaceFormat::ThreeMf => three_mf(),
         SurfaceFormat::Amf => amf(),
         SurfaceFormat::ThreeDxml => three_dxml(),
-        SurfaceFormat::Step => step(),
+        // Read by another program, in a process of its own: `tests/step` gives it such files.
+        SurfaceFormat::Step => Vec::new(),
         SurfaceFormat::Sldprt => sldprt(),
     }
 }
@@ -358,91 +357,6 @@ fn three_dxml() -> Vec<Hostile> {
         .1
         .replace("<InstanceRep", &format!("{instances}<InstanceRep"));
     found.push(("many instances", product(&many, &representation.1)));
-    found
-}
-
-fn step() -> Vec<Hostile> {
-    let good = String::from_utf8(surface_files::step()).expect("made of text");
-    let with = |statements: &str| good.replace("DATA;\n", &format!("DATA;\n{statements}"));
-    let mut found = vec![
-        (
-            "deep brackets",
-            with(&format!("#900=X({});\n", "(".repeat(500_000))).into_bytes(),
-        ),
-        (
-            "deep brackets, closed",
-            with(&format!(
-                "#900=X({}{});\n",
-                "(".repeat(100_000),
-                ")".repeat(100_000)
-            ))
-            .into_bytes(),
-        ),
-        (
-            "deep types",
-            with(&format!(
-                "#900=X({}1{});\n",
-                "A(".repeat(100_000),
-                ")".repeat(100_000)
-            ))
-            .into_bytes(),
-        ),
-        (
-            "an open string",
-            with(&format!("#900=X('{}", "a".repeat(1 << 20))).into_bytes(),
-        ),
-        (
-            "many statements",
-            with(&"#900=X();\n".repeat(100_000)).into_bytes(),
-        ),
-        (
-            "many numbers",
-            with(&format!("#900=X(({}));\n", "1.,".repeat(300_000))).into_bytes(),
-        ),
-        (
-            "enormous numbers",
-            with("#99999999999999999999999=X(1);\n").into_bytes(),
-        ),
-        (
-            "a unit of itself",
-            good.replace(
-                "(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))",
-                "(CONVERSION_BASED_UNIT('X',#900)LENGTH_UNIT()NAMED_UNIT(*))",
-            )
-            .into_bytes(),
-        ),
-        (
-            "an enormous box",
-            good.replace("0.700", "7E300").into_bytes(),
-        ),
-        ("a long box", good.replace("0.700", "7E9").into_bytes()),
-        ("a flat box", good.replace("0.700", "0.000").into_bytes()),
-        (
-            "a box that is not a number",
-            good.replace("0.700", "NAN").into_bytes(),
-        ),
-    ];
-    // Every reference in turn to its own statement.
-    let mut loops: BTreeMap<&str, String> = BTreeMap::new();
-    for line in good.lines().filter(|line| line.starts_with('#')) {
-        let Some((own, body)) = line.split_once('=') else {
-            continue;
-        };
-        let kind = body.split('(').next().unwrap_or_default();
-        if let Some(at) = body.find('#')
-            && !loops.contains_key(kind)
-        {
-            let end = body[at + 1..].find(|c: char| !c.is_ascii_digit());
-            let end = end.map_or(body.len(), |k| at + 1 + k);
-            let looped = format!("{own}={}{own}{}", &body[..at], &body[end..]);
-            loops.insert(kind, good.replace(line, &looped));
-        }
-    }
-    found.extend(
-        loops
-            .into_values()
-            .map(|text| ("a reference to itself", text.into_bytes())),
-    );
     found
 }
 

@@ -234,6 +234,7 @@ fn shape(name: &str) -> Mesh {
     let placement = Placement {
         translate_m: [0.0, 0.0, lift],
         rotate_deg: [0.0; 3],
+        ..Placement::default()
     };
     Mesh::place(
         stl::read(&bytes).unwrap(),
@@ -457,6 +458,7 @@ fn a_turned_body_is_certified_alike_on_any_number_of_threads() {
     let placement = Placement {
         translate_m: [0.003, -0.002, 0.09],
         rotate_deg: [17.0, -23.0, 40.0],
+        ..Placement::default()
     };
     let file = stl::read(&bytes).unwrap();
     let mesh = Mesh::place(file, &Transform::new(0.001, &placement)).unwrap();

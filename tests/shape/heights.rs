@@ -192,6 +192,7 @@ fn half_sphere(translate_m: [f64; 3], rotate_deg: [f64; 3]) -> Mesh {
     let placement = Placement {
         translate_m,
         rotate_deg,
+        ..Placement::default()
     };
     Mesh::place(
         stl::read(&bytes).unwrap(),
@@ -295,6 +296,7 @@ fn neighbours_leave_no_crack_in_any_position() {
         let placement = Placement {
             translate_m: [0.0; 3],
             rotate_deg,
+            ..Placement::default()
         };
         let mesh = Mesh::place(file.clone(), &Transform::new(0.001, &placement)).unwrap();
         let [tilt_x, tilt_y, _] = rotate_deg.map(f64::to_radians);
@@ -359,6 +361,7 @@ fn a_far_origin_loses_no_border() {
     let placement = Placement {
         translate_m: [-1000.0, 1000.0, 0.03],
         rotate_deg: [0.0; 3],
+        ..Placement::default()
     };
     let transform = Transform::new(0.001, &placement);
     let shape = |x: f64| 0.03 + (0.0025 - x * x).max(0.0).sqrt();

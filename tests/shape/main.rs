@@ -11,6 +11,4 @@ mod marks;
 mod more_formats;
 mod points;
 mod solidworks;
-#[cfg(feature = "step")]
-mod step;
 mod stl;

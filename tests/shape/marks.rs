@@ -18,6 +18,7 @@ use fluxform_shape::primitive::PlacedPrimitive;
 use fluxform_shape::scattered::Probe;
 use fluxform_shape::scattered::adaptive::{Adaptive, Grading, adaptive};
 use fluxform_shape::scattered::poisson::poisson;
+use fluxform_shape::step::BodyOptions;
 use fluxform_shape::{Settings, Surface, discretize_with, stl};
 
 use fluxform_testing::surfaces::{block, exact, file, grid, lifted, sample, seed_grid};
@@ -402,6 +403,7 @@ fn a_small_formula_is_found_in_a_wide_region() {
         let placement = Placement {
             translate_m: [0.0171, -0.0233, 0.0],
             rotate_deg: [0.0, 0.0, about_z],
+            ..Placement::default()
         };
         let placed = PlacedPrimitive::new(primitive, &placement).unwrap();
         let surface = Surface::Primitive(placed);
@@ -439,10 +441,12 @@ fn a_grids_marks_agree_with_its_heights() {
             path: root().join("shapes/half_cylinder.stl"),
             unit_m: Some(0.001),
         },
+        bodies: BodyOptions::default(),
         scale: [1.0; 3],
         placement: Placement {
             translate_m: [0.0, 0.0, 0.06],
             rotate_deg: [7.0, 20.0, 33.0],
+            ..Placement::default()
         },
         grid: GridRequest { x: axis, y: axis },
     };
@@ -451,7 +455,7 @@ fn a_grids_marks_agree_with_its_heights() {
         ..Settings::default()
     };
     let found = discretize_with(&document, &settings, &Silent).unwrap();
-    let (surface, _) = Surface::open(&document).unwrap();
+    let (surface, _) = Surface::open(&document, &Silent).unwrap();
     let probe = Probe::new(&surface, &found.points.grid);
     for k in 0..found.points.len() {
         let (sample, marks) = probe

@@ -3,7 +3,9 @@
 use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 
+use fluxform_base::progress::Silent;
 use fluxform_shape::document::SurfaceFormat;
+use fluxform_shape::step::BodyOptions;
 use fluxform_shape::{MeshReport, ShapeError, surface};
 
 use crate::formats::{read, refusal};
@@ -160,18 +162,18 @@ fn a_file_without_an_ending_is_known_by_its_content() {
         // This is a test's own file.
         #[allow(clippy::disallowed_methods)]
         std::fs::write(&path, &bytes).unwrap();
-        if cfg!(feature = "step") || name != "STEP" {
-            let report = MeshReport::of_file(&path).unwrap();
+        if name != "STEP" {
+            let report = of_file(&path).unwrap();
             assert_eq!(report.format, name);
         }
     }
     #[allow(clippy::disallowed_methods)]
     std::fs::write(&path, off()).unwrap();
-    let unit = surface::read(&path, None).unwrap_err();
+    let unit = surface::read(&path, None, &BodyOptions::default(), &Silent).unwrap_err();
     assert!(matches!(unit, ShapeError::UnitMissing { .. }), "{unit}");
     #[allow(clippy::disallowed_methods)]
     std::fs::write(&path, b"some text").unwrap();
-    let unknown = MeshReport::of_file(&path).unwrap_err();
+    let unknown = of_file(&path).unwrap_err();
     assert!(matches!(unknown, ShapeError::Format { .. }), "{unknown}");
 }
 
@@ -183,9 +185,7 @@ fn what_is_not_read_comes_with_advice() {
         ("a.x_t", "STL"),
         ("a.gltf", ".glb"),
     ] {
-        let message = MeshReport::of_file(Path::new(name))
-            .unwrap_err()
-            .to_string();
+        let message = of_file(Path::new(name)).unwrap_err().to_string();
         assert!(
             message.contains(advice) && message.contains("; "),
             "{message}"
@@ -216,7 +216,11 @@ fn a_file_with_a_hole_is_refused_where_the_hole_begins() {
         file.set_len(length).unwrap();
         file.seek(SeekFrom::End(-1)).unwrap();
         file.write_all(b"\n").unwrap();
-        let message = MeshReport::of_file(&path).unwrap_err().to_string();
+        let message = of_file(&path).unwrap_err().to_string();
         assert!(message.contains("zeros alone"), "{name}: {message}");
     }
+}
+
+fn of_file(path: &Path) -> Result<MeshReport, ShapeError> {
+    MeshReport::of_file(path, &BodyOptions::default(), &Silent)
 }

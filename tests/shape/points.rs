@@ -7,6 +7,7 @@ use fluxform_numerics::axis::Axis;
 use fluxform_shape::document::{
     AxisRequest, GridRequest, Placement, Primitive, ShapeDocument, SurfaceSource,
 };
+use fluxform_shape::step::BodyOptions;
 use fluxform_shape::{ConstraintPoints, Discretized, ShapeError, discretize};
 
 use fluxform_testing::root;
@@ -56,6 +57,7 @@ fn exactly(primitive: Primitive, placement: Placement, grid: GridRequest) -> Sha
     ShapeDocument {
         name: "exact".into(),
         source: SurfaceSource::Primitive(primitive),
+        bodies: BodyOptions::default(),
         scale: [1.0; 3],
         placement,
         grid,
@@ -180,6 +182,7 @@ fn a_turned_body_and_a_turned_primitive_agree() {
             let turned = |z| Placement {
                 translate_m: [0.011, -0.023, z],
                 rotate_deg: [0.0, 0.0, turn],
+                ..Placement::default()
             };
             let mesh = from_stl(name, turned(lift), grid);
             let mut document = exactly(primitive(name), turned(0.0), grid);
@@ -227,6 +230,7 @@ fn a_surface_outside_the_grid_is_refused_with_both_extents() {
     let far = Placement {
         translate_m: [0.25, 0.0, 0.03],
         rotate_deg: [0.0; 3],
+        ..Placement::default()
     };
     let said = message(&file(&path, 0.001, far, seed_grid()));
     assert!(
@@ -237,6 +241,7 @@ fn a_surface_outside_the_grid_is_refused_with_both_extents() {
     let small = Placement {
         translate_m: [0.0007, 0.0007, 0.03],
         rotate_deg: [0.0; 3],
+        ..Placement::default()
     };
     let said = message(&file(&path, 1e-6, small, seed_grid()));
     assert!(said.contains("none of the 3721 grid points"), "{said}");

@@ -25,6 +25,7 @@ fn real_files_match_a_search_through_all_triangles() {
         let placement = Placement {
             translate_m: [0.013, -0.007, 0.3],
             rotate_deg: [20.0, -35.0, 55.0],
+            ..Placement::default()
         };
         let mesh = Mesh::place(file, &Transform::new(0.0254, &placement)).unwrap();
         let [x, y] = mesh.facts().bounds.plan();

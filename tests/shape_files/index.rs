@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use fluxform_base::progress::Silent;
 use fluxform_shape::MeshReport;
+use fluxform_shape::step::BodyOptions;
 
 use fluxform_testing::needs::{self, Trial, corpus_folder};
 use fluxform_testing::trials;
@@ -60,7 +62,7 @@ fn real_files_have_the_indexs_facts() {
         if entry["format"] == "step" {
             continue;
         }
-        let result = MeshReport::of_file(&folder.join(name));
+        let result = MeshReport::of_file(&folder.join(name), &BodyOptions::default(), &Silent);
         if let Some((_, said)) = REFUSED.iter().find(|(file, _)| *file == name) {
             let message = result.unwrap_err().to_string();
             assert!(message.contains(said), "{message}");
@@ -107,7 +109,12 @@ fn real_files_have_the_indexs_facts() {
 }
 
 fn report(name: &str) -> MeshReport {
-    MeshReport::of_file(&corpus_folder().join(name)).unwrap()
+    MeshReport::of_file(
+        &corpus_folder().join(name),
+        &BodyOptions::default(),
+        &Silent,
+    )
+    .unwrap()
 }
 
 fn components_in_other_parts_are_placed() {

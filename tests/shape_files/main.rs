@@ -4,8 +4,6 @@
 
 mod heights;
 mod index;
-#[cfg(feature = "step")]
-mod step;
 mod stl;
 
 use std::process::{Command, ExitCode};
@@ -19,8 +17,6 @@ fn main() -> ExitCode {
             .into_iter()
             .flatten(),
     );
-    #[cfg(feature = "step")]
-    all.extend(step::trials());
     needs::run(all)
 }
 

@@ -8,6 +8,7 @@ use fluxform_shape::document::{AxisRequest, GridRequest, Placement, ShapeDocumen
 use fluxform_shape::height::{Grid, Sample, heights};
 use fluxform_shape::mesh::{FileMesh, Mesh, Triangle};
 use fluxform_shape::placement::Transform;
+use fluxform_shape::step::BodyOptions;
 
 pub fn binary(triangles: &[[[f32; 3]; 3]]) -> Vec<u8> {
     let mut bytes = vec![b' '; 80];
@@ -80,6 +81,7 @@ pub fn file(path: &Path, unit_m: f64, placement: Placement, grid: GridRequest) -
             path: path.into(),
             unit_m: Some(unit_m),
         },
+        bodies: BodyOptions::default(),
         scale: [1.0; 3],
         placement,
         grid,
@@ -90,6 +92,7 @@ pub fn lifted(z_m: f64) -> Placement {
     Placement {
         translate_m: [0.0, 0.0, z_m],
         rotate_deg: [0.0; 3],
+        ..Placement::default()
     }
 }
 

@@ -209,7 +209,7 @@ fn places(
         name: shape.document.name.clone(),
         source,
     };
-    let (surface, _) = Surface::open(&shape.document).map_err(fault)?;
+    let (surface, _) = Surface::open(&shape.document, &Silent).map_err(fault)?;
     let heights = surface.heights(&plan, &bench.within()).map_err(fault)?;
     let seen = heights.iter().enumerate().filter_map(|(k, sample)| {
         let z = sample.as_ref()?.height_m;

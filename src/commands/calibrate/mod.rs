@@ -755,6 +755,17 @@ fn outside_warning(manifest: &Manifest, points: &ConstraintPoints) -> Option<Str
                 && inside(&manifest.map.z_m, points.height_m[*i]))
         })
         .count();
+    if outside == points.len() {
+        let ends = [manifest.map.x_m, manifest.map.y_m, manifest.map.z_m];
+        let ends = ends.map(|axis| {
+            [axis.from_m, axis.to_m].map(|end| format!("{}", (end * 1e6).round() / 1e3))
+        });
+        return Some(format!(
+            "the object lies wholly outside the design's workspace, where a runtime gives no force: \
+             --fit DESIGN (fit_mm = [{}] in its shape file) moves it in",
+            ends.as_flattened().join(", ")
+        ));
+    }
     (outside > 0).then(|| {
         format!(
             "{outside} of {} points lie outside the design's workspace: lambda counts them, but a \

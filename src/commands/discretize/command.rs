@@ -75,6 +75,9 @@ pub struct Discretize {
         conflicts_with_all = ["holes", "certify", "max_deviation", "poisson", "out"]
     )]
     pub(super) inspect: bool,
+    /// With --inspect: report and draw where the part lies over this design's array and workspace
+    #[arg(long, value_name = "DESIGN", requires = "inspect")]
+    pub(super) over: Option<FileArgument>,
     /// Draw heights, what each point is, and the deviation between them (SVG)
     #[arg(long, value_name = "FILE", conflicts_with_all = ["max_deviation", "poisson"])]
     pub(super) plot: Option<FileArgument>,

@@ -1,9 +1,9 @@
 //! `discretize --inspect`: what a surface's file holds.
 
-use std::path::PathBuf;
+use std::path::Path;
 
 use super::command::Discretize;
-use super::inspect::{Inspection, drawn, inspect};
+use super::inspect::{Inspected, Inspection, Placed, inspect};
 use crate::bundle::artefact::Input;
 use crate::cli::documents;
 use crate::cli::failure::Failure;
@@ -13,56 +13,81 @@ use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{count, extents, mm, number};
 use crate::cli::start::begin;
 use crate::cli::values::FileArgument;
+use crate::design::Need;
 use crate::shape::MeshReport;
 use crate::shape::document::{SurfaceSource, unit_name};
+use crate::shape::step::NamedBody;
 
 impl Discretize {
     pub(crate) fn inspected(&self, printer: &Printer) -> Result<(), Failure> {
-        let given = self.surface.given();
-        let placed: Vec<&str> = given.into_iter().filter(|flag| *flag != "--unit").collect();
-        if !placed.is_empty() {
-            return Err(Failure::Usage(format!(
-                "{} cannot be used with --inspect, which looks at the file as it is",
-                placed.join(" ")
-            )));
-        }
-        let (path, unit_m, inputs) = self.file(printer)?;
+        let (inspected, inputs) = self.looked_at(printer)?;
         let bar = begin(printer);
-        let inspection = inspect(&path, inputs)?;
+        let (inspection, drawn) = inspect(&inspected, inputs, self.plot.is_some(), &bar)?;
         for warning in &inspection.surface.warnings {
             printer.warning(warning);
         }
         let mut place = Stream::Output;
-        if let Some(file) = &self.plot {
-            let plot = Picture::new(file, self.writing.force, [&path]);
+        if let (Some(file), Some(drawn)) = (&self.plot, drawn) {
+            let surface = inspection.inputs.last().map(|input| Path::new(&input.path));
+            let plot = Picture::new(file, self.writing.force, surface);
             plot.check(&inspection.inputs)?;
-            let svg = drawn(&path, unit_m, &bar)?.svg();
-            place = plot.write(&inspection.inputs, &svg, printer)?;
+            place = plot.write(&inspection.inputs, &drawn.svg(), printer)?;
         }
         printer.summary(place, &inspection, || self.report(&inspection))
     }
 
-    /// The surface's file, its unit as stated, and the document that names it.
-    fn file(&self, printer: &Printer) -> Result<(PathBuf, Option<f64>, Vec<Input>), Failure> {
+    /// What to look at: the file as it is, unless flags place it.
+    fn looked_at(&self, printer: &Printer) -> Result<(Inspected, Vec<Input>), Failure> {
+        // These say what the file is, and place nothing.
+        const OF_THE_FILE: [&str; 3] = ["--unit", "--chord", "--body"];
+        const OF_THE_GRID: [&str; 3] = ["--grid", "--x", "--y"];
+        let given = self.surface.given();
+        let points: Vec<&str> = given
+            .iter()
+            .copied()
+            .filter(|f| OF_THE_GRID.contains(f))
+            .collect();
+        if !points.is_empty() {
+            return Err(Failure::Usage(format!(
+                "{} cannot be used with --inspect, which makes no points",
+                points.join(" ")
+            )));
+        }
+        let over = self
+            .over
+            .as_ref()
+            .map(|file| documents::design(file, Need::MAP, printer));
+        let over = over.transpose()?.map(|document| Box::new(document.design));
+        let placed = over.is_some() || given.iter().any(|flag| !OF_THE_FILE.contains(flag));
         if let FileArgument::Path(path) = &self.shape
             && !documents::is_document(&self.shape)
+            && !placed
         {
-            return Ok((path.clone(), self.surface.unit, Vec::new()));
+            let bodies = documents::bodies(&self.surface);
+            return Ok((Inspected::bare(path, self.surface.unit, bodies), Vec::new()));
         }
         let shapes = documents::shapes(std::slice::from_ref(&self.shape), &self.surface, printer)?;
-        let mut shapes = shapes.into_iter();
-        match shapes
-            .next()
-            .map(|shape| (shape.document.source, shape.input))
-        {
-            Some((SurfaceSource::File { path, unit_m }, input)) => {
-                Ok((path, unit_m, input.into_iter().collect()))
-            }
-            _ => Err(Failure::Usage(format!(
+        let Some(shape) = shapes.into_iter().next() else {
+            return Err(Failure::Usage("there is nothing to inspect".to_owned()));
+        };
+        let SurfaceSource::File { path, unit_m } = shape.document.source.clone() else {
+            return Err(Failure::Usage(format!(
                 "{}: this shape is a formula: there is no file to inspect",
                 self.shape.as_given().display()
-            ))),
+            )));
+        };
+        let inputs = shape.input.into_iter().collect();
+        if !placed {
+            let bodies = shape.document.bodies;
+            return Ok((Inspected::bare(&path, unit_m, bodies), inputs));
         }
+        let inspected = Inspected {
+            document: shape.document,
+            stated_m: unit_m,
+            placed,
+            over,
+        };
+        Ok((inspected, inputs))
     }
 
     fn report(&self, inspection: &Inspection) -> String {
@@ -102,11 +127,73 @@ impl Discretize {
                 &format!("about {} from the body", mm(found.deviation * unit_m)),
             );
         }
+        if let Some(hidden) = &inspection.hidden {
+            sheet.line(
+                "hidden",
+                &format!(
+                    "{} % of the area from above, {} % of what faces up (undercuts, hollows)",
+                    number((100.0 * hidden.of_area).round()),
+                    number((1000.0 * hidden.of_upward).round() / 10.0)
+                ),
+            );
+        }
+        for (k, body) in found.named_bodies.iter().take(MOST_LISTED).enumerate() {
+            sheet.line(&format!("body {}", k + 1), &described(body));
+        }
+        if found.named_bodies.len() > MOST_LISTED {
+            let more = found.named_bodies.len() - MOST_LISTED;
+            sheet.line("bodies", &format!("{more} more, all in --format json"));
+        }
+        if let Some(reader) = &found.read_by {
+            sheet.line("read by", reader);
+        }
+        if let Some(placed) = &inspection.placed {
+            sheet.line("placed", &lies(placed));
+        }
         if let Some(FileArgument::Path(path)) = &self.plot {
             sheet.line("drawn in", &path.display().to_string());
         }
         sheet.finish()
     }
+}
+
+/// Bodies that are listed on the screen.
+const MOST_LISTED: usize = 12;
+
+/// A body's name, assembly, colour and triangles.
+fn described(body: &NamedBody) -> String {
+    let mut text = vec![body.name.clone()];
+    if !body.within.is_empty() {
+        text.push(format!("in {}", body.within.join(" / ")));
+    }
+    if let Some(color) = body.color {
+        let hex = color.map(|c| format!("{:02x}", (255.0 * c.clamp(0.0, 1.0)).round() as u8));
+        text.push(format!("#{}", hex.concat()));
+    }
+    text.push(count(body.triangles, "triangle"));
+    text.join(", ")
+}
+
+/// Where a placed surface lies.
+fn lies(placed: &Placed) -> String {
+    let corner = |c: &[f64; 3]| c.map(|v| number(v * 1e3)).join(", ");
+    let mut text = format!(
+        "from ({}) to ({}) mm",
+        corner(&placed.bounds_min_m),
+        corner(&placed.bounds_max_m)
+    );
+    if let (Some(min), Some(max)) = (&placed.workspace_min_m, &placed.workspace_max_m) {
+        text += &format!(
+            "; the workspace is ({}) to ({}) mm: {}",
+            corner(min),
+            corner(max),
+            match placed.inside {
+                Some(true) => "wholly inside",
+                _ => "it reaches beyond (--fit DESIGN moves it in)",
+            }
+        );
+    }
+    text
 }
 
 /// The unit, as far as it is known.

@@ -21,6 +21,7 @@ use crate::progress::Progress;
 use crate::scene::cached_field::ShapeField;
 use crate::shape::certificate::{Certificate, Certify, stated_tessellation};
 use crate::shape::document::{ShapeDocument, SurfaceSource};
+use crate::shape::hidden::Hidden;
 use crate::shape::holes::Holes;
 use crate::shape::point_flags::Marks;
 use crate::shape::surface::{ByteObserver, read_file};
@@ -90,6 +91,9 @@ pub struct PointsSummary {
     /// Triangles without area, left out; absent for a primitive.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub degenerate_triangles: Option<usize>,
+    /// How much of the surface a height map cannot show; absent for a primitive.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hidden: Option<Hidden>,
     /// How far the interpolated points may lie from the surface.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub deviation: Option<DeviationSummary>,
@@ -258,7 +262,7 @@ pub fn run_with(
     progress: &dyn Progress,
 ) -> Result<PointsReport, RunError> {
     let made_with = options.made_with(document, inputs.first());
-    let opened = OpenedSurface::new(document, inputs)?;
+    let opened = OpenedSurface::new(document, inputs, progress)?;
     let mut report = opened.discretize(document, options, None, progress)?;
     report.summary.made_with = made_with;
     Ok(report)
@@ -274,7 +278,7 @@ pub(crate) fn run_cached(
     field: ShapeField,
     progress: &dyn Progress,
 ) -> Result<PointsReport, RunError> {
-    let opened = OpenedSurface::new(document, inputs)?;
+    let opened = OpenedSurface::new(document, inputs, progress)?;
     let cached = field.certificate(document, &opened.inputs);
     let known = cached.known();
     let new = known.is_none();
@@ -298,9 +302,13 @@ impl OpenedSurface {
     ///
     /// # Errors
     /// A file without a surface.
-    fn new(document: &ShapeDocument, mut inputs: Vec<Input>) -> Result<Self, RunError> {
+    fn new(
+        document: &ShapeDocument,
+        mut inputs: Vec<Input>,
+        progress: &dyn Progress,
+    ) -> Result<Self, RunError> {
         let mut parsed = ParsedBytes::default();
-        let (surface, warnings) = Surface::open_observed(document, &mut parsed)
+        let (surface, warnings) = Surface::open_observed(document, &mut parsed, progress)
             .map_err(|source| shape_error(document, source))?;
         if let SurfaceSource::File { path, .. } = &document.source {
             parsed.add_to(&mut inputs, path);
@@ -377,6 +385,9 @@ fn report(document: &ShapeDocument, inputs: Vec<Input>, discretized: Discretized
             ));
         }
     }
+    if let (Some(reader), Some(stage)) = (&discretized.read_by, accuracy.get_mut("tessellation")) {
+        stage.method = format!("{}; read by {reader}", stage.method).into();
+    }
     let summary = PointsSummary {
         schema_version: SCHEMA_VERSION,
         fluxform_version: FLUXFORM_VERSION,
@@ -396,6 +407,7 @@ fn report(document: &ShapeDocument, inputs: Vec<Input>, discretized: Discretized
         bounds_max_m: discretized.bounds.max_m,
         triangles: discretized.mesh.as_ref().map(|mesh| mesh.triangles),
         degenerate_triangles: discretized.mesh.as_ref().map(|mesh| mesh.degenerate),
+        hidden: discretized.hidden,
         deviation,
         accuracy,
         warnings,
@@ -483,6 +495,7 @@ impl PointsReport {
             heights: &heights,
             marks: &marks,
             cells: self.discretized.cells_m.as_deref().unwrap_or(&[]),
+            over: None,
         })
     }
 

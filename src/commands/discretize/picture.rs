@@ -1,5 +1,6 @@
 //! A picture of a surface seen from above: heights, marks, deviation.
 
+use crate::design::Design;
 use crate::plot::plane::{Cells, Mark, Panel, PlanePlot, Together};
 use crate::shape::height::Grid;
 use crate::shape::point_flags::Marks;
@@ -37,6 +38,66 @@ pub(super) struct PictureData<'a> {
     pub(super) marks: &'a [Option<Marks>],
     /// A bound of the vertical difference, one value a cell; empty where there is none.
     pub(super) cells: &'a [Option<f64>],
+    /// The array that the surface lies over.
+    pub(super) over: Option<Outline>,
+}
+
+/// An array from above, m.
+pub(super) struct Outline {
+    /// Middles of the coils.
+    coils: Vec<[f64; 2]>,
+    /// Ends of the workspace along x and y.
+    workspace: [[f64; 2]; 2],
+}
+
+/// Dots along a side of the workspace.
+const DOTS: usize = 60;
+
+impl Outline {
+    pub(super) fn of(design: &Design) -> Self {
+        let workspace = &design.workspace;
+        Self {
+            coils: design
+                .array
+                .positions_m
+                .iter()
+                .map(|p| [p[0], p[1]])
+                .collect(),
+            workspace: [workspace.x_m, workspace.y_m].map(|axis| [axis.from, axis.to]),
+        }
+    }
+
+    /// Its two kinds of points.
+    fn marks(&self, factor: f64) -> [Mark; 2] {
+        let [x, y] = self.workspace;
+        let along = |k: usize, [from, to]: [f64; 2]| from + (to - from) * k as f64 / DOTS as f64;
+        let sides = (0..=DOTS).flat_map(|k| {
+            [
+                [along(k, x), y[0]],
+                [along(k, x), y[1]],
+                [x[0], along(k, y)],
+                [x[1], along(k, y)],
+            ]
+        });
+        let scaled = |p: [f64; 2]| (p[0] * factor, p[1] * factor);
+        [
+            Mark {
+                name: "workspace",
+                points: sides.map(scaled).collect(),
+            },
+            Mark {
+                name: "coil",
+                points: self.coils.iter().copied().map(scaled).collect(),
+            },
+        ]
+    }
+
+    /// The range that holds it and `ends`, along an axis.
+    fn widened(&self, axis: usize, ends: [f64; 2]) -> [f64; 2] {
+        let coils = self.coils.iter().map(|coil| coil[axis]);
+        let all = coils.chain(self.workspace[axis]);
+        all.fold(ends, |[low, high], c| [low.min(c), high.max(c)])
+    }
 }
 
 pub(super) fn picture(seen: &PictureData<'_>) -> PlanePlot {
@@ -78,7 +139,34 @@ pub(super) fn picture(seen: &PictureData<'_>) -> PlanePlot {
             marks: Vec::new(),
         });
     }
-    let [x, y] = seen.grid.plan().map(|ends| ends.map(|end| end * factor));
+    let [mut x, mut y] = seen.grid.plan();
+    if let Some(over) = &seen.over {
+        // Cells would be drawn over the whole range: a panel of its own, of points alone.
+        let (columns, rows) = (seen.grid.x_m.nodes(), seen.grid.y_m.nodes());
+        let part = seen
+            .heights
+            .iter()
+            .enumerate()
+            .filter(|(_, height)| height.is_some());
+        let at = |k: usize| {
+            (
+                columns[k % columns.len()] * factor,
+                rows[k / columns.len()] * factor,
+            )
+        };
+        let mut marks = vec![Mark {
+            name: "part",
+            points: part.map(|(k, _)| at(k)).collect(),
+        }];
+        marks.extend(over.marks(factor));
+        panels = vec![Panel {
+            title: format!("the part over the array and its workspace / {unit}"),
+            cells: None,
+            marks,
+        }];
+        (x, y) = (over.widened(0, x), over.widened(1, y));
+    }
+    let [x, y] = [x, y].map(|ends| ends.map(|end| end * factor));
     PlanePlot {
         title: seen.title.clone(),
         unit: unit.to_owned(),

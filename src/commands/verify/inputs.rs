@@ -16,7 +16,8 @@ use crate::commands::lambda::LambdaOptions;
 use crate::design::{Design, Need, Steel as Described, source};
 use crate::lambda::Settings;
 use crate::scene::sources::ShapeSource;
-use crate::shape::document::{Placement, RawSurface, ShapeDocument, SurfaceSource};
+use crate::shape::document::{Fit, Placement, RawSurface, Seat, ShapeDocument, SurfaceSource, Up};
+use crate::shape::step::BodyOptions;
 
 /// Inputs that are read again: a bundle names them, and is not trusted with any number or size.
 const INPUTS_MAX: usize = 16;
@@ -261,6 +262,19 @@ fn raw(path: &Path, surface: &SurfaceOptions) -> RawSurface {
         placement: Placement {
             translate_m: surface.translate_m,
             rotate_deg: surface.rotate_deg,
+            seat: Seat {
+                up: surface.up.as_deref().and_then(Up::of).unwrap_or_default(),
+                center: surface.center,
+                rest_on_m: surface.rest_on_m,
+                fit: surface.fit_m.map(|box_m| Fit {
+                    box_m,
+                    scale: surface.scale_to_fit,
+                }),
+            },
+        },
+        bodies: BodyOptions {
+            chord_m: surface.chord_m,
+            body: surface.body.clone(),
         },
         samples: surface.samples,
         x_m: surface.x_m,

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::unit::unit_names;
 use super::{AxisRequest, GridRequest, Placement, ShapeDocument, SurfaceSource};
 use crate::format::SurfaceFormat;
+use crate::step::BodyOptions;
 use fluxform_design::message_text::axis_fault;
 use fluxform_numerics::axis::Axis;
 
@@ -16,6 +17,8 @@ pub struct RawSurface {
     /// Metres per unit of the file's coordinates (see [`super::parse_unit`]); where the format
     /// carries its own, it must be the same.
     pub unit_m: Option<f64>,
+    /// How bodies are cut into facets, and which of them.
+    pub bodies: BodyOptions,
     /// Factors along the file's axes; positive.
     pub scale: [f64; 3],
     /// Rotation, then translation.
@@ -98,6 +101,7 @@ impl ShapeDocument {
         let Placement {
             translate_m,
             rotate_deg,
+            seat: _,
         } = surface.placement;
         let finite = [translate_m, rotate_deg]
             .iter()
@@ -110,6 +114,7 @@ impl ShapeDocument {
             name: stem(&path),
             grid: grid(surface)?,
             source: SurfaceSource::File { path, unit_m },
+            bodies: surface.bodies.clone(),
             scale: surface.scale,
             placement: surface.placement,
         })

@@ -3,8 +3,11 @@
 use std::path::Path;
 
 use super::unit::{parse_unit, unit_names};
-use super::{AxisRequest, GridRequest, Placement, Primitive, ShapeDocument, SurfaceSource};
+use super::{
+    AxisRequest, Fit, GridRequest, Placement, Primitive, Seat, ShapeDocument, SurfaceSource, Up,
+};
 use crate::format::SurfaceFormat;
+use crate::step::BodyOptions;
 use fluxform_base::units::m_from_mm;
 use fluxform_design::diagnostics::{Faults, InvalidDocument};
 use fluxform_design::keys::{Key, with_meanings};
@@ -73,17 +76,73 @@ fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
     let placement = Placement {
         translate_m: root.tuple("translate_mm", &BODY_MM).map(m_from_mm),
         rotate_deg: root.tuple("rotate_deg", &Rule::any("degrees")),
+        seat: seat(root),
     };
+    let bodies = bodies(root);
     let grid = points(root.section("points"));
     Some(ShapeDocument {
         name: name?,
         source: source?,
+        bodies,
         scale: scale?,
         placement,
         grid: grid?,
     })
 }
 
+/// Where the surface goes by its own box.
+fn seat(root: &mut Section<'_>) -> Seat {
+    const KEYS: [&str; 5] = ["up", "center", "rest_on_mm", "fit_mm", "scale_to_fit"];
+    if root.has("primitive") {
+        for key in KEYS {
+            if root.has(key) {
+                let message = "a primitive lies where its base is";
+                root.fault(key, message, "use base_mm, height_mm or translate_mm");
+            }
+        }
+        root.ignore(&KEYS);
+        return Seat::default();
+    }
+    let up = root.choice("up", &Up::NAMES).unwrap_or_default();
+    let center = root.flag_or("center", false);
+    let rest_on = root.number("rest_on_mm", &BODY_MM);
+    let ends = root.tuple::<6>("fit_mm", &BODY_MM);
+    let scale = root.flag_or("scale_to_fit", false);
+    if scale && !root.has("fit_mm") {
+        let message = "there is no box to scale to";
+        root.fault("scale_to_fit", message, "add fit_mm, the ends of a box");
+    }
+    if center && root.has("fit_mm") {
+        let message = "fit_mm puts the surface into the middle of its box";
+        root.fault("center", message, "leave one of the two out");
+    }
+    let fit = root.has("fit_mm").then(|| {
+        let [a, b, c, d, e, f] = ends.map(m_from_mm);
+        Fit {
+            box_m: [[a, b], [c, d], [e, f]],
+            scale,
+        }
+    });
+    if fit.is_some_and(|fit| fit.box_m.iter().any(|[from, to]| from >= to)) {
+        let message = "a side of the box ends before it begins";
+        root.fault("fit_mm", message, "write x, y and z, each FROM, TO, in mm");
+    }
+    Seat {
+        up,
+        center,
+        rest_on_m: rest_on.map(|length| m_from_mm(length.value)),
+        fit,
+    }
+}
+
+/// How bodies of STEP files are cut into facets, and which.
+fn bodies(root: &mut Section<'_>) -> BodyOptions {
+    let chord = root.number("chord_mm", &BODY_MM.positive());
+    BodyOptions {
+        chord_m: chord.map(|chord| m_from_mm(chord.value)),
+        body: root.text("body").map(|body| body.value),
+    }
+}
 /// The keys of a shape: those of a surface file, then those of the primitives.
 #[must_use]
 pub fn keys() -> Vec<Key> {
@@ -122,6 +181,22 @@ const MEANINGS: &[(&str, &str)] = &[
     ),
     ("translate_mm", "moves the surface, after its rotation"),
     ("rotate_deg", "rotates it about x, then y, then z"),
+    ("up", "the file's direction that points up"),
+    ("center", "whether the middle of its box comes to x = y = 0"),
+    ("rest_on_mm", "height of its lowest point"),
+    (
+        "fit_mm",
+        "box that it is moved into, from and to along x, y and z: to the middle, onto the lower end",
+    ),
+    ("scale_to_fit", "whether it is also scaled to fill that box"),
+    (
+        "chord_mm",
+        "STEP: how far a facet may lie from its face; without it a 4000th of the size",
+    ),
+    (
+        "body",
+        "STEP: the one body or assembly to read, by name or number",
+    ),
     ("primitive", "a body with a formula, instead of a file"),
     ("side_mm", "of `flat` and `wedge`: length of a side"),
     ("height_mm", "of `flat`: its height above the windings"),

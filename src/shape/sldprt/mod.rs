@@ -123,6 +123,7 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
         deviation: deviation.max(coordinate_rounding),
         deviation_is_known: false,
         warnings,
+        ..FileMesh::default()
     })
 }
 

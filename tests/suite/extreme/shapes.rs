@@ -280,6 +280,7 @@ fn offsets() -> Vec<Case> {
                 let back = Placement {
                     translate_m: [-1000.0, -1000.0, 0.0],
                     rotate_deg: [0.0; 3],
+                    ..Placement::default()
                 };
                 let m = Mesh::place(file, &Transform::new(1e-3, &back)).map_err(told)?;
                 let g = grid((-0.05, 0.05, 61), (-0.05, 0.05, 61));

@@ -8,9 +8,12 @@ use fluxform::bundle::json::to_json;
 use fluxform::commands::evaluate::{Evaluation, evaluate};
 use fluxform::design::{Design, Need};
 use fluxform::field::dipole::cylinder_moment_a_m2;
+use fluxform::progress::Silent;
 use fluxform::shape::document::{Placement, parse_unit};
+use fluxform::shape::mesh::FileMesh;
 use fluxform::shape::placement::Transform;
-use fluxform::shape::surface;
+use fluxform::shape::step::BodyOptions;
+use fluxform::shape::{ShapeError, surface};
 use fluxform::units::m_from_mm;
 
 pub fn cases() -> Vec<Case> {
@@ -99,18 +102,13 @@ fn lengths() -> Vec<Case> {
             "units: a surface without a unit",
             "refused: no guess",
             0.0,
-            || refused(surface::read(Path::new("surface.stl"), None), &["unit"]),
+            || refused(read_surface(None), &["unit"]),
         ),
         case(
             "units: a surface in units of 0 m",
             "refused: it must be positive",
             0.0,
-            || {
-                refused(
-                    surface::read(Path::new("surface.stl"), Some(0.0)),
-                    &["positive"],
-                )
-            },
+            || refused(read_surface(Some(0.0)), &["positive"]),
         ),
         case(
             "units: millimetres to metres",
@@ -266,4 +264,9 @@ fn numbers() -> Vec<Case> {
             || refused(to_json(&[f64::INFINITY]), &["finite"]),
         ),
     ]
+}
+
+fn read_surface(stated_m: Option<f64>) -> Result<(FileMesh, f64), ShapeError> {
+    let path = Path::new("surface.stl");
+    surface::read(path, stated_m, &BodyOptions::default(), &Silent)
 }

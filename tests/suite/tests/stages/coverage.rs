@@ -238,7 +238,7 @@ fn deviation_m(
     plan: &Plan,
     height_m: impl Fn(usize) -> Option<f64>,
 ) -> f64 {
-    let (surface, _) = Surface::open(document).unwrap();
+    let (surface, _) = Surface::open(document, &Silent).unwrap();
     let (nx, ny) = (plan.x_m.samples, plan.y_m.samples);
     let places = |axis: &Axis| Axis {
         samples: 16 * (axis.samples - 1) + 1,

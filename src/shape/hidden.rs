@@ -1,0 +1,167 @@
+//! What a height map cannot show: how much of a surface is not seen from above.
+//!
+//! Points spread evenly over the area (by an additive recurrence, so always the same ones) are looked
+//! at along vertical lines: one that lies below what such a line meets first is hidden.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::height::Grid;
+use crate::mesh::{Mesh, cross, dot, minus};
+use crate::scattered::Probe;
+use crate::surface::Surface;
+use fluxform_numerics::axis::Axis;
+
+/// Points that are looked at.
+const POINTS: usize = 20_000;
+/// Cells along x, and as many along y, in which triangles are looked up.
+const CELLS: usize = 101;
+/// Of a facet's area this share at least must show in plan for it to face up or down.
+const LEVEL: f64 = 1e-6;
+/// Depths below this share of the surface's height count as seen.
+const DEPTH: f64 = 1e-6;
+
+/// Shares of a surface's area, to about a hundredth.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Hidden {
+    /// Not seen from above: below other parts of the surface, or facing down as a body's underside.
+    pub of_area: f64,
+    /// Of the area that faces up, what lies under other parts of the surface: undercuts, hollows.
+    pub of_upward: f64,
+}
+
+impl Hidden {
+    /// Of a surface; `None` for a formula, which hides nothing.
+    #[must_use]
+    pub fn of(surface: &Surface) -> Option<Self> {
+        match surface {
+            Surface::Mesh(mesh) => Some(of_mesh(surface, mesh)),
+            Surface::Primitive(_) => None,
+        }
+    }
+}
+
+fn of_mesh(surface: &Surface, mesh: &Mesh) -> Hidden {
+    let triangles = mesh.triangles();
+    let normal = |k: usize| {
+        let [a, b, c] = triangles[k];
+        cross(minus(b, a), minus(c, a))
+    };
+    // Ends of the triangles along the whole area, in their order.
+    let bounds = mesh.facts().bounds;
+    let (mut area, mut six_volumes) = (0.0, 0.0);
+    let mut ends = Vec::with_capacity(triangles.len());
+    for (k, triangle) in triangles.iter().enumerate() {
+        let normal = normal(k);
+        area += 0.5 * dot(normal, normal).sqrt();
+        six_volumes += dot(minus(triangle[0], bounds.min_m), normal);
+        ends.push(area);
+    }
+    // A body whose triangles look inwards is turned inside out.
+    let outward = if six_volumes < 0.0 { -1.0 } else { 1.0 };
+    let [x_m, y_m] = bounds.plan().map(|[from, to]| Axis {
+        from,
+        to,
+        samples: if to > from { CELLS } else { 1 },
+    });
+    let grid = Grid { x_m, y_m };
+    let probe = Probe::new(surface, &grid);
+    let depth_m =
+        DEPTH * (bounds.max_m[2] - bounds.min_m[2]) + 2.0 * mesh.facts().coordinate_rounding_m;
+    // Counts of points: all, hidden, facing up, of these hidden.
+    let look = |k: usize| -> [usize; 4] {
+        let at = area * (k as f64 + 0.5) / POINTS as f64;
+        let index = ends
+            .partition_point(|end| *end < at)
+            .min(triangles.len() - 1);
+        let [a, b, c] = triangles[index];
+        // The plastic number's recurrence fills a square evenly; folded, a triangle.
+        let [mut s, mut t] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2]
+            .map(|step: f64| (0.5 + step * k as f64).fract());
+        if s + t > 1.0 {
+            (s, t) = (1.0 - s, 1.0 - t);
+        }
+        let point = [0, 1, 2].map(|i| a[i] + s * (b[i] - a[i]) + t * (c[i] - a[i]));
+        let normal = normal(index);
+        let level = LEVEL * dot(normal, normal).sqrt();
+        let top = probe.at([point[0], point[1]]);
+        let covered = top.is_some_and(|(top, _)| top.height_m > point[2] + depth_m);
+        // A wall, seen edge-on, hides nothing by itself.
+        if normal[2].abs() <= level {
+            return [1, 0, 0, 0];
+        }
+        let up = usize::from(outward * normal[2] > 0.0);
+        [1, usize::from(covered), up, up * usize::from(covered)]
+    };
+    let sums = (0..POINTS)
+        .into_par_iter()
+        .map(look)
+        .reduce(|| [0; 4], |a, b| [0, 1, 2, 3].map(|i| a[i] + b[i]));
+    let share = |part: usize, whole: usize| part as f64 / whole.max(1) as f64;
+    Hidden {
+        of_area: share(sums[1], sums[0]),
+        of_upward: share(sums[3], sums[2]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::document::Placement;
+    use crate::mesh::{FileMesh, Triangle};
+    use crate::placement::Transform;
+
+    /// A body of revolution: its outline's radii and heights, mm, counterclockwise about its inside.
+    fn turned(outline: &[[f64; 2]]) -> Surface {
+        const SECTORS: usize = 48;
+        let at = |[r, z]: [f64; 2], k: usize| {
+            let (sin, cos) =
+                (std::f64::consts::TAU * (k % SECTORS) as f64 / SECTORS as f64).sin_cos();
+            [r * cos, r * sin, z]
+        };
+        let mut triangles: Vec<Triangle> = Vec::new();
+        for (i, a) in outline.iter().enumerate() {
+            let b = outline[(i + 1) % outline.len()];
+            for k in 0..SECTORS {
+                let [p, q, r, s] = [at(*a, k), at(*a, k + 1), at(b, k + 1), at(b, k)];
+                triangles.extend([[p, q, r], [p, r, s]]);
+            }
+        }
+        let file = FileMesh {
+            triangles,
+            coordinate_rounding: 6.5e-7,
+            ..FileMesh::default()
+        };
+        let placed = Transform::new(1e-3, &Placement::default());
+        Surface::Mesh(Mesh::place(file, &placed).unwrap())
+    }
+
+    #[test]
+    fn what_lies_under_other_parts_is_hidden() {
+        // A washer countersunk from both ends: nothing that faces up is covered.
+        let washer = turned(&[
+            [6.5, 0.0],
+            [6.5, 5.3],
+            [4.1, 5.3],
+            [3.35, 4.55],
+            [3.35, 0.75],
+            [4.1, 0.0],
+        ]);
+        let found = Hidden::of(&washer).unwrap();
+        assert!(found.of_upward < 1e-3, "{found:?}");
+        // A mushroom: of the foot's upper side, from 2 to 5, all lies under the cap of radius 6.
+        let mushroom = turned(&[
+            [5.0, 0.0],
+            [5.0, 1.0],
+            [2.0, 1.0],
+            [2.0, 4.0],
+            [6.0, 4.0],
+            [6.0, 5.0],
+            [0.1, 5.0],
+            [0.1, 0.0],
+        ]);
+        let found = Hidden::of(&mushroom).unwrap();
+        let share = (25.0 - 4.0) / (25.0 - 4.0 + 36.0 - 0.01);
+        assert!((found.of_upward - share).abs() < 0.01, "{found:?} {share}");
+    }
+}
