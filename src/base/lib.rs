@@ -4,4 +4,5 @@
 pub mod accuracy;
 pub mod force_constant;
 pub mod progress;
+pub mod sideways;
 pub mod units;

@@ -60,7 +60,9 @@ mod power;
 mod problem;
 mod qr_reduction;
 mod rest;
+pub mod sideways;
 mod solve;
+mod vector_allocation;
 mod wiring;
 pub mod worst;
 
@@ -69,4 +71,5 @@ pub use fluxform_base::force_constant::{Criterion, ForceConstants, NamedConstant
 pub use path::{Breakpoint, Event, Path};
 pub use problem::{ForceProblem, ProblemError, Settings};
 pub use solve::{OperatingPoint, Precision, Solution, Status, solve};
+pub use vector_allocation::{VectorAllocation, VectorAllocator};
 pub use wiring::{Rewired, Wiring, WiringError};

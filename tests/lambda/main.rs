@@ -14,5 +14,6 @@ mod power;
 mod random;
 mod saturation;
 mod search;
+mod vector_allocation;
 mod vertices;
 mod worst;
