@@ -4,6 +4,8 @@
 mod cored;
 #[path = "commands/near.rs"]
 mod near;
+#[path = "commands/sideways.rs"]
+mod sideways;
 
 use std::path::{Path, PathBuf};
 

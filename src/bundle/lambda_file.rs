@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::artefact::Input;
 use fluxform_base::accuracy::StageAccuracy;
 use fluxform_base::force_constant::{Criterion, ForceConstants};
+pub use fluxform_base::sideways::Sideways;
 
 /// The path of e*(lambda) and the constants read off it. `null` where a limit never binds or
 /// nothing can be rendered.
@@ -76,6 +77,10 @@ pub struct LambdaFile {
     /// forces of several currents do not add up.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub working_point: Option<WorkingPointForces>,
+    /// The sideways force at the chosen lambda; absent without one and in files of programs without
+    /// it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sideways: Option<Sideways>,
     /// Each stage's estimated error.
     pub accuracy: BTreeMap<String, StageAccuracy>,
 }

@@ -1,7 +1,8 @@
 //! Pieces of summaries that several commands tell alike.
 
-use super::quantity::{count, error, length_error, mm, number};
+use super::quantity::{count, error, length_error, mm, number, number_to, percent};
 use crate::accuracy::StageAccuracy;
+use crate::bundle::lambda_file::Sideways;
 use crate::bundle::manifest::{AxisSummary, LeftOut};
 use crate::cli::layout::grid;
 use crate::design::Design;
@@ -125,5 +126,22 @@ pub fn force_constant(lambda_n_per_m: Option<f64>) -> String {
     lambda_n_per_m.map_or_else(
         || "none".to_owned(),
         |lambda| format!("{} N/m", number(lambda)),
+    )
+}
+
+/// The sideways force that the chosen currents and feedback leave.
+pub fn sideways(of: &Sideways) -> String {
+    let off = |share: f64, degrees: f64| format!("{}, {degrees:.0} degrees off", percent(share));
+    let points = if of.vector_reached == 1.0 {
+        "every point".to_owned()
+    } else {
+        format!("{} of the points", percent(of.vector_reached))
+    };
+    format!(
+        "{} of the push with these currents\n{} with feedback of the upward force\n\
+         none with feedback of all components: at {points}, for {} times the power",
+        off(of.static_share, of.static_median_deg),
+        off(of.feedback_share, of.feedback_median_deg),
+        number_to(of.vector_power_ratio, 3)
     )
 }

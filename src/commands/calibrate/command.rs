@@ -13,7 +13,7 @@ use super::DEFAULT_REACH_M;
 use super::plan::{Cost, Done, Plan, plan};
 use super::run;
 use crate::bundle::artefact::{FLUXFORM_VERSION, SCHEMA_VERSION};
-use crate::bundle::lambda_file::WorkingPointForces;
+use crate::bundle::lambda_file::{Sideways, WorkingPointForces};
 use crate::bundle::manifest::Manifest;
 use crate::cli::args::{SurfaceFlags, Tolerance, Writing};
 use crate::cli::budget::{allow, asked, costs};
@@ -115,6 +115,7 @@ struct BundleSummary<'a> {
     worst_error_n: Option<f64>,
     relative_rms_error: Option<f64>,
     rank: usize,
+    sideways: Option<Sideways>,
     manifest: &'a Manifest,
 }
 
@@ -262,6 +263,7 @@ fn bundle_summary(bundle: &BundleReport) -> BundleSummary<'_> {
         worst_error_n: file.worst_error_n,
         relative_rms_error: file.relative_rms_error,
         rank: file.rank,
+        sideways: file.sideways,
         manifest: &bundle.manifest,
     }
 }
@@ -293,6 +295,7 @@ fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> String {
             file.criterion.described(&percent(file.jnd))
         ),
     );
+    sheet.line("sideways", &sideways(report));
     sheet.line("accuracy", &accuracies(report));
     if let Some(told) = working_points(report) {
         sheet.line("steel", &told);
@@ -413,6 +416,21 @@ fn working_points(report: &CalibrateReport) -> Option<String> {
             )
         )
     })
+}
+
+/// The sideways force that the static currents of every shape leave, and feedback.
+fn sideways(report: &CalibrateReport) -> String {
+    let lines = report.bundles.iter().filter_map(|bundle| {
+        let (file, of) = (&bundle.lambda.file, bundle.lambda.file.sideways?);
+        Some(format!(
+            "{}: {} of the push, {:.0} degrees off; with feedback {}",
+            file.shape,
+            percent(of.static_share),
+            of.static_median_deg,
+            percent(of.feedback_share)
+        ))
+    });
+    lines.collect::<Vec<_>>().join("\n")
 }
 
 /// The largest error of each stage over all shapes.

@@ -260,6 +260,9 @@ fn summary(design: &Design, report: &LambdaReport) -> String {
     if let Some(point) = &file.working_point {
         sheet.line("steel", &along_the_curve(point));
     }
+    if let Some(of) = &file.sideways {
+        sheet.line("sideways", &describe::sideways(of));
+    }
     if let Some(told) = &file.feedback {
         sheet.line("feedback", &feedback(told));
         if let Some(found) = told.at_chosen.as_ref().or(told.at_largest.as_ref()) {

@@ -40,6 +40,7 @@ use crate::shape::document::ShapeDocument;
 mod picture;
 mod points;
 mod points_effect;
+mod sideways;
 mod warnings;
 
 /// Forces change over about the height above the coils: so many patches resolve them.
@@ -137,7 +138,15 @@ pub fn run(
     };
     let none = ShapeField::default();
     let grid = solve_at(&scene, &solved, none, &of_grid, &plain, progress)?.file;
-    let found = solve_at(&scene, &solved, none, &chosen, options, progress)?;
+    let mut found = solve_at(&scene, &solved, none, &chosen, options, progress)?;
+    sideways::add(
+        &mut found.file,
+        &scene,
+        &solved,
+        &chosen,
+        &options.wiring,
+        progress,
+    )?;
     let mut report = found.with(points);
     if let Some(coarser) = coarser {
         let other = solve_at(&scene, &solved, none, &coarser, &plain, progress)?.file;
@@ -216,12 +225,14 @@ pub(crate) fn solve(
     options: &LambdaOptions,
     progress: &dyn Progress,
 ) -> Result<LambdaReport, RunError> {
-    let found = solve_at(
+    let of_grid = WantedPoints::of_grid(&points);
+    let mut found = solve_at(scene, solved, field, &of_grid, options, progress)?;
+    sideways::add(
+        &mut found.file,
         scene,
         solved,
-        field,
-        &WantedPoints::of_grid(&points),
-        options,
+        &of_grid,
+        &options.wiring,
         progress,
     )?;
     Ok(found.with(points))
@@ -540,6 +551,7 @@ fn file(
         variants: None,
         feedback: None,
         working_point: None,
+        sideways: None,
         accuracy,
     }
 }
