@@ -4,5 +4,4 @@
 pub mod accuracy;
 pub mod force_constant;
 pub mod progress;
-pub mod sideways;
 pub mod units;

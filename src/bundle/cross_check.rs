@@ -1,8 +1,9 @@
 //! A bundle says some things twice: for people, for C programs, for spreadsheets. They must agree.
 
+use super::array_checks::LARGEST;
 use super::lambda_file::LambdaFile;
 use super::manifest::{AxisSummary, INTERPOLATION, Manifest};
-use super::npz::{LARGEST, MapArrays, PASSIVE};
+use super::npz::{MapArrays, PASSIVE};
 use super::rendering::HeightGrid;
 use super::table::{CurrentRow, PointRow};
 

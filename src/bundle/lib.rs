@@ -16,6 +16,7 @@
 //! assert!(refused.to_string().contains("it has no manifest.json"));
 //! ```
 
+mod array_checks;
 pub mod artefact;
 #[allow(clippy::disallowed_methods)] // the one place that writes files
 pub mod atomic;
@@ -28,6 +29,7 @@ pub mod lambda_file;
 pub mod load;
 pub mod mag_manip;
 pub mod manifest;
+pub mod map_table;
 mod npy;
 pub mod npz;
 pub mod number;

@@ -6,8 +6,8 @@
 //! `inductance_h` `[coil, coil]`, and `voltage_v` (no dimension) where the supply's is known. All
 //! are f64, the flags too, so that loaders of older bundles pass over them. New in schema 1.2.
 
+use super::array_checks::{BEYOND, LARGEST, NpzError, all_finite, all_within, bad, check_nodes};
 use super::manifest::PointsGrid;
-use super::npz::{BEYOND, LARGEST, NpzError, all_within, bad, check_nodes};
 use super::table::PointRow;
 
 pub(super) const HEIGHT_X: &str = "height_x_m";
@@ -55,7 +55,7 @@ impl Rendering {
                 let message = format!("must hold {count} numbers, holds {}", values.len());
                 return Err(bad(name, message));
             }
-            if !values.iter().all(|value| value.is_finite()) {
+            if !all_finite(values) {
                 return Err(bad(name, "holds a number that is not finite"));
             }
             if !all_within(values, LARGEST) {

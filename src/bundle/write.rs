@@ -14,9 +14,10 @@ use super::json::to_json;
 use super::lambda_file::LambdaFile;
 use super::mag_manip::{HEAD, Multipoles, VectorField, write_multipoles, write_vector_field};
 use super::manifest::{MadeWith, Manifest, MapSidecar};
+use super::map_table::write_map;
 use super::npz::{MapArrays, to_npz};
 use super::seal::to_record;
-use super::table::{CurrentRow, PointRow, write_currents, write_map, write_points};
+use super::table::{CurrentRow, PointRow, write_currents, write_points};
 use super::timing::StageSeconds;
 use super::vtk::write_vti;
 

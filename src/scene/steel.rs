@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 use super::Scene;
 use super::at_current::{self, SATURATED_TOLERANCE};
 use crate::RunError;
-use crate::design::bh_table::read_bh_table;
+use crate::design::bh_table::BhTable;
+use crate::design::source;
 use crate::design::{Core, Coupling, Design, Steel as Described};
 use crate::field::steel::array::CoupledArray;
 use crate::field::steel::axial_table::AxialTable;
@@ -53,6 +54,8 @@ pub struct SceneCore {
     pub knee_t: f64,
     /// S/m.
     pub conductivity_s_per_m: f64,
+    /// The table of the magnetisation curve as it was parsed.
+    pub curve_text: Option<String>,
     /// Warnings about the material.
     pub warnings: Vec<String>,
 }
@@ -79,11 +82,15 @@ impl SceneCore {
             top_m: core.above_m,
         };
         let mut warnings = Vec::new();
+        let mut curve_text = None;
         let (material, knee_t) = match &core.steel {
             Described::Linear(mu_r) => (Material::Linear(*mu_r), core.knee_t),
             Described::Curve(path) => {
-                let table =
-                    read_bh_table(path).map_err(|fault| RunError::Input(fault.to_string()))?;
+                let text = source::table_text_of(path);
+                let text = text.map_err(|fault| RunError::Input(fault.to_string()))?;
+                let table = BhTable::from_csv(&text, path)
+                    .map_err(|fault| RunError::Input(fault.to_string()))?;
+                curve_text = Some(text);
                 let curve = BhCurve::new(&table.b_t, &table.h_a_per_m).map_err(|fault| {
                     RunError::Input(format!("core.bh_curve {}: {fault}", path.display()))
                 })?;
@@ -97,6 +104,7 @@ impl SceneCore {
             material,
             knee_t: knee_t.unwrap_or(f64::INFINITY),
             conductivity_s_per_m: core.conductivity_s_per_m,
+            curve_text,
             warnings,
         })
     }

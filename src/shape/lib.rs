@@ -72,5 +72,7 @@ mod xml;
 
 pub use error::ShapeError;
 pub use inspect::MeshReport;
-pub use points::{ConstraintPoints, Discretized, Settings, discretize, discretize_with};
+pub use points::{
+    ConstraintPoints, Discretized, Settings, discretize, discretize_surface, discretize_with,
+};
 pub use surface::Surface;

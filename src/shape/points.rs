@@ -186,7 +186,20 @@ pub fn discretize_with(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Discretized, ShapeError> {
-    let (surface, mut warnings) = Surface::open(document)?;
+    let (surface, warnings) = Surface::open(document)?;
+    discretize_surface(document, (surface, warnings), settings, progress)
+}
+
+/// As [`discretize_with`], for a surface that was opened before, with its warnings.
+///
+/// # Errors
+/// As [`discretize_with`].
+pub fn discretize_surface(
+    document: &ShapeDocument,
+    (surface, mut warnings): (Surface, Vec<String>),
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Discretized, ShapeError> {
     progress.check()?;
     let bounds = surface.extent();
     let grid = requested_grid(document, &bounds)?;

@@ -1,6 +1,6 @@
 //! A surface in metres, whether it is a mesh or a formula.
 
-use std::io;
+use std::io::{self, Read};
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -27,12 +27,50 @@ pub enum Surface {
     Primitive(PlacedPrimitive),
 }
 
+/// Sees the bytes of a surface file as they are parsed, so that a digest is of those bytes.
+pub trait ByteObserver {
+    /// The file is read from its beginning: earlier bytes do not count.
+    fn restart(&mut self);
+    /// The next bytes.
+    fn observe(&mut self, bytes: &[u8]);
+}
+
+impl ByteObserver for () {
+    fn restart(&mut self) {}
+    fn observe(&mut self, _: &[u8]) {}
+}
+
+/// A source whose bytes are observed as they are read.
+struct Observed<'a, R> {
+    source: R,
+    observer: &'a mut dyn ByteObserver,
+}
+
+impl<R: Read> Read for Observed<'_, R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.source.read(buffer)?;
+        self.observer.observe(&buffer[..count]);
+        Ok(count)
+    }
+}
+
 impl Surface {
     /// Opens, reads and places what a document names; the second value holds warnings.
     ///
     /// # Errors
     /// [`ShapeError`] with the path and the place.
     pub fn open(document: &ShapeDocument) -> Result<(Self, Vec<String>), ShapeError> {
+        Self::open_observed(document, &mut ())
+    }
+
+    /// As [`Surface::open`]; `observer` sees the bytes of the surface's file, if it has one.
+    ///
+    /// # Errors
+    /// As [`Surface::open`].
+    pub fn open_observed(
+        document: &ShapeDocument,
+        observer: &mut dyn ByteObserver,
+    ) -> Result<(Self, Vec<String>), ShapeError> {
         check_placement(&document.placement)?;
         let (path, unit_m) = match &document.source {
             SurfaceSource::Primitive(primitive) => {
@@ -41,7 +79,7 @@ impl Surface {
             }
             SurfaceSource::File { path, unit_m } => (path, unit_m),
         };
-        let (mut file, unit_m) = read(path, *unit_m)?;
+        let (mut file, unit_m) = read_observed(path, *unit_m, observer)?;
         let mut warnings = std::mem::take(&mut file.warnings);
         let transform = Transform::new(unit_m, &document.placement).scaled(document.scale);
         let mesh = Mesh::place(file, &transform)?;
@@ -110,6 +148,14 @@ impl Surface {
 /// # Errors
 /// [`ShapeError`]: no or another unit, a file that cannot be read.
 pub fn read(path: &Path, stated_m: Option<f64>) -> Result<(FileMesh, f64), ShapeError> {
+    read_observed(path, stated_m, &mut ())
+}
+
+fn read_observed(
+    path: &Path,
+    stated_m: Option<f64>,
+    observer: &mut dyn ByteObserver,
+) -> Result<(FileMesh, f64), ShapeError> {
     let format = SurfaceFormat::of(path).ok_or_else(|| ShapeError::Format { path: path.into() })?;
     if stated_m.is_none() && !format.carries_unit() {
         return Err(ShapeError::UnitMissing {
@@ -124,7 +170,7 @@ pub fn read(path: &Path, stated_m: Option<f64>) -> Result<(FileMesh, f64), Shape
             "the unit is {unit_m} m; it must be positive"
         )));
     }
-    let file = read_mesh(format, path)?;
+    let file = read_mesh(format, path, observer)?;
     match (file.unit_m, stated_m) {
         (Some(own), Some(stated)) if own != stated => Err(ShapeError::UnitDiffers {
             path: path.into(),
@@ -140,23 +186,31 @@ pub fn read(path: &Path, stated_m: Option<f64>) -> Result<(FileMesh, f64), Shape
 }
 
 /// The triangles of the file at `path`; of a binary STL the bytes are not held beside them.
-pub(super) fn read_mesh(format: SurfaceFormat, path: &Path) -> Result<FileMesh, ShapeError> {
+pub(super) fn read_mesh(
+    format: SurfaceFormat,
+    path: &Path,
+    observer: &mut dyn ByteObserver,
+) -> Result<FileMesh, ShapeError> {
     if format == SurfaceFormat::Stl
-        && let Some(result) = streamed(path)
+        && let Some(result) = streamed(path, observer)
     {
         return result.map_err(|source| ShapeError::Stl {
             path: path.into(),
             source,
         });
     }
-    format.read(path, &read_file(path)?)
+    let bytes = read_file(path)?;
+    observer.restart();
+    observer.observe(&bytes);
+    format.read(path, &bytes)
 }
 
 /// `None` for what is no whole binary STL file, and where the file system fails: reading it
 /// otherwise tells why.
-fn streamed(path: &Path) -> Option<Result<FileMesh, StlError>> {
-    let (file, length) = named_file::open(path, LARGEST_FILE).ok()?;
-    stl::stream(file, length).ok()?
+fn streamed(path: &Path, observer: &mut dyn ByteObserver) -> Option<Result<FileMesh, StlError>> {
+    let (source, length) = named_file::open(path, LARGEST_FILE).ok()?;
+    observer.restart();
+    stl::stream(Observed { source, observer }, length).ok()?
 }
 
 fn check_placement(placement: &Placement) -> Result<(), ShapeError> {

@@ -214,8 +214,8 @@ fn all_formats_of_a_map() {
 #[test]
 #[ignore = "prints times"]
 fn figures() {
+    use fluxform::bundle::map_table::write_map;
     use fluxform::bundle::npz::{from_npz, to_npz};
-    use fluxform::bundle::table::write_map;
     use fluxform::numerics::lagrange::locate;
     use std::time::Instant;
     let mut sample = sample(false, [61, 61, 29]);

@@ -17,8 +17,8 @@ fn the_sideways_force_is_that_of_probed_gradients() {
     let (design, _) = Design::from_toml(&text, &path, Need::LAMBDA).expect("valid");
     let (document, _) = ShapeDocument::read(&here("shapes/wedge.toml")).expect("valid");
     let options = LambdaOptions::default();
-    let report = run(&design, &document, Vec::new(), &options, &Silent).expect("solves");
-    let points = &report.points.discretized.points;
+    let (points, report) = run(&design, &document, Vec::new(), &options, &Silent).expect("solves");
+    let points = &points.discretized.points;
     let rows = || (0..points.height_m.len()).step_by(4);
     let places = rows().map(|row| [points.x_m[row], points.y_m[row], points.height_m[row]]);
     let request = ProbeRequest {
@@ -74,7 +74,7 @@ fn the_seeds_array_pushes_sideways_as_computed_elsewhere() {
         let shape = here(&format!("shapes/{name}.toml"));
         let (document, _) = ShapeDocument::read(&shape).expect("valid");
         let options = LambdaOptions::default();
-        let report = run(&design, &document, Vec::new(), &options, &Silent).expect("solves");
+        let (_, report) = run(&design, &document, Vec::new(), &options, &Silent).expect("solves");
         let found = report.file.sideways.expect("reported");
         let within = |value: f64, [least, most]: [f64; 2], slack: f64| {
             assert!(

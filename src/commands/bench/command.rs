@@ -19,6 +19,7 @@ use crate::cli::values::{self, FileArgument};
 use crate::commands::calibrate::curve_table;
 use crate::commands::lambda::command::CriterionFlags;
 use crate::design::Need;
+use crate::scene::Scene;
 use crate::scene::cost::{Components, of_map};
 
 /// Error against run time of a design and its objects
@@ -96,7 +97,7 @@ impl Bench {
             printer,
         )?;
         let mut inputs = vec![document.input.clone()];
-        inputs.extend(curve_table(design)?.map(|(input, _)| input));
+        inputs.extend(curve_table(&Scene::new(design)?).map(|(input, _)| input));
         let request = BenchRequest {
             design,
             inputs,

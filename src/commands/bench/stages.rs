@@ -10,11 +10,12 @@ use crate::commands::calibrate::needed_coils;
 use crate::commands::calibrate::needed_nodes;
 use crate::commands::discretize::scattered;
 use crate::commands::discretize::{self, PointsReport};
-use crate::commands::lambda::{LambdaOptions, WantedPoints, resolving, solve_points};
+use crate::commands::lambda::{LambdaOptions, WantedPoints, resolving, solve_at};
 use crate::commands::map::MAP_TOLERANCE;
 use crate::design::Design;
 use crate::map::{Components, FieldMap};
 use crate::progress::Progress;
+use crate::scene::cached_field::ShapeField;
 use crate::scene::maps::{Felt, SceneMap};
 use crate::scene::sources::Sampling;
 use crate::scene::sources::ShapeSource;
@@ -168,7 +169,11 @@ impl<'a> Bench<'a> {
             tolerance: Some(solved.forces.tolerance),
             ..self.request.lambda.clone()
         };
-        self.timed(|within| solve_points(self.scene, &solved.forces, points, &options, within))
+        let (scene, none) = (self.scene, ShapeField::default());
+        self.timed(|within| {
+            let report = solve_at(scene, &solved.forces, none, points, &options, within)?;
+            Ok(report.file)
+        })
     }
 
     /// The map of the coils that carry current, as far as the object's points need it.

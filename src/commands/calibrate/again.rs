@@ -2,9 +2,8 @@
 
 use super::BothSolved;
 use super::CalibrateOptions;
+use super::Calibration;
 use super::Inductances;
-use super::Kept;
-use super::compute;
 use super::point_rows;
 use crate::RunError;
 use crate::bundle::artefact::Input;
@@ -48,26 +47,22 @@ pub fn expected(
     let field = FieldStore::new(scene, tolerance, table, Store::none());
     let solved = BothSolved::new(scene, &field, tolerance, progress)?;
     let circuit = Inductances::new(scene, &solved.map, progress);
-    let kept = Kept {
+    let calibration = Calibration {
+        scene,
+        solved: &solved,
         source,
         curve,
         circuit: &circuit,
         field: field.of_shape(&shape.document.name),
-    };
-    let points = kept.points(shape, progress)?;
-    let seal = |content: &BundleContent| Ok(sealed_manifest(content)?);
-    let (manifest, lambda) = compute(
-        scene,
-        &solved,
-        kept,
-        (shape, points),
+        shape,
         options,
-        progress,
-        seal,
-    )?;
+    };
+    let points = calibration.points(progress)?;
+    let seal = |content: &BundleContent| Ok(sealed_manifest(content)?);
+    let (manifest, lambda) = calibration.compute(&points, progress, seal)?;
     Ok(Expected {
         manifest,
-        points: point_rows(&lambda.points.discretized.points),
+        points: point_rows(&points.discretized.points),
         lambda: lambda.file,
     })
 }

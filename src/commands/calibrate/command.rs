@@ -4,7 +4,6 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use clap::Args;
-use serde::Serialize;
 
 use super::BundleReport;
 use super::CalibrateOptions;
@@ -12,8 +11,7 @@ use super::CalibrateReport;
 use super::DEFAULT_REACH_M;
 use super::plan::{Cost, Done, Plan, plan};
 use super::run;
-use crate::bundle::artefact::{FLUXFORM_VERSION, SCHEMA_VERSION};
-use crate::bundle::lambda_file::{Sideways, WorkingPointForces};
+use crate::bundle::lambda_file::WorkingPointForces;
 use crate::bundle::manifest::Manifest;
 use crate::cli::args::{SurfaceFlags, Tolerance, Writing};
 use crate::cli::budget::{allow, asked, costs};
@@ -32,7 +30,6 @@ use crate::cli::start::folder;
 use crate::cli::values::{self, FileArgument};
 use crate::commands::lambda::command::{CriterionFlags, rendered};
 use crate::design::{Design, Need};
-use crate::lambda::{Criterion, ForceConstants};
 use crate::scene::cost::{Components, of_map};
 use crate::scene::sources::DesignSource;
 
@@ -88,37 +85,6 @@ pub struct Calibrate {
     surface: SurfaceFlags,
 }
 
-/// What is told to programs.
-#[derive(Serialize)]
-struct CalibrateSummary<'a> {
-    schema_version: &'static str,
-    fluxform_version: &'static str,
-    design: &'a str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    plan: Option<Plan>,
-    bundles: Vec<BundleSummary<'a>>,
-}
-
-/// One bundle; the keys are those of `lambda.json` and `manifest.json`.
-#[derive(Serialize)]
-struct BundleSummary<'a> {
-    shape: &'a str,
-    folder: String,
-    points: usize,
-    outside: usize,
-    criterion: Criterion,
-    #[serde(flatten)]
-    constants: ForceConstants,
-    lambda_n_per_m: Option<f64>,
-    currents_a: Option<&'a [f64]>,
-    rms_error_n: Option<f64>,
-    worst_error_n: Option<f64>,
-    relative_rms_error: Option<f64>,
-    rank: usize,
-    sideways: Option<Sideways>,
-    manifest: &'a Manifest,
-}
-
 impl Calibrate {
     /// Runs the command.
     ///
@@ -165,17 +131,11 @@ impl Calibrate {
             printer,
         )?;
         let bar = begin(printer);
-        let report = run(source, &shapes, &options, &bar)?;
+        let mut report = run(source, &shapes, &options, &bar)?;
         drop(bar);
         warn(&report, printer);
-        let json = CalibrateSummary {
-            schema_version: SCHEMA_VERSION,
-            fluxform_version: FLUXFORM_VERSION,
-            design: &design.name,
-            plan,
-            bundles: report.bundles.iter().map(bundle_summary).collect(),
-        };
-        let json = printer.with_warnings(&json);
+        report.plan = plan;
+        let json = printer.with_warnings(&report);
         let folder = options.out.join(&design.name);
         printer.summary(Place::Output, &json, || summary(design, &report, &folder))?;
         let missed = |b: &BundleReport| b.lambda.accuracy_missed.clone();
@@ -245,26 +205,6 @@ fn warn(report: &CalibrateReport, printer: &Printer) {
         for warning in &bundle.lambda.warnings {
             printer.warning(&format!("{shape}: {warning}"));
         }
-    }
-}
-
-fn bundle_summary(bundle: &BundleReport) -> BundleSummary<'_> {
-    let file = &bundle.lambda.file;
-    BundleSummary {
-        shape: &file.shape,
-        folder: bundle.folder.display().to_string(),
-        points: file.points,
-        outside: bundle.lambda.points.summary.outside,
-        criterion: file.criterion,
-        constants: file.constants,
-        lambda_n_per_m: file.lambda_n_per_m,
-        currents_a: file.currents_a.as_deref(),
-        rms_error_n: file.rms_error_n,
-        worst_error_n: file.worst_error_n,
-        relative_rms_error: file.relative_rms_error,
-        rank: file.rank,
-        sideways: file.sideways,
-        manifest: &bundle.manifest,
     }
 }
 

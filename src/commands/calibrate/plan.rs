@@ -111,7 +111,7 @@ pub fn plan(
     progress: &dyn Progress,
 ) -> Result<Plan, RunError> {
     let scene = Scene::new(source.design)?;
-    let curve = curve_table(source.design)?;
+    let curve = curve_table(&scene);
     let field = field_store(&scene, curve.as_ref(), options);
     let kept = field.holds_steel();
     let tolerance = options.lambda.tolerance;

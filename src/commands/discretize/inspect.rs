@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::picture::{Scale, Seen, picture};
-use super::{shape_error, with_surface};
+use super::{ParsedBytes, shape_error};
 use crate::RunError;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::numerics::axis::Axis;
@@ -39,13 +39,15 @@ pub struct Inspection {
 ///
 /// # Errors
 /// A file that is no surface.
-pub fn inspect(path: &Path, inputs: Vec<Input>) -> Result<Inspection, RunError> {
-    let document = as_it_is(path, 1.0);
-    let surface = MeshReport::of_file(path).map_err(|source| shape_error(&document, source))?;
+pub fn inspect(path: &Path, mut inputs: Vec<Input>) -> Result<Inspection, RunError> {
+    let mut parsed = ParsedBytes::default();
+    let surface = MeshReport::of_file_observed(path, &mut parsed)
+        .map_err(|source| shape_error(&as_it_is(path, 1.0), source))?;
+    parsed.add_to(&mut inputs, path);
     Ok(Inspection {
         schema_version: SCHEMA_VERSION,
         fluxform_version: FLUXFORM_VERSION,
-        inputs: with_surface(&document, inputs),
+        inputs,
         surface,
     })
 }

@@ -6,19 +6,19 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::{MarkCounts, TableFiles, shape_error, table, with_surface};
+use super::{MarkCounts, OpenedSurface, TableFiles, shape_error, table};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION};
 use crate::commands::made_with::{PointsAsked, surface};
 use crate::progress::Progress;
 use crate::scene::sources::Sampling;
+use crate::shape::ShapeError;
 use crate::shape::document::ShapeDocument;
 use crate::shape::points::requested_grid;
 use crate::shape::scattered::adaptive::{Grading, adaptive};
 use crate::shape::scattered::poisson::poisson;
 use crate::shape::scattered::{Probe, Scattered};
-use crate::shape::{ShapeError, Surface};
 
 impl Sampling {
     /// As the record states them; `file` is the shape file's entry among the inputs.
@@ -105,9 +105,12 @@ pub fn run(
     progress: &dyn Progress,
 ) -> Result<ScatteredReport, RunError> {
     let made_with = sampling.made_with(document, inputs.first());
-    let inputs = with_surface(document, inputs);
+    let OpenedSurface {
+        surface,
+        warnings,
+        inputs,
+    } = OpenedSurface::new(document, inputs)?;
     let failed = |source: ShapeError| shape_error(document, source);
-    let (surface, warnings) = Surface::open(document).map_err(failed)?;
     let grid = requested_grid(document, &surface.extent()).map_err(failed)?;
     let probe = Probe::new(&surface, &grid);
     let stage = |estimate: f64, method: &str| StageAccuracy {

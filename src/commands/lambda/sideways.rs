@@ -19,7 +19,7 @@ const MOST_POINTS: usize = 1000;
 ///
 /// # Errors
 /// Points that cannot be computed; interruption.
-pub(super) fn add(
+pub(crate) fn add(
     file: &mut LambdaFile,
     scene: &Scene,
     solved: &Solved,

@@ -1,23 +1,20 @@
-//! Warnings about a force constant: why there is none, why it is zero, who does not feel it.
+//! Warnings about a force constant: why there is none, why it is zero, where it is not felt.
 
-use super::LambdaOptions;
+use super::PosedProblem;
 use super::points::WantedPoints;
 use crate::lambda::feedback::reachable;
+use crate::lambda::worst::WorstSolution;
 use crate::lambda::{Criterion, ForceProblem, Solution, Status};
 
 /// More deciding points than this are counted, not listed.
 const LISTED: usize = 3;
 
-/// Every warning about `solution`, the points' own first.
-pub(super) fn all(
-    points: &WantedPoints,
-    problem: &ForceProblem,
-    solution: &Solution,
-    options: &LambdaOptions,
-) -> Vec<String> {
+/// Every warning about a solution, the points' own first.
+pub(super) fn all(posed: &PosedProblem, solution: &Solution, worst: &WorstSolution) -> Vec<String> {
+    let (points, problem) = (posed.points, &posed.problem);
     let mut warnings = points.warnings.clone();
     warnings.extend(of_status(solution.status).map(str::to_owned));
-    let criterion = options.settings.criterion;
+    let criterion = posed.options.settings.criterion;
     match &solution.chosen {
         None if solution.status == Status::Solved => warnings.push(match criterion {
             Criterion::Maxmin => no_maxmin(points, problem),
@@ -49,6 +46,13 @@ pub(super) fn all(
                 }),
         ),
         None => {}
+    }
+    if !worst.complete {
+        warnings.push(
+            "the worst-point path could not be followed to its end: its numbers are not the \
+             minimum; please report this design and shape"
+                .to_owned(),
+        );
     }
     warnings
 }

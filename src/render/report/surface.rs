@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::data::BundleFacts;
+use super::data::CalibratedObject;
 use super::frame::{Section, figure};
 use super::html::{Cell, Html, Table};
 use super::number::{count, figures, force};
@@ -12,21 +12,41 @@ use super::pack::f32s;
 const MOST: usize = 81;
 
 /// Points of a grid, x fastest; `None` where there is no surface.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Surface {
+struct Surface {
     /// The grid's ends along x, m.
-    pub x_m: [f64; 2],
+    x_m: [f64; 2],
     /// The grid's ends along y, m.
-    pub y_m: [f64; 2],
+    y_m: [f64; 2],
     /// Points along x.
-    pub columns: usize,
+    columns: usize,
     /// Heights, m.
-    pub height_m: Vec<Option<f64>>,
+    height_m: Vec<Option<f64>>,
     /// Given minus wanted, N; empty without a force constant.
-    pub error_n: Vec<Option<f64>>,
+    error_n: Vec<Option<f64>>,
 }
 
 impl Surface {
+    fn new(object: &CalibratedObject) -> Self {
+        let grid = &object.manifest.points;
+        // A manifest that was made here has flags that fit its axes.
+        let flags = grid.flags().unwrap_or_default();
+        let at_points = |values: &mut dyn Iterator<Item = f64>| -> Vec<Option<f64>> {
+            let value = |flag: &bool| flag.then(|| values.next()).flatten();
+            flags.iter().map(value).collect()
+        };
+        let error_n = object.curves.chosen.as_ref().map(|forces| {
+            let pairs = forces.static_n.iter().zip(&forces.wanted_n);
+            at_points(&mut pairs.map(|(given, wanted)| given - wanted))
+        });
+        Self {
+            x_m: [grid.x_m.from_m, grid.x_m.to_m],
+            y_m: [grid.y_m.from_m, grid.y_m.to_m],
+            columns: grid.x_m.samples,
+            height_m: at_points(&mut object.points.iter().map(|row| row.height_m)),
+            error_n: error_n.unwrap_or_default(),
+        }
+    }
+
     fn rows(&self) -> usize {
         self.height_m.len() / self.columns.max(1)
     }
@@ -89,8 +109,11 @@ impl Surface {
     }
 }
 
-pub(super) fn section(facts: &BundleFacts, data: &mut serde_json::Map<String, Value>) -> Section {
-    let surface = &facts.surface;
+pub(super) fn section(
+    object: &CalibratedObject,
+    data: &mut serde_json::Map<String, Value>,
+) -> Section {
+    let surface = Surface::new(object);
     let mut body = Html::default();
     let step = surface.step();
     let thinned = if step > 1 {
@@ -107,10 +130,10 @@ pub(super) fn section(facts: &BundleFacts, data: &mut serde_json::Map<String, Va
             "The surface that the finger's magnet follows, its {} and the coils below; \
              the ring is where the force is most wrong. Drag, use the arrow keys or the buttons \
              to turn it.{thinned}",
-            count(facts.points, "constraint point")
+            count(object.points.len(), "constraint point")
         ),
     );
-    if facts.chosen.is_some() {
+    if object.lambda.lambda_n_per_m.is_some() {
         figure(
             &mut body,
             "errors",
@@ -121,7 +144,7 @@ pub(super) fn section(facts: &BundleFacts, data: &mut serde_json::Map<String, Va
         data.insert("errors".to_owned(), json!(true));
     }
     body.raw("</div>");
-    if let Some(table) = shares(surface) {
+    if let Some(table) = shares(&surface) {
         body.folded_table(&table);
     }
     data.insert("surface".to_owned(), surface.json());
