@@ -6,6 +6,7 @@ use crate::bundle::lambda_file::Sideways;
 use crate::bundle::manifest::{AxisSummary, LeftOut};
 use crate::cli::layout::grid;
 use crate::design::Design;
+use crate::lambda::GivenForce;
 
 /// Coils beyond this many are told in sum, not one by one.
 const COILS_SHOWN: usize = 100;
@@ -126,6 +127,21 @@ pub fn force_constant(lambda_n_per_m: Option<f64>) -> String {
     lambda_n_per_m.map_or_else(
         || "none".to_owned(),
         |lambda| format!("{} N/m", number(lambda)),
+    )
+}
+
+/// How much of the requested force the static currents give.
+pub fn given_force(given: &GivenForce) -> String {
+    let above = if given.above_saturation {
+        "; lambda is above saturation: all currents are at their limits"
+    } else {
+        ""
+    };
+    format!(
+        "{} of the requested force on average, {} to {} over the points{above}",
+        percent(given.mean),
+        number_to(given.least * 100.0, 3),
+        percent(given.most)
     )
 }
 

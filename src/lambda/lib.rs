@@ -53,6 +53,7 @@ mod certificate;
 mod cone;
 mod criteria;
 pub mod feedback;
+mod given;
 mod homotopy;
 mod model;
 mod path;
@@ -68,6 +69,7 @@ pub mod worst;
 
 pub use allocation::{Allocation, Allocator, AllocatorError, Reach};
 pub use fluxform_base::force_constant::{Criterion, ForceConstants, NamedConstant};
+pub use given::GivenForce;
 pub use path::{Breakpoint, Event, Path};
 pub use problem::{ForceProblem, ProblemError, Settings};
 pub use solve::{OperatingPoint, Precision, Solution, Status, solve};

@@ -271,6 +271,9 @@ fn operating_point(sheet: &mut Sheet, points: &PointsReport, file: &LambdaFile) 
             ),
         );
     }
+    if let Some(given) = &file.given_force {
+        sheet.line("given", &describe::given_force(given));
+    }
     if let (Some(rms), Some(worst)) = (file.rms_error_n, file.worst_error_n) {
         let relative = file.relative_rms_error.map_or_else(String::new, |part| {
             format!(" ({} of the rms force)", percent(part))
