@@ -1,11 +1,12 @@
 //! `bench`: errors fall with their knobs, files are as promised, bad input is refused.
 
-use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 
 use fluxform::bundle::bench::{BenchFile, KnobName, Run, ShapeBench};
 use fluxform::bundle::schema::SCHEMAS;
 use fluxform::lambda::Criterion;
+use fluxform_testing::place::Place;
+use fluxform_testing::run::Ran;
 use serde_json::Value;
 
 const REST: &str = r#"
@@ -33,27 +34,18 @@ y_mm = [-17.0, 17.0, 29]
 "#;
 
 /// A folder with a design and an object.
-fn place(parts: &str) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let design = format!("name = \"small\"\n{parts}{COIL}{REST}");
-    lay(folder.path(), "small.toml", &design);
-    lay(folder.path(), "dome.toml", DOME);
-    folder
+fn place(parts: &str) -> Place {
+    let place = Place::empty();
+    place.write(
+        "small.toml",
+        &format!("name = \"small\"\n{parts}{COIL}{REST}"),
+    );
+    place.write("dome.toml", DOME);
+    place
 }
 
-#[allow(clippy::disallowed_methods)] // the test's own folder
-fn lay(folder: &Path, name: &str, text: &str) {
-    std::fs::write(folder.join(name), text).unwrap();
-}
-
-fn command(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_fluxform"));
-    command.arg("bench").args(arguments).current_dir(folder);
-    command
-}
-
-fn bench(folder: &Path, arguments: &[&str]) -> Output {
-    command(folder, arguments).output().unwrap()
+fn bench(place: &Place, arguments: &[&str]) -> Ran {
+    place.run(&[&["bench"], arguments].concat())
 }
 
 const ASKED: [&str; 7] = [
@@ -66,14 +58,8 @@ const ASKED: [&str; 7] = [
     "json",
 ];
 
-fn json(output: &Output) -> Value {
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{said}");
-    serde_json::from_slice(&output.stdout).unwrap()
-}
-
-fn measured(folder: &Path, arguments: &[&str]) -> BenchFile {
-    serde_json::from_value(json(&bench(folder, arguments))).unwrap()
+fn measured(place: &Place, arguments: &[&str]) -> BenchFile {
+    serde_json::from_value(bench(place, arguments).ends(0).json()).unwrap()
 }
 
 /// The errors along the knob, the others at their finest.
@@ -93,8 +79,8 @@ fn falls(errors: &[f64], by: f64) {
 }
 
 fn errors_fall(parts: &str) {
-    let folder = place(parts);
-    let file = measured(folder.path(), &ASKED);
+    let place = place(parts);
+    let file = measured(&place, &ASKED);
     let shape = &file.shapes[0];
     falls(&along(shape, KnobName::Points, |run| run.lambda_error), 4.0);
     falls(&along(shape, KnobName::Nodes, |run| run.felt_error), 30.0);
@@ -132,8 +118,8 @@ fn errors_of_a_cored_coil_fall_with_their_knobs() {
 
 #[test]
 fn the_cheapest_settings_meet_their_target_and_can_be_pasted() {
-    let folder = place(ARRAY);
-    let file = measured(folder.path(), &ASKED);
+    let place = place(ARRAY);
+    let file = measured(&place, &ASKED);
     let shape = &file.shapes[0];
     let own = shape.reference.lambda_error.unwrap();
     assert_eq!(shape.cheapest.len(), 3);
@@ -172,23 +158,20 @@ fn the_cheapest_settings_meet_their_target_and_can_be_pasted() {
             .to_owned();
         *text = text.replace(&old, &format!("{name} = {value}"));
     }
-    lay(folder.path(), "pasted.toml", &design);
-    lay(folder.path(), "coarse.toml", &dome);
+    place.write("pasted.toml", &design);
+    place.write("coarse.toml", &dome);
     let tolerance = loose.paste[0].split_once(' ').unwrap().1;
-    let lambda = Command::new(env!("CARGO_BIN_EXE_fluxform"))
-        .args(["lambda", "pasted.toml", "coarse.toml", "--format", "json"])
-        .args(["--tolerance", tolerance])
-        .current_dir(folder.path())
-        .output();
-    let lambda = json(&lambda.unwrap())["lambda_n_per_m"].as_f64().unwrap();
+    let lambda = ["lambda", "pasted.toml", "coarse.toml", "--format", "json"];
+    let lambda = place.run(&[&lambda[..], &["--tolerance", tolerance]].concat());
+    let lambda = lambda.ends(0).json()["lambda_n_per_m"].as_f64().unwrap();
     assert!((lambda / run.lambda_n_per_m.unwrap() - 1.0).abs() < 1e-9);
 }
 
 #[test]
 fn the_files_hold_every_run_and_fit_their_schema() {
-    let folder = place(ARRAY);
-    let told = json(&bench(folder.path(), &ASKED));
-    let read = |name: &str| std::fs::read_to_string(folder.path().join("b").join(name)).unwrap();
+    let place = place(ARRAY);
+    let told = bench(&place, &ASKED).ends(0).json();
+    let read = |name: &str| place.text(&format!("b/{name}"));
     let written: Value = serde_json::from_str(&read("bench.json")).unwrap();
     assert_eq!(written["shapes"], told["shapes"]);
     let schema = SCHEMAS
@@ -226,16 +209,16 @@ fn the_files_hold_every_run_and_fit_their_schema() {
         "{why}"
     );
     // The same inputs may replace their files, others may not.
-    assert!(bench(folder.path(), &ASKED).status.success());
-    lay(folder.path(), "dome.toml", &DOME.replace("31.0", "32.0"));
-    assert_eq!(bench(folder.path(), &ASKED).status.code(), Some(4));
+    bench(&place, &ASKED).ends(0);
+    place.write("dome.toml", &DOME.replace("31.0", "32.0"));
+    bench(&place, &ASKED).ends(4);
 }
 
 #[test]
 fn points_graded_to_a_deviation_are_swept_instead() {
-    let folder = place(ARRAY);
+    let place = place(ARRAY);
     let arguments = [&ASKED[..], &["--max-deviation", "0.05mm"]].concat();
-    let file = measured(folder.path(), &arguments);
+    let file = measured(&place, &arguments);
     let shape = &file.shapes[0];
     let errors = along(shape, KnobName::MaxDeviation, |run| run.lambda_error);
     assert!(errors.iter().all(|error| *error < 0.1), "{errors:?}");
@@ -250,50 +233,37 @@ fn points_graded_to_a_deviation_are_swept_instead() {
 
 #[test]
 fn bad_input_is_refused_before_anything_is_measured() {
-    let folder = place(ARRAY);
-    assert_eq!(bench(folder.path(), &["small.toml"]).status.code(), Some(2));
-    let missing = bench(folder.path(), &["small.toml", "gone.toml"]);
-    assert_eq!(missing.status.code(), Some(3), "{missing:?}");
-    assert!(String::from_utf8_lossy(&missing.stderr).contains("gone.toml"));
+    let place = place(ARRAY);
+    bench(&place, &["small.toml"]).ends(2);
+    bench(&place, &["small.toml", "gone.toml"])
+        .ends(3)
+        .says(&["gone.toml"]);
     let narrow = REST.replace("[-24.0, 24.0, 49]", "[-15.0, 15.0, 49]");
     let design = format!("name = \"small\"\n{ARRAY}{COIL}{narrow}");
-    lay(folder.path(), "small.toml", &design);
-    let outside = bench(folder.path(), &ASKED);
-    assert_eq!(outside.status.code(), Some(3), "{outside:?}");
-    let said = String::from_utf8_lossy(&outside.stderr);
-    assert!(
-        said.contains("outside") && said.contains("[workspace]"),
-        "{said}"
-    );
-    assert!(!folder.path().join("b").exists());
+    place.write("small.toml", &design);
+    bench(&place, &ASKED)
+        .ends(3)
+        .says(&["outside", "[workspace]"]);
+    assert!(!place.path("b").exists());
 }
 
 #[test]
 #[cfg(unix)]
 fn a_signal_ends_a_run_without_a_file() {
-    let folder = place(ARRAY);
+    let place = place(ARRAY);
     // Coils that are coupled and points that are many: seconds, whatever the machine.
     let cored = format!("name = \"small\"\n{ARRAY}{CORE}{COIL}{REST}");
-    lay(
-        folder.path(),
-        "small.toml",
-        &cored.replace("columns = 2", "columns = 5"),
-    );
-    lay(
-        folder.path(),
+    place.write("small.toml", &cored.replace("columns = 2", "columns = 5"));
+    place.write(
         "dome.toml",
         &DOME.replace("33]", "133]").replace("29]", "129]"),
     );
-    let mut run = command(folder.path(), &["small.toml", "dome.toml", "--out", "b"])
-        .stdout(std::process::Stdio::null())
-        .stderr(std::process::Stdio::null())
-        .spawn()
-        .unwrap();
+    let mut run = place.spawn(&["bench", "small.toml", "dome.toml", "--out", "b"]);
     std::thread::sleep(std::time::Duration::from_millis(800));
     let asked = Command::new("kill")
         .args(["-INT", &run.id().to_string()])
         .status();
     assert!(asked.unwrap().success());
     assert_eq!(run.wait().unwrap().code(), Some(130));
-    assert!(!folder.path().join("b").exists());
+    assert!(!place.path("b").exists());
 }

@@ -1,16 +1,25 @@
 //! `compare`: differences that are known in closed form, symmetry, limits, the command itself.
 #![allow(clippy::disallowed_methods)] // tests write their own files
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
+use std::process::ExitCode;
 
 use fluxform::bundle::artefact::Input;
-use fluxform::commands::compare::{CompareFile, CompareOptions, Pair, run};
+use fluxform::commands::compare::{CompareOptions, CompareReport, Pair, run};
 use fluxform::design::{Design, Need};
 use fluxform::progress::Silent;
 use fluxform::scene::sources::ShapeSource;
 use fluxform::shape::document::ShapeDocument;
+use fluxform_testing::place::Place;
+use fluxform_testing::{committed, needs, root, trials};
 use serde_json::Value;
+
+fn main() -> ExitCode {
+    needs::run(trials! {
+        None => [an_object_does_not_differ_from_itself, the_order_does_not_matter, a_lifted_surface_is_apart_by_its_height_with_feedback, beside_an_object_there_is_no_force_with_feedback, stronger_currents_only_lift_weak_forces_over_the_threshold, the_unpowered_steel_pulls_on_both_alike, where_nothing_can_be_rendered_nothing_is_compared, the_bytes_do_not_depend_on_threads, the_command_reports_draws_and_refuses],
+        needs::python() => [the_confusions_are_what_the_readme_shows],
+    })
+}
 
 const JND: f64 = 0.07;
 const OWN: CompareOptions = CompareOptions {
@@ -18,10 +27,6 @@ const OWN: CompareOptions = CompareOptions {
     jnd: JND,
     tolerance: None,
 };
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
 
 fn design(changes: &[(&str, &str)]) -> Design {
     let path = root().join("designs/seed_air.toml");
@@ -60,9 +65,9 @@ fn dome(name: &str) -> ShapeSource {
     )
 }
 
-fn compared(design: &Design, shapes: &[ShapeSource], options: &CompareOptions) -> CompareFile {
+fn compared(design: &Design, shapes: &[ShapeSource], options: &CompareOptions) -> CompareReport {
     let input = Input::of_bytes("design.toml", b"");
-    run(design, shapes, &input, options, &Silent).unwrap().file
+    run(design, shapes, &input, options, &Silent).unwrap()
 }
 
 fn numbers(pair: &Pair) -> [f64; 6] {
@@ -77,13 +82,11 @@ fn numbers(pair: &Pair) -> [f64; 6] {
     .map(Option::unwrap)
 }
 
-#[test]
 fn an_object_does_not_differ_from_itself() {
     let file = compared(&design(&[]), &[wedge("one"), wedge("other")], &OWN);
     assert_eq!(numbers(&file.pairs[0]), [0.0; 6]);
 }
 
-#[test]
 fn the_order_does_not_matter() {
     let design = design(&[]);
     let ab = compared(&design, &[wedge("a"), dome("b"), flat("c", 50.0)], &OWN);
@@ -106,7 +109,6 @@ fn the_order_does_not_matter() {
     }
 }
 
-#[test]
 fn a_lifted_surface_is_apart_by_its_height_with_feedback() {
     let shapes = [flat("low", 50.0), flat("high", 54.0)];
     // 4 mm of 54 mm: where the relative difference decides.
@@ -136,7 +138,6 @@ fn a_lifted_surface_is_apart_by_its_height_with_feedback() {
     assert!(fixed > 0.0 && (fixed / found - 1.0).abs() > 1e-3);
 }
 
-#[test]
 fn beside_an_object_there_is_no_force_with_feedback() {
     let file = compared(&design(&[]), &[flat("flat", 50.0), dome("dome")], &OWN);
     let pair = &file.pairs[0];
@@ -146,7 +147,6 @@ fn beside_an_object_there_is_no_force_with_feedback() {
     assert!(at.a_force_n > 0.0 && at.b_force_n == 0.0);
 }
 
-#[test]
 fn stronger_currents_only_lift_weak_forces_over_the_threshold() {
     let shapes = [flat("flat", 50.0), wedge("wedge"), dome("dome")];
     let with = |current_a: f64| {
@@ -161,7 +161,7 @@ fn stronger_currents_only_lift_weak_forces_over_the_threshold() {
     };
     let [weakest, weak, usual, strong, stronger] = [1e-3, 2e-3, 2.0, 2e4, 4e4].map(with);
     for k in 0..weak.pairs.len() {
-        let of = |file: &CompareFile| numbers(&file.pairs[k]);
+        let of = |file: &CompareReport| numbers(&file.pairs[k]);
         for what in 0..4 {
             let [weakest, weak, usual, strong, stronger] =
                 [&weakest, &weak, &usual, &strong, &stronger].map(|file| of(file)[what]);
@@ -176,7 +176,6 @@ fn stronger_currents_only_lift_weak_forces_over_the_threshold() {
     }
 }
 
-#[test]
 fn the_unpowered_steel_pulls_on_both_alike() {
     let text = std::fs::read_to_string(root().join("designs/seed.toml")).unwrap();
     let text = text.replace("pitch_mm = 50.0", "pitch_mm = 50.0\ncoupling = \"none\"");
@@ -193,13 +192,12 @@ fn the_unpowered_steel_pulls_on_both_alike() {
     };
     let (with, without) = (of(true), of(false));
     // What is wanted includes the pull, so feedback does not differ; static currents leave some.
-    let felt = |file: &CompareFile| file.pairs[0].feedback_jnd.unwrap();
+    let felt = |file: &CompareReport| file.pairs[0].feedback_jnd.unwrap();
     assert!((felt(&with) / felt(&without) - 1.0).abs() < 1e-9);
-    let fixed = |file: &CompareFile| file.pairs[0].static_rms_jnd.unwrap();
+    let fixed = |file: &CompareReport| file.pairs[0].static_rms_jnd.unwrap();
     assert!((fixed(&with) / fixed(&without) - 1.0).abs() > 1e-4);
 }
 
-#[test]
 fn where_nothing_can_be_rendered_nothing_is_compared() {
     let design = design(&[("\"repel\"", "\"attract\"")]);
     let file = compared(&design, &[wedge("a"), dome("b")], &OWN);
@@ -209,7 +207,6 @@ fn where_nothing_can_be_rendered_nothing_is_compared() {
     assert!(!file.picture().svg().contains("NaN"));
 }
 
-#[test]
 fn the_bytes_do_not_depend_on_threads() {
     let in_threads = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
@@ -219,66 +216,39 @@ fn the_bytes_do_not_depend_on_threads() {
     assert_eq!(in_threads(1), in_threads(3));
 }
 
-fn fluxform(arguments: &[&str]) -> (Option<i32>, String, String) {
-    let run = Command::new(env!("CARGO_BIN_EXE_fluxform"))
-        .args(arguments)
-        .current_dir(root())
-        .output()
-        .unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap();
-    (run.status.code(), text(run.stdout), text(run.stderr))
-}
-
-#[test]
-fn the_command_tells_draws_and_refuses() {
-    let folder = tempfile::tempdir().unwrap();
-    let svg: PathBuf = folder.path().join("apart.svg");
+fn the_command_reports_draws_and_refuses() {
+    let place = Place::new();
     let air = "designs/seed_air.toml";
     let two = ["shapes/flat.toml", "shapes/wedge.toml"];
-    let plot = ["--plot", svg.to_str().unwrap(), "--format", "json"];
-    let told = [&["compare", air], &two[..], &plot[..]].concat();
-    let (code, out, err) = fluxform(&told);
-    assert_eq!(code, Some(0), "{err}");
-    let json: Value = serde_json::from_str(&out).unwrap();
+    let plot = ["--plot", "apart.svg", "--format", "json"];
+    let compare = [&["compare", air], &two[..], &plot[..]].concat();
+    let json = place.run(&compare).ends(0).json();
     let pair = &json["pairs"][0];
     assert_eq!((&pair["a"], &pair["b"]), (&"flat".into(), &"wedge".into()));
     let jnd = pair["static_jnd"].as_f64().unwrap();
     assert!(jnd > 1.0 && jnd <= 1.0 / JND);
-    let drawn = std::fs::read_to_string(&svg).unwrap();
+    let drawn = place.text("apart.svg");
     assert!(drawn.contains("wedge") && drawn.contains(&format!("{jnd:.2}")));
     // The lambdas are those of `lambda`.
-    let (_, alone, _) = fluxform(&["lambda", air, two[1], "--format", "json"]);
-    let alone: Value = serde_json::from_str(&alone).unwrap();
+    let alone = place
+        .run(&["lambda", air, two[1], "--format", "json"])
+        .json();
     let lambda = |value: &Value| value.as_f64().unwrap();
     let here = lambda(&json["shapes"][1]["lambda_n_per_m"]);
     assert!((here / lambda(&alone["lambda_n_per_m"]) - 1.0).abs() < 1e-9);
 
-    let (code, ..) = fluxform(&["compare", air, two[0]]);
-    assert_eq!(code, Some(2), "one shape alone");
-    let (code, _, err) = fluxform(&["compare", air, two[0], two[0]]);
-    assert_eq!(code, Some(3));
-    assert!(err.contains("two shapes are called"), "{err}");
-    std::fs::write(&svg, "mine").unwrap();
-    assert_eq!(fluxform(&told).0, Some(4), "a file that is not ours");
+    place.run(&["compare", air, two[0]]).ends(2);
+    let same = place.run(&["compare", air, two[0], two[0]]);
+    same.ends(3).says(&["two shapes are called"]);
+    place.write("apart.svg", "mine");
+    place.run(&compare).ends(4);
 }
 
-#[test]
 fn the_confusions_are_what_the_readme_shows() {
-    let run = Command::new("python3")
-        .args(["scripts/confusion.py", env!("CARGO_BIN_EXE_fluxform")])
-        .current_dir(root())
-        .output();
-    let Ok(run) = run else {
-        #[allow(clippy::print_stderr)] // a test may tell that it was skipped
-        {
-            eprintln!("skipped: no python3");
-        }
-        return;
-    };
-    let errors = String::from_utf8(run.stderr).unwrap();
-    assert!(run.status.success(), "{errors}");
-    let page = std::fs::read_to_string(root().join("results/README.md")).unwrap();
-    for part in String::from_utf8(run.stdout).unwrap().split("\n\n") {
+    let place = Place::with(&["scripts", "designs", "shapes"]);
+    let printed = place.shell("python3 scripts/confusion.py $(command -v fluxform)");
+    let page = committed("results/README.md");
+    for part in printed.ends(0).out.split("\n\n") {
         assert!(
             page.contains(part.trim_end()),
             "not in results/README.md:\n{part}"

@@ -5,15 +5,13 @@
 #![allow(clippy::print_stderr, clippy::print_stdout)] // a test may tell what it compared
 #![allow(clippy::disallowed_methods)] // a test writes where it likes
 
-#[path = "support/needs.rs"]
-mod needs;
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Output};
 
 use fluxform::map::multipole::{PARTS, Source, magnitudes};
-use needs::trials;
+use fluxform_testing::run::program;
+use fluxform_testing::{needs, root, trials};
 use serde_json::Value;
 
 fn main() -> ExitCode {
@@ -30,12 +28,8 @@ fn main() -> ExitCode {
     })
 }
 
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
 fn fluxform(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_fluxform"))
+    Command::new(program())
         .arg("--quiet")
         .args(arguments)
         .current_dir(root())
@@ -462,12 +456,7 @@ fn mag_manip_reads_what_is_stated() {
         let run = Command::new(&python)
             .arg("scripts/peers/compare_magmanip.py")
             .arg(coarse(design, folder.path()))
-            .args([
-                "--points",
-                "200",
-                "--fluxform",
-                env!("CARGO_BIN_EXE_fluxform"),
-            ])
+            .args(["--points", "200", "--fluxform", program().to_str().unwrap()])
             .current_dir(root())
             .output()
             .unwrap();

@@ -5,23 +5,17 @@
 //! marked `ci`, and solves all of them again.
 #![allow(clippy::print_stderr, clippy::print_stdout)] // a test may tell what it compared
 
-#[path = "support/needs.rs"]
-mod needs;
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Output};
 
 use fluxform::commands::evaluate::evaluate;
 use fluxform::design::{Design, Need};
-use needs::trials;
+use fluxform_testing::run::program;
+use fluxform_testing::{Random, needs, root, trials};
 use serde_json::{Value, json};
 
 const DESIGNS: usize = 100;
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
 
 fn main() -> ExitCode {
     needs::run(trials! {
@@ -103,7 +97,7 @@ fn file_of(folder: &Path, name: &str, content: &Value) -> String {
 
 /// What `optimize` says of a design, as the script's `--judge` takes it.
 fn claim(design: &Path) -> Value {
-    let run = Command::new(env!("CARGO_BIN_EXE_fluxform"))
+    let run = Command::new(program())
         .args(["optimize", "--format", "json"])
         .arg(design)
         .current_dir(root())
@@ -141,22 +135,9 @@ fn claim(design: &Path) -> Value {
     claim
 }
 
-/// Numbers from 0 to 1 that are always the same (a linear congruence by Knuth).
-struct Numbers(u64);
-
-impl Numbers {
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        low + (high - low) * (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
-
 /// A random design and what `evaluate` says of it; with a core, within the box of the script's
 /// table.
-fn random_design(numbers: &mut Numbers, core: bool) -> Value {
+fn random_design(numbers: &mut Random, core: bool) -> Value {
     let mut mm = |low: f64, high: f64| (numbers.between(low, high) * 1e3).round() / 1e3;
     let inner = mm(4.5, 39.0);
     let outer = inner + 2.0 * mm(1.5, 13.5);
@@ -192,7 +173,7 @@ fn random_design(numbers: &mut Numbers, core: bool) -> Value {
 
 fn both_models_agree_on_random_designs() {
     let python = python();
-    let mut numbers = Numbers(7);
+    let mut numbers = Random::new(7);
     let designs: Vec<Value> = (0..2 * DESIGNS)
         .map(|k| random_design(&mut numbers, k >= DESIGNS))
         .collect();

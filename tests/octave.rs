@@ -2,12 +2,6 @@
 //! forces, heights and currents are Rust's. The same file serves MATLAB, which is not tried here.
 #![allow(clippy::disallowed_methods, clippy::print_stderr)]
 
-#[path = "support/needs.rs"]
-mod needs;
-#[allow(dead_code)] // the other tests of bundles use the rest
-#[path = "bundle/sample.rs"]
-mod sample;
-
 use std::fs;
 use std::path::Path;
 use std::process::{Command, ExitCode, Output};
@@ -16,12 +10,12 @@ use fluxform::bundle::load::Bundle;
 use fluxform::bundle::replay::Answer;
 use fluxform::commands::replay::renderer::Renderer;
 
-use needs::trials;
-use sample::*;
+use fluxform_testing::bundle::*;
+use fluxform_testing::{Random, needs, root, trials};
 
 fn main() -> ExitCode {
     needs::run(trials! {
-        missing() => [
+        needs::octave() => [
             octave_and_rust_give_the_same_forces_heights_and_currents,
             octave_reads_the_tables_and_the_json_files_by_its_own_functions,
             a_loaded_map_goes_into_a_mat_file,
@@ -30,19 +24,11 @@ fn main() -> ExitCode {
     })
 }
 
-/// Octave of version 7 or newer, where there is none.
-fn missing() -> Option<String> {
-    let newer = "printf('%d', compare_versions(version, '7.0.0', '>='))";
-    let found = command(Path::new("."), newer).output();
-    let there = found.is_ok_and(|output| output.stdout == b"1");
-    (!there).then(|| "octave-cli 7 or newer (Debian: octave)".to_owned())
-}
-
 fn command(folder: &Path, script: &str) -> Command {
     let mut command = Command::new("octave-cli");
     command
         .args(["--norc", "--quiet", "--eval", script])
-        .env("FLUXFORM_SCRIPTS", scripts())
+        .env("FLUXFORM_SCRIPTS", root().join("scripts"))
         .current_dir(folder);
     command
 }
@@ -68,12 +54,12 @@ fn rows(output: &Output) -> Vec<Vec<f64>> {
 
 /// Positions inside the map, on its nodes and borders, and outside.
 fn positions(bundle: &Bundle) -> Vec<[f64; 3]> {
-    let mut seed = 11;
+    let mut random = Random::new(11);
     let map = &bundle.map;
     (0..200)
         .map(|i| {
             [&map.x_m, &map.y_m, &map.z_m].map(|axis| {
-                let t = random(&mut seed);
+                let t = random.unit();
                 let (from, to) = (axis[0], axis[axis.len() - 1]);
                 match i % 5 {
                     0 => axis[(t * axis.len() as f64) as usize],
@@ -104,7 +90,7 @@ fn octave_and_rust_give_the_same_forces_heights_and_currents() {
         ("tilted with pull", true, true, [13, 9, 11]),
         ("short axes", false, true, [2, 3, 1]),
     ] {
-        let folder = temporary();
+        let folder = tempfile::tempdir().unwrap();
         let mut sample = sample(tilted, samples);
         if pulled {
             sample = sample.with_pull();
@@ -193,7 +179,7 @@ printf('\\n');
 ";
 
 fn octave_reads_the_tables_and_the_json_files_by_its_own_functions() {
-    let folder = temporary();
+    let folder = tempfile::tempdir().unwrap();
     let target = folder.path().join("bundle");
     sample(false, [4, 3, 2]).write(&target, false).unwrap();
     let bundle = Bundle::open(&target).unwrap();
@@ -235,7 +221,7 @@ printf('%d ', size(again.gz_t_per_m_per_a));
 ";
 
 fn a_loaded_map_goes_into_a_mat_file() {
-    let folder = temporary();
+    let folder = tempfile::tempdir().unwrap();
     let target = folder.path().join("bundle");
     sample(false, [5, 4, 3]).write(&target, false).unwrap();
     let output = octave(folder.path(), KEPT);
@@ -243,7 +229,7 @@ fn a_loaded_map_goes_into_a_mat_file() {
 }
 
 fn a_changed_file_is_refused() {
-    let folder = temporary();
+    let folder = tempfile::tempdir().unwrap();
     let target = folder.path().join("bundle");
     for (file, from, to) in [
         ("currents.csv", "1.3", "1.4"),

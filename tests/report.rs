@@ -1,64 +1,33 @@
 //! Pages: what stands in them, that inputs stay texts, and that a browser draws them.
 
-use std::os::unix::fs::symlink;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
+use std::process::{Command, ExitCode, Output};
 
+use fluxform_testing::place::Place;
+use fluxform_testing::{needs, root, trials};
 use serde_json::Value;
-use tempfile::TempDir;
+
+fn main() -> ExitCode {
+    needs::run(trials! {
+        None => [a_bundle_holds_its_page_and_verify_checks_it, the_page_tells_what_the_files_hold, pages_are_the_same_bytes_whatever_the_threads, a_hostile_path_stays_text, a_page_can_be_left_out_and_is_there_without_a_force_constant, optimize_and_sweep_write_pages],
+        no_browser() => [a_browser_draws_the_page_and_answers, a_browser_draws_the_pages_of_a_null_constant_of_optimize_and_of_a_sweep],
+    })
+}
 
 const DESIGN: &str = "designs/seed_air.toml";
 /// What a page may weigh, bytes.
 const MOST_BYTES: usize = 600_000;
 
-/// A folder with the repository's designs and shapes in it.
-struct Place(TempDir);
-
-impl Place {
-    fn new() -> Self {
-        let folder = TempDir::new().unwrap();
-        for name in ["designs", "shapes"] {
-            symlink(repository(name), folder.path().join(name)).unwrap();
-        }
-        Self(folder)
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn read(&self, name: &str) -> String {
-        std::fs::read_to_string(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
-    }
-
-    #[allow(clippy::disallowed_methods)] // a test's own file
-    fn write(&self, name: &str, text: &str) {
-        let path = self.path(name);
-        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-        std::fs::write(path, text).unwrap();
-    }
-
-    fn run(&self, arguments: &[&str], code: i32) -> String {
-        let output = Command::new(env!("CARGO_BIN_EXE_fluxform"))
-            .args(arguments)
-            .current_dir(self.0.path())
-            .output()
-            .unwrap();
-        assert_eq!(output.status.code(), Some(code), "{arguments:?} {output:?}");
-        String::from_utf8(output.stdout).unwrap()
-    }
-
-    fn listed(&self, bundle: &str) -> Vec<String> {
-        let manifest = self.read(&format!("{bundle}/manifest.json"));
-        let manifest: Value = serde_json::from_str(&manifest).unwrap();
-        let files = manifest["files"].as_array().unwrap();
-        let name = |file: &Value| file["path"].as_str().unwrap().to_owned();
-        files.iter().map(name).collect()
-    }
+fn run(place: &Place, arguments: &[&str], code: i32) -> String {
+    place.run(arguments).ends(code).out
 }
 
-fn repository(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
+fn listed(place: &Place, bundle: &str) -> Vec<String> {
+    let manifest = place.text(&format!("{bundle}/manifest.json"));
+    let manifest: Value = serde_json::from_str(&manifest).unwrap();
+    let files = manifest["files"].as_array().unwrap();
+    let name = |file: &Value| file["path"].as_str().unwrap().to_owned();
+    files.iter().map(name).collect()
 }
 
 /// A page that needs nothing but itself, is one document, and is not too large.
@@ -83,12 +52,11 @@ fn is_a_page(html: &str) {
     }
 }
 
-#[test]
 fn a_bundle_holds_its_page_and_verify_checks_it() {
     let place = Place::new();
-    place.run(&["calibrate", DESIGN, "shapes/wedge.toml"], 0);
+    run(&place, &["calibrate", DESIGN, "shapes/wedge.toml"], 0);
     let bundle = "results/seed_air/wedge";
-    let listed = place.listed(bundle);
+    let listed = listed(&place, bundle);
     let pages = [
         "report.html",
         "plots/lambda.svg",
@@ -100,7 +68,7 @@ fn a_bundle_holds_its_page_and_verify_checks_it() {
     for name in pages {
         assert!(listed.iter().any(|one| one == name), "{name}: {listed:?}");
     }
-    let html = place.read(&format!("{bundle}/report.html"));
+    let html = place.text(&format!("{bundle}/report.html"));
     is_a_page(&html);
     for told in [
         "<h1>wedge on seed_air</h1>",
@@ -120,22 +88,21 @@ fn a_bundle_holds_its_page_and_verify_checks_it() {
     }
     // The shipped curve tells that it is not this run's.
     assert!(html.contains("id=\"draw-cost\"") && html.contains("Not measured in this run"));
-    place.run(&["verify", bundle], 0);
+    run(&place, &["verify", bundle], 0);
     place.write(
         &format!("{bundle}/report.html"),
         &html.replacen("The answer", "The onswer", 1),
     );
-    place.run(&["verify", bundle], 5);
+    run(&place, &["verify", bundle], 5);
 }
 
-#[test]
 fn the_page_tells_what_the_files_hold() {
     let place = Place::new();
-    place.run(&["calibrate", DESIGN, "shapes/flat.toml"], 0);
+    run(&place, &["calibrate", DESIGN, "shapes/flat.toml"], 0);
     let bundle = "results/seed_air/flat";
-    let html = place.read(&format!("{bundle}/report.html"));
+    let html = place.text(&format!("{bundle}/report.html"));
     let lambda: Value =
-        serde_json::from_str(&place.read(&format!("{bundle}/lambda.json"))).unwrap();
+        serde_json::from_str(&place.text(&format!("{bundle}/lambda.json"))).unwrap();
     let chosen = lambda["lambda_n_per_m"].as_f64().unwrap();
     // Its first digits, cut off rather than rounded.
     let digits = &chosen.to_string()[..5];
@@ -143,7 +110,7 @@ fn the_page_tells_what_the_files_hold() {
     let worst = lambda["worst_error_n"].as_f64().unwrap() * 1e3;
     assert!(html.contains(&worst.to_string()[..4]), "{worst}");
     // Every plot has its numbers beside it, in as many rows as are drawn.
-    let errors = place.read(&format!("{bundle}/plots/errors.csv"));
+    let errors = place.text(&format!("{bundle}/plots/errors.csv"));
     assert_eq!(errors.lines().count(), 3722);
     let mut largest = 0.0_f64;
     for line in errors.lines().skip(1) {
@@ -151,12 +118,11 @@ fn the_page_tells_what_the_files_hold() {
         largest = largest.max((cells[3] - cells[2]).abs());
     }
     assert!((largest * 1e3 / worst - 1.0).abs() < 1e-12);
-    let field = place.read(&format!("{bundle}/plots/field.csv"));
+    let field = place.text(&format!("{bundle}/plots/field.csv"));
     assert!(field.starts_with("x_m,y_m,z_m,dbz_dz_t_per_m\n"));
     assert_eq!(field.lines().count(), 3 * 41 * 41 + 1);
 }
 
-#[test]
 fn pages_are_the_same_bytes_whatever_the_threads() {
     let place = Place::new();
     for (threads, out) in [("1", "one"), ("2", "two")] {
@@ -169,7 +135,7 @@ fn pages_are_the_same_bytes_whatever_the_threads() {
             "--out",
             out,
         ];
-        place.run(&arguments, 0);
+        run(&place, &arguments, 0);
     }
     for name in [
         "report.html",
@@ -177,10 +143,10 @@ fn pages_are_the_same_bytes_whatever_the_threads() {
         "plots/field.svg",
         "plots/errors.csv",
     ] {
-        let read = |out: &str| place.read(&format!("{out}/seed_air/half-sphere/{name}"));
+        let read = |out: &str| place.text(&format!("{out}/seed_air/half-sphere/{name}"));
         let text = read("one");
         assert!(text == read("two"), "{name}");
-        let machine = place.0.path().to_string_lossy().into_owned();
+        let machine = place.root().to_string_lossy().into_owned();
         assert!(
             !text.contains(&machine),
             "{name} names the machine's folders"
@@ -188,41 +154,52 @@ fn pages_are_the_same_bytes_whatever_the_threads() {
     }
 }
 
-#[test]
 fn a_hostile_path_stays_text() {
     let place = Place::new();
     // A folder and a file: a path may hold what ends a script.
     let hostile = "bad<!--<script><b/script><img src=x onerror=\"alert('1')\">&amp;.toml";
-    let shape = place.read("shapes/flat.toml");
+    let shape = place.text("shapes/flat.toml");
     place.write(
         hostile,
         &shape.replace("\"flat.stl\"", "\"../shapes/flat.stl\""),
     );
     let hostile_at = format!("./{hostile}");
-    let shown = place.run(&["calibrate", DESIGN, &hostile_at, "--format", "json"], 0);
+    let shown = run(
+        &place,
+        &["calibrate", DESIGN, &hostile_at, "--format", "json"],
+        0,
+    );
     let told: Value = serde_json::from_str(&shown).unwrap();
     let folder = told["bundles"][0]["folder"].as_str().unwrap();
-    let html = place.read(&format!("{folder}/report.html"));
+    let html = place.text(&format!("{folder}/report.html"));
     is_a_page(&html);
     assert!(html.contains("&lt;img src=x onerror=&quot;alert(&#39;1&#39;)&quot;&gt;&amp;amp;"));
     assert!(!html.contains("<img") && !html.contains("bad<"));
 }
 
-#[test]
 fn a_page_can_be_left_out_and_is_there_without_a_force_constant() {
     let place = Place::new();
     let arguments = ["calibrate", DESIGN, "shapes/flat.toml", "--no-report"];
-    place.run(&arguments, 0);
+    run(&place, &arguments, 0);
     let bundle = "results/seed_air/flat";
-    let listed = place.listed(bundle);
+    let listed = listed(&place, bundle);
     assert!(
         !listed
             .iter()
             .any(|name| name.contains("plots") || name.contains("report"))
     );
     assert!(!place.path(&format!("{bundle}/report.html")).exists());
+    let place = attracted();
+    let html = place.text("results/attract/flat/report.html");
+    is_a_page(&html);
+    assert!(html.contains("There is no force constant"));
+}
+
+/// A bundle without a force constant.
+fn attracted() -> Place {
+    let place = Place::new();
     // Magnets that are only attracted cannot be pushed up.
-    let design = place.read(DESIGN).replace("repel", "attract");
+    let design = place.text(DESIGN).replace("repel", "attract");
     let design = if design.contains("attract") {
         design
     } else {
@@ -232,31 +209,17 @@ fn a_page_can_be_left_out_and_is_there_without_a_force_constant() {
         "attract.toml",
         &design.replace("\"seed_air\"", "\"attract\""),
     );
-    place.run(&["calibrate", "attract.toml", "shapes/flat.toml"], 4);
-    let html = place.read("results/attract/flat/report.html");
-    is_a_page(&html);
-    assert!(html.contains("There is no force constant"));
-    in_a_browser(&place.path("results/attract/flat/report.html"));
+    run(
+        &place,
+        &["calibrate", "attract.toml", "shapes/flat.toml"],
+        4,
+    );
+    place
 }
 
-#[test]
-fn optimize_and_sweep_write_pages() {
+/// A sweep and its page.
+fn swept() -> Place {
     let place = Place::new();
-    place.run(&["optimize", DESIGN, "--report", "best.html"], 0);
-    let html = place.read("best.html");
-    is_a_page(&html);
-    for told in [
-        "Certificate: global",
-        "held back by",
-        "1 % more",
-        "as given",
-    ] {
-        assert!(html.contains(told), "{told}");
-    }
-    place.run(&["optimize", DESIGN, "--report", "best.html"], 0);
-    place.write("other.html", "mine");
-    place.run(&["optimize", DESIGN, "--report", "other.html"], 4);
-    place.run(&["optimize", DESIGN, "--report", "-", "--out", "-"], 2);
     let set = [
         "--set",
         "wire.diameter_mm=0.5:0.8:0.1",
@@ -274,8 +237,8 @@ fn optimize_and_sweep_write_pages() {
         "--out",
         "plan.json",
     ];
-    place.run(&plan, 0);
-    place.run(&["sweep", "run", "plan.json", "--out", "points"], 0);
+    run(&place, &plan, 0);
+    run(&place, &["sweep", "run", "plan.json", "--out", "points"], 0);
     let merge = [
         "sweep",
         "merge",
@@ -284,51 +247,84 @@ fn optimize_and_sweep_write_pages() {
         "--report",
         "sweep.html",
     ];
-    place.run(&merge, 0);
-    let html = place.read("sweep.html");
+    run(&place, &merge, 0);
+    place
+}
+
+fn optimize_and_sweep_write_pages() {
+    let place = Place::new();
+    run(&place, &["optimize", DESIGN, "--report", "best.html"], 0);
+    let html = place.text("best.html");
+    is_a_page(&html);
+    for told in [
+        "Certificate: global",
+        "held back by",
+        "1 % more",
+        "as given",
+    ] {
+        assert!(html.contains(told), "{told}");
+    }
+    run(&place, &["optimize", DESIGN, "--report", "best.html"], 0);
+    place.write("other.html", "mine");
+    run(&place, &["optimize", DESIGN, "--report", "other.html"], 4);
+    run(
+        &place,
+        &["optimize", DESIGN, "--report", "-", "--out", "-"],
+        2,
+    );
+    let place = swept();
+    let html = place.text("sweep.html");
     is_a_page(&html);
     for told in ["12 of 12 designs", "wire.diameter_mm", "draw-front-2"] {
         assert!(html.contains(told), "{told}");
     }
-    for page in ["best.html", "sweep.html"] {
-        in_a_browser(&place.path(page));
-    }
 }
 
-/// What the script that drives a browser says; `None` where there is no browser or no Python.
-fn browser(page: &Path) -> Option<Output> {
-    let script = repository("tests/report/browser.py");
-    let run = Command::new("python3")
-        .arg(script)
-        .arg("check")
-        .arg(page)
-        .output();
-    let output = run.ok()?;
-    (output.status.code() != Some(77)).then_some(output)
+/// What the script that drives a browser says.
+fn browser(page: &Path) -> Output {
+    let mut python = Command::new("python3");
+    let script = python.arg(root().join("tests/report/browser.py"));
+    script.arg("check").arg(page).output().unwrap()
 }
 
-#[allow(clippy::print_stdout)] // a skipped check says so
+/// A browser that a script can drive, where there is none.
+fn no_browser() -> Option<String> {
+    let page = root().join("results/half_sphere.svg");
+    needs::python().or_else(|| {
+        let missing = browser(&page).status.code() == Some(77);
+        missing.then(|| "chromium".to_owned())
+    })
+}
+
 fn in_a_browser(page: &Path) {
-    match browser(page) {
-        None => println!("skipped: no chromium here"),
-        Some(output) => assert!(output.status.success(), "{}: {output:?}", page.display()),
-    }
+    let output = browser(page);
+    assert!(output.status.success(), "{}: {output:?}", page.display());
 }
 
-#[test]
+fn a_browser_draws_the_pages_of_a_null_constant_of_optimize_and_of_a_sweep() {
+    in_a_browser(&attracted().path("results/attract/flat/report.html"));
+    in_a_browser(&swept().path("sweep.html"));
+    let place = Place::new();
+    run(&place, &["optimize", DESIGN, "--report", "best.html"], 0);
+    in_a_browser(&place.path("best.html"));
+}
+
 fn a_browser_draws_the_page_and_answers() {
     let place = Place::new();
-    place.run(&["calibrate", DESIGN, "shapes/half_cylinder.toml"], 0);
+    run(
+        &place,
+        &["calibrate", DESIGN, "shapes/half_cylinder.toml"],
+        0,
+    );
     let page = "results/seed_air/half-cylinder/report.html";
     in_a_browser(&place.path(page));
     // The check must be able to fail: one letter changed and the policy refuses the script,
-    let html = place.read(page);
+    let html = place.text(page);
     let fails = |name: &str, broken: String| {
         assert!(broken != html, "{name} breaks nothing");
         place.write(name, &broken);
-        if let Some(output) = browser(&place.path(name)) {
-            assert_eq!(output.status.code(), Some(1), "{name}: {output:?}");
-        }
+        let output = browser(&place.path(name));
+        assert_eq!(output.status.code(), Some(1), "{name}: {output:?}");
     };
     fails(
         "refused.html",

@@ -38,6 +38,7 @@ const CLOSEST_M: f64 = 1e-15;
 /// Whether no number is larger; in blocks, as [`all_finite`].
 pub(super) fn all_within(values: &[f64], largest: f64) -> bool {
     values.chunks(1024).all(|block| {
+        fluxform_base::progress::poll();
         block
             .iter()
             .fold(true, |all, value| all & (value.abs() <= largest))
@@ -58,6 +59,7 @@ pub(super) fn check_nodes(name: &'static str, nodes: &[f64]) -> Result<(), NpzEr
 /// Whether all numbers are finite; in blocks, so that it runs at memory speed.
 pub(super) fn all_finite(values: &[f64]) -> bool {
     values.chunks(1024).all(|block| {
+        fluxform_base::progress::poll();
         block
             .iter()
             .fold(true, |all, value| all & value.is_finite())

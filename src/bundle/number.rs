@@ -74,12 +74,9 @@ mod tests {
 
     #[test]
     fn text_reads_back_to_the_same_bits() {
-        let mut bits = 0x9e37_79b9_7f4a_7c15u64;
+        let mut random = fluxform_numerics::random::Random::new(7);
         for _ in 0..200_000 {
-            bits = bits
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            let value = f64::from_bits(bits);
+            let value = f64::from_bits(random.bits());
             if value.is_finite() {
                 let text = text(value);
                 assert_eq!(

@@ -8,7 +8,8 @@ use super::printer::Printer;
 use super::quantity::bytes;
 use crate::RunError;
 use crate::design::Design;
-use crate::scene::cost::{Cost, of_points, of_steel};
+use crate::scene::cost::{Cost, of_points, of_pull, of_steel};
+use crate::scene::passive::PASSIVE_TOLERANCE;
 use crate::scene::sources::ShapeSource;
 
 /// Share of the free memory that a run takes unasked.
@@ -51,10 +52,13 @@ pub fn asked(shapes: &[ShapeSource]) -> Asked {
 pub fn costs(design: &Design, shapes: &[ShapeSource], tolerance: Option<f64>) -> Vec<Cost> {
     let coils = design.array.positions_m.len();
     let points = shapes.iter().map(|s| of_points(&s.document, coils));
-    points.chain(of_steel(design, tolerance)).collect()
+    let steel = of_steel(design, tolerance);
+    let pull = of_pull(design, PASSIVE_TOLERANCE);
+    points.chain(steel).chain(pull).collect()
 }
 
-/// Refuses costs that exceed the budget, and announces long ones.
+/// Refuses costs that exceed the budget, and announces long ones and those that end with less
+/// accuracy than requested.
 ///
 /// # Errors
 /// More memory than allowed: a bad input where a document asks for it, wrong usage where a flag does.
@@ -63,27 +67,17 @@ pub fn allow(
     asked: Asked,
     printer: &Printer,
 ) -> Result<(), Failure> {
-    let granted = GRANTED.get().copied();
-    let budget = granted.map_or_else(|| SHARE * available_bytes(), |granted| granted as f64);
     for cost in costs {
-        if cost.bytes > budget {
-            let limit = match granted {
-                Some(_) => "--memory grants",
-                None => "three quarters of what this machine has free are",
-            };
-            let message = format!(
-                "{} would take about {} of memory, and {limit} {}; {}, or grant more with \
-                 --memory {}",
-                cost.what,
-                bytes(cost.bytes as u64),
-                bytes(budget as u64),
-                cost.reduce,
-                bytes((1.1 * cost.bytes) as u64).replace(' ', ""),
-            );
-            return Err(match asked {
-                Asked::Flag => Failure::Usage(message),
-                Asked::Document => RunError::Input(message).into(),
-            });
+        within(&cost).map_err(|message| match asked {
+            Asked::Flag => Failure::Usage(message),
+            Asked::Document => RunError::Input(message).into(),
+        })?;
+        if let Some((error, tolerance)) = cost.misses {
+            printer.notice(&format!(
+                "{} cannot be solved to the tolerance {tolerance:.0e}: its error will be {error:.0e} at \
+                 least, however long it takes; {}",
+                cost.what, cost.reduce
+            ));
         }
         let seconds = cost.cpu_seconds / rayon::current_num_threads() as f64;
         if seconds > LONG_S {
@@ -96,6 +90,30 @@ pub fn allow(
         }
     }
     Ok(())
+}
+
+/// Whether `cost` is within the budget.
+///
+/// # Errors
+/// What it would take, what there is, and what helps.
+pub fn within(cost: &Cost) -> Result<(), String> {
+    let granted = GRANTED.get().copied();
+    let budget = granted.map_or_else(|| SHARE * available_bytes(), |granted| granted as f64);
+    if cost.bytes <= budget {
+        return Ok(());
+    }
+    let limit = match granted {
+        Some(_) => "--memory grants",
+        None => "three quarters of what this machine has free are",
+    };
+    Err(format!(
+        "{} would take about {} of memory, and {limit} {}; {}, or grant more with --memory {}",
+        cost.what,
+        bytes(cost.bytes as u64),
+        bytes(budget as u64),
+        cost.reduce,
+        bytes((1.1 * cost.bytes) as u64).replace(' ', ""),
+    ))
 }
 
 /// Bytes that this process may still take: the least of the machine's free memory, the limit of its

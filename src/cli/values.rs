@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::lambda::Criterion;
+use crate::map::Components;
 use crate::shape::document::parse_unit;
 use crate::units::m_from_mm;
 
@@ -14,6 +15,13 @@ pub fn criterion() -> impl TypedValueParser<Value = Criterion> {
     let of = |criterion: &Criterion| PossibleValue::new(criterion.name()).help(criterion.meaning());
     let names = PossibleValuesParser::new(Criterion::ALL.iter().map(of));
     names.try_map(|name| name.parse::<Criterion>())
+}
+
+/// Any components of a map by their name.
+pub fn components() -> impl TypedValueParser<Value = Components> {
+    let of = |one: &Components| PossibleValue::new(one.name()).help(one.meaning());
+    let names = PossibleValuesParser::new(Components::ALL.iter().map(of));
+    names.try_map(|name| name.parse::<Components>())
 }
 
 /// Most threads that may be asked for.

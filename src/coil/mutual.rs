@@ -198,6 +198,7 @@ fn matrix_of(
 #[allow(clippy::print_stdout)]
 mod tests {
     use super::*;
+    use fluxform_numerics::random::Random;
 
     #[test]
     fn far_apart_the_coils_are_dipoles() {
@@ -276,13 +277,8 @@ mod tests {
 
     /// Claimed and true relative errors of random pairs, from touching to far apart.
     fn claims(count: usize, seed: u64) -> Vec<(f64, f64)> {
-        let mut state = seed;
-        let mut between = |lo: f64, hi: f64| {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            lo + (hi - lo) * (state >> 11) as f64 / (1u64 << 53) as f64
-        };
+        let mut random = Random::new(seed);
+        let mut between = |lo, hi| random.between(lo, hi);
         (0..count)
             .map(|pair| {
                 let inner_radius_m = between(0.003, 0.03);

@@ -264,6 +264,47 @@ fn solve_finely(problem: &ForceProblem, largest: &[f64]) -> Solved {
     literal
 }
 
+/// lambda_linear and lambda_jnd, N/m, off the two paths; null where no height is above zero.
+fn first_and_jnd(
+    problem: &ForceProblem,
+    settings: &Settings,
+    solved: &Solved,
+    comparison: &Comparison<'_>,
+    rank: usize,
+) -> (Option<f64>, Option<f64>) {
+    let linear = if comparison.mean_square <= Num::ZERO {
+        None
+    } else if rank == problem.coils() {
+        comparison.linear(&solved.model, &solved.bounds, &solved.free_bounds)
+    } else {
+        comparison.linear_by_error()
+    };
+    let jnd = match linear {
+        None => None,
+        Some(lambda) if settings.jnd_weight == 0.0 => Some(lambda),
+        Some(_) => comparison.jnd(settings.jnd_weight),
+    };
+    let si = |lambda: Num| times_power(lambda.to_f64(), solved.reduced.lambda_scale);
+    (linear.map(si), jnd.map(si))
+}
+
+/// How far the result can be relied on.
+fn status(solved: &Solved, comparison: &Comparison<'_>) -> Status {
+    let unmoved = |trace: &Trace| {
+        let all = |piece: &Piece| piece.x.iter().chain(&piece.x_rate).all(|&x| x == Num::ZERO);
+        trace.pieces.iter().all(all)
+    };
+    if !solved.reliable() {
+        Status::Stalled
+    } else if comparison.mean_square <= Num::ZERO {
+        Status::NothingWanted
+    } else if unmoved(&solved.unlimited) {
+        Status::NothingRendered
+    } else {
+        Status::Solved
+    }
+}
+
 /// Reads the force constants off the path and evaluates currents in the precision `T`.
 fn finish<T: Real>(
     problem: &ForceProblem,
@@ -280,35 +321,9 @@ fn finish<T: Real>(
         unlimited: &solved.unlimited,
         mean_square: Num::dot(heights, heights),
     };
-    let wanted = comparison.mean_square > Num::ZERO;
-    let linear = if !wanted {
-        None
-    } else if rank == problem.coils() {
-        comparison.linear(&solved.model, &solved.bounds, &solved.free_bounds)
-    } else {
-        comparison.linear_by_error()
-    };
-    let jnd = match linear {
-        None => None,
-        Some(lambda) if settings.jnd_weight == 0.0 => Some(lambda),
-        Some(_) => comparison.jnd(settings.jnd_weight),
-    };
-    let si = |lambda: Num| times_power(lambda.to_f64(), solved.reduced.lambda_scale);
-    let (linear, jnd) = (linear.map(si), jnd.map(si));
+    let (linear, jnd) = first_and_jnd(problem, settings, solved, &comparison, rank);
     let saturation = path.last_turn().or(linear.filter(|&lambda| lambda == 0.0));
-    let unmoved = |trace: &Trace| {
-        let all = |piece: &Piece| piece.x.iter().chain(&piece.x_rate).all(|&x| x == Num::ZERO);
-        trace.pieces.iter().all(all)
-    };
-    let status = if !solved.reliable() {
-        Status::Stalled
-    } else if !wanted {
-        Status::NothingWanted
-    } else if unmoved(&solved.unlimited) {
-        Status::NothingRendered
-    } else {
-        Status::Solved
-    };
+    let status = status(solved, &comparison);
     let lowest = problem
         .height_m
         .iter()

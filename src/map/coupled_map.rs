@@ -28,6 +28,7 @@ pub struct TableReport {
     /// Points sampled for the table and its check, over all attempts.
     pub samples: usize,
     /// Nodes along x, y, z.
+    #[serde(rename = "nodes")]
     pub degrees: [usize; 3],
     /// Coefficients kept, over all drives and components.
     pub coefficients: usize,
@@ -157,20 +158,7 @@ impl<'a> SampledField<'a> {
             .flat_map(|y| grid.x_m.iter().map(|x| [*x, *y]))
             .collect();
         progress.begin("map", heights as u64);
-        // What the table does not reach.
-        let mut direct: Vec<Option<Vec<f64>>> = Vec::with_capacity(heights);
-        for z_m in &grid.z_m {
-            progress.check()?;
-            direct.push(if self.holds(grid, *z_m) {
-                None
-            } else {
-                let points: Vec<[f64; 3]> = place.iter().map(|[x, y]| [*x, *y, *z_m]).collect();
-                let mut out = vec![0.0; self.sampler.drives() * count * plane];
-                self.sampler.sample(&points, self.components, &mut out)?;
-                Some(out)
-            });
-            progress.advance(1);
-        }
+        let direct = self.out_of_reach(grid, &place, progress)?;
         let reached: Vec<f64> = (grid.z_m.iter().zip(&direct))
             .filter_map(|(z_m, direct)| direct.is_none().then_some(*z_m))
             .collect();
@@ -232,6 +220,30 @@ impl<'a> SampledField<'a> {
             distinct_radii: 0,
             tabulated: direct.iter().any(Option::is_none),
         })
+    }
+
+    /// Samples at the nodes of the planes that the table does not reach; `None` for the others.
+    fn out_of_reach(
+        &self,
+        grid: &Grid,
+        nodes_m: &[[f64; 2]],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Option<Vec<f64>>>, MapError> {
+        let plane = |z_m: &f64| {
+            progress.check()?;
+            let sampled = if self.holds(grid, *z_m) {
+                None
+            } else {
+                let points: Vec<[f64; 3]> = nodes_m.iter().map(|[x, y]| [*x, *y, *z_m]).collect();
+                let series = self.sampler.drives() * series(self.components);
+                let mut out = vec![0.0; series * nodes_m.len()];
+                self.sampler.sample(&points, self.components, &mut out)?;
+                Some(out)
+            };
+            progress.advance(1);
+            Ok(sampled)
+        };
+        grid.z_m.iter().map(plane).collect()
     }
 
     /// Whether the table reaches the plane of `grid` at `z_m`.

@@ -46,18 +46,8 @@ pub fn interpolation_error(
     interpolation_error_by(&direct, coils, grid, gz)
 }
 
-/// Compares the interpolated dB_z/dz ([coil, z, y, x] on `grid`) with direct values in the
-/// middle of cells, faces and edges, in the four lowest layers and the highest, for
-/// the innermost and the outermost coil.
-///
-/// # Errors
-/// Those of `direct`.
-pub fn interpolation_error_by(
-    direct: Direct<'_>,
-    coils: &[PlacedCoil],
-    grid: &Grid,
-    gz: &[f64],
-) -> Result<InterpolationError, MapError> {
+/// The middles of cells, faces and edges in the layers that decide.
+fn staggered(grid: &Grid) -> [Grid; 7] {
     let [x, y, z] = [&grid.x_m, &grid.y_m, &grid.z_m];
     let middles = |nodes: &[f64]| -> Vec<f64> {
         if nodes.len() < 2 {
@@ -78,7 +68,7 @@ pub fn interpolation_error_by(
             .map(|(_, z)| z)
             .collect()
     };
-    let staggered = [
+    [
         (middles(x), middles(y), middles(z)),
         // Where the errors along two axes have the sign that the third's has not.
         (x.clone(), middles(y), middles(z)),
@@ -92,7 +82,22 @@ pub fn interpolation_error_by(
         x_m,
         y_m,
         z_m: layers(z_m),
-    });
+    })
+}
+
+/// Compares the interpolated dB_z/dz ([coil, z, y, x] on `grid`) with direct values in the
+/// middle of cells, faces and edges, in the four lowest layers and the highest, for
+/// the innermost and the outermost coil.
+///
+/// # Errors
+/// Those of `direct`.
+pub fn interpolation_error_by(
+    direct: Direct<'_>,
+    coils: &[PlacedCoil],
+    grid: &Grid,
+    gz: &[f64],
+) -> Result<InterpolationError, MapError> {
+    let [x, y, z] = [&grid.x_m, &grid.y_m, &grid.z_m];
     let nodes = x.len() * y.len() * z.len();
     let watched = innermost_and_outermost(coils, grid);
     let placed: Vec<PlacedCoil> = watched.iter().map(|coil| coils[*coil]).collect();
@@ -100,7 +105,7 @@ pub fn interpolation_error_by(
         largest: 0.0,
         samples: 0,
     };
-    for places in staggered {
+    for places in staggered(grid) {
         let exact = direct(&placed, &places)?;
         let plane = places.x_m.len() * places.y_m.len();
         let stencils = |nodes: &[f64], at: &[f64]| -> Vec<lagrange::Stencil> {

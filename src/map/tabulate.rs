@@ -5,6 +5,7 @@
 //! the direct sums once it is the cheaper of the two.
 
 use serde::{Deserialize, Serialize};
+use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
 use rayon::prelude::*;
 
@@ -17,15 +18,48 @@ use fluxform_field::winding::{AxialField, OnEdge};
 use fluxform_numerics::chebyshev::{Evaluation, Layout};
 use fluxform_numerics::dispatch;
 
-/// What a map holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// The components of a map. The name in artefacts and on the command line is the variant's in lower
+/// case, its meaning the first line of the variant's comment.
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Default,
+    EnumMessage,
+    EnumString,
+    IntoStaticStr,
+    VariantArray,
+    Serialize,
+)]
+#[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Components {
-    /// dB_z/dz.
+    /// dBz/dz
+    #[default]
     Gz,
-    /// dB_z/dz and the whole gradient tensor.
+    /// dBz/dz and the gradient tensor
     Gradient,
-    /// dB_z/dz, the gradient tensor and the field.
+    /// dBz/dz, the gradient tensor and the field
     All,
+}
+
+impl Components {
+    /// All of them.
+    pub const ALL: &[Self] = Self::VARIANTS;
+
+    /// The name in artefacts and on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+
+    /// The components in words.
+    #[must_use]
+    pub fn meaning(self) -> &'static str {
+        self.get_documentation().unwrap_or_default()
+    }
 }
 
 /// Maps per ampere of every coil over a grid, C order.
@@ -93,6 +127,23 @@ const TABLE_GAIN: usize = 4;
 /// Share of the tolerance given to the direct sums; the table takes as much, rounding the rest.
 const SHARE: f64 = 0.4;
 
+/// `N` numbers of every node's field, times the coil's gain.
+fn spread<const N: usize>(
+    (planes, plane): (usize, usize),
+    of: impl Fn(usize, usize) -> (f64, [f64; N]) + Sync,
+) -> Vec<f64> {
+    let mut out = vec![0.0; planes * plane * N];
+    out.par_chunks_mut(N * plane.max(1))
+        .enumerate()
+        .for_each(|(piece, out)| {
+            for (place, values) in out.as_chunks_mut::<N>().0.iter_mut().enumerate() {
+                let (gain, numbers) = of(piece, place);
+                *values = numbers.map(|number| gain * number);
+            }
+        });
+    out
+}
+
 /// Maps of identical `coils`, each with `source` about its axis, over `grid`, every component to
 /// `tolerance` relative to the largest |grad B| at its height. The bytes do not depend on the
 /// number of threads.
@@ -147,22 +198,6 @@ pub fn tabulate(
             coils[coil].gain,
         )
     };
-    // `N` numbers of every node's field, times the coil's gain.
-    fn spread<const N: usize>(
-        (planes, plane): (usize, usize),
-        of: impl Fn(usize, usize) -> (f64, [f64; N]) + Sync,
-    ) -> Vec<f64> {
-        let mut out = vec![0.0; planes * plane * N];
-        out.par_chunks_mut(N * plane.max(1))
-            .enumerate()
-            .for_each(|(piece, out)| {
-                for (place, values) in out.as_chunks_mut::<N>().0.iter_mut().enumerate() {
-                    let (gain, numbers) = of(piece, place);
-                    *values = numbers.map(|number| gain * number);
-                }
-            });
-        out
-    }
     let size = (planes, plane);
     let gradient = (components != Components::Gz).then(|| {
         spread::<9>(size, |piece, place| {

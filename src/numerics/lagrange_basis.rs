@@ -13,6 +13,12 @@ pub struct Basis {
 }
 
 impl Basis {
+    /// Number of nodes.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.nodes.len()
+    }
+
     /// The basis on the nodes of `rule`.
     #[must_use]
     pub fn new(rule: &Rule) -> Self {

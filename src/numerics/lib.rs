@@ -17,6 +17,7 @@ pub mod least_squares;
 pub mod log_rule;
 pub mod matrix;
 pub mod qr;
+pub mod random;
 pub mod real;
 pub mod refinement;
 pub mod ring_functions;

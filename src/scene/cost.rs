@@ -8,6 +8,7 @@ use super::steel::{self, COUPLED_TOLERANCE};
 use crate::design::Design;
 use crate::field::steel::array::closest_m;
 use crate::field::steel::array_cost::ArrayCost;
+use crate::field::steel::passive::coupling_tolerance;
 pub use crate::map::Components;
 use crate::shape::document::{AxisRequest, ShapeDocument};
 
@@ -34,6 +35,8 @@ pub struct Cost {
     pub cpu_seconds: f64,
     /// How to make it smaller.
     pub reduce: &'static str,
+    /// The error that is left whatever the effort, and the tolerance that it exceeds.
+    pub misses: Option<(f64, f64)>,
 }
 
 /// A table of `components` over the workspace of `design`.
@@ -53,6 +56,7 @@ pub fn of_map(design: &Design, components: Components) -> Cost {
         bytes: MAP_VALUE_BYTES * parts * coils as f64 * product(&samples),
         cpu_seconds: 0.0,
         reduce: "ask for fewer samples under [workspace], or for fewer components",
+        misses: None,
     }
 }
 
@@ -65,6 +69,7 @@ pub fn of_vector_field(design: &Design, nodes: usize) -> Cost {
         bytes: VECTOR_VALUE_BYTES * 3.0 * coils as f64 * product(&[nodes; 3]),
         cpu_seconds: 0.0,
         reduce: "ask for fewer --vfield-nodes",
+        misses: None,
     }
 }
 
@@ -81,6 +86,7 @@ pub fn of_points(shape: &ShapeDocument, coils: usize) -> Cost {
         bytes: (POINT_BYTES + FORCE_BYTES * coils as f64) * product(&samples),
         cpu_seconds: 0.0,
         reduce: "ask for fewer points (x_mm and y_mm under [points], or --grid)",
+        misses: None,
     }
 }
 
@@ -93,6 +99,7 @@ pub fn of_probe(design: &Design, points: usize, components: usize) -> Cost {
         bytes: PROBE_VALUE_BYTES * product(&[coils, points, components]),
         cpu_seconds: 0.0,
         reduce: "ask for fewer points, or for --components gz",
+        misses: None,
     }
 }
 
@@ -104,18 +111,44 @@ pub fn of_steel(design: &Design, tolerance: Option<f64>) -> Option<Cost> {
     }
     let scene = Scene::new(design).ok()?;
     let positions_m = &design.array.positions_m;
+    let tolerance = tolerance.unwrap_or(COUPLED_TOLERANCE);
     let cost = ArrayCost::new(
         scene.core.as_ref()?.shape,
         scene.winding.length_m,
         positions_m,
         closest_m(positions_m),
-        tolerance.unwrap_or(COUPLED_TOLERANCE),
+        tolerance,
     );
     Some(Cost {
         what: format!("the steel of {} coupled cores", positions_m.len()),
         bytes: cost.bytes,
         cpu_seconds: cost.operations / OPERATIONS_PER_S,
         reduce: "use fewer coils, shorter cores, a larger --tolerance, or coupling = \"none\"",
+        misses: (cost.least_error > tolerance).then_some((cost.least_error, tolerance)),
+    })
+}
+
+/// The pull of a coupled array's unpowered steel, to `tolerance` of it; `None` where the design leaves it
+/// out (then few cores are coupled), or does not say enough.
+#[must_use]
+pub fn of_pull(design: &Design, tolerance: f64) -> Option<Cost> {
+    if !design.magnet.passive_force || !steel::coupled(design) {
+        return None;
+    }
+    let scene = Scene::new(design).ok()?;
+    let positions_m = &design.array.positions_m;
+    let cost = ArrayCost::of_pull(
+        scene.core.as_ref()?.shape,
+        positions_m,
+        closest_m(positions_m),
+        coupling_tolerance(tolerance),
+    );
+    Some(Cost {
+        what: format!("the pull of {} coupled cores", positions_m.len()),
+        bytes: cost.bytes,
+        cpu_seconds: cost.operations / OPERATIONS_PER_S,
+        reduce: "use fewer coils, coupling = \"none\", or leave the pull out (passive_force = false)",
+        misses: None,
     })
 }
 

@@ -1,5 +1,5 @@
-//! How exact the quadratures of coils that answer to themselves alone turned out to be, by direct
-//! values.
+//! How exact quadratures turned out to be: those of coils that answer to themselves alone by direct
+//! values, those of a magnet's volume by much finer ones.
 //!
 //! The rules' a-priori bounds hold everywhere and are careful: what they are at a few places is
 //! some hundred times better. Both are stated, the sampled one as the estimate.
@@ -7,6 +7,7 @@
 use super::Scene;
 use super::steel::{Solved, Steel};
 use crate::field::winding::{AxialField, OnEdge};
+use crate::progress::Silent;
 
 /// The estimate is this multiple of the largest difference that was found.
 const SAFETY: f64 = 30.0;
@@ -14,6 +15,11 @@ const SAFETY: f64 = 30.0;
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Places at which values are compared.
 pub(crate) const PLACES: usize = 48;
+
+/// Points at which forces are compared with finer ones.
+const FORCE_PLACES: usize = 12;
+/// Their tolerance, relative to that of the forces.
+const FINER_FORCES: f64 = 0.01;
 
 /// A value of dB_z/dz per ampere to be compared.
 pub(crate) struct Sample {
@@ -62,6 +68,54 @@ pub(crate) fn sharper(
         count += 1;
         largest = largest.max((gz - here.dbz_dz).abs() / on_axis.gradient_norm());
     }
+    sampled(largest, direct, count, proven)
+}
+
+/// `proven`, a bound a priori of `forces_n_per_a` at `points_m` ([point, coil]), with what forces to a
+/// hundredth of the tolerance say in its place: for a magnet that is no point, whose rules' bounds are
+/// the most careful ones.
+pub(crate) fn sharper_by_finer(
+    scene: &Scene,
+    solved: &Solved,
+    points_m: &[[f64; 3]],
+    forces_n_per_a: &[f64],
+    proven: Evaluation,
+) -> Evaluation {
+    let Some(driven) = scene.coils.iter().position(|coil| coil.gain != 0.0) else {
+        return proven;
+    };
+    let coils = scene.coils.len();
+    let heights = points_m.iter().map(|place| place[2]).enumerate();
+    // The lowest is where rules err most.
+    let lowest = heights.min_by(|a, b| a.1.total_cmp(&b.1));
+    let mut rows = spread(points_m.len(), FORCE_PLACES);
+    rows.extend(lowest.map(|(row, _)| row));
+    let [axis_x, axis_y] = scene.coils[driven].axis_m;
+    let places: Vec<[f64; 3]> = rows.iter().map(|row| points_m[*row]).collect();
+    let on_axis = places.iter().map(|place| [axis_x, axis_y, place[2]]);
+    let places: Vec<[f64; 3]> = places.iter().copied().chain(on_axis).collect();
+    let finer = Solved {
+        tolerance: FINER_FORCES * solved.tolerance,
+        ..solved.clone()
+    };
+    let Ok(sure) = scene.forces_n_per_a(&finer, &places, &Silent) else {
+        return proven;
+    };
+    let mut largest = 0.0_f64;
+    for (k, row) in rows.iter().enumerate() {
+        // |F| <= |m| |grad B|: no height's largest gradient is below what the force on an axis needs.
+        let size = sure[(rows.len() + k) * coils + driven].abs();
+        let (told, sure) = (&forces_n_per_a[row * coils..], &sure[k * coils..]);
+        for (told, sure) in told.iter().zip(sure).take(coils) {
+            largest = largest.max((told - sure).abs() / size);
+        }
+    }
+    let direct = "forces by rules and fields to a hundredth of the tolerance";
+    sampled(largest, direct, rows.len(), proven)
+}
+
+/// What the `largest` difference at `count` places says, or what is `proven` where that is less.
+fn sampled(largest: f64, direct: &str, count: usize, proven: Evaluation) -> Evaluation {
     let estimate = SAFETY * largest + ROUNDING;
     // Not a number: fields beyond the range of doubles.
     if count == 0 || estimate.is_nan() || estimate >= proven.estimate {

@@ -8,6 +8,7 @@ pub mod maps;
 pub mod neighbours;
 pub mod passive;
 pub mod passive_map;
+mod passive_table;
 pub mod rated;
 pub mod single;
 pub mod sources;

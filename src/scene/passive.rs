@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::Scene;
+use super::passive_table::{region, scattered_z_n};
 use super::steel::coupled;
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
@@ -19,6 +20,8 @@ pub const PASSIVE_TOLERANCE: f64 = 1e-3;
 
 /// The same where the pull is left out: how large it is matters to some digits only.
 pub const LEFT_OUT_TOLERANCE: f64 = 1e-2;
+/// Of it what tabulating the pull may add: digits that are reported are those of the pull itself.
+const TABLE_SHARE: f64 = 0.01;
 /// Most cores whose coupling is worth its memory and time where the pull is left out: both grow as
 /// powers of their number.
 const MOST_COUPLED: usize = 36;
@@ -44,7 +47,8 @@ pub fn left_out_z_n(scene: &Scene, places_m: &[[f64; 3]]) -> Result<Vec<f64>, Ru
     };
     let pull = PassivePull::new(&pulled, LEFT_OUT_TOLERANCE);
     let pull = pull.map_err(|fault| too_close(&pulled, fault))?;
-    Ok(pull.forces_z_n(places_m))
+    let aim = TABLE_SHARE * LEFT_OUT_TOLERANCE;
+    Ok(scattered_z_n(scene, &pull, places_m, aim))
 }
 
 /// The pull wherever the magnet's centre is among `places_m`; `None` without steel. With `alone`
@@ -146,13 +150,7 @@ pub fn direct_z_n(
 /// What the pull's solvers need to know; `None` without steel.
 fn pulled<'a>(scene: &'a Scene, places_m: &[[f64; 3]], alone: bool) -> Option<Pulled<'a>> {
     let core = scene.core.as_ref()?;
-    let range = |axis: usize| {
-        places_m
-            .iter()
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], p| {
-                [lo.min(p[axis]), hi.max(p[axis])]
-            })
-    };
+    let [x_m, y_m, z_m] = region(places_m);
     let magnet = &scene.design.magnet;
     Some(Pulled {
         shape: core.shape,
@@ -168,11 +166,7 @@ fn pulled<'a>(scene: &'a Scene, places_m: &[[f64; 3]], alone: bool) -> Option<Pu
             diameter_m: magnet.diameter_m,
             length_m: magnet.length_m,
         }),
-        region: Region {
-            x_m: range(0),
-            y_m: range(1),
-            z_m: range(2),
-        },
+        region: Region { x_m, y_m, z_m },
     })
 }
 

@@ -237,13 +237,8 @@ mod tests {
 
     #[test]
     fn the_tree_finds_the_pairs_that_all_against_all_find() {
-        let mut state = 11u64;
-        let mut next = |width: f64| {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            width * (state >> 11) as f64 / (1u64 << 53) as f64
-        };
+        let mut random = fluxform_numerics::random::Random::new(11);
+        let mut next = |width: f64| width * random.unit();
         let triangles: Vec<Triangle> = (0..600)
             .map(|_| {
                 let at = [next(1.0), next(1.0), next(1.0)];

@@ -113,6 +113,8 @@ pub fn heights(
                 progress.check()?;
                 let to = (from + STRIDE).min(end);
                 for index in from..to {
+                    // One triangle may lie over thousands of points.
+                    fluxform_base::progress::poll();
                     layer.add(index as u32, &nodes, reach);
                 }
                 progress.advance((to - from) as u64);
@@ -267,7 +269,10 @@ impl<'a> Layer<'a> {
         self.covering
             .par_iter_mut()
             .zip(&other.covering)
-            .for_each(|(mine, theirs)| *mine = higher(triangles, *mine, *theirs));
+            .for_each(|(mine, theirs)| {
+                fluxform_base::progress::poll();
+                *mine = higher(triangles, *mine, *theirs);
+            });
         for (point, touch) in other.touching {
             self.touch(point, touch);
         }
@@ -286,6 +291,7 @@ impl<'a> Layer<'a> {
         self.covering
             .par_iter()
             .map(|hit| {
+                fluxform_base::progress::poll();
                 (hit.triangle != u32::MAX).then(|| Sample {
                     height_m: hit.height,
                     normal: upward_normal(&triangles[hit.triangle as usize]),

@@ -27,6 +27,7 @@ pub fn holes(grid: &Grid, samples: &[Option<Sample>]) -> Vec<usize> {
     let mut outside = vec![false; samples.len()];
     let mut open: Vec<usize> = Vec::new();
     for (index, sample) in samples.iter().enumerate() {
+        fluxform_base::progress::poll();
         let (column, row) = (index % columns, index / columns);
         let border = column == 0 || row == 0 || column + 1 == columns || row + 1 == rows;
         if border && sample.is_none() {
@@ -35,6 +36,7 @@ pub fn holes(grid: &Grid, samples: &[Option<Sample>]) -> Vec<usize> {
         }
     }
     while let Some(index) = open.pop() {
+        fluxform_base::progress::poll();
         for next in neighbours(grid, index).into_iter().flatten() {
             if samples[next].is_none() && !outside[next] {
                 outside[next] = true;

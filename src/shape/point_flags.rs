@@ -217,13 +217,8 @@ mod tests {
     /// Against the places a little beside the point, in every direction.
     #[test]
     fn a_sector_holds_the_directions_that_stay_inside() {
-        let mut state = 5u64;
-        let mut next = || {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            (state >> 33) as f64 % 19.0 - 9.0
-        };
+        let mut random = fluxform_numerics::random::Random::new(5);
+        let mut next = || random.below(19) as f64 - 9.0;
         let mut looked = 0;
         for _ in 0..200 {
             // Even numbers: the middle of a side is exact.

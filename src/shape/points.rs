@@ -289,6 +289,7 @@ fn mark(
             if row % MARKED_BETWEEN_LOOKS == 0 {
                 progress.check()?;
             }
+            fluxform_base::progress::poll();
             let found = probe.at([points.x_m[row], points.y_m[row]]);
             Ok(Marks {
                 filled: filled.binary_search(&points.grid_index[row]).is_ok(),
@@ -380,6 +381,7 @@ fn collect(
     let (x, y) = (grid.x_m.nodes(), grid.y_m.nodes());
     let (mut below, mut lowest_m) = (0, 0.0f64);
     for (index, sample) in samples.iter().enumerate() {
+        fluxform_base::progress::poll();
         let Some(sample) = sample else { continue };
         if sample.height_m < -rounding_m {
             below += 1;

@@ -278,10 +278,11 @@ fn folders() -> Vec<String> {
     folders.collect()
 }
 
-/// The members of the workspace, by their folders' names.
+/// The members of the workspace that compute, by their folders' names: all but what tests share.
 pub fn members() -> BTreeSet<String> {
     let name = |folder: &String| folder.rsplit('/').next().unwrap().to_owned();
-    folders().iter().map(name).collect()
+    let computes = |folder: &&String| *folder != "tests/support";
+    folders().iter().filter(computes).map(name).collect()
 }
 
 /// The manifests of all packages.
@@ -337,6 +338,16 @@ pub fn sources() -> Vec<Source> {
             let within = path.strip_prefix("src/").or(suite)?;
             Some(Source::new(within, &read(path)))
         })
+        .collect()
+}
+
+/// The Rust files that tests share.
+pub fn shared_by_tests() -> Vec<Source> {
+    let shared = |path: &String| path.starts_with("tests/support/") && path.ends_with(".rs");
+    let within = |path: &String| path.strip_prefix("tests/").unwrap().to_owned();
+    let paths = files().into_iter().filter(shared);
+    paths
+        .map(|path| Source::new(&within(&path), &read(&path)))
         .collect()
 }
 

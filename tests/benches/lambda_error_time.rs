@@ -22,15 +22,9 @@ use fluxform::numerics::axis::Axis;
 use fluxform::progress::Silent;
 use fluxform::scene::Scene;
 use fluxform::scene::steel;
+use fluxform_testing::force_problems::{Case, D, d};
+use fluxform_testing::least_error::Search;
 use serde_json::{Value, json};
-
-#[path = "../lambda/case.rs"]
-mod case;
-#[path = "../lambda/search.rs"]
-mod search;
-
-use case::{Case, D, d};
-use search::Search;
 
 type Failure = Box<dyn Error + Send + Sync>;
 

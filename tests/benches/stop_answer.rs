@@ -4,10 +4,6 @@
 #![allow(clippy::print_stdout)] // the table
 #![allow(clippy::disallowed_methods)] // own files, and wall time
 
-#[allow(dead_code)]
-#[path = "../shape/samples.rs"]
-mod samples;
-
 use std::collections::BTreeSet;
 use std::fs;
 use std::io::Read;
@@ -15,6 +11,9 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
+
+use fluxform_testing::run::program_or_other;
+use fluxform_testing::surface_files;
 
 /// When the signals are sent, s.
 const AFTER_S: [f64; 8] = [0.1, 0.3, 0.6, 1.0, 1.7, 3.0, 5.0, 8.0];
@@ -206,8 +205,7 @@ const LOCKED: &str = "locked";
 const BODIES: usize = 600;
 
 fn main() {
-    let binary = std::env::var("FLUXFORM_OTHER")
-        .unwrap_or_else(|_| env!("CARGO_BIN_EXE_fluxform").to_owned());
+    let binary = program_or_other().display().to_string();
     let only = std::env::args().skip(1).find(|arg| !arg.starts_with("--"));
     let folder = tempfile::tempdir().unwrap();
     prepare(&binary, folder.path());
@@ -288,7 +286,7 @@ fn peak(child: &Child) -> u64 {
 
 /// The sample of a box in STEP many times in a row, as the bodies of one part.
 fn boxes() -> String {
-    let text = String::from_utf8(samples::step()).unwrap();
+    let text = String::from_utf8(surface_files::step()).unwrap();
     let (head, rest) = text.split_once("DATA;\n").unwrap();
     let (data, tail) = rest.split_once("ENDSEC;").unwrap();
     let lines: Vec<&str> = data.lines().collect();

@@ -6,7 +6,7 @@ use std::fmt;
 use fluxform::bundle::npz::{MapArrays, from_npz};
 use serde_json::Value;
 
-use crate::place::Tree;
+use fluxform_testing::tree::Tree;
 
 /// What no artefact claims to be better than: the tolerance of fields in air.
 const LEAST: f64 = 1e-12;

@@ -8,8 +8,39 @@ use fluxform::bundle::artefact::sha256_hex;
 use fluxform::bundle::json::to_json;
 use fluxform::bundle::load::Bundle;
 
-use crate::loaders::c_loader;
-use crate::sample::*;
+use fluxform_testing::bundle::*;
+use fluxform_testing::loaders::c_loader;
+use fluxform_testing::needs::{self, Trial};
+use fluxform_testing::run::Ran;
+use fluxform_testing::{root, trials};
+
+pub fn trials() -> Vec<Trial> {
+    trials! {
+        None => [
+            the_library_refuses_malformed_archives,
+            files_of_holes_are_refused_by_the_library_before_they_are_read,
+        ],
+        needs::numpy() => [
+            python_refuses_malformed_archives,
+            files_of_holes_are_refused_by_python_before_they_are_read,
+        ],
+        needs::c_compiler() => [
+            c_refuses_malformed_archives,
+            files_of_holes_are_refused_by_c_before_they_are_read,
+        ],
+        needs::octave() => [octave_refuses_malformed_archives],
+    }
+}
+
+/// The Python loader as a program.
+pub fn python_loads(bundle: &Path) -> Ran {
+    let mut python = Command::new("python3");
+    python
+        .arg(root().join("scripts/load_bundle.py"))
+        .arg(bundle);
+    python.env("PYTHONDONTWRITEBYTECODE", "1");
+    Ran::of(python.output().unwrap())
+}
 
 /// A good archive taken apart.
 #[derive(Clone)]
@@ -180,9 +211,8 @@ for k = 1:numel(folders)
     end
 end";
 
-#[test]
-fn all_loaders_refuse_the_same_malformed_archives() {
-    let folder = temporary();
+fn the_library_refuses_malformed_archives() {
+    let folder = tempfile::tempdir().unwrap();
     let bundles = malformed(folder.path());
     let read: Vec<&str> = bundles
         .iter()
@@ -191,56 +221,51 @@ fn all_loaders_refuse_the_same_malformed_archives() {
         .collect();
     assert_eq!(read, [""; 0], "the library reads them");
     Bundle::open(&folder.path().join("good")).unwrap();
-    if has_numpy() {
-        for (name, target) in &bundles {
-            let mut python = Command::new("python3");
-            python.arg(scripts().join("load_bundle.py")).arg(target);
-            let output = python.env("PYTHONDONTWRITEBYTECODE", "1").output().unwrap();
-            let words = String::from_utf8_lossy(&output.stderr).into_owned();
-            assert_eq!(output.status.code(), Some(3), "Python, {name}: {words}");
-            assert!(words.contains("map.npz"), "Python, {name}: {words}");
-        }
-    } else {
-        eprintln!("skipped: no python3 with numpy");
+}
+
+fn python_refuses_malformed_archives() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, target) in malformed(folder.path()) {
+        let ran = python_loads(&target);
+        assert_eq!(ran.code, Some(3), "{name}: {}", ran.err);
+        assert!(ran.err.contains("map.npz"), "{name}: {}", ran.err);
     }
-    match c_loader(folder.path(), &[]) {
-        Some(program) => {
-            for (name, target) in &bundles {
-                let mut c = Command::new(&program);
-                let output = c.arg(target.join("map.npz")).output().unwrap();
-                assert_eq!(output.status.code(), Some(3), "C, {name}");
-            }
-        }
-        None => eprintln!("skipped: no C compiler"),
+}
+
+fn c_refuses_malformed_archives() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = c_loader(folder.path(), &[]);
+    for (name, target) in malformed(folder.path()) {
+        let output = Command::new(&program).arg(target.join("map.npz")).output();
+        assert_eq!(output.unwrap().status.code(), Some(3), "{name}");
     }
+}
+
+fn octave_refuses_malformed_archives() {
+    let folder = tempfile::tempdir().unwrap();
+    let bundles = malformed(folder.path());
     let folders: String = std::iter::once(folder.path().join("good"))
         .chain(bundles.iter().map(|(_, target)| target.clone()))
         .map(|target| format!("{}\n", target.display()))
         .collect();
     fs::write(folder.path().join("folders.txt"), folders).unwrap();
-    let octave = Command::new("octave-cli")
+    let output = Command::new("octave-cli")
         .args(["--norc", "--quiet", "--eval", OCTAVE])
-        .env("FLUXFORM_SCRIPTS", scripts())
+        .env("FLUXFORM_SCRIPTS", root().join("scripts"))
         .current_dir(folder.path())
-        .output();
-    match octave {
-        Ok(output) => {
-            let told = String::from_utf8_lossy(&output.stdout).into_owned();
-            let mut answers = told.lines();
-            assert_eq!(answers.next(), Some("read"), "{told}");
-            for (name, _) in &bundles {
-                assert_eq!(answers.next(), Some("fluxform:bundle"), "Octave, {name}");
-            }
-        }
-        Err(_) => eprintln!("skipped: no octave-cli (Debian: octave)"),
+        .output()
+        .unwrap();
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    let mut answers = printed.lines();
+    assert_eq!(answers.next(), Some("read"), "{printed}");
+    for (name, _) in &bundles {
+        assert_eq!(answers.next(), Some("fluxform:bundle"), "{name}");
     }
 }
 
 /// A file of holes took the memory that it claims to need.
-#[cfg(target_os = "linux")]
-#[test]
-fn files_of_holes_are_refused_by_all_loaders_before_they_are_read() {
-    let folder = temporary();
+fn bundles_with_holes(refuse: impl Fn(&Path, &str)) {
+    let folder = tempfile::tempdir().unwrap();
     let sample = sample(false, [4, 4, 4]);
     for (name, bytes) in [
         ("map.npz", 6_000_000_000),
@@ -265,37 +290,47 @@ fn files_of_holes_are_refused_by_all_loaders_before_they_are_read() {
             }),
         }
         fs::write(target.join("manifest.json"), to_json(&manifest).unwrap()).unwrap();
-        let error = Bundle::open(&target).unwrap_err().to_string();
+        refuse(&target, name);
+    }
+}
+
+fn files_of_holes_are_refused_by_the_library_before_they_are_read() {
+    bundles_with_holes(|target, _| {
+        let error = Bundle::open(target).unwrap_err().to_string();
         assert!(
             error.contains("holes") || error.contains("at most"),
             "{error}"
         );
-        if has_numpy() {
-            // 2 GB of address space are too few to read any of them.
-            let command = "ulimit -v 2000000; exec python3 \"$0\" \"$1\"";
-            let mut python = Command::new("sh");
-            python
-                .args(["-c", command])
-                .arg(scripts().join("load_bundle.py"))
-                .arg(&target);
-            python.env("OPENBLAS_NUM_THREADS", "1");
-            let output = python.env("PYTHONDONTWRITEBYTECODE", "1").output().unwrap();
-            let words = String::from_utf8_lossy(&output.stderr).into_owned();
-            assert_eq!(output.status.code(), Some(3), "{words}");
-            assert!(
-                words.contains("holes") || words.contains("4 GiB"),
-                "{words}"
-            );
+    });
+}
+
+fn files_of_holes_are_refused_by_python_before_they_are_read() {
+    bundles_with_holes(|target, _| {
+        // 2 GB of address space are too few to read any of them.
+        let mut python = Command::new("sh");
+        python
+            .args(["-c", "ulimit -v 2000000; exec python3 \"$0\" \"$1\""])
+            .arg(root().join("scripts/load_bundle.py"))
+            .arg(target)
+            .env("OPENBLAS_NUM_THREADS", "1")
+            .env("PYTHONDONTWRITEBYTECODE", "1");
+        let ran = Ran::of(python.output().unwrap());
+        assert_eq!(ran.code, Some(3), "{}", ran.err);
+        assert!(
+            ran.err.contains("holes") || ran.err.contains("4 GiB"),
+            "{}",
+            ran.err
+        );
+    });
+}
+
+fn files_of_holes_are_refused_by_c_before_they_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = c_loader(folder.path(), &[]);
+    bundles_with_holes(|target, name| {
+        if name == "map.npz" {
+            let output = Command::new(&program).arg(target.join(name)).output();
+            assert_eq!(output.unwrap().status.code(), Some(3));
         }
-        if name == "map.npz"
-            && let Some(program) = c_loader(folder.path(), &[])
-        {
-            let output = Command::new(program)
-                .arg(target.join(name))
-                .output()
-                .unwrap();
-            let words = String::from_utf8_lossy(&output.stderr).into_owned();
-            assert_eq!(output.status.code(), Some(3), "{words}");
-        }
-    }
+    });
 }

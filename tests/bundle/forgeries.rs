@@ -12,7 +12,7 @@ use fluxform::bundle::manifest::{LeftOut, MadeWith, Manifest};
 use fluxform::bundle::npz::{MapArrays, to_npz};
 use fluxform::bundle::rendering::HeightGrid;
 use fluxform::bundle::seal::to_record;
-use fluxform::bundle::table::{CurrentRow, PointRow, write_currents, write_points};
+use fluxform::bundle::table::{CurrentRow, PointRow, write_rows};
 use fluxform::commands::calibrate::{self, CalibrateOptions};
 use fluxform::commands::verify::{Verifier, VerifyOptions};
 use fluxform::design::{Design, Need};
@@ -20,8 +20,6 @@ use fluxform::lambda::Criterion;
 use fluxform::progress::Silent;
 use fluxform::scene::sources::{DesignSource, ShapeSource};
 use fluxform::shape::document::ShapeDocument;
-
-use crate::sample::temporary;
 
 const DESIGN: &str = "name = \"small\"\n[coil]\ninner_diameter_mm = 24\nouter_diameter_mm = 38\n\
                       length_mm = 70\n[wire]\ndiameter_mm = 0.7\n[array]\nrows = 1\ncolumns = 2\n\
@@ -101,10 +99,15 @@ impl Parts {
         map.extend(&self.behind);
         let mut files = BTreeMap::from([("map.npz".to_owned(), map)]);
         let mut table = Vec::new();
-        write_points(&mut table, &self.points).unwrap();
+        write_rows(&mut table, PointRow::COLUMNS, self.points.iter().copied()).unwrap();
         files.insert("points.csv".to_owned(), table);
         let mut table = Vec::new();
-        write_currents(&mut table, &self.currents).unwrap();
+        write_rows(
+            &mut table,
+            CurrentRow::COLUMNS,
+            self.currents.iter().copied(),
+        )
+        .unwrap();
         files.insert("currents.csv".to_owned(), table);
         files.insert("lambda.json".to_owned(), to_json(&self.lambda).unwrap());
         files.extend(self.others.clone());
@@ -180,6 +183,14 @@ enum Elsewhere {
     Unchecked,
 }
 use Elsewhere::{Noticed, Unchecked};
+use fluxform_testing::needs::Trial;
+use fluxform_testing::trials;
+
+pub fn trials() -> Vec<Trial> {
+    trials! {
+        None => [every_forgery_with_fitting_checksums_is_noticed, a_bundle_of_an_older_schema_is_compared_as_far_as_it_goes, missing_and_changed_inputs_are_stated, every_single_byte_edit_of_a_bundle_is_noticed],
+    }
+}
 
 type Forgery = (&'static str, Elsewhere, fn(&mut Parts));
 
@@ -480,9 +491,8 @@ fn passes(verifier: &mut Verifier, folder: &Path) -> (bool, bool) {
     }
 }
 
-#[test]
 fn every_forgery_with_fitting_checksums_is_noticed() {
-    let folder = temporary();
+    let folder = tempfile::tempdir().unwrap();
     let honest = Parts::of(&calibrated(folder.path(), true));
     let mut verifier = Verifier::default();
     let whole = folder.path().join("whole");
@@ -524,9 +534,67 @@ fn every_forgery_with_fitting_checksums_is_noticed() {
     assert_eq!(missed, []);
 }
 
-#[test]
+/// A bundle as programs before schema 1.4 wrote it: without the run's options, in other words, and with
+/// another piece at the end of the path, as forces that differ within their errors give it.
+fn as_an_older_program_wrote_it(parts: &mut Parts) {
+    for version in [
+        &mut parts.manifest.schema_version,
+        &mut parts.lambda.schema_version,
+    ] {
+        *version = "1.2.0".to_owned();
+    }
+    parts.manifest.made_with = None;
+    for stage in parts.manifest.accuracy.values_mut() {
+        stage.method = "in other words".to_owned();
+        stage.estimate *= 30.0;
+    }
+    parts.lambda.path.pop();
+    parts.others.remove("plots/errors.csv");
+}
+
+/// `verify` once called every difference in wording a fault of the bundle, and the whole of it wrong.
+fn a_bundle_of_an_older_schema_is_compared_as_far_as_it_goes() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut honest = Parts::of(&calibrated(folder.path(), true));
+    as_an_older_program_wrote_it(&mut honest);
+    let run = |parts: &Parts, name: &str, accept_unchecked| {
+        let target = folder.path().join(name);
+        if !target.exists() {
+            parts.write(&target);
+        }
+        let options = VerifyOptions { accept_unchecked };
+        Verifier::default()
+            .verify(&target, options, &Silent)
+            .unwrap()
+    };
+    let report = run(&honest, "older", false);
+    assert!(report.checks.iter().all(|c| c.passed), "{report:?}");
+    assert!(report.checks.len() > 5 && !report.passed, "{report:?}");
+    let parts = report.unchecked.join("\n");
+    for part in ["schema 1.2.0 do not name", "lambda.json path", "method"] {
+        assert!(parts.contains(part), "{part}: {parts}");
+    }
+    assert!(run(&honest, "older", true).passed);
+    let mut forged = honest.clone();
+    forged.manifest.magnet.moment_a_m2[2] *= 1.01;
+    assert!(!run(&forged, "forged magnet", true).passed);
+    let mut forged = honest.clone();
+    forged.lambda.rms_error_n = forged.lambda.rms_error_n.map(|n| 2.0 * n);
+    assert!(!run(&forged, "forged error", true).passed);
+    // With which flags a surface was given it does not state either.
+    let surface = folder.path().join("slope.stl");
+    fs::write(&surface, SHAPE).unwrap();
+    let path = surface.display().to_string();
+    for inputs in [&mut honest.manifest.inputs, &mut honest.lambda.inputs] {
+        inputs[1].path.clone_from(&path);
+    }
+    let unplaced = run(&honest, "unplaced", true);
+    let parts = unplaced.unchecked.join("\n");
+    assert!(unplaced.passed && parts.contains("placed"), "{unplaced:?}");
+}
+
 fn missing_and_changed_inputs_are_stated() {
-    let folder = temporary();
+    let folder = tempfile::tempdir().unwrap();
     let bundle = calibrated(folder.path(), false);
     let run = |accept_unchecked| {
         let options = VerifyOptions { accept_unchecked };
@@ -570,9 +638,8 @@ const SAMPLED: usize = 13;
 /// Bytes of every file changed; of the manifest, which no checksum covers, every byte: replaced,
 /// blanked, removed or doubled in turn. `FLUXFORM_EVERY_EDIT=1` tries all of these and all bits on
 /// every byte of every file.
-#[test]
 fn every_single_byte_edit_of_a_bundle_is_noticed() {
-    let folder = temporary();
+    let folder = tempfile::tempdir().unwrap();
     let bundle = calibrated(folder.path(), false);
     let manifest = Bundle::open(&bundle).unwrap().manifest;
     let mut names: Vec<&str> = manifest.files.iter().map(|f| f.path.as_str()).collect();

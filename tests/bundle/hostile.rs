@@ -2,13 +2,23 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 
 use fluxform::bundle::artefact::sha256_hex;
 use fluxform::bundle::load::{Bundle, BundleError};
 use serde_json::{Value, json};
 
-use crate::sample::*;
+use fluxform_testing::bundle::*;
+use fluxform_testing::needs::{self, Trial};
+use fluxform_testing::trials;
+
+use crate::archives::python_loads;
+
+pub fn trials() -> Vec<Trial> {
+    trials! {
+        None => [hostile_and_damaged_bundles_are_refused, another_minor_version_is_read],
+        needs::numpy() => [python_refuses_hostile_and_damaged_bundles],
+    }
+}
 
 /// A bundle's manifest, edited.
 fn edit_manifest(target: &Path, edit: impl FnOnce(&mut Value)) {
@@ -18,27 +28,17 @@ fn edit_manifest(target: &Path, edit: impl FnOnce(&mut Value)) {
     fs::write(&path, manifest.to_string()).unwrap();
 }
 
-#[test]
-fn hostile_and_damaged_bundles_are_refused() {
+/// Has hostile and damaged bundles refused by the library, and then by `refused`.
+fn hostile_and_damaged_bundles(refused: &dyn Fn(&Path)) {
     let refuse = |edit: &dyn Fn(&Path), words: &str| {
-        let folder = temporary();
+        let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("flat");
         fs::write(folder.path().join("secret"), "0123").unwrap();
         sample(false, [4, 4, 4]).write(&target, false).unwrap();
         edit(&target);
         let error = Bundle::open(&target).unwrap_err().to_string();
         assert!(error.contains(words), "expected {words:?}, got {error:?}");
-        if has_numpy() {
-            let mut python = Command::new("python3");
-            let output = python
-                .arg(scripts().join("load_bundle.py"))
-                .arg(&target)
-                .output()
-                .unwrap();
-            let words = String::from_utf8_lossy(&output.stderr).into_owned();
-            assert_eq!(output.status.code(), Some(3), "Python: {words}");
-            assert!(!words.contains("Traceback"), "{words}");
-        }
+        refused(&target);
     };
     let list = |name: &'static str| {
         move |target: &Path| {
@@ -126,9 +126,20 @@ fn hostile_and_damaged_bundles_are_refused() {
     );
 }
 
-#[test]
+fn hostile_and_damaged_bundles_are_refused() {
+    hostile_and_damaged_bundles(&|_| {});
+}
+
+fn python_refuses_hostile_and_damaged_bundles() {
+    hostile_and_damaged_bundles(&|target| {
+        let ran = python_loads(target);
+        assert_eq!(ran.code, Some(3), "{}", ran.err);
+        assert!(!ran.err.contains("Traceback"), "{}", ran.err);
+    });
+}
+
 fn another_minor_version_is_read() {
-    let folder = temporary();
+    let folder = tempfile::tempdir().unwrap();
     let target = folder.path().join("flat");
     sample(false, [4, 4, 4]).write(&target, false).unwrap();
     edit_manifest(&target, |manifest| {

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 use fluxform::bundle::load::Bundle;
@@ -10,17 +10,38 @@ use fluxform::bundle::npz::MapArrays;
 use fluxform::bundle::replay::Answer;
 use fluxform::commands::replay::renderer::Renderer;
 
-use crate::sample::*;
+use fluxform_testing::bundle::*;
+use fluxform_testing::loaders::c_loader;
+use fluxform_testing::needs::{self, SANITIZERS, Trial};
+use fluxform_testing::{Random, root, trials};
+
+pub fn trials() -> Vec<Trial> {
+    trials! {
+        None => [
+            the_forces_of_the_library_are_those_of_the_field,
+            extreme_limits_are_met_by_the_library,
+        ],
+        needs::numpy() => [
+            python_gives_the_forces_of_the_library,
+            extreme_limits_give_the_same_currents_in_python,
+        ],
+        needs::c_compiler() => [
+            c_gives_the_forces_of_the_library,
+            extreme_limits_give_the_same_currents_in_c,
+        ],
+        needs::sanitizers() => [the_c_loader_survives_damaged_files],
+    }
+}
 
 /// Positions in and slightly around the map; nodes, borders and corners among them.
 fn positions(map: &MapArrays) -> Vec<[f64; 3]> {
-    let mut seed = 7;
+    let mut random = Random::new(7);
     let axes = [&map.x_m, &map.y_m, &map.z_m];
     (0..1000)
         .map(|i| {
             axes.map(|axis| {
                 let (from, to) = (axis[0], axis[axis.len() - 1]);
-                let t = random(&mut seed);
+                let t = random.unit();
                 match (i % 10, axis.len()) {
                     (_, 1) => from,
                     (0, n) => axis[(t * n as f64) as usize],
@@ -45,14 +66,13 @@ fn numbers(line: &str) -> Vec<f64> {
         .collect()
 }
 
-/// Runs a program on the positions as lines of text and parses the forces it prints; `None` when
-/// the program is not there.
-fn forces_from(mut command: Command, at: &[[f64; 3]]) -> Option<Vec<Vec<f64>>> {
+/// Runs a program on the positions as lines of text and parses the forces it prints.
+fn forces_from(mut command: Command, at: &[[f64; 3]]) -> Vec<Vec<f64>> {
     let mut child = command
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()
-        .ok()?;
+        .unwrap();
     let text: String = at
         .iter()
         .map(|p| format!("{} {} {}\n", p[0], p[1], p[2]))
@@ -63,7 +83,7 @@ fn forces_from(mut command: Command, at: &[[f64; 3]]) -> Option<Vec<Vec<f64>>> {
     feeder.join().unwrap().unwrap();
     assert!(output.status.success(), "{command:?} failed");
     let text = String::from_utf8(output.stdout).unwrap();
-    Some(text.lines().map(numbers).collect())
+    text.lines().map(numbers).collect()
 }
 
 const PYTHON_READS_STDIN: &str = "\
@@ -78,40 +98,6 @@ for row, pull, height, currents, force, answer in found:
     height = 0 if np.isnan(height) or code == 2 else height
     print(*map(repr, map(float, [*row, pull, height, code, force, *currents])))
 ";
-
-/// The C loader as a program; `None` without a C compiler.
-pub fn c_loader(folder: &Path, flags: &[&str]) -> Option<PathBuf> {
-    let program = folder.join("replay");
-    let built = Command::new("cc")
-        .args([
-            "-std=c99",
-            "-Wall",
-            "-Wextra",
-            "-Wpedantic",
-            "-Werror",
-            "-O2",
-        ])
-        .args(flags)
-        .args(
-            [
-                "fluxform_replay.c",
-                "fluxform_bundle.c",
-                "fluxform_currents.c",
-            ]
-            .map(|name| scripts().join(name)),
-        )
-        .arg("-o")
-        .arg(&program)
-        .arg("-lm")
-        .status()
-        .ok()?;
-    // Extra flags, such as sanitizers, may be unknown here; the plain build must work.
-    assert!(
-        built.success() || !flags.is_empty(),
-        "the C loader does not compile"
-    );
-    built.success().then_some(program)
-}
 
 /// Where in a line forces per ampere and pull, height, answer, force, and currents begin.
 const PARTS: [usize; 6] = [0, COILS + 1, COILS + 2, COILS + 3, COILS + 4, 2 * COILS + 4];
@@ -148,15 +134,46 @@ fn compare(loader: &str, found: &[Vec<f64>], want: &[Vec<f64>]) {
     );
 }
 
-#[test]
-fn rust_python_and_c_give_the_same_forces() {
+/// Another reader of bundles.
+enum Loader {
+    Python,
+    C,
+}
+
+impl Loader {
+    fn agrees(&self, name: &str, folder: &Path, bundle: &Path, at: &[[f64; 3]], want: &[Vec<f64>]) {
+        let (loader, command) = match self {
+            Self::Python => {
+                let mut python = Command::new("python3");
+                python
+                    .args(["-c", PYTHON_READS_STDIN])
+                    .arg(root().join("scripts"));
+                python.arg(bundle).env("PYTHONDONTWRITEBYTECODE", "1");
+                ("Python", python)
+            }
+            Self::C => {
+                let mut c = Command::new(c_loader(folder, &[]));
+                c.arg(bundle.join("map.npz"));
+                ("C", c)
+            }
+        };
+        compare(
+            &format!("{name}, {loader}"),
+            &forces_from(command, at),
+            want,
+        );
+    }
+}
+
+/// The answers of the library, and of another loader where there is one.
+fn forces_on_samples(other: Option<&Loader>) {
     for (name, tilted, pulled, samples) in [
         ("upright", false, false, [13, 17, 11]),
         ("upright with pull", false, true, [13, 17, 11]),
         ("tilted with pull", true, true, [13, 9, 11]),
         ("short axes", false, true, [2, 3, 1]),
     ] {
-        let folder = temporary();
+        let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("bundle");
         let mut sample = sample(tilted, samples);
         if pulled {
@@ -209,36 +226,27 @@ fn rust_python_and_c_give_the_same_forces() {
                 assert!((found - pull).abs() <= 1e-2 * pull.abs(), "{found} {pull}");
             }
         }
-        if has_numpy() {
-            let mut python = Command::new("python3");
-            python
-                .args(["-c", PYTHON_READS_STDIN])
-                .arg(scripts())
-                .arg(&target);
-            compare(
-                &format!("{name}, Python"),
-                &forces_from(python, &at).unwrap(),
-                &want,
-            );
-        } else {
-            eprintln!("skipped: no python3 with numpy");
-        }
-        match c_loader(folder.path(), &[]) {
-            Some(program) => {
-                let mut c = Command::new(program);
-                c.arg(target.join("map.npz"));
-                compare(&format!("{name}, C"), &forces_from(c, &at).unwrap(), &want);
-            }
-            None => eprintln!("skipped: no C compiler"),
+        if let Some(loader) = other {
+            loader.agrees(name, folder.path(), &target, &at, &want);
         }
     }
 }
 
+fn the_forces_of_the_library_are_those_of_the_field() {
+    forces_on_samples(None);
+}
+
+fn python_gives_the_forces_of_the_library() {
+    forces_on_samples(Some(&Loader::Python));
+}
+
+fn c_gives_the_forces_of_the_library() {
+    forces_on_samples(Some(&Loader::C));
+}
+
 /// Broke: with a lower limit of -1e30 A the C loader answered 8 A where the sum may be 5 A.
-#[test]
-fn extreme_limits_give_the_same_currents_in_all_runtimes() {
-    let folder = temporary();
-    let program = c_loader(folder.path(), &[]);
+fn currents_at_extreme_limits(other: Option<&Loader>) {
+    let folder = tempfile::tempdir().unwrap();
     for (number, (lower, upper, total)) in [
         ([-1e30; 4], [8.0; 4], Some(5.0)),
         ([-1e30, 0.0, 0.0, -1e30], [8.0, 2.0, 1.3, 1e30], Some(5.0)),
@@ -279,26 +287,28 @@ fn extreme_limits_give_the_same_currents_in_all_runtimes() {
                 "{number}: {currents:?}"
             );
         }
-        if has_numpy() {
-            let mut python = Command::new("python3");
-            python
-                .args(["-c", PYTHON_READS_STDIN])
-                .arg(scripts())
-                .arg(&target)
-                .env("PYTHONDONTWRITEBYTECODE", "1");
-            let found = forces_from(python, &at).unwrap();
-            compare(&format!("limits {number}, Python"), &found, &want);
-        }
-        if let Some(program) = &program {
-            let mut c = Command::new(program);
-            c.arg(target.join("map.npz"));
-            compare(
-                &format!("limits {number}, C"),
-                &forces_from(c, &at).unwrap(),
+        if let Some(loader) = other {
+            loader.agrees(
+                &format!("limits {number}"),
+                folder.path(),
+                &target,
+                &at,
                 &want,
             );
         }
     }
+}
+
+fn extreme_limits_are_met_by_the_library() {
+    currents_at_extreme_limits(None);
+}
+
+fn extreme_limits_give_the_same_currents_in_python() {
+    currents_at_extreme_limits(Some(&Loader::Python));
+}
+
+fn extreme_limits_give_the_same_currents_in_c() {
+    currents_at_extreme_limits(Some(&Loader::C));
 }
 
 /// What the library answers at a position, in the order of the other loaders' lines.
@@ -319,37 +329,26 @@ fn answered(bundle: &Bundle, renderer: &mut Renderer, position: [f64; 3]) -> Vec
     line
 }
 
-#[test]
 fn the_c_loader_survives_damaged_files() {
-    let folder = temporary();
-    let Some(program) = c_loader(
-        folder.path(),
-        &[
-            "-g",
-            "-fsanitize=address,undefined",
-            "-fno-sanitize-recover=all",
-        ],
-    ) else {
-        eprintln!("skipped: no C compiler with sanitizers");
-        return;
-    };
+    let folder = tempfile::tempdir().unwrap();
+    let program = c_loader(folder.path(), &["-g", SANITIZERS[0], SANITIZERS[1]]);
     let target = folder.path().join("bundle");
     sample(true, [3, 2, 2])
         .with_pull()
         .write(&target, false)
         .unwrap();
     let bytes = fs::read(target.join("map.npz")).unwrap();
-    let mut seed = 3;
+    let mut random = Random::new(3);
     let damaged = folder.path().join("damaged.npz");
     let directory = bytes.len() - 1900; // names, offsets and sizes of the central directory
     for round in 0..150 {
         let mut edited = bytes.clone();
         match round % 3 {
-            0 => edited.truncate((random(&mut seed) * bytes.len() as f64) as usize),
-            1 => edited[(random(&mut seed) * bytes.len() as f64) as usize] ^= 1 << (round % 8),
+            0 => edited.truncate((random.unit() * bytes.len() as f64) as usize),
+            1 => edited[(random.unit() * bytes.len() as f64) as usize] ^= 1 << (round % 8),
             _ => {
-                let at = directory + (random(&mut seed) * 1890.0) as usize;
-                edited[at..at + 4].fill((random(&mut seed) * 256.0) as u8);
+                let at = directory + (random.unit() * 1890.0) as usize;
+                edited[at..at + 4].fill((random.unit() * 256.0) as u8);
             }
         }
         fs::write(&damaged, &edited).unwrap();

@@ -6,6 +6,19 @@ mod archives;
 mod forgeries;
 mod hostile;
 mod loaders;
-mod sample;
 mod whole;
 mod written;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let rooms = [
+        archives::trials(),
+        forgeries::trials(),
+        hostile::trials(),
+        loaders::trials(),
+        whole::trials(),
+        written::trials(),
+    ];
+    fluxform_testing::needs::run(rooms.into_iter().flatten())
+}

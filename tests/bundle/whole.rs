@@ -11,11 +11,32 @@ use fluxform::bundle::seal::to_record;
 use fluxform::lambda::Criterion;
 use serde_json::json;
 
-use crate::sample::*;
+use fluxform_testing::bundle::*;
+use fluxform_testing::needs::Trial;
+use fluxform_testing::tree::assert_no_leftovers;
+use fluxform_testing::{Random, trials};
 
-#[test]
+pub fn trials() -> Vec<Trial> {
+    trials! {
+        None => [a_bundle_is_replaced_only_when_it_is_ours_and_the_users_files_stay, single_files_are_whole_or_absent, after_a_kill_at_any_moment_the_bundle_is_whole_or_absent, two_runs_on_one_folder_leave_one_whole_bundle, full_disks_are_reported],
+        unbound_by_permissions() => [read_only_folders_are_reported],
+        Some("the test that kills it".to_owned()) => [child_that_writes_until_killed],
+    }
+}
+
+/// Somebody whom permissions bind, where that is somebody else.
+fn unbound_by_permissions() -> Option<String> {
+    let folder = tempfile::tempdir().unwrap();
+    let shut = folder.path().join("shut");
+    fs::create_dir(&shut).unwrap();
+    let mode = std::os::unix::fs::PermissionsExt::from_mode(0o555);
+    fs::set_permissions(&shut, mode).unwrap();
+    let unbound = fs::write(shut.join("probe"), "").is_ok();
+    unbound.then(|| "a user whom permissions bind".to_owned())
+}
+
 fn a_bundle_is_replaced_only_when_it_is_ours_and_the_users_files_stay() {
-    let folder = temporary();
+    let folder = tempfile::tempdir().unwrap();
     let target = folder.path().join("seed/flat");
     let mut sample = sample(false, [4, 4, 4]);
     sample.write(&target, false).unwrap();
@@ -68,9 +89,8 @@ fn a_bundle_is_replaced_only_when_it_is_ours_and_the_users_files_stay() {
     assert_no_leftovers(folder.path());
 }
 
-#[test]
 fn single_files_are_whole_or_absent() {
-    let folder = temporary();
+    let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("new/points.csv");
     let inputs = [Input::of_bytes("a.stl", b"solid")];
     let ours =
@@ -121,11 +141,11 @@ fn single_files_are_whole_or_absent() {
     assert_eq!(fs::read_dir(folder.path().join("new")).unwrap().count(), 2);
 }
 
-#[cfg(unix)]
-#[test]
-fn full_disks_and_read_only_folders_are_told() {
-    use std::os::unix::fs::PermissionsExt;
-    let put = |out: &mut dyn std::io::Write| out.write_all(&[b'x'; 3 << 20]);
+fn put(out: &mut dyn std::io::Write) -> std::io::Result<()> {
+    out.write_all(&[b'x'; 3 << 20])
+}
+
+fn full_disks_are_reported() {
     if Path::new("/dev/full").exists() {
         let error = write(Path::new("/dev/full"), &Overwrite::force(), put).unwrap_err();
         assert!(matches!(error, WriteError::DiskFull { .. }), "{error}");
@@ -133,14 +153,14 @@ fn full_disks_and_read_only_folders_are_told() {
         write(Path::new("/dev/null"), &Overwrite::force(), put).unwrap();
         assert!(!Path::new("/dev/null").metadata().unwrap().is_file());
     }
-    let folder = temporary();
+}
+
+fn read_only_folders_are_reported() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
     let shut = folder.path().join("shut");
     fs::create_dir(&shut).unwrap();
     fs::set_permissions(&shut, fs::Permissions::from_mode(0o555)).unwrap();
-    if fs::write(shut.join("probe"), "").is_ok() {
-        eprintln!("skipped: this user may write into read-only folders");
-        return;
-    }
     let error = write(&shut.join("map.npz"), &Overwrite::force(), put).unwrap_err();
     assert!(matches!(error, WriteError::ReadOnly { .. }), "{error}");
     let error = sample(false, [4, 4, 4])
@@ -150,8 +170,6 @@ fn full_disks_and_read_only_folders_are_told() {
 }
 
 /// The child of the test below: writes the same bundle again and again until it is killed.
-#[test]
-#[ignore = "run by the kill test"]
 fn child_that_writes_until_killed() {
     let Some(target) = std::env::var_os("FLUXFORM_KILL_TARGET") else {
         return;
@@ -162,11 +180,10 @@ fn child_that_writes_until_killed() {
     }
 }
 
-#[test]
 fn after_a_kill_at_any_moment_the_bundle_is_whole_or_absent() {
-    let folder = temporary();
+    let folder = tempfile::tempdir().unwrap();
     let target = folder.path().join("flat");
-    let mut seed = 11;
+    let mut random = Random::new(11);
     let mut present = 0;
     for round in 0..30 {
         let mut child = Command::new(std::env::current_exe().unwrap())
@@ -181,7 +198,7 @@ fn after_a_kill_at_any_moment_the_bundle_is_whole_or_absent() {
             .spawn()
             .unwrap();
         std::thread::sleep(std::time::Duration::from_millis(
-            4 + (random(&mut seed) * 26.0) as u64,
+            4 + (random.unit() * 26.0) as u64,
         ));
         child.kill().unwrap();
         child.wait().unwrap();
@@ -199,9 +216,8 @@ fn after_a_kill_at_any_moment_the_bundle_is_whole_or_absent() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "leftovers");
 }
 
-#[test]
 fn two_runs_on_one_folder_leave_one_whole_bundle() {
-    let folder = temporary();
+    let folder = tempfile::tempdir().unwrap();
     let target = folder.path().join("flat");
     std::thread::scope(|scope| {
         for _ in 0..4 {

@@ -9,11 +9,20 @@ use fluxform::bundle::schema::SCHEMAS;
 use fluxform::bundle::write::{MapFormats, write_map_files};
 use serde_json::Value;
 
-use crate::sample::*;
+use fluxform_testing::bundle::*;
+use fluxform_testing::needs::Trial;
+use fluxform_testing::tree::assert_no_leftovers;
+use fluxform_testing::trials;
 
-#[test]
+pub fn trials() -> Vec<Trial> {
+    trials! {
+        None => [what_is_written_is_read_back_and_written_again_to_the_same_bytes, written_json_fits_the_committed_schemas, contradictions_and_bad_numbers_are_not_written, all_formats_of_a_map],
+        Some("--ignored, as it prints times".to_owned()) => [figures],
+    }
+}
+
 fn what_is_written_is_read_back_and_written_again_to_the_same_bytes() {
-    let folder = temporary();
+    let folder = tempfile::tempdir().unwrap();
     let (first, second) = (
         folder.path().join("x/first"),
         folder.path().join("y/second"),
@@ -55,9 +64,8 @@ fn what_is_written_is_read_back_and_written_again_to_the_same_bytes() {
     );
 }
 
-#[test]
 fn written_json_fits_the_committed_schemas() {
-    let folder = temporary();
+    let folder = tempfile::tempdir().unwrap();
     let target = folder.path().join("bundle");
     let sample = sample(false, [4, 4, 4]);
     let manifest = sample.write(&target, false).unwrap();
@@ -92,9 +100,8 @@ fn written_json_fits_the_committed_schemas() {
     }
 }
 
-#[test]
 fn contradictions_and_bad_numbers_are_not_written() {
-    let folder = temporary();
+    let folder = tempfile::tempdir().unwrap();
     let target = folder.path().join("flat");
     let refuse = |edit: fn(&mut Sample), words: &str| {
         let mut sample = sample(false, [4, 4, 4]);
@@ -140,9 +147,8 @@ fn contradictions_and_bad_numbers_are_not_written() {
     );
 }
 
-#[test]
 fn all_formats_of_a_map() {
-    let folder = temporary();
+    let folder = tempfile::tempdir().unwrap();
     let mut sample = sample(true, [4, 3, 2]);
     let nodes = sample.map.gz_t_per_m_per_a.len();
     sample.map.field_t_per_a = Some((0..3 * nodes).map(|i| (i as f64 * 0.7).sin()).collect());
@@ -211,8 +217,6 @@ fn all_formats_of_a_map() {
 
 /// Times of the stages that a map of nine coils goes through; `cargo test --release --test bundle
 /// -- --ignored --nocapture figures`.
-#[test]
-#[ignore = "prints times"]
 fn figures() {
     use fluxform::bundle::map_table::write_map;
     use fluxform::bundle::npz::{from_npz, to_npz};
@@ -229,7 +233,7 @@ fn figures() {
     sample.map.gz_t_per_m_per_a = (0..9 * nodes)
         .map(|i| (i as f64 * 0.7).sin() * 0.013)
         .collect();
-    let folder = temporary();
+    let folder = tempfile::tempdir().unwrap();
     let time = |what: &str, work: &mut dyn FnMut()| {
         let times: Vec<f64> = (0..7)
             .map(|_| {

@@ -1,12 +1,13 @@
 //! What would take more memory than there is, is refused before anything is computed.
 
-use crate::support::{Place, SEED};
+use crate::SEED;
+use fluxform_testing::place::Place;
 
 /// 7 GB and more of a map, 1e8 points, 1e9 nodes: the run once computed until it was killed.
 #[test]
 fn too_large_a_job_is_refused_at_once() {
     let place = Place::new();
-    let seed = place.seed();
+    let seed = place.text(SEED);
     let fine = seed
         .replace("-50.0, 50.0, 61]", "-50.0, 50.0, 460]")
         .replace("10.0, 80.0, 29]", "10.0, 80.0, 460]");
@@ -61,7 +62,7 @@ fn too_large_a_job_is_refused_at_once() {
 fn a_plan_solves_no_array() {
     let place = Place::new();
     let dense = place
-        .seed()
+        .text(SEED)
         .replace("rows = 3", "rows = 100")
         .replace("columns = 3", "columns = 100")
         .replace("total_current_max_a = 18.0", "")

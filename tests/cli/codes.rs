@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use fluxform::bundle::artefact::sha256_hex;
 
-use crate::support::{Place, SEED};
+use crate::SEED;
+use fluxform_testing::place::Place;
 
 /// Codes that nothing outside brings about at will: a mistake of the program, a machine that starts
 /// no process, and Ctrl-C, which `interrupt.rs` sends. Unit tests hold the first two.
@@ -213,7 +214,7 @@ const CASES: &[Case] = &[
 /// A folder in which every case can be brought about.
 fn prepared() -> Place {
     let place = Place::new();
-    let seed = place.seed();
+    let seed = place.text(SEED);
     place.write("bad.toml", &seed.replace("pitch_mm", "pich_mm"));
     place.write("attract.toml", &seed.replace("\"repel\"", "\"attract\""));
     place.write(
@@ -349,7 +350,7 @@ fn a_summary_that_belongs_to_standard_error_goes_into_the_error() {
     assert_eq!(ran.json()["points"], 1);
     assert_eq!(ran.error()["error"]["code"], "E403");
     // An optimum's design on standard output, its summary and the error on standard error.
-    let seed = place.seed();
+    let seed = place.text(SEED);
     place.write("tight.toml", &seed);
     let args = ["optimize", "tight.toml", "--out", "-", "--format", "json"];
     let ran = place.run(&args).ends(0);

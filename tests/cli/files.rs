@@ -1,6 +1,7 @@
 //! Files: what is replaced, what is refused, and that bytes depend on nothing but the inputs.
 
-use crate::support::{Place, SEED};
+use crate::SEED;
+use fluxform_testing::place::Place;
 
 #[test]
 fn what_is_not_ours_is_replaced_only_with_force() {
@@ -18,7 +19,7 @@ fn what_is_not_ours_is_replaced_only_with_force() {
 
     place.run(&["map", SEED, "--out", "maps"]).ends(0);
     place.run(&["map", SEED, "--out", "maps"]).ends(0);
-    place.write("other.toml", &place.seed().replace("1429", "1400"));
+    place.write("other.toml", &place.text(SEED).replace("1429", "1400"));
     place.run(&["map", "other.toml", "--out", "maps"]).ends(4);
     place
         .run(&["map", "other.toml", "--out", "maps", "--force"])
@@ -187,7 +188,7 @@ fn a_link_named_like_a_folder_put_aside_empties_no_folder() {
         std::os::unix::fs::symlink(&victim, place.path(&format!("{own}/{name}"))).unwrap();
     }
     std::os::unix::fs::symlink(&victim, &kept).unwrap();
-    place.write("other.toml", &place.seed().replace("1429", "1400"));
+    place.write("other.toml", &place.text(SEED).replace("1429", "1400"));
     let before = tree(&place.path("."));
     let refused = ["calibrate", "other.toml", "shapes/flat.toml"];
     place.run(&[&refused[..], &["--no-cache"]].concat()).ends(4);

@@ -2,7 +2,7 @@
 
 use fluxform::bundle::artefact::SCHEMA_VERSION;
 
-use crate::support::Place;
+use fluxform_testing::place::Place;
 
 /// Every command that the program takes, with the commands below it: `sweep`, `sweep plan`.
 fn commands() -> Vec<Vec<String>> {

@@ -7,7 +7,8 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use crate::support::{Place, SEED};
+use crate::SEED;
+use fluxform_testing::place::Place;
 
 fn signal(child: &Child) {
     let sent = Command::new("kill")

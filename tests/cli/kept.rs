@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::support::Place;
+use fluxform_testing::place::Place;
 
 const KEPT: &str = "results/seed/.fluxform-kept";
 const FILES: [&str; 5] = [

@@ -1,12 +1,13 @@
 //! Bad input: the exit code, and a message that says where, what and what to do.
 
-use crate::support::{Place, SEED};
+use crate::SEED;
+use fluxform_testing::place::Place;
 
 #[test]
 fn every_fault_is_shown_with_its_line_and_a_caret() {
     let place = Place::new();
     let text = place
-        .seed()
+        .text(SEED)
         .replace("pitch_mm", "pich_mm")
         .replace("resistance_max_ohm = 6.0", "resistance_max_ohm = -6.0");
     place.write("bad.toml", &text);
@@ -37,7 +38,7 @@ fn every_fault_is_shown_with_its_line_and_a_caret() {
 #[test]
 fn faults_of_all_documents_are_told_in_one_run() {
     let place = Place::new();
-    place.write("design.toml", &place.seed().replace("turns", "tunrs"));
+    place.write("design.toml", &place.text(SEED).replace("turns", "tunrs"));
     place.write("shape.toml", "name = \"a\"\nprimitive = \"flatt\"\n");
     place
         .run(&["calibrate", "design.toml", "shape.toml", "shapes/flat.toml"])
@@ -63,7 +64,7 @@ fn a_warning_stops_nothing_and_quiet_hides_it() {
     place.write(
         "metres.toml",
         &place
-            .seed()
+            .text(SEED)
             .replace("length_max_mm = 100.0", "length_max_mm = 0.1"),
     );
     let ran = place.run(&["evaluate", "metres.toml"]).ends(0);
@@ -233,7 +234,7 @@ fn a_result_not_meets_request_is_told_and_ends_with_4() {
     assert_eq!(ran.error()["error"]["exit_code"], 4);
 
     // A magnet that is only pulled down feels no object.
-    let text = place.seed().replace("\"repel\"", "\"attract\"");
+    let text = place.text(SEED).replace("\"repel\"", "\"attract\"");
     place.write("attract.toml", &text);
     let args = [
         "lambda",

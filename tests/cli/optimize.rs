@@ -2,7 +2,8 @@
 
 use serde_json::Value;
 
-use super::support::{Place, SEED};
+use crate::SEED;
+use fluxform_testing::place::Place;
 
 /// A steel core would take longer, and nothing here depends on it.
 const LIMITS: &str = "name = \"odd\"\n[wire]\ndiameter_mm = 0.7\n[supply]\ncurrent_max_a = 1.3\n";
@@ -160,7 +161,7 @@ fn the_same_bytes_with_any_number_of_threads() {
 #[test]
 fn polarity_decides_the_sign() {
     let place = Place::new();
-    let seed = place.seed();
+    let seed = place.text(SEED);
     place.write("attract.toml", &seed.replace("\"repel\"", "\"attract\""));
     let up = place
         .run(&["optimize", SEED, "--format", "json"])
@@ -179,7 +180,7 @@ fn polarity_decides_the_sign() {
 #[test]
 fn a_sensitivity_is_what_a_little_more_gives() {
     let place = Place::new();
-    let seed = place.seed();
+    let seed = place.text(SEED);
     let force = |limit: f64| {
         let text = seed.replace(
             "resistance_max_ohm = 6.0",
@@ -227,7 +228,7 @@ fn dimensions_can_be_kept() {
 #[test]
 fn a_start_outside_the_limits_changes_nothing() {
     let place = Place::new();
-    let seed = place.seed();
+    let seed = place.text(SEED);
     place.write(
         "far.toml",
         &seed.replace("length_mm = 100.0", "length_mm = 700.0"),

@@ -2,23 +2,9 @@
 
 use serde_json::Value;
 
-use crate::support::{Place, SEED};
-
-/// Uniform numbers of a linear congruence, summed to nearly normal ones.
-struct Noise(u64);
-
-impl Noise {
-    fn normal(&mut self) -> f64 {
-        let mut uniform = || {
-            self.0 = self
-                .0
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (self.0 >> 11) as f64 / (1u64 << 53) as f64
-        };
-        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
-    }
-}
+use crate::SEED;
+use fluxform_testing::Random;
+use fluxform_testing::place::Place;
 
 /// How a scan differs from what the design gives.
 #[derive(Clone)]
@@ -78,7 +64,7 @@ impl Made {
         let mut lines = told.lines().map(|line| line.split(',').collect::<Vec<_>>());
         let header = lines.next().unwrap();
         let rows: Vec<Vec<&str>> = lines.collect();
-        let mut noise = Noise(self.seed);
+        let mut noise = Random::new(self.seed);
         let mut scan = format!("x_m,y_m,z_m,coil,current_a,{}\n", self.columns.join(","));
         for (k, [x, y, z]) in points_m.iter().enumerate() {
             for (coil, gain) in &self.coils {
@@ -207,7 +193,7 @@ fn what_was_changed_is_found_within_the_stated_errors() {
     let told = compare(&place, "scan.csv", &[]);
     let line = told["fit"]["gain_toml"].as_str().unwrap();
     let design = place
-        .seed()
+        .text(SEED)
         .replace("[array]\n", &format!("[array]\n{line}\n"));
     place.write("gained.toml", &design);
     let args = [
@@ -342,7 +328,7 @@ fn the_parameter_at_fault_is_named() {
     let made = Made::new(&FIELD, &coils);
     made.write(&place, "long.csv", &grid());
     let short = place
-        .seed()
+        .text(SEED)
         .replace("length_mm = 100.0", "length_mm = 99.0");
     place.write(
         "short.toml",
@@ -559,7 +545,7 @@ fn scan_of(place: &Place, truth: &str, points_m: &[[f64; 3]], noise_t: f64, seed
         let name = format!("{column}_per_a");
         header.iter().position(|cell| *cell == name).unwrap()
     });
-    let mut noise = Noise(seed);
+    let mut noise = Random::new(seed);
     let mut scan = format!("x_m,y_m,z_m,coil,current_a,{}\n", FIELD.join(","));
     for ([x, y, z], row) in points_m.iter().zip(lines) {
         scan.push_str(&format!("{x},{y},{z},0,1.3"));
@@ -631,9 +617,9 @@ fn large_changes_are_fitted_to_their_end() {
 #[test]
 fn stated_intervals_hold_random_truths() {
     let place = Place::new();
-    let seed = alone(&place.seed());
+    let seed = alone(&place.text(SEED));
     place.write("design.toml", &seed);
-    let mut numbers = Noise(5);
+    let mut numbers = Random::new(5);
     let (mut held, mut tried) = (0, 0);
     for run in 0..24 {
         let (key, value) = [

@@ -1,6 +1,7 @@
 //! Designs with steel: what is refused, what is warned of, what the summaries tell.
 
-use crate::support::{Place, Ran};
+use fluxform_testing::place::Place;
+use fluxform_testing::run::Ran;
 
 const CORED: &str = "designs/seed.toml";
 

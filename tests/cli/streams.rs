@@ -4,7 +4,8 @@ use std::fs::File;
 use std::io::Read;
 use std::process::Stdio;
 
-use crate::support::{Place, SEED};
+use crate::SEED;
+use fluxform_testing::place::Place;
 
 #[test]
 fn json_is_one_object_with_the_fixed_keys() {
@@ -113,7 +114,7 @@ fn quiet_leaves_data_and_errors() {
 #[test]
 fn a_design_and_points_may_come_from_standard_input() {
     let place = Place::new();
-    let seed = place.seed();
+    let seed = place.text(SEED);
     let piped = place.run_with_input(&["evaluate", "-"], &seed).ends(0);
     let read = place.run(&["evaluate", SEED]).ends(0);
     assert_eq!(piped.out, read.out);

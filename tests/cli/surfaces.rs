@@ -1,6 +1,8 @@
 //! Surfaces on the command line: looked at, drawn, enlarged, refused.
 
-use crate::support::Place;
+use fluxform_testing::place::Place;
+
+use crate::SEED;
 
 #[test]
 fn a_file_is_inspected_without_its_unit_and_the_guess_is_never_used() {
@@ -162,7 +164,7 @@ fn factors_that_differ_are_refused_unless_they_are_meant() {
 fn a_force_constant_of_weighted_points_is_held_against_the_grids() {
     let place = Place::new();
     let design = place
-        .seed()
+        .text(SEED)
         .replace("pitch_mm = 50.0", "pitch_mm = 50.0\ncoupling = \"none\"");
     place.write("design.toml", &design);
     let lambda = |flags: &[&str]| {

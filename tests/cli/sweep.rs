@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use crate::support::{Place, SEED};
+use crate::SEED;
+use fluxform_testing::place::Place;
 
 const FILES: [&str; 3] = ["sweep.csv", "sweep.svg", "sweep_pareto.csv"];
 
@@ -117,7 +118,7 @@ fn a_row_is_what_evaluate_says() {
         .ends(0);
     let text: Value = serde_json::from_slice(&place.read(&point("p", 0))).unwrap();
     let design = place
-        .seed()
+        .text(SEED)
         .replace("diameter_mm = 0.7", "diameter_mm = 0.55");
     let design = design.replace("length_mm = 100.0", "length_mm = 70.0");
     place.write("design.toml", &design);

@@ -1,6 +1,6 @@
 //! `verify` of fresh bundles: what calibrate wrote follows from its inputs, whatever was requested.
 
-use crate::support::Place;
+use fluxform_testing::place::Place;
 
 /// The parts of a design that the cases change.
 const AIR: &str = "";

@@ -143,9 +143,9 @@ fn flat(text: &str) -> [f64; 3] {
     let (document, _) = ShapeDocument::read(&here("shapes/flat.toml")).expect("a valid shape");
     let design = read(text, Need::LAMBDA);
     let options = lambda::LambdaOptions::default();
-    let file = lambda::run(&design, &document, Vec::new(), &options, &Silent)
-        .expect("solves")
-        .file;
+    let solved = lambda::run(&design, &document, Vec::new(), &options, &Silent);
+    let (_, report) = solved.expect("solves");
+    let file = report.file;
     [
         file.constants.lambda_linear_n_per_m,
         file.constants.lambda_jnd_n_per_m,

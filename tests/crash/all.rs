@@ -1,4 +1,4 @@
-//! All of `tests/crash.rs` at length, with the figures as a table.
+//! All of `tests/crash` at length, with the figures as a table.
 //!
 //! ```text
 //! cargo bench --locked --bench crash_safety -- [KILLS] [--every 1] [--seed 1]
@@ -13,11 +13,11 @@
 #![allow(clippy::print_stdout, clippy::disallowed_methods, clippy::exit)]
 
 #[cfg(unix)]
+mod changes;
+#[cfg(unix)]
 mod disk;
 #[cfg(unix)]
 mod kill;
-#[cfg(unix)]
-mod place;
 #[cfg(unix)]
 mod scenario;
 #[cfg(unix)]
@@ -65,10 +65,10 @@ fn main() {
 mod unix {
     use crate::disk::{Somebody, file_limit, small_disk};
     use crate::kill::{How, Strike, at_random};
-    use crate::place::Dice;
     use crate::scenario::{MAIN, MORE, Prepared, Scenario};
     use crate::table::{self, Row};
     use crate::together::{RIVALS, asked_to_stop, other_inputs, same_inputs};
+    use fluxform_testing::Random;
 
     /// How calls are struck, and every how many of them.
     const STRIKES: [(How, usize); 6] = [
@@ -84,7 +84,7 @@ mod unix {
     pub struct All {
         kills: usize,
         every: usize,
-        dice: Dice,
+        random: Random,
         pub rows: Vec<Row>,
         pub skipped: Vec<String>,
         /// Where something was left behind that must not be.
@@ -96,7 +96,7 @@ mod unix {
             Self {
                 kills,
                 every,
-                dice: Dice::new(seed),
+                random: Random::new(seed),
                 rows: Vec::new(),
                 skipped: Vec::new(),
                 failed: Vec::new(),
@@ -112,28 +112,28 @@ mod unix {
                 for (number, it) in all.iter().enumerate() {
                     let part = |n: usize| kills * n / all.len();
                     let kills = part(number + 1) - part(number);
-                    self.disturb(it, |it, dice| at_random(it, kills, dice));
+                    self.disturb(it, |it, random| at_random(it, kills, random));
                 }
             }
             let few = self.kills.div_ceil(100).max(2);
             for it in main.iter().chain(&more) {
-                self.disturb(it, |it, dice| small_disk(it, few, dice));
-                self.disturb(it, |it, dice| file_limit(it, few, dice));
+                self.disturb(it, |it, random| small_disk(it, few, random));
+                self.disturb(it, |it, random| file_limit(it, few, random));
                 if let Ok(somebody) = &somebody {
-                    self.disturb(it, |it, dice| somebody.closed(it, few, dice));
+                    self.disturb(it, |it, random| somebody.closed(it, few, random));
                 }
-                self.disturb(it, |it, dice| asked_to_stop(it, 2 * few, dice));
-                self.disturb(it, |it, dice| same_inputs(it, few, dice));
+                self.disturb(it, |it, random| asked_to_stop(it, 2 * few, random));
+                self.disturb(it, |it, random| same_inputs(it, few, random));
             }
             for rivals in RIVALS {
-                let row = other_inputs(rivals, 2 * few, &mut self.dice);
+                let row = other_inputs(rivals, 2 * few, &mut self.random);
                 self.keep(rivals.name, row);
             }
             for it in main.iter().chain(&more) {
                 if let Ok(strike) = &strike {
                     for (how, every) in STRIKES {
                         let every = every * self.every;
-                        self.disturb(it, |it, dice| strike.at_every(it, how, every, dice));
+                        self.disturb(it, |it, random| strike.at_every(it, how, every, random));
                     }
                 }
             }
@@ -156,9 +156,9 @@ mod unix {
         fn disturb(
             &mut self,
             prepared: &Prepared,
-            act: impl FnOnce(&Prepared, &mut Dice) -> Result<Row, String>,
+            act: impl FnOnce(&Prepared, &mut Random) -> Result<Row, String>,
         ) {
-            let row = act(prepared, &mut self.dice);
+            let row = act(prepared, &mut self.random);
             self.keep(prepared.scenario.name, row);
         }
 

@@ -5,9 +5,16 @@ use std::os::unix::fs::{MetadataExt, PermissionsExt, chown};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::place::{Dice, PROGRAM, Place, Ran, after_changes, changes, tree};
-use crate::scenario::{Prepared, same};
+use crate::changes::{after_changes, changes};
+use crate::scenario::Prepared;
 use crate::table::Row;
+use fluxform_testing::{
+    Random,
+    inputs::OUT,
+    place::Place,
+    run::{Ran, program},
+    tree::{same, tree},
+};
 
 /// Runs the arguments on a small disk mounted at `out`, then again on a large one; what lies there
 /// is copied aside after each.
@@ -29,7 +36,7 @@ cp -a out second
 "#;
 
 /// How a folder of its own can be mounted, or why not.
-fn mounter() -> Result<Vec<&'static str>, String> {
+pub fn mounter() -> Result<Vec<&'static str>, String> {
     for way in [&["-m"][..], &["-r", "-m"]] {
         let tried = Command::new("unshare")
             .args(way)
@@ -43,14 +50,14 @@ fn mounter() -> Result<Vec<&'static str>, String> {
 }
 
 /// Disks of `steps` sizes, from nothing to a little more than is needed.
-pub fn small_disk(prepared: &Prepared, steps: usize, dice: &mut Dice) -> Result<Row, String> {
+pub fn small_disk(prepared: &Prepared, steps: usize, random: &mut Random) -> Result<Row, String> {
     let way = mounter()?;
     let pages = |bytes: &Vec<u8>| bytes.len().div_ceil(4096) + 1;
     let before: usize = prepared.before.values().map(pages).sum();
     let after: usize = prepared.after.values().map(pages).sum();
     let mut row = Row::new(prepared.scenario.name, "a tmpfs that fills up");
     for step in 0..steps {
-        let part = (step as f64 + dice.part()) / steps as f64;
+        let part = (step as f64 + random.unit()) / steps as f64;
         let size = 1 + before + (part * 1.1 * after as f64) as usize;
         let place = prepared.fresh();
         let mut command = Command::new("unshare");
@@ -58,48 +65,50 @@ pub fn small_disk(prepared: &Prepared, steps: usize, dice: &mut Dice) -> Result<
             .args(&way)
             .args(["sh", "-c", ON_A_SMALL_DISK, "sh"])
             .arg(format!("{}k", 4 * size))
-            .arg(PROGRAM)
+            .arg(program())
             .args(prepared.scenario.args);
         place.at_home(&mut command);
         let script = command.output().unwrap();
         if !script.status.success() {
-            return Err(format!("the script: {}", Ran::of(script).said));
+            return Err(format!("the script: {}", Ran::of(script).err));
         }
-        let text = |name: &str| fs::read_to_string(place.path().join(name)).unwrap_or_default();
+        let text = |name: &str| fs::read_to_string(place.path(name)).unwrap_or_default();
         let ran = Ran {
             code: text("code").trim().parse().ok(),
-            said: text("said"),
+            out: String::new(),
+            err: text("said"),
         };
         if text("code").trim() == "small" {
             continue;
         }
-        ran.ends(&[0, 4])?;
-        if ran.code == Some(4) && !ran.said.contains("disk is full") {
-            return Err(format!("does not tell that the disk is full: {}", ran.said));
+        ran.ended_with(&[0, 4])?;
+        if ran.code == Some(4) && !ran.err.contains("disk is full") {
+            return Err(format!("does not tell that the disk is full: {}", ran.err));
         }
         row.struck += usize::from(ran.code == Some(4));
-        fs::remove_dir_all(place.out()).unwrap();
-        fs::rename(place.path().join("first"), place.out()).unwrap();
+        fs::remove_dir_all(place.path(OUT)).unwrap();
+        fs::rename(place.path("first"), place.path(OUT)).unwrap();
         let found = prepared.survived_as_it_is(&place)?;
         if found.temporary + found.put_aside + found.empty_folders > 0 {
             return Err(format!(
                 "{found:?} left on a disk of {size} pages: {}",
-                ran.said
+                ran.err
             ));
         }
         let again = Ran {
             code: text("code_again").trim().parse().ok(),
-            said: text("said_again"),
+            out: String::new(),
+            err: text("said_again"),
         };
-        again.ends(&[0])?;
-        same(&tree(&place.path().join("second")), &prepared.after)?;
+        again.ended_with(&[0])?;
+        same(&tree(&place.path("second")), &prepared.after)?;
         row.add(found);
     }
     Ok(row)
 }
 
 /// Files may not grow beyond a limit.
-pub fn file_limit(prepared: &Prepared, steps: usize, dice: &mut Dice) -> Result<Row, String> {
+pub fn file_limit(prepared: &Prepared, steps: usize, random: &mut Random) -> Result<Row, String> {
     // What is kept for the next run may go unkept without a word.
     let artefacts = prepared
         .after
@@ -108,18 +117,18 @@ pub fn file_limit(prepared: &Prepared, steps: usize, dice: &mut Dice) -> Result<
     let largest = artefacts.map(|(_, bytes)| bytes.len()).max().unwrap_or(0);
     let mut row = Row::new(prepared.scenario.name, "a limit on the size of a file");
     for step in 0..steps {
-        let part = (step as f64 + dice.part()) / steps as f64;
+        let part = (step as f64 + random.unit()) / steps as f64;
         let blocks = (part * largest as f64 / 512.0) as usize;
         let place = prepared.fresh();
         let mut command = Command::new("sh");
         command
             .args(["-c", "trap '' XFSZ; ulimit -f $1; shift; exec \"$@\"", "sh"])
             .arg(blocks.to_string())
-            .arg(PROGRAM)
+            .arg(program())
             .args(prepared.scenario.args);
         place.at_home(&mut command);
         let ran = Ran::of(command.output().unwrap());
-        ran.ends(&[0, 4])?;
+        ran.ended_with(&[0, 4])?;
         row.struck += usize::from(ran.code == Some(4));
         row.add(prepared.survived_tidily(&place, &ran)?);
     }
@@ -141,15 +150,15 @@ impl Somebody {
     /// The one who runs the test, or nobody where that is root; the reason where neither can be.
     pub fn new() -> Result<Self, String> {
         let home = Place::empty();
-        let program = home.path().join("fluxform");
+        let linked = home.path("fluxform");
         // Linked where that can be: the program is large.
-        fs::hard_link(PROGRAM, &program)
-            .or_else(|_| fs::copy(PROGRAM, &program).map(drop))
+        fs::hard_link(program(), &linked)
+            .or_else(|_| fs::copy(program(), &linked).map(drop))
             .unwrap();
-        let root = fs::metadata(home.path()).unwrap().uid() == 0;
+        let root = fs::metadata(home.root()).unwrap().uid() == 0;
         let somebody = Self {
             _home: home,
-            program,
+            program: linked,
             steps_down: root,
         };
         let place = Place::empty();
@@ -173,7 +182,7 @@ impl Somebody {
             Command::new(&self.program)
         };
         command.args(args);
-        place.at_home(&mut command);
+        place.quietly(&mut command);
         command
     }
 
@@ -192,43 +201,48 @@ impl Somebody {
     }
 
     /// The folder is closed before the run, or after some of its changes.
-    pub fn closed(&self, prepared: &Prepared, runs: usize, dice: &mut Dice) -> Result<Row, String> {
+    pub fn closed(
+        &self,
+        prepared: &Prepared,
+        runs: usize,
+        random: &mut Random,
+    ) -> Result<Row, String> {
         let mut row = Row::new(prepared.scenario.name, "a folder closed before or half way");
         let mut count = 0;
         for run in 0..=runs + 1 {
             let place = prepared.fresh();
-            self.give(&place.out());
+            self.give(&place.path(OUT));
             let mut command = self.command(&place, prepared.scenario.args);
             if run == 0 {
                 let mut child = command.spawn().unwrap();
-                count = changes(&place.out(), &mut child).max(1);
-                Ran::of(child.wait_with_output().unwrap()).ends(&[0])?;
+                count = changes(&place.path(OUT), &mut child).max(1);
+                Ran::of(child.wait_with_output().unwrap()).ended_with(&[0])?;
                 prepared.agrees(&place)?;
                 continue;
             }
             let child = if run == 1 {
-                close(&place.out());
+                close(&place.path(OUT));
                 command.spawn().unwrap()
             } else {
                 let mut child = command.spawn().unwrap();
-                after_changes(&place.out(), &mut child, 1 + dice.below(count));
-                close(&place.out());
+                after_changes(&place.path(OUT), &mut child, 1 + random.below(count));
+                close(&place.path(OUT));
                 child
             };
             let ran = Ran::of(child.wait_with_output().unwrap());
-            open(&place.out());
-            ran.ends(if run == 1 { &[4] } else { &[0, 4] })?;
-            if ran.code == Some(4) && !ran.said.contains("read-only or belongs to someone else") {
+            open(&place.path(OUT));
+            ran.ended_with(if run == 1 { &[4] } else { &[0, 4] })?;
+            if ran.code == Some(4) && !ran.err.contains("read-only or belongs to someone else") {
                 return Err(format!(
                     "does not tell that the folder is closed: {}",
-                    ran.said
+                    ran.err
                 ));
             }
             row.struck += usize::from(ran.code == Some(4));
             let found = prepared.survived_as_it_is(&place)?;
-            self.give(&place.out());
+            self.give(&place.path(OUT));
             let again = self.command(&place, prepared.scenario.args).output();
-            Ran::of(again.unwrap()).ends(&[0])?;
+            Ran::of(again.unwrap()).ended_with(&[0])?;
             prepared.agrees(&place)?;
             row.add(found);
         }

@@ -1,22 +1,23 @@
 //! SIGKILL at random moments, and right before each call that changes files.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use crate::place::{Dice, Place, Ran, after_changes, changes};
+use crate::changes::{after_changes, changes};
 use crate::scenario::{Found, Prepared};
 use crate::table::Row;
+use fluxform_testing::{Random, inputs::OUT, place::Place, run::Ran};
 
 /// Kills until `wanted` runs were killed; half of the moments are spread evenly over the run, half lie
 /// close behind a change in its folder.
-pub fn at_random(prepared: &Prepared, wanted: usize, dice: &mut Dice) -> Result<Row, String> {
+pub fn at_random(prepared: &Prepared, wanted: usize, random: &mut Random) -> Result<Row, String> {
     let mut row = Row::new(prepared.scenario.name, "SIGKILL at a random moment");
     let changed = {
         let place = prepared.fresh();
-        let mut child = place.command(prepared.scenario.args).spawn().unwrap();
-        let changed = changes(&place.out(), &mut child);
+        let mut child = place.spawn(prepared.scenario.args);
+        let changed = changes(&place.path(OUT), &mut child);
         child.wait().unwrap();
         changed.max(1)
     };
@@ -26,13 +27,13 @@ pub fn at_random(prepared: &Prepared, wanted: usize, dice: &mut Dice) -> Result<
         }
         let place = prepared.fresh();
         let began = Instant::now();
-        let mut child = place.command(prepared.scenario.args).spawn().unwrap();
+        let mut child = place.spawn(prepared.scenario.args);
         if attempt % 2 == 0 {
-            let moment = Duration::from_secs_f64(dice.part() * prepared.seconds);
+            let moment = Duration::from_secs_f64(random.unit() * prepared.seconds);
             sleep(moment.saturating_sub(began.elapsed()));
         } else {
-            after_changes(&place.out(), &mut child, 1 + dice.below(changed));
-            sleep(Duration::from_secs_f64(0.002 * dice.part()));
+            after_changes(&place.path(OUT), &mut child, 1 + random.below(changed));
+            sleep(Duration::from_secs_f64(0.002 * random.unit()));
         }
         child.kill().unwrap();
         let ran = Ran::of(child.wait_with_output().unwrap());
@@ -98,8 +99,8 @@ impl Strike {
             return Err("calls are traced on Linux on x86-64 only".to_owned());
         }
         let folder = Place::empty();
-        let program = folder.path().join("strike");
-        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/crash/strike.c");
+        let program = folder.path("strike");
+        let source = fluxform_testing::root().join("tests/crash/strike.c");
         let made = Command::new("cc")
             .args(["-O1", "-o"])
             .arg(&program)
@@ -122,11 +123,12 @@ impl Strike {
     }
 
     fn run(&self, place: &Place, mode: &str, at: i64, args: &[&str]) -> (Ran, Option<usize>) {
-        let log = place.path().join("calls");
+        let log = place.path("calls");
         let mut command = Command::new(&self.program);
         command
             .arg(&log)
-            .args([mode, &at.to_string(), crate::place::PROGRAM])
+            .args([mode, &at.to_string()])
+            .arg(fluxform_testing::run::program())
             .args(args);
         place.at_home(&mut command);
         let ran = Ran::of(command.output().unwrap());
@@ -141,7 +143,7 @@ impl Strike {
             _ => "count",
         };
         let (ran, calls) = self.run(&prepared.fresh(), mode, i64::MAX, prepared.scenario.args);
-        ran.ends(&[0])?;
+        ran.ended_with(&[0])?;
         calls.ok_or_else(|| "nobody counted the calls".to_owned())
     }
 
@@ -151,10 +153,10 @@ impl Strike {
         prepared: &Prepared,
         how: How,
         every: usize,
-        dice: &mut Dice,
+        random: &mut Random,
     ) -> Result<Row, String> {
         let mut row = Row::new(prepared.scenario.name, how.told());
-        for at in (1 + dice.below(every)..=self.calls(prepared, how)?).step_by(every) {
+        for at in (1 + random.below(every)..=self.calls(prepared, how)?).step_by(every) {
             let place = prepared.fresh();
             let (ran, _) = self.run(&place, how.mode(), at as i64, prepared.scenario.args);
             let found = self.judged(prepared, how, &place, &ran);
@@ -173,9 +175,9 @@ impl Strike {
     ) -> Result<Found, String> {
         match how {
             // Threads may have done a little more, or all of it.
-            How::Kill | How::Renames | How::Plain => ran.ends(&[137, 0])?,
+            How::Kill | How::Renames | How::Plain => ran.ended_with(&[137, 0])?,
             // What is kept for the next run may go unkept without a word.
-            How::Full | How::Denied | How::Broken => ran.ends(&[4, 0])?,
+            How::Full | How::Denied | How::Broken => ran.ended_with(&[4, 0])?,
         }
         if ran.code == Some(4) {
             let words = match how {
@@ -183,8 +185,8 @@ impl Strike {
                 How::Denied => "read-only",
                 _ => "cannot",
             };
-            if !ran.said.contains(words) {
-                return Err(format!("does not say {words:?}: {}", ran.said));
+            if !ran.err.contains(words) {
+                return Err(format!("does not say {words:?}: {}", ran.err));
             }
         }
         let found = prepared.survived(place)?;

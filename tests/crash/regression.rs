@@ -4,8 +4,27 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::Duration;
 
-use crate::place::{Place, Ran};
-use crate::scenario::inputs;
+use crate::scenario::written;
+use fluxform_testing::needs::Trial;
+use fluxform_testing::{
+    inputs::{OUT, scenes},
+    place::Place,
+    run::Ran,
+    trials,
+};
+
+pub fn trials() -> Vec<Trial> {
+    trials! {
+        None => [
+            sigterm_is_heeded_as_ctrl_c_is,
+            an_interrupted_run_leaves_no_empty_folder,
+            a_map_leaves_no_other_format_of_an_older_one_beside_it,
+            a_shape_named_like_a_temporary_folder_is_refused_not_lost,
+            temporary_files_of_a_killed_run_go_with_no_cache,
+            two_plans_at_once_do_not_share_a_folder,
+        ],
+    }
+}
 
 /// Seconds of work on one bundle.
 const LONG: [&str; 8] = [
@@ -20,7 +39,7 @@ const LONG: [&str; 8] = [
 ];
 
 fn with_a_surface() -> Place {
-    let place = inputs();
+    let place = scenes();
     let facet = "facet normal 0 0 1\nouter loop\nvertex -13 -13 0\nvertex 13 -13 0\nvertex 0 13 3\n\
                  endloop\nendfacet\n";
     place.write("bump.stl", &format!("solid bump\n{facet}endsolid bump\n"));
@@ -29,7 +48,7 @@ fn with_a_surface() -> Place {
 
 /// Sends the signal half way; the second one where the first is not heeded would end it.
 fn stopped(place: &Place, signal: &str) -> Ran {
-    let child = place.command(&LONG).spawn().unwrap();
+    let child = place.spawn(&LONG);
     sleep(Duration::from_millis(400));
     let sent = Command::new("kill")
         .args([signal, &child.id().to_string()])
@@ -38,30 +57,27 @@ fn stopped(place: &Place, signal: &str) -> Ran {
     Ran::of(child.wait_with_output().unwrap())
 }
 
-#[test]
 fn sigterm_is_heeded_as_ctrl_c_is() {
     for signal in ["-TERM", "-INT"] {
         let place = with_a_surface();
         let ran = stopped(&place, signal);
-        ran.ends(&[130]).unwrap();
-        assert!(ran.said.contains("interrupted"), "{}", ran.said);
+        ran.ended_with(&[130]).unwrap();
+        assert!(ran.err.contains("interrupted"), "{}", ran.err);
     }
 }
 
-#[test]
 fn an_interrupted_run_leaves_no_empty_folder() {
     let place = with_a_surface();
-    stopped(&place, "-TERM").ends(&[130]).unwrap();
-    assert!(place.tree().is_empty(), "{:?}", place.tree().keys());
+    stopped(&place, "-TERM").ended_with(&[130]).unwrap();
+    assert!(written(&place).is_empty(), "{:?}", written(&place).keys());
 }
 
-#[test]
 fn a_map_leaves_no_other_format_of_an_older_one_beside_it() {
-    let place = inputs();
+    let place = scenes();
     let map = |flags: &[&str]| {
         let args = [&["map", "air.toml", "--out", "out"], flags].concat();
-        place.run(&args).ends(&[0]).unwrap();
-        place.tree().into_keys().collect::<Vec<String>>()
+        place.run(&args).ended_with(&[0]).unwrap();
+        written(&place).into_keys().collect::<Vec<String>>()
     };
     assert_eq!(
         map(&["--csv", "--vtk"]),
@@ -71,25 +87,23 @@ fn a_map_leaves_no_other_format_of_an_older_one_beside_it() {
     // What is not the program's own stays, whatever its name.
     place.write("out/map.csv", "mine\n");
     assert_eq!(map(&[]), ["map.csv", "map.json", "map.npz"]);
-    assert_eq!(place.tree()["map.csv"], b"mine\n");
+    assert_eq!(written(&place)["map.csv"], b"mine\n");
 }
 
-#[test]
 fn a_shape_named_like_a_temporary_folder_is_refused_not_lost() {
-    let place = inputs();
-    let shape = String::from_utf8(std::fs::read(place.path().join("bump.toml")).unwrap()).unwrap();
+    let place = scenes();
+    let shape = String::from_utf8(std::fs::read(place.path("bump.toml")).unwrap()).unwrap();
     place.write(
         "odd.toml",
         &shape.replace("\"bump\"", "\".fluxform-7.tmp\""),
     );
     let ran = place.run(&["calibrate", "air.toml", "odd.toml", "--out", "out"]);
-    ran.ends(&[4]).unwrap();
-    assert!(ran.said.contains("choose another name"), "{}", ran.said);
+    ran.ended_with(&[4]).unwrap();
+    assert!(ran.err.contains("choose another name"), "{}", ran.err);
 }
 
-#[test]
 fn temporary_files_of_a_killed_run_go_with_no_cache() {
-    let place = inputs();
+    let place = scenes();
     let args = [
         "calibrate",
         "two.toml",
@@ -98,16 +112,15 @@ fn temporary_files_of_a_killed_run_go_with_no_cache() {
         "out",
         "--no-report",
     ];
-    place.run(&args).ends(&[0]).unwrap();
+    place.run(&args).ended_with(&[0]).unwrap();
     place.write("out/two/.fluxform-kept/.fluxform-7Xq.tmp", "");
     let again = [&args[..], &["--no-cache"]].concat();
-    place.run(&again).ends(&[0]).unwrap();
-    assert!(!place.out().join("two/.fluxform-kept").exists());
+    place.run(&again).ended_with(&[0]).unwrap();
+    assert!(!place.path(OUT).join("two/.fluxform-kept").exists());
 }
 
-#[test]
 fn two_plans_at_once_do_not_share_a_folder() {
-    let place = inputs();
+    let place = scenes();
     for (design, plan) in [("air.toml", "one.json"), ("other_air.toml", "two.json")] {
         let args = [
             "sweep",
@@ -118,16 +131,11 @@ fn two_plans_at_once_do_not_share_a_folder() {
             "--out",
             plan,
         ];
-        place.run(&args).ends(&[0]).unwrap();
+        place.run(&args).ended_with(&[0]).unwrap();
     }
     for round in 0..6 {
         let out = format!("out/{round}");
-        let run = |plan| {
-            place
-                .command(&["sweep", "run", plan, "--out", &out])
-                .spawn()
-                .unwrap()
-        };
+        let run = |plan| place.spawn(&["sweep", "run", plan, "--out", &out]);
         let codes = [run("one.json"), run("two.json")]
             .map(|child| Ran::of(child.wait_with_output().unwrap()))
             .map(|ran| ran.code);

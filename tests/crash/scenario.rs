@@ -1,11 +1,15 @@
 //! What is disturbed, and what must be true of its files afterwards.
 
-use std::collections::BTreeSet;
 use std::time::Instant;
 
+use fluxform_testing::inputs::{OUT, scenes};
 use serde_json::Value;
 
-use crate::place::{Place, Ran, Tree};
+use fluxform_testing::{
+    place::Place,
+    run::Ran,
+    tree::{Tree, agree, file_name, same, tree},
+};
 
 /// A command and what lies there before it.
 pub struct Scenario {
@@ -141,82 +145,13 @@ pub const MORE: &[Scenario] = &[
     },
 ];
 
+/// What a place's output folder holds.
+pub fn written(place: &Place) -> Tree {
+    tree(&place.path(OUT))
+}
+
 /// A file that the user laid into the folder of an older bundle.
 const NOTES: &str = "notes.txt";
-
-/// Two cored coils that magnetise each other.
-const TWO: &str = r#"name = "two"
-coil = { inner_diameter_mm = 24.0, outer_diameter_mm = 38.0, length_mm = 100.0 }
-wire = { diameter_mm = 0.7 }
-core = { below_mm = 7.0, relative_permeability = 1300.0 }
-array = { rows = 1, columns = 2, pitch_mm = 43.0 }
-magnet = { diameter_mm = 10.0, length_mm = 10.0, magnetization_a_per_m = 1.1579e6 }
-supply = { current_max_a = 1.3, voltage_v = 36.0 }
-target = { height_mm = 30.0 }
-[workspace]
-x_mm = [-40.0, 40.0, 9]
-y_mm = [-30.0, 30.0, 9]
-z_mm = [30.0, 70.0, 9]
-"#;
-
-/// Four coils without steel.
-const AIR: &str = r#"name = "air"
-coil = { inner_diameter_mm = 24.0, outer_diameter_mm = 38.0, length_mm = 70.0 }
-wire = { diameter_mm = 0.7 }
-array = { rows = 2, columns = 2, pitch_mm = 43.0 }
-magnet = { diameter_mm = 10.0, length_mm = 10.0, magnetization_a_per_m = 1.1579e6 }
-supply = { current_max_a = 1.3, voltage_v = 36.0 }
-limits = { resistance_max_ohm = 6.0, settling_max_ms = 100.0, outer_diameter_max_mm = 38.0, length_max_mm = 100.0 }
-target = { height_mm = 30.0 }
-[workspace]
-x_mm = [-40.0, 40.0, 21]
-y_mm = [-30.0, 30.0, 21]
-z_mm = [30.0, 70.0, 21]
-"#;
-
-const BUMP: &str = r#"name = "bump"
-primitive = "half-sphere"
-radius_mm = 13
-base_mm = 37
-[points]
-x_mm = [-13.0, 13.0, 9]
-y_mm = [-13.0, 13.0, 9]
-"#;
-
-const RAMP: &str = r#"name = "ramp"
-primitive = "wedge"
-side_mm = 26
-low_mm = 37
-high_mm = 47
-[points]
-x_mm = [-13.0, 13.0, 7]
-y_mm = [-13.0, 13.0, 7]
-"#;
-
-/// Lays the inputs of all scenarios.
-pub fn inputs() -> Place {
-    let place = Place::empty();
-    place.write("two.toml", TWO);
-    place.write("air.toml", AIR);
-    // The same name and so the same folder, other numbers.
-    place.write("other.toml", &TWO.replace("1300.0", "700.0"));
-    place.write(
-        "other_air.toml",
-        &AIR.replace("length_mm = 70.0", "length_mm = 77.0"),
-    );
-    place.write("bump.toml", BUMP);
-    place.write("ramp.toml", RAMP);
-    let path = (0..700).map(|i| {
-        let t = f64::from(i) * 1e-3;
-        let (x, y) = (0.009 * (7.0 * t).cos(), 0.009 * (9.1 * t).sin());
-        format!("{t},{x},{y},0.047\n")
-    });
-    place.write(
-        "finger.csv",
-        &format!("t_s,x_m,y_m,z_m\n{}", path.collect::<String>()),
-    );
-    place
-}
 
 /// A scenario with what it leaves when nobody disturbs it.
 pub struct Prepared {
@@ -230,19 +165,19 @@ pub struct Prepared {
 
 impl Prepared {
     pub fn new(scenario: &'static Scenario) -> Result<Self, String> {
-        let place = inputs();
+        let place = scenes();
         for args in scenario.before {
-            place.run(args).ends(&[0])?;
+            place.run(args).ended_with(&[0])?;
         }
-        if place.out().join("two/bump").is_dir() {
+        if place.path(OUT).join("two/bump").is_dir() {
             place.write("out/two/bump/notes.txt", "remember\n");
         }
-        let before = place.tree();
-        let whole = place.copy();
+        let before = written(&place);
+        let whole = place.duplicate();
         let began = Instant::now();
-        whole.run(scenario.args).ends(&[0])?;
+        whole.run(scenario.args).ended_with(&[0])?;
         let seconds = began.elapsed().as_secs_f64();
-        let after = whole.tree();
+        let after = written(&whole);
         let prepared = Self {
             scenario,
             place,
@@ -256,12 +191,12 @@ impl Prepared {
 
     /// A place of its own for one disturbed run.
     pub fn fresh(&self) -> Place {
-        self.place.copy()
+        self.place.duplicate()
     }
 
     /// Every file is what it was before, what it is afterwards, or a temporary one.
     pub fn whole_or_absent(&self, place: &Place) -> Result<Found, String> {
-        let now = place.tree();
+        let now = written(place);
         let mut found = Found::default();
         for (path, bytes) in &now {
             if path.split('/').any(is_temporary) {
@@ -327,10 +262,10 @@ impl Prepared {
 
     /// What `verify` says of every bundle.
     pub fn verified(&self, place: &Place) -> Result<usize, String> {
-        let bundles = bundles(&place.tree());
+        let bundles = bundles(&written(place));
         for manifest in &bundles {
             let folder = format!("out/{}", manifest.trim_end_matches("/manifest.json"));
-            place.run(&["verify", &folder]).ends(&[0])?;
+            place.run(&["verify", &folder]).ended_with(&[0])?;
         }
         Ok(bundles.len())
     }
@@ -339,13 +274,14 @@ impl Prepared {
     /// run leaves, to the byte and to the last file.
     pub fn runs_again(&self, place: &Place) -> Result<(), String> {
         let ran = place.run(self.scenario.args);
-        ran.ends(&[0]).map_err(|told| format!("again: {told}"))?;
+        ran.ended_with(&[0])
+            .map_err(|told| format!("again: {told}"))?;
         self.agrees(place)
     }
 
     /// What lies there is what an undisturbed run leaves.
     pub fn agrees(&self, place: &Place) -> Result<(), String> {
-        same(&place.tree(), &self.after)
+        same(&written(place), &self.after)
     }
 
     /// All of it, after a run that was disturbed.
@@ -411,31 +347,6 @@ impl std::ops::AddAssign for Found {
     }
 }
 
-/// A file is the same in two places; what is kept for the next run names its folder in its head.
-fn agree(name: &str, one: &[u8], other: &[u8]) -> bool {
-    const OWN: std::ops::Range<usize> = 8..40;
-    if !name.contains(".fluxform-kept/") || one.len().min(other.len()) < OWN.end {
-        return one == other;
-    }
-    one[..OWN.start] == other[..OWN.start] && one[OWN.end..] == other[OWN.end..]
-}
-
-/// Two trees are the same but for the seconds.
-pub fn same(now: &Tree, wanted: &Tree) -> Result<(), String> {
-    let names: BTreeSet<&String> = now.keys().chain(wanted.keys()).collect();
-    for name in names {
-        match (now.get(name), wanted.get(name)) {
-            (Some(_), None) => return Err(format!("{name} is left over")),
-            (None, _) => return Err(format!("{name} is missing")),
-            (Some(a), Some(b)) if !agree(name, a, b) && !file_name(name).starts_with("timing") => {
-                return Err(format!("{name} differs"));
-            }
-            _ => {}
-        }
-    }
-    Ok(())
-}
-
 fn bundles(tree: &Tree) -> Vec<String> {
     let ours = |path: &&String| {
         file_name(path) == "manifest.json"
@@ -449,10 +360,6 @@ fn bundles(tree: &Tree) -> Vec<String> {
 fn is_temporary(part: &str) -> bool {
     let note = part.starts_with('.') && part.ends_with(".json.fluxform-old");
     note || (part.starts_with(".fluxform-") && part.ends_with(".tmp"))
-}
-
-fn file_name(path: &str) -> &str {
-    path.rsplit('/').next().unwrap_or(path)
 }
 
 /// The path a file had before its folder was put aside.

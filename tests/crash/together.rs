@@ -5,23 +5,30 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::Duration;
 
-use crate::place::{Dice, Place, Ran, Tree, after_changes, changes};
-use crate::scenario::{Prepared, inputs, same};
+use crate::changes::{after_changes, changes};
+use crate::scenario::{Prepared, written};
 use crate::table::Row;
+use fluxform_testing::{
+    Random,
+    inputs::{OUT, scenes},
+    place::Place,
+    run::Ran,
+    tree::{Tree, same},
+};
 
 /// The same command twice at once: both end well.
-pub fn same_inputs(prepared: &Prepared, runs: usize, dice: &mut Dice) -> Result<Row, String> {
+pub fn same_inputs(prepared: &Prepared, runs: usize, random: &mut Random) -> Result<Row, String> {
     let mut row = Row::new(prepared.scenario.name, "the same run at the same time");
     for _ in 0..runs {
         let place = prepared.fresh();
-        let one = place.command(prepared.scenario.args).spawn().unwrap();
+        let one = place.spawn(prepared.scenario.args);
         sleep(Duration::from_secs_f64(
-            0.3 * prepared.seconds * dice.part(),
+            0.3 * prepared.seconds * random.unit(),
         ));
         let two = place.run(prepared.scenario.args);
         let one = Ran::of(one.wait_with_output().unwrap());
-        one.ends(&[0])?;
-        two.ends(&[0])?;
+        one.ended_with(&[0])?;
+        two.ended_with(&[0])?;
         prepared.agrees(&place)?;
         row.add(prepared.survived(&place)?);
     }
@@ -81,8 +88,8 @@ pub const RIVALS: &[Rivals] = &[
     },
 ];
 
-fn rival_inputs() -> Result<Place, String> {
-    let place = inputs();
+fn rival_scenes() -> Result<Place, String> {
+    let place = scenes();
     for (design, plan) in [("air.toml", "plan.json"), ("other_air.toml", "other.json")] {
         let set = [
             "--set",
@@ -91,41 +98,41 @@ fn rival_inputs() -> Result<Place, String> {
             "coil.outer_diameter_mm=26:38:2",
         ];
         let args = [&["sweep", "plan", design][..], &set, &["--out", plan]].concat();
-        place.run(&args).ends(&[0])?;
+        place.run(&args).ended_with(&[0])?;
     }
     Ok(place)
 }
 
 /// Two runs with other inputs at once: without `--force` one has the folder and the other is refused,
 /// with it the last one has it; nothing is mixed.
-pub fn other_inputs(rivals: &Rivals, runs: usize, dice: &mut Dice) -> Result<Row, String> {
+pub fn other_inputs(rivals: &Rivals, runs: usize, random: &mut Random) -> Result<Row, String> {
     let mut row = Row::new(rivals.name, "a run with other inputs at the same time");
-    let place = rival_inputs()?;
+    let place = rival_scenes()?;
     let mut seconds: f64 = 0.0;
     let mut alone = Vec::new();
     for args in [rivals.one, rivals.two] {
-        let place = place.copy();
+        let place = place.duplicate();
         let began = std::time::Instant::now();
-        place.run(args).ends(&[0])?;
+        place.run(args).ended_with(&[0])?;
         seconds = seconds.max(began.elapsed().as_secs_f64());
-        alone.push(place.tree());
+        alone.push(written(&place));
     }
     for run in 0..runs {
-        let place = place.copy();
+        let place = place.duplicate();
         let forced = run % 2 == 1;
         let flags: &[&str] = if forced { &["--force"] } else { &[] };
         let [first, second] = [rivals.one, rivals.two].map(|args| [args, flags].concat());
-        let one = place.command(&first).spawn().unwrap();
-        sleep(Duration::from_secs_f64(0.1 * seconds * dice.part()));
+        let one = place.spawn(&first);
+        sleep(Duration::from_secs_f64(0.1 * seconds * random.unit()));
         let two = place.run(&second);
         let one = Ran::of(one.wait_with_output().unwrap());
         for ran in [&one, &two] {
-            ran.ends(if forced { &[0] } else { &[0, 4] })?;
+            ran.ended_with(if forced { &[0] } else { &[0, 4] })?;
         }
         if !forced && one.code == two.code {
             return Err(format!("both ended alike: {one:?} {two:?}"));
         }
-        let now = place.tree();
+        let now = written(&place);
         // Of points that two forced sweeps fight for each is whole; only the plan's owner counts them.
         if !(forced && rivals.name == "sweep run") {
             unmixed(&now, &alone, rivals.units)?;
@@ -161,25 +168,25 @@ fn unmixed(now: &Tree, alone: &[Tree], units: &[&str]) -> Result<(), String> {
 }
 
 /// SIGINT and SIGTERM at random moments: what was finished is kept, nothing else is left.
-pub fn asked_to_stop(prepared: &Prepared, runs: usize, dice: &mut Dice) -> Result<Row, String> {
+pub fn asked_to_stop(prepared: &Prepared, runs: usize, random: &mut Random) -> Result<Row, String> {
     let mut row = Row::new(
         prepared.scenario.name,
         "SIGINT or SIGTERM at a random moment",
     );
     let changed = {
         let place = prepared.fresh();
-        let mut child = place.command(prepared.scenario.args).spawn().unwrap();
-        let changed = changes(&place.out(), &mut child);
+        let mut child = place.spawn(prepared.scenario.args);
+        let changed = changes(&place.path(OUT), &mut child);
         child.wait().unwrap();
         changed.max(1)
     };
     for run in 0..runs {
         let place = prepared.fresh();
-        let mut child = place.command(prepared.scenario.args).spawn().unwrap();
+        let mut child = place.spawn(prepared.scenario.args);
         if run % 4 < 2 {
-            sleep(Duration::from_secs_f64(prepared.seconds * dice.part()));
+            sleep(Duration::from_secs_f64(prepared.seconds * random.unit()));
         } else {
-            after_changes(&place.out(), &mut child, 1 + dice.below(changed));
+            after_changes(&place.path(OUT), &mut child, 1 + random.below(changed));
         }
         let signal = ["-INT", "-TERM"][run % 2];
         // A program that has ended takes no signal.
@@ -189,10 +196,10 @@ pub fn asked_to_stop(prepared: &Prepared, runs: usize, dice: &mut Dice) -> Resul
         let output = child.wait_with_output().unwrap();
         let by_signal = output.status.signal();
         let ran = Ran::of(output);
-        let untouched = same(&place.tree(), &prepared.before).is_ok();
+        let untouched = same(&written(&place), &prepared.before).is_ok();
         // Before the program listens it ends as any other does.
         if !(by_signal.is_some() && untouched) {
-            ran.ends(&[130, 0])?;
+            ran.ended_with(&[130, 0])?;
         }
         row.struck += usize::from(ran.code != Some(0));
         row.add(prepared.survived_tidily(&place, &ran)?);

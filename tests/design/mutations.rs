@@ -1,26 +1,10 @@
 //! No text, however broken, makes the readers panic, and what they accept is finite.
 
+use fluxform_testing::Random;
 use std::path::Path;
 
 use fluxform_design::{Design, Need};
 use fluxform_shape::document::ShapeDocument;
-
-/// A small deterministic generator (splitmix64).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.next() % n as u64) as usize
-    }
-}
 
 const PIECES: [&str; 30] = [
     "[",
@@ -80,7 +64,7 @@ rotate_deg = [0, 0, 7]\n[points]\nx_mm = [-50, 50, 61]\ny_mm = [-50, 50, 61]\nou
 #[test]
 fn mutated_designs_are_read_or_refused() {
     let every = include_str!("../fixtures/design/every_key.toml");
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     let (mut read, mut refused) = (0, 0);
     for _ in 0..4000 {
         let text = mutate(every, &mut random);
@@ -108,7 +92,7 @@ fn mutated_designs_are_read_or_refused() {
 
 #[test]
 fn mutated_shapes_are_read_or_refused() {
-    let mut random = Random(13);
+    let mut random = Random::new(13);
     for _ in 0..4000 {
         let text = mutate(SHAPE, &mut random);
         match ShapeDocument::from_toml(&text, Path::new("s.toml")) {
@@ -120,10 +104,10 @@ fn mutated_shapes_are_read_or_refused() {
 
 #[test]
 fn noise_is_refused() {
-    let mut random = Random(29);
+    let mut random = Random::new(29);
     for _ in 0..2000 {
         let bytes: Vec<u8> = (0..random.below(300))
-            .map(|_| random.next() as u8)
+            .map(|_| random.bits() as u8)
             .collect();
         let text = String::from_utf8_lossy(&bytes);
         let invalid = Design::from_toml(&text, Path::new("d.toml"), Need::SWEEP).unwrap_err();

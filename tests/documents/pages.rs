@@ -1,7 +1,5 @@
 //! The documents and their parts.
 
-use std::path::{Path, PathBuf};
-
 /// Documents for users, each with a title.
 pub const PAGES: [&str; 8] = [
     "README.md",
@@ -14,13 +12,8 @@ pub const PAGES: [&str; 8] = [
     "tests/README.md",
 ];
 
-pub fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
 pub fn page(name: &str) -> String {
-    let path: PathBuf = root().join(name);
-    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{name}: {error}"))
+    fluxform_testing::committed(name)
 }
 
 /// The text of the section of that title, in whichever document it is.

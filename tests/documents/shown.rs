@@ -4,10 +4,23 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Command;
 
-use crate::pages::{command_and_output, page, root, section};
+use fluxform_testing::place::Place;
+use fluxform_testing::root;
+use fluxform_testing::run::program;
+
+use crate::pages::{command_and_output, page, section};
+use fluxform_testing::needs::{self, Trial};
+use fluxform_testing::trials;
+
+pub fn trials() -> Vec<Trial> {
+    trials! {
+        None => [the_first_command_prints_what_the_readme_shows, the_picture_is_what_its_command_draws, the_table_of_numbers_is_what_the_commands_print, one_command_of_a_section_prints_what_is_shown, the_errors_of_a_scene_are_those_shown, the_sweep_prints_what_is_shown, the_replay_prints_what_is_shown, every_command_has_a_row_and_every_row_is_a_command],
+        needs::python() => [the_table_of_force_constants_is_what_its_script_prints],
+    }
+}
 
 fn printed(arguments: &[impl AsRef<std::ffi::OsStr> + std::fmt::Debug]) -> String {
-    let run = Command::new(env!("CARGO_BIN_EXE_fluxform"))
+    let run = Command::new(program())
         .args(arguments)
         .current_dir(root())
         .output()
@@ -41,7 +54,6 @@ fn arguments(command: &str, files: &[&str], folder: &Path) -> Vec<String> {
         .collect()
 }
 
-#[test]
 fn the_first_command_prints_what_the_readme_shows() {
     let (command, shown) = command_and_output("Try it");
     let command = command
@@ -72,7 +84,6 @@ fn coarse(picture: &str) -> String {
     coarse + rest
 }
 
-#[test]
 fn the_picture_is_what_its_command_draws() {
     let readme = page("README.md");
     let (_, rest) = readme.split_once("The picture is what `").unwrap();
@@ -84,7 +95,6 @@ fn the_picture_is_what_its_command_draws() {
     assert!(same, "draw results/half_sphere.svg again: {command}");
 }
 
-#[test]
 fn the_table_of_numbers_is_what_the_commands_print() {
     let readme = page("README.md");
     let coil = printed(&["evaluate", "designs/seed.toml"]);
@@ -106,7 +116,6 @@ fn the_table_of_numbers_is_what_the_commands_print() {
     }
 }
 
-#[test]
 fn one_command_of_a_section_prints_what_is_shown() {
     for title in ["Find the best coil", "Compare with a Gauss-meter scan"] {
         let (command, shown) = command_and_output(title);
@@ -131,7 +140,6 @@ fn untimed(text: &str) -> Vec<String> {
     errors.map(without).collect()
 }
 
-#[test]
 fn the_errors_of_a_scene_are_those_shown() {
     let (command, shown) = command_and_output("Error against time of a scene");
     let folder = tempfile::tempdir().unwrap();
@@ -143,7 +151,6 @@ fn the_errors_of_a_scene_are_those_shown() {
     assert_eq!(untimed(&shown), printed);
 }
 
-#[test]
 fn the_sweep_prints_what_is_shown() {
     let (commands, shown) = command_and_output("Sweep designs");
     let folder = tempfile::tempdir().unwrap();
@@ -155,7 +162,6 @@ fn the_sweep_prints_what_is_shown() {
     assert_eq!(lasting(&shown), lasting(&all));
 }
 
-#[test]
 fn the_replay_prints_what_is_shown() {
     let (command, shown) = command_and_output("Follow a finger");
     let folder = tempfile::tempdir().unwrap();
@@ -168,19 +174,10 @@ fn the_replay_prints_what_is_shown() {
     assert_eq!(lasting(&shown), lasting(&printed));
 }
 
-#[test]
 fn the_table_of_force_constants_is_what_its_script_prints() {
-    let run = Command::new("python3")
-        .args(["scripts/seed_table.py", env!("CARGO_BIN_EXE_fluxform")])
-        .current_dir(root())
-        .output();
-    let Ok(run) = run else {
-        eprintln!("skipped: no python3");
-        return;
-    };
-    let errors = String::from_utf8(run.stderr).unwrap();
-    assert!(run.status.success(), "{errors}");
-    let printed = String::from_utf8(run.stdout).unwrap();
+    let place = Place::with(&["scripts", "designs", "shapes"]);
+    let printed = place.shell("python3 scripts/seed_table.py $(command -v fluxform)");
+    let printed = printed.ends(0).out;
     let readme = page("README.md");
     assert!(printed.lines().count() > 6, "{printed}");
     for part in printed.split("\n\n") {
@@ -189,7 +186,6 @@ fn the_table_of_force_constants_is_what_its_script_prints() {
     }
 }
 
-#[test]
 fn every_command_has_a_row_and_every_row_is_a_command() {
     let commands = section("Commands");
     let rows: BTreeSet<&str> = commands

@@ -1,58 +1,46 @@
 //! The tutorial: its files are written, its commands run in order, its outputs compared.
 
-use std::fs;
-use std::os::unix::fs::symlink;
-use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use fluxform_testing::place::Place;
 
-use crate::pages::{blocks, page, root, section};
+use crate::pages::{blocks, page, section};
+use fluxform_testing::needs::{self, Trial};
+use fluxform_testing::trials;
+
+pub fn trials() -> Vec<Trial> {
+    trials! {
+        None => [the_table_of_what_one_percent_changes_is_true, the_warnings_of_the_table_are_what_is_said, the_tutorial_runs_and_prints_what_it_shows],
+        needs::numpy() => [the_tutorial_runs_with_python],
+        needs::c_compiler() => [the_tutorial_runs_with_a_c_compiler],
+        needs::octave() => [the_tutorial_runs_with_octave],
+    }
+}
 
 const TUTORIAL: &str = "designs/first_display.md";
 
 /// A folder with the repository's scripts, designs and shapes.
-fn place() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    for name in ["scripts", "designs", "shapes"] {
-        symlink(root().join(name), folder.path().join(name)).unwrap();
-    }
-    folder
+fn place() -> Place {
+    Place::with(&["scripts", "designs", "shapes"])
 }
 
-fn shell(folder: &Path, script: &str) -> Output {
-    let programs = Path::new(env!("CARGO_BIN_EXE_fluxform")).parent().unwrap();
-    let path = std::env::var("PATH").unwrap();
-    Command::new("sh")
-        .args(["-e", "-c", script])
-        .current_dir(folder)
-        .env("PATH", format!("{}:{path}", programs.display()))
-        .env("LC_ALL", "C")
-        .output()
-        .unwrap()
+/// A program that a block of the tutorial needs.
+#[derive(Clone, Copy, PartialEq)]
+enum Tool {
+    Octave,
+    C,
+    Python,
 }
 
-/// Whether a program answers.
-fn there(program: &str, arguments: &[&str]) -> bool {
-    Command::new(program)
-        .args(arguments)
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .status()
-        .is_ok_and(|status| status.success())
-}
-
-/// What a script needs that this machine has not.
-fn missing(script: &str) -> Option<&'static str> {
-    let modern = "exit(compare_versions(version, '7.0.0', '<'))";
-    if script.contains("octave-cli") && !there("octave-cli", &["--norc", "--eval", modern]) {
-        return Some("octave-cli of version 7 or newer");
+/// What a script needs.
+fn tool(script: &str) -> Option<Tool> {
+    if script.contains("octave-cli") {
+        Some(Tool::Octave)
+    } else if script.contains("cc -std") {
+        Some(Tool::C)
+    } else if script.contains("python3") {
+        Some(Tool::Python)
+    } else {
+        None
     }
-    if script.contains("cc -std") && !there("cc", &["--version"]) {
-        return Some("a C compiler");
-    }
-    if script.contains("python3") && !there("python3", &["-c", "import numpy"]) {
-        return Some("python3 with numpy");
-    }
-    None
 }
 
 /// Without what depends on the machine or the folder.
@@ -63,23 +51,21 @@ fn lasting(text: &str) -> Vec<&str> {
         .collect()
 }
 
-#[test]
-fn the_tutorial_runs_and_prints_what_it_shows() {
-    let folder = place();
+/// Runs the blocks that need nothing or `with`, in order, and compares what they print.
+fn tutorial(with: Option<Tool>) {
+    let place = place();
     let mut printed: Option<String> = None;
-    let (mut files, mut commands, mut outputs) = (0, 0, 0);
+    let (mut files, mut commands, mut with_tool, mut outputs) = (0, 0, 0, 0);
     for block in blocks(&page(TUTORIAL)) {
         match block.language.as_str() {
             "sh" => {
                 printed = None;
-                if let Some(what) = missing(&block.text) {
-                    eprintln!("skipped: no {what} for\n{}", block.text);
+                let needs = tool(&block.text);
+                if needs.is_some() && needs != with {
                     continue;
                 }
-                let ran = shell(folder.path(), &block.text);
-                let errors = String::from_utf8_lossy(&ran.stderr).into_owned();
-                assert!(ran.status.success(), "{}{errors}", block.text);
-                printed = Some(String::from_utf8(ran.stdout).unwrap());
+                printed = Some(place.shell(&block.text).ends(0).out);
+                with_tool += usize::from(needs.is_some());
                 commands += 1;
             }
             "text" => {
@@ -92,17 +78,33 @@ fn the_tutorial_runs_and_prints_what_it_shows() {
                 let name = block.before.split('`').rfind(|part| part.contains('.'));
                 let name = name.unwrap_or_else(|| panic!("no file is named: {}", block.before));
                 assert!(name.len() < 20, "{name} is no file's name");
-                fs::write(folder.path().join(name), &block.text).unwrap();
+                place.write(name, &block.text);
                 files += 1;
             }
         }
     }
     assert_eq!(files, 6);
     assert!(commands >= 4 && outputs >= 4, "{commands} {outputs}");
-    let table = folder.path().join("table.csv");
-    if table.exists() {
-        the_row_of_a_position(&fs::read_to_string(table).unwrap());
+    assert!(with.is_none() || with_tool > 0, "no block needs the tool");
+    if place.path("table.csv").exists() {
+        the_row_of_a_position(&place.text("table.csv"));
     }
+}
+
+fn the_tutorial_runs_and_prints_what_it_shows() {
+    tutorial(None);
+}
+
+fn the_tutorial_runs_with_python() {
+    tutorial(Some(Tool::Python));
+}
+
+fn the_tutorial_runs_with_a_c_compiler() {
+    tutorial(Some(Tool::C));
+}
+
+fn the_tutorial_runs_with_octave() {
+    tutorial(Some(Tool::Octave));
 }
 
 /// Row 1 + (27 k + j) 27 + i belongs to the grid's position, and columns 7 to 15 are currents.
@@ -137,25 +139,25 @@ fn the_row_of_a_position(table: &str) {
 }
 
 /// Resistance, inductance and force of a design.
-fn evaluated(folder: &Path, text: &str) -> [f64; 3] {
-    fs::write(folder.join("tried.toml"), text).unwrap();
-    let ran = shell(folder, "fluxform evaluate tried.toml --format json");
-    assert!(ran.status.success());
-    let told: serde_json::Value = serde_json::from_slice(&ran.stdout).unwrap();
+fn evaluated(place: &Place, text: &str) -> [f64; 3] {
+    place.write("tried.toml", text);
+    let report = place
+        .run(&["evaluate", "tried.toml", "--format", "json"])
+        .ends(0)
+        .json();
     [
         "/coil/resistance_ohm",
         "/coil/inductance_h",
         "/target/force_n",
     ]
-    .map(|key| told.pointer(key).unwrap().as_f64().unwrap())
+    .map(|key| report.pointer(key).unwrap().as_f64().unwrap())
 }
 
-#[test]
 fn the_table_of_what_one_percent_changes_is_true() {
-    let folder = place();
+    let place = place();
     let tutorial = page(TUTORIAL);
     let design = &blocks(&tutorial)[0].text;
-    let as_given = evaluated(folder.path(), design);
+    let as_given = evaluated(&place, design);
     let rows = tutorial.lines().filter(|line| line.starts_with("| `"));
     let mut checked = 0;
     for row in rows {
@@ -176,7 +178,7 @@ fn the_table_of_what_one_percent_changes_is_true() {
             1.01 * number
         };
         let edited = design.replace(line, &line.replacen(value, &format!("{more:?}"), 1));
-        let changed = evaluated(folder.path(), &edited);
+        let changed = evaluated(&place, &edited);
         for (column, told) in cells[2..5].iter().enumerate() {
             let found = 100.0 * (changed[column] / as_given[column] - 1.0);
             let found = if found.abs() < 0.005 {
@@ -191,14 +193,13 @@ fn the_table_of_what_one_percent_changes_is_true() {
     assert_eq!(checked, 8);
 }
 
-#[test]
 fn the_warnings_of_the_table_are_what_is_said() {
-    let folder = place();
+    let place = place();
     let tutorial = page(TUTORIAL);
     for block in blocks(&tutorial) {
         for name in ["desk.toml", "plate.toml"] {
             if block.before.contains(name) && block.language == "toml" {
-                fs::write(folder.path().join(name), &block.text).unwrap();
+                place.write(name, &block.text);
             }
         }
     }
@@ -227,9 +228,8 @@ fn the_warnings_of_the_table_are_what_is_said() {
     assert_eq!(rows, cases.len());
     for (message, script) in cases {
         assert!(table.contains(&format!("`{message}`")), "{message}");
-        let ran = shell(folder.path(), script);
-        let said = String::from_utf8_lossy(&ran.stderr).into_owned();
         // Long messages are wrapped.
+        let said = place.shell(script).err;
         let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(said.contains(message), "{script}\n{said}");
     }

@@ -15,10 +15,8 @@
 #![allow(clippy::print_stdout, clippy::disallowed_methods, clippy::exit)]
 
 #[cfg(target_os = "linux")]
-#[path = "documents/damage.rs"]
 mod damage;
 #[cfg(target_os = "linux")]
-#[path = "documents/measured.rs"]
 mod measured;
 
 #[cfg(not(target_os = "linux"))]

@@ -9,7 +9,7 @@ use std::time::Instant;
 use cpu_time::ProcessTime;
 use peak_alloc::PeakAlloc;
 
-use crate::support::Random;
+use fluxform_testing::Random;
 
 /// What stands at a name of an input.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use fluxform::shape::document::SurfaceFormat;
 
 use crate::mutation::zipped;
-use crate::samples;
+use fluxform_testing::surface_files;
 
 type Parts<'a> = &'a [(&'a str, String)];
 
@@ -240,10 +240,10 @@ fn bomb(names: &[&str], content: &str) -> Vec<Hostile> {
 }
 
 fn three_mf() -> Vec<Hostile> {
-    let good = String::from_utf8(samples::three_mf_model("inch")).expect("made of text");
+    let good = String::from_utf8(surface_files::three_mf_model("inch")).expect("made of text");
     let mut found: Vec<Hostile> = xml(&good, "model")
         .into_iter()
-        .map(|(name, text)| (name, samples::three_mf_of(&text)))
+        .map(|(name, text)| (name, surface_files::three_mf_of(&text)))
         .collect();
     found.extend(bomb(&["3D/3dmodel.model"], "<model>"));
     found.extend(bomb(&["_rels/.rels"], "<Relationships>"));
@@ -265,24 +265,30 @@ fn three_mf() -> Vec<Hostile> {
         .collect();
     parts.push(("3D/3dmodel.model".into(), root.clone().into_bytes()));
     found.push(("many parts, many components", zipped(&parts)));
-    found.push(("many components", samples::three_mf_of(&root)));
+    found.push(("many components", surface_files::three_mf_of(&root)));
     let apart = with(&components(20, " p:path=\"/3D/../../etc/passwd\""));
-    found.push(("a path out of the archive", samples::three_mf_of(&apart)));
+    found.push((
+        "a path out of the archive",
+        surface_files::three_mf_of(&apart),
+    ));
     let itself = with(&components(2000, " p:path=\"/3D/3dmodel.model\""));
-    found.push(("itself by another name", samples::three_mf_of(&itself)));
+    found.push((
+        "itself by another name",
+        surface_files::three_mf_of(&itself),
+    ));
     let faces = "<triangle v1=\"0\" v2=\"1\" v3=\"2\"/>".repeat(60_000);
     let many = good.replace("</triangles>", &format!("{faces}</triangles>"));
-    found.push(("many faces, well packed", samples::three_mf_of(&many)));
+    found.push(("many faces, well packed", surface_files::three_mf_of(&many)));
     let objects: String = (3..20_000)
         .map(|k| format!("<object id=\"{k}\"/>"))
         .collect();
     let many = good.replace("</resources>", &format!("{objects}</resources>"));
-    found.push(("many objects", samples::three_mf_of(&many)));
+    found.push(("many objects", surface_files::three_mf_of(&many)));
     found
 }
 
 fn amf() -> Vec<Hostile> {
-    let good = samples::amf("mm");
+    let good = surface_files::amf("mm");
     let mut found: Vec<Hostile> = xml(&good, "amf")
         .into_iter()
         .map(|(name, text)| (name, text.into_bytes()))
@@ -311,7 +317,7 @@ fn amf() -> Vec<Hostile> {
 }
 
 fn three_dxml() -> Vec<Hostile> {
-    let [manifest, structure, representation] = samples::three_dxml_parts();
+    let [manifest, structure, representation] = surface_files::three_dxml_parts();
     let product = |structure: &str, representation: &str| {
         archive(&[
             (manifest.0, manifest.1.clone()),
@@ -353,7 +359,7 @@ fn three_dxml() -> Vec<Hostile> {
 }
 
 fn step() -> Vec<Hostile> {
-    let good = String::from_utf8(samples::step()).expect("made of text");
+    let good = String::from_utf8(surface_files::step()).expect("made of text");
     let with = |statements: &str| good.replace("DATA;\n", &format!("DATA;\n{statements}"));
     let mut found = vec![
         (
@@ -440,10 +446,10 @@ fn step() -> Vec<Hostile> {
 fn sldprt() -> Vec<Hostile> {
     let marker = [0x14, 0, 0x06, 0, 0x08, 0];
     let head = [0x6b, 0x22, 0x77, 0x37, 0, 0, 0, 4];
-    let mut claims = samples::sldprt();
+    let mut claims = surface_files::sldprt();
     // The length unpacked, then that of the name.
     claims[26..30].copy_from_slice(&(1u32 << 30).to_le_bytes());
-    let mut named = samples::sldprt();
+    let mut named = surface_files::sldprt();
     named[30..34].copy_from_slice(&u32::MAX.to_le_bytes());
     let table = |strips: u32, rest: &[u32]| -> Vec<u8> {
         [4, 8, 2, strips]
@@ -457,18 +463,18 @@ fn sldprt() -> Vec<Hostile> {
         ("markers", [head.to_vec(), marker.repeat(200_000)].concat()),
         ("an enormous block", claims),
         ("an enormous name", named),
-        ("a bomb", samples::sldprt_of(&vec![0; 100 << 20])),
+        ("a bomb", surface_files::sldprt_of(&vec![0; 100 << 20])),
         (
             "tables that never end",
-            samples::sldprt_of(&table(u32::MAX, &threes)),
+            surface_files::sldprt_of(&table(u32::MAX, &threes)),
         ),
         (
             "tables in tables",
-            samples::sldprt_of(&table(100_000, &[]).repeat(40_000)),
+            surface_files::sldprt_of(&table(100_000, &[]).repeat(40_000)),
         ),
         (
             "a long strip",
-            samples::sldprt_of(
+            surface_files::sldprt_of(
                 &[
                     table(1, &[100_000, 12, 100, 2, 100_000]),
                     vec![0; 1_200_000],

@@ -16,23 +16,14 @@ mod harness;
 mod kinds;
 #[allow(dead_code)]
 mod mutation;
-#[allow(dead_code)]
-#[path = "../bundle/sample.rs"]
-mod sample;
-#[allow(dead_code)]
-#[path = "../shape/samples.rs"]
-mod samples;
 mod structure;
-#[allow(dead_code)]
-#[path = "../shape/support.rs"]
-mod support;
 
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
+use fluxform_testing::Random;
 use harness::{BEGAN, Harness, millis};
 use peak_alloc::PeakAlloc;
-use support::Random;
 
 #[global_allocator]
 static HEAP: PeakAlloc = PeakAlloc;
@@ -79,7 +70,7 @@ fn main() {
             continue;
         }
         let start = Instant::now();
-        let tally = harness.run(&kind, &mut Random(seed), |_| {
+        let tally = harness.run(&kind, &mut Random::new(seed), |_| {
             start.elapsed().as_secs_f64() < seconds
         });
         let faults: u64 = tally.faults.values().sum();

@@ -6,7 +6,7 @@ use flate2::Compression;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
-use crate::support::Random;
+use fluxform_testing::Random;
 
 /// No mutated content grows beyond this, bytes.
 const MOST: usize = 4 << 20;
@@ -49,7 +49,7 @@ impl Seed {
         match self {
             Self::Plain(bytes) => bytes.clone(),
             Self::Zip(parts) => zipped(parts),
-            Self::Display(stream) => crate::samples::sldprt_of(stream),
+            Self::Display(stream) => fluxform_testing::surface_files::sldprt_of(stream),
         }
     }
 

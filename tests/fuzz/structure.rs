@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::mutation::damage;
-use crate::support::Random;
+use fluxform_testing::Random;
 
 /// No mutated content grows beyond this, bytes.
 const MOST: usize = 1 << 20;

@@ -16,12 +16,6 @@
 
 mod hostile;
 mod mutation;
-#[allow(dead_code)]
-#[path = "../shape/samples.rs"]
-mod samples;
-#[allow(dead_code)]
-#[path = "../shape/support.rs"]
-mod support;
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -31,9 +25,9 @@ use std::time::{Duration, Instant};
 
 use cpu_time::ProcessTime;
 use fluxform::shape::document::SurfaceFormat;
+use fluxform_testing::{Random, surface_files, surfaces};
 use mutation::Seed;
 use peak_alloc::PeakAlloc;
-use support::Random;
 
 #[global_allocator]
 static HEAP: PeakAlloc = PeakAlloc;
@@ -65,29 +59,32 @@ fn seeds(format: SurfaceFormat) -> Vec<Seed> {
                          2.9e+000\n   vertex 10.1 .3 3\n   vertex -4.7 8.3 1e-3\n  endloop\n \
                          endfacet\nendsolid a b\n";
             vec![
-                Seed::Plain(support::binary(&floats)),
+                Seed::Plain(surfaces::binary(&floats)),
                 Seed::Plain(ascii.repeat(2).into_bytes()),
             ]
         }
-        SurfaceFormat::Obj => vec![text(samples::obj())],
+        SurfaceFormat::Obj => vec![text(surface_files::obj())],
         SurfaceFormat::Ply => vec![
-            text(samples::ply_ascii()),
-            text(samples::ply_binary(false)),
-            text(samples::ply_binary(true)),
+            text(surface_files::ply_ascii()),
+            text(surface_files::ply_binary(false)),
+            text(surface_files::ply_binary(true)),
         ],
-        SurfaceFormat::ThreeMf => vec![text(samples::three_mf("inch"))],
+        SurfaceFormat::ThreeMf => vec![text(surface_files::three_mf("inch"))],
         SurfaceFormat::Amf => vec![
-            text(samples::amf("mm").into_bytes()),
-            text(samples::zipped(&[("a.amf", &samples::amf("mm"))])),
+            text(surface_files::amf("mm").into_bytes()),
+            text(surface_files::zipped(&[(
+                "a.amf",
+                &surface_files::amf("mm"),
+            )])),
         ],
-        SurfaceFormat::ThreeDxml => vec![text(samples::three_dxml())],
-        SurfaceFormat::Step => vec![text(samples::step())],
+        SurfaceFormat::ThreeDxml => vec![text(surface_files::three_dxml())],
+        SurfaceFormat::Step => vec![text(surface_files::step())],
         SurfaceFormat::Sldprt => vec![
-            Seed::Display(samples::display_lists()),
-            Seed::Plain(samples::sldprt()),
+            Seed::Display(surface_files::display_lists()),
+            Seed::Plain(surface_files::sldprt()),
         ],
     };
-    let folder = support::corpus();
+    let folder = std::env::var_os("FLUXFORM_CORPUS").map(PathBuf::from);
     let mut real: Vec<PathBuf> = folder
         .iter()
         .flat_map(|folder| [folder.clone(), folder.join("bad_stl")])
@@ -230,7 +227,7 @@ fn run(name: &str, format: SurfaceFormat, seconds: f64, seed: u64) -> bool {
     for seed in &seeds {
         tally.give(name, format, "a seed", &seed.pack(), seed.content());
     }
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let mut round = 0;
     while start.elapsed().as_secs_f64() < seconds {
         let (bytes, content) = seeds[round % seeds.len()].mutated(&mut random);

@@ -2,13 +2,7 @@
 
 use fluxform_lambda::{Allocation, Allocator, AllocatorError, Reach};
 
-use crate::random::Random;
-
-impl Random {
-    fn below(&mut self, n: usize) -> usize {
-        (self.next() * n as f64) as usize
-    }
-}
+use fluxform_testing::Random;
 
 /// One allocation problem.
 #[derive(Debug, Clone)]
@@ -172,7 +166,7 @@ impl Problem {
 /// Generic, tied, near-tied and badly scaled problems, with zeros and negative limits.
 fn problem(random: &mut Random, kind: usize) -> Problem {
     let n = 1 + random.below(5);
-    let decades = |random: &mut Random| 10f64.powf(6.0 * (random.next() - 0.5));
+    let decades = |random: &mut Random| 10f64.powf(6.0 * (random.unit() - 0.5));
     let mut problem = Problem {
         force_n_per_a: Vec::new(),
         resistance_ohm: Vec::new(),
@@ -182,11 +176,11 @@ fn problem(random: &mut Random, kind: usize) -> Problem {
         wanted_n: 0.0,
     };
     for _ in 0..n {
-        let mut g = 2.0 * random.next() - 0.6;
-        let mut upper = 0.3 + 2.0 * random.next();
-        let reverses = random.next() < 0.4;
-        let mut lower = if reverses { -1.5 * random.next() } else { 0.0 };
-        let mut r = 3.0 + 4.0 * random.next();
+        let mut g = 2.0 * random.unit() - 0.6;
+        let mut upper = 0.3 + 2.0 * random.unit();
+        let reverses = random.unit() < 0.4;
+        let mut lower = if reverses { -1.5 * random.unit() } else { 0.0 };
+        let mut r = 3.0 + 4.0 * random.unit();
         match kind {
             1 => {
                 (g, upper, r) = ((3.0 * g).round() / 3.0, 1.3, 6.0);
@@ -202,14 +196,14 @@ fn problem(random: &mut Random, kind: usize) -> Problem {
                 upper *= decades(random);
             }
             4 => {
-                if random.next() < 0.3 {
+                if random.unit() < 0.3 {
                     upper = 0.0;
                 }
-                if random.next() < 0.3 {
-                    g = if random.next() < 0.5 { 0.0 } else { 0.7 };
+                if random.unit() < 0.3 {
+                    g = if random.unit() < 0.5 { 0.0 } else { 0.7 };
                 }
             }
-            5 => g = 0.7 * (1.0 + 1e-15 * (6.0 * random.next()).round()),
+            5 => g = 0.7 * (1.0 + 1e-15 * (6.0 * random.unit()).round()),
             _ => {}
         }
         problem.force_n_per_a.push(g);
@@ -217,30 +211,30 @@ fn problem(random: &mut Random, kind: usize) -> Problem {
         problem.lower_a.push(lower);
         problem.upper_a.push(upper);
     }
-    if random.next() < 0.7 {
+    if random.unit() < 0.7 {
         let all: f64 = problem.upper_a.iter().sum();
-        let part = if random.next() < 0.1 {
+        let part = if random.unit() < 0.1 {
             0.0
         } else {
-            random.next()
+            random.unit()
         };
         problem.total_a = Some(all * part);
     }
-    problem.wanted_n = if random.next() < 0.2 { -1.0 } else { 1.0 };
+    problem.wanted_n = if random.unit() < 0.2 { -1.0 } else { 1.0 };
     let most_n = problem.exhaustive().most_n.abs();
     problem.wanted_n *= most_n
         * match random.below(10) {
             0 => 1.0,
-            1 => 1.0 - 1e-9 * random.next(),
+            1 => 1.0 - 1e-9 * random.unit(),
             2 => 0.0,
-            _ => 1.3 * random.next(),
+            _ => 1.3 * random.unit(),
         };
     problem
 }
 
 #[test]
 fn exhaustive_search_over_all_states_finds_nothing_better() {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     let (mut reached, mut saturated, mut sums) = (0, 0, 0);
     let mut worst = 0.0_f64;
     for round in 0..12_000 {
@@ -296,7 +290,7 @@ fn exhaustive_search_over_all_states_finds_nothing_better() {
 /// Broke: with a lower limit of -1e30 A, 8 A flowed where the sum may be 5 A.
 #[test]
 fn extreme_limits_are_kept_to_the_last_ampere() {
-    let mut random = Random(29);
+    let mut random = Random::new(29);
     let ends = [0.0, 1e-30, 1e-9, 0.7, 2.0, 8.0, 1e9, 1e30];
     let (mut reached, mut saturated) = (0, 0);
     for round in 0..20_000 {
@@ -304,7 +298,7 @@ fn extreme_limits_are_kept_to_the_last_ampere() {
         let mut pick =
             |n: usize| -> Vec<f64> { (0..n).map(|_| ends[random.below(ends.len())]).collect() };
         let (upper, lower, total) = (pick(coils), pick(coils), pick(1)[0]);
-        let mut between = |from: f64, to: f64| from + (to - from) * random.next();
+        let mut between = |from: f64, to: f64| from + (to - from) * random.unit();
         let forces: Vec<f64> = (0..coils)
             .map(|_| {
                 let force: f64 = between(-0.3, 1.0);
@@ -353,15 +347,15 @@ fn extreme_limits_are_kept_to_the_last_ampere() {
 #[test]
 fn other_currents_of_the_same_force_cost_more() {
     // Nine coils: any move that keeps the force and the limits raises the power.
-    let mut random = Random(11);
+    let mut random = Random::new(11);
     for round in 0..300 {
         let mut problem = Problem {
-            force_n_per_a: (0..9).map(|_| 0.3 * random.next() - 0.05).collect(),
-            resistance_ohm: (0..9).map(|_| 5.0 + 2.0 * random.next()).collect(),
+            force_n_per_a: (0..9).map(|_| 0.3 * random.unit() - 0.05).collect(),
+            resistance_ohm: (0..9).map(|_| 5.0 + 2.0 * random.unit()).collect(),
             lower_a: vec![if round % 2 == 0 { 0.0 } else { -0.7 }; 9],
             upper_a: vec![1.3; 9],
             total_a: (round % 3 == 0).then_some(3.1),
-            wanted_n: 0.4 * random.next(),
+            wanted_n: 0.4 * random.unit(),
         };
         let (mut currents, found, _) = problem.solve();
         if found.reach == Reach::Saturated {
@@ -376,7 +370,7 @@ fn other_currents_of_the_same_force_cost_more() {
             if i == j || g[j] == 0.0 {
                 continue;
             }
-            let step = 1e-3 * (random.next() - 0.5);
+            let step = 1e-3 * (random.unit() - 0.5);
             let mut other = currents.clone();
             other[i] += step;
             other[j] -= step * g[i] / g[j];

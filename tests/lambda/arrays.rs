@@ -2,7 +2,8 @@
 
 use fluxform_lambda::{Event, Settings, Solution, Status, solve};
 
-use crate::case::{Case, D, Numbers, d, telling_lambdas};
+use fluxform_testing::Random;
+use fluxform_testing::force_problems::{Case, D, d, telling_lambdas};
 
 /// Point dipoles in place of coils: a smooth, symmetric array like the real one.
 fn dipole_array(positions: &[[f64; 2]], points: &[[f64; 3]]) -> Vec<f64> {
@@ -218,7 +219,7 @@ fn order_does_not_matter() {
 #[test]
 fn the_error_is_convex_smooth_and_relatively_growing() {
     for seed in 0..40 {
-        let mut n = Numbers(seed + 5);
+        let mut n = Random::new(seed + 5);
         let (points, m) = (12 + n.below(30), 1 + n.below(12));
         let case = Case {
             forces: (0..points * m).map(|_| n.normal() + 0.8).collect(),

@@ -8,8 +8,9 @@ use fluxform_base::units::DETECTION_THRESHOLD_N;
 use fluxform_lambda::worst::{felt, maxmin, worst_point};
 use fluxform_lambda::{Settings, Status, Wiring, solve};
 
-use crate::case::{Case, Numbers, small_case};
 use crate::vertices::{Demand, Vertices};
+use fluxform_testing::Random;
+use fluxform_testing::force_problems::{Case, small_case};
 
 fn top(case: &Case) -> f64 {
     case.heights.iter().fold(0.0, |most, &h| most.max(h))
@@ -79,7 +80,7 @@ fn errors_that_nobody_feels_end_where_all_vertices_say() {
     let (mut tried, mut worst, mut most_part) = (0, 0.0_f64, 0.0_f64);
     for seed in 0..4600 {
         let mut case = small_case(seed + 20_000);
-        let mut n = Numbers(seed + 5);
+        let mut n = Random::new(seed + 5);
         // Heights of zero, and forces so small that a finger does not feel them.
         for h in &mut case.heights {
             *h *= [1.0, 1.0, 0.1, 0.0][n.below(4)];

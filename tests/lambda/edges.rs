@@ -3,7 +3,7 @@
 use fluxform_lambda::worst::{felt, worst_point};
 use fluxform_lambda::{Criterion, Settings, Solution, Status, solve};
 
-use crate::case::{Case, small_case};
+use fluxform_testing::force_problems::{Case, small_case};
 
 fn plain_case() -> Case {
     Case {

@@ -3,8 +3,9 @@
 use fluxform_lambda::{Solution, Status};
 use fluxform_numerics::real::Real;
 
-use crate::case::{Case, D, Numbers, d, small_case, telling_lambdas};
-use crate::search::Search;
+use fluxform_testing::Random;
+use fluxform_testing::force_problems::{Case, D, d, small_case, telling_lambdas};
+use fluxform_testing::least_error::Search;
 
 fn check_small(seed: u64) {
     let case = small_case(seed);
@@ -138,7 +139,7 @@ fn small_problems_match_exhaustive_search() {
 fn an_offset_is_compensated_exactly() {
     for seed in 0..600 {
         let mut case = small_case(seed);
-        let mut n = Numbers(seed + 77_777);
+        let mut n = Random::new(seed + 77_777);
         let strength = [0.01, 0.3, 5.0][n.below(3)];
         case.offset = Some(case.heights.iter().map(|_| strength * n.normal()).collect());
         let search = Search::new(&case);

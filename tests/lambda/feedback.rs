@@ -4,20 +4,21 @@ use fluxform_lambda::feedback::{NoLambda, Reachable, Span, dip_between, reachabl
 use fluxform_lambda::worst::maxmin;
 use fluxform_numerics::real::Real;
 
-use crate::case::{Case, D, Numbers, d, small_case};
+use fluxform_testing::Random;
+use fluxform_testing::force_problems::{Case, D, d, small_case};
 
 /// Random rows and limits: ties, zeros, currents below zero, limits over six decades.
 fn knapsack(seed: u64) -> Case {
-    let mut n = Numbers(seed);
+    let mut n = Random::new(seed);
     let coils = 1 + n.below(6);
     let style = n.below(4);
-    let force = |n: &mut Numbers| match style {
+    let force = |n: &mut Random| match style {
         0 => n.below(5) as f64 - 2.0,
         1 => n.unit() * 10_f64.powf(n.between(-6.0, 0.0)),
         _ => n.normal(),
     };
     let forces = (0..coils).map(|_| force(&mut n)).collect();
-    let limit = |n: &mut Numbers| match n.below(6) {
+    let limit = |n: &mut Random| match n.below(6) {
         0 => 0.0,
         1 | 2 => 2.0,
         _ => 2.0 * 10_f64.powf(n.between(-6.0, 0.0)),
@@ -172,7 +173,7 @@ fn every_force_is_met_up_to_the_largest_lambda_and_missed_beyond() {
 
 #[test]
 fn no_other_currents_give_the_same_force_with_less_power() {
-    let mut n = Numbers(7);
+    let mut n = Random::new(7);
     for seed in 0..2000 {
         let mut case = small_case(seed);
         case.heights.truncate(1);
@@ -254,7 +255,7 @@ fn a_flat_surface_over_a_square_array_is_served_symmetrically() {
 
 #[test]
 fn weights_count_as_repeated_points_do() {
-    let mut n = Numbers(3);
+    let mut n = Random::new(3);
     let case = flat(2);
     let weights: Vec<f64> = (0..25).map(|_| 1.0 + n.below(3) as f64).collect();
     let mut repeated = case.clone();

@@ -3,7 +3,6 @@
 
 mod allocation;
 mod arrays;
-mod case;
 mod criteria;
 mod edges;
 mod exhaustive;
@@ -11,9 +10,7 @@ mod feedback;
 mod mirror;
 mod oracle;
 mod power;
-mod random;
 mod saturation;
-mod search;
 mod vector_allocation;
 mod vertices;
 mod worst;

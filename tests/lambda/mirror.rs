@@ -4,12 +4,13 @@ use fluxform_lambda::feedback::{Span, reachable};
 use fluxform_lambda::worst::{felt, maxmin, worst_point};
 use fluxform_lambda::{Settings, Status};
 
-use crate::case::{Case, Numbers, small_case};
+use fluxform_testing::Random;
+use fluxform_testing::force_problems::{Case, small_case};
 
 /// Drivers that push, reverse, and pull, without a limit on the sum.
 fn mixed(seed: u64) -> Case {
     let mut case = small_case(seed + 90_000);
-    let mut n = Numbers(seed + 3);
+    let mut n = Random::new(seed + 3);
     case.total = None;
     for i in 0..case.coils() {
         let size = case.upper[i].max(0.3);

@@ -2,7 +2,7 @@
 
 use fluxform_lambda::Status;
 
-use crate::case::Case;
+use fluxform_testing::force_problems::Case;
 
 #[derive(serde::Deserialize)]
 struct Oracle {

@@ -1,6 +1,6 @@
 //! Where currents are not unique.
 
-use crate::case::{Case, small_case, telling_lambdas};
+use fluxform_testing::force_problems::{Case, small_case, telling_lambdas};
 
 /// Currents of least power: no exchange among coils that leaves the forces as they are, and
 /// keeps within the limits, saves power.

@@ -2,13 +2,14 @@
 
 use fluxform_lambda::{Settings, solve};
 
-use crate::case::{Case, D, Numbers, d, small_case};
-use crate::search::Search;
+use fluxform_testing::Random;
+use fluxform_testing::force_problems::{Case, D, d, small_case};
+use fluxform_testing::least_error::Search;
 
 /// A ring of coils over points that turn with it, one coil in the middle, a sum that binds: all coils
 /// of the ring tie, in fours or more as in a 3 x 3 array. `coupling` mixes the neighbours' forces in.
 fn ring(seed: u64, coupling: f64) -> Case {
-    let mut n = Numbers(seed);
+    let mut n = Random::new(seed);
     let around = 2 + n.below(3);
     let points = 2 * around;
     let near: Vec<f64> = (0..points).map(|_| n.between(0.1, 1.0)).collect();
@@ -111,7 +112,7 @@ fn rounding_does_not_decide_where_currents_stop_changing() {
         };
         for size in [1e-15, 1e-12, 1e-10] {
             let mut rounded = case.clone();
-            let mut n = Numbers(seed + 99);
+            let mut n = Random::new(seed + 99);
             rounded
                 .forces
                 .iter_mut()
@@ -134,7 +135,7 @@ fn sums_that_bind_end_where_exhaustive_search_says() {
     let mut bound = 0;
     for seed in 0..1500 {
         let mut case = small_case(seed + 50_000);
-        let mut n = Numbers(seed + 7);
+        let mut n = Random::new(seed + 7);
         let all: f64 = case.upper.iter().sum();
         case.total = Some(all * n.between(0.05, 0.95));
         bound += usize::from(check(&case, &format!("small {seed}")).is_some());

@@ -3,7 +3,7 @@
 use fluxform_lambda::{Reach, VectorAllocation, VectorAllocator};
 use nalgebra::{DMatrix, DVector};
 
-use crate::random::Random;
+use fluxform_testing::Random;
 
 const SIDEWAYS: f64 = 0.3;
 
@@ -20,31 +20,31 @@ struct Problem {
 
 impl Problem {
     fn random(random: &mut Random) -> Self {
-        let coils = 1 + (random.next() * 5.0) as usize;
-        let two_way = random.next() < 0.5;
+        let coils = 1 + (random.unit() * 5.0) as usize;
+        let two_way = random.unit() < 0.5;
         let force_n_per_a: Vec<[f64; 3]> = (0..coils)
-            .map(|_| std::array::from_fn(|_| 0.2 * (random.next() - 0.4)))
+            .map(|_| std::array::from_fn(|_| 0.2 * (random.unit() - 0.4)))
             .collect();
-        let upper_a: Vec<f64> = (0..coils).map(|_| 0.3 + 2.0 * random.next()).collect();
+        let upper_a: Vec<f64> = (0..coils).map(|_| 0.3 + 2.0 * random.unit()).collect();
         let lower_a = upper_a.iter().map(|u| if two_way { -u } else { 0.0 });
         let lower_a: Vec<f64> = lower_a.collect();
-        let total_a = (random.next() < 0.5).then(|| 0.2 + 2.0 * random.next());
+        let total_a = (random.unit() < 0.5).then(|| 0.2 + 2.0 * random.unit());
         // Half of the requests are within reach, or were without the sum's limit.
-        let requested_n = if random.next() < 0.5 {
+        let requested_n = if random.unit() < 0.5 {
             let mut force = [0.0; 3];
             for i in 0..coils {
-                let current = lower_a[i] + random.next() * (upper_a[i] - lower_a[i]);
+                let current = lower_a[i] + random.unit() * (upper_a[i] - lower_a[i]);
                 for k in 0..3 {
                     force[k] += force_n_per_a[i][k] * current;
                 }
             }
             force
         } else {
-            std::array::from_fn(|_| 0.8 * (random.next() - 0.5))
+            std::array::from_fn(|_| 0.8 * (random.unit() - 0.5))
         };
         Self {
             force_n_per_a,
-            resistance_ohm: (0..coils).map(|_| 1.0 + 6.0 * random.next()).collect(),
+            resistance_ohm: (0..coils).map(|_| 1.0 + 6.0 * random.unit()).collect(),
             lower_a,
             upper_a,
             total_a,
@@ -185,7 +185,7 @@ fn pseudo_inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
 
 #[test]
 fn currents_are_those_of_the_exhaustive_search() {
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     let (mut reached, mut out_of_reach, mut unproven) = (0, 0, 0);
     for number in 0..1500 {
         let problem = Problem::random(&mut random);
@@ -318,26 +318,26 @@ fn forces_do_not_jump_along_a_path_nor_do_currents_within_reach() {
 
 #[test]
 fn large_and_stiff_arrays_are_proven() {
-    let mut random = Random(11);
+    let mut random = Random::new(11);
     for side in [5, 8, 12] {
         let coils = side * side;
         for k in 0..40 {
-            let resistance = (0..coils).map(|_| 10f64.powf(4.0 * random.next() - 2.0));
+            let resistance = (0..coils).map(|_| 10f64.powf(4.0 * random.unit() - 2.0));
             let resistance: Vec<f64> = resistance.collect();
             let upper: Vec<f64> = (0..coils)
-                .map(|_| 10f64.powf(3.0 * random.next() - 2.0))
+                .map(|_| 10f64.powf(3.0 * random.unit() - 2.0))
                 .collect();
             let lower = vec![0.0; coils];
             let total = (k % 2 == 0).then(|| 0.2 * upper.iter().sum::<f64>());
             let mut allocator =
                 VectorAllocator::new(&resistance, &lower, &upper, total, SIDEWAYS).unwrap();
             let at = [
-                0.1 * (random.next() - 0.5),
-                0.1 * (random.next() - 0.5),
+                0.1 * (random.unit() - 0.5),
+                0.1 * (random.unit() - 0.5),
                 0.02,
             ];
             let mut currents = vec![0.0; coils];
-            let force = 10f64.powf(3.0 * random.next() - 3.0);
+            let force = 10f64.powf(3.0 * random.unit() - 3.0);
             let request = [0.3 * force, -0.2 * force, force];
             let result = allocator.allocate(&array(side, at), request, &mut currents);
             assert!(result.proven, "{side} {k}: {result:?}");

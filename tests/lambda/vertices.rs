@@ -2,7 +2,7 @@
 
 use fluxform_numerics::real::Real;
 
-use crate::case::{Case, D, d};
+use fluxform_testing::force_problems::{Case, D, d};
 
 /// `a . (x, t) >= constant + lambda slope`.
 type Row = (Vec<D>, D, D);

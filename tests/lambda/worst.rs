@@ -3,8 +3,9 @@
 use fluxform_lambda::worst::{WorstSolution, maxmin, worst_point};
 use fluxform_lambda::{Event, Settings, solve};
 
-use crate::case::{Case, Numbers, small_case};
 use crate::vertices::Vertices;
+use fluxform_testing::Random;
+use fluxform_testing::force_problems::{Case, small_case};
 
 fn solved(case: &Case) -> WorstSolution {
     worst_point(&case.problem(), &Settings::default()).expect("a well-formed problem")
@@ -104,7 +105,7 @@ fn small_problems_match_every_vertex() {
 fn an_offset_is_part_of_it() {
     for seed in 0..300 {
         let mut case = small_case(seed);
-        let mut n = Numbers(seed + 4711);
+        let mut n = Random::new(seed + 4711);
         let strength = [0.01, 0.3, 5.0][n.below(3)];
         case.offset = Some(case.heights.iter().map(|_| strength * n.normal()).collect());
         check(&case, &format!("offset {seed}"));
@@ -233,7 +234,7 @@ fn the_path_is_convex_and_its_constants_are_where_they_are_defined() {
 fn maxmin_leaves_no_point_too_weak_and_nothing_better_is_found() {
     for seed in 0..300 {
         let mut case = small_case(seed);
-        let mut n = Numbers(seed + 99);
+        let mut n = Random::new(seed + 99);
         if n.below(3) == 0 {
             case.offset = Some(case.heights.iter().map(|_| 0.1 * n.unit()).collect());
         }
@@ -362,7 +363,7 @@ fn degenerate_problems_have_their_closed_answers() {
 fn weights_count_points_as_often_as_they_say() {
     for seed in 0..200 {
         let case = small_case(seed);
-        let mut n = Numbers(seed + 31);
+        let mut n = Random::new(seed + 31);
         let times: Vec<usize> = case.heights.iter().map(|_| 1 + n.below(4)).collect();
         let m = case.coils();
         let mut repeated = case.clone();
@@ -440,7 +441,7 @@ fn a_useless_coil_of_wide_limits_does_not_hide_what_others_hold() {
 /// forces are smaller than any number's inverse.
 #[test]
 fn forces_without_an_inverse_do_not_hide_missed_points() {
-    let mut numbers = Numbers(7);
+    let mut numbers = Random::new(7);
     let points = 10_000;
     let (mut forces, mut offset) = (Vec::new(), Vec::new());
     for j in 0..points {
@@ -472,7 +473,7 @@ fn forces_without_an_inverse_do_not_hide_missed_points() {
 
 /// A 3 x 3 array under a surface that rises with x, symmetric in y up to rounding; every point as
 /// often as `copies` says, the same up to rounding.
-fn twins(numbers: &mut Numbers, size: f64, copies: usize) -> Case {
+fn twins(numbers: &mut Random, size: f64, copies: usize) -> Case {
     let pitch = numbers.between(0.04, 0.06);
     let (low, rise) = (numbers.between(0.02, 0.04), numbers.between(0.1, 0.3));
     let (mut forces, mut heights, mut offset) = (Vec::new(), Vec::new(), Vec::new());
@@ -526,7 +527,7 @@ fn assert_whole(case: &Case, turns_at_least: usize, what: &str) {
 /// seemed to be missed next, and hid the one that was. The path then jumped at a turn.
 #[test]
 fn a_twin_of_an_active_point_does_not_hide_the_one_missed_next() {
-    let mut numbers = Numbers(29);
+    let mut numbers = Random::new(29);
     for round in 0..40 {
         let size = [1e-15, 1e-14, 1e-13, 1e-12][round % 4];
         assert_whole(&twins(&mut numbers, size, 1), 11, &format!("{round}"));
@@ -537,7 +538,7 @@ fn a_twin_of_an_active_point_does_not_hide_the_one_missed_next() {
 /// off by up to 3 % of lambda max h where it was not.
 #[test]
 fn more_twins_than_are_asked_for_do_not_hide_the_one_missed_next() {
-    let mut numbers = Numbers(31);
+    let mut numbers = Random::new(31);
     for round in 0..30 {
         let size = [1e-14, 3e-14, 1e-13][round % 3];
         assert_whole(&twins(&mut numbers, size, 12), 5, &format!("{round}"));
@@ -548,7 +549,7 @@ fn more_twins_than_are_asked_for_do_not_hide_the_one_missed_next() {
 /// path must not end where one of them gives way to another.
 #[test]
 fn a_symmetric_array_is_followed_past_rows_that_depend_on_each_other() {
-    let mut numbers = Numbers(17);
+    let mut numbers = Random::new(17);
     for round in 0..60 {
         let pitch = numbers.between(0.03, 0.06);
         let bump = 0.02 * numbers.unit();

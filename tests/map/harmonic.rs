@@ -1,5 +1,6 @@
 //! Maps of sources without symmetry against direct evaluation.
 
+use fluxform_testing::Random;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
@@ -20,21 +21,9 @@ struct Charges {
     asked: AtomicUsize,
 }
 
-/// Numbers between 0 and 1.
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = (self.0)
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
-
 impl Charges {
     fn new(a_core: usize) -> Self {
-        let (mut random, mut places_m) = (Random(7), Vec::new());
+        let (mut random, mut places_m) = (Random::new(7), Vec::new());
         for core in 0..9 {
             let [cx, cy] = [core % 3, core / 3].map(|i| 0.05 * (f64::from(i) - 1.0));
             for charge in 0..a_core {

@@ -9,6 +9,7 @@ use fluxform_map::tabulate::{Grid, PlacedCoil};
 use fluxform_map::{Components, FieldMap, interpolation_error, tabulate};
 use fluxform_numerics::axis::Axis;
 use fluxform_numerics::lagrange;
+use fluxform_testing::Random;
 
 fn seed() -> Winding {
     Winding {
@@ -259,7 +260,7 @@ fn the_interpolation_error_covers_other_places() {
             .expect("an error");
         let nodes = grid.x_m.len() * grid.y_m.len() * grid.z_m.len();
         let mut worst = 0.0_f64;
-        let mut state = 1_u64;
+        let mut random = Random::new(1_u64);
         for k in 0..grid.z_m.len() - 1 {
             let largest = (0..200)
                 .map(|i| {
@@ -271,12 +272,7 @@ fn the_interpolation_error_covers_other_places() {
                 })
                 .fold(0.0, f64::max);
             for _ in 0..3000 {
-                let mut unit = || {
-                    state = state
-                        .wrapping_mul(6364136223846793005)
-                        .wrapping_add(1442695040888963407);
-                    (state >> 11) as f64 / (1_u64 << 53) as f64
-                };
+                let mut unit = || random.unit();
                 let coil = (unit() * 9.0) as usize;
                 let z = grid.z_m[k] + unit() * (grid.z_m[k + 1] - grid.z_m[k]);
                 let point = [0.1 * unit() - 0.05, 0.097 * unit() - 0.047, z];

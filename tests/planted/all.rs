@@ -1,4 +1,4 @@
-//! All of `tests/planted.rs`: every case, with a row each.
+//! All of `tests/planted`: every case, with a row each.
 //!
 //! ```text
 //! cargo bench --locked --bench planted -- [--rows] [--command map]

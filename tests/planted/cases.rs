@@ -8,7 +8,9 @@ use std::process::Command;
 
 use sha2::{Digest, Sha256};
 
-use crate::commands::{Writes, copy, lay_inputs, run, words};
+use fluxform_testing::tree::copy;
+
+use crate::commands::{Writes, lay_inputs, run, words};
 use crate::snapshot::{Kind, Snapshot, snapshot};
 
 /// Where links lead to, and what must never change.

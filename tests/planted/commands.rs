@@ -1,15 +1,12 @@
 //! Every command that writes, with its inputs; what each writes is found by running it.
 
 use std::fs;
-use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// The program under test; another build of it by `FLUXFORM_OTHER`.
-pub fn program() -> String {
-    std::env::var("FLUXFORM_OTHER").unwrap_or_else(|_| env!("CARGO_BIN_EXE_fluxform").to_owned())
-}
+use fluxform_testing::inputs::{AIR, BUMP};
+use fluxform_testing::run::program_or_other;
 
 /// A command that writes, and what is run before it to make its inputs.
 #[derive(Clone, Copy, Debug)]
@@ -148,16 +145,22 @@ pub const MEASURES: &[Writes] = &[writes(
 /// Lays the inputs.
 pub fn lay_inputs(place: &Path) {
     let write = |name: &str, text: &str| fs::write(place.join(name), text).unwrap();
-    write("air.toml", AIR);
-    write(
-        "steel.toml",
-        &AIR.replace("\"air\"", "\"steel\"")
-            .replace("array = { rows = 1, columns = 2, pitch_mm = 43.0 }", CORE),
-    );
-    write("bump.toml", BUMP);
+    // Many runs: two coils, few nodes and points.
+    let air = AIR
+        .replace("rows = 2", "rows = 1")
+        .replace(", 21]", ", 7]")
+        .replace("40.0", "20.0")
+        .replace("[-30.0, 30.0,", "[-20.0, 20.0,");
+    let bump = BUMP.replace(", 9]", ", 5]");
+    let steel = air
+        .replace("\"air\"", "\"steel\"")
+        .replace("array = { rows = 1, columns = 2, pitch_mm = 43.0 }", CORE);
+    write("air.toml", &air);
+    write("steel.toml", &steel);
+    write("bump.toml", &bump);
     write(
         "knob.toml",
-        &BUMP
+        &bump
             .replace("bump", "knob")
             .replace("base_mm = 37", "base_mm = 39"),
     );
@@ -183,29 +186,6 @@ pub fn lay_inputs(place: &Path) {
 
 const CORE: &str = "core = { below_mm = 7.0, relative_permeability = 1300.0 }";
 
-const AIR: &str = r#"name = "air"
-coil = { inner_diameter_mm = 24.0, outer_diameter_mm = 38.0, length_mm = 70.0 }
-wire = { diameter_mm = 0.7 }
-array = { rows = 1, columns = 2, pitch_mm = 43.0 }
-magnet = { diameter_mm = 10.0, length_mm = 10.0, magnetization_a_per_m = 1.1579e6 }
-supply = { current_max_a = 1.3, voltage_v = 36.0 }
-limits = { resistance_max_ohm = 6.0, settling_max_ms = 100.0, outer_diameter_max_mm = 38.0, length_max_mm = 100.0 }
-target = { height_mm = 30.0 }
-[workspace]
-x_mm = [-20.0, 20.0, 7]
-y_mm = [-20.0, 20.0, 7]
-z_mm = [30.0, 70.0, 7]
-"#;
-
-const BUMP: &str = r#"name = "bump"
-primitive = "half-sphere"
-radius_mm = 13
-base_mm = 37
-[points]
-x_mm = [-13.0, 13.0, 5]
-y_mm = [-13.0, 13.0, 5]
-"#;
-
 /// How a run ended.
 #[derive(Clone, Debug)]
 pub struct Ran {
@@ -222,7 +202,7 @@ const HANGS: Duration = Duration::from_secs(120);
 pub fn run(place: &Path, words: &[String]) -> Ran {
     let log = place.with_extension("log");
     let file = fs::File::create(&log).unwrap();
-    let mut child = Command::new(program())
+    let mut child = Command::new(program_or_other())
         .args(words)
         .current_dir(place)
         .stdin(Stdio::null())
@@ -251,19 +231,4 @@ pub fn run(place: &Path, words: &[String]) -> Ran {
 
 pub fn words(line: &str) -> Vec<String> {
     line.split_whitespace().map(str::to_owned).collect()
-}
-
-/// Copies a folder with its modes; it holds only files and folders.
-pub fn copy(from: &Path, to: &Path) {
-    fs::create_dir_all(to).unwrap();
-    for entry in fs::read_dir(from).unwrap().map(Result::unwrap) {
-        let target = to.join(entry.file_name());
-        if entry.file_type().unwrap().is_dir() {
-            copy(&entry.path(), &target);
-        } else {
-            fs::copy(entry.path(), target).unwrap();
-        }
-    }
-    let mode = fs::metadata(from).unwrap().permissions().mode();
-    fs::set_permissions(to, fs::Permissions::from_mode(mode)).unwrap();
 }

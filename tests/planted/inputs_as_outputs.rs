@@ -5,7 +5,9 @@ use std::os::unix::fs::symlink;
 use std::path::Path;
 
 use crate::cases::Prepared;
-use crate::commands::{copy, run, words};
+use fluxform_testing::tree::copy;
+
+use crate::commands::{run, words};
 use crate::judge::Row;
 use crate::snapshot::{change, snapshot};
 

@@ -3,15 +3,17 @@
 use fluxform::bundle::replay::Answer;
 use fluxform::bundle::trajectory::Trajectory;
 use fluxform::bundle::write::{BundleContent, write_bundle};
-use fluxform::commands::replay::summary::Told;
+use fluxform::commands::replay::summary::TrajectorySource;
 use fluxform::commands::replay::synthesize::{Kind, Synthesis};
 use fluxform::commands::replay::{Opened, ReplayReport, run};
 use fluxform::progress::Silent;
 
-use crate::support::{Random, coupled, in_air};
+use fluxform_testing::Random;
 
-fn told() -> Told {
-    Told {
+use crate::support::{coupled, in_air};
+
+fn told() -> TrajectorySource {
+    TrajectorySource {
         source: "a test".to_owned(),
         input: None,
         synthesis: None,
@@ -114,7 +116,7 @@ fn no_other_currents_of_the_same_force_are_cooler() {
         let terms = currents.iter().zip(&limits.resistance_ohm);
         terms.map(|(i, r)| r * i * i).sum()
     };
-    let mut random = Random(17);
+    let mut random = Random::new(17);
     let mut g = vec![0.0; rows.coils];
     let mut tried = 0;
     for row in (0..rows.len()).filter(|row| rows.answer[*row] == Answer::Ok) {
@@ -122,7 +124,7 @@ fn no_other_currents_of_the_same_force_are_cooler() {
         let currents = rows.currents_a(row);
         for _ in 0..20 {
             // A random direction without force, as far as the limits let it go.
-            let mut move_a: Vec<f64> = g.iter().map(|_| random.next() - 0.5).collect();
+            let mut move_a: Vec<f64> = g.iter().map(|_| random.unit() - 0.5).collect();
             let along: f64 = move_a.iter().zip(&g).map(|(m, g)| m * g).sum();
             let square: f64 = g.iter().map(|g| g * g).sum();
             for (m, g) in move_a.iter_mut().zip(&g) {

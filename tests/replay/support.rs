@@ -1,6 +1,6 @@
-//! A small bundle, and random numbers.
+//! Small bundles.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use fluxform::bundle::artefact::Input;
@@ -11,15 +11,8 @@ use fluxform::design::{Design, Need};
 use fluxform::progress::Silent;
 use fluxform::scene::sources::{DesignSource, ShapeSource};
 use fluxform::shape::document::ShapeDocument;
+use fluxform_testing::root;
 use tempfile::TempDir;
-
-#[path = "../lambda/random.rs"]
-mod random;
-pub use random::Random;
-
-fn here(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
-}
 
 /// Bundles of a design, with every (from, to) in its text replaced.
 pub struct Bundles {
@@ -29,7 +22,7 @@ pub struct Bundles {
 
 impl Bundles {
     fn new(design: &str, changes: &[(&str, &str)], shapes: &[&str]) -> Self {
-        let path = here(design);
+        let path = root().join(design);
         let shipped = std::fs::read_to_string(&path).expect("shipped design");
         let text = changes.iter().fold(shipped, |text, (from, to)| {
             assert!(text.contains(from), "{from} is not in {design}");
@@ -40,10 +33,10 @@ impl Bundles {
         let shapes: Vec<ShapeSource> = shapes
             .iter()
             .map(|shape| {
-                let text = std::fs::read_to_string(here(&format!("shapes/{shape}.toml")))
+                let text = std::fs::read_to_string(root().join(format!("shapes/{shape}.toml")))
                     .expect("shipped shape")
                     .replace("61]", "21]");
-                let path = here(&format!("shapes/{shape}.toml"));
+                let path = root().join(format!("shapes/{shape}.toml"));
                 let (document, _) = ShapeDocument::from_toml(&text, &path).expect("valid");
                 let input = Some(Input::of_bytes(*shape, text.as_bytes()));
                 ShapeSource { document, input }

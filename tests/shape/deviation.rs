@@ -11,7 +11,8 @@ use fluxform_shape::primitive::PlacedPrimitive;
 use fluxform_shape::tessellation::estimated_deviation_m;
 use fluxform_shape::{Surface, deviation, stl};
 
-use crate::support::{Random, exact, grid, root, sample};
+use fluxform_testing::surfaces::{exact, grid, sample};
+use fluxform_testing::{Random, root};
 
 fn certified(mesh: &Mesh, plan: &Grid) -> (Vertical, Option<Interval>) {
     let heights: Vec<Option<f64>> = heights(mesh, plan);
@@ -170,7 +171,7 @@ fn bilinear(heights: &[Option<f64>], plan: &Grid, p: [f64; 2]) -> Option<f64> {
 
 #[test]
 fn random_soups_match_a_ray_caster() {
-    let mut random = Random(11);
+    let mut random = Random::new(11);
     let mut tried = 0;
     for case in 0..60 {
         let count = 3 + random.below(25);
@@ -462,7 +463,7 @@ fn a_turned_body_is_certified_alike_on_any_number_of_threads() {
     let plan = grid((-0.03, 0.031, 18), (-0.029, 0.03, 15));
     let (found, apart) = certified(&mesh, &plan);
     let heights = heights(&mesh, &plan);
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     let mut most = [0.0_f64; 2];
     for _ in 0..400 {
         let p = [random.between(-0.03, 0.031), random.between(-0.029, 0.03)];

@@ -9,10 +9,10 @@ use fluxform_shape::document::{
 use fluxform_shape::mesh::FileMesh;
 use fluxform_shape::{MeshReport, discretize};
 
-use crate::samples::{
+use fluxform_testing::surface_files::{
     amf, amf_parts, obj, ply_ascii, ply_binary, sldprt, three_dxml, three_mf, three_mf_of, zipped,
 };
-use crate::support::{file, lifted};
+use fluxform_testing::surfaces::{file, lifted};
 
 /// The tetrahedron that every sample holds: its volume and the upper corner of its box.
 const VOLUME: f64 = 0.7 * 1.3 * 2.9 / 6.0;
@@ -202,7 +202,7 @@ fn a_ply_header_is_held_against_the_file() {
 
 #[test]
 fn three_mf_faults_have_part_and_line() {
-    let good = String::from_utf8(crate::samples::three_mf_model("inch")).unwrap();
+    let good = String::from_utf8(fluxform_testing::surface_files::three_mf_model("inch")).unwrap();
     for (from, to, said) in [
         (
             "v1=\"0\"",
@@ -306,7 +306,7 @@ fn references_and_damaged_attributes_of_xml_are_not_passed_over() {
         let message = refusal(SurfaceFormat::Amf, amf_with(x).as_bytes());
         assert!(message.contains("expected a number"), "{x}: {message}");
     }
-    let model = String::from_utf8(crate::samples::three_mf_model("inch")).unwrap();
+    let model = String::from_utf8(fluxform_testing::surface_files::three_mf_model("inch")).unwrap();
     for (from, to, said) in [
         ("unit=\"inch\"", "unit=inch", "the XML is damaged"),
         ("unit=\"inch\"", "unit=\"&in;\"", "unit `&in;` is unknown"),
@@ -325,7 +325,7 @@ fn references_and_damaged_attributes_of_xml_are_not_passed_over() {
 
 #[test]
 fn two_objects_of_one_id_are_refused_in_3dxml() {
-    let [manifest, structure, representation] = crate::samples::three_dxml_parts();
+    let [manifest, structure, representation] = fluxform_testing::surface_files::three_dxml_parts();
     for (from, to) in [
         ("Rep id=\"5\"", "Rep id=\"2\""),
         ("3D id=\"2\"", "3D id=\"1\""),
@@ -347,7 +347,7 @@ fn two_objects_of_one_id_are_refused_in_3dxml() {
 
 #[test]
 fn a_body_in_another_document_is_refused_in_3dxml_not_taken_for_one_of_the_same_number() {
-    let [manifest, structure, representation] = crate::samples::three_dxml_parts();
+    let [manifest, structure, representation] = fluxform_testing::surface_files::three_dxml_parts();
     let product = |to: &str| {
         let from = "urn:3DXML:Reference:loc:2";
         assert!(structure.1.contains(from));
@@ -500,7 +500,7 @@ fn the_oddities_of_writers_change_nothing() {
         assert!((report.volume.unwrap() - VOLUME).abs() < 1e-6, "{text}");
     }
     // 3MF: prefixes, another place of the model, apostrophes, numbers with exponents and blanks.
-    let model = text(crate::samples::three_mf_model("inch"));
+    let model = text(fluxform_testing::surface_files::three_mf_model("inch"));
     let prefixed = model
         .replace("</", "</m:")
         .replace('<', "<m:")
@@ -524,7 +524,7 @@ fn the_oddities_of_writers_change_nothing() {
 
 #[test]
 fn a_3dxml_body_that_is_no_tessellation_is_refused() {
-    let [manifest, structure, representation] = crate::samples::three_dxml_parts();
+    let [manifest, structure, representation] = fluxform_testing::surface_files::three_dxml_parts();
     for (from, to, said) in [
         ("\"TESSELLATED\"", "\"CGR\"", "stored as `CGR`"),
         ("\"TESSELLATED\"", "\"\"", "stored as ``"),
@@ -545,7 +545,7 @@ fn a_3dxml_body_that_is_no_tessellation_is_refused() {
 /// Wherever it stands among the faces, and with vertices of its own.
 #[test]
 fn a_coarser_version_in_3dxml_is_passed_over() {
-    let [manifest, structure, representation] = crate::samples::three_dxml_parts();
+    let [manifest, structure, representation] = fluxform_testing::surface_files::three_dxml_parts();
     let wanted = read(SurfaceFormat::ThreeDxml, &three_dxml()).unwrap();
     let end = "</VertexBuffer></Rep>";
     assert!(representation.1.contains(end));

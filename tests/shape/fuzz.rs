@@ -8,8 +8,9 @@ use fluxform_shape::mesh::Mesh;
 use fluxform_shape::placement::Transform;
 use fluxform_shape::stl;
 
-use crate::samples;
-use crate::support::{Random, binary, grid, sample};
+use fluxform_testing::Random;
+use fluxform_testing::surface_files;
+use fluxform_testing::surfaces::{binary, grid, sample};
 
 fn mutate(bytes: &mut Vec<u8>, random: &mut Random) {
     const PIECES: [&[u8]; 14] = [
@@ -64,7 +65,7 @@ fn mutated_files_are_read_or_refused() {
         text.as_bytes().to_vec(),
         text.repeat(2).into_bytes(),
     ];
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     let (mut read, mut sampled) = (0, 0);
     for round in 0..60_000 {
         let mut bytes = seeds[round % 3].clone();
@@ -101,38 +102,50 @@ fn mutated_files_of_every_format_are_read_or_refused() {
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     type Pack = fn(&[u8]) -> Vec<u8>;
     let as_it_is: Pack = <[u8]>::to_vec;
-    let [manifest, structure, representation] = samples::three_dxml_parts();
+    let [manifest, structure, representation] = surface_files::three_dxml_parts();
     let product = |structure: &str, representation: &str| {
-        samples::zipped(&[
+        surface_files::zipped(&[
             (manifest.0, &manifest.1),
             ("P.3dxml", structure),
             ("R.3DRep", representation),
         ])
     };
     let seeds: [(SurfaceFormat, Vec<u8>, Pack); 9] = [
-        (SurfaceFormat::Obj, samples::obj(), as_it_is),
-        (SurfaceFormat::Ply, samples::ply_ascii(), as_it_is),
-        (SurfaceFormat::Ply, samples::ply_binary(false), as_it_is),
-        (SurfaceFormat::ThreeMf, samples::three_mf("inch"), as_it_is),
+        (SurfaceFormat::Obj, surface_files::obj(), as_it_is),
+        (SurfaceFormat::Ply, surface_files::ply_ascii(), as_it_is),
+        (
+            SurfaceFormat::Ply,
+            surface_files::ply_binary(false),
+            as_it_is,
+        ),
         (
             SurfaceFormat::ThreeMf,
-            samples::three_mf_model("inch"),
-            |model| samples::three_mf_of(&String::from_utf8_lossy(model)),
+            surface_files::three_mf("inch"),
+            as_it_is,
+        ),
+        (
+            SurfaceFormat::ThreeMf,
+            surface_files::three_mf_model("inch"),
+            |model| surface_files::three_mf_of(&String::from_utf8_lossy(model)),
         ),
         (
             SurfaceFormat::Amf,
-            samples::amf("mm").into_bytes(),
+            surface_files::amf("mm").into_bytes(),
             as_it_is,
         ),
-        (SurfaceFormat::ThreeDxml, samples::three_dxml(), as_it_is),
-        (SurfaceFormat::Sldprt, samples::sldprt(), as_it_is),
+        (
+            SurfaceFormat::ThreeDxml,
+            surface_files::three_dxml(),
+            as_it_is,
+        ),
+        (SurfaceFormat::Sldprt, surface_files::sldprt(), as_it_is),
         (
             SurfaceFormat::Sldprt,
-            samples::display_lists(),
-            samples::sldprt_of,
+            surface_files::display_lists(),
+            surface_files::sldprt_of,
         ),
     ];
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     let look = |format: SurfaceFormat, bytes: &[u8]| {
         let Ok(file) = format.read(Path::new("f"), bytes) else {
             return 0;

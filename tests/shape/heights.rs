@@ -6,7 +6,8 @@ use fluxform_shape::mesh::{FileMesh, Mesh, Triangle};
 use fluxform_shape::placement::Transform;
 use fluxform_shape::stl;
 
-use crate::support::{Random, binary, box_of, corpus, exact, grid, root, sample};
+use fluxform_testing::surfaces::{binary, box_of, exact, grid, sample};
+use fluxform_testing::{Random, root};
 
 /// Height over an integer point by whole-number arithmetic: (numerator, denominator > 0).
 fn brute_force(triangles: &[[[i64; 3]; 3]], x: i64, y: i64) -> Option<(i128, i128)> {
@@ -100,7 +101,7 @@ fn check(triangles: &[[[i64; 3]; 3]], from: i64, to: i64, step: i64, tolerance: 
 
 #[test]
 fn random_soups_match_whole_number_arithmetic() {
-    let mut random = Random(1);
+    let mut random = Random::new(1);
     let mut covered = 0;
     for round in 0..60 {
         // Small numbers put points on edges, vertices and walls all the time.
@@ -123,7 +124,7 @@ fn random_soups_match_whole_number_arithmetic() {
 
 #[test]
 fn vertical_walls_show_their_top() {
-    let mut random = Random(2);
+    let mut random = Random::new(2);
     let mut covered = 0;
     for _ in 0..40 {
         let triangles: Vec<_> = (0..12)
@@ -144,7 +145,7 @@ fn vertical_walls_show_their_top() {
 
 #[test]
 fn needles_of_a_million_to_one_are_exact() {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     let mut covered = 0;
     for _ in 0..60 {
         let mut number = |n: usize| random.below(2 * n + 1) as i64 - n as i64;
@@ -214,7 +215,7 @@ fn seed_plan() -> Grid {
 fn order_orientation_and_threads_leave_every_bit() {
     let bytes = std::fs::read(root().join("shapes/half_sphere.stl")).unwrap();
     let file = stl::read(&bytes).unwrap();
-    let mut random = Random(4);
+    let mut random = Random::new(4);
     let place = |triangles: Vec<Triangle>| {
         let file = FileMesh {
             triangles,
@@ -288,7 +289,7 @@ fn neighbours_leave_no_crack_in_any_position() {
     let mut file = stl::read(&bytes).unwrap();
     // Without rounding nothing is snapped: only the edges' exact treatment closes the surface.
     file.coordinate_rounding = 0.0;
-    let mut random = Random(6);
+    let mut random = Random::new(6);
     for _ in 0..20 {
         let rotate_deg = [20.0, 20.0, 180.0].map(|most| random.between(-most, most));
         let placement = Placement {
@@ -382,57 +383,6 @@ fn a_far_origin_loses_no_border() {
             assert!(off < allowed_m, "{x}: {height} {}", shape(x));
         }
     }
-}
-
-#[test]
-fn real_files_match_a_search_through_all_triangles() {
-    let Some(folder) = corpus() else { return };
-    for name in [
-        "trimesh__angle_block.STL",
-        "trimesh__unit_sphere.STL",
-        "trimesh__20mm-xyz-cube.stl",
-        "swurdf__base_link.STL",
-        "sxt__Part1.STL",
-    ] {
-        let file = stl::read(&std::fs::read(folder.join(name)).unwrap()).unwrap();
-        let placement = Placement {
-            translate_m: [0.013, -0.007, 0.3],
-            rotate_deg: [20.0, -35.0, 55.0],
-        };
-        let mesh = Mesh::place(file, &Transform::new(0.0254, &placement)).unwrap();
-        let [x, y] = mesh.facts().bounds.plan();
-        let plan = grid((x[0], x[1], 41), (y[0], y[1], 41));
-        let mut hits = 0;
-        for (k, found) in sample(&mesh, &plan).iter().enumerate() {
-            let p = [plan.x_m.node(k % 41), plan.y_m.node(k / 41)];
-            let wanted = mesh
-                .triangles()
-                .iter()
-                .filter_map(|t| plane_height(t, p))
-                .fold(None, |m: Option<f64>, h| Some(m.map_or(h, |m| m.max(h))));
-            if let Some(wanted) = wanted {
-                let height = found.unwrap().height_m;
-                assert!(
-                    (height - wanted).abs() < 1e-9,
-                    "{name} {p:?}: {height} {wanted}"
-                );
-                hits += 1;
-            }
-        }
-        assert!(hits > 400, "{name}: {hits}");
-    }
-}
-
-/// Height of the triangle's plane over a point strictly inside it, by Cramer's rule.
-fn plane_height(t: &Triangle, p: [f64; 2]) -> Option<f64> {
-    let [u, v] = [1, 2].map(|k| [0, 1, 2].map(|c| t[k][c] - t[0][c]));
-    let d = [p[0] - t[0][0], p[1] - t[0][1]];
-    let whole = u[0] * v[1] - u[1] * v[0];
-    let (s, r) = (
-        (d[0] * v[1] - d[1] * v[0]) / whole,
-        (u[0] * d[1] - u[1] * d[0]) / whole,
-    );
-    (s > 0.0 && r > 0.0 && s + r < 1.0).then(|| t[0][2] + s * u[2] + r * v[2])
 }
 
 /// Of two faces that both fall from a ridge the flatter is seen, of two that rise from a gutter the

@@ -3,7 +3,7 @@
 use fluxform_shape::document::SurfaceFormat;
 
 use crate::formats::refusal;
-use crate::samples::{amf, three_mf_of, zipped};
+use fluxform_testing::surface_files::{amf, three_mf_of, zipped};
 
 /// A 3MF file that builds its object `last`; from the second on each is made of the one before
 /// twice.
@@ -14,7 +14,7 @@ fn doubled(last: usize) -> Vec<u8> {
         objects +=
             &format!("<object id=\"{id}\"><components>{before}{before}</components></object>");
     }
-    let model = String::from_utf8(crate::samples::three_mf_model("inch")).unwrap();
+    let model = String::from_utf8(fluxform_testing::surface_files::three_mf_model("inch")).unwrap();
     let start = model.find("<object id=\"2\"").unwrap();
     let end = model.find("</resources>").unwrap();
     let model = format!("{}{objects}{}", &model[..start], &model[end..]);
@@ -62,14 +62,14 @@ fn what_an_archive_claims_to_unpack_to_is_held_against_its_length() {
     assert_eq!(changed, 2);
     let message = refusal(SurfaceFormat::ThreeMf, &lying);
     assert!(message.contains("larger than its declared"), "{message}");
-    let part = crate::samples::sldprt_of(&vec![0; 20 << 20]);
+    let part = fluxform_testing::surface_files::sldprt_of(&vec![0; 20 << 20]);
     let message = refusal(SurfaceFormat::Sldprt, &part);
     assert!(message.contains("more than its data can hold"), "{message}");
 }
 
 #[test]
 fn names_of_parts_lead_nowhere_outside_the_archive() {
-    let model = String::from_utf8(crate::samples::three_mf_model("inch")).unwrap();
+    let model = String::from_utf8(fluxform_testing::surface_files::three_mf_model("inch")).unwrap();
     for name in ["../../3D/3dmodel.model", "C:\\3D\\3dmodel.model"] {
         let message = refusal(SurfaceFormat::ThreeMf, &zipped(&[(name, &model)]));
         assert!(
@@ -94,7 +94,7 @@ fn entities_of_xml_are_not_replaced() {
     let bomb = amf("mm").replacen("<amf", laughs, 1);
     let text = bomb.replace("<v1>0</v1>", "<v1>&b;</v1>");
     refusal(SurfaceFormat::Amf, text.as_bytes());
-    let model = String::from_utf8(crate::samples::three_mf_model("inch")).unwrap();
+    let model = String::from_utf8(fluxform_testing::surface_files::three_mf_model("inch")).unwrap();
     let model = model.replacen("<model", &laughs.replace("amf", "model"), 1);
     let text = model.replace("v1=\"0\"", "v1=\"&b;\"");
     refusal(SurfaceFormat::ThreeMf, &three_mf_of(&text));
@@ -106,7 +106,7 @@ fn extensions_without_end_are_refused() {
         .map(|k| format!(" xmlns:p{k}=\"/core/\""))
         .collect();
     let required: String = (0..20_000).map(|k| format!("p{k} ")).collect();
-    let model = String::from_utf8(crate::samples::three_mf_model("inch")).unwrap();
+    let model = String::from_utf8(fluxform_testing::surface_files::three_mf_model("inch")).unwrap();
     let open = format!("<model{spaces} requiredextensions=\"{required}\" ");
     let message = refusal(
         SurfaceFormat::ThreeMf,
@@ -126,7 +126,7 @@ fn a_small_file_does_not_unfold_into_a_large_one() {
 /// found to be deep, and laying them out went as deep as they lay.
 #[test]
 fn a_chain_of_bodies_is_refused_from_whichever_end_it_is_met() {
-    let model = String::from_utf8(crate::samples::three_mf_model("inch")).unwrap();
+    let model = String::from_utf8(fluxform_testing::surface_files::three_mf_model("inch")).unwrap();
     let (objects, items): (String, String) = (3..10_000)
         .map(|id| {
             let before = id - 1;

@@ -4,7 +4,7 @@ use fluxform_shape::MeshReport;
 use fluxform_shape::document::SurfaceFormat;
 use fluxform_shape::mesh::{FileMesh, Triangle};
 
-use crate::support::block;
+use fluxform_testing::surfaces::block;
 
 fn report(triangles: Vec<Triangle>) -> MeshReport {
     let file = FileMesh {

@@ -1,7 +1,6 @@
 //! Surfaces: readers, exact heights, primitives, constraint points.
 #![allow(missing_docs)]
 
-mod corpus;
 mod deviation;
 mod formats;
 mod fuzz;
@@ -10,8 +9,6 @@ mod hostile;
 mod inspect;
 mod marks;
 mod points;
-mod samples;
 #[cfg(feature = "step")]
 mod step;
 mod stl;
-mod support;

@@ -20,7 +20,8 @@ use fluxform_shape::scattered::adaptive::{Adaptive, Grading, adaptive};
 use fluxform_shape::scattered::poisson::poisson;
 use fluxform_shape::{Settings, Surface, discretize_with, stl};
 
-use crate::support::{Random, block, exact, file, grid, lifted, root, sample, seed_grid};
+use fluxform_testing::surfaces::{block, exact, file, grid, lifted, sample, seed_grid};
+use fluxform_testing::{Random, root};
 
 /// Patches as wide as the deviation allows.
 fn to(max_deviation_m: f64) -> Grading {
@@ -147,7 +148,7 @@ fn holes_are_told_and_filled_only_when_asked() {
 /// Against a flood from outside over grids with a margin, sweep after sweep until nothing changes.
 #[test]
 fn random_holes_are_those_that_no_flood_reaches() {
-    let mut random = Random(17);
+    let mut random = Random::new(17);
     let some = sample(
         &exact(block([-1.0; 3], [1.0; 3])),
         &grid((0.0, 1.0, 2), (0.0, 1.0, 2)),

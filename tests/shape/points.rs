@@ -1,7 +1,6 @@
 //! From documents to constraint points: the seed's shapes, placements, and what is refused.
 
 use std::path::Path;
-use std::process::Command;
 
 use fluxform_base::progress::{Progress, Silent};
 use fluxform_numerics::axis::Axis;
@@ -10,7 +9,8 @@ use fluxform_shape::document::{
 };
 use fluxform_shape::{ConstraintPoints, Discretized, ShapeError, discretize};
 
-use crate::support::{file, lifted, root, seed_grid};
+use fluxform_testing::root;
+use fluxform_testing::surfaces::{file, lifted, seed_grid};
 
 const NAMES: [&str; 4] = ["flat", "half_sphere", "half_cylinder", "wedge"];
 
@@ -334,42 +334,6 @@ fn an_interruption_ends_it() {
     let path = root().join("shapes/half_sphere.stl");
     let result = discretize(&file(&path, 0.001, lifted(0.03), seed_grid()), &Stop);
     assert!(matches!(result, Err(ShapeError::Interrupted(_))));
-}
-
-#[test]
-#[allow(clippy::print_stderr)]
-fn the_committed_shapes_are_what_the_script_makes() {
-    let folder = tempfile::tempdir().unwrap();
-    let script = root().join("scripts/make_shapes.py");
-    match Command::new("python3")
-        .arg(script)
-        .arg(folder.path())
-        .output()
-    {
-        Ok(run) => assert!(
-            run.status.success(),
-            "{}",
-            String::from_utf8_lossy(&run.stderr)
-        ),
-        Err(error) => {
-            eprintln!("skipped: python3 does not run here ({error})");
-            return;
-        }
-    }
-    for name in NAMES {
-        for file in [
-            format!("{name}.stl"),
-            format!("{name}.toml"),
-            format!("primitives/{name}.toml"),
-        ] {
-            let made = std::fs::read(folder.path().join(&file)).unwrap();
-            let committed = std::fs::read(root().join("shapes").join(&file)).unwrap();
-            assert!(
-                made == committed,
-                "shapes/{file} is not what scripts/make_shapes.py makes"
-            );
-        }
-    }
 }
 
 #[test]

@@ -5,54 +5,12 @@ use std::path::Path;
 use fluxform_shape::MeshReport;
 use fluxform_shape::document::SurfaceFormat;
 
-use crate::support::corpus;
-
-/// Volume in mm^3 and box in mm by OpenCASCADE at a chord of 0.05 mm.
-const TRUTH: [(&str, f64, [f64; 6]); 2] = [
-    (
-        "trimesh__base_interface_AP203.STEP",
-        1.25799e6,
-        [-299.706, -319.311, -2.38125, 299.706, 319.311, 2.38125],
-    ),
-    (
-        "trimesh__featuretype.STEP",
-        190_532.0,
-        [-63.5, -31.75, 0.0, 63.5, 31.75, 34.925],
-    ),
-];
-
-#[test]
-#[allow(clippy::print_stderr)]
-fn real_bodies_are_those_of_another_reader() {
-    let Some(folder) = corpus() else { return };
-    for (name, volume_mm3, bounds_mm) in TRUTH {
-        let report = MeshReport::of_file(&folder.join(name)).unwrap();
-        let mm = report.unit_m.unwrap() * 1000.0;
-        assert_eq!(mm, 25.4, "{name}");
-        eprintln!(
-            "{name}: {} triangles, volume {:?} mm3, {:?} {:?}, watertight {}",
-            report.triangles,
-            report.volume.map(|v| v * mm.powi(3)),
-            report.bounds_min.map(|c| c * mm),
-            report.bounds_max.map(|c| c * mm),
-            report.watertight
-        );
-        let got = report.volume.unwrap() * mm.powi(3);
-        assert!(
-            (got - volume_mm3).abs() < 2e-3 * volume_mm3,
-            "{name}: {got}"
-        );
-        for (k, wanted) in bounds_mm.iter().enumerate() {
-            let got = [report.bounds_min, report.bounds_max][k / 3][k % 3] * mm;
-            let most = report.deviation * mm + 0.05;
-            assert!((got - wanted).abs() < most, "{name}: {got} {wanted}");
-        }
-    }
-}
-
 #[test]
 fn a_box_is_a_box() {
-    let read = SurfaceFormat::Step.read(Path::new("f.step"), &crate::samples::step());
+    let read = SurfaceFormat::Step.read(
+        Path::new("f.step"),
+        &fluxform_testing::surface_files::step(),
+    );
     let report = MeshReport::new(SurfaceFormat::Step, read.unwrap());
     assert_eq!((report.unit_m, report.watertight), (Some(1e-3), true));
     assert_eq!(report.triangles, 12);
@@ -61,17 +19,6 @@ fn a_box_is_a_box() {
     for (got, wanted) in report.bounds_max.iter().zip([0.7, 1.3, 2.9]) {
         assert!((got - wanted).abs() < 1e-12, "{got}");
     }
-}
-
-#[test]
-fn an_assembly_is_refused_with_advice() {
-    let Some(folder) = corpus() else { return };
-    let result = MeshReport::of_file(&folder.join("trimesh__box_sides.STEP"));
-    let said = result.unwrap_err().to_string();
-    assert!(
-        said.contains("it is an assembly") && said.contains("step_to_stl.py"),
-        "{said}"
-    );
 }
 
 #[test]
@@ -94,7 +41,7 @@ fn what_is_no_body_is_refused_with_advice() {
 /// They would be left out without a word.
 #[test]
 fn surfaces_beside_the_bodies_are_refused() {
-    let good = String::from_utf8(crate::samples::step()).unwrap();
+    let good = String::from_utf8(fluxform_testing::surface_files::step()).unwrap();
     for kind in ["SHELL_BASED_SURFACE_MODEL", "FACETED_BREP"] {
         let text = good.replace("DATA;\n", &format!("DATA;\n#900 = {kind} ('',#1);\n"));
         let read = SurfaceFormat::Step.read(Path::new("f.step"), text.as_bytes());
@@ -106,7 +53,7 @@ fn surfaces_beside_the_bodies_are_refused() {
 /// The reader behind recurses: these would end the process, not the reading.
 #[test]
 fn what_leads_the_reader_down_without_end_is_refused() {
-    let good = String::from_utf8(crate::samples::step()).unwrap();
+    let good = String::from_utf8(fluxform_testing::surface_files::step()).unwrap();
     let refusal = |text: &str| {
         let read = SurfaceFormat::Step.read(Path::new("f.step"), text.as_bytes());
         read.unwrap_err().to_string()

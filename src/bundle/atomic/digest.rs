@@ -7,6 +7,9 @@ use sha2::{Digest, Sha256};
 
 /// Writes of at least this size pass through unbuffered.
 const BUFFER_BYTES: usize = 1 << 20;
+/// What waits for the disk at most where a file is forced to it: one call that waits for gigabytes
+/// hears no request to stop, and what is given up with them in memory takes as long to remove.
+const UNFORCED_BYTES: u64 = 8 << 20;
 
 /// What was written: size and digest of the bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -17,17 +20,29 @@ pub struct Written {
     pub sha256: String,
 }
 
+/// Whether what is written must be on the disk before it counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Durability {
+    /// As the system likes: devices, and what can be computed again.
+    Cached,
+    /// Forced to the disk piece by piece; the caller forces the rest, once the file has its mode.
+    Forced,
+}
+
 /// Runs `content` into `file` through a buffer, hashing on the way.
 pub(super) fn fill(
     file: &mut File,
+    durability: Durability,
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<Written> {
     let mut buffered = BufWriter::with_capacity(
         BUFFER_BYTES,
         Hashing {
             file,
+            durability,
             sha256: Sha256::new(),
             bytes: 0,
+            unforced: 0,
         },
     );
     let outcome = content(&mut buffered);
@@ -59,8 +74,11 @@ pub(crate) fn hex(bytes: &[u8]) -> String {
 
 struct Hashing<'a> {
     file: &'a mut File,
+    durability: Durability,
     sha256: Sha256,
     bytes: u64,
+    /// Bytes since the last that were forced to the disk.
+    unforced: u64,
 }
 
 impl Write for Hashing<'_> {
@@ -70,6 +88,11 @@ impl Write for Hashing<'_> {
         let count = self.file.write(&buffer[..buffer.len().min(BUFFER_BYTES)])?;
         self.sha256.update(&buffer[..count]);
         self.bytes += count as u64;
+        self.unforced += count as u64;
+        if self.durability == Durability::Forced && self.unforced >= UNFORCED_BYTES {
+            self.file.sync_data()?;
+            self.unforced = 0;
+        }
         Ok(count)
     }
 

@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::created_dirs::{MadeFolders, made_in};
-use super::digest::{Written, fill};
+use super::digest::{Durability, Written, fill};
 use super::dir::{Dir, Kind, Status};
 use super::names::{check_name, parent_of};
 use super::overwrite::{Permit, real};
@@ -30,7 +30,7 @@ pub fn write(
         return File::options()
             .write(true)
             .open(path)
-            .and_then(|mut device| fill(&mut device, content))
+            .and_then(|mut device| fill(&mut device, Durability::Cached, content))
             .map_err(|error| WriteError::from_io("write", path, error));
     }
     let mut set = FileSet::begin(parent_of(path), overwrite.clone());
@@ -66,7 +66,8 @@ pub(crate) fn put(
         return Err(io::Error::other("what is there is no regular file"));
     }
     let mut made = new_temporary(dir, earlier)?;
-    fill(&mut made.file, content)?;
+    // Small: one call at the end forces it.
+    fill(&mut made.file, Durability::Cached, content)?;
     finish(&made, earlier)?;
     if forced {
         made.file.sync_all()?;
@@ -194,7 +195,7 @@ impl FileSet {
         })
         .map_err(|error| error.of("write", &target))?;
         self.made.push(made);
-        let written = fill(&mut temporary.file, content).map_err(fail)?;
+        let written = fill(&mut temporary.file, Durability::Forced, content).map_err(fail)?;
         finish(&temporary, earlier)
             .and_then(|()| temporary.file.sync_all())
             .map_err(fail)?;

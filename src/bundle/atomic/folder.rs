@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 
 use super::absorb::{Owned, absorb, give_modes};
 use super::created_dirs::{MadeFolders, made_in};
-use super::digest::fill;
+use super::digest::{Durability, fill};
 use super::dir::{Dir, Kind, short_identity};
 use super::names::{MANIFEST, OLD, check_name, parent_of};
 use super::overwrite::real;
@@ -130,7 +130,7 @@ impl FolderDraft {
                 dir = dir.child_or_new(part)?;
             }
             let mut file = dir.new_file(file, 0o666)?;
-            let written = fill(&mut file, content)?;
+            let written = fill(&mut file, Durability::Forced, content)?;
             file.sync_all()?;
             Ok(written)
         };

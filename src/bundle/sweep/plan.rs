@@ -1,5 +1,6 @@
 //! `plan.json`: what a sweep computes, sealed by a digest of itself.
 
+use fluxform_numerics::random;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -162,12 +163,7 @@ impl PlanFile {
     /// (splitmix64), so that no two points share a sequence, whichever process computes them.
     #[must_use]
     pub fn seed_at(&self, index: u64) -> u64 {
-        let mut z = self
-            .seed
-            .wrapping_add(index.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        random::seed_at(self.seed, index)
     }
 
     fn digest(&self) -> String {

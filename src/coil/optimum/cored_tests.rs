@@ -443,13 +443,8 @@ fn a_table_moved_to_a_thick_winding_serves_thin_ones() {
 
 /// Rules and windows of a fixed sequence, of every kind that a design may ask for.
 fn drawn(count: usize) -> Vec<(CoreRule, Window)> {
-    let mut state = 7_u64;
-    let mut log = move |lo: f64, hi: f64| {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        lo * (hi / lo).powf((state >> 11) as f64 / (1_u64 << 53) as f64)
-    };
+    let mut random = fluxform_numerics::random::Random::new(7);
+    let mut log = |lo, hi| random.decades(lo, hi);
     (0..count)
         .map(|_| {
             let rule = CoreRule {

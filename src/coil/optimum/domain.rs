@@ -105,111 +105,32 @@ impl Domain {
     /// The first pair of limits that exclude each other whatever the coil.
     #[must_use]
     pub fn contradiction(problem: &Problem<'_>) -> Option<Contradiction> {
-        let limit = |name| problem.limit_of(name);
-        let wanted = &problem.task.limits;
-        let either =
-            |a: LimitName, b: LimitName| limit(a).map(|v| (a, v)).or(limit(b).map(|v| (b, v)));
-        let mm = |v: f64| format!("{:.6} mm", v * 1e3);
-        let fixed = &problem.task.fixed;
-        let clash = |between: [LimitName; 2], by: f64, message: String| {
-            Some(Contradiction {
-                between,
-                by,
-                message,
-            })
+        given_outside_its_limit(problem)
+            .or_else(|| no_room_for_a_layer(problem))
+            .or_else(|| no_room_for_a_turn(problem))
+            .or_else(|| Self::of(problem).resistance_out_of_reach(problem))
+    }
+
+    /// The least resistance that the current or the power needs, above the largest allowed.
+    fn resistance_out_of_reach(&self, problem: &Problem<'_>) -> Option<Contradiction> {
+        let [least, most] = self.volume_m3;
+        if least <= most * (1.0 + TOUCHING) {
+            return None;
+        }
+        let lower = if problem.limit_of(LimitName::Power).is_some() {
+            LimitName::Power
+        } else {
+            LimitName::Current
         };
-        for (given, bound, name, fixed_name, lower) in [
-            (
-                fixed.inner_diameter_m,
-                wanted.inner_diameter_min_m,
-                LimitName::InnerDiameter,
-                LimitName::FixedInner,
-                true,
+        let ratio = least / most;
+        Some(Contradiction {
+            between: [LimitName::Resistance, lower],
+            by: (ratio - 1.0) * most * problem.strand.resistance_per_volume(),
+            message: format!(
+                "the least resistance that {} asks for is {ratio} times the largest allowed",
+                lower.key()
             ),
-            (
-                fixed.outer_diameter_m,
-                wanted.outer_diameter_max_m,
-                LimitName::OuterDiameter,
-                LimitName::FixedOuter,
-                false,
-            ),
-            (
-                fixed.length_m,
-                wanted.length_max_m,
-                LimitName::Length,
-                LimitName::FixedLength,
-                false,
-            ),
-        ] {
-            if let (Some(given), Some(bound)) = (given, bound) {
-                let excess = if lower { bound - given } else { given - bound };
-                if excess > TOUCHING * bound {
-                    return clash(
-                        [name, fixed_name],
-                        excess,
-                        format!(
-                            "the given {} of {} is outside its limit of {}",
-                            name.key(),
-                            mm(given),
-                            mm(bound)
-                        ),
-                    );
-                }
-            }
-        }
-        let wire_m = problem.strand.diameter_m;
-        let outer = either(LimitName::FixedOuter, LimitName::OuterDiameter);
-        let inner = either(LimitName::FixedInner, LimitName::InnerDiameter);
-        if let Some((outer_name, outer_m)) = outer {
-            let (inner_name, inner_m) = inner.unwrap_or((LimitName::OneLayer, 0.0));
-            let missing = inner_m + 2.0 * wire_m - outer_m;
-            if missing > TOUCHING * outer_m {
-                return clash(
-                    [outer_name, inner_name],
-                    missing,
-                    format!(
-                        "an outer diameter of {} leaves no room for one layer of {} wire around a \
-                         bore of {}: {} are missing",
-                        mm(outer_m),
-                        mm(wire_m),
-                        mm(inner_m),
-                        mm(missing)
-                    ),
-                );
-            }
-        }
-        let length = either(LimitName::FixedLength, LimitName::Length);
-        if let Some((name, length_m)) = length
-            && wire_m - length_m > TOUCHING * wire_m
-        {
-            return clash(
-                [name, LimitName::OneTurn],
-                wire_m - length_m,
-                format!(
-                    "a length of {} leaves no room for one turn of {} wire",
-                    mm(length_m),
-                    mm(wire_m)
-                ),
-            );
-        }
-        let volume = Self::of(problem).volume_m3;
-        if volume[0] > volume[1] * (1.0 + TOUCHING) {
-            let lower = if problem.limit_of(LimitName::Power).is_some() {
-                LimitName::Power
-            } else {
-                LimitName::Current
-            };
-            let ratio = volume[0] / volume[1];
-            return clash(
-                [LimitName::Resistance, lower],
-                (ratio - 1.0) * volume[1] * problem.strand.resistance_per_volume(),
-                format!(
-                    "the least resistance that {} asks for is {ratio} times the largest allowed",
-                    lower.key()
-                ),
-            );
-        }
-        None
+        })
     }
 
     /// Limits of which one is missing so that the force has a maximum; empty where it has one.
@@ -274,6 +195,89 @@ impl Domain {
             ln(self.length_m[0].max(1e-3 * longest), longest),
         ]
     }
+}
+
+fn mm(length_m: f64) -> String {
+    format!("{:.6} mm", length_m * 1e3)
+}
+
+/// Of two limits on one size the first that is set, with its value in metres.
+fn either(problem: &Problem<'_>, names: [LimitName; 2]) -> Option<(LimitName, f64)> {
+    let limit = |name| problem.limit_of(name).map(|value| (name, value));
+    names.into_iter().find_map(limit)
+}
+
+/// A size that is given and outside its own limit.
+fn given_outside_its_limit(problem: &Problem<'_>) -> Option<Contradiction> {
+    let (fixed, limits) = (&problem.task.fixed, &problem.task.limits);
+    // Given, limit and by how much the given one exceeds it, m.
+    let sizes = [
+        (
+            (LimitName::InnerDiameter, LimitName::FixedInner),
+            (fixed.inner_diameter_m, limits.inner_diameter_min_m),
+            -1.0,
+        ),
+        (
+            (LimitName::OuterDiameter, LimitName::FixedOuter),
+            (fixed.outer_diameter_m, limits.outer_diameter_max_m),
+            1.0,
+        ),
+        (
+            (LimitName::Length, LimitName::FixedLength),
+            (fixed.length_m, limits.length_max_m),
+            1.0,
+        ),
+    ];
+    sizes.into_iter().find_map(|((name, fixed), size, sign)| {
+        let (Some(given), Some(bound)) = size else {
+            return None;
+        };
+        let excess = sign * (given - bound);
+        (excess > TOUCHING * bound).then(|| Contradiction {
+            between: [name, fixed],
+            by: excess,
+            message: format!(
+                "the given {} of {} is outside its limit of {}",
+                name.key(),
+                mm(given),
+                mm(bound)
+            ),
+        })
+    })
+}
+
+fn no_room_for_a_layer(problem: &Problem<'_>) -> Option<Contradiction> {
+    let wire_m = problem.strand.diameter_m;
+    let (outer_name, outer_m) = either(problem, [LimitName::FixedOuter, LimitName::OuterDiameter])?;
+    let (inner_name, inner_m) = either(problem, [LimitName::FixedInner, LimitName::InnerDiameter])
+        .unwrap_or((LimitName::OneLayer, 0.0));
+    let missing = inner_m + 2.0 * wire_m - outer_m;
+    (missing > TOUCHING * outer_m).then(|| Contradiction {
+        between: [outer_name, inner_name],
+        by: missing,
+        message: format!(
+            "an outer diameter of {} leaves no room for one layer of {} wire around a bore of {}: \
+             {} are missing",
+            mm(outer_m),
+            mm(wire_m),
+            mm(inner_m),
+            mm(missing)
+        ),
+    })
+}
+
+fn no_room_for_a_turn(problem: &Problem<'_>) -> Option<Contradiction> {
+    let wire_m = problem.strand.diameter_m;
+    let (name, length_m) = either(problem, [LimitName::FixedLength, LimitName::Length])?;
+    (wire_m - length_m > TOUCHING * wire_m).then(|| Contradiction {
+        between: [name, LimitName::OneTurn],
+        by: wire_m - length_m,
+        message: format!(
+            "a length of {} leaves no room for one turn of {} wire",
+            mm(length_m),
+            mm(wire_m)
+        ),
+    })
 }
 
 #[cfg(test)]

@@ -204,6 +204,51 @@ fn update(b: &mut [[f64; 3]; 3], s: [f64; 3], y: [f64; 3]) {
 /// Step of the central differences that make the Lagrangian's second derivatives.
 const DIFFERENCE: f64 = 1e-4;
 
+/// Central differences of the Lagrangian's slope at `x`; `None` where the problem ends.
+fn second_derivatives(
+    problem: &dyn Smooth,
+    x: [f64; 3],
+    multipliers: &[f64],
+    evaluations: &mut usize,
+) -> Option<[[f64; 3]; 3]> {
+    let mut second = [[0.0; 3]; 3];
+    for i in 0..3 {
+        let slope_at = |side: f64| {
+            let mut moved = x;
+            moved[i] += side * DIFFERENCE;
+            Some(lagrangian_slope(&problem.at(moved)?, multipliers))
+        };
+        *evaluations += 2;
+        let (up, down) = (slope_at(1.0)?, slope_at(-1.0)?);
+        for j in 0..3 {
+            second[i][j] = (up[j] - down[j]) / (2.0 * DIFFERENCE);
+        }
+    }
+    Some(second)
+}
+
+/// Newton's step in `x` and the new multipliers of the active rows, in this order; `None` if the
+/// conditions are singular.
+fn newton_step(second: &[[f64; 3]; 3], point: &Point, active: &[usize]) -> Option<DVector<f64>> {
+    let size = 3 + active.len();
+    let mut matrix = DMatrix::zeros(size, size);
+    let mut right = DVector::zeros(size);
+    for i in 0..3 {
+        for j in 0..3 {
+            matrix[(i, j)] = 0.5 * (second[i][j] + second[j][i]);
+        }
+        right[i] = -point.slope[i];
+    }
+    for (k, &row) in active.iter().enumerate() {
+        for i in 0..3 {
+            matrix[(3 + k, i)] = point.normals[row][i];
+            matrix[(i, 3 + k)] = point.normals[row][i];
+        }
+        right[3 + k] = -point.rows[row];
+    }
+    matrix.lu().solve(&right)
+}
+
 /// Newton on the optimality conditions of the active rows; kept where it converges to a point
 /// that meets every row.
 fn polish(problem: &dyn Smooth, local: &mut Local) {
@@ -217,38 +262,11 @@ fn polish(problem: &dyn Smooth, local: &mut Local) {
     let mut point = local.point.clone();
     let mut multipliers = local.multipliers.clone();
     for _ in 0..4 {
-        let mut second = [[0.0; 3]; 3];
-        for i in 0..3 {
-            let slope_at = |side: f64| {
-                let mut moved = x;
-                moved[i] += side * DIFFERENCE;
-                Some(lagrangian_slope(&problem.at(moved)?, &multipliers))
-            };
-            local.evaluations += 2;
-            let (Some(up), Some(down)) = (slope_at(1.0), slope_at(-1.0)) else {
-                return;
-            };
-            for j in 0..3 {
-                second[i][j] = (up[j] - down[j]) / (2.0 * DIFFERENCE);
-            }
-        }
-        let size = 3 + active.len();
-        let mut matrix = DMatrix::zeros(size, size);
-        let mut right = DVector::zeros(size);
-        for i in 0..3 {
-            for j in 0..3 {
-                matrix[(i, j)] = 0.5 * (second[i][j] + second[j][i]);
-            }
-            right[i] = -point.slope[i];
-        }
-        for (k, &row) in active.iter().enumerate() {
-            for i in 0..3 {
-                matrix[(3 + k, i)] = point.normals[row][i];
-                matrix[(i, 3 + k)] = point.normals[row][i];
-            }
-            right[3 + k] = -point.rows[row];
-        }
-        let Some(solution) = matrix.lu().solve(&right) else {
+        let Some(second) = second_derivatives(problem, x, &multipliers, &mut local.evaluations)
+        else {
+            return;
+        };
+        let Some(solution) = newton_step(&second, &point, &active) else {
             return;
         };
         let length = (0..3).fold(0.0_f64, |s, i| s.max(solution[i].abs()));

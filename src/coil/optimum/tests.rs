@@ -6,6 +6,7 @@ use crate::circuit::Circuit;
 use fluxform_base::progress::Silent;
 use fluxform_design::{Limits, Wire};
 use fluxform_field::magnet::{Cylinder, MagnetRule, Sources};
+use fluxform_numerics::random::Random;
 
 pub(super) const HEIGHT_M: f64 = 0.03;
 const MOMENT_A_M2: f64 = 0.909_41;
@@ -81,32 +82,19 @@ fn is_lower(limit: &LimitUse, value: f64) -> bool {
     }
 }
 
-/// Numbers between 0 and 1 from a linear congruence.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
-
 /// The strongest of many random coils within the limits, in the box given.
 fn best_random(task: &Task, count: usize, outer_m: f64, length_m: f64) -> f64 {
     let model = air(HEIGHT_M);
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     let mut best = 0.0_f64;
     for problem in Problem::of_wire(&model, task, task.strands[0]) {
         for _ in 0..count {
-            let outer = outer_m * random.next().sqrt();
-            let inner = outer * random.next();
+            let outer = outer_m * random.unit().sqrt();
+            let inner = outer * random.unit();
             let window = Window {
                 inner_radius_m: inner,
                 depth_m: outer - inner,
-                length_m: length_m * random.next(),
+                length_m: length_m * random.unit(),
             };
             // The inductance is computed only for a coil that may be the best.
             let met = |problem: &Problem<'_>| {

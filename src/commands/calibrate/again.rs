@@ -18,7 +18,7 @@ use crate::scene::cached_field::FieldStore;
 use crate::scene::sources::DesignSource;
 use crate::scene::sources::ShapeSource;
 
-/// What a bundle must hold. The digests in the manifest's list stand for the content of all files.
+/// The expected content of a bundle. The digests in the manifest's list stand for the content of all files.
 #[derive(Debug, Clone)]
 pub struct Expected {
     /// `manifest.json`.

@@ -238,8 +238,8 @@ fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> String {
     sheet.line("given", &given(report));
     sheet.line("sideways", &sideways(report));
     sheet.line("accuracy", &accuracies(report));
-    if let Some(told) = working_points(report) {
-        sheet.line("steel", &told);
+    if let Some(steel) = working_points(report) {
+        sheet.line("steel", &steel);
     }
     let left_out: BTreeSet<String> = report
         .bundles
@@ -249,7 +249,7 @@ fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> String {
             let shape = &bundle.manifest.shape;
             parts
                 .lines()
-                .map(|part| told_of(shape, part, report))
+                .map(|part| with_shape(shape, part, report))
                 .collect::<Vec<_>>()
         })
         .collect();
@@ -269,7 +269,7 @@ fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> String {
 }
 
 /// A line about every shape stands for itself; others begin with their shape.
-fn told_of(shape: &str, part: &str, report: &CalibrateReport) -> String {
+fn with_shape(shape: &str, part: &str, report: &CalibrateReport) -> String {
     let of_all = report.bundles.iter().all(|bundle| {
         describe::left_out(&bundle.manifest.left_out)
             .lines()
@@ -282,7 +282,7 @@ fn told_of(shape: &str, part: &str, report: &CalibrateReport) -> String {
     }
 }
 
-/// What was chosen, one row per shape.
+/// The chosen force constants, one row per shape.
 fn shapes_table(report: &CalibrateReport) -> String {
     let or_none = |value: Option<String>| value.unwrap_or_else(|| "none".to_owned());
     let row = |bundle: &BundleReport| {

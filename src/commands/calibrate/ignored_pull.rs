@@ -9,6 +9,9 @@ use crate::scene::passive::couples_left_out;
 use crate::scene::steel::coupled;
 use crate::units::DETECTION_THRESHOLD_N;
 
+/// Shares that differ by no more than this factor are one.
+const SAME: f64 = 1.0 + 1e-9;
+
 /// The pull at an object's points.
 pub(crate) enum IgnoredPull {
     /// Computed.
@@ -17,7 +20,7 @@ pub(crate) enum IgnoredPull {
     Unknown(String),
 }
 
-/// What it amounts to.
+/// Its size.
 pub(crate) struct Measured {
     /// The largest of its vertical force at a point, N.
     largest_n: f64,
@@ -100,7 +103,8 @@ impl Measured {
             largest_n: forces_n.iter().fold(0.0, |most, f| most.max(f.abs())),
             wanted_n: lambda_n_per_m * height_m.iter().copied().fold(0.0, f64::max),
             one_by_one: false,
-            weakest: shares.reduce(|a, b| if b.share > a.share { b } else { a }),
+            // Of shares that differ by a rounding, as those of symmetric places do, the first.
+            weakest: shares.reduce(|a, b| if b.share > SAME * a.share { b } else { a }),
         }
     }
 

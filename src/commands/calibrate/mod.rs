@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 use super::discretize::{self, PointsReport, point_rows, points_grid};
 use super::lambda::{LambdaOptions, LambdaReport, WantedPoints, sideways, solve_at};
@@ -15,6 +15,7 @@ use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS, arithmetic};
 use crate::bundle::atomic::WriteError;
 use crate::bundle::cache::Store;
+use crate::bundle::json::displayed;
 use crate::bundle::manifest::{
     AxisSummary, CircuitSummary, Interpolation, LambdaSummary, LeftOut, MadeWith, Manifest,
     PassiveForce,
@@ -83,7 +84,7 @@ pub struct CalibrateOptions {
 }
 
 impl CalibrateOptions {
-    /// What the command does by default, under the folder `out`.
+    /// The command's defaults, under the folder `out`.
     pub fn new(out: impl Into<PathBuf>) -> Self {
         Self {
             out: out.into(),
@@ -95,7 +96,7 @@ impl CalibrateOptions {
         }
     }
 
-    /// What `verify` needs beside the inputs to compute the same bundle again. A new option does not
+    /// The options that `verify` needs beside the inputs to compute the same bundle again. A new option does not
     /// compile before it is recorded or left out on purpose.
     pub(crate) fn made_with(&self, shape: &ShapeSource) -> MadeWith {
         let CalibrateOptions {
@@ -147,7 +148,7 @@ pub struct CalibrateReport {
     pub fluxform_version: &'static str,
     /// Name of the design.
     pub design: String,
-    /// What was to be computed and what left out, where that was requested first.
+    /// The plan, where `--explain` requested it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plan: Option<Plan>,
     /// One entry a shape, in the order given.
@@ -168,11 +169,6 @@ pub struct BundleReport {
     pub lambda: LambdaReport,
     /// `manifest.json` as written.
     pub manifest: Manifest,
-}
-
-/// A path that is no text is stated as nearly as it can be.
-fn displayed<S: Serializer>(path: &Path, out: S) -> Result<S::Ok, S::Error> {
-    out.collect_str(&path.display())
 }
 
 impl CalibrateReport {

@@ -34,11 +34,11 @@ use crate::shape::holes::Holes;
 /// its unit and place.
 ///
 /// How far the surface departs from bilinear interpolation between the points is certified. After
-/// the normal the table tells of walls, rims, creases (with the other face's normal) and overhangs.
+/// the normal the table marks walls, rims, creases (with the other face's normal) and overhangs.
 /// Instead of the grid's points, --max-deviation chooses as few as a deviation needs, --poisson
 /// points without a pattern; both give each point the area it stands for (weight_m2).
 ///
-/// With --inspect nothing is made of the surface: what its file holds is told, in its own unit, with
+/// With --inspect no points are made: the content of the surface's file is reported, in its own unit, with
 /// a guess at that unit, which is never used.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Writing, &[
@@ -138,7 +138,7 @@ impl Discretize {
                 };
                 report.summary.warnings = printer.warnings();
                 printer.summary(place, &report.summary, || {
-                    self.told_scattered(&report.summary)
+                    self.text_scattered(&report.summary)
                 })?;
                 continue;
             }
@@ -161,7 +161,7 @@ impl Discretize {
                 }
             };
             report.summary.warnings = printer.warnings();
-            printer.summary(place, &report.summary, || self.told(&report.summary))?;
+            printer.summary(place, &report.summary, || self.text(&report.summary))?;
         }
         Ok(())
     }
@@ -233,7 +233,7 @@ impl Discretize {
         }
     }
 
-    fn told_scattered(&self, summary: &ScatteredSummary) -> String {
+    fn text_scattered(&self, summary: &ScatteredSummary) -> String {
         let mut sheet = Sheet::new(&format!(
             "{}: {}, {}",
             summary.shape,
@@ -266,7 +266,7 @@ impl Discretize {
         sheet.finish()
     }
 
-    fn told(&self, summary: &PointsSummary) -> String {
+    fn text(&self, summary: &PointsSummary) -> String {
         let mut sheet = Sheet::new(&format!(
             "{}: {}",
             summary.shape,

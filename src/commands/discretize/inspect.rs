@@ -1,10 +1,10 @@
-//! `discretize --inspect`: what a surface file holds, before anything is made of it.
+//! `discretize --inspect`: the content of a surface file.
 
 use std::path::Path;
 
 use serde::Serialize;
 
-use super::picture::{Scale, Seen, picture};
+use super::picture::{PictureData, Scale, picture};
 use super::{ParsedBytes, shape_error};
 use crate::RunError;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
@@ -29,16 +29,16 @@ pub struct Inspection {
     pub schema_version: &'static str,
     /// Program that wrote it.
     pub fluxform_version: &'static str,
-    /// What went in.
+    /// Input files.
     pub inputs: Vec<Input>,
-    /// What the file holds; lengths in its own unit.
+    /// The content of the file; lengths in its own unit.
     pub surface: MeshReport,
 }
 
 /// Looks at the file at `path`; `inputs` holds the document that names it, if there is one.
 ///
 /// # Errors
-/// A file that is no surface.
+/// A file without a surface.
 pub fn inspect(path: &Path, mut inputs: Vec<Input>) -> Result<Inspection, RunError> {
     let mut parsed = ParsedBytes::default();
     let surface = MeshReport::of_file_observed(path, &mut parsed)
@@ -55,7 +55,7 @@ pub fn inspect(path: &Path, mut inputs: Vec<Input>) -> Result<Inspection, RunErr
 /// The surface as the file has it, from above; in millimetres where its unit is known.
 ///
 /// # Errors
-/// A file that is no surface; interruption.
+/// A file without a surface; interruption.
 pub fn drawn(
     path: &Path,
     stated_m: Option<f64>,
@@ -90,7 +90,7 @@ pub fn drawn(
         .collect();
     let heights: Vec<_> = samples.iter().map(|s| s.map(|s| s.height_m)).collect();
     let cells = by_cell(&surface, &grid, &samples, progress)?;
-    Ok(picture(&Seen {
+    Ok(picture(&PictureData {
         title: document.name.clone(),
         scale,
         grid: &grid,

@@ -111,7 +111,7 @@ impl Discretize {
     }
 }
 
-/// What is known of the unit.
+/// The unit, as far as it is known.
 fn unit(found: &MeshReport) -> String {
     if let Some(unit_m) = found.unit_m {
         return format!("{}, as the file says", unit_name(unit_m));

@@ -35,15 +35,15 @@ mod picture;
 pub mod scattered;
 mod table;
 
-use picture::{Scale, Seen};
+use picture::{PictureData, Scale};
 
-/// The points and what is to be told about them.
+/// The points of a grid and their figures.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct PointsReport {
     /// The points.
     pub discretized: Discretized,
-    /// Figures, as the JSON summary tells them.
+    /// The JSON result.
     pub summary: PointsSummary,
 }
 
@@ -57,7 +57,7 @@ pub struct PointsSummary {
     pub fluxform_version: &'static str,
     /// Name of the shape.
     pub shape: String,
-    /// What went in.
+    /// Input files.
     pub inputs: Vec<Input>,
     /// The options of the run.
     #[serde(skip_serializing_if = "Options::is_empty")]
@@ -161,32 +161,32 @@ impl MarkCounts {
 
 impl DeviationSummary {
     fn new(certificate: &Certificate) -> Option<Self> {
-        let found = &certificate.vertical;
-        // Without a cell of four points there is nothing to tell.
-        (found.cells.inner > 0 && found.worst().value_m.is_finite()).then(|| {
+        let vertical = &certificate.vertical;
+        // Without a cell of four points there is no deviation.
+        (vertical.cells.inner > 0 && vertical.worst().value_m.is_finite()).then(|| {
             let apart = certificate.hausdorff;
             Self {
-                above_m: found.above.value_m.max(0.0),
-                above_at_m: found.above.at_m,
-                below_m: found.below.value_m.max(0.0),
-                below_at_m: found.below.at_m,
+                above_m: vertical.above.value_m.max(0.0),
+                above_at_m: vertical.above.at_m,
+                below_m: vertical.below.value_m.max(0.0),
+                below_at_m: vertical.below.at_m,
                 hausdorff_lower_m: apart.map(|apart| apart.lower_m),
                 hausdorff_upper_m: apart.map(|apart| apart.upper_m),
                 hausdorff_at_m: apart.map(|apart| apart.at_m),
-                cells: found.cells.inner,
-                silhouette_cells: found.cells.silhouette,
+                cells: vertical.cells.inner,
+                silhouette_cells: vertical.cells.silhouette,
                 silhouette_m: certificate.silhouette_m,
-                missed_cells: found.cells.missed,
+                missed_cells: vertical.cells.missed,
                 budget_m: certificate.budget_m(),
             }
         })
     }
 }
 
-/// What is asked of a discretisation besides its points.
+/// The options of `discretize` for the points of a grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PointsOptions {
-    /// What is done with holes.
+    /// The treatment of holes.
     pub holes: Holes,
     /// How the points are compared with the surface.
     pub certify: Certify,
@@ -297,7 +297,7 @@ impl OpenedSurface {
     /// file.
     ///
     /// # Errors
-    /// A file that is no surface.
+    /// A file without a surface.
     fn new(document: &ShapeDocument, mut inputs: Vec<Input>) -> Result<Self, RunError> {
         let mut parsed = ParsedBytes::default();
         let (surface, warnings) = Surface::open_observed(document, &mut parsed)
@@ -434,17 +434,19 @@ pub(crate) fn with_surface(document: &ShapeDocument, mut inputs: Vec<Input>) -> 
 /// The rows of `points.csv`.
 #[must_use]
 pub fn point_rows(points: &ConstraintPoints) -> Vec<PointRow> {
-    (0..points.len())
-        .map(|i| PointRow {
-            x_m: points.x_m[i],
-            y_m: points.y_m[i],
-            height_m: points.height_m[i],
-            normal: points.normal[i],
-        })
-        .collect()
+    (0..points.len()).map(|k| point_row(points, k)).collect()
 }
 
-/// The grid of the points as a manifest tells it.
+fn point_row(points: &ConstraintPoints, k: usize) -> PointRow {
+    PointRow {
+        x_m: points.x_m[k],
+        y_m: points.y_m[k],
+        height_m: points.height_m[k],
+        normal: points.normal[k],
+    }
+}
+
+/// The grid of the points as a manifest states it.
 #[must_use]
 pub fn points_grid(points: &ConstraintPoints) -> PointsGrid {
     let present: Vec<bool> = points
@@ -464,7 +466,7 @@ impl PointsReport {
         table::of_grid(out, &self.discretized.points)
     }
 
-    /// The points' heights, what they are besides, and how far the surface departs between them.
+    /// The points' heights and flags, and how far the surface departs between them.
     #[must_use]
     pub fn picture(&self) -> PlanePlot {
         let points = &self.discretized.points;
@@ -474,7 +476,7 @@ impl PointsReport {
             heights[index] = Some(points.height_m[row]);
             marks[index] = Some(points.marks[row]);
         }
-        picture::picture(&Seen {
+        picture::picture(&PictureData {
             title: format!("{}: constraint points", self.summary.shape),
             scale: Scale::MILLIMETRES,
             grid: &points.grid,
@@ -485,7 +487,7 @@ impl PointsReport {
     }
 
     /// Writes the points to `path` and the summary beside them, `points.csv` and `points.json`:
-    /// both or none. What is there is replaced only with `force` or when its summary is of the same
+    /// both or none. Existing files are replaced only with `force` or when its summary is of the same
     /// inputs and lists it unchanged.
     ///
     /// # Errors
@@ -511,7 +513,7 @@ impl TableFiles {
     /// Those of the table at `path`, made from `inputs`.
     ///
     /// # Errors
-    /// A name that is none, or that ends as the summary does.
+    /// An invalid name, or one that ends as the summary does.
     pub fn new(path: &Path, force: bool, inputs: &[Input]) -> Result<Self, RunError> {
         let name = path
             .file_name()

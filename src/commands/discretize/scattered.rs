@@ -42,12 +42,12 @@ impl Sampling {
     }
 }
 
-/// The points and what is to be told about them.
+/// Weighted points and their figures.
 #[derive(Debug, Clone)]
 pub struct ScatteredReport {
     /// The points.
     pub points: Scattered,
-    /// Figures, as the JSON summary tells them.
+    /// The JSON result.
     pub summary: ScatteredSummary,
 }
 
@@ -60,7 +60,7 @@ pub struct ScatteredSummary {
     pub fluxform_version: &'static str,
     /// Name of the shape.
     pub shape: String,
-    /// What went in.
+    /// Input files.
     pub inputs: Vec<Input>,
     /// The options of the run.
     pub made_with: Options,
@@ -146,26 +146,7 @@ pub fn run(
             (found.points, "poisson")
         }
     };
-    if points.is_empty() {
-        let none = "no point of the surface lies in the region of its grid; change the \
-                    translation, the unit or the grid";
-        return Err(failed(ShapeError::Document(none.to_owned())));
-    }
-    let lowest_m = points
-        .height_m
-        .iter()
-        .copied()
-        .fold(f64::INFINITY, f64::min);
-    if lowest_m < -rounding_m {
-        let below = points.height_m.iter().filter(|h| **h < -rounding_m).count();
-        return Err(failed(ShapeError::BelowZero {
-            below,
-            points: points.len(),
-            lowest_m,
-        }));
-    }
-    // A surface that rests on z = 0 may be rounded below it.
-    points.height_m.iter_mut().for_each(|h| *h = h.max(0.0));
+    let lowest_m = check_heights(&mut points, rounding_m).map_err(failed)?;
     let summary = ScatteredSummary {
         schema_version: SCHEMA_VERSION,
         fluxform_version: FLUXFORM_VERSION,
@@ -186,6 +167,34 @@ pub fn run(
         files: Vec::new(),
     };
     Ok(ScatteredReport { points, summary })
+}
+
+/// The lowest height as it was, m. Heights that are below zero by rounding become zero.
+///
+/// # Errors
+/// No point, or one below zero.
+fn check_heights(points: &mut Scattered, rounding_m: f64) -> Result<f64, ShapeError> {
+    if points.is_empty() {
+        let none = "no point of the surface lies in the region of its grid; change the \
+                    translation, the unit or the grid";
+        return Err(ShapeError::Document(none.to_owned()));
+    }
+    let lowest_m = points
+        .height_m
+        .iter()
+        .copied()
+        .fold(f64::INFINITY, f64::min);
+    if lowest_m < -rounding_m {
+        let below = points.height_m.iter().filter(|h| **h < -rounding_m).count();
+        return Err(ShapeError::BelowZero {
+            below,
+            points: points.len(),
+            lowest_m,
+        });
+    }
+    // A surface that rests on z = 0 may be rounded below it.
+    points.height_m.iter_mut().for_each(|h| *h = h.max(0.0));
+    Ok(lowest_m)
 }
 
 impl ScatteredReport {

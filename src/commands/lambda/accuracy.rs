@@ -3,7 +3,9 @@
 use crate::accuracy::StageAccuracy;
 use crate::design::MagnetModel;
 use crate::field::winding::KERNEL_ERROR;
-use crate::scene::evaluation_sample::{Evaluation, PLACES, Sample, sharper, spread};
+use crate::scene::evaluation_sample::{
+    Evaluation, PLACES, Sample, sharper, sharper_by_finer, spread,
+};
 use crate::scene::steel::{EVALUATION_SHARE, Solved, Steel};
 use crate::scene::{AIR_SHARE, MAGNET_FINEST, MAGNET_SHARE, Scene};
 
@@ -17,7 +19,11 @@ pub(super) fn forces_accuracy(
     let proven = evaluation(scene, solved);
     let [m_x, m_y, m_z] = scene.moment_a_m2;
     let dipole = scene.design.magnet.model == MagnetModel::Dipole;
-    if !dipole || m_x != 0.0 || m_y != 0.0 || m_z == 0.0 {
+    if !dipole {
+        let sampled = sharper_by_finer(scene, solved, points_m, forces_n_per_a, proven);
+        return accuracy_of(scene, solved, sampled);
+    }
+    if m_x != 0.0 || m_y != 0.0 || m_z == 0.0 {
         return accuracy_of(scene, solved, proven);
     }
     let coils = scene.coils.len();

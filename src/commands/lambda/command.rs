@@ -217,7 +217,7 @@ pub fn rendered(shapes: &[(&str, Option<f64>)]) -> Result<(), Failure> {
     Err(Failure::Unmet(Wish::ForceConstant, message))
 }
 
-/// The result is there, but there is no force constant.
+/// The failure of a result without force constant.
 pub fn no_constant(shapes: &[&str]) -> Failure {
     let message = format!(
         "the chosen lambda is null for {}: see the warnings",

@@ -15,7 +15,7 @@ use super::PosedProblem;
 
 /// Layers of a shell lie no further apart, m.
 const SPACING_M: f64 = 2e-3;
-/// Layers above the surface, at most: a shell is no search of all space.
+/// Layers above the surface, at most: a shell is not a search of all space.
 const MOST_LAYERS: f64 = 500.0;
 
 /// The options of `--feedback`.

@@ -117,7 +117,7 @@ pub fn run(
     let chosen = sampled.as_ref().map(WantedPoints::of_scattered);
     let coarser = sampling.and_then(coarser).map(sample).transpose()?;
     let coarser = coarser.as_ref().map(WantedPoints::of_scattered);
-    // The steel is solved once, for the lowest place of all that is asked of it.
+    // The steel is solved once, for the lowest of all places.
     let of_all = [Some(&of_grid), chosen.as_ref(), coarser.as_ref()];
     let lowest = of_all.into_iter().flatten().map(WantedPoints::lowest_m);
     let lowest_m = lowest.fold(f64::INFINITY, f64::min);

@@ -229,7 +229,7 @@ fn table_of(variants: &[LambdaVariant]) -> String {
     headed_table(variants.iter().map(row))
 }
 
-/// What currents for the worst point would do instead.
+/// The result of currents for the worst point.
 fn worst_point(worst: &WorstPointFile) -> String {
     let constant = |lambda: Option<f64>| lambda.map_or_else(|| "none".to_owned(), number);
     let least = worst.worst_error_n.map_or_else(String::new, |least| {
@@ -245,7 +245,7 @@ fn worst_point(worst: &WorstPointFile) -> String {
     )
 }
 
-/// What the steel does at the chosen currents, where it follows a curve.
+/// The steel at the chosen currents, along its curve.
 fn along_the_curve(point: &WorkingPointForces) -> String {
     let peak_t = point.peak_field_t.iter().copied().fold(0.0, f64::max);
     format!(

@@ -135,7 +135,7 @@ fn maxmin_is_zero(points: &WantedPoints, problem: &ForceProblem, deciding: &[usi
     }
 }
 
-/// What binds before any force is rendered.
+/// The limit that binds before any force is rendered.
 fn binds_at_zero(problem: &ForceProblem) -> String {
     if problem.total_max_a == Some(0.0) {
         return "the sum of the currents may not exceed 0 A; raise total_current_max_a".to_owned();

@@ -8,6 +8,7 @@ use crate::bundle::artefact::Options;
 use crate::bundle::force_map::ForceMap;
 use crate::bundle::rendering::HeightGrid;
 use crate::bundle::trajectory::Trajectory;
+use crate::numerics::random::Random;
 
 /// Largest distance of the exploring finger from the surface, m: the seed's trial.
 const DEVIATION_M: f64 = 0.014;
@@ -19,7 +20,7 @@ const BEYOND_M: f64 = 0.015;
 const LINES: f64 = 11.0;
 /// Time of one turn of the circle, s.
 const TURN_S: f64 = 4.0;
-/// Positions are told to a micrometre.
+/// Positions are rounded to a micrometre.
 const RESOLUTION_M: f64 = 1e-6;
 
 /// Kinds of trajectories.
@@ -45,7 +46,7 @@ impl Kind {
     }
 }
 
-/// What is made up.
+/// A trajectory to be made up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Synthesis {
     /// Which kind.
@@ -77,10 +78,10 @@ impl Synthesis {
             Kind::Circle => circle(&t_s, &surface),
             Kind::Explore => self.explore(&t_s, &surface, map.ends_m()[0][1]),
         };
-        let told = |v: f64| (v / RESOLUTION_M).round() / (1.0 / RESOLUTION_M);
+        let rounded = |v: f64| (v / RESOLUTION_M).round() / (1.0 / RESOLUTION_M);
         Trajectory {
             t_s,
-            position_m: position_m.into_iter().map(|p| p.map(told)).collect(),
+            position_m: position_m.into_iter().map(|p| p.map(rounded)).collect(),
         }
     }
 
@@ -101,10 +102,10 @@ impl Synthesis {
     }
 
     fn explore(&self, t_s: &[f64], surface: &Surface, border_m: f64) -> Vec<[f64; 3]> {
-        let mut random = Random(self.seed);
+        let mut random = Random::new(self.seed);
         // A slow wave and a faster one along x and y, three along z.
         let mut waves = |speeds: &[f64]| -> Vec<[f64; 2]> {
-            let wave = |hz: &f64| [hz * (0.8 + 0.4 * random.next()), random.next()];
+            let wave = |hz: &f64| [hz * (0.8 + 0.4 * random.unit()), random.unit()];
             speeds.iter().map(wave).collect()
         };
         let (x, y) = (waves(&[0.31, 0.83]), waves(&[0.23, 0.71]));
@@ -117,7 +118,7 @@ impl Synthesis {
         };
         let away: Vec<f64> = t_s.iter().map(|t| sum(&z, *t, &[1.0, 0.7, 0.3])).collect();
         let most = away.iter().fold(1e-9_f64, |most, a| most.max(a.abs()));
-        let noise = |random: &mut Random| NOISE_M * (2.0 * random.next() - 1.0);
+        let noise = |random: &mut Random| NOISE_M * (2.0 * random.unit() - 1.0);
         t_s.iter()
             .zip(&away)
             .map(|(&t, away)| {
@@ -178,25 +179,11 @@ impl<'a> Surface<'a> {
     }
 }
 
-/// SplitMix64.
-struct Random(u64);
-
-impl Random {
-    /// From 0 to 1.
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
-
 /// The options of `replay` as its record states them.
 #[must_use]
 pub fn made_with(synthesis: Option<&Synthesis>, dynamics: bool) -> Options {
     #[derive(Serialize)]
-    struct Asked {
+    struct Recorded {
         dynamics: bool,
         synthesize: Option<&'static str>,
         seed: Option<u64>,
@@ -212,7 +199,7 @@ pub fn made_with(synthesis: Option<&Synthesis>, dynamics: bool) -> Options {
         } = *synthesis;
         (kind.name(), seed, duration_s, rate_hz)
     });
-    Options::of(&Asked {
+    Options::of(&Recorded {
         dynamics,
         synthesize: made_up.map(|(kind, ..)| kind),
         seed: made_up.map(|(_, seed, ..)| seed),

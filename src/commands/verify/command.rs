@@ -3,6 +3,7 @@
 use clap::Args;
 
 use super::{Check, Verifier, VerifyOptions, VerifyReport};
+use crate::cli::budget::within;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
@@ -47,7 +48,7 @@ impl Verify {
         let options = VerifyOptions {
             accept_unchecked: self.accept_unchecked,
         };
-        let report = Verifier::default().verify(&self.bundle, options, &bar)?;
+        let report = Verifier::limited(within).verify(&self.bundle, options, &bar)?;
         drop(bar);
         for note in &report.notes {
             printer.warning(note);
@@ -106,7 +107,7 @@ impl Verify {
 
 fn checks_table(checks: &[Check]) -> String {
     let head = ["check", "measured", "allowed", "", "how"].map(str::to_owned);
-    let told = |value: f64| {
+    let shown = |value: f64| {
         if value == 0.0 {
             "0".to_owned()
         } else {
@@ -116,8 +117,8 @@ fn checks_table(checks: &[Check]) -> String {
     let row = |check: &Check| {
         vec![
             check.name.to_owned(),
-            told(check.measured),
-            told(check.allowed),
+            shown(check.measured),
+            shown(check.allowed),
             if check.passed { "ok" } else { "FAILED" }.to_owned(),
             check.how.clone(),
         ]

@@ -24,7 +24,7 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use self::inputs::Sources;
-use self::route::Route;
+use self::route::{FINER, Route};
 use super::calibrate::CalibrateOptions;
 use super::calibrate::PASSIVE_STAGE;
 use super::calibrate::again::{Expected, expected};
@@ -32,15 +32,19 @@ use crate::RunError;
 use crate::bundle::artefact::{Input, UNITS};
 use crate::bundle::load::Bundle;
 use crate::bundle::manifest::Manifest;
+use crate::design::Design;
 use crate::progress::Progress;
 use crate::scene::Scene;
+use crate::scene::cost::{self, Cost};
+use crate::scene::passive::PASSIVE_TOLERANCE;
 use crate::scene::sources::DesignSource;
+use crate::scene::steel::COUPLED_TOLERANCE;
 use crate::shape::document::ShapeDocument;
 
 /// Errors that a bundle claims are believed up to this where they cannot be computed again.
 const CLAIMED_MAX: f64 = 1e-3;
 
-/// What was checked.
+/// The checks of a bundle: the JSON result.
 #[derive(Debug, Clone, Serialize)]
 pub struct VerifyReport {
     /// Name of the design.
@@ -49,9 +53,9 @@ pub struct VerifyReport {
     pub shape: String,
     /// Every check.
     pub checks: Vec<Check>,
-    /// What is worth knowing and no fault of the bundle.
+    /// Remarks that are no fault of the bundle.
     pub notes: Vec<String>,
-    /// What could not be checked, and why.
+    /// Parts that could not be checked, and why.
     pub unchecked: Vec<String>,
     /// Whether all checks passed, and nothing was left unchecked without permission.
     pub passed: bool,
@@ -60,9 +64,9 @@ pub struct VerifyReport {
 /// One check.
 #[derive(Debug, Clone, Serialize)]
 pub struct Check {
-    /// What was checked.
+    /// Its name.
     pub name: &'static str,
-    /// What was measured.
+    /// The measured difference.
     pub measured: f64,
     /// The most it may be.
     pub allowed: f64,
@@ -72,7 +76,7 @@ pub struct Check {
     pub how: String,
 }
 
-/// What is requested.
+/// The options of `verify`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct VerifyOptions {
     /// A bundle passes although something could not be checked.
@@ -89,14 +93,16 @@ pub fn run(path: &Path, progress: &dyn Progress) -> Result<VerifyReport, RunErro
     Verifier::default().verify(path, VerifyOptions::default(), progress)
 }
 
-/// Verifies one bundle after another. What inputs give is computed once for all bundles in a row
+/// Verifies one bundle after another. A bundle is computed from its inputs once for all in a row
 /// that name the same inputs and options.
 #[derive(Debug, Default)]
 pub struct Verifier {
     last: Option<(Recipe, Arc<Expected>)>,
+    /// Refuses what takes more memory than allowed.
+    within: Option<fn(&Cost) -> Result<(), String>>,
 }
 
-/// What decides the content of a bundle.
+/// All that decides the content of a bundle.
 #[derive(Debug, Clone, PartialEq)]
 struct Recipe {
     inputs: Vec<Input>,
@@ -134,6 +140,31 @@ impl Judgement {
 }
 
 impl Verifier {
+    /// One that asks `within` before it computes whether a cost is allowed; a message refuses it.
+    #[must_use]
+    pub fn limited(within: fn(&Cost) -> Result<(), String>) -> Self {
+        Self {
+            last: None,
+            within: Some(within),
+        }
+    }
+
+    fn check_costs(&self, design: &Design, bundle: &Bundle) -> Result<(), RunError> {
+        let Some(within) = self.within else {
+            return Ok(());
+        };
+        let made_with = bundle.manifest.made_with.as_ref();
+        let tolerance = made_with.and_then(|made| made.tolerance);
+        // Solved again as the bundle was made, and to judge that a finer time.
+        let finer = tolerance.unwrap_or(COUPLED_TOLERANCE).min(CLAIMED_MAX) * FINER;
+        let steel = cost::of_steel(design, Some(finer));
+        let pull = cost::of_pull(design, FINER * PASSIVE_TOLERANCE);
+        for cost in steel.iter().chain(&pull) {
+            within(cost).map_err(RunError::Input)?;
+        }
+        Ok(())
+    }
+
     /// As [`run`].
     ///
     /// # Errors
@@ -166,6 +197,7 @@ impl Verifier {
             progress.end();
             return Ok(all.report(options));
         }
+        self.check_costs(&sources.design, &all.bundle)?;
         let expected = self.expected(&mut all, &scene, &sources, progress)?;
         progress.advance(1);
         progress.check()?;
@@ -194,7 +226,7 @@ impl Verifier {
         Ok(all.report(options))
     }
 
-    /// What the inputs give, compared with the bundle; `None` where an input is not here.
+    /// The bundle that the inputs give, compared with this one; `None` where an input is missing.
     fn expected(
         &mut self,
         all: &mut Judgement,
@@ -217,13 +249,20 @@ impl Verifier {
                 return Ok(None);
             }
         };
+        if all.bundle.manifest.made_with.is_none() {
+            all.unchecked.push(format!(
+                "the run's options: bundles of schema {} do not name them, so its tolerance and reach \
+                 are taken to be the defaults",
+                all.bundle.manifest.schema_version
+            ));
+        }
         let recipe = Recipe {
             inputs: all.bundle.manifest.inputs.clone(),
             shape: shape.document.clone(),
             options,
         };
         let known = self.last.as_ref().filter(|(known, _)| *known == recipe);
-        let found = match known {
+        let computed = match known {
             Some((_, known)) => Arc::clone(known),
             None => {
                 let input = &all.bundle.manifest.inputs[0];
@@ -235,7 +274,7 @@ impl Verifier {
                 let quiet = Quiet(progress);
                 let curve = sources.curve.as_ref();
                 match expected(scene, source, curve, shape, &recipe.options, &quiet) {
-                    Ok(found) => Arc::new(found),
+                    Ok(computed) => Arc::new(computed),
                     Err(error @ RunError::Interrupted(_)) => return Err(error),
                     Err(error) => {
                         all.add([wrong(format!("the inputs give no bundle: {error}"))]);
@@ -244,8 +283,8 @@ impl Verifier {
                 }
             }
         };
-        self.last = Some((recipe, Arc::clone(&found)));
-        let compared = compared::compare(&all.bundle, &found);
+        self.last = Some((recipe, Arc::clone(&computed)));
+        let compared = compared::compare(&all.bundle, &computed);
         all.add([compared.check]);
         all.unchecked.extend(compared.unchecked);
         if !compared.exact {
@@ -256,7 +295,7 @@ impl Verifier {
                 compared::made_on(&all.bundle)
             ));
         }
-        Ok(Some(found))
+        Ok(Some(computed))
     }
 }
 
@@ -424,10 +463,10 @@ fn scene_agrees(bundle: &Bundle, scene: &Scene) -> Check {
             },
         ),
     ];
-    let other_words = words.iter().any(|(told, wanted)| told != wanted);
+    let other_words = words.iter().any(|(stored, expected)| stored != expected);
     let worst = lists
         .into_iter()
-        .map(|(told, wanted)| difference(told, wanted))
+        .map(|(stored, expected)| difference(stored, expected))
         .fold(if other_words { f64::INFINITY } else { 0.0 }, f64::max);
     let how = "names, units, positions, gains, limits, resistance, voltage and magnet against \
                design.toml";

@@ -12,6 +12,13 @@ const STEPS: f64 = 15.0;
 /// Solutions: the coarse and the fine one.
 const SOLUTIONS: f64 = 2.0;
 const NUMBER_BYTES: f64 = 8.0;
+/// Unknowns that cores send each other of the pull, as a share of all for every e-fold of the
+/// tolerance: 0.017 to 0.04 for cores 2.1 to 10 radii apart, 2.5 to 9 radii long.
+const SENT: f64 = 0.022;
+/// Matrices of the pull's coupling that are there at once.
+const PULL_MATRICES: f64 = 5.0;
+/// Operations of factoring and solving for all columns, in cubes of the size.
+const PULL_CUBES: f64 = 8.0 / 3.0;
 /// Bytes of a pair of cores in the table of offsets.
 const PAIR_BYTES: f64 = 24.0;
 
@@ -22,6 +29,9 @@ pub struct ArrayCost {
     pub bytes: f64,
     /// Additions and multiplications of the largest products.
     pub operations: f64,
+    /// The error that the caps on resolution leave, relative; far below the tolerance where they do not
+    /// bind.
+    pub least_error: f64,
 }
 
 impl ArrayCost {
@@ -57,6 +67,35 @@ impl ArrayCost {
             bytes: NUMBER_BYTES * (matrices + potentials + steps) + PAIR_BYTES * cores * cores,
             operations: SOLUTIONS
                 * (STEPS * 2.0 * size * size * cores * cores * drives + 10.0 * matrices),
+            least_error: 2.0 * resolution.exchange_error(shape, closest_m),
+        }
+    }
+
+    /// The cost of the pull of unpowered cores on a magnet to `tolerance` of what their coupling adds
+    /// (see [`super::passive::neighbours`]): matrices of all potentials that all cores send. Right within
+    /// a factor of about three.
+    #[must_use]
+    pub fn of_pull(
+        shape: CoreShape,
+        positions_m: &[[f64; 2]],
+        closest_m: f64,
+        tolerance: f64,
+    ) -> Self {
+        let resolution = ArrayResolution::for_tolerance(tolerance, shape, closest_m);
+        let unknowns = resolution.unknowns(shape, 0.0) as f64;
+        let sent = SENT * (1.0 / tolerance).ln() * unknowns;
+        let cores = positions_m.len() as f64;
+        let size = sent * cores;
+        let offsets = if positions_m.len() <= COUNTED {
+            different_offsets(positions_m) as f64
+        } else {
+            cores
+        };
+        Self {
+            bytes: NUMBER_BYTES * (PULL_MATRICES * size * size + offsets * sent * sent)
+                + PAIR_BYTES * cores * cores,
+            operations: PULL_CUBES * size.powi(3) + offsets * unknowns * unknowns * sent,
+            least_error: 2.0 * resolution.exchange_error(shape, closest_m),
         }
     }
 }

@@ -60,6 +60,18 @@ struct Factor {
     load: DVector<f64>,
 }
 
+/// How many elements share each unknown; more than there are where it is kept.
+fn sharers(elements: &[Vec<usize>], kept: &[usize], unknowns: usize) -> Vec<usize> {
+    let mut sharers = vec![0_usize; unknowns];
+    for &unknown in elements.iter().flatten() {
+        sharers[unknown] += 1;
+    }
+    for &unknown in kept {
+        sharers[unknown] = usize::MAX;
+    }
+    sharers
+}
+
 impl Plan {
     /// A plan for elements with the given unknowns, each `0..unknowns`. `merges` lists the fronts
     /// that each merge joins: elements by their index, then merges in the order of this list.
@@ -71,13 +83,7 @@ impl Plan {
         kept: &[usize],
         unknowns: usize,
     ) -> Self {
-        let mut sharers = vec![0_usize; unknowns];
-        for &unknown in elements.iter().flatten() {
-            sharers[unknown] += 1;
-        }
-        for &unknown in kept {
-            sharers[unknown] = usize::MAX;
-        }
+        let sharers = sharers(elements, kept, unknowns);
         // Sharers met so far in the subtree of a front; a front's unknowns are in no other
         // pending front's subtree unless shared, so counts travel with the unknowns.
         let mut pending: Vec<Vec<(usize, usize)>> = Vec::new();
@@ -115,16 +121,13 @@ impl Plan {
             for (k, &unknown) in all.iter().enumerate() {
                 place[unknown] = k;
             }
+            let places_of = |unknowns: &mut dyn Iterator<Item = usize>| -> Vec<usize> {
+                unknowns.map(|unknown| place[unknown]).collect()
+            };
             let places = match elements.get(front) {
-                Some(element) => vec![element.iter().map(|&unknown| place[unknown]).collect()],
-                None => parts
-                    .iter()
-                    .map(|&part| {
-                        pending[part]
-                            .iter()
-                            .map(|&(unknown, _)| place[unknown])
-                            .collect()
-                    })
+                Some(element) => vec![places_of(&mut element.iter().copied())],
+                None => (parts.iter())
+                    .map(|&part| places_of(&mut pending[part].iter().map(|&(unknown, _)| unknown)))
                     .collect(),
             };
             pending.push(

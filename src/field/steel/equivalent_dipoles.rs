@@ -58,6 +58,78 @@ pub(super) struct Near<'a> {
     pub(super) winding: &'a Winding,
 }
 
+/// Largest gradients that the rings of a layer would have alone, added up, T/m: how far above the
+/// layer's field that is, so many digits cancel.
+fn parts_of_layer(outline: &Generatrix, largest: &[f64], distance: impl Fn(f64) -> f64) -> f64 {
+    outline
+        .areas_m2()
+        .zip(&outline.nodes)
+        .zip(largest)
+        .map(|((area, node), layer)| {
+            let d = distance(node.z_m);
+            // A ring's part near a point is as long as its distance, at most the whole ring.
+            let share = (d / (PI * node.r_m)).min(1.0);
+            area * layer * share * 6.0 * MU_0_T_M_PER_A / (4.0 * PI * d.powi(4))
+        })
+        .sum()
+}
+
+/// Dipoles around a ring whose points are `ratio` radii away.
+fn angles_of(ratio: f64, modes: usize, tolerance: f64) -> usize {
+    // Slowest where r^2 = ring^2 + distance^2.
+    let decay = ratio.asinh();
+    // The gradient of a dipole's field has azimuthal modes n^2.5 exp(-n decay).
+    let digits = (1.0 / tolerance).ln();
+    let growth = 2.5 * (digits / decay).max(1.0).ln();
+    let needed = modes + ((digits + growth) / decay).ceil() as usize;
+    needed.clamp(2 * modes + 1, MOST_ANGLES)
+}
+
+/// Position (m) and outer normal of every dipole of every core.
+fn dipole_places(rings: &Rings, angles: &[usize], positions_m: &[[f64; 2]]) -> Vec<[f64; 6]> {
+    let mut places = Vec::new();
+    for position in positions_m {
+        for (ring, angles) in rings.rings.iter().zip(angles) {
+            places.extend((0..*angles).map(|k| {
+                let (s, c) = (TAU * (k as f64 + 0.5) / *angles as f64).sin_cos();
+                [
+                    position[0] + ring.r_m * c,
+                    position[1] + ring.r_m * s,
+                    ring.z_m,
+                    ring.normal[0] * c,
+                    ring.normal[0] * s,
+                    ring.normal[1],
+                ]
+            }));
+        }
+    }
+    places
+}
+
+/// The moments of a core's dipoles from those of its rings' azimuthal modes, in the order of
+/// [`dipole_places`].
+fn dipole_moments(
+    by_mode: &DMatrix<f64>,
+    modes: usize,
+    angles: &[usize],
+    mut put: impl FnMut(usize, f64),
+) {
+    let mut place = 0;
+    for (ring, angles) in angles.iter().enumerate() {
+        let turn = TAU / *angles as f64;
+        for k in 0..*angles {
+            let theta = turn * (k as f64 + 0.5);
+            let mut moment = by_mode[(ring, 0)];
+            for mode in 1..modes {
+                let (s, c) = (mode as f64 * theta).sin_cos();
+                moment += c * by_mode[(ring, 2 * mode - 1)] + s * by_mode[(ring, 2 * mode)];
+            }
+            put(place + k, turn * moment);
+        }
+        place += angles;
+    }
+}
+
 /// Dipoles that stand for all cores of an array, for every drive.
 #[derive(Debug, Clone)]
 pub struct ArraySources {
@@ -94,51 +166,14 @@ impl ArraySources {
         let size = winding
             .field(winding.outer_radius_m, height_m)
             .map_or(f64::INFINITY, |field| field.gradient_norm());
-        let parts: f64 = outline
-            .areas_m2()
-            .zip(&outline.nodes)
-            .zip(&largest)
-            .map(|((area, node), layer)| {
-                let d = distance(node.z_m);
-                // A ring's part near a point is as long as its distance, at most the whole ring.
-                let share = (d / (PI * node.r_m)).min(1.0);
-                area * layer * share * 6.0 * MU_0_T_M_PER_A / (4.0 * PI * d.powi(4))
-            })
-            .sum();
+        let parts = parts_of_layer(outline, &largest, distance);
         let tolerance = tolerance / (parts / size).clamp(1.0, MOST_CANCELLATION);
         let order = (4.0 - 1.3 * tolerance.log10()).ceil().max(3.0) as usize;
         let rings = Rings::new(outline, order, |z| PANEL * distance(z));
-        let angles: Vec<usize> = rings
-            .rings
-            .iter()
-            .map(|ring| {
-                let ratio = distance(ring.z_m) / ring.r_m;
-                // Slowest where r^2 = ring^2 + distance^2.
-                let decay = ratio.asinh();
-                // The gradient of a dipole's field has azimuthal modes n^2.5 exp(-n decay).
-                let digits = (1.0 / tolerance).ln();
-                let growth = 2.5 * (digits / decay).max(1.0).ln();
-                let needed = modes + ((digits + growth) / decay).ceil() as usize;
-                needed.clamp(2 * modes + 1, MOST_ANGLES)
-            })
+        let angles: Vec<usize> = (rings.rings.iter())
+            .map(|ring| angles_of(distance(ring.z_m) / ring.r_m, modes, tolerance))
             .collect();
-
-        let mut places = Vec::new();
-        for position in positions_m {
-            for (ring, angles) in rings.rings.iter().zip(&angles) {
-                places.extend((0..*angles).map(|k| {
-                    let (s, c) = (TAU * (k as f64 + 0.5) / *angles as f64).sin_cos();
-                    [
-                        position[0] + ring.r_m * c,
-                        position[1] + ring.r_m * s,
-                        ring.z_m,
-                        ring.normal[0] * c,
-                        ring.normal[0] * s,
-                        ring.normal[1],
-                    ]
-                }));
-            }
-        }
+        let places = dipole_places(&rings, &angles, positions_m);
         let a_core = places.len() / positions_m.len().max(1);
         let mut moments = vec![0.0; places.len() * drives];
         moments
@@ -148,21 +183,9 @@ impl ArraySources {
                 for drive in 0..drives {
                     fluxform_base::progress::poll();
                     let by_mode = rings.moments(&layers(drive, core));
-                    let mut place = 0;
-                    for (ring, angles) in angles.iter().enumerate() {
-                        let turn = TAU / *angles as f64;
-                        for k in 0..*angles {
-                            let theta = turn * (k as f64 + 0.5);
-                            let mut moment = by_mode[(ring, 0)];
-                            for mode in 1..modes {
-                                let (s, c) = (mode as f64 * theta).sin_cos();
-                                moment += c * by_mode[(ring, 2 * mode - 1)]
-                                    + s * by_mode[(ring, 2 * mode)];
-                            }
-                            out[(place + k) * drives + drive] = turn * moment;
-                        }
-                        place += angles;
-                    }
+                    dipole_moments(&by_mode, modes, &angles, |place, moment| {
+                        out[place * drives + drive] = moment;
+                    });
                 }
             });
         Self {

@@ -102,10 +102,92 @@ const MOST_REFINEMENTS: usize = 7;
 const GROWTH: f64 = 1.35;
 /// Tolerance of what the coupling adds over that of the force.
 const COARSER: f64 = 10.0;
+/// Every solution of the coupling is to be better than the last by this factor.
+const FINER: f64 = 0.2;
 /// Refinements of the coupling.
 const MOST_COUPLINGS: usize = 3;
 /// Points a portion of work.
 const CHUNK: usize = 64;
+
+/// The table of one core alone with its error: made finer until that is within `2 aim`, or the
+/// best of those tried. `None` if the core does not answer.
+fn tabulated(
+    reaction: &Reaction,
+    magnet: &PassiveMagnet,
+    mut grid: Grid,
+    checks: &Checks,
+    aim: f64,
+) -> Option<(f64, Isolated)> {
+    let mut best: Option<(f64, Isolated)> = None;
+    for _ in 0..=MOST_REFINEMENTS {
+        let isolated = Isolated::new(reaction, magnet, grid)?;
+        let error = checks.error_of(&isolated);
+        let [across, up] = isolated.tails();
+        if best.as_ref().is_none_or(|(e, _)| error < *e) {
+            best = Some((error, isolated));
+        }
+        if error <= 2.0 * aim {
+            break;
+        }
+        for (tail, nodes) in [across, up].iter().zip(&mut grid.nodes) {
+            if *tail >= 0.3 * across.max(up) {
+                *nodes = (GROWTH * *nodes as f64).ceil() as usize;
+            }
+        }
+    }
+    best
+}
+
+/// The force that the cores' coupling adds at some places, N, and its error.
+struct Added {
+    force_n: Vec<[f64; 3]>,
+    error_n: Vec<f64>,
+}
+
+impl Added {
+    fn nothing(places: usize) -> Self {
+        Self {
+            force_n: vec![[0.0; 3]; places],
+            error_n: vec![0.0; places],
+        }
+    }
+
+    /// The coupling that `solve` gives to a tolerance, tightened until two in a row agree to their
+    /// share of `tolerance`.
+    fn refined(
+        solve: impl Fn(f64) -> Neighbours,
+        places_m: &[[f64; 3]],
+        alone: &[[f64; 3]],
+        tolerance: f64,
+    ) -> (Neighbours, Self) {
+        let of = |n: &Neighbours| -> Vec<[f64; 3]> {
+            places_m.par_iter().map(|at| n.force_n(*at)).collect()
+        };
+        let mut aim = first_coupling(tolerance);
+        let mut coarse = solve(aim);
+        let mut added = Self {
+            force_n: of(&coarse),
+            error_n: vec![0.0; places_m.len()],
+        };
+        for _ in 0..MOST_COUPLINGS {
+            aim *= FINER;
+            let fine = solve(aim);
+            let finer = of(&fine);
+            let mut worst = 0.0_f64;
+            for (k, error) in added.error_n.iter_mut().enumerate() {
+                *error = norm(reaction::minus(added.force_n[k], finer[k]));
+                let total: [f64; 3] = std::array::from_fn(|i| alone[k][i] + finer[k][i]);
+                worst = worst.max(*error / norm(total));
+            }
+            if worst <= aim_share(tolerance) {
+                break;
+            }
+            // The difference bounds the finer one's error from here, on the safe side.
+            (coarse, added.force_n) = (fine, finer);
+        }
+        (coarse, added)
+    }
+}
 
 impl PassivePull {
     /// Prepares the pull to an estimated error of `tolerance`, or as near to it as its tables
@@ -142,32 +224,16 @@ impl PassivePull {
         let span = region.z_m[0] - shape.top_m;
         grid.heights_m[1] = grid.heights_m[1].max(region.z_m[0] + 0.05 * span);
         let checks = Checks::new(pulled, &magnet, &resolution, &grid);
-        let mut best: Option<(f64, Isolated)> = None;
-        for _ in 0..=MOST_REFINEMENTS {
-            let Some(isolated) = Isolated::new(&reaction, &magnet, grid) else {
-                return Ok(Self {
-                    positions_m: Vec::new(),
-                    isolated: None,
-                    neighbours: None,
-                    relative_error: 0.0,
-                    coupling_share: 0.0,
-                });
-            };
-            let error = checks.error_of(&isolated);
-            let [across, up] = isolated.tails();
-            if best.as_ref().is_none_or(|(e, _)| error < *e) {
-                best = Some((error, isolated));
-            }
-            if error <= 2.0 * aim {
-                break;
-            }
-            for (tail, nodes) in [across, up].iter().zip(&mut grid.nodes) {
-                if *tail >= 0.3 * across.max(up) {
-                    *nodes = (GROWTH * *nodes as f64).ceil() as usize;
-                }
-            }
-        }
-        let (table_error, isolated) = best.expect("at least one table was made");
+        let Some((table_error, isolated)) = tabulated(&reaction, &magnet, grid, &checks, aim)
+        else {
+            return Ok(Self {
+                positions_m: Vec::new(),
+                isolated: None,
+                neighbours: None,
+                relative_error: 0.0,
+                coupling_share: 0.0,
+            });
+        };
         let mut pull = Self {
             positions_m: pulled.positions_m.to_vec(),
             isolated: Some(isolated),
@@ -177,44 +243,25 @@ impl PassivePull {
         };
         let places_m = spread(pulled);
         let alone: Vec<_> = places_m.iter().map(|at| pull.force_n(*at)).collect();
-        let mut added = vec![[0.0; 3]; places_m.len()];
-        let mut coupling_error_n = vec![0.0; places_m.len()];
-        if pulled.coupled && pulled.positions_m.len() > 1 {
-            let mut aim = (COARSER * tolerance).clamp(1e-6, 0.1);
+        let coupled = pulled.coupled && pulled.positions_m.len() > 1;
+        let added = if coupled {
             let solve = |aim| couple(pulled, &magnet, closest_m, aim);
-            let of = |n: &Neighbours| -> Vec<[f64; 3]> {
-                places_m.par_iter().map(|at| n.force_n(*at)).collect()
-            };
-            let mut coarse = solve(aim);
-            added = of(&coarse);
-            for _ in 0..MOST_COUPLINGS {
-                aim *= 0.2;
-                let fine = solve(aim);
-                let finer = of(&fine);
-                let mut worst = 0.0_f64;
-                for (k, error) in coupling_error_n.iter_mut().enumerate() {
-                    *error = norm(reaction::minus(added[k], finer[k]));
-                    let total: [f64; 3] = std::array::from_fn(|i| alone[k][i] + finer[k][i]);
-                    worst = worst.max(*error / norm(total));
-                }
-                if worst <= aim_share(tolerance) {
-                    break;
-                }
-                // The difference stands for the finer one from here, on the safe side.
-                (coarse, added) = (fine, finer);
-            }
-            pull.neighbours = Some(coarse);
-        }
+            let (neighbours, added) = Added::refined(solve, &places_m, &alone, tolerance);
+            pull.neighbours = Some(neighbours);
+            added
+        } else {
+            Added::nothing(places_m.len())
+        };
         let rule_error = magnet.magnet_rule(region.z_m[0]).bound();
         for (k, at) in places_m.iter().enumerate() {
-            let total: [f64; 3] = std::array::from_fn(|i| alone[k][i] + added[k][i]);
+            let total: [f64; 3] = std::array::from_fn(|i| alone[k][i] + added.force_n[k][i]);
             let size = norm(total);
             let of_tables: f64 =
                 pull.each_n(*at).map(norm).sum::<f64>() * (table_error + rule_error);
             pull.relative_error = pull
                 .relative_error
-                .max((of_tables + coupling_error_n[k]) / size);
-            pull.coupling_share = pull.coupling_share.max(norm(added[k]) / size);
+                .max((of_tables + added.error_n[k]) / size);
+            pull.coupling_share = pull.coupling_share.max(norm(added.force_n[k]) / size);
         }
         Ok(pull)
     }
@@ -285,6 +332,17 @@ fn check(pulled: &Pulled, tolerance: f64) -> Result<f64, NoPull> {
         });
     }
     Ok(closest_m)
+}
+
+/// What the coupling must be solved to at least where the force is asked for to `tolerance`: the
+/// first solution and one that judges it.
+#[must_use]
+pub fn coupling_tolerance(tolerance: f64) -> f64 {
+    FINER * first_coupling(tolerance)
+}
+
+fn first_coupling(tolerance: f64) -> f64 {
+    (COARSER * tolerance).clamp(1e-6, 0.1)
 }
 
 /// The part of the tolerance that the coupling may take.

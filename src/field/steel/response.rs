@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 
+use super::CoreShape;
 use super::double_layer::operators;
 use super::exchange::{Grading, Stretched, side_panels};
 use super::generatrix::{Face, Generatrix, Panel};
@@ -25,6 +26,58 @@ pub struct Ring {
     pub z_m: f64,
     /// Outer normal (r, z).
     pub normal: [f64; 2],
+}
+
+/// A part of a face with rings on it: face, from and to in its coordinate, m.
+type RingPanel = (Face, f64, f64);
+
+/// Each face cut into panels at most `length_m(z)` long, the side from the top down.
+fn ring_panels(shape: CoreShape, length_m: impl Fn(f64) -> f64) -> Vec<RingPanel> {
+    let mut panels: Vec<RingPanel> = Vec::new();
+    for (face, z_m) in [(Face::Bottom, shape.bottom_m), (Face::Top, shape.top_m)] {
+        let pieces = (shape.radius_m / length_m(z_m)).ceil().max(1.0);
+        for piece in 0..pieces as usize {
+            let edge = |k: usize| shape.radius_m * k as f64 / pieces;
+            panels.push((face, edge(piece), edge(piece + 1)));
+        }
+    }
+    let side = side_panels(shape, &length_m);
+    panels.extend(side.into_iter().map(|(from, to)| (Face::Side, from, to)));
+    panels
+}
+
+/// Integrals of a panel's layer polynomials times the rings' over what the two panels share;
+/// layer times interpolation times r is a polynomial there, for which `product` is exact.
+fn gather_shared(
+    shape: CoreShape,
+    (panel, layer): (&Panel, &Basis),
+    ((face, from, to), basis): (&RingPanel, &Basis),
+    product: &gauss::Rule,
+    mut add: impl FnMut(usize, usize, f64),
+) {
+    let (lo, hi) = panel.range_m();
+    let (lo, hi) = (lo.max(*from), hi.min(*to));
+    if *face != panel.face || lo >= hi {
+        return;
+    }
+    let mut shares = vec![0.0; layer.size()];
+    let mut values = vec![0.0; basis.size()];
+    let (half, middle) = (0.5 * (hi - lo), 0.5 * (lo + hi));
+    for (x, weight) in product.nodes.iter().zip(&product.weights) {
+        let coordinate = middle + half * x;
+        let weight = half * weight * shape.on(panel.face, coordinate).0;
+        let length = panel.to_m - panel.from_m;
+        layer.weights(
+            2.0 * (coordinate - panel.from_m) / length - 1.0,
+            &mut shares,
+        );
+        basis.weights(2.0 * (coordinate - from) / (to - from) - 1.0, &mut values);
+        for (ring, value) in values.iter().enumerate() {
+            for (place, share) in shares.iter().enumerate() {
+                add(place, ring, weight * share * value);
+            }
+        }
+    }
 }
 
 /// Rings on a core's outline and the interpolation from them to the outline's nodes.
@@ -50,17 +103,7 @@ impl Rings {
         let shape = outline.shape;
         let rule = gauss::rule(order);
         let basis = Basis::new(rule);
-        // (face, from, to), the side from the top down.
-        let mut panels: Vec<(Face, f64, f64)> = Vec::new();
-        for (face, z_m) in [(Face::Bottom, shape.bottom_m), (Face::Top, shape.top_m)] {
-            let pieces = (shape.radius_m / length_m(z_m)).ceil().max(1.0);
-            for piece in 0..pieces as usize {
-                let edge = |k: usize| shape.radius_m * k as f64 / pieces;
-                panels.push((face, edge(piece), edge(piece + 1)));
-            }
-        }
-        let side = side_panels(shape, &length_m);
-        panels.extend(side.into_iter().map(|(from, to)| (Face::Side, from, to)));
+        let panels = ring_panels(shape, length_m);
         let mut rings = Vec::with_capacity(panels.len() * order);
         for (face, from, to) in &panels {
             rings.extend(rule.nodes.iter().map(|x| {
@@ -85,8 +128,6 @@ impl Rings {
         let mut gather = DMatrix::zeros(outline.nodes.len(), rings.len());
         let product = gauss::rule((outline.order + order).div_ceil(2));
         let layer = Basis::new(gauss::rule(outline.order));
-        let mut shares = vec![0.0; outline.order];
-        let mut values = vec![0.0; order];
         for (index, panel) in outline.panels.iter().enumerate() {
             let first = index * outline.order;
             for (place, node) in outline.nodes[first..first + outline.order]
@@ -102,29 +143,11 @@ impl Rings {
                     to_nodes[(first + place, ring)] = weight;
                 });
             }
-            // Layer times interpolation times r is a polynomial on what two panels share.
-            let (lo, hi) = panel.range_m();
-            for (of, (face, from, to)) in panels.iter().enumerate() {
-                let (lo, hi) = (lo.max(*from), hi.min(*to));
-                if *face != panel.face || lo >= hi {
-                    continue;
-                }
-                let (half, middle) = (0.5 * (hi - lo), 0.5 * (lo + hi));
-                for (x, weight) in product.nodes.iter().zip(&product.weights) {
-                    let coordinate = middle + half * x;
-                    let weight = half * weight * shape.on(panel.face, coordinate).0;
-                    let length = panel.to_m - panel.from_m;
-                    layer.weights(
-                        2.0 * (coordinate - panel.from_m) / length - 1.0,
-                        &mut shares,
-                    );
-                    basis.weights(2.0 * (coordinate - from) / (to - from) - 1.0, &mut values);
-                    for (ring, value) in values.iter().enumerate() {
-                        for (place, share) in shares.iter().enumerate() {
-                            gather[(first + place, of * order + ring)] += weight * share * value;
-                        }
-                    }
-                }
+            for (of, to_ring) in panels.iter().enumerate() {
+                let add = |place: usize, ring: usize, share: f64| {
+                    gather[(first + place, of * order + ring)] += share;
+                };
+                gather_shared(shape, (panel, &layer), (to_ring, &basis), &product, add);
             }
         }
         Self {

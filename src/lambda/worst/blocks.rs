@@ -362,13 +362,8 @@ mod tests {
     /// Of the points above each probe's limit the furthest is told, and none below all limits.
     #[test]
     fn the_point_furthest_above_each_limit_is_found() {
-        let mut state = 3u64;
-        let mut next = || {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        };
+        let mut random = fluxform_numerics::random::Random::new(3);
+        let mut next = || random.between(-1.0, 1.0);
         let count = 700;
         // A curve of points and a little of chance, as neighbours on a surface have it.
         let place = |j: usize| 0.011 * j as f64;

@@ -128,13 +128,8 @@ mod tests {
     /// Rows held one by one come in the order in which they are missed.
     #[test]
     fn points_are_told_in_the_order_in_which_the_path_misses_them() {
-        let mut state = 9u64;
-        let mut next = || {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        };
+        let mut random = fluxform_numerics::random::Random::new(9);
+        let mut next = || random.between(-1.0, 1.0);
         let count = 40;
         let forces: Vec<f64> = (0..2 * count).map(|_| next()).collect();
         let heights: Vec<f64> = (0..count).map(|_| 1.3 + 0.7 * next()).collect();

@@ -174,25 +174,8 @@ impl Program {
             fluxform_base::progress::poll();
             vertex.place(self, lambda);
             let cautious = exchanges_here > patience;
-            let (mut entering, mut next) = self.look(&vertex, lambda, cautious);
-            // A row may turn out not to end the step, a twin of an active one: then another may.
-            // A step without end is never taken before the last of them.
-            let mut asked = 0;
-            while entering.is_none() && (asked < TWINS || next.is_none()) {
-                fluxform_base::progress::poll();
-                let stand = Stand {
-                    lambda,
-                    z: &vertex.z,
-                    rate: &vertex.rate,
-                    step: next.map(|(_, step)| step),
-                };
-                if !ask(self, &stand) {
-                    break;
-                }
-                asked += 1;
-                vertex.active.resize(self.rows(), false);
-                (entering, next) = self.look(&vertex, lambda, cautious);
-            }
+            let (mut entering, next, asked) =
+                self.look_further(&mut vertex, lambda, cautious, &mut ask);
             // A row that the last step did not know and that is violated where it led ended it
             // earlier.
             if let Some(before) = hasty.take_if(|h| entering.is_some_and(|row| row >= h.rows)) {
@@ -238,6 +221,37 @@ impl Program {
             }
         }
         (pieces, End::Stalled)
+    }
+
+    /// As [`Self::look`], with the rows that `ask` adds; and how many it added.
+    ///
+    /// A row may turn out not to end the step, a twin of an active one: then another may. A step
+    /// without end is never taken before the last of them.
+    fn look_further(
+        &mut self,
+        vertex: &mut Vertex,
+        lambda: Num,
+        cautious: bool,
+        ask: &mut impl FnMut(&mut Self, &Stand) -> bool,
+    ) -> (Option<usize>, Option<(usize, Num)>, usize) {
+        let (mut entering, mut next) = self.look(vertex, lambda, cautious);
+        let mut asked = 0;
+        while entering.is_none() && (asked < TWINS || next.is_none()) {
+            fluxform_base::progress::poll();
+            let stand = Stand {
+                lambda,
+                z: &vertex.z,
+                rate: &vertex.rate,
+                step: next.map(|(_, step)| step),
+            };
+            if !ask(self, &stand) {
+                break;
+            }
+            asked += 1;
+            vertex.active.resize(self.rows(), false);
+            (entering, next) = self.look(vertex, lambda, cautious);
+        }
+        (entering, next, asked)
     }
 
     /// The row that is violated most, and the one that will be first as lambda grows with the
@@ -609,13 +623,8 @@ mod tests {
     /// rounding, and a parameter of any size, the same are found as by looking at all of them.
     #[test]
     fn no_row_that_matters_is_passed_over() {
-        let mut state = 21u64;
-        let mut next = || {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        };
+        let mut random = fluxform_numerics::random::Random::new(21);
+        let mut next = || random.between(-1.0, 1.0);
         let mut found = [0; 2];
         for case in 0..600 {
             let lambda = Num::of([0.0, 0.7, 1.3e3, 1.7e6][case % 4]);

@@ -111,13 +111,8 @@ mod tests {
 
     #[test]
     fn the_tree_finds_what_a_search_through_all_finds() {
-        let mut state = 7u64;
-        let mut next = || {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1u64 << 53) as f64
-        };
+        let mut random = fluxform_numerics::random::Random::new(7);
+        let mut next = || random.unit();
         let triangles: Vec<Triangle> = (0..300)
             .map(|_| {
                 let at = [next(), next(), next()];

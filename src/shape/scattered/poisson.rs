@@ -10,6 +10,7 @@ use crate::error::ShapeError;
 use crate::height::Sample;
 use crate::point_flags::Marks;
 use fluxform_base::progress::Progress;
+use fluxform_numerics::random::Random;
 
 /// Darts into every free cell.
 const ROUNDS: u64 = 40;
@@ -62,7 +63,7 @@ pub fn poisson(
         count,
         darts: vec![None; count[0] * count[1]],
     };
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let mut order: Vec<usize> = (0..cells.darts.len()).collect();
     for k in (1..order.len()).rev() {
         order.swap(k, (random.unit() * (k + 1) as f64) as usize);
@@ -199,19 +200,5 @@ impl Cells {
             }
         }
         best
-    }
-}
-
-/// A repeatable stream of numbers (splitmix64).
-struct Random(u64);
-
-impl Random {
-    /// From 0 to below 1.
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 }

@@ -1,11 +1,13 @@
 //! What is claimed of |B| in linear cores against much finer solutions, searched differently.
 
-use super::support::{Design, Lcg};
+use super::support::Design;
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::CoupledArray;
 use fluxform_field::steel::core_flux_density::{CoreField, peak_depth_m};
 use fluxform_field::steel::cored_coil::CoredCoil;
 use fluxform_field::winding::Winding;
+use fluxform_testing::Random;
+use fluxform_testing::random_of_study;
 use std::f64::consts::PI;
 
 /// Tolerance of the solutions that stand for the truth.
@@ -18,7 +20,7 @@ const STEPS: usize = 36;
 
 /// Coils and cores of every aspect: thin and thick, recessed and protruding at either end, mu_r
 /// 2 to 1e5.
-pub fn random_cores(mut random: Lcg, count: usize) -> Vec<Design> {
+pub fn random_cores(mut random: Random, count: usize) -> Vec<Design> {
     (0..count)
         .map(|_| {
             let inner_radius_m = random.decades(0.002, 0.05);
@@ -176,7 +178,7 @@ fn the_peak_in_a_recessed_core_is_where_it_is_claimed() {
 /// The small version of the study below.
 #[test]
 pub fn random_cores_have_the_peak_that_is_claimed() {
-    study(&random_cores(Lcg(SEED), 12));
+    study(&random_cores(Random::new(SEED), 12));
 }
 
 /// `cargo test --test field steel -- --ignored --nocapture claimed_in_full` prints the table;
@@ -184,7 +186,7 @@ pub fn random_cores_have_the_peak_that_is_claimed() {
 #[test]
 #[ignore = "a minute of CPU: 160 random cored coils"]
 pub fn random_cores_have_the_peak_that_is_claimed_in_full() {
-    study(&random_cores(Lcg::of_study(SEED), 160));
+    study(&random_cores(random_of_study(SEED), 160));
 }
 
 fn study(designs: &[Design]) {
@@ -216,7 +218,7 @@ struct Coupled {
     currents_a: Vec<f64>,
 }
 
-fn coupled(mut random: Lcg, count: usize) -> Vec<Coupled> {
+fn coupled(mut random: Random, count: usize) -> Vec<Coupled> {
     (0..count)
         .map(|index| {
             let radius_m = random.decades(0.003, 0.02);
@@ -296,7 +298,7 @@ fn study_coupled(cases: &[Coupled], tolerance: f64, truth: f64) {
 /// The small version of the study below.
 #[test]
 fn coupled_cores_have_the_field_that_is_claimed() {
-    study_coupled(&coupled(Lcg(SEED), 2), 1e-3, 1e-5);
+    study_coupled(&coupled(Random::new(SEED), 2), 1e-3, 1e-5);
 }
 
 /// `cargo test --test field steel -- --ignored --nocapture coupled_cores_in_full` prints the table.
@@ -305,7 +307,7 @@ fn coupled_cores_have_the_field_that_is_claimed() {
 fn coupled_cores_in_full_have_the_field_that_is_claimed() {
     for tolerance in [1e-3, 1e-4] {
         study_coupled(
-            &coupled(Lcg::of_study(SEED), 6),
+            &coupled(random_of_study(SEED), 6),
             tolerance,
             0.01 * tolerance,
         );

@@ -4,10 +4,11 @@ use fluxform_field::steel::CLOSEST;
 use fluxform_field::steel::cored_coil::CoredCoil;
 use fluxform_field::winding::AxialField;
 
-use super::support::{Design, Lcg, designs};
+use super::support::{Design, designs};
+use fluxform_testing::Random;
 
 /// A place outside winding and steel, its distance from the steel uniform in the logarithm.
-fn place(design: &Design, random: &mut Lcg) -> (f64, f64) {
+fn place(design: &Design, random: &mut Random) -> (f64, f64) {
     let (core, winding) = (design.core, design.winding);
     loop {
         let d = random.decades(1.001 * CLOSEST, 3.0) * core.radius_m;
@@ -90,7 +91,7 @@ fn claims_cover_the_solution_wherever_places_are_accepted() {
             nodes += coil.core.outline().nodes.len();
             reached += usize::from(coil.relative_error <= tolerance);
             let claim = coil.relative_error + tight.relative_error;
-            let mut random = Lcg(7);
+            let mut random = Random::new(7);
             for _ in 0..60 {
                 let (r, z) = place(&design, &mut random);
                 let error = difference(&coil.core.field(r, z), &tight.core.field(r, z));

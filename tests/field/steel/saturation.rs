@@ -1,11 +1,13 @@
 //! What is claimed of coils along a magnetisation curve against far finer solutions.
 
 use super::claims::{covered, random_cores};
-use super::support::{Design, Lcg, SEED_COIL, SEED_CORE};
+use super::support::{Design, SEED_COIL, SEED_CORE};
 use fluxform_coil::inductance::self_inductance_h;
 use fluxform_field::steel::bh_curve::BhCurve;
 use fluxform_field::steel::generatrix::Resolution;
 use fluxform_field::steel::saturated_coil::CoilWithCurve;
+use fluxform_testing::Random;
+use fluxform_testing::random_of_study;
 use rayon::prelude::*;
 
 const SEED: u64 = 20_261_123;
@@ -43,7 +45,7 @@ struct Case {
 }
 
 /// The seed's coil and random ones, the steel from far below its knee to far above it.
-fn cases(mut random: Lcg, count: usize) -> Vec<Case> {
+fn cases(mut random: Random, count: usize) -> Vec<Case> {
     let curves = curves();
     let seed = Design {
         winding: SEED_COIL,
@@ -57,7 +59,7 @@ fn cases(mut random: Lcg, count: usize) -> Vec<Case> {
             current_a,
         })
         .into();
-    let of_cores = Lcg(random.0 + 1);
+    let of_cores = Random::new(random.bits());
     for design in random_cores(of_cores, count) {
         // Ampere turns over the length drive 10 to 1000 kA/m.
         let field = random.decades(1e4, 1e6);
@@ -133,7 +135,7 @@ fn study<const N: usize>(cases: &[Case], tolerances: [f64; N]) {
 /// The small version of the study below.
 #[test]
 fn claims_hold_along_curves() {
-    study(&cases(Lcg(SEED), 0)[2..5], [1e-4]);
+    study(&cases(Random::new(SEED), 0)[2..5], [1e-4]);
 }
 
 /// `cargo test --test field steel -- --ignored --nocapture along_curves_in_full` prints the table;
@@ -141,5 +143,5 @@ fn claims_hold_along_curves() {
 #[test]
 #[ignore = "minutes of CPU: 42 states of the steel"]
 fn claims_hold_along_curves_in_full() {
-    study(&cases(Lcg::of_study(SEED), 36), [1e-4]);
+    study(&cases(random_of_study(SEED), 36), [1e-4]);
 }

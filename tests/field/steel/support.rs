@@ -4,6 +4,7 @@ use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::cored_coil::CoredCoil;
 use fluxform_field::winding::Winding;
+use fluxform_testing::{Random, committed};
 use serde_json::Value;
 
 pub const SEED_COIL: Winding = Winding {
@@ -72,34 +73,10 @@ pub fn inductance_difference(a: &CoredCoil, b: &CoredCoil) -> f64 {
     (a - b).abs() / a.abs().max(own)
 }
 
-/// Numerical Recipes' linear congruential generator: the same designs everywhere.
-pub struct Lcg(pub u64);
-
-impl Lcg {
-    /// The generator of a full study: `FLUXFORM_SEED` draws other cases than the committed seed.
-    pub fn of_study(committed: u64) -> Self {
-        Self(std::env::var("FLUXFORM_SEED").map_or(committed, |seed| seed.parse().expect("a seed")))
-    }
-
-    /// Uniform in `lo..hi`.
-    pub fn between(&mut self, lo: f64, hi: f64) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        lo + (hi - lo) * (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// Uniform in the logarithm.
-    pub fn decades(&mut self, lo: f64, hi: f64) -> f64 {
-        self.between(lo.ln(), hi.ln()).exp()
-    }
-}
-
 /// Generic designs: coils from thimble to plate, cores longer and shorter than them, recessed
 /// and protruding, weakly and strongly magnetic.
 pub fn designs(count: usize) -> Vec<Design> {
-    let mut random = Lcg(20_260_713);
+    let mut random = Random::new(20_260_713);
     (0..count)
         .map(|_| {
             let inner_radius_m = random.decades(0.002, 0.03);
@@ -125,12 +102,7 @@ pub fn designs(count: usize) -> Vec<Design> {
 
 /// A committed oracle, `tests/oracles/steel/<name>.json`.
 pub fn oracle(name: &str) -> Value {
-    let path = format!(
-        "{}/../../tests/oracles/steel/{name}.json",
-        env!("CARGO_MANIFEST_DIR")
-    );
-    let text = std::fs::read_to_string(&path).expect("committed oracle");
-    serde_json::from_str(&text).expect("JSON")
+    serde_json::from_str(&committed(&format!("tests/oracles/steel/{name}.json"))).expect("JSON")
 }
 
 pub fn number(value: &Value) -> f64 {

@@ -3,7 +3,7 @@
 
 use super::claims::{covered, random_cores};
 use super::saturation::curves;
-use super::support::{Design, Lcg};
+use super::support::Design;
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::{ArrayResolution, closest_m};
 use fluxform_field::steel::bh_curve::BhCurve;
@@ -13,6 +13,8 @@ use fluxform_field::steel::permeability::Permeability;
 use fluxform_field::steel::saturated::Status;
 use fluxform_field::steel::saturated_array::SaturatedArray;
 use fluxform_field::winding::Winding;
+use fluxform_testing::Random;
+use fluxform_testing::random_of_study;
 use rayon::prelude::*;
 
 const SEED: u64 = 20_261_124;
@@ -31,10 +33,10 @@ struct Case {
 }
 
 /// `coils` coils each, close together or apart, the steel from far below its knee to far above it.
-fn cases(mut random: Lcg, coils: usize, count: usize) -> Vec<Case> {
+fn cases(mut random: Random, coils: usize, count: usize) -> Vec<Case> {
     let curves = curves();
     let designs = match coils {
-        1 => random_cores(Lcg(random.0 + 1), count),
+        1 => random_cores(Random::new(random.bits()), count),
         _ => (0..count).map(|_| stout(&mut random)).collect(),
     };
     designs
@@ -61,7 +63,7 @@ fn cases(mut random: Lcg, coils: usize, count: usize) -> Vec<Case> {
 }
 
 /// A coil a few radii long: what cores exchange has few unknowns.
-fn stout(random: &mut Lcg) -> Design {
+fn stout(random: &mut Random) -> Design {
     let inner_radius_m = random.decades(0.003, 0.02);
     let length_m = inner_radius_m * random.between(1.5, 5.0);
     Design {
@@ -212,8 +214,8 @@ fn study(what: &str, cases: &[Case]) -> Vec<f64> {
 /// The small version of the study below.
 #[test]
 fn claims_hold_at_working_points() {
-    study("one coil", &cases(Lcg(SEED), 1, 4));
-    study("two coils", &cases(Lcg(SEED), 2, 2));
+    study("one coil", &cases(Random::new(SEED), 1, 4));
+    study("two coils", &cases(Random::new(SEED), 2, 2));
 }
 
 /// `cargo test --test field steel -- --ignored --nocapture at_working_points_in_full` prints the
@@ -222,7 +224,7 @@ fn claims_hold_at_working_points() {
 #[ignore = "minutes of CPU: 120 states of the steel"]
 fn claims_hold_at_working_points_in_full() {
     for (what, coils) in [("one coil", 1), ("two coils", 2), ("three coils", 3)] {
-        for median in study(what, &cases(Lcg::of_study(SEED), coils, 40)) {
+        for median in study(what, &cases(random_of_study(SEED), coils, 40)) {
             assert!(median <= MOST_MEDIAN, "{what}: {median}");
         }
     }

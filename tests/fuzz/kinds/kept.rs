@@ -8,7 +8,7 @@ use sha2::{Digest, Sha256};
 use super::limits;
 use crate::harness::{Content, Input, Kind};
 use crate::structure::damage_text;
-use crate::support::Random;
+use fluxform_testing::Random;
 
 pub fn kind() -> Kind {
     Kind {

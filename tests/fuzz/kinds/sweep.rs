@@ -12,7 +12,7 @@ use fluxform::progress::Silent;
 use super::{limits, refusal};
 use crate::harness::{Content, Input, Kind};
 use crate::structure::damage_json;
-use crate::support::Random;
+use fluxform_testing::Random;
 
 pub fn kinds() -> Vec<Kind> {
     vec![

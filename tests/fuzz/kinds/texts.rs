@@ -15,7 +15,7 @@ use fluxform::shape::document::{AxisRequest, ShapeDocument, SurfaceSource};
 use super::{finite, limits, refusal};
 use crate::harness::{Content, Input, Kind};
 use crate::structure::damage_text;
-use crate::support::{Random, root};
+use fluxform_testing::{Random, root};
 
 pub fn kinds() -> Vec<Kind> {
     let kind = |name, bytes_per_byte, seeds, hostile, mutate, give| Kind {

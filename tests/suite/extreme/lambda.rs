@@ -5,8 +5,8 @@ use serde_json::Value;
 
 use super::check::{Outcome, close, holds, measured, number, numbers, off, oracle, told, worst};
 use super::{Case, case};
-use crate::effort::Numbers;
 use fluxform::lambda::{ForceProblem, Settings, Solution, Status, solve};
+use fluxform::numerics::random::Random;
 
 pub fn cases() -> Vec<Case> {
     [
@@ -66,7 +66,7 @@ impl Problem {
 
 /// A generic problem.
 pub fn generic(points: usize, coils: usize, seed: u64) -> Problem {
-    let mut n = Numbers(seed);
+    let mut n = Random::new(seed);
     Problem::new(
         (0..points * coils).map(|_| n.between(-0.05, 0.3)).collect(),
         (0..points).map(|_| n.between(0.03, 0.08)).collect(),
@@ -170,7 +170,7 @@ fn closed_forms() -> Vec<Case> {
             "rank 1; the limit where the currents of least power, all in proportion, reach it",
             1e-12,
             || {
-                let mut n = Numbers(3);
+                let mut n = Random::new(3);
                 let rows: Vec<f64> = (0..40).map(|_| n.between(0.3, 1.0)).collect();
                 let strength: Vec<f64> = (0..9).map(|_| n.between(0.1, 0.4)).collect();
                 let forces = rows

@@ -2,9 +2,9 @@
 
 use super::check::{Outcome, apart, holds, measured, number, off, oracle, refused, told, worst};
 use super::{Case, case};
-use crate::effort::Numbers;
 use fluxform::coil::transient::VoltageStep;
 use fluxform::lambda::{ForceProblem, Settings, solve};
+use fluxform::numerics::random::Random;
 use fluxform::numerics::small_quadratic::{Row, minimise};
 
 pub fn cases() -> Vec<Case> {
@@ -297,7 +297,7 @@ fn parallel() -> Vec<Case> {
 
 /// One point weighs `weight` times the others: its error against that of plain weights.
 fn heavy(weight: f64) -> Outcome {
-    let mut n = Numbers(17);
+    let mut n = Random::new(17);
     let forces: Vec<f64> = (0..30 * 4).map(|_| n.between(0.02, 0.3)).collect();
     let heights: Vec<f64> = (0..30).map(|_| n.between(0.03, 0.08)).collect();
     let mut weights = vec![1.0; 30];

@@ -1,7 +1,6 @@
 //! What grows, how far, and the work that is measured at each size.
 
 use super::THREADS;
-use crate::effort::Numbers;
 use crate::force::{forces, with_coils};
 use crate::inputs::{OPTIMUM_AIR, SEED, SEED_AIR};
 use crate::stages::posed;
@@ -18,6 +17,7 @@ use fluxform::lambda::{self, Allocator, Settings};
 use fluxform::map::Components;
 use fluxform::map::tabulate::{Grid, tabulate};
 use fluxform::numerics::axis::Axis;
+use fluxform::numerics::random::Random;
 use fluxform::progress::Silent;
 use fluxform::scene::Scene;
 use fluxform::scene::steel::{self, COUPLED_TOLERANCE};
@@ -388,7 +388,7 @@ fn allocate(side: usize, effort: &Effort) -> Sized {
     let (lower, upper) = (vec![0.0; coils], vec![2.0; coils]);
     let mut allocator = Allocator::new(&vec![6.0; coils], &lower, &upper, Some(coils as f64))
         .map_err(|error| refused(&error))?;
-    let mut numbers = Numbers(3);
+    let mut numbers = Random::new(3);
     let rows: Vec<f64> = (0..ROWS * coils).map(|_| numbers.unit()).collect();
     let mut currents = vec![0.0; coils];
     let work = || {

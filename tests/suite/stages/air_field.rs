@@ -6,7 +6,7 @@
 use serde::Deserialize;
 
 use super::curve;
-use crate::effort::{Found, Numbers, Pace};
+use crate::effort::{Found, Pace};
 use crate::file::{Curve, StageCurves};
 use crate::inputs::{AIR_COIL, SEED};
 use crate::reference::{AXIAL_ERROR, axial_gradient};
@@ -16,6 +16,7 @@ use fluxform::design::Need;
 use fluxform::field::batch::Wanted;
 use fluxform::field::winding::KERNEL_ERROR;
 use fluxform::field::winding::{AxialField, Winding};
+use fluxform::numerics::random::Random;
 use fluxform::progress::Progress;
 use fluxform::scene::Scene;
 
@@ -132,7 +133,7 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, RunError> {
 
 /// The vectorised rule.
 fn batch(winding: &Winding, pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
-    let mut numbers = Numbers(7);
+    let mut numbers = Random::new(7);
     let mut places: Vec<[f64; 2]> = (0..POINTS)
         .map(|_| [numbers.between(0.0, 0.14), numbers.between(LOWEST_M, 0.08)])
         .collect();

@@ -4,11 +4,12 @@
 //! the surface meant is the file's, and its price is their number.
 
 use super::{Measured, curve, stage};
-use crate::effort::{Found, Numbers, Pace};
+use crate::effort::{Found, Pace};
 use crate::file::{Curve, StageCurves};
 use crate::test_surface::{grid, height_m, mesh};
 use fluxform::RunError;
 use fluxform::numerics::double_double::DoubleDouble as Num;
+use fluxform::numerics::random::Random;
 use fluxform::progress::{Progress, Silent};
 use fluxform::shape::height::heights;
 use fluxform::shape::mesh::{Mesh, Triangle};
@@ -84,7 +85,7 @@ fn exactness(pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
         let plan = grid(samples);
         let (x, y) = (plan.x_m.nodes(), plan.y_m.nodes());
         let (found, timing) = pace.time(progress, || Ok(heights(&mesh, &plan, &Silent)?))?;
-        let mut numbers = Numbers(17);
+        let mut numbers = Random::new(17);
         let mut error = 0.0_f64;
         for _ in 0..COMPARED.min(found.len()) {
             let k = ((numbers.unit() * found.len() as f64) as usize).min(found.len() - 1);
@@ -120,7 +121,7 @@ pub(super) fn problem() -> Result<serde_json::Value, RunError> {
     let mesh = mesh(SIDE)?;
     let plan = grid(DEFAULT);
     let (x, y) = (plan.x_m.nodes(), plan.y_m.nodes());
-    let mut numbers = Numbers(17);
+    let mut numbers = Random::new(17);
     let at = |unit: f64| ((unit * plan.len() as f64) as usize).min(plan.len() - 1);
     let looked: Vec<usize> = (0..COMPARED).map(|_| at(numbers.unit())).collect();
     let exact = looked.iter().map(|k| {

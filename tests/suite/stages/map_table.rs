@@ -1,7 +1,7 @@
 //! Maps over the workspace: the error of their nodes, and the error between them.
 
 use super::{Measured, curve, stage};
-use crate::effort::{Found, Numbers, Pace};
+use crate::effort::{Found, Pace};
 use crate::file::{Curve, StageCurves};
 use crate::inputs::{SEED, SEED_AIR};
 use crate::reference::{AXIAL_ERROR, axial_gradient};
@@ -14,6 +14,7 @@ use fluxform::map::tabulate::{Grid, tabulate};
 use fluxform::map::{Components, FieldMap};
 use fluxform::numerics::axis::Axis;
 use fluxform::numerics::lagrange::locate;
+use fluxform::numerics::random::Random;
 use fluxform::progress::{Progress, Silent};
 use fluxform::scene::Scene;
 use fluxform::scene::maps::{Felt, SceneMap};
@@ -77,7 +78,7 @@ fn grid(design: &Design, nodes: Option<usize>) -> Grid {
 
 /// Nodes to look at: coil, and indices along z, y, x; the lowest plane twice as often.
 fn looked_at(grid: &Grid, coils: usize) -> Vec<[usize; 4]> {
-    let mut numbers = Numbers(11);
+    let mut numbers = Random::new(11);
     let mut below = |n: usize| ((numbers.unit() * n as f64) as usize).min(n - 1);
     (0..COMPARED)
         .map(|k| {
@@ -242,7 +243,7 @@ fn coupled(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curv
 fn between(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
     let scene = Scene::new(design)?;
     let solved = steel::solve(&scene, None, MAP_TOLERANCE, 0.0)?;
-    let mut numbers = Numbers(13);
+    let mut numbers = Random::new(13);
     let whole = grid(design, None);
     let ends = |nodes: &[f64]| [nodes[0], nodes[nodes.len() - 1]];
     let [x, y, z] = [&whole.x_m, &whole.y_m, &whole.z_m].map(|nodes| ends(nodes));

@@ -24,10 +24,10 @@ use fluxform::scene::steel::{self, Solved};
 use fluxform::shape::Surface;
 use fluxform::shape::document::ShapeDocument;
 use fluxform::shape::height::Grid as Plan;
-use fluxform_bench::effort::Numbers;
+use fluxform_testing::Random;
 
-use crate::case::Case;
-use crate::search;
+use fluxform_testing::force_problems::Case;
+use fluxform_testing::least_error;
 
 const SCENES: u64 = 100;
 /// A true error below this is the reference's own rounding and counts as so much.
@@ -58,7 +58,7 @@ fn kind(scene: u64) -> Kind {
 }
 
 /// A design of random dimensions; lengths in millimetres.
-fn design(kind: Kind, n: &mut Numbers) -> Design {
+fn design(kind: Kind, n: &mut Random) -> Design {
     let inner = n.between(4.0, 24.0);
     let depth = n.between(1.5, 9.0);
     let outer = inner + 2.0 * depth;
@@ -98,7 +98,7 @@ fn design(kind: Kind, n: &mut Numbers) -> Design {
 }
 
 /// A random formula over the workspace's plan, its points on a grid; lengths in millimetres.
-fn shape(design: &Design, n: &mut Numbers) -> ShapeDocument {
+fn shape(design: &Design, n: &mut Random) -> ShapeDocument {
     let half = 1e3 * design.workspace.x_m.to;
     let [low, high] = [design.workspace.z_m.from, design.workspace.z_m.to].map(|z| 1e3 * z);
     let base = low + 0.1 * (high - low);
@@ -150,7 +150,7 @@ fn sizes(scene: &Scene, exact: &Solved, z_m: &[f64]) -> Vec<f64> {
 }
 
 /// The map: its nodes, and between them.
-fn map_claims(scene: &Scene, solved: &Solved, exact: &Solved, n: &mut Numbers) -> [Claim; 2] {
+fn map_claims(scene: &Scene, solved: &Solved, exact: &Solved, n: &mut Random) -> [Claim; 2] {
     let workspace = &scene.design.workspace;
     let grid = Grid {
         x_m: workspace.x_m.nodes(),
@@ -270,9 +270,10 @@ fn deviation_m(
 /// Points, forces and lambda, as `lambda` tells them.
 fn lambda_claims(scene: &Scene, exact: &Solved, document: &ShapeDocument) -> Vec<Claim> {
     let options = LambdaOptions::default();
-    let report = run(scene.design, document, Vec::new(), &options, &Silent).unwrap();
+    let solved = run(scene.design, document, Vec::new(), &options, &Silent);
+    let (points, report) = solved.unwrap();
     let claimed = |stage: &str| report.file.accuracy[stage].estimate;
-    let points = &report.points.discretized.points;
+    let points = &points.discretized.points;
     let plan = points.grid;
     let rows = points.row_of_grid_point();
     let height = |k: usize| rows[k].map(|row| points.height_m[row]);
@@ -314,7 +315,7 @@ fn lambda_claims(scene: &Scene, exact: &Solved, document: &ShapeDocument) -> Vec
     let problem: ForceProblem = case.problem();
     let solution = lambda::solve(&problem, &Settings::default()).unwrap();
     let reach = solution.constants.lambda_jnd_n_per_m.unwrap_or(1.0);
-    let search = search::Search::new(&case);
+    let search = least_error::Search::new(&case);
     let found = [0.7, 1.0, 1.3].iter().fold(0.0_f64, |most, part| {
         let at = part * reach;
         let scale = at * at * case.mean_square();
@@ -330,7 +331,7 @@ fn lambda_claims(scene: &Scene, exact: &Solved, document: &ShapeDocument) -> Vec
 }
 
 fn claims(number: u64) -> Vec<Claim> {
-    let mut n = Numbers(1_000 + number);
+    let mut n = Random::new(1_000 + number);
     let kind = kind(number);
     let design = design(kind, &mut n);
     let document = shape(&design, &mut n);

@@ -8,10 +8,3 @@ mod command;
 mod coverage;
 mod page;
 mod rows;
-
-#[path = "../../../lambda/case.rs"]
-#[allow(dead_code)]
-mod case;
-#[path = "../../../lambda/search.rs"]
-#[allow(dead_code)]
-mod search;

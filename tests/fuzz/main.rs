@@ -2,36 +2,33 @@
 //! the three loaders of bundles. The long run is `cargo bench --bench fuzz_inputs`.
 #![allow(clippy::disallowed_methods, clippy::print_stderr)]
 
-#[path = "../fuzz/harness.rs"]
 mod harness;
-#[path = "../fuzz/kinds/mod.rs"]
 mod kinds;
 mod loaders;
 #[allow(dead_code)]
-#[path = "../fuzz/mutation.rs"]
 mod mutation;
-#[allow(dead_code)]
-#[path = "../bundle/sample.rs"]
-mod sample;
-#[allow(dead_code)]
-#[path = "../shape/samples.rs"]
-mod samples;
-#[path = "../fuzz/structure.rs"]
 mod structure;
-#[allow(dead_code)]
-#[path = "../shape/support.rs"]
-mod support;
 
+use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use fluxform_testing::needs::{self, Trial};
+use fluxform_testing::{Random, trials};
 use harness::{BEGAN, Harness, millis};
 use peak_alloc::PeakAlloc;
-use support::Random;
 
 #[global_allocator]
 static HEAP: PeakAlloc = PeakAlloc;
+
+fn main() -> ExitCode {
+    needs::run(trials().into_iter().chain(loaders::trials()))
+}
+
+fn trials() -> Vec<Trial> {
+    trials! { None => [every_kind_of_input_is_read_or_refused_within_its_limits] }
+}
 
 /// Memory is measured for the whole process: one test at a time.
 static ALONE: Mutex<()> = Mutex::new(());
@@ -69,7 +66,6 @@ fn watch() {
     });
 }
 
-#[test]
 fn every_kind_of_input_is_read_or_refused_within_its_limits() {
     let _alone = alone();
     watch();
@@ -85,7 +81,7 @@ fn every_kind_of_input_is_read_or_refused_within_its_limits() {
     for kind in &kinds {
         let start = Instant::now();
         let mut begun: Option<Instant> = None;
-        let tally = harness.run(kind, &mut Random(1), |mutants| {
+        let tally = harness.run(kind, &mut Random::new(1), |mutants| {
             another(mutants, *begun.get_or_insert_with(Instant::now))
         });
         eprintln!(

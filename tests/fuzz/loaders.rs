@@ -1,17 +1,27 @@
 //! The loaders of bundles in Python, Octave and C on the same mutants as the library's.
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use fluxform::commands::replay::Opened;
+use fluxform_testing::loaders::c_loader;
+use fluxform_testing::needs::{self, SANITIZERS, Trial};
+use fluxform_testing::{Random, root, trials};
 
 use crate::harness::Input;
 use crate::kinds::bundle::{hostile, mutate, seeds};
-use crate::sample::{has_numpy, scripts};
-use crate::support::Random;
+
 use crate::{alone, another};
+
+pub fn trials() -> Vec<Trial> {
+    trials! {
+        needs::sanitizers() => [the_c_loader_reads_or_refuses_the_same_bundles_under_sanitizers],
+        needs::numpy() => [the_python_loader_reads_or_refuses_the_same_bundles_with_its_own_error],
+        needs::octave() => [the_octave_loader_reads_or_refuses_the_same_bundles_with_its_own_error],
+    }
+}
 
 /// Positions in, around and far from the samples' map.
 const POSITIONS: &str =
@@ -36,50 +46,18 @@ fn corpus(random: &mut Random) -> impl Iterator<Item = (String, Input)> {
     hostile().into_iter().chain(good).chain(mutants)
 }
 
-/// The C loader with its sanitizers; `None`, with the reason printed, where they cannot be had.
-fn sanitized(folder: &Path) -> Option<PathBuf> {
-    let program = folder.join("replay");
-    let sources =
-        ["replay", "bundle", "currents"].map(|n| scripts().join(format!("fluxform_{n}.c")));
-    let built = Command::new("cc")
-        .args([
-            "-std=c99",
-            "-Wall",
-            "-Wextra",
-            "-Wpedantic",
-            "-Werror",
-            "-O1",
-            "-g",
-        ])
-        .args(["-fsanitize=address,undefined", "-fno-sanitize-recover=all"])
-        .args(sources)
-        .arg("-o")
-        .arg(&program)
-        .arg("-lm")
-        .stderr(Stdio::null())
-        .status();
-    if built.is_ok_and(|built| built.success()) {
-        return Some(program);
-    }
-    eprintln!("skipped: no C compiler with the address and undefined behaviour sanitizers");
-    None
-}
-
 /// Whether the library reads the bundle as far as the other loaders do.
 fn ours(folder: &Path) -> bool {
     Opened::new(folder).is_ok()
 }
 
-#[test]
 fn the_c_loader_reads_or_refuses_the_same_bundles_under_sanitizers() {
     let _alone = alone();
     let folder = tempfile::tempdir().unwrap();
-    let Some(program) = sanitized(folder.path()) else {
-        return;
-    };
+    let program = c_loader(folder.path(), &["-g", SANITIZERS[0], SANITIZERS[1]]);
     let bundle = folder.path().join("bundle");
     let (start, mut read, mut inputs) = (Instant::now(), 0, 0);
-    let mut random = Random(2);
+    let mut random = Random::new(2);
     let must = hostile().len() + seeds().len();
     for (what, input) in corpus(&mut random) {
         if inputs >= must && !another((inputs - must) as u64, start) {
@@ -164,15 +142,10 @@ for folder in sys.stdin.read().splitlines():
 /// Bundles that one Python process is given.
 const BATCH: usize = 60;
 
-#[test]
 fn the_python_loader_reads_or_refuses_the_same_bundles_with_its_own_error() {
     let _alone = alone();
-    if !has_numpy() {
-        eprintln!("skipped: no python3 with numpy");
-        return;
-    }
     let folder = tempfile::tempdir().unwrap();
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     let mut corpus = corpus(&mut random);
     let (start, mut read, mut inputs) = (Instant::now(), 0, 0);
     let must = hostile().len() + seeds().len();
@@ -190,7 +163,7 @@ fn the_python_loader_reads_or_refuses_the_same_bundles_with_its_own_error() {
         }
         let mut child = Command::new("python3")
             .args(["-c", PYTHON])
-            .arg(scripts())
+            .arg(root().join("scripts"))
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
@@ -251,16 +224,10 @@ end
 "#;
 
 /// Octave starts slowly: all folders in one process, and few mutants.
-#[test]
 fn the_octave_loader_reads_or_refuses_the_same_bundles_with_its_own_error() {
     let _alone = alone();
-    let version = Command::new("octave-cli").arg("--version").output();
-    if !version.is_ok_and(|output| output.status.success()) {
-        eprintln!("skipped: no octave-cli (Debian: octave)");
-        return;
-    }
     let folder = tempfile::tempdir().unwrap();
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     let must = hostile().len() + seeds().len();
     let mut names = Vec::new();
     let mut batch = String::new();
@@ -273,7 +240,7 @@ fn the_octave_loader_reads_or_refuses_the_same_bundles_with_its_own_error() {
     std::fs::write(folder.path().join("folders.txt"), batch).unwrap();
     let output = Command::new("octave-cli")
         .args(["--norc", "--quiet", "--eval", OCTAVE])
-        .env("FLUXFORM_SCRIPTS", scripts())
+        .env("FLUXFORM_SCRIPTS", root().join("scripts"))
         .current_dir(folder.path())
         .output()
         .unwrap();

@@ -2,7 +2,7 @@
 
 use fluxform_numerics::real::Real;
 
-use crate::case::{Case, D, d};
+use crate::force_problems::{Case, D, d};
 
 /// `G'G`, `G'h` and `G'offset` in double-double, formed once for all searches.
 pub struct Search<'a> {

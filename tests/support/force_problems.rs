@@ -2,38 +2,13 @@
 
 use fluxform_lambda::{ForceProblem, Settings, Solution, solve};
 use fluxform_numerics::double_double::DoubleDouble;
+use fluxform_numerics::random::Random;
 use fluxform_numerics::real::Real;
 
 pub type D = DoubleDouble;
 
 pub fn d(value: f64) -> D {
     D::exactly(value)
-}
-
-/// Deterministic generic numbers.
-pub struct Numbers(pub u64);
-
-impl Numbers {
-    /// Uniform in (0, 1).
-    pub fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64 + 1e-17
-    }
-
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
-    pub fn below(&mut self, n: usize) -> usize {
-        (self.unit() * n as f64) as usize
-    }
-
-    pub fn normal(&mut self) -> f64 {
-        (-2.0 * self.unit().ln()).sqrt() * (std::f64::consts::TAU * self.unit()).cos()
-    }
 }
 
 /// An owned problem.
@@ -93,7 +68,7 @@ impl Case {
 /// Random problems with everything that goes wrong: ties, copies, zero columns, limits over
 /// decades, limits of zero, a binding sum, currents below zero, few points.
 pub fn small_case(seed: u64) -> Case {
-    let mut n = Numbers(seed);
+    let mut n = Random::new(seed);
     let m = 1 + n.below(4);
     let points = 1 + n.below(7);
     let style = n.below(8);

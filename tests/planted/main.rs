@@ -5,17 +5,11 @@
 #![cfg(target_os = "linux")] // links, pipes, modes
 #![allow(clippy::disallowed_methods, clippy::print_stdout)] // a test's own files and its table
 
-#[path = "planted/cases.rs"]
 mod cases;
-#[path = "planted/commands.rs"]
 mod commands;
-#[path = "planted/inputs_as_outputs.rs"]
 mod inputs_as_outputs;
-#[path = "planted/judge.rs"]
 mod judge;
-#[path = "planted/run.rs"]
 mod run;
-#[path = "planted/snapshot.rs"]
 mod snapshot;
 
 /// Every so many cases one: prime, so that all plants, names and flags have their turn.
@@ -39,7 +33,7 @@ fn nothing_of_the_users_is_changed() {
 #[test]
 fn every_command_with_an_output_is_tried() {
     let help = |words: &[&str]| {
-        let ran = std::process::Command::new(commands::program())
+        let ran = std::process::Command::new(fluxform_testing::run::program_or_other())
             .args(words)
             .arg("--help")
             .output()

@@ -1,5 +1,7 @@
 //! Every small damage to a document, in a fixed order.
 
+use fluxform_testing::Random;
+
 /// A damaged document.
 pub struct Mutant {
     pub number: usize,
@@ -165,26 +167,20 @@ fn misspelt(key: &str) -> Vec<(&'static str, String)> {
 
 /// Every byte put in somewhere, every bit turned somewhere, the text cut at many places.
 fn bytes(text: &str, add: &mut impl FnMut(String, Vec<u8>)) {
-    let mut state = 7_u64;
-    let mut place = |below: usize| {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1);
-        (state >> 33) as usize % below
-    };
+    let mut random = Random::new(7);
     for byte in 0..=255_u8 {
         let mut bytes = text.as_bytes().to_vec();
-        let at = place(bytes.len());
+        let at = random.below(bytes.len());
         bytes.insert(at, byte);
         add(format!("byte {byte:#04x} put in at {at}"), bytes);
         let mut bytes = text.as_bytes().to_vec();
-        let at = place(bytes.len());
+        let at = random.below(bytes.len());
         bytes[at] = byte;
         add(format!("byte {byte:#04x} at {at}"), bytes);
     }
     for bit in 0..8 {
         let mut bytes = text.as_bytes().to_vec();
-        let at = place(bytes.len());
+        let at = random.below(bytes.len());
         bytes[at] ^= 1 << bit;
         add(format!("bit {bit} turned at {at}"), bytes);
     }

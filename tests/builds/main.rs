@@ -11,24 +11,18 @@
 #![cfg(unix)]
 #![allow(clippy::disallowed_methods, clippy::print_stderr)] // a test's own files
 
-#[path = "builds/difference.rs"]
 mod difference;
-#[path = "support/needs.rs"]
-mod needs;
-#[allow(dead_code)]
-#[path = "crash/place.rs"]
-mod place;
-#[allow(dead_code)]
-#[path = "crash/scenario.rs"]
-mod scenario;
 
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::{Command, ExitCode};
 
 use difference::{Difference, between};
-use needs::trials;
-use place::{PROGRAM, Place, Tree};
+use fluxform_testing::inputs::{OUT, scenes};
+use fluxform_testing::place::Place;
+use fluxform_testing::run::program;
+use fluxform_testing::tree::{Tree, same, tree};
+use fluxform_testing::{needs, trials};
 
 fn main() -> ExitCode {
     needs::run(trials! {
@@ -54,7 +48,7 @@ struct Way {
 impl Way {
     fn plain() -> Self {
         Self {
-            start: vec![PROGRAM.to_owned()],
+            start: vec![program().display().to_string()],
             ..Self::default()
         }
     }
@@ -75,7 +69,7 @@ impl Way {
 
     /// What every command that computes makes of the same inputs.
     fn artefacts(&self) -> Tree {
-        let place = scenario::inputs();
+        let place = scenes();
         for args in [
             &[
                 "calibrate",
@@ -117,7 +111,7 @@ impl Way {
         ] {
             self.run(&place, args);
         }
-        let mut tree = place.tree();
+        let mut tree = tree(&place.path(OUT));
         for (name, args) in [
             (
                 "evaluate.json",
@@ -195,7 +189,8 @@ fn no_emulator() -> Option<String> {
 /// A processor without AVX, emulated.
 fn old_processor() -> Way {
     let mut way = Way::plain();
-    let start = [EMULATOR, "-cpu", "Westmere", PROGRAM];
+    let program = program().display().to_string();
+    let start = [EMULATOR, "-cpu", "Westmere", &program];
     way.start = start.map(str::to_owned).to_vec();
     way
 }
@@ -214,11 +209,11 @@ fn what_another_processor_kept_is_not_used() {
         "out",
         "--no-report",
     ];
-    let (shared, own) = (scenario::inputs(), scenario::inputs());
+    let (shared, own) = (scenes(), scenes());
     Way::plain().run(&shared, &args);
     way.run(&shared, &args);
     way.run(&own, &args);
-    scenario::same(&shared.tree(), &own.tree()).unwrap();
+    same(&tree(&shared.path(OUT)), &tree(&own.path(OUT))).unwrap();
 }
 
 fn other_build() -> Option<OsString> {

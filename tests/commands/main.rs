@@ -1,10 +1,8 @@
 //! The main job from documents to a verified bundle.
 
-#[path = "commands/cored.rs"]
 mod cored;
-#[path = "commands/near.rs"]
+mod inputs;
 mod near;
-#[path = "commands/sideways.rs"]
 mod sideways;
 
 use std::path::{Path, PathBuf};
@@ -98,7 +96,8 @@ fn the_jnd_is_what_the_limits_may_add_to_the_error() {
     let at = 0.3;
     let mut options = LambdaOptions::default();
     options.settings.at_n_per_m = Some(at);
-    let report = lambda::run(&design, &document, Vec::new(), &options, &Silent).expect("solves");
+    let solved = lambda::run(&design, &document, Vec::new(), &options, &Silent);
+    let (_, report) = solved.expect("solves");
     let file = &report.file;
     assert!(at < file.constants.lambda_linear_n_per_m.expect("linear"));
     let floor = file.at.as_ref().expect("asked for").rms_error_n / (at * 0.05);

@@ -1,21 +1,20 @@
 //! A synthetic bundle of an analytic field, and helpers.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::path::Path;
 
-use fluxform::accuracy::StageAccuracy;
-use fluxform::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
-use fluxform::bundle::atomic::WriteError;
-use fluxform::bundle::lambda_file::{AtLambda, LambdaFile, PathStep};
-use fluxform::bundle::manifest::*;
-use fluxform::bundle::npz::{MapArrays, Runtime};
-use fluxform::bundle::rendering::{HeightGrid, Rendering};
-use fluxform::bundle::table::{CurrentRow, PointRow};
-use fluxform::bundle::timing::StageSeconds;
-use fluxform::bundle::write::{BundleContent, write_bundle};
-use fluxform::lambda::{Criterion, ForceConstants};
-use fluxform::numerics::axis::Axis;
+use fluxform_base::accuracy::StageAccuracy;
+use fluxform_base::force_constant::{Criterion, ForceConstants};
+use fluxform_bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
+use fluxform_bundle::atomic::WriteError;
+use fluxform_bundle::lambda_file::{AtLambda, LambdaFile, PathStep};
+use fluxform_bundle::manifest::*;
+use fluxform_bundle::npz::{MapArrays, Runtime};
+use fluxform_bundle::rendering::{HeightGrid, Rendering};
+use fluxform_bundle::table::{CurrentRow, PointRow};
+use fluxform_bundle::timing::StageSeconds;
+use fluxform_bundle::write::{BundleContent, write_bundle};
+use fluxform_numerics::axis::Axis;
 
 /// A small bundle of an analytic field: a magnetic charge below each coil.
 pub struct Sample {
@@ -307,34 +306,4 @@ pub fn sidecar(manifest: &Manifest) -> MapSidecar {
         accuracy: manifest.accuracy.clone(),
         files: Vec::new(),
     }
-}
-
-pub fn temporary() -> tempfile::TempDir {
-    tempfile::tempdir().unwrap()
-}
-
-pub fn assert_no_leftovers(folder: &Path) {
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let name = entry.unwrap().file_name().into_string().unwrap();
-        assert!(!name.contains("fluxform"), "{name} is left");
-    }
-}
-
-pub fn random(seed: &mut u64) -> f64 {
-    *seed = seed
-        .wrapping_mul(6_364_136_223_846_793_005)
-        .wrapping_add(1_442_695_040_888_963_407);
-    (*seed >> 11) as f64 / (1u64 << 53) as f64
-}
-
-pub fn scripts() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts")
-}
-
-pub fn has_numpy() -> bool {
-    let probe = Command::new("python3")
-        .args(["-c", "import numpy"])
-        .stderr(Stdio::null())
-        .status();
-    probe.is_ok_and(|status| status.success())
 }

@@ -5,6 +5,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
+use fluxform_testing::run::program_or_other;
+
 use crate::linux::{CPU_SECONDS, MEMORY_KIB};
 
 /// How a run ended.
@@ -21,14 +23,13 @@ pub struct Measured {
 
 /// Runs the program, or that named by `FLUXFORM_OTHER`, on one thread.
 pub fn measured(place: &Path, words: &[&str]) -> Measured {
-    let program = std::env::var("FLUXFORM_OTHER")
-        .unwrap_or_else(|_| env!("CARGO_BIN_EXE_fluxform").to_owned());
     let bounds =
         format!("ulimit -c 0; ulimit -t {CPU_SECONDS}; ulimit -v {MEMORY_KIB}; exec \"$0\" \"$@\"");
     let log = place.join("said.log");
     let file = fs::File::create(&log).unwrap();
     let mut child = Command::new("sh")
-        .args(["-c", &bounds, &program])
+        .args(["-c", &bounds])
+        .arg(program_or_other())
         .args(words)
         .args(["--threads", "1"])
         .current_dir(place)

@@ -1,6 +1,6 @@
-//! What the tests of surfaces share.
+//! Meshes, grids and documents for the tests of surfaces.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use fluxform_base::progress::Silent;
 use fluxform_numerics::axis::Axis;
@@ -8,47 +8,6 @@ use fluxform_shape::document::{AxisRequest, GridRequest, Placement, ShapeDocumen
 use fluxform_shape::height::{Grid, Sample, heights};
 use fluxform_shape::mesh::{FileMesh, Mesh, Triangle};
 use fluxform_shape::placement::Transform;
-
-/// A repeatable stream of numbers (splitmix64).
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        let unit = (self.bits() >> 11) as f64 / (1u64 << 53) as f64;
-        low + (high - low) * unit
-    }
-
-    pub fn below(&mut self, n: usize) -> usize {
-        (self.bits() % n as u64) as usize
-    }
-}
-
-pub fn root() -> PathBuf {
-    // Tests of the member and of the whole program share this file.
-    let own = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut folders = own.ancestors();
-    let top = folders.find(|folder| folder.join("Cargo.lock").is_file());
-    top.expect("the repository").to_path_buf()
-}
-
-/// The folder of real surface files with their index that `FLUXFORM_CORPUS` names, or `None` with a
-/// printed reason.
-#[allow(clippy::print_stderr)]
-pub fn corpus() -> Option<PathBuf> {
-    let folder = std::env::var_os("FLUXFORM_CORPUS").map(PathBuf::from);
-    if folder.is_none() {
-        eprintln!("skipped: FLUXFORM_CORPUS names no folder of real surface files");
-    }
-    folder
-}
 
 pub fn binary(triangles: &[[[f32; 3]; 3]]) -> Vec<u8> {
     let mut bytes = vec![b' '; 80];
@@ -132,4 +91,16 @@ pub fn lifted(z_m: f64) -> Placement {
         translate_m: [0.0, 0.0, z_m],
         rotate_deg: [0.0; 3],
     }
+}
+
+/// Height of the triangle's plane over a point strictly inside it, by Cramer's rule.
+pub fn plane_height(t: &Triangle, p: [f64; 2]) -> Option<f64> {
+    let [u, v] = [1, 2].map(|k| [0, 1, 2].map(|c| t[k][c] - t[0][c]));
+    let d = [p[0] - t[0][0], p[1] - t[0][1]];
+    let whole = u[0] * v[1] - u[1] * v[0];
+    let (s, r) = (
+        (d[0] * v[1] - d[1] * v[0]) / whole,
+        (u[0] * d[1] - u[1] * d[0]) / whole,
+    );
+    (s > 0.0 && r > 0.0 && s + r < 1.0).then(|| t[0][2] + s * u[2] + r * v[2])
 }

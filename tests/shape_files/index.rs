@@ -4,7 +4,12 @@ use std::collections::BTreeMap;
 
 use fluxform_shape::MeshReport;
 
-use crate::support::corpus;
+use fluxform_testing::needs::{self, Trial, corpus_folder};
+use fluxform_testing::trials;
+
+pub fn trials() -> Vec<Trial> {
+    trials! { needs::corpus() => [real_files_have_the_indexs_facts, components_in_other_parts_are_placed, an_amf_body_is_whole, a_native_part_is_its_stl_within_the_stated_deviation, open_edges_and_units_are_told] }
+}
 
 /// One line of the index, by the names of its columns.
 type Entry = BTreeMap<String, String>;
@@ -44,9 +49,8 @@ const REFUSED: [(&str, &str); 3] = [
     ),
 ];
 
-#[test]
 fn real_files_have_the_indexs_facts() {
-    let Some(folder) = corpus() else { return };
+    let folder = corpus_folder();
     let index = std::fs::read_to_string(folder.join("index.tsv")).unwrap();
     let mut read_files = 0;
     for entry in entries(&index) {
@@ -101,36 +105,27 @@ fn real_files_have_the_indexs_facts() {
     assert_eq!(read_files, 16);
 }
 
-fn report(name: &str) -> Option<MeshReport> {
-    Some(MeshReport::of_file(&corpus()?.join(name)).unwrap())
+fn report(name: &str) -> MeshReport {
+    MeshReport::of_file(&corpus_folder().join(name)).unwrap()
 }
 
-#[test]
 fn components_in_other_parts_are_placed() {
-    let Some(report) = report("assimp__production_components.3mf") else {
-        return;
-    };
+    let report = report("assimp__production_components.3mf");
     // A corner of a cube of 10 mm, and one of 5 mm moved by 20 mm.
     assert_eq!((report.triangles, report.unit_m), (8, Some(1e-3)));
     assert_eq!(report.bounds_max, [25.0, 10.0, 10.0]);
     assert!((report.volume.unwrap() - (1000.0 + 125.0) / 6.0).abs() < 1e-12);
 }
 
-#[test]
 fn an_amf_body_is_whole() {
-    let Some(report) = report("assimp__test1.amf") else {
-        return;
-    };
+    let report = report("assimp__test1.amf");
     // A tetrahedron on a triangle of base 1 and depth 1.5, 4 high.
     assert_eq!((report.triangles, report.watertight), (4, true));
     assert!((report.volume.unwrap().abs() - 1.0).abs() < 1e-12);
 }
 
-#[test]
 fn a_native_part_is_its_stl_within_the_stated_deviation() {
-    let (Some(part), Some(stl)) = (report("sxt__Part1.SLDPRT"), report("sxt__Part1.STL")) else {
-        return;
-    };
+    let (part, stl) = (report("sxt__Part1.SLDPRT"), report("sxt__Part1.STL"));
     assert_eq!((part.triangles, part.unit_m), (750, Some(1.0)));
     let volume_mm3 = part.volume.unwrap() * 1e9;
     assert!((volume_mm3 - 15663.4).abs() < 0.05, "{volume_mm3}");
@@ -149,14 +144,11 @@ fn a_native_part_is_its_stl_within_the_stated_deviation() {
     );
 }
 
-#[test]
 fn open_edges_and_units_are_told() {
-    let (Some(holes), Some(metres)) = (
+    let (holes, metres) = (
         report("assimp__sphereWithHole.stl"),
         report("swurdf__base_link.STL"),
-    ) else {
-        return;
-    };
+    );
     assert!(holes.open_edges > 0 && holes.volume.is_none());
     assert!(
         holes.warnings[0].contains("the surface is open"),

@@ -1,0 +1,21 @@
+//! The binary as its users meet it: exit codes, streams, files, messages.
+#![cfg(unix)] // signals, /dev/full, links
+
+mod budget;
+mod codes;
+mod files;
+mod help;
+mod interrupt;
+mod kept;
+mod lambda;
+mod messages;
+mod optimize;
+mod scan;
+mod steel;
+mod streams;
+mod surfaces;
+mod sweep;
+mod verify;
+
+/// The array of the reference design without steel.
+const SEED: &str = "designs/seed_air.toml";
