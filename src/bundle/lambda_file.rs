@@ -8,8 +8,9 @@ use serde::{Deserialize, Serialize};
 use super::artefact::Input;
 use fluxform_base::accuracy::StageAccuracy;
 use fluxform_lambda::feedback::Rendered;
+pub use fluxform_lambda::sideways::Sideways;
 use fluxform_lambda::worst::ActivePoint;
-use fluxform_lambda::{Criterion, ForceConstants, Wiring};
+use fluxform_lambda::{Criterion, ForceConstants, GivenForce, Wiring};
 
 /// The path of e*(lambda) and the constants read off it. `null` where a limit never binds or
 /// nothing can be rendered.
@@ -78,6 +79,14 @@ pub struct LambdaFile {
     /// forces of several currents do not add up.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub working_point: Option<WorkingPointForces>,
+    /// How much of the requested force the chosen currents give; absent without any and in files of
+    /// programs without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub given_force: Option<GivenForce>,
+    /// The sideways force at the chosen lambda; absent without one and in files of programs without
+    /// it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sideways: Option<Sideways>,
     /// Each stage's estimated error.
     pub accuracy: BTreeMap<String, StageAccuracy>,
 }

@@ -1,10 +1,12 @@
 //! Pieces of summaries that several commands print alike.
 
-use super::quantity::{count, error, length_error, mm, number};
+use super::quantity::{count, error, length_error, mm, number, number_to, percent};
 use crate::accuracy::StageAccuracy;
+use crate::bundle::lambda_file::Sideways;
 use crate::bundle::manifest::{AxisSummary, LeftOut};
 use crate::cli::layout::grid;
 use crate::design::Design;
+use crate::lambda::GivenForce;
 
 /// Coils beyond this many are summed up, not listed.
 const COILS_SHOWN: usize = 100;
@@ -125,5 +127,37 @@ pub fn force_constant(lambda_n_per_m: Option<f64>) -> String {
     lambda_n_per_m.map_or_else(
         || "none".to_owned(),
         |lambda| format!("{} N/m", number(lambda)),
+    )
+}
+
+/// How much of the requested force the static currents give.
+pub fn given_force(given: &GivenForce) -> String {
+    let above = if given.above_saturation {
+        "; lambda is above saturation: all currents are at their limits"
+    } else {
+        ""
+    };
+    format!(
+        "{} of the requested force on average, {} to {} over the points{above}",
+        percent(given.mean),
+        number_to(given.least * 100.0, 3),
+        percent(given.most)
+    )
+}
+
+/// The sideways force that the chosen currents and feedback leave.
+pub fn sideways(of: &Sideways) -> String {
+    let off = |share: f64, degrees: f64| format!("{}, {degrees:.0} degrees off", percent(share));
+    let points = if of.vector_reached == 1.0 {
+        "every point".to_owned()
+    } else {
+        format!("{} of the points", percent(of.vector_reached))
+    };
+    format!(
+        "{} of the push with these currents\n{} with feedback of the upward force\n\
+         none with feedback of all components: at {points}, for {} times the power",
+        off(of.static_share, of.static_median_deg),
+        off(of.feedback_share, of.feedback_median_deg),
+        number_to(of.vector_power_ratio, 3)
     )
 }

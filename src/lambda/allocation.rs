@@ -125,6 +125,16 @@ impl Allocator {
         })
     }
 
+    /// Lower and upper limit of a coil, A.
+    pub(super) fn limits_a(&self, coil: usize) -> (f64, f64) {
+        (self.lower_a[coil], self.upper_a[coil])
+    }
+
+    /// Limit of the currents' sum, A; infinite without one.
+    pub(super) fn total_a(&self) -> f64 {
+        self.total_a
+    }
+
     /// Number of coils.
     #[must_use]
     pub fn coils(&self) -> usize {

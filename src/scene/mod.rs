@@ -25,6 +25,7 @@ use crate::RunError;
 use crate::bundle::manifest::{ArrayGeometry, CurrentLimits, MagnetSummary};
 use crate::coil::circuit::{self, Circuit};
 use crate::design::{Coil, Coupling, Design, MagnetModel, Polarity};
+use crate::field::batch::Gradients;
 use crate::field::components::Components;
 use crate::field::dipole;
 use crate::field::magnet::{Cylinder, MagnetRule, Sources};
@@ -284,6 +285,30 @@ impl<'a> Scene<'a> {
         points_m: &[[f64; 3]],
         progress: &dyn Progress,
     ) -> Result<Vec<f64>, RunError> {
+        let forces = self.forces::<1>(solved, points_m, progress)?;
+        Ok(forces.into_flattened())
+    }
+
+    /// As [`Scene::forces_n_per_a`], along x, y and z: F = (m . grad) B.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn force_vectors_n_per_a(
+        &self,
+        solved: &Solved,
+        points_m: &[[f64; 3]],
+        progress: &dyn Progress,
+    ) -> Result<Vec<[f64; 3]>, RunError> {
+        self.forces::<3>(solved, points_m, progress)
+    }
+
+    /// The last `N` components of the force.
+    fn forces<const N: usize>(
+        &self,
+        solved: &Solved,
+        points_m: &[[f64; 3]],
+        progress: &dyn Progress,
+    ) -> Result<Vec<[f64; N]>, RunError> {
         let coils = self.coils.len();
         let finest = MAGNET_SHARE * solved.tolerance.max(MAGNET_FINEST);
         let groups = self
@@ -299,7 +324,7 @@ impl<'a> Scene<'a> {
             of_rules(MagnetRule::reach_m),
             of_rules(MagnetRule::amplification),
         );
-        let mut forces = vec![0.0; points_m.len() * coils];
+        let mut forces = vec![[0.0; N]; points_m.len() * coils];
         progress.begin("forces", points_m.len() as u64);
         // As fine as the nearest of all points needs, whatever the portion.
         let sources = solved.sources(self, points_m, reach_m, amplification)?;
@@ -320,7 +345,7 @@ impl<'a> Scene<'a> {
                 .map(|rows| {
                     progress.check()?;
                     let points: Vec<[f64; 3]> = rows.iter().map(|row| points_m[*row]).collect();
-                    let mut out = vec![0.0; rows.len() * coils];
+                    let mut out = vec![[0.0; N]; rows.len() * coils];
                     self.add_forces(solved, (own, sources), rule, &points, &mut out)?;
                     progress.advance(rows.len() as u64);
                     Ok((rows, out))
@@ -337,17 +362,17 @@ impl<'a> Scene<'a> {
     }
 
     /// Adds the forces by the field of each coil's own source and of what else there is.
-    fn add_forces(
+    fn add_forces<const N: usize>(
         &self,
         solved: &Solved,
         (own, sources): (&dyn AxialSource, Option<&SteelField>),
         rule: &MagnetRule,
         points_m: &[[f64; 3]],
-        rows: &mut [f64],
+        rows: &mut [[f64; N]],
     ) -> Result<(), RunError> {
         let coils = self.coils.len();
-        let tilted = !rule.is_upright();
-        let parts = if tilted {
+        let whole = N > 1 || !rule.is_upright();
+        let parts = if whole {
             Components::Gradient
         } else {
             Components::Gz
@@ -359,7 +384,7 @@ impl<'a> Scene<'a> {
         };
         let tolerance = share * solved.tolerance / rule.amplification();
         for node in rule.nodes() {
-            let [m_x, m_y, m_z] = node.moment_a_m2;
+            let m_z = node.moment_a_m2[2];
             let places: Vec<[f64; 3]> = points_m
                 .iter()
                 .map(|p| std::array::from_fn(|i| p[i] + node.offset_m[i]))
@@ -382,16 +407,19 @@ impl<'a> Scene<'a> {
                 let block = parts.count() * count;
                 let steel = steel.get(column * block..(column + 1) * block);
                 for (row, place) in places.iter().enumerate() {
-                    let mut force = m_z * air.dbz_dz[row];
-                    if tilted {
-                        // dB_x/dz = (dx / r) dB_r/dz, and the same along y.
+                    let mut force = [0.0, 0.0, m_z * air.dbz_dz[row]];
+                    if whole {
                         let (dx, dy) = offset(place);
-                        force += air.dbr_dz_over_r[row] * (m_x * dx + m_y * dy);
+                        force = axial_force_n(node.moment_a_m2, &air, row, [dx, dy]);
                     }
                     if let Some(steel) = steel {
-                        force += upward_n(node.moment_a_m2, parts, steel, row);
+                        let added = force_n(node.moment_a_m2, parts, steel, row);
+                        force = std::array::from_fn(|i| force[i] + added[i]);
                     }
-                    rows[row * coils + column] += coil.gain * force;
+                    let sums = &mut rows[row * coils + column];
+                    for (sum, value) in sums.iter_mut().zip(&force[3 - N..]) {
+                        *sum += coil.gain * value;
+                    }
                 }
             }
         }
@@ -469,19 +497,56 @@ fn largest(currents_a: &[f64]) -> f64 {
     currents_a.iter().copied().fold(0.0, f64::max)
 }
 
-/// Upward force on a dipole at one of the points at which one drive's `parts` were sampled,
-/// [component, point]: m . dB/dz, N (per ampere if they are).
+/// Force on a dipole in an axial field, N (per ampere if that is), `dx_dy_m` off its axis:
+/// (m . grad) B with dB_x/dz = (dx / r) dB_r/dz and dB_r/dr = -dB_z/dz - B_r/r.
+fn axial_force_n(
+    [m_x, m_y, m_z]: [f64; 3],
+    air: &Gradients,
+    row: usize,
+    [dx, dy]: [f64; 2],
+) -> [f64; 3] {
+    let (zz, radial, rotated) = (air.dbz_dz[row], air.dbr_dz_over_r[row], air.br_over_r[row]);
+    let r2 = dx * dx + dy * dy;
+    // On the axis dB_r/dr = B_r/r.
+    let bent = if r2 > 0.0 {
+        -(zz + 2.0 * rotated) / r2
+    } else {
+        0.0
+    };
+    let along = m_x * dx + m_y * dy;
+    [
+        m_x * rotated + bent * dx * along + m_z * radial * dx,
+        m_y * rotated + bent * dy * along + m_z * radial * dy,
+        m_z * zz + radial * along,
+    ]
+}
+
+/// Force on a dipole at one of the points at which one drive's `parts` were sampled,
+/// [component, point]: (m . grad) B, N (per ampere if they are); the upward one alone from
+/// [`Components::Gz`].
+fn force_n(moment_a_m2: [f64; 3], parts: Components, values: &[f64], row: usize) -> [f64; 3] {
+    let count = values.len() / parts.count();
+    let part = |component: usize| values[component * count + row];
+    let [m_x, m_y, m_z] = moment_a_m2;
+    match parts {
+        Components::Gz => [0.0, 0.0, m_z * part(0)],
+        Components::Gradient | Components::All => {
+            let [xx, xy, xz, yz, zz] = std::array::from_fn(part);
+            [
+                m_x * xx + m_y * xy + m_z * xz,
+                m_x * xy - m_y * (xx + zz) + m_z * yz,
+                m_x * xz + m_y * yz + m_z * zz,
+            ]
+        }
+    }
+}
+
+/// Its upward part.
 pub(crate) fn upward_n(
     moment_a_m2: [f64; 3],
     parts: Components,
     values: &[f64],
     row: usize,
 ) -> f64 {
-    let count = values.len() / parts.count();
-    let part = |component: usize| values[component * count + row];
-    let [m_x, m_y, m_z] = moment_a_m2;
-    match parts {
-        Components::Gz => m_z * part(0),
-        Components::Gradient | Components::All => m_x * part(2) + m_y * part(3) + m_z * part(4),
-    }
+    force_n(moment_a_m2, parts, values, row)[2]
 }

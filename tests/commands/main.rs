@@ -3,6 +3,7 @@
 mod cored;
 mod inputs;
 mod near;
+mod sideways;
 
 use std::path::{Path, PathBuf};
 

@@ -11,5 +11,6 @@ mod mirror;
 mod oracle;
 mod power;
 mod saturation;
+mod vector_allocation;
 mod vertices;
 mod worst;

@@ -180,6 +180,8 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
         variants: None,
         feedback: None,
         working_point: None,
+        given_force: None,
+        sideways: None,
         accuracy: accuracy.clone(),
     };
     let manifest = Manifest {

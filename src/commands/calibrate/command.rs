@@ -235,6 +235,8 @@ fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> String {
             file.criterion.described(&percent(file.jnd))
         ),
     );
+    sheet.line("given", &given(report));
+    sheet.line("sideways", &sideways(report));
     sheet.line("accuracy", &accuracies(report));
     if let Some(steel) = working_points(report) {
         sheet.line("steel", &steel);
@@ -355,6 +357,31 @@ fn working_points(report: &CalibrateReport) -> Option<String> {
             )
         )
     })
+}
+
+/// How much of the requested force the static currents of every shape give.
+fn given(report: &CalibrateReport) -> String {
+    let lines = report.bundles.iter().filter_map(|bundle| {
+        let file = &bundle.lambda.file;
+        let given = describe::given_force(file.given_force.as_ref()?);
+        Some(format!("{}: {given}", file.shape))
+    });
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// The sideways force that the static currents of every shape leave, and feedback.
+fn sideways(report: &CalibrateReport) -> String {
+    let lines = report.bundles.iter().filter_map(|bundle| {
+        let (file, of) = (&bundle.lambda.file, bundle.lambda.file.sideways?);
+        Some(format!(
+            "{}: {} of the push, {:.0} degrees off; with feedback {}",
+            file.shape,
+            percent(of.static_share),
+            of.static_median_deg,
+            percent(of.feedback_share)
+        ))
+    });
+    lines.collect::<Vec<_>>().join("\n")
 }
 
 /// The largest error of each stage over all shapes.

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::discretize::{self, PointsReport, point_rows, points_grid};
-use super::lambda::{LambdaOptions, LambdaReport, WantedPoints, solve_at};
+use super::lambda::{LambdaOptions, LambdaReport, WantedPoints, sideways, solve_at};
 use super::made_with::surface;
 use super::map::{arrays, runtime, summary, workspace_grid};
 use crate::RunError;
@@ -404,6 +404,14 @@ impl Calibration<'_> {
         };
         let of_grid = WantedPoints::of_grid(points);
         let mut lambda = solve_at(scene, &solved.forces, field, &of_grid, &options, progress)?;
+        sideways::add(
+            &mut lambda.file,
+            scene,
+            &solved.forces,
+            &of_grid,
+            &options.wiring,
+            progress,
+        )?;
         let grid_points = &points.discretized.points;
         let reach_m = self.options.reach_m;
         let mut needed = NeededMap::new(scene, &solved.map, field, grid_points, reach_m, progress)?;

@@ -7,6 +7,7 @@ mod picture;
 mod points;
 mod points_effect;
 mod result_file;
+pub(crate) mod sideways;
 mod text;
 mod variants;
 mod warnings;
@@ -132,7 +133,15 @@ pub fn run(
         solve_at(&scene, &solved, none, points, options, progress)
     };
     let (Some(chosen), Some(sampled)) = (chosen, sampled) else {
-        let report = solve_with(&of_grid, options)?;
+        let mut report = solve_with(&of_grid, options)?;
+        sideways::add(
+            &mut report.file,
+            &scene,
+            &solved,
+            &of_grid,
+            &options.wiring,
+            progress,
+        )?;
         return Ok((points, report));
     };
     // Feedback and picture are of the chosen points alone.
@@ -143,6 +152,14 @@ pub fn run(
     };
     let grid = solve_with(&of_grid, &plain)?.file;
     let mut report = solve_with(&chosen, options)?;
+    sideways::add(
+        &mut report.file,
+        &scene,
+        &solved,
+        &chosen,
+        &options.wiring,
+        progress,
+    )?;
     if let Some(coarser) = coarser {
         let other = solve_with(&coarser, &plain)?.file;
         let stage = quadrature(&report.file, &other);

@@ -10,7 +10,7 @@ use crate::bundle::lambda_file::{
     AtLambda, LambdaFile, PathStep, TolerancePoint, WorstPointAt, WorstPointFile, WorstPointStep,
 };
 use crate::lambda::worst::{WorstSolution, felt};
-use crate::lambda::{Breakpoint, Event, OperatingPoint, Solution, Status};
+use crate::lambda::{Breakpoint, Event, GivenForce, OperatingPoint, Solution, Status};
 use crate::units::DETECTION_THRESHOLD_N;
 
 impl PosedProblem<'_> {
@@ -61,6 +61,8 @@ impl PosedProblem<'_> {
             variants: None,
             feedback: None,
             working_point: None,
+            given_force: chosen.and_then(|point| self.given(point, solution)),
+            sideways: None,
             accuracy,
         };
         if let Some(wiring) = &file.wiring {
@@ -76,6 +78,16 @@ impl PosedProblem<'_> {
             }
         }
         Ok(file)
+    }
+
+    fn given(&self, point: &OperatingPoint, solution: &Solution) -> Option<GivenForce> {
+        let saturation = solution.constants.lambda_saturation_n_per_m;
+        GivenForce::of(
+            &self.unwired,
+            point.lambda_n_per_m,
+            &point.currents_a,
+            saturation,
+        )
     }
 
     fn at(&self, point: &OperatingPoint, worst: &WorstSolution) -> AtLambda {

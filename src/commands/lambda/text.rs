@@ -42,6 +42,9 @@ pub(super) fn summary(design: &Design, points: &PointsReport, report: &LambdaRep
     if let Some(point) = &file.working_point {
         sheet.line("steel", &along_the_curve(point));
     }
+    if let Some(of) = &file.sideways {
+        sheet.line("sideways", &describe::sideways(of));
+    }
     if let Some(with_feedback) = &file.feedback {
         feedback_lines(&mut sheet, design, with_feedback);
     }
@@ -267,6 +270,9 @@ fn operating_point(sheet: &mut Sheet, points: &PointsReport, file: &LambdaFile) 
                 mm(mean_m)
             ),
         );
+    }
+    if let Some(given) = &file.given_force {
+        sheet.line("given", &describe::given_force(given));
     }
     if let (Some(rms), Some(worst)) = (file.rms_error_n, file.worst_error_n) {
         let relative = file.relative_rms_error.map_or_else(String::new, |part| {

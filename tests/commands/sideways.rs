@@ -1,0 +1,92 @@
+//! The sideways force against fields of `probe`, and of the seed's array against other solutions.
+
+use fluxform::commands::lambda::{LambdaOptions, run};
+use fluxform::commands::probe::{ProbeRequest, probe};
+use fluxform::design::{Design, Need};
+use fluxform::field::components::Components;
+use fluxform::progress::Silent;
+use fluxform::scene::Scene;
+use fluxform::shape::document::ShapeDocument;
+
+use super::{here, seed_air};
+
+#[test]
+fn the_sideways_force_is_that_of_probed_gradients() {
+    // Tilted, so that every component of the gradient counts.
+    let text = seed_air().replace("[magnet]", "[magnet]\ntilt_deg = [11.0, -7.0]");
+    let path = here("designs/seed_air.toml");
+    let (design, _) = Design::from_toml(&text, &path, Need::LAMBDA).expect("valid");
+    let (document, _) = ShapeDocument::read(&here("shapes/wedge.toml")).expect("valid");
+    let options = LambdaOptions::default();
+    let (points, report) = run(&design, &document, Vec::new(), &options, &Silent).expect("solves");
+    let points = &points.discretized.points;
+    let rows = || (0..points.height_m.len()).step_by(4);
+    let places = rows().map(|row| [points.x_m[row], points.y_m[row], points.height_m[row]]);
+    let request = ProbeRequest {
+        components: Components::Gradient,
+        ..ProbeRequest::default()
+    };
+    let table = probe(&design, places.collect(), request, &Silent).expect("probes");
+    let moment = Scene::new(&design).expect("a scene").moment_a_m2;
+    assert!(moment[0].abs() > 0.05 * moment[2].abs());
+    let currents = report.file.currents_a.as_ref().expect("currents");
+    let lambda = report.file.lambda_n_per_m.expect("a force constant");
+    let (mut sideways, mut requested, mut angles) = (0.0, 0.0, Vec::new());
+    for (place, row) in rows().enumerate() {
+        let mut force = [0.0; 3];
+        for (coil, current) in currents.iter().enumerate() {
+            let gradient = table.field(place, coil).gradient_t_per_m_per_a;
+            for (i, sum) in force.iter_mut().enumerate() {
+                // grad (m . B)
+                let along: f64 = (0..3).map(|k| moment[k] * gradient[k][i]).sum();
+                *sum += current * along;
+            }
+        }
+        let side = force[0].hypot(force[1]);
+        sideways += side * side;
+        requested += (lambda * points.height_m[row]).powi(2);
+        angles.push(side.atan2(force[2]).to_degrees());
+    }
+    angles.sort_by(f64::total_cmp);
+    let found = report.file.sideways.expect("reported");
+    assert_eq!(found.points, angles.len());
+    let share = (sideways / requested).sqrt();
+    assert!(
+        (found.static_share / share - 1.0).abs() < 1e-9,
+        "{found:?} {share}"
+    );
+    let median = angles[angles.len() / 2];
+    assert!(
+        (found.static_median_deg - median).abs() < 1e-6,
+        "{found:?} {median}"
+    );
+}
+
+#[test]
+fn the_seeds_array_pushes_sideways_as_computed_elsewhere() {
+    let path = here("designs/seed.toml");
+    let (design, _) = Design::read(&path, Need::LAMBDA).expect("valid");
+    // Shares and angles of two other point sets; feedback and power of one.
+    let expected = [
+        ("flat", [0.29, 0.31], [15.0, 16.0], 0.33, 1.28),
+        ("half_sphere", [0.78, 0.86], [34.0, 37.0], 0.20, 1.03),
+    ];
+    for (name, share, degrees, feedback, power) in expected {
+        let shape = here(&format!("shapes/{name}.toml"));
+        let (document, _) = ShapeDocument::read(&shape).expect("valid");
+        let options = LambdaOptions::default();
+        let (_, report) = run(&design, &document, Vec::new(), &options, &Silent).expect("solves");
+        let found = report.file.sideways.expect("reported");
+        let within = |value: f64, [least, most]: [f64; 2], slack: f64| {
+            assert!(
+                value > least - slack && value < most + slack,
+                "{name}: {found:?}"
+            );
+        };
+        within(found.static_share, share, 0.01);
+        within(found.static_median_deg, degrees, 1.0);
+        within(found.feedback_share, [feedback; 2], 0.02);
+        within(found.vector_power_ratio, [power; 2], 0.02);
+        assert_eq!(found.vector_reached, 1.0, "{name}: {found:?}");
+    }
+}

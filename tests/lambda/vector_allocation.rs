@@ -1,0 +1,369 @@
+//! The allocation of a force vector against an exhaustive search over every coil's state.
+
+use fluxform_lambda::{Reach, VectorAllocation, VectorAllocator};
+use nalgebra::{DMatrix, DVector};
+
+use fluxform_testing::Random;
+
+const SIDEWAYS: f64 = 0.3;
+
+/// One allocation problem.
+#[derive(Debug, Clone)]
+struct Problem {
+    force_n_per_a: Vec<[f64; 3]>,
+    resistance_ohm: Vec<f64>,
+    lower_a: Vec<f64>,
+    upper_a: Vec<f64>,
+    total_a: Option<f64>,
+    requested_n: [f64; 3],
+}
+
+impl Problem {
+    fn random(random: &mut Random) -> Self {
+        let coils = 1 + (random.unit() * 5.0) as usize;
+        let two_way = random.unit() < 0.5;
+        let force_n_per_a: Vec<[f64; 3]> = (0..coils)
+            .map(|_| std::array::from_fn(|_| 0.2 * (random.unit() - 0.4)))
+            .collect();
+        let upper_a: Vec<f64> = (0..coils).map(|_| 0.3 + 2.0 * random.unit()).collect();
+        let lower_a = upper_a.iter().map(|u| if two_way { -u } else { 0.0 });
+        let lower_a: Vec<f64> = lower_a.collect();
+        let total_a = (random.unit() < 0.5).then(|| 0.2 + 2.0 * random.unit());
+        // Half of the requests are within reach, or were without the sum's limit.
+        let requested_n = if random.unit() < 0.5 {
+            let mut force = [0.0; 3];
+            for i in 0..coils {
+                let current = lower_a[i] + random.unit() * (upper_a[i] - lower_a[i]);
+                for k in 0..3 {
+                    force[k] += force_n_per_a[i][k] * current;
+                }
+            }
+            force
+        } else {
+            std::array::from_fn(|_| 0.8 * (random.unit() - 0.5))
+        };
+        Self {
+            force_n_per_a,
+            resistance_ohm: (0..coils).map(|_| 1.0 + 6.0 * random.unit()).collect(),
+            lower_a,
+            upper_a,
+            total_a,
+            requested_n,
+        }
+    }
+
+    fn coils(&self) -> usize {
+        self.force_n_per_a.len()
+    }
+
+    fn solve(&self) -> (Vec<f64>, VectorAllocation) {
+        let (lower, upper) = (&self.lower_a, &self.upper_a);
+        let resistance = &self.resistance_ohm;
+        let mut allocator =
+            VectorAllocator::new(resistance, lower, upper, self.total_a, SIDEWAYS).unwrap();
+        let mut currents = vec![f64::NAN; self.coils()];
+        let result = allocator.allocate(&self.force_n_per_a, self.requested_n, &mut currents);
+        (currents, result)
+    }
+
+    fn power_w(&self, currents: &[f64]) -> f64 {
+        let terms = currents.iter().zip(&self.resistance_ohm);
+        terms.map(|(i, r)| r * i * i).sum()
+    }
+
+    /// |w (G I - f)|, N.
+    fn missing_n(&self, currents: &[f64]) -> f64 {
+        let missing = (0..3).map(|k| {
+            let given = currents.iter().zip(&self.force_n_per_a);
+            let given: f64 = given.map(|(i, g)| g[k] * i).sum();
+            let weight = if k < 2 { SIDEWAYS } else { 1.0 };
+            (weight * (given - self.requested_n[k])).powi(2)
+        });
+        missing.sum::<f64>().sqrt()
+    }
+
+    fn within_limits(&self, currents: &[f64], slack: f64) -> bool {
+        let sum: f64 = currents.iter().sum();
+        (0..self.coils()).all(|i| {
+            currents[i] >= self.lower_a[i] - slack && currents[i] <= self.upper_a[i] + slack
+        }) && self.total_a.is_none_or(|total| sum <= total + slack)
+    }
+
+    /// The least distance from the request and the least power at it, over all states of the coils
+    /// and of the sum.
+    fn exhaustive(&self) -> (f64, f64) {
+        let coils = self.coils();
+        let mut best = (f64::INFINITY, f64::INFINITY);
+        for state in 0..3_usize.pow(coils as u32) {
+            for binds in [false, true] {
+                let Some(currents) = self.of_state(state, binds) else {
+                    continue;
+                };
+                if !self.within_limits(&currents, 1e-9) {
+                    continue;
+                }
+                let (missing, power) = (self.missing_n(&currents), self.power_w(&currents));
+                let nearer = missing < best.0 - 1e-10;
+                if nearer || (missing < best.0 + 1e-10 && power < best.1) {
+                    best = (missing.min(best.0), power);
+                }
+            }
+        }
+        best
+    }
+
+    /// The currents nearest to the request, of least power among those, with every coil at a limit
+    /// but the free ones.
+    fn of_state(&self, state: usize, binds: bool) -> Option<Vec<f64>> {
+        let mut currents = vec![0.0; self.coils()];
+        let mut free = Vec::new();
+        let mut rest = state;
+        for i in 0..self.coils() {
+            match rest % 3 {
+                0 => currents[i] = self.lower_a[i],
+                1 => free.push(i),
+                _ => currents[i] = self.upper_a[i],
+            }
+            rest /= 3;
+        }
+        let total = self.total_a.filter(|_| binds);
+        if free.is_empty() || (binds && total.is_none()) {
+            return (!binds).then_some(currents);
+        }
+        // In x = sqrt(R) I the least power is the least norm. A sum that binds is met along the
+        // null space of the ones.
+        let root: Vec<f64> = free
+            .iter()
+            .map(|i| self.resistance_ohm[*i].sqrt())
+            .collect();
+        let n = free.len();
+        let rows = DMatrix::from_fn(3, n, |k, a| {
+            let weight = if k < 2 { SIDEWAYS } else { 1.0 };
+            weight * self.force_n_per_a[free[a]][k] / root[a]
+        });
+        let missing = DVector::from_fn(3, |k, _| {
+            let weight = if k < 2 { SIDEWAYS } else { 1.0 };
+            let held: f64 = (0..self.coils())
+                .map(|i| self.force_n_per_a[i][k] * currents[i])
+                .sum();
+            weight * (self.requested_n[k] - held)
+        });
+        let solution = match total {
+            None => pseudo_inverse(&rows) * missing,
+            Some(total) => {
+                let ones = DVector::from_fn(n, |a, _| 1.0 / root[a]);
+                let held: f64 = currents.iter().sum();
+                let along = &ones * ((total - held) / ones.norm_squared());
+                let across =
+                    DMatrix::identity(n, n) - &ones * ones.transpose() / ones.norm_squared();
+                let moved = &rows * &across;
+                &along + &across * (pseudo_inverse(&moved) * (missing - &rows * &along))
+            }
+        };
+        for (a, i) in free.iter().enumerate() {
+            currents[*i] = solution[a] / root[a];
+        }
+        Some(currents)
+    }
+}
+
+/// A^T (A A^T)^+ of a matrix with three rows.
+fn pseudo_inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+    let product = matrix * matrix.transpose();
+    let eigen = product.symmetric_eigen();
+    let largest = eigen.eigenvalues.max();
+    let inverse = eigen.eigenvalues.map(|value| {
+        if value > 1e-13 * largest {
+            1.0 / value
+        } else {
+            0.0
+        }
+    });
+    let vectors = &eigen.eigenvectors;
+    matrix.transpose() * vectors * DMatrix::from_diagonal(&inverse) * vectors.transpose()
+}
+
+#[test]
+fn currents_are_those_of_the_exhaustive_search() {
+    let mut random = Random::new(5);
+    let (mut reached, mut out_of_reach, mut unproven) = (0, 0, 0);
+    for number in 0..1500 {
+        let problem = Problem::random(&mut random);
+        let (currents, result) = problem.solve();
+        let (missing, power) = problem.exhaustive();
+        assert!(
+            problem.within_limits(&currents, 1e-9),
+            "{number}: {problem:?} {currents:?}"
+        );
+        let own = problem.missing_n(&currents);
+        assert!(
+            (own - missing).abs() <= 1e-9,
+            "{number}: missing {own} of {missing}; {problem:?}"
+        );
+        let own = problem.power_w(&currents);
+        let close = (own - power).abs() <= 1e-7 * power.max(1e-6);
+        assert!(
+            close,
+            "{number}: power {own} of {power}; {problem:?} {currents:?}"
+        );
+        match result.reach {
+            Reach::Reached => reached += 1,
+            Reach::Saturated => out_of_reach += 1,
+        }
+        unproven += usize::from(!result.proven);
+    }
+    assert!(
+        reached > 300 && out_of_reach > 300,
+        "{reached} {out_of_reach}"
+    );
+    assert_eq!(unproven, 0);
+}
+
+/// An array of coils like dipoles on a square grid, the finger above it.
+fn array(side: usize, position_m: [f64; 3]) -> Vec<[f64; 3]> {
+    let pitch_m = 0.05;
+    let half = 0.5 * pitch_m * (side as f64 - 1.0);
+    let place = |i: usize| pitch_m * i as f64 - half;
+    let coils = (0..side * side).map(|i| [place(i % side), place(i / side)]);
+    coils
+        .map(|[x, y]| {
+            // The force between two dipoles along z at this offset, in units of its axial value at
+            // 30 mm.
+            let d = [position_m[0] - x, position_m[1] - y, position_m[2] + 0.02];
+            let r2: f64 = d.iter().map(|v| v * v).sum();
+            let cos2 = d[2] * d[2] / r2;
+            let size = 0.1 * (0.05_f64.powi(2) / r2).powi(2) / 2.0;
+            let r = r2.sqrt();
+            let side = size * (5.0 * cos2 - 1.0);
+            [
+                side * d[0] / r,
+                side * d[1] / r,
+                size * (5.0 * cos2 - 3.0) * d[2] / r,
+            ]
+        })
+        .collect()
+}
+
+fn allocator(coils: usize, lower_a: f64, total_a: Option<f64>) -> VectorAllocator {
+    let (ohm, lower, upper) = (vec![6.0; coils], vec![lower_a; coils], vec![2.0; coils]);
+    VectorAllocator::new(&ohm, &lower, &upper, total_a, SIDEWAYS).unwrap()
+}
+
+#[test]
+fn mirrored_places_get_mirrored_currents() {
+    let mut allocator = allocator(9, 0.0, None);
+    let (mut here, mut there) = (vec![0.0; 9], vec![0.0; 9]);
+    for k in 0..200 {
+        let [x, y] = [0.0003 * f64::from(k), 0.011];
+        let force = 0.002 * f64::from(k);
+        let a = allocator.allocate(
+            &array(3, [x, y, 0.03]),
+            [0.3 * force, 0.0, force],
+            &mut here,
+        );
+        let b = allocator.allocate(
+            &array(3, [-x, y, 0.03]),
+            [-0.3 * force, 0.0, force],
+            &mut there,
+        );
+        assert_eq!(a.reach, b.reach);
+        for row in 0..3 {
+            for column in 0..3 {
+                let pair = [here[3 * row + column], there[3 * row + 2 - column]];
+                assert!((pair[0] - pair[1]).abs() < 1e-9, "{k}: {here:?} {there:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn forces_do_not_jump_along_a_path_nor_do_currents_within_reach() {
+    // Through places within and out of reach: with an eighth of the step the largest change falls,
+    // which a jump's would not; towards the end of reach currents grow like a square root. Out of
+    // reach a weak coil may cross its whole range while the force hardly moves.
+    let change = |steps: u32, total, lift_n| {
+        let mut allocator = allocator(9, 0.0, total);
+        let mut last: Option<(Vec<f64>, [f64; 3], Reach)> = None;
+        let mut largest = [0.0_f64; 2];
+        for k in 0..=steps {
+            let t = f64::from(k) / f64::from(steps);
+            let (s, c) = ((7.0 * t).sin(), (5.0 * t).cos());
+            let at = [0.09 * (t - 0.5), 0.04 * s, 0.03 + 0.01 * c];
+            let mut currents = vec![0.0; 9];
+            let request = [0.02 * (9.0 * t).sin(), 0.0, 0.02 + lift_n * t];
+            let result = allocator.allocate(&array(3, at), request, &mut currents);
+            assert!(result.proven, "{t}");
+            if let Some((before, force, reach)) = &last {
+                let differences = before.iter().zip(&currents).map(|(a, b)| (a - b).abs());
+                if *reach == Reach::Reached && result.reach == Reach::Reached {
+                    largest[0] = differences.fold(largest[0], f64::max);
+                }
+                let differences = force
+                    .iter()
+                    .zip(&result.force_n)
+                    .map(|(a, b)| (a - b).abs());
+                largest[1] = differences.fold(largest[1], f64::max);
+            }
+            last = Some((currents, result.force_n, result.reach));
+        }
+        largest
+    };
+    for (total, lift_n) in [(None, 0.12), (Some(5.0), 0.12), (None, 0.01)] {
+        let (coarse, fine) = (change(4000, total, lift_n), change(32_000, total, lift_n));
+        for k in 0..2 {
+            assert!(fine[k] < 0.4 * coarse[k], "{total:?}: {coarse:?} {fine:?}");
+        }
+    }
+}
+
+#[test]
+fn large_and_stiff_arrays_are_proven() {
+    let mut random = Random::new(11);
+    for side in [5, 8, 12] {
+        let coils = side * side;
+        for k in 0..40 {
+            let resistance = (0..coils).map(|_| 10f64.powf(4.0 * random.unit() - 2.0));
+            let resistance: Vec<f64> = resistance.collect();
+            let upper: Vec<f64> = (0..coils)
+                .map(|_| 10f64.powf(3.0 * random.unit() - 2.0))
+                .collect();
+            let lower = vec![0.0; coils];
+            let total = (k % 2 == 0).then(|| 0.2 * upper.iter().sum::<f64>());
+            let mut allocator =
+                VectorAllocator::new(&resistance, &lower, &upper, total, SIDEWAYS).unwrap();
+            let at = [
+                0.1 * (random.unit() - 0.5),
+                0.1 * (random.unit() - 0.5),
+                0.02,
+            ];
+            let mut currents = vec![0.0; coils];
+            let force = 10f64.powf(3.0 * random.unit() - 3.0);
+            let request = [0.3 * force, -0.2 * force, force];
+            let result = allocator.allocate(&array(side, at), request, &mut currents);
+            assert!(result.proven, "{side} {k}: {result:?}");
+        }
+    }
+}
+
+#[test]
+#[ignore = "prints times"]
+fn time_of_a_step() {
+    for side in [3, 8] {
+        let coils = side * side;
+        let mut allocator = allocator(coils, 0.0, None);
+        let mut currents = vec![0.0; coils];
+        let places: Vec<_> = (0..1000)
+            .map(|k| array(side, [1e-5 * f64::from(k), 0.007, 0.03]))
+            .collect();
+        for force in [0.05, 0.3] {
+            let start = std::time::Instant::now();
+            for forces in &places {
+                allocator.allocate(forces, [0.0, 0.0, force], &mut currents);
+            }
+            println!(
+                "{coils} coils, {force} N: {:?} a step",
+                start.elapsed() / 1000
+            );
+        }
+    }
+}
