@@ -256,7 +256,7 @@ pub fn height(text: &str) -> Result<f64, String> {
     };
     let digits = size.trim_end_matches(|c: char| c.is_alphabetic());
     match number(digits) {
-        Ok(zero) if zero == 0.0 => Ok(0.0),
+        Ok(0.0) => Ok(0.0),
         _ => length_with_unit(size).map(|length_m| sign * length_m),
     }
 }

@@ -128,6 +128,8 @@ fn children(node: &Node<'_>, meshes: usize) -> Vec<(usize, Affine)> {
 }
 
 /// Adds a primitive's triangles.
+///
+/// Long because every way of listing triangles is one arm of it.
 fn triangles(
     primitive: &gltf::Primitive<'_>,
     blob: &[u8],

@@ -52,9 +52,9 @@ impl Bounds {
             max_m: [f64::NEG_INFINITY; 3],
         };
         points.fold(none, |mut bounds, point| {
-            for k in 0..3 {
-                bounds.min_m[k] = bounds.min_m[k].min(point[k]);
-                bounds.max_m[k] = bounds.max_m[k].max(point[k]);
+            for (k, value) in point.into_iter().enumerate() {
+                bounds.min_m[k] = bounds.min_m[k].min(value);
+                bounds.max_m[k] = bounds.max_m[k].max(value);
             }
             bounds
         })

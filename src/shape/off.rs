@@ -25,6 +25,8 @@ pub(crate) fn begins(bytes: &[u8]) -> bool {
 /// # Errors
 /// [`ReadError`] with the line: counts that the file does not hold, a number or an index that is
 /// none, no face.
+///
+/// Long because the file is one pass over its sections, each of which needs the counts before it.
 pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
     let bytes = narrow(bytes);
     let mut lines = Lines::new(&bytes);

@@ -202,6 +202,8 @@ pub fn discretize_with(
 ///
 /// # Errors
 /// As [`discretize_with`].
+///
+/// Long because every step uses what the steps before it made.
 pub fn discretize_surface(
     document: &ShapeDocument,
     (surface, mut warnings): (Surface, Vec<String>),

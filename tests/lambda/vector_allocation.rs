@@ -118,11 +118,11 @@ impl Problem {
         let mut currents = vec![0.0; self.coils()];
         let mut free = Vec::new();
         let mut rest = state;
-        for i in 0..self.coils() {
+        for (i, current) in currents.iter_mut().enumerate() {
             match rest % 3 {
-                0 => currents[i] = self.lower_a[i],
+                0 => *current = self.lower_a[i],
                 1 => free.push(i),
-                _ => currents[i] = self.upper_a[i],
+                _ => *current = self.upper_a[i],
             }
             rest /= 3;
         }
@@ -347,6 +347,7 @@ fn large_and_stiff_arrays_are_proven() {
 
 #[test]
 #[ignore = "prints times"]
+#[allow(clippy::disallowed_methods, clippy::print_stdout)]
 fn time_of_a_step() {
     for side in [3, 8] {
         let coils = side * side;

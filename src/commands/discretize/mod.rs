@@ -386,7 +386,7 @@ fn report(document: &ShapeDocument, inputs: Vec<Input>, discretized: Discretized
         }
     }
     if let (Some(reader), Some(stage)) = (&discretized.read_by, accuracy.get_mut("tessellation")) {
-        stage.method = format!("{}; read by {reader}", stage.method).into();
+        stage.method = format!("{}; read by {reader}", stage.method);
     }
     let summary = PointsSummary {
         schema_version: SCHEMA_VERSION,
