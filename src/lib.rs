@@ -72,7 +72,7 @@
 //! let places: Vec<[f64; 3]> = (0..points.len())
 //!     .map(|j| [points.x_m[j], points.y_m[j], points.height_m[j]])
 //!     .collect();
-//! let solved = steel::solve(&scene, None, KERNEL_ERROR, 0.015)?; // no steel here; from 15 mm up
+//! let solved = steel::solve(&scene, scene.tolerances.forces, 0.015)?; // no steel here; from 15 mm up
 //! let forces = scene.forces_n_per_a(&solved, &places, &Silent)?;
 //! let problem = ForceProblem {
 //!     forces_n_per_a: &forces,

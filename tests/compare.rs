@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use fluxform::bundle::artefact::Input;
-use fluxform::commands::compare::{CompareFile, CompareOptions, Pair, run};
+use fluxform::commands::compare::{CompareOptions, CompareReport, Pair, run};
 use fluxform::design::{Design, Need};
 use fluxform::progress::Silent;
 use fluxform::scene::sources::ShapeSource;
@@ -65,9 +65,9 @@ fn dome(name: &str) -> ShapeSource {
     )
 }
 
-fn compared(design: &Design, shapes: &[ShapeSource], options: &CompareOptions) -> CompareFile {
+fn compared(design: &Design, shapes: &[ShapeSource], options: &CompareOptions) -> CompareReport {
     let input = Input::of_bytes("design.toml", b"");
-    run(design, shapes, &input, options, &Silent).unwrap().file
+    run(design, shapes, &input, options, &Silent).unwrap()
 }
 
 fn numbers(pair: &Pair) -> [f64; 6] {
@@ -161,7 +161,7 @@ fn stronger_currents_only_lift_weak_forces_over_the_threshold() {
     };
     let [weakest, weak, usual, strong, stronger] = [1e-3, 2e-3, 2.0, 2e4, 4e4].map(with);
     for k in 0..weak.pairs.len() {
-        let of = |file: &CompareFile| numbers(&file.pairs[k]);
+        let of = |file: &CompareReport| numbers(&file.pairs[k]);
         for what in 0..4 {
             let [weakest, weak, usual, strong, stronger] =
                 [&weakest, &weak, &usual, &strong, &stronger].map(|file| of(file)[what]);
@@ -192,9 +192,9 @@ fn the_unpowered_steel_pulls_on_both_alike() {
     };
     let (with, without) = (of(true), of(false));
     // The requested force includes the pull, so feedback does not differ; static currents leave some.
-    let felt = |file: &CompareFile| file.pairs[0].feedback_jnd.unwrap();
+    let felt = |file: &CompareReport| file.pairs[0].feedback_jnd.unwrap();
     assert!((felt(&with) / felt(&without) - 1.0).abs() < 1e-9);
-    let fixed = |file: &CompareFile| file.pairs[0].static_rms_jnd.unwrap();
+    let fixed = |file: &CompareReport| file.pairs[0].static_rms_jnd.unwrap();
     assert!((fixed(&with) / fixed(&without) - 1.0).abs() > 1e-4);
 }
 

@@ -159,15 +159,15 @@ fn random_design(numbers: &mut Random, core: bool) -> Value {
     let told = evaluate(&design, Vec::new(), None).unwrap();
     json!({
         "name": text.replace('\n', " "),
-        "inner_diameter_m": told.coil.inner_diameter_m,
-        "outer_diameter_m": told.coil.outer_diameter_m,
-        "length_m": told.coil.length_m,
+        "inner_diameter_m": told.coil.size.inner_diameter_m,
+        "outer_diameter_m": told.coil.size.outer_diameter_m,
+        "length_m": told.coil.size.length_m,
         "wire_diameter_m": design.wire.diameter_m,
         "current_a": told.target.current_a,
         "core": core,
         "force_n": told.target.force_n,
-        "resistance_ohm": told.coil.resistance_ohm,
-        "inductance_h": told.coil.inductance_h,
+        "resistance_ohm": told.coil.circuit.resistance_ohm,
+        "inductance_h": told.coil.circuit.inductance_h,
     })
 }
 

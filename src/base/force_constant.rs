@@ -55,6 +55,16 @@ impl Criterion {
         }
     }
 
+    /// Whether its currents are those of the least mean square error; otherwise they leave no point
+    /// too weak.
+    #[must_use]
+    pub fn is_least_mean_square(self) -> bool {
+        match self {
+            Self::Linear | Self::Jnd | Self::Saturation => true,
+            Self::Maxmin => false,
+        }
+    }
+
     /// What the constant that it chooses means.
     #[must_use]
     pub fn meaning(self) -> &'static str {

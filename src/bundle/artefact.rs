@@ -43,6 +43,26 @@ impl Input {
     }
 }
 
+/// The digest of an input whose bytes arrive in pieces.
+#[derive(Debug, Clone, Default)]
+pub struct InputDigest(sha2::Sha256);
+
+impl InputDigest {
+    /// Adds bytes.
+    pub fn update(&mut self, bytes: &[u8]) {
+        sha2::Digest::update(&mut self.0, bytes);
+    }
+
+    /// The input of all bytes since it was made.
+    #[must_use]
+    pub fn input(self, path: impl Into<String>) -> Input {
+        Input {
+            path: path.into(),
+            sha256: super::atomic::hex(&sha2::Digest::finalize(self.0)),
+        }
+    }
+}
+
 /// A file that belongs to an artefact.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct FileEntry {

@@ -284,6 +284,14 @@ impl<'a> Serializer for Finite<'a> {
     }
 }
 
+/// Serialises a path as text; one that is no text as nearly as it can be.
+///
+/// # Errors
+/// The serialiser's.
+pub fn displayed<S: Serializer>(path: &std::path::Path, out: S) -> Result<S::Ok, S::Error> {
+    out.collect_str(&path.display())
+}
+
 #[cfg(test)]
 mod tests {
     use super::{JsonError, fault, to_json};

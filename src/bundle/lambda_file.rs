@@ -7,7 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use super::artefact::Input;
 use fluxform_base::accuracy::StageAccuracy;
-use fluxform_base::force_constant::{Criterion, ForceConstants};
+use fluxform_lambda::feedback::Rendered;
+use fluxform_lambda::worst::ActivePoint;
+use fluxform_lambda::{Criterion, ForceConstants, Wiring};
 
 /// The path of e*(lambda) and the constants read off it. `null` where a limit never binds or
 /// nothing can be rendered.
@@ -58,7 +60,7 @@ pub struct LambdaFile {
     pub tolerance: Option<TolerancePoint>,
     /// Coils broken or in series on request; absent when none are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub wiring: Option<WiringFile>,
+    pub wiring: Option<Wiring>,
     /// The same object with one change at a time, the first as given; absent when not asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variants: Option<Vec<LambdaVariant>>,
@@ -117,9 +119,9 @@ pub struct FeedbackFile {
     /// The static currents at the chosen lambda; null without one.
     pub without: Option<StaticRendering>,
     /// With feedback at the same lambda; null without one.
-    pub at_chosen: Option<FeedbackRendering>,
+    pub at_chosen: Option<Rendered>,
     /// With feedback at its own largest lambda; null without one.
-    pub at_largest: Option<FeedbackRendering>,
+    pub at_largest: Option<Rendered>,
     /// The same demand above and below the surface; absent when not asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shell: Option<FeedbackShell>,
@@ -147,37 +149,6 @@ pub struct StaticRendering {
     pub largest_current_a: f64,
     /// Power in the coils, W.
     pub power_w: f64,
-}
-
-/// A surface with the currents of least power at every point; means by the points' weights.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct FeedbackRendering {
-    /// N/m.
-    pub lambda_n_per_m: f64,
-    /// N; 0 where every force is within reach.
-    pub rms_error_n: f64,
-    /// N.
-    pub worst_error_n: f64,
-    /// Points whose force is beyond reach.
-    pub points_unreached: usize,
-    /// Mean power in the coils, W.
-    pub mean_power_w: f64,
-    /// Largest power at any point, W.
-    pub max_power_w: f64,
-    /// Largest |current| of any coil, A.
-    pub largest_current_a: f64,
-    /// Largest |current| of each coil, A.
-    pub current_max_a: Vec<f64>,
-    /// Root mean square current of each coil, A.
-    pub current_rms_a: Vec<f64>,
-    /// Share of the points at which each coil carries more than 1e-6 of its limit.
-    pub active_share: Vec<f64>,
-    /// Mean number of such coils.
-    pub active_mean: f64,
-    /// Fewest at any point.
-    pub active_min: usize,
-    /// Most at any point.
-    pub active_max: usize,
 }
 
 /// The demand lambda h(x, y) at places above and below the surface.
@@ -225,24 +196,14 @@ pub struct TolerancePoint {
     pub currents_a: Option<Vec<f64>>,
 }
 
-/// Coils that do not carry a current of their own.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct WiringFile {
-    /// Coils without current.
-    pub broken: Vec<usize>,
-    /// Pairs with one current, which counts once in the sum that the supply limits.
-    pub series: Vec<[usize; 2]>,
-}
-
 /// The force constants with one change.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LambdaVariant {
     /// What is changed.
     pub name: String,
-    /// Coils without current.
-    pub broken: Vec<usize>,
-    /// Pairs in series.
-    pub series: Vec<[usize; 2]>,
+    /// Its wiring.
+    #[serde(flatten)]
+    pub wiring: Wiring,
     /// Whether the force without currents counts.
     pub passive_force: bool,
     /// Whether any coil may carry a negative current.
@@ -331,19 +292,9 @@ pub struct WorstPointFile {
     /// Bound on the error of `worst_error_n`, N.
     pub gap_n: Option<f64>,
     /// The points that decide at the chosen lambda, and their shares of the proof.
-    pub active: Option<Vec<ActivePointShare>>,
+    pub active: Option<Vec<ActivePoint>>,
     /// Where t* turns, lambda ascending; between them t* and the currents are linear in lambda.
     pub path: Vec<WorstPointStep>,
-}
-
-/// A point that decides.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct ActivePointShare {
-    /// Its row in `points.csv`, from 0.
-    pub point: usize,
-    /// Positive where the force is too weak, negative where it is too strong; absolute values
-    /// sum to 1.
-    pub multiplier: f64,
 }
 
 /// A turn of t*.

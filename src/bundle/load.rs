@@ -20,7 +20,7 @@ use super::lambda_file::LambdaFile;
 use super::manifest::Manifest;
 use super::npz::{MapArrays, from_npz};
 use super::read_bounded::{FILE_MAX_BYTES, check_plain, digest_plain, read_plain};
-use super::read_table::{read_currents, read_points};
+use super::read_table::{read_currents, read_rows};
 use super::table::{CurrentRow, PointRow};
 use fluxform_numerics::lagrange::{Cell, locate};
 
@@ -159,7 +159,7 @@ impl Bundle {
         let bundle = Self {
             folder: folder.to_path_buf(),
             map: from_npz(part(map)?).map_err(|error| content(map, error.to_string()))?,
-            points: read_points(points, part(points)?)
+            points: read_rows(points, part(points)?, PointRow::COLUMNS)
                 .map_err(|error| content(points, error.to_string()))?,
             currents: read_currents(currents, part(currents)?)
                 .map_err(|error| content(currents, error.to_string()))?,

@@ -4,7 +4,7 @@ use std::io::Read;
 
 use csv::{ByteRecord, ReaderBuilder, Trim};
 
-use super::table::{CURRENT_COLUMNS, CurrentRow, POINT_COLUMNS, PointRow};
+use super::table::{CurrentRow, RowColumn};
 
 /// No more faults than this are reported.
 const MAX_FAULTS: usize = 20;
@@ -206,20 +206,32 @@ pub fn read_positions(name: &str, source: impl Read) -> Result<Vec<[f64; 3]>, Ta
         .collect())
 }
 
-/// Reads `points.csv`.
+/// Reads the rows of a table, their columns by name.
 ///
 /// # Errors
 /// As [`read_columns`].
-pub(crate) fn read_points(name: &str, source: impl Read) -> Result<Vec<PointRow>, TableError> {
-    let columns = read_columns(name, source, &POINT_COLUMNS)?;
-    Ok((0..columns[0].len())
-        .map(|row| PointRow {
-            x_m: columns[0][row],
-            y_m: columns[1][row],
-            height_m: columns[2][row],
-            normal: [columns[3][row], columns[4][row], columns[5][row]],
-        })
-        .collect())
+pub(crate) fn read_rows<R: Clone + Default>(
+    name: &str,
+    source: impl Read,
+    columns: &[RowColumn<R>],
+) -> Result<Vec<R>, TableError> {
+    let (values, lines) = read_numbered(name, source, &names(columns))?;
+    Ok(rows(columns, &values, lines.len()))
+}
+
+fn names<R>(columns: &[RowColumn<R>]) -> Vec<&'static str> {
+    columns.iter().map(|column| column.name).collect()
+}
+
+fn rows<R: Clone + Default>(columns: &[RowColumn<R>], values: &[Vec<f64>], count: usize) -> Vec<R> {
+    let mut rows = vec![R::default(); count];
+    for (column, values) in columns.iter().zip(values) {
+        let Some(set) = column.set else { continue };
+        for (row, value) in rows.iter_mut().zip(values) {
+            set(row, *value);
+        }
+    }
+    rows
 }
 
 /// Reads `currents.csv`; its rows must be the coils 0, 1, 2, ...
@@ -227,28 +239,21 @@ pub(crate) fn read_points(name: &str, source: impl Read) -> Result<Vec<PointRow>
 /// # Errors
 /// As [`read_columns`].
 pub(crate) fn read_currents(name: &str, source: impl Read) -> Result<Vec<CurrentRow>, TableError> {
-    let (columns, lines) = read_numbered(name, source, &CURRENT_COLUMNS)?;
-    (0..columns[0].len())
-        .map(|row| {
-            if columns[0][row] != row as f64 {
-                let (line, found) = (lines[row], columns[0][row]);
-                let fault = format!("{name}:{line}: column coil: expected {row}, found {found}");
-                return Err(TableError::one(fault));
-            }
-            Ok(CurrentRow {
-                coil: row,
-                x_m: columns[1][row],
-                y_m: columns[2][row],
-                current_a: columns[3][row],
-            })
-        })
-        .collect()
+    let columns = CurrentRow::COLUMNS;
+    let (values, lines) = read_numbered(name, source, &names(columns))?;
+    let mut coils = values[0].iter().enumerate();
+    if let Some((row, coil)) = coils.find(|(row, coil)| **coil != *row as f64) {
+        let line = lines[row];
+        let fault = format!("{name}:{line}: column coil: expected {row}, found {coil}");
+        return Err(TableError::one(fault));
+    }
+    Ok(rows(columns, &values, lines.len()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::table::{write_currents, write_points};
+    use crate::table::{PointRow, write_rows};
 
     #[test]
     fn what_was_written_is_read_back() {
@@ -261,8 +266,11 @@ mod tests {
             })
             .collect();
         let mut text = Vec::new();
-        write_points(&mut text, &points).unwrap();
-        assert_eq!(read_points("p", text.as_slice()).unwrap(), points);
+        write_rows(&mut text, PointRow::COLUMNS, points.iter().copied()).unwrap();
+        assert_eq!(
+            read_rows("p", text.as_slice(), PointRow::COLUMNS).unwrap(),
+            points
+        );
         let currents: Vec<CurrentRow> = (0..9)
             .map(|coil| CurrentRow {
                 coil,
@@ -272,7 +280,7 @@ mod tests {
             })
             .collect();
         let mut text = Vec::new();
-        write_currents(&mut text, &currents).unwrap();
+        write_rows(&mut text, CurrentRow::COLUMNS, currents.iter().copied()).unwrap();
         assert_eq!(read_currents("c", text.as_slice()).unwrap(), currents);
         let text = String::from_utf8(text).unwrap().replace("\n3,", "\n4,");
         let error = read_currents("c", text.as_bytes()).unwrap_err();

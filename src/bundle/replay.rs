@@ -86,19 +86,6 @@ impl ReplayRows {
         &self.current_a[row * self.coils..(row + 1) * self.coils]
     }
 
-    /// The header's names.
-    fn names(&self) -> Vec<String> {
-        let mut names: Vec<String> = ["t_s", "x_m", "y_m", "z_m"].map(str::to_owned).to_vec();
-        names.extend(["wanted_force_n", "force_n", "error_n"].map(str::to_owned));
-        names.extend((0..self.coils).map(|coil| format!("current_{coil}_a")));
-        names.extend(["static_force_n", "static_error_n"].map(str::to_owned));
-        if !self.commanded_a.is_empty() {
-            names.extend((0..self.coils).map(|coil| format!("commanded_{coil}_a")));
-        }
-        names.push("status".to_owned());
-        names
-    }
-
     /// Writes the table.
     ///
     /// # Errors
@@ -107,31 +94,24 @@ impl ReplayRows {
         let mut block = self.names().join(",").into_bytes();
         block.push(b'\n');
         for row in 0..self.len() {
-            let range = row * self.coils..(row + 1) * self.coils;
-            let forces = [
-                self.wanted_force_n[row],
-                self.force_n[row],
-                self.error_n(row),
-            ];
-            let fixed = [self.static_force_n[row], self.static_error_n(row)];
-            let commanded = self.commanded_a.get(range.clone()).unwrap_or_default();
-            let numbers = std::iter::once(&self.t_s[row])
-                .chain(&self.position_m[row])
-                .chain(&forces)
-                .chain(&self.current_a[range])
-                .chain(&fixed)
-                .chain(commanded);
-            for value in numbers {
-                if !value.is_finite() {
-                    let message = format!("row {row} of the replay is not finite");
-                    return Err(io::Error::new(io::ErrorKind::InvalidData, message));
+            for column in COLUMNS {
+                match column.cells {
+                    Cells::Number(value) => self.push(&mut block, row, value(self, row))?,
+                    Cells::PerCoil(values) => {
+                        let range = row * self.coils..(row + 1) * self.coils;
+                        for value in values(self).get(range).unwrap_or_default() {
+                            self.push(&mut block, row, *value)?;
+                        }
+                    }
+                    Cells::Word(word) => {
+                        block.extend_from_slice(word(self, row).as_bytes());
+                        block.push(b',');
+                    }
                 }
-                // Minus nothing is nothing.
-                push_number(&mut block, value + 0.0);
-                block.push(b',');
             }
-            block.extend_from_slice(self.answer[row].word().as_bytes());
-            block.push(b'\n');
+            if let Some(last) = block.last_mut() {
+                *last = b'\n';
+            }
             if block.len() >= BLOCK_BYTES {
                 out.write_all(&block)?;
                 block.clear();
@@ -139,7 +119,85 @@ impl ReplayRows {
         }
         out.write_all(&block)
     }
+
+    /// The header's names.
+    fn names(&self) -> Vec<String> {
+        let mut names = Vec::new();
+        for column in COLUMNS {
+            match column.cells {
+                Cells::Number(_) | Cells::Word(_) => names.push(column.name.to_owned()),
+                // Currents that were commanded are left out where they are those that flow.
+                Cells::PerCoil(values) if values(self).is_empty() => {}
+                Cells::PerCoil(_) => {
+                    let name = |coil: usize| column.name.replace("{}", &coil.to_string());
+                    names.extend((0..self.coils).map(name));
+                }
+            }
+        }
+        names
+    }
+
+    fn push(&self, block: &mut Vec<u8>, row: usize, value: f64) -> io::Result<()> {
+        if !value.is_finite() {
+            let message = format!("row {row} of the replay is not finite");
+            return Err(io::Error::new(io::ErrorKind::InvalidData, message));
+        }
+        // Minus nothing is nothing.
+        push_number(block, value + 0.0);
+        block.push(b',');
+        Ok(())
+    }
 }
+
+/// A column of `replay.csv`.
+struct ReplayColumn {
+    /// Its header; `{}` stands for the number of the coil.
+    name: &'static str,
+    cells: Cells,
+}
+
+#[derive(Clone, Copy)]
+enum Cells {
+    /// A number at every position.
+    Number(fn(&ReplayRows, usize) -> f64),
+    /// A number for every coil at every position.
+    PerCoil(fn(&ReplayRows) -> &[f64]),
+    /// A word at every position.
+    Word(fn(&ReplayRows, usize) -> &'static str),
+}
+
+const fn number(name: &'static str, value: fn(&ReplayRows, usize) -> f64) -> ReplayColumn {
+    ReplayColumn {
+        name,
+        cells: Cells::Number(value),
+    }
+}
+
+const fn per_coil(name: &'static str, values: fn(&ReplayRows) -> &[f64]) -> ReplayColumn {
+    ReplayColumn {
+        name,
+        cells: Cells::PerCoil(values),
+    }
+}
+
+/// The columns of `replay.csv`: the one place that names them.
+const COLUMNS: &[ReplayColumn] = &[
+    number("t_s", |rows, at| rows.t_s[at]),
+    number("x_m", |rows, at| rows.position_m[at][0]),
+    number("y_m", |rows, at| rows.position_m[at][1]),
+    number("z_m", |rows, at| rows.position_m[at][2]),
+    number("wanted_force_n", |rows, at| rows.wanted_force_n[at]),
+    number("force_n", |rows, at| rows.force_n[at]),
+    number("error_n", ReplayRows::error_n),
+    per_coil("current_{}_a", |rows| &rows.current_a),
+    number("static_force_n", |rows, at| rows.static_force_n[at]),
+    number("static_error_n", ReplayRows::static_error_n),
+    per_coil("commanded_{}_a", |rows| &rows.commanded_a),
+    ReplayColumn {
+        name: "status",
+        cells: Cells::Word(|rows, at| rows.answer[at].word()),
+    },
+];
 
 #[cfg(test)]
 mod tests {
@@ -176,5 +234,10 @@ mod tests {
         assert!(header.contains("static_error_n,commanded_0_a,commanded_1_a,status\n"));
         rows.force_n[0] = f64::NAN;
         assert!(text(&rows).is_err());
+        let page = include_str!("../../results/README.md");
+        for column in COLUMNS {
+            let name = column.name.replace("{}", "0");
+            assert!(page.contains(&name), "{name}");
+        }
     }
 }

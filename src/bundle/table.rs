@@ -33,14 +33,48 @@ pub const FORCE_COLUMNS: [&str; 6] = [
     "torque_z_n_m_per_a",
 ];
 
-/// Columns of `points.csv`.
-pub const POINT_COLUMNS: [&str; 6] = ["x_m", "y_m", "height_m", "normal_x", "normal_y", "normal_z"];
+/// A column of a table whose rows are `R`: the one place that names it. Writers, readers and the
+/// tests of the documents go through these.
+pub struct RowColumn<R> {
+    /// Its header.
+    pub name: &'static str,
+    /// Its SI unit; empty for counts, flags and directions.
+    pub unit: &'static str,
+    /// A row's value.
+    pub get: fn(&R) -> f64,
+    /// Sets it in a row that is read; `None` in tables that are only written.
+    pub set: Option<fn(&mut R, f64)>,
+}
 
-/// Columns of `currents.csv`.
-pub(crate) const CURRENT_COLUMNS: [&str; 4] = ["coil", "x_m", "y_m", "current_a"];
+impl<R> RowColumn<R> {
+    /// A column of a table that is only written.
+    pub const fn written(name: &'static str, unit: &'static str, get: fn(&R) -> f64) -> Self {
+        Self {
+            name,
+            unit,
+            get,
+            set: None,
+        }
+    }
+
+    /// A column of a table that is read back.
+    const fn stored(
+        name: &'static str,
+        unit: &'static str,
+        get: fn(&R) -> f64,
+        set: fn(&mut R, f64),
+    ) -> Self {
+        Self {
+            name,
+            unit,
+            get,
+            set: Some(set),
+        }
+    }
+}
 
 /// A constraint point: a row of `points.csv`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PointRow {
     /// m.
     pub x_m: f64,
@@ -52,8 +86,20 @@ pub struct PointRow {
     pub normal: [f64; 3],
 }
 
+impl PointRow {
+    /// The columns of `points.csv`.
+    pub const COLUMNS: &[RowColumn<Self>] = &[
+        RowColumn::stored("x_m", "m", |p| p.x_m, |p, v| p.x_m = v),
+        RowColumn::stored("y_m", "m", |p| p.y_m, |p, v| p.y_m = v),
+        RowColumn::stored("height_m", "m", |p| p.height_m, |p, v| p.height_m = v),
+        RowColumn::stored("normal_x", "", |p| p.normal[0], |p, v| p.normal[0] = v),
+        RowColumn::stored("normal_y", "", |p| p.normal[1], |p, v| p.normal[1] = v),
+        RowColumn::stored("normal_z", "", |p| p.normal[2], |p, v| p.normal[2] = v),
+    ];
+}
+
 /// A coil's static current: a row of `currents.csv`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CurrentRow {
     /// Index of the coil in the array.
     pub coil: usize,
@@ -65,26 +111,30 @@ pub struct CurrentRow {
     pub current_a: f64,
 }
 
+impl CurrentRow {
+    /// The columns of `currents.csv`.
+    pub const COLUMNS: &[RowColumn<Self>] = &[
+        RowColumn::stored("coil", "", |c| c.coil as f64, |c, v| c.coil = v as usize),
+        RowColumn::stored("x_m", "m", |c| c.x_m, |c, v| c.x_m = v),
+        RowColumn::stored("y_m", "m", |c| c.y_m, |c, v| c.y_m = v),
+        RowColumn::stored("current_a", "A", |c| c.current_a, |c, v| c.current_a = v),
+    ];
+}
+
 /// A column of a table.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 pub enum Column<'a> {
     /// Real numbers.
     Number(&'a [f64]),
     /// Whole numbers.
     Index(&'a [i64]),
-    /// Real numbers by row, as many as the first column has.
-    NumberOf(&'a dyn Fn(usize) -> f64),
-    /// Whole numbers by row, as many as the first column has.
-    IndexOf(&'a dyn Fn(usize) -> i64),
 }
 
 impl Column<'_> {
-    /// `None` for those that have as many rows as are asked of them.
-    fn len(&self) -> Option<usize> {
+    fn len(&self) -> usize {
         match self {
-            Self::Number(values) => Some(values.len()),
-            Self::Index(values) => Some(values.len()),
-            Self::NumberOf(_) | Self::IndexOf(_) => None,
+            Self::Number(values) => values.len(),
+            Self::Index(values) => values.len(),
         }
     }
 }
@@ -94,12 +144,9 @@ impl Column<'_> {
 /// # Errors
 /// The writer's; `InvalidData` for columns of different lengths and for numbers that are not finite.
 pub fn write_columns(out: &mut dyn Write, columns: &[(&str, Column)]) -> io::Result<()> {
-    let mut lengths = columns.iter().map(|(name, column)| (name, column.len()));
-    let rows = lengths.next().and_then(|(_, rows)| rows).unwrap_or(0);
-    if let Some((name, Some(length))) =
-        lengths.find(|(_, length)| length.is_some_and(|n| n != rows))
-    {
-        let message = format!("column {name} has {length} rows, expected {rows}");
+    let rows = columns.first().map_or(0, |(_, column)| column.len());
+    if let Some((name, column)) = columns.iter().find(|(_, column)| column.len() != rows) {
+        let message = format!("column {name} has {} rows, expected {rows}", column.len());
         return Err(invalid(message));
     }
     let mut lines = Lines::begin(out, columns.iter().map(|(name, _)| *name))?;
@@ -108,8 +155,6 @@ pub fn write_columns(out: &mut dyn Write, columns: &[(&str, Column)]) -> io::Res
             match column {
                 Column::Number(values) => lines.number(values[row])?,
                 Column::Index(values) => lines.index(values[row]),
-                Column::NumberOf(value) => lines.number(value(row))?,
-                Column::IndexOf(value) => lines.index(value(row)),
             }
         }
         lines.end_row()?;
@@ -117,34 +162,40 @@ pub fn write_columns(out: &mut dyn Write, columns: &[(&str, Column)]) -> io::Res
     lines.finish()
 }
 
-/// Writes `points.csv`; the rows' order is kept (x fastest, then y).
+/// Writes rows in their order, all their columns in that of the table.
 ///
 /// # Errors
 /// As [`write_columns`].
-pub fn write_points(out: &mut dyn Write, points: &[PointRow]) -> io::Result<()> {
-    let mut lines = Lines::begin(out, POINT_COLUMNS)?;
-    for point in points {
-        for value in [point.x_m, point.y_m, point.height_m]
-            .iter()
-            .chain(&point.normal)
-        {
-            lines.number(*value)?;
-        }
-        lines.end_row()?;
-    }
-    lines.finish()
+pub fn write_rows<R>(
+    out: &mut dyn Write,
+    columns: &[RowColumn<R>],
+    rows: impl IntoIterator<Item = R>,
+) -> io::Result<()> {
+    let none: [RowColumn<()>; 0] = [];
+    let rows = rows.into_iter().map(|row| (row, ()));
+    write_joined_rows(out, columns, none, rows)
 }
 
-/// Writes `currents.csv`.
+/// As [`write_rows`], for rows of two parts: the columns of the first, then those of the second.
 ///
 /// # Errors
 /// As [`write_columns`].
-pub fn write_currents(out: &mut dyn Write, currents: &[CurrentRow]) -> io::Result<()> {
-    let mut lines = Lines::begin(out, CURRENT_COLUMNS)?;
-    for row in currents {
-        lines.index(row.coil as i64);
-        for value in [row.x_m, row.y_m, row.current_a] {
-            lines.number(value)?;
+pub fn write_joined_rows<A, B>(
+    out: &mut dyn Write,
+    first: &[RowColumn<A>],
+    second: impl AsRef<[RowColumn<B>]>,
+    rows: impl IntoIterator<Item = (A, B)>,
+) -> io::Result<()> {
+    let second = second.as_ref();
+    let names = first.iter().map(|column| column.name);
+    let names = names.chain(second.iter().map(|column| column.name));
+    let mut lines = Lines::begin(out, names)?;
+    for (a, b) in rows {
+        for column in first {
+            lines.number((column.get)(&a))?;
+        }
+        for column in second {
+            lines.number((column.get)(&b))?;
         }
         lines.end_row()?;
     }
@@ -264,14 +315,14 @@ mod tests {
             height_m: 0.05,
             normal: [0.0, 0.6, 0.8],
         };
-        write_points(&mut text, &[point]).unwrap();
+        write_rows(&mut text, PointRow::COLUMNS, [point]).unwrap();
         let mut row = CurrentRow {
             coil: 7,
             x_m: 0.05,
             y_m: 0.0,
             current_a: 1.3,
         };
-        write_currents(&mut text, &[row]).unwrap();
+        write_rows(&mut text, CurrentRow::COLUMNS, [row]).unwrap();
         write_columns(
             &mut text,
             &[
@@ -286,9 +337,30 @@ mod tests {
              coil,x_m,y_m,current_a\n7,0.05,0,1.3\nt_s,coil\n0.7,3\n30,-1\n"
         );
         row.current_a = f64::NAN;
-        let error = write_currents(&mut Vec::new(), &[row]).unwrap_err();
+        let error = write_rows(&mut Vec::new(), CurrentRow::COLUMNS, [row]).unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::InvalidData);
         let uneven = [("a", Column::Number(&[0.7])), ("b", Column::Index(&[]))];
         assert!(write_columns(&mut Vec::new(), &uneven).is_err());
+    }
+
+    fn names<R>(columns: &[RowColumn<R>]) -> String {
+        let names: Vec<&str> = columns.iter().map(|column| column.name).collect();
+        names.join(",")
+    }
+
+    #[test]
+    fn the_page_of_bundles_names_every_column_and_names_end_in_their_units() {
+        let page = include_str!("../../results/README.md");
+        for names in [names(PointRow::COLUMNS), names(CurrentRow::COLUMNS)] {
+            assert!(page.contains(&format!("`{names}`")), "{names}");
+        }
+        let points = PointRow::COLUMNS.iter().map(|c| (c.name, c.unit));
+        let currents = CurrentRow::COLUMNS.iter().map(|c| (c.name, c.unit));
+        for (name, unit) in points.chain(currents).filter(|(_, unit)| !unit.is_empty()) {
+            assert!(
+                name.ends_with(&format!("_{}", unit.to_lowercase())),
+                "{name}"
+            );
+        }
     }
 }

@@ -17,7 +17,7 @@ use super::manifest::{MadeWith, Manifest, MapSidecar};
 use super::map_table::write_map;
 use super::npz::{MapArrays, to_npz};
 use super::seal::to_record;
-use super::table::{CurrentRow, PointRow, write_currents, write_points};
+use super::table::{CurrentRow, PointRow, write_rows};
 use super::timing::StageSeconds;
 use super::vtk::write_vti;
 
@@ -138,8 +138,12 @@ fn put_files(
         put("map.npz", &|out| {
             out.write_all(&to_npz(content.map).map_err(invalid)?)
         })?,
-        put("points.csv", &|out| write_points(out, content.points))?,
-        put("currents.csv", &|out| write_currents(out, content.currents))?,
+        put("points.csv", &|out| {
+            write_rows(out, PointRow::COLUMNS, content.points.iter().copied())
+        })?,
+        put("currents.csv", &|out| {
+            write_rows(out, CurrentRow::COLUMNS, content.currents.iter().copied())
+        })?,
         put("lambda.json", &|out| {
             out.write_all(&to_json(content.lambda).map_err(invalid)?)
         })?,

@@ -27,7 +27,7 @@ pub struct Common {
     pub color: Colour,
 }
 
-/// How results are told.
+/// How results are printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     /// A summary for people

@@ -28,26 +28,26 @@ pub fn grant(memory: Option<u64>) {
     }
 }
 
-/// Whether what was asked for comes from a document or from a flag of the command line.
+/// The origin of an amount of work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Asked {
+pub enum CostOrigin {
     /// A design or shape file.
     Document,
     /// A flag.
     Flag,
 }
 
-/// Who asks for the points of `shapes`: the flags of a surface given directly, or a file.
+/// The origin of the points of `shapes`: the flags of a surface given directly, or a file.
 #[must_use]
-pub fn asked(shapes: &[ShapeSource]) -> Asked {
+pub fn cost_origin(shapes: &[ShapeSource]) -> CostOrigin {
     if shapes.iter().any(|shape| shape.input.is_none()) {
-        Asked::Flag
+        CostOrigin::Flag
     } else {
-        Asked::Document
+        CostOrigin::Document
     }
 }
 
-/// What forces of `design` at the points of `shapes` take.
+/// The costs of the forces of `design` at the points of `shapes`.
 #[must_use]
 pub fn costs(design: &Design, shapes: &[ShapeSource], tolerance: Option<f64>) -> Vec<Cost> {
     let coils = design.array.positions_m.len();
@@ -64,13 +64,13 @@ pub fn costs(design: &Design, shapes: &[ShapeSource], tolerance: Option<f64>) ->
 /// More memory than allowed: a bad input where a document asks for it, wrong usage where a flag does.
 pub fn allow(
     costs: impl IntoIterator<Item = Cost>,
-    asked: Asked,
+    origin: CostOrigin,
     printer: &Printer,
 ) -> Result<(), Failure> {
     for cost in costs {
-        within(&cost).map_err(|message| match asked {
-            Asked::Flag => Failure::Usage(message),
-            Asked::Document => RunError::Input(message).into(),
+        within(&cost).map_err(|message| match origin {
+            CostOrigin::Flag => Failure::Usage(message),
+            CostOrigin::Document => RunError::Input(message).into(),
         })?;
         if let Some((error, tolerance)) = cost.misses {
             printer.notice(&format!(
@@ -95,7 +95,7 @@ pub fn allow(
 /// Whether `cost` is within the budget.
 ///
 /// # Errors
-/// What it would take, what there is, and what helps.
+/// The memory it would take, the memory there is, and what helps.
 pub fn within(cost: &Cost) -> Result<(), String> {
     let granted = GRANTED.get().copied();
     let budget = granted.map_or_else(|| SHARE * available_bytes(), |granted| granted as f64);

@@ -33,7 +33,7 @@ pub enum Code {
     Limits,
     /// The chosen lambda is null.
     NoForceConstant,
-    /// An accuracy that was asked for and not reached.
+    /// A requested accuracy that was not reached.
     Accuracy,
     /// No coil meets the limits.
     NoCoil,
@@ -157,13 +157,13 @@ impl Code {
         self.exit().map_or(101, Exit::code)
     }
 
-    /// What it means, in a line.
+    /// Its meaning, in a line.
     #[must_use]
     pub const fn meaning(self) -> &'static str {
         self.row().2
     }
 
-    /// What `--explain` prints about it.
+    /// The text of `--explain`.
     #[must_use]
     pub fn explanation(self) -> &'static str {
         let all = include_str!("explanations.txt");
@@ -185,8 +185,8 @@ mod tests {
             assert!(Code::ALL[..i].iter().all(|c| c.name() != code.name()));
             let digits = &code.name()[1..];
             let exit = code.exit_code().to_string();
-            let told = if exit.len() == 3 { 3 } else { 1 };
-            assert_eq!(digits[..told], exit, "{}", code.name());
+            let width = if exit.len() == 3 { 3 } else { 1 };
+            assert_eq!(digits[..width], exit, "{}", code.name());
         }
     }
 

@@ -1,4 +1,4 @@
-//! Pieces of summaries that several commands tell alike.
+//! Pieces of summaries that several commands print alike.
 
 use super::quantity::{count, error, length_error, mm, number};
 use crate::accuracy::StageAccuracy;
@@ -6,9 +6,9 @@ use crate::bundle::manifest::{AxisSummary, LeftOut};
 use crate::cli::layout::grid;
 use crate::design::Design;
 
-/// Coils beyond this many are told in sum, not one by one.
+/// Coils beyond this many are summed up, not listed.
 const COILS_SHOWN: usize = 100;
-/// Columns of coils that stand in no grid.
+/// Columns of coils that are not on a grid.
 const COLUMNS: usize = 8;
 /// Most columns that fit a screen.
 const COLUMNS_MAX: usize = 12;
@@ -42,12 +42,12 @@ pub fn array(design: &Design) -> String {
     }
 }
 
-/// Currents as the coils stand, seen from above: y grows upwards, x to the right.
+/// Currents as the coils are placed, seen from above: y grows upwards, x to the right.
 pub fn currents(design: &Design, currents_a: &[f64]) -> String {
     per_coil(design, "A", currents_a, 4)
 }
 
-/// One value a coil, with so many decimals, as the coils stand.
+/// One value per coil, with so many decimals, as the coils are placed.
 pub fn per_coil(design: &Design, unit: &str, values: &[f64], decimals: usize) -> String {
     let cells: Vec<String> = values.iter().map(|v| format!("{v:.decimals$}")).collect();
     if cells.len() == 1 {
@@ -100,7 +100,7 @@ pub fn heights(min_m: f64, max_m: f64) -> String {
     }
 }
 
-/// What was left out and what it costs, one line each.
+/// Each thing that was left out with its cost, one line each.
 pub fn left_out(parts: &[LeftOut]) -> String {
     let lines: Vec<String> = parts
         .iter()

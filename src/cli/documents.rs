@@ -31,7 +31,7 @@ pub struct DesignDocument {
 }
 
 impl DesignDocument {
-    /// The file that it names besides, which is read when the design is computed.
+    /// The other file that it names, which is read when the design is computed.
     pub fn also_read(&self) -> impl Iterator<Item = &Path> {
         self.design.curve_file().into_iter()
     }
@@ -69,7 +69,7 @@ pub fn design_and_shapes(
     match (design, shapes) {
         (Ok((design, warnings)), Ok(shapes)) => {
             printer.document_warnings(&warnings);
-            Ok((design, told(shapes, printer)))
+            Ok((design, with_warnings(shapes, printer)))
         }
         (Err(fault), Err(Failure::Documents(mut faults))) => {
             faults.insert(0, fault);
@@ -90,13 +90,13 @@ pub fn shapes(
     flags: &SurfaceFlags,
     printer: &Printer,
 ) -> Result<Vec<ShapeSource>, Failure> {
-    Ok(told(read_shapes(files, flags)?, printer))
+    Ok(with_warnings(read_shapes(files, flags)?, printer))
 }
 
 /// The points of a CSV table with columns `x_m,y_m,z_m`, and its entry among the inputs.
 ///
 /// # Errors
-/// Every cell that is no number; a file that cannot be read.
+/// Every cell that is not a number; a file that cannot be read.
 pub fn points(file: &FileArgument) -> Result<(Vec<[f64; 3]>, Input), Failure> {
     let name = file.as_given().display().to_string();
     let bytes = bytes_of(file, "a CSV table with columns x_m,y_m,z_m")?;
@@ -124,7 +124,7 @@ pub fn scan(file: &FileArgument, coils: usize) -> Result<(Scan, Input), Failure>
 /// A trajectory, and its entry among the inputs.
 ///
 /// # Errors
-/// Every cell that is no number; time that runs backwards; a file that cannot be read.
+/// Every cell that is not a number; time that runs backwards; a file that cannot be read.
 pub fn trajectory(file: &FileArgument) -> Result<(Trajectory, Input), Failure> {
     let name = file.as_given().display().to_string();
     let bytes = bytes_of(file, "a CSV table with columns t_s,x_m,y_m,z_m")?;
@@ -135,7 +135,7 @@ pub fn trajectory(file: &FileArgument) -> Result<(Trajectory, Input), Failure> {
 /// The plan of a sweep, and its entry among the inputs.
 ///
 /// # Errors
-/// A file that cannot be read, that is no plan, or a plan that was edited.
+/// A file that cannot be read, that is not a plan, or a plan that was edited.
 pub fn plan(file: &FileArgument) -> Result<(PlanFile, Input), Failure> {
     let name = file.as_given().display().to_string();
     let bytes = bytes_of(file, "the plan of a sweep")?;
@@ -209,14 +209,14 @@ fn read_design(
 /// A shape, and the warnings where a document describes it.
 type ReadShape = (ShapeSource, Option<Faults>);
 
-fn told(shapes: Vec<ReadShape>, printer: &Printer) -> Vec<ShapeSource> {
-    let tell = |(shape, warnings): ReadShape| {
+fn with_warnings(shapes: Vec<ReadShape>, printer: &Printer) -> Vec<ShapeSource> {
+    let warn = |(shape, warnings): ReadShape| {
         if let Some(warnings) = warnings {
             printer.document_warnings(&warnings);
         }
         shape
     };
-    shapes.into_iter().map(tell).collect()
+    shapes.into_iter().map(warn).collect()
 }
 
 /// Whether a shape is described by a document (as opposed to a surface given directly).

@@ -5,11 +5,11 @@ use serde::Serialize;
 use super::code::Code;
 use super::failure::Failure;
 use super::layout::{Side, table};
-use super::printer::{Place, Printer};
+use super::printer::{Printer, Stream};
 
-/// What is to be explained.
+/// The codes to be explained.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Asked {
+pub enum ExplainTarget {
     /// Every code, a line each.
     List,
     /// These, in full.
@@ -20,9 +20,9 @@ pub enum Asked {
 ///
 /// # Errors
 /// Anything else.
-pub fn asked(text: &str) -> Result<Asked, String> {
+pub fn target(text: &str) -> Result<ExplainTarget, String> {
     if text == "list" {
-        return Ok(Asked::List);
+        return Ok(ExplainTarget::List);
     }
     let meant = |code: &Code| {
         code.name().eq_ignore_ascii_case(text) || code.exit_code().to_string() == text
@@ -35,7 +35,7 @@ pub fn asked(text: &str) -> Result<Asked, String> {
             names.join(", ")
         ));
     }
-    Ok(Asked::Codes(codes))
+    Ok(ExplainTarget::Codes(codes))
 }
 
 #[derive(Serialize)]
@@ -52,14 +52,14 @@ struct Explanation {
     explanation: Option<&'static str>,
 }
 
-/// Prints what is asked for.
+/// Prints what is target for.
 ///
 /// # Errors
 /// Standard output that takes no more.
-pub fn run(asked: &Asked, printer: &Printer) -> Result<(), Failure> {
-    let (codes, full) = match asked {
-        Asked::List => (&Code::ALL[..], false),
-        Asked::Codes(codes) => (&codes[..], true),
+pub fn run(target: &ExplainTarget, printer: &Printer) -> Result<(), Failure> {
+    let (codes, full) = match target {
+        ExplainTarget::List => (&Code::ALL[..], false),
+        ExplainTarget::Codes(codes) => (&codes[..], true),
     };
     if printer.json() {
         let codes = codes.iter().map(|code| Explanation {
@@ -71,7 +71,7 @@ pub fn run(asked: &Asked, printer: &Printer) -> Result<(), Failure> {
         let explained = Explained {
             codes: codes.collect(),
         };
-        return printer.summary(Place::Output, &explained, String::new);
+        return printer.summary(Stream::Output, &explained, String::new);
     }
     let text = if full { pages(codes) } else { list(codes) };
     printer.data(|out| out.write_all(text.as_bytes()))
@@ -102,17 +102,23 @@ fn pages(codes: &[Code]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Asked, Code, asked};
+    use super::{Code, ExplainTarget, target};
 
     #[test]
     fn codes_are_found_by_name_and_by_exit_code() {
-        assert_eq!(asked("list"), Ok(Asked::List));
-        assert_eq!(asked("e402"), Ok(Asked::Codes(vec![Code::NoForceConstant])));
-        let Ok(Asked::Codes(codes)) = asked("5") else {
+        assert_eq!(target("list"), Ok(ExplainTarget::List));
+        assert_eq!(
+            target("e402"),
+            Ok(ExplainTarget::Codes(vec![Code::NoForceConstant]))
+        );
+        let Ok(ExplainTarget::Codes(codes)) = target("5") else {
             panic!("5 is an exit code");
         };
         assert_eq!(codes, [Code::Check, Code::Damaged]);
-        assert_eq!(asked("130"), Ok(Asked::Codes(vec![Code::Interrupted])));
-        assert!(asked("E999").unwrap_err().contains("E301"));
+        assert_eq!(
+            target("130"),
+            Ok(ExplainTarget::Codes(vec![Code::Interrupted]))
+        );
+        assert!(target("E999").unwrap_err().contains("E301"));
     }
 }

@@ -48,14 +48,14 @@ pub enum Failure {
     PipeClosed,
 }
 
-/// What a result was wished to be.
+/// A request that a result does not meet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Wish {
     /// Within the limits.
     Limits,
     /// One with a force constant.
     ForceConstant,
-    /// As accurate as asked for.
+    /// The requested accuracy.
     Accuracy,
     /// A coil.
     Coil,
@@ -66,7 +66,7 @@ pub enum Wish {
 }
 
 impl Failure {
-    /// What kind of failure it is; `None` where there is nothing to report.
+    /// The kind of failure; `None` where there is nothing to report.
     #[must_use]
     pub fn code(&self) -> Option<Code> {
         Some(match self {
@@ -163,7 +163,7 @@ impl From<JsonError> for Failure {
     }
 }
 
-/// One fault as `--format json` tells it; what is not known is absent.
+/// One fault as `--format json` states it; what is not known is absent.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct FaultEntry {
     /// `error` or `warning`.
@@ -180,12 +180,12 @@ pub struct FaultEntry {
     /// Dotted key of a document, or name of a table's column.
     #[serde(skip_serializing_if = "Option::is_none")]
     key: Option<String>,
-    /// What was expected, where the message says so.
+    /// The expected value, where the message states it.
     #[serde(skip_serializing_if = "Option::is_none")]
     expected: Option<String>,
-    /// What is wrong: what was expected and found.
+    /// The message: expected and actual value.
     message: String,
-    /// What to do.
+    /// Advice.
     #[serde(skip_serializing_if = "Option::is_none")]
     advice: Option<String>,
 }
@@ -244,7 +244,7 @@ impl FaultEntry {
     }
 }
 
-/// What a message says was expected.
+/// The expected value that a message states.
 fn expected(message: &str) -> Option<String> {
     let (_, after) = message.split_once("expected ")?;
     let end = after.find([';', '\n']).unwrap_or(after.len());

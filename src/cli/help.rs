@@ -1,6 +1,6 @@
 //! The end of every help page: exit codes and examples.
 
-/// The exit codes that a command can end with besides 0 and 2.
+/// The exit codes that a command can end with in addition to 0 and 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Codes {
     /// Prints only.

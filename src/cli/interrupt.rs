@@ -23,7 +23,7 @@ use crate::RunError;
 use crate::bundle::atomic::{awaited_folder, is_writing};
 use crate::progress::{Interrupted, stop_flag, stop_requested};
 
-/// Whether a signal ends the process at once: it was asked before, or no job polls.
+/// Whether a signal ends the process at once: it was signalled before, or no job polls.
 static ENDS: LazyLock<Arc<AtomicBool>> = LazyLock::new(|| Arc::new(AtomicBool::new(true)));
 /// Whether somebody has taken it on to report how the command ended.
 static ENDED: AtomicBool = AtomicBool::new(false);

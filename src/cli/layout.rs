@@ -43,7 +43,7 @@ impl Sheet {
         self.text.push('\n');
     }
 
-    /// Adds text as it stands.
+    /// Adds text unchanged.
     pub fn raw(&mut self, text: &str) {
         self.text.push_str(text);
     }

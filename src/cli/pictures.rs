@@ -6,7 +6,7 @@
 use std::path::PathBuf;
 
 use super::failure::Failure;
-use super::printer::{Place, Printer};
+use super::printer::{Printer, Stream};
 use super::values::FileArgument;
 use crate::RunError;
 use crate::bundle::artefact::Input;
@@ -24,7 +24,7 @@ pub struct Picture<'a> {
 }
 
 impl<'a> Picture<'a> {
-    /// The one that goes to `file`. `protected` are files that the run reads, or writes besides, and that
+    /// The one that goes to `file`. `protected` are files that the run also reads or writes, and that
     /// are not among its inputs.
     pub fn new<P: Into<PathBuf>>(
         file: &'a FileArgument,
@@ -53,15 +53,20 @@ impl<'a> Picture<'a> {
         }
     }
 
-    /// Writes it, whole or not at all. Tells where a summary may go besides.
+    /// Writes it, whole or not at all. Returns where a summary may still go.
     ///
     /// # Errors
     /// See [`Failure`].
-    pub fn write(&self, inputs: &[Input], text: &str, printer: &Printer) -> Result<Place, Failure> {
+    pub fn write(
+        &self,
+        inputs: &[Input],
+        text: &str,
+        printer: &Printer,
+    ) -> Result<Stream, Failure> {
         let path = match self.file {
             FileArgument::Standard => {
                 printer.data(|out| out.write_all(text.as_bytes()))?;
-                return Ok(Place::Error);
+                return Ok(Stream::Error);
             }
             FileArgument::Path(path) => path,
         };
@@ -72,7 +77,7 @@ impl<'a> Picture<'a> {
             out.write_all(text.as_bytes())
         })
         .map_err(RunError::from)?;
-        Ok(Place::Output)
+        Ok(Stream::Output)
     }
 
     fn overwrite(&self, mark: &str, inputs: &[Input]) -> Overwrite {

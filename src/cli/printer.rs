@@ -1,6 +1,6 @@
 //! The one place that talks: results to standard output, messages to standard error.
 //!
-//! With `--quiet` only errors and the data that was asked for (JSON, CSV, `--out -`) are left. With
+//! With `--quiet` only errors and the data that was requested (JSON, CSV, `--out -`) are left. With
 //! `--format json` warnings go into the JSON object, and a summary that belongs to standard error
 //! waits for the end of the command and goes into the error's object if there is an error, so that
 //! every stream holds one object at most.
@@ -34,7 +34,7 @@ pub struct Printer {
 
 /// Where a summary goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
+pub enum Stream {
     /// Standard output.
     Output,
     /// Standard error, because standard output holds the data itself.
@@ -60,9 +60,9 @@ struct ErrorFacts {
     code: &'static str,
     /// The process's exit code.
     exit_code: u8,
-    /// What the code means.
+    /// The code's meaning.
     meaning: &'static str,
-    /// What happened, one line a fault.
+    /// The message, one line per fault.
     message: String,
     faults: Vec<FaultEntry>,
     warnings: Vec<String>,
@@ -72,7 +72,7 @@ struct ErrorFacts {
 }
 
 impl ErrorFacts {
-    /// What is known of every failure of that kind.
+    /// The advice for every failure of that kind.
     fn of(code: Code) -> Self {
         Self {
             code: code.name(),
@@ -87,7 +87,7 @@ impl ErrorFacts {
 
     /// The object, on one line.
     fn line(self) -> String {
-        // Plain texts and whole numbers always can be told.
+        // Plain texts and whole numbers can always be written.
         serde_json::to_string(&ErrorObject { error: self }).unwrap_or_default()
     }
 }
@@ -119,7 +119,7 @@ impl Printer {
         self.format == Format::Json
     }
 
-    /// Whether only errors and data are told.
+    /// Whether only errors and data are printed.
     #[must_use]
     pub fn quiet(&self) -> bool {
         self.quiet
@@ -181,7 +181,7 @@ impl Printer {
     /// Standard output that takes no more.
     pub fn summary(
         &self,
-        place: Place,
+        place: Stream,
         json: &impl Serialize,
         human: impl FnOnce() -> String,
     ) -> Result<(), Failure> {
@@ -191,12 +191,12 @@ impl Printer {
             Format::Human => visible(&human()).into_owned().into_bytes(),
         };
         match place {
-            Place::Output => self.data(|out| out.write_all(&text)),
-            Place::Error if self.json() => {
+            Stream::Output => self.data(|out| out.write_all(&text)),
+            Stream::Error if self.json() => {
                 self.pending.replace(Some(text));
                 Ok(())
             }
-            Place::Error => {
+            Stream::Error => {
                 say(&String::from_utf8_lossy(&text));
                 Ok(())
             }
@@ -210,7 +210,7 @@ impl Printer {
         }
     }
 
-    /// Writes data that was asked for to standard output.
+    /// Writes requested data to standard output.
     ///
     /// # Errors
     /// Standard output that takes no more.
@@ -247,9 +247,9 @@ impl Printer {
                 .iter()
                 .map(|document| shown_path(document.faults.path()))
                 .collect();
-            self.tell(code, &format!("refused: {}", names.join(", ")));
+            self.report(code, &format!("refused: {}", names.join(", ")));
         } else {
-            self.tell(code, &failure.message());
+            self.report(code, &failure.message());
         }
     }
 
@@ -262,28 +262,28 @@ impl Printer {
             };
             say(&error.line());
         } else {
-            self.tell(Code::Internal, message);
+            self.report(Code::Internal, message);
         }
     }
 
     /// Reports wrong usage as `error` words it, and its code.
     pub fn usage(&self, error: &clap::Error) {
         if self.json() {
-            let told = error.render().to_string();
-            let message = told.trim().trim_start_matches("error: ").to_owned();
+            let usage = error.render().to_string();
+            let message = usage.trim().trim_start_matches("error: ").to_owned();
             self.failure(&Failure::Usage(message));
             return;
         }
         let plain = error.render().to_string();
-        let told = match visible(&plain) {
+        let shown = match visible(&plain) {
             Cow::Borrowed(_) if self.colour => error.render().ansi().to_string(),
             tame => tame.into_owned(),
         };
         let marked = format!("error[{}]:", Code::Arguments.name());
-        say(&told.replacen("error:", &marked, 1));
+        say(&shown.replacen("error:", &marked, 1));
     }
 
-    fn tell(&self, code: Code, message: &str) {
+    fn report(&self, code: Code, message: &str) {
         let head = self.head(&format!("error[{}]", code.name()), "31");
         say(&format!("{head} {}\n", visible(message)));
     }
@@ -297,7 +297,7 @@ impl Printer {
     }
 }
 
-/// Writes to standard error. Where that is closed there is nobody to tell.
+/// Writes to standard error. Where that is closed nobody reads it.
 pub fn say(text: &str) {
     let mut text = text.to_owned();
     if !text.ends_with('\n') {
@@ -308,6 +308,6 @@ pub fn say(text: &str) {
 
 /// Columns at which messages are wrapped.
 fn width() -> usize {
-    let told = std::env::var("COLUMNS").ok().and_then(|c| c.parse().ok());
-    told.unwrap_or(100).clamp(40, 160)
+    let columns = std::env::var("COLUMNS").ok().and_then(|c| c.parse().ok());
+    columns.unwrap_or(100).clamp(40, 160)
 }

@@ -20,7 +20,7 @@ pub fn number_to(value: f64, digits: i32) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
-    // Through the decimal digits: they tell the exponent after rounding.
+    // Through the decimal digits: they show the exponent after rounding.
     let rounded = format!("{:.*e}", (digits - 1).max(0) as usize, value);
     let exponent: i32 = rounded
         .split_once('e')
@@ -40,6 +40,16 @@ fn trimmed(text: &str) -> &str {
     } else {
         text
     }
+}
+
+/// `x 0 to 20, y -5 to 5, z 0 to 3`: a box's ends. What rounding left of a zero, a billionth of the
+/// box's largest coordinate or less, is one.
+pub fn extents(min: [f64; 3], max: [f64; 3]) -> String {
+    let largest = (min.iter().chain(&max)).fold(0.0, |m: f64, c| m.max(c.abs()));
+    let end = |c: f64| number(if c.abs() <= 1e-9 * largest { 0.0 } else { c });
+    let axis = |(k, name)| format!("{name} {} to {}", end(min[k]), end(max[k]));
+    let axes: Vec<String> = ["x", "y", "z"].into_iter().enumerate().map(axis).collect();
+    axes.join(", ")
 }
 
 /// `value` with five significant digits.
@@ -133,6 +143,14 @@ pub fn count(n: usize, thing: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A box that rests on zero printed as one from -1.7764e-15 mm on.
+    #[test]
+    fn what_rounding_left_of_zero_prints_as_zero() {
+        let printed = extents([-1.7764e-15, -5.0, 1e-7], [20.0, 5.3, 31.0]);
+        assert_eq!(printed, "x 0 to 20, y -5 to 5.3, z 1e-7 to 31");
+        assert_eq!(extents([-0.0; 3], [0.0; 3]), "x 0 to 0, y 0 to 0, z 0 to 0");
+    }
 
     #[test]
     fn the_prefix_suits_the_rounded_number() {

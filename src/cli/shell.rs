@@ -13,7 +13,7 @@ pub use super::exit::Exit;
 pub use super::failure::Failure;
 pub use super::help::{Codes, page};
 pub use super::layout::{Sheet, Side, table};
-pub use super::printer::{Place, Printer};
+pub use super::printer::{Printer, Stream};
 pub use super::quantity::{bytes, count, error, number_to, si};
 pub use super::start::{begin, folder};
 pub use super::values::FileArgument;
@@ -31,7 +31,7 @@ pub trait Program: CommandFactory + FromArgMatches {
         Self::from_arg_matches(matches)
     }
 
-    /// What every command takes.
+    /// The options of every command.
     fn common(&self) -> &Common;
 
     /// Runs it.
@@ -75,7 +75,7 @@ pub fn main<P: Program>(args: impl Iterator<Item = OsString>) -> ExitCode {
     }
 }
 
-/// Threads and memory, as asked for.
+/// Threads and memory, as requested.
 fn prepare(common: &Common) -> Result<(), Failure> {
     if let Some(threads) = common.threads {
         rayon::ThreadPoolBuilder::new()
@@ -105,7 +105,7 @@ fn told_early(args: &[OsString]) -> Common {
     }
 }
 
-/// Whether a panic is caught where it happens and told as what it means.
+/// Whether a panic is caught where it happens and reported as what it means.
 fn caught() -> bool {
     #[cfg(feature = "step")]
     return crate::shape::step::guards_panics();
@@ -113,9 +113,9 @@ fn caught() -> bool {
     false
 }
 
-/// What clap has to say: help, the version, or wrong usage.
+/// Clap's own output: help, the version, or wrong usage.
 fn not_parsed(error: &clap::Error, args: &[OsString]) -> Exit {
-    // Help is asked for, or shown where nothing was.
+    // Help is requested, or shown where nothing was.
     let help = matches!(
         error.kind(),
         ErrorKind::DisplayHelp
@@ -136,7 +136,7 @@ fn not_parsed(error: &clap::Error, args: &[OsString]) -> Exit {
     }
 }
 
-/// The colours of help and usage errors, which are told before the arguments are known.
+/// The colours of help and usage errors, which are printed before the arguments are known.
 fn colour_of(args: &[OsString]) -> ColorChoice {
     match value_of(args, "--color") {
         Some("always") => ColorChoice::Always,

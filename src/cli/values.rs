@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::lambda::Criterion;
+use crate::map::Components;
 use crate::shape::document::parse_unit;
 use crate::units::m_from_mm;
 
@@ -14,6 +15,13 @@ pub fn criterion() -> impl TypedValueParser<Value = Criterion> {
     let of = |criterion: &Criterion| PossibleValue::new(criterion.name()).help(criterion.meaning());
     let names = PossibleValuesParser::new(Criterion::ALL.iter().map(of));
     names.try_map(|name| name.parse::<Criterion>())
+}
+
+/// Any components of a map by their name.
+pub fn components() -> impl TypedValueParser<Value = Components> {
+    let of = |one: &Components| PossibleValue::new(one.name()).help(one.meaning());
+    let names = PossibleValuesParser::new(Components::ALL.iter().map(of));
+    names.try_map(|name| name.parse::<Components>())
 }
 
 /// Most threads that may be asked for.
@@ -106,7 +114,7 @@ pub fn noise(text: &str) -> Result<f64, String> {
     match number(text)? {
         noise if noise > 0.0 => Ok(noise),
         _ => Err(format!(
-            "{text} is no noise: expected a number greater than 0, like 1e-6"
+            "invalid noise {text}: expected a number greater than 0, like 1e-6"
         )),
     }
 }
@@ -168,7 +176,7 @@ pub fn tolerance(text: &str) -> Result<f64, String> {
         Ok(value)
     } else {
         Err(format!(
-            "{value:e} is no tolerance: expected {:e} to {:e}, the allowed error relative to the \
+            "invalid tolerance {value:e}: expected {:e} to {:e}, the allowed error relative to the \
              field gradient |grad B|, like 1e-9",
             TOLERANCE.start(),
             TOLERANCE.end()
@@ -183,7 +191,7 @@ pub fn jnd(text: &str) -> Result<f64, String> {
         Ok(value)
     } else {
         Err(format!(
-            "{value} is no just-noticeable difference: expected a part of the force greater than \
+            "invalid just-noticeable difference {value}: expected a part of the force greater than \
              0, like 0.07"
         ))
     }
@@ -196,7 +204,7 @@ pub fn force_constant(text: &str) -> Result<f64, String> {
         Ok(value)
     } else {
         Err(format!(
-            "{value} is no force constant: expected N/m, 0 or more, like 2.0"
+            "invalid force constant {value}: expected N/m, 0 or more, like 2.0"
         ))
     }
 }
@@ -206,7 +214,7 @@ pub fn pair(text: &str) -> Result<[usize; 2], String> {
     let coil = |text: &str| text.trim().parse::<usize>().ok();
     let coils = text.split_once('+');
     let found = coils.and_then(|(a, b)| Some([coil(a)?, coil(b)?]));
-    found.ok_or_else(|| format!("{text:?} is no pair of coils: expected two numbers, like 0+8"))
+    found.ok_or_else(|| format!("invalid pair of coils {text:?}: expected two numbers, like 0+8"))
 }
 
 /// A length in millimetres, 0 or more; m.
@@ -216,7 +224,7 @@ pub fn length(text: &str) -> Result<f64, String> {
         Ok(m_from_mm(value))
     } else {
         Err(format!(
-            "{value} is no distance: expected millimetres, 0 or more"
+            "invalid distance {value}: expected millimetres, 0 or more"
         ))
     }
 }

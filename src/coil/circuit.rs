@@ -2,6 +2,8 @@
 
 use std::f64::consts::PI;
 
+use serde::Serialize;
+
 use super::inductance::self_inductance_h;
 use fluxform_base::units::{
     COPPER_DENSITY_KG_PER_M3, COPPER_TEMPERATURE_COEFFICIENT_PER_K, REFERENCE_TEMPERATURE_C,
@@ -27,6 +29,27 @@ pub fn winding(coil: &Coil, wire: &Wire) -> Winding {
         outer_radius_m: 0.5 * coil.outer_diameter_m,
         length_m: coil.length_m,
         turns: coil.turns.unwrap_or_else(|| turns_that_fit(coil, wire)),
+    }
+}
+
+/// A coil's dimensions.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CoilSize {
+    /// Inner diameter, m.
+    pub inner_diameter_m: f64,
+    /// Outer diameter, m.
+    pub outer_diameter_m: f64,
+    /// Length, m.
+    pub length_m: f64,
+}
+
+impl From<&Coil> for CoilSize {
+    fn from(coil: &Coil) -> Self {
+        Self {
+            inner_diameter_m: coil.inner_diameter_m,
+            outer_diameter_m: coil.outer_diameter_m,
+            length_m: coil.length_m,
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::circuit::{Circuit, turns_that_fit};
 use fluxform_design::{Coil, Design, Limits};
@@ -328,6 +328,12 @@ pub static LIMITS: [Limit; 18] = [
     },
 ];
 
+impl Serialize for LimitName {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.key())
+    }
+}
+
 impl LimitName {
     /// Its row of the table.
     #[must_use]
@@ -351,6 +357,16 @@ impl LimitName {
     #[must_use]
     pub fn is_equality(self) -> bool {
         self.limit().direction == Direction::Equal
+    }
+
+    /// Whether it limits a dimension of the coil, not what it is made of or does.
+    #[must_use]
+    pub fn is_dimension(self) -> bool {
+        self.is_geometry()
+            || matches!(
+                self,
+                Self::OuterDiameter | Self::InnerDiameter | Self::Length
+            )
     }
 
     /// Whether it follows from geometry and cannot be blamed on a limit that was set.

@@ -60,8 +60,8 @@ struct Arguments {
     #[command(flatten)]
     common: Common,
     /// Explain an error code, like E301, or an exit code; `list` names all of them
-    #[arg(long, value_name = "CODE", value_parser = explain::asked)]
-    explain: Option<explain::Asked>,
+    #[arg(long, value_name = "CODE", value_parser = explain::target)]
+    explain: Option<explain::ExplainTarget>,
     /// The command.
     #[command(subcommand)]
     command: Option<Command>,
@@ -109,7 +109,7 @@ impl Program for Arguments {
 
     fn run(&self, printer: &Printer) -> Result<(), Failure> {
         match (&self.explain, &self.command) {
-            (Some(asked), _) => explain::run(asked, printer),
+            (Some(target), _) => explain::run(target, printer),
             (None, Some(command)) => run(command, printer),
             (None, None) => Ok(()),
         }

@@ -33,6 +33,7 @@ mod checks;
 pub mod diagnostics;
 mod draft;
 pub mod gauge;
+mod key;
 pub mod keys;
 mod limits;
 pub mod message_text;

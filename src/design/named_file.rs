@@ -69,6 +69,49 @@ pub fn read(path: &Path, max_bytes: u64) -> Result<Vec<u8>, NamedFileError> {
     }
 }
 
+/// Bytes that are read between two looks.
+const PIECE: u64 = 1 << 20;
+
+/// The same; `watch` sees every piece as it is read, and ends the reading by false: then there is
+/// no result.
+///
+/// # Errors
+/// [`NamedFileError`].
+pub fn read_watched(
+    path: &Path,
+    max_bytes: u64,
+    watch: &mut dyn FnMut(&[u8]) -> bool,
+) -> Result<Option<Vec<u8>>, NamedFileError> {
+    let (mut file, stated) = open(path, max_bytes)?;
+    let mut bytes = Vec::new();
+    loop {
+        let from = bytes.len();
+        // What is never read is never held: room is made as the file turns out to be one.
+        if bytes.capacity() == from {
+            let room = (stated + 1 - from as u64).min((from as u64).max(PIECE));
+            bytes
+                .try_reserve_exact(usize::try_from(room).unwrap_or(usize::MAX))
+                .map_err(io::Error::from)?;
+        }
+        let left = stated + 1 - from as u64;
+        (&mut file).take(left.min(PIECE)).read_to_end(&mut bytes)?;
+        if bytes.len() == from {
+            break;
+        }
+        if !watch(&bytes[from..]) {
+            return Ok(None);
+        }
+        if bytes.len() as u64 > stated {
+            break;
+        }
+    }
+    if bytes.len() as u64 == stated {
+        Ok(Some(bytes))
+    } else {
+        Err(NamedFileError::OtherLength)
+    }
+}
+
 fn regular(found: &fs::Metadata) -> Result<(), NamedFileError> {
     if found.is_dir() {
         Err(NamedFileError::Folder)

@@ -15,7 +15,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::diagnostics::{Fault, Faults, InvalidDocument, Severity};
-use super::keys::{Key, Keys, Without};
+use super::key::{Key, Keys, Without};
 use super::message_text::{QUOTED_MAX, escaped, nearest, quoted};
 
 /// A value and its bytes in the text (those of its section where it is a default).

@@ -5,7 +5,7 @@ use toml::de::DeValue;
 
 use super::diagnostics::Fault;
 use super::gauge::awg_mm;
-use super::keys::Without;
+use super::key::Without;
 use super::message_text::{axis_fault, nearest, number, quoted};
 use super::reader::{Located, Section, ValueRef};
 use super::rule::{Bound, Rule};

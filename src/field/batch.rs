@@ -6,6 +6,7 @@
 //! are given to the exact path.
 
 use super::winding::{AxialField, OnEdge, Winding, sheet_end};
+use crate::components::Components;
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::dispatch::{self, Kernel, LANES, Lanes};
 use fluxform_numerics::gauss;
@@ -19,23 +20,14 @@ const BOUND_SCALE: f64 = 16.0;
 /// Digits that the quick form may lose to rounding, relative to the tolerance.
 const ROUNDING_SHARE: f64 = 0.1;
 
-/// What the batch gives a point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantities {
-    /// dB_z/dz only.
-    Gz,
-    /// dB_z/dz, (dB_r/dz)/r and B_r/r: the whole gradient outside the conductor.
-    Gradient,
-}
-
 /// The gradient's independent components outside the conductor, per ampere, one entry a point.
 #[derive(Debug, Clone, Default)]
 pub struct Gradients {
     /// dB_z/dz, T/m/A.
     pub dbz_dz: Vec<f64>,
-    /// (dB_r/dz)/r = (dB_z/dr)/r, T/m^2/A; empty for [`Quantities::Gz`].
+    /// (dB_r/dz)/r = (dB_z/dr)/r, T/m^2/A; empty for [`Components::Gz`].
     pub dbr_dz_over_r: Vec<f64>,
-    /// B_r/r, T/m/A; empty for [`Quantities::Gz`].
+    /// B_r/r, T/m/A; empty for [`Components::Gz`].
     pub br_over_r: Vec<f64>,
 }
 
@@ -129,14 +121,14 @@ impl Winding {
         r_m: &[f64],
         z_m: &[f64],
         tolerance: f64,
-        wanted: Quantities,
+        components: Components,
     ) -> Result<Gradients, OnEdge> {
         assert_eq!(r_m.len(), z_m.len(), "one height a radius");
         let mut out = Gradients {
             dbz_dz: vec![0.0; r_m.len()],
             ..Gradients::default()
         };
-        if wanted == Quantities::Gradient {
+        if components != Components::Gz {
             out.dbr_dz_over_r = vec![0.0; r_m.len()];
             out.br_over_r = vec![0.0; r_m.len()];
         }
@@ -153,9 +145,9 @@ impl Winding {
                         r_m: r,
                         z_m: z,
                         dbz_dz: &mut out.dbz_dz[range.clone()],
-                        rest: match wanted {
-                            Quantities::Gz => None,
-                            Quantities::Gradient => Some((
+                        rest: match components {
+                            Components::Gz => None,
+                            Components::Gradient | Components::All => Some((
                                 &mut out.dbr_dz_over_r[range.clone()],
                                 &mut out.br_over_r[range],
                             )),
@@ -172,7 +164,7 @@ impl Winding {
                             ..
                         } = self.field(r_m[index], z_m[index])?;
                         out.dbz_dz[index] = dbz_dz;
-                        if wanted == Quantities::Gradient {
+                        if components != Components::Gz {
                             out.dbr_dz_over_r[index] = dbr_dz_over_r;
                             out.br_over_r[index] = br_over_r;
                         }

@@ -26,6 +26,7 @@
 //! ```
 
 pub mod batch;
+pub mod components;
 pub mod dipole;
 pub mod frame;
 pub mod magnet;

@@ -1,13 +1,14 @@
 //! What a map needs of an axisymmetric source, be it a winding alone or one with its core.
 
-use super::batch::{Gradients, Quantities};
+use super::batch::Gradients;
+use super::components::Components;
 use super::winding::{OnEdge, Winding};
 
 /// A source that is symmetric about the z axis, per ampere. Outside its conductors and cores the
 /// field is the gradient of a harmonic function.
 pub trait AxialSource: Sync {
     /// Gradients per ampere at points (`r_m`, `z_m`), to `tolerance` relative to the largest
-    /// |grad B| at each point's height.
+    /// |grad B| at each point's height; of `components` those that belong to the gradient.
     ///
     /// # Errors
     /// [`OnEdge`] where the gradient is unbounded at a point.
@@ -16,7 +17,7 @@ pub trait AxialSource: Sync {
         r_m: &[f64],
         z_m: &[f64],
         tolerance: f64,
-        wanted: Quantities,
+        components: Components,
     ) -> Result<Gradients, OnEdge>;
 
     /// B_z per ampere, T/A, to `tolerance` relative to the largest |B| at each point's height.
@@ -35,9 +36,9 @@ impl AxialSource for Winding {
         r_m: &[f64],
         z_m: &[f64],
         tolerance: f64,
-        wanted: Quantities,
+        components: Components,
     ) -> Result<Gradients, OnEdge> {
-        Self::gradients(self, r_m, z_m, tolerance, wanted)
+        Self::gradients(self, r_m, z_m, tolerance, components)
     }
 
     fn axial_fields(&self, r_m: &[f64], z_m: &[f64], tolerance: f64) -> Result<Vec<f64>, OnEdge> {

@@ -12,10 +12,13 @@
 //! is too strong somewhere) to a largest one, `min_j (max + F_p,j) / h_j` for heights above zero.
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::allocation::{Allocator, AllocatorError};
 use super::certificate::best_within_limits;
 use super::problem::{ForceProblem, ProblemError, Settings};
+use super::wiring::Wiring;
 
 /// Points handled together: fixed, so that sums do not depend on the number of threads.
 const CHUNK_POINTS: usize = 4096;
@@ -188,36 +191,47 @@ impl Span {
     }
 }
 
-/// A surface rendered at one force constant with currents of least power at every point. Means
-/// are over the points, by their weights.
-#[derive(Debug, Clone, PartialEq)]
+/// A surface with the currents of least power at every point; means by the points' weights.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Rendered {
-    /// Force constant, N/m.
+    /// N/m.
     pub lambda_n_per_m: f64,
-    /// Root of the mean square force error, N; 0 where every force is within reach.
+    /// N; 0 where every force is within reach.
     pub rms_error_n: f64,
-    /// Largest force error, N.
+    /// N.
     pub worst_error_n: f64,
     /// Points whose force is beyond reach.
-    pub unreached: usize,
-    /// Mean of sum R_i I_i^2, W.
+    pub points_unreached: usize,
+    /// Mean power in the coils, W.
     pub mean_power_w: f64,
-    /// Largest of it at any point, W.
+    /// Largest power at any point, W.
     pub max_power_w: f64,
-    /// Largest |current| of each coil at any point, A.
+    /// Largest |current| of any coil, A.
+    pub largest_current_a: f64,
+    /// Largest |current| of each coil, A.
     pub current_max_a: Vec<f64>,
-    /// Root of the mean square current of each coil, A.
+    /// Root mean square current of each coil, A.
     pub current_rms_a: Vec<f64>,
-    /// Share of the points at which each coil is active.
+    /// Share of the points at which each coil carries more than 1e-6 of its limit.
     pub active_share: Vec<f64>,
-    /// Mean number of active coils.
+    /// Mean number of such coils.
     pub active_mean: f64,
-    /// Fewest active coils at any point.
+    /// Fewest at any point.
     pub active_min: usize,
-    /// Most active coils at any point.
+    /// Most at any point.
     pub active_max: usize,
     /// Force at each point, the one without currents included, N.
+    #[serde(skip)]
     pub forces_n: Vec<f64>,
+}
+
+impl Rendered {
+    /// Gives both coils of a pair their common current and share.
+    pub fn spread(&mut self, wiring: &Wiring) {
+        wiring.spread(&mut self.current_max_a);
+        wiring.spread(&mut self.current_rms_a);
+        wiring.spread(&mut self.active_share);
+    }
 }
 
 /// Renders every point by itself: eq. 8 with the currents of least power.
@@ -366,9 +380,10 @@ impl Sums {
             lambda_n_per_m,
             rms_error_n: mean(self.square).sqrt(),
             worst_error_n: self.worst,
-            unreached: self.unreached,
+            points_unreached: self.unreached,
             mean_power_w: mean(self.power),
             max_power_w: self.most_power,
+            largest_current_a: self.largest.iter().copied().fold(0.0, f64::max),
             current_rms_a: self.squares.iter().map(|sum| mean(*sum).sqrt()).collect(),
             active_mean: mean(self.active.iter().sum()),
             active_share: self.active.iter().map(|sum| mean(*sum)).collect(),

@@ -1,13 +1,16 @@
 //! Coils that are broken, or wired in series, as changes of a force problem.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::problem::ForceProblem;
 
-/// What is changed about the coils.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+/// Coils that do not carry a current of their own.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Wiring {
-    /// Coils that carry no current.
+    /// Coils without current.
     pub broken: Vec<usize>,
-    /// Pairs that carry one current; it counts once in the sum that the supply limits.
+    /// Pairs with one current, which counts once in the sum that the supply limits.
     pub series: Vec<[usize; 2]>,
 }
 

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use rayon::prelude::*;
 
 use super::harmonic::{Extent, Table, kind};
-use super::map_source::{GRADIENT, Sampler, gz, series, tensor};
+use super::map_source::{GRADIENT, Sampler, gz, tensor};
 use super::tabulate::{Components, FieldMap, Grid, MapError, PlacedCoil};
 use fluxform_base::progress::Progress;
 
@@ -28,6 +28,7 @@ pub struct TableReport {
     /// Points sampled for the table and its check, over all attempts.
     pub samples: usize,
     /// Nodes along x, y, z.
+    #[serde(rename = "nodes")]
     pub degrees: [usize; 3],
     /// Coefficients kept, over all drives and components.
     pub coefficients: usize,
@@ -150,7 +151,7 @@ impl<'a> SampledField<'a> {
         progress: &dyn Progress,
     ) -> Result<FieldMap, MapError> {
         let (plane, heights) = (grid.x_m.len() * grid.y_m.len(), grid.z_m.len());
-        let count = series(self.components);
+        let count = self.components.count();
         let place: Vec<[f64; 2]> = grid
             .y_m
             .iter()
@@ -234,7 +235,7 @@ impl<'a> SampledField<'a> {
                 None
             } else {
                 let points: Vec<[f64; 3]> = nodes_m.iter().map(|[x, y]| [*x, *y, *z_m]).collect();
-                let series = self.sampler.drives() * series(self.components);
+                let series = self.sampler.drives() * self.components.count();
                 let mut out = vec![0.0; series * nodes_m.len()];
                 self.sampler.sample(&points, self.components, &mut out)?;
                 Some(out)
@@ -301,7 +302,7 @@ fn certify(
     let points: Vec<[f64; 3]> = (planes.iter().zip(&heights))
         .flat_map(|(plane, z)| plane.iter().map(move |[x, y]| [*x, *y, *z]))
         .collect();
-    let count = sampler.drives() * series(components);
+    let count = sampler.drives() * components.count();
     let mut exact = vec![0.0; count * points.len()];
     sampler.sample(&points, components, &mut exact)?;
     let mut certificate = 0.0_f64;

@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use super::map_source::{GRADIENT, Sampler, series};
+use super::map_source::{GRADIENT, Sampler};
 use super::tabulate::{Components, MapError};
 use fluxform_numerics::laplace::Laplace;
 use fluxform_numerics::matrix::{product, transpose};
@@ -193,7 +193,7 @@ impl Table {
             asked.push(points.len());
             starts.push(starts[starts.len() - 1] + layer.x.len() * layer.y.len());
         }
-        let count = sampler.drives() * series(components);
+        let count = sampler.drives() * components.count();
         let mut samples = vec![0.0; count * points.len()];
         sampler.sample(&points, components, &mut samples)?;
 
@@ -334,5 +334,5 @@ pub struct Stencil {
 
 /// Of the gradient or of the field.
 pub(super) fn kind(place: usize, components: Components) -> usize {
-    usize::from(place % series(components) >= GRADIENT)
+    usize::from(place % components.count() >= GRADIENT)
 }

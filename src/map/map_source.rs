@@ -1,6 +1,6 @@
 //! What a map needs of a source without symmetry: an array whose cores all answer to every coil.
 
-use fluxform_field::steel::equivalent_dipoles::{ArraySources, Parts};
+use fluxform_field::steel::equivalent_dipoles::ArraySources;
 
 use super::tabulate::{Components, MapError};
 
@@ -14,7 +14,7 @@ pub trait Sampler: Sync {
     fn top_m(&self) -> f64;
 
     /// Values per ampere of every drive at `points_m`, into `out`, [drive, component, point],
-    /// with [`series`] components a drive: dB_z/dz for [`Components::Gz`]; dB_x/dx, dB_x/dy,
+    /// with [`Components::count`] components per drive: dB_z/dz for [`Components::Gz`]; dB_x/dx, dB_x/dy,
     /// dB_x/dz, dB_y/dz, dB_z/dz for [`Components::Gradient`] (the tensor has no trace and is
     /// symmetric outside the sources), T/m/A; then B_x, B_y, B_z for [`Components::All`], T/A.
     ///
@@ -29,16 +29,6 @@ pub trait Sampler: Sync {
         components: Components,
         out: &mut [f64],
     ) -> Result<(), MapError>;
-}
-
-/// Number of independent components of a drive.
-#[must_use]
-pub fn series(components: Components) -> usize {
-    match components {
-        Components::Gz => 1,
-        Components::Gradient => GRADIENT,
-        Components::All => GRADIENT + 3,
-    }
 }
 
 /// Independent components of the gradient.
@@ -57,16 +47,6 @@ pub(super) fn tensor([xx, xy, xz, yz, zz]: [f64; GRADIENT]) -> [f64; 9] {
     [xx, xy, xz, xy, -xx - zz, yz, xz, yz, zz]
 }
 
-/// What is sampled for a map's components.
-#[must_use]
-pub fn parts_of(components: Components) -> Parts {
-    match components {
-        Components::Gz => Parts::Gz,
-        Components::Gradient => Parts::Gradient,
-        Components::All => Parts::All,
-    }
-}
-
 impl Sampler for ArraySources {
     fn drives(&self) -> usize {
         Self::drives(self)
@@ -82,7 +62,7 @@ impl Sampler for ArraySources {
         components: Components,
         out: &mut [f64],
     ) -> Result<(), MapError> {
-        Self::sample(self, points_m, parts_of(components), out);
+        Self::sample(self, points_m, components, out);
         Ok(())
     }
 }

@@ -13,7 +13,6 @@ use rayon::prelude::*;
 
 use super::tabulate::{Components, FieldMap, Grid, MapError, PlacedCoil};
 use fluxform_base::progress::Progress;
-use fluxform_field::batch::Quantities;
 use fluxform_field::source::AxialSource;
 use fluxform_numerics::chebyshev::{Evaluation, Layout, Scattered, Table};
 use fluxform_numerics::dispatch;
@@ -251,9 +250,9 @@ impl<'a> MeanField<'a> {
     ) -> Result<(), MapError> {
         let z_m = z_m + oz;
         let wanted = if self.count == 1 {
-            Quantities::Gz
+            Components::Gz
         } else {
-            Quantities::Gradient
+            Components::Gradient
         };
         // At one height the source, too, is a series in the radius.
         let farthest_m = self.radius_m + ox.hypot(oy);

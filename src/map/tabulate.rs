@@ -10,23 +10,12 @@ use rayon::prelude::*;
 
 use super::radii::Radii;
 use fluxform_base::progress::{Interrupted, Progress};
-use fluxform_field::batch::Quantities;
+pub use fluxform_field::components::Components;
 use fluxform_field::frame::to_cartesian;
 use fluxform_field::source::AxialSource;
 use fluxform_field::winding::{AxialField, OnEdge};
 use fluxform_numerics::chebyshev::{Evaluation, Layout};
 use fluxform_numerics::dispatch;
-
-/// What a map holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Components {
-    /// dB_z/dz.
-    Gz,
-    /// dB_z/dz and the whole gradient tensor.
-    Gradient,
-    /// dB_z/dz, the gradient tensor and the field.
-    All,
-}
 
 /// Maps per ampere of every coil over a grid, C order.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -249,12 +238,8 @@ impl Level {
         components: Components,
         tolerance: f64,
     ) -> Result<Self, OnEdge> {
-        let wanted = match components {
-            Components::Gz => Quantities::Gz,
-            Components::Gradient | Components::All => Quantities::Gradient,
-        };
         let heights = vec![z_m; radii_m.len()];
-        let gradients = source.gradients(radii_m, &heights, tolerance, wanted)?;
+        let gradients = source.gradients(radii_m, &heights, tolerance, components)?;
         let b_z = if components == Components::All {
             source.axial_fields(radii_m, &heights, tolerance)?
         } else {

@@ -1,14 +1,10 @@
 //! One core along its B-H curve, alone with its winding at a given current.
 
 use super::Scene;
-use super::steel::SceneCore;
+use super::core_material::SceneCore;
 use crate::RunError;
 use crate::field::steel::bh_curve::BhCurve;
 use crate::field::steel::saturated_coil::{CoilWithCurve, SaturatedCoil, SaturatedCoilError};
-
-/// Default tolerance along a B-H curve: the curve's kinks cross the elements, so that digits are
-/// dear.
-pub const SATURATED_TOLERANCE: f64 = 1e-4;
 
 /// The coil of `scene` at `current_a` along `curve`, to `tolerance` from `height_m` up, or as far
 /// as the refinements carry.

@@ -1,4 +1,4 @@
-//! A design's field, kept from run to run beside its bundles.
+//! A design's field, cached from run to run beside its bundles.
 //!
 //! What coils, steel and magnet give does not depend on current limits, criteria or the
 //! just-noticeable difference: as long as those alone change, steel, forces and maps are read and
@@ -7,7 +7,7 @@
 use std::sync::OnceLock;
 
 use super::Scene;
-use super::maps::{Felt, SceneMap};
+use super::maps::{MagnetMean, SceneMap};
 use super::passive;
 use super::steel::{self, Solved};
 use crate::RunError;
@@ -31,22 +31,22 @@ pub const STORE_FOLDER: &str = ".fluxform-kept";
 /// Entry of the design's steel.
 const STEEL: &str = "steel";
 
-/// Where a design's field is kept.
+/// Where a design's field is cached.
 #[derive(Debug)]
 pub struct FieldStore {
     store: Store,
-    /// The same, for what does not depend on the design: kept without steel too.
+    /// The same, for what does not depend on the design: cached without steel too.
     shapes: Store,
     field: Origin,
-    /// Of the design's array, once a shape has asked for it.
+    /// Of the design's array, once a shape needs it.
     inspection: OnceLock<Inspection>,
 }
 
 impl FieldStore {
-    /// The field of `scene` to `tolerance`, with the text of its magnetisation curve's table if it
-    /// has one, in `store`. Without steel nothing is kept: computing is faster than reading.
+    /// The field of `scene`, with the text of its magnetisation curve's table if it
+    /// has one, in `store`. Without steel nothing is cached: computing is faster than reading.
     #[must_use]
-    pub fn new(scene: &Scene, tolerance: Option<f64>, curve: Option<&str>, store: Store) -> Self {
+    pub fn new(scene: &Scene, curve: Option<&str>, store: Store) -> Self {
         let design = scene.design;
         let shapes = store.clone();
         let store = if design.core.is_some() {
@@ -54,7 +54,7 @@ impl FieldStore {
         } else {
             Store::none()
         };
-        // Debug text tells every number to the last bit.
+        // Debug text holds every number to the last bit.
         let parts = format!(
             "{:?}",
             (
@@ -64,7 +64,7 @@ impl FieldStore {
                 &design.array,
                 &design.magnet,
                 design.workspace.z_m.from,
-                tolerance,
+                scene.tolerances,
             )
         );
         let mut field = Origin::of_build(BUILD).and(parts.as_bytes());
@@ -88,19 +88,14 @@ impl FieldStore {
         self.store.holds(STEEL, &self.field)
     }
 
-    /// As [`steel::solve`].
+    /// As [`steel::solve`], as finely as maps need it.
     ///
     /// # Errors
     /// As [`steel::solve`].
-    pub fn steel(
-        &self,
-        scene: &Scene,
-        tolerance: Option<f64>,
-        air_default: f64,
-    ) -> Result<Solved, RunError> {
+    pub fn steel(&self, scene: &Scene) -> Result<Solved, RunError> {
         let lowest_m = scene.design.workspace.z_m.from;
         self.store.remember(STEEL, &self.field, || {
-            steel::solve(scene, tolerance, air_default, lowest_m)
+            steel::solve(scene, scene.tolerances.map, lowest_m)
         })
     }
 
@@ -108,19 +103,19 @@ impl FieldStore {
     #[must_use]
     pub fn of_shape<'a>(&'a self, name: &'a str) -> ShapeField<'a> {
         ShapeField {
-            kept: Some((self, name)),
+            cached: Some((self, name)),
         }
     }
 }
 
-/// What one shape needs of a design's field.
+/// The part of a design's field that one shape needs.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ShapeField<'a> {
-    kept: Option<(&'a FieldStore, &'a str)>,
+    cached: Option<(&'a FieldStore, &'a str)>,
 }
 
 impl<'a> ShapeField<'a> {
-    /// As [`Scene::forces_n_per_a`]; `what` tells these points from others of the shape.
+    /// As [`Scene::forces_n_per_a`]; `what` is their name among the points of the shape.
     ///
     /// # Errors
     /// As [`Scene::forces_n_per_a`].
@@ -133,7 +128,7 @@ impl<'a> ShapeField<'a> {
         progress: &dyn Progress,
     ) -> Result<Vec<f64>, RunError> {
         let compute = || scene.forces_n_per_a(solved, points_m, progress);
-        let Some((FieldStore { store, field, .. }, shape)) = self.kept else {
+        let Some((FieldStore { store, field, .. }, shape)) = self.cached else {
             return compute();
         };
         let origin = field
@@ -152,7 +147,7 @@ impl<'a> ShapeField<'a> {
         points_m: &[[f64; 3]],
     ) -> Result<Vec<f64>, RunError> {
         let compute = || passive::left_out_z_n(scene, points_m);
-        let Some((FieldStore { store, field, .. }, shape)) = self.kept else {
+        let Some((FieldStore { store, field, .. }, shape)) = self.cached else {
             return compute();
         };
         let origin = field
@@ -169,22 +164,24 @@ impl<'a> ShapeField<'a> {
     pub fn peak_t(self, array: &CoupledArray, currents_a: &[f64]) -> Result<f64, OnEdge> {
         let depth_m = peak_depth_m(array.response.outline.shape);
         let most = |peaks: Vec<f64>| peaks.into_iter().fold(0.0, f64::max);
-        let Some((kept, shape)) = self.kept else {
+        let Some((cached, shape)) = self.cached else {
             let inspection = Inspection::new(array, depth_m)?;
             return inspection.peaks_t(array, currents_a).map(most);
         };
         let numbers = currents_a.iter().copied().chain([depth_m]);
-        let origin = kept.field.clone().and_numbers(numbers);
-        kept.store.remember(&format!("{shape}.peak"), &origin, || {
-            let inspection = match kept.inspection.get() {
-                Some(inspection) => inspection,
-                None => {
-                    let made = Inspection::new(array, depth_m)?;
-                    kept.inspection.get_or_init(|| made)
-                }
-            };
-            inspection.peaks_t(array, currents_a).map(most)
-        })
+        let origin = cached.field.clone().and_numbers(numbers);
+        cached
+            .store
+            .remember(&format!("{shape}.peak"), &origin, || {
+                let inspection = match cached.inspection.get() {
+                    Some(inspection) => inspection,
+                    None => {
+                        let made = Inspection::new(array, depth_m)?;
+                        cached.inspection.get_or_init(|| made)
+                    }
+                };
+                inspection.peaks_t(array, currents_a).map(most)
+            })
     }
 
     /// The entry of what is found of the points of `document`, read from `inputs`.
@@ -196,7 +193,7 @@ impl<'a> ShapeField<'a> {
             |origin, input| origin.and(input.sha256.as_bytes()),
         );
         Entry {
-            store: self.kept.map(|(field, _)| &field.shapes),
+            store: self.cached.map(|(field, _)| &field.shapes),
             name: format!("{}.points", document.name),
             origin,
         }
@@ -214,15 +211,15 @@ impl<'a> ShapeField<'a> {
         coils: &[PlacedCoil],
         grid: &Grid,
         components: Components,
-        felt: &Felt,
+        magnet: &MagnetMean,
         progress: &dyn Progress,
     ) -> Result<SceneMap, RunError> {
-        let compute = || SceneMap::new(scene, solved, coils, grid, components, felt, progress);
-        let Some((FieldStore { store, field, .. }, shape)) = self.kept else {
+        let compute = || SceneMap::new(scene, solved, coils, grid, components, magnet, progress);
+        let Some((FieldStore { store, field, .. }, shape)) = self.cached else {
             return compute();
         };
         let coils: Vec<usize> = coils.iter().map(|coil| coil.number).collect();
-        let what = format!("{:?}", (coils, components, felt));
+        let what = format!("{:?}", (coils, components, magnet));
         let origin = [&grid.x_m, &grid.y_m, &grid.z_m]
             .into_iter()
             .fold(field.clone().and(what.as_bytes()), |origin, nodes| {
@@ -232,7 +229,7 @@ impl<'a> ShapeField<'a> {
     }
 }
 
-/// What is kept of a shape's points.
+/// The cached certificate of a shape's points.
 #[derive(Debug)]
 pub struct Entry<'a> {
     store: Option<&'a Store>,
@@ -241,7 +238,7 @@ pub struct Entry<'a> {
 }
 
 impl Entry<'_> {
-    /// What an earlier run found.
+    /// The result of an earlier run.
     #[must_use]
     pub fn known(&self) -> Option<Certificate> {
         self.store?.recall(&self.name, &self.origin)

@@ -4,7 +4,8 @@
 //! proportional to the work.
 
 use super::Scene;
-use super::steel::{self, COUPLED_TOLERANCE};
+use super::coupled;
+use super::tolerances::Tolerances;
 use crate::design::Design;
 use crate::field::steel::array::closest_m;
 use crate::field::steel::array_cost::ArrayCost;
@@ -24,7 +25,7 @@ const PROBE_VALUE_BYTES: f64 = 16.0;
 /// Operations a second of one thread on the products of a coupled array.
 const OPERATIONS_PER_S: f64 = 2e9;
 
-/// What a part of a job takes.
+/// Memory and time of a part of a job.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cost {
     /// The part, as messages name it.
@@ -106,12 +107,12 @@ pub fn of_probe(design: &Design, points: usize, components: usize) -> Cost {
 /// The steel of a coupled array; `None` where the design has none, or does not say enough.
 #[must_use]
 pub fn of_steel(design: &Design, tolerance: Option<f64>) -> Option<Cost> {
-    if !steel::coupled(design) {
+    if !coupled(design) {
         return None;
     }
     let scene = Scene::new(design).ok()?;
     let positions_m = &design.array.positions_m;
-    let tolerance = tolerance.unwrap_or(COUPLED_TOLERANCE);
+    let tolerance = Tolerances::of_inductances(tolerance);
     let cost = ArrayCost::new(
         scene.core.as_ref()?.shape,
         scene.winding.length_m,
@@ -132,7 +133,7 @@ pub fn of_steel(design: &Design, tolerance: Option<f64>) -> Option<Cost> {
 /// out (then few cores are coupled), or does not say enough.
 #[must_use]
 pub fn of_pull(design: &Design, tolerance: f64) -> Option<Cost> {
-    if !design.magnet.passive_force || !steel::coupled(design) {
+    if !design.magnet.passive_force || !coupled(design) {
         return None;
     }
     let scene = Scene::new(design).ok()?;

@@ -5,8 +5,7 @@
 //! some hundred times better. Both are stated, the sampled one as the estimate.
 
 use super::Scene;
-use super::steel::{Solved, Steel};
-use crate::field::winding::{AxialField, OnEdge};
+use super::steel::Solved;
 
 /// The estimate is this multiple of the largest difference that was found.
 const SAFETY: f64 = 30.0;
@@ -41,17 +40,8 @@ pub(crate) fn sharper(
     samples: impl IntoIterator<Item = Sample>,
     proven: Evaluation,
 ) -> Evaluation {
-    let (layer, direct) = match &solved.steel {
-        Steel::None => (None, "elliptic integrals"),
-        Steel::Alone(core) => (
-            Some(&core.layer),
-            "elliptic integrals over the core's layer",
-        ),
-        Steel::Coupled(_) => return proven,
-    };
-    let field = |r_m: f64, z_m: f64| -> Result<AxialField, OnEdge> {
-        let air = scene.winding.field(r_m, z_m)?;
-        Ok(layer.map_or(air, |layer| air + layer.field(r_m, z_m)))
+    let Some((field, direct)) = solved.steel().direct(&scene.winding) else {
+        return proven;
     };
     let (mut count, mut largest) = (0, 0.0_f64);
     for Sample { r_m, z_m, gz } in samples {

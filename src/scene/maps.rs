@@ -3,12 +3,14 @@
 use serde::{Deserialize, Serialize};
 
 use super::evaluation_sample::{Evaluation, PLACES, Sample, sharper, spread};
-use super::steel::{EVALUATION_SHARE, Solved, Steel, SteelField, clearance_m, coupled};
-use super::{AIR_SHARE, Scene};
+use super::steel::{EVALUATION_SHARE, Solved, clearance_m};
+use super::{AIR_SHARE, Scene, coupled};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::field::magnet::MagnetRule;
-use crate::field::steel::axial_table::AxialTable;
+use crate::field::source::AxialSource;
+use crate::field::steel::array_steel::SteelField;
+use crate::field::winding::KERNEL_ERROR;
 use crate::map::coupled_map::{SampledField, TableReport};
 use crate::map::mean::MeanField;
 
@@ -46,110 +48,138 @@ impl SceneMap {
         coils: &[PlacedCoil],
         grid: &Grid,
         components: Components,
-        felt: &Felt,
+        magnet: &MagnetMean,
         progress: &dyn Progress,
     ) -> Result<Self, RunError> {
-        // A grid through every place that a node of the magnet can take.
-        let widest = widest(grid, felt);
-        let lowest = lowest_plane(grid);
-        let (table, map, between) = match &solved.steel {
-            Steel::None => {
-                let share = if felt.is_field() { 1.0 } else { AIR_SHARE };
-                let tolerance = share * solved.tolerance / felt.amplification;
-                let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
-                    tabulate(&scene.winding, coils, grid, components, tolerance, p)
-                };
-                let means = MeanField::new(
-                    &scene.winding,
-                    coils,
-                    grid,
-                    components,
-                    MEAN_SHARE * share * solved.tolerance,
-                    SOURCE_SHARE * tolerance,
-                );
-                let one = Maker {
-                    one: &one,
-                    means: means.as_ref(),
-                };
-                let map = mean(&one, felt, coils, grid, components, progress)?;
-                progress.begin("interpolation error", 1);
-                let between = if felt.is_field() {
-                    let gz = &map.gz_t_per_m_per_a;
-                    interpolation_error(&scene.winding, coils, grid, gz, tolerance)?
-                } else {
-                    between(&one, felt, coils, grid, &map)?
-                };
-                (None, map, between)
-            }
-            Steel::Alone(coil) => {
-                let tolerance = MAP_SHARE * solved.tolerance / felt.amplification;
-                if let Some(core) = &scene.core {
-                    clearance_m(scene, core, &lowest, felt.reach_m)?;
-                }
-                let own = EVALUATION_SHARE * tolerance;
-                let source = AxialTable::new(Some(scene.winding), coil.layer.clone(), own);
-                let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
-                    tabulate(&source, coils, grid, components, tolerance, p)
-                };
-                let means = MeanField::new(
-                    &source,
-                    coils,
-                    grid,
-                    components,
-                    MEAN_SHARE * MAP_SHARE * solved.tolerance,
-                    SOURCE_SHARE * tolerance,
-                );
-                let one = Maker {
-                    one: &one,
-                    means: means.as_ref(),
-                };
-                let map = mean(&one, felt, coils, grid, components, progress)?;
-                progress.begin("interpolation error", 1);
-                let between = between(&one, felt, coils, grid, &map)?;
-                (None, map, between)
-            }
-            Steel::Coupled(_) => {
-                let tolerance = MAP_SHARE * solved.tolerance / felt.amplification;
-                let steel = solved.sources(scene, &lowest, felt.reach_m, felt.amplification)?;
-                let Some(SteelField::Coupled(steel)) = steel else {
-                    return Err(no_steel());
-                };
-                let sampled = SampledField::new(
-                    &steel,
-                    &widest,
-                    components,
-                    tolerance,
-                    felt.visits(),
-                    progress,
-                )?;
-                let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
-                    let mut map =
-                        tabulate(&scene.winding, coils, grid, components, tolerance, &Silent)?;
-                    add(&mut map, &sampled.map(coils, grid, p)?, 1.0);
-                    Ok(map)
-                };
-                let one = Maker {
-                    one: &one,
-                    means: None,
-                };
-                let map = mean(&one, felt, coils, grid, components, progress)?;
-                progress.begin("interpolation error", 1);
-                let between = between(&one, felt, coils, grid, &map)?;
-                (Some(sampled.report), map, between)
-            }
+        let task = MapTask {
+            scene,
+            solved,
+            coils,
+            grid,
+            magnet,
+        };
+        let share = if !solved.has_steel() && magnet.is_field() {
+            1.0
+        } else if solved.has_steel() {
+            MAP_SHARE
+        } else {
+            AIR_SHARE
+        };
+        let tolerance = share * solved.tolerance / magnet.amplification;
+        let own = EVALUATION_SHARE * tolerance;
+        let (table, map, between) = match solved.steel().axial_source(scene.winding, own) {
+            Some(source) => task.axial(&*source, share, tolerance, components, progress)?,
+            None => task.coupled(tolerance, components, progress)?,
         };
         progress.end();
         let mut evaluation = evaluation(&map, solved);
-        if felt.is_field() {
+        if magnet.is_field() {
             evaluation = sharper(scene, solved, samples(&map, coils), evaluation);
         }
-        let accuracy = accuracy(evaluation, solved, felt.bound);
+        let accuracy = accuracy(evaluation, solved, magnet.bound);
         Ok(Self {
             map,
             between,
             table,
             accuracy,
         })
+    }
+}
+
+/// A map to be made: source, coils, grid and magnet.
+struct MapTask<'a> {
+    scene: &'a Scene<'a>,
+    solved: &'a Solved,
+    coils: &'a [PlacedCoil],
+    grid: &'a Grid,
+    magnet: &'a MagnetMean,
+}
+
+/// A map with what is known of it before its accuracy.
+type Mapped = (Option<TableReport>, FieldMap, InterpolationError);
+
+impl MapTask<'_> {
+    /// Coils each of which is a `source` about its own axis: a map over the distance from it.
+    fn axial(
+        &self,
+        source: &dyn AxialSource,
+        share: f64,
+        tolerance: f64,
+        components: Components,
+        progress: &dyn Progress,
+    ) -> Result<Mapped, RunError> {
+        let Self {
+            scene,
+            solved,
+            coils,
+            grid,
+            magnet,
+        } = *self;
+        if let Some(core) = &scene.core {
+            clearance_m(scene, core, &lowest_plane(grid), magnet.reach_m)?;
+        }
+        let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
+            tabulate(source, coils, grid, components, tolerance, p)
+        };
+        let means = MeanField::new(
+            source,
+            coils,
+            grid,
+            components,
+            MEAN_SHARE * share * solved.tolerance,
+            SOURCE_SHARE * tolerance,
+        );
+        let one = Maker {
+            one: &one,
+            means: means.as_ref(),
+        };
+        let map = mean(&one, magnet, coils, grid, components, progress)?;
+        progress.begin("interpolation error", 1);
+        // In air the field between the nodes is had as finely as the map itself, at once.
+        let between = if magnet.is_field() && !solved.has_steel() {
+            interpolation_error(source, coils, grid, &map.gz_t_per_m_per_a, tolerance)?
+        } else {
+            between(&one, magnet, coils, grid, &map)?
+        };
+        Ok((None, map, between))
+    }
+
+    /// Coils whose cores all answer to every winding: the windings by distance, the steel from a
+    /// table of its harmonic field.
+    fn coupled(
+        &self,
+        tolerance: f64,
+        components: Components,
+        progress: &dyn Progress,
+    ) -> Result<Mapped, RunError> {
+        let Self {
+            scene,
+            solved,
+            coils,
+            grid,
+            magnet,
+        } = *self;
+        let lowest = lowest_plane(grid);
+        let steel = solved.sources(scene, &lowest, magnet.reach_m, magnet.amplification)?;
+        let steel = steel.as_ref().and_then(SteelField::coupled);
+        let steel = steel.ok_or_else(no_steel)?;
+        // A grid through every place that a node of the magnet can take.
+        let widest = widest(grid, magnet);
+        let visits = magnet.visits();
+        let sampled = SampledField::new(steel, &widest, components, tolerance, visits, progress)?;
+        let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
+            let mut map = tabulate(&scene.winding, coils, grid, components, tolerance, &Silent)?;
+            add(&mut map, &sampled.map(coils, grid, p)?, 1.0);
+            Ok(map)
+        };
+        let one = Maker {
+            one: &one,
+            means: None,
+        };
+        let map = mean(&one, magnet, coils, grid, components, progress)?;
+        progress.begin("interpolation error", 1);
+        let between = between(&one, magnet, coils, grid, &map)?;
+        Ok((Some(sampled.report), map, between))
     }
 }
 
@@ -175,10 +205,10 @@ struct Maker<'a> {
 /// Offsets of a magnet's dipoles from its centre, m, and their parts of its moment.
 type Shares = Vec<([f64; 3], f64)>;
 
-/// What a map's values are the mean of: offsets of the magnet's dipoles and their parts of its
+/// The mean that a map's values are: offsets of the magnet's dipoles and their parts of its
 /// moment, fewer from greater heights up.
 #[derive(Debug, Clone)]
-pub struct Felt {
+pub struct MagnetMean {
     /// Height from which the offsets (m) and parts hold, ascending.
     layers: Vec<(f64, Shares)>,
     /// Largest sum of the parts' magnitudes.
@@ -195,7 +225,7 @@ const MOST_AMPLIFICATION_OF_TABLES: f64 = 100.0;
 /// Growth of the distance from the sources at which a rule of fewer dipoles is sought.
 const FARTHER: f64 = 1.25;
 
-impl Felt {
+impl MagnetMean {
     /// The field itself.
     #[must_use]
     pub fn field() -> Self {
@@ -207,13 +237,13 @@ impl Felt {
         }
     }
 
-    /// What the magnet of `scene` feels at the heights `z_m`, ascending, to `tolerance`.
+    /// The mean over the magnet of `scene` at the heights `z_m`, ascending, to `tolerance`.
     ///
     /// # Errors
     /// A magnet that touches what it is attracted by.
     pub fn by_magnet(scene: &Scene, z_m: &[f64], tolerance: f64) -> Result<Self, RunError> {
         let top_m = scene.core.as_ref().map_or(0.0, |c| c.shape.top_m.max(0.0));
-        let mut felt = Self {
+        let mut magnet = Self {
             layers: Vec::new(),
             ..Self::field()
         };
@@ -229,18 +259,18 @@ impl Felt {
             }
             sought_m = *z;
             let rule = scene.magnet_rule(*z, tolerance)?;
-            let fewer = felt
+            let fewer = magnet
                 .layers
                 .last()
                 .is_none_or(|(_, shares)| rule.nodes().len() < shares.len());
-            if fewer && (felt.layers.is_empty() || rule.amplification() <= most) {
-                felt.amplification = felt.amplification.max(rule.amplification());
-                felt.bound = felt.bound.max(rule.bound());
-                felt.reach_m = felt.reach_m.max(rule.reach_m());
-                felt.layers.push((*z, shares(&rule)));
+            if fewer && (magnet.layers.is_empty() || rule.amplification() <= most) {
+                magnet.amplification = magnet.amplification.max(rule.amplification());
+                magnet.bound = magnet.bound.max(rule.bound());
+                magnet.reach_m = magnet.reach_m.max(rule.reach_m());
+                magnet.layers.push((*z, shares(&rule)));
             }
         }
-        Ok(felt)
+        Ok(magnet)
     }
 
     /// Whether it is the field itself.
@@ -291,19 +321,19 @@ fn shifted(grid: &Grid, offset_m: [f64; 3]) -> Grid {
 
 fn mean(
     one: &Maker,
-    felt: &Felt,
+    magnet: &MagnetMean,
     coils: &[PlacedCoil],
     grid: &Grid,
     components: Components,
     progress: &dyn Progress,
 ) -> Result<FieldMap, MapError> {
     let mut pieces = Vec::new();
-    for z_m in felt.pieces(&grid.z_m) {
+    for z_m in magnet.pieces(&grid.z_m) {
         let grid = Grid {
             z_m: z_m.to_vec(),
             ..grid.clone()
         };
-        let shares = felt.at(z_m[0]);
+        let shares = magnet.at(z_m[0]);
         pieces.push(mean_of(one, shares, coils, &grid, components, progress)?);
     }
     if pieces.is_empty() {
@@ -383,13 +413,13 @@ fn mean_of(
 
 fn between(
     one: &Maker,
-    felt: &Felt,
+    magnet: &MagnetMean,
     coils: &[PlacedCoil],
     grid: &Grid,
     map: &FieldMap,
 ) -> Result<InterpolationError, MapError> {
     let direct = |coils: &[PlacedCoil], places: &Grid| {
-        mean(one, felt, coils, places, Components::Gz, &Silent)
+        mean(one, magnet, coils, places, Components::Gz, &Silent)
     };
     interpolation_error_by(&direct, coils, grid, &map.gz_t_per_m_per_a)
 }
@@ -425,10 +455,10 @@ fn add(map: &mut FieldMap, other: &FieldMap, factor: f64) {
 }
 
 /// The grid whose box holds every place of the magnet's dipoles: its ends moved outwards.
-fn widest(grid: &Grid, felt: &Felt) -> Grid {
+fn widest(grid: &Grid, magnet: &MagnetMean) -> Grid {
     let moved = |nodes: &[f64], axis: usize| {
         let mut out = nodes.to_vec();
-        for (_, shares) in &felt.layers {
+        for (_, shares) in &magnet.layers {
             for (offset, _) in shares {
                 out.extend(nodes.first().map(|x| x + offset[axis]));
                 out.extend(nodes.last().map(|x| x + offset[axis]));
@@ -478,14 +508,13 @@ fn samples(map: &FieldMap, coils: &[PlacedCoil]) -> Vec<Sample> {
         .collect()
 }
 
-/// What is proven of the map's error at its nodes, the steel's solution and the magnet left out.
+/// The proven bound of the map's error at its nodes, the steel's solution and the magnet left out.
 fn evaluation(map: &FieldMap, solved: &Solved) -> Evaluation {
-    let estimate = match solved.steel {
-        Steel::None => map.relative_error.max(crate::field::winding::KERNEL_ERROR),
+    let estimate = if solved.has_steel() {
         // The winding's rule, the steel's evaluation and its table.
-        Steel::Alone(_) | Steel::Coupled(_) => {
-            (2.0 * MAP_SHARE + EVALUATION_SHARE) * solved.tolerance
-        }
+        (2.0 * MAP_SHARE + EVALUATION_SHARE) * solved.tolerance
+    } else {
+        map.relative_error.max(KERNEL_ERROR)
     };
     let method = if map.tabulated {
         "a-priori bounds of the radial quadrature and of the tables"
@@ -501,9 +530,10 @@ fn evaluation(map: &FieldMap, solved: &Solved) -> Evaluation {
 /// The map's own error at its nodes.
 fn accuracy(evaluation: Evaluation, solved: &Solved, magnet: f64) -> StageAccuracy {
     let Evaluation { estimate, method } = evaluation;
-    let table = match solved.steel {
-        Steel::None | Steel::Alone(_) => "",
-        Steel::Coupled(_) => ", its table by comparison with direct values",
+    let table = if solved.steel().coupled().is_some() {
+        ", its table by comparison with direct values"
+    } else {
+        ""
     };
     StageAccuracy {
         estimate: estimate + solved.steel_error + magnet,

@@ -1,7 +1,8 @@
-//! What every command needs of a design: the source, the coils, the magnet, the currents.
+//! A design made ready for computing: sources, coils, magnet, currents, tolerances.
 
 pub mod at_current;
 pub mod cached_field;
+pub mod core_material;
 pub mod cost;
 pub mod evaluation_sample;
 pub mod maps;
@@ -13,6 +14,7 @@ pub mod rated;
 pub mod single;
 pub mod sources;
 pub mod steel;
+pub mod tolerances;
 pub mod working_point;
 
 use std::collections::BTreeMap;
@@ -23,23 +25,22 @@ use crate::RunError;
 use crate::bundle::manifest::{ArrayGeometry, CurrentLimits, MagnetSummary};
 use crate::coil::circuit::{self, Circuit};
 use crate::design::{Coil, Coupling, Design, MagnetModel, Polarity};
-use crate::field::batch::Quantities;
+use crate::field::components::Components;
 use crate::field::dipole;
 use crate::field::magnet::{Cylinder, MagnetRule, Sources};
 use crate::field::source::AxialSource;
-use crate::field::steel::axial_table::AxialTable;
-use crate::field::steel::equivalent_dipoles::Parts;
-use crate::field::winding::KERNEL_ERROR;
+use crate::field::steel::array_steel::SteelField;
 use crate::field::winding::Winding;
 use crate::map::tabulate::PlacedCoil;
 use crate::progress::Progress;
-use crate::scene::steel::{EVALUATION_SHARE, SceneCore, Solved, Steel, SteelField};
+use crate::scene::core_material::SceneCore;
+use crate::scene::steel::{EVALUATION_SHARE, Solved};
+use crate::scene::tolerances::{MAGNET_FINEST, Tolerances};
 
 /// Points handed to one thread at a time; fixed, so that bytes do not depend on threads.
 const PORTION: usize = 4096;
-/// Share of the tolerance given to the magnet's dipoles, and the finest asked of them.
+/// Share of the tolerance given to the magnet's dipoles.
 pub(crate) const MAGNET_SHARE: f64 = 0.3;
-pub(crate) const MAGNET_FINEST: f64 = 1e-9;
 /// Share of the tolerance given to the windings' field where the magnet takes its own.
 pub(crate) const AIR_SHARE: f64 = 0.6;
 
@@ -112,14 +113,24 @@ pub struct Scene<'a> {
     pub lower_a: Vec<f64>,
     /// Upper current limit of each coil, A: the lower of the driver's and the supply's V/R.
     pub upper_a: Vec<f64>,
+    /// To what accuracy each stage is computed.
+    pub tolerances: Tolerances,
 }
 
 impl<'a> Scene<'a> {
-    /// Makes a design ready.
+    /// Makes a design ready, to the default accuracy of its physics.
     ///
     /// # Errors
     /// A design without a coil; a B-H table that cannot be used.
     pub fn new(design: &'a Design) -> Result<Self, RunError> {
+        Self::with_tolerance(design, None)
+    }
+
+    /// As [`Scene::new`], every stage to the accuracy that was `requested`, if any was.
+    ///
+    /// # Errors
+    /// As [`Scene::new`].
+    pub fn with_tolerance(design: &'a Design, requested: Option<f64>) -> Result<Self, RunError> {
         let coil = design.coil.ok_or_else(|| {
             RunError::Input("the design has no [coil] section, which this command needs".to_owned())
         })?;
@@ -144,6 +155,8 @@ impl<'a> Scene<'a> {
             .collect();
         let voltage_v = design.supply.voltage_v;
         let rated = |limit: &f64| circuit.rated_current_a(*limit, voltage_v);
+        let upper_a: Vec<f64> = design.supply.current_max_a.iter().map(rated).collect();
+        let tolerances = Tolerances::new(design, core.as_ref(), largest(&upper_a), requested);
         Ok(Self {
             design,
             coil,
@@ -151,7 +164,7 @@ impl<'a> Scene<'a> {
             core,
             coils,
             moment_a_m2: moment_a_m2(design),
-            upper_a: design.supply.current_max_a.iter().map(rated).collect(),
+            upper_a,
             lower_a: design
                 .supply
                 .current_min_a
@@ -159,13 +172,24 @@ impl<'a> Scene<'a> {
                 .map(|l| -rated(&-l))
                 .collect(),
             circuit,
+            tolerances,
         })
+    }
+
+    /// The same scene, every stage to the accuracy that was `requested`, if any was.
+    #[must_use]
+    pub fn to_tolerance(&self, requested: Option<f64>) -> Self {
+        let rated_a = self.rated_current_a();
+        Self {
+            tolerances: Tolerances::new(self.design, self.core.as_ref(), rated_a, requested),
+            ..self.clone()
+        }
     }
 
     /// The rated current of one coil: the largest of the array's upper limits, A.
     #[must_use]
     pub fn rated_current_a(&self) -> f64 {
-        self.upper_a.iter().copied().fold(0.0, f64::max)
+        largest(&self.upper_a)
     }
 
     /// How far below its centre the magnet extends, m; 0 for a dipole.
@@ -179,16 +203,6 @@ impl<'a> Scene<'a> {
                 length_m: magnet.length_m,
             }
             .depth_along_m(self.moment_a_m2),
-        }
-    }
-
-    /// Default tolerance of forces in air: that of the kernel for a dipole, of the finest rule for
-    /// a cylinder.
-    #[must_use]
-    pub fn force_tolerance(&self) -> f64 {
-        match self.design.magnet.model {
-            MagnetModel::Dipole => KERNEL_ERROR,
-            MagnetModel::Cylinder => MAGNET_FINEST,
         }
     }
 
@@ -290,16 +304,14 @@ impl<'a> Scene<'a> {
         // As fine as the nearest of all points needs, whatever the portion.
         let sources = solved.sources(self, points_m, reach_m, amplification)?;
         // Many dipoles take a winding and its own core from one table.
-        let table = match &solved.steel {
-            Steel::Alone(coil) if reach_m > 0.0 => Some(AxialTable::new(
-                Some(self.winding),
-                coil.layer.clone(),
-                EVALUATION_SHARE * solved.tolerance / amplification,
-            )),
-            Steel::None | Steel::Alone(_) | Steel::Coupled(_) => None,
+        let table = if reach_m > 0.0 && solved.has_steel() {
+            let tolerance = EVALUATION_SHARE * solved.tolerance / amplification;
+            solved.steel().axial_source(self.winding, tolerance)
+        } else {
+            None
         };
         let (own, sources): (&dyn AxialSource, _) = match &table {
-            Some(table) => (table, None),
+            Some(table) => (&**table, None),
             None => (&self.winding, sources.as_ref()),
         };
         for (rule, rows) in &groups {
@@ -335,17 +347,13 @@ impl<'a> Scene<'a> {
     ) -> Result<(), RunError> {
         let coils = self.coils.len();
         let tilted = !rule.is_upright();
-        let (wanted, parts) = if tilted {
-            (Quantities::Gradient, Parts::Gradient)
+        let parts = if tilted {
+            Components::Gradient
         } else {
-            (Quantities::Gz, Parts::Gz)
-        };
-        let share = match solved.steel {
-            Steel::None => AIR_SHARE,
-            Steel::Alone(_) | Steel::Coupled(_) => EVALUATION_SHARE,
+            Components::Gz
         };
         let share = if rule.nodes().len() > 1 || sources.is_some() {
-            share
+            solved.evaluation_share()
         } else {
             1.0
         };
@@ -357,7 +365,7 @@ impl<'a> Scene<'a> {
                 .map(|p| std::array::from_fn(|i| p[i] + node.offset_m[i]))
                 .collect();
             let steel = sources.map_or_else(Vec::new, |sources| {
-                solved.steel_fields(self, sources, &places, parts)
+                self.steel_fields(sources, &places, parts)
             });
             let count = places.len();
             let z_m: Vec<f64> = places.iter().map(|p| p[2]).collect();
@@ -370,7 +378,7 @@ impl<'a> Scene<'a> {
                         dx.hypot(dy)
                     })
                     .collect();
-                let air = own.gradients(&r_m, &z_m, tolerance, wanted)?;
+                let air = own.gradients(&r_m, &z_m, tolerance, parts)?;
                 let block = parts.count() * count;
                 let steel = steel.get(column * block..(column + 1) * block);
                 for (row, place) in places.iter().enumerate() {
@@ -390,7 +398,20 @@ impl<'a> Scene<'a> {
         Ok(())
     }
 
-    /// The array as artefacts tell it.
+    /// The steel's part of the field per ampere of every coil at `points_m`, [coil, component,
+    /// point], gains not applied.
+    #[must_use]
+    pub fn steel_fields(
+        &self,
+        sources: &SteelField,
+        points_m: &[[f64; 3]],
+        parts: Components,
+    ) -> Vec<f64> {
+        let axes_m = self.coils.iter().map(|coil| coil.axis_m);
+        sources.of_windings(axes_m, points_m, parts)
+    }
+
+    /// The array as artefacts state it.
     #[must_use]
     pub fn array_geometry(&self) -> ArrayGeometry {
         ArrayGeometry {
@@ -404,7 +425,7 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// The current limits as artefacts tell them.
+    /// The current limits as artefacts state them.
     #[must_use]
     pub fn current_limits(&self) -> CurrentLimits {
         CurrentLimits {
@@ -414,7 +435,7 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// The magnet as artefacts tell it.
+    /// The magnet as artefacts state it.
     #[must_use]
     pub fn magnet_summary(&self) -> MagnetSummary {
         let magnet = &self.design.magnet;
@@ -436,14 +457,31 @@ impl<'a> Scene<'a> {
     }
 }
 
+/// Whether the design's cores are coupled.
+#[must_use]
+pub fn coupled(design: &Design) -> bool {
+    design.core.is_some()
+        && design.array.coupling == Coupling::Full
+        && design.array.positions_m.len() > 1
+}
+
+fn largest(currents_a: &[f64]) -> f64 {
+    currents_a.iter().copied().fold(0.0, f64::max)
+}
+
 /// Upward force on a dipole at one of the points at which one drive's `parts` were sampled,
 /// [component, point]: m . dB/dz, N (per ampere if they are).
-pub(crate) fn upward_n(moment_a_m2: [f64; 3], parts: Parts, values: &[f64], row: usize) -> f64 {
+pub(crate) fn upward_n(
+    moment_a_m2: [f64; 3],
+    parts: Components,
+    values: &[f64],
+    row: usize,
+) -> f64 {
     let count = values.len() / parts.count();
     let part = |component: usize| values[component * count + row];
     let [m_x, m_y, m_z] = moment_a_m2;
     match parts {
-        Parts::Gz => m_z * part(0),
-        Parts::Gradient | Parts::All => m_x * part(2) + m_y * part(3) + m_z * part(4),
+        Components::Gz => m_z * part(0),
+        Components::Gradient | Components::All => m_x * part(2) + m_y * part(3) + m_z * part(4),
     }
 }

@@ -7,20 +7,19 @@ use serde::Serialize;
 use super::Scene;
 use super::single::above_knee;
 use super::steel;
-use super::steel::{COUPLED_TOLERANCE, Solved, Steel, TWO_OF_COUPLED_CORES};
+use super::steel::Solved;
 use super::working_point::{WorkingPoint, relative_difference};
 use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed};
 use crate::coil::mutual;
-use crate::field::batch::Quantities;
+use crate::field::components::Components;
+use crate::field::steel::array_steel::TWO_OF_COUPLED_CORES;
 use crate::field::steel::core_flux_density::peak_depth_m;
-use crate::field::steel::equivalent_dipoles::Parts;
-use crate::field::winding::KERNEL_ERROR;
 
 /// The array's inductances.
 #[derive(Debug, Clone, Serialize)]
-pub struct ArrayFacts {
-    /// One entry a coil.
+pub struct ArraySummary {
+    /// One entry per coil.
     pub coils: Vec<ArrayCoil>,
     /// Inductance matrix, H: `[i][j]` is the flux through coil i for one ampere in coil j. With
     /// a B-H curve that of the linear array whose permeability is `relative_permeability`.
@@ -31,16 +30,16 @@ pub struct ArrayFacts {
     pub relative_permeability: Option<f64>,
     /// With a B-H curve: all coils at their rated currents.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub working_point: Option<WorkingPointFacts>,
-    /// What misses the tolerance.
+    pub working_point: Option<WorkingPointSummary>,
+    /// The stages that miss the tolerance.
     #[serde(skip)]
     pub(crate) accuracy_missed: Vec<String>,
 }
 
 /// All coils at their rated currents, along the B-H curve.
 #[derive(Debug, Clone, Serialize)]
-pub struct WorkingPointFacts {
-    /// A, one a coil.
+pub struct WorkingPointSummary {
+    /// A, one per coil.
     pub currents_a: Vec<f64>,
     /// Flux linkage of every coil, Wb.
     pub flux_linkage_wb: Vec<f64>,
@@ -73,40 +72,39 @@ pub struct ArrayCoil {
 /// The array among its neighbours; `None` for a single coil.
 pub(crate) fn array(
     scene: &Scene,
-    tolerance: Option<f64>,
     accuracy: &mut BTreeMap<&'static str, StageAccuracy>,
-    notes: &mut Vec<String>,
-) -> Result<Option<ArrayFacts>, RunError> {
+    warnings: &mut Vec<String>,
+) -> Result<Option<ArraySummary>, RunError> {
     if scene.coils.len() < 2 {
         return Ok(None);
     }
     let axes = &scene.design.array.positions_m;
     let lowest_m = scene.design.target_height_m;
-    let solved = steel::solve(scene, tolerance, KERNEL_ERROR, lowest_m)?;
-    let wanted = tolerance.unwrap_or(COUPLED_TOLERANCE);
-    let in_air = in_air(scene, wanted);
+    let solved = steel::solve(scene, scene.tolerances.field, lowest_m)?;
+    let tolerance = scene.tolerances.inductances;
+    let in_air = in_air(scene, tolerance);
     let air = in_air.0.clone();
     let (matrix, stage) = inductances(&solved, in_air);
-    let accuracy_missed = missed([(&"mutual_inductance", &stage)], wanted);
+    let accuracy_missed = missed([(&"mutual_inductance", &stage)], tolerance);
     accuracy.insert("mutual_inductance", stage);
     let (mut peak_t, mut mean_t) = (Vec::new(), Vec::new());
-    let working_point = match WorkingPoint::new(scene, &solved, &scene.upper_a, None, lowest_m)? {
+    let working_point = match WorkingPoint::new(scene, &solved, &scene.upper_a, lowest_m)? {
         Some(point) => {
             accuracy.insert("working_point", point.accuracy());
             peak_t.clone_from(&point.peak_field_t);
             mean_t.clone_from(&point.mean_field_t);
-            Some(working_point_facts(scene, &solved, &point, &air)?)
+            Some(working_point_summary(scene, &solved, &point, &air)?)
         }
         None => None,
     };
-    if let (Steel::Coupled(array), None) = (&solved.steel, &working_point) {
+    if let (Some(array), None) = (solved.steel().coupled(), &working_point) {
         let depth_m = peak_depth_m(array.response.outline.shape);
         let inside = array.core_fields(&scene.upper_a, depth_m)?;
         peak_t = inside.iter().map(|field| field.peak_t).collect();
         mean_t = inside.iter().map(|field| field.mean_t).collect();
         let most_t = peak_t.iter().copied().fold(0.0, f64::max);
         let knee_t = scene.core.as_ref().map_or(f64::INFINITY, |c| c.knee_t);
-        notes.extend(above_knee(
+        warnings.extend(above_knee(
             most_t,
             knee_t,
             "a core of the array with all coils at their rated currents",
@@ -125,7 +123,7 @@ pub(crate) fn array(
             current_max_a: scene.upper_a[coil],
         })
         .collect();
-    Ok(Some(ArrayFacts {
+    Ok(Some(ArraySummary {
         coils,
         mutual_inductance_h: matrix,
         relative_permeability: working_point
@@ -152,25 +150,18 @@ pub(crate) fn inductances(
     let mut estimate = error;
     let mut method = "two quadratures of the windings' mutual inductance";
     let mut relative_to = "each mutual inductance";
-    match &solved.steel {
-        Steel::None => {}
-        Steel::Alone(coil) => {
-            for (i, row) in matrix.iter_mut().enumerate() {
-                row[i] += coil.added_inductance_h;
-            }
-            method = "neighbours' cores left out (coupling = \"none\"): mutual inductances are \
-                      those of the windings in air";
+    for (i, row) in matrix.iter_mut().enumerate() {
+        for (j, value) in row.iter_mut().enumerate() {
+            *value += solved.steel().added_inductance_h(i, j);
         }
-        Steel::Coupled(array) => {
-            for (i, row) in matrix.iter_mut().enumerate() {
-                for (j, value) in row.iter_mut().enumerate() {
-                    *value += array.added_inductance_h[(i, j)];
-                }
-            }
-            estimate += array.relative_error;
-            relative_to = "the largest self inductance";
-            method = TWO_OF_COUPLED_CORES;
-        }
+    }
+    if solved.steel().coupled().is_some() {
+        estimate += solved.steel_error;
+        relative_to = "the largest self inductance";
+        method = TWO_OF_COUPLED_CORES;
+    } else if solved.has_steel() {
+        method = "neighbours' cores left out (coupling = \"none\"): mutual inductances are \
+                  those of the windings in air";
     }
     let stage = StageAccuracy {
         estimate,
@@ -180,17 +171,17 @@ pub(crate) fn inductances(
     (matrix, stage)
 }
 
-/// What the cores do at a working point, beside the linear solution.
-fn working_point_facts(
+/// The cores at a working point, beside the linear solution.
+fn working_point_summary(
     scene: &Scene,
     solved: &Solved,
     point: &WorkingPoint,
     air_inductance_h: &[Vec<f64>],
-) -> Result<WorkingPointFacts, RunError> {
+) -> Result<WorkingPointSummary, RunError> {
     let places = around(scene);
     let sources = solved.sources(scene, &places, 0.0, 1.0)?;
     let steel = sources.map_or_else(Vec::new, |sources| {
-        solved.steel_fields(scene, &sources, &places, Parts::Gz)
+        scene.steel_fields(&sources, &places, Components::Gz)
     });
     let (mut air, mut linear) = (vec![0.0; places.len()], vec![0.0; places.len()]);
     let z_m: Vec<f64> = places.iter().map(|p| p[2]).collect();
@@ -204,7 +195,7 @@ fn working_point_facts(
         let r_m: Vec<f64> = places.iter().map(|p| (p[0] - x).hypot(p[1] - y)).collect();
         let own = scene
             .winding
-            .gradients(&r_m, &z_m, solved.tolerance, Quantities::Gz)?;
+            .gradients(&r_m, &z_m, solved.tolerance, Components::Gz)?;
         for (row, (air, linear)) in air.iter_mut().zip(&mut linear).enumerate() {
             *air += current * coil.gain * own.dbz_dz[row];
             *linear += current * coil.gain * steel[row];
@@ -214,7 +205,7 @@ fn working_point_facts(
     let top_m = scene.core.as_ref().map_or(0.0, |core| core.shape.top_m);
     let total = point
         .field(scene, lowest_m, lowest_m - top_m)
-        .at(&places, Parts::Gz);
+        .at(&places, Components::Gz);
     let sum = |steel: &[f64]| -> Vec<f64> { air.iter().zip(steel).map(|(a, s)| a + s).collect() };
     let flux_linkage_wb = air_inductance_h
         .iter()
@@ -224,7 +215,7 @@ fn working_point_facts(
             air + steel
         })
         .collect();
-    Ok(WorkingPointFacts {
+    Ok(WorkingPointSummary {
         currents_a: point.currents_a.clone(),
         flux_linkage_wb,
         deviation_from_linear: relative_difference(&sum(&total), &sum(&linear)),

@@ -2,9 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::Scene;
 use super::passive_table::{region, scattered_z_n};
-use super::steel::coupled;
+use super::{Scene, coupled};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::design::MagnetModel;

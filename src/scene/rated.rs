@@ -1,33 +1,73 @@
-//! One coil alone at its rated current: what `evaluate` tells of it and a sweep tabulates.
+//! One coil alone at its rated current: what `evaluate` reports, `optimize` writes of its best coil
+//! and a sweep tabulates.
 
 use std::collections::BTreeMap;
 
+use serde::Serialize;
+
 use super::Scene;
-use super::single::{Single, TargetForce};
+use super::single::{CoreSummary, Single, TargetSummary};
 use crate::RunError;
-use crate::accuracy::missed;
-use crate::coil::circuit::Circuit;
+use crate::accuracy::{StageAccuracy, missed};
+use crate::coil::circuit::{Circuit, CoilSize};
 use crate::coil::limits::{self, Evaluated, LimitCheck};
 use crate::units::STEEL_DENSITY_KG_PER_M3;
 
 /// One coil alone at its rated current, SI.
 pub(crate) struct Rated {
-    /// The coil with its core.
-    pub single: Single,
-    /// Its circuit, the core's part of the inductance included.
-    pub circuit: Circuit,
-    /// The rated current, A.
-    pub current_a: f64,
-    /// Heat, W.
-    pub power_w: f64,
-    /// Mass of wire and core, kg.
-    pub mass_kg: f64,
-    /// What the magnet feels at the target.
-    pub force: TargetForce,
+    /// Dimensions, turns and circuit.
+    pub coil: CoilSummary,
+    /// Field and force at the target.
+    pub target: TargetSummary,
+    /// The steel; `None` for air coils.
+    pub core: Option<CoreSummary>,
+    /// The permeability that the transient estimate uses.
+    pub relative_permeability: f64,
     /// The design's limits by name.
     pub limits: BTreeMap<&'static str, LimitCheck>,
-    /// What misses the tolerance.
+    /// Each stage's estimated error.
+    pub accuracy: BTreeMap<&'static str, StageAccuracy>,
+    /// The stages that miss the tolerance.
     pub accuracy_missed: Vec<String>,
+    /// Warnings for the user.
+    pub warnings: Vec<String>,
+}
+
+/// A coil and its circuit, SI.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct CoilSummary {
+    /// Its dimensions.
+    #[serde(flatten)]
+    pub size: CoilSize,
+    /// Number of turns.
+    pub turns: f64,
+    /// Circuit and mass.
+    #[serde(flatten)]
+    pub circuit: CircuitSummary,
+}
+
+/// Circuit, mass and heat of a coil, SI.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct CircuitSummary {
+    /// Resistance at the wire's temperature, ohm.
+    pub resistance_ohm: f64,
+    /// Self inductance, H; with a B-H curve the flux linkage over the rated current.
+    pub inductance_h: f64,
+    /// Flux linkage at the rated current, Wb; with a B-H curve.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flux_linkage_wb: Option<f64>,
+    /// L/R, s.
+    pub time_constant_s: f64,
+    /// Five time constants, s.
+    pub settling_s: f64,
+    /// Length of wire, m.
+    pub wire_length_m: f64,
+    /// Mass of wire and core, kg.
+    pub mass_kg: f64,
+    /// Heat at the rated current, W.
+    pub power_w: f64,
 }
 
 impl Rated {
@@ -35,18 +75,20 @@ impl Rated {
     ///
     /// # Errors
     /// A target on the winding's edge or in the steel; steel that cannot be solved.
-    pub(crate) fn new(scene: &Scene, tolerance: Option<f64>) -> Result<Self, RunError> {
+    pub(crate) fn new(scene: &Scene) -> Result<Self, RunError> {
         let current_a = scene.rated_current_a();
-        let mut single = Single::new(scene, tolerance)?;
-        let mut circuit = scene.circuit;
-        circuit.inductance_h = single.inductance_h;
+        let mut single = Single::new(scene)?;
+        let circuit = Circuit {
+            inductance_h: single.inductance_h,
+            ..scene.circuit
+        };
         let power_w = circuit.power_w(current_a);
         let steel_kg = scene
             .core
             .as_ref()
             .map_or(0.0, |core| core.shape.volume_m3() * STEEL_DENSITY_KG_PER_M3);
         let mass_kg = circuit.wire_mass_kg + steel_kg;
-        let force = single.force(scene, current_a)?;
+        let target = single.target(scene, current_a)?;
         let limits = limits::check(&Evaluated {
             design: scene.design,
             circuit: &circuit,
@@ -55,14 +97,27 @@ impl Rated {
             core_field_t: single.core.as_ref().map(|core| core.peak_field_t),
         });
         Ok(Self {
-            accuracy_missed: missed(&single.accuracy, single.tolerance),
-            single,
-            circuit,
-            current_a,
-            power_w,
-            mass_kg,
-            force,
+            coil: CoilSummary {
+                size: CoilSize::from(&scene.coil),
+                turns: circuit.turns,
+                circuit: CircuitSummary {
+                    resistance_ohm: circuit.resistance_ohm,
+                    inductance_h: circuit.inductance_h,
+                    flux_linkage_wb: single.flux_linkage_wb,
+                    time_constant_s: circuit.time_constant_s(),
+                    settling_s: circuit.settling_s(),
+                    wire_length_m: circuit.wire_length_m,
+                    mass_kg,
+                    power_w,
+                },
+            },
+            target,
+            relative_permeability: single.relative_permeability,
+            core: single.core,
             limits,
+            accuracy_missed: missed(&single.accuracy, single.tolerance),
+            accuracy: single.accuracy,
+            warnings: single.warnings,
         })
     }
 }

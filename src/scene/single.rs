@@ -4,14 +4,14 @@ use serde::Serialize;
 
 use std::collections::BTreeMap;
 
-use super::at_current::{self, SATURATED_TOLERANCE};
-use super::passive;
-use super::steel::{ALONG_CURVE, CORED_TOLERANCE, Material, SceneCore, TWO_OF_ONE_CORE};
-use super::{MAGNET_SHARE, Scene};
+use super::core_material::{Material, SceneCore};
+use super::tolerances::MAGNET_FINEST;
+use super::{MAGNET_SHARE, Scene, at_current, passive};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::coil::inductance;
 use crate::field::frame::to_cartesian;
+use crate::field::steel::array_steel::{ALONG_CURVE, TWO_OF_ONE_CORE};
 use crate::field::steel::bh_curve::BhCurve;
 use crate::field::steel::core_flux_density::peak_depth_m;
 use crate::field::steel::cored_coil::CoredCoil;
@@ -23,7 +23,7 @@ use crate::units::STEEL_DENSITY_KG_PER_M3;
 /// The steel of the coil.
 #[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
-pub struct CoreFacts {
+pub struct CoreSummary {
     /// Radius, m.
     pub radius_m: f64,
     /// Length, m.
@@ -32,8 +32,8 @@ pub struct CoreFacts {
     pub mass_kg: f64,
     /// The permeability of linear steel; with a B-H curve that of its origin.
     pub relative_permeability: f64,
-    /// `linear` or `curve`.
-    pub material: &'static str,
+    /// How the steel magnetises.
+    pub material: MaterialKind,
     /// Largest |B| at the rated current, well inside the surface, T.
     pub peak_field_t: f64,
     /// Where: radius and height, m.
@@ -47,6 +47,48 @@ pub struct CoreFacts {
     pub deviation_from_linear: Option<f64>,
 }
 
+/// How steel magnetises.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MaterialKind {
+    /// By a constant relative permeability.
+    Linear,
+    /// Along a B-H curve.
+    Curve,
+}
+
+/// Field and force at the target, SI.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct TargetSummary {
+    /// Height of the magnet's centre, m.
+    pub height_m: f64,
+    /// The rated current: the largest of the drivers' limits, or the supply's V/R, A.
+    pub current_a: f64,
+    /// dB_z/dz on the axis, T/m/A.
+    pub gradient_t_per_m_per_a: f64,
+    /// B_z on the axis, T/A.
+    pub field_t_per_a: f64,
+    /// Upward force at the rated current, N; the unpowered steel's pull included where the
+    /// design includes it.
+    pub force_n: f64,
+    /// Force vector at the rated current, N, as `force_n`.
+    pub force_vector_n: [f64; 3],
+    /// Torque on the magnet about its centre at the rated current, N m, the steel's pull left out.
+    pub torque_n_m: [f64; 3],
+    /// Upward force of the unpowered steel, N; where the design includes it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub passive_force_n: Option<f64>,
+}
+
+impl TargetSummary {
+    /// Upward force of the rated current alone, N.
+    #[must_use]
+    pub fn current_force_n(&self) -> f64 {
+        self.force_n - self.passive_force_n.unwrap_or(0.0)
+    }
+}
+
 /// One coil alone, per ampere; with a B-H curve at the rated current, divided by it.
 pub(crate) struct Single {
     /// Self inductance, H.
@@ -58,13 +100,13 @@ pub(crate) struct Single {
     /// The permeability that the transient estimate uses.
     pub relative_permeability: f64,
     /// The steel.
-    pub core: Option<CoreFacts>,
+    pub core: Option<CoreSummary>,
     /// Each stage's estimated error.
     pub accuracy: BTreeMap<&'static str, StageAccuracy>,
     /// Warnings for the user.
-    pub notes: Vec<String>,
+    pub warnings: Vec<String>,
     source: Source,
-    /// The tolerance asked for, or the default.
+    /// The tolerance it was computed to.
     pub tolerance: f64,
 }
 
@@ -73,16 +115,6 @@ enum Source {
     Air(Winding),
     Cored(Box<CoredCoil>),
     Saturated(Winding, Box<MagnetizedCore>),
-}
-
-/// The force on the magnet at the target.
-pub(crate) struct TargetForce {
-    /// N.
-    pub force_n: [f64; 3],
-    /// About the magnet's centre, N m.
-    pub torque_n_m: [f64; 3],
-    /// Upward pull of the unpowered steel, N.
-    pub passive_n: Option<f64>,
 }
 
 fn stage(estimate: f64, relative_to: &str, method: &str) -> StageAccuracy {
@@ -94,39 +126,10 @@ fn stage(estimate: f64, relative_to: &str, method: &str) -> StageAccuracy {
 }
 
 impl Single {
-    pub(crate) fn new(scene: &Scene, tolerance: Option<f64>) -> Result<Self, RunError> {
+    pub(crate) fn new(scene: &Scene) -> Result<Self, RunError> {
         let height_m = scene.design.target_height_m;
-        let air_inductance_h = scene.circuit.inductance_h;
         let Some(core) = &scene.core else {
-            let accuracy = BTreeMap::from([
-                (
-                    "field",
-                    stage(
-                        KERNEL_ERROR,
-                        "|grad B| (|B| for the field) at the target",
-                        "a-priori quadrature bound 1e-15; rounding sampled against 40-digit values",
-                    ),
-                ),
-                (
-                    "inductance",
-                    stage(
-                        inductance::RELATIVE_ERROR,
-                        "the inductance",
-                        "a-priori quadrature bound; sampled against 20-digit values",
-                    ),
-                ),
-            ]);
-            return Ok(Self {
-                inductance_h: air_inductance_h,
-                flux_linkage_wb: None,
-                field: scene.winding.field(0.0, height_m)?,
-                relative_permeability: 1.0,
-                core: None,
-                accuracy,
-                notes: Vec::new(),
-                source: Source::Air(scene.winding),
-                tolerance: tolerance.unwrap_or(KERNEL_ERROR),
-            });
+            return Self::in_air(scene);
         };
         let shape = core.shape;
         if height_m <= shape.top_m {
@@ -140,9 +143,48 @@ impl Single {
         if let Material::Curve(curve) = &core.material
             && scene.rated_current_a() > 0.0
         {
-            return Self::saturated(scene, core, curve, tolerance);
+            return Self::saturated(scene, core, curve);
         }
-        let tolerance = tolerance.unwrap_or(CORED_TOLERANCE);
+        Self::linear(scene, core)
+    }
+
+    fn in_air(scene: &Scene) -> Result<Self, RunError> {
+        let height_m = scene.design.target_height_m;
+        let accuracy = BTreeMap::from([
+            (
+                "field",
+                stage(
+                    KERNEL_ERROR,
+                    "|grad B| (|B| for the field) at the target",
+                    "a-priori quadrature bound 1e-15; rounding sampled against 40-digit values",
+                ),
+            ),
+            (
+                "inductance",
+                stage(
+                    inductance::RELATIVE_ERROR,
+                    "the inductance",
+                    "a-priori quadrature bound; sampled against 20-digit values",
+                ),
+            ),
+        ]);
+        Ok(Self {
+            inductance_h: scene.circuit.inductance_h,
+            flux_linkage_wb: None,
+            field: scene.winding.field(0.0, height_m)?,
+            relative_permeability: 1.0,
+            core: None,
+            accuracy,
+            warnings: Vec::new(),
+            source: Source::Air(scene.winding),
+            tolerance: scene.tolerances.coil,
+        })
+    }
+
+    /// The coil with linear steel, or along a curve without current.
+    fn linear(scene: &Scene, core: &SceneCore) -> Result<Self, RunError> {
+        let (shape, tolerance) = (core.shape, scene.tolerances.coil);
+        let height_m = scene.design.target_height_m;
         let mu_r = core.relative_permeability();
         let coil = CoredCoil::new(&scene.winding, shape, mu_r, tolerance, height_m)?;
         let current_a = scene.rated_current_a();
@@ -177,12 +219,12 @@ impl Single {
                 ),
             ),
         ]);
-        let facts = CoreFacts {
+        let facts = CoreSummary {
             radius_m: shape.radius_m,
             length_m: shape.length_m(),
             mass_kg: shape.volume_m3() * STEEL_DENSITY_KG_PER_M3,
             relative_permeability: mu_r,
-            material: "linear",
+            material: MaterialKind::Linear,
             peak_field_t: inside.peak_t,
             peak_at_m: [
                 inside.peak_at_m[0].hypot(inside.peak_at_m[1]),
@@ -192,35 +234,30 @@ impl Single {
             knee_t: core.knee_t,
             deviation_from_linear: None,
         };
-        let mut notes = core.warnings.clone();
+        let mut warnings = core.warnings.clone();
         if matches!(core.material, Material::Linear(_)) {
-            notes.extend(above_knee(
+            warnings.extend(above_knee(
                 inside.peak_t,
                 core.knee_t,
                 "the core at the rated current",
             ));
         }
         Ok(Self {
-            inductance_h: air_inductance_h + coil.added_inductance_h,
+            inductance_h: scene.circuit.inductance_h + coil.added_inductance_h,
             flux_linkage_wb: None,
             field: coil.field(0.0, height_m)?,
             relative_permeability: mu_r,
             core: Some(facts),
             accuracy,
-            notes,
+            warnings,
             source: Source::Cored(Box::new(coil)),
             tolerance,
         })
     }
 
     /// The coil at its rated current along `curve`.
-    fn saturated(
-        scene: &Scene,
-        core: &SceneCore,
-        curve: &BhCurve,
-        tolerance: Option<f64>,
-    ) -> Result<Self, RunError> {
-        let tolerance = tolerance.unwrap_or(SATURATED_TOLERANCE);
+    fn saturated(scene: &Scene, core: &SceneCore, curve: &BhCurve) -> Result<Self, RunError> {
+        let tolerance = scene.tolerances.coil;
         let height_m = scene.design.target_height_m;
         let current_a = scene.rated_current_a();
         let state = at_current::solve(scene, core, curve, current_a, tolerance, height_m)?;
@@ -247,21 +284,21 @@ impl Single {
             ),
         ]);
         let mean_t = state.inside.mean_b_t;
-        let facts = CoreFacts {
+        let facts = CoreSummary {
             radius_m: shape.radius_m,
             length_m: shape.length_m(),
             mass_kg: shape.volume_m3() * STEEL_DENSITY_KG_PER_M3,
             relative_permeability: initial,
-            material: "curve",
+            material: MaterialKind::Curve,
             peak_field_t: state.inside.peak_b_t,
             peak_at_m: [state.inside.peak_at_m.0, state.inside.peak_at_m.1],
             mean_field_t: mean_t,
             knee_t: core.knee_t,
             deviation_from_linear: Some(field.dbz_dz / linear.dbz_dz - 1.0),
         };
-        let mut notes = core.warnings.clone();
+        let mut warnings = core.warnings.clone();
         if state.inside.peak_b_t > core.knee_t {
-            notes.push(format!(
+            warnings.push(format!(
                 "the core at the rated current reaches {:.2} T, above the steel's knee at {:.2} T: \
                  the force is {:.1} % off that of linear steel, and forces of several currents do \
                  not add up",
@@ -271,7 +308,7 @@ impl Single {
             ));
         }
         if curve.largest_b_t() < state.inside.peak_b_t {
-            notes.push(format!(
+            warnings.push(format!(
                 "the B-H table ends at {} T, below the core's {:.2} T: beyond its last point the \
                  steel is taken as saturated (slope mu_0)",
                 curve.largest_b_t(),
@@ -285,16 +322,23 @@ impl Single {
             relative_permeability: curve.relative_permeability(mean_t).max(1.0),
             core: Some(facts),
             accuracy,
-            notes,
+            warnings,
             source: Source::Saturated(scene.winding, Box::new(state.layer)),
             tolerance,
         })
     }
 
-    /// The force at the target on the axis at `current_a`.
-    pub(crate) fn force(&mut self, scene: &Scene, current_a: f64) -> Result<TargetForce, RunError> {
+    /// Field and force at the target on the axis at `current_a`.
+    ///
+    /// # Errors
+    /// A place of the magnet on the winding's edge; a magnet that touches what attracts it.
+    pub(crate) fn target(
+        &mut self,
+        scene: &Scene,
+        current_a: f64,
+    ) -> Result<TargetSummary, RunError> {
         let height_m = scene.design.target_height_m;
-        let rule = scene.magnet_rule(height_m, MAGNET_SHARE * self.tolerance.max(1e-9))?;
+        let rule = scene.magnet_rule(height_m, MAGNET_SHARE * self.tolerance.max(MAGNET_FINEST))?;
         let (mut fields, mut gradients) = (Vec::new(), Vec::new());
         for node in rule.nodes() {
             let [x, y, z] = node.offset_m;
@@ -309,7 +353,7 @@ impl Single {
         }
         let mut force_n = rule.force_n(&gradients);
         // What a design does not ask for is not computed.
-        let mut passive_n = None;
+        let mut passive_force_n = None;
         if scene.design.magnet.passive_force {
             let place = [0.0, 0.0, height_m];
             if let Some(pull) = passive::pull(scene, &[place], true)? {
@@ -317,15 +361,20 @@ impl Single {
                 for (force, pulled) in force_n.iter_mut().zip(pulled_n) {
                     *force += pulled;
                 }
-                passive_n = Some(pulled_n[2]);
+                passive_force_n = Some(pulled_n[2]);
                 let stage = passive::accuracy(&pull);
                 self.accuracy.insert("passive_force", stage);
             }
         }
-        Ok(TargetForce {
-            force_n,
+        Ok(TargetSummary {
+            height_m,
+            current_a,
+            gradient_t_per_m_per_a: self.field.dbz_dz,
+            field_t_per_a: self.field.b_z,
+            force_n: force_n[2],
+            force_vector_n: force_n,
             torque_n_m: rule.torque_n_m(&fields, &gradients),
-            passive_n,
+            passive_force_n,
         })
     }
 
@@ -343,7 +392,7 @@ pub(crate) fn above_knee(peak_t: f64, knee_t: f64, whose: &str) -> Option<String
     (peak_t > knee_t).then(|| {
         format!(
             "{whose} reaches {peak_t:.2} T, above the steel's knee at {knee_t} T, but is taken as \
-             linear: the force will be smaller than told; give core.bh_curve, or lower the current"
+             linear: the force will be smaller than stated; give core.bh_curve, or lower the current"
         )
     })
 }

@@ -1,31 +1,24 @@
 //! The steel at given currents in all coils, along its B-H curve: what superposition leaves out.
 
 use super::at_current::{self, no_state};
+use super::core_material::{Material, SceneCore};
 use super::maps::lowest_plane;
-use super::steel::{
-    ALONG_CURVE, EVALUATION_SHARE, Material, SceneCore, Solved, Steel, SteelField, clearance_m,
-    coupled,
-};
-use super::{MAGNET_SHARE, Scene, upward_n};
+use super::steel::{EVALUATION_SHARE, Solved, clearance_m};
+use super::{MAGNET_SHARE, Scene, coupled, upward_n};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
-use crate::field::steel::axial_table::AxialTable;
+use crate::field::components::Components;
+use crate::field::steel::array_steel::{ALONG_CURVE, SteelField};
 use crate::field::steel::bh_curve::BhCurve;
 use crate::field::steel::core_flux_density::peak_depth_m;
-use crate::field::steel::equivalent_dipoles::{ArraySources, Parts};
+use crate::field::steel::equivalent_dipoles::ArraySources;
 use crate::field::steel::saturated::Convergence;
 use crate::field::steel::saturated_array::SaturatedArray;
 use crate::field::steel::saturated_coil::SaturatedCoil;
-use crate::map::Components;
 use crate::map::coupled_map::SampledField;
 use crate::map::map_source::Sampler;
-use crate::map::map_source::parts_of;
 use crate::map::tabulate::{Grid, MapError, PlacedCoil, tabulate};
 use crate::progress::Progress;
-
-/// Default tolerance of the steel at a working point, relative to the largest |grad B| at a
-/// height: what the modes that are taken as linear leave is of this order.
-pub const WORKING_POINT_TOLERANCE: f64 = 1e-3;
 
 /// Deviation from superposition above which a warning is due.
 const SUPERPOSITION_WARNING: f64 = 0.01;
@@ -70,15 +63,12 @@ impl WorkingPoint {
         scene: &Scene,
         solved: &Solved,
         currents_a: &[f64],
-        tolerance: Option<f64>,
         lowest_m: f64,
     ) -> Result<Option<Self>, RunError> {
         let Some((core, curve)) = curved(scene) else {
             return Ok(None);
         };
-        let tolerance = tolerance
-            .unwrap_or(WORKING_POINT_TOLERANCE)
-            .max(WORKING_POINT_TOLERANCE);
+        let tolerance = scene.tolerances.working_point;
         let effective_a: Vec<f64> = currents_a
             .iter()
             .zip(&scene.coils)
@@ -89,7 +79,7 @@ impl WorkingPoint {
         } else {
             Self::alone(scene, core, curve, &effective_a, tolerance, lowest_m)?
         };
-        if let Steel::Coupled(array) = &solved.steel {
+        if let Some(array) = solved.steel().coupled() {
             let depth_m = peak_depth_m(core.shape);
             let added = array.transverse_peaks_t(&effective_a, depth_m)?;
             for (peak, added) in made.peak_field_t.iter_mut().zip(added) {
@@ -209,8 +199,8 @@ impl WorkingPoint {
                 .zip(&scene.coils)
                 .filter_map(|((current, state), coil)| {
                     let layer = &state.as_ref()?.layer;
-                    let table = AxialTable::new(None, layer.clone(), tolerance);
-                    Some((*current, coil.axis_m, SteelField::Alone(table.into())))
+                    let field = SteelField::of_core(layer.clone(), tolerance);
+                    Some((*current, coil.axis_m, field))
                 })
                 .collect(),
         };
@@ -244,7 +234,7 @@ impl WorkingPoint {
                 *whole += factor * value;
             }
         };
-        // Gains stand in the maps already.
+        // The maps include the gains.
         for (values, current) in windings
             .gz_t_per_m_per_a
             .chunks_exact(nodes.max(1))
@@ -277,13 +267,7 @@ impl WorkingPoint {
         points_m: &[[f64; 3]],
         progress: &dyn Progress,
     ) -> Result<Vec<f64>, RunError> {
-        let air = Solved {
-            steel: Steel::None,
-            tolerance: EVALUATION_SHARE * self.tolerance,
-            steel_error: 0.0,
-            relative_permeability: 1.0,
-            along_curve: false,
-        };
+        let air = Solved::in_air(EVALUATION_SHARE * self.tolerance);
         let per_ampere = scene.forces_n_per_a(&air, points_m, progress)?;
         let mut total: Vec<f64> = per_ampere
             .chunks_exact(scene.coils.len())
@@ -297,9 +281,9 @@ impl WorkingPoint {
         let (lowest_m, distance_m) = clearance_m(scene, core, points_m, rule.reach_m())?;
         let field = self.field(scene, lowest_m, distance_m);
         let parts = if rule.is_upright() {
-            Parts::Gz
+            Components::Gz
         } else {
-            Parts::Gradient
+            Components::Gradient
         };
         for node in rule.nodes() {
             let places: Vec<[f64; 3]> = points_m
@@ -349,7 +333,7 @@ pub struct TotalField {
 impl TotalField {
     /// The field at `points_m`, [component, point].
     #[must_use]
-    pub fn at(&self, points_m: &[[f64; 3]], parts: Parts) -> Vec<f64> {
+    pub fn at(&self, points_m: &[[f64; 3]], parts: Components) -> Vec<f64> {
         let mut total = vec![0.0; parts.count() * points_m.len()];
         let mut one = total.clone();
         for (current, [x, y], sources) in &self.parts {
@@ -381,7 +365,7 @@ impl Sampler for TotalField {
         components: Components,
         out: &mut [f64],
     ) -> Result<(), MapError> {
-        out.copy_from_slice(&self.at(points_m, parts_of(components)));
+        out.copy_from_slice(&self.at(points_m, components));
         Ok(())
     }
 }

@@ -11,6 +11,12 @@ use crate::placement::sin_cos_deg;
 use crate::read_error::ReadError;
 use crate::xml::{Document, Element, Step};
 
+/// True for XML whose first element is `amf`, zipped or not.
+pub(crate) fn begins(bytes: &[u8]) -> bool {
+    let head = &bytes[..bytes.len().min(1024)];
+    Archive::has(bytes, ".amf") || head.windows(4).any(|w| w == b"<amf")
+}
+
 /// Reads an AMF file's bytes. Without a unit it is in millimetres.
 ///
 /// # Errors

@@ -7,6 +7,7 @@ use std::io::{Cursor, Read};
 use zip::ZipArchive;
 
 use crate::read_error::{Place, ReadError};
+use crate::text::narrow;
 
 /// So many bytes may be unpacked from any archive,
 const LEAST_BUDGET: u64 = 8 << 20;
@@ -30,6 +31,15 @@ impl<'a> Archive<'a> {
     /// True for bytes that begin as archives do.
     pub(super) fn is(bytes: &[u8]) -> bool {
         bytes.starts_with(b"PK\x03\x04")
+    }
+
+    /// True for an archive with a part whose name, in lower case, ends so.
+    pub(super) fn has(bytes: &[u8], ending: &str) -> bool {
+        Self::is(bytes)
+            && Archive::open(bytes).is_ok_and(|archive| {
+                let mut names = archive.names();
+                names.any(|name| name.to_ascii_lowercase().ends_with(ending))
+            })
     }
 
     /// Opens a file's bytes.
@@ -93,9 +103,10 @@ fn sought(name: &str) -> String {
 
 /// XML's bytes as text, without a byte-order mark.
 pub(super) fn text_of(bytes: Vec<u8>) -> Result<String, String> {
-    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
-        return Err("the XML is in UTF-16; save it in UTF-8".into());
-    }
+    let bytes = match narrow(&bytes) {
+        Cow::Owned(narrowed) => narrowed,
+        Cow::Borrowed(_) => bytes,
+    };
     let mut text = String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
         format!("the XML is not in UTF-8 (byte {at}); save it in UTF-8")

@@ -2,9 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use crate::deviation::{
-    Faces, Interval, Lattice, Vertical, hausdorff, primitive, primitive_by_cell, vertical,
+    Faces, Interval, Lattice, Looks, Vertical, hausdorff, primitive, primitive_by_cell, vertical,
     vertical_by_cell,
 };
 use crate::error::ShapeError;
@@ -34,7 +35,7 @@ pub enum Tessellation {
     None,
     /// A body was cut into facets here, to hold it.
     Known,
-    /// A program's own facets for the display, by the rule that program follows.
+    /// A program's own facets for the display, from the angles within each face.
     Display,
     /// Estimated from the angles between the facets.
     Angles,
@@ -68,7 +69,7 @@ impl Tessellation {
             Self::None => "exact: the surface is a formula",
             Self::Known => "known: the chord to which the file's body was cut into facets",
             Self::Display => {
-                "an estimate: the rule by which display facets are made, from their box"
+                "an estimate: the sagitta of display facets within each face, from their angles"
             }
             Self::Angles => {
                 "an estimate: the sagitta of facets that turn smoothly, from their angles"
@@ -130,7 +131,8 @@ impl Certificate {
     }
 }
 
-/// Compares the points with the surface they were taken from.
+/// Compares the points with the surface they were taken from; `None` where that was not asked for,
+/// or its effort is spent.
 ///
 /// # Errors
 /// [`ShapeError::Interrupted`] when the user asked to stop.
@@ -155,7 +157,8 @@ pub fn certify(
             (Tessellation::None, 0.0),
         ),
         Surface::Mesh(mesh) => {
-            let faces = Faces::new(mesh, grid);
+            let effort = Looks::usual();
+            let faces = Faces::new(mesh, grid, Arc::clone(&effort));
             let lattice = Lattice::new(&faces, grid, &heights);
             let found = vertical(mesh, grid, &lattice, progress)?;
             let apart = if how == Certify::Distance {
@@ -163,6 +166,9 @@ pub fn certify(
             } else {
                 None
             };
+            if effort.is_spent() {
+                return Ok(None);
+            }
             (found, apart, Tessellation::of(mesh))
         }
     };
@@ -177,7 +183,7 @@ pub fn certify(
 }
 
 /// For every cell of the grid, x fastest, a bound of the vertical difference, m; `None` for cells
-/// of which a corner has no surface.
+/// of which a corner has no surface. No result where the effort of it is spent.
 ///
 /// # Errors
 /// [`Interrupted`] when the user asked to stop.
@@ -186,7 +192,7 @@ pub fn by_cell(
     grid: &Grid,
     samples: &[Option<Sample>],
     progress: &dyn Progress,
-) -> Result<Vec<Option<f64>>, Interrupted> {
+) -> Result<Option<Vec<Option<f64>>>, Interrupted> {
     let heights: Vec<Option<f64>> = samples
         .iter()
         .map(|sample| sample.map(|sample| sample.height_m))
@@ -194,11 +200,13 @@ pub fn by_cell(
     match surface {
         Surface::Primitive(shape) => {
             progress.check()?;
-            Ok(primitive_by_cell(shape, grid, &heights))
+            Ok(Some(primitive_by_cell(shape, grid, &heights)))
         }
         Surface::Mesh(mesh) => {
-            let faces = Faces::new(mesh, grid);
-            vertical_by_cell(&Lattice::new(&faces, grid, &heights), progress)
+            let effort = Looks::usual();
+            let faces = Faces::new(mesh, grid, Arc::clone(&effort));
+            let cells = vertical_by_cell(&Lattice::new(&faces, grid, &heights), progress)?;
+            Ok((!effort.is_spent()).then_some(cells))
         }
     }
 }

@@ -11,9 +11,10 @@ use crate::mesh::{Triangle, cross, minus};
 
 /// Parts into which the search is cut, about.
 const PARTS: usize = 256;
-/// Pairs that are looked at in one part, at most, and more for every triangle: bodies may lie over
-/// each other many times.
-const MOST_PAIRS: [usize; 2] = [20_000, 8];
+/// Pairs that are looked at in one part, at most, and more for every so many triangles: bodies may
+/// lie over each other many times.
+const MOST_PAIRS: usize = 8_000;
+const TRIANGLES_A_PAIR: usize = 4;
 
 /// What was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -131,7 +132,7 @@ impl Search<'_> {
                     }
                 }
             }
-            if looked > MOST_PAIRS[0] + MOST_PAIRS[1] * self.triangles.len() {
+            if looked > MOST_PAIRS + self.triangles.len() / TRIANGLES_A_PAIR {
                 found.complete = false;
                 break;
             }

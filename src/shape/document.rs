@@ -1,16 +1,18 @@
 //! What a shape file says, validated, in SI units.
 
-mod format;
 mod raw;
 mod read;
+mod unit;
+
 pub use read::keys;
 
 use std::path::PathBuf;
 
 use fluxform_numerics::axis::Axis;
 
-pub use format::{SurfaceFormat, parse_unit, unit_name};
+pub use crate::format::SurfaceFormat;
 pub use raw::{RawSurface, RawSurfaceError};
+pub use unit::{parse_unit, unit_name};
 
 /// A validated shape document, or a raw surface with its flags.
 #[derive(Debug, Clone, PartialEq)]

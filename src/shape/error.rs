@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use crate::document::SurfaceFormat;
 use crate::read_error::ReadError;
-use crate::stl::StlError;
 use fluxform_base::progress::Interrupted;
 
 /// A shape that gives no constraint points. Lengths are metres inside, millimetres in messages.
@@ -20,9 +19,10 @@ pub enum ShapeError {
     },
     /// The name's ending belongs to no surface format.
     #[error(
-        "{}: not a surface that is read: expected a shape file (.toml) or {}",
+        "{}: not a surface that is read: expected a shape file (.toml) or {}{}",
         path.display(),
-        SurfaceFormat::endings()
+        SurfaceFormat::endings(),
+        SurfaceFormat::advice(path).map_or_else(String::new, |advice| format!("; {advice}"))
     )]
     Format {
         /// Path as given.
@@ -61,14 +61,6 @@ pub enum ShapeError {
         path: PathBuf,
         /// The fault, with its place.
         source: ReadError,
-    },
-    /// The STL file is damaged or is none.
-    #[error("{}: {source}", path.display())]
-    Stl {
-        /// Path as given.
-        path: PathBuf,
-        /// The fault, with its byte or line.
-        source: StlError,
     },
     /// Every triangle is a line or a point.
     #[error(

@@ -16,7 +16,7 @@ use crate::height::Grid;
 use crate::mesh::{FileMesh, Mesh, Triangle, cross, minus};
 use crate::placement::Transform;
 use crate::scattered::Probe;
-use crate::surface::{Surface, read_mesh};
+use crate::surface::{ByteObserver, Surface, read_mesh};
 use fluxform_numerics::axis::Axis;
 
 /// What a surface file holds. Lengths are in the file's unit.
@@ -100,9 +100,18 @@ impl MeshReport {
     /// # Errors
     /// [`ShapeError`] with the path and the place.
     pub fn of_file(path: &Path) -> Result<Self, ShapeError> {
-        let format =
-            SurfaceFormat::of(path).ok_or_else(|| ShapeError::Format { path: path.into() })?;
-        let file = read_mesh(format, path)?;
+        Self::of_file_observed(path, &mut ())
+    }
+
+    /// As [`MeshReport::of_file`]; `observer` sees the file's bytes.
+    ///
+    /// # Errors
+    /// As [`MeshReport::of_file`].
+    pub fn of_file_observed(
+        path: &Path,
+        observer: &mut dyn ByteObserver,
+    ) -> Result<Self, ShapeError> {
+        let (format, file) = read_mesh(path, observer)?;
         let coordinates = file.triangles.as_flattened().as_flattened().iter();
         let largest = coordinates.fold(0.0, |m: f64, c| m.max(c.abs()));
         if largest > FARTHEST {

@@ -37,11 +37,14 @@ pub mod deviation;
 pub mod document;
 pub mod error;
 pub mod format;
+pub mod glb;
 pub mod height;
+pub mod height_image;
 pub mod holes;
 pub mod inspect;
 pub mod mesh;
 pub mod obj;
+pub mod off;
 pub mod placement;
 pub mod ply;
 pub mod point_flags;
@@ -66,11 +69,14 @@ mod edges;
 mod index;
 mod number;
 mod polygon;
+mod text;
 mod tokens;
 mod vertical_hit;
 mod xml;
 
 pub use error::ShapeError;
 pub use inspect::MeshReport;
-pub use points::{ConstraintPoints, Discretized, Settings, discretize, discretize_with};
+pub use points::{
+    ConstraintPoints, Discretized, Settings, discretize, discretize_surface, discretize_with,
+};
 pub use surface::Surface;

@@ -5,9 +5,24 @@
 
 use crate::mesh::FileMesh;
 use crate::number::{Numbers, shown};
-use crate::polygon::{Cutter, MOST_CORNERS};
+use crate::polygon::{Faces, MOST_CORNERS};
 use crate::read_error::{Place, ReadError};
+use crate::text::narrow;
 use crate::tokens::Lines;
+
+/// First words of lines that OBJ files begin with.
+const FIRST: [&[u8]; 7] = [b"v", b"vn", b"vt", b"o", b"g", b"mtllib", b"usemtl"];
+
+/// True for a text whose first line that is no comment is one of an OBJ file.
+pub(crate) fn begins(bytes: &[u8]) -> bool {
+    let bytes = narrow(&bytes[..bytes.len().min(4096) & !1]);
+    let mut lines = Lines::new(&bytes);
+    let mut first = None;
+    while let (None, Some(line)) = (first, lines.next_line()) {
+        first = line.words().next();
+    }
+    first.is_some_and(|first| FIRST.contains(&first))
+}
 
 /// Reads an OBJ file's bytes; names may be in any encoding.
 ///
@@ -15,7 +30,8 @@ use crate::tokens::Lines;
 /// [`ReadError`] with the line: a number that is none, an index without a vertex, no face.
 pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
     let mut reader = Reader::default();
-    let mut lines = Lines::new(bytes);
+    let bytes = narrow(bytes);
+    let mut lines = Lines::new(&bytes);
     while let Some(line) = lines.next_line() {
         fluxform_base::progress::poll();
         let mut words = line.words();
@@ -30,19 +46,11 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
     reader.mesh()
 }
 
-/// A face: its line, and how many corners it has.
-struct Face {
-    line: u32,
-    corners: u32,
-}
-
 #[derive(Default)]
 struct Reader {
     numbers: Numbers,
     vertices: Vec<[f64; 3]>,
-    /// Indices of all faces, from 0.
-    indices: Vec<u32>,
-    faces: Vec<Face>,
+    faces: Faces,
     free_form: usize,
 }
 
@@ -63,9 +71,8 @@ impl Reader {
         words: impl Iterator<Item = &'a [u8]>,
         line: usize,
     ) -> Result<(), String> {
-        let start = self.indices.len();
         for word in words {
-            if self.indices.len() - start == MOST_CORNERS {
+            if self.faces.corners() == MOST_CORNERS {
                 return Err(format!("a face has more than {MOST_CORNERS} corners"));
             }
             let first = word.split(|b| *b == b'/').next().unwrap_or_default();
@@ -90,18 +97,15 @@ impl Reader {
                     u32::try_from(index).map_err(|_| "the file has too many vertices")?
                 }
             };
-            self.indices.push(index);
+            self.faces.push_index(index);
         }
-        let corners = self.indices.len() - start;
+        let corners = self.faces.corners();
         if corners < 3 {
             return Err(format!(
                 "a face has at least three corners; here are {corners}"
             ));
         }
-        self.faces.push(Face {
-            line: u32::try_from(line).unwrap_or(u32::MAX),
-            corners: corners as u32,
-        });
+        self.faces.end_face(line);
         Ok(())
     }
 
@@ -112,27 +116,14 @@ impl Reader {
                 self.vertices.len(),
             )));
         }
-        let mut triangles = Vec::with_capacity(self.indices.len() - 2 * self.faces.len());
-        let mut cutter = Cutter::new();
-        let mut corners = Vec::new();
-        let mut rest = self.indices.as_slice();
-        for face in self.faces {
-            let (indices, after) = rest.split_at(face.corners as usize);
-            rest = after;
-            corners.clear();
-            for index in indices {
-                let vertex = self.vertices.get(*index as usize).ok_or_else(|| {
-                    let what = format!(
-                        "a face has the index {}, but the file has {} vertices",
-                        u64::from(*index) + 1,
-                        self.vertices.len()
-                    );
-                    ReadError::new(Place::Line(face.line as usize), what)
-                })?;
-                corners.push(*vertex);
-            }
-            cutter.cut(&corners, &mut triangles);
-        }
+        let (triangles, _) = self.faces.cut(&self.vertices).map_err(|(line, index)| {
+            let what = format!(
+                "a face has the index {}, but the file has {} vertices",
+                u64::from(index) + 1,
+                self.vertices.len()
+            );
+            ReadError::new(Place::Line(line), what)
+        })?;
         let mut warnings = Vec::new();
         if self.free_form > 0 {
             warnings.push(format!(

@@ -14,7 +14,7 @@ use ply_rs_bw::ply::{
 
 use crate::mesh::FileMesh;
 use crate::number::{F32_ROUNDING, shown};
-use crate::polygon::{Cutter, MOST_CORNERS};
+use crate::polygon::{Faces, MOST_CORNERS};
 use crate::read_error::ReadError;
 
 /// Elements that the parser makes at once: it allocates for each.
@@ -27,7 +27,7 @@ const AT_ONCE: usize = 1 << 12;
 /// are not finite, an index without a vertex, points without a face.
 pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
     let first = bytes.trim_ascii_start();
-    if !first.starts_with(b"ply") {
+    if !begins(bytes) {
         let what = format!(
             "this is not a PLY file: it begins with `{}` instead of `ply`",
             shown(&first[..first.len().min(16)])
@@ -43,7 +43,7 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
     let length = reader.get_mut().fill_buf().map_or(0, <[u8]>::len);
     check(&header, length)?;
     let mut vertices: Vec<Vertex> = Vec::new();
-    let mut faces = Faces::default();
+    let mut faces = Read::default();
     for (name, element) in &header.elements {
         match name.as_str() {
             "vertex" => {
@@ -54,7 +54,13 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
                     Ok(())
                 })?;
             }
-            "face" => each(&mut reader, element, &header, |face: Face| faces.add(&face))?,
+            "face" => each(&mut reader, element, &header, |face: Face| {
+                faces.face(&face)
+            })?,
+            "tristrips" => each(&mut reader, element, &header, |strips: Face| {
+                faces.strips(&strips);
+                Ok(())
+            })?,
             _ => each(&mut reader, element, &header, |_: Skipped| Ok(()))?,
         }
     }
@@ -82,59 +88,109 @@ fn each<E: PropertyAccess>(
     Ok(())
 }
 
-/// Faces one after the other.
+/// What is read of faces and strips.
 #[derive(Default)]
-struct Faces {
-    /// How many corners each has.
-    corners: Vec<u32>,
-    /// Indices of all corners.
-    indices: Vec<u32>,
+struct Read {
+    faces: Faces,
+    /// How many there are.
+    number: usize,
     /// The first face with an index that no vertex can have, and that.
     astray: Option<(usize, i64)>,
 }
 
-impl Faces {
-    fn add(&mut self, face: &Face) -> Result<(), ReadError> {
-        let number = self.corners.len();
+impl Read {
+    fn face(&mut self, face: &Face) -> Result<(), ReadError> {
         if face.0.len() > MOST_CORNERS {
             return Err(ReadError::file(format!(
-                "face {number} (from 0) has more than {MOST_CORNERS} corners"
+                "face {} (from 0) has more than {MOST_CORNERS} corners",
+                self.number
             )));
         }
-        for index in &face.0 {
-            match u32::try_from(*index) {
-                Ok(index) => self.indices.push(index),
-                Err(_) => {
-                    self.astray.get_or_insert((number, *index));
-                    self.indices.push(u32::MAX);
+        self.add(face.0.iter().copied());
+        Ok(())
+    }
+
+    /// A strip of triangles, or several with -1 between them.
+    fn strips(&mut self, strips: &Face) {
+        for strip in strips.0.split(|index| *index == -1) {
+            for (k, w) in strip.windows(3).enumerate() {
+                // Every other triangle of a strip runs the other way.
+                let corners = [w[k % 2], w[1 - k % 2], w[2]];
+                // Strips are joined by triangles without area.
+                if corners[0] != corners[1] && corners[1] != corners[2] && corners[2] != corners[0]
+                {
+                    self.add(corners.into_iter());
                 }
             }
         }
-        self.corners.push(face.0.len() as u32);
-        Ok(())
+    }
+
+    fn add(&mut self, corners: impl Iterator<Item = i64>) {
+        for index in corners {
+            let known = u32::try_from(index);
+            if known.is_err() {
+                self.astray.get_or_insert((self.number, index));
+            }
+            self.faces.push_index(known.unwrap_or(u32::MAX));
+        }
+        self.faces.end_face(self.number);
+        self.number += 1;
     }
 }
 
-/// The file with every byte of its header in ASCII: comments may be in any encoding, but the
-/// parser takes only UTF-8.
+/// True for bytes that begin as PLY files do.
+pub(crate) fn begins(bytes: &[u8]) -> bool {
+    bytes.trim_ascii_start().starts_with(b"ply")
+}
+
+/// First words of a header's lines.
+const HEADER: [&[u8]; 7] = [
+    b"ply",
+    b"format",
+    b"comment",
+    b"obj_info",
+    b"element",
+    b"property",
+    b"end_header",
+];
+
+/// The file with a header that the parser takes: comments may be in any encoding, and some
+/// programs wrote them without the word `comment`.
 fn plain_header(bytes: &[u8]) -> Cow<'_, [u8]> {
     let mark = b"end_header";
     let end = bytes.windows(mark.len()).position(|w| w == mark);
     let header = &bytes[..end.unwrap_or(bytes.len())];
-    if header.is_ascii() {
+    let first = |line: &[u8]| {
+        let word = line.trim_ascii_start().split(|b| *b <= b' ').next();
+        word.unwrap_or_default().to_vec()
+    };
+    let known = |line: &[u8]| {
+        let word = first(line);
+        word.is_empty() || HEADER.contains(&word.as_slice())
+    };
+    let lines = || header.split_inclusive(|b| matches!(b, b'\n' | b'\r'));
+    if end.is_none() || (header.is_ascii() && lines().all(known)) {
         return Cow::Borrowed(bytes);
     }
-    let plain = |b: &u8| if b.is_ascii() { *b } else { b'?' };
-    let mut copy: Vec<u8> = header.iter().map(plain).collect();
+    let mut copy = Vec::with_capacity(bytes.len() + 64);
+    for line in lines() {
+        if !known(line) {
+            copy.extend_from_slice(b"comment ");
+        }
+        let plain = |b: &u8| if b.is_ascii() { *b } else { b'?' };
+        copy.extend(line.iter().map(plain));
+    }
     copy.extend_from_slice(&bytes[header.len()..]);
     Cow::Owned(copy)
 }
 
 fn fault(error: ParseError) -> ReadError {
-    // The parser shows the whole line and its inner errors, over several lines.
+    // The parser quotes the whole line and shows its inner errors as Rust does: only its first
+    // sentences are for the user.
     let text = error.to_string();
     let text: Vec<&str> = text.split_whitespace().collect();
     let mut what = text.join(" ");
+    what.truncate(what.find(" Error: ").unwrap_or(what.len()));
     if let Some((at, _)) = what.char_indices().nth(200) {
         what.truncate(at);
         what.push_str("...");
@@ -183,13 +239,9 @@ fn check(header: &Header, length: usize) -> Result<(), ReadError> {
         let what = "the PLY file has no element `vertex` with the properties x, y and z";
         return Err(ReadError::file(what));
     }
-    if !property("face", &INDICES) {
-        let what = if property("tristrips", &INDICES) {
-            "the PLY file holds triangle strips, which are not read; export it with faces"
-        } else {
-            "the PLY file has no element `face` with a list `vertex_indices`: there is no \
-             surface, only points; make a mesh of them first"
-        };
+    if !property("face", &INDICES) && !property("tristrips", &INDICES) {
+        let what = "the PLY file has no element `face` with a list `vertex_indices`: there is no \
+                    surface, only points; make a mesh of them first";
         return Err(ReadError::file(what));
     }
     Ok(())
@@ -206,8 +258,8 @@ fn size(kind: &ScalarType) -> u128 {
     }
 }
 
-fn mesh(header: &Header, vertices: &[Vertex], faces: &Faces) -> Result<FileMesh, ReadError> {
-    if faces.corners.is_empty() {
+fn mesh(header: &Header, vertices: &[Vertex], read: &Read) -> Result<FileMesh, ReadError> {
+    if read.faces.is_empty() {
         return Err(ReadError::file(format!(
             "the PLY file holds {} points and no face: there is no surface; make a mesh of them \
              first",
@@ -231,27 +283,13 @@ fn mesh(header: &Header, vertices: &[Vertex], faces: &Faces) -> Result<FileMesh,
             vertices.len()
         ))
     };
-    if let Some((number, index)) = faces.astray {
+    if let Some((number, index)) = read.astray {
         return Err(without_vertex(number, index));
     }
-    let wanted = faces.corners.iter().map(|n| n.saturating_sub(2) as usize);
-    let mut triangles = Vec::with_capacity(wanted.sum());
-    let mut cutter = Cutter::new();
-    let mut corners = Vec::new();
-    let mut short = 0;
-    let mut rest = faces.indices.as_slice();
-    for (number, count) in faces.corners.iter().enumerate() {
-        let (indices, after) = rest.split_at(*count as usize);
-        rest = after;
-        corners.clear();
-        for index in indices {
-            let vertex = vertices.get(*index as usize);
-            let vertex = vertex.ok_or_else(|| without_vertex(number, i64::from(*index)))?;
-            corners.push(vertex.0);
-        }
-        short += usize::from(corners.len() < 3);
-        cutter.cut(&corners, &mut triangles);
-    }
+    let points: Vec<[f64; 3]> = vertices.iter().map(|vertex| vertex.0).collect();
+    let cut = read.faces.cut(&points);
+    let (triangles, short) =
+        cut.map_err(|(number, index)| without_vertex(number, i64::from(index)))?;
     if triangles.is_empty() {
         let what = "no face of the PLY file has three corners: there is no surface";
         return Err(ReadError::file(what));

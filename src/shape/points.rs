@@ -186,7 +186,20 @@ pub fn discretize_with(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Discretized, ShapeError> {
-    let (surface, mut warnings) = Surface::open(document)?;
+    let (surface, warnings) = Surface::open(document)?;
+    discretize_surface(document, (surface, warnings), settings, progress)
+}
+
+/// As [`discretize_with`], for a surface that was opened before, with its warnings.
+///
+/// # Errors
+/// As [`discretize_with`].
+pub fn discretize_surface(
+    document: &ShapeDocument,
+    (surface, mut warnings): (Surface, Vec<String>),
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Discretized, ShapeError> {
     progress.check()?;
     let bounds = surface.extent();
     let grid = requested_grid(document, &bounds)?;
@@ -233,8 +246,16 @@ pub fn discretize_with(
         Some(known) if how != Certify::No => Some(known.clone()),
         _ => certify(&surface, &grid, &samples, how, progress)?,
     };
+    if how != Certify::No && certificate.is_none() {
+        warnings.push(
+            "the effort of a certificate is spent: so many triangles lie over each other that how \
+             far the points depart from the surface between them is not computed; the heights are \
+             exact all the same (repair or coarsen the mesh, or certify = no)"
+                .into(),
+        );
+    }
     let cells_m = if settings.cells && grid.len() <= MOST_CERTIFIED {
-        Some(by_cell(&surface, &grid, &samples, progress)?)
+        by_cell(&surface, &grid, &samples, progress)?
     } else {
         None
     };

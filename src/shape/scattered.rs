@@ -3,7 +3,7 @@
 pub mod adaptive;
 pub mod poisson;
 
-use crate::deviation::{Faces, Patch, Rect, primitive};
+use crate::deviation::{Faces, Looks, Patch, Rect, primitive};
 use crate::edges::{Edges, WELD_ROUNDINGS, weld};
 use crate::error::ShapeError;
 use crate::height::{Grid, Sample, reach_m};
@@ -89,7 +89,7 @@ impl<'a> Probe<'a> {
                 Kind::Mesh {
                     mesh,
                     index: Index::new(mesh, reach),
-                    faces: Faces::new(mesh, grid),
+                    faces: Faces::new(mesh, grid, Looks::endless()),
                     rules: Rules {
                         reach_m: reach,
                         plain_layers: 1 + u32::from(closed),

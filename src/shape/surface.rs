@@ -1,6 +1,6 @@
 //! A surface in metres, whether it is a mesh or a formula.
 
-use std::io;
+use std::io::{self, Read};
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -11,7 +11,8 @@ use crate::height::{self, Grid, Sample};
 use crate::mesh::{Bounds, FileMesh, Mesh, MeshFacts};
 use crate::placement::Transform;
 use crate::primitive::PlacedPrimitive;
-use crate::stl::{self, StlError};
+use crate::read_error::ReadError;
+use crate::stl;
 use fluxform_base::progress::Progress;
 use fluxform_design::named_file::{self, NamedFileError};
 
@@ -27,12 +28,50 @@ pub enum Surface {
     Primitive(PlacedPrimitive),
 }
 
+/// Sees the bytes of a surface file as they are parsed, so that a digest is of those bytes.
+pub trait ByteObserver {
+    /// The file is read from its beginning: earlier bytes do not count.
+    fn restart(&mut self);
+    /// The next bytes.
+    fn observe(&mut self, bytes: &[u8]);
+}
+
+impl ByteObserver for () {
+    fn restart(&mut self) {}
+    fn observe(&mut self, _: &[u8]) {}
+}
+
+/// A source whose bytes are observed as they are read.
+struct Observed<'a, R> {
+    source: R,
+    observer: &'a mut dyn ByteObserver,
+}
+
+impl<R: Read> Read for Observed<'_, R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.source.read(buffer)?;
+        self.observer.observe(&buffer[..count]);
+        Ok(count)
+    }
+}
+
 impl Surface {
     /// Opens, reads and places what a document names; the second value holds warnings.
     ///
     /// # Errors
     /// [`ShapeError`] with the path and the place.
     pub fn open(document: &ShapeDocument) -> Result<(Self, Vec<String>), ShapeError> {
+        Self::open_observed(document, &mut ())
+    }
+
+    /// As [`Surface::open`]; `observer` sees the bytes of the surface's file, if it has one.
+    ///
+    /// # Errors
+    /// As [`Surface::open`].
+    pub fn open_observed(
+        document: &ShapeDocument,
+        observer: &mut dyn ByteObserver,
+    ) -> Result<(Self, Vec<String>), ShapeError> {
         check_placement(&document.placement)?;
         let (path, unit_m) = match &document.source {
             SurfaceSource::Primitive(primitive) => {
@@ -41,7 +80,7 @@ impl Surface {
             }
             SurfaceSource::File { path, unit_m } => (path, unit_m),
         };
-        let (mut file, unit_m) = read(path, *unit_m)?;
+        let (mut file, unit_m) = read_observed(path, *unit_m, observer)?;
         let mut warnings = std::mem::take(&mut file.warnings);
         let transform = Transform::new(unit_m, &document.placement).scaled(document.scale);
         let mesh = Mesh::place(file, &transform)?;
@@ -110,12 +149,23 @@ impl Surface {
 /// # Errors
 /// [`ShapeError`]: no or another unit, a file that cannot be read.
 pub fn read(path: &Path, stated_m: Option<f64>) -> Result<(FileMesh, f64), ShapeError> {
-    let format = SurfaceFormat::of(path).ok_or_else(|| ShapeError::Format { path: path.into() })?;
-    if stated_m.is_none() && !format.carries_unit() {
-        return Err(ShapeError::UnitMissing {
-            path: path.into(),
-            format: format.name(),
-        });
+    read_observed(path, stated_m, &mut ())
+}
+
+fn read_observed(
+    path: &Path,
+    stated_m: Option<f64>,
+    observer: &mut dyn ByteObserver,
+) -> Result<(FileMesh, f64), ShapeError> {
+    let missing = |format: SurfaceFormat| ShapeError::UnitMissing {
+        path: path.into(),
+        format: format.name(),
+    };
+    let by_name = SurfaceFormat::of(path);
+    if let (Some(format), None) = (by_name, stated_m)
+        && !format.carries_unit()
+    {
+        return Err(missing(format));
     }
     if let Some(unit_m) = stated_m
         && !(unit_m > 0.0 && unit_m.is_finite())
@@ -124,13 +174,14 @@ pub fn read(path: &Path, stated_m: Option<f64>) -> Result<(FileMesh, f64), Shape
             "the unit is {unit_m} m; it must be positive"
         )));
     }
-    let file = read_mesh(format, path)?;
+    let (format, file) = read_mesh(path, observer)?;
     match (file.unit_m, stated_m) {
         (Some(own), Some(stated)) if own != stated => Err(ShapeError::UnitDiffers {
             path: path.into(),
             file: unit_name(own),
             stated: unit_name(stated),
         }),
+        (None, None) => Err(missing(format)),
         (own, stated) => {
             // The reader of a format that carries its unit gives it.
             let unit_m = own.or(stated).unwrap_or(1.0);
@@ -139,24 +190,39 @@ pub fn read(path: &Path, stated_m: Option<f64>) -> Result<(FileMesh, f64), Shape
     }
 }
 
-/// The triangles of the file at `path`; of a binary STL the bytes are not held beside them.
-pub(super) fn read_mesh(format: SurfaceFormat, path: &Path) -> Result<FileMesh, ShapeError> {
-    if format == SurfaceFormat::Stl
-        && let Some(result) = streamed(path)
+/// The triangles of the file at `path`, and its format: by the name's ending, or by the content
+/// where the name has none. Of a binary STL the bytes are not held beside the triangles.
+pub(super) fn read_mesh(
+    path: &Path,
+    observer: &mut dyn ByteObserver,
+) -> Result<(SurfaceFormat, FileMesh), ShapeError> {
+    let by_name = SurfaceFormat::of(path);
+    if by_name.is_none() && path.extension().is_some() {
+        return Err(ShapeError::Format { path: path.into() });
+    }
+    if by_name.is_none_or(|format| format == SurfaceFormat::Stl)
+        && let Some(result) = streamed(path, observer)
     {
-        return result.map_err(|source| ShapeError::Stl {
+        let file = result.map_err(|source| ShapeError::Content {
             path: path.into(),
             source,
         });
+        return Ok((SurfaceFormat::Stl, file?));
     }
-    format.read(path, &read_file(path)?)
+    let bytes = read_file(path)?;
+    observer.restart();
+    observer.observe(&bytes);
+    let format = by_name.or_else(|| SurfaceFormat::of_content(&bytes));
+    let format = format.ok_or_else(|| ShapeError::Format { path: path.into() })?;
+    Ok((format, format.read(path, &bytes)?))
 }
 
 /// `None` for what is no whole binary STL file, and where the file system fails: reading it
 /// otherwise tells why.
-fn streamed(path: &Path) -> Option<Result<FileMesh, StlError>> {
-    let (file, length) = named_file::open(path, LARGEST_FILE).ok()?;
-    stl::stream(file, length).ok()?
+fn streamed(path: &Path, observer: &mut dyn ByteObserver) -> Option<Result<FileMesh, ReadError>> {
+    let (source, length) = named_file::open(path, LARGEST_FILE).ok()?;
+    observer.restart();
+    stl::stream(Observed { source, observer }, length).ok()?
 }
 
 fn check_placement(placement: &Placement) -> Result<(), ShapeError> {
@@ -197,8 +263,49 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
         }
         NamedFileError::OtherLength => format!("expected a surface, {error}"),
     };
-    named_file::read(path, LARGEST_FILE).map_err(|error| ShapeError::Unreadable {
+    let unreadable = |what: String| ShapeError::Unreadable {
         path: path.into(),
-        what: what(error),
-    })
+        what,
+    };
+    let mut zeros = Zeros::default();
+    let read = named_file::read_watched(path, LARGEST_FILE, &mut |piece| {
+        fluxform_base::progress::poll();
+        zeros.see(piece)
+    });
+    match read.map_err(|error| unreadable(what(error)))? {
+        Some(bytes) => Ok(bytes),
+        None => Err(unreadable(zeros.what())),
+    }
+}
+
+/// No surface file holds so many zeros in a row, bytes: a copy that broke off leaves them, and so
+/// does a file that is longer than what was written to it.
+const LONGEST_HOLE: u64 = 16 << 20;
+
+/// Looks for holes in a file that is read piece by piece.
+#[derive(Default)]
+pub(super) struct Zeros {
+    seen: u64,
+    run: u64,
+}
+
+impl Zeros {
+    /// Sees the next piece; false where a hole is too long.
+    pub(super) fn see(&mut self, piece: &[u8]) -> bool {
+        self.seen += piece.len() as u64;
+        match piece.iter().rposition(|byte| *byte != 0) {
+            None => self.run += piece.len() as u64,
+            Some(last) => self.run = (piece.len() - 1 - last) as u64,
+        }
+        self.run < LONGEST_HOLE
+    }
+
+    /// Where the hole is, and what to do.
+    pub(super) fn what(&self) -> String {
+        format!(
+            "from byte {} on there are zeros alone: the copy or the download broke off; copy it \
+             again",
+            self.seen - self.run
+        )
+    }
 }

@@ -6,10 +6,12 @@
 
 use rayon::prelude::*;
 
-use crate::mesh::{Mesh, cross, dot, minus};
+use crate::mesh::{Mesh, Triangle, cross, dot, minus};
 
 /// Turns beyond this are edges of the body, not of the tessellation, degrees.
 const SHARPEST_DEG: f64 = 20.0;
+/// Inside one face of a body a larger turn is a fold of the display, degrees.
+const SHARPEST_IN_FACE_DEG: f64 = 90.0;
 
 /// A side of a triangle: its ends' name, the triangle, which of the three.
 type Side = (u64, u32, u8);
@@ -27,7 +29,16 @@ fn name(ends: &[[u64; 3]; 2]) -> u64 {
 /// The largest estimated deviation of a facet from the surface meant, m; 0 for a plane body.
 #[must_use]
 pub fn estimated_deviation_m(mesh: &Mesh) -> f64 {
-    let triangles = mesh.triangles();
+    estimate(mesh.triangles(), SHARPEST_DEG)
+}
+
+/// The same of the triangles of one smooth face, where every edge inside is of the tessellation,
+/// in their unit.
+pub(super) fn face_deviation(triangles: &[Triangle]) -> f64 {
+    estimate(triangles, SHARPEST_IN_FACE_DEG)
+}
+
+fn estimate(triangles: &[Triangle], sharpest_deg: f64) -> f64 {
     let side = |(_, index, side): &Side| {
         let corners = &triangles[*index as usize];
         let ends =
@@ -43,7 +54,7 @@ pub fn estimated_deviation_m(mesh: &Mesh) -> f64 {
         })
         .collect();
     sides.par_sort_unstable();
-    let cosine = SHARPEST_DEG.to_radians().cos();
+    let cosine = sharpest_deg.to_radians().cos();
     let mut rises = vec![[0.0_f64; 2]; triangles.len()];
     let mut from = 0;
     while from < sides.len() {

@@ -15,6 +15,11 @@ use crate::read_error::{Place, ReadError};
 use crate::three_mf::transform;
 use crate::xml::{Document, Element, Step};
 
+/// True for an archive with Dassault's manifest.
+pub(crate) fn begins(bytes: &[u8]) -> bool {
+    Archive::has(bytes, "manifest.xml")
+}
+
 /// Reads a 3DXML file's bytes.
 ///
 /// # Errors

@@ -27,6 +27,11 @@ const HARMLESS: [&str; 5] = [
     "/trianglesets/",
 ];
 
+/// True for an archive with a model part.
+pub(crate) fn begins(bytes: &[u8]) -> bool {
+    Archive::has(bytes, ".model")
+}
+
 /// Reads a 3MF file's bytes.
 ///
 /// # Errors

@@ -10,32 +10,7 @@ const MOST_LINES: usize = 80;
 const REASON: &str = "/// Long because ";
 
 /// Functions that are longer and give no reason, with their lines. The list may only shrink.
-const LONG: &[(&str, &str)] = &[
-    ("src/commands/calibrate/mod.rs", "compute"),
-    ("src/commands/calibrate/plan.rs", "terms"),
-    ("src/commands/compare/mod.rs", "run"),
-    ("src/commands/discretize/scattered.rs", "run"),
-    ("src/commands/lambda/command.rs", "summary"),
-    ("src/commands/lambda/feedback.rs", "shell"),
-    ("src/commands/lambda/mod.rs", "solve_at"),
-    ("src/commands/lambda/variants.rs", "all"),
-    ("src/commands/map/mod.rs", "run"),
-    ("src/commands/map/multipoles.rs", "make"),
-    ("src/commands/optimize/mod.rs", "take"),
-    ("src/commands/optimize/text.rs", "found"),
-    ("src/commands/probe/scan/keys.rs", "keys"),
-    ("src/commands/probe/scan/mod.rs", "compare"),
-    ("src/commands/probe/scan/mod.rs", "fit_file"),
-    ("src/commands/replay/command.rs", "run"),
-    ("src/commands/replay/command.rs", "told"),
-    ("src/commands/sweep/merge.rs", "merge"),
-    ("src/commands/verify/constant.rs", "checks"),
-    ("src/commands/verify/passive.rs", "checks"),
-    ("src/scene/maps.rs", "new"),
-    ("src/scene/single.rs", "new"),
-    ("src/scene/steel.rs", "solve"),
-    ("src/shape/scattered/poisson.rs", "poisson"),
-];
+const LONG: &[(&str, &str)] = &[("src/shape/scattered/poisson.rs", "poisson")];
 
 /// Name and length of every function outside tests whose comment gives no reason; the text is as
 /// rustfmt leaves it.

@@ -51,7 +51,7 @@ fn dome_m(x: f64, y: f64) -> f64 {
 /// Forces of a design's array over a square of nodes.
 fn forces(design: &Design, nodes: usize, height_m: fn(f64, f64) -> f64) -> Result<Case, Failure> {
     let scene = Scene::new(design)?;
-    let solved = steel::solve(&scene, None, 1e-12, 0.03)?;
+    let solved = steel::solve(&scene, scene.tolerances.field, 0.03)?;
     let side_m = Axis {
         from: -0.05,
         to: 0.05,

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use fluxform::commands::bench::clock::Watch;
 use fluxform::numerics::axis::Axis;
 use fluxform::progress::Silent;
-use fluxform::shape::deviation::{Faces, Lattice, hausdorff, vertical};
+use fluxform::shape::deviation::{Faces, Lattice, Looks, hausdorff, vertical};
 use fluxform::shape::document::Placement;
 use fluxform::shape::height::{Grid, heights};
 use fluxform::shape::mesh::{FileMesh, Mesh};
@@ -80,7 +80,7 @@ fn million() -> Result<(), Failure> {
     );
     let (certified, seconds) = timed(|| {
         let known: Vec<Option<f64>> = found.iter().map(|s| s.map(|s| s.height_m)).collect();
-        let faces = Faces::new(&mesh, &plan);
+        let faces = Faces::new(&mesh, &plan, Looks::endless());
         vertical(&mesh, &plan, &Lattice::new(&faces, &plan, &known), &Silent)
     });
     let certified = certified.map_err(|e| e.to_string())?;
@@ -116,7 +116,7 @@ fn main() -> Result<(), Failure> {
             let plan = grid(samples);
             let found = heights(&mesh, &plan, &Silent).map_err(|e| e.to_string())?;
             let known: Vec<Option<f64>> = found.iter().map(|s| s.map(|s| s.height_m)).collect();
-            let faces = Faces::new(&mesh, &plan);
+            let faces = Faces::new(&mesh, &plan, Looks::endless());
             let lattice = Lattice::new(&faces, &plan, &known);
             let (off, first_s) = timed(|| vertical(&mesh, &plan, &lattice, &Silent));
             let off = off.map_err(|e| e.to_string())?;

@@ -26,7 +26,6 @@ use fluxform::scene::Scene;
 use fluxform::scene::steel::{self, Solved};
 
 const MAP_TOLERANCE: f64 = 1e-9;
-const FORCE_TOLERANCE: f64 = 1e-12;
 type Failure = Box<dyn Error + Send + Sync>;
 
 /// The flat surface's height.
@@ -133,7 +132,7 @@ fn measure(design: &Design) -> Result<(), Failure> {
     println!("|---|---|---|---|---|");
     let scene = time("scene: coil, inductance", 1, 21, || Ok(Scene::new(design)?))?;
     let solved = time("steel, default tolerance; nothing without", 1, 5, || {
-        Ok(steel::solve(&scene, None, FORCE_TOLERANCE, HEIGHT_M)?)
+        Ok(steel::solve(&scene, scene.tolerances.forces, HEIGHT_M)?)
     })?;
     let workspace = &design.workspace;
     let grid = Grid {

@@ -25,7 +25,6 @@ use fluxform::scene::Scene;
 use fluxform::scene::steel;
 use fluxform_bench::memory::peak_bytes;
 
-const TOLERANCE: f64 = 1e-12;
 type Failure = Box<dyn Error + Send + Sync>;
 
 /// Surfaces of the table: name, rows and columns of the array, its pitch, half the side of the
@@ -92,7 +91,7 @@ fn row(
     design.supply.current_min_a = vec![0.0; side * side];
     design.supply.total_current_max_a = Some(2.0 * (side * side) as f64);
     let scene = Scene::new(&design)?;
-    let solved = steel::solve(&scene, None, TOLERANCE, 0.03)?;
+    let solved = steel::solve(&scene, scene.tolerances.forces, 0.03)?;
     let side_m = Axis {
         from: -half_m,
         to: half_m,

@@ -12,7 +12,7 @@ use fluxform::bundle::manifest::{LeftOut, MadeWith, Manifest};
 use fluxform::bundle::npz::{MapArrays, to_npz};
 use fluxform::bundle::rendering::HeightGrid;
 use fluxform::bundle::seal::to_record;
-use fluxform::bundle::table::{CurrentRow, PointRow, write_currents, write_points};
+use fluxform::bundle::table::{CurrentRow, PointRow, write_rows};
 use fluxform::commands::calibrate::{self, CalibrateOptions};
 use fluxform::commands::verify::{Verifier, VerifyOptions};
 use fluxform::design::{Design, Need};
@@ -99,10 +99,15 @@ impl Parts {
         map.extend(&self.behind);
         let mut files = BTreeMap::from([("map.npz".to_owned(), map)]);
         let mut table = Vec::new();
-        write_points(&mut table, &self.points).unwrap();
+        write_rows(&mut table, PointRow::COLUMNS, self.points.iter().copied()).unwrap();
         files.insert("points.csv".to_owned(), table);
         let mut table = Vec::new();
-        write_currents(&mut table, &self.currents).unwrap();
+        write_rows(
+            &mut table,
+            CurrentRow::COLUMNS,
+            self.currents.iter().copied(),
+        )
+        .unwrap();
         files.insert("currents.csv".to_owned(), table);
         files.insert("lambda.json".to_owned(), to_json(&self.lambda).unwrap());
         files.extend(self.others.clone());

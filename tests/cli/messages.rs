@@ -138,9 +138,9 @@ fn arguments_are_validated_with_their_meaning() {
         place.run(&[&base[..], more].concat()).ends(2)
     };
     lambda(&["--tolerance", "3"]).says(&["relative to the field gradient", "1e-15 to 1e-1"]);
-    lambda(&["--tolerance", "-1e-9"]).says(&["-1e-9 is no tolerance"]);
+    lambda(&["--tolerance", "-1e-9"]).says(&["invalid tolerance -1e-9"]);
     lambda(&["--jnd", "0"]).says(&["greater than 0"]);
-    lambda(&["--at", "-2"]).says(&["-2 is no force constant"]);
+    lambda(&["--at", "-2"]).says(&["invalid force constant -2"]);
     lambda(&["--threads", "0"]).says(&["from 1 to 1024"]);
     lambda(&["--criterion", "best"]).says(&["linear, jnd, saturation, maxmin"]);
     let raw = |more: &[&str]| {

@@ -57,9 +57,9 @@ fn near(value: f64, expected: f64, relative: f64) {
 #[test]
 fn the_seed_coil_is_that_of_finite_elements() {
     let result = evaluated(&seed(&[ALONE]));
-    near(result.coil.resistance_ohm, 6.0753, 1e-5);
-    near(result.coil.inductance_h, 0.184_092, 3e-6);
-    near(result.coil.settling_s, 0.1515, 1e-3);
+    near(result.coil.circuit.resistance_ohm, 6.0753, 1e-5);
+    near(result.coil.circuit.inductance_h, 0.184_092, 3e-6);
+    near(result.coil.circuit.settling_s, 0.1515, 1e-3);
     near(result.target.gradient_t_per_m_per_a, -0.428_229, 2e-6);
     near(result.target.force_n, 0.778_87, 1e-5);
     let core = result.core.expect("a core");
@@ -67,11 +67,15 @@ fn the_seed_coil_is_that_of_finite_elements() {
     assert!(core.mean_field_t < core.peak_field_t && result.array.is_none());
     assert!(!result.limits["settling_s"].met && !result.limits["resistance_ohm"].met);
     assert!(result.accuracy_reached && result.accuracy["field"].estimate <= 1e-6);
-    assert!(result.notes.is_empty(), "{:?}", result.notes);
+    assert!(result.warnings.is_empty(), "{:?}", result.warnings);
     // Eddy currents make the force wait for the current, the current rise faster than 3 tau.
     let step = result.transient.expect("a transient");
     assert!(step.force_95_s > step.current_95_s, "{step:?}");
-    near(step.current_95_s, 3.0 * result.coil.time_constant_s, 0.1);
+    near(
+        step.current_95_s,
+        3.0 * result.coil.circuit.time_constant_s,
+        0.1,
+    );
     let fits = evaluated(&seed(&[ALONE, ("turns = 1429", "")]));
     near(fits.coil.turns, 1428.57, 3e-6);
 }
@@ -84,9 +88,9 @@ fn six_ampere_magnet_and_pull_are_those_of_finite_elements() {
     near(linear.target.force_n, 2.337, 3e-4);
     // Linear steel far above its knee is not passed over in silence.
     assert!(
-        linear.notes[0].contains("knee at 1.5 T"),
+        linear.warnings[0].contains("knee at 1.5 T"),
         "{:?}",
-        linear.notes
+        linear.warnings
     );
     changes.push((
         "relative_permeability = 1000.0",
@@ -97,10 +101,10 @@ fn six_ampere_magnet_and_pull_are_those_of_finite_elements() {
     near(core.peak_field_t, 1.92, 0.02);
     let deviation = core.deviation_from_linear.expect("a curve");
     assert!((deviation + 0.068).abs() < 0.003, "{deviation}");
-    assert!(curve.notes[0].contains("knee"), "{:?}", curve.notes);
-    let flux_wb = curve.coil.flux_linkage_wb.expect("a curve");
-    near(flux_wb, 6.0 * curve.coil.inductance_h, 1e-12);
-    assert!(curve.coil.inductance_h < linear.coil.inductance_h);
+    assert!(curve.warnings[0].contains("knee"), "{:?}", curve.warnings);
+    let flux_wb = curve.coil.circuit.flux_linkage_wb.expect("a curve");
+    near(flux_wb, 6.0 * curve.coil.circuit.inductance_h, 1e-12);
+    assert!(curve.coil.circuit.inductance_h < linear.coil.circuit.inductance_h);
 
     let magnet = ("model = \"dipole\"", "model = \"cylinder\"");
     let whole = evaluated(&seed(&[ALONE, magnet]));
@@ -143,9 +147,9 @@ fn flat(text: &str) -> [f64; 3] {
     let (document, _) = ShapeDocument::read(&here("shapes/flat.toml")).expect("a valid shape");
     let design = read(text, Need::LAMBDA);
     let options = lambda::LambdaOptions::default();
-    let file = lambda::run(&design, &document, Vec::new(), &options, &Silent)
-        .expect("solves")
-        .file;
+    let solved = lambda::run(&design, &document, Vec::new(), &options, &Silent);
+    let (_, report) = solved.expect("solves");
+    let file = report.file;
     [
         file.constants.lambda_linear_n_per_m,
         file.constants.lambda_jnd_n_per_m,
@@ -190,7 +194,11 @@ fn steel_as_permeable_as_air_is_air() {
             evaluated(&cored),
             evaluated(&format!("{head}[array]{tail}")),
         );
-        near(cored.coil.inductance_h, air.coil.inductance_h, 1e-12);
+        near(
+            cored.coil.circuit.inductance_h,
+            air.coil.circuit.inductance_h,
+            1e-12,
+        );
         let (with, without) = (&cored.target, &air.target);
         near(
             with.gradient_t_per_m_per_a,

@@ -1,6 +1,7 @@
 //! The main job from documents to a verified bundle.
 
 mod cored;
+mod inputs;
 mod near;
 
 use std::path::{Path, PathBuf};
@@ -11,9 +12,10 @@ use fluxform::bundle::load::Bundle;
 use fluxform::bundle::npz::{from_npz, to_npz};
 use fluxform::commands::calibrate::{self, CalibrateOptions, CalibrateReport, DEFAULT_REACH_M};
 use fluxform::commands::lambda::LambdaOptions;
-use fluxform::commands::probe::{ProbeComponents, ProbeRequest};
+use fluxform::commands::probe::ProbeRequest;
 use fluxform::commands::{evaluate, lambda, probe, verify};
 use fluxform::design::{Design, Need};
+use fluxform::field::components::Components;
 use fluxform::progress::Silent;
 use fluxform::scene::sources::{DesignSource, ShapeSource};
 use fluxform::shape::document::ShapeDocument;
@@ -94,7 +96,8 @@ fn the_jnd_is_what_the_limits_may_add_to_the_error() {
     let at = 0.3;
     let mut options = LambdaOptions::default();
     options.settings.at_n_per_m = Some(at);
-    let report = lambda::run(&design, &document, Vec::new(), &options, &Silent).expect("solves");
+    let solved = lambda::run(&design, &document, Vec::new(), &options, &Silent);
+    let (_, report) = solved.expect("solves");
     let file = &report.file;
     assert!(at < file.constants.lambda_linear_n_per_m.expect("linear"));
     let floor = file.at.as_ref().expect("asked for").rms_error_n / (at * 0.05);
@@ -161,8 +164,8 @@ fn the_seed_air_coil() {
     let path = here("designs/seed_air.toml");
     let (design, _) = Design::read(&path, Need::EVALUATE).expect("a valid design");
     let result = evaluate::evaluate(&design, Vec::new(), None).expect("evaluates");
-    assert!((result.coil.resistance_ohm - 6.0753).abs() < 5e-5);
-    assert!((result.coil.inductance_h - 0.014_501_926_063_452_128).abs() < 1e-14);
+    assert!((result.coil.circuit.resistance_ohm - 6.0753).abs() < 5e-5);
+    assert!((result.coil.circuit.inductance_h - 0.014_501_926_063_452_128).abs() < 1e-14);
     assert!(
         (result.target.gradient_t_per_m_per_a / -0.054_820_592_063_778_707 - 1.0).abs() < 1e-12
     );
@@ -210,7 +213,7 @@ fn a_probe_on_an_edge_is_told_with_its_number_and_coil() {
     let (design, _) = Design::read(&here("designs/seed_air.toml"), Need::PROBE).expect("valid");
     let points = vec![[0.0, 0.0, 0.03], [0.012, 0.0, 0.0]];
     let request = ProbeRequest {
-        components: ProbeComponents::All,
+        components: Components::All,
         force: false,
         tolerance: None,
     };

@@ -5,8 +5,9 @@
 
 use std::path::Path;
 
-use fluxform::commands::probe::{ProbeComponents, ProbeRequest, ProbeTable, probe};
+use fluxform::commands::probe::{ProbeRequest, ProbeTable, probe};
 use fluxform::design::{Design, Need};
+use fluxform::field::components::Components;
 use fluxform::progress::Silent;
 
 /// A coil of 24 and 38 mm, 100 mm long, around a core of `core`, `columns` of them in a row.
@@ -26,7 +27,7 @@ fn design(core: &str, columns: usize, magnet: &str) -> Design {
 
 fn table(design: &Design, points_m: &[[f64; 3]], tolerance: f64, force: bool) -> ProbeTable {
     let request = ProbeRequest {
-        components: ProbeComponents::All,
+        components: Components::All,
         force,
         tolerance: Some(tolerance),
     };

@@ -1,7 +1,7 @@
 //! The air coil against high-precision values and against physics.
 
 use fluxform_coil::inductance::self_inductance_h;
-use fluxform_field::batch::Quantities;
+use fluxform_field::components::Components;
 use fluxform_field::winding::{AxialField, Winding};
 use serde_json::Value;
 
@@ -114,10 +114,10 @@ fn the_batch_keeps_its_tolerance() {
             for tolerance in [1e-3, 1e-6, 1e-9, 1e-12] {
                 let z = vec![z; r.len()];
                 let batch = winding
-                    .gradients(&r, &z, tolerance, Quantities::Gradient)
+                    .gradients(&r, &z, tolerance, Components::Gradient)
                     .expect("edges");
                 let gz = winding
-                    .gradients(&r, &z, tolerance, Quantities::Gz)
+                    .gradients(&r, &z, tolerance, Components::Gz)
                     .expect("edges");
                 let b_z = winding.axial_fields(&r, &z, tolerance).expect("edges");
                 for (i, f) in exact.iter().enumerate() {

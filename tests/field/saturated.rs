@@ -4,11 +4,12 @@
 #![allow(clippy::print_stdout)]
 
 use fluxform_coil::inductance::self_inductance_h;
+use fluxform_field::components::Components;
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::{ArrayResolution, CoupledArray, closest_m};
 use fluxform_field::steel::bh_curve::BhCurve;
 use fluxform_field::steel::cored_coil::Excitation;
-use fluxform_field::steel::equivalent_dipoles::{ArraySources, Parts};
+use fluxform_field::steel::equivalent_dipoles::ArraySources;
 use fluxform_field::steel::generatrix::{Generatrix, Resolution};
 use fluxform_field::steel::magnetized::MagnetizedCore;
 use fluxform_field::steel::permeability::{Constant, Permeability};
@@ -100,7 +101,7 @@ fn solve(
 /// dB_z/dz of the steel at points, T/m.
 fn slopes(sources: &ArraySources, points: &[[f64; 3]], currents_a: &[f64]) -> Vec<f64> {
     let mut values = vec![0.0; sources.drives() * points.len()];
-    sources.sample(points, Parts::Gz, &mut values);
+    sources.sample(points, Components::Gz, &mut values);
     (0..points.len())
         .map(|p| {
             (0..sources.drives())

@@ -26,6 +26,9 @@ pub fn inputs(format: SurfaceFormat) -> Vec<Hostile> {
         SurfaceFormat::Stl => stl(),
         SurfaceFormat::Obj => obj(),
         SurfaceFormat::Ply => ply(),
+        SurfaceFormat::Off => off(),
+        SurfaceFormat::Glb => glb(),
+        SurfaceFormat::HeightImage => height_image(),
         SurfaceFormat::ThreeMf => three_mf(),
         SurfaceFormat::Amf => amf(),
         SurfaceFormat::ThreeDxml => three_dxml(),
@@ -443,6 +446,60 @@ fn step() -> Vec<Hostile> {
     found
 }
 
+fn off() -> Vec<Hostile> {
+    vec![
+        (
+            "an enormous count",
+            b"OFF 4000000000 4000000000 0\n0 0 0\n".to_vec(),
+        ),
+        (
+            "comments",
+            b"OFF\n"
+                .iter()
+                .copied()
+                .chain(b"#\n".repeat(500_000))
+                .collect(),
+        ),
+        (
+            "a long face",
+            format!(
+                "OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n60000 {}",
+                "0 ".repeat(60_000)
+            )
+            .into_bytes(),
+        ),
+    ]
+}
+
+fn glb() -> Vec<Hostile> {
+    let good = surface_files::glb();
+    let mut found = Vec::new();
+    for number in [&b"\"count\":4"[..], b"\"count\":9", b"\"byteLength\":72"] {
+        let mut bytes = good.clone();
+        if let Some(at) = bytes.windows(number.len()).position(|w| w == number) {
+            // As long as the number and the blanks that follow allow.
+            let end = at + number.len();
+            bytes[end - 1] = b'9';
+            found.push(("a claim", bytes));
+        }
+    }
+    let mut length = good;
+    length[8..12].copy_from_slice(&u32::MAX.to_le_bytes());
+    found.push(("an enormous length", length));
+    found
+}
+
+fn height_image() -> Vec<Hostile> {
+    let flat = vec![0; 2000 * 2000];
+    let image = surface_files::height_image(2000, &flat, png::BitDepth::Eight);
+    let mut claims = image.clone();
+    // Width and height; the checksum of the header is then another.
+    claims[16..24].fill(0x7f);
+    let crc = crc32fast::hash(&claims[12..29]);
+    claims[29..33].copy_from_slice(&crc.to_be_bytes());
+    vec![("an enormous image", claims), ("a plane of zeros", image)]
+}
+
 fn sldprt() -> Vec<Hostile> {
     let marker = [0x14, 0, 0x06, 0, 0x08, 0];
     let head = [0x6b, 0x22, 0x77, 0x37, 0, 0, 0, 4];
@@ -464,6 +521,13 @@ fn sldprt() -> Vec<Hostile> {
         ("an enormous block", claims),
         ("an enormous name", named),
         ("a bomb", surface_files::sldprt_of(&vec![0; 100 << 20])),
+        (
+            "decoys",
+            surface_files::sldprt_blocks(&vec![
+                ("Contents/DisplayLists", &[7u8; 2000][..], false);
+                3000
+            ]),
+        ),
         (
             "tables that never end",
             surface_files::sldprt_of(&table(u32::MAX, &threes)),

@@ -45,7 +45,9 @@ const HANGS: Duration = Duration::from_secs(60);
 const LARGEST_SEED: u64 = 300_000;
 
 /// Endings, one for each format.
-const FORMATS: [&str; 8] = ["stl", "obj", "ply", "3mf", "amf", "3dxml", "step", "sldprt"];
+const FORMATS: [&str; 11] = [
+    "stl", "obj", "ply", "off", "glb", "png", "3mf", "amf", "3dxml", "step", "sldprt",
+];
 
 /// What the watch sees: milliseconds since the start when the input began, 0 between inputs.
 static BEGAN: AtomicU64 = AtomicU64::new(0);
@@ -68,7 +70,13 @@ fn seeds(format: SurfaceFormat) -> Vec<Seed> {
             text(surface_files::ply_ascii()),
             text(surface_files::ply_binary(false)),
             text(surface_files::ply_binary(true)),
+            text(surface_files::ply_strips()),
         ],
+        SurfaceFormat::Off => vec![text(surface_files::off())],
+        SurfaceFormat::Glb => vec![text(surface_files::glb())],
+        SurfaceFormat::HeightImage => [png::BitDepth::Eight, png::BitDepth::Sixteen]
+            .map(|depth| text(surface_files::height_image(5, &[17; 40], depth)))
+            .to_vec(),
         SurfaceFormat::ThreeMf => vec![text(surface_files::three_mf("inch"))],
         SurfaceFormat::Amf => vec![
             text(surface_files::amf("mm").into_bytes()),
@@ -82,6 +90,14 @@ fn seeds(format: SurfaceFormat) -> Vec<Seed> {
         SurfaceFormat::Sldprt => vec![
             Seed::Display(surface_files::display_lists()),
             Seed::Plain(surface_files::sldprt()),
+            Seed::Plain(surface_files::sldprt_compound(&[(
+                "Contents/DisplayLists__ZLB",
+                &surface_files::display_lists(),
+            )])),
+            Seed::Plain(surface_files::sldprt_assembly(
+                surface_files::assembly().0.as_bytes(),
+                &surface_files::assembly().1,
+            )),
         ],
     };
     let folder = std::env::var_os("FLUXFORM_CORPUS").map(PathBuf::from);

@@ -150,11 +150,15 @@ fn every_force_is_met_up_to_the_largest_lambda_and_missed_beyond() {
         let Ok(lambda) = largest(&case) else { continue };
         for share in [0.3, 0.77, 1.0] {
             let found = render(&case.problem(), share * lambda).unwrap();
-            assert_eq!((found.unreached, found.worst_error_n), (0, 0.0), "{seed}");
+            assert_eq!(
+                (found.points_unreached, found.worst_error_n),
+                (0, 0.0),
+                "{seed}"
+            );
         }
         let reach = reachable(&case.problem()).unwrap();
         let found = render(&case.problem(), 1.3 * lambda).unwrap();
-        assert!(found.unreached > 0, "{seed}");
+        assert!(found.points_unreached > 0, "{seed}");
         let missing = case.heights.iter().zip(&reach.most_n);
         let missing: Vec<f64> = missing
             .map(|(h, most)| (1.3 * lambda * h - most).max(0.0))
@@ -190,7 +194,7 @@ fn no_other_currents_give_the_same_force_with_less_power() {
             continue;
         }
         let found = render(&case.problem(), force / 0.7).unwrap();
-        assert_eq!(found.unreached, 0, "{seed}");
+        assert_eq!(found.points_unreached, 0, "{seed}");
         assert!(found.mean_power_w <= power * (1.0 + 1e-9), "{seed}");
     }
 }

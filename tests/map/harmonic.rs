@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use fluxform_base::progress::Silent;
 use fluxform_map::coupled_map::{SampledField, TableReport};
-use fluxform_map::map_source::{Sampler, series};
+use fluxform_map::map_source::Sampler;
 use fluxform_map::tabulate::{Grid, MapError, PlacedCoil};
 use fluxform_map::{Components, FieldMap};
 
@@ -101,7 +101,7 @@ impl Sampler for Charges {
     ) -> Result<(), MapError> {
         self.asked.fetch_add(points_m.len(), Ordering::Relaxed);
         let values: Vec<_> = points_m.par_iter().map(|p| self.at(*p)).collect();
-        let count = series(components);
+        let count = components.count();
         for (place, row) in out.chunks_exact_mut(points_m.len()).enumerate() {
             let component = if count == 1 { 4 } else { place % count };
             for (out, at) in row.iter_mut().zip(&values) {

@@ -1,7 +1,7 @@
 //! Maps against direct evaluation, and their interpolation error against other places.
 
 use fluxform_base::progress::Silent;
-use fluxform_field::batch::{Gradients, Quantities};
+use fluxform_field::batch::Gradients;
 use fluxform_field::frame::to_cartesian;
 use fluxform_field::source::AxialSource;
 use fluxform_field::winding::{OnEdge, Winding};
@@ -131,7 +131,7 @@ impl AxialSource for Raised {
         r_m: &[f64],
         z_m: &[f64],
         tolerance: f64,
-        wanted: Quantities,
+        wanted: Components,
     ) -> Result<Gradients, OnEdge> {
         let z_m = self.below(z_m);
         self.winding.gradients(r_m, &z_m, tolerance, wanted)

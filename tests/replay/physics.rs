@@ -3,7 +3,7 @@
 use fluxform::bundle::replay::Answer;
 use fluxform::bundle::trajectory::Trajectory;
 use fluxform::bundle::write::{BundleContent, write_bundle};
-use fluxform::commands::replay::summary::Told;
+use fluxform::commands::replay::summary::TrajectorySource;
 use fluxform::commands::replay::synthesize::{Kind, Synthesis};
 use fluxform::commands::replay::{Opened, ReplayReport, run};
 use fluxform::progress::Silent;
@@ -12,8 +12,8 @@ use fluxform_testing::Random;
 
 use crate::support::{coupled, in_air};
 
-fn told() -> Told {
-    Told {
+fn told() -> TrajectorySource {
+    TrajectorySource {
         source: "a test".to_owned(),
         input: None,
         synthesis: None,

@@ -2,7 +2,7 @@
 
 use fluxform_base::progress::{Progress, Silent};
 use fluxform_shape::certificate::{Certify, certify};
-use fluxform_shape::deviation::{Faces, Interval, Lattice, Vertical, hausdorff, vertical};
+use fluxform_shape::deviation::{Faces, Interval, Lattice, Looks, Vertical, hausdorff, vertical};
 use fluxform_shape::document::{Placement, Primitive};
 use fluxform_shape::height::Grid;
 use fluxform_shape::mesh::{Mesh, Triangle};
@@ -16,7 +16,7 @@ use fluxform_testing::{Random, root};
 
 fn certified(mesh: &Mesh, plan: &Grid) -> (Vertical, Option<Interval>) {
     let heights: Vec<Option<f64>> = heights(mesh, plan);
-    let faces = Faces::new(mesh, plan);
+    let faces = Faces::new(mesh, plan, Looks::endless());
     let lattice = Lattice::new(&faces, plan, &heights);
     let found = vertical(mesh, plan, &lattice, &Silent).unwrap();
     let apart = hausdorff(mesh, &lattice, &found, &Silent).unwrap();
@@ -528,7 +528,7 @@ fn cells_one_by_one_add_up_to_the_whole() {
     assert!((whole(&found) / bound_m - 1.0).abs() < 1e-5, "{bound_m}");
 
     let of_mesh = heights(&mesh, &plan);
-    let faces = Faces::new(&mesh, &plan);
+    let faces = Faces::new(&mesh, &plan, Looks::endless());
     let lattice = Lattice::new(&faces, &plan, &of_mesh);
     let met = deviation::vertical_by_cell(&lattice, &Silent).unwrap();
     let bound_m = vertical(&mesh, &plan, &lattice, &Silent).unwrap().bound_m();
@@ -551,7 +551,7 @@ fn an_interruption_ends_the_cells_too() {
     let mesh = exact(roof(&[[-2.0, 0.5], [0.3, 0.7], [3.0, 0.5]], [-1.0, 2.0]));
     let plan = grid((-1.0, 1.0, 3), (-0.5, 0.5, 3));
     let heights = heights(&mesh, &plan);
-    let faces = Faces::new(&mesh, &plan);
+    let faces = Faces::new(&mesh, &plan, Looks::endless());
     let lattice = Lattice::new(&faces, &plan, &heights);
     assert!(deviation::vertical_by_cell(&lattice, &Stop).is_err());
     assert!(vertical(&mesh, &plan, &lattice, &Stop).is_err());

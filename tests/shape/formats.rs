@@ -18,7 +18,7 @@ use fluxform_testing::surfaces::{file, lifted};
 const VOLUME: f64 = 0.7 * 1.3 * 2.9 / 6.0;
 const CORNER: [f64; 3] = [0.7, 1.3, 2.9];
 
-fn read(format: SurfaceFormat, bytes: &[u8]) -> Result<FileMesh, String> {
+pub fn read(format: SurfaceFormat, bytes: &[u8]) -> Result<FileMesh, String> {
     let read = format.read(Path::new("f"), bytes);
     read.map_err(|error| error.to_string())
 }
@@ -277,8 +277,8 @@ fn amf_constellations_place_their_objects() {
     assert!(refusal(SurfaceFormat::Amf, lost.as_bytes()).contains("places `3`"));
     let wrong = amf("inch").replace("<v1>0</v1>", "<v1>4</v1>");
     assert!(refusal(SurfaceFormat::Amf, wrong.as_bytes()).contains("index 4"));
-    assert!(refusal(SurfaceFormat::Amf, b"<html></html>").contains("XML of `html`"));
-    assert!(refusal(SurfaceFormat::Amf, b"\xff\xfe<\0a\0").contains("UTF-16"));
+    assert!(refusal(SurfaceFormat::Amf, b"<some></some>").contains("XML of `some`"));
+    assert!(refusal(SurfaceFormat::Amf, b"\xff\xfe<\0a\0").contains("the XML"));
 }
 
 /// Constellations within each other were left out where another object stood beside them.
@@ -370,31 +370,6 @@ fn a_body_in_another_document_is_refused_in_3dxml_not_taken_for_one_of_the_same_
         file.unwrap().triangles
     };
     assert_eq!(read(&own), read(&three_dxml()));
-}
-
-#[test]
-fn a_damaged_native_part_is_refused() {
-    let good = sldprt();
-    for (at, byte, said) in [(4, 1, "its sign is missing"), (8, 1, "no block of data")] {
-        let mut bytes = good.clone();
-        bytes[at] ^= byte;
-        let message = refusal(SurfaceFormat::Sldprt, &bytes);
-        assert!(message.contains(said), "{message}");
-    }
-    // Checksum, then the length unpacked.
-    for at in [18, 26] {
-        let mut bytes = good.clone();
-        bytes[at] ^= 1;
-        let message = refusal(SurfaceFormat::Sldprt, &bytes);
-        assert!(message.contains("that it claims"), "{at}: {message}");
-        bytes[at..at + 4].copy_from_slice(&u32::MAX.to_le_bytes());
-        refusal(SurfaceFormat::Sldprt, &bytes);
-    }
-    let ole = refusal(SurfaceFormat::Sldprt, b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1");
-    assert!(
-        ole.contains("up to 2014") && ole.contains("save the body as STL"),
-        "{ole}"
-    );
 }
 
 #[test]

@@ -8,7 +8,9 @@ mod heights;
 mod hostile;
 mod inspect;
 mod marks;
+mod more_formats;
 mod points;
+mod solidworks;
 #[cfg(feature = "step")]
 mod step;
 mod stl;

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use fluxform_base::progress::Silent;
 use fluxform_numerics::axis::Axis;
 use fluxform_shape::certificate::Certify;
-use fluxform_shape::deviation::{Faces, Lattice, vertical};
+use fluxform_shape::deviation::{Faces, Lattice, Looks, vertical};
 use fluxform_shape::document::{
     AxisRequest, GridRequest, Placement, Primitive, ShapeDocument, SurfaceSource,
 };
@@ -295,7 +295,7 @@ fn graded_points_hold_their_deviation_with_fewer_than_a_grid() {
                 .iter()
                 .map(|s| s.map(|s| s.height_m))
                 .collect();
-            let faces = Faces::new(mesh, &plan);
+            let faces = Faces::new(mesh, &plan, Looks::endless());
             let off =
                 vertical(mesh, &plan, &Lattice::new(&faces, &plan, &heights), &Silent).unwrap();
             assert!(off.bound_m() > 2.0 * deviation_m, "{off:?}");

@@ -294,7 +294,8 @@ fn files_that_cannot_be_read_are_named() {
         assert!(said.contains("no such file"), "{said}");
     }
     assert!(open(Path::new("a.ply"), None).contains("PLY files carry no unit"));
-    assert!(open(Path::new("surface"), Some(0.001)).contains("not a surface that is read"));
+    assert!(open(Path::new("surface.txt"), Some(0.001)).contains("not a surface that is read"));
+    assert!(open(Path::new("surface"), Some(0.001)).contains("no such file"));
     assert!(open(Path::new("/dev/null.stl"), Some(0.001)).contains("no such file"));
 }
 

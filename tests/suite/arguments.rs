@@ -7,7 +7,7 @@ use clap::builder::PossibleValuesParser;
 use fluxform::RunError;
 use fluxform::bundle::json::to_json;
 use fluxform::cli::shell::{
-    Codes, Common, Failure, FileArgument, Place, Printer, Program, Sheet, Side, Writing, begin,
+    Codes, Common, Failure, FileArgument, Printer, Program, Sheet, Side, Stream, Writing, begin,
     folder, page, table,
 };
 use fluxform::cli::shell::{bytes, count, error, number_to, si};
@@ -136,7 +136,7 @@ impl Program for Arguments {
             printer.warning(&format!("peer not measured: {missing}"));
         }
         let folder = request.out.display().to_string();
-        printer.summary(Place::Output, &printer.with_warnings(&file), || {
+        printer.summary(Stream::Output, &printer.with_warnings(&file), || {
             summary(&file, &folder)
         })
     }
@@ -178,7 +178,7 @@ impl Arguments {
             write_catalogue(&rows, made_with.clone(), out, self.writing.force)?;
         }
         let table = catalogue_file(&rows, made_with);
-        printer.summary(Place::Output, &table, || told_cases(&table.cases))?;
+        printer.summary(Stream::Output, &table, || told_cases(&table.cases))?;
         let failed: Vec<&str> = (table.cases.iter())
             .filter(|row| !row.pass)
             .map(|row| row.name.as_str())

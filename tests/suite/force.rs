@@ -4,7 +4,6 @@ use super::inputs::BuiltIn;
 use super::test_surface::HALF_M;
 use fluxform::RunError;
 use fluxform::design::{Design, Need};
-use fluxform::field::winding::KERNEL_ERROR;
 use fluxform::lambda::ForceProblem;
 use fluxform::numerics::axis::Axis;
 use fluxform::progress::Silent;
@@ -75,7 +74,7 @@ pub fn forces(
 ) -> Result<Forces, RunError> {
     let design = with_coils(design, side)?;
     let scene = Scene::new(&design)?;
-    let solved = steel::solve(&scene, None, KERNEL_ERROR, 0.03)?;
+    let solved = steel::solve(&scene, scene.tolerances.field, 0.03)?;
     let line = Axis {
         from: -HALF_M,
         to: HALF_M,

@@ -2,9 +2,9 @@
 
 use fluxform::report::frame::{Page, Section, figure};
 use fluxform::report::html::{Cell, Html, Table};
+use fluxform::report::inputs::sources;
 use fluxform::report::measured::{MeasuredCurve, MeasuredRow};
 use fluxform::report::number::{count, figures, percent, si};
-use fluxform::report::optimum::sources;
 use serde_json::{Map, Value, json};
 
 use crate::file::{BenchFile, Curve, Law, Row, StageCurves};

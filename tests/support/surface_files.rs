@@ -3,7 +3,7 @@
 use std::io::{Cursor, Write};
 
 use flate2::Compression;
-use flate2::write::DeflateEncoder;
+use flate2::write::{DeflateEncoder, ZlibEncoder};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
@@ -187,24 +187,181 @@ pub fn display_lists() -> Vec<u8> {
     stream
 }
 
-pub fn sldprt_of(stream: &[u8]) -> Vec<u8> {
-    let mut packer = DeflateEncoder::new(Vec::new(), Compression::default());
-    packer.write_all(stream).unwrap();
-    let packed = packer.finish().unwrap();
-    let name = b"Contents/DisplayLists";
+/// A SOLIDWORKS file since 2015 of these blocks: name, content, and whether it verifies. The
+/// header of one that does not claims to reach to the end of the file.
+pub fn sldprt_blocks(blocks: &[(&str, &[u8], bool)]) -> Vec<u8> {
     let mut bytes = vec![0x6b, 0x22, 0x77, 0x37, 0, 0, 0, 4];
-    bytes.extend([0x14, 0, 0x06, 0, 0x08, 0]);
-    let sizes = [packed.len(), stream.len(), name.len()].map(|n| n as u32);
-    for word in [1, crc32fast::hash(stream), sizes[0], sizes[1], sizes[2]] {
-        bytes.extend(word.to_le_bytes());
+    let mut decoys = Vec::new();
+    for (name, stream, whole) in blocks {
+        let mut packer = DeflateEncoder::new(Vec::new(), Compression::default());
+        packer.write_all(stream).unwrap();
+        let packed = packer.finish().unwrap();
+        bytes.extend([0x14, 0, 0x06, 0, 0x08, 0]);
+        if !whole {
+            decoys.push((bytes.len() + 8, bytes.len() + 20 + name.len()));
+        }
+        let sizes = [packed.len(), stream.len(), name.len()].map(|n| n as u32);
+        let checksum = crc32fast::hash(stream) ^ u32::from(!whole);
+        for word in [1, checksum, sizes[0], sizes[1], sizes[2]] {
+            bytes.extend(word.to_le_bytes());
+        }
+        bytes.extend(name.bytes().map(|b| b.rotate_left(4)));
+        bytes.extend(packed);
     }
-    bytes.extend(name.map(|b| b.rotate_left(4)));
-    bytes.extend(packed);
+    let length = bytes.len();
+    for (at, start) in decoys {
+        bytes[at..at + 4].copy_from_slice(&((length - start) as u32).to_le_bytes());
+    }
     bytes
+}
+
+pub fn sldprt_of(stream: &[u8]) -> Vec<u8> {
+    sldprt_blocks(&[("Contents/DisplayLists", stream, true)])
 }
 
 pub fn sldprt() -> Vec<u8> {
     sldprt_of(&display_lists())
+}
+
+/// A SOLIDWORKS file up to 2014 of these streams; names that end in `__ZLB` are packed.
+pub fn sldprt_compound(streams: &[(&str, &[u8])]) -> Vec<u8> {
+    let mut file = cfb::CompoundFile::create(Cursor::new(Vec::new())).unwrap();
+    for (name, stream) in streams {
+        let folder = name.rsplit_once('/').unwrap().0;
+        file.create_storage_all(format!("/{folder}")).unwrap();
+        let mut content = stream.to_vec();
+        if name.ends_with("__ZLB") {
+            content = vec![0x23; 16];
+            for chunk in stream.chunks(100) {
+                let mut packer = ZlibEncoder::new(Vec::new(), Compression::default());
+                packer.write_all(chunk).unwrap();
+                let packed = packer.finish().unwrap();
+                content.extend((chunk.len() as u32).to_le_bytes());
+                content.extend((packed.len() as u32).to_le_bytes());
+                content.extend(packed);
+            }
+            content.extend([0; 8]);
+        }
+        let mut target = file.create_stream(format!("/{name}")).unwrap();
+        target.write_all(&content).unwrap();
+    }
+    file.flush().unwrap();
+    file.into_inner().into_inner()
+}
+
+/// An assembly of two tetrahedra, the second 10 m along x and turned by 90 degrees about z, and
+/// of a third that is hidden: its document, and its display lists.
+pub fn assembly() -> (String, Vec<u8>) {
+    let references = [
+        (1, "NO", "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"),
+        (2, "NO", "0 1 0 0 -1 0 0 0 0 0 1 0 10 0 0 1"),
+        (3, "YES", "1 0 0 0 0 1 0 0 0 0 1 0 0 0 7 1"),
+    ];
+    let references = references.map(|(k, hidden, place)| {
+        format!(
+            "<swReference id=\"{}\" swName=\"body\" swReferenceNumber=\"{k}\" \
+             swSuppressed=\"NO\" swHidden=\"{hidden}\" swModelRef=\"5\" \
+             swTransform=\"{place}\"/>",
+            10 + k
+        )
+    });
+    let tree = format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?><swSolidWorks><swHeader>\
+         <swFile id=\"3\" swPath=\"Z:\\both.SLDASM\"/><swFile id=\"6\" \
+         swPath=\"Z:\\a b\\Body.SLDPRT\"/></swHeader><swModelList>\
+         <swModel id=\"5\" swName=\"Body\" swFileRef=\"6\" swBoundingBox=\"0 0 0 0.7 1.3 2.9\"/>\
+         <swModel id=\"2\" swName=\"both\" swFileRef=\"3\">{}</swModel></swModelList>\
+         </swSolidWorks>",
+        references.concat()
+    );
+    let path = "C:\\elsewhere\\Body.SLDPRT";
+    let mut stream = vec![0, 7, 0xff, 0xfe, 0xff, path.len() as u8];
+    stream.extend(path.encode_utf16().flat_map(u16::to_le_bytes));
+    stream.extend(display_lists());
+    (tree, stream)
+}
+
+/// The tetrahedron's faces as one strip and a triangle, -1 between them.
+pub fn ply_strips() -> Vec<u8> {
+    let mut bytes = b"ply\nformat binary_big_endian 1.0\nelement vertex 4\nproperty float x\n\
+                      property float y\nproperty float z\nelement tristrips 1\n\
+                      property list int int vertex_indices\nend_header\n"
+        .to_vec();
+    for c in VERTICES.as_flattened() {
+        bytes.extend(c.to_be_bytes());
+    }
+    let strip = [0i32, 2, 1, 3, -1, 0, 1, 3, -1, 0, 3, 2];
+    bytes.extend((strip.len() as i32).to_be_bytes());
+    bytes.extend(strip.iter().flat_map(|index| index.to_be_bytes()));
+    bytes
+}
+
+pub fn off() -> Vec<u8> {
+    let mut text = String::from("OFF # a body\n4 4 6\n\n");
+    for [x, y, z] in VERTICES {
+        text += &format!("{x} {y} {z}\n");
+    }
+    for [a, b, c] in TRIANGLES {
+        text += &format!("3 {a} {b} {c} 0.5 0.5 0.5\n");
+    }
+    text.into_bytes()
+}
+
+/// The tetrahedron, which glTF has with y upwards, in two primitives; its node doubles it.
+pub fn glb() -> Vec<u8> {
+    let mut blob = Vec::new();
+    for [x, y, z] in VERTICES {
+        for c in [x, z, -y] {
+            blob.extend((c / 2.0).to_le_bytes());
+        }
+    }
+    for index in TRIANGLES[..3].as_flattened().iter().chain(&TRIANGLES[3]) {
+        blob.extend((*index as u16).to_le_bytes());
+    }
+    let json = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],
+        "nodes":[{"children":[1]},{"mesh":0,"scale":[2,2,2]}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1},
+        {"attributes":{"POSITION":0},"indices":2,"mode":5}]}],
+        "buffers":[{"byteLength":72}],"bufferViews":[{"buffer":0,"byteLength":48},
+        {"buffer":0,"byteOffset":48,"byteLength":24}],"accessors":[
+        {"bufferView":0,"componentType":5126,"count":4,"type":"VEC3","min":[0,0,-1],"max":[1,2,0]},
+        {"bufferView":1,"componentType":5123,"count":9,"type":"SCALAR"},
+        {"bufferView":1,"byteOffset":18,"componentType":5123,"count":3,"type":"SCALAR"}]}"#;
+    let mut json = json.as_bytes().to_vec();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let mut bytes = b"glTF\x02\0\0\0".to_vec();
+    let length = 12 + 8 + json.len() + 8 + blob.len();
+    bytes.extend((length as u32).to_le_bytes());
+    for (kind, chunk) in [(b"JSON", &json), (b"BIN\0", &blob)] {
+        bytes.extend((chunk.len() as u32).to_le_bytes());
+        bytes.extend(kind);
+        bytes.extend(chunk);
+    }
+    bytes
+}
+
+/// A PNG of grey, its rows from the top; with one bit depth of 8 or 16.
+pub fn height_image(width: u32, levels: &[u16], depth: png::BitDepth) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, levels.len() as u32 / width);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(depth);
+    let mut writer = encoder.write_header().unwrap();
+    let data: Vec<u8> = match depth {
+        png::BitDepth::Sixteen => levels.iter().flat_map(|l| l.to_be_bytes()).collect(),
+        _ => levels.iter().map(|l| *l as u8).collect(),
+    };
+    writer.write_image_data(&data).unwrap();
+    writer.finish().unwrap();
+    bytes
+}
+
+/// The assembly of this document and these display lists.
+pub fn sldprt_assembly(tree: &[u8], lists: &[u8]) -> Vec<u8> {
+    sldprt_blocks(&[
+        ("swXmlContents/COMPINSTANCETREE", tree, true),
+        ("Contents/DisplayLists", lists, true),
+    ])
 }
 
 /// A part in STEP: a box of 0.7 x 1.3 x 2.9 mm, its six faces planes.

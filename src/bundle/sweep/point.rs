@@ -45,7 +45,7 @@ impl Status {
 }
 
 /// What is tabulated of one design: one coil alone at its rated current, SI.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Row {
     /// Number of turns.
     pub turns: f64,

@@ -2,43 +2,96 @@
 
 use std::io::{self, Write};
 
-use super::{Mode, OptimumRow, PointFile, Value};
+use super::{Mode, PointFile, Value};
 use crate::number::{push_index, push_number};
 
-/// Columns after `index` and the set keys. Cells that do not apply are empty.
-pub const ROW_COLUMNS: [&str; 14] = [
-    "turns",
-    "resistance_ohm",
-    "inductance_h",
-    "settling_s",
-    "power_w",
-    "mass_kg",
-    "wire_length_m",
-    "current_a",
-    "gradient_t_per_m_per_a",
-    "force_n",
-    "core_peak_field_t",
-    "limits_met",
-    "status",
-    "message",
+/// A cell of a result. Cells that do not apply are empty.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cell<'a> {
+    /// A number, SI.
+    Number(Option<f64>),
+    /// A count.
+    Count(Option<u64>),
+    /// A yes or no.
+    Flag(Option<bool>),
+    /// A word.
+    Text(&'a str),
+}
+
+/// A column: its name, unit last, and its cell of a point.
+pub struct Column {
+    /// Its name.
+    pub name: &'static str,
+    /// Its cell.
+    pub cell: fn(&PointFile) -> Cell<'_>,
+}
+
+const fn column(name: &'static str, cell: fn(&PointFile) -> Cell<'_>) -> Column {
+    Column { name, cell }
+}
+
+macro_rules! of_row {
+    ($name:literal, $kind:ident, $row:ident => $value:expr) => {
+        column($name, |point| {
+            Cell::$kind(point.row.as_ref().and_then(|$row| $value))
+        })
+    };
+}
+
+macro_rules! of_optimum {
+    ($name:literal, $kind:ident, $best:ident => $value:expr) => {
+        of_row!($name, $kind, row => row.optimum.as_ref().and_then(|$best| $value))
+    };
+}
+
+/// Columns after `index` and the set keys.
+pub static ROW_COLUMNS: [Column; 14] = [
+    of_row!("turns", Number, row => Some(row.turns)),
+    of_row!("resistance_ohm", Number, row => Some(row.resistance_ohm)),
+    of_row!("inductance_h", Number, row => Some(row.inductance_h)),
+    of_row!("settling_s", Number, row => Some(row.settling_s)),
+    of_row!("power_w", Number, row => Some(row.power_w)),
+    of_row!("mass_kg", Number, row => Some(row.mass_kg)),
+    of_row!("wire_length_m", Number, row => Some(row.wire_length_m)),
+    of_row!("current_a", Number, row => Some(row.current_a)),
+    of_row!("gradient_t_per_m_per_a", Number, row => Some(row.gradient_t_per_m_per_a)),
+    of_row!("force_n", Number, row => Some(row.force_n)),
+    of_row!("core_peak_field_t", Number, row => row.core_peak_field_t),
+    of_row!("limits_met", Flag, row => Some(row.limits_met)),
+    column("status", |point| Cell::Text(point.status.name())),
+    column("message", |point| {
+        Cell::Text(point.message.as_deref().unwrap_or(""))
+    }),
 ];
 
 /// Columns after those of a sweep that optimises.
-pub const OPTIMUM_COLUMNS: [&str; 8] = [
-    "best_inner_diameter_m",
-    "best_outer_diameter_m",
-    "best_length_m",
-    "best_wire_diameter_m",
-    "best_layers",
-    "best_turns_per_layer",
-    "certificate",
-    "upper_bound_n",
+pub static OPTIMUM_COLUMNS: [Column; 8] = [
+    of_optimum!("best_inner_diameter_m", Number, best => Some(best.inner_diameter_m)),
+    of_optimum!("best_outer_diameter_m", Number, best => Some(best.outer_diameter_m)),
+    of_optimum!("best_length_m", Number, best => Some(best.length_m)),
+    of_optimum!("best_wire_diameter_m", Number, best => Some(best.wire_diameter_m)),
+    of_optimum!("best_layers", Count, best => best.layers),
+    of_optimum!("best_turns_per_layer", Count, best => best.turns_per_layer),
+    column("certificate", |point| {
+        let best = point.row.as_ref().and_then(|row| row.optimum.as_ref());
+        Cell::Text(best.map_or("", |best| best.certificate.name()))
+    }),
+    of_optimum!("upper_bound_n", Number, best => best.upper_bound_n),
 ];
+
+/// The columns of a sweep's results.
+pub fn columns(mode: Mode) -> impl Iterator<Item = &'static Column> {
+    let of_optimum: &[Column] = match mode {
+        Mode::Evaluate => &[],
+        Mode::Optimize | Mode::OptimizeWound => &OPTIMUM_COLUMNS,
+    };
+    ROW_COLUMNS.iter().chain(of_optimum)
+}
 
 /// Writes rows as they come.
 pub struct TableWriter<'a> {
     out: &'a mut dyn Write,
-    optimum: bool,
+    mode: Mode,
     line: Vec<u8>,
 }
 
@@ -56,15 +109,13 @@ impl<'a> TableWriter<'a> {
     ) -> io::Result<Self> {
         let mut table = Self {
             out,
-            optimum: mode != Mode::Evaluate,
+            mode,
             line: Vec::new(),
         };
-        let found: &[&str] = if table.optimum { &OPTIMUM_COLUMNS } else { &[] };
         table.text("index");
         for key in keys
             .into_iter()
-            .chain(ROW_COLUMNS)
-            .chain(found.iter().copied())
+            .chain(columns(mode).map(|column| column.name))
             .chain(extra.iter().copied())
         {
             table.text(key);
@@ -87,65 +138,22 @@ impl<'a> TableWriter<'a> {
         for value in values {
             self.value(value);
         }
-        match &point.row {
-            Some(row) => {
-                for number in [
-                    row.turns,
-                    row.resistance_ohm,
-                    row.inductance_h,
-                    row.settling_s,
-                    row.power_w,
-                    row.mass_kg,
-                    row.wire_length_m,
-                    row.current_a,
-                    row.gradient_t_per_m_per_a,
-                    row.force_n,
-                ] {
-                    self.number(number);
-                }
-                match row.core_peak_field_t {
-                    Some(field_t) => self.number(field_t),
-                    None => self.text(""),
-                }
-                self.text(if row.limits_met { "true" } else { "false" });
-            }
-            None => {
-                for _ in 0..ROW_COLUMNS.len() - 2 {
-                    self.text("");
-                }
-            }
-        }
-        self.text(point.status.name());
-        self.text(point.message.as_deref().unwrap_or(""));
-        if self.optimum {
-            self.optimum(point.row.as_ref().and_then(|row| row.optimum.as_ref()));
+        for column in columns(self.mode) {
+            self.cell(&(column.cell)(point));
         }
         for flag in extra {
-            self.text(if *flag { "true" } else { "false" });
+            self.text(&flag.to_string());
         }
         self.end()
     }
 
-    fn optimum(&mut self, found: Option<&OptimumRow>) {
-        let Some(found) = found else {
-            OPTIMUM_COLUMNS.iter().for_each(|_| self.text(""));
-            return;
-        };
-        for length_m in [
-            found.inner_diameter_m,
-            found.outer_diameter_m,
-            found.length_m,
-            found.wire_diameter_m,
-        ] {
-            self.number(length_m);
-        }
-        for whole in [found.layers, found.turns_per_layer] {
-            self.text(&whole.map_or_else(String::new, |whole| whole.to_string()));
-        }
-        self.text(found.certificate.name());
-        match found.upper_bound_n {
-            Some(bound_n) => self.number(bound_n),
-            None => self.text(""),
+    fn cell(&mut self, cell: &Cell<'_>) {
+        match cell {
+            Cell::Number(Some(value)) => self.number(*value),
+            Cell::Count(Some(count)) => self.text(&count.to_string()),
+            Cell::Flag(Some(flag)) => self.text(&flag.to_string()),
+            Cell::Text(text) => self.text(text),
+            Cell::Number(None) | Cell::Count(None) | Cell::Flag(None) => self.text(""),
         }
     }
 

@@ -1,8 +1,8 @@
 //! Coils that are a little weaker than the best one, and shorter, lighter or cooler.
 
-use super::model::{CoilModel, Strand, Window};
+use super::model::{CoilModel, Window};
 use super::near_optimal_bore::best_near;
-use super::outcome::BestCoil;
+use super::outcome::{Advantage, Alternative, BestCoil};
 use super::problem::{Problem, Task};
 use super::scalar;
 use super::sqp::Local;
@@ -16,38 +16,12 @@ pub const SHARE: f64 = 0.01;
 const STEP: f64 = 0.97;
 const STEPS: i32 = 40;
 const TOLERANCE: f64 = 1e-4;
-
-/// What is reduced.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Reduced {
-    /// Length.
-    Length,
-    /// Mass of wire and core.
-    Mass,
-    /// Heat at the rated current.
-    Power,
-}
-
-/// A coil that gives up [`SHARE`] of the force.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Alternative {
-    /// For what.
-    pub reduced: Reduced,
-    /// Its section.
-    pub window: Window,
-    /// Its wire.
-    pub strand: Strand,
-    /// Turns, not rounded.
-    pub turns: f64,
-    /// |force|, N.
-    pub force_n: f64,
-    /// Rated current, A.
-    pub current_a: f64,
-}
+/// Relative difference of two coils that are one.
+const SAME: f64 = 1e-3;
 
 /// For each of length, mass and heat the coil of `best`'s wire that has least of it and lacks at
-/// most [`SHARE`] of the force, to about 1e-4 and as far as a local search goes; none where the
-/// force falls at once or where nothing is to be gained.
+/// most [`SHARE`] of the force, to about 1e-4 and as far as a local search can say; none where the
+/// force falls at once or where nothing is to be gained. Coils that hardly differ are one.
 ///
 /// # Errors
 /// Interruption.
@@ -57,13 +31,30 @@ pub fn alternatives(
     best: &BestCoil,
     progress: &dyn Progress,
 ) -> Result<Vec<Alternative>, Interrupted> {
+    let mut list: Vec<Alternative> = Vec::new();
+    for (sought, coil) in reduced_coils(model, task, best, progress)? {
+        let coil = Alternative::new(&coil, best, Some(sought));
+        if !list.iter().any(|known| known.is_near(&coil, SAME)) {
+            list.push(coil);
+        }
+    }
+    Ok(list)
+}
+
+/// The coil that has least of each, where there is one.
+fn reduced_coils(
+    model: &dyn CoilModel,
+    task: &Task,
+    best: &BestCoil,
+    progress: &dyn Progress,
+) -> Result<Vec<(Advantage, BestCoil)>, Interrupted> {
     let mut list = Vec::new();
-    for reduced in [Reduced::Length, Reduced::Mass, Reduced::Power] {
+    for sought in Advantage::ALL {
         progress.check()?;
-        if reduced == Reduced::Length && task.fixed.length_m.is_some() {
+        if sought == Advantage::Shorter && task.fixed.length_m.is_some() {
             continue;
         }
-        list.extend(least(model, task, best, reduced));
+        list.extend(least(model, task, best, sought).map(|coil| (sought, coil)));
     }
     Ok(list)
 }
@@ -72,8 +63,8 @@ fn least(
     model: &dyn CoilModel,
     task: &Task,
     best: &BestCoil,
-    reduced: Reduced,
-) -> Option<Alternative> {
+    sought: Advantage,
+) -> Option<BestCoil> {
     let volume = best.window.volume_over_pi_m3().value;
     let resistance_ohm = volume * best.strand.resistance_per_volume();
     let core_kg = model
@@ -86,14 +77,14 @@ fn least(
         .ok()?
         .core_mass_kg
         .value;
-    let value = match reduced {
-        Reduced::Length => best.window.length_m,
-        Reduced::Mass => volume * best.strand.mass_per_volume() + core_kg,
-        Reduced::Power => best.current_a * best.current_a * resistance_ohm,
+    let value = match sought {
+        Advantage::Shorter => best.window.length_m,
+        Advantage::Lighter => volume * best.strand.mass_per_volume() + core_kg,
+        Advantage::Cooler => best.current_a * best.current_a * resistance_ohm,
     };
     let enough = best.force_n.ln() + (-SHARE).ln_1p();
     let margin = |share: f64| {
-        let found = under(model, task, best, reduced, share * value);
+        let found = under(model, task, best, sought, share * value);
         found.map_or(-1.0, |(_, local)| -local.point.objective - enough)
     };
     let (mut inside, mut outside) = (1.0, None);
@@ -113,40 +104,42 @@ fn least(
     if share > 1.0 - 2.0 * TOLERANCE {
         return None;
     }
-    let (window, local) = under(model, task, best, reduced, share * value)?;
+    let (window, local) = under(model, task, best, sought, share * value)?;
     let regime = Problem::of_wire(model, task, best.strand)
         .into_iter()
         .find(|problem| problem.regime == best.regime)?;
-    Some(Alternative {
-        reduced,
+    Some(BestCoil {
         window,
         strand: best.strand,
         turns: best.strand.turns(&window),
+        whole: None,
+        regime: best.regime,
         force_n: (-local.point.objective).exp(),
         current_a: regime.rate(window)?.current_a,
+        limits: Vec::new(),
     })
 }
 
-/// The best coil of which `reduced` is at most `most`.
+/// The best coil that has `most` or less of what is `sought`.
 fn under(
     model: &dyn CoilModel,
     task: &Task,
     best: &BestCoil,
-    reduced: Reduced,
+    sought: Advantage,
     most: f64,
 ) -> Option<(Window, Local)> {
     let limits = &task.limits;
     let tighter = |limit: Option<f64>| Some(limit.map_or(most, |limit| limit.min(most)));
-    let limits = match reduced {
-        Reduced::Length => Limits {
+    let limits = match sought {
+        Advantage::Shorter => Limits {
             length_max_m: tighter(limits.length_max_m),
             ..*limits
         },
-        Reduced::Mass => Limits {
+        Advantage::Lighter => Limits {
             mass_max_kg: tighter(limits.mass_max_kg),
             ..*limits
         },
-        Reduced::Power => Limits {
+        Advantage::Cooler => Limits {
             power_max_w: tighter(limits.power_max_w),
             ..*limits
         },
@@ -191,30 +184,32 @@ mod tests {
             outcome.best.expect("optimal")
         };
         let top = best(limits);
-        let list = alternatives(&model, &task, &top, &Silent).expect("runs");
-        let reduced: Vec<Reduced> = list.iter().map(|found| found.reduced).collect();
-        assert_eq!(reduced, [Reduced::Length, Reduced::Mass, Reduced::Power]);
+        let list = reduced_coils(&model, &task, &top, &Silent).expect("runs");
+        let sought: Vec<Advantage> = list.iter().map(|(sought, _)| *sought).collect();
+        assert_eq!(sought, Advantage::ALL);
         let volume = |window: &Window| window.volume_over_pi_m3().value;
-        for found in &list {
+        for (sought, found) in &list {
             let ratio = found.force_n / top.force_n;
             assert!((0.99..0.9903).contains(&ratio), "{found:?} {ratio}");
-            let amount = match found.reduced {
-                Reduced::Length => found.window.length_m / top.window.length_m,
-                Reduced::Mass | Reduced::Power => volume(&found.window) / volume(&top.window),
+            let amount = match sought {
+                Advantage::Shorter => found.window.length_m / top.window.length_m,
+                Advantage::Lighter | Advantage::Cooler => {
+                    volume(&found.window) / volume(&top.window)
+                }
             };
             assert!(amount < 0.99, "{found:?} {amount}");
             // No coil with so little of it is stronger.
             let window = found.window;
-            let tighter = match found.reduced {
-                Reduced::Length => Limits {
+            let tighter = match sought {
+                Advantage::Shorter => Limits {
                     length_max_m: Some(window.length_m),
                     ..limits
                 },
-                Reduced::Mass => Limits {
+                Advantage::Lighter => Limits {
                     mass_max_kg: Some(volume(&window) * top.strand.mass_per_volume()),
                     ..limits
                 },
-                Reduced::Power => Limits {
+                Advantage::Cooler => Limits {
                     power_max_w: Some(4.0 * volume(&window) * top.strand.resistance_per_volume()),
                     ..limits
                 },

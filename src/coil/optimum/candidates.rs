@@ -3,60 +3,19 @@
 use super::diagnosis;
 use super::domain::Domain;
 use super::local_searches::{self, Solved};
-use super::model::{Strand, Window};
-use super::outcome::{BestCoil, Certificate, LimitUse, OptimumStatus, Violation};
+use super::model::Window;
+use super::outcome::{
+    Advantage, Alternative, BestCoil, Certificate, LimitUse, OptimumStatus, Outcome, Violation,
+    WholeTurns,
+};
 use super::problem::{LimitName, Problem};
 use super::search;
 
 /// Share of the best force that a listed coil may lack.
 pub const SHARE: f64 = 0.01;
-/// Most coils listed beside the best.
+/// Most coils listed beside the best, and reported.
 const LISTED: usize = 50;
-
-/// A coil that can be wound.
-#[derive(Debug, Clone, PartialEq)]
-pub struct WoundCoil {
-    /// Its wire.
-    pub strand: Strand,
-    /// Layers n.
-    pub layers: u64,
-    /// Turns a layer m.
-    pub turns_per_layer: u64,
-    /// Its section.
-    pub window: Window,
-    /// Rated current, A.
-    pub current_a: f64,
-    /// |force| at the target, N.
-    pub force_n: f64,
-    /// Mass of the wire's metal, kg.
-    pub wire_mass_kg: f64,
-    /// Heat at the rated current, W.
-    pub power_w: f64,
-    /// The limits; sensitivities are the continuous problem's and zero here.
-    pub limits: Vec<LimitUse>,
-}
-
-/// The best coil that can be wound, and others worth a look.
-#[derive(Debug, Clone, PartialEq)]
-pub struct WoundOutcome {
-    /// How it ended.
-    pub status: OptimumStatus,
-    /// The best; present with [`OptimumStatus::Optimal`].
-    pub best: Option<WoundCoil>,
-    /// Coils within [`SHARE`] of its force that are shorter, lighter or cooler, none of them
-    /// beaten by another in force, length, mass and heat together; strongest first.
-    pub alternatives: Vec<WoundCoil>,
-    /// What is proven.
-    pub certificate: Certificate,
-    /// Best force of a coil whose turns need not be whole, N.
-    pub continuous_n: Option<f64>,
-    /// That coil, with what its limits cost.
-    pub continuous: Option<BestCoil>,
-    /// Evaluations of a coil by the local searches.
-    pub evaluations: usize,
-    /// Local searches.
-    pub starts: usize,
-}
+const ALTERNATIVES: usize = 20;
 
 /// One coil with its best bore.
 #[derive(Debug, Clone, Copy)]
@@ -67,20 +26,43 @@ pub(super) struct Leaf {
     pub ln_force: f64,
 }
 
-impl WoundOutcome {
-    /// No coil that can be wound, beside what `problems` found of those that cannot.
-    pub(super) fn none(status: OptimumStatus, problems: &[Solved<'_>]) -> Self {
-        Self {
-            status,
-            best: None,
-            alternatives: Vec::new(),
-            certificate: Certificate::of_searches(local_searches::starts_of(problems), 0),
-            continuous_n: local_searches::best_of(problems).and_then(Solved::force_n),
-            continuous: local_searches::best_of(problems).and_then(search::describe),
-            evaluations: problems.iter().map(|s| s.evaluations).sum(),
-            starts: local_searches::starts_of(problems),
-        }
+/// No coil that can be wound, beside what `problems` found of those that cannot.
+pub(super) fn none(status: OptimumStatus, problems: &[Solved<'_>]) -> Outcome {
+    let best = local_searches::best_of(problems);
+    Outcome {
+        continuous_force_n: best.and_then(Solved::force_n),
+        continuous: best.and_then(search::describe),
+        wires: Vec::new(),
+        ..search::without_coil(status, problems)
     }
+}
+
+/// The best coil of `listed` and what is `certificate`d of it, its limits as dear as they are to
+/// the coil whose turns need not be whole; `None` where no coil is listed.
+pub(super) fn found(
+    listed: Listed,
+    problems: &[Solved<'_>],
+    certificate: impl FnOnce(&BestCoil) -> Certificate,
+) -> Option<Outcome> {
+    let (mut best, others) = (listed.best?, listed.others);
+    let outcome = none(OptimumStatus::Optimal, problems);
+    for used in &mut best.limits {
+        let continuous = outcome.continuous.as_ref();
+        used.sensitivity_n_per_unit = continuous
+            .and_then(|coil| coil.limit(used.name))
+            .map_or(0.0, |other| other.sensitivity_n_per_unit);
+    }
+    // Of many the strongest, the weakest and those evenly between.
+    let count = others.len().min(ALTERNATIVES);
+    let at = |k: usize| k * (others.len() - 1) / (count - 1).max(1);
+    Some(Outcome {
+        alternatives: (0..count)
+            .map(|k| Alternative::new(&others[at(k)], &best, None))
+            .collect(),
+        certificate: certificate(&best),
+        best: Some(best),
+        ..outcome
+    })
 }
 
 /// A finite box about a problem's continuous optimum.
@@ -120,7 +102,7 @@ pub(super) fn rounded_status(open: &[&Solved<'_>]) -> OptimumStatus {
 }
 
 /// The coil of a leaf in SI units.
-pub(super) fn describe(problem: &Problem<'_>, leaf: &Leaf) -> Option<WoundCoil> {
+pub(super) fn describe(problem: &Problem<'_>, leaf: &Leaf) -> Option<BestCoil> {
     let rated = problem.rate(leaf.window)?;
     let point = problem.scaled(&rated);
     let limits = problem
@@ -133,25 +115,28 @@ pub(super) fn describe(problem: &Problem<'_>, leaf: &Leaf) -> Option<WoundCoil> 
                 LimitName::Axis | LimitName::OneLayer | LimitName::OneTurn
             )
         })
-        .map(|(row, bound)| LimitUse {
-            name: bound.name,
-            value: rated.values[row].value,
-            limit: bound.limit,
-            active: point.rows[row].abs() <= 1e-9,
-            sensitivity_n_per_unit: 0.0,
+        .map(|(row, bound)| {
+            let active = point.rows[row].abs() <= 1e-9;
+            LimitUse::new(
+                bound.name,
+                rated.values[row].value,
+                bound.limit,
+                active,
+                0.0,
+            )
         })
         .collect();
-    let volume = leaf.window.volume_over_pi_m3().value;
-    let resistance_ohm = volume * problem.strand.resistance_per_volume();
-    Some(WoundCoil {
-        strand: problem.strand,
-        layers: leaf.layers,
-        turns_per_layer: leaf.turns,
+    Some(BestCoil {
         window: leaf.window,
+        strand: problem.strand,
+        turns: (leaf.layers * leaf.turns) as f64,
+        whole: Some(WholeTurns {
+            layers: leaf.layers,
+            turns_per_layer: leaf.turns,
+        }),
+        regime: problem.regime,
         current_a: rated.current_a,
         force_n: rated.force_n.value,
-        wire_mass_kg: volume * problem.strand.mass_per_volume(),
-        power_w: rated.current_a * rated.current_a * resistance_ohm,
         limits,
     })
 }
@@ -160,18 +145,17 @@ pub(super) fn describe(problem: &Problem<'_>, leaf: &Leaf) -> Option<WoundCoil> 
 /// not beaten by a stronger one in all three.
 #[derive(Debug, Default)]
 pub(super) struct Listed {
-    best: Option<WoundCoil>,
-    others: Vec<WoundCoil>,
+    best: Option<BestCoil>,
+    others: Vec<BestCoil>,
 }
 
 impl Listed {
     /// Takes the next coil in the order of force.
-    pub fn add(&mut self, coil: WoundCoil) {
-        let traits = |coil: &WoundCoil| [coil.window.length_m, coil.wire_mass_kg, coil.power_w];
-        let ours = traits(&coil);
+    pub fn add(&mut self, coil: BestCoil) {
+        let ours = Advantage::amounts(&coil);
         // Rounding is no advantage.
-        let beaten = |other: &WoundCoil| {
-            let pairs = traits(other).into_iter().zip(ours);
+        let beaten = |other: &BestCoil| {
+            let pairs = Advantage::amounts(other).into_iter().zip(ours);
             pairs.fold(true, |all, (theirs, ours)| {
                 all && theirs <= ours * (1.0 + 1e-9)
             })
@@ -186,10 +170,6 @@ impl Listed {
     /// Whether no more are listed.
     pub(crate) fn is_full(&self) -> bool {
         self.others.len() >= LISTED
-    }
-
-    pub fn finish(self) -> (Option<WoundCoil>, Vec<WoundCoil>) {
-        (self.best, self.others)
     }
 }
 

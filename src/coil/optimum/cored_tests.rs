@@ -242,7 +242,7 @@ fn wound_is_what_brute_force_finds_and_no_better_than_continuous() {
     let best = outcome.best.expect("a coil");
     assert_eq!(outcome.certificate.kind, CertificateKind::Exhaustive);
     assert_eq!(outcome.certificate.cells, 100);
-    assert!(best.force_n <= outcome.continuous_n.expect("an optimum") * (1.0 + 1e-9));
+    assert!(best.force_n <= outcome.continuous_force_n.expect("an optimum") * (1.0 + 1e-9));
     let mut brute = (0.0, 0, 0);
     for problem in Problem::of_wire(&model, &task, task.strands[0]) {
         let wire_m = problem.strand.diameter_m;
@@ -532,7 +532,7 @@ fn a_wound_coil_beside_a_thin_continuous_optimum_is_nearly_as_strong() {
     };
     let outcome = optimise_wound(&model(rule, true), &task, &quick(), &Silent);
     let outcome = outcome.expect("not interrupted");
-    let (best, continuous_n) = (outcome.best.expect("a coil"), outcome.continuous_n);
+    let (best, continuous_n) = (outcome.best.expect("a coil"), outcome.continuous_force_n);
     let share = best.force_n / continuous_n.expect("an optimum");
     assert!(share > 0.95 && share < 1.0 + 1e-6, "{share} {best:?}");
     for limit in &best.limits {

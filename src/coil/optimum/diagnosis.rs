@@ -133,7 +133,7 @@ pub(super) fn violations(problem: &Problem<'_>, window: Window) -> Vec<Violation
             name: bound.name,
             value: value.value,
             limit: bound.limit,
-            excess: row,
+            excess: row.exp_m1(),
         })
         .collect();
     broken.sort_by(|a, b| b.excess.total_cmp(&a.excess));

@@ -59,10 +59,12 @@ pub mod task;
 mod tests;
 pub mod wound;
 
-pub use candidates::{WoundCoil, WoundOutcome};
 pub use local_searches::Settings;
 pub use model::{CoilModel, Strand, Window};
-pub use outcome::{BestCoil, Certificate, CertificateKind, LimitUse, OptimumStatus, Outcome};
+pub use outcome::{
+    Advantage, Alternative, BestCoil, Certificate, CertificateKind, Ending, LimitUse,
+    OptimumStatus, Outcome, Valley, WholeTurns, WireOutcome,
+};
 pub use problem::{Fixed, LimitName, Task};
 pub use search::optimise;
 pub use wound::optimise_wound;

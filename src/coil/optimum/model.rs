@@ -6,6 +6,8 @@ use fluxform_base::units::{
 use fluxform_design::Wire;
 use std::f64::consts::PI;
 
+use crate::circuit::CoilSize;
+
 /// The winding's section: a1 <= r <= a1 + depth, -length <= z <= 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {
@@ -33,6 +35,16 @@ impl Window {
         Sloped {
             value: sum * w * l,
             slope: [2.0 * w * l, 2.0 * (a + w) * l, sum * w, 0.0],
+        }
+    }
+}
+
+impl From<&Window> for CoilSize {
+    fn from(window: &Window) -> Self {
+        Self {
+            inner_diameter_m: 2.0 * window.inner_radius_m,
+            outer_diameter_m: 2.0 * window.outer_radius_m(),
+            length_m: window.length_m,
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::domain::Domain;
 use super::local_searches::{Solved, keep_better};
 use super::model::Window;
+use super::outcome::Valley;
 use super::problem::{Fixed, LimitName, Problem, Task};
 use super::scalar;
 use super::sqp::{self, FEASIBLE, Local};
@@ -15,12 +16,11 @@ const TOLERANCE: f64 = 1e-6;
 /// Steps that look for a bore outside the valley.
 const STEPS: i32 = 12;
 
-/// Smallest and largest inner diameter, m, of coils within [`SHARE`] of the best force; `None`
-/// where the bore is given.
-pub(super) fn bores_m(
+/// Inner diameters of coils within [`SHARE`] of the best force; `None` where the bore is given.
+pub(super) fn valley(
     solved: &Solved<'_>,
     progress: &dyn Progress,
-) -> Result<Option<[f64; 2]>, Interrupted> {
+) -> Result<Option<Valley>, Interrupted> {
     let problem = &solved.problem;
     let Some(best) = &solved.best else {
         return Ok(None);
@@ -64,7 +64,10 @@ pub(super) fn bores_m(
             None => limit,
         };
     }
-    Ok(Some(ends.map(|radius| 2.0 * radius)))
+    Ok(Some(Valley {
+        force_share: SHARE,
+        inner_diameter_m: ends.map(|radius| 2.0 * radius),
+    }))
 }
 
 /// ln of the best force of a coil whose bore has the radius `inner_m`.

@@ -4,10 +4,11 @@
 //! and taken as powers of the dimensions while the coil alone is optimised; again at what comes
 //! out, until it no longer moves: then values and slopes are those of the coupled array.
 
+use fluxform_field::components::Components;
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::CoupledArray;
 use fluxform_field::steel::cored_coil::CoredCoil;
-use fluxform_field::steel::equivalent_dipoles::{ArraySources, Parts};
+use fluxform_field::steel::equivalent_dipoles::ArraySources;
 use fluxform_field::winding::Winding;
 
 /// Relative accuracy of the coupled solution.
@@ -86,7 +87,7 @@ impl Neighbours {
         let [x, y] = self.positions_m[self.drive];
         let points: Vec<[f64; 3]> = dipoles.iter().map(|d| [x, y, d.0]).collect();
         let mut steel = vec![0.0; self.positions_m.len() * points.len()];
-        sources.sample(&points, Parts::Gz, &mut steel);
+        sources.sample(&points, Components::Gz, &mut steel);
         let steel = &steel[self.drive * points.len()..(self.drive + 1) * points.len()];
         let (mut among, mut by_itself) = (0.0, 0.0);
         for (&(z_m, moment), steel) in dipoles.iter().zip(steel) {

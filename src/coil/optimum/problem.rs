@@ -5,6 +5,8 @@
 //! The rated current min(I_max, V/R) has a kink where the supply takes over, and heat at a given
 //! voltage falls with the resistance: either side of the kink is a smooth problem of its own.
 
+use serde::Serialize;
+
 use super::model::{CoilModel, Sloped, Strand, Window};
 use super::sqp::{Local, Point, Smooth};
 use crate::circuit::SETTLING_TIME_CONSTANTS;
@@ -64,7 +66,8 @@ pub struct Bounded {
 }
 
 /// Who sets the rated current.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Regime {
     /// The driver: I = I_max, R I_max <= V.
     Driver,

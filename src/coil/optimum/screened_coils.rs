@@ -13,11 +13,11 @@ use rayon::prelude::*;
 
 use super::best_bore::{Bores, summit};
 use super::best_first::{CoilSets, Parts, Strongest, WHOLE, whole};
-use super::candidates::{Leaf, WoundOutcome, around_optimum, rounded_status};
+use super::candidates::{self, Leaf, around_optimum, rounded_status};
 use super::domain::Domain;
 use super::local_searches::{self, Solved};
 use super::model::{CoilModel, Window};
-use super::outcome::{Certificate, CertificateKind, OptimumStatus};
+use super::outcome::{BestCoil, Certificate, CertificateKind, Outcome};
 use super::problem::{Fixed, LimitName, Problem, Task};
 use super::sqp::{self, FEASIBLE};
 use super::surrogate;
@@ -41,7 +41,7 @@ pub(super) fn optimise(
     task: &Task,
     coarse: &[Solved<'_>],
     progress: &dyn Progress,
-) -> Result<WoundOutcome, Interrupted> {
+) -> Result<Outcome, Interrupted> {
     let sharp_model = surrogate::sharpened(model, task, coarse, progress)?;
     let restated = sharp_model
         .as_deref()
@@ -77,26 +77,22 @@ pub(super) fn optimise(
     let best_ln = near.fold(f64::NEG_INFINITY, |most, leaf| most.max(leaf.ln_force));
     let search = Strongest::of(&coils, best_ln, PAIRS as usize, progress)?;
     progress.end();
-    let (best, alternatives) = search.listed.finish();
-    let Some(best) = best else {
-        let open: Vec<&Solved<'_>> = open().collect();
-        return Ok(WoundOutcome::none(rounded_status(&open), sharp));
-    };
-    Ok(WoundOutcome {
-        best: Some(best),
-        alternatives,
-        certificate: Certificate {
-            kind: if complete {
-                CertificateKind::Exhaustive
-            } else {
-                CertificateKind::of_searches(local_searches::starts_of(sharp))
-            },
-            upper_bound_n: None,
-            gap: None,
-            cells: search.cells,
+    let certificate = |_: &BestCoil| Certificate {
+        kind: if complete {
+            CertificateKind::Exhaustive
+        } else {
+            CertificateKind::of_searches(local_searches::starts_of(sharp))
         },
-        ..WoundOutcome::none(OptimumStatus::Optimal, sharp)
-    })
+        upper_bound_n: None,
+        gap: None,
+        cells: search.cells,
+    };
+    Ok(
+        candidates::found(search.listed, sharp, certificate).unwrap_or_else(|| {
+            let open: Vec<&Solved<'_>> = open().collect();
+            candidates::none(rounded_status(&open), sharp)
+        }),
+    )
 }
 
 /// The coils of one wire and regime by layers and turns a layer.
@@ -322,7 +318,7 @@ mod tests {
             assert_eq!(tried.certificate.cells, 14 * 8);
             assert_eq!(proven.certificate.kind, CertificateKind::Global);
             let (a, b) = (tried.best.expect("a coil"), proven.best.expect("a coil"));
-            assert_eq!((a.layers, a.turns_per_layer), (b.layers, b.turns_per_layer));
+            assert_eq!(a.whole, b.whole);
             assert!((a.force_n / b.force_n - 1.0).abs() < 1e-9, "{a:?} {b:?}");
         }
     }

@@ -49,19 +49,16 @@ pub fn optimise(
         ));
     };
     let best = describe(winner);
-    let valley_m = if settings.valley {
-        near_optimal_bore::bores_m(winner, progress)?
+    let valley = if settings.valley {
+        near_optimal_bore::valley(winner, progress)?
     } else {
         None
     };
     Ok(Outcome {
-        status: OptimumStatus::Optimal,
         best,
         certificate,
-        wires: wires(&problems),
-        evaluations: problems.iter().map(|s| s.evaluations).sum(),
-        starts: starts_of(&problems),
-        valley_m,
+        valley,
+        ..without_coil(OptimumStatus::Optimal, &problems)
     })
 }
 
@@ -138,7 +135,11 @@ fn wires(problems: &[Solved<'_>]) -> Vec<WireOutcome> {
     let mut wires: Vec<WireOutcome> = Vec::new();
     for solved in problems {
         let force_n = solved.force_n();
-        match wires.iter_mut().find(|w| w.strand == solved.problem.strand) {
+        let wire_diameter_m = solved.problem.strand.diameter_m;
+        match wires
+            .iter_mut()
+            .find(|w| w.wire_diameter_m == wire_diameter_m)
+        {
             Some(wire) => {
                 wire.force_n = match (wire.force_n, force_n) {
                     (Some(a), Some(b)) => Some(a.max(b)),
@@ -146,7 +147,7 @@ fn wires(problems: &[Solved<'_>]) -> Vec<WireOutcome> {
                 }
             }
             None => wires.push(WireOutcome {
-                strand: solved.problem.strand,
+                wire_diameter_m,
                 force_n,
             }),
         }
@@ -154,15 +155,19 @@ fn wires(problems: &[Solved<'_>]) -> Vec<WireOutcome> {
     wires
 }
 
-fn without_coil(status: OptimumStatus, problems: &[Solved<'_>]) -> Outcome {
+/// Why there is no coil, and how far `problems` were searched.
+pub(super) fn without_coil(status: OptimumStatus, problems: &[Solved<'_>]) -> Outcome {
     Outcome {
         status,
         best: None,
+        continuous: None,
+        continuous_force_n: None,
+        alternatives: Vec::new(),
         certificate: Certificate::of_searches(starts_of(problems), 0),
         wires: wires(problems),
         evaluations: problems.iter().map(|s| s.evaluations).sum(),
         starts: starts_of(problems),
-        valley_m: None,
+        valley: None,
     }
 }
 
@@ -396,19 +401,20 @@ pub(super) fn describe(solved: &Solved<'_>) -> Option<BestCoil> {
         .filter(|(_, bound)| bound.name != LimitName::Axis)
         .map(|(row, bound)| {
             let multiplier = local.multipliers[row];
-            LimitUse {
-                name: bound.name,
-                value: rated.values[row].value,
-                limit: bound.limit,
-                active: multiplier.abs() > 1e-9 * strongest || bound.name.is_equality(),
-                sensitivity_n_per_unit: problem.sensitivity_n_per_unit(row, multiplier, &rated),
-            }
+            LimitUse::new(
+                bound.name,
+                rated.values[row].value,
+                bound.limit,
+                multiplier.abs() > 1e-9 * strongest || bound.name.is_equality(),
+                problem.sensitivity_n_per_unit(row, multiplier, &rated),
+            )
         })
         .collect();
     Some(BestCoil {
         window,
         strand: problem.strand,
         turns: problem.strand.turns(&window),
+        whole: None,
         regime: problem.regime,
         current_a: rated.current_a,
         force_n: rated.force_n.value,

@@ -517,8 +517,12 @@ fn the_better_wire_is_chosen() {
     is_global(&outcome, coil);
     assert_eq!(outcome.wires.len(), 3);
     for wire in &outcome.wires {
+        let strands = choose.strands.iter();
         let alone = Task {
-            strands: vec![wire.strand],
+            strands: strands
+                .filter(|strand| strand.diameter_m == wire.wire_diameter_m)
+                .copied()
+                .collect(),
             ..choose.clone()
         };
         let force_n = solved(&alone).best.expect("optimal").force_n;
@@ -536,7 +540,7 @@ fn the_valley_ends_where_the_force_has_fallen() {
     let seed = task(limits, Some(36.0));
     let settings = Settings::default();
     let outcome = optimise(&air(HEIGHT_M), &seed, &settings, &Silent).expect("runs");
-    let [low, high] = outcome.valley_m.expect("a free bore");
+    let [low, high] = outcome.valley.expect("a free bore").inner_diameter_m;
     assert_eq!(low, 0.0);
     let at_end = Task {
         fixed: Fixed {
@@ -594,8 +598,9 @@ fn winding_equals_brute_force() {
             }
         }
     }
+    let whole = best.whole.expect("whole turns");
     assert_eq!(
-        (best.layers, best.turns_per_layer),
+        (whole.layers, whole.turns_per_layer),
         (which.0 as u64, which.1 as u64)
     );
     assert!(
@@ -603,10 +608,14 @@ fn winding_equals_brute_force() {
         "{} {brute}",
         best.force_n
     );
-    assert!(outcome.continuous_n.is_some_and(|n| n >= best.force_n));
+    assert!(
+        outcome
+            .continuous_force_n
+            .is_some_and(|n| n >= best.force_n)
+    );
     for other in &outcome.alternatives {
-        let shorter = other.window.length_m < best.window.length_m;
-        let less = other.wire_mass_kg < best.wire_mass_kg || other.power_w < best.power_w;
+        let shorter = other.size.length_m < best.window.length_m;
+        let less = other.wire_mass_kg < best.wire_mass_kg() || other.power_w < best.power_w();
         assert!(other.force_n >= 0.99 * best.force_n && (shorter || less));
     }
 }
@@ -622,7 +631,8 @@ fn the_seed_wound() {
     let outcome = outcome.expect("runs");
     let best = outcome.best.expect("optimal");
     assert_eq!(outcome.certificate.kind, CertificateKind::Global);
-    assert_eq!((best.layers, best.turns_per_layer), (26, 85));
+    let whole = best.whole.expect("whole turns");
+    assert_eq!((whole.layers, whole.turns_per_layer), (26, 85));
     assert!(
         (best.force_n - 0.137_743_285).abs() < 1e-8,
         "{}",

@@ -6,10 +6,10 @@
 use super::best_first::Strongest;
 use super::bounded_coils::{BoundedCoils, next_to_continuous};
 use super::branch_and_bound::{self, GAP};
-use super::candidates::{SHARE, WoundOutcome, around_optimum, rounded_status};
+use super::candidates::{self, SHARE, around_optimum, rounded_status};
 use super::local_searches::{self, Settings, Solved};
 use super::model::CoilModel;
-use super::outcome::{Certificate, CertificateKind, OptimumStatus};
+use super::outcome::{BestCoil, Certificate, CertificateKind, Outcome};
 use super::problem::Task;
 use super::screened_coils;
 use super::search;
@@ -25,10 +25,10 @@ pub fn optimise_wound(
     task: &Task,
     settings: &Settings,
     progress: &dyn Progress,
-) -> Result<WoundOutcome, Interrupted> {
+) -> Result<Outcome, Interrupted> {
     let problems = match search::solve_all(model, task, settings, progress)? {
         Ok(problems) => problems,
-        Err((status, problems)) => return Ok(WoundOutcome::none(status, &problems)),
+        Err((status, problems)) => return Ok(candidates::none(status, &problems)),
     };
     if model.air_dipoles().is_none() {
         return screened_coils::optimise(model, task, &problems, progress);
@@ -57,18 +57,12 @@ pub fn optimise_wound(
     progress.begin("wind", open.len() as u64);
     let search = Strongest::of(&coils, best_ln, settings.cells / 4, progress)?;
     progress.end();
-    let (best, alternatives) = search.listed.finish();
-    let Some(best) = best else {
-        return Ok(WoundOutcome::none(rounded_status(&open), &problems));
-    };
-    let top_ln = best.force_n.ln();
-    let upper_ln = search.bound_ln.max(top_ln);
-    let gap = (upper_ln - top_ln).exp_m1();
-    complete &= gap.is_finite();
-    Ok(WoundOutcome {
-        best: Some(best),
-        alternatives,
-        certificate: Certificate {
+    let certificate = |best: &BestCoil| {
+        let top_ln = best.force_n.ln();
+        let upper_ln = search.bound_ln.max(top_ln);
+        let gap = (upper_ln - top_ln).exp_m1();
+        let complete = complete && gap.is_finite();
+        Certificate {
             kind: if complete && gap <= GAP {
                 CertificateKind::Global
             } else {
@@ -77,9 +71,10 @@ pub fn optimise_wound(
             upper_bound_n: complete.then(|| upper_ln.exp()),
             gap: complete.then_some(gap),
             cells: search.cells,
-        },
-        ..WoundOutcome::none(OptimumStatus::Optimal, &problems)
-    })
+        }
+    };
+    Ok(candidates::found(search.listed, &problems, certificate)
+        .unwrap_or_else(|| candidates::none(rounded_status(&open), &problems)))
 }
 
 #[cfg(test)]

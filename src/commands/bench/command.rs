@@ -7,18 +7,19 @@ use clap::Args;
 use super::{BenchRequest, Estimate, run};
 use crate::bundle::bench::{BenchFile, Cheapest, ShapeBench};
 use crate::cli::args::{SurfaceFlags, Tolerance, Writing};
-use crate::cli::budget::{allow, asked, costs};
+use crate::cli::budget::{allow, cost_origin, costs};
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{count, error, number, number_to, percent, si};
 use crate::cli::start::{begin, folder};
 use crate::cli::values::{self, FileArgument};
 use crate::commands::calibrate::curve_table;
 use crate::commands::lambda::command::CriterionFlags;
 use crate::design::Need;
+use crate::scene::Scene;
 use crate::scene::cost::{Components, of_map};
 
 /// Error against run time of a design and its objects
@@ -92,11 +93,11 @@ impl Bench {
             costs(design, &shapes, tolerance)
                 .into_iter()
                 .chain([of_map(design, Components::Gz)]),
-            asked(&shapes),
+            cost_origin(&shapes),
             printer,
         )?;
         let mut inputs = vec![document.input.clone()];
-        inputs.extend(curve_table(design)?.map(|(input, _)| input));
+        inputs.extend(curve_table(&Scene::new(design)?).map(|(input, _)| input));
         let request = BenchRequest {
             design,
             inputs,
@@ -111,7 +112,7 @@ impl Bench {
         let file = run(&request, &|estimate| printer.notice(&said(estimate)), &bar)?;
         drop(bar);
         let to = request.out.display().to_string();
-        printer.summary(Place::Output, &printer.with_warnings(&file), || {
+        printer.summary(Stream::Output, &printer.with_warnings(&file), || {
             summary(&file, &to)
         })
     }

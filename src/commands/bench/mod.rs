@@ -31,8 +31,8 @@ use crate::design::{Design, MagnetModel};
 use crate::lambda::{Criterion, Solution};
 use crate::progress::Progress;
 use crate::scene::Scene;
+use crate::scene::coupled;
 use crate::scene::sources::ShapeSource;
-use crate::scene::steel;
 
 /// The errors for which the cheapest settings are named.
 pub const TARGETS: [f64; 3] = [0.1, 0.01, 0.001];
@@ -108,7 +108,7 @@ fn measure(
     announce: &dyn Fn(Estimate),
     progress: &dyn Progress,
 ) -> Result<BenchFile, RunError> {
-    let scene = Scene::new(request.design)?;
+    let scene = Scene::with_tolerance(request.design, request.lambda.tolerance)?;
     let effort = if request.quick {
         Effort::GLANCE
     } else {
@@ -119,12 +119,7 @@ fn measure(
     progress.begin("present settings", 4 * request.shapes.len() as u64);
     for shape in request.shapes {
         let present = bench.present(shape)?;
-        planned.push(Ladders::new(
-            request,
-            bench.present_tolerance(),
-            shape,
-            present,
-        ));
+        planned.push(Ladders::new(request, scene.tolerances.map, shape, present));
     }
     progress.end();
     let bound_s = Ladders::bound_s(request.quick);
@@ -232,7 +227,7 @@ fn measure_shape(
     let constants = present.map_or_else(Vec::new, |file| constants(&file, &refined.solution));
     Ok(ShapeBench {
         shape: shape.document.name.clone(),
-        reference: refined.told(),
+        reference: refined.summary(),
         knobs,
         runs,
         cheapest,
@@ -323,7 +318,7 @@ fn left_out(scene: &Scene, request: &BenchRequest) -> Vec<LeftOutKnob> {
             "steel resolution",
             "the design has no [core]: the tolerance is that of the windings' field alone",
         ),
-        Some(_) if steel::coupled(scene.design) => one(
+        Some(_) if coupled(scene.design) => one(
             "steel resolution",
             "not a knob of its own: panels and the exchange between the cores follow from --tolerance",
         ),

@@ -27,7 +27,7 @@ fn overwrite(inputs: &[Input], request: &BenchRequest) -> Overwrite {
 #[must_use]
 pub fn made_with(request: &BenchRequest) -> Options {
     #[derive(Serialize)]
-    struct Asked {
+    struct Recorded {
         criterion: Criterion,
         jnd: f64,
         tolerance: Option<f64>,
@@ -48,7 +48,7 @@ pub fn made_with(request: &BenchRequest) -> Options {
     let LambdaOptions {
         settings,
         tolerance,
-        // Not asked for by this command.
+        // Not options of this command.
         sampling: _,
         wiring: _,
         variants: _,
@@ -62,7 +62,7 @@ pub fn made_with(request: &BenchRequest) -> Options {
     } = *settings;
     let surfaces = shapes.iter();
     let surfaces = surfaces.map(|shape| surface(&shape.document, shape.input.as_ref()));
-    Options::of(&Asked {
+    Options::of(&Recorded {
         criterion,
         jnd: jnd_weight,
         tolerance: *tolerance,

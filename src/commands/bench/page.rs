@@ -6,9 +6,9 @@ use crate::bundle::bench::{BenchFile, Cheapest, Run, ShapeBench};
 use crate::plot::curves::{CurvesPlot, Line};
 use crate::report::frame::{Page, Section, figure};
 use crate::report::html::{Cell, Html, Table};
+use crate::report::inputs::sources;
 use crate::report::measured::{MeasuredCurve, MeasuredRow};
 use crate::report::number::{count, figures, percent, si};
-use crate::report::optimum::sources;
 
 /// Name of the page.
 pub const PAGE: &str = "report.html";

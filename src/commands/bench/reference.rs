@@ -103,7 +103,7 @@ fn chosen(solution: &Solution) -> Option<f64> {
 pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<Refined, RunError> {
     let watch = Watch::start();
     let scene = bench.scene;
-    let tightest = bench.present_tolerance();
+    let tightest = scene.tolerances.map;
     let in_air = scene.core.is_none();
     let tolerance = if in_air {
         AIR
@@ -111,7 +111,7 @@ pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<R
         (STEEL * tightest).max(TIGHTEST_STEEL.min(tightest))
     };
     let lowest_m = scene.design.workspace.z_m.from;
-    let solved = steel::solve(scene, Some(tolerance), tolerance, lowest_m)?;
+    let solved = steel::solve(scene, tolerance, lowest_m)?;
     bench.check()?;
     let points = bench.points(&shape.document, ladders.refined_points(), &Silent)?;
     let forces = scene.forces_n_per_a(&solved, &points.positions_m, &bench.within())?;
@@ -165,7 +165,7 @@ pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<R
 
 impl Refined {
     /// As the result states it.
-    pub fn told(&self) -> Reference {
+    pub fn summary(&self) -> Reference {
         let field = if self.in_air {
             "the windings' field to rounding"
         } else {
@@ -263,8 +263,8 @@ impl Places {
                 }
                 difference += currents_a[*coil] * (force - direct[*coil]);
             }
-            let wanted = lambda_n_per_m * place[2];
-            largest = largest.max((difference / wanted).abs());
+            let target = lambda_n_per_m * place[2];
+            largest = largest.max((difference / target).abs());
         }
         Ok(largest)
     }

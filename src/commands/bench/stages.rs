@@ -10,15 +10,15 @@ use crate::commands::calibrate::needed_coils;
 use crate::commands::calibrate::needed_nodes;
 use crate::commands::discretize::scattered;
 use crate::commands::discretize::{self, PointsReport};
-use crate::commands::lambda::{LambdaOptions, WantedPoints, resolving, solve_points};
-use crate::commands::map::MAP_TOLERANCE;
+use crate::commands::lambda::{LambdaOptions, WantedPoints, resolving, solve_at};
 use crate::design::Design;
 use crate::map::{Components, FieldMap};
 use crate::progress::Progress;
-use crate::scene::maps::{Felt, SceneMap};
+use crate::scene::cached_field::ShapeField;
+use crate::scene::maps::{MagnetMean, SceneMap};
 use crate::scene::sources::Sampling;
 use crate::scene::sources::ShapeSource;
-use crate::scene::steel::{self, Solved, Steel};
+use crate::scene::steel::{self, Solved};
 use crate::scene::{MAGNET_SHARE, Scene};
 use crate::shape::document::ShapeDocument;
 use crate::shape::points::ConstraintPoints;
@@ -96,23 +96,13 @@ impl<'a> Bench<'a> {
         Within(self.progress)
     }
 
-    /// The tolerance of the present settings, whether asked for or not.
-    pub fn present_tolerance(&self) -> f64 {
-        steel::tolerance_of(self.scene, self.request.lambda.tolerance, MAP_TOLERANCE)
-    }
-
-    /// The steel, if there is any.
-    pub fn steel(&self, tolerance: Option<f64>) -> Result<(BothSolved, f64), RunError> {
-        let lowest_m = self.scene.design.workspace.z_m.from;
+    /// The steel, if there is any, to the accuracy that was `requested`, if any was.
+    pub fn steel(&self, requested: Option<f64>) -> Result<(BothSolved, f64), RunError> {
+        let scene = &self.scene.to_tolerance(requested);
+        let lowest_m = scene.design.workspace.z_m.from;
         self.timed(|_| {
-            let map = steel::solve(self.scene, tolerance, MAP_TOLERANCE, lowest_m)?;
-            let forces = match map.steel {
-                Steel::None => {
-                    let air = self.scene.force_tolerance();
-                    steel::solve(self.scene, tolerance, air, lowest_m)?
-                }
-                Steel::Alone(_) | Steel::Coupled(_) => map.clone(),
-            };
+            let map = steel::solve(scene, scene.tolerances.map, lowest_m)?;
+            let forces = map.for_forces(scene, lowest_m)?;
             Ok(BothSolved { forces, map })
         })
     }
@@ -168,7 +158,11 @@ impl<'a> Bench<'a> {
             tolerance: Some(solved.forces.tolerance),
             ..self.request.lambda.clone()
         };
-        self.timed(|within| solve_points(self.scene, &solved.forces, points, &options, within))
+        let (scene, none) = (self.scene, ShapeField::default());
+        self.timed(|within| {
+            let report = solve_at(scene, &solved.forces, none, points, &options, within)?;
+            Ok(report.file)
+        })
     }
 
     /// The map of the coils that carry current, as far as the object's points need it.
@@ -189,7 +183,7 @@ impl<'a> Bench<'a> {
         self.timed(|within| {
             let solved = &solved.map;
             let share = MAGNET_SHARE * solved.tolerance;
-            let felt = Felt::by_magnet(self.scene, &grid.z_m, share)?;
+            let felt = MagnetMean::by_magnet(self.scene, &grid.z_m, share)?;
             let made = SceneMap::new(self.scene, solved, &coils, &grid, components, &felt, within)?;
             Ok(made.map)
         })

@@ -2,9 +2,8 @@
 
 use super::BothSolved;
 use super::CalibrateOptions;
+use super::Calibration;
 use super::Inductances;
-use super::Kept;
-use super::compute;
 use super::point_rows;
 use crate::RunError;
 use crate::bundle::artefact::Input;
@@ -19,7 +18,7 @@ use crate::scene::cached_field::FieldStore;
 use crate::scene::sources::DesignSource;
 use crate::scene::sources::ShapeSource;
 
-/// What a bundle must hold. The digests in the manifest's list stand for the content of all files.
+/// The expected content of a bundle. The digests in the manifest's list stand for the content of all files.
 #[derive(Debug, Clone)]
 pub struct Expected {
     /// `manifest.json`.
@@ -43,31 +42,27 @@ pub fn expected(
     options: &CalibrateOptions,
     progress: &dyn Progress,
 ) -> Result<Expected, RunError> {
-    let tolerance = options.lambda.tolerance;
+    let scene = &scene.to_tolerance(options.lambda.tolerance);
     let table = curve.map(|(_, text)| text.as_str());
-    let field = FieldStore::new(scene, tolerance, table, Store::none());
-    let solved = BothSolved::new(scene, &field, tolerance, progress)?;
+    let field = FieldStore::new(scene, table, Store::none());
+    let solved = BothSolved::new(scene, &field, progress)?;
     let circuit = Inductances::new(scene, &solved.map, progress);
-    let kept = Kept {
+    let calibration = Calibration {
+        scene,
+        solved: &solved,
         source,
         curve,
         circuit: &circuit,
         field: field.of_shape(&shape.document.name),
-    };
-    let points = kept.points(shape, progress)?;
-    let seal = |content: &BundleContent| Ok(sealed_manifest(content)?);
-    let (manifest, lambda) = compute(
-        scene,
-        &solved,
-        kept,
-        (shape, points),
+        shape,
         options,
-        progress,
-        seal,
-    )?;
+    };
+    let points = calibration.points(progress)?;
+    let seal = |content: &BundleContent| Ok(sealed_manifest(content)?);
+    let (manifest, lambda) = calibration.compute(&points, progress, seal)?;
     Ok(Expected {
         manifest,
-        points: point_rows(&lambda.points.discretized.points),
+        points: point_rows(&points.discretized.points),
         lambda: lambda.file,
     })
 }

@@ -4,7 +4,6 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use clap::Args;
-use serde::Serialize;
 
 use super::BundleReport;
 use super::CalibrateOptions;
@@ -12,17 +11,16 @@ use super::CalibrateReport;
 use super::DEFAULT_REACH_M;
 use super::plan::{Cost, Done, Plan, plan};
 use super::run;
-use crate::bundle::artefact::{FLUXFORM_VERSION, SCHEMA_VERSION};
 use crate::bundle::lambda_file::WorkingPointForces;
 use crate::bundle::manifest::Manifest;
 use crate::cli::args::{SurfaceFlags, Tolerance, Writing};
-use crate::cli::budget::{allow, asked, costs};
+use crate::cli::budget::{allow, cost_origin, costs};
 use crate::cli::describe;
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, headed_table};
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{
     bytes, count, error, force, length_error, mm, number, number_to, percent,
 };
@@ -32,7 +30,6 @@ use crate::cli::start::folder;
 use crate::cli::values::{self, FileArgument};
 use crate::commands::lambda::command::{CriterionFlags, rendered};
 use crate::design::{Design, Need};
-use crate::lambda::{Criterion, ForceConstants};
 use crate::scene::cost::{Components, of_map};
 use crate::scene::sources::DesignSource;
 
@@ -88,36 +85,6 @@ pub struct Calibrate {
     surface: SurfaceFlags,
 }
 
-/// What is told to programs.
-#[derive(Serialize)]
-struct CalibrateSummary<'a> {
-    schema_version: &'static str,
-    fluxform_version: &'static str,
-    design: &'a str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    plan: Option<Plan>,
-    bundles: Vec<BundleSummary<'a>>,
-}
-
-/// One bundle; the keys are those of `lambda.json` and `manifest.json`.
-#[derive(Serialize)]
-struct BundleSummary<'a> {
-    shape: &'a str,
-    folder: String,
-    points: usize,
-    outside: usize,
-    criterion: Criterion,
-    #[serde(flatten)]
-    constants: ForceConstants,
-    lambda_n_per_m: Option<f64>,
-    currents_a: Option<&'a [f64]>,
-    rms_error_n: Option<f64>,
-    worst_error_n: Option<f64>,
-    relative_rms_error: Option<f64>,
-    rank: usize,
-    manifest: &'a Manifest,
-}
-
 impl Calibrate {
     /// Runs the command.
     ///
@@ -154,29 +121,23 @@ impl Calibrate {
             .transpose()?;
         drop(bar);
         if let Some(plan) = plan.as_ref().filter(|_| !printer.json()) {
-            printer.summary(Place::Output, plan, || explained(plan))?;
+            printer.summary(Stream::Output, plan, || explained(plan))?;
         }
         allow(
             costs(design, &shapes, self.tolerance.tolerance)
                 .into_iter()
                 .chain([of_map(design, Components::Gz)]),
-            asked(&shapes),
+            cost_origin(&shapes),
             printer,
         )?;
         let bar = begin(printer);
-        let report = run(source, &shapes, &options, &bar)?;
+        let mut report = run(source, &shapes, &options, &bar)?;
         drop(bar);
         warn(&report, printer);
-        let json = CalibrateSummary {
-            schema_version: SCHEMA_VERSION,
-            fluxform_version: FLUXFORM_VERSION,
-            design: &design.name,
-            plan,
-            bundles: report.bundles.iter().map(bundle_summary).collect(),
-        };
-        let json = printer.with_warnings(&json);
+        report.plan = plan;
+        let json = printer.with_warnings(&report);
         let folder = options.out.join(&design.name);
-        printer.summary(Place::Output, &json, || summary(design, &report, &folder))?;
+        printer.summary(Stream::Output, &json, || summary(design, &report, &folder))?;
         let missed = |b: &BundleReport| b.lambda.accuracy_missed.clone();
         let missed: Vec<String> = report.bundles.iter().flat_map(missed).collect();
         accuracy_check(&missed)?;
@@ -247,25 +208,6 @@ fn warn(report: &CalibrateReport, printer: &Printer) {
     }
 }
 
-fn bundle_summary(bundle: &BundleReport) -> BundleSummary<'_> {
-    let file = &bundle.lambda.file;
-    BundleSummary {
-        shape: &file.shape,
-        folder: bundle.folder.display().to_string(),
-        points: file.points,
-        outside: bundle.lambda.points.summary.outside,
-        criterion: file.criterion,
-        constants: file.constants,
-        lambda_n_per_m: file.lambda_n_per_m,
-        currents_a: file.currents_a.as_deref(),
-        rms_error_n: file.rms_error_n,
-        worst_error_n: file.worst_error_n,
-        relative_rms_error: file.relative_rms_error,
-        rank: file.rank,
-        manifest: &bundle.manifest,
-    }
-}
-
 fn size(manifest: &Manifest) -> u64 {
     manifest.files.iter().map(|file| file.bytes).sum()
 }
@@ -294,8 +236,8 @@ fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> String {
         ),
     );
     sheet.line("accuracy", &accuracies(report));
-    if let Some(told) = working_points(report) {
-        sheet.line("steel", &told);
+    if let Some(steel) = working_points(report) {
+        sheet.line("steel", &steel);
     }
     let left_out: BTreeSet<String> = report
         .bundles
@@ -305,7 +247,7 @@ fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> String {
             let shape = &bundle.manifest.shape;
             parts
                 .lines()
-                .map(|part| told_of(shape, part, report))
+                .map(|part| with_shape(shape, part, report))
                 .collect::<Vec<_>>()
         })
         .collect();
@@ -325,7 +267,7 @@ fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> String {
 }
 
 /// A line about every shape stands for itself; others begin with their shape.
-fn told_of(shape: &str, part: &str, report: &CalibrateReport) -> String {
+fn with_shape(shape: &str, part: &str, report: &CalibrateReport) -> String {
     let of_all = report.bundles.iter().all(|bundle| {
         describe::left_out(&bundle.manifest.left_out)
             .lines()
@@ -338,7 +280,7 @@ fn told_of(shape: &str, part: &str, report: &CalibrateReport) -> String {
     }
 }
 
-/// What was chosen, one row per shape.
+/// The chosen force constants, one row per shape.
 fn shapes_table(report: &CalibrateReport) -> String {
     let or_none = |value: Option<String>| value.unwrap_or_else(|| "none".to_owned());
     let row = |bundle: &BundleReport| {

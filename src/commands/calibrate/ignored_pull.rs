@@ -2,11 +2,11 @@
 
 use crate::RunError;
 use crate::bundle::manifest::LeftOut;
-use crate::commands::lambda::LambdaReport;
+use crate::commands::lambda::{LambdaReport, WantedPoints};
 use crate::scene::Scene;
 use crate::scene::cached_field::ShapeField;
+use crate::scene::coupled;
 use crate::scene::passive::couples_left_out;
-use crate::scene::steel::coupled;
 use crate::units::DETECTION_THRESHOLD_N;
 
 /// Shares that differ by no more than this factor are one.
@@ -20,7 +20,7 @@ pub(crate) enum IgnoredPull {
     Unknown(String),
 }
 
-/// What it amounts to.
+/// Its size.
 pub(crate) struct Measured {
     /// The largest of its vertical force at a point, N.
     largest_n: f64,
@@ -48,16 +48,13 @@ impl IgnoredPull {
     pub(crate) fn new(
         scene: &Scene,
         lambda: &LambdaReport,
+        points: &WantedPoints,
         field: ShapeField,
     ) -> Result<Option<Self>, RunError> {
         if scene.design.magnet.passive_force || scene.core.is_none() {
             return Ok(None);
         }
-        let points = &lambda.points.discretized.points;
-        let places: Vec<[f64; 3]> = (0..points.len())
-            .map(|j| [points.x_m[j], points.y_m[j], points.height_m[j]])
-            .collect();
-        let forces_n = match field.pull_left_out_n(scene, &places) {
+        let forces_n = match field.pull_left_out_n(scene, &points.positions_m) {
             Ok(forces_n) => forces_n,
             Err(RunError::Interrupted(stop)) => return Err(stop.into()),
             Err(fault) => return Ok(Some(Self::Unknown(fault.to_string()))),

@@ -1,39 +1,43 @@
 //! `calibrate`: map, points and lambda for each shape, one bundle each.
 
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
+
 use super::discretize::{self, PointsReport, point_rows, points_grid};
-use super::lambda::{LambdaOptions, LambdaReport, solve};
+use super::lambda::{LambdaOptions, LambdaReport, WantedPoints, solve_at};
 use super::made_with::surface;
-use super::map::{MAP_TOLERANCE, arrays, runtime, summary, workspace_grid};
+use super::map::{arrays, runtime, summary, workspace_grid};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS, arithmetic};
 use crate::bundle::atomic::WriteError;
 use crate::bundle::cache::Store;
+use crate::bundle::json::displayed;
 use crate::bundle::manifest::{
     AxisSummary, CircuitSummary, Interpolation, LambdaSummary, LeftOut, MadeWith, Manifest,
     PassiveForce,
 };
-use crate::bundle::npz::PASSIVE;
+use crate::bundle::npz::{PASSIVE, Runtime};
 use crate::bundle::rendering::{HeightGrid, Rendering};
-use crate::bundle::table::CurrentRow;
+use crate::bundle::table::{CurrentRow, PointRow};
 use crate::bundle::timing::StageSeconds;
 use crate::bundle::write::{BundleContent, check_bundle_target, write_bundle};
-use crate::design::{Design, source};
+use crate::design::Design;
 use crate::lambda::Settings;
 use crate::map::tabulate::{Grid, PlacedCoil};
 use crate::map::{Components, FieldMap};
 use crate::progress::Progress;
+use crate::report::bundle_files;
 use crate::scene::cached_field::{FieldStore, STORE_FOLDER, ShapeField};
-use crate::scene::maps::{Felt, SceneMap};
+use crate::scene::maps::{MagnetMean, SceneMap};
 use crate::scene::neighbours;
 use crate::scene::passive::PASSIVE_TOLERANCE;
 use crate::scene::passive_map::PassiveMap;
 use crate::scene::sources::{DesignSource, ShapeSource};
-use crate::scene::steel;
-use crate::scene::steel::{Solved, Steel};
+use crate::scene::steel::Solved;
 use crate::scene::{MAGNET_SHARE, Scene};
 use crate::shape::points::ConstraintPoints;
 
@@ -44,8 +48,9 @@ mod page;
 pub mod plan;
 mod recorded;
 
+pub use crate::report::bundle_files::PAGE_FILE;
 pub(crate) use ignored_pull::IgnoredPull;
-pub use page::PAGE_FILE;
+use plan::Plan;
 
 /// The name under which a bundle keeps the design it was made from.
 pub const DESIGN_FILE: &str = "design.toml";
@@ -60,7 +65,7 @@ pub const PASSIVE_STAGE: &str = "passive_force_map";
 /// deviation between finger and surface is 14 mm.
 pub const DEFAULT_REACH_M: f64 = 0.020;
 
-/// What is asked.
+/// The options of `calibrate`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrateOptions {
     /// Folder under which `<design>/<shape>/` is written.
@@ -78,7 +83,7 @@ pub struct CalibrateOptions {
 }
 
 impl CalibrateOptions {
-    /// What the command does by default, under the folder `out`.
+    /// The command's defaults, under the folder `out`.
     pub fn new(out: impl Into<PathBuf>) -> Self {
         Self {
             out: out.into(),
@@ -90,7 +95,7 @@ impl CalibrateOptions {
         }
     }
 
-    /// What `verify` needs beside the inputs to compute the same bundle again. A new option does not
+    /// The options that `verify` needs beside the inputs to compute the same bundle again. A new option does not
     /// compile before it is recorded or left out on purpose.
     pub(crate) fn made_with(&self, shape: &ShapeSource) -> MadeWith {
         let CalibrateOptions {
@@ -132,24 +137,37 @@ impl CalibrateOptions {
     }
 }
 
-/// What was made.
-#[derive(Debug, Clone)]
+/// The bundles of one design. Serialised it is the JSON result.
+#[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
 pub struct CalibrateReport {
+    /// Layout of the artefacts.
+    pub schema_version: &'static str,
+    /// Program that wrote them.
+    pub fluxform_version: &'static str,
+    /// Name of the design.
+    pub design: String,
+    /// The plan, where `--explain` requested it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plan: Option<Plan>,
     /// One entry a shape, in the order given.
     pub bundles: Vec<BundleReport>,
 }
 
-/// One bundle.
-#[derive(Debug, Clone)]
+/// One bundle: what `lambda` reports of its shape, and its manifest.
+#[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
 pub struct BundleReport {
     /// Its folder.
+    #[serde(serialize_with = "displayed")]
     pub folder: PathBuf,
+    /// Grid points without surface, left out.
+    pub outside: usize,
+    /// The force constant.
+    #[serde(flatten)]
+    pub lambda: LambdaReport,
     /// `manifest.json` as written.
     pub manifest: Manifest,
-    /// The force constant.
-    pub lambda: LambdaReport,
 }
 
 impl CalibrateReport {
@@ -173,19 +191,9 @@ pub fn run(
     options: &CalibrateOptions,
     progress: &dyn Progress,
 ) -> Result<CalibrateReport, RunError> {
-    for (i, shape) in shapes.iter().enumerate() {
-        if shapes[..i]
-            .iter()
-            .any(|other| other.document.name == shape.document.name)
-        {
-            return Err(RunError::Input(format!(
-                "two shapes are called {:?}: their bundles would share a folder; rename one",
-                shape.document.name
-            )));
-        }
-    }
-    let scene = Scene::new(source.design)?;
-    let curve = curve_table(source.design)?;
+    check_names(shapes)?;
+    let scene = Scene::with_tolerance(source.design, options.lambda.tolerance)?;
+    let curve = curve_table(&scene);
     // Before anything is computed, cleared or kept: a run that is refused changes nothing.
     for shape in shapes {
         let inputs = inputs(source, curve.as_ref(), shape);
@@ -198,24 +206,47 @@ pub fn run(
         store_of(&scene, options).clear();
     }
     let field = field_store(&scene, curve.as_ref(), options);
-    let solved = BothSolved::new(&scene, &field, options.lambda.tolerance, progress)?;
+    let solved = BothSolved::new(&scene, &field, progress)?;
     let circuit = Inductances::new(&scene, &solved.map, progress);
     let bundles = shapes
         .iter()
         .map(|shape| {
-            let kept = Kept {
+            Calibration {
+                scene: &scene,
+                solved: &solved,
                 source,
                 curve: curve.as_ref(),
                 circuit: &circuit,
                 field: field.of_shape(&shape.document.name),
-            };
-            calibrate_one(&scene, &solved, kept, shape, options, progress)
+                shape,
+                options,
+            }
+            .write(progress)
         })
         .collect::<Result<_, _>>()?;
-    Ok(CalibrateReport { bundles })
+    Ok(CalibrateReport {
+        schema_version: SCHEMA_VERSION,
+        fluxform_version: FLUXFORM_VERSION,
+        design: source.design.name.clone(),
+        plan: None,
+        bundles,
+    })
 }
 
-/// What earlier runs kept of the field, as far as that is wanted.
+/// # Errors
+/// Two shapes of one name.
+fn check_names(shapes: &[ShapeSource]) -> Result<(), RunError> {
+    let mut names = BTreeSet::new();
+    match shapes.iter().find(|s| !names.insert(&s.document.name)) {
+        None => Ok(()),
+        Some(shape) => Err(RunError::Input(format!(
+            "two shapes are called {:?}: their bundles would share a folder; rename one",
+            shape.document.name
+        ))),
+    }
+}
+
+/// The field that earlier runs cached, unless the options are against that.
 pub(crate) fn field_store(
     scene: &Scene,
     curve: Option<&(Input, String)>,
@@ -227,7 +258,7 @@ pub(crate) fn field_store(
         Store::none()
     };
     let table = curve.map(|(_, text)| text.as_str());
-    FieldStore::new(scene, options.lambda.tolerance, table, store)
+    FieldStore::new(scene, table, store)
 }
 
 /// Beside the design's bundles.
@@ -235,38 +266,16 @@ fn store_of(scene: &Scene, options: &CalibrateOptions) -> Store {
     Store::in_folder(options.out.join(&scene.design.name), STORE_FOLDER)
 }
 
-/// The table of the design's magnetisation curve: its entry among the inputs and its text.
-pub(crate) fn curve_table(design: &Design) -> Result<Option<(Input, String)>, RunError> {
-    let Some(path) = design.curve_file() else {
-        return Ok(None);
-    };
-    let text = source::table_text_of(path).map_err(|fault| RunError::Input(fault.to_string()))?;
+/// The table of the design's magnetisation curve as it was parsed: its entry among the inputs and
+/// its text.
+pub(crate) fn curve_table(scene: &Scene) -> Option<(Input, String)> {
+    let path = scene.design.curve_file()?;
+    let text = scene.core.as_ref()?.curve_text.clone()?;
     let input = Input::of_bytes(path.display().to_string(), text.as_bytes());
-    Ok(Some((input, text)))
+    Some((input, text))
 }
 
-/// What a bundle keeps as it is.
-#[derive(Clone, Copy)]
-struct Kept<'a> {
-    source: DesignSource<'a>,
-    curve: Option<&'a (Input, String)>,
-    circuit: &'a Inductances,
-    field: ShapeField<'a>,
-}
-
-impl Kept<'_> {
-    /// The object's points; their inputs are those of the whole bundle.
-    fn points(
-        &self,
-        shape: &ShapeSource,
-        progress: &dyn Progress,
-    ) -> Result<PointsReport, RunError> {
-        let inputs = inputs(self.source, self.curve, shape);
-        discretize::run_kept(&shape.document, inputs, self.field, progress)
-    }
-}
-
-/// Finest tolerance asked of inductances in air, which decide how currents lag alone.
+/// Finest tolerance of inductances in air: they decide how currents lag, and nothing else.
 const INDUCTANCE_TOLERANCE: f64 = 1e-6;
 
 /// How the coils' currents follow their voltages; the same for every shape.
@@ -278,8 +287,8 @@ struct Inductances {
 impl Inductances {
     fn new(scene: &Scene, solved: &Solved, progress: &dyn Progress) -> Self {
         progress.begin("inductances", 1);
-        let wanted = solved.tolerance.max(INDUCTANCE_TOLERANCE);
-        let in_air = neighbours::in_air(scene, wanted);
+        let tolerance = solved.tolerance.max(INDUCTANCE_TOLERANCE);
+        let in_air = neighbours::in_air(scene, tolerance);
         let (inductance_h, accuracy) = neighbours::inductances(solved, in_air);
         progress.end();
         Self {
@@ -292,26 +301,18 @@ impl Inductances {
     }
 }
 
-/// The sources as forces and as maps ask for them: of steel one solution serves both.
+/// The sources to the tolerance of forces and to that of maps: of steel one solution serves both.
 struct BothSolved {
     forces: Solved,
     map: Solved,
 }
 
 impl BothSolved {
-    fn new(
-        scene: &Scene,
-        field: &FieldStore,
-        tolerance: Option<f64>,
-        progress: &dyn Progress,
-    ) -> Result<Self, RunError> {
+    fn new(scene: &Scene, field: &FieldStore, progress: &dyn Progress) -> Result<Self, RunError> {
         let lowest_m = scene.design.workspace.z_m.from;
         progress.begin("steel", 1);
-        let map = field.steel(scene, tolerance, MAP_TOLERANCE)?;
-        let forces = match map.steel {
-            Steel::None => steel::solve(scene, tolerance, scene.force_tolerance(), lowest_m)?,
-            Steel::Alone(_) | Steel::Coupled(_) => map.clone(),
-        };
+        let map = field.steel(scene)?;
+        let forces = map.for_forces(scene, lowest_m)?;
         progress.end();
         Ok(Self { forces, map })
     }
@@ -323,7 +324,7 @@ fn folder_of(scene: &Scene, shape: &ShapeSource, options: &CalibrateOptions) -> 
     design.join(&shape.document.name)
 }
 
-/// What a bundle is made from, but for the surface that the shape's document names.
+/// The inputs of a bundle, but for the surface that the shape's document names.
 fn inputs(
     source: DesignSource,
     curve: Option<&(Input, String)>,
@@ -336,131 +337,199 @@ fn inputs(
     all.cloned().collect()
 }
 
-fn calibrate_one(
-    scene: &Scene,
-    solved: &BothSolved,
-    kept: Kept,
-    shape: &ShapeSource,
-    options: &CalibrateOptions,
-    progress: &dyn Progress,
-) -> Result<BundleReport, RunError> {
-    progress.take_seconds();
-    let folder = folder_of(scene, shape, options);
-    let points = kept.points(shape, progress)?;
-    let made_with = options.made_with(shape);
-    let inputs = &points.summary.inputs;
-    check_bundle_target(&folder, options.force, inputs, Some(&made_with))?;
-    let write = |content: &BundleContent| {
-        let timing: Vec<StageSeconds> = progress
-            .take_seconds()
-            .into_iter()
-            .map(|(stage, seconds)| StageSeconds { stage, seconds })
-            .collect();
-        progress.check()?;
-        progress.begin("write", 1);
-        let manifest = write_bundle(&folder, options.force, content, &timing)?;
-        progress.end();
-        Ok(manifest)
-    };
-    let (manifest, lambda) = compute(
-        scene,
-        solved,
-        kept,
-        (shape, points),
-        options,
-        progress,
-        write,
-    )?;
-    Ok(BundleReport {
-        folder,
-        manifest,
-        lambda,
-    })
+/// One shape on a design whose sources are solved.
+#[derive(Clone, Copy)]
+struct Calibration<'a> {
+    scene: &'a Scene<'a>,
+    solved: &'a BothSolved,
+    source: DesignSource<'a>,
+    curve: Option<&'a (Input, String)>,
+    circuit: &'a Inductances,
+    field: ShapeField<'a>,
+    shape: &'a ShapeSource,
+    options: &'a CalibrateOptions,
 }
 
-/// Computes everything that a bundle holds and hands it to `take`, which returns the manifest with
-/// its list of files.
-fn compute(
-    scene: &Scene,
-    solved: &BothSolved,
-    kept: Kept,
-    (shape, points): (&ShapeSource, PointsReport),
-    options: &CalibrateOptions,
-    progress: &dyn Progress,
-    take: impl FnOnce(&BundleContent) -> Result<Manifest, RunError>,
-) -> Result<(Manifest, LambdaReport), RunError> {
-    let Kept {
-        source,
-        curve,
-        circuit,
-        field,
-    } = kept;
-    let asked = LambdaOptions {
-        picture: options.page,
-        ..options.lambda.clone()
-    };
-    let mut lambda = solve(scene, &solved.forces, field, points, &asked, progress)?;
-    let mut needed = NeededMap::new(
-        scene,
-        &solved.map,
-        field,
-        &lambda,
-        options.reach_m,
-        progress,
-    )?;
-    let passive = passive_map(scene, &needed.made.map, progress)?;
-    progress.begin("passive force", 1);
-    let ignored = IgnoredPull::new(scene, &lambda, field)?;
-    progress.end();
-    if let Some(ignored) = ignored {
-        lambda.warnings.extend(ignored.warning(lambda.file.jnd));
-        needed.left_out.push(ignored.left_out());
-    }
-    let mut manifest = manifest(scene, &lambda, &needed, passive.as_ref());
-    manifest.made_with = Some(options.made_with(shape));
-    manifest.circuit = Some(circuit.circuit.clone());
-    let stage = circuit.accuracy.clone();
-    manifest.accuracy.insert("inductances".to_owned(), stage);
-    lambda.warnings.extend(outside_warning(&manifest, &lambda));
-    let currents = current_rows(scene, &lambda);
-    let rows = point_rows(&lambda.points.discretized.points);
-    let mut runtime = runtime(scene, lambda.file.lambda_n_per_m);
-    runtime.rendering = HeightGrid::of_points(&manifest.points, &rows).map(|heights| Rendering {
-        heights,
-        static_current_a: currents.iter().map(|row| row.current_a).collect(),
-        inductance_h: circuit.circuit.inductance_h.concat(),
-        voltage_v: circuit.circuit.voltage_v,
-    });
-    let mut map = arrays(&needed.made.map, runtime);
-    map.passive_force_n = passive.as_ref().map(|p| Cow::Borrowed(&*p.force_z_n));
-    let mut extra = vec![(DESIGN_FILE, source.text.as_bytes())];
-    extra.extend(curve.map(|(_, text)| (CURVE_FILE, text.as_bytes())));
-    let mut pages = Vec::new();
-    if let Some(picture) = &lambda.picture {
-        progress.begin("report", 1);
-        let seen = page::Seen {
-            scene,
-            lambda: &lambda,
-            picture,
-            needed: &needed,
-            manifest: &manifest,
-            tolerance: solved.map.tolerance,
+impl Calibration<'_> {
+    /// Computes the bundle and writes it.
+    fn write(&self, progress: &dyn Progress) -> Result<BundleReport, RunError> {
+        progress.take_seconds();
+        let (options, folder) = (
+            self.options,
+            folder_of(self.scene, self.shape, self.options),
+        );
+        let points = self.points(progress)?;
+        // Checked again with the digest of the surface that was parsed.
+        let made_with = options.made_with(self.shape);
+        let inputs = &points.summary.inputs;
+        check_bundle_target(&folder, options.force, inputs, Some(&made_with))?;
+        let write = |content: &BundleContent| {
+            let seconds = progress.take_seconds().into_iter();
+            let timing: Vec<StageSeconds> = seconds
+                .map(|(stage, seconds)| StageSeconds { stage, seconds })
+                .collect();
+            progress.check()?;
+            progress.begin("write", 1);
+            let manifest = write_bundle(&folder, options.force, content, &timing)?;
+            progress.end();
+            Ok(manifest)
         };
-        let others: Vec<&str> = extra.iter().map(|(name, _)| *name).collect();
-        pages = page::files(&seen, &others)
+        let (manifest, lambda) = self.compute(&points, progress, write)?;
+        Ok(BundleReport {
+            folder,
+            outside: points.summary.outside,
+            lambda,
+            manifest,
+        })
+    }
+
+    /// The object's points; their inputs are those of the whole bundle.
+    fn points(&self, progress: &dyn Progress) -> Result<PointsReport, RunError> {
+        let inputs = inputs(self.source, self.curve, self.shape);
+        discretize::run_cached(&self.shape.document, inputs, self.field, progress)
+    }
+
+    /// Computes everything that a bundle holds and hands it to `take`, which returns the manifest
+    /// with its list of files.
+    fn compute(
+        &self,
+        points: &PointsReport,
+        progress: &dyn Progress,
+        take: impl FnOnce(&BundleContent) -> Result<Manifest, RunError>,
+    ) -> Result<(Manifest, LambdaReport), RunError> {
+        let (scene, solved, field) = (self.scene, self.solved, self.field);
+        let options = LambdaOptions {
+            picture: self.options.page,
+            ..self.options.lambda.clone()
+        };
+        let of_grid = WantedPoints::of_grid(points);
+        let mut lambda = solve_at(scene, &solved.forces, field, &of_grid, &options, progress)?;
+        let grid_points = &points.discretized.points;
+        let reach_m = self.options.reach_m;
+        let mut needed = NeededMap::new(scene, &solved.map, field, grid_points, reach_m, progress)?;
+        let passive = passive_map(scene, &needed.made.map, progress)?;
+        progress.begin("passive force", 1);
+        let ignored = IgnoredPull::new(scene, &lambda, &of_grid, field)?;
+        progress.end();
+        if let Some(ignored) = ignored {
+            lambda.warnings.extend(ignored.warning(lambda.file.jnd));
+            needed.left_out.push(ignored.left_out());
+        }
+        let manifest = self.manifest(&lambda, grid_points, &needed, passive.as_ref());
+        lambda
+            .warnings
+            .extend(outside_warning(&manifest, grid_points));
+        let rows = point_rows(grid_points);
+        let currents = current_rows(scene, &lambda);
+        let mut map = arrays(
+            &needed.made.map,
+            self.runtime(&lambda, &manifest, &rows, &currents),
+        );
+        map.passive_force_n = passive.as_ref().map(|p| Cow::Borrowed(&*p.force_z_n));
+        let mut extra = vec![(DESIGN_FILE, self.source.text.as_bytes())];
+        extra.extend((self.curve).map(|(_, text)| (CURVE_FILE, text.as_bytes())));
+        let mut content = BundleContent {
+            manifest,
+            map: &map,
+            points: &rows,
+            currents: &currents,
+            lambda: &lambda.file,
+            extra: &extra,
+        };
+        let pages = self.pages(&content, &lambda, progress)?;
+        let pages = pages.iter().map(|(name, bytes)| (*name, &bytes[..]));
+        let extra: Vec<(&str, &[u8])> = extra.iter().copied().chain(pages).collect();
+        content.extra = &extra;
+        let manifest = take(&content)?;
+        Ok((manifest, lambda))
+    }
+
+    /// The page and the plots beside `content`, if they are requested.
+    fn pages(
+        &self,
+        content: &BundleContent,
+        lambda: &LambdaReport,
+        progress: &dyn Progress,
+    ) -> Result<Vec<(&'static str, Vec<u8>)>, RunError> {
+        let Some(picture) = &lambda.picture else {
+            return Ok(Vec::new());
+        };
+        progress.begin("report", 1);
+        let tolerance = self.solved.map.tolerance;
+        let object = page::object(self.scene, content, picture, &lambda.warnings, tolerance);
+        let others: Vec<&str> = content.extra.iter().map(|(name, _)| *name).collect();
+        let files = bundle_files::files(&object, &others)
             .map_err(|error| WriteError::from_io("write", Path::new(PAGE_FILE), error))?;
         progress.end();
+        Ok(files)
     }
-    extra.extend(pages.iter().map(|(name, bytes)| (*name, bytes.as_slice())));
-    let manifest = take(&BundleContent {
-        manifest,
-        map: &map,
-        points: &rows,
-        currents: &currents,
-        lambda: &lambda.file,
-        extra: &extra,
-    })?;
-    Ok((manifest, lambda))
+
+    /// The numbers that a runtime needs beside the map.
+    fn runtime(
+        &self,
+        lambda: &LambdaReport,
+        manifest: &Manifest,
+        rows: &[PointRow],
+        currents: &[CurrentRow],
+    ) -> Runtime {
+        let circuit = &self.circuit.circuit;
+        let rendering = HeightGrid::of_points(&manifest.points, rows).map(|heights| Rendering {
+            heights,
+            static_current_a: currents.iter().map(|row| row.current_a).collect(),
+            inductance_h: circuit.inductance_h.concat(),
+            voltage_v: circuit.voltage_v,
+        });
+        Runtime {
+            rendering,
+            ..runtime(self.scene, lambda.file.lambda_n_per_m)
+        }
+    }
+
+    /// `manifest.json`, but for its list of files.
+    fn manifest(
+        &self,
+        lambda: &LambdaReport,
+        points: &ConstraintPoints,
+        needed: &NeededMap,
+        passive: Option<&PassiveMap>,
+    ) -> Manifest {
+        let (scene, file) = (self.scene, &lambda.file);
+        let mut accuracy = file.accuracy.clone();
+        accuracy.insert("map".to_owned(), needed.made.accuracy.clone());
+        accuracy.insert("inductances".to_owned(), self.circuit.accuracy.clone());
+        let mut map = summary(&needed.made.map, needed.components, needed.made.between);
+        if let Some(passive) = passive {
+            accuracy.insert(PASSIVE_STAGE.to_owned(), passive.accuracy.clone());
+            map.passive_force = Some(PassiveForce {
+                array: PASSIVE.to_owned(),
+                largest_n: passive.largest_n,
+                interpolation: Interpolation::tricubic(passive.between, passive.definition()),
+            });
+        }
+        Manifest {
+            schema_version: SCHEMA_VERSION.to_owned(),
+            fluxform_version: FLUXFORM_VERSION.to_owned(),
+            design: file.design.clone(),
+            shape: file.shape.clone(),
+            inputs: file.inputs.clone(),
+            made_with: Some(self.options.made_with(self.shape)),
+            units: UNITS.to_owned(),
+            array: scene.array_geometry(),
+            limits: scene.current_limits(),
+            resistance_ohm: scene.resistances_ohm(),
+            circuit: Some(self.circuit.circuit.clone()),
+            magnet: scene.magnet_summary(),
+            lambda: LambdaSummary {
+                lambda_n_per_m: file.lambda_n_per_m,
+                criterion: file.criterion,
+            },
+            points: points_grid(points),
+            map,
+            left_out: needed.left_out.clone(),
+            accuracy,
+            files: Vec::new(),
+        }
+    }
 }
 
 /// The unpowered steel's pull on the map's nodes, where the design asks for it.
@@ -495,12 +564,12 @@ impl NeededMap {
         scene: &Scene,
         solved: &Solved,
         field: ShapeField,
-        lambda: &LambdaReport,
+        points: &ConstraintPoints,
         reach_m: f64,
         progress: &dyn Progress,
     ) -> Result<Self, RunError> {
         let mut left_out = Vec::new();
-        let grid = needed_grid(scene.design, lambda, reach_m, &mut left_out);
+        let grid = needed_grid(scene.design, points, reach_m, &mut left_out);
         let components = if scene.tilted() {
             Components::Gradient
         } else {
@@ -519,7 +588,7 @@ impl NeededMap {
                 error_cost: 0.0,
             });
         }
-        let felt = Felt::by_magnet(scene, &grid.z_m, MAGNET_SHARE * solved.tolerance)?;
+        let felt = MagnetMean::by_magnet(scene, &grid.z_m, MAGNET_SHARE * solved.tolerance)?;
         let mut made = field.map(scene, solved, &driven, &grid, components, &felt, progress)?;
         drop_weak_coils(
             scene,
@@ -637,12 +706,12 @@ pub(crate) fn needed_nodes(design: &Design, points: &ConstraintPoints, reach_m: 
 
 fn needed_grid(
     design: &Design,
-    lambda: &LambdaReport,
+    points: &ConstraintPoints,
     reach_m: f64,
     left_out: &mut Vec<LeftOut>,
 ) -> Grid {
     let whole = workspace_grid(design);
-    let grid = needed_nodes(design, &lambda.points.discretized.points, reach_m);
+    let grid = needed_nodes(design, points, reach_m);
     let count = |grid: &Grid| grid.x_m.len() * grid.y_m.len() * grid.z_m.len();
     if count(&grid) < count(&whole) {
         left_out.push(LeftOut {
@@ -661,49 +730,6 @@ fn needed_grid(
     grid
 }
 
-fn manifest(
-    scene: &Scene,
-    lambda: &LambdaReport,
-    needed: &NeededMap,
-    passive: Option<&PassiveMap>,
-) -> Manifest {
-    let file = &lambda.file;
-    let mut accuracies = file.accuracy.clone();
-    accuracies.insert("map".to_owned(), needed.made.accuracy.clone());
-    let mut map = summary(&needed.made.map, needed.components, needed.made.between);
-    if let Some(passive) = passive {
-        accuracies.insert(PASSIVE_STAGE.to_owned(), passive.accuracy.clone());
-        map.passive_force = Some(PassiveForce {
-            array: PASSIVE.to_owned(),
-            largest_n: passive.largest_n,
-            interpolation: Interpolation::tricubic(passive.between, passive.definition()),
-        });
-    }
-    Manifest {
-        schema_version: SCHEMA_VERSION.to_owned(),
-        fluxform_version: FLUXFORM_VERSION.to_owned(),
-        design: file.design.clone(),
-        shape: file.shape.clone(),
-        inputs: file.inputs.clone(),
-        made_with: None,
-        units: UNITS.to_owned(),
-        array: scene.array_geometry(),
-        limits: scene.current_limits(),
-        resistance_ohm: scene.resistances_ohm(),
-        circuit: None,
-        magnet: scene.magnet_summary(),
-        lambda: LambdaSummary {
-            lambda_n_per_m: file.lambda_n_per_m,
-            criterion: file.criterion,
-        },
-        points: points_grid(&lambda.points.discretized.points),
-        map,
-        left_out: needed.left_out.clone(),
-        accuracy: accuracies,
-        files: Vec::new(),
-    }
-}
-
 /// Static currents, zero where there is no force constant.
 fn current_rows(scene: &Scene, lambda: &LambdaReport) -> Vec<CurrentRow> {
     let currents = lambda.file.currents_a.as_deref();
@@ -720,9 +746,8 @@ fn current_rows(scene: &Scene, lambda: &LambdaReport) -> Vec<CurrentRow> {
 }
 
 /// A sentence on the points that lie outside the map, where a runtime gives no force.
-fn outside_warning(manifest: &Manifest, lambda: &LambdaReport) -> Option<String> {
+fn outside_warning(manifest: &Manifest, points: &ConstraintPoints) -> Option<String> {
     let inside = |axis: &AxisSummary, value: f64| axis.from_m <= value && value <= axis.to_m;
-    let points = &lambda.points.discretized.points;
     let outside = (0..points.len())
         .filter(|i| {
             !(inside(&manifest.map.x_m, points.x_m[*i])

@@ -1,4 +1,4 @@
-//! What `calibrate` is about to compute, what it leaves out, and what leaving it out costs.
+//! The plan of `calibrate`: the terms it computes, those it leaves out, and what leaving out costs.
 //!
 //! Costs are found by computing forces at a few points of every shape both ways, of the array's
 //! middle coils alone: the array itself is never solved here.
@@ -12,23 +12,24 @@ use super::needed_coils;
 use super::needed_nodes;
 use crate::RunError;
 use crate::commands::discretize::{PointsOptions, run_with};
-use crate::commands::map::{MAP_TOLERANCE, workspace_grid};
+use crate::commands::map::workspace_grid;
 use crate::design::{Coupling, Design, MagnetModel};
 use crate::field::winding::KERNEL_ERROR;
 use crate::progress::{Progress, Silent};
 use crate::scene::Scene;
+use crate::scene::core_material::Material;
+use crate::scene::coupled;
 use crate::scene::passive;
 use crate::scene::sources::DesignSource;
 use crate::scene::sources::ShapeSource;
 use crate::scene::steel;
-use crate::scene::steel::{Material, coupled};
 use crate::shape::certificate::Certify;
 use crate::shape::points::ConstraintPoints;
 
 /// Most coils of which costs are computed.
 const MIDDLE_COILS: usize = 9;
 
-/// What is computed for a design's shapes.
+/// The computation for a design's shapes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Plan {
     /// Tolerance of forces and maps, relative to the largest |grad B| at a height.
@@ -46,13 +47,13 @@ pub struct Plan {
 /// One term of the physics.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Term {
-    /// What it is.
+    /// Its name.
     pub what: &'static str,
     /// Whether it is computed.
     pub done: Done,
     /// Why.
     pub why: String,
-    /// What leaving it out costs (or would cost), if that is known.
+    /// The cost of leaving it out, if that is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cost: Option<Cost>,
 }
@@ -75,7 +76,7 @@ impl Done {
     }
 }
 
-/// What leaving a term out costs.
+/// The cost of leaving a term out.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Cost {
@@ -110,10 +111,10 @@ pub fn plan(
     options: &CalibrateOptions,
     progress: &dyn Progress,
 ) -> Result<Plan, RunError> {
-    let scene = Scene::new(source.design)?;
-    let curve = curve_table(source.design)?;
+    let scene = Scene::with_tolerance(source.design, options.lambda.tolerance)?;
+    let curve = curve_table(&scene);
     let field = field_store(&scene, curve.as_ref(), options);
-    let kept = field.holds_steel();
+    let cached = field.holds_steel();
     let tolerance = options.lambda.tolerance;
     let whole = workspace_grid(source.design);
     let size = |grid: &crate::map::tabulate::Grid| [grid.x_m.len(), grid.y_m.len(), grid.z_m.len()];
@@ -140,8 +141,8 @@ pub fn plan(
     Ok(Plan {
         coils,
         cost_coils: coils.min(MIDDLE_COILS),
-        tolerance: steel::tolerance_of(&scene, tolerance, MAP_TOLERANCE).max(KERNEL_ERROR),
-        terms: terms(&scene, kept, tolerance, &places, progress)?,
+        tolerance: scene.tolerances.map.max(KERNEL_ERROR),
+        terms: terms(&scene, cached, tolerance, &places, progress)?,
         shapes: planned,
     })
 }
@@ -169,7 +170,7 @@ fn telling(points: &ConstraintPoints) -> Vec<[f64; 3]> {
 
 fn terms(
     scene: &Scene,
-    kept: bool,
+    cached: bool,
     tolerance: Option<f64>,
     places: &[[f64; 3]],
     progress: &dyn Progress,
@@ -222,18 +223,28 @@ fn terms(
         progress.end();
         return Ok(terms);
     };
-    terms.push(Term {
+    terms.extend(steel_terms(&core.material, cached));
+    terms.extend(coupling(&middle, tolerance, places));
+    progress.advance(1);
+    terms.push(passive_force(&Scene::new(&middle)?, places)?);
+    progress.end();
+    Ok(terms)
+}
+
+/// The steel and its saturation.
+fn steel_terms(material: &Material, cached: bool) -> [Term; 2] {
+    let steel = Term {
         what: "steel",
-        done: if kept { Done::Kept } else { Done::Computed },
-        why: if kept {
+        done: if cached { Done::Kept } else { Done::Computed },
+        why: if cached {
             "solved in an earlier run and kept: coils, core, array and magnet are the same"
         } else {
             "the cores multiply the coils' field"
         }
         .to_owned(),
         cost: None,
-    });
-    terms.push(match &core.material {
+    };
+    let saturation = match material {
         Material::Curve(_) => Term {
             what: "saturation",
             done: Done::Computed,
@@ -249,12 +260,8 @@ fn terms(
             ),
             cost: None,
         },
-    });
-    terms.extend(coupling(&middle, tolerance, places));
-    progress.advance(1);
-    terms.push(passive_force(&Scene::new(&middle)?, places)?);
-    progress.end();
-    Ok(terms)
+    };
+    [steel, saturation]
 }
 
 /// The design with no more than nine coils, those closest to the array's middle.
@@ -301,9 +308,9 @@ fn near(design: &Design, places: &[[f64; 3]]) -> Vec<[f64; 3]> {
 
 /// Forces per ampere at `places` with another design; `None` where it cannot be computed.
 fn forces(design: &Design, tolerance: Option<f64>, places: &[[f64; 3]]) -> Option<Vec<f64>> {
-    let scene = Scene::new(design).ok()?;
+    let scene = Scene::with_tolerance(design, tolerance).ok()?;
     let lowest_m = design.workspace.z_m.from;
-    let solved = steel::solve(&scene, tolerance, KERNEL_ERROR, lowest_m).ok()?;
+    let solved = steel::solve(&scene, scene.tolerances.field, lowest_m).ok()?;
     scene.forces_n_per_a(&solved, places, &Silent).ok()
 }
 
@@ -319,7 +326,7 @@ fn change(of: &[f64], other: &[f64], coils: usize) -> f64 {
     .fold(0.0, f64::max)
 }
 
-/// What changing the design by `edit` does to the forces at `places`.
+/// The change of the forces at `places` from one edit of the design to another.
 fn cost_of(
     design: &Design,
     tolerance: Option<f64>,

@@ -8,16 +8,16 @@ use serde::Deserialize;
 use crate::report::data::ErrorTime;
 use crate::report::measured::{MeasuredCurve, MeasuredRow};
 use crate::scene::Scene;
-use crate::scene::steel::coupled;
+use crate::scene::coupled;
 
 /// The table of a whole run of the measuring suite.
 const TABLE: &str = include_str!("../../../results/bench/bench.json");
-/// What it was recorded on; to be changed with the table.
+/// The machine on which it was recorded; to be changed with the table.
 const MACHINE: &str = "one core of a shared two-core x86-64 machine";
 /// Name of the knob.
 const KNOB: &str = "tolerance";
 
-/// What the page shows of the table.
+/// The part of the table that the page shows.
 #[derive(Deserialize)]
 struct Recorded {
     fluxform_version: String,

@@ -14,7 +14,7 @@ use crate::units::DETECTION_THRESHOLD_N;
 pub struct Felt {
     /// Upward, N.
     pub force_n: f64,
-    /// What the coils give one by one, added without signs, N.
+    /// The coils' forces, added without signs, N.
     pub gross_n: f64,
 }
 

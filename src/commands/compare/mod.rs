@@ -21,21 +21,23 @@ use crate::lambda::{self, Allocator, Criterion, ForceProblem, Reach, Settings, S
 use crate::plot::matrix::{MatrixPlot, Panel};
 use crate::progress::Progress;
 use crate::scene::Scene;
+use crate::scene::core_material::Material;
 use crate::scene::passive;
 use crate::scene::sources::ShapeSource;
 use crate::scene::steel;
-use crate::scene::steel::{Material, Solved};
+use crate::scene::steel::Solved;
 use crate::units::DETECTION_THRESHOLD_N;
 
 pub(crate) mod command;
 pub mod difference;
+mod text;
 
 use difference::{Difference, Felt, Sides, difference};
 
 /// Places handed to one thread at a time; fixed, so that bytes do not depend on threads.
 const PORTION: usize = 4096;
 
-/// What is asked.
+/// The options of `compare`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CompareOptions {
     /// One force constant for all objects, N/m; `None`: each at its own `lambda_jnd`.
@@ -46,33 +48,20 @@ pub struct CompareOptions {
     pub tolerance: Option<f64>,
 }
 
-/// The comparison and what is to be told with it.
-#[derive(Debug, Clone)]
-pub struct CompareReport {
-    /// The JSON result.
-    pub file: CompareFile,
-    /// Warnings for the user.
-    pub warnings: Vec<String>,
-    /// Whether the tolerance asked for was reached.
-    pub accuracy_reached: bool,
-    /// What misses it.
-    pub accuracy_missed: Vec<String>,
-}
-
-/// What `compare` prints; SI.
+/// The comparison, SI. Serialised it is the JSON result.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct CompareFile {
+pub struct CompareReport {
     /// Layout of the artefact.
     pub schema_version: &'static str,
     /// Program that wrote it.
     pub fluxform_version: &'static str,
     /// Name of the design.
     pub design: String,
-    /// What went in, paths as given on the command line.
+    /// Input files, paths as given on the command line.
     pub inputs: Vec<Input>,
-    /// Forces this part apart are just told apart.
+    /// Forces that differ by this part are just distinguished.
     pub jnd: f64,
-    /// Forces this much apart are, whatever their size, not told apart, N.
+    /// Forces that differ by less are not distinguished, whatever their size, N.
     pub threshold_n: f64,
     /// How each lambda was chosen: `jnd`, or `given`.
     pub criterion: &'static str,
@@ -82,6 +71,12 @@ pub struct CompareFile {
     pub pairs: Vec<Pair>,
     /// Errors of the forces and of the differences.
     pub accuracy: BTreeMap<&'static str, StageAccuracy>,
+    /// Warnings for the user.
+    #[serde(skip)]
+    pub warnings: Vec<String>,
+    /// The stages that miss the requested tolerance.
+    #[serde(skip)]
+    pub accuracy_missed: Vec<String>,
 }
 
 /// One object as rendered.
@@ -153,7 +148,7 @@ struct Object {
     rendered: Option<Rendered>,
 }
 
-/// What an object is rendered with.
+/// Force constant and static currents of an object.
 struct Rendered {
     lambda_n_per_m: f64,
     currents_a: Vec<f64>,
@@ -161,7 +156,7 @@ struct Rendered {
 
 /// Forces of one object at the places of another.
 #[derive(Debug, Clone, Default)]
-struct Field {
+struct RenderedForces {
     fixed: Vec<Felt>,
     feedback: Vec<Felt>,
     saturated: usize,
@@ -185,7 +180,7 @@ pub fn run(
             return Err(RunError::Input(message));
         }
     }
-    let scene = Scene::new(design)?;
+    let scene = Scene::with_tolerance(design, options.tolerance)?;
     let of_shapes = shapes.iter().filter_map(|shape| shape.input.clone());
     let inputs: Vec<Input> = std::iter::once(design_input.clone())
         .chain(of_shapes)
@@ -198,7 +193,7 @@ pub fn run(
         .iter()
         .fold(f64::INFINITY, |z, p| z.min(p.summary.min_height_m));
     progress.begin("steel", 1);
-    let solved = steel::solve(&scene, options.tolerance, scene.force_tolerance(), lowest_m)?;
+    let solved = steel::solve(&scene, scene.tolerances.forces, lowest_m)?;
     progress.end();
     let mut warnings = Vec::new();
     let objects = points
@@ -210,7 +205,7 @@ pub fn run(
         if matches!(core.material, Material::Curve(_)) {
             warnings.push(
                 "the forces of several currents are added up, which holds as long as the steel is \
-                 linear; `lambda` tells what the B-H curve changes at its currents"
+                 linear; `lambda` states the change by the B-H curve at its currents"
                     .to_owned(),
             );
         }
@@ -218,23 +213,13 @@ pub fn run(
     let fields = fields(&scene, &objects, progress)?;
     let stage = proven_accuracy(&scene, &solved);
     let (pairs, error) = pairs(&objects, &fields, options.jnd, stage.estimate);
-    let told = objects.iter().enumerate().map(|(k, object)| {
-        let rendered = object.rendered.as_ref();
-        ComparedShape {
-            shape: object.name().to_owned(),
-            points: object.positions_m.len(),
-            lambda_n_per_m: rendered.map(|r| r.lambda_n_per_m),
-            currents_a: rendered.map(|r| r.currents_a.clone()),
-            saturated_share: rendered
-                .map(|_| fields[k][k].saturated as f64 / object.positions_m.len() as f64),
-        }
-    });
     let difference = StageAccuracy {
         estimate: error,
         relative_to: "1 just-noticeable difference".to_owned(),
         method: "first order: the error of every coil's force at the places told".to_owned(),
     };
-    let file = CompareFile {
+    let accuracy = BTreeMap::from([("forces", stage), ("difference", difference)]);
+    Ok(CompareReport {
         schema_version: SCHEMA_VERSION,
         fluxform_version: FLUXFORM_VERSION,
         design: design.name.clone(),
@@ -245,16 +230,13 @@ pub fn run(
             Some(_) => "given",
             None => Criterion::Jnd.name(),
         },
-        shapes: told.collect(),
+        shapes: (objects.iter().zip(&fields).enumerate())
+            .map(|(k, (object, fields))| object.compared(&fields[k]))
+            .collect(),
         pairs,
-        accuracy: BTreeMap::from([("forces", stage), ("difference", difference)]),
-    };
-    let accuracy_missed = missed(&file.accuracy, solved.tolerance);
-    Ok(CompareReport {
-        file,
+        accuracy_missed: missed(&accuracy, solved.tolerance),
+        accuracy,
         warnings,
-        accuracy_reached: accuracy_missed.is_empty(),
-        accuracy_missed,
     })
 }
 
@@ -299,9 +281,9 @@ impl Object {
         let solution = lambda::solve(&problem, &settings)?;
         progress.end();
         let name = &points.summary.shape;
-        let told = points.summary.warnings.iter().map(String::as_str);
-        let told = told.chain(unusual(solution.status));
-        warnings.extend(told.map(|warning| format!("{name}: {warning}")));
+        let own = points.summary.warnings.iter().map(String::as_str);
+        let all = own.chain(unusual(solution.status));
+        warnings.extend(all.map(|warning| format!("{name}: {warning}")));
         let rendered = Rendered::of(solution, options);
         Ok(Self {
             rendered,
@@ -317,13 +299,25 @@ impl Object {
         &self.points.summary.shape
     }
 
+    /// The object as rendered, with its own field at its points.
+    fn compared(&self, own: &RenderedForces) -> ComparedShape {
+        let (rendered, points) = (self.rendered.as_ref(), self.positions_m.len());
+        ComparedShape {
+            shape: self.name().to_owned(),
+            points,
+            lambda_n_per_m: rendered.map(|r| r.lambda_n_per_m),
+            currents_a: rendered.map(|r| r.currents_a.clone()),
+            saturated_share: rendered.map(|_| own.saturated as f64 / points as f64),
+        }
+    }
+
     /// The field of `other` at this object's places.
-    fn feels(&self, other: &Self, allocator: &Allocator) -> Field {
+    fn feels(&self, other: &Self, allocator: &Allocator) -> RenderedForces {
         let Some(rendered) = &other.rendered else {
-            return Field::default();
+            return RenderedForces::default();
         };
         let coils = allocator.coils();
-        let portions: Vec<Field> = self
+        let portions: Vec<RenderedForces> = self
             .positions_m
             .par_chunks(PORTION)
             .zip(self.forces_n_per_a.par_chunks(PORTION * coils))
@@ -331,7 +325,7 @@ impl Object {
             .map(|(portion, (places, rows))| {
                 let mut allocator = allocator.clone();
                 let mut currents = vec![0.0; coils];
-                let mut field = Field::default();
+                let mut field = RenderedForces::default();
                 for (k, (place, row)) in places.iter().zip(rows.chunks_exact(coils)).enumerate() {
                     let passive = self.passive_n.as_ref();
                     let passive_n = passive.map_or(0.0, |passive| passive[portion * PORTION + k]);
@@ -347,11 +341,13 @@ impl Object {
                 field
             })
             .collect();
-        portions.into_iter().fold(Field::default(), Field::joined)
+        portions
+            .into_iter()
+            .fold(RenderedForces::default(), RenderedForces::joined)
     }
 }
 
-impl Field {
+impl RenderedForces {
     fn joined(mut self, more: Self) -> Self {
         self.fixed.extend(more.fixed);
         self.feedback.extend(more.feedback);
@@ -362,7 +358,7 @@ impl Field {
 
 impl Rendered {
     fn of(solution: Solution, options: &CompareOptions) -> Option<Self> {
-        // A constant that was asked for is rendered as well as can be.
+        // A constant that was given is rendered as well as can be.
         let point = match options.lambda_n_per_m {
             Some(_) => solution.at,
             None => solution.chosen,
@@ -394,7 +390,7 @@ fn fields(
     scene: &Scene,
     objects: &[Object],
     progress: &dyn Progress,
-) -> Result<Vec<Vec<Field>>, RunError> {
+) -> Result<Vec<Vec<RenderedForces>>, RunError> {
     let total_a = scene.design.supply.total_current_max_a;
     let ohm = scene.resistances_ohm();
     let allocator = Allocator::new(&ohm, &scene.lower_a, &scene.upper_a, total_a)
@@ -414,14 +410,19 @@ fn fields(
     Ok(fields)
 }
 
-/// Every two objects, and the largest error of the differences told.
-fn pairs(objects: &[Object], fields: &[Vec<Field>], jnd: f64, part: f64) -> (Vec<Pair>, f64) {
+/// Every two objects, and the largest error of their differences.
+fn pairs(
+    objects: &[Object],
+    fields: &[Vec<RenderedForces>],
+    jnd: f64,
+    part: f64,
+) -> (Vec<Pair>, f64) {
     let mut pairs = Vec::new();
     let mut error = 0.0_f64;
     for (i, a) in objects.iter().enumerate() {
         for (j, b) in objects.iter().enumerate().skip(i + 1) {
             let able = a.rendered.is_some() && b.rendered.is_some();
-            let both = |pick: fn(&Field) -> &[Felt]| {
+            let both = |pick: fn(&RenderedForces) -> &[Felt]| {
                 let side = |surface: usize| Sides {
                     a: pick(&fields[surface][i]),
                     b: pick(&fields[surface][j]),
@@ -446,17 +447,17 @@ fn pairs(objects: &[Object], fields: &[Vec<Field>], jnd: f64, part: f64) -> (Vec
             for found in [&fixed, &feedback].into_iter().flatten() {
                 error = error.max(found.error(part, jnd));
             }
-            let told =
+            let of =
                 |found: &Option<Difference>, pick: fn(&Difference) -> f64| found.as_ref().map(pick);
             pairs.push(Pair {
                 a: a.name().to_owned(),
                 b: b.name().to_owned(),
-                static_jnd: told(&fixed, |d| d.largest),
-                feedback_jnd: told(&feedback, |d| d.largest),
-                static_rms_jnd: told(&fixed, |d| d.rms),
-                feedback_rms_jnd: told(&feedback, |d| d.rms),
-                static_felt_share: told(&fixed, |d| d.felt_share),
-                feedback_felt_share: told(&feedback, |d| d.felt_share),
+                static_jnd: of(&fixed, |d| d.largest),
+                feedback_jnd: of(&feedback, |d| d.largest),
+                static_rms_jnd: of(&fixed, |d| d.rms),
+                feedback_rms_jnd: of(&feedback, |d| d.rms),
+                static_felt_share: of(&fixed, |d| d.felt_share),
+                feedback_felt_share: of(&feedback, |d| d.felt_share),
                 static_at: fixed.as_ref().map(place),
                 feedback_at: feedback.as_ref().map(place),
             });
@@ -465,7 +466,7 @@ fn pairs(objects: &[Object], fields: &[Vec<Field>], jnd: f64, part: f64) -> (Vec
     (pairs, error)
 }
 
-impl CompareFile {
+impl CompareReport {
     /// Objects without a force constant.
     #[must_use]
     pub fn without_constant(&self) -> Vec<&str> {

@@ -10,15 +10,15 @@ use crate::RunError;
 use crate::bundle::artefact::Input;
 use crate::bundle::atomic::{self, Overwrite, check_distinct};
 use crate::cli::args::{SamplingFlags, SurfaceFlags, Writing};
-use crate::cli::budget::{allow, asked};
+use crate::cli::budget::{allow, cost_origin};
 use crate::cli::describe;
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
 use crate::cli::pictures::Picture;
-use crate::cli::printer::{Place, Printer};
-use crate::cli::quantity::{count, length_error, mm, number};
+use crate::cli::printer::{Printer, Stream};
+use crate::cli::quantity::{count, extents, length_error, mm, number};
 use crate::cli::start::begin;
 use crate::cli::values::FileArgument;
 use crate::scene::cost::of_points;
@@ -34,11 +34,11 @@ use crate::shape::holes::Holes;
 /// its unit and place.
 ///
 /// How far the surface departs from bilinear interpolation between the points is certified. After
-/// the normal the table tells of walls, rims, creases (with the other face's normal) and overhangs.
+/// the normal the table marks walls, rims, creases (with the other face's normal) and overhangs.
 /// Instead of the grid's points, --max-deviation chooses as few as a deviation needs, --poisson
 /// points without a pattern; both give each point the area it stands for (weight_m2).
 ///
-/// With --inspect nothing is made of the surface: what its file holds is told, in its own unit, with
+/// With --inspect no points are made: the content of the surface's file is reported, in its own unit, with
 /// a guess at that unit, which is never used.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Writing, &[
@@ -117,7 +117,7 @@ impl Discretize {
         let shapes = documents::shapes(std::slice::from_ref(&self.shape), &self.surface, printer)?;
         allow(
             shapes.iter().map(|shape| of_points(&shape.document, 0)),
-            asked(&shapes),
+            cost_origin(&shapes),
             printer,
         )?;
         let bar = begin(printer);
@@ -133,12 +133,12 @@ impl Discretize {
                     Some(place) => place,
                     None => {
                         report.write(self.out.as_given(), self.writing.force)?;
-                        Place::Output
+                        Stream::Output
                     }
                 };
                 report.summary.warnings = printer.warnings();
                 printer.summary(place, &report.summary, || {
-                    self.told_scattered(&report.summary)
+                    self.text_scattered(&report.summary)
                 })?;
                 continue;
             }
@@ -149,7 +149,7 @@ impl Discretize {
                     Some(place) => place,
                     None => {
                         report.write(self.out.as_given(), self.writing.force)?;
-                        Place::Output
+                        Stream::Output
                     }
                 };
             let place = match &plot {
@@ -157,11 +157,11 @@ impl Discretize {
                 Some(plot) => {
                     let (inputs, svg) = (&report.summary.inputs, report.picture().svg());
                     let after = plot.write(inputs, &svg, printer)?;
-                    if after == Place::Error { after } else { place }
+                    if after == Stream::Error { after } else { place }
                 }
             };
             report.summary.warnings = printer.warnings();
-            printer.summary(place, &report.summary, || self.told(&report.summary))?;
+            printer.summary(place, &report.summary, || self.text(&report.summary))?;
         }
         Ok(())
     }
@@ -218,22 +218,22 @@ impl Discretize {
         printer: &Printer,
         inputs: &[Input],
         csv: impl Fn(&mut dyn std::io::Write) -> std::io::Result<()>,
-    ) -> Result<Option<Place>, Failure> {
+    ) -> Result<Option<Stream>, Failure> {
         match &self.out {
             FileArgument::Standard => {
                 printer.data(|out| csv(out))?;
-                Ok(Some(Place::Error))
+                Ok(Some(Stream::Error))
             }
             FileArgument::Path(path) if atomic::is_stream(path) => {
                 let overwrite = Overwrite::same_bytes(self.writing.force, inputs);
                 atomic::write(path, &overwrite, |out| csv(out)).map_err(RunError::from)?;
-                Ok(Some(Place::Output))
+                Ok(Some(Stream::Output))
             }
             FileArgument::Path(_) => Ok(None),
         }
     }
 
-    fn told_scattered(&self, summary: &ScatteredSummary) -> String {
+    fn text_scattered(&self, summary: &ScatteredSummary) -> String {
         let mut sheet = Sheet::new(&format!(
             "{}: {}, {}",
             summary.shape,
@@ -266,7 +266,7 @@ impl Discretize {
         sheet.finish()
     }
 
-    fn told(&self, summary: &PointsSummary) -> String {
+    fn text(&self, summary: &PointsSummary) -> String {
         let mut sheet = Sheet::new(&format!(
             "{}: {}",
             summary.shape,
@@ -289,13 +289,14 @@ impl Discretize {
             let outside = count(summary.outside, "grid point");
             sheet.line("left out", &format!("{outside} without surface"));
         }
-        let corner = |c: &[f64; 3]| c.map(|v| number(v * 1000.0)).join(", ");
         sheet.line(
             "surface",
             &format!(
-                "from ({}) to ({}) mm{}",
-                corner(&summary.bounds_min_m),
-                corner(&summary.bounds_max_m),
+                "{} mm{}",
+                extents(
+                    summary.bounds_min_m.map(|c| c * 1000.0),
+                    summary.bounds_max_m.map(|c| c * 1000.0)
+                ),
                 match (summary.triangles, summary.degenerate_triangles) {
                     (Some(all), Some(0)) => format!(", {}", count(all, "triangle")),
                     (Some(all), Some(flat)) =>

@@ -1,11 +1,11 @@
-//! `discretize --inspect`: what a surface file holds, before anything is made of it.
+//! `discretize --inspect`: the content of a surface file.
 
 use std::path::Path;
 
 use serde::Serialize;
 
-use super::picture::{Scale, Seen, picture};
-use super::{shape_error, with_surface};
+use super::picture::{PictureData, Scale, picture};
+use super::{ParsedBytes, shape_error};
 use crate::RunError;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::numerics::axis::Axis;
@@ -29,23 +29,25 @@ pub struct Inspection {
     pub schema_version: &'static str,
     /// Program that wrote it.
     pub fluxform_version: &'static str,
-    /// What went in.
+    /// Input files.
     pub inputs: Vec<Input>,
-    /// What the file holds; lengths in its own unit.
+    /// The content of the file; lengths in its own unit.
     pub surface: MeshReport,
 }
 
 /// Looks at the file at `path`; `inputs` holds the document that names it, if there is one.
 ///
 /// # Errors
-/// A file that is no surface.
-pub fn inspect(path: &Path, inputs: Vec<Input>) -> Result<Inspection, RunError> {
-    let document = as_it_is(path, 1.0);
-    let surface = MeshReport::of_file(path).map_err(|source| shape_error(&document, source))?;
+/// A file without a surface.
+pub fn inspect(path: &Path, mut inputs: Vec<Input>) -> Result<Inspection, RunError> {
+    let mut parsed = ParsedBytes::default();
+    let surface = MeshReport::of_file_observed(path, &mut parsed)
+        .map_err(|source| shape_error(&as_it_is(path, 1.0), source))?;
+    parsed.add_to(&mut inputs, path);
     Ok(Inspection {
         schema_version: SCHEMA_VERSION,
         fluxform_version: FLUXFORM_VERSION,
-        inputs: with_surface(&document, inputs),
+        inputs,
         surface,
     })
 }
@@ -53,7 +55,7 @@ pub fn inspect(path: &Path, inputs: Vec<Input>) -> Result<Inspection, RunError> 
 /// The surface as the file has it, from above; in millimetres where its unit is known.
 ///
 /// # Errors
-/// A file that is no surface; interruption.
+/// A file without a surface; interruption.
 pub fn drawn(
     path: &Path,
     stated_m: Option<f64>,
@@ -87,8 +89,9 @@ pub fn drawn(
         .map(|index| at(index).map(|(_, marks)| marks))
         .collect();
     let heights: Vec<_> = samples.iter().map(|s| s.map(|s| s.height_m)).collect();
-    let cells = by_cell(&surface, &grid, &samples, progress)?;
-    Ok(picture(&Seen {
+    // Where its effort is spent the picture is without bounds.
+    let cells = by_cell(&surface, &grid, &samples, progress)?.unwrap_or_default();
+    Ok(picture(&PictureData {
         title: document.name.clone(),
         scale,
         grid: &grid,

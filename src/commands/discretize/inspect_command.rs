@@ -9,8 +9,8 @@ use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::layout::Sheet;
 use crate::cli::pictures::Picture;
-use crate::cli::printer::{Place, Printer};
-use crate::cli::quantity::{count, mm, number};
+use crate::cli::printer::{Printer, Stream};
+use crate::cli::quantity::{count, extents, mm, number};
 use crate::cli::start::begin;
 use crate::cli::values::FileArgument;
 use crate::shape::MeshReport;
@@ -32,7 +32,7 @@ impl Discretize {
         for warning in &inspection.surface.warnings {
             printer.warning(warning);
         }
-        let mut place = Place::Output;
+        let mut place = Stream::Output;
         if let Some(file) = &self.plot {
             let plot = Picture::new(file, self.writing.force, [&path]);
             plot.check(&inspection.inputs)?;
@@ -73,13 +73,11 @@ impl Discretize {
             found.format,
             count(found.triangles, "triangle")
         ));
-        let corner = |c: &[f64; 3]| c.map(number).join(", ");
         sheet.line(
             "box",
             &format!(
-                "from ({}) to ({}) in the file's unit",
-                corner(&found.bounds_min),
-                corner(&found.bounds_max)
+                "{} in the file's unit",
+                extents(found.bounds_min, found.bounds_max)
             ),
         );
         sheet.line("unit", &unit(found));
@@ -111,7 +109,7 @@ impl Discretize {
     }
 }
 
-/// What is known of the unit.
+/// The unit, as far as it is known.
 fn unit(found: &MeshReport) -> String {
     if let Some(unit_m) = found.unit_m {
         return format!("{}, as the file says", unit_name(unit_m));

@@ -9,7 +9,9 @@ use serde::Serialize;
 use super::made_with::{PointsAsked, surface};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
-use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION};
+use crate::bundle::artefact::{
+    FLUXFORM_VERSION, FileEntry, Input, InputDigest, Options, SCHEMA_VERSION,
+};
 use crate::bundle::atomic::{FileSet, Overwrite};
 use crate::bundle::manifest::{AxisSummary, PointsGrid};
 use crate::bundle::seal::to_record;
@@ -21,8 +23,10 @@ use crate::shape::certificate::{Certificate, Certify, stated_tessellation};
 use crate::shape::document::{ShapeDocument, SurfaceSource};
 use crate::shape::holes::Holes;
 use crate::shape::point_flags::Marks;
-use crate::shape::surface::read_file;
-use crate::shape::{ConstraintPoints, Discretized, Settings, ShapeError, discretize_with};
+use crate::shape::surface::{ByteObserver, read_file};
+use crate::shape::{
+    ConstraintPoints, Discretized, Settings, ShapeError, Surface, discretize_surface,
+};
 
 pub(crate) mod command;
 pub mod inspect;
@@ -31,15 +35,15 @@ mod picture;
 pub mod scattered;
 mod table;
 
-use picture::{Scale, Seen};
+use picture::{PictureData, Scale};
 
-/// The points and what is to be told about them.
+/// The points of a grid and their figures.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct PointsReport {
     /// The points.
     pub discretized: Discretized,
-    /// Figures, as the JSON summary tells them.
+    /// The JSON result.
     pub summary: PointsSummary,
 }
 
@@ -53,7 +57,7 @@ pub struct PointsSummary {
     pub fluxform_version: &'static str,
     /// Name of the shape.
     pub shape: String,
-    /// What went in.
+    /// Input files.
     pub inputs: Vec<Input>,
     /// The options of the run.
     #[serde(skip_serializing_if = "Options::is_empty")]
@@ -157,32 +161,32 @@ impl MarkCounts {
 
 impl DeviationSummary {
     fn new(certificate: &Certificate) -> Option<Self> {
-        let found = &certificate.vertical;
-        // Without a cell of four points there is nothing to tell.
-        (found.cells.inner > 0 && found.worst().value_m.is_finite()).then(|| {
+        let vertical = &certificate.vertical;
+        // Without a cell of four points there is no deviation.
+        (vertical.cells.inner > 0 && vertical.worst().value_m.is_finite()).then(|| {
             let apart = certificate.hausdorff;
             Self {
-                above_m: found.above.value_m.max(0.0),
-                above_at_m: found.above.at_m,
-                below_m: found.below.value_m.max(0.0),
-                below_at_m: found.below.at_m,
+                above_m: vertical.above.value_m.max(0.0),
+                above_at_m: vertical.above.at_m,
+                below_m: vertical.below.value_m.max(0.0),
+                below_at_m: vertical.below.at_m,
                 hausdorff_lower_m: apart.map(|apart| apart.lower_m),
                 hausdorff_upper_m: apart.map(|apart| apart.upper_m),
                 hausdorff_at_m: apart.map(|apart| apart.at_m),
-                cells: found.cells.inner,
-                silhouette_cells: found.cells.silhouette,
+                cells: vertical.cells.inner,
+                silhouette_cells: vertical.cells.silhouette,
                 silhouette_m: certificate.silhouette_m,
-                missed_cells: found.cells.missed,
+                missed_cells: vertical.cells.missed,
                 budget_m: certificate.budget_m(),
             }
         })
     }
 }
 
-/// What is asked of a discretisation besides its points.
+/// The options of `discretize` for the points of a grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PointsOptions {
-    /// What is done with holes.
+    /// The treatment of holes.
     pub holes: Holes,
     /// How the points are compared with the surface.
     pub certify: Certify,
@@ -254,50 +258,107 @@ pub fn run_with(
     progress: &dyn Progress,
 ) -> Result<PointsReport, RunError> {
     let made_with = options.made_with(document, inputs.first());
-    let inputs = with_surface(document, inputs);
-    let mut report = discretized_as(document, inputs, options, None, progress)?;
+    let opened = OpenedSurface::new(document, inputs)?;
+    let mut report = opened.discretize(document, options, None, progress)?;
     report.summary.made_with = made_with;
     Ok(report)
 }
 
-/// As [`run`], with what an earlier run found of these points and this surface.
+/// As [`run`], with the certificate that an earlier run cached for these points and this surface.
 ///
 /// # Errors
 /// As [`run_with`].
-pub(crate) fn run_kept(
+pub(crate) fn run_cached(
     document: &ShapeDocument,
     inputs: Vec<Input>,
     field: ShapeField,
     progress: &dyn Progress,
 ) -> Result<PointsReport, RunError> {
-    let inputs = with_surface(document, inputs);
-    let kept = field.certificate(document, &inputs);
-    let known = kept.known();
+    let opened = OpenedSurface::new(document, inputs)?;
+    let cached = field.certificate(document, &opened.inputs);
+    let known = cached.known();
     let new = known.is_none();
-    let options = PointsOptions::default();
-    let report = discretized_as(document, inputs, &options, known, progress)?;
-    if let (true, Some(found)) = (new, &report.discretized.certificate) {
-        kept.keep(found);
+    let report = opened.discretize(document, &PointsOptions::default(), known, progress)?;
+    if let (true, Some(certificate)) = (new, &report.discretized.certificate) {
+        cached.keep(certificate);
     }
     Ok(report)
 }
 
-fn discretized_as(
-    document: &ShapeDocument,
+/// A document's surface, read, and the inputs with the digest of the bytes that were parsed.
+pub(crate) struct OpenedSurface {
+    surface: Surface,
+    warnings: Vec<String>,
     inputs: Vec<Input>,
-    options: &PointsOptions,
-    known: Option<Certificate>,
-    progress: &dyn Progress,
-) -> Result<PointsReport, RunError> {
-    let settings = Settings {
-        holes: options.holes,
-        certify: options.certify,
-        known,
-        marks: true,
-        cells: options.picture,
-    };
-    let discretized = discretize_with(document, &settings, progress)
-        .map_err(|source| shape_error(document, source))?;
+}
+
+impl OpenedSurface {
+    /// Reads the surface that `document` names; `inputs` holds the document's own entry, if it is a
+    /// file.
+    ///
+    /// # Errors
+    /// A file without a surface.
+    fn new(document: &ShapeDocument, mut inputs: Vec<Input>) -> Result<Self, RunError> {
+        let mut parsed = ParsedBytes::default();
+        let (surface, warnings) = Surface::open_observed(document, &mut parsed)
+            .map_err(|source| shape_error(document, source))?;
+        if let SurfaceSource::File { path, .. } = &document.source {
+            parsed.add_to(&mut inputs, path);
+        }
+        Ok(Self {
+            surface,
+            warnings,
+            inputs,
+        })
+    }
+
+    fn discretize(
+        self,
+        document: &ShapeDocument,
+        options: &PointsOptions,
+        known: Option<Certificate>,
+        progress: &dyn Progress,
+    ) -> Result<PointsReport, RunError> {
+        let settings = Settings {
+            holes: options.holes,
+            certify: options.certify,
+            known,
+            marks: true,
+            cells: options.picture,
+        };
+        let surface = (self.surface, self.warnings);
+        let discretized = discretize_surface(document, surface, &settings, progress)
+            .map_err(|source| shape_error(document, source))?;
+        Ok(report(document, self.inputs, discretized))
+    }
+}
+
+/// The digest of a surface file's bytes as they are parsed.
+#[derive(Default)]
+struct ParsedBytes(InputDigest);
+
+impl ByteObserver for ParsedBytes {
+    fn restart(&mut self) {
+        self.0 = InputDigest::default();
+    }
+
+    fn observe(&mut self, bytes: &[u8]) {
+        self.0.update(bytes);
+    }
+}
+
+impl ParsedBytes {
+    /// Adds the file to `inputs`, unless it is among them.
+    fn add_to(self, inputs: &mut Vec<Input>, path: &Path) {
+        let input = self.0.input(path.display().to_string());
+        if !inputs.iter().any(|known| known.path == input.path) {
+            inputs.push(input);
+        }
+    }
+}
+
+/// The points and their figures.
+fn report(document: &ShapeDocument, inputs: Vec<Input>, discretized: Discretized) -> PointsReport {
     let facts = discretized.points.facts();
     let mut accuracy = BTreeMap::from([("points", discretized.accuracy.clone())]);
     let mut warnings = discretized.warnings.clone();
@@ -340,10 +401,10 @@ fn discretized_as(
         warnings,
         files: Vec::new(),
     };
-    Ok(PointsReport {
+    PointsReport {
         discretized,
         summary,
-    })
+    }
 }
 
 fn shape_error(document: &ShapeDocument, source: ShapeError) -> RunError {
@@ -356,15 +417,15 @@ fn shape_error(document: &ShapeDocument, source: ShapeError) -> RunError {
     }
 }
 
-/// `inputs` and the surface file that `document` names, paths as given.
+/// `inputs` and the surface file that `document` names as it is now, paths as given: for what is
+/// refused before the surface is parsed.
 pub(crate) fn with_surface(document: &ShapeDocument, mut inputs: Vec<Input>) -> Vec<Input> {
     if let SurfaceSource::File { path, .. } = &document.source {
-        // What cannot be read is told, with the reason, by the reader that comes next.
+        // A file that cannot be read is reported, with the reason, by the reader that comes next.
         if let Ok(bytes) = read_file(path) {
-            let input = Input::of_bytes(path.display().to_string(), &bytes);
-            if !inputs.iter().any(|known| known.path == input.path) {
-                inputs.push(input);
-            }
+            let mut digest = ParsedBytes::default();
+            digest.observe(&bytes);
+            digest.add_to(&mut inputs, path);
         }
     }
     inputs
@@ -373,17 +434,19 @@ pub(crate) fn with_surface(document: &ShapeDocument, mut inputs: Vec<Input>) -> 
 /// The rows of `points.csv`.
 #[must_use]
 pub fn point_rows(points: &ConstraintPoints) -> Vec<PointRow> {
-    (0..points.len())
-        .map(|i| PointRow {
-            x_m: points.x_m[i],
-            y_m: points.y_m[i],
-            height_m: points.height_m[i],
-            normal: points.normal[i],
-        })
-        .collect()
+    (0..points.len()).map(|k| point_row(points, k)).collect()
 }
 
-/// The grid of the points as a manifest tells it.
+fn point_row(points: &ConstraintPoints, k: usize) -> PointRow {
+    PointRow {
+        x_m: points.x_m[k],
+        y_m: points.y_m[k],
+        height_m: points.height_m[k],
+        normal: points.normal[k],
+    }
+}
+
+/// The grid of the points as a manifest states it.
 #[must_use]
 pub fn points_grid(points: &ConstraintPoints) -> PointsGrid {
     let present: Vec<bool> = points
@@ -403,7 +466,7 @@ impl PointsReport {
         table::of_grid(out, &self.discretized.points)
     }
 
-    /// The points' heights, what they are besides, and how far the surface departs between them.
+    /// The points' heights and flags, and how far the surface departs between them.
     #[must_use]
     pub fn picture(&self) -> PlanePlot {
         let points = &self.discretized.points;
@@ -413,7 +476,7 @@ impl PointsReport {
             heights[index] = Some(points.height_m[row]);
             marks[index] = Some(points.marks[row]);
         }
-        picture::picture(&Seen {
+        picture::picture(&PictureData {
             title: format!("{}: constraint points", self.summary.shape),
             scale: Scale::MILLIMETRES,
             grid: &points.grid,
@@ -424,7 +487,7 @@ impl PointsReport {
     }
 
     /// Writes the points to `path` and the summary beside them, `points.csv` and `points.json`:
-    /// both or none. What is there is replaced only with `force` or when its summary is of the same
+    /// both or none. Existing files are replaced only with `force` or when its summary is of the same
     /// inputs and lists it unchanged.
     ///
     /// # Errors
@@ -450,7 +513,7 @@ impl TableFiles {
     /// Those of the table at `path`, made from `inputs`.
     ///
     /// # Errors
-    /// A name that is none, or that ends as the summary does.
+    /// An invalid name, or one that ends as the summary does.
     pub fn new(path: &Path, force: bool, inputs: &[Input]) -> Result<Self, RunError> {
         let name = path
             .file_name()

@@ -26,8 +26,8 @@ impl Scale {
     };
 }
 
-/// What is drawn.
-pub(super) struct Seen<'a> {
+/// The data of the picture.
+pub(super) struct PictureData<'a> {
     pub(super) title: String,
     pub(super) scale: Scale,
     pub(super) grid: &'a Grid,
@@ -39,7 +39,7 @@ pub(super) struct Seen<'a> {
     pub(super) cells: &'a [Option<f64>],
 }
 
-pub(super) fn picture(seen: &Seen<'_>) -> PlanePlot {
+pub(super) fn picture(seen: &PictureData<'_>) -> PlanePlot {
     let Scale { unit, factor } = seen.scale;
     let scaled = |values: &[Option<f64>]| -> Vec<Option<f64>> {
         values.iter().map(|v| v.map(|v| v * factor)).collect()
@@ -88,7 +88,7 @@ pub(super) fn picture(seen: &Seen<'_>) -> PlanePlot {
     }
 }
 
-fn marks(seen: &Seen<'_>) -> Vec<Mark> {
+fn marks(seen: &PictureData<'_>) -> Vec<Mark> {
     let (x, y) = (seen.grid.x_m.nodes(), seen.grid.y_m.nodes());
     let factor = seen.scale.factor;
     let of = |name: &'static str, kind: &dyn Fn(usize, &Option<Marks>) -> bool| Mark {

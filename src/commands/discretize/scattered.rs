@@ -6,19 +6,19 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::{MarkCounts, TableFiles, shape_error, table, with_surface};
+use super::{MarkCounts, OpenedSurface, TableFiles, shape_error, table};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, Options, SCHEMA_VERSION};
 use crate::commands::made_with::{PointsAsked, surface};
 use crate::progress::Progress;
 use crate::scene::sources::Sampling;
+use crate::shape::ShapeError;
 use crate::shape::document::ShapeDocument;
 use crate::shape::points::requested_grid;
 use crate::shape::scattered::adaptive::{Grading, adaptive};
 use crate::shape::scattered::poisson::poisson;
 use crate::shape::scattered::{Probe, Scattered};
-use crate::shape::{ShapeError, Surface};
 
 impl Sampling {
     /// As the record states them; `file` is the shape file's entry among the inputs.
@@ -42,12 +42,12 @@ impl Sampling {
     }
 }
 
-/// The points and what is to be told about them.
+/// Weighted points and their figures.
 #[derive(Debug, Clone)]
 pub struct ScatteredReport {
     /// The points.
     pub points: Scattered,
-    /// Figures, as the JSON summary tells them.
+    /// The JSON result.
     pub summary: ScatteredSummary,
 }
 
@@ -60,7 +60,7 @@ pub struct ScatteredSummary {
     pub fluxform_version: &'static str,
     /// Name of the shape.
     pub shape: String,
-    /// What went in.
+    /// Input files.
     pub inputs: Vec<Input>,
     /// The options of the run.
     pub made_with: Options,
@@ -105,9 +105,12 @@ pub fn run(
     progress: &dyn Progress,
 ) -> Result<ScatteredReport, RunError> {
     let made_with = sampling.made_with(document, inputs.first());
-    let inputs = with_surface(document, inputs);
+    let OpenedSurface {
+        surface,
+        warnings,
+        inputs,
+    } = OpenedSurface::new(document, inputs)?;
     let failed = |source: ShapeError| shape_error(document, source);
-    let (surface, warnings) = Surface::open(document).map_err(failed)?;
     let grid = requested_grid(document, &surface.extent()).map_err(failed)?;
     let probe = Probe::new(&surface, &grid);
     let stage = |estimate: f64, method: &str| StageAccuracy {
@@ -143,26 +146,7 @@ pub fn run(
             (found.points, "poisson")
         }
     };
-    if points.is_empty() {
-        let none = "no point of the surface lies in the region of its grid; change the \
-                    translation, the unit or the grid";
-        return Err(failed(ShapeError::Document(none.to_owned())));
-    }
-    let lowest_m = points
-        .height_m
-        .iter()
-        .copied()
-        .fold(f64::INFINITY, f64::min);
-    if lowest_m < -rounding_m {
-        let below = points.height_m.iter().filter(|h| **h < -rounding_m).count();
-        return Err(failed(ShapeError::BelowZero {
-            below,
-            points: points.len(),
-            lowest_m,
-        }));
-    }
-    // A surface that rests on z = 0 may be rounded below it.
-    points.height_m.iter_mut().for_each(|h| *h = h.max(0.0));
+    let lowest_m = check_heights(&mut points, rounding_m).map_err(failed)?;
     let summary = ScatteredSummary {
         schema_version: SCHEMA_VERSION,
         fluxform_version: FLUXFORM_VERSION,
@@ -183,6 +167,34 @@ pub fn run(
         files: Vec::new(),
     };
     Ok(ScatteredReport { points, summary })
+}
+
+/// The lowest height as it was, m. Heights that are below zero by rounding become zero.
+///
+/// # Errors
+/// No point, or one below zero.
+fn check_heights(points: &mut Scattered, rounding_m: f64) -> Result<f64, ShapeError> {
+    if points.is_empty() {
+        let none = "no point of the surface lies in the region of its grid; change the \
+                    translation, the unit or the grid";
+        return Err(ShapeError::Document(none.to_owned()));
+    }
+    let lowest_m = points
+        .height_m
+        .iter()
+        .copied()
+        .fold(f64::INFINITY, f64::min);
+    if lowest_m < -rounding_m {
+        let below = points.height_m.iter().filter(|h| **h < -rounding_m).count();
+        return Err(ShapeError::BelowZero {
+            below,
+            points: points.len(),
+            lowest_m,
+        });
+    }
+    // A surface that rests on z = 0 may be rounded below it.
+    points.height_m.iter_mut().for_each(|h| *h = h.max(0.0));
+    Ok(lowest_m)
 }
 
 impl ScatteredReport {

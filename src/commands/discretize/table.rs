@@ -1,60 +1,65 @@
-//! The table of constraint points, with what each point is besides a height.
+//! The table of constraint points with their flags.
 
 use std::io::{self, Write};
 
-use crate::bundle::table::{Column, POINT_COLUMNS, write_columns};
+use super::point_row;
+use crate::bundle::table::{PointRow, RowColumn, write_joined_rows};
 use crate::shape::ConstraintPoints;
 use crate::shape::point_flags::Marks;
 use crate::shape::scattered::Scattered;
 
+/// The part of a row after those of `points.csv`.
+struct Flags {
+    marks: Marks,
+    /// The other normal of a crease; the point's own where there is no crease.
+    crease_normal: [f64; 3],
+    /// Area that the point stands for, where points are weighted.
+    weight_m2: f64,
+}
+
+fn flag(is: bool) -> f64 {
+    f64::from(u8::from(is))
+}
+
+/// The columns of weighted points; of those of a grid all but the last.
+const COLUMNS: [RowColumn<Flags>; 10] = [
+    RowColumn::written("wall", "", |p| flag(p.marks.wall)),
+    RowColumn::written("rim", "", |p| flag(p.marks.rim)),
+    RowColumn::written("crease", "", |p| flag(p.marks.crease.is_some())),
+    RowColumn::written("crease_normal_x", "", |p| p.crease_normal[0]),
+    RowColumn::written("crease_normal_y", "", |p| p.crease_normal[1]),
+    RowColumn::written("crease_normal_z", "", |p| p.crease_normal[2]),
+    RowColumn::written("layers", "", |p| f64::from(p.marks.layers)),
+    RowColumn::written("overhang", "", |p| flag(p.marks.overhang)),
+    RowColumn::written("filled", "", |p| flag(p.marks.filled)),
+    RowColumn::written("weight_m2", "m^2", |p| p.weight_m2),
+];
+
 /// The points of a grid.
 pub(super) fn of_grid(out: &mut dyn Write, points: &ConstraintPoints) -> io::Result<()> {
-    let positions = [&points.x_m[..], &points.y_m, &points.height_m];
-    write(out, positions, &points.normal, &points.marks, None)
+    let rows = (0..points.len()).map(|k| with_flags(point_row(points, k), points.marks[k], 0.0));
+    write_joined_rows(out, PointRow::COLUMNS, &COLUMNS[..COLUMNS.len() - 1], rows)
 }
 
 /// Points on no grid, with the area each stands for.
 pub(super) fn of_scattered(out: &mut dyn Write, points: &Scattered) -> io::Result<()> {
-    let positions = [&points.x_m[..], &points.y_m, &points.height_m];
-    write(
-        out,
-        positions,
-        &points.normal,
-        &points.marks,
-        Some(&points.weight_m2),
-    )
+    let rows = (0..points.len()).map(|k| {
+        let point = PointRow {
+            x_m: points.x_m[k],
+            y_m: points.y_m[k],
+            height_m: points.height_m[k],
+            normal: points.normal[k],
+        };
+        with_flags(point, points.marks[k], points.weight_m2[k])
+    });
+    write_joined_rows(out, PointRow::COLUMNS, COLUMNS, rows)
 }
 
-/// After the normal: `wall`, `rim`, `crease` (0 or 1), the crease's other normal (the same one
-/// where there is no crease), `layers`, `overhang`, `filled`, and `weight_m2` where there is one.
-fn write(
-    out: &mut dyn Write,
-    positions: [&[f64]; 3],
-    normals: &[[f64; 3]],
-    marks: &[Marks],
-    weight_m2: Option<&[f64]>,
-) -> io::Result<()> {
-    let flag = |kind: fn(&Marks) -> bool| move |row: usize| i64::from(kind(&marks[row]));
-    let normal = [0, 1, 2].map(|k| move |row: usize| normals[row][k]);
-    let crease = [0, 1, 2].map(|k| move |row: usize| marks[row].crease.unwrap_or(normals[row])[k]);
-    let (wall, rim) = (flag(|m| m.wall), flag(|m| m.rim));
-    let on_crease = flag(|m| m.crease.is_some());
-    let (overhang, filled) = (flag(|m| m.overhang), flag(|m| m.filled));
-    let layers = |row: usize| i64::from(marks[row].layers);
-    let numbers = positions.into_iter().map(Column::Number);
-    let numbers = numbers.chain(normal.iter().map(|part| Column::NumberOf(part)));
-    let mut columns: Vec<(&str, Column)> = POINT_COLUMNS.into_iter().zip(numbers).collect();
-    columns.extend([
-        ("wall", Column::IndexOf(&wall)),
-        ("rim", Column::IndexOf(&rim)),
-        ("crease", Column::IndexOf(&on_crease)),
-        ("crease_normal_x", Column::NumberOf(&crease[0])),
-        ("crease_normal_y", Column::NumberOf(&crease[1])),
-        ("crease_normal_z", Column::NumberOf(&crease[2])),
-        ("layers", Column::IndexOf(&layers)),
-        ("overhang", Column::IndexOf(&overhang)),
-        ("filled", Column::IndexOf(&filled)),
-    ]);
-    columns.extend(weight_m2.map(|weights| ("weight_m2", Column::Number(weights))));
-    write_columns(out, &columns)
+fn with_flags(point: PointRow, marks: Marks, weight_m2: f64) -> (PointRow, Flags) {
+    let flags = Flags {
+        marks,
+        crease_normal: marks.crease.unwrap_or(point.normal),
+        weight_m2,
+    };
+    (point, flags)
 }

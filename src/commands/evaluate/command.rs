@@ -2,24 +2,25 @@
 
 use clap::Args;
 
-use super::{CoreFacts, Evaluation, TargetFacts, TransientFacts, evaluate};
+use super::{Evaluation, Transient, evaluate};
 use crate::accuracy::StageAccuracy;
 use crate::cli::args::Tolerance;
-use crate::cli::budget::{Asked, allow};
+use crate::cli::budget::{CostOrigin, allow};
 use crate::cli::describe;
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::limits::{label, limit_row};
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{force, mass, mm, number, number_to, percent, si};
 use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
 use crate::cli::values::FileArgument;
 use crate::design::{Design, Need};
 use crate::scene::cost::of_steel;
-use crate::scene::neighbours::{ArrayFacts, WorkingPointFacts};
+use crate::scene::neighbours::{ArraySummary, WorkingPointSummary};
+use crate::scene::single::{CoreSummary, MaterialKind, TargetSummary};
 
 /// Evaluate one coil as given: circuit, field and force at the target, limits
 ///
@@ -58,15 +59,15 @@ impl Evaluate {
         let document = documents::design(&self.design, Need::EVALUATE, printer)?;
         let design = &document.design;
         let steel = of_steel(design, self.tolerance.tolerance);
-        allow(steel, Asked::Document, printer)?;
+        allow(steel, CostOrigin::Document, printer)?;
         let bar = begin(printer);
         let result = evaluate(design, vec![document.input], self.tolerance.tolerance)?;
         drop(bar);
-        for note in &result.notes {
-            printer.warning(note);
+        for warning in &result.warnings {
+            printer.warning(warning);
         }
         let json = printer.with_warnings(&result);
-        printer.summary(Place::Output, &json, || summary(design, &result))?;
+        printer.summary(Stream::Output, &json, || summary(design, &result))?;
         accuracy_check(&result.accuracy_missed)?;
         if self.strict && !result.limits_met() {
             let unmet: Vec<String> = result
@@ -84,6 +85,7 @@ impl Evaluate {
 
 fn summary(design: &Design, result: &Evaluation) -> String {
     let (coil, target) = (&result.coil, &result.target);
+    let circuit = &coil.circuit;
     let mut sheet = Sheet::new(&format!("{}: one coil as given", result.design));
     sheet.line(
         "coil",
@@ -91,22 +93,22 @@ fn summary(design: &Design, result: &Evaluation) -> String {
             "{} turns of {} wire; {} to {} diameter, {} long",
             number(coil.turns),
             mm(design.wire.diameter_m),
-            mm(coil.inner_diameter_m),
-            mm(coil.outer_diameter_m),
-            mm(coil.length_m)
+            mm(coil.size.inner_diameter_m),
+            mm(coil.size.outer_diameter_m),
+            mm(coil.size.length_m)
         ),
     );
-    let flux = coil.flux_linkage_wb.map_or_else(String::new, |flux| {
+    let flux = circuit.flux_linkage_wb.map_or_else(String::new, |flux| {
         format!("; flux linkage {}", si(flux, "Wb"))
     });
     sheet.line(
         "circuit",
         &format!(
             "{}, {}{flux}; time constant {}, settled after {}",
-            si(coil.resistance_ohm, "ohm"),
-            si(coil.inductance_h, "H"),
-            si(coil.time_constant_s, "s"),
-            si(coil.settling_s, "s")
+            si(circuit.resistance_ohm, "ohm"),
+            si(circuit.inductance_h, "H"),
+            si(circuit.time_constant_s, "s"),
+            si(circuit.settling_s, "s")
         ),
     );
     let steel_kg = result.core.as_ref().map_or(0.0, |core| core.mass_kg);
@@ -117,9 +119,9 @@ fn summary(design: &Design, result: &Evaluation) -> String {
         "wire",
         &format!(
             "{} long, {}{steel}; {} of heat at {}",
-            si(coil.wire_length_m, "m"),
-            mass(coil.mass_kg - steel_kg),
-            si(coil.power_w, "W"),
+            si(circuit.wire_length_m, "m"),
+            mass(circuit.mass_kg - steel_kg),
+            si(circuit.power_w, "W"),
             si(target.current_a, "A")
         ),
     );
@@ -130,7 +132,7 @@ fn summary(design: &Design, result: &Evaluation) -> String {
         let stage = result.accuracy.get("transient");
         sheet.line("step", &step(transient, stage));
     }
-    sheet.line("target", &felt(target));
+    sheet.line("target", &at_target(target));
     if let Some(array) = &result.array {
         let matrix = &array.mutual_inductance_h;
         let others = matrix.iter().enumerate().flat_map(|(i, row)| {
@@ -144,7 +146,7 @@ fn summary(design: &Design, result: &Evaluation) -> String {
                 "{}; largest mutual inductance {} ({} of a coil's own)",
                 describe::array(design),
                 si(largest, "H"),
-                percent(largest / coil.inductance_h)
+                percent(largest / circuit.inductance_h)
             ),
         );
         if let Some(point) = &array.working_point {
@@ -160,17 +162,13 @@ fn summary(design: &Design, result: &Evaluation) -> String {
 }
 
 /// The steel of the coil alone.
-fn steel_core(core: &CoreFacts, target: &TargetFacts) -> String {
-    let material = if core.material == "curve" {
-        format!(
-            "a B-H curve, relative permeability {} at its origin",
-            number(core.relative_permeability)
-        )
-    } else {
-        format!(
-            "relative permeability {}",
-            number(core.relative_permeability)
-        )
+fn steel_core(core: &CoreSummary, target: &TargetSummary) -> String {
+    let permeability = number(core.relative_permeability);
+    let material = match core.material {
+        MaterialKind::Curve => {
+            format!("a B-H curve, relative permeability {permeability} at its origin")
+        }
+        MaterialKind::Linear => format!("relative permeability {permeability}"),
     };
     let mut text = format!(
         "{} diameter, {} long; {material}\n\
@@ -193,7 +191,7 @@ fn steel_core(core: &CoreFacts, target: &TargetFacts) -> String {
 }
 
 /// After a voltage step.
-fn step(transient: &TransientFacts, stage: Option<&StageAccuracy>) -> String {
+fn step(transient: &Transient, stage: Option<&StageAccuracy>) -> String {
     let error = match stage {
         Some(stage) if stage.estimate > 0.0 => {
             format!(", +/- {}", percent(stage.estimate))
@@ -207,8 +205,8 @@ fn step(transient: &TransientFacts, stage: Option<&StageAccuracy>) -> String {
     )
 }
 
-/// What the magnet feels at the target.
-fn felt(target: &TargetFacts) -> String {
+/// Force and field at the target.
+fn at_target(target: &TargetSummary) -> String {
     let way = |f: f64| match f {
         f if f > 0.0 => " up",
         f if f < 0.0 => " down",
@@ -233,8 +231,8 @@ fn felt(target: &TargetFacts) -> String {
         let vector = |values: [f64; 3], unit: &str| {
             // What rounding leaves of a zero is not worth its digits.
             let largest = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-            let told = |v: f64| if v.abs() < 1e-12 * largest { 0.0 } else { v };
-            values.map(|v| si(told(v), unit)).join(", ")
+            let rounded = |v: f64| if v.abs() < 1e-12 * largest { 0.0 } else { v };
+            values.map(|v| si(rounded(v), unit)).join(", ")
         };
         text.push_str(&format!(
             "\nforce along x, y, z {}\ntorque about x, y, z {}",
@@ -251,7 +249,7 @@ fn felt(target: &TargetFacts) -> String {
 }
 
 /// All coils at their rated currents, along the B-H curve.
-fn all_at_once(array: &ArrayFacts, point: &WorkingPointFacts) -> String {
+fn all_at_once(array: &ArraySummary, point: &WorkingPointSummary) -> String {
     let linear = array
         .relative_permeability
         .map_or_else(String::new, |mu_r| {
@@ -273,13 +271,13 @@ fn all_at_once(array: &ArrayFacts, point: &WorkingPointFacts) -> String {
 }
 
 /// Flux density in the cores of an array, where they are coupled.
-fn cores(sheet: &mut Sheet, design: &Design, array: &ArrayFacts) {
+fn cores(sheet: &mut Sheet, design: &Design, array: &ArraySummary) {
     let peak: Option<Vec<f64>> = array.coils.iter().map(|coil| coil.peak_field_t).collect();
     let mean: Option<Vec<f64>> = array.coils.iter().map(|coil| coil.mean_field_t).collect();
     for (label, values) in [("core peak", peak), ("core mean", mean)] {
         if let Some(values) = values {
-            let told = describe::per_coil(design, "T", &values, 3);
-            let (unit, rest) = told.split_once('\n').unwrap_or((&told, ""));
+            let listed = describe::per_coil(design, "T", &values, 3);
+            let (unit, rest) = listed.split_once('\n').unwrap_or((&listed, ""));
             let head = format!("|B| with all coils at their rated currents, {unit}");
             sheet.line(label, format!("{head}\n{rest}").trim_end());
         }

@@ -2,26 +2,23 @@
 
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
-use crate::bundle::lambda_file::{
-    FeedbackFile, FeedbackPlace, FeedbackRendering, FeedbackShell, StaticRendering,
-};
+use crate::bundle::lambda_file::{FeedbackFile, FeedbackPlace, FeedbackShell, StaticRendering};
 use crate::lambda::feedback::{
     Decided, FeedbackError, NoLambda, Rendered, Span, dip_between, reachable, render,
 };
-use crate::lambda::{ForceProblem, OperatingPoint, Wiring};
+use crate::lambda::{ForceProblem, OperatingPoint};
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::passive;
-use crate::scene::steel::Solved;
 
-use super::points::WantedPoints;
+use super::PosedProblem;
 
 /// Layers of a shell lie no further apart, m.
 const SPACING_M: f64 = 2e-3;
-/// Layers above the surface, at most: a shell is no search of all space.
+/// Layers above the surface, at most: a shell is not a search of all space.
 const MOST_LAYERS: f64 = 500.0;
 
-/// What is asked.
+/// The options of `--feedback`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FeedbackOptions {
     /// How far above and below the surface the same demand is to be met, m (> 0).
@@ -41,66 +38,58 @@ fn floor_m(scene: &Scene, lowest_m: f64) -> f64 {
     scene.design.workspace.z_m.from.min(lowest_m)
 }
 
-/// A solved object, to be rendered with feedback.
-pub(super) struct Rendering<'a> {
-    pub(super) scene: &'a Scene<'a>,
-    pub(super) solved: &'a Solved,
-    pub(super) points: &'a WantedPoints,
-    /// The problem with every coil by itself.
-    pub(super) given: &'a ForceProblem<'a>,
-    /// The same as wired.
-    pub(super) problem: &'a ForceProblem<'a>,
-    pub(super) wiring: &'a Wiring,
-    /// The static currents, one a coil of the array.
-    pub(super) chosen: Option<&'a OperatingPoint>,
-}
-
-/// What there is to say.
-pub(super) struct Told {
+/// The result of rendering with feedback.
+pub(super) struct WithFeedback {
     pub(super) file: FeedbackFile,
-    /// With a shell: what is not known between its layers.
+    /// With a shell: the error between its layers.
     pub(super) between_layers: Option<StageAccuracy>,
     /// Force at each point at the chosen lambda, N; empty without one.
     pub(super) forces_n: Vec<f64>,
 }
 
-impl Rendering<'_> {
-    /// Everything told of feedback.
+impl PosedProblem<'_> {
+    /// The object with currents of their own at every point. `chosen` holds the static currents,
+    /// one per coil of the array.
     ///
     /// # Errors
     /// Places that cannot be computed; interruption.
-    pub(super) fn told(
+    pub(super) fn feedback(
         &self,
-        asked: &FeedbackOptions,
+        options: &FeedbackOptions,
+        chosen: Option<&OperatingPoint>,
         progress: &dyn Progress,
-    ) -> Result<Told, RunError> {
+    ) -> Result<WithFeedback, RunError> {
         let mut span = Span::default();
-        span.add(self.problem.height_m, &reachable(self.problem)?);
+        span.add(self.problem.height_m, &reachable(&self.problem)?);
         let largest = span.largest();
-        let at = |lambda| render(self.problem, lambda).map_err(of_render);
-        let chosen = self.chosen.map(|chosen| at(chosen.lambda_n_per_m));
-        let mut chosen = chosen.transpose()?;
-        let forces_n = chosen.as_mut().map(|r| std::mem::take(&mut r.forces_n));
-        let own = largest.ok().map(|found| at(found.lambda_n_per_m));
-        let shell = asked.shell_m.map(|reach| self.shell(reach, progress));
-        let (shell, stage) = shell.transpose()?.unzip();
-        let (lambda_n_per_m, reason) = in_words(largest);
+        let rendered = |lambda| {
+            let mut rendered = render(&self.problem, lambda).map_err(render_error)?;
+            rendered.spread(&self.options.wiring);
+            Ok::<Rendered, RunError>(rendered)
+        };
+        let at_chosen = chosen.map(|chosen| rendered(chosen.lambda_n_per_m));
+        let mut at_chosen = at_chosen.transpose()?;
+        let forces_n = at_chosen.as_mut().map(|r| std::mem::take(&mut r.forces_n));
+        let at_largest = largest.ok().map(|largest| rendered(largest.lambda_n_per_m));
+        let shell = options.shell_m.map(|reach| self.shell(reach, progress));
+        let (shell, between_layers) = shell.transpose()?.unzip();
+        let (lambda_n_per_m, reason) = lambda_or_reason(largest);
         let file = FeedbackFile {
             lambda_n_per_m,
             reason,
             smallest_lambda_n_per_m: span.smallest_n_per_m(),
-            decided_at: largest.ok().map(|found| FeedbackPlace {
-                point: found.point,
-                position_m: self.points.positions_m[found.point],
+            decided_at: largest.ok().map(|largest| FeedbackPlace {
+                point: largest.point,
+                position_m: self.points.positions_m[largest.point],
             }),
-            without: self.chosen.map(|chosen| self.fixed(chosen)),
-            at_chosen: chosen.map(|r| self.rendering(r)),
-            at_largest: own.transpose()?.map(|r| self.rendering(r)),
+            without: chosen.map(|chosen| self.fixed(chosen)),
+            at_chosen,
+            at_largest: at_largest.transpose()?,
             shell,
         };
-        Ok(Told {
+        Ok(WithFeedback {
             file,
-            between_layers: stage.flatten(),
+            between_layers: between_layers.flatten(),
             forces_n: forces_n.unwrap_or_default(),
         })
     }
@@ -117,78 +106,38 @@ impl Rendering<'_> {
         }
     }
 
-    fn rendering(&self, mut found: Rendered) -> FeedbackRendering {
-        let lists = [
-            &mut found.current_max_a,
-            &mut found.current_rms_a,
-            &mut found.active_share,
-        ];
-        lists.into_iter().for_each(|list| self.wiring.spread(list));
-        FeedbackRendering {
-            lambda_n_per_m: found.lambda_n_per_m,
-            rms_error_n: found.rms_error_n,
-            worst_error_n: found.worst_error_n,
-            points_unreached: found.unreached,
-            mean_power_w: found.mean_power_w,
-            max_power_w: found.max_power_w,
-            largest_current_a: found.current_max_a.iter().copied().fold(0.0, f64::max),
-            current_max_a: found.current_max_a,
-            current_rms_a: found.current_rms_a,
-            active_share: found.active_share,
-            active_mean: found.active_mean,
-            active_min: found.active_min,
-            active_max: found.active_max,
-        }
-    }
-
     /// The force constant that can be given within `reach_m` above and below the surface.
     fn shell(
         &self,
         reach_m: f64,
         progress: &dyn Progress,
     ) -> Result<(FeedbackShell, Option<StageAccuracy>), RunError> {
-        // Two steps at a time up and down, so that every second layer holds both ends too.
-        let pairs = (reach_m / (2.0 * SPACING_M) * (1.0 - 1e-12)).ceil();
-        if pairs > 0.5 * MOST_LAYERS {
-            return Err(RunError::Input(format!(
-                "--shell {} mm is more than {} mm: no finger leaves a surface so far",
-                reach_m * 1e3,
-                MOST_LAYERS * SPACING_M * 1e3
-            )));
-        }
-        let steps = 2 * pairs.max(1.0) as usize;
-        let floor_m = floor_m(self.scene, self.points.lowest_m());
+        let layers = Layers::new(reach_m, floor_m(self.scene, self.points.lowest_m()))?;
+        let positions_m = &self.points.positions_m;
         let height_m = self.problem.height_m;
-        let layer = |k: usize| -> Vec<[f64; 3]> {
-            let lift_m = reach_m * (k as f64 / steps as f64 - 1.0);
-            let lifted = |p: &[f64; 3]| [p[0], p[1], (p[2] + lift_m).max(floor_m)];
-            self.points.positions_m.iter().map(lifted).collect()
-        };
-        let below = |k: usize| {
-            let lift_m = reach_m * (k as f64 / steps as f64 - 1.0);
-            let heights = self.points.height_m.iter();
-            heights.filter(|h| **h + lift_m < floor_m).count()
-        };
-        let layers = 2 * steps + 1;
+        // The steel's pull is solved once, for both ends of the shell.
         let pull = if self.problem.offset_n.is_some() {
-            let ends = [layer(0), layer(layers - 1)].concat();
-            passive::pull(self.scene, &ends, false)?
+            let ends = [
+                layers.places(0, positions_m),
+                layers.places(layers.count() - 1, positions_m),
+            ];
+            passive::pull(self.scene, &ends.concat(), false)?
         } else {
             None
         };
         let (mut all, mut every_second) = (Span::default(), Span::default());
-        let mut limits = Vec::with_capacity(layers);
-        for k in 0..layers {
-            let places = layer(k);
+        let mut limits = Vec::with_capacity(layers.count());
+        for k in 0..layers.count() {
+            let places = layers.places(k, positions_m);
             let forces = self.scene.forces_n_per_a(self.solved, &places, progress)?;
             let offset_n = pull.as_ref().map(|pull| pull.forces_z_n(&places));
-            let given = ForceProblem {
+            let unwired = ForceProblem {
                 forces_n_per_a: &forces,
                 offset_n: offset_n.as_deref(),
-                ..*self.given
+                ..self.unwired
             };
-            let rewired = self.wiring.apply(&given);
-            let reach = reachable(&rewired.problem(&given))?;
+            let rewired = self.options.wiring.apply(&unwired);
+            let reach = reachable(&rewired.problem(&unwired))?;
             all.add(height_m, &reach);
             if k % 2 == 0 {
                 every_second.add(height_m, &reach);
@@ -198,11 +147,9 @@ impl Rendering<'_> {
             limits.push(felt.map(of_height).collect());
         }
         let largest = all.largest();
-        let (lambda_n_per_m, reason) = in_words(largest);
-        let coarse = every_second
-            .largest()
-            .ok()
-            .map(|found| found.lambda_n_per_m);
+        let (lambda_n_per_m, reason) = lambda_or_reason(largest);
+        let coarse = every_second.largest().ok();
+        let coarse = coarse.map(|largest| largest.lambda_n_per_m);
         let stage = lambda_n_per_m.map(|lambda| {
             let missed = coarse.map_or(0.0, |coarse| coarse - lambda);
             StageAccuracy {
@@ -215,32 +162,87 @@ impl Rendering<'_> {
         });
         let shell = FeedbackShell {
             reach_m,
-            layers,
-            spacing_m: reach_m / steps as f64,
-            floor_m,
-            clipped: (0..layers).map(below).sum(),
-            places: layers * height_m.len(),
+            layers: layers.count(),
+            spacing_m: reach_m / layers.steps as f64,
+            floor_m: layers.floor_m,
+            clipped: layers.clipped(&self.points.height_m),
+            places: layers.count() * height_m.len(),
             lambda_n_per_m,
             reason,
             smallest_lambda_n_per_m: all.smallest_n_per_m(),
             every_second_lambda_n_per_m: coarse,
-            decided_at: largest.ok().map(|found| FeedbackPlace {
-                point: found.point,
-                position_m: layer(found.layer)[found.point],
+            decided_at: largest.ok().map(|largest| FeedbackPlace {
+                point: largest.point,
+                position_m: layers.places(largest.layer, positions_m)[largest.point],
             }),
         };
         Ok((shell, stage))
     }
 }
 
-fn in_words(largest: Result<Decided, NoLambda>) -> (Option<f64>, Option<String>) {
+/// Copies of the surface, evenly spaced above and below it.
+struct Layers {
+    reach_m: f64,
+    /// Layers above the surface, and below it.
+    steps: usize,
+    /// No place is lower, m.
+    floor_m: f64,
+}
+
+impl Layers {
+    /// # Errors
+    /// A reach beyond what a finger leaves a surface by.
+    fn new(reach_m: f64, floor_m: f64) -> Result<Self, RunError> {
+        // Two steps at a time up and down, so that every second layer holds both ends too.
+        let pairs = (reach_m / (2.0 * SPACING_M) * (1.0 - 1e-12)).ceil();
+        if pairs > 0.5 * MOST_LAYERS {
+            return Err(RunError::Input(format!(
+                "--shell {} mm is more than {} mm: no finger leaves a surface so far",
+                reach_m * 1e3,
+                MOST_LAYERS * SPACING_M * 1e3
+            )));
+        }
+        Ok(Self {
+            reach_m,
+            steps: 2 * pairs.max(1.0) as usize,
+            floor_m,
+        })
+    }
+
+    fn count(&self) -> usize {
+        2 * self.steps + 1
+    }
+
+    /// Height of a layer above the surface, m.
+    fn lift_m(&self, layer: usize) -> f64 {
+        self.reach_m * (layer as f64 / self.steps as f64 - 1.0)
+    }
+
+    fn places(&self, layer: usize, surface_m: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let lift_m = self.lift_m(layer);
+        let lifted = |p: &[f64; 3]| [p[0], p[1], (p[2] + lift_m).max(self.floor_m)];
+        surface_m.iter().map(lifted).collect()
+    }
+
+    /// Places of all layers that would be below the floor.
+    fn clipped(&self, height_m: &[f64]) -> usize {
+        let below = |layer: usize| {
+            let lift_m = self.lift_m(layer);
+            let heights = height_m.iter();
+            heights.filter(|h| **h + lift_m < self.floor_m).count()
+        };
+        (0..self.count()).map(below).sum()
+    }
+}
+
+fn lambda_or_reason(largest: Result<Decided, NoLambda>) -> (Option<f64>, Option<String>) {
     match largest {
-        Ok(found) => (Some(found.lambda_n_per_m), None),
+        Ok(largest) => (Some(largest.lambda_n_per_m), None),
         Err(why) => (None, Some(why.to_string())),
     }
 }
 
-fn of_render(error: FeedbackError) -> RunError {
+fn render_error(error: FeedbackError) -> RunError {
     match error {
         FeedbackError::Problem(problem) => problem.into(),
         FeedbackError::Allocator(limits) => RunError::Input(limits.to_string()),

@@ -1,13 +1,13 @@
-//! `lambda --plot`: what is drawn of a solved object.
+//! `lambda --plot`: the picture of a solved object.
 
 use crate::bundle::lambda_file::LambdaFile;
 use crate::lambda::{Criterion, ForceProblem, Solution};
 use crate::plot::lambda::{ChosenForces, Constant, ErrorMap, LambdaPlot};
 use crate::plot::plane::{Cells, Together};
 
-use super::points::WantedPoints;
+use super::PosedProblem;
 
-/// Evenly spaced force constants besides the breakpoints.
+/// Evenly spaced force constants beside the breakpoints.
 const STEPS: usize = 240;
 /// The axis ends this much beyond the last constant shown,
 const MARGIN: f64 = 1.12;
@@ -16,75 +16,127 @@ const FARTHEST: f64 = 4.0;
 /// Points on no grid are drawn up to about this many.
 const MOST_POINTS: usize = 20_000;
 
-/// What is drawn.
-pub(super) struct Seen<'a> {
-    pub(super) file: &'a LambdaFile,
-    pub(super) points: &'a WantedPoints,
-    /// As wired.
-    pub(super) problem: &'a ForceProblem<'a>,
-    pub(super) solution: &'a Solution,
-    /// Forces with feedback at the chosen lambda, N; empty where not asked for.
-    pub(super) feedback_n: Vec<f64>,
-    /// Makes the currents of the problem those of the array.
-    pub(super) spread: &'a dyn Fn(&mut [f64]),
-}
-
-pub(super) fn picture(seen: Seen<'_>) -> LambdaPlot {
-    let (file, path) = (seen.file, &seen.solution.path);
-    let feedback = file.feedback.as_ref().and_then(|told| told.lambda_n_per_m);
-    let constants: Vec<Constant> = Criterion::ALL
-        .iter()
-        .map(|&criterion| (criterion.name(), file.constants.of(criterion)))
-        .chain([("feedback", feedback)])
-        .filter_map(|(name, lambda_n_per_m)| {
-            lambda_n_per_m.map(|lambda_n_per_m| Constant {
-                name,
-                lambda_n_per_m,
+impl PosedProblem<'_> {
+    /// The picture of a solved object. `feedback_n` are the forces with feedback at the chosen
+    /// lambda, N; empty where not requested.
+    pub(super) fn picture(
+        &self,
+        file: &LambdaFile,
+        solution: &Solution,
+        feedback_n: Vec<f64>,
+    ) -> LambdaPlot {
+        let path = &solution.path;
+        let feedback = file.feedback.as_ref().and_then(|f| f.lambda_n_per_m);
+        let constants: Vec<Constant> = Criterion::ALL
+            .iter()
+            .map(|&criterion| (criterion.name(), file.constants.of(criterion)))
+            .chain([("feedback", feedback)])
+            .filter_map(|(name, lambda_n_per_m)| {
+                lambda_n_per_m.map(|lambda_n_per_m| Constant {
+                    name,
+                    lambda_n_per_m,
+                })
             })
+            .collect();
+        let turns: Vec<f64> = path
+            .breakpoints()
+            .iter()
+            .map(|b| b.lambda_n_per_m)
+            .collect();
+        let all = constants.iter().map(|one| one.lambda_n_per_m);
+        let last = all.chain(turns.last().copied()).fold(0.0, f64::max);
+        let shown = match file.lambda_n_per_m.filter(|lambda| *lambda > 0.0) {
+            Some(chosen) => last.min(FARTHEST * chosen),
+            None => last,
+        };
+        let end_n_per_m = if shown > 0.0 { MARGIN * shown } else { 1.0 };
+        let mut lambdas: Vec<f64> = (0..=STEPS)
+            .map(|k| end_n_per_m * k as f64 / STEPS as f64)
+            .chain(turns.iter().copied().filter(|turn| *turn <= end_n_per_m))
+            .collect();
+        lambdas.sort_by(f64::total_cmp);
+        lambdas.dedup();
+        let rms_height_m = rms_height_m(&self.problem);
+        let rms_error_n: Vec<f64> = lambdas.iter().map(|l| path.error_n2(*l).sqrt()).collect();
+        let relative = |(lambda, error): (&f64, &f64)| {
+            let wanted = lambda * rms_height_m;
+            // More than the whole force is no rendering: the axis is for the rest.
+            (wanted > 0.0)
+                .then(|| error / wanted)
+                .filter(|part| *part <= 1.0)
+        };
+        let currents = |lambda: &f64| {
+            let mut currents = path.currents_a(*lambda);
+            self.options.wiring.spread(&mut currents);
+            currents
+        };
+        LambdaPlot {
+            title: format!("{} on {}", file.shape, file.design),
+            end_n_per_m,
+            relative_error: lambdas.iter().zip(&rms_error_n).map(relative).collect(),
+            currents_a: lambdas.iter().map(currents).collect(),
+            breakpoint: lambdas.iter().map(|l| turns.contains(l)).collect(),
+            lambda_n_per_m: lambdas,
+            rms_error_n,
+            constants,
+            chosen: self.chosen_forces(solution, feedback_n),
+        }
+    }
+
+    fn chosen_forces(&self, solution: &Solution, feedback_n: Vec<f64>) -> Option<ChosenForces> {
+        let (problem, at) = (&self.problem, solution.chosen.as_ref()?);
+        let lambda_n_per_m = at.lambda_n_per_m;
+        let wanted_n: Vec<f64> = problem
+            .height_m
+            .iter()
+            .map(|h| lambda_n_per_m * h)
+            .collect();
+        let rows = problem.forces_n_per_a.chunks_exact(problem.coils());
+        let static_n: Vec<f64> = rows
+            .enumerate()
+            .map(|(point, row)| {
+                let offset = problem.offset_n.map_or(0.0, |offset| offset[point]);
+                let terms = row.iter().zip(&at.currents_a);
+                terms.fold(offset, |sum, (force, current)| sum + force * current)
+            })
+            .collect();
+        let errors = static_n.iter().zip(&wanted_n);
+        let errors_mn: Vec<f64> = errors
+            .map(|(given, wanted)| (given - wanted) * 1e3)
+            .collect();
+        let map = match &self.points.grid {
+            Some(grid) => {
+                let mut values = vec![None; grid.columns * grid.rows];
+                for (place, error) in grid.index.iter().zip(&errors_mn) {
+                    values[*place] = Some(*error);
+                }
+                let [x_mm, y_mm] = grid.plan_m.map(|ends| ends.map(|end| end * 1e3));
+                ErrorMap::Grid {
+                    x_mm,
+                    y_mm,
+                    cells: Cells {
+                        columns: grid.columns,
+                        values,
+                        together: Together::Largest,
+                    },
+                }
+            }
+            None => {
+                let every = errors_mn.len().div_ceil(MOST_POINTS).max(1);
+                let places = self.points.positions_m.iter().step_by(every);
+                ErrorMap::Scattered {
+                    points_mm: places.map(|p| (p[0] * 1e3, p[1] * 1e3)).collect(),
+                    errors_mn: errors_mn.into_iter().step_by(every).collect(),
+                }
+            }
+        };
+        Some(ChosenForces {
+            lambda_n_per_m,
+            wanted_n,
+            static_n,
+            feedback_n,
+            map,
         })
-        .collect();
-    let turns: Vec<f64> = path
-        .breakpoints()
-        .iter()
-        .map(|b| b.lambda_n_per_m)
-        .collect();
-    let all = constants.iter().map(|one| one.lambda_n_per_m);
-    let last = all.chain(turns.last().copied()).fold(0.0, f64::max);
-    let shown = match file.lambda_n_per_m.filter(|lambda| *lambda > 0.0) {
-        Some(chosen) => last.min(FARTHEST * chosen),
-        None => last,
-    };
-    let end_n_per_m = if shown > 0.0 { MARGIN * shown } else { 1.0 };
-    let mut lambdas: Vec<f64> = (0..=STEPS)
-        .map(|k| end_n_per_m * k as f64 / STEPS as f64)
-        .chain(turns.iter().copied().filter(|turn| *turn <= end_n_per_m))
-        .collect();
-    lambdas.sort_by(f64::total_cmp);
-    lambdas.dedup();
-    let rms_height_m = rms_height_m(seen.problem);
-    let rms_error_n: Vec<f64> = lambdas.iter().map(|l| path.error_n2(*l).sqrt()).collect();
-    let relative = |(lambda, error): (&f64, &f64)| {
-        let wanted = lambda * rms_height_m;
-        // More than the whole force is no rendering: the axis is for the rest.
-        (wanted > 0.0)
-            .then(|| error / wanted)
-            .filter(|part| *part <= 1.0)
-    };
-    let currents = |lambda: &f64| {
-        let mut currents = path.currents_a(*lambda);
-        (seen.spread)(&mut currents);
-        currents
-    };
-    LambdaPlot {
-        title: format!("{} on {}", file.shape, file.design),
-        end_n_per_m,
-        relative_error: lambdas.iter().zip(&rms_error_n).map(relative).collect(),
-        currents_a: lambdas.iter().map(currents).collect(),
-        breakpoint: lambdas.iter().map(|l| turns.contains(l)).collect(),
-        lambda_n_per_m: lambdas,
-        rms_error_n,
-        constants,
-        chosen: chosen(seen),
     }
 }
 
@@ -96,60 +148,4 @@ fn rms_height_m(problem: &ForceProblem) -> f64 {
         (sum + weight(point) * h * h, all + weight(point))
     });
     (sum / all).sqrt()
-}
-
-fn chosen(seen: Seen<'_>) -> Option<ChosenForces> {
-    let (problem, at) = (seen.problem, seen.solution.chosen.as_ref()?);
-    let lambda_n_per_m = at.lambda_n_per_m;
-    let wanted_n: Vec<f64> = problem
-        .height_m
-        .iter()
-        .map(|h| lambda_n_per_m * h)
-        .collect();
-    let rows = problem.forces_n_per_a.chunks_exact(problem.coils());
-    let static_n: Vec<f64> = rows
-        .enumerate()
-        .map(|(point, row)| {
-            let offset = problem.offset_n.map_or(0.0, |offset| offset[point]);
-            let terms = row.iter().zip(&at.currents_a);
-            terms.fold(offset, |sum, (force, current)| sum + force * current)
-        })
-        .collect();
-    let errors = static_n.iter().zip(&wanted_n);
-    let errors_mn: Vec<f64> = errors
-        .map(|(given, wanted)| (given - wanted) * 1e3)
-        .collect();
-    let map = match &seen.points.grid {
-        Some(grid) => {
-            let mut values = vec![None; grid.columns * grid.rows];
-            for (place, error) in grid.index.iter().zip(&errors_mn) {
-                values[*place] = Some(*error);
-            }
-            let [x_mm, y_mm] = grid.plan_m.map(|ends| ends.map(|end| end * 1e3));
-            ErrorMap::Grid {
-                x_mm,
-                y_mm,
-                cells: Cells {
-                    columns: grid.columns,
-                    values,
-                    together: Together::Largest,
-                },
-            }
-        }
-        None => {
-            let every = errors_mn.len().div_ceil(MOST_POINTS).max(1);
-            let places = seen.points.positions_m.iter().step_by(every);
-            ErrorMap::Scattered {
-                points_mm: places.map(|p| (p[0] * 1e3, p[1] * 1e3)).collect(),
-                errors_mn: errors_mn.into_iter().step_by(every).collect(),
-            }
-        }
-    };
-    Some(ChosenForces {
-        lambda_n_per_m,
-        wanted_n,
-        static_n,
-        feedback_n: seen.feedback_n,
-        map,
-    })
 }

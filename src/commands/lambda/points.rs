@@ -18,7 +18,7 @@ pub(crate) struct WantedPoints {
     pub(crate) weights: Option<Vec<f64>>,
     /// Name of the shape.
     pub(crate) shape: String,
-    /// What went in.
+    /// Input files.
     pub(crate) inputs: Vec<Input>,
     /// Each part of the heights' error; `points` is the rounding.
     pub(crate) accuracy: BTreeMap<&'static str, StageAccuracy>,
@@ -67,7 +67,7 @@ impl WantedPoints {
 
     pub(crate) fn of_scattered(report: &ScatteredReport) -> Self {
         let (points, summary) = (&report.points, &report.summary);
-        // What the patches lack besides; without patches nothing is known between the points.
+        // The patches' deviation is in it; without patches nothing is known between the points.
         let patches = summary.accuracy.contains_key("patches");
         let budget_m = summary.accuracy.values().map(|stage| stage.estimate).sum();
         Self {

@@ -1,93 +1,82 @@
-//! What the error of the constraint points does to the force constant.
+//! The effect of the constraint points' error on the force constant.
 //!
 //! The points' error budget moves surface and magnet together. Points are lifted by it and the
 //! problem is solved again with the forces there: a first-order estimate of how far lambda may
 //! move, not a bound, because the errors of single points need not agree.
 
-use super::points::WantedPoints;
+use super::PosedProblem;
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::lambda::{self, ForceProblem, Settings, Wiring};
 use crate::progress::Progress;
-use crate::scene::Scene;
-use crate::scene::cached_field::ShapeField;
-use crate::scene::steel::Solved;
 
 /// The share of the lowest height by which points are moved at most: beyond, first order ends.
 const MOST_OF_HEIGHT: f64 = 0.02;
-/// Of more points than twice this many every second, third and so on is taken: a shift of all of
-/// them is told as well by some, lifted and not.
+/// Of more points than twice this many every second, third and so on is taken: some of them,
+/// lifted and not, show a shift of all as well.
 const ENOUGH_POINTS: usize = 600;
 
-/// What is solved again.
-pub(super) struct Moved<'a> {
-    pub(super) scene: &'a Scene<'a>,
-    pub(super) solved: &'a Solved,
-    pub(super) field: ShapeField<'a>,
-    pub(super) points: &'a WantedPoints,
-    /// At the points as they are.
-    pub(super) given: &'a ForceProblem<'a>,
-    pub(super) wiring: &'a Wiring,
-}
-
-/// How far lambda moves with the points' error budget; `None` without a lambda or a budget.
-///
-/// # Errors
-/// A problem that cannot be solved; interruption.
-pub(super) fn of_points(
-    moved: &Moved<'_>,
-    settings: &Settings,
-    progress: &dyn Progress,
-) -> Result<Option<StageAccuracy>, RunError> {
-    let Some(budget_m) = moved.points.budget_m else {
-        return Ok(None);
-    };
-    let step_m = budget_m.min(MOST_OF_HEIGHT * moved.points.lowest_m());
-    if step_m.is_nan() || step_m <= 0.0 {
-        return Ok(None);
-    }
-    let given = moved.given;
-    let every = (given.height_m.len() / ENOUGH_POINTS).max(1);
-    let here = some(given.forces_n_per_a, given.coils(), every);
-    let mut lifted_m = some(&moved.points.positions_m, 1, every);
-    // Lifted only: the steel's solution was made for the points and above.
-    lifted_m.iter_mut().for_each(|at| at[2] += step_m);
-    let there =
-        (moved.field).forces_n_per_a("lifted", moved.scene, moved.solved, &lifted_m, progress)?;
-    let height_m = some(given.height_m, 1, every);
-    let lifted_height_m: Vec<f64> = lifted_m.iter().map(|at| at[2]).collect();
-    let offset_n = given.offset_n.map(|offset| some(offset, 1, every));
-    let weights = given.weights.map(|weights| some(weights, 1, every));
-    let lambda = |forces_n_per_a: &[f64], height_m: &[f64]| {
-        let problem = ForceProblem {
-            forces_n_per_a,
-            height_m,
-            offset_n: offset_n.as_deref(),
-            weights: weights.as_deref(),
-            ..*given
+impl PosedProblem<'_> {
+    /// How far lambda moves with the points' error budget; `None` without a lambda or a budget.
+    ///
+    /// # Errors
+    /// A problem that cannot be solved; interruption.
+    pub(super) fn effect_of_points(
+        &self,
+        progress: &dyn Progress,
+    ) -> Result<Option<StageAccuracy>, RunError> {
+        let Some(budget_m) = self.points.budget_m else {
+            return Ok(None);
         };
-        chosen_lambda(&problem, moved.wiring, settings)
-    };
-    let (Some(here), Some(there)) = (lambda(&here, &height_m)?, lambda(&there, &lifted_height_m)?)
-    else {
-        return Ok(None);
-    };
-    if here <= 0.0 {
-        return Ok(None);
+        let step_m = budget_m.min(MOST_OF_HEIGHT * self.points.lowest_m());
+        if step_m.is_nan() || step_m <= 0.0 {
+            return Ok(None);
+        }
+        let unwired = &self.unwired;
+        let every = (unwired.height_m.len() / ENOUGH_POINTS).max(1);
+        let here = some(unwired.forces_n_per_a, unwired.coils(), every);
+        let mut lifted_m = some(&self.points.positions_m, 1, every);
+        // Lifted only: the steel's solution was made for the points and above.
+        lifted_m.iter_mut().for_each(|at| at[2] += step_m);
+        let there =
+            self.field
+                .forces_n_per_a("lifted", self.scene, self.solved, &lifted_m, progress)?;
+        let height_m = some(unwired.height_m, 1, every);
+        let lifted_height_m: Vec<f64> = lifted_m.iter().map(|at| at[2]).collect();
+        let offset_n = unwired.offset_n.map(|offset| some(offset, 1, every));
+        let weights = unwired.weights.map(|weights| some(weights, 1, every));
+        let lambda = |forces_n_per_a: &[f64], height_m: &[f64]| {
+            let problem = ForceProblem {
+                forces_n_per_a,
+                height_m,
+                offset_n: offset_n.as_deref(),
+                weights: weights.as_deref(),
+                ..*unwired
+            };
+            chosen_lambda(&problem, &self.options.wiring, &self.options.settings)
+        };
+        let (Some(here), Some(there)) =
+            (lambda(&here, &height_m)?, lambda(&there, &lifted_height_m)?)
+        else {
+            return Ok(None);
+        };
+        if here <= 0.0 {
+            return Ok(None);
+        }
+        let all = if every == 1 {
+            "all points".to_owned()
+        } else {
+            format!("one point of {every}")
+        };
+        Ok(Some(StageAccuracy {
+            estimate: (there / here - 1.0).abs() * (budget_m / step_m),
+            relative_to: "lambda".to_owned(),
+            method: format!(
+                "an estimate: {all} lifted by the points' error budget (grid, tessellation, \
+                 rounding), forces and lambda computed again, to first order"
+            ),
+        }))
     }
-    let all = if every == 1 {
-        "all points".to_owned()
-    } else {
-        format!("one point of {every}")
-    };
-    Ok(Some(StageAccuracy {
-        estimate: (there / here - 1.0).abs() * (budget_m / step_m),
-        relative_to: "lambda".to_owned(),
-        method: format!(
-            "an estimate: {all} lifted by the points' error budget (grid, tessellation, \
-             rounding), forces and lambda computed again, to first order"
-        ),
-    }))
 }
 
 /// Every `every`-th row of `width` values.

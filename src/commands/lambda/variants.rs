@@ -1,12 +1,12 @@
-//! What an offset, currents of both signs, pairs in series and broken coils do to lambda.
+//! The effect of an offset, currents of both signs, pairs in series and broken coils on lambda.
 
 use std::slice::from_ref;
 
+use super::PosedProblem;
 use crate::RunError;
-use crate::bundle::lambda_file::{LambdaFile, LambdaVariant, TolerancePoint, WiringFile};
-use crate::lambda::worst::{felt, worst_point};
+use crate::bundle::lambda_file::LambdaVariant;
+use crate::lambda::worst::worst_point;
 use crate::lambda::{self, ForceProblem, Settings, Status, Wiring};
-use crate::units::DETECTION_THRESHOLD_N;
 
 /// Two coils opposite each other within this part of their distance are a pair.
 const OPPOSITE: f64 = 1e-6;
@@ -14,7 +14,7 @@ const OPPOSITE: f64 = 1e-6;
 /// Smaller relative changes are rounding.
 const NO_CHANGE: f64 = 1e-11;
 
-/// One change to be tried.
+/// One change of the object.
 struct Change {
     name: String,
     wiring: Wiring,
@@ -24,8 +24,19 @@ struct Change {
     pulls: bool,
 }
 
+impl Change {
+    /// The same under another name.
+    fn renamed(&self, name: String) -> Self {
+        Self {
+            name,
+            wiring: self.wiring.clone(),
+            ..*self
+        }
+    }
+}
+
 /// Pairs of coils opposite each other through the array's centre.
-pub(super) fn opposite_pairs(positions_m: &[[f64; 2]]) -> Vec<[usize; 2]> {
+fn opposite_pairs(positions_m: &[[f64; 2]]) -> Vec<[usize; 2]> {
     let count = positions_m.len() as f64;
     let centre = [0, 1].map(|k| positions_m.iter().map(|p| p[k]).sum::<f64>() / count);
     let mut pairs = Vec::new();
@@ -41,91 +52,50 @@ pub(super) fn opposite_pairs(positions_m: &[[f64; 2]]) -> Vec<[usize; 2]> {
     pairs
 }
 
-/// Solves the problem as given, then with one change at a time. `offset_n` is the force without
-/// currents, whether or not `given` has it; `pairs` are those to be wired in series.
+/// The problem as given, then with one change at a time. `passive_n` is the force without
+/// currents, whether or not the problem has it.
 pub(super) fn all(
-    given: &ForceProblem,
-    offset_n: Option<&[f64]>,
-    settings: &Settings,
-    wiring: &Wiring,
-    pairs: &[[usize; 2]],
+    posed: &PosedProblem,
+    passive_n: Option<&[f64]>,
 ) -> Result<Vec<LambdaVariant>, RunError> {
-    let plain = |name: String, wiring: Wiring| Change {
-        name,
-        wiring,
-        offset: given.offset_n.is_some(),
-        pulls: false,
-    };
-    let tried = |change: &Change, base: Option<f64>| {
-        let lower_a: Vec<f64> = given.upper_a.iter().map(|u| -u).collect();
+    let unwired = &posed.unwired;
+    let (settings, wiring) = (&posed.options.settings, &posed.options.wiring);
+    let reversed_a: Vec<f64> = unwired.upper_a.iter().map(|u| -u).collect();
+    let solve = |change: &Change, base: Option<f64>| {
         let problem = ForceProblem {
-            offset_n: offset_n.filter(|_| change.offset),
+            offset_n: passive_n.filter(|_| change.offset),
             lower_a: if change.pulls {
-                &lower_a
+                &reversed_a
             } else {
-                given.lower_a
+                unwired.lower_a
             },
-            ..*given
+            ..*unwired
         };
         solved(&problem, settings, change, base)
     };
-    let given_so = tried(&plain("as given".to_owned(), wiring.clone()), None)?;
-    let base = given_so.lambda_n_per_m;
+    let as_given = Change {
+        name: "as given".to_owned(),
+        wiring: wiring.clone(),
+        offset: unwired.offset_n.is_some(),
+        pulls: false,
+    };
+    let first = solve(&as_given, None)?;
+    let base = first.lambda_n_per_m;
     let mut variants = vec![LambdaVariant {
         relative_change: base.filter(|&l| l > 0.0).map(|_| 0.0),
-        ..given_so
+        ..first
     }];
-    let mut changes = Vec::new();
-    if offset_n.is_some() {
-        let offset = given.offset_n.is_none();
-        let name = if offset { "with" } else { "without" };
-        changes.push(Change {
-            offset,
-            ..plain(format!("{name} passive force"), wiring.clone())
-        });
+    for change in supply_and_series(posed, passive_n.is_some(), &as_given) {
+        variants.push(solve(&change, base)?);
     }
-    if given
-        .lower_a
-        .iter()
-        .zip(given.upper_a)
-        .any(|(&l, &u)| l != -u)
-    {
-        changes.push(Change {
-            pulls: true,
-            ..plain("push and pull".to_owned(), wiring.clone())
-        });
-    }
-    let busy =
-        |coil: usize| wiring.broken.contains(&coil) || wiring.series.as_flattened().contains(&coil);
-    let free: Vec<[usize; 2]> = pairs
-        .iter()
-        .copied()
-        .filter(|&[a, b]| !busy(a) && !busy(b))
-        .collect();
-    let in_series = |more: &[[usize; 2]]| {
-        let mut changed = wiring.clone();
-        changed.series.extend_from_slice(more);
-        changed
-    };
-    for pair in &free {
-        let name = format!("{}+{} in series", pair[0], pair[1]);
-        changes.push(plain(name, in_series(from_ref(pair))));
-    }
-    if free.len() > 1 {
-        changes.push(plain("all pairs in series".to_owned(), in_series(&free)));
-    }
-    for change in &changes {
-        variants.push(tried(change, base)?);
-    }
-    let without = |coils: &[usize]| {
-        let mut changed = wiring.clone();
-        changed.broken.extend_from_slice(coils);
-        changed
+    let broken = |coils: &[usize], name: String| {
+        let mut change = as_given.renamed(name);
+        change.wiring.broken.extend_from_slice(coils);
+        change
     };
     let mut hurt: Vec<(f64, usize)> = Vec::new();
-    for coil in (0..given.coils()).filter(|&coil| !busy(coil)) {
-        let name = format!("{coil} broken");
-        let variant = tried(&plain(name, without(&[coil])), base)?;
+    for coil in (0..unwired.coils()).filter(|&coil| !is_wired(wiring, coil)) {
+        let variant = solve(&broken(&[coil], format!("{coil} broken")), base)?;
         hurt.push((variant.lambda_n_per_m.unwrap_or(0.0), coil));
         variants.push(variant);
     }
@@ -133,10 +103,55 @@ pub(super) fn all(
     hurt.sort_by(|a, b| a.0.total_cmp(&b.0));
     if let [(_, a), (_, b), _, ..] = hurt[..] {
         let (a, b) = (a.min(b), a.max(b));
-        let name = format!("{a} and {b} broken");
-        variants.push(tried(&plain(name, without(&[a, b])), base)?);
+        let worst_two = broken(&[a, b], format!("{a} and {b} broken"));
+        variants.push(solve(&worst_two, base)?);
     }
     Ok(variants)
+}
+
+/// Whether a coil is broken or in a pair already.
+fn is_wired(wiring: &Wiring, coil: usize) -> bool {
+    wiring.broken.contains(&coil) || wiring.series.as_flattened().contains(&coil)
+}
+
+/// The changes of offset, currents and pairs in series. `steel_pulls`: there is a force without
+/// currents.
+fn supply_and_series(posed: &PosedProblem, steel_pulls: bool, as_given: &Change) -> Vec<Change> {
+    let unwired = &posed.unwired;
+    let mut changes = Vec::new();
+    if steel_pulls {
+        let offset = !as_given.offset;
+        let name = if offset { "with" } else { "without" };
+        changes.push(Change {
+            offset,
+            ..as_given.renamed(format!("{name} passive force"))
+        });
+    }
+    let mut limits = unwired.lower_a.iter().zip(unwired.upper_a);
+    if limits.any(|(&l, &u)| l != -u) {
+        changes.push(Change {
+            pulls: true,
+            ..as_given.renamed("push and pull".to_owned())
+        });
+    }
+    let free = |coil| !is_wired(&as_given.wiring, coil);
+    let pairs: Vec<[usize; 2]> = opposite_pairs(&posed.scene.design.array.positions_m)
+        .into_iter()
+        .filter(|&[a, b]| free(a) && free(b))
+        .collect();
+    let in_series = |pairs: &[[usize; 2]], name: String| {
+        let mut change = as_given.renamed(name);
+        change.wiring.series.extend_from_slice(pairs);
+        change
+    };
+    for pair in &pairs {
+        let name = format!("{}+{} in series", pair[0], pair[1]);
+        changes.push(in_series(from_ref(pair), name));
+    }
+    if pairs.len() > 1 {
+        changes.push(in_series(&pairs, "all pairs in series".to_owned()));
+    }
+    changes
 }
 
 fn solved(
@@ -162,8 +177,7 @@ fn solved(
     let lambda = chosen.map(|chosen| chosen.lambda_n_per_m);
     Ok(LambdaVariant {
         name: change.name.clone(),
-        broken: change.wiring.broken.clone(),
-        series: change.wiring.series.clone(),
+        wiring: change.wiring.clone(),
         passive_force: change.offset,
         pulls: wired.lower_a.iter().any(|&lower| lower < 0.0),
         constants: solution.constants,
@@ -188,54 +202,4 @@ fn solved(
         power_w: currents_a.as_ref().map(power),
         currents_a,
     })
-}
-
-/// The largest force constant whose errors are not felt at any point.
-pub(super) fn tolerance(
-    problem: &ForceProblem,
-    share: f64,
-    wiring: &Wiring,
-) -> Result<TolerancePoint, RunError> {
-    let found = felt(problem, share, DETECTION_THRESHOLD_N)?;
-    let found = found.map(|mut found| {
-        wiring.spread(&mut found.currents_a);
-        found
-    });
-    let found = found.as_ref();
-    Ok(TolerancePoint {
-        lambda_n_per_m: found.map(|found| found.lambda_n_per_m),
-        share,
-        threshold_n: DETECTION_THRESHOLD_N,
-        point: found.map(|found| found.point),
-        part: found.map(|found| found.part),
-        currents_a: found.map(|found| found.currents_a.clone()),
-    })
-}
-
-/// Tells the wiring, and gives both coils of a pair their current wherever currents are told.
-pub(super) fn tell_wiring(file: &mut LambdaFile, wiring: &Wiring) {
-    if wiring.is_plain() {
-        return;
-    }
-    let spread = |currents: &mut Vec<f64>| wiring.spread(currents);
-    file.currents_a.iter_mut().for_each(spread);
-    for step in &mut file.path {
-        wiring.spread(&mut step.currents_a);
-    }
-    if let Some(at) = &mut file.at {
-        wiring.spread(&mut at.currents_a);
-        if let Some(worst) = &mut at.worst_point {
-            wiring.spread(&mut worst.currents_a);
-        }
-    }
-    if let Some(worst) = &mut file.worst_point {
-        worst.currents_a.iter_mut().for_each(spread);
-        for step in &mut worst.path {
-            wiring.spread(&mut step.currents_a);
-        }
-    }
-    file.wiring = Some(WiringFile {
-        broken: wiring.broken.clone(),
-        series: wiring.series.clone(),
-    });
 }

@@ -1,40 +1,43 @@
-//! Warnings about a force constant: why there is none, why it is zero, who does not feel it.
+//! Warnings about a force constant: why there is none, why it is zero, where it is not felt.
 
-use super::LambdaOptions;
+use super::PosedProblem;
 use super::points::WantedPoints;
 use crate::lambda::feedback::reachable;
-use crate::lambda::{Criterion, ForceProblem, Solution, Status};
+use crate::lambda::worst::WorstSolution;
+use crate::lambda::{ForceProblem, Solution, Status};
 
 /// More deciding points than this are counted, not listed.
 const LISTED: usize = 3;
 
-/// Every warning about `solution`, the points' own first.
-pub(super) fn all(
-    points: &WantedPoints,
-    problem: &ForceProblem,
-    solution: &Solution,
-    options: &LambdaOptions,
-) -> Vec<String> {
+/// Every warning about a solution, the points' own first.
+pub(super) fn all(posed: &PosedProblem, solution: &Solution, worst: &WorstSolution) -> Vec<String> {
+    let (points, problem) = (posed.points, &posed.problem);
     let mut warnings = points.warnings.clone();
     warnings.extend(of_status(solution.status).map(str::to_owned));
-    let criterion = options.settings.criterion;
+    let criterion = posed.options.settings.criterion;
     match &solution.chosen {
-        None if solution.status == Status::Solved => warnings.push(match criterion {
-            Criterion::Maxmin => no_maxmin(points, problem),
-            Criterion::Jnd | Criterion::Linear | Criterion::Saturation => format!(
-                "the limits never bind by the criterion {}: lambda is null; choose another with \
-                 --criterion",
-                criterion.name()
-            ),
-        }),
-        Some(chosen) if chosen.lambda_n_per_m == 0.0 => warnings.push(match criterion {
-            Criterion::Maxmin => maxmin_is_zero(points, problem, &solution.maxmin_points),
-            Criterion::Jnd | Criterion::Linear | Criterion::Saturation => format!(
-                "lambda is 0 by the criterion {}: {}",
-                criterion.name(),
-                binds_at_zero(problem)
-            ),
-        }),
+        None if solution.status == Status::Solved => {
+            warnings.push(if criterion.is_least_mean_square() {
+                format!(
+                    "the limits never bind by the criterion {}: lambda is null; choose another \
+                     with --criterion",
+                    criterion.name()
+                )
+            } else {
+                no_maxmin(points, problem)
+            });
+        }
+        Some(chosen) if chosen.lambda_n_per_m == 0.0 => {
+            warnings.push(if criterion.is_least_mean_square() {
+                format!(
+                    "lambda is 0 by the criterion {}: {}",
+                    criterion.name(),
+                    binds_at_zero(problem)
+                )
+            } else {
+                maxmin_is_zero(points, problem, &solution.maxmin_points)
+            });
+        }
         Some(chosen) => warnings.extend(
             solution
                 .constants
@@ -49,6 +52,13 @@ pub(super) fn all(
                 }),
         ),
         None => {}
+    }
+    if !worst.complete {
+        warnings.push(
+            "the worst-point path could not be followed to its end: its numbers are not the \
+             minimum; please report this design and shape"
+                .to_owned(),
+        );
     }
     warnings
 }
@@ -131,7 +141,7 @@ fn maxmin_is_zero(points: &WantedPoints, problem: &ForceProblem, deciding: &[usi
     }
 }
 
-/// What binds before any force is rendered.
+/// The limit that binds before any force is rendered.
 fn binds_at_zero(problem: &ForceProblem) -> String {
     if problem.total_max_a == Some(0.0) {
         return "the sum of the currents may not exceed 0 A; raise total_current_max_a".to_owned();

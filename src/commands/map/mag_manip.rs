@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use rayon::prelude::*;
+use serde::Serialize;
 
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::mag_manip::{MultipoleSource, Multipoles, VectorField};
-use crate::commands::probe::Places;
+use crate::commands::probe::FieldAt;
 use crate::field::frame::CartesianField;
 use crate::map::multipole::{PARTS, magnitudes};
 use crate::map::multipole_fit::{Model, Samples};
@@ -15,106 +16,105 @@ use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::steel::Solved;
 
-pub use super::multipoles::MULTIPOLE_TOLERANCE;
-pub use super::vector_field::{FEWEST_NODES, MOST_NODES_UNASKED};
-
-/// What is asked for mag_manip.
+/// The options of mag_manip's files.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct MagManipRequest {
     /// File of the field on nodes.
     pub vector_field: Option<PathBuf>,
     /// Nodes along each axis; `None` for the most that the workspace has along one, but no more
-    /// than [`MOST_NODES_UNASKED`].
+    /// than `vector_field::MOST_DEFAULT_NODES`.
     pub nodes: Option<usize>,
     /// File of the multipole sources.
     pub multipoles: Option<PathBuf>,
-    /// Tolerance of the multipoles; `None` for [`MULTIPOLE_TOLERANCE`].
+    /// Tolerance of the multipoles; `None` for `multipoles::MULTIPOLE_TOLERANCE`.
     pub tolerance: Option<f64>,
 }
 
-/// The field on nodes, and what is known of it.
-#[derive(Debug, Clone)]
-pub struct VectorFieldMade {
-    /// File.
-    pub path: PathBuf,
+/// The field on nodes and its error, as `map` reports it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VectorFieldSummary {
+    /// File as given.
+    pub file: String,
     /// Nodes along each axis.
     pub nodes: usize,
-    /// First and last node along x, y and z, m.
-    pub ends_m: [[f64; 2]; 3],
     /// Steps along x, y and z, m.
-    pub steps_m: [f64; 3],
+    pub step_m: [f64; 3],
     /// Places at which the interpolation was compared.
     pub checks: usize,
+    /// Relative to the largest |B| at the height.
+    pub field_error: f64,
+    /// Relative to the largest |grad B| at the height.
+    pub gradient_error: f64,
+}
+
+/// Multipole sources and their error, as `map` reports them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MultipolesSummary {
+    /// File as given.
+    pub file: String,
+    /// Sources of one coil, the most of all.
+    pub sources: usize,
+    /// Coefficients of one coil, the most of all.
+    pub coefficients: usize,
+    /// The largest condition of a fit.
+    pub condition: f64,
+    /// Points of the fit.
+    pub points: usize,
+    /// Points of the comparison.
+    pub checks: usize,
+    /// Relative to the largest |B| at the height.
+    pub field_error: f64,
+    /// Relative to the largest |grad B| at the height.
+    pub gradient_error: f64,
+    /// The requested tolerance.
+    pub tolerance: f64,
+    /// Whether both errors are within it.
+    pub tolerance_met: bool,
+}
+
+/// The field on nodes.
+#[derive(Debug, Clone)]
+pub(super) struct VectorFieldMade {
+    pub(super) path: PathBuf,
+    pub(super) summary: VectorFieldSummary,
+    /// First and last node along x, y and z, m.
+    pub(super) ends_m: [[f64; 2]; 3],
     /// T/A, [coil, z, y, x, 3].
-    pub field_t_per_a: Vec<f64>,
+    pub(super) field_t_per_a: Vec<f64>,
     /// Of field and gradient.
-    pub accuracy: [StageAccuracy; 2],
+    pub(super) accuracy: [StageAccuracy; 2],
 }
 
 impl VectorFieldMade {
     /// As it is written.
-    #[must_use]
-    pub fn content<'a>(&'a self, name: &'a str) -> VectorField<'a> {
+    pub(super) fn content<'a>(&'a self, name: &'a str) -> VectorField<'a> {
         VectorField {
             name,
             ends_m: self.ends_m,
-            nodes: self.nodes,
+            nodes: self.summary.nodes,
             field_t_per_a: &self.field_t_per_a,
         }
     }
 }
 
-/// Multipole sources, and what is known of them.
+/// Multipole sources.
 #[derive(Debug, Clone)]
-pub struct MultipolesMade {
-    /// File.
-    pub path: PathBuf,
+pub(super) struct MultipolesMade {
+    pub(super) path: PathBuf,
+    pub(super) summary: MultipolesSummary,
     /// Coil by coil: the model and the coil's place in it.
-    pub coils: Vec<(usize, usize)>,
-    /// The models: one for all coils among coupled cores, one a coil otherwise.
-    pub models: Vec<Model>,
+    pub(super) coils: Vec<(usize, usize)>,
+    /// The models: one for all coils among coupled cores, one per coil otherwise.
+    pub(super) models: Vec<Model>,
     /// From, to along x, y and z, m.
-    pub workspace_m: [[f64; 2]; 3],
-    /// Points fitted to.
-    pub points: usize,
-    /// Points compared at.
-    pub checks: usize,
-    /// The tolerance asked for.
-    pub tolerance: f64,
+    pub(super) workspace_m: [[f64; 2]; 3],
     /// Of field and gradient.
-    pub accuracy: [StageAccuracy; 2],
+    pub(super) accuracy: [StageAccuracy; 2],
 }
 
 impl MultipolesMade {
-    /// Whether both errors are within the tolerance.
-    #[must_use]
-    pub fn reached(&self) -> bool {
-        self.accuracy.iter().all(|a| a.estimate <= self.tolerance)
-    }
-
-    /// Sources of one coil, the most of all.
-    #[must_use]
-    pub fn sources(&self) -> usize {
-        let counts = self.models.iter().map(|model| model.sources.len());
-        counts.max().unwrap_or(0)
-    }
-
-    /// Coefficients of one coil, the most of all.
-    #[must_use]
-    pub fn coefficients(&self) -> usize {
-        let counts = self.models.iter().flat_map(|model| &model.coefficients);
-        counts.map(Vec::len).max().unwrap_or(0)
-    }
-
-    /// The largest condition of a fit.
-    #[must_use]
-    pub fn condition(&self) -> f64 {
-        (self.models.iter()).fold(1.0, |most, model| most.max(model.condition))
-    }
-
     /// As it is written.
-    #[must_use]
-    pub fn content<'a>(&'a self, name: &'a str) -> Multipoles<'a> {
+    pub(super) fn content<'a>(&'a self, name: &'a str) -> Multipoles<'a> {
         let coils = self.coils.iter().map(|(model, place)| {
             let model = &self.models[*model];
             let mut rest = model.coefficients[*place].as_slice();
@@ -140,7 +140,7 @@ impl MultipolesMade {
 /// Largest errors found at samples are raised by this: other places may be worse.
 pub(super) const SAFETY: f64 = 1.25;
 
-/// What errors of field and gradient are relative to.
+/// The accuracy of field and gradient from their largest errors at samples.
 pub(super) fn stages(errors: [f64; 2], own: f64, method: &str) -> [StageAccuracy; 2] {
     let kinds = ["|B|", "|grad B|"];
     std::array::from_fn(|k| StageAccuracy {
@@ -161,7 +161,7 @@ pub(super) fn direct(
     points_m: Vec<[f64; 3]>,
     progress: &dyn Progress,
 ) -> Result<Samples, RunError> {
-    let places = Places::new(scene, solved, &points_m, 0.0)?;
+    let places = FieldAt::new(scene, solved, &points_m, 0.0)?;
     progress.begin("samples", points_m.len() as u64);
     let portions = (points_m.par_chunks(PORTION).enumerate())
         .map(|(portion, points)| {

@@ -3,6 +3,7 @@
 pub(crate) mod command;
 pub mod mag_manip;
 mod multipoles;
+mod text;
 mod vector_field;
 
 use std::borrow::Cow;
@@ -11,10 +12,14 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use self::mag_manip::{MULTIPOLE_TOLERANCE, MagManipRequest, MultipolesMade, VectorFieldMade};
+use self::mag_manip::{
+    MagManipRequest, MultipolesMade, MultipolesSummary, VectorFieldMade, VectorFieldSummary,
+};
+pub use self::multipoles::MULTIPOLE_TOLERANCE;
 use crate::RunError;
-use crate::accuracy::missed;
+use crate::accuracy::{StageAccuracy, missed};
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, Options, SCHEMA_VERSION, UNITS};
+use crate::bundle::json::displayed;
 use crate::bundle::manifest::{
     AxisSummary, Interpolation, MapSidecar, MapSummary, WorkingPointMap,
 };
@@ -26,19 +31,16 @@ use crate::map::tabulate::Grid;
 use crate::map::{Components, FieldMap, InterpolationError};
 use crate::progress::Progress;
 use crate::scene::Scene;
-use crate::scene::maps::{Felt, SceneMap};
-use crate::scene::steel;
+use crate::scene::maps::{MagnetMean, SceneMap};
+use crate::scene::steel::{self, Solved};
 use crate::scene::working_point::{WorkingPoint, relative_difference, superposition_ends};
 
-/// Default tolerance of a map, relative to the largest |grad B| at each height.
-pub const MAP_TOLERANCE: f64 = 1e-9;
-
-/// What is asked.
+/// The options of `map`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MapRequest {
-    /// What the map holds.
+    /// The components of the map.
     pub components: Components,
-    /// Tolerance; `None` for [`MAP_TOLERANCE`].
+    /// Tolerance; `None` for the default.
     pub tolerance: Option<f64>,
     /// Currents of the working point, A, one a coil; `None` for the rated ones. Without a B-H
     /// curve there is no working point.
@@ -57,8 +59,8 @@ impl MapRequest {
     /// As the record states them: what they change in the map's files.
     fn made_with(&self) -> Options {
         #[derive(Serialize)]
-        struct Asked<'a> {
-            components: &'static str,
+        struct Recorded<'a> {
+            components: Components,
             tolerance: Option<f64>,
             currents_a: Option<&'a [f64]>,
             vfield_nodes: Option<usize>,
@@ -79,8 +81,8 @@ impl MapRequest {
             multipoles: _,
             tolerance: mpem_tolerance,
         } = mag_manip;
-        Options::of(&Asked {
-            components: components_name(*components),
+        Options::of(&Recorded {
+            components: *components,
             tolerance: *tolerance,
             currents_a: currents_a.as_deref(),
             vfield_nodes: *nodes,
@@ -89,13 +91,18 @@ impl MapRequest {
     }
 }
 
-/// What was made.
-#[derive(Debug, Clone)]
+/// The maps of a design. Serialised it is the JSON result.
+#[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
 pub struct MapReport {
     /// `map.json` as written.
+    #[serde(flatten)]
     pub sidecar: MapSidecar,
+    /// The components of the map.
+    #[serde(skip)]
+    pub components: Components,
     /// Folder of the files.
+    #[serde(serialize_with = "displayed")]
     pub folder: PathBuf,
     /// Nodes times coils.
     pub point_coils: usize,
@@ -104,17 +111,37 @@ pub struct MapReport {
     /// Whether radial tables replaced direct sums.
     pub tabulated: bool,
     /// The compact form of a coupled array's steel, where there is one.
-    pub table: Option<TableReport>,
-    /// The field on nodes for mag_manip, where asked for.
-    pub vector_field: Option<VectorFieldMade>,
-    /// The multipole sources for mag_manip, where asked for.
-    pub multipoles: Option<MultipolesMade>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub table: Option<CompactSteel>,
+    /// The field on nodes for mag_manip, where requested.
+    #[serde(rename = "vfield", skip_serializing_if = "Option::is_none")]
+    pub vector_field: Option<VectorFieldSummary>,
+    /// The multipole sources for mag_manip, where requested.
+    #[serde(rename = "mpem", skip_serializing_if = "Option::is_none")]
+    pub multipoles: Option<MultipolesSummary>,
     /// Warnings for the user.
+    #[serde(skip)]
     pub warnings: Vec<String>,
-    /// Whether the tolerance asked for was reached.
-    pub accuracy_reached: bool,
-    /// What misses it.
+    /// The stages that miss the requested tolerance.
+    #[serde(skip)]
     pub accuracy_missed: Vec<String>,
+}
+
+/// The compact form that stands for the steel of a coupled array.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CompactSteel {
+    /// Its size and its error; without a lowest height places are sampled one by one.
+    #[serde(flatten)]
+    pub report: TableReport,
+    /// Memory of its coefficients.
+    pub bytes: u64,
+}
+
+impl From<TableReport> for CompactSteel {
+    fn from(report: TableReport) -> Self {
+        let bytes = (report.coefficients * size_of::<f64>()) as u64;
+        Self { report, bytes }
+    }
 }
 
 /// Largest difference of `gz` from the sum of the coils' maps times their currents, relative to
@@ -147,111 +174,33 @@ pub fn run(
     request: &MapRequest,
     progress: &dyn Progress,
 ) -> Result<MapReport, RunError> {
-    let scene = Scene::new(design)?;
-    let asked = &request.mag_manip;
-    let besides = [&asked.vector_field, &asked.multipoles];
-    let besides: Vec<&Path> = besides
-        .into_iter()
-        .flatten()
-        .map(PathBuf::as_path)
-        .collect();
+    let scene = Scene::with_tolerance(design, request.tolerance)?;
+    let mag_manip = &request.mag_manip;
     let protected: Vec<PathBuf> = design
         .curve_file()
         .map(Path::to_path_buf)
         .into_iter()
         .collect();
+    // Refused before anything is computed.
     let made_with = request.made_with();
+    let beside = [&mag_manip.vector_field, &mag_manip.multipoles];
+    let beside: Vec<&Path> = beside.into_iter().flatten().map(PathBuf::as_path).collect();
     check_map_files(
         &request.out,
         request.force,
         (&inputs, &made_with),
         &protected,
         request.formats,
-        &besides,
+        &beside,
     )?;
-    let nodes = (asked.vector_field.as_ref())
-        .map(|path| Ok::<_, RunError>((path, vector_field::nodes(&scene, asked.nodes)?)))
-        .transpose()?;
-    let grid = workspace_grid(design);
-    let lowest_m = grid.z_m.first().copied().unwrap_or(0.0);
-    let lowest_m = (nodes.as_ref()).map_or(lowest_m, |(_, [_, _, z])| lowest_m.min(z.from));
-    progress.begin("steel", 1);
-    let solved = steel::solve(&scene, request.tolerance, MAP_TOLERANCE, lowest_m)?;
-    progress.end();
-    let made = SceneMap::new(
-        &scene,
-        &solved,
-        &scene.coils,
-        &grid,
-        request.components,
-        &Felt::field(),
-        progress,
-    )?;
-    let map = &made.map;
-    let mut summary = summary(map, request.components, made.between);
-    let mut accuracy = BTreeMap::from([("map".to_owned(), made.accuracy.clone())]);
-    let currents_a = request.currents_a.as_deref().unwrap_or(&scene.upper_a);
-    progress.begin("working point", 1);
-    let point = WorkingPoint::new(&scene, &solved, currents_a, request.tolerance, lowest_m)?;
-    let mut whole = None;
-    let mut warnings = scene
-        .core
-        .as_ref()
-        .map_or_else(Vec::new, |core| core.warnings.clone());
-    if let Some(point) = &point {
-        let gz = point.gz_t_per_m(&scene, &grid, progress)?;
-        let deviation_from_linear = deviation(&gz, map, currents_a);
-        accuracy.insert("working_point".to_owned(), point.accuracy());
-        warnings.extend(superposition_ends(
-            &scene,
-            deviation_from_linear,
-            &point.peak_field_t,
-            "the maps",
-        ));
-        summary.working_point = Some(WorkingPointMap {
-            array: WORKING_POINT.to_owned(),
-            currents_a: currents_a.to_vec(),
-            deviation_from_linear,
-            peak_field_t: point.peak_field_t.clone(),
-            mean_field_t: point.mean_field_t.clone(),
-        });
-        whole = Some(gz);
+    let made = Made::new(&scene, request, progress)?;
+    let map = &made.map.map;
+    let mut summary = summary(map, request.components, made.map.between);
+    let mut arrays = arrays(map, runtime(&scene, None));
+    if let Some(together) = &made.together {
+        summary.working_point = Some(together.summary.clone());
+        arrays.working_point_gz_t_per_m = Some(Cow::Borrowed(&together.gz_t_per_m));
     }
-    progress.end();
-    progress.check()?;
-    let vector_field = nodes
-        .map(|(path, axes)| vector_field::make(&scene, &solved, path.clone(), axes, progress))
-        .transpose()?;
-    let multipoles = (asked.multipoles.as_ref())
-        .map(|path| {
-            let tolerance = asked.tolerance.unwrap_or(MULTIPOLE_TOLERANCE);
-            let own_error = made.accuracy.estimate;
-            multipoles::make(
-                &scene,
-                &solved,
-                path.clone(),
-                tolerance,
-                own_error,
-                progress,
-            )
-        })
-        .transpose()?;
-    let stages = [
-        (
-            ["vfield", "vfield_gradient"],
-            vector_field.as_ref().map(|v| &v.accuracy),
-        ),
-        (
-            ["mpem", "mpem_gradient"],
-            multipoles.as_ref().map(|m| &m.accuracy),
-        ),
-    ];
-    for (names, stages) in stages {
-        for (name, stage) in names.iter().zip(stages.into_iter().flatten()) {
-            accuracy.insert((*name).to_owned(), stage.clone());
-        }
-    }
-    progress.check()?;
     let sidecar = MapSidecar {
         schema_version: SCHEMA_VERSION.to_owned(),
         fluxform_version: FLUXFORM_VERSION.to_owned(),
@@ -262,52 +211,171 @@ pub fn run(
         array: scene.array_geometry(),
         magnet: scene.magnet_summary(),
         map: summary,
-        accuracy,
+        accuracy: made.accuracy(),
         files: Vec::new(),
     };
-    let runtime = runtime(&scene, None);
-    let mut arrays = arrays(map, runtime);
-    arrays.working_point_gz_t_per_m = whole.map(Cow::Owned);
     progress.begin("write", 1);
-    let nodes = vector_field
-        .as_ref()
-        .map(|v| (&v.path, v.content(&design.name)));
-    let sources = multipoles
-        .as_ref()
-        .map(|m| (&m.path, m.content(&design.name)));
-    let mut besides = Vec::new();
-    besides.extend(nodes.as_ref().map(|(path, content)| Beside {
+    let nodes = (made.vector_field.as_ref()).map(|v| (&v.path, v.content(&design.name)));
+    let sources = (made.multipoles.as_ref()).map(|m| (&m.path, m.content(&design.name)));
+    let nodes = nodes.as_ref().map(|(path, content)| Beside {
         path,
         content: BesideContent::VectorField(content),
-    }));
-    besides.extend(sources.as_ref().map(|(path, content)| Beside {
+    });
+    let sources = sources.as_ref().map(|(path, content)| Beside {
         path,
         content: BesideContent::Multipoles(content),
-    }));
+    });
+    let beside: Vec<Beside> = nodes.into_iter().chain(sources).collect();
     let sidecar = write_map_and(
         &request.out,
         request.force,
         &sidecar,
         &arrays,
         request.formats,
-        &besides,
+        &beside,
         &protected,
     )?;
     progress.end();
-    let accuracy_missed = missed(&sidecar.accuracy, solved.tolerance);
-    Ok(MapReport {
-        sidecar,
-        folder: request.out.clone(),
-        point_coils: map.gz_t_per_m_per_a.len(),
-        distinct_radii: map.distinct_radii,
-        tabulated: map.tabulated,
-        table: made.table,
-        vector_field,
-        multipoles,
-        warnings,
-        accuracy_reached: accuracy_missed.is_empty(),
-        accuracy_missed,
-    })
+    Ok(made.report(&scene, request, sidecar))
+}
+
+/// Everything that is computed for the files.
+struct Made {
+    solved: Solved,
+    map: SceneMap,
+    together: Option<Together>,
+    vector_field: Option<VectorFieldMade>,
+    multipoles: Option<MultipolesMade>,
+}
+
+impl Made {
+    fn new(scene: &Scene, request: &MapRequest, progress: &dyn Progress) -> Result<Self, RunError> {
+        let mag_manip = &request.mag_manip;
+        let nodes = (mag_manip.vector_field.as_ref())
+            .map(|path| Ok::<_, RunError>((path, vector_field::nodes(scene, mag_manip.nodes)?)))
+            .transpose()?;
+        // The steel is solved once, for the lowest of the workspace and of mag_manip's nodes.
+        let grid = workspace_grid(scene.design);
+        let lowest_m = grid.z_m.first().copied().unwrap_or(0.0);
+        let lowest_m = (nodes.as_ref()).map_or(lowest_m, |(_, [_, _, z])| lowest_m.min(z.from));
+        progress.begin("steel", 1);
+        let solved = steel::solve(scene, scene.tolerances.map, lowest_m)?;
+        progress.end();
+        let map = SceneMap::new(
+            scene,
+            &solved,
+            &scene.coils,
+            &grid,
+            request.components,
+            &MagnetMean::field(),
+            progress,
+        )?;
+        let tabulated = (&grid, &map.map, lowest_m);
+        let together = Together::new(scene, &solved, tabulated, request, progress)?;
+        progress.check()?;
+        let vector_field = nodes
+            .map(|(path, axes)| vector_field::make(scene, &solved, path.clone(), axes, progress))
+            .transpose()?;
+        let multipoles = (mag_manip.multipoles.as_ref())
+            .map(|path| {
+                let tolerance = mag_manip.tolerance.unwrap_or(MULTIPOLE_TOLERANCE);
+                let (path, own_error) = (path.clone(), map.accuracy.estimate);
+                multipoles::make(scene, &solved, path, tolerance, own_error, progress)
+            })
+            .transpose()?;
+        progress.check()?;
+        Ok(Self {
+            solved,
+            map,
+            together,
+            vector_field,
+            multipoles,
+        })
+    }
+
+    /// Each stage's estimated error.
+    fn accuracy(&self) -> BTreeMap<String, StageAccuracy> {
+        let mut accuracy = BTreeMap::from([("map".to_owned(), self.map.accuracy.clone())]);
+        let together = self.together.as_ref();
+        let stage = together.map(|t| ("working_point".to_owned(), t.accuracy.clone()));
+        accuracy.extend(stage);
+        let vfield = self.vector_field.as_ref().map(|made| &made.accuracy);
+        let mpem = self.multipoles.as_ref().map(|made| &made.accuracy);
+        for (names, stages) in [
+            (["vfield", "vfield_gradient"], vfield),
+            (["mpem", "mpem_gradient"], mpem),
+        ] {
+            let stages = stages.into_iter().flatten().cloned();
+            accuracy.extend(names.map(str::to_owned).into_iter().zip(stages));
+        }
+        accuracy
+    }
+
+    fn report(self, scene: &Scene, request: &MapRequest, sidecar: MapSidecar) -> MapReport {
+        let core = scene.core.as_ref();
+        let mut warnings = core.map_or_else(Vec::new, |core| core.warnings.clone());
+        warnings.extend(self.together.and_then(|together| together.warning));
+        MapReport {
+            accuracy_missed: missed(&sidecar.accuracy, self.solved.tolerance),
+            sidecar,
+            components: request.components,
+            folder: request.out.clone(),
+            point_coils: self.map.map.gz_t_per_m_per_a.len(),
+            distinct_radii: self.map.map.distinct_radii,
+            tabulated: self.map.map.tabulated,
+            table: self.map.table.map(CompactSteel::from),
+            vector_field: self.vector_field.map(|made| made.summary),
+            multipoles: self.multipoles.map(|made| made.summary),
+            warnings,
+        }
+    }
+}
+
+/// The map of all coils together at given currents, their steel along its B-H curve.
+struct Together {
+    summary: WorkingPointMap,
+    gz_t_per_m: Vec<f64>,
+    accuracy: StageAccuracy,
+    /// Where the sum of the coils' maps is too far off.
+    warning: Option<String>,
+}
+
+impl Together {
+    /// `None` without a B-H curve. The grid comes with its map and the lowest height that the steel
+    /// was solved for.
+    fn new(
+        scene: &Scene,
+        solved: &Solved,
+        (grid, map, lowest_m): (&Grid, &FieldMap, f64),
+        request: &MapRequest,
+        progress: &dyn Progress,
+    ) -> Result<Option<Self>, RunError> {
+        let currents_a = request.currents_a.as_deref().unwrap_or(&scene.upper_a);
+        progress.begin("working point", 1);
+        let point = WorkingPoint::new(scene, solved, currents_a, lowest_m)?;
+        let Some(point) = point else {
+            progress.end();
+            return Ok(None);
+        };
+        let gz_t_per_m = point.gz_t_per_m(scene, grid, progress)?;
+        progress.end();
+        let deviation_from_linear = deviation(&gz_t_per_m, map, currents_a);
+        let peak_field_t = &point.peak_field_t;
+        let warning = superposition_ends(scene, deviation_from_linear, peak_field_t, "the maps");
+        let accuracy = point.accuracy();
+        Ok(Some(Self {
+            gz_t_per_m,
+            accuracy,
+            warning,
+            summary: WorkingPointMap {
+                array: WORKING_POINT.to_owned(),
+                currents_a: currents_a.to_vec(),
+                deviation_from_linear,
+                peak_field_t: point.peak_field_t,
+                mean_field_t: point.mean_field_t,
+            },
+        }))
+    }
 }
 
 /// The nodes of the design's workspace.
@@ -320,16 +388,7 @@ pub(crate) fn workspace_grid(design: &Design) -> Grid {
     }
 }
 
-/// How artefacts and the command line call the components.
-pub(crate) fn components_name(components: Components) -> &'static str {
-    match components {
-        Components::Gz => "gz",
-        Components::Gradient => "gradient",
-        Components::All => "all",
-    }
-}
-
-/// The map's grid, coils and interpolation as artefacts tell them.
+/// The map's grid, coils and interpolation as artefacts state them.
 pub(crate) fn summary(
     map: &FieldMap,
     components: Components,
@@ -346,14 +405,14 @@ pub(crate) fn summary(
         y_m: AxisSummary::of_nodes(&map.y_m),
         z_m: AxisSummary::of_nodes(&map.z_m),
         coil: indices(map),
-        components: components_name(components).to_owned(),
+        components: components.name().to_owned(),
         interpolation: Interpolation::tricubic(between.largest, definition),
         passive_force: None,
         working_point: None,
     }
 }
 
-/// What a runtime needs besides the map.
+/// The numbers that a runtime needs beside the map.
 pub(crate) fn runtime(scene: &Scene, lambda_n_per_m: Option<f64>) -> Runtime {
     Runtime {
         moment_a_m2: scene.moment_a_m2,

@@ -1,14 +1,15 @@
 //! Multipole sources of a scene: the fewest of a ladder of layouts that meet a tolerance.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use super::mag_manip::{MultipolesMade, SAFETY, direct, largest, stages};
+use super::mag_manip::{MultipolesMade, MultipolesSummary, SAFETY, direct, largest, stages};
 use crate::RunError;
-use crate::map::multipole_fit::{ALONE, COUPLED, Kind, Model, sources, terms};
+use crate::accuracy::StageAccuracy;
+use crate::map::multipole_fit::{ALONE, COUPLED, Kind, Model, Samples, sources, terms};
 use crate::numerics::axis::Axis;
 use crate::progress::Progress;
 use crate::scene::Scene;
-use crate::scene::steel::{Solved, Steel};
+use crate::scene::steel::Solved;
 
 /// Default tolerance of the multipoles: of field and gradient, relative to the largest at each
 /// height.
@@ -63,7 +64,7 @@ pub(super) fn make(
     }
 
     let axes_m: Vec<[f64; 2]> = scene.coils.iter().map(|c| c.axis_m).collect();
-    let coupled = matches!(solved.steel, Steel::Coupled(_));
+    let coupled = solved.steel().coupled().is_some();
     // Coils with common sources: all of them, or each for itself.
     let every: Vec<usize> = (0..axes_m.len()).collect();
     let groups: Vec<&[usize]> = if coupled {
@@ -71,34 +72,22 @@ pub(super) fn make(
     } else {
         every.chunks(1).collect()
     };
+    let placing = Placing {
+        axes_m: &axes_m,
+        top_m,
+        outer_radius_m: scene.winding.outer_radius_m,
+    };
     let ladder: &[&[Kind]] = if coupled { &COUPLED } else { &ALONE };
     progress.begin("multipoles", (ladder.len() * groups.len()) as u64);
-    let mut best: Option<([f64; 2], Vec<Model>)> = None;
-    for kinds in ladder {
-        let mut errors = [0.0_f64; 2];
-        let mut models = Vec::new();
-        for coils in &groups {
-            progress.check()?;
-            let own: Vec<[f64; 2]> = coils.iter().map(|coil| axes_m[*coil]).collect();
-            let placed = sources(kinds, &own, top_m, scene.winding.outer_radius_m);
-            if best.is_some() && terms(&placed) > MOST_TERMS {
-                break;
-            }
-            let model = Model::fit(placed, &samples, coils);
-            let off = model.largest_errors(&checks, coils);
-            errors = std::array::from_fn(|k| errors[k].max(off[k]));
-            models.push(model);
-            progress.advance(1);
-        }
-        let worst = |errors: &[f64; 2]| errors[0].max(errors[1]);
-        let better = (best.as_ref()).is_none_or(|(least, _)| worst(&errors) < worst(least));
-        if models.len() == groups.len() && better {
-            best = Some((errors, models));
-        }
-        if (best.as_ref()).is_some_and(|(e, _)| SAFETY * worst(e) + own_error <= tolerance) {
-            break;
-        }
-    }
+    let enough = |errors: &[f64; 2]| SAFETY * worst(errors) + own_error <= tolerance;
+    let best = best_layout(
+        ladder,
+        &groups,
+        &placing,
+        [&samples, &checks],
+        enough,
+        progress,
+    )?;
     progress.end();
     let (errors, models) = best.unwrap_or_default();
     let coils = if coupled {
@@ -111,16 +100,92 @@ pub(super) fn make(
          not see, of every coil; and the direct values' own error",
         checks.points_m.len()
     );
+    let counts = [samples.points_m.len(), checks.points_m.len()];
+    let accuracy = stages(errors, own_error, &method);
     Ok(MultipolesMade {
+        summary: summary(&path, &models, counts, tolerance, &accuracy),
         path,
         coils,
         models,
         workspace_m: axes.map(|axis| [axis.from, axis.to]),
-        points: samples.points_m.len(),
-        checks: checks.points_m.len(),
-        tolerance,
-        accuracy: stages(errors, own_error, &method),
+        accuracy,
     })
+}
+
+/// The figures of the fit; `counts` are of the points of fit and comparison.
+fn summary(
+    path: &Path,
+    models: &[Model],
+    [points, checks]: [usize; 2],
+    tolerance: f64,
+    accuracy: &[StageAccuracy; 2],
+) -> MultipolesSummary {
+    let orders = models.iter().flat_map(|model| &model.coefficients);
+    MultipolesSummary {
+        file: path.display().to_string(),
+        sources: models.iter().map(|m| m.sources.len()).max().unwrap_or(0),
+        coefficients: orders.map(Vec::len).max().unwrap_or(0),
+        condition: models.iter().fold(1.0, |most, m| most.max(m.condition)),
+        points,
+        checks,
+        field_error: accuracy[0].estimate,
+        gradient_error: accuracy[1].estimate,
+        tolerance,
+        tolerance_met: accuracy.iter().all(|stage| stage.estimate <= tolerance),
+    }
+}
+
+/// Where sources can be placed.
+struct Placing<'a> {
+    axes_m: &'a [[f64; 2]],
+    top_m: f64,
+    outer_radius_m: f64,
+}
+
+/// The larger of two errors.
+fn worst(errors: &[f64; 2]) -> f64 {
+    errors[0].max(errors[1])
+}
+
+/// Errors of field and gradient, and one model for each group of coils.
+type Layout = ([f64; 2], Vec<Model>);
+
+/// The first layout of the ladder whose errors are `enough`, or the one with the least errors.
+/// `groups` are coils with common sources; `samples` are for the fit and for the comparison.
+fn best_layout(
+    ladder: &[&[Kind]],
+    groups: &[&[usize]],
+    placing: &Placing,
+    [samples, checks]: [&Samples; 2],
+    enough: impl Fn(&[f64; 2]) -> bool,
+    progress: &dyn Progress,
+) -> Result<Option<Layout>, RunError> {
+    let mut best: Option<Layout> = None;
+    for kinds in ladder {
+        let mut errors = [0.0_f64; 2];
+        let mut models = Vec::new();
+        for coils in groups {
+            progress.check()?;
+            let own: Vec<[f64; 2]> = coils.iter().map(|coil| placing.axes_m[*coil]).collect();
+            let placed = sources(kinds, &own, placing.top_m, placing.outer_radius_m);
+            if best.is_some() && terms(&placed) > MOST_TERMS {
+                break;
+            }
+            let model = Model::fit(placed, samples, coils);
+            let off = model.largest_errors(checks, coils);
+            errors = std::array::from_fn(|k| errors[k].max(off[k]));
+            models.push(model);
+            progress.advance(1);
+        }
+        let better = (best.as_ref()).is_none_or(|(least, _)| worst(&errors) < worst(least));
+        if models.len() == groups.len() && better {
+            best = Some((errors, models));
+        }
+        if (best.as_ref()).is_some_and(|(errors, _)| enough(errors)) {
+            break;
+        }
+    }
+    Ok(best)
 }
 
 /// Planes of samples: close where the field varies most, at the bottom, and denser to the ends.

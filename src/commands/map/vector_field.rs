@@ -2,23 +2,24 @@
 
 use std::path::PathBuf;
 
-use super::mag_manip::{SAFETY, VectorFieldMade, direct, largest, stages};
+use super::mag_manip::{SAFETY, VectorFieldMade, VectorFieldSummary, direct, largest, stages};
 use crate::RunError;
 use crate::map::Components;
 use crate::map::catmull_rom::{AxisPosition, Nodes, Stencil, stencil};
 use crate::map::multipole::{PARTS, magnitudes};
+use crate::map::multipole_fit::Samples;
 use crate::map::tabulate::Grid;
 use crate::numerics::axis::Axis;
 use crate::progress::Progress;
 use crate::scene::Scene;
-use crate::scene::maps::{Felt, SceneMap};
+use crate::scene::maps::{MagnetMean, SceneMap};
 use crate::scene::steel::Solved;
 
 /// Fewest nodes along each axis.
 pub const FEWEST_NODES: usize = 6;
-/// Most nodes along each axis unless more are asked for: mag_manip takes minutes and gigabytes to
+/// Most nodes along each axis by default: mag_manip takes minutes and gigabytes to
 /// read millions of vectors.
-pub const MOST_NODES_UNASKED: usize = 31;
+pub const MOST_DEFAULT_NODES: usize = 31;
 
 /// Cells looked at along x and along y.
 const CELLS: usize = 16;
@@ -33,12 +34,12 @@ const PARTS_OF_CELL: [f64; 3] = [0.0, 0.25, 0.5];
 ///
 /// # Errors
 /// A workspace without extent along an axis.
-pub(super) fn nodes(scene: &Scene, asked: Option<usize>) -> Result<[Axis; 3], RunError> {
+pub(super) fn nodes(scene: &Scene, requested: Option<usize>) -> Result<[Axis; 3], RunError> {
     let workspace = &scene.design.workspace;
     let axes = [workspace.x_m, workspace.y_m, workspace.z_m];
     let top_m = scene.core.as_ref().map_or(0.0, |c| c.shape.top_m.max(0.0));
     let most = axes.iter().map(|axis| axis.samples).max().unwrap_or(0);
-    let count = asked.unwrap_or(most.clamp(FEWEST_NODES, MOST_NODES_UNASKED));
+    let count = requested.unwrap_or(most.clamp(FEWEST_NODES, MOST_DEFAULT_NODES));
     for (name, axis) in ["x", "y", "z"].iter().zip(&axes) {
         if axis.to <= axis.from {
             return Err(RunError::Input(format!(
@@ -80,7 +81,7 @@ pub(super) fn make(
         y_m: y.nodes(),
         z_m: z.nodes(),
     };
-    let felt = Felt::field();
+    let felt = MagnetMean::field();
     let all = Components::All;
     let made = SceneMap::new(scene, solved, &scene.coils, &grid, all, &felt, progress)?;
     let field_t_per_a = made.map.field_t_per_a.unwrap_or_default();
@@ -94,6 +95,42 @@ pub(super) fn make(
     let points_m = places.iter().map(at).collect();
     let samples = direct(scene, solved, points_m, progress)?;
     let heights = largest(&samples);
+    let errors = interpolation_errors(&field_t_per_a, count, steps_m, &places, &samples, &heights);
+    let method = format!(
+        "{SAFETY} times the largest difference of mag_manip's default interpolation (cubic, \
+         central slopes) from direct values at {} places on nodes, in the middles of cells and \
+         half way between, in the lowest layers and the highest, of every coil; and the nodes' own \
+         error",
+        samples.points_m.len()
+    );
+    let accuracy = stages(errors, made.accuracy.estimate, &method);
+    let [field_error, gradient_error] = [0, 1].map(|k: usize| accuracy[k].estimate);
+    Ok(VectorFieldMade {
+        summary: VectorFieldSummary {
+            file: path.display().to_string(),
+            nodes: count,
+            step_m: steps_m,
+            checks: samples.points_m.len(),
+            field_error,
+            gradient_error,
+        },
+        path,
+        ends_m: axes.map(|axis| [axis.from, axis.to]),
+        field_t_per_a,
+        accuracy,
+    })
+}
+
+/// Largest errors of field and gradient that mag_manip's interpolation makes of the nodes, relative
+/// to the largest at the height.
+fn interpolation_errors(
+    field_t_per_a: &[f64],
+    count: usize,
+    steps_m: [f64; 3],
+    places: &[[AxisPosition; 3]],
+    samples: &Samples,
+    heights: &[(f64, [f64; 2])],
+) -> [f64; 2] {
     let mut errors = [0.0_f64; 2];
     let whole = 3 * count * count * count;
     for (values, parts) in field_t_per_a.chunks_exact(whole).zip(&samples.parts) {
@@ -117,22 +154,7 @@ pub(super) fn make(
             }
         }
     }
-    let method = format!(
-        "{SAFETY} times the largest difference of mag_manip's default interpolation (cubic, \
-         central slopes) from direct values at {} places on nodes, in the middles of cells and \
-         half way between, in the lowest layers and the highest, of every coil; and the nodes' own \
-         error",
-        samples.points_m.len()
-    );
-    Ok(VectorFieldMade {
-        path,
-        nodes: count,
-        ends_m: axes.map(|axis| [axis.from, axis.to]),
-        steps_m,
-        checks: samples.points_m.len(),
-        field_t_per_a,
-        accuracy: stages(errors, made.accuracy.estimate, &method),
-    })
+    errors
 }
 
 /// Cells that are looked at along an axis of the nodes: those within the workspace, at most so

@@ -14,7 +14,7 @@ use crate::cli::documents::{self, DesignDocument};
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
 use crate::cli::pictures::Picture;
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::{accuracy_check, begin};
 use crate::cli::values::FileArgument;
 use crate::design::Need;
@@ -47,7 +47,7 @@ pub struct Optimize {
     /// coil nearest to the centre, where the design couples them
     #[arg(long)]
     neighbours: bool,
-    /// Local searches for every wire, besides that from the design's own coil
+    /// Local searches for every wire, in addition to that from the design's own coil
     #[arg(long, value_name = "N", default_value_t = 24, value_parser = starts)]
     starts: usize,
     /// Where the sequence of starting points begins
@@ -71,7 +71,7 @@ pub struct Optimize {
     tolerance: Tolerance,
 }
 
-/// A dimension that is kept.
+/// A dimension that keeps the design's value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Key {
     /// The bore
@@ -139,13 +139,13 @@ impl Optimize {
         };
         let result = optimize(&source, inputs, &self.request(), &bar)?;
         drop(bar);
-        for note in &result.notes {
-            printer.warning(note);
+        for warning in &result.warnings {
+            printer.warning(warning);
         }
         let mut place = self.write(&result, &mark, &overwrite, printer)?;
         if let Some(page) = &page {
             let after = page.write(&result.inputs, &page::html(&result), printer)?;
-            if after == Place::Error {
+            if after == Stream::Error {
                 place = after;
             }
         }
@@ -177,7 +177,7 @@ impl Optimize {
         }
     }
 
-    /// What tells a design that was made of this one from any other file.
+    /// The line by which a design that was made of this one is known from any other file.
     fn mark(&self, document: &DesignDocument) -> String {
         format!(
             "# Made of {} (sha256 {}) by `fluxform optimize`.",
@@ -186,27 +186,27 @@ impl Optimize {
         )
     }
 
-    /// Writes the best coil's design where it was asked for; tells where the summary goes.
+    /// Writes the best coil's design where it was requested; returns where the summary goes.
     fn write(
         &self,
         result: &Optimization,
         mark: &str,
         overwrite: &Overwrite,
         printer: &Printer,
-    ) -> Result<Place, Failure> {
+    ) -> Result<Stream, Failure> {
         let (Some(out), Some(text)) = (&self.out, &result.design_text) else {
-            return Ok(Place::Output);
+            return Ok(Stream::Output);
         };
         let text = format!("{mark}\n{text}");
         match out {
             FileArgument::Standard => {
                 printer.data(|out| out.write_all(text.as_bytes()))?;
-                Ok(Place::Error)
+                Ok(Stream::Error)
             }
             FileArgument::Path(path) => {
                 write(path, overwrite, |out| out.write_all(text.as_bytes()))
                     .map_err(RunError::from)?;
-                Ok(Place::Output)
+                Ok(Stream::Output)
             }
         }
     }

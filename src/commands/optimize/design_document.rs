@@ -6,9 +6,9 @@
 use std::path::Path;
 
 use crate::RunError;
-use crate::coil::limits::LimitCheck;
+use crate::coil::limits::{LimitCheck, LimitName, by_key};
 use crate::coil::optimum::problem::Regime;
-use crate::coil::optimum::{Fixed, Strand, Window};
+use crate::coil::optimum::{BestCoil, Fixed};
 use crate::design::template::Template;
 use crate::design::{Design, Need, Severity};
 use crate::scene::Scene;
@@ -39,17 +39,6 @@ pub struct Document<'a> {
     pub path: &'a Path,
 }
 
-/// A coil that was found.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Chosen {
-    pub strand: Strand,
-    pub window: Window,
-    /// Layers and turns a layer, where they are whole.
-    pub whole: Option<[u64; 2]>,
-    pub regime: Regime,
-    pub fixed: Fixed,
-}
-
 /// The coil as a design.
 pub(super) struct WrittenDesign {
     pub text: String,
@@ -71,9 +60,9 @@ struct Sizes {
 }
 
 impl Sizes {
-    fn new(chosen: &Chosen, design: &Design) -> Self {
+    fn new(best: &BestCoil, design: &Design) -> Self {
         let limits = &design.limits;
-        let window = &chosen.window;
+        let window = &best.window;
         let least = limits.inner_diameter_min_m.map_or(0.0, mm);
         let most = |limit: Option<f64>| limit.map_or(f64::INFINITY, mm);
         let (outer_max, length_max) =
@@ -87,25 +76,24 @@ impl Sizes {
             outer,
             length: mm(window.length_m).min(length_max),
         };
-        let Some([layers, turns]) = chosen.whole else {
+        let Some(whole) = best.whole else {
             return sizes;
         };
-        let wire = mm(chosen.strand.diameter_m);
-        let build = 2.0 * layers as f64 * wire;
+        let wire = mm(best.strand.diameter_m);
+        let build = 2.0 * whole.layers as f64 * wire;
         if inner + build > outer_max {
             inner = (outer_max - build).max(floor);
         }
         Self {
             inner,
             outer: rounded(inner + build),
-            length: rounded(turns as f64 * wire).min(length_max),
+            length: rounded(whole.turns_per_layer as f64 * wire).min(length_max),
         }
     }
 
     /// Less wire by the relative amount `by`.
-    fn shrink(&mut self, by: f64, chosen: &Chosen) {
-        let fixed = &chosen.fixed;
-        if chosen.whole.is_some() {
+    fn shrink(&mut self, by: f64, best: &BestCoil, fixed: &Fixed) {
+        if best.whole.is_some() {
             let step = by * self.outer;
             if fixed.inner_diameter_m.is_none() && self.inner > step {
                 self.inner -= step;
@@ -125,43 +113,44 @@ fn rounded(value_mm: f64) -> f64 {
     mm(value_mm * 1e-3)
 }
 
-/// The design with the coil `chosen`, and the coil evaluated.
+/// The design with the coil `best`, and the coil evaluated.
 ///
 /// # Errors
 /// A coil that cannot be computed.
 pub(super) fn write(
     document: &Document<'_>,
-    chosen: &Chosen,
+    best: &BestCoil,
+    fixed: &Fixed,
     tolerance: Option<f64>,
-) -> Result<(WrittenDesign, RatedFacts), RunError> {
-    let mut sizes = Sizes::new(chosen, document.design);
+) -> Result<(WrittenDesign, Rated), RunError> {
+    let mut sizes = Sizes::new(best, document.design);
     let mut attempt = 0;
     loop {
-        let written = text_of(document, chosen, &sizes)?;
-        let rated = RatedFacts::of(&written.design, tolerance)?;
-        let over = excess(&rated, chosen.regime);
+        let written = text_of(document, best, &sizes)?;
+        let rated = rated(&written.design, tolerance)?;
+        let over = excess(&rated, best.regime);
         if over == 0.0 || over.abs() > ROUNDING || attempt == ATTEMPTS {
             return Ok((written, rated));
         }
         // The limits' own slopes are of order one.
         let by = (over.abs() * 2f64.powi(attempt)).max(2.3e-16);
-        sizes.shrink(by.copysign(over), chosen);
+        sizes.shrink(by.copysign(over), best, fixed);
         attempt += 1;
     }
 }
 
 /// By how much limits on the amount of wire are exceeded, relatively; negative where the coil has
 /// too little of it.
-fn excess(rated: &RatedFacts, regime: Regime) -> f64 {
-    let geometry = ["outer_diameter_m", "inner_diameter_m", "length_m"];
+fn excess(rated: &Rated, regime: Regime) -> f64 {
     let mut most = 0.0;
-    for (name, LimitCheck { value, limit, met }) in &rated.limits {
-        if *met || geometry.contains(name) {
+    for (key, LimitCheck { value, limit, met }) in &rated.limits {
+        let of_wire = by_key(key).filter(|row| !row.name.is_dimension());
+        let Some(row) = of_wire.filter(|_| !met) else {
             continue;
-        }
+        };
         let over = value / limit - 1.0;
         // At a given voltage heat falls with the resistance.
-        let lacking = *name == "power_w" && regime == Regime::Supply;
+        let lacking = row.name == LimitName::Power && regime == Regime::Supply;
         let over = if lacking { -over } else { over };
         if f64::abs(over) > f64::abs(most) {
             most = over;
@@ -172,7 +161,7 @@ fn excess(rated: &RatedFacts, regime: Regime) -> f64 {
 
 fn text_of(
     document: &Document<'_>,
-    chosen: &Chosen,
+    best: &BestCoil,
     sizes: &Sizes,
 ) -> Result<WrittenDesign, RunError> {
     let design = document.design;
@@ -190,12 +179,12 @@ fn text_of(
         ("coil.outer_diameter_mm", number(sizes.outer)),
         ("coil.length_mm", number(sizes.length)),
     ];
-    if let Some([layers, turns]) = chosen.whole {
-        let turns = toml::Value::Integer((layers * turns) as i64);
+    if let Some(whole) = best.whole {
+        let turns = toml::Value::Integer((whole.layers * whole.turns_per_layer) as i64);
         settings.push(("coil.turns", turns));
     }
     if !design.wire.choices_m.is_empty() {
-        let strand = &chosen.strand;
+        let strand = &best.strand;
         settings.push(("wire.diameter_mm", number(mm(strand.diameter_m))));
         let conductor = number(mm(strand.conductor_diameter_m));
         settings.push(("wire.conductor_diameter_mm", conductor));
@@ -203,65 +192,22 @@ fn text_of(
     let text = template.with(settings).map_err(RunError::Input)?;
     let (design, _) = Design::from_toml(&text, document.path, NEED).map_err(|refused| {
         let faults = refused.faults.list().iter();
-        let told: Vec<String> = faults
+        let faults: Vec<String> = faults
             .filter(|fault| fault.severity == Severity::Error)
             .map(ToString::to_string)
             .collect();
         RunError::Input(format!(
             "the best coil makes no design of its own: {}",
-            told.join("; ")
+            faults.join("; ")
         ))
     })?;
     Ok(WrittenDesign { text, design })
 }
 
-/// A coil at its rated current as `evaluate` computes it.
-pub(super) struct RatedFacts {
-    pub size: super::SizeFacts,
-    pub turns: f64,
-    pub circuit: super::CircuitFacts,
-    pub current_a: f64,
-    pub gradient_t_per_m_per_a: f64,
-    /// Of the current alone, N.
-    pub force_n: f64,
-    pub passive_n: Option<f64>,
-    pub core_peak_field_t: Option<f64>,
-    pub limits: std::collections::BTreeMap<&'static str, LimitCheck>,
-    pub accuracy: std::collections::BTreeMap<&'static str, crate::accuracy::StageAccuracy>,
-    pub accuracy_reached: bool,
-    pub notes: Vec<String>,
-}
-
-impl RatedFacts {
-    pub(super) fn of(design: &Design, tolerance: Option<f64>) -> Result<Self, RunError> {
-        let scene = Scene::new(design)?;
-        let rated = Rated::new(&scene, tolerance)?;
-        let circuit = &rated.circuit;
-        Ok(Self {
-            size: super::SizeFacts {
-                inner_diameter_m: scene.coil.inner_diameter_m,
-                outer_diameter_m: scene.coil.outer_diameter_m,
-                length_m: scene.coil.length_m,
-            },
-            turns: circuit.turns,
-            circuit: super::CircuitFacts {
-                resistance_ohm: circuit.resistance_ohm,
-                inductance_h: circuit.inductance_h,
-                time_constant_s: circuit.time_constant_s(),
-                settling_s: circuit.settling_s(),
-                wire_length_m: circuit.wire_length_m,
-                mass_kg: rated.mass_kg,
-                power_w: rated.power_w,
-            },
-            current_a: rated.current_a,
-            gradient_t_per_m_per_a: rated.single.field.dbz_dz,
-            force_n: rated.force.force_n[2] - rated.force.passive_n.unwrap_or(0.0),
-            passive_n: rated.force.passive_n,
-            core_peak_field_t: rated.single.core.as_ref().map(|core| core.peak_field_t),
-            limits: rated.limits,
-            accuracy: rated.single.accuracy,
-            accuracy_reached: rated.accuracy_missed.is_empty(),
-            notes: rated.single.notes,
-        })
-    }
+/// The coil of `design` as `evaluate` computes it.
+///
+/// # Errors
+/// A coil that cannot be computed.
+pub(super) fn rated(design: &Design, tolerance: Option<f64>) -> Result<Rated, RunError> {
+    Rated::new(&Scene::with_tolerance(design, tolerance)?)
 }

@@ -3,7 +3,7 @@
 pub(crate) mod command;
 mod design_document;
 mod model;
-mod outcome_words;
+mod no_coil;
 pub mod page;
 mod result;
 mod text;
@@ -13,31 +13,26 @@ use std::collections::BTreeMap;
 pub use design_document::Document;
 pub use result::*;
 
-use self::design_document::{Chosen, RatedFacts};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::coil::circuit::Circuit;
+use crate::coil::limits::{LimitCheck, LimitName, by_key};
 use crate::coil::optimum::alternatives::alternatives;
 use crate::coil::optimum::neighbours::Neighbours;
-use crate::coil::optimum::problem::{LimitName, Regime};
-use crate::coil::optimum::task::Surroundings;
+use crate::coil::optimum::task::{self, Surroundings};
 use crate::coil::optimum::{
-    BestCoil, Certificate, Fixed, LimitUse, OptimumStatus, Settings, Window, near_optimal_bore,
-    optimise, optimise_wound, task,
+    BestCoil, Fixed, LimitUse, Outcome, Settings, Window, optimise, optimise_wound,
 };
 use crate::design::Design;
-use crate::field::winding::KERNEL_ERROR;
 use crate::progress::{Progress, Silent};
-use crate::scene::Scene;
-use crate::scene::steel::{self, Steel, coupled};
+use crate::scene::rated::Rated;
+use crate::scene::steel;
+use crate::scene::{Scene, coupled};
 
 /// How well the optimiser's force among neighbours agrees with a coupled solution: what the
 /// latter is solved to there.
 const NEIGHBOURS_AGREE: f64 = 1e-3;
-
-/// Most alternatives that are told.
-const ALTERNATIVES_MAX: usize = 20;
 
 /// A dimension that may be given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,7 +45,7 @@ pub enum Dimension {
     Length,
 }
 
-/// What is asked.
+/// The options of [`optimize`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct OptimizeRequest {
     /// Whole layers and turns.
@@ -66,7 +61,7 @@ pub struct OptimizeRequest {
     pub seed: u64,
     /// Boxes of coils that a certificate may take; 0 for none.
     pub cells: usize,
-    /// Whether valley and alternatives are wanted.
+    /// Whether valley and alternatives are computed.
     pub around: bool,
     /// Allowed error of the best coil's evaluation.
     pub tolerance: Option<f64>,
@@ -93,22 +88,6 @@ impl Default for OptimizeRequest {
     }
 }
 
-/// What either search found.
-struct Search {
-    status: OptimumStatus,
-    best: Option<BestCoil>,
-    whole: Option<[u64; 2]>,
-    /// The coil whose turns need not be whole.
-    continuous: Option<BestCoil>,
-    continuous_n: Option<f64>,
-    certificate: Certificate,
-    evaluations: usize,
-    starts: usize,
-    valley_m: Option<[f64; 2]>,
-    wires: Vec<WireFacts>,
-    alternatives: Vec<AlternativeFacts>,
-}
-
 /// The best coil within the limits of a design, evaluated as `evaluate` does.
 ///
 /// # Errors
@@ -121,153 +100,140 @@ pub fn optimize(
 ) -> Result<Optimization, RunError> {
     let design = document.design;
     let fixed = fixed(design, &request.fixed)?;
+    // Before the search, which takes long: a design whose own coil is at fault is found at once.
     let given = design
         .coil
-        .map(|_| RatedFacts::of(design, request.tolerance));
-    let search = search(design, fixed, request, progress)?;
+        .map(|_| design_document::rated(design, request.tolerance));
+    let outcome = search(design, fixed, request, progress)?;
     let mut result = Optimization {
         schema_version: SCHEMA_VERSION,
         fluxform_version: FLUXFORM_VERSION,
         design: design.name.clone(),
         inputs,
-        status: outcome_words::status(&search.status),
-        no_coil: outcome_words::no_coil(&search.status, request.wound),
+        status: outcome.status.ending(),
+        no_coil: no_coil::why(&outcome.status, request.wound),
         wound: request.wound,
-        fixed: outcome_words::fixed(&fixed, search.continuous.as_ref()),
+        fixed: sensitivities(
+            &fixed,
+            outcome.continuous.as_ref().or(outcome.best.as_ref()),
+        ),
         coil: None,
         objective: None,
         limits: BTreeMap::new(),
         bounds: BTreeMap::new(),
-        certificate: CertificateFacts {
-            kind: search.certificate.kind,
-            upper_bound_n: search.certificate.upper_bound_n,
-            gap: search.certificate.gap,
-            cells: search.certificate.cells,
-        },
-        evaluations: search.evaluations,
-        starts: search.starts,
+        certificate: outcome.certificate,
+        evaluations: outcome.evaluations,
+        starts: outcome.starts,
         seed: request.seed,
-        valley: search.valley_m.map(|inner_diameter_m| ValleyFacts {
-            force_share: near_optimal_bore::SHARE,
-            inner_diameter_m,
-        }),
-        wires: search.wires.clone(),
-        continuous_force_n: search.continuous_n.filter(|_| request.wound),
+        valley: outcome.valley,
+        wires: outcome.wires,
+        continuous_force_n: outcome.continuous_force_n,
         alternatives: Vec::new(),
         given: None,
         accuracy: BTreeMap::new(),
         accuracy_reached: true,
         design_text: None,
-        notes: Vec::new(),
+        warnings: Vec::new(),
     };
-    if let Some(best) = &search.best {
-        let chosen = Chosen {
-            strand: best.strand,
-            window: best.window,
-            whole: search.whole,
-            regime: best.regime,
-            fixed,
-        };
-        let (written, rated) = design_document::write(document, &chosen, request.tolerance)?;
-        result.take(&search, best, rated);
+    if let Some(best) = &outcome.best {
+        // The optimiser's numbers are left behind here: the coil is written as a design and
+        // evaluated as any other, so no number differs from what `evaluate` says of the file.
+        let (written, rated) = design_document::write(document, best, &fixed, request.tolerance)?;
+        result.alternatives = outcome.alternatives;
+        result.take(best, rated);
         if surroundings(design, request.neighbours) == Surroundings::Neighbours {
             result.among_neighbours(&written.design, best, request.tolerance)?;
         }
         result.design_text = Some(written.text);
-        result.notes.extend(too_wide(&written.design));
+        result.warnings.extend(too_wide(&written.design));
     }
-    result.take_given(design, given);
+    result.take_given(given);
     Ok(result)
 }
 
 impl Optimization {
     /// The best coil as it was evaluated.
-    fn take(&mut self, search: &Search, best: &BestCoil, rated: RatedFacts) {
-        let sensitivity = |name: &str| {
-            let source = search.continuous.as_ref().unwrap_or(best);
-            let found = source.limits.iter().find(|l| l.name.key() == name);
-            found.map_or(0.0, |used| used.sensitivity_n_per_unit)
-        };
-        let active = |name: &str| {
-            let found = best.limits.iter().find(|l| l.name.key() == name);
-            found.is_some_and(|used| used.active && !used.name.is_equality())
-        };
-        self.limits = rated
-            .limits
-            .iter()
-            .filter(|(name, _)| **name != "winding_fill")
-            .map(|(name, check)| {
-                let held = self.fixed.contains_key(name);
-                let facts = LimitFacts {
-                    value: check.value,
-                    limit: check.limit,
-                    met: check.met,
-                    active: active(name),
-                    sensitivity_n_per_unit: if held { 0.0 } else { sensitivity(name) },
-                };
-                (*name, facts)
-            })
-            .collect();
+    fn take(&mut self, best: &BestCoil, rated: Rated) {
+        self.take_limits(best, &rated.limits);
+        let force_n = rated.target.current_force_n();
+        // The bound is the optimiser's; what evaluate adds is rounding.
+        let bound_n = self.certificate.upper_bound_n;
+        let bound_n = bound_n.map(|bound| bound.max(force_n.abs()));
+        self.certificate.upper_bound_n = bound_n;
+        self.certificate.gap = bound_n.map(|bound| (bound / force_n.abs() - 1.0).max(0.0));
+        let sign = if force_n < 0.0 { -1.0 } else { 1.0 };
+        for other in &mut self.alternatives {
+            other.force_n *= sign;
+        }
+        self.coil = Some(BestCoilSummary {
+            size: rated.coil.size,
+            turns: rated.coil.turns,
+            whole: best.whole,
+            wire_diameter_m: best.strand.diameter_m,
+            conductor_diameter_m: best.strand.conductor_diameter_m,
+            circuit: rated.coil.circuit,
+            core_peak_field_t: rated.core.as_ref().map(|core| core.peak_field_t),
+        });
+        let target = &rated.target;
+        self.objective = Some(Objective {
+            force_n,
+            current_a: target.current_a,
+            current_set_by: best.regime,
+            gradient_t_per_m_per_a: target.gradient_t_per_m_per_a,
+            height_m: target.height_m,
+            alone_force_n: None,
+            passive_force_n: target.passive_force_n,
+        });
+        self.accuracy_reached = rated.accuracy_missed.is_empty();
+        self.accuracy = rated.accuracy;
+        self.agreement(best.force_n, force_n, "evaluate's");
+        self.warnings = rated.warnings;
+    }
+
+    /// The design's limits as `evaluate` checks them and what else bounds the coil, with what each
+    /// costs.
+    fn take_limits(&mut self, best: &BestCoil, checks: &BTreeMap<&'static str, LimitCheck>) {
+        let inequality = |used: &&LimitUse| !used.name.is_equality();
+        for (key, check) in checks {
+            let Some(row) = by_key(key).filter(|row| row.name != LimitName::WindingFill) else {
+                continue;
+            };
+            let known = best.limit(row.name).filter(inequality);
+            let LimitCheck { value, limit, met } = *check;
+            let used = LimitUse {
+                name: row.name,
+                value,
+                limit,
+                met,
+                active: known.is_some_and(|used| used.active),
+                // A dimension that is given cannot move to its limit.
+                sensitivity_n_per_unit: known
+                    .filter(|_| !self.fixed.contains_key(key))
+                    .map_or(0.0, |used| used.sensitivity_n_per_unit),
+            };
+            self.limits.insert(key, used);
+        }
         self.bounds = best
             .limits
             .iter()
-            .filter(|used| !self.limits.contains_key(used.name.key()) && !used.name.is_equality())
-            .map(|used| (used.name.key(), bound(used, sensitivity(used.name.key()))))
+            .filter(inequality)
+            .filter(|used| !self.limits.contains_key(used.name.key()))
+            .map(|used| (used.name.key(), *used))
             .collect();
-        let force_n = rated.force_n;
-        let sign = if force_n < 0.0 { -1.0 } else { 1.0 };
-        // The bound is the optimiser's; what evaluate adds is rounding.
-        self.certificate.upper_bound_n = self
-            .certificate
-            .upper_bound_n
-            .map(|bound| bound.max(force_n.abs()));
-        self.certificate.gap = self
-            .certificate
-            .upper_bound_n
-            .map(|bound| (bound / force_n.abs() - 1.0).max(0.0));
-        self.alternatives = search
-            .alternatives
-            .iter()
-            .cloned()
-            .map(|mut other| {
-                other.force_lost = 1.0 - other.force_n / best.force_n;
-                other.force_n *= sign;
-                other
-            })
-            .collect();
-        self.coil = Some(BestFacts {
-            size: rated.size,
-            turns: rated.turns,
-            layers: search.whole.map(|[layers, _]| layers),
-            turns_per_layer: search.whole.map(|[_, turns]| turns),
-            wire_diameter_m: best.strand.diameter_m,
-            conductor_diameter_m: best.strand.conductor_diameter_m,
-            circuit: rated.circuit,
-            core_peak_field_t: rated.core_peak_field_t,
-        });
-        self.objective = Some(ObjectiveFacts {
-            force_n,
-            current_a: rated.current_a,
-            current_set_by: match best.regime {
-                Regime::Driver => "driver",
-                Regime::Supply => "supply",
-            },
-            gradient_t_per_m_per_a: rated.gradient_t_per_m_per_a,
-            height_m: 0.0,
-            alone_force_n: None,
-            passive_force_n: rated.passive_n,
-        });
-        self.accuracy = rated.accuracy;
+    }
+
+    /// States how far the optimiser's force is from that of a better computation; returns it.
+    fn agreement(&mut self, optimiser_n: f64, force_n: f64, whose: &str) -> f64 {
+        let estimate = (optimiser_n / force_n.abs() - 1.0).abs();
         self.accuracy.insert(
             "optimiser",
             StageAccuracy {
-                estimate: (best.force_n / force_n.abs() - 1.0).abs(),
+                estimate,
                 relative_to: "the force".to_owned(),
-                method: "the optimiser's force against evaluate's at the best coil".to_owned(),
+                method: format!("the optimiser's force against {whose} at the best coil"),
             },
         );
-        self.accuracy_reached = rated.accuracy_reached;
-        self.notes = rated.notes;
+        estimate
     }
 
     /// Force and settling among the neighbours' cores, which `evaluate` leaves out, by a coupled
@@ -278,14 +244,14 @@ impl Optimization {
         best: &BestCoil,
         tolerance: Option<f64>,
     ) -> Result<(), RunError> {
-        let scene = Scene::new(design)?;
+        let scene = Scene::with_tolerance(design, tolerance)?;
         let Some(neighbours) = Neighbours::new(&design.array.positions_m) else {
             return Ok(());
         };
         let coil = neighbours.drive();
         let [x_m, y_m] = design.array.positions_m[coil];
         let height_m = design.target_height_m;
-        let solved = steel::solve(&scene, tolerance, KERNEL_ERROR, height_m)?;
+        let solved = steel::solve(&scene, scene.tolerances.field, height_m)?;
         let per_ampere = scene.forces_n_per_a(&solved, &[[x_m, y_m, height_m]], &Silent)?;
         let Some(objective) = &mut self.objective else {
             return Ok(());
@@ -294,75 +260,43 @@ impl Optimization {
         let force_n = per_ampere[coil] / scene.coils[coil].gain * objective.current_a;
         objective.alone_force_n = Some(objective.force_n);
         objective.force_n = force_n;
-        let off = (best.force_n / force_n.abs() - 1.0).abs();
-        self.accuracy.insert(
-            "optimiser",
-            StageAccuracy {
-                estimate: off,
-                relative_to: "the force".to_owned(),
-                method: "the optimiser's force against a coupled solution at the best coil"
-                    .to_owned(),
-            },
-        );
+        let off = self.agreement(best.force_n, force_n, "a coupled solution");
         if off > NEIGHBOURS_AGREE || !solved.reached() {
             self.accuracy_reached = false;
-            self.notes.push(format!(
+            self.warnings.push(format!(
                 "among the neighbours' cores the coupled solution gives {force_n:.6} N where the \
                  optimiser counted on {:.6} N: the best coil may be another",
                 best.force_n
             ));
         }
-        if let (Some(facts), Steel::Coupled(array)) = (
-            self.limits.get_mut(LimitName::Settling.key()),
-            &solved.steel,
-        ) {
+        if let Some(used) = self.limits.get_mut(LimitName::Settling.key()) {
+            let added_h = solved.steel().added_inductance_h(coil, coil);
             let circuit = Circuit {
-                inductance_h: scene.circuit.inductance_h + array.added_inductance_h[(coil, coil)],
+                inductance_h: scene.circuit.inductance_h + added_h,
                 ..scene.circuit
             };
-            facts.value = circuit.settling_s();
-            facts.met = facts.value <= facts.limit * (1.0 + NEIGHBOURS_AGREE);
+            used.value = circuit.settling_s();
+            used.met = used.value <= used.limit * (1.0 + NEIGHBOURS_AGREE);
         }
         Ok(())
     }
 
     /// The design's own coil, where it can be computed.
-    fn take_given(&mut self, design: &Design, given: Option<Result<RatedFacts, RunError>>) {
-        if let Some(objective) = &mut self.objective {
-            objective.height_m = design.target_height_m;
-        }
+    fn take_given(&mut self, given: Option<Result<Rated, RunError>>) {
         match given {
             Some(Ok(rated)) => {
-                self.given = Some(GivenFacts {
-                    size: rated.size,
-                    turns: rated.turns,
-                    circuit: rated.circuit,
-                    force_n: rated.force_n,
+                self.given = Some(GivenCoil {
+                    coil: rated.coil,
+                    force_n: rated.target.current_force_n(),
                     limits: rated.limits,
                 });
             }
-            Some(Err(error)) => self.notes.push(format!(
+            Some(Err(error)) => self.warnings.push(format!(
                 "the design's own coil cannot be computed and is left out of the comparison: \
                  {error}"
             )),
             None => {}
         }
-    }
-}
-
-fn bound(used: &LimitUse, sensitivity_n_per_unit: f64) -> LimitFacts {
-    let slack = 1e-9 * used.limit.abs();
-    let met = if used.name.is_lower() {
-        used.value >= used.limit - slack
-    } else {
-        used.value <= used.limit + slack
-    };
-    LimitFacts {
-        value: used.value,
-        limit: used.limit,
-        met,
-        active: used.active,
-        sensitivity_n_per_unit,
     }
 }
 
@@ -386,7 +320,7 @@ fn fixed(design: &Design, dimensions: &[Dimension]) -> Result<Fixed, RunError> {
     Ok(fixed)
 }
 
-/// What stands beside the coil: the neighbours' cores where they are asked for, are coupled and
+/// The coil's surroundings: the neighbours' cores where they are requested, are coupled and
 /// are there.
 fn surroundings(design: &Design, neighbours: bool) -> Surroundings {
     if neighbours && coupled(design) {
@@ -401,7 +335,7 @@ fn search(
     fixed: Fixed,
     request: &OptimizeRequest,
     progress: &dyn Progress,
-) -> Result<Search, RunError> {
+) -> Result<Outcome, RunError> {
     let refused = |error: task::NoTask| RunError::Input(error.to_string());
     let task = task::of_design(design, fixed).map_err(refused)?;
     let model = model::coil_model(
@@ -418,15 +352,31 @@ fn search(
         valley: request.around,
     };
     if request.wound {
-        let found = optimise_wound(model, &task, &settings, progress)?;
-        return Ok(outcome_words::wound(found));
+        return Ok(optimise_wound(model, &task, &settings, progress)?);
     }
-    let found = optimise(model, &task, &settings, progress)?;
-    let around = match &found.best {
-        Some(best) if request.around => alternatives(model, &task, best, progress)?,
-        _ => Vec::new(),
-    };
-    Ok(outcome_words::continuous(found, &around))
+    let mut outcome = optimise(model, &task, &settings, progress)?;
+    if let Some(best) = outcome.best.as_ref().filter(|_| request.around) {
+        outcome.alternatives = alternatives(model, &task, best, progress)?;
+    }
+    Ok(outcome)
+}
+
+/// Dimensions that were given, with the force that a metre more of each would add to `best`.
+fn sensitivities(fixed: &Fixed, best: Option<&BestCoil>) -> BTreeMap<&'static str, FixedDimension> {
+    let dimensions = [
+        (LimitName::FixedInner, fixed.inner_diameter_m),
+        (LimitName::FixedOuter, fixed.outer_diameter_m),
+        (LimitName::FixedLength, fixed.length_m),
+    ];
+    let given = dimensions.into_iter().filter_map(|(name, value)| {
+        let used = best.and_then(|best| best.limit(name));
+        let dimension = FixedDimension {
+            value: value?,
+            sensitivity_n_per_unit: used.map(|used| used.sensitivity_n_per_unit),
+        };
+        Some((name.key(), dimension))
+    });
+    given.collect()
 }
 
 /// A coil that is wider than the array's pitch fits nowhere.
@@ -441,7 +391,7 @@ fn too_wide(design: &Design) -> Option<String> {
     }
     (coil.outer_diameter_m > nearest * (1.0 + 1e-12)).then(|| {
         format!(
-            "the best coil is {:.6} mm wide, but the array's coils stand {:.6} mm apart: set \
+            "the best coil is {:.6} mm wide, but the array's coils are {:.6} mm apart: set \
              limits.outer_diameter_max_mm, or the array wider",
             coil.outer_diameter_m * 1e3,
             nearest * 1e3

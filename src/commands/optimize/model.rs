@@ -4,8 +4,8 @@ use crate::RunError;
 use crate::coil::optimum::CoilModel;
 use crate::coil::optimum::task::{self, Surroundings};
 use crate::design::Design;
-use crate::field::winding::KERNEL_ERROR;
-use crate::scene::{MAGNET_FINEST, MAGNET_SHARE, magnet_rule};
+use crate::scene::tolerances::Tolerances;
+use crate::scene::{MAGNET_SHARE, magnet_rule};
 
 /// The coil of `design` as a function of its winding's window.
 ///
@@ -20,13 +20,11 @@ pub(super) fn coil_model(
         .core
         .as_ref()
         .map_or(0.0, |core| core.above_m.max(0.0));
-    // As fine as the coil's own evaluation.
-    let tolerance = tolerance.unwrap_or(KERNEL_ERROR).max(MAGNET_FINEST);
     let magnet = magnet_rule(
         design,
         design.target_height_m,
         top_m,
-        MAGNET_SHARE * tolerance,
+        MAGNET_SHARE * Tolerances::of_optimum(tolerance),
     )?;
     task::coil_model_in(design, &magnet, surroundings)
         .map_err(|error| RunError::Input(error.to_string()))

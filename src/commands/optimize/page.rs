@@ -1,93 +1,271 @@
-//! The page of an optimisation.
+//! The page of an optimisation: the best coil, what holds it back, how sure it is.
 
-use super::result::{CircuitFacts, Optimization, SizeFacts};
-use crate::report::optimum::{ActiveLimit, Alternative, OptimumFacts, page};
+use serde_json::{Map, Value};
 
-/// What `optimize` tells as one HTML page.
+use super::result::{BestCoilSummary, GivenCoil, Objective, Optimization};
+use super::text::better;
+use crate::coil::optimum::LimitUse;
+use crate::coil::optimum::outcome::Alternative;
+use crate::report::frame::{Page, Section};
+use crate::report::html::{Cell, Html, Table};
+use crate::report::inputs::sources;
+use crate::report::limits::{in_unit, words};
+use crate::report::number::{count, figures, force, mm, percent, si};
+
+/// The result of `optimize` as one HTML page.
 #[must_use]
 pub fn html(result: &Optimization) -> String {
-    page(&OptimumFacts {
-        design: &result.design,
-        version: result.fluxform_version,
-        inputs: result
-            .inputs
-            .iter()
-            .map(|input| (input.path.as_str(), input.sha256.as_str()))
-            .collect(),
-        none: result.no_coil.as_ref().map(|none| none.message.as_str()),
-        found: result
-            .objective
-            .map(|best| (best.force_n, best.current_a, best.height_m)),
-        coil: properties(result),
-        limits: result
-            .limits
-            .iter()
-            .chain(&result.bounds)
-            .map(|(name, limit)| ActiveLimit {
-                name,
-                value: limit.value,
-                limit: limit.limit,
-                active: limit.active,
-                sensitivity_n_per_unit: limit.sensitivity_n_per_unit,
-            })
-            .collect(),
-        certificate: result.certificate.kind.name(),
-        scope: [
-            result.certificate.kind.scope(),
-            result.certificate.kind.open_question(),
+    let mut lead = Html::default();
+    let text = match (&result.objective, &result.no_coil) {
+        (Some(best), _) => format!(
+            "The best coil within the design's limits pushes the magnet with {} at {} A, {} mm \
+             above it.",
+            force(best.force_n),
+            figures(best.current_a, 4),
+            mm(best.height_m)
+        ),
+        (None, Some(none)) => format!("There is no such coil: {}", none.message),
+        (None, None) => "There is no such coil.".to_owned(),
+    };
+    lead.element("p class=\"lead\"", &text);
+    let inputs: Vec<(&str, &str)> = result
+        .inputs
+        .iter()
+        .map(|input| (input.path.as_str(), input.sha256.as_str()))
+        .collect();
+    Page {
+        kind: "Optimisation",
+        title: format!("The best coil of {}", result.design),
+        lead,
+        sections: vec![
+            answer(result),
+            limits(result),
+            sure(result),
+            sources(&inputs),
         ],
-        bound: (result.certificate.upper_bound_n, result.certificate.gap),
-        searched: [result.starts, result.evaluations, result.certificate.cells],
-        alternatives: result
-            .alternatives
-            .iter()
-            .map(|one| Alternative {
-                size_m: [
-                    one.size.inner_diameter_m,
-                    one.size.outer_diameter_m,
-                    one.size.length_m,
-                ],
-                force_n: one.force_n,
-                lost: one.force_lost,
-                wire_mass_kg: one.wire_mass_kg,
-                power_w: one.power_w,
-                better: one.better.clone(),
-            })
-            .collect(),
-        notes: &result.notes,
-    })
+        data: Value::Object(Map::new()),
+        foot: format!(
+            "fluxform {}. This page needs nothing but itself.",
+            result.fluxform_version
+        ),
+    }
+    .html()
 }
 
-/// A number's name, and where it stands.
-type Column<T> = (&'static str, fn(&T) -> f64);
+/// A row of the comparison: its name in artefacts, the best coil's number and the given one's.
+type Property = (
+    &'static str,
+    fn(&BestCoilSummary, &Objective) -> f64,
+    fn(&GivenCoil) -> Option<f64>,
+);
 
-/// The best coil's numbers beside those of the design's own.
-fn properties(result: &Optimization) -> Vec<(&'static str, f64, Option<f64>)> {
-    let (Some(coil), Some(best)) = (&result.coil, &result.objective) else {
-        return Vec::new();
+const PROPERTIES: [Property; 11] = [
+    ("force_n", |_, o| o.force_n, |g| Some(g.force_n)),
+    (
+        "inner_diameter_m",
+        |c, _| c.size.inner_diameter_m,
+        |g| Some(g.coil.size.inner_diameter_m),
+    ),
+    (
+        "outer_diameter_m",
+        |c, _| c.size.outer_diameter_m,
+        |g| Some(g.coil.size.outer_diameter_m),
+    ),
+    (
+        "length_m",
+        |c, _| c.size.length_m,
+        |g| Some(g.coil.size.length_m),
+    ),
+    ("turns", |c, _| c.turns, |g| Some(g.coil.turns)),
+    ("wire_diameter_m", |c, _| c.wire_diameter_m, |_| None),
+    (
+        "resistance_ohm",
+        |c, _| c.circuit.resistance_ohm,
+        |g| Some(g.coil.circuit.resistance_ohm),
+    ),
+    (
+        "settling_s",
+        |c, _| c.circuit.settling_s,
+        |g| Some(g.coil.circuit.settling_s),
+    ),
+    (
+        "power_w",
+        |c, _| c.circuit.power_w,
+        |g| Some(g.coil.circuit.power_w),
+    ),
+    (
+        "mass_kg",
+        |c, _| c.circuit.mass_kg,
+        |g| Some(g.coil.circuit.mass_kg),
+    ),
+    (
+        "wire_length_m",
+        |c, _| c.circuit.wire_length_m,
+        |g| Some(g.coil.circuit.wire_length_m),
+    ),
+];
+
+fn answer(result: &Optimization) -> Section {
+    let mut body = Html::default();
+    if let (Some(coil), Some(objective)) = (&result.coil, &result.objective) {
+        let row = |(name, best, given): Property| -> Vec<Cell> {
+            let (name, unit) = words(name);
+            let given = result.given.as_ref().and_then(given);
+            let given = given.map_or_else(|| "\u{2013}".to_owned(), |v| in_unit(v, unit));
+            vec![
+                name.into(),
+                in_unit(best(coil, objective), unit).into(),
+                given.into(),
+            ]
+        };
+        body.table(&Table {
+            caption: "The best coil beside the design's own".to_owned(),
+            head: vec![("property", false), ("best", true), ("as given", true)],
+            rows: PROPERTIES.into_iter().map(row).collect(),
+            prose: false,
+        });
+    }
+    if !result.alternatives.is_empty() {
+        let row = |one: &Alternative| -> Vec<Cell> {
+            let size = &one.size;
+            let sizes = [size.inner_diameter_m, size.outer_diameter_m, size.length_m];
+            let [inner, outer, length] = sizes.map(mm);
+            vec![
+                format!("{inner} to {outer}, {length} long").into(),
+                force(one.force_n).into(),
+                percent(one.force_lost).into(),
+                si(one.wire_mass_kg, "kg").into(),
+                si(one.power_w, "W").into(),
+                better(one).into(),
+            ]
+        };
+        body.table(&Table {
+            caption: "Coils that give a little less".to_owned(),
+            head: vec![
+                ("diameters, length / mm", false),
+                ("force", true),
+                ("lost", true),
+                ("wire", true),
+                ("heat", true),
+                ("better in being", false),
+            ],
+            rows: result.alternatives.iter().map(row).collect(),
+            prose: false,
+        });
+    }
+    Section {
+        id: "answer",
+        title: "The answer",
+        body,
+    }
+}
+
+fn limits(result: &Optimization) -> Section {
+    let mut body = Html::default();
+    let limits: Vec<&LimitUse> = result
+        .limits
+        .values()
+        .chain(result.bounds.values())
+        .collect();
+    let active: Vec<String> = limits
+        .iter()
+        .filter(|limit| limit.active)
+        .map(|limit| words(limit.name.key()).0)
+        .collect();
+    body.raw("<ul class=\"said\">");
+    let text = if active.is_empty() {
+        "No limit holds the force back.".to_owned()
+    } else {
+        format!("The force is held back by {}.", active.join(", "))
     };
-    let given = result.given.as_ref();
-    let force_n = given.map(|given| given.force_n);
-    let mut rows = vec![("force_n", best.force_n, force_n)];
-    let (size, own) = (coil.size, given.map(|given| given.size));
-    let sizes: [Column<SizeFacts>; 3] = [
-        ("inner_diameter_m", |size| size.inner_diameter_m),
-        ("outer_diameter_m", |size| size.outer_diameter_m),
-        ("length_m", |size| size.length_m),
-    ];
-    rows.extend(sizes.map(|(name, of)| (name, of(&size), own.as_ref().map(of))));
-    rows.extend([
-        ("turns", coil.turns, given.map(|given| given.turns)),
-        ("wire_diameter_m", coil.wire_diameter_m, None),
-    ]);
-    let (circuit, own) = (coil.circuit, given.map(|given| given.circuit));
-    let circuits: [Column<CircuitFacts>; 5] = [
-        ("resistance_ohm", |circuit| circuit.resistance_ohm),
-        ("settling_s", |circuit| circuit.settling_s),
-        ("power_w", |circuit| circuit.power_w),
-        ("mass_kg", |circuit| circuit.mass_kg),
-        ("wire_length_m", |circuit| circuit.wire_length_m),
-    ];
-    rows.extend(circuits.map(|(name, of)| (name, of(&circuit), own.as_ref().map(of))));
-    rows
+    body.element("li", &text);
+    for warning in &result.warnings {
+        body.raw("<li><strong>Note:</strong> ")
+            .text(warning)
+            .raw("</li>");
+    }
+    body.raw("</ul>");
+    // What one percent more of a limit would give compares limits of different units.
+    let gain = |limit: &LimitUse| 0.01 * limit.limit * limit.sensitivity_n_per_unit;
+    let most = limits.iter().map(|l| gain(l).abs()).fold(0.0, f64::max);
+    let row = |limit: &&LimitUse| -> Vec<Cell> {
+        let (name, unit) = words(limit.name.key());
+        let width = if most > 0.0 {
+            gain(limit).abs() / most * 100.0
+        } else {
+            0.0
+        };
+        let bar = format!(
+            "<svg class=\"bar\" aria-hidden=\"true\"><rect class=\"some\" y=\"25%\" \
+             height=\"50%\" width=\"{width:.2}%\"/></svg>"
+        );
+        vec![
+            name.into(),
+            in_unit(limit.value, unit).into(),
+            in_unit(limit.limit, unit).into(),
+            if limit.active { "yes" } else { "no" }.into(),
+            Cell::Markup(bar),
+            if limit.active {
+                force(gain(limit))
+            } else {
+                "none".to_owned()
+            }
+            .into(),
+        ]
+    };
+    if !limits.is_empty() {
+        body.table(&Table {
+            caption: "The limits, and the force that one percent more of each would give"
+                .to_owned(),
+            head: vec![
+                ("limit", false),
+                ("value", true),
+                ("limit", true),
+                ("holds it back", false),
+                ("for 1 % more", false),
+                ("force gained", true),
+            ],
+            rows: limits.iter().map(row).collect(),
+            prose: false,
+        });
+    }
+    Section {
+        id: "limits",
+        title: "What limits it",
+        body,
+    }
+}
+
+fn sure(result: &Optimization) -> Section {
+    let mut body = Html::default();
+    let certificate = &result.certificate;
+    let kind = certificate.kind;
+    let said = match (certificate.upper_bound_n, certificate.gap) {
+        (Some(bound_n), Some(gap)) => format!(
+            "Certificate: {}. No coil within the limits gives more than {}, which is {} more \
+             than this one.",
+            kind.name(),
+            force(bound_n),
+            percent(gap)
+        ),
+        (None, _) | (_, None) => format!(
+            "Certificate: {} ({}; {}).",
+            kind.name(),
+            kind.scope(),
+            kind.open_question()
+        ),
+    };
+    body.raw("<ul class=\"said\">").element("li", &said);
+    let text = format!(
+        "{}, {} of a coil, {} of coils bounded.",
+        count(result.starts, "local search").replace("searchs", "searches"),
+        count(result.evaluations, "evaluation"),
+        count(certificate.cells, "box").replace("boxs", "boxes")
+    );
+    body.element("li", &text).raw("</ul>");
+    Section {
+        id: "good",
+        title: "How sure it is",
+        body,
+    }
 }

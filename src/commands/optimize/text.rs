@@ -1,13 +1,18 @@
 //! The summary of `optimize`.
 
-use super::{AlternativeFacts, BestFacts, GivenFacts, LimitFacts, ObjectiveFacts, Optimization};
+use super::{BestCoilSummary, GivenCoil, Objective, Optimization};
 use crate::accuracy::CertificateKind;
 use crate::cli::describe;
 use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::limits::{label, limit_row, limit_value};
 use crate::cli::quantity::{count, error, force, mass, mm, number, number_to, percent, si};
 use crate::cli::values::FileArgument;
-use crate::coil::limits::by_key;
+use crate::coil::circuit::CoilSize;
+use crate::coil::limits::LimitName;
+use crate::coil::optimum::outcome::Alternative;
+use crate::coil::optimum::problem::Regime;
+use crate::coil::optimum::{LimitUse, WholeTurns};
+use crate::scene::rated::CircuitSummary;
 
 /// Most alternatives on screen; JSON has more.
 const SHOWN: usize = 6;
@@ -20,7 +25,7 @@ pub fn summary(result: &Optimization, out: Option<&FileArgument>) -> String {
     };
     let mut sheet = Sheet::new(&format!("{}: {kind}", result.design));
     match (&result.coil, &result.objective) {
-        (Some(coil), Some(objective)) => found(&mut sheet, result, coil, objective),
+        (Some(coil), Some(objective)) => best(&mut sheet, result, coil, objective),
         _ => none(&mut sheet, result),
     }
     if let (Some(FileArgument::Path(path)), true) = (out, result.design_text.is_some()) {
@@ -59,57 +64,9 @@ fn none(sheet: &mut Sheet, result: &Optimization) {
     sheet.line("searched", &searched(result));
 }
 
-fn found(sheet: &mut Sheet, result: &Optimization, coil: &BestFacts, objective: &ObjectiveFacts) {
-    let turns = match (coil.layers, coil.turns_per_layer) {
-        (Some(layers), Some(turns)) => format!(
-            "{} of {turns} turns, {} turns in all",
-            count(layers as usize, "layer"),
-            number(coil.turns)
-        ),
-        _ => format!(
-            "{} {}",
-            number(coil.turns),
-            if coil.turns == 1.0 { "turn" } else { "turns" }
-        ),
-    };
-    sheet.line(
-        "coil",
-        &format!(
-            "{} to {} diameter, {} long; {turns} of {} wire",
-            mm(coil.size.inner_diameter_m),
-            mm(coil.size.outer_diameter_m),
-            mm(coil.size.length_m),
-            mm(coil.wire_diameter_m)
-        ),
-    );
-    let way = if objective.force_n < 0.0 {
-        "down"
-    } else {
-        "up"
-    };
-    sheet.line(
-        "force",
-        &format!(
-            "{} {way} on the magnet, {} above the coil at {}, the {} limit{}{}",
-            force(objective.force_n.abs()),
-            mm(objective.height_m),
-            si(objective.current_a, "A"),
-            if objective.current_set_by == "supply" {
-                "supply's"
-            } else {
-                "driver's"
-            },
-            objective.alone_force_n.map_or_else(String::new, |alone| {
-                format!(
-                    "\namong its neighbours' cores; {} alone, as in the table below",
-                    force(alone.abs())
-                )
-            }),
-            objective.passive_force_n.map_or_else(String::new, |pull| {
-                format!("\nbesides, the unpowered steel pulls with {}", force(pull))
-            })
-        ),
-    );
+fn best(sheet: &mut Sheet, result: &Optimization, coil: &BestCoilSummary, objective: &Objective) {
+    sheet.line("coil", &dimensions(coil));
+    sheet.line("force", &force_at_target(objective));
     if let Some(misses) = result.given.as_ref().and_then(misses) {
         sheet.line("as given", &misses);
     }
@@ -125,8 +82,9 @@ fn found(sheet: &mut Sheet, result: &Optimization, coil: &BestFacts, objective: 
         .limits
         .iter()
         .chain(&result.bounds)
-        .filter(|(_, used)| used.active && used.sensitivity_n_per_unit != 0.0)
-        .map(|(name, used)| sensitivity(name, used))
+        .map(|(_, used)| used)
+        .filter(|used| used.active && used.sensitivity_n_per_unit != 0.0)
+        .map(sensitivity)
         .collect();
     if !held.is_empty() {
         sheet.line("worth", &held.join("\n"));
@@ -144,7 +102,7 @@ fn found(sheet: &mut Sheet, result: &Optimization, coil: &BestFacts, objective: 
         );
     }
     if result.wires.len() > 1 {
-        let told: Vec<String> = result
+        let wires: Vec<String> = result
             .wires
             .iter()
             .map(|wire| {
@@ -152,11 +110,65 @@ fn found(sheet: &mut Sheet, result: &Optimization, coil: &BestFacts, objective: 
                 format!("{}: {best}", mm(wire.wire_diameter_m))
             })
             .collect();
-        sheet.line("wires", &told.join("\n"));
+        sheet.line("wires", &wires.join("\n"));
     }
     sheet.line("searched", &searched(result));
     let stages = result.accuracy.iter().map(|(name, stage)| (*name, stage));
     sheet.line("accuracy", &describe::accuracy(stages));
+}
+
+/// Dimensions, turns and wire.
+fn dimensions(coil: &BestCoilSummary) -> String {
+    let turns = match coil.whole {
+        Some(WholeTurns {
+            layers,
+            turns_per_layer,
+        }) => format!(
+            "{} of {turns_per_layer} turns, {} turns in all",
+            count(layers as usize, "layer"),
+            number(coil.turns)
+        ),
+        None => format!(
+            "{} {}",
+            number(coil.turns),
+            if coil.turns == 1.0 { "turn" } else { "turns" }
+        ),
+    };
+    format!(
+        "{} to {} diameter, {} long; {turns} of {} wire",
+        mm(coil.size.inner_diameter_m),
+        mm(coil.size.outer_diameter_m),
+        mm(coil.size.length_m),
+        mm(coil.wire_diameter_m)
+    )
+}
+
+/// The force, and whose current it is.
+fn force_at_target(objective: &Objective) -> String {
+    let way = if objective.force_n < 0.0 {
+        "down"
+    } else {
+        "up"
+    };
+    format!(
+        "{} {way} on the magnet, {} above the coil at {}, the {} limit{}{}",
+        force(objective.force_n.abs()),
+        mm(objective.height_m),
+        si(objective.current_a, "A"),
+        match objective.current_set_by {
+            Regime::Supply => "supply's",
+            Regime::Driver => "driver's",
+        },
+        objective.alone_force_n.map_or_else(String::new, |alone| {
+            format!(
+                "\namong its neighbours' cores; {} alone, as in the table below",
+                force(alone.abs())
+            )
+        }),
+        objective.passive_force_n.map_or_else(String::new, |pull| {
+            format!("\nalso, the unpowered steel pulls with {}", force(pull))
+        })
+    )
 }
 
 fn searched(result: &Optimization) -> String {
@@ -166,7 +178,7 @@ fn searched(result: &Optimization) -> String {
     )
 }
 
-fn certificate(result: &Optimization, objective: &ObjectiveFacts) -> String {
+fn certificate(result: &Optimization, objective: &Objective) -> String {
     let certificate = &result.certificate;
     let bound = certificate
         .upper_bound_n
@@ -202,8 +214,8 @@ fn above(bound_n: f64) -> String {
     }
 }
 
-/// What the design's own coil misses.
-fn misses(given: &GivenFacts) -> Option<String> {
+/// The limits that the design's own coil misses.
+fn misses(given: &GivenCoil) -> Option<String> {
     let unmet: Vec<String> = given
         .limits
         .iter()
@@ -221,8 +233,9 @@ fn misses(given: &GivenFacts) -> Option<String> {
 }
 
 /// `1 ohm more gives 12 mN`.
-fn sensitivity(name: &str, used: &LimitFacts) -> String {
-    let (unit, per_si) = by_key(name).map_or(("mm", 1e3), |limit| limit.step);
+fn sensitivity(used: &LimitUse) -> String {
+    let row = used.name.limit();
+    let (unit, per_si) = row.step;
     let size = 1.0 / per_si;
     // A unit that is not small against the limit is no slope.
     let scale = if size > 0.3 * used.limit { 1e-3 } else { 1.0 };
@@ -231,56 +244,65 @@ fn sensitivity(name: &str, used: &LimitFacts) -> String {
     format!(
         "{} {unit} {way} {} gives {}",
         number(scale),
-        match name {
-            "wire_length_m" => "allowed".to_owned(),
-            name => format!("of {}", label(name)),
+        if used.name == LimitName::WireLength {
+            "allowed".to_owned()
+        } else {
+            format!("of {}", row.label)
         },
         force(gain.abs())
     )
 }
 
-fn beside(coil: &BestFacts, objective: &ObjectiveFacts, given: Option<&GivenFacts>) -> String {
-    let ours = &coil.circuit;
-    let mut rows = vec![vec![String::new(), "best".to_owned()]];
-    let lines = [
-        (
-            "force",
-            force(objective.alone_force_n.unwrap_or(objective.force_n)),
-        ),
-        ("inner diameter", mm(coil.size.inner_diameter_m)),
-        ("outer diameter", mm(coil.size.outer_diameter_m)),
-        ("length", mm(coil.size.length_m)),
-        ("turns", number(coil.turns)),
-        ("resistance", si(ours.resistance_ohm, "ohm")),
-        ("inductance", si(ours.inductance_h, "H")),
-        ("settling", si(ours.settling_s, "s")),
-        ("wire", si(ours.wire_length_m, "m")),
-        ("mass", mass(ours.mass_kg)),
-        ("heat", si(ours.power_w, "W")),
-    ];
-    for (name, value) in lines {
-        rows.push(vec![name.to_owned(), value]);
-    }
-    if let Some(given) = given {
-        let theirs = &given.circuit;
-        let values = [
-            "as given".to_owned(),
-            force(given.force_n),
-            mm(given.size.inner_diameter_m),
-            mm(given.size.outer_diameter_m),
-            mm(given.size.length_m),
-            number(given.turns),
-            si(theirs.resistance_ohm, "ohm"),
-            si(theirs.inductance_h, "H"),
-            si(theirs.settling_s, "s"),
-            si(theirs.wire_length_m, "m"),
-            mass(theirs.mass_kg),
-            si(theirs.power_w, "W"),
-        ];
-        for (row, value) in rows.iter_mut().zip(values) {
-            row.push(value);
-        }
-    }
+/// A row of the comparison: its name, its number of a coil and how it is shown.
+type Property = (&'static str, fn(&Column<'_>) -> String);
+
+/// The numbers of a coil that are compared.
+struct Column<'a> {
+    force_n: f64,
+    size: &'a CoilSize,
+    turns: f64,
+    circuit: &'a CircuitSummary,
+}
+
+const PROPERTIES: [Property; 11] = [
+    ("force", |of| force(of.force_n)),
+    ("inner diameter", |of| mm(of.size.inner_diameter_m)),
+    ("outer diameter", |of| mm(of.size.outer_diameter_m)),
+    ("length", |of| mm(of.size.length_m)),
+    ("turns", |of| number(of.turns)),
+    ("resistance", |of| si(of.circuit.resistance_ohm, "ohm")),
+    ("inductance", |of| si(of.circuit.inductance_h, "H")),
+    ("settling", |of| si(of.circuit.settling_s, "s")),
+    ("wire", |of| si(of.circuit.wire_length_m, "m")),
+    ("mass", |of| mass(of.circuit.mass_kg)),
+    ("heat", |of| si(of.circuit.power_w, "W")),
+];
+
+fn beside(best: &BestCoilSummary, objective: &Objective, given: Option<&GivenCoil>) -> String {
+    let mut columns = vec![(
+        "best",
+        Column {
+            force_n: objective.alone_force_n.unwrap_or(objective.force_n),
+            size: &best.size,
+            turns: best.turns,
+            circuit: &best.circuit,
+        },
+    )];
+    columns.extend(given.map(|given| {
+        let column = Column {
+            force_n: given.force_n,
+            size: &given.coil.size,
+            turns: given.coil.turns,
+            circuit: &given.coil.circuit,
+        };
+        ("as given", column)
+    }));
+    let head = columns.iter().map(|(name, _)| (*name).to_owned());
+    let mut rows = vec![std::iter::once(String::new()).chain(head).collect()];
+    rows.extend(PROPERTIES.map(|(name, shown)| {
+        let cells = columns.iter().map(|(_, column)| shown(column));
+        std::iter::once(name.to_owned()).chain(cells).collect()
+    }));
     table(&[Side::Left, Side::Right, Side::Right], &rows)
 }
 
@@ -298,7 +320,7 @@ fn limits(result: &Optimization) -> String {
     table(&[Side::Left, Side::Right, Side::Right, Side::Left], &rows)
 }
 
-fn alternatives(list: &[AlternativeFacts]) -> String {
+fn alternatives(list: &[Alternative]) -> String {
     let head = [
         "instead",
         "force",
@@ -313,9 +335,9 @@ fn alternatives(list: &[AlternativeFacts]) -> String {
     .map(str::to_owned);
     let mut rows = vec![head.to_vec()];
     for other in shown(list) {
-        let turns = match (other.layers, other.turns_per_layer) {
-            (Some(layers), Some(turns)) => format!("{layers} x {turns}"),
-            _ => number(other.turns),
+        let turns = match other.whole {
+            Some(whole) => format!("{} x {}", whole.layers, whole.turns_per_layer),
+            None => number(other.turns),
         };
         rows.push(vec![
             mm(other.wire_diameter_m),
@@ -326,7 +348,7 @@ fn alternatives(list: &[AlternativeFacts]) -> String {
             turns,
             mass(other.wire_mass_kg),
             si(other.power_w, "W"),
-            other.better.join(", "),
+            better(other),
         ]);
     }
     let mut sides = [Side::Right; 9];
@@ -336,7 +358,13 @@ fn alternatives(list: &[AlternativeFacts]) -> String {
 }
 
 /// The first, the last, and those evenly between.
-fn shown(list: &[AlternativeFacts]) -> impl Iterator<Item = &AlternativeFacts> {
-    let told = list.len().min(SHOWN);
-    (0..told).map(move |k| &list[k * (list.len() - 1) / (told - 1).max(1)])
+fn shown(list: &[Alternative]) -> impl Iterator<Item = &Alternative> {
+    let count = list.len().min(SHOWN);
+    (0..count).map(move |k| &list[k * (list.len() - 1) / (count - 1).max(1)])
+}
+
+/// In what a coil is better.
+pub(super) fn better(other: &Alternative) -> String {
+    let words: Vec<&str> = other.better.iter().map(|better| better.name()).collect();
+    words.join(", ")
 }

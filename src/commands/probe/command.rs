@@ -7,25 +7,26 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::{ProbeComponents, ProbeRequest, ProbeTable, probe};
+use super::{ProbeRequest, ProbeTable, probe};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::bundle::atomic::{self, Overwrite};
 use crate::bundle::read_table::read_columns;
 use crate::cli::args::{Tolerance, Writing};
-use crate::cli::budget::{Asked, allow};
+use crate::cli::budget::{CostOrigin, allow};
 use crate::cli::describe;
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::count;
 use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
 use crate::cli::values::FileArgument;
 use crate::design::Need;
+use crate::field::components::Components;
 use crate::scene::cost::{of_probe, of_steel};
 
 /// How every table of points begins.
@@ -42,7 +43,7 @@ const HEADER: &str = "x_m,y_m,z_m,coil,";
 ///
 /// With --compare a Gauss-meter's scan takes the points' place: a CSV table with x_m, y_m, z_m, any of
 /// bx_t, by_t, bz_t, dbx_dx_t_per_m to dbz_dz_t_per_m, and the currents that flowed, either as coil
-/// and current_a or as current_0_a, current_1_a and so on. Told are the residuals, the scale of each
+/// and current_a or as current_0_a, current_1_a and so on. Reported are the residuals, the scale of each
 /// coil with the line for `[array] gain`, a constant background, where the sensor's frame stands, and
 /// which parameter of the design would explain the residuals; --out takes the residuals as a table.
 #[derive(Debug, Args)]
@@ -64,8 +65,8 @@ pub struct Probe {
     #[arg(value_name = "POINTS", required_unless_present = "compare")]
     pub(super) points: Option<FileArgument>,
     /// What is reported at each point
-    #[arg(long, value_enum, default_value_t = Components::All, conflicts_with = "compare")]
-    components: Components,
+    #[arg(long, value_enum, default_value_t = ComponentsArgument::All, conflicts_with = "compare")]
+    components: ComponentsArgument,
     /// Report force and torque on the magnet per ampere too: six columns
     #[arg(long, conflicts_with = "compare")]
     pub(super) magnet_force: bool,
@@ -81,7 +82,7 @@ pub struct Probe {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Components {
+enum ComponentsArgument {
     /// Field and gradient: twelve columns
     All,
     /// Gradient: nine columns
@@ -90,7 +91,7 @@ enum Components {
     Gz,
 }
 
-/// What is told about the table; with its columns where standard output holds nothing else.
+/// What is reported about the table; with its columns where standard output holds nothing else.
 #[derive(Serialize)]
 struct ProbeSummary {
     schema_version: &'static str,
@@ -120,9 +121,9 @@ impl Probe {
         let (points_m, points_input) = documents::points(points)?;
         let points = points_m.len();
         let components = match self.components {
-            Components::All => ProbeComponents::All,
-            Components::Gradient => ProbeComponents::Gradient,
-            Components::Gz => ProbeComponents::Gz,
+            ComponentsArgument::All => Components::All,
+            ComponentsArgument::Gradient => Components::Gradient,
+            ComponentsArgument::Gz => Components::Gz,
         };
         let protected: Vec<PathBuf> = document.also_read().map(Path::to_path_buf).collect();
         let inputs = vec![document.input, points_input];
@@ -135,7 +136,7 @@ impl Probe {
             overwrite.check(path).map_err(RunError::from)?;
         }
         let design = &document.design;
-        let parts = match self.components {
+        let parts = match components {
             Components::All => 12,
             Components::Gradient => 9,
             Components::Gz => 1,
@@ -143,7 +144,7 @@ impl Probe {
         allow(
             std::iter::once(of_probe(design, points, parts))
                 .chain(of_steel(design, self.tolerance.tolerance)),
-            Asked::Document,
+            CostOrigin::Document,
             printer,
         )?;
         let bar = begin(printer);
@@ -167,23 +168,23 @@ impl Probe {
         let place = match out {
             FileArgument::Standard if printer.json() => {
                 summary.columns = Some(columns(&table)?);
-                Place::Output
+                Stream::Output
             }
             FileArgument::Standard => {
                 printer.data(|out| table.write(out))?;
-                Place::Error
+                Stream::Error
             }
             FileArgument::Path(path) => {
                 atomic::write(path, &overwrite, |out| table.write(out)).map_err(RunError::from)?;
-                Place::Output
+                Stream::Output
             }
         };
         let json = printer.with_warnings(&summary);
-        printer.summary(place, &json, || self.told(&summary))?;
+        printer.summary(place, &json, || self.text(&summary))?;
         accuracy_check(&table.accuracy_missed)
     }
 
-    fn told(&self, summary: &ProbeSummary) -> String {
+    fn text(&self, summary: &ProbeSummary) -> String {
         let mut sheet = Sheet::new(&format!(
             "{}: {} at {}",
             summary.design,

@@ -3,6 +3,7 @@
 pub(crate) mod command;
 pub mod scan;
 
+use crate::field::components::Components;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
@@ -15,34 +16,22 @@ use crate::design::Design;
 use crate::field::frame::{CartesianField, to_cartesian};
 use crate::field::magnet::MagnetRule;
 use crate::field::steel::CLOSEST;
-use crate::field::steel::equivalent_dipoles::Parts;
-use crate::field::winding::KERNEL_ERROR;
+use crate::field::steel::array_steel::SteelField;
 use crate::progress::Progress;
 use crate::scene::steel;
-use crate::scene::steel::{Solved, Steel, SteelField, clearance_of_m};
-use crate::scene::{MAGNET_FINEST, MAGNET_SHARE, Scene};
-
-/// What is asked at the points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum ProbeComponents {
-    /// Field and gradient tensor.
-    All,
-    /// Gradient tensor.
-    Gradient,
-    /// dB_z/dz.
-    Gz,
-}
+use crate::scene::steel::{Solved, clearance_of_m};
+use crate::scene::tolerances::MAGNET_FINEST;
+use crate::scene::{MAGNET_SHARE, Scene};
 
 /// Field and gradient per ampere, coil by coil within a point.
 #[derive(Debug, Clone)]
 pub struct ProbeTable {
-    components: ProbeComponents,
+    components: Components,
     points_m: Vec<[f64; 3]>,
     coils: usize,
     /// [point, coil]
     fields: Vec<CartesianField>,
-    /// [point, coil]: force (N/A) and torque about the centre (N m/A) of the magnet; where asked.
+    /// [point, coil]: force (N/A) and torque about the centre (N m/A) of the magnet; where requested.
     forces: Vec<[f64; 6]>,
     /// Estimated error relative to |grad B| at the point; with steel, to the largest at its height.
     pub relative_error: f64,
@@ -52,16 +41,16 @@ pub struct ProbeTable {
     pub relative_to_height: bool,
     /// Estimated error of the forces, relative to |m| times the largest |grad B| at the height.
     pub force_error: Option<f64>,
-    /// What misses the tolerance.
+    /// The stages that miss the tolerance.
     pub accuracy_missed: Vec<String>,
 }
 
-/// What is asked of [`probe`].
+/// The options of [`probe`].
 #[derive(Debug, Clone, Copy)]
 pub struct ProbeRequest {
-    /// Parts of the field.
-    pub components: ProbeComponents,
-    /// Force and torque on the design's magnet besides, its centre at the points.
+    /// Components of the field.
+    pub components: Components,
+    /// Also force and torque on the design's magnet, its centre at the points.
     pub force: bool,
     /// Tolerance; `None` for the default.
     pub tolerance: Option<f64>,
@@ -71,7 +60,7 @@ impl Default for ProbeRequest {
     /// Field and gradient, to the default tolerance, without the force.
     fn default() -> Self {
         Self {
-            components: ProbeComponents::All,
+            components: Components::All,
             force: false,
             tolerance: None,
         }
@@ -86,17 +75,17 @@ const PORTION: usize = 256;
 ///
 /// # Errors
 /// A design that cannot be computed; a point on a winding's edge or on the steel; a magnet that
-/// touches the array, where the force is asked for; interruption.
+/// touches the array, where the force is requested; interruption.
 pub fn probe(
     design: &Design,
     points_m: Vec<[f64; 3]>,
     request: ProbeRequest,
     progress: &dyn Progress,
 ) -> Result<ProbeTable, RunError> {
-    let scene = Scene::new(design)?;
+    let scene = Scene::with_tolerance(design, request.tolerance)?;
     // A value depends on its own point alone: neither the solution nor how it is evaluated may
     // depend on where the other points are.
-    let solved = steel::solve(&scene, request.tolerance, KERNEL_ERROR, f64::NEG_INFINITY)?;
+    let solved = steel::solve(&scene, scene.tolerances.field, f64::NEG_INFINITY)?;
     let groups = groups(&scene, &points_m)?;
     progress.begin("probe", points_m.len() as u64);
     let coils = scene.coils.len();
@@ -110,7 +99,7 @@ pub fn probe(
             .then(|| scene.magnet_rule(group.magnet_lowest_m, finest))
             .transpose()?;
         let own: Vec<[f64; 3]> = group.rows.iter().map(|row| points_m[*row]).collect();
-        let places = Places::of_group(&scene, &solved, group, &points_m, rule.as_ref())?;
+        let places = FieldAt::of_group(&scene, &solved, group, &points_m, rule.as_ref())?;
         let portions = own
             .par_chunks(PORTION)
             .zip(group.rows.par_chunks(PORTION))
@@ -145,9 +134,10 @@ pub fn probe(
     progress.end();
     let stage = StageAccuracy {
         estimate: solved.point_error(),
-        relative_to: match solved.steel {
-            Steel::None => "|grad B| at the point",
-            Steel::Alone(_) | Steel::Coupled(_) => "the largest |grad B| at the point's height",
+        relative_to: if solved.has_steel() {
+            "the largest |grad B| at the point's height"
+        } else {
+            "|grad B| at the point"
         }
         .to_owned(),
         method: String::new(),
@@ -160,7 +150,7 @@ pub fn probe(
         points_m,
         relative_error: solved.point_error(),
         method: solved.point_method(),
-        relative_to_height: !matches!(solved.steel, Steel::None),
+        relative_to_height: solved.has_steel(),
         force_error: request.force.then_some(magnet_error),
         accuracy_missed: missed([(&"field", &stage)], solved.tolerance),
     })
@@ -206,14 +196,13 @@ fn groups(scene: &Scene, points_m: &[[f64; 3]]) -> Result<BTreeMap<[i32; 2], Gro
     Ok(groups)
 }
 
-/// What gives the field at any place.
-pub(crate) struct Places<'a> {
+/// The field of every coil at places within reach of the steel's sources.
+pub(crate) struct FieldAt<'a> {
     scene: &'a Scene<'a>,
-    solved: &'a Solved,
     sources: Option<SteelField>,
 }
 
-impl<'a> Places<'a> {
+impl<'a> FieldAt<'a> {
     /// For places within `reach_m` of `points_m`.
     ///
     /// # Errors
@@ -226,7 +215,6 @@ impl<'a> Places<'a> {
     ) -> Result<Self, RunError> {
         Ok(Self {
             scene,
-            solved,
             sources: solved.sources(scene, points_m, reach_m, 1.0)?,
         })
     }
@@ -248,7 +236,6 @@ impl<'a> Places<'a> {
         }
         Ok(Self {
             scene,
-            solved,
             sources: solved.sources_at(
                 group.lowest_m - reach_m,
                 group.distance_m - reach_m,
@@ -257,8 +244,8 @@ impl<'a> Places<'a> {
         })
     }
 
-    /// Field and gradient per ampere, [point, coil]; the first of `points_m` is told as number
-    /// `first`.
+    /// Field and gradient per ampere, [point, coil]; messages give the first of `points_m` the
+    /// number `first`.
     ///
     /// # Errors
     /// A point on a winding's edge.
@@ -270,36 +257,35 @@ impl<'a> Places<'a> {
         self.driven_fields(points_m, first, &|_, _| true)
     }
 
-    /// As [`Places::fields`], but only where `wanted` says so of a point and a coil; zero elsewhere.
+    /// As [`FieldAt::fields`], but only where `needed` says so of a point and a coil; zero elsewhere.
     ///
     /// # Errors
-    /// As [`Places::fields`].
+    /// As [`FieldAt::fields`].
     pub(crate) fn driven_fields(
         &self,
         points_m: &[[f64; 3]],
         first: usize,
-        wanted: &dyn Fn(usize, usize) -> bool,
+        needed: &dyn Fn(usize, usize) -> bool,
     ) -> Result<Vec<CartesianField>, RunError> {
-        self.numbered_fields(points_m, &|row| first + row, wanted)
+        self.numbered_fields(points_m, &|row| first + row, needed)
     }
 
-    /// As [`Places::driven_fields`], with the numbers by which messages name the points.
+    /// As [`FieldAt::driven_fields`], with the numbers by which messages name the points.
     fn numbered_fields(
         &self,
         points_m: &[[f64; 3]],
         number: &dyn Fn(usize) -> usize,
-        wanted: &dyn Fn(usize, usize) -> bool,
+        needed: &dyn Fn(usize, usize) -> bool,
     ) -> Result<Vec<CartesianField>, RunError> {
         let scene = self.scene;
         let count = points_m.len();
         let added = self.sources.as_ref().map_or_else(Vec::new, |sources| {
-            self.solved
-                .steel_fields(scene, sources, points_m, Parts::All)
+            scene.steel_fields(sources, points_m, Components::All)
         });
         let mut fields = Vec::with_capacity(count * scene.coils.len());
         for (row, [x, y, z]) in points_m.iter().enumerate() {
             for (column, coil) in scene.coils.iter().enumerate() {
-                if !wanted(row, column) {
+                if !needed(row, column) {
                     fields.push(CartesianField::default());
                     continue;
                 }
@@ -313,7 +299,7 @@ impl<'a> Places<'a> {
                 })?;
                 let mut field = to_cartesian(&axial, dx, dy);
                 if !added.is_empty() {
-                    let block = column * Parts::All.count();
+                    let block = column * Components::All.count();
                     add(&mut field, |part| added[(block + part) * count + row]);
                 }
                 fields.push(scaled(field, coil.gain));
@@ -399,13 +385,12 @@ impl ProbeTable {
     /// The writer's.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         let mut columns: Vec<&str> = Vec::new();
-        if self.components == ProbeComponents::All {
+        if self.components == Components::All {
             columns.extend(FIELD_COLUMNS);
         }
-        let first = if self.components == ProbeComponents::Gz {
-            8
-        } else {
-            0
+        let first = match self.components {
+            Components::Gz => 8,
+            Components::Gradient | Components::All => 0,
         };
         columns.extend(&GRADIENT_COLUMNS[first..]);
         if !self.forces.is_empty() {
@@ -421,7 +406,7 @@ impl ProbeTable {
                 let pair = point * self.coils + coil;
                 let field = &self.fields[pair];
                 let mut row = Vec::with_capacity(columns.len());
-                if self.components == ProbeComponents::All {
+                if self.components == Components::All {
                     row.extend(field.field_t_per_a);
                 }
                 row.extend(&field.gradient_t_per_m_per_a.as_flattened()[first..]);

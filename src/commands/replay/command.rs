@@ -5,25 +5,24 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::output::{ReplayFiles, write_trajectory};
-use super::summary::{ErrorFacts, ReplaySummary, Told};
+use super::summary::TrajectorySource;
 use super::synthesize;
 use super::synthesize::{Kind, Synthesis};
-use super::{Opened, ReplayReport, run};
+use super::text;
+use super::{Opened, run};
 use crate::RunError;
+use crate::bundle::artefact::Input;
 use crate::bundle::atomic::{Overwrite, check_distinct};
+use crate::bundle::trajectory::Trajectory;
 use crate::cli::args::Writing;
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
-use crate::cli::layout::Sheet;
 use crate::cli::pictures::Picture;
-use crate::cli::printer::{Place, Printer};
-use crate::cli::quantity::{count, error, force, number, percent, si};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::start::begin;
 use crate::cli::values::{self, FileArgument};
 
-/// Forces below this are rounding, N.
-const NOTHING_N: f64 = 1e-12;
 /// More positions than this are refused.
 const MOST_POSITIONS: f64 = 1e8;
 
@@ -33,10 +32,10 @@ const MOST_POSITIONS: f64 = 1e8;
 /// position it commands the currents of least power whose force on the magnet is lambda h(x, y),
 /// or the nearest force that the limits allow (equation 8). h is interpolated bilinearly between
 /// the bundle's points and is zero where there is no surface; outside the map nothing is commanded.
-/// The table tells the wanted force, the force given and their difference, every coil's current,
+/// The table states the wanted force, the force given and their difference, every coil's current,
 /// what the bundle's fixed currents would give instead, and whether a position was met (ok),
 /// beyond the limits (saturated) or outside the map. A position is held until the next one; with
-/// --dynamics what is told is the end of that time.
+/// --dynamics its row states the end of that time.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Writing, &[
     ("fluxform calibrate designs/seed_air.toml shapes/flat.toml", "make a bundle"),
@@ -130,60 +129,17 @@ impl Replay {
             FileArgument::Path(path) => Some(ReplayFiles::new(path)?),
         };
         let opened = Opened::new(&self.bundle)?;
-        let (trajectory, told) = match (&self.trajectory, self.synthesis()) {
-            (Some(file), _) => {
-                let (trajectory, input) = documents::trajectory(file)?;
-                let source = input.path.clone();
-                let input = Some(input);
-                let synthesis = None;
-                (
-                    trajectory,
-                    Told {
-                        source,
-                        input,
-                        synthesis,
-                    },
-                )
-            }
-            (None, Some((synthesis, source))) => {
-                let trajectory = opened.synthesize(&synthesis);
-                (
-                    trajectory,
-                    Told {
-                        source,
-                        input: None,
-                        synthesis: Some(synthesis),
-                    },
-                )
-            }
-            (None, None) => {
-                let message = "name a trajectory, or ask for one with --synthesize";
-                return Err(Failure::Usage(message.to_owned()));
-            }
-        };
+        let (trajectory, source) = self.trajectory(&opened)?;
         let inputs: Vec<_> = std::iter::once(opened.input.clone())
-            .chain(told.input.clone())
+            .chain(source.input.clone())
             .collect();
         let outputs = self.outputs(files.as_ref());
         check_distinct(&outputs).map_err(RunError::from)?;
-        let force = self.writing.force;
         let reads = opened.files();
-        let of_table = |files: &ReplayFiles| {
-            Overwrite::new(force, files.record(), &inputs)
-                .made_with(&synthesize::made_with(
-                    told.synthesis.as_ref(),
-                    self.dynamics,
-                ))
-                .protecting(reads.iter())
-        };
-        let of_table = files.as_ref().map(of_table);
-        if let (Some(files), Some(overwrite)) = (&files, &of_table) {
-            for path in files.paths() {
-                overwrite.check(&path).map_err(RunError::from)?;
-            }
-        }
+        let overwrite = self.table_overwrite(files.as_ref(), &inputs, &source, &reads)?;
         let table = files.iter().flat_map(ReplayFiles::paths);
         let protected: Vec<PathBuf> = reads.iter().cloned().chain(table).collect();
+        let force = self.writing.force;
         if let Some(path) = &self.trajectory_out {
             let overwrite = Overwrite::same_bytes(force, &inputs).protecting(protected.iter());
             write_trajectory(&trajectory, path, &overwrite)?;
@@ -197,7 +153,7 @@ impl Replay {
             plot.check(&inputs)?;
         }
         let bar = begin(printer);
-        let mut report = run(&opened, &trajectory, told, self.dynamics, &bar)?;
+        let mut report = run(&opened, &trajectory, source, self.dynamics, &bar)?;
         drop(bar);
         for warning in &report.summary.warnings {
             printer.warning(warning);
@@ -205,20 +161,67 @@ impl Replay {
         if let Some(plot) = &plot {
             plot.write(&inputs, &report.svg(), printer)?;
         }
-        let place = match (&files, &of_table) {
+        let place = match (&files, &overwrite) {
             (Some(files), Some(overwrite)) => {
                 report.write(files, overwrite)?;
-                Place::Output
+                Stream::Output
             }
-            _ => {
+            (None, _) | (_, None) => {
                 printer.data(|out| report.rows.write(out))?;
-                Place::Error
+                Stream::Error
             }
         };
         report.summary.warnings = printer.warnings();
+        let written = files.as_ref().map(|files| {
+            let beside = [&self.trajectory_out, &self.plot].into_iter().flatten();
+            written(files, beside)
+        });
         printer.summary(place, &report.summary, || {
-            self.told(&report, files.as_ref())
+            text::summary(&report, written.as_deref())
         })
+    }
+
+    /// The trajectory of the file or the synthesis, and where it is from.
+    fn trajectory(&self, opened: &Opened) -> Result<(Trajectory, TrajectorySource), Failure> {
+        if let Some(file) = &self.trajectory {
+            let (trajectory, input) = documents::trajectory(file)?;
+            let source = TrajectorySource {
+                source: input.path.clone(),
+                input: Some(input),
+                synthesis: None,
+            };
+            return Ok((trajectory, source));
+        }
+        let Some((synthesis, source)) = self.synthesis() else {
+            let message = "name a trajectory, or ask for one with --synthesize";
+            return Err(Failure::Usage(message.to_owned()));
+        };
+        let trajectory = opened.synthesize(&synthesis);
+        let source = TrajectorySource {
+            source,
+            input: None,
+            synthesis: Some(synthesis),
+        };
+        Ok((trajectory, source))
+    }
+
+    /// The permission to replace the table and what is beside it, refused early where there is none.
+    fn table_overwrite(
+        &self,
+        files: Option<&ReplayFiles>,
+        inputs: &[Input],
+        source: &TrajectorySource,
+        reads: &[PathBuf],
+    ) -> Result<Option<Overwrite>, Failure> {
+        let Some(files) = files else { return Ok(None) };
+        let made_with = synthesize::made_with(source.synthesis.as_ref(), self.dynamics);
+        let overwrite = Overwrite::new(self.writing.force, files.record(), inputs)
+            .made_with(&made_with)
+            .protecting(reads.iter());
+        for path in files.paths() {
+            overwrite.check(&path).map_err(RunError::from)?;
+        }
+        Ok(Some(overwrite))
     }
 
     /// Every file that is to be written.
@@ -228,7 +231,7 @@ impl Replay {
         table.chain(beside.cloned()).collect()
     }
 
-    /// What is to be made up, and its name for people.
+    /// The requested synthesis, and its name for people.
     fn synthesis(&self) -> Option<(Synthesis, String)> {
         let (kind, name) = match self.synthesize? {
             KindFlag::Scan => (Kind::Scan, "scan lines".to_owned()),
@@ -246,127 +249,11 @@ impl Replay {
         };
         Some((synthesis, name))
     }
-
-    fn told(&self, report: &ReplayReport, files: Option<&ReplayFiles>) -> String {
-        let summary = &report.summary;
-        let trajectory = &summary.trajectory;
-        let mut sheet = Sheet::new(&format!(
-            "{} on {}: {} in {} s ({})",
-            summary.shape,
-            summary.design,
-            count(trajectory.positions, "position"),
-            number(trajectory.duration_s),
-            trajectory.source
-        ));
-        sheet.line(
-            "wanted",
-            &format!(
-                "{} N/m times the height, at most {}",
-                number(summary.lambda_n_per_m),
-                force(summary.force.wanted_max_n)
-            ),
-        );
-        sheet.line("feedback", &errors(&summary.force.feedback));
-        sheet.line(
-            "fixed",
-            &format!(
-                "{} (the bundle's static currents)",
-                errors(&summary.force.fixed)
-            ),
-        );
-        sheet.line("currents", &currents(summary));
-        let power = &summary.power;
-        sheet.line(
-            "heat",
-            &format!(
-                "{} on the average, at most {}; fixed currents {}",
-                si(power.mean_w, "W"),
-                si(power.max_w, "W"),
-                si(power.static_w, "W")
-            ),
-        );
-        sheet.line(
-            "limits",
-            &format!(
-                "bind {} of the time; outside the map {}",
-                percent(summary.saturated_time_fraction),
-                percent(summary.outside_time_fraction)
-            ),
-        );
-        if let Some(dynamics) = &summary.dynamics {
-            let voltage = dynamics
-                .voltage_v
-                .map_or_else(String::new, |v| format!(", voltages up to {} V", number(v)));
-            sheet.line(
-                "lag",
-                &format!(
-                    "time constants from {} to {}{voltage}",
-                    si(dynamics.time_constant_min_s, "s"),
-                    si(dynamics.time_constant_max_s, "s")
-                ),
-            );
-        }
-        if let Some(stage) = summary.accuracy.get("force").filter(|s| s.estimate > 0.0) {
-            sheet.line(
-                "accuracy",
-                &format!(
-                    "forces to {} N by the map's stated errors; optimality of the currents {}",
-                    error(stage.estimate),
-                    summary
-                        .accuracy
-                        .get("allocation")
-                        .map_or_else(String::new, |stage| error(stage.estimate))
-                ),
-            );
-        }
-        if let Some(files) = files {
-            let mut names: Vec<String> = files.names().map(str::to_owned).to_vec();
-            let beside = [&self.trajectory_out, &self.plot].into_iter().flatten();
-            names.extend(beside.map(|path| path.display().to_string()));
-            let folder = files.folder().display();
-            sheet.line("written to", &format!("{folder}: {}", names.join(", ")));
-        }
-        if let Some(step_s) = report.step_s {
-            sheet.line("step", &format!("{} each on this machine", si(step_s, "s")));
-        }
-        sheet.finish()
-    }
 }
 
-fn newton(force_n: f64) -> String {
-    if force_n < NOTHING_N {
-        "none".to_owned()
-    } else {
-        force(force_n)
-    }
-}
-
-fn errors(facts: &ErrorFacts) -> String {
-    if facts.worst_error_n < NOTHING_N {
-        return "no error".to_owned();
-    }
-    let relative = facts
-        .relative_rms_error
-        .map_or_else(String::new, |part| format!(" ({})", percent(part)));
-    let place = facts.worst_at.map_or_else(String::new, |place| {
-        let at = [place.x_m, place.y_m, place.z_m].map(|c| number(c * 1e3));
-        format!(" at {} s, ({}) mm", number(place.t_s), at.join(", "))
-    });
-    format!(
-        "error rms {}{relative}, worst {}{place}",
-        newton(facts.rms_error_n),
-        newton(facts.worst_error_n)
-    )
-}
-
-fn currents(summary: &ReplaySummary) -> String {
-    let facts = &summary.currents;
-    let most = facts.max_a.iter().copied().fold(0.0, f64::max);
-    let rms = facts.rms_a.iter().copied().fold(0.0, f64::max);
-    format!(
-        "at most {} a coil and {} in all; rms at most {} a coil",
-        si(most, "A"),
-        si(facts.max_sum_a, "A"),
-        si(rms, "A")
-    )
+/// Folder and names of what was written, for people.
+fn written<'a>(files: &ReplayFiles, beside: impl Iterator<Item = &'a PathBuf>) -> String {
+    let mut names: Vec<String> = files.names().map(str::to_owned).to_vec();
+    names.extend(beside.map(|path| path.display().to_string()));
+    format!("{}: {}", files.folder().display(), names.join(", "))
 }

@@ -1,8 +1,8 @@
 //! `replay`: what a runtime does along a trajectory, from a bundle alone.
 //!
-//! A position is held until the next one is measured. What is told of it is the end of that time:
-//! with `dynamics` the currents are then as far as their circuit has let them come, and without
-//! they are the commanded ones.
+//! A position is held until the next one is measured. Its row states the end of that time: with
+//! `dynamics` the currents are then as far as their circuit has let them come, without it they are
+//! the commanded ones.
 
 pub(crate) mod command;
 pub mod output;
@@ -10,6 +10,7 @@ mod plausible;
 pub mod renderer;
 pub mod summary;
 pub mod synthesize;
+mod text;
 
 use std::path::{Path, PathBuf};
 
@@ -21,7 +22,7 @@ use crate::bundle::trajectory::Trajectory;
 use crate::coil::drive::Drive;
 use crate::progress::Progress;
 use renderer::{Renderer, RendererError, Step};
-use summary::{DynamicsFacts, ReplaySummary, Told};
+use summary::{DynamicsSummary, ReplaySummary, TrajectorySource};
 use synthesize::Synthesis;
 
 /// Positions between two looks at the interruption flag.
@@ -106,27 +107,27 @@ impl Opened {
     }
 }
 
-/// What a replay found.
+/// The result of a replay.
 #[derive(Debug, Clone)]
 pub struct ReplayReport {
     /// The table.
     pub rows: ReplayRows,
-    /// The facts about it.
+    /// Its summary: the JSON result.
     pub summary: ReplaySummary,
-    /// Seconds a step of the loop took on the average; `None` where nobody measures.
+    /// Mean seconds of a step of the loop; `None` where nobody measures.
     pub step_s: Option<f64>,
     /// Seconds of every stage.
     pub seconds: Vec<(String, f64)>,
 }
 
-/// Replays `trajectory`, of which `told` says where it is from.
+/// Replays `trajectory`, which is from `source`.
 ///
 /// # Errors
 /// Positions that must be millimetres; `dynamics` on a bundle without inductances; interruption.
 pub fn run(
     opened: &Opened,
     trajectory: &Trajectory,
-    told: Told,
+    source: TrajectorySource,
     dynamics: bool,
     progress: &dyn Progress,
 ) -> Result<ReplayReport, RunError> {
@@ -136,7 +137,7 @@ pub fn run(
         return Err(RunError::Input(format!(
             "{}: no position lies inside the map, but a thousandth of them would: they are in \
              millimetres; x_m, y_m and z_m must be in metres",
-            told.source
+            source.source
         )));
     }
     let mut drive = dynamics.then(|| opened.drive()).transpose()?;
@@ -161,9 +162,9 @@ pub fn run(
         .iter()
         .find(|(stage, _)| stage == "replay")
         .map(|(_, seconds)| seconds / trajectory.len().max(1) as f64);
-    let facts = drive
+    let dynamics = drive
         .as_ref()
-        .map(|drive| DynamicsFacts::of(drive, &opened.bundle));
+        .map(|drive| DynamicsSummary::of(drive, &opened.bundle));
     let mut follower = Follower {
         renderer,
         fixed_a: opened
@@ -175,7 +176,7 @@ pub fn run(
         bounds: summary::Bounds::of(&opened.bundle),
     };
     let rows = follower.rows(trajectory, &steps, commanded_a, drive.as_mut(), progress)?;
-    let summary = ReplaySummary::new(opened, told, &rows, facts, &follower.bounds, warnings);
+    let summary = ReplaySummary::new(opened, source, &rows, dynamics, &follower.bounds, warnings);
     Ok(ReplayReport {
         rows,
         summary,
@@ -184,7 +185,7 @@ pub fn run(
     })
 }
 
-/// Goes through the positions again for what a runtime has no time to ask.
+/// Goes through the positions again for the numbers that a runtime has no time for.
 struct Follower {
     renderer: Renderer,
     /// The bundle's static currents.

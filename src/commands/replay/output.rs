@@ -27,7 +27,7 @@ impl ReplayFiles {
     /// Those of the table at `path`: `replay.csv`, `replay.json` and `timing_replay.json`.
     ///
     /// # Errors
-    /// A name that is none, or that ends as the facts' file does.
+    /// An invalid name, or one that ends as the facts' file does.
     pub fn new(path: &Path) -> Result<Self, RunError> {
         let name = path
             .file_name()
@@ -61,13 +61,13 @@ impl ReplayFiles {
         })
     }
 
-    /// The file that tells what the others were made from.
+    /// The file that records the inputs and options of the others.
     #[must_use]
     pub fn record(&self) -> PathBuf {
         self.folder.join(&self.facts)
     }
 
-    /// What is written, for people.
+    /// The names of the files, for people.
     #[must_use]
     pub fn names(&self) -> [&str; 3] {
         [&self.table, &self.facts, &self.timing]

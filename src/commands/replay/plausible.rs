@@ -6,8 +6,8 @@ use crate::bundle::trajectory::Trajectory;
 const GAP: f64 = 10.0;
 /// A median time between positions longer than this betrays milliseconds, s.
 const SLOW_S: f64 = 1.0;
-/// Gaps told one by one.
-const GAPS_TOLD: usize = 3;
+/// Gaps that are listed one by one.
+const GAPS_LISTED: usize = 3;
 /// Millimetres taken for metres.
 const MILLI: f64 = 1e-3;
 
@@ -34,13 +34,13 @@ pub fn in_millimetres(trajectory: &Trajectory, ends_m: &[[f64; 2]; 3]) -> bool {
     none && 2 * count(trajectory, |p| milli(ends_m, p)) > trajectory.len()
 }
 
-/// What is worth a warning.
+/// Warnings about an implausible trajectory.
 #[must_use]
 pub fn warnings(trajectory: &Trajectory, ends_m: &[[f64; 2]; 3]) -> Vec<String> {
-    let mut told = Vec::new();
+    let mut found = Vec::new();
     let milli = count(trajectory, |p| milli(ends_m, p));
     if milli > 0 {
-        told.push(format!(
+        found.push(format!(
             "{milli} of {} positions lie metres away, but inside the map if they are in millimetres: \
              x_m, y_m and z_m must be in metres",
             trajectory.len()
@@ -51,7 +51,7 @@ pub fn warnings(trajectory: &Trajectory, ends_m: &[[f64; 2]; 3]) -> Vec<String> 
         let mm = ends_m
             .map(|ends| ends.map(micrometre))
             .map(|[from, to]| format!("{from} to {to}"));
-        told.push(format!(
+        found.push(format!(
             "no position lies inside the map, which reaches from {} mm in x, {} mm in y and {} mm \
              in z: nothing is rendered",
             mm[0], mm[1], mm[2]
@@ -60,7 +60,7 @@ pub fn warnings(trajectory: &Trajectory, ends_m: &[[f64; 2]; 3]) -> Vec<String> 
     let median_s = trajectory.median_step_s();
     let median = (median_s * 1e6).round() / 1e6;
     if median_s > SLOW_S {
-        told.push(format!(
+        found.push(format!(
             "the median time between positions is {median} s: t_s must be in seconds, not in \
              milliseconds"
         ));
@@ -69,18 +69,18 @@ pub fn warnings(trajectory: &Trajectory, ends_m: &[[f64; 2]; 3]) -> Vec<String> 
     let gaps: Vec<usize> = (1..times.len())
         .filter(|&row| times[row] - times[row - 1] > GAP * median_s && median_s > 0.0)
         .collect();
-    for &row in gaps.iter().take(GAPS_TOLD) {
-        told.push(format!(
+    for &row in gaps.iter().take(GAPS_LISTED) {
+        found.push(format!(
             "no position from {} s to {} s, more than {GAP} times the median {median} s: the \
              last currents are held meanwhile",
             times[row - 1],
             times[row]
         ));
     }
-    if gaps.len() > GAPS_TOLD {
-        told.push(format!("and {} such gaps more", gaps.len() - GAPS_TOLD));
+    if gaps.len() > GAPS_LISTED {
+        found.push(format!("and {} such gaps more", gaps.len() - GAPS_LISTED));
     }
-    told
+    found
 }
 
 #[cfg(test)]
@@ -113,10 +113,10 @@ mod tests {
         let mut mixed = trajectory(&even, 1.0);
         mixed.position_m[7] = [12.0, -20.0, 50.0];
         assert!(!in_millimetres(&mixed, &BOX));
-        let told = warnings(&mixed, &BOX);
+        let all = warnings(&mixed, &BOX);
         assert!(
-            told.len() == 1 && told[0].starts_with("1 of 40 positions lie metres away"),
-            "{told:?}"
+            all.len() == 1 && all[0].starts_with("1 of 40 positions lie metres away"),
+            "{all:?}"
         );
         // Beside a map that reaches down to z = 0, a thousandth of anything near lies inside.
         let low = [BOX[0], BOX[1], [0.0, 0.07]];
@@ -125,10 +125,10 @@ mod tests {
         assert!(!in_millimetres(&beside, &low));
         let mut late = even.clone();
         late[30..].iter_mut().for_each(|t| *t += 0.19);
-        let told = warnings(&trajectory(&late, 1.0), &BOX);
+        let all = warnings(&trajectory(&late, 1.0), &BOX);
         assert!(
-            told.len() == 1 && told[0].contains("no position from 0.58 s to 0.79"),
-            "{told:?}"
+            all.len() == 1 && all[0].contains("no position from 0.58 s to 0.79"),
+            "{all:?}"
         );
         let slow: Vec<f64> = even.iter().map(|t| t * 1e3).collect();
         assert!(warnings(&trajectory(&slow, 1.0), &BOX)[0].contains("milliseconds"));

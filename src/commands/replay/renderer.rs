@@ -17,7 +17,7 @@ pub struct Renderer {
     force_n_per_a: Vec<f64>,
 }
 
-/// What a step found.
+/// The result of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Step {
@@ -27,7 +27,7 @@ pub struct Step {
     pub height_m: f64,
     /// lambda h(x, y), N; 0 where there is no surface and outside the map.
     pub wanted_n: f64,
-    /// What the commanded currents give, the unpowered steel's pull included, N.
+    /// The force of the commanded currents, the unpowered steel's pull included, N.
     pub force_n: f64,
     /// That pull, N.
     pub passive_n: f64,

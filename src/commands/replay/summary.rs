@@ -1,4 +1,4 @@
-//! What a replay tells besides its table.
+//! The summary of a replay beside its table.
 
 use std::collections::BTreeMap;
 
@@ -15,16 +15,16 @@ use crate::coil::drive::Drive;
 
 /// Where a trajectory is from.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Told {
-    /// The file as given, or what was made up.
+pub struct TrajectorySource {
+    /// The file as given, or the synthesis in words.
     pub source: String,
     /// The file's entry among the inputs.
     pub input: Option<Input>,
-    /// What was made up.
+    /// The synthesis, where the trajectory is not from a file.
     pub synthesis: Option<Synthesis>,
 }
 
-/// The facts of a replay.
+/// The JSON result of a replay.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReplaySummary {
     /// Layout, `major.minor.patch`.
@@ -42,19 +42,19 @@ pub struct ReplaySummary {
     /// The bundle's force constant, N/m.
     pub lambda_n_per_m: f64,
     /// The trajectory.
-    pub trajectory: TrajectoryFacts,
+    pub trajectory: TrajectorySummary,
     /// Forces with position feedback (Case I) and with fixed currents (Case II).
-    pub force: ForceFacts,
+    pub force: ForceSummary,
     /// Currents that flow.
-    pub currents: CurrentFacts,
+    pub currents: CurrentSummary,
     /// Heat in the coils.
-    pub power: PowerFacts,
+    pub power: PowerSummary,
     /// Part of the time during which the limits allow only the nearest force.
     pub saturated_time_fraction: f64,
     /// Part of the time outside the map.
     pub outside_time_fraction: f64,
     /// How fast the currents follow; null where they are taken to follow at once.
-    pub dynamics: Option<DynamicsFacts>,
+    pub dynamics: Option<DynamicsSummary>,
     /// Each stage's estimated error.
     pub accuracy: BTreeMap<&'static str, StageAccuracy>,
     /// Warnings for the user.
@@ -65,8 +65,8 @@ pub struct ReplaySummary {
 
 /// A trajectory.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TrajectoryFacts {
-    /// The file as given, or what was made up.
+pub struct TrajectorySummary {
+    /// The file as given, or the synthesis in words.
     pub source: String,
     /// How many positions.
     pub positions: usize,
@@ -78,19 +78,19 @@ pub struct TrajectoryFacts {
 
 /// Forces along a trajectory.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ForceFacts {
+pub struct ForceSummary {
     /// The largest force wanted, N.
     pub wanted_max_n: f64,
     /// With position feedback.
-    pub feedback: ErrorFacts,
+    pub feedback: ErrorSummary,
     /// With the bundle's fixed currents.
     #[serde(rename = "static")]
-    pub fixed: ErrorFacts,
+    pub fixed: ErrorSummary,
 }
 
 /// Differences from the wanted force, over the positions inside the map.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ErrorFacts {
+pub struct ErrorSummary {
     /// Root mean square, N.
     pub rms_error_n: f64,
     /// The same over the wanted force's root mean square; null where none is wanted.
@@ -98,12 +98,12 @@ pub struct ErrorFacts {
     /// Largest size, N.
     pub worst_error_n: f64,
     /// Where and when; null where no position is inside the map.
-    pub worst_at: Option<PlaceFacts>,
+    pub worst_at: Option<TimedPlace>,
 }
 
 /// A place at a time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct PlaceFacts {
+pub struct TimedPlace {
     /// s.
     pub t_s: f64,
     /// m.
@@ -116,7 +116,7 @@ pub struct PlaceFacts {
 
 /// Currents along a trajectory.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct CurrentFacts {
+pub struct CurrentSummary {
     /// Largest size in every coil, A.
     pub max_a: Vec<f64>,
     /// Root mean square over time in every coil, A.
@@ -127,7 +127,7 @@ pub struct CurrentFacts {
 
 /// Heat along a trajectory.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct PowerFacts {
+pub struct PowerSummary {
     /// Mean over time, W.
     pub mean_w: f64,
     /// Largest, W.
@@ -138,16 +138,16 @@ pub struct PowerFacts {
 
 /// The coils' circuit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct DynamicsFacts {
+pub struct DynamicsSummary {
     /// The fastest pattern of currents, s.
     pub time_constant_min_s: f64,
     /// The slowest, s.
     pub time_constant_max_s: f64,
-    /// What bounds the coils' voltages, V; null where nothing does.
+    /// The bound of the coils' voltages, V; null without one.
     pub voltage_v: Option<f64>,
 }
 
-impl DynamicsFacts {
+impl DynamicsSummary {
     pub(super) fn of(drive: &Drive, bundle: &Bundle) -> Self {
         let [shortest, longest] = drive.time_constants_s().unwrap_or_default();
         let rendering = bundle.map.runtime.rendering.as_ref();
@@ -232,9 +232,9 @@ impl Bounds {
 impl ReplaySummary {
     pub(super) fn new(
         opened: &Opened,
-        told: Told,
+        source: TrajectorySource,
         rows: &ReplayRows,
-        dynamics: Option<DynamicsFacts>,
+        dynamics: Option<DynamicsSummary>,
         bounds: &Bounds,
         warnings: Vec<String>,
     ) -> Self {
@@ -260,12 +260,12 @@ impl ReplaySummary {
             design: bundle.manifest.design.clone(),
             shape: bundle.manifest.shape.clone(),
             inputs: std::iter::once(opened.input.clone())
-                .chain(told.input)
+                .chain(source.input)
                 .collect(),
-            made_with: made_with(told.synthesis.as_ref(), dynamics.is_some()),
+            made_with: made_with(source.synthesis.as_ref(), dynamics.is_some()),
             lambda_n_per_m: opened.renderer.lambda_n_per_m(),
-            trajectory: TrajectoryFacts {
-                source: told.source,
+            trajectory: TrajectorySummary {
+                source: source.source,
                 positions: rows.len(),
                 duration_s: rows
                     .t_s
@@ -274,19 +274,19 @@ impl ReplaySummary {
                     .map_or(0.0, |(b, a)| b - a),
                 median_step_s: trajectory.median_step_s(),
             },
-            force: ForceFacts {
+            force: ForceSummary {
                 wanted_max_n: rows.wanted_force_n.iter().copied().fold(0.0, size),
                 feedback: errors(rows, |row| rows.error_n(row)),
                 fixed: errors(rows, |row| rows.static_error_n(row)),
             },
-            currents: CurrentFacts {
+            currents: CurrentSummary {
                 max_a: (0..rows.coils).map(|i| coil(i).fold(0.0, size)).collect(),
                 rms_a: (0..rows.coils)
                     .map(|i| times.mean(coil(i).map(|current| current * current)).sqrt())
                     .collect(),
                 max_sum_a: sums.reduce(f64::max).unwrap_or(0.0),
             },
-            power: PowerFacts {
+            power: PowerSummary {
                 mean_w: times.mean(heats.iter().copied()),
                 max_w: heats.iter().copied().fold(0.0, f64::max),
                 static_w: heat(&fixed),
@@ -335,7 +335,7 @@ impl Times {
 }
 
 /// Errors over the positions inside the map.
-fn errors(rows: &ReplayRows, error: impl Fn(usize) -> f64) -> ErrorFacts {
+fn errors(rows: &ReplayRows, error: impl Fn(usize) -> f64) -> ErrorSummary {
     let inside: Vec<usize> = (0..rows.len())
         .filter(|&row| rows.answer[row] != Answer::Outside)
         .collect();
@@ -351,13 +351,13 @@ fn errors(rows: &ReplayRows, error: impl Fn(usize) -> f64) -> ErrorFacts {
             a
         }
     });
-    ErrorFacts {
+    ErrorSummary {
         rms_error_n,
         relative_rms_error: (wanted_n > 0.0).then(|| rms_error_n / wanted_n),
         worst_error_n: worst.map_or(0.0, |row| error(row).abs()),
         worst_at: worst.map(|row| {
             let [x_m, y_m, z_m] = rows.position_m[row];
-            PlaceFacts {
+            TimedPlace {
                 t_s: rows.t_s[row],
                 x_m,
                 y_m,

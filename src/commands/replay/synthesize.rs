@@ -20,7 +20,7 @@ const BEYOND_M: f64 = 0.015;
 const LINES: f64 = 11.0;
 /// Time of one turn of the circle, s.
 const TURN_S: f64 = 4.0;
-/// Positions are told to a micrometre.
+/// Positions are rounded to a micrometre.
 const RESOLUTION_M: f64 = 1e-6;
 
 /// Kinds of trajectories.
@@ -46,7 +46,7 @@ impl Kind {
     }
 }
 
-/// What is made up.
+/// A trajectory to be made up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Synthesis {
     /// Which kind.
@@ -78,10 +78,10 @@ impl Synthesis {
             Kind::Circle => circle(&t_s, &surface),
             Kind::Explore => self.explore(&t_s, &surface, map.ends_m()[0][1]),
         };
-        let told = |v: f64| (v / RESOLUTION_M).round() / (1.0 / RESOLUTION_M);
+        let rounded = |v: f64| (v / RESOLUTION_M).round() / (1.0 / RESOLUTION_M);
         Trajectory {
             t_s,
-            position_m: position_m.into_iter().map(|p| p.map(told)).collect(),
+            position_m: position_m.into_iter().map(|p| p.map(rounded)).collect(),
         }
     }
 
@@ -183,7 +183,7 @@ impl<'a> Surface<'a> {
 #[must_use]
 pub fn made_with(synthesis: Option<&Synthesis>, dynamics: bool) -> Options {
     #[derive(Serialize)]
-    struct Asked {
+    struct Recorded {
         dynamics: bool,
         synthesize: Option<&'static str>,
         seed: Option<u64>,
@@ -199,7 +199,7 @@ pub fn made_with(synthesis: Option<&Synthesis>, dynamics: bool) -> Options {
         } = *synthesis;
         (kind.name(), seed, duration_s, rate_hz)
     });
-    Options::of(&Asked {
+    Options::of(&Recorded {
         dynamics,
         synthesize: made_up.map(|(kind, ..)| kind),
         seed: made_up.map(|(_, seed, ..)| seed),

@@ -14,7 +14,7 @@ const SLACK: f64 = 1e-9;
 /// make a text of what looks like a number.
 ///
 /// # Errors
-/// What was expected and found.
+/// The expected and the actual text.
 pub fn parse(text: &str) -> Result<Axis, String> {
     let (key, values) = text
         .split_once('=')
@@ -26,7 +26,7 @@ pub fn parse(text: &str) -> Result<Axis, String> {
         .any(|part| part.is_empty() || !part.chars().all(bare))
     {
         return Err(format!(
-            "{key:?} is no key: expected a dotted path, like wire.diameter_mm"
+            "invalid key {key:?}: expected a dotted path, like wire.diameter_mm"
         ));
     }
     let values = match range(values) {
@@ -42,7 +42,7 @@ pub fn parse(text: &str) -> Result<Axis, String> {
     })
 }
 
-/// FROM, TO, STEP; `None` where the text is no range: a colon after a number begins one.
+/// FROM, TO, STEP; `None` where the text is not a range: a colon after a number begins one.
 fn range(text: &str) -> Option<Result<[f64; 3], String>> {
     let parts: Vec<&str> = text.split(':').map(str::trim).collect();
     if parts.len() < 2 || parts[0].parse::<f64>().is_err() {
@@ -56,7 +56,7 @@ fn range(text: &str) -> Option<Result<[f64; 3], String>> {
     Some(match (numbers.as_slice(), parts.len()) {
         ([from, to, step], 3) => Ok([*from, *to, *step]),
         _ => Err(format!(
-            "{text:?} is no range: expected FROM:TO:STEP, three finite numbers, like 0.5:1.0:0.05"
+            "invalid range {text:?}: expected FROM:TO:STEP, three finite numbers, like 0.5:1.0:0.05"
         )),
     })
 }
@@ -112,14 +112,14 @@ fn list(text: &str) -> Result<Vec<Value>, String> {
     for item in items(text)? {
         let value = value(item)?;
         if values.contains(&value) {
-            return Err(format!("{item} stands there twice"));
+            return Err(format!("{item} is there twice"));
         }
         values.push(value);
     }
     Ok(values)
 }
 
-/// The parts between the commas that stand in no bracket and no quotes.
+/// The parts between the commas that are in no bracket and no quotes.
 fn items(text: &str) -> Result<Vec<&str>, String> {
     let (mut depth, mut quoted, mut start) = (0i32, false, 0);
     let mut items = Vec::new();
@@ -236,9 +236,9 @@ mod tests {
     fn what_is_no_axis_is_refused_with_what_was_expected() {
         for (text, said) in [
             ("wire.diameter_mm", "expected KEY=FROM:TO:STEP"),
-            ("=1,2", "is no key"),
-            ("wire..d=1", "is no key"),
-            ("wire d=1", "is no key"),
+            ("=1,2", "invalid key"),
+            ("wire..d=1", "invalid key"),
+            ("wire d=1", "invalid key"),
             ("a=1:2:0", "STEP is 0"),
             ("a=1:2:-0.1", "leads down"),
             ("a=2:1:0.1", "leads up"),

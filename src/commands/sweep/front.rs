@@ -44,10 +44,10 @@ mod tests {
                 no_worse && (points[b] != points[a] || b < a)
             })
         };
-        let mut wanted: Vec<usize> = (0..points.len()).filter(|&a| !beaten(a)).collect();
-        wanted.sort_by(|&a, &b| points[a][0].total_cmp(&points[b][0]));
-        assert_eq!(front(&points), wanted);
-        assert!(wanted.len() > 1);
+        let mut expected: Vec<usize> = (0..points.len()).filter(|&a| !beaten(a)).collect();
+        expected.sort_by(|&a, &b| points[a][0].total_cmp(&points[b][0]));
+        assert_eq!(front(&points), expected);
+        assert!(expected.len() > 1);
         assert!(front(&[]).is_empty());
     }
 }

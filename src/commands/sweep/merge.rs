@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::front::front;
 use crate::RunError;
 use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION};
-use crate::bundle::atomic::{FileSet, Overwrite, WriteError};
+use crate::bundle::atomic::{FileSet, Overwrite, WriteError, Written};
 use crate::bundle::seal::to_record;
 use crate::bundle::sweep::{
     MergeSummary, PlanFile, PointFile, PointStore, StoredPoint, TableWriter,
@@ -23,28 +23,28 @@ mod page;
 const PORTION: u64 = 4096;
 /// Ranges of missing points that are named.
 const NAMED: usize = 10;
-/// What the force is held against: name, unit, column of the front's table.
+/// The costs that the force is compared with: name, unit, column of the front's table.
 const COSTS: [(&str, &str, &str); 3] = [
     ("resistance", "ohm", "front_resistance"),
     ("mass", "kg", "front_mass"),
     ("settling time", "s", "front_settling"),
 ];
 
-/// What is merged.
+/// The options of a merge.
 #[derive(Debug, Clone)]
 pub struct MergeRequest {
     /// Folders that `sweep run` wrote to; each point is taken from the first that has it.
     pub folders: Vec<PathBuf>,
     /// Merge what there is, even if points are missing.
     pub partial: bool,
-    /// Whether a page is wanted.
+    /// Whether a page is requested.
     pub page: bool,
 }
 
 /// Where the files go.
 #[derive(Debug, Clone)]
 pub struct MergeFiles {
-    /// The table; plot, front and sidecar stand beside it under its name.
+    /// The table; plot, front and sidecar are beside it under its name.
     pub table: PathBuf,
     /// Replace what is there.
     pub force: bool,
@@ -69,15 +69,15 @@ impl MergeFiles {
 /// A merged sweep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MergeReport {
-    /// What the sidecar tells.
+    /// The content of the sidecar.
     pub summary: MergeSummary,
     /// Which points are missing, as text; empty where none is.
     pub missing: String,
-    /// The page, if one was asked for.
+    /// The page, if one was requested.
     pub page: Option<String>,
 }
 
-/// The few numbers of a point that are kept: index, force, costs, whether limits are met.
+/// The few numbers of a point that are held: index, force, costs, whether limits are met.
 struct Brief {
     index: u64,
     force_n: f64,
@@ -109,7 +109,7 @@ impl From<io::Error> for Stop {
 /// Merges into files: the table, the plot, the designs on the fronts, and the sidecar.
 ///
 /// # Errors
-/// Points that are missing, unless asked for what there is; points of another plan; files that are
+/// Points that are missing, unless a partial merge is requested; points of another plan; files that are
 /// not ours; interruption.
 pub fn merge(
     plan: &PlanFile,
@@ -165,24 +165,10 @@ pub fn merge(
     let written = set.write(&plot_name, |out| out.write_all(plot.svg().as_bytes()))?;
     listed.push(FileEntry::new(plot_name, written));
     let best = rows_on(&gathered.briefs, &fronts);
-    let points = best
-        .iter()
-        .map(|(index, _)| found(plan, request, *index))
-        .collect::<Result<Vec<_>, _>>()?;
     let front_name = name("_pareto.csv");
-    let written = set.write(&front_name, |out| {
-        let keys = plan.axes.iter().map(|axis| axis.key.as_str());
-        let mut table =
-            TableWriter::begin(out, plan.mode, keys, &COSTS.map(|(_, _, column)| column))?;
-        for ((index, flags), point) in best.iter().zip(&points) {
-            // What was there a moment ago may be gone.
-            let point = point.as_ref().ok_or(io::ErrorKind::NotFound)?;
-            table.row(&plan.values_at(*index), point, flags)?;
-        }
-        Ok(())
-    })?;
+    let written = write_front(&mut set, &front_name, plan, request, &best)?;
     listed.push(FileEntry::new(front_name, written));
-    tell(&mut summary, &gathered, best.len() as u64, among_met);
+    count(&mut summary, &gathered, best.len() as u64, among_met);
     summary.files = listed;
     set.write(&name("_merge.json"), |out| {
         let bytes = to_record(&summary)
@@ -194,6 +180,32 @@ pub fn merge(
         .page
         .then(|| page::html(plan, &summary, &plot, &gathered.briefs, &best));
     Ok(report(summary, &gathered, page))
+}
+
+/// Writes the table of the designs on a front.
+fn write_front(
+    set: &mut FileSet,
+    name: &str,
+    plan: &PlanFile,
+    request: &MergeRequest,
+    best: &[(u64, [bool; 3])],
+) -> Result<Written, RunError> {
+    let points = best
+        .iter()
+        .map(|(index, _)| found(plan, request, *index))
+        .collect::<Result<Vec<_>, _>>()?;
+    let written = set.write(name, |out| {
+        let keys = plan.axes.iter().map(|axis| axis.key.as_str());
+        let mut table =
+            TableWriter::begin(out, plan.mode, keys, &COSTS.map(|(_, _, column)| column))?;
+        for ((index, flags), point) in best.iter().zip(&points) {
+            // What was there a moment ago may be gone.
+            let point = point.as_ref().ok_or(io::ErrorKind::NotFound)?;
+            table.row(&plan.values_at(*index), point, flags)?;
+        }
+        Ok(())
+    })?;
+    Ok(written)
 }
 
 /// Merges into a table alone; the summary lists no files.
@@ -214,7 +226,7 @@ pub fn merge_table(
     let (fronts, among_met) = fronts(&gathered.briefs);
     let best = rows_on(&gathered.briefs, &fronts);
     let mut summary = summary(plan, plan_input);
-    tell(&mut summary, &gathered, best.len() as u64, among_met);
+    count(&mut summary, &gathered, best.len() as u64, among_met);
     let page = request.page.then(|| {
         let plot = plot(plan, &gathered.briefs, &fronts, among_met);
         page::html(plan, &summary, &plot, &gathered.briefs, &best)
@@ -222,7 +234,7 @@ pub fn merge_table(
     Ok((table, report(summary, &gathered, page)))
 }
 
-/// Writes the table's rows in the points' order and keeps what the fronts need.
+/// Writes the table's rows in the points' order and collects what the fronts need.
 fn gather(
     plan: &PlanFile,
     request: &MergeRequest,
@@ -412,7 +424,8 @@ fn summary(plan: &PlanFile, plan_input: Input) -> MergeSummary {
     }
 }
 
-fn tell(summary: &mut MergeSummary, gathered: &Gathered, front: u64, among_met: bool) {
+/// Fills in what was gathered.
+fn count(summary: &mut MergeSummary, gathered: &Gathered, front: u64, among_met: bool) {
     summary.rows = gathered.rows;
     summary.missing = gathered.missing_count();
     summary.failed = gathered.failed;

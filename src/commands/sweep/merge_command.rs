@@ -15,7 +15,7 @@ use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
 use crate::cli::pictures::Picture;
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{bytes, count, force};
 use crate::cli::start::{begin, folder};
 use crate::cli::values::FileArgument;
@@ -26,7 +26,7 @@ use crate::cli::values::FileArgument;
 /// against resistance, mass and settling time with the designs that no other one beats,
 /// NAME_pareto.csv with those designs, and NAME_merge.json. The best are chosen among the designs that
 /// meet their limits, if any does. Missing points are named and end with exit code 4 and no table,
-/// unless --partial asks for what there is: then the exit code is 0 and the missing are told as a
+/// unless --partial asks for what there is: then the exit code is 0 and the missing are reported as a
 /// warning. Points of another plan are refused.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Writing, &[
@@ -54,8 +54,9 @@ pub struct Merge {
     writing: Writing,
 }
 
+/// The summary as JSON, with where the table went.
 #[derive(Serialize)]
-struct Told<'a> {
+struct MergeJson<'a> {
     #[serde(flatten)]
     summary: &'a MergeSummary,
     table: String,
@@ -102,7 +103,7 @@ impl Merge {
                 let (table, report) = merge_table(&plan, input, &request, &bar)?;
                 drop(bar);
                 printer.data(|out| out.write_all(&table))?;
-                (report, Place::Error)
+                (report, Stream::Error)
             }
             FileArgument::Path(path) => {
                 let ending = path.extension().unwrap_or_default();
@@ -117,7 +118,7 @@ impl Merge {
                 let bar = begin(printer);
                 let report = merge(&plan, input, &request, &files, &bar)?;
                 drop(bar);
-                (report, Place::Output)
+                (report, Stream::Output)
             }
         };
         if report.summary.missing > 0 {
@@ -128,16 +129,16 @@ impl Merge {
         }
         if let (Some(page), Some(html)) = (&page, &report.page) {
             let after = page.write(&report.summary.inputs, html, printer)?;
-            if after == Place::Error {
+            if after == Stream::Error {
                 place = after;
             }
         }
-        let json = Told {
+        let json = MergeJson {
             summary: &report.summary,
             table: self.out.as_given().display().to_string(),
         };
         let json = printer.with_warnings(&json);
-        printer.summary(place, &json, || self.told(&report))
+        printer.summary(place, &json, || self.text(&report))
     }
 
     fn files(&self, table: &Path) -> MergeFiles {
@@ -147,7 +148,7 @@ impl Merge {
         }
     }
 
-    fn told(&self, report: &MergeReport) -> String {
+    fn text(&self, report: &MergeReport) -> String {
         let summary = &report.summary;
         let rows = count(summary.rows as usize, "design");
         let mut sheet = Sheet::new(&format!("{}: a sweep of {rows}", summary.design));

@@ -1,6 +1,6 @@
 //! `sweep`: a grid of designs, planned, computed in parts that may be cut short, and merged.
 //!
-//! A row is what `evaluate` tells of the coil alone; the array's inductances, which no column
+//! A row is what `evaluate` reports of the coil alone; the array's inductances, which no column
 //! shows, are not computed.
 
 pub mod axis;

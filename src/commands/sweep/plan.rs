@@ -11,17 +11,17 @@ use crate::bundle::sweep::{Axis, Mode, POINTS_MAX, PlanFile, Value};
 use crate::design::template::Template;
 use crate::design::{Design, Severity, Steel, source};
 
-/// Values at fault that are told one by one.
+/// Values at fault that are reported one by one.
 const TOLD: usize = 20;
 /// The key of a B-H table.
 const CURVE_KEY: &str = "core.bh_curve";
 
-/// What is to be planned.
+/// The options of a plan.
 #[derive(Debug, Clone)]
 pub struct PlanRequest {
-    /// What varies; the last is the fastest.
+    /// The varied keys; the last is the fastest.
     pub axes: Vec<Axis>,
-    /// What is done with each design.
+    /// How each design is computed.
     pub mode: Mode,
     /// Where randomness begins.
     pub seed: u64,

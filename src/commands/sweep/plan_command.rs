@@ -15,7 +15,7 @@ use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::count;
 use crate::cli::values::FileArgument;
 use crate::design::Need;
@@ -105,12 +105,12 @@ impl Plan {
             FileArgument::Standard => {
                 let text = to_json(&plan)?;
                 printer.data(|out| out.write_all(&text))?;
-                Place::Error
+                Stream::Error
             }
             FileArgument::Path(path) => {
                 let overwrite = Overwrite::same_bytes(self.writing.force, &plan.inputs);
                 write_json(path, &overwrite, &plan).map_err(RunError::from)?;
-                Place::Output
+                Stream::Output
             }
         };
         let json = PlanSummary {
@@ -130,10 +130,10 @@ impl Plan {
             plan_sha256: &plan.plan_sha256,
         };
         let json = printer.with_warnings(&json);
-        printer.summary(place, &json, || self.told(&plan))
+        printer.summary(place, &json, || self.text(&plan))
     }
 
-    fn told(&self, plan: &PlanFile) -> String {
+    fn text(&self, plan: &PlanFile) -> String {
         let designs = count(plan.points as usize, "design");
         let mut sheet = Sheet::new(&format!("{}: a sweep of {designs}", plan.design));
         let axes: Vec<String> = plan

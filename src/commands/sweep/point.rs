@@ -4,12 +4,13 @@ use std::path::Path;
 
 use crate::RunError;
 use crate::bundle::sweep::{Mode, OptimumRow, PlanFile, PointFile, Row, Status, Value};
+use crate::coil::optimum::Ending;
 use crate::commands::optimize::{Document, Optimization, OptimizeRequest, optimize};
 use crate::design::template::Template;
 use crate::design::{Design, InvalidDocument, Need, Severity};
 use crate::progress::Silent;
 use crate::scene::Scene;
-use crate::scene::rated::Rated;
+use crate::scene::rated::{CircuitSummary, Rated};
 
 /// A plan made ready for computing its points.
 pub(super) struct Sweep<'a> {
@@ -20,7 +21,7 @@ pub(super) struct Sweep<'a> {
 
 impl<'a> Sweep<'a> {
     /// # Errors
-    /// A text that is no TOML.
+    /// Invalid TOML.
     pub(super) fn new(plan: &'a PlanFile) -> Result<Self, RunError> {
         let path = plan.inputs.first().map_or("", |input| input.path.as_str());
         let path = Path::new(path);
@@ -37,18 +38,18 @@ impl<'a> Sweep<'a> {
     pub(super) fn point(&self, index: u64) -> PointFile {
         let sha256 = &self.plan.plan_sha256;
         let point = match self.outcome(index) {
-            Ok(Found::Row(row, status)) => PointFile::new(sha256, index, Ok((row, status))),
-            Ok(Found::NoCoil(status, why)) => PointFile::without_row(sha256, index, status, why),
+            Ok(Computed::Row(row, status)) => PointFile::new(sha256, index, Ok((row, status))),
+            Ok(Computed::NoCoil(status, why)) => PointFile::without_row(sha256, index, status, why),
             Err(message) => PointFile::new(sha256, index, Err(message)),
         };
         match point.to_bytes() {
             Ok(_) => point,
-            // A number that is none.
+            // A number that is not finite.
             Err(error) => PointFile::new(sha256, index, Err(error.to_string())),
         }
     }
 
-    fn outcome(&self, index: u64) -> Result<Found, String> {
+    fn outcome(&self, index: u64) -> Result<Computed, String> {
         let values = self.plan.values_at(index);
         let settings = self
             .plan
@@ -62,10 +63,8 @@ impl<'a> Sweep<'a> {
             Mode::Optimize | Mode::OptimizeWound => Need::OPTIMIZE,
         };
         let (design, _) = Design::from_toml(&text, self.path, need).map_err(|e| refusal(&e))?;
-        let found = match self.plan.mode {
-            Mode::Evaluate => {
-                evaluated(&design, self.plan.tolerance).map(|(row, status)| Found::Row(row, status))
-            }
+        let computed = match self.plan.mode {
+            Mode::Evaluate => evaluated(&design, self.plan.tolerance),
             Mode::Optimize | Mode::OptimizeWound => {
                 let document = Document {
                     design: &design,
@@ -82,35 +81,26 @@ impl<'a> Sweep<'a> {
                 optimize(&document, Vec::new(), &request, &Silent).map(|result| optimum(&result))
             }
         };
-        found.map_err(|error| error.to_string())
+        computed.map_err(|error| error.to_string())
     }
 }
 
-/// What was found of one design.
-enum Found {
+/// The result of one design.
+enum Computed {
     Row(Row, Status),
     NoCoil(Status, String),
 }
 
-fn optimum(result: &Optimization) -> Found {
+fn optimum(result: &Optimization) -> Computed {
     let (Some(coil), Some(objective)) = (&result.coil, &result.objective) else {
-        let status = if result.status == "unbounded" {
-            Status::Unbounded
-        } else {
-            Status::Infeasible
+        let status = match result.status {
+            Ending::Unbounded => Status::Unbounded,
+            Ending::Infeasible | Ending::Optimal => Status::Infeasible,
         };
         let why = result.no_coil.as_ref().map(|none| none.message.clone());
-        return Found::NoCoil(status, why.unwrap_or_default());
+        return Computed::NoCoil(status, why.unwrap_or_default());
     };
-    let circuit = &coil.circuit;
     let row = Row {
-        turns: coil.turns,
-        resistance_ohm: circuit.resistance_ohm,
-        inductance_h: circuit.inductance_h,
-        settling_s: circuit.settling_s,
-        power_w: circuit.power_w,
-        mass_kg: circuit.mass_kg,
-        wire_length_m: circuit.wire_length_m,
         current_a: objective.current_a,
         gradient_t_per_m_per_a: objective.gradient_t_per_m_per_a,
         force_n: objective.force_n + objective.passive_force_n.unwrap_or(0.0),
@@ -121,55 +111,59 @@ fn optimum(result: &Optimization) -> Found {
             outer_diameter_m: coil.size.outer_diameter_m,
             length_m: coil.size.length_m,
             wire_diameter_m: coil.wire_diameter_m,
-            layers: coil.layers,
-            turns_per_layer: coil.turns_per_layer,
+            layers: coil.whole.map(|whole| whole.layers),
+            turns_per_layer: coil.whole.map(|whole| whole.turns_per_layer),
             certificate: result.certificate.kind,
             upper_bound_n: result.certificate.upper_bound_n,
         }),
+        ..row(coil.turns, &coil.circuit)
     };
-    let status = if result.accuracy_reached {
-        Status::Done
-    } else {
-        Status::AccuracyNotReached
-    };
-    Found::Row(row, status)
+    Computed::Row(row, status(result.accuracy_reached))
 }
 
-fn evaluated(design: &Design, tolerance: Option<f64>) -> Result<(Row, Status), RunError> {
-    let scene = Scene::new(design)?;
-    let rated = Rated::new(&scene, tolerance)?;
-    let circuit = &rated.circuit;
+fn evaluated(design: &Design, tolerance: Option<f64>) -> Result<Computed, RunError> {
+    let rated = Rated::new(&Scene::with_tolerance(design, tolerance)?)?;
     let row = Row {
-        turns: circuit.turns,
+        current_a: rated.target.current_a,
+        gradient_t_per_m_per_a: rated.target.gradient_t_per_m_per_a,
+        force_n: rated.target.force_n,
+        core_peak_field_t: rated.core.as_ref().map(|core| core.peak_field_t),
+        limits_met: rated.limits.values().all(|check| check.met),
+        ..row(rated.coil.turns, &rated.coil.circuit)
+    };
+    Ok(Computed::Row(row, status(rated.accuracy_missed.is_empty())))
+}
+
+/// A row of the coil alone.
+fn row(turns: f64, circuit: &CircuitSummary) -> Row {
+    Row {
+        turns,
         resistance_ohm: circuit.resistance_ohm,
         inductance_h: circuit.inductance_h,
-        settling_s: circuit.settling_s(),
-        power_w: rated.power_w,
-        mass_kg: rated.mass_kg,
+        settling_s: circuit.settling_s,
+        power_w: circuit.power_w,
+        mass_kg: circuit.mass_kg,
         wire_length_m: circuit.wire_length_m,
-        current_a: rated.current_a,
-        gradient_t_per_m_per_a: rated.single.field.dbz_dz,
-        force_n: rated.force.force_n[2],
-        core_peak_field_t: rated.single.core.as_ref().map(|core| core.peak_field_t),
-        limits_met: rated.limits.values().all(|check| check.met),
-        optimum: None,
-    };
-    let status = if rated.accuracy_missed.is_empty() {
+        ..Row::default()
+    }
+}
+
+fn status(accuracy_reached: bool) -> Status {
+    if accuracy_reached {
         Status::Done
     } else {
         Status::AccuracyNotReached
-    };
-    Ok((row, status))
+    }
 }
 
 /// Why a design was refused, in one line and without places: its text is not the user's.
 fn refusal(refused: &InvalidDocument) -> String {
     let faults = refused.faults.list().iter();
-    let told: Vec<String> = faults
+    let faults: Vec<String> = faults
         .filter(|fault| fault.severity == Severity::Error)
         .map(ToString::to_string)
         .collect();
-    told.join("; ")
+    faults.join("; ")
 }
 
 /// The value as TOML. Whole numbers are integers: keys that count take them, all others too.

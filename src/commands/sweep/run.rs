@@ -1,4 +1,4 @@
-//! `sweep run`: computes points, keeps those that are there.
+//! `sweep run`: computes the points that are missing.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -53,23 +53,23 @@ impl Part {
     }
 }
 
-/// What was computed.
+/// The counts of a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunReport {
-    /// Points asked for.
+    /// Requested points.
     pub points: u64,
     /// Points that were there.
     pub kept: u64,
     /// Points whose design cannot be computed, those that were there included.
     pub failed: u64,
-    /// Points that miss the accuracy asked for.
+    /// Points that miss the requested accuracy.
     pub inaccurate: u64,
     /// The first that failed, and why.
     pub first_failure: Option<(u64, String)>,
 }
 
 /// Computes the points `indices` of `plan` into `folder`, in parallel, each into its own file.
-/// Points that are there are kept, unless `force` asks for them again.
+/// Points that are there are kept, unless `force` requests them again.
 ///
 /// # Errors
 /// Inputs that have changed since the plan was made; a folder or file that belongs to something

@@ -8,14 +8,14 @@ use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::count;
 use crate::cli::start::{begin, folder};
 use crate::cli::values::FileArgument;
 
 /// Compute the points of a plan, or a part of them
 ///
-/// Computes what `evaluate` tells of the coil alone for every design of the plan, each into a
+/// Computes what `evaluate` reports of the coil alone for every design of the plan, each into a
 /// small file points/000/000123.json of the folder. Points that are there are kept, so a run that
 /// was killed or interrupted goes on where it stopped; several runs may share a folder, on one
 /// machine or many. A design that cannot be computed becomes a row that says why; the exit code is
@@ -102,14 +102,14 @@ impl Run {
             accuracy_not_reached: report.inaccurate,
         };
         let json = printer.with_warnings(&json);
-        printer.summary(Place::Output, &json, || self.told(&plan.design, &report))?;
+        printer.summary(Stream::Output, &json, || self.text(&plan.design, &report))?;
         if self.allow_failed {
             return Ok(());
         }
         unmet(&report)
     }
 
-    fn told(&self, design: &str, report: &RunReport) -> String {
+    fn text(&self, design: &str, report: &RunReport) -> String {
         let points = count(report.points as usize, "point");
         let mut sheet = Sheet::new(&format!("{design}: {points} of a sweep"));
         let computed = report.points - report.kept;

@@ -7,7 +7,7 @@ use crate::cli::budget::within;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{count, error};
 use crate::cli::start::begin;
 
@@ -57,7 +57,7 @@ impl Verify {
             printer.warning(&format!("not checked: {part}"));
         }
         let json = printer.with_warnings(&report);
-        printer.summary(Place::Output, &json, || self.summary(&report))?;
+        printer.summary(Stream::Output, &json, || self.summary(&report))?;
         let failed = report.checks.iter().filter(|check| !check.passed);
         let failed: Vec<String> = failed
             .map(|check| format!("{} ({})", check.name, check.how))
@@ -107,7 +107,7 @@ impl Verify {
 
 fn checks_table(checks: &[Check]) -> String {
     let head = ["check", "measured", "allowed", "", "how"].map(str::to_owned);
-    let told = |value: f64| {
+    let shown = |value: f64| {
         if value == 0.0 {
             "0".to_owned()
         } else {
@@ -117,8 +117,8 @@ fn checks_table(checks: &[Check]) -> String {
     let row = |check: &Check| {
         vec![
             check.name.to_owned(),
-            told(check.measured),
-            told(check.allowed),
+            shown(check.measured),
+            shown(check.allowed),
             if check.passed { "ok" } else { "FAILED" }.to_owned(),
             check.how.clone(),
         ]

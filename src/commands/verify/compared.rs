@@ -99,7 +99,7 @@ pub(super) fn made_on(bundle: &Bundle) -> &str {
 pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
     let made_by = MadeBy::of(bundle);
     let manifests = [&bundle.manifest, &expected.manifest].map(serde_json::to_value);
-    let [Ok(mut told), Ok(mut wanted)] = manifests else {
+    let [Ok(mut stored), Ok(mut again)] = manifests else {
         let how = "manifest.json cannot be written as it is".to_owned();
         return Compared {
             check: check("recomputed", 1.0, 0.0, how),
@@ -108,7 +108,7 @@ pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
         };
     };
     if made_by == MadeBy::Same {
-        return exactly(bundle, expected, [told, wanted]);
+        return exactly(bundle, expected, [stored, again]);
     }
     let mut faults = Vec::new();
     let tolerance = tolerance(expected);
@@ -119,7 +119,7 @@ pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
     )];
     let same_list = made_by != MadeBy::Another;
     kept_and_pages(bundle, expected, same_list, &mut faults, &mut unchecked);
-    for side in [&mut told, &mut wanted] {
+    for side in [&mut stored, &mut again] {
         for key in ["files", "schema_version", "fluxform_version"] {
             side[key] = Value::Null;
         }
@@ -131,15 +131,15 @@ pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
         }
     }
     let mut differences = Differences::new(made_by, Some(tolerance));
-    differences.add("manifest.json", &told, &wanted);
+    differences.add("manifest.json", &stored, &again);
     let lambdas = [&bundle.lambda, &expected.lambda].map(serde_json::to_value);
-    if let [Ok(mut told), Ok(mut wanted)] = lambdas {
-        for side in [&mut told, &mut wanted] {
+    if let [Ok(mut stored), Ok(mut again)] = lambdas {
+        for side in [&mut stored, &mut again] {
             for key in ["schema_version", "fluxform_version"] {
                 side[key] = Value::Null;
             }
         }
-        differences.add("lambda.json", &told, &wanted);
+        differences.add("lambda.json", &stored, &again);
     }
     faults.extend(differences.faults);
     if !differences.unchecked.is_empty() {
@@ -164,12 +164,12 @@ pub(super) fn compare(bundle: &Bundle, expected: &Expected) -> Compared {
 fn exactly(bundle: &Bundle, expected: &Expected, manifests: [Value; 2]) -> Compared {
     let mut faults = Vec::new();
     differing_files(bundle, expected, &mut faults);
-    let [told, wanted] = manifests.map(|mut side| {
+    let [stored, again] = manifests.map(|mut side| {
         side["files"] = Value::Null;
         side
     });
     let mut differences = Differences::new(MadeBy::Same, None);
-    differences.add("manifest.json", &told, &wanted);
+    differences.add("manifest.json", &stored, &again);
     faults.extend(differences.faults);
     // Two numbers may be equal and not the same: 0.0 and -0.0.
     let bytes = to_record(&expected.manifest).map(|text| sha256_hex(&text));
@@ -185,21 +185,21 @@ fn exactly(bundle: &Bundle, expected: &Expected, manifests: [Value; 2]) -> Compa
 }
 
 fn named(name: &'static str, faults: &[String], how: &str) -> Check {
-    let mut told = how.to_owned();
+    let mut stored = how.to_owned();
     if !faults.is_empty() {
         let first: Vec<&str> = faults.iter().take(NAMED).map(String::as_str).collect();
-        told = format!("not what the inputs give: {}", first.join(", "));
+        stored = format!("not what the inputs give: {}", first.join(", "));
         if faults.len() > NAMED {
-            told.push_str(&format!(" and {} more", faults.len() - NAMED));
+            stored.push_str(&format!(" and {} more", faults.len() - NAMED));
         }
     }
-    check(name, faults.len() as f64, 0.0, told)
+    check(name, faults.len() as f64, 0.0, stored)
 }
 
 /// Listed files with another name, place, size or digest.
 fn differing_files(bundle: &Bundle, expected: &Expected, faults: &mut Vec<String>) {
-    let (told, wanted) = (&bundle.manifest.files, &expected.manifest.files);
-    if told == wanted {
+    let (stored, again) = (&bundle.manifest.files, &expected.manifest.files);
+    if stored == again {
         return;
     }
     let before = faults.len();
@@ -209,10 +209,10 @@ fn differing_files(bundle: &Bundle, expected: &Expected, faults: &mut Vec<String
             .map(|file| (file.path.clone(), file.sha256.clone()))
             .collect()
     };
-    let (told, wanted) = (by_name(told), by_name(wanted));
-    let names: BTreeSet<&String> = told.keys().chain(wanted.keys()).collect();
+    let (stored, again) = (by_name(stored), by_name(again));
+    let names: BTreeSet<&String> = stored.keys().chain(again.keys()).collect();
     for name in names {
-        match (told.get(name), wanted.get(name)) {
+        match (stored.get(name), again.get(name)) {
             (Some(a), Some(b)) if a == b => {}
             (Some(_), Some(_)) => faults.push(name.clone()),
             (Some(_), None) => faults.push(format!("{name}, which is none of its files")),
@@ -233,18 +233,18 @@ fn kept_and_pages(
     faults: &mut Vec<String>,
     unchecked: &mut Vec<String>,
 ) {
-    let (told, wanted) = (&bundle.manifest.files, &expected.manifest.files);
+    let (stored, again) = (&bundle.manifest.files, &expected.manifest.files);
     let names = |files: &[FileEntry]| -> Vec<String> {
         files.iter().map(|file| file.path.clone()).collect()
     };
-    if same_list && names(told) != names(wanted) {
+    if same_list && names(stored) != names(again) {
         faults.push("the list of files".to_owned());
     }
     let mut pages = Vec::new();
-    for file in told {
+    for file in stored {
         let copy = [DESIGN_FILE, CURVE_FILE].contains(&file.path.as_str());
         let page = file.path.ends_with(".html") || file.path.starts_with("plots/");
-        let other = wanted.iter().find(|other| other.path == file.path);
+        let other = again.iter().find(|other| other.path == file.path);
         if copy && other != Some(file) {
             faults.push(file.path.clone());
         } else if (page || other.is_none()) && other != Some(file) {
@@ -259,10 +259,10 @@ fn kept_and_pages(
     }
 }
 
-fn same_points(told: &[PointRow], wanted: &[PointRow]) -> bool {
+fn same_points(stored: &[PointRow], again: &[PointRow]) -> bool {
     let near = |a: f64, b: f64| (a - b).abs() <= ROUNDING * a.abs().max(b.abs()).max(1e-3);
-    told.len() == wanted.len()
-        && told.iter().zip(wanted).all(|(a, b)| {
+    stored.len() == again.len()
+        && stored.iter().zip(again).all(|(a, b)| {
             let parts = a.normal.iter().zip(&b.normal);
             near(a.x_m, b.x_m)
                 && near(a.y_m, b.y_m)
@@ -304,8 +304,8 @@ impl Differences {
         }
     }
 
-    fn add(&mut self, at: &str, told: &Value, wanted: &Value) {
-        if told == wanted {
+    fn add(&mut self, at: &str, stored: &Value, again: &Value) {
+        if stored == again {
             return;
         }
         let key = at.rsplit(' ').next().unwrap_or(at);
@@ -315,7 +315,7 @@ impl Differences {
             self.unchecked.push(at.to_owned());
             return;
         }
-        match (told, wanted) {
+        match (stored, again) {
             (Value::Object(a), Value::Object(b)) if another || a.keys().eq(b.keys()) => {
                 let keys: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
                 for key in keys {
@@ -337,7 +337,7 @@ impl Differences {
             }
             _ => {
                 let estimate = ESTIMATED.contains(&key);
-                let near = |tolerance| near(told, wanted, tolerance, estimate);
+                let near = |tolerance| near(stored, again, tolerance, estimate);
                 if self.tolerance.is_some_and(near) {
                     return;
                 }
@@ -365,7 +365,7 @@ fn numbers(list: &[Value]) -> bool {
 }
 
 /// Whether two numbers, or two lists of numbers, are the same but for rounding.
-fn near(told: &Value, wanted: &Value, tolerance: f64, estimate: bool) -> bool {
+fn near(stored: &Value, again: &Value, tolerance: f64, estimate: bool) -> bool {
     let list = |value: &Value| -> Option<Vec<f64>> {
         match value {
             Value::Array(parts) => parts.iter().map(Value::as_f64).collect(),
@@ -374,10 +374,10 @@ fn near(told: &Value, wanted: &Value, tolerance: f64, estimate: bool) -> bool {
         }
     };
     // Counts and indices are the same or not.
-    if told.is_u64() || told.is_i64() || wanted.is_u64() || wanted.is_i64() {
+    if stored.is_u64() || stored.is_i64() || again.is_u64() || again.is_i64() {
         return false;
     }
-    let (Some(a), Some(b)) = (list(told), list(wanted)) else {
+    let (Some(a), Some(b)) = (list(stored), list(again)) else {
         return false;
     };
     let largest = b.iter().fold(0.0_f64, |most, value| most.max(value.abs()));

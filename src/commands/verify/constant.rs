@@ -4,12 +4,12 @@ use super::passive::offset_n;
 use super::route::Route;
 use super::{Bounds, Check, check, difference, ratio, worst};
 use crate::RunError;
+use crate::bundle::lambda_file::LambdaFile;
 use crate::bundle::load::Bundle;
 use crate::field::winding::KERNEL_ERROR;
-use crate::lambda::{self, Criterion, ForceProblem, Settings};
+use crate::lambda::{self, ForceProblem, Settings};
 use crate::progress::Progress;
 use crate::scene::evaluation_sample::spread;
-use crate::scene::steel::{self, Steel};
 
 /// Largest difference of a force constant that is solved for again, relative.
 const LAMBDA_AGREES: f64 = 1e-8;
@@ -33,16 +33,13 @@ pub(super) fn checks(
         .collect();
     let lowest_m = bundle.map.z_m.first().copied().unwrap_or(0.0);
     // Forces that differ by their stated error move force constants and errors by a few times it.
-    let slack = match route.solved.steel {
-        Steel::None => 0.0,
-        Steel::Alone(_) | Steel::Coupled(_) => FORCES_MOVE * bounds.forces,
+    let slack = if route.solved.has_steel() {
+        FORCES_MOVE * bounds.forces
+    } else {
+        0.0
     };
-    let solved = match &route.solved.steel {
-        Steel::None => steel::solve(scene, None, scene.force_tolerance(), lowest_m)?,
-        Steel::Alone(_) | Steel::Coupled(_) => route.solved.clone(),
-    };
+    let solved = route.solved.for_forces(scene, lowest_m)?;
     let forces = scene.forces_n_per_a(&solved, &positions, progress)?;
-    let coils = scene.coils.len();
     let mut checks = vec![sampled_forces(route, bounds, &positions, &forces)?];
 
     let heights: Vec<f64> = bundle.points.iter().map(|p| p.height_m).collect();
@@ -61,9 +58,8 @@ pub(super) fn checks(
         total_max_a: scene.design.supply.total_current_max_a,
         resistance_ohm: &resistance_ohm,
     };
-    let criterion = stored.criterion;
     let settings = Settings {
-        criterion,
+        criterion: stored.criterion,
         jnd_weight: stored.jnd,
         at_n_per_m: stored.lambda_n_per_m,
     };
@@ -74,66 +70,75 @@ pub(super) fn checks(
         .zip(again.constants.named())
         .map(|(stored, again)| (stored.lambda_n_per_m, again.lambda_n_per_m))
         .chain([(stored.lambda_n_per_m, chosen)])
-        .map(|(told, found)| difference(told.as_slice(), found.as_slice()))
+        .map(|(stored, again)| difference(stored.as_slice(), again.as_slice()))
         .fold(0.0, f64::max);
     let how = "all force constants solved for again";
     checks.push(check("lambda", worst, agrees, how.to_owned()));
 
-    if let Some(told) = &stored.worst_point {
+    if let Some(worst) = &stored.worst_point {
         let lambda = stored.lambda_n_per_m;
-        let found = worst::checks(&problem, &settings, again.status, told, lambda, agrees)?;
-        checks.extend(found);
+        let worst = worst::checks(&problem, &settings, again.status, worst, lambda, agrees)?;
+        checks.extend(worst);
     }
-    let (Some(lambda), Some(currents)) = (stored.lambda_n_per_m, &stored.currents_a) else {
-        return Ok(checks);
-    };
-    let residual: Vec<f64> = forces
-        .chunks_exact(coils)
+    if let (Some(lambda), Some(currents)) = (stored.lambda_n_per_m, &stored.currents_a) {
+        checks.extend(currents_checks(stored, &problem, lambda, currents, slack));
+    }
+    Ok(checks)
+}
+
+/// The errors that the stored currents have, and the proof that no others are better. `slack` is
+/// how much the stated errors of the forces may move them.
+fn currents_checks(
+    stored: &LambdaFile,
+    problem: &ForceProblem,
+    lambda: f64,
+    currents: &[f64],
+    slack: f64,
+) -> Vec<Check> {
+    let agrees = slack.max(LAMBDA_AGREES);
+    let heights = problem.height_m;
+    let residual: Vec<f64> = problem
+        .forces_n_per_a
+        .chunks_exact(problem.coils())
         .enumerate()
         .map(|(point, row)| {
-            let pull = offset_n.as_ref().map_or(0.0, |offset| offset[point]);
+            let pull = problem.offset_n.map_or(0.0, |offset| offset[point]);
             let pushed: f64 = row.iter().zip(currents).map(|(g, i)| g * i).sum();
             lambda * heights[point] - pull - pushed
         })
         .collect();
     let n = heights.len() as f64;
-    let wanted = lambda * lambda * heights.iter().map(|h| h * h).sum::<f64>() / n;
+    let mean_square_force = lambda * lambda * heights.iter().map(|h| h * h).sum::<f64>() / n;
+    let rms_force = mean_square_force.sqrt();
     let mean_square = residual.iter().map(|e| e * e).sum::<f64>() / n;
-    let rms = stored
-        .rms_error_n
-        .map_or(f64::INFINITY, |told| (told - mean_square.sqrt()).abs());
-    let how = "the mean square error summed over all points";
-    checks.push(check(
-        "rms error",
-        ratio(rms, wanted.sqrt()),
-        agrees,
-        how.to_owned(),
-    ));
-    let worst = residual.iter().fold(0.0_f64, |most, e| most.max(e.abs()));
-    let worst = stored
-        .worst_error_n
-        .map_or(f64::INFINITY, |told| (told - worst).abs());
-    let how = "the largest error over all points";
-    checks.push(check(
-        "worst error",
-        ratio(worst, wanted.sqrt()),
-        agrees,
-        how.to_owned(),
-    ));
-    if criterion == Criterion::Maxmin {
+    let largest = residual.iter().fold(0.0_f64, |most, e| most.max(e.abs()));
+    let against = |name, stored: Option<f64>, again: f64, how: &str| {
+        let off = stored.map_or(f64::INFINITY, |stored| (stored - again).abs());
+        check(name, ratio(off, rms_force), agrees, how.to_owned())
+    };
+    let last = if stored.criterion.is_least_mean_square() {
+        let gap = ratio(duality_gap(problem, &residual, currents), mean_square_force);
+        let how = "proof of optimality: no currents within the limits are better by more";
+        check("duality gap", gap, slack.max(GAP_ALLOWED), how.to_owned())
+    } else {
         // These currents are for the weakest point, not for the mean square.
-        checks.push(worst::weakest_point(&residual, wanted.sqrt(), agrees));
-        return Ok(checks);
-    }
-    let gap = ratio(duality_gap(&problem, &residual, currents), wanted);
-    let how = "proof of optimality: no currents within the limits are better by more";
-    checks.push(check(
-        "duality gap",
-        gap,
-        slack.max(GAP_ALLOWED),
-        how.to_owned(),
-    ));
-    Ok(checks)
+        worst::weakest_point(&residual, rms_force, agrees)
+    };
+    vec![
+        against(
+            "rms error",
+            stored.rms_error_n,
+            mean_square.sqrt(),
+            "the mean square error summed over all points",
+        ),
+        against(
+            "worst error",
+            stored.worst_error_n,
+            largest,
+            "the largest error over all points",
+        ),
+        last,
+    ]
 }
 
 /// How much the pull's stated error may move force constants and errors, relative.
@@ -145,11 +150,11 @@ fn passive_slack(
 ) -> f64 {
     let Some(offset_n) = offset_n else { return 0.0 };
     let rms = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>().sqrt();
-    let told = [
+    let stored = [
         bundle.lambda.lambda_n_per_m,
         bundle.lambda.constants.lambda_linear_n_per_m,
     ];
-    let least = told
+    let least = stored
         .into_iter()
         .flatten()
         .filter(|l| *l > 0.0)

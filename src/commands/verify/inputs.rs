@@ -1,4 +1,4 @@
-//! What a bundle was made from: the documents that it names, looked at again.
+//! The inputs of a bundle: the documents that it names, read again.
 
 use std::io;
 use std::path::Path;
@@ -18,7 +18,7 @@ use crate::lambda::Settings;
 use crate::scene::sources::ShapeSource;
 use crate::shape::document::{Placement, RawSurface, ShapeDocument, SurfaceSource};
 
-/// Inputs that are looked at again: a bundle names them, and is not trusted with any number or size.
+/// Inputs that are read again: a bundle names them, and is not trusted with any number or size.
 const INPUTS_MAX: usize = 16;
 /// The largest of them.
 const INPUT_MAX_BYTES: u64 = 1 << 30;
@@ -85,13 +85,13 @@ impl Sources {
         }
         let mut missing = Vec::new();
         for (place, input) in inputs.iter().take(INPUTS_MAX).enumerate() {
-            match found(input) {
-                Found::Same => {}
-                Found::Changed => faults.push(format!(
+            match state_of(input) {
+                InputState::Same => {}
+                InputState::Changed => faults.push(format!(
                     "{} has changed since the bundle was made",
                     input.path
                 )),
-                Found::Missing if place < kept.len() => {
+                InputState::Missing if place < kept.len() => {
                     if input.path != STANDARD {
                         let (name, path) = (kept[place].0, &input.path);
                         notes.push(format!(
@@ -99,7 +99,7 @@ impl Sources {
                         ));
                     }
                 }
-                Found::Missing => missing.push(input.path.clone()),
+                InputState::Missing => missing.push(input.path.clone()),
             }
         }
         let shape = match inputs.get(kept.len()..) {
@@ -135,11 +135,11 @@ impl Sources {
 
 /// The options of the run that made the bundle; faults where they are none.
 pub(super) fn options(bundle: &Bundle) -> Result<CalibrateOptions, String> {
-    let told = &bundle.lambda;
+    let stored = &bundle.lambda;
     let settings = Settings {
-        criterion: told.criterion,
-        jnd_weight: told.jnd,
-        at_n_per_m: told.at.as_ref().map(|at| at.lambda_n_per_m),
+        criterion: stored.criterion,
+        jnd_weight: stored.jnd,
+        at_n_per_m: stored.at.as_ref().map(|at| at.lambda_n_per_m),
     };
     let made_with = bundle.manifest.made_with.as_ref();
     let mut options = CalibrateOptions::new("");
@@ -194,28 +194,28 @@ fn kept_text(bundle: &Bundle, name: &str) -> Result<String, RunError> {
     Ok(text)
 }
 
-enum Found {
+enum InputState {
     Same,
     Changed,
     Missing,
 }
 
 /// Whether the input's file is still what it was.
-fn found(input: &Input) -> Found {
+fn state_of(input: &Input) -> InputState {
     if input.path == STANDARD {
-        return Found::Missing;
+        return InputState::Missing;
     }
     match digest_plain(Path::new(&input.path), INPUT_MAX_BYTES) {
-        Ok((_, digest)) if digest == input.sha256 => Found::Same,
+        Ok((_, digest)) if digest == input.sha256 => InputState::Same,
         Err(error)
             if matches!(
                 error.kind(),
                 io::ErrorKind::NotFound | io::ErrorKind::NotADirectory
             ) =>
         {
-            Found::Missing
+            InputState::Missing
         }
-        Ok(_) | Err(_) => Found::Changed,
+        Ok(_) | Err(_) => InputState::Changed,
     }
 }
 

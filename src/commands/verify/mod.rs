@@ -38,13 +38,13 @@ use crate::scene::Scene;
 use crate::scene::cost::{self, Cost};
 use crate::scene::passive::PASSIVE_TOLERANCE;
 use crate::scene::sources::DesignSource;
-use crate::scene::steel::COUPLED_TOLERANCE;
+use crate::scene::tolerances::Tolerances;
 use crate::shape::document::ShapeDocument;
 
 /// Errors that a bundle claims are believed up to this where they cannot be computed again.
 const CLAIMED_MAX: f64 = 1e-3;
 
-/// What was checked.
+/// The checks of a bundle: the JSON result.
 #[derive(Debug, Clone, Serialize)]
 pub struct VerifyReport {
     /// Name of the design.
@@ -53,9 +53,9 @@ pub struct VerifyReport {
     pub shape: String,
     /// Every check.
     pub checks: Vec<Check>,
-    /// What is worth knowing and no fault of the bundle.
+    /// Remarks that are no fault of the bundle.
     pub notes: Vec<String>,
-    /// What could not be checked, and why.
+    /// Parts that could not be checked, and why.
     pub unchecked: Vec<String>,
     /// Whether all checks passed, and nothing was left unchecked without permission.
     pub passed: bool,
@@ -64,9 +64,9 @@ pub struct VerifyReport {
 /// One check.
 #[derive(Debug, Clone, Serialize)]
 pub struct Check {
-    /// What was checked.
+    /// Its name.
     pub name: &'static str,
-    /// What was measured.
+    /// The measured difference.
     pub measured: f64,
     /// The most it may be.
     pub allowed: f64,
@@ -76,7 +76,7 @@ pub struct Check {
     pub how: String,
 }
 
-/// What is requested.
+/// The options of `verify`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct VerifyOptions {
     /// A bundle passes although something could not be checked.
@@ -93,10 +93,10 @@ pub fn run(path: &Path, progress: &dyn Progress) -> Result<VerifyReport, RunErro
     Verifier::default().verify(path, VerifyOptions::default(), progress)
 }
 
-/// Refuses, with the reason, what costs more than the machine grants.
+/// Refuses, with the reason, a cost beyond what the machine grants.
 pub type Limit = fn(&Cost) -> Result<(), String>;
 
-/// Verifies one bundle after another. What inputs give is computed once for all bundles in a row
+/// Verifies one bundle after another. A bundle is computed from its inputs once for all in a row
 /// that name the same inputs and options.
 #[derive(Debug, Default)]
 pub struct Verifier {
@@ -105,7 +105,7 @@ pub struct Verifier {
     within: Option<Limit>,
 }
 
-/// What decides the content of a bundle.
+/// All that decides the content of a bundle.
 #[derive(Debug, Clone, PartialEq)]
 struct Recipe {
     inputs: Vec<Input>,
@@ -159,7 +159,7 @@ impl Verifier {
         let made_with = bundle.manifest.made_with.as_ref();
         let tolerance = made_with.and_then(|made| made.tolerance);
         // Solved again as the bundle was made, and to judge that a finer time.
-        let finer = tolerance.unwrap_or(COUPLED_TOLERANCE).min(CLAIMED_MAX) * FINER;
+        let finer = Tolerances::of_inductances(tolerance).min(CLAIMED_MAX) * FINER;
         let steel = cost::of_steel(design, Some(finer));
         let pull = cost::of_pull(design, FINER * PASSIVE_TOLERANCE);
         for cost in steel.iter().chain(&pull) {
@@ -229,7 +229,7 @@ impl Verifier {
         Ok(all.report(options))
     }
 
-    /// What the inputs give, compared with the bundle; `None` where an input is not here.
+    /// The bundle that the inputs give, compared with this one; `None` where an input is missing.
     fn expected(
         &mut self,
         all: &mut Judgement,
@@ -265,7 +265,7 @@ impl Verifier {
             options,
         };
         let known = self.last.as_ref().filter(|(known, _)| *known == recipe);
-        let found = match known {
+        let computed = match known {
             Some((_, known)) => Arc::clone(known),
             None => {
                 let input = &all.bundle.manifest.inputs[0];
@@ -277,7 +277,7 @@ impl Verifier {
                 let quiet = Quiet(progress);
                 let curve = sources.curve.as_ref();
                 match expected(scene, source, curve, shape, &recipe.options, &quiet) {
-                    Ok(found) => Arc::new(found),
+                    Ok(computed) => Arc::new(computed),
                     Err(error @ RunError::Interrupted(_)) => return Err(error),
                     Err(error) => {
                         all.add([wrong(format!("the inputs give no bundle: {error}"))]);
@@ -286,8 +286,8 @@ impl Verifier {
                 }
             }
         };
-        self.last = Some((recipe, Arc::clone(&found)));
-        let compared = compared::compare(&all.bundle, &found);
+        self.last = Some((recipe, Arc::clone(&computed)));
+        let compared = compared::compare(&all.bundle, &computed);
         all.add([compared.check]);
         all.unchecked.extend(compared.unchecked);
         if !compared.exact {
@@ -298,7 +298,7 @@ impl Verifier {
                 compared::made_on(&all.bundle)
             ));
         }
-        Ok(Some(found))
+        Ok(Some(computed))
     }
 }
 
@@ -466,10 +466,10 @@ fn scene_agrees(bundle: &Bundle, scene: &Scene) -> Check {
             },
         ),
     ];
-    let other_words = words.iter().any(|(told, wanted)| told != wanted);
+    let other_words = words.iter().any(|(stored, expected)| stored != expected);
     let worst = lists
         .into_iter()
-        .map(|(told, wanted)| difference(told, wanted))
+        .map(|(stored, expected)| difference(stored, expected))
         .fold(if other_words { f64::INFINITY } else { 0.0 }, f64::max);
     let how = "names, units, positions, gains, limits, resistance, voltage and magnet against \
                design.toml";

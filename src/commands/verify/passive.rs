@@ -35,15 +35,15 @@ pub(super) fn checks(
 ) -> Result<Vec<Check>, RunError> {
     const NODES: &str = "passive force nodes";
     let map = &bundle.map;
-    let wanted = scene.design.magnet.passive_force && scene.core.is_some();
+    let counts = scene.design.magnet.passive_force && scene.core.is_some();
     let Some(values) = &map.passive_force_n else {
         let how = "the design has passive_force, the bundle holds none: calibrate again".to_owned();
-        return Ok(wanted
+        return Ok(counts
             .then(|| check(NODES, f64::MAX, 0.0, how))
             .into_iter()
             .collect());
     };
-    if !wanted {
+    if !counts {
         let how = "the bundle holds a passive force, the design has none".to_owned();
         return Ok(vec![check(NODES, f64::MAX, 0.0, how)]);
     }
@@ -67,7 +67,7 @@ pub(super) fn checks(
         .iter()
         .zip(&finer.force_z_n)
         .enumerate()
-        .map(|(i, (told, found))| ratio((told - found).abs(), sizes[i / (nx * ny)]))
+        .map(|(i, (stored, finer))| ratio((stored - finer).abs(), sizes[i / (nx * ny)]))
         .fold(0.0, f64::max);
     let allowed = stated + finer.accuracy.estimate;
     let mut checks = vec![check(
@@ -77,31 +77,7 @@ pub(super) fn checks(
         "every node against a finer map of the pull".to_owned(),
     )];
 
-    // The level below a place, and the place; the first half on nodes.
-    let cells = [nx, ny, nz].map(|n| n.saturating_sub(1).max(1));
-    let places: Vec<(usize, [f64; 3])> = spread(nx * ny * nz, PULL_SAMPLES)
-        .into_iter()
-        .map(|i| (i / (nx * ny), [i % nx, i / nx % ny, i / (nx * ny)], 0.0))
-        .chain(
-            spread(cells[0] * cells[1] * cells[2], PULL_SAMPLES)
-                .into_iter()
-                .map(|i| {
-                    let k = i / (cells[0] * cells[1]);
-                    (k, [i % cells[0], i / cells[0] % cells[1], k], 0.43)
-                }),
-        )
-        .map(|(level, cell, t)| {
-            let at = |nodes: &[f64], i: usize| match nodes.get(i + 1) {
-                Some(next) => nodes[i] + t * (next - nodes[i]),
-                None => nodes[i],
-            };
-            let [x, y, z] = cell;
-            (
-                level,
-                [at(&grid.x_m, x), at(&grid.y_m, y), at(&grid.z_m, z)],
-            )
-        })
-        .collect();
+    let places = places(&grid);
     let points: Vec<[f64; 3]> = places.iter().map(|(_, at)| *at).collect();
     let Some(sure) = passive::direct_z_n(scene, &points, tolerance)? else {
         return Ok(checks);
@@ -110,8 +86,8 @@ pub(super) fn checks(
         .iter()
         .zip(&sure)
         .map(|((level, at), sure)| {
-            let found = bundle.passive_force_n(*at).unwrap_or(f64::INFINITY);
-            ratio((found - sure).abs(), sizes[*level])
+            let stored = bundle.passive_force_n(*at).unwrap_or(f64::INFINITY);
+            ratio((stored - sure).abs(), sizes[*level])
         })
         .collect();
     let (on, between) = errors.split_at(PULL_SAMPLES.min(nx * ny * nz));
@@ -128,4 +104,29 @@ pub(super) fn checks(
         ),
     ));
     Ok(checks)
+}
+
+/// Places on nodes, then as many between them, each with the level at or below it.
+fn places(grid: &Grid) -> Vec<(usize, [f64; 3])> {
+    let [nx, ny, nz] = [grid.x_m.len(), grid.y_m.len(), grid.z_m.len()];
+    let cells = [nx, ny, nz].map(|n| n.saturating_sub(1).max(1));
+    let on_nodes = spread(nx * ny * nz, PULL_SAMPLES)
+        .into_iter()
+        .map(|i| ([i % nx, i / nx % ny, i / (nx * ny)], 0.0));
+    let between = spread(cells.iter().product(), PULL_SAMPLES)
+        .into_iter()
+        .map(|i| {
+            let k = i / (cells[0] * cells[1]);
+            ([i % cells[0], i / cells[0] % cells[1], k], 0.43)
+        });
+    on_nodes
+        .chain(between)
+        .map(|([x, y, z], t)| {
+            let at = |nodes: &[f64], i: usize| match nodes.get(i + 1) {
+                Some(next) => nodes[i] + t * (next - nodes[i]),
+                None => nodes[i],
+            };
+            (z, [at(&grid.x_m, x), at(&grid.y_m, y), at(&grid.z_m, z)])
+        })
+        .collect()
 }

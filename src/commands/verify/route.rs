@@ -1,12 +1,12 @@
 //! Fields by another route than the bundle's.
 
+use crate::field::components::Components;
 use rayon::prelude::*;
 
 use super::Bounds;
 use crate::RunError;
 use crate::bundle::load::Bundle;
 use crate::field::magnet::MagnetRule;
-use crate::field::steel::equivalent_dipoles::Parts;
 use crate::field::winding::KERNEL_ERROR;
 use crate::scene::Scene;
 use crate::scene::steel::{self, Solved};
@@ -37,7 +37,7 @@ impl<'a> Route<'a> {
         let tolerance = FINER * bounds.map.min(bounds.forces).max(KERNEL_ERROR);
         Ok(Self {
             scene,
-            solved: steel::solve(scene, Some(tolerance), KERNEL_ERROR, lowest_m)?,
+            solved: steel::solve(scene, tolerance, lowest_m)?,
             rule: scene.magnet_rule(lowest_m, tolerance)?,
         })
     }
@@ -78,9 +78,8 @@ impl<'a> Route<'a> {
                 .collect();
             let steel = match &sources {
                 Some(sources) => {
-                    let parts = Parts::Gradient;
-                    self.solved
-                        .steel_fields(self.scene, sources, &places, parts)
+                    let parts = Components::Gradient;
+                    self.scene.steel_fields(sources, &places, parts)
                 }
                 None => Vec::new(),
             };
@@ -89,7 +88,7 @@ impl<'a> Route<'a> {
                 let (dx, dy) = (place[0] - coil.axis_m[0], place[1] - coil.axis_m[1]);
                 let (zz, rz_over_r) = of_winding(self.scene, dx.hypot(dy), place[2]);
                 let part = |component: usize| {
-                    let block = wanted[row].0 * Parts::Gradient.count() + component;
+                    let block = wanted[row].0 * Components::Gradient.count() + component;
                     steel
                         .get(block * places.len() + row)
                         .copied()

@@ -2,7 +2,7 @@
 
 use super::{Check, RunError, check, difference, ratio};
 use crate::bundle::lambda_file::WorstPointFile;
-use crate::lambda::worst::{ActivePoint, lower_bound_n, worst_point};
+use crate::lambda::worst::{lower_bound_n, worst_point};
 use crate::lambda::{ForceProblem, Settings, Status};
 
 /// Constants solved for again, the largest error at any point, and the proof that the points
@@ -12,7 +12,7 @@ pub(super) fn checks(
     problem: &ForceProblem,
     settings: &Settings,
     status: Status,
-    told: &WorstPointFile,
+    stored: &WorstPointFile,
     lambda_n_per_m: Option<f64>,
     agrees: f64,
 ) -> Result<Vec<Check>, RunError> {
@@ -20,22 +20,25 @@ pub(super) fn checks(
     let rendered = |lambda: Option<f64>| lambda.filter(|_| status != Status::NothingRendered);
     let constants = [
         (
-            told.lambda_linear_n_per_m,
+            stored.lambda_linear_n_per_m,
             rendered(again.lambda_linear_n_per_m),
         ),
-        (told.lambda_jnd_n_per_m, rendered(again.lambda_jnd_n_per_m)),
+        (
+            stored.lambda_jnd_n_per_m,
+            rendered(again.lambda_jnd_n_per_m),
+        ),
     ];
     let worst = constants
         .iter()
-        .map(|(told, found)| difference(told.as_slice(), found.as_slice()))
+        .map(|(stored, again)| difference(stored.as_slice(), again.as_slice()))
         .fold(0.0, f64::max);
     let how = "the worst-point force constants solved for again";
     let mut checks = vec![check("worst-point lambda", worst, agrees, how.to_owned())];
     let (Some(lambda), Some(currents), Some(error), Some(active)) = (
         lambda_n_per_m,
-        &told.currents_a,
-        told.worst_error_n,
-        &told.active,
+        &stored.currents_a,
+        stored.worst_error_n,
+        &stored.active,
     ) else {
         return Ok(checks);
     };
@@ -61,14 +64,7 @@ pub(super) fn checks(
         agrees,
         how.to_owned(),
     ));
-    let active: Vec<ActivePoint> = active
-        .iter()
-        .map(|active| ActivePoint {
-            point: active.point,
-            multiplier: active.multiplier,
-        })
-        .collect();
-    let gap = largest - lower_bound_n(problem, lambda, &active);
+    let gap = largest - lower_bound_n(problem, lambda, active);
     let how = "proof of optimality from the points that decide";
     checks.push(check(
         "worst-point gap",

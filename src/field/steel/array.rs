@@ -17,11 +17,12 @@ use nalgebra::{DMatrix, DVector};
 use super::CoreShape;
 use super::cored_coil::Excitation;
 use super::coupling::{Coupling, different_offsets};
-use super::equivalent_dipoles::{ArraySources, Near, Parts};
+use super::equivalent_dipoles::{ArraySources, Near};
 use super::exchange::{Grading, LEAST_GAP, PART, side_panels};
 use super::generatrix::{Generatrix, Resolution};
 use super::response::{Response, Rings};
 use super::symmetry::{Motion, motions};
+use crate::components::Components;
 use crate::winding::{OnEdge, Winding};
 use fluxform_base::units::MU_0_T_M_PER_A;
 
@@ -253,7 +254,7 @@ impl CoupledArray {
         let sources =
             |array: &Self| ArraySources::of_array(array, lowest_m, distance_m, 0.05 * tolerance);
         let (fine, coarse) = (sources(self), sources(other));
-        let parts = Parts::Gradient;
+        let parts = Components::Gradient;
         let mut worst = 0.0_f64;
         for height in [0.0, 1.0, 4.0] {
             let z_m = lowest_m + height * shape.radius_m;

@@ -8,14 +8,14 @@
 //! computed from the exact field when a point first falls into it. What a point's value is thus
 //! depends on the point alone. Points closer than `NEAREST` to a source get the exact field.
 
+use crate::components::Components;
 use std::collections::HashMap;
 use std::f64::consts::{PI, SQRT_2};
 use std::sync::{Arc, OnceLock, PoisonError, RwLock};
 
-use super::equivalent_dipoles::Parts;
 use super::magnetized::MagnetizedCore;
 use super::magnetized::loops::{LoopFields, Rectangle};
-use crate::batch::{Gradients, Quantities};
+use crate::batch::Gradients;
 use crate::source::AxialSource;
 use crate::winding::{AxialField, OnEdge, Winding};
 use fluxform_base::units::MU_0_T_M_PER_A;
@@ -146,7 +146,7 @@ impl AxialTable {
         Ok(out)
     }
 
-    /// `parts` at `points_m`, into `out`, [component, point], in the order of [`Parts`]; away from
+    /// `parts` at `points_m`, into `out`, [component, point], in the order of [`Components`]; away from
     /// the winding's conductor, if the table has one.
     ///
     /// # Errors
@@ -157,7 +157,7 @@ impl AxialTable {
     pub fn sample_parts(
         &self,
         points_m: &[[f64; 3]],
-        parts: Parts,
+        parts: Components,
         out: &mut [f64],
     ) -> Result<(), OnEdge> {
         let count = points_m.len();
@@ -165,13 +165,13 @@ impl AxialTable {
         let r_m: Vec<f64> = points_m.iter().map(|[x, y, _]| x.hypot(*y)).collect();
         let z_m: Vec<f64> = points_m.iter().map(|p| p[2]).collect();
         let wanted: &[Quantity] = match parts {
-            Parts::Gz => {
+            Components::Gz => {
                 let values = self.sample(&r_m, &z_m, &[Quantity::DbzDz])?;
                 out.copy_from_slice(&values[0]);
                 return Ok(());
             }
-            Parts::Gradient => &GRADIENT,
-            Parts::All => &[
+            Components::Gradient => &GRADIENT,
+            Components::All => &[
                 Quantity::DbzDz,
                 Quantity::DbrDzOverR,
                 Quantity::BrOverR,
@@ -194,7 +194,7 @@ impl AxialTable {
             put(2, slope * x);
             put(3, slope * y);
             put(4, zz);
-            if parts == Parts::All {
+            if parts == Components::All {
                 put(5, ratio * x);
                 put(6, ratio * y);
                 put(7, values[3][place]);
@@ -297,7 +297,7 @@ impl AxialTable {
         let own = if held.contains(&Quantity::Bz) {
             winding.axial_fields(r_m, z_m, tolerance)?
         } else {
-            let own = winding.gradients(r_m, z_m, tolerance, Quantities::Gradient)?;
+            let own = winding.gradients(r_m, z_m, tolerance, Components::Gradient)?;
             [own.dbz_dz, own.dbr_dz_over_r, own.br_over_r].concat()
         };
         for (value, own) in values.iter_mut().zip(own) {
@@ -418,11 +418,11 @@ impl AxialSource for AxialTable {
         r_m: &[f64],
         z_m: &[f64],
         _tolerance: f64,
-        wanted: Quantities,
+        components: Components,
     ) -> Result<Gradients, OnEdge> {
-        let quantities: &[Quantity] = match wanted {
-            Quantities::Gz => &[Quantity::DbzDz],
-            Quantities::Gradient => &GRADIENT,
+        let quantities: &[Quantity] = match components {
+            Components::Gz => &[Quantity::DbzDz],
+            Components::Gradient | Components::All => &GRADIENT,
         };
         let mut values = self.sample(r_m, z_m, quantities)?.into_iter();
         let mut next = || values.next().unwrap_or_default();
@@ -477,7 +477,7 @@ mod tests {
             let table = AxialTable::new(Some(winding), coil.core.clone(), tolerance);
             let mut all = vec![0.0; 8 * places.len()];
             table
-                .sample_parts(&places, Parts::All, &mut all)
+                .sample_parts(&places, Components::All, &mut all)
                 .expect("off the edges");
             for (place, point) in places.iter().enumerate() {
                 let r_m = point[0].hypot(point[1]);
@@ -496,7 +496,7 @@ mod tests {
                 let alone = AxialTable::new(Some(winding), coil.core.clone(), tolerance);
                 let mut one = vec![0.0; 8];
                 alone
-                    .sample_parts(&[*point], Parts::All, &mut one)
+                    .sample_parts(&[*point], Components::All, &mut one)
                     .expect("off the edges");
                 for (component, value) in one.into_iter().enumerate() {
                     assert_eq!(value, all[component * places.len() + place]);

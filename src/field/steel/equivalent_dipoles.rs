@@ -4,6 +4,7 @@
 //! distance asks for, whatever the layer does at the edges. The dipoles of all cores are shared
 //! by all drives, which differ in their moments alone: one pass over them serves every drive.
 
+use crate::components::Components;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
@@ -22,29 +23,6 @@ const PANEL: f64 = 1.5;
 const CLOSEST: f64 = 0.02;
 /// Most angles of a ring.
 const MOST_ANGLES: usize = 2000;
-
-/// Which components are requested, in the order of [`ArraySources::sample`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Parts {
-    /// dB_z/dz.
-    Gz,
-    /// dB_x/dx, dB_x/dy, dB_x/dz, dB_y/dz, dB_z/dz.
-    Gradient,
-    /// The gradient's five, then B_x, B_y, B_z.
-    All,
-}
-
-impl Parts {
-    /// Number of components.
-    #[must_use]
-    pub fn count(self) -> usize {
-        match self {
-            Self::Gz => 1,
-            Self::Gradient => 5,
-            Self::All => 8,
-        }
-    }
-}
 
 /// Most digits by which the layer's parts may cancel in the field that is left.
 const MOST_CANCELLATION: f64 = 1e12;
@@ -218,7 +196,7 @@ impl ArraySources {
     ///
     /// # Panics
     /// When `out` has another length than drives x components x points.
-    pub fn sample(&self, points_m: &[[f64; 3]], parts: Parts, out: &mut [f64]) {
+    pub fn sample(&self, points_m: &[[f64; 3]], parts: Components, out: &mut [f64]) {
         let columns = self.drives * parts.count();
         assert_eq!(out.len(), columns * points_m.len());
         let chunks: Vec<Vec<f64>> = points_m
@@ -267,7 +245,7 @@ fn largest_layer(
 struct Pass<'a> {
     sources: &'a ArraySources,
     points: &'a [[f64; 3]],
-    parts: Parts,
+    parts: Components,
 }
 
 impl Kernel for Pass<'_> {
@@ -276,9 +254,9 @@ impl Kernel for Pass<'_> {
     #[inline(always)]
     fn run<const FMA: bool>(self) -> Vec<f64> {
         match self.parts {
-            Parts::Gz => self.run_parts::<FMA, 1>(),
-            Parts::Gradient => self.run_parts::<FMA, 5>(),
-            Parts::All => self.run_parts::<FMA, 8>(),
+            Components::Gz => self.run_parts::<FMA, 1>(),
+            Components::Gradient => self.run_parts::<FMA, 5>(),
+            Components::All => self.run_parts::<FMA, 8>(),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 pub mod array;
 pub mod array_cost;
+pub mod array_steel;
 pub mod axial_table;
 pub mod bh_check;
 pub mod bh_curve;

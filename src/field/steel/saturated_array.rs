@@ -25,13 +25,14 @@ use super::array::{ArrayResolution, closest_m};
 use super::cored_coil::Excitation;
 use super::coupling::{Coupling, different_offsets};
 use super::curve_refinement::{AlongCurve, Level, Try, refined};
-use super::equivalent_dipoles::{ArraySources, Near, Parts};
+use super::equivalent_dipoles::{ArraySources, Near};
 use super::generatrix::{Generatrix, Resolution};
 use super::permeability::Permeability;
 use super::response::{Response, Rings, mean};
 use super::saturated::{Convergence, CoreField, SaturatedCore, Solution};
 use super::spectral_fem::MeshError;
 use super::symmetry::motions;
+use crate::components::Components;
 use crate::winding::{OnEdge, Winding};
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::anderson::Anderson;
@@ -358,7 +359,7 @@ impl SaturatedArray {
         let sources =
             |array: &Self| ArraySources::of_saturated(array, lowest_m, distance_m, 0.1 * tolerance);
         let (fine, coarse) = (sources(self), sources(other));
-        let parts = Parts::Gradient;
+        let parts = Components::Gradient;
         let reach = self.winding.outer_radius_m;
         let mut worst = 0.0_f64;
         for height in [0.0, 1.0, 4.0] {

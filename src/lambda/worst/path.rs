@@ -1,5 +1,8 @@
 //! The worst-point path in SI units: the least largest error and its currents at any lambda.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::constraint_generation::Followed;
 use super::program::Piece;
 use super::scaled::Scaled;
@@ -28,13 +31,13 @@ pub struct Turn {
     pub events: Vec<Event>,
 }
 
-/// A point that decides, and how much it does.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A point that decides.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ActivePoint {
-    /// Its number among the points.
+    /// Its row in `points.csv`, from 0.
     pub point: usize,
-    /// Its share of the proof: positive where the force is too weak, negative where it is too
-    /// strong; absolute values sum to 1.
+    /// Positive where the force is too weak, negative where it is too strong; absolute values
+    /// sum to 1.
     pub multiplier: f64,
 }
 

@@ -1,27 +1,39 @@
 //! How good a result is: the error budget from file to finger, and every stage's estimate.
 
-use super::data::{BudgetPart, BundleFacts, ErrorTime};
+use super::data::{CalibratedObject, ErrorTime};
 use super::frame::{Section, figure};
 use super::html::{Cell, Html, Table};
 use super::measured::MeasuredRow;
 use super::number::{figures, force, percent, si};
+use fluxform_base::accuracy::StageAccuracy;
 use serde_json::{Map, Value, json};
+
+/// A part of the error that a force gathers.
+struct BudgetPart {
+    /// The step that adds it.
+    name: &'static str,
+    /// Relative to the force, as `basis` states.
+    part: f64,
+    /// How it follows from the stages' estimates.
+    basis: &'static str,
+}
 
 /// The axis of the budget: from ten to this power up to the whole force.
 const LEAST: f64 = -16.0;
 
-pub(super) fn section(facts: &BundleFacts, data: &mut Map<String, Value>) -> Section {
+pub(super) fn section(object: &CalibratedObject, data: &mut Map<String, Value>) -> Section {
     let mut body = Html::default();
-    told(&mut body, facts);
-    body.table(&budget(facts));
+    let parts = budget(object);
+    summary(&mut body, object, &parts);
+    body.table(&budget_table(object, &parts));
     body.raw(
         "<p class=\"key\"><span class=\"swatch numeric\"></span>numerical error \
               <span class=\"swatch physical\"></span>what static currents cannot give \
               <span class=\"swatch jnd\"></span>just noticeable; the bars' scale is logarithmic, \
               1e-16 at the left, the whole force at the right</p>",
     );
-    body.folded_table(&stages(facts));
-    if let Some(curve) = &facts.error_time {
+    body.folded_table(&stages(object));
+    if let Some(curve) = &object.error_time {
         error_time(&mut body, curve, data);
     }
     Section {
@@ -31,11 +43,67 @@ pub(super) fn section(facts: &BundleFacts, data: &mut Map<String, Value>) -> Sec
     }
 }
 
-fn told(body: &mut Html, facts: &BundleFacts) {
-    let largest = facts
-        .budget
-        .iter()
-        .reduce(|a, b| if b.part > a.part { b } else { a });
+/// The errors that a force gathers from the file to the finger, relative to it.
+fn budget(object: &CalibratedObject) -> Vec<BudgetPart> {
+    let (manifest, file) = (object.manifest, object.lambda);
+    let estimate = |stage: &str| manifest.accuracy.get(stage).map_or(0.0, |s| s.estimate);
+    let heights = ["points_tessellation", "points_grid", "points"].map(estimate);
+    let all: f64 = heights.iter().sum();
+    let (per_m, basis) = match manifest.accuracy.get("lambda_of_points") {
+        Some(moved) if all > 0.0 => (
+            moved.estimate / all,
+            "height error, times what heights change in lambda",
+        ),
+        Some(_) | None => {
+            let lowest = object.lowest_m();
+            let part = if lowest > 0.0 { 1.0 / lowest } else { 0.0 };
+            (part, "height error over the lowest height")
+        }
+    };
+    let part = |name, part: f64, basis| BudgetPart { name, part, basis };
+    let mut parts = vec![
+        part("tessellation", heights[0] * per_m, basis),
+        part("grid of points", heights[1] * per_m, basis),
+        part("rounding in the file", heights[2] * per_m, basis),
+        part(
+            "field",
+            estimate("forces"),
+            "of the largest gradient at the point's height",
+        ),
+        part(
+            "map nodes",
+            estimate("map"),
+            "of the largest gradient at the node's height",
+        ),
+        part(
+            "map interpolation",
+            manifest.map.interpolation.largest_error,
+            "largest between nodes, of the largest gradient at the height",
+        ),
+    ];
+    if let (Some(rms_n), Some(relative), Some(gap_n2)) = (
+        file.rms_error_n,
+        file.relative_rms_error,
+        file.duality_gap_n2,
+    ) && relative > 0.0
+    {
+        // sqrt(e^2 + gap) - e, at most either of these.
+        let more_n = (gap_n2 / (2.0 * rms_n)).min(gap_n2.sqrt());
+        parts.push(part(
+            "lambda's optimality",
+            more_n * relative / rms_n,
+            "what the duality gap leaves open of the rms error, over the rms force",
+        ));
+    }
+    parts
+}
+
+fn summary(body: &mut Html, object: &CalibratedObject, parts: &[BudgetPart]) {
+    let file = object.lambda;
+    let mut parts = parts.iter();
+    let largest = parts
+        .next()
+        .map(|first| parts.fold(first, |a, b| if b.part > a.part { b } else { a }));
     body.raw("<ul class=\"said\">");
     if let Some(largest) = largest {
         let text = format!(
@@ -43,34 +111,35 @@ fn told(body: &mut Html, facts: &BundleFacts) {
              force. A finger notices {}.",
             largest.name,
             percent(largest.part),
-            percent(facts.jnd)
+            percent(file.jnd)
         );
         body.element("li", &text);
     }
-    if let Some(chosen) = &facts.chosen {
+    if let (Some(gap_n2), Some(rms_n)) = (file.duality_gap_n2, file.rms_error_n) {
         let text = format!(
             "No currents within the limits give a smaller mean square error at this lambda: the \
              duality gap is {} N\u{b2}, the mean square error {} N\u{b2}.",
-            figures(chosen.duality_gap_n2, 2),
-            figures(chosen.rms_error_n * chosen.rms_error_n, 3)
+            figures(gap_n2, 2),
+            figures(rms_n * rms_n, 3)
         );
         body.element("li", &text);
     }
     let text = format!(
         "The forces of {} coils at {} points have rank {}.",
-        facts.coils.len(),
-        facts.points,
-        facts.rank
+        object.manifest.array.positions_m.len(),
+        file.points,
+        file.rank
     );
     body.element("li", &text).raw("</ul>");
 }
 
 /// One row a part, from file to finger.
-fn budget(facts: &BundleFacts) -> Table {
+fn budget_table(object: &CalibratedObject, parts: &[BudgetPart]) -> Table {
+    let file = object.lambda;
     let row = |part: &BudgetPart, class: &str| -> Vec<Cell> {
         vec![
             part.name.into(),
-            Cell::Markup(bar(part.part, facts.jnd, class)),
+            Cell::Markup(bar(part.part, file.jnd, class)),
             if part.part > 0.0 {
                 percent(part.part)
             } else {
@@ -80,11 +149,11 @@ fn budget(facts: &BundleFacts) -> Table {
             part.basis.into(),
         ]
     };
-    let mut rows: Vec<Vec<Cell>> = facts.budget.iter().map(|p| row(p, "numeric")).collect();
-    if let Some(chosen) = &facts.chosen {
+    let mut rows: Vec<Vec<Cell>> = parts.iter().map(|p| row(p, "numeric")).collect();
+    if file.lambda_n_per_m.is_some() {
         let finger = BudgetPart {
             name: "static currents",
-            part: chosen.relative_rms_error.unwrap_or(0.0),
+            part: file.relative_rms_error.unwrap_or(0.0),
             basis: "rms force error over the rms force: the coils, not the computation",
         };
         rows.push(row(&finger, "physical"));
@@ -126,13 +195,13 @@ fn bar(part: f64, jnd: f64, class: &str) -> String {
     )
 }
 
-fn stages(facts: &BundleFacts) -> Table {
-    let row = |stage: &super::data::StageFacts| -> Vec<Cell> {
+fn stages(object: &CalibratedObject) -> Table {
+    let row = |(name, stage): (&String, &StageAccuracy)| -> Vec<Cell> {
         vec![
-            stage.name.replace('_', " ").into(),
+            name.replace('_', " ").into(),
             figures(stage.estimate, 3).into(),
-            stage.relative_to.to_owned().into(),
-            stage.method.to_owned().into(),
+            stage.relative_to.clone().into(),
+            stage.method.clone().into(),
         ]
     };
     Table {
@@ -143,7 +212,7 @@ fn stages(facts: &BundleFacts) -> Table {
             ("relative to", false),
             ("how it was found", false),
         ],
-        rows: facts.accuracy.iter().map(row).collect(),
+        rows: object.manifest.accuracy.iter().map(row).collect(),
         prose: true,
     }
 }
@@ -195,9 +264,8 @@ fn error_time(body: &mut Html, shipped: &ErrorTime, data: &mut Map<String, Value
 }
 
 /// The worst point in words.
-pub(super) fn worst(facts: &BundleFacts) -> Option<String> {
-    let chosen = facts.chosen?;
-    let at = chosen.worst_at?;
+pub(super) fn worst(object: &CalibratedObject) -> Option<String> {
+    let at = object.worst_place()?;
     let [x, y, z] = at.position_m.map(super::number::mm);
     let way = if at.given_n < at.wanted_n {
         "too weak"

@@ -1,41 +1,45 @@
 //! What limits a result: coils, points, the design's own limits.
 
-use super::data::{BundleFacts, CoilFacts, LimitRow};
+use std::collections::BTreeMap;
+
+use fluxform_coil::limits::LimitCheck;
+
+use super::data::{CalibratedObject, DrivenCoil};
 use super::error_budget::worst;
 use super::frame::Section;
 use super::html::{Cell, Html, Table};
 use super::number::{count, figures, force, mm, percent, si};
 
-/// Most deciding points that are listed.
-const TOLD: usize = 5;
+/// Deciding points that are listed, at most.
+const LISTED: usize = 5;
 
-pub(super) fn section(facts: &BundleFacts) -> Section {
+pub(super) fn section(object: &CalibratedObject) -> Section {
     let mut body = Html::default();
     body.raw("<ul class=\"said\">");
-    body.element("li", &coils(facts));
-    if let Some(text) = worst(facts) {
+    body.element("li", &coils(object));
+    if let Some(text) = worst(object) {
         body.element("li", &text);
     }
-    if let Some(text) = deciding(facts) {
+    if let Some(text) = deciding(object) {
         body.element("li", &text);
     }
-    if let Some(text) = unmet(&facts.limits) {
+    if let Some(text) = unmet(&object.limits) {
         body.element("li", &text);
     }
-    for warning in facts.warnings {
+    for warning in object.warnings {
         body.raw("<li><strong>Note:</strong> ")
             .text(warning)
             .raw("</li>");
     }
     body.raw("</ul>");
-    if !facts.limits.is_empty() {
-        body.table(&table(&facts.limits));
+    if !object.limits.is_empty() {
+        body.table(&table(&object.limits));
         let mut note =
             "One coil at its rated current, its inductance among its neighbours.".to_owned();
-        if !facts.unchecked.is_empty() {
+        if !object.unchecked.is_empty() {
             note += &format!(
                 " Not looked at here: {}; `fluxform evaluate` tells it.",
-                facts.unchecked.join(", ")
+                object.unchecked.join(", ")
             );
         }
         body.element("p class=\"note\"", &note);
@@ -48,15 +52,16 @@ pub(super) fn section(facts: &BundleFacts) -> Section {
 }
 
 /// Which coils carry all they may.
-fn coils(facts: &BundleFacts) -> String {
-    if facts.chosen.is_none() {
+fn coils(object: &CalibratedObject) -> String {
+    if object.lambda.lambda_n_per_m.is_none() {
         return "No lambda is chosen, so no coil carries a current.".to_owned();
     }
-    let bound: Vec<String> = (0..facts.coils.len())
-        .filter(|coil| facts.coils[*coil].at_limit())
+    let coils = object.coils();
+    let bound: Vec<String> = (0..coils.len())
+        .filter(|coil| coils[*coil].at_limit())
         .map(|coil| coil.to_string())
         .collect();
-    let of = count(facts.coils.len(), "coil");
+    let of = count(coils.len(), "coil");
     let mut text = if bound.is_empty() {
         format!("None of {of} is at its limit.")
     } else {
@@ -66,8 +71,8 @@ fn coils(facts: &BundleFacts) -> String {
             bound.join(", ")
         )
     };
-    let sum: f64 = facts.coils.iter().map(|coil| coil.current_a).sum();
-    if let Some(most) = facts.total_max_a {
+    let sum: f64 = coils.iter().map(|coil| coil.current_a).sum();
+    if let Some(most) = object.manifest.limits.total_current_max_a {
         text += &format!(
             " Their sum is {} A of {} A.",
             figures(sum, 4),
@@ -77,39 +82,46 @@ fn coils(facts: &BundleFacts) -> String {
     text
 }
 
-fn deciding(facts: &BundleFacts) -> Option<String> {
-    let mut points = facts.deciding.clone();
-    points.sort_by(|a, b| b.share.abs().total_cmp(&a.share.abs()));
-    let told: Vec<String> = points
+fn deciding(object: &CalibratedObject) -> Option<String> {
+    let mut points = object.lambda.worst_point.as_ref()?.active.clone()?;
+    points.sort_by(|a, b| b.multiplier.abs().total_cmp(&a.multiplier.abs()));
+    let listed: Vec<String> = points
         .iter()
-        .take(TOLD)
+        .take(LISTED)
         .map(|point| {
-            let [x, y, z] = point.position_m.map(mm);
-            let way = if point.share > 0.0 { "weak" } else { "strong" };
+            let [x, y, z] = object.position_m(point.point).map(mm);
+            let way = if point.multiplier > 0.0 {
+                "weak"
+            } else {
+                "strong"
+            };
             format!(
                 "({x}, {y}, {z}) mm too {way} {}",
-                percent(point.share.abs())
+                percent(point.multiplier.abs())
             )
         })
         .collect();
-    let more = match points.len().saturating_sub(TOLD) {
+    let more = match points.len().saturating_sub(LISTED) {
         0 => String::new(),
         more => format!(" and {more} more"),
     };
-    (!told.is_empty()).then(|| {
+    (!listed.is_empty()).then(|| {
         format!(
             "If the largest error is to be least instead, these points decide, by their share: \
              {}{more}.",
-            told.join("; ")
+            listed.join("; ")
         )
     })
 }
 
-pub(super) fn unmet(limits: &[LimitRow]) -> Option<String> {
+/// The limits of a coil by their keys.
+type Checks = BTreeMap<&'static str, LimitCheck>;
+
+fn unmet(limits: &Checks) -> Option<String> {
     let missed: Vec<String> = limits
         .iter()
-        .filter(|limit| !limit.met)
-        .map(|limit| words(limit.name).0)
+        .filter(|(_, limit)| !limit.met)
+        .map(|(key, _)| words(key).0)
         .collect();
     if limits.is_empty() {
         None
@@ -127,7 +139,8 @@ pub(super) fn unmet(limits: &[LimitRow]) -> Option<String> {
 }
 
 /// A limit's name in words, and its unit.
-pub(super) fn words(name: &str) -> (String, &'static str) {
+#[must_use]
+pub fn words(name: &str) -> (String, &'static str) {
     let units = [
         ("_ohm", "\u{3a9}"),
         ("_kg", "kg"),
@@ -147,7 +160,8 @@ pub(super) fn words(name: &str) -> (String, &'static str) {
 }
 
 /// A value in its unit.
-pub(super) fn in_unit(value: f64, unit: &str) -> String {
+#[must_use]
+pub fn in_unit(value: f64, unit: &str) -> String {
     match unit {
         "" => figures(value, 6),
         "N" => force(value),
@@ -157,9 +171,9 @@ pub(super) fn in_unit(value: f64, unit: &str) -> String {
     }
 }
 
-pub(super) fn table(limits: &[LimitRow]) -> Table {
-    let row = |limit: &LimitRow| -> Vec<Cell> {
-        let (name, unit) = words(limit.name);
+fn table(limits: &Checks) -> Table {
+    let row = |(key, limit): (&&'static str, &LimitCheck)| -> Vec<Cell> {
+        let (name, unit) = words(key);
         let verdict = if limit.met {
             "<span class=\"met\">met</span>"
         } else {
@@ -186,12 +200,12 @@ pub(super) fn table(limits: &[LimitRow]) -> Table {
 }
 
 /// The currents as bars against their limits.
-pub(super) fn currents(coils: &[CoilFacts]) -> Table {
+pub(super) fn currents(coils: &[DrivenCoil]) -> Table {
     let low = coils.iter().map(|coil| coil.min_a).fold(0.0, f64::min);
     let high = coils.iter().map(|coil| coil.max_a).fold(0.0, f64::max);
     let span = if high > low { high - low } else { 1.0 };
     let place = |current: f64| ((current - low) / span * 100.0).clamp(0.0, 100.0);
-    let row = |(number, coil): (usize, &CoilFacts)| -> Vec<Cell> {
+    let row = |(number, coil): (usize, &DrivenCoil)| -> Vec<Cell> {
         let (from, to) = (
             place(coil.current_a.min(0.0)),
             place(coil.current_a.max(0.0)),

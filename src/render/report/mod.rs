@@ -5,16 +5,17 @@
 //! ([`html`]). The same data give the same bytes.
 
 pub mod bundle;
+pub mod bundle_files;
 pub mod data;
 mod error_budget;
-pub mod field;
+mod field;
 pub mod frame;
 pub mod html;
-mod limits;
+pub mod inputs;
+pub mod limits;
 pub mod measured;
 pub mod number;
-pub mod optimum;
 pub mod pack;
 mod path;
-pub mod surface;
+mod surface;
 pub mod sweep;

@@ -1,9 +1,10 @@
 //! Error and currents over lambda.
 
 use fluxform_base::force_constant::NamedConstant;
+use fluxform_bundle::lambda_file::{LambdaFile, PathStep, WorstPointStep};
 use serde_json::{Map, Value, json};
 
-use super::data::BundleFacts;
+use super::data::CalibratedObject;
 use super::frame::{Section, figure};
 use super::html::{Cell, Html, Table};
 use super::number::{count, figures, lambda};
@@ -12,7 +13,7 @@ use super::pack::f32s;
 /// Breakpoints that are listed; more are in `lambda.json`.
 const LISTED: usize = 60;
 
-pub(super) fn section(facts: &BundleFacts, data: &mut Map<String, Value>) -> Section {
+pub(super) fn section(object: &CalibratedObject, data: &mut Map<String, Value>) -> Section {
     let mut body = Html::default();
     body.raw("<div class=\"pair\">");
     figure(
@@ -29,9 +30,9 @@ pub(super) fn section(facts: &BundleFacts, data: &mut Map<String, Value>) -> Sec
         "Static currents of least mean square error over lambda; straight between breakpoints.",
     );
     body.raw("</div>");
-    body.table(&constants(facts));
-    body.folded_table(&breakpoints(facts));
-    data.insert("path".to_owned(), curves(facts));
+    body.table(&constants(object));
+    body.folded_table(&breakpoints(object));
+    data.insert("path".to_owned(), curves(object));
     Section {
         id: "path",
         title: "Over lambda",
@@ -39,10 +40,9 @@ pub(super) fn section(facts: &BundleFacts, data: &mut Map<String, Value>) -> Sec
     }
 }
 
-fn curves(facts: &BundleFacts) -> Value {
-    let plot = facts.curves;
-    let coils = facts.coils.len();
-    let currents: Vec<Value> = (0..coils)
+fn curves(object: &CalibratedObject) -> Value {
+    let plot = object.curves;
+    let currents: Vec<Value> = (0..object.manifest.array.positions_m.len())
         .map(|coil| f32s(plot.currents_a.iter().map(|at| at[coil])))
         .collect();
     let turns: Vec<usize> = (0..plot.breakpoint.len())
@@ -53,19 +53,21 @@ fn curves(facts: &BundleFacts) -> Value {
         .iter()
         .map(|one| json!({ "name": one.name, "lambda": one.lambda_n_per_m }))
         .collect();
-    let turns_on = |(lambda, _): &&(f64, f64)| *lambda <= plot.end_n_per_m;
+    let worst = object.lambda.worst_point.as_ref();
+    let worst = worst.map_or(&[][..], |worst| &worst.path);
+    let before_end = |turn: &&WorstPointStep| turn.lambda_n_per_m <= plot.end_n_per_m;
     // One beyond the end, so that the line reaches it.
-    let shown = facts.worst_turns.iter().filter(turns_on).count() + 1;
-    let worst: Vec<(f64, f64)> = facts.worst_turns.iter().take(shown).copied().collect();
+    let shown = worst.iter().filter(before_end).count() + 1;
+    let worst = &worst[..shown.min(worst.len())];
     json!({
         "end": plot.end_n_per_m,
-        "chosen": facts.chosen.map(|chosen| chosen.lambda_n_per_m),
+        "chosen": object.lambda.lambda_n_per_m,
         "lambda": f32s(plot.lambda_n_per_m.iter().copied()),
         "rms": f32s(plot.rms_error_n.iter().map(|e| e * 1e3)),
         "relative": f32s(plot.relative_error.iter().map(|p| p.map_or(f64::NAN, |p| p * 100.0))),
         "worst": {
-            "lambda": f32s(worst.iter().map(|turn| turn.0)),
-            "error": f32s(worst.iter().map(|turn| turn.1 * 1e3)),
+            "lambda": f32s(worst.iter().map(|turn| turn.lambda_n_per_m)),
+            "error": f32s(worst.iter().map(|turn| turn.worst_error_n * 1e3)),
         },
         "currents": currents,
         "turns": turns,
@@ -73,7 +75,36 @@ fn curves(facts: &BundleFacts) -> Value {
     })
 }
 
-fn constants(facts: &BundleFacts) -> Table {
+/// Every force constant of a result by name: those of the mean square, then those of the largest
+/// error.
+fn named_constants(file: &LambdaFile) -> Vec<NamedConstant> {
+    let worst = file.worst_point.as_ref();
+    let more = [
+        (
+            "tolerance",
+            "The largest whose errors are not felt at any point",
+            file.tolerance.as_ref().and_then(|t| t.lambda_n_per_m),
+        ),
+        (
+            "linear, worst point",
+            "Where the first limit binds if the largest error is to be least",
+            worst.and_then(|worst| worst.lambda_linear_n_per_m),
+        ),
+        (
+            "jnd, worst point",
+            "The same as jnd if the largest error is to be least",
+            worst.and_then(|worst| worst.lambda_jnd_n_per_m),
+        ),
+    ];
+    let more = more.map(|(name, meaning, lambda_n_per_m)| NamedConstant {
+        name,
+        meaning,
+        lambda_n_per_m,
+    });
+    file.constants.named().into_iter().chain(more).collect()
+}
+
+fn constants(object: &CalibratedObject) -> Table {
     let row = |one: &NamedConstant| -> Vec<Cell> {
         vec![
             one.name.into(),
@@ -84,17 +115,18 @@ fn constants(facts: &BundleFacts) -> Table {
     Table {
         caption: "The named force constants".to_owned(),
         head: vec![("name", false), ("lambda", true), ("what it is", false)],
-        rows: facts.constants.iter().map(row).collect(),
+        rows: named_constants(object.lambda).iter().map(row).collect(),
         prose: true,
     }
 }
 
-fn breakpoints(facts: &BundleFacts) -> Table {
-    let all = facts.breakpoints.len();
-    let row = |one: &super::data::Breakpoint| -> Vec<Cell> {
+fn breakpoints(object: &CalibratedObject) -> Table {
+    let path = &object.lambda.path;
+    let all = path.len();
+    let row = |one: &PathStep| -> Vec<Cell> {
         vec![
             figures(one.lambda_n_per_m, 6).into(),
-            one.event.to_owned().into(),
+            one.event.clone().into(),
         ]
     };
     let more = if all > LISTED {
@@ -105,7 +137,7 @@ fn breakpoints(facts: &BundleFacts) -> Table {
     Table {
         caption: format!("{} of the path{more}", count(all, "breakpoint")),
         head: vec![("lambda / N/m", true), ("what happens", false)],
-        rows: facts.breakpoints.iter().take(LISTED).map(row).collect(),
+        rows: path.iter().take(LISTED).map(row).collect(),
         prose: true,
     }
 }

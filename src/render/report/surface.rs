@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use super::data::CalibratedObject;
 use super::frame::{Section, figure};
 use super::html::{Cell, Html, Table};
 use super::number::{count, figures, force};
@@ -11,21 +12,41 @@ use super::pack::f32s;
 const MOST: usize = 81;
 
 /// Points of a grid, x fastest; `None` where there is no surface.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Surface {
+struct Surface {
     /// The grid's ends along x, m.
-    pub x_m: [f64; 2],
+    x_m: [f64; 2],
     /// The grid's ends along y, m.
-    pub y_m: [f64; 2],
+    y_m: [f64; 2],
     /// Points along x.
-    pub columns: usize,
+    columns: usize,
     /// Heights, m.
-    pub height_m: Vec<Option<f64>>,
-    /// Given minus requested, N; empty without a force constant.
-    pub error_n: Vec<Option<f64>>,
+    height_m: Vec<Option<f64>>,
+    /// Given minus wanted, N; empty without a force constant.
+    error_n: Vec<Option<f64>>,
 }
 
 impl Surface {
+    fn new(object: &CalibratedObject) -> Self {
+        let grid = &object.manifest.points;
+        // A manifest that was made here has flags that fit its axes.
+        let flags = grid.flags().unwrap_or_default();
+        let at_points = |values: &mut dyn Iterator<Item = f64>| -> Vec<Option<f64>> {
+            let value = |flag: &bool| flag.then(|| values.next()).flatten();
+            flags.iter().map(value).collect()
+        };
+        let error_n = object.curves.chosen.as_ref().map(|forces| {
+            let pairs = forces.static_n.iter().zip(&forces.wanted_n);
+            at_points(&mut pairs.map(|(given, wanted)| given - wanted))
+        });
+        Self {
+            x_m: [grid.x_m.from_m, grid.x_m.to_m],
+            y_m: [grid.y_m.from_m, grid.y_m.to_m],
+            columns: grid.x_m.samples,
+            height_m: at_points(&mut object.points.iter().map(|row| row.height_m)),
+            error_n: error_n.unwrap_or_default(),
+        }
+    }
+
     fn rows(&self) -> usize {
         self.height_m.len() / self.columns.max(1)
     }
@@ -71,7 +92,7 @@ impl Surface {
             )
         };
         let mm = |[from, to]: [f64; 2], samples: usize| {
-            // The first point of every block is where the grid's ends say.
+            // The first point of every block stands where the grid's ends tell.
             let last = samples.div_ceil(step).max(1) - 1;
             let share = (last * step) as f64 / (samples.max(2) - 1) as f64;
             [from * 1e3, (from + (to - from) * share) * 1e3]
@@ -88,13 +109,11 @@ impl Surface {
     }
 }
 
-/// The surface with `points` constraint points; with their errors where `lambda_is_known`.
 pub(super) fn section(
-    surface: &Surface,
-    points: usize,
-    lambda_is_known: bool,
+    object: &CalibratedObject,
     data: &mut serde_json::Map<String, Value>,
 ) -> Section {
+    let surface = Surface::new(object);
     let mut body = Html::default();
     let step = surface.step();
     let thinned = if step > 1 {
@@ -111,10 +130,10 @@ pub(super) fn section(
             "The surface that the finger's magnet follows, its {} and the coils below; \
              the ring is where the force is most wrong. Drag, use the arrow keys or the buttons \
              to turn it.{thinned}",
-            count(points, "constraint point")
+            count(object.points.len(), "constraint point")
         ),
     );
-    if lambda_is_known {
+    if object.lambda.lambda_n_per_m.is_some() {
         figure(
             &mut body,
             "errors",
@@ -125,7 +144,7 @@ pub(super) fn section(
         data.insert("errors".to_owned(), json!(true));
     }
     body.raw("</div>");
-    if let Some(table) = shares(surface) {
+    if let Some(table) = shares(&surface) {
         body.folded_table(&table);
     }
     data.insert("surface".to_owned(), surface.json());

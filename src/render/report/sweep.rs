@@ -4,8 +4,8 @@ use serde_json::{Map, Value, json};
 
 use super::frame::{Page, Section, figure};
 use super::html::Html;
+use super::inputs::sources;
 use super::number::{force, si};
-use super::optimum::sources;
 use super::pack::f32s;
 use crate::plot::pareto::ParetoPlot;
 

@@ -13,7 +13,7 @@ use std::collections::BinaryHeap;
 use super::nearest::Tree;
 use super::piece::{Face, Patch, Point, Polygon, Rect};
 use super::visible::supremum_over_visible;
-use super::{DEEPEST, Extreme, Faces, Lattice, Vertical, Worst};
+use super::{DEEPEST, Extreme, Faces, Lattice, Leaf, Vertical, Worst};
 use crate::mesh::{Mesh, Triangle};
 use fluxform_base::progress::{Interrupted, Progress};
 
@@ -207,14 +207,9 @@ impl Search<'_> {
         for (cell, patch) in patches {
             progress.check()?;
             let faces = self.faces;
-            faces.leaves(
-                patch.rect,
-                &lattice.members(*cell),
-                DEEPEST,
-                &mut |rect, members| {
-                    self.begin(rect, members, patch, &mut open);
-                },
-            );
+            faces.leaves(patch.rect, &lattice.members(*cell), DEEPEST, &mut |leaf| {
+                self.begin(leaf, patch, &mut open)
+            });
         }
         let mut looked = 0;
         while let Some(Open { bound_m, part, .. }) = open.pop() {
@@ -253,31 +248,28 @@ impl Search<'_> {
     }
 
     /// Opens the visible pieces of a leaf whose vertical difference exceeds what is known.
-    fn begin(
-        &mut self,
-        rect: &Rect,
-        members: &[u32],
-        patch: &Patch,
-        open: &mut BinaryHeap<Open<Part>>,
-    ) {
-        let hair = self.faces.hair;
-        let others: std::rc::Rc<[Face]> = members
-            .iter()
-            .map(|face| self.faces.list[*face as usize])
-            .collect();
-        for face in others.iter() {
-            let polygon = face.within(rect);
-            if polygon.width() <= hair.plan_m / 4.0
+    fn begin(&mut self, leaf: &Leaf<'_>, patch: &Patch, open: &mut BinaryHeap<Open<Part>>) {
+        let look = self.faces.look();
+        let list = &self.faces.list;
+        let faces = leaf.faces.iter().map(|face| list[*face as usize]);
+        // Of plain faces none hides another.
+        let others: std::rc::Rc<[Face]> = match leaf.plain {
+            true => std::rc::Rc::new([]),
+            false => faces.clone().collect(),
+        };
+        for face in &faces.collect::<Vec<_>>() {
+            let polygon = face.within(leaf.rect);
+            if polygon.width() <= look.hair.plan_m / 4.0
                 || difference(face, &polygon, patch).value_m <= self.enough_m()
             {
                 continue;
             }
             let above = |p: Point| face.height(p) - patch.height_m(p);
             let below = |p: Point| -above(p);
-            let Some(above) = supremum_over_visible(face, &polygon, &others, hair, &above) else {
+            let Some(above) = supremum_over_visible(face, &polygon, &others, look, &above) else {
                 continue;
             };
-            let below = supremum_over_visible(face, &polygon, &others, hair, &below);
+            let below = supremum_over_visible(face, &polygon, &others, look, &below);
             let bound_m = below.map_or(above, |below| above.or(below)).value_m;
             let part = Part {
                 face: *face,

@@ -9,10 +9,13 @@ mod hausdorff;
 mod nearest;
 pub(super) mod piece;
 mod primitive;
+mod sheets;
 mod visible;
 
 use std::borrow::Cow;
 use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -21,10 +24,10 @@ use crate::height::{Grid, heights, reach_m};
 use crate::index::Buckets;
 use crate::mesh::Mesh;
 use crate::vertical_hit::is_wall;
-use fluxform_base::progress::{Interrupted, Progress};
+use fluxform_base::progress::{self, Interrupted, Progress};
 use fluxform_numerics::axis::Axis;
 
-use self::visible::{HIGHEST, Hair, supremum_over_visible};
+use self::visible::{HIGHEST, Hair, Look, supremum_over_visible};
 
 pub use self::hausdorff::{Interval, hausdorff};
 pub use self::piece::{Extreme, Patch, Rect};
@@ -93,6 +96,62 @@ pub struct Cells {
 pub struct Faces {
     list: Vec<piece::Face>,
     hair: Hair,
+    effort: Arc<Looks>,
+}
+
+/// A part of a cell, and the faces of which something may be seen there.
+struct Leaf<'a> {
+    rect: &'a Rect,
+    faces: &'a [u32],
+    /// Whether they cover it and none lies over another: all are seen whole.
+    plain: bool,
+}
+
+/// How much more is compared: a count of looks at faces, hence the same on every machine and with
+/// any number of threads.
+#[derive(Debug)]
+pub struct Looks {
+    left: AtomicI64,
+}
+
+/// Looks, about ten seconds of one core.
+const USUAL_LOOKS: i64 = 1 << 30;
+/// Looks that cutting a face to a part of a cell and sorting it among others takes.
+const LOOKS_A_LEAF: usize = 16;
+
+impl Looks {
+    /// So many looks, and no more.
+    #[must_use]
+    pub fn new(looks: i64) -> Arc<Self> {
+        Arc::new(Self {
+            left: AtomicI64::new(looks),
+        })
+    }
+
+    /// What a certificate may take.
+    #[must_use]
+    pub fn usual() -> Arc<Self> {
+        Self::new(USUAL_LOOKS)
+    }
+
+    /// As much as it takes.
+    #[must_use]
+    pub fn endless() -> Arc<Self> {
+        Self::new(i64::MAX)
+    }
+
+    /// Takes so many looks; true where they are spent. What is spent altogether does not depend on
+    /// who spends it first, and once nothing is left all results are void.
+    fn spend(&self, looks: usize) -> bool {
+        let looks = i64::try_from(looks).unwrap_or(i64::MAX / 2);
+        self.left.fetch_sub(looks, Ordering::Relaxed) < looks
+    }
+
+    /// Whether nothing is left: then no comparison that drew on it states anything.
+    #[must_use]
+    pub fn is_spent(&self) -> bool {
+        self.left.load(Ordering::Relaxed) < 0
+    }
 }
 
 /// The largest differences over a rectangle.
@@ -123,7 +182,7 @@ impl Worst {
 impl Faces {
     /// The mesh's triangles but for vertical walls, which have no height of their own.
     #[must_use]
-    pub fn new(mesh: &Mesh, grid: &Grid) -> Self {
+    pub fn new(mesh: &Mesh, grid: &Grid, effort: Arc<Looks>) -> Self {
         let reach = reach_m(mesh, grid);
         let bounds = mesh.facts().bounds;
         let largest = |corners: [&[f64]; 2]| {
@@ -144,6 +203,14 @@ impl Faces {
                 plan_m: HAIR * plan_m,
                 height_m: HAIR * height_m,
             },
+            effort,
+        }
+    }
+
+    fn look(&self) -> Look<'_> {
+        Look {
+            hair: self.hair,
+            effort: &self.effort,
         }
     }
 
@@ -162,8 +229,8 @@ impl Faces {
     /// larger than those of `known` are not looked for.
     pub(super) fn worst(&self, rect: &Rect, among: &[u32], patch: &Patch, known: Worst) -> Worst {
         let mut worst = known;
-        self.leaves(*rect, among, DEEPEST, &mut |leaf, faces| {
-            self.compare(leaf, faces, patch, &mut worst);
+        self.leaves(*rect, among, DEEPEST, &mut |leaf| {
+            self.compare(leaf, patch, &mut worst);
         });
         worst
     }
@@ -174,18 +241,34 @@ impl Faces {
         worst.max(0.0) + ROUNDINGS * self.hair.height_m
     }
 
-    /// Quarters the rectangle until few faces are left in each part; what a single other face
-    /// hides there is left out.
-    fn leaves(&self, rect: Rect, among: &[u32], deep: u32, visit: &mut dyn FnMut(&Rect, &[u32])) {
-        if among.len() <= TOGETHER {
-            visit(&rect, among);
+    /// Quarters the rectangle until few faces are left in each part, or none of them lies over
+    /// another; what others hide there is left out as far as that is soon known.
+    fn leaves(&self, rect: Rect, among: &[u32], deep: u32, visit: &mut dyn FnMut(&Leaf<'_>)) {
+        progress::poll();
+        if self.effort.spend(LOOKS_A_LEAF * among.len()) {
             return;
         }
-        let kept = self.not_hidden(&rect, among);
+        let mut give = |faces: &[u32], plain: bool| {
+            visit(&Leaf {
+                rect: &rect,
+                faces,
+                plain,
+            });
+        };
+        if among.len() <= TOGETHER {
+            give(among, false);
+            return;
+        }
+        let sheets = self.sheets(&rect, among);
+        if sheets.plain {
+            give(&sheets.faces, true);
+            return;
+        }
+        let kept = self.not_hidden(&rect, &sheets.faces);
         let [width, depth] = rect.sides();
         let smallest = width.min(depth) < 256.0 * self.hair.plan_m;
         if kept.len() <= TOGETHER || deep == 0 || smallest {
-            visit(&rect, &kept);
+            give(&kept, false);
             return;
         }
         let quarters = rect.quarters();
@@ -229,21 +312,23 @@ impl Faces {
         // A floor under everything is hidden wherever there is surface.
         let floor_m = lowest - lowest.abs() - 1.0;
         let mut open = false;
-        self.leaves(*rect, among, DEEPEST, &mut |leaf, faces| {
-            let others: Vec<_> = faces.iter().map(|face| self.list[*face as usize]).collect();
-            open |= piece::Face::floor(leaf, floor_m).is_none_or(|floor| {
-                let whole = floor.within(leaf);
-                supremum_over_visible(&floor, &whole, &others, self.hair, &|_| 0.0).is_some()
-            });
+        self.leaves(*rect, among, DEEPEST, &mut |leaf| {
+            let faces = leaf.faces.iter();
+            let others: Vec<_> = faces.map(|face| self.list[*face as usize]).collect();
+            open |= !leaf.plain
+                && piece::Face::floor(leaf.rect, floor_m).is_none_or(|floor| {
+                    let whole = floor.within(leaf.rect);
+                    supremum_over_visible(&floor, &whole, &others, self.look(), &|_| 0.0).is_some()
+                });
         });
-        !open
+        !open && !self.effort.is_spent()
     }
 
-    fn compare(&self, rect: &Rect, faces: &[u32], patch: &Patch, worst: &mut Worst) {
-        let mut pieces = Vec::with_capacity(faces.len());
-        for &index in faces {
+    fn compare(&self, leaf: &Leaf<'_>, patch: &Patch, worst: &mut Worst) {
+        let mut pieces = Vec::with_capacity(leaf.faces.len());
+        for &index in leaf.faces {
             let face = self.list[index as usize];
-            let part = face.within(rect);
+            let part = face.within(leaf.rect);
             if part.width() <= self.hair.plan_m / 4.0 {
                 continue;
             }
@@ -251,19 +336,23 @@ impl Faces {
             let above = part.supremum(|p| face.height(p) - patch.height_m(p));
             worst.above = worst.above.or(above);
             let below = part.supremum(|p| patch.height_m(p) - face.height(p));
-            pieces.push((face, part, below.value_m));
+            if leaf.plain {
+                worst.below = worst.below.or(below);
+            } else if below.value_m > worst.below.value_m {
+                pieces.push((face, part, below.value_m));
+            }
         }
-        if pieces.iter().all(|piece| piece.2 <= worst.below.value_m) {
+        if pieces.is_empty() {
             return;
         }
-        let others: Vec<piece::Face> = pieces.iter().map(|piece| piece.0).collect();
+        let others: Vec<piece::Face> = leaf.faces.iter().map(|k| self.list[*k as usize]).collect();
         pieces.sort_by(|p, q| q.2.total_cmp(&p.2));
         for (face, part, bound) in &pieces {
-            if *bound <= worst.below.value_m {
+            if *bound <= worst.below.value_m || self.effort.is_spent() {
                 break;
             }
             let value = |p: piece::Point| patch.height_m(p) - face.height(p);
-            if let Some(below) = supremum_over_visible(face, part, &others, self.hair, &value) {
+            if let Some(below) = supremum_over_visible(face, part, &others, self.look(), &value) {
                 worst.below = worst.below.or(below);
             }
         }
@@ -587,12 +676,77 @@ mod tests {
         ]
     }
 
+    /// A closed cone: a fan of `count` facets over another that is its floor.
+    fn cone(count: usize) -> Mesh {
+        let rim = |k: usize| {
+            let t = std::f64::consts::TAU * (k % count) as f64 / count as f64;
+            [0.03 * t.cos(), 0.03 * t.sin(), 1e-3]
+        };
+        let facets = (0..count).flat_map(|k| {
+            let apex = |z| [1.7e-4, -2.3e-4, z];
+            let [a, b] = [rim(k), rim(k + 1)];
+            [[apex(0.031), a, b], [apex(1e-3), b, a]]
+        });
+        placed(facets.collect())
+    }
+
+    fn looks_of(mesh: &Mesh) -> (Vertical, i64) {
+        let grid = grid([31, 41]);
+        let known = heights(mesh, &grid, &Silent).unwrap();
+        let known: Vec<Option<f64>> = known.iter().map(|s| s.map(|s| s.height_m)).collect();
+        let effort = Looks::endless();
+        let faces = Faces::new(mesh, &grid, Arc::clone(&effort));
+        let lattice = Lattice::new(&faces, &grid, &known);
+        let worst = vertical(mesh, &grid, &lattice, &Silent).unwrap();
+        (worst, i64::MAX - effort.left.load(Ordering::Relaxed))
+    }
+
+    /// The cell under the apex was quartered until no two slivers were left together.
+    #[test]
+    fn the_work_of_a_fan_grows_no_faster_than_its_facets() {
+        let [few, many] = [500, 8000].map(|count| looks_of(&cone(count)));
+        assert!(many.1 < 20 * few.1, "{} {}", few.1, many.1);
+        // The floor is hidden, and the finer cone is the rounder.
+        let [few, many] = [few.0, many.0].map(|worst| (worst.above.value_m, worst.below.value_m));
+        assert!((few.0 - many.0).abs() < 1e-7, "{few:?} {many:?}");
+        assert!(few.1 < 1e-3 && many.1 < 1e-3, "{few:?} {many:?}");
+    }
+
+    /// Sheets through each other took minutes; now the answer is that there is none.
+    #[test]
+    fn a_spent_effort_is_reported_with_any_number_of_threads() {
+        let mesh = placed((0..3000).map(sheet).collect());
+        let grid = grid([11, 9]);
+        let known = heights(&mesh, &grid, &Silent).unwrap();
+        let known: Vec<Option<f64>> = known.iter().map(|s| s.map(|s| s.height_m)).collect();
+        let run = |looks: i64, threads: usize| {
+            let effort = Looks::new(looks);
+            let faces = Faces::new(&mesh, &grid, Arc::clone(&effort));
+            let lattice = Lattice::new(&faces, &grid, &known);
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+            let all = || vertical(&mesh, &grid, &lattice, &Silent).unwrap();
+            pool.build().unwrap().install(all);
+            (
+                effort.is_spent(),
+                looks - effort.left.load(Ordering::Relaxed),
+            )
+        };
+        let (spent, whole) = run(1 << 40, 3);
+        assert!(!spent);
+        for threads in [1, 4] {
+            assert_eq!(run(whole, threads), (false, whole));
+            assert!(run(whole - 1, threads).0);
+            let (spent, looks) = run(100_000, threads);
+            assert!(spent && looks < whole / 2, "{looks} {whole}");
+        }
+    }
+
     /// The lists of a million such triangles on this grid would have taken 40 GB.
     #[test]
     fn sheets_over_the_whole_grid_share_their_lists() {
         let faces = placed((0..70_000).map(sheet).collect());
         let grid = grid([61, 51]);
-        let faces = Faces::new(&faces, &grid);
+        let faces = Faces::new(&faces, &grid, Looks::usual());
         let heights = vec![None; grid.len()];
         let lattice = Lattice::new(&faces, &grid, &heights);
         let side = lattice.block;
@@ -617,7 +771,7 @@ mod tests {
         };
         let mesh = placed((0..40).map(bump).chain((0..3).map(sheet)).collect());
         let grid = grid([11, 8]);
-        let faces = Faces::new(&mesh, &grid);
+        let faces = Faces::new(&mesh, &grid, Looks::usual());
         let known = heights(&mesh, &grid, &Silent).unwrap();
         let known: Vec<Option<f64>> = known.iter().map(|s| s.map(|s| s.height_m)).collect();
         let fine = Lattice::new(&faces, &grid, &known);
@@ -646,7 +800,7 @@ mod tests {
         let mesh = placed((0..3).map(sheet).collect());
         for samples in [[1, 7], [7, 1], [1, 1]] {
             let grid = grid(samples);
-            let faces = Faces::new(&mesh, &grid);
+            let faces = Faces::new(&mesh, &grid, Looks::usual());
             let known = vec![Some(0.01); grid.len()];
             let lattice = Lattice::new(&faces, &grid, &known);
             assert_eq!(lattice.len(), 0);

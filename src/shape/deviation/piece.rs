@@ -314,21 +314,26 @@ impl Polygon {
 
     /// Area over half the perimeter: about the width of a thin piece.
     pub(super) fn width(&self) -> f64 {
+        let perimeter: f64 = (self.sides())
+            .map(|(a, b)| (b[0] - a[0]).hypot(b[1] - a[1]))
+            .sum();
+        if perimeter > 0.0 {
+            2.0 * self.area() / perimeter
+        } else {
+            0.0
+        }
+    }
+
+    /// Area, seen from the first corner, where least is lost in the sum.
+    pub(super) fn area(&self) -> f64 {
         if self.count < 3 {
             return 0.0;
         }
         let origin = self.corners[0];
-        let (mut area, mut perimeter) = (0.0, 0.0);
-        for (a, b) in self.sides() {
-            area +=
-                (a[0] - origin[0]) * (b[1] - origin[1]) - (a[1] - origin[1]) * (b[0] - origin[0]);
-            perimeter += (b[0] - a[0]).hypot(b[1] - a[1]);
-        }
-        if perimeter > 0.0 {
-            area / perimeter
-        } else {
-            0.0
-        }
+        let twice = self.sides().map(|(a, b)| {
+            (a[0] - origin[0]) * (b[1] - origin[1]) - (a[1] - origin[1]) * (b[0] - origin[0])
+        });
+        0.5 * twice.sum::<f64>()
     }
 
     /// The largest value over the polygon of a function that is quadratic along every line and

@@ -5,6 +5,7 @@
 //! hiding regions' sides. Which parts, is decided on lines beside them, a hair inside the piece or
 //! outside the region, so that what is shared with a neighbour needs no exact arithmetic.
 
+use super::Looks;
 use super::piece::{Extreme, Face, Point, Polygon, along};
 
 /// Lengths below which two places in plan are not told apart.
@@ -16,20 +17,34 @@ pub(super) struct Hair {
     pub(super) height_m: f64,
 }
 
+/// How a piece is looked at: what is not told apart, and how much may yet be looked at.
+#[derive(Clone, Copy)]
+pub(super) struct Look<'a> {
+    pub(super) hair: Hair,
+    pub(super) effort: &'a Looks,
+}
+
+/// Looks that cutting one polygon by another takes.
+const CUTS: usize = 4;
+
 /// So many of the others are looked at first: what they hide needs no more.
 pub(super) const HIGHEST: usize = 16;
 
-/// The largest value over the visible part of `piece`, a part of `face`; `None` when it is hidden.
-/// Among many `others` the highest should come first.
+/// The largest value over the visible part of `piece`, a part of `face`; `None` when it is hidden,
+/// or where the effort is spent. Among many `others` the highest should come first.
 pub(super) fn supremum_over_visible(
     face: &Face,
     piece: &Polygon,
     others: &[Face],
-    hair: Hair,
+    look: Look<'_>,
     value: &impl Fn(Point) -> f64,
 ) -> Option<Extreme> {
+    let Look { hair, effort } = look;
+    if effort.spend(CUTS * others.len()) {
+        return None;
+    }
     if others.len() > HIGHEST
-        && supremum_over_visible(face, piece, &others[..HIGHEST], hair, value).is_none()
+        && supremum_over_visible(face, piece, &others[..HIGHEST], look, value).is_none()
     {
         return None;
     }
@@ -40,6 +55,10 @@ pub(super) fn supremum_over_visible(
         .collect();
     if regions.is_empty() {
         return Some(piece.supremum(value));
+    }
+    // Every side of every region is held against every region.
+    if effort.spend(CUTS * regions.len() * (regions.len() + 1)) {
+        return None;
     }
     let mut best = None;
     let mut hidden = Vec::with_capacity(regions.len());

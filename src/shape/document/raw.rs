@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::format::{SurfaceFormat, unit_names};
+use super::unit::unit_names;
 use super::{AxisRequest, GridRequest, Placement, ShapeDocument, SurfaceSource};
+use crate::format::SurfaceFormat;
 use fluxform_design::message_text::axis_fault;
 use fluxform_numerics::axis::Axis;
 
@@ -37,7 +38,12 @@ pub enum RawSurfaceError {
         path: PathBuf,
     },
     /// The file's ending is none that is read.
-    #[error("{}: not a surface that is read: expected a shape file (.toml) or {}", path.display(), SurfaceFormat::endings())]
+    #[error(
+        "{}: not a surface that is read: expected a shape file (.toml) or {}{}",
+        path.display(),
+        SurfaceFormat::endings(),
+        SurfaceFormat::advice(path).map_or_else(String::new, |advice| format!("; {advice}"))
+    )]
     UnknownFormat {
         /// The surface file.
         path: PathBuf,
@@ -77,14 +83,16 @@ impl ShapeDocument {
     /// reader of surfaces to say.
     ///
     /// # Errors
-    /// Wrong usage: no unit for STL, OBJ or PLY, an unknown ending, an axis that cannot be.
+    /// Wrong usage: no unit for a format that carries none, an unknown ending, an axis that cannot be.
     pub fn raw(surface: &RawSurface) -> Result<Self, RawSurfaceError> {
         let path = surface.path.clone();
-        let Some(format) = SurfaceFormat::of(&path) else {
+        let format = SurfaceFormat::of(&path);
+        // The content of a file without an ending states its format once it is read.
+        if format.is_none() && path.extension().is_some() {
             return Err(RawSurfaceError::UnknownFormat { path });
-        };
+        }
         let unit_m = surface.unit_m;
-        if unit_m.is_none() && !format.carries_unit() {
+        if unit_m.is_none() && format.is_some_and(|format| !format.carries_unit()) {
             return Err(RawSurfaceError::UnitNeeded { path });
         }
         let Placement {

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use super::format::{SurfaceFormat, parse_unit, unit_names};
+use super::unit::{parse_unit, unit_names};
 use super::{AxisRequest, GridRequest, Placement, Primitive, ShapeDocument, SurfaceSource};
+use crate::format::SurfaceFormat;
 use fluxform_base::units::m_from_mm;
 use fluxform_design::diagnostics::{Faults, InvalidDocument};
 use fluxform_design::keys::{Key, with_meanings};
@@ -190,16 +191,20 @@ fn surface(root: &mut Section<'_>, path: &Path) -> Option<SurfaceSource> {
     let unit = root.text("unit");
     let unit_m = unit.as_ref().and_then(|unit| unit_of(root, &unit.value));
     let file = file?;
-    let Some(format) = SurfaceFormat::of(Path::new(&file)) else {
+    let format = SurfaceFormat::of(Path::new(&file));
+    // The content of a file without an ending states its format once it is read.
+    if format.is_none() && Path::new(&file).extension().is_some() {
         let message = format!(
             "expected a file ending in {}, found {}",
             SurfaceFormat::endings(),
             quoted(&file)
         );
-        root.fault("surface", message, "convert the surface to one of these");
+        let advice = SurfaceFormat::advice(Path::new(&file));
+        let advice = advice.unwrap_or("convert the surface to one of these");
+        root.fault("surface", message, advice);
         return None;
-    };
-    if !format.carries_unit() && !root.has("unit") {
+    }
+    if format.is_some_and(|format| !format.carries_unit()) && !root.has("unit") {
         let help = format!(
             "add unit = \"mm\" or what it was drawn in ({})",
             unit_names().join(", ")

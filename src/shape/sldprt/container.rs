@@ -1,15 +1,18 @@
 //! The container of SOLIDWORKS files since 2015: named blocks of raw DEFLATE data.
 //!
 //! A block: the marker, five little-endian u32 (type, CRC-32 and lengths of the data, length of
-//! the name), the name with its nibbles swapped, the data. Near the end of the file a directory
-//! repeats the headers; it is not used.
+//! the name), the name with its nibbles swapped, the data. One name may head several blocks, of
+//! which exactly one verifies by its length and checksum; the others may claim to reach over it.
+//! So headers are looked for everywhere, also inside what a block claims, and a stream is the
+//! first block of its name that verifies. Near the end of the file a directory repeats the
+//! headers; it is not used.
 
 use std::io::Read;
 
 use flate2::read::DeflateDecoder;
 
 use super::ADVICE;
-use crate::read_error::{Place, ReadError};
+use crate::read_error::ReadError;
 
 const SIGN: [u8; 4] = [0, 0, 0, 4];
 const MARKER: [u8; 6] = [0x14, 0, 0x06, 0, 0x08, 0];
@@ -23,13 +26,20 @@ const MOST_RATIO: u64 = 200;
 const RESERVED_RATIO: u64 = 8;
 /// Larger display data belong to no part.
 const MOST_BYTES: u64 = 2 << 30;
+/// So many times the file's length, and so many bytes, are unpacked in search of a block that
+/// verifies.
+const MOST_TRIED: [u64; 2] = [20, 16 << 20];
+
+/// The file's blocks, headers alone.
+pub(super) struct Blocks<'a> {
+    bytes: &'a [u8],
+    blocks: Vec<Block>,
+}
 
 /// A block's header.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Block {
-    pub(super) name: String,
-    /// Offset of the header.
-    at: usize,
+struct Block {
+    name: String,
     /// Offset of the data.
     start: usize,
     crc: u32,
@@ -37,31 +47,50 @@ pub(super) struct Block {
     unpacked: u32,
 }
 
-/// The blocks of a file, in file order.
-pub(super) fn blocks(bytes: &[u8]) -> Result<Vec<Block>, ReadError> {
-    if bytes.get(4..8) != Some(&SIGN) {
-        return Err(ReadError::new(
-            Place::Byte(4),
-            format!("this is no SOLIDWORKS part of 2015 or later (its sign is missing): {ADVICE}"),
-        ));
+impl<'a> Blocks<'a> {
+    /// True for bytes that begin as such files do.
+    pub(super) fn is(bytes: &[u8]) -> bool {
+        bytes.get(4..8) == Some(&SIGN)
     }
-    let mut found = Vec::new();
-    let mut at = 8;
-    while let Some(step) = position(&bytes[at..]) {
-        at += step;
-        match block(bytes, at) {
-            Some(block) => {
-                at = block.start + block.packed;
-                found.push(block);
-            }
-            None => at += 1,
+
+    /// The headers of a file, in file order.
+    pub(super) fn open(bytes: &'a [u8]) -> Result<Self, ReadError> {
+        let mut blocks = Vec::new();
+        let mut at = 8;
+        while let Some(step) = position(&bytes[at..]) {
+            fluxform_base::progress::poll();
+            at += step;
+            blocks.extend(block(bytes, at));
+            at += 1;
         }
+        if blocks.is_empty() {
+            let what = format!("the SOLIDWORKS file holds no block of data: {ADVICE}");
+            return Err(ReadError::file(what));
+        }
+        Ok(Self { bytes, blocks })
     }
-    if found.is_empty() {
-        let what = format!("the SOLIDWORKS file holds no block of data: {ADVICE}");
-        return Err(ReadError::file(what));
+
+    /// The data of the first block of this name that verifies; `None` without a block of it.
+    pub(super) fn stream(&self, name: &str) -> Result<Option<Vec<u8>>, ReadError> {
+        let mut tried = 0;
+        let [ratio, least] = MOST_TRIED;
+        let mut left = least.max(ratio * self.bytes.len() as u64);
+        for block in self.blocks.iter().filter(|block| block.name == name) {
+            fluxform_base::progress::poll();
+            tried += 1;
+            if let Some(data) = block.unpack(self.bytes, &mut left) {
+                return Ok(Some(data));
+            }
+        }
+        if tried == 0 {
+            return Ok(None);
+        }
+        Err(ReadError::file(format!(
+            "none of the {tried} blocks `{name}` of the file has the length and the checksum that \
+             it claims: the part was saved without its display, or the file is damaged: copy it \
+             again, or {ADVICE}"
+        )))
     }
-    Ok(found)
 }
 
 fn position(bytes: &[u8]) -> Option<usize> {
@@ -89,47 +118,37 @@ fn block(bytes: &[u8], at: usize) -> Option<Block> {
     let name: Vec<u8> = name.iter().map(|b| b.rotate_left(4)).collect();
     let name = String::from_utf8(name).ok()?;
     let start = at + HEADER + length;
-    let packed = packed as usize;
-    let whole = bytes.len() - start >= packed;
-    (whole && !name.chars().any(char::is_control)).then_some(Block {
+    (!name.chars().any(char::is_control)).then_some(Block {
         name,
-        at,
         start,
         crc,
-        packed,
+        packed: packed as usize,
         unpacked,
     })
 }
 
 impl Block {
-    /// The block's data, their length and checksum verified.
-    pub(super) fn unpack(&self, bytes: &[u8]) -> Result<Vec<u8>, ReadError> {
-        let fault = |what: &str| {
-            let what = format!(
-                "the block `{}` {what}: the file is damaged; copy it again, or {ADVICE}",
-                self.name
-            );
-            Err(ReadError::new(Place::Byte(self.at), what))
-        };
+    /// The block's data where their length and checksum verify; `left` is what may yet be
+    /// unpacked.
+    fn unpack(&self, bytes: &[u8], left: &mut u64) -> Option<Vec<u8>> {
+        let packed = bytes[self.start..].get(..self.packed)?;
         let claimed = u64::from(self.unpacked);
         let length = self.packed as u64;
-        if claimed > MOST_BYTES.min(LEAST_BUDGET.max(MOST_RATIO * length)) {
-            return fault("claims to unpack to more than its data can hold");
+        if claimed
+            > (*left)
+                .min(MOST_BYTES)
+                .min(LEAST_BUDGET.max(MOST_RATIO * length))
+        {
+            return None;
         }
-        let packed = &bytes[self.start..self.start + self.packed];
         let reserved = claimed.min(RESERVED_RATIO * length);
         let mut data = Vec::with_capacity(usize::try_from(reserved).unwrap_or(0));
-        let decoder = DeflateDecoder::new(packed);
-        if decoder.take(claimed + 1).read_to_end(&mut data).is_err() {
-            return fault("cannot be unpacked");
-        }
-        if data.len() as u64 != claimed {
-            return fault("does not have the length that it claims");
-        }
-        if crc32fast::hash(&data) != self.crc {
-            return fault("does not have the checksum that it claims");
-        }
-        Ok(data)
+        let read = DeflateDecoder::new(packed)
+            .take(claimed + 1)
+            .read_to_end(&mut data);
+        *left = left.saturating_sub(1 + data.len() as u64);
+        let verifies = data.len() as u64 == claimed && crc32fast::hash(&data) == self.crc;
+        (read.is_ok() && verifies).then_some(data)
     }
 }
 

@@ -13,24 +13,25 @@ const PAIRS: u32 = 2;
 /// A strip has at least one triangle.
 const SHORTEST: u32 = 3;
 
-/// All triangles of the stream, in file order.
-pub(super) fn triangles(stream: &[u8]) -> Result<Vec<Triangle>, ReadError> {
+/// All tables of the stream, in file order: one for each face of a body.
+pub(super) fn tables(stream: &[u8]) -> Vec<Table> {
     let mut found = Vec::new();
     let mut at = 0;
     while at + 16 <= stream.len() {
         match table(stream, at) {
             Some(table) => {
-                table.read(stream, &mut found)?;
+                fluxform_base::progress::poll();
                 at = table.end;
+                found.push(table);
             }
             None => at += 1,
         }
     }
-    Ok(found)
+    found
 }
 
 /// A table of strips.
-struct Table {
+pub(super) struct Table {
     /// Offset of the first strip's length.
     lengths: usize,
     strips: usize,
@@ -82,7 +83,17 @@ fn vertex(point: &[u8; 12]) -> [f64; 3] {
 }
 
 impl Table {
-    fn read(&self, stream: &[u8], triangles: &mut Vec<Triangle>) -> Result<(), ReadError> {
+    /// Offset of the table.
+    pub(super) fn start(&self) -> usize {
+        self.lengths
+    }
+
+    /// Adds the table's triangles.
+    pub(super) fn read(
+        &self,
+        stream: &[u8],
+        triangles: &mut Vec<Triangle>,
+    ) -> Result<(), ReadError> {
         let (points, _) = stream[self.points..self.end].as_chunks::<12>();
         let finite = |point: &[u8; 12]| vertex(point).iter().all(|c| c.is_finite());
         if !points.iter().all(finite) {

@@ -1,88 +1,162 @@
-//! Native SOLIDWORKS parts, experimental: the triangles that the part shows on the screen.
+//! Native SOLIDWORKS parts and assemblies, experimental: the triangles that they show on the
+//! screen.
 //!
 //! The format is not published; what is read here was found by looking at files. Everything is
-//! verified (checksums, lengths, counts), nothing is guessed: a part that does not fit is refused.
-//! The body itself (a Parasolid) is not read, so the surface is as coarse as its display.
+//! verified (checksums, lengths, counts, the boxes of an assembly's parts), nothing is guessed: a
+//! file that does not fit is refused. The body itself (a Parasolid) is not read, so the surface is
+//! as coarse as its display.
 
+mod compound;
 mod container;
 mod display;
+mod product;
 
+use self::compound::Compound;
+use self::container::Blocks;
+use self::display::Table;
+use self::product::Product;
+use crate::archive::text_of;
 use crate::mesh::{FileMesh, Triangle};
 use crate::number::F32_ROUNDING;
-use crate::read_error::ReadError;
+use crate::read_error::{Place, ReadError};
+use crate::tessellation::face_deviation;
 
 /// What to do instead, for messages.
-const ADVICE: &str = "open it in SOLIDWORKS and save the body as STL (binary, fine resolution) \
-                      or 3MF";
+const ADVICE: &str = "open it in SOLIDWORKS and save the body as STEP, STL (binary, fine \
+                      resolution) or 3MF";
 /// The stream with what is shown.
 const DISPLAY: &str = "Contents/DisplayLists";
+/// The document of an assembly's parts.
+const TREE: &str = "swXmlContents/COMPINSTANCETREE";
 
-/// Reads a part's bytes; coordinates are in metres.
+/// The two containers of SOLIDWORKS files.
+enum Container<'a> {
+    Blocks(Blocks<'a>),
+    Compound(Box<Compound<'a>>),
+}
+
+impl<'a> Container<'a> {
+    fn open(bytes: &'a [u8]) -> Result<Self, ReadError> {
+        if Compound::is(bytes) {
+            return Ok(Self::Compound(Box::new(Compound::open(bytes)?)));
+        }
+        if !Blocks::is(bytes) {
+            let what = format!("this is not a SOLIDWORKS file (its sign is missing): {ADVICE}");
+            return Err(ReadError::new(Place::Byte(4), what));
+        }
+        Ok(Self::Blocks(Blocks::open(bytes)?))
+    }
+
+    fn stream(&mut self, name: &str) -> Result<Option<Vec<u8>>, ReadError> {
+        match self {
+            Self::Blocks(blocks) => blocks.stream(name),
+            Self::Compound(compound) => compound.stream(name),
+        }
+    }
+}
+
+/// True for bytes that begin as a SOLIDWORKS file does.
+pub(crate) fn begins(bytes: &[u8]) -> bool {
+    Blocks::is(bytes) || Compound::is(bytes)
+}
+
+/// Reads a part's or an assembly's bytes; coordinates are in metres.
 ///
 /// # Errors
-/// [`ReadError`]: a part saved before 2015, an assembly, a part without display data, or bytes
-/// that do not verify.
+/// [`ReadError`]: no or incomplete display data, or bytes that do not verify.
 pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
-    if bytes.starts_with(b"\xd0\xcf\x11\xe0") {
-        return Err(ReadError::file(format!(
-            "this is an OLE document, as SOLIDWORKS wrote up to 2014; such parts are not read: \
-             {ADVICE}"
-        )));
-    }
-    let blocks = container::blocks(bytes)?;
-    let names = || blocks.iter().map(|block| block.name.as_str());
-    // What only assemblies and drawings hold.
-    if names().any(|name| name.starts_with("Contents/Components") || name.contains("CompInst")) {
-        return Err(ReadError::file(format!(
-            "this is an assembly, not a part: {ADVICE}"
-        )));
-    }
-    let block = blocks.iter().find(|block| block.name == DISPLAY);
-    let block = block.ok_or_else(|| {
+    let mut container = Container::open(bytes)?;
+    let product = match container.stream(TREE) {
+        Ok(Some(tree)) => product(&tree)?,
+        // Of a part this document is of no use.
+        Ok(None) | Err(_) => None,
+    };
+    let stream = container.stream(DISPLAY)?.ok_or_else(|| {
         ReadError::file(format!(
             "this SOLIDWORKS file holds no display data (`{DISPLAY}`): {ADVICE}"
         ))
     })?;
-    let stream = block.unpack(bytes)?;
-    let triangles = display::triangles(&stream)?;
-    if triangles.is_empty() {
+    let tables = display::tables(&stream);
+    if tables.is_empty() {
         return Err(ReadError::file(format!(
-            "the part's display data hold no face (a part saved without display, or of a newer \
-             kind): {ADVICE}"
+            "the display data hold no face (a file of sketches alone, or one saved without display \
+             or of a newer kind): {ADVICE}"
         )));
     }
-    let (largest, deviation) = (largest(&triangles), deviation(&triangles));
-    let warnings = vec![format!(
-        "reading SOLIDWORKS parts is experimental: the surface is the part's display mesh, which \
-         may lie up to about {:.3} mm from the body (an estimate for the coarsest setting of the \
-         image quality); compare with a STL or 3MF file of the same part",
+    let deviation = deviation(&stream, &tables)?;
+    let mut warnings = vec![format!(
+        "reading SOLIDWORKS files is experimental: the surface is the display mesh, which may lie \
+         about {:.3} mm from the body (an estimate, from the angles between the facets of each \
+         face); compare with a STEP, STL or 3MF file of the same part",
         deviation * 1000.0
     )];
+    let triangles = match product {
+        None => {
+            let mut triangles = Vec::new();
+            for table in &tables {
+                table.read(&stream, &mut triangles)?;
+            }
+            triangles
+        }
+        Some(product) => {
+            let (triangles, hidden) = product.lay_out(&stream, &tables)?;
+            if hidden > 0 {
+                warnings.push(format!(
+                    "{hidden} hidden or suppressed components of the assembly are left out"
+                ));
+            }
+            triangles
+        }
+    };
+    if triangles.is_empty() {
+        let what = format!("every component of the assembly is hidden or suppressed: {ADVICE}");
+        return Err(ReadError::file(what));
+    }
+    let [min, max] = box_of(&triangles);
+    let largest = (min.iter().chain(&max)).fold(0.0, |m: f64, c| m.max(c.abs()));
+    let coordinate_rounding = largest * F32_ROUNDING;
     Ok(FileMesh {
         triangles,
-        coordinate_rounding: largest * F32_ROUNDING,
+        coordinate_rounding,
         unit_m: Some(1.0),
-        deviation,
+        // Of plane faces nothing but the rounding is left.
+        deviation: deviation.max(coordinate_rounding),
         deviation_is_known: false,
         warnings,
     })
 }
 
-fn largest(triangles: &[Triangle]) -> f64 {
-    let coordinates = triangles.as_flattened().as_flattened().iter();
-    coordinates.fold(0.0, |m: f64, c| m.max(c.abs()))
+fn product(tree: &[u8]) -> Result<Option<Product>, ReadError> {
+    let fault = |what: String| ReadError::new(Place::Part(TREE.into(), 0), what);
+    let start = tree.windows(5).position(|w| w == b"<?xml").unwrap_or(0);
+    let text = tree[start..].trim_ascii_end();
+    let end = text.iter().rposition(|b| *b == b'>').map_or(0, |k| k + 1);
+    if end == 0 {
+        return Ok(None);
+    }
+    Product::read(&text_of(text[..end].to_vec()).map_err(fault)?)
 }
 
-/// The display's deviation is about 0.025 2 d / (6 + 1.6 Q), d being the diagonal of the box and
-/// Q the image quality in per cent. Q is not known here, so it is taken as 0.
-fn deviation(triangles: &[Triangle]) -> f64 {
-    let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+/// How far the facets may lie from the body: all triangles of a table are of one smooth face.
+fn deviation(stream: &[u8], tables: &[Table]) -> Result<f64, ReadError> {
+    let mut most = 0.0_f64;
+    let mut face = Vec::new();
+    for table in tables {
+        face.clear();
+        table.read(stream, &mut face)?;
+        most = most.max(face_deviation(&face));
+    }
+    Ok(most)
+}
+
+/// Lower and upper corner.
+fn box_of(triangles: &[Triangle]) -> [[f64; 3]; 2] {
+    let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
     for vertex in triangles.as_flattened() {
         for k in 0..3 {
-            min[k] = min[k].min(vertex[k]);
-            max[k] = max[k].max(vertex[k]);
+            bounds[0][k] = bounds[0][k].min(vertex[k]);
+            bounds[1][k] = bounds[1][k].max(vertex[k]);
         }
     }
-    let square: f64 = (0..3).map(|k| (max[k] - min[k]).powi(2)).sum();
-    0.025 * 2.0 * square.sqrt() / 6.0
+    bounds
 }

@@ -5,6 +5,7 @@ use std::io::{self, Read};
 use crate::mesh::{FileMesh, Triangle};
 use crate::number::F32_ROUNDING;
 use crate::stl::StlError;
+use crate::surface::Zeros;
 
 const HEADER: usize = 84;
 const RECORD: usize = 50;
@@ -12,6 +13,8 @@ const RECORD: usize = 50;
 const NORMAL: usize = 12;
 /// Records read at once from a file.
 const PIECE: usize = 1 << 13;
+/// Triangles that are reserved at once.
+const RESERVED: usize = 1 << 22;
 const SIGN: u32 = 1 << 31;
 
 /// True when the length is what the header's count asks for.
@@ -49,13 +52,18 @@ pub(super) fn read_from(
         return Ok(None);
     };
     let mut left = claimed as usize;
-    let mut found = Records::with_capacity(left);
+    let mut zeros = Zeros::default();
+    // The count fits the length, but a file may be longer than what was written to it.
+    let mut found = Records::with_capacity(left.min(RESERVED));
     let mut piece = vec![0; RECORD * left.min(PIECE)];
     while left > 0 {
         fluxform_base::progress::poll();
         let records = left.min(PIECE);
         let piece = &mut piece[..RECORD * records];
         source.read_exact(piece)?;
+        if !zeros.see(piece) {
+            return Ok(Some(Err(StlError::Hole { what: zeros.what() })));
+        }
         found.add(piece);
         left -= records;
     }

@@ -8,23 +8,29 @@ mod binary;
 
 use std::io::{self, Read};
 
+use crate::format::starts;
 use crate::mesh::FileMesh;
+use crate::read_error::ReadError;
+use crate::text::narrow;
 
-/// Why bytes are no STL mesh, and where.
+/// Why bytes are no STL mesh, and where: the message of a [`ReadError`].
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum StlError {
+pub(super) enum StlError {
     /// No byte at all.
     #[error("the file is empty (0 bytes): the export or the download failed")]
     Empty,
     /// Well formed, but without a triangle.
     #[error("the STL file holds no triangle: export a body or a surface")]
     NoTriangle,
-    /// Something else than STL.
-    #[error("this is not an STL file but {what}")]
-    Other {
-        /// What it looks like, and what to do.
-        what: &'static str,
+    /// Zeros where triangles belong.
+    #[error("{what}")]
+    Hole {
+        /// Where, and what to do.
+        what: String,
     },
+    /// Blanks alone.
+    #[error("this is not an STL file but blank; the export failed")]
+    Blank,
     /// Too short for a header and a count.
     #[error(
         "binary STL cut short: {length} bytes, where header and triangle count alone take 84; \
@@ -111,17 +117,28 @@ pub enum StlError {
 /// bytes in names are accepted, and a missing `endsolid` after a whole facet is a warning.
 ///
 /// # Errors
-/// [`StlError`] with the byte or the line.
-pub fn read(bytes: &[u8]) -> Result<FileMesh, StlError> {
+/// [`ReadError`] with the byte or the line.
+pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
+    parse(bytes).map_err(ReadError::from)
+}
+
+/// True for bytes that begin as STL files do: a count that fits the length, or `solid` and a text.
+pub(crate) fn begins(bytes: &[u8]) -> bool {
+    binary::length_fits(bytes) || (starts(bytes, b"solid") && ascii::looks_like(bytes))
+}
+
+fn parse(bytes: &[u8]) -> Result<FileMesh, StlError> {
     if bytes.is_empty() {
         return Err(StlError::Empty);
     }
-    let mesh = if binary::length_fits(bytes) {
-        binary::read(bytes)?
-    } else if let Some(what) = something_else(bytes) {
-        return Err(StlError::Other { what });
-    } else if ascii::looks_like(bytes) {
-        ascii::read(bytes)?
+    if binary::length_fits(bytes) {
+        return binary::read(bytes).and_then(not_empty);
+    }
+    let text = narrow(bytes);
+    let mesh = if ascii::after_mark(&text).trim_ascii_start().is_empty() {
+        return Err(StlError::Blank);
+    } else if ascii::looks_like(&text) {
+        ascii::read(&text)?
     } else {
         return Err(binary::fault(bytes));
     };
@@ -134,9 +151,15 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, StlError> {
 ///
 /// # Errors
 /// The source's own.
-pub fn stream(source: impl Read, length: u64) -> io::Result<Option<Result<FileMesh, StlError>>> {
+pub fn stream(source: impl Read, length: u64) -> io::Result<Option<Result<FileMesh, ReadError>>> {
     let result = binary::read_from(source, length)?;
-    Ok(result.map(|mesh| mesh.and_then(not_empty)))
+    Ok(result.map(|mesh| mesh.and_then(not_empty).map_err(ReadError::from)))
+}
+
+impl From<StlError> for ReadError {
+    fn from(error: StlError) -> Self {
+        Self::file(error.to_string())
+    }
 }
 
 fn not_empty(mesh: FileMesh) -> Result<FileMesh, StlError> {
@@ -145,53 +168,4 @@ fn not_empty(mesh: FileMesh) -> Result<FileMesh, StlError> {
     } else {
         Ok(mesh)
     }
-}
-
-/// What a file that is no STL looks like.
-fn something_else(bytes: &[u8]) -> Option<&'static str> {
-    const SIGNS: [(&[u8], &str); 12] = [
-        (
-            b"version https://git-lfs",
-            "a git-LFS pointer to one: run `git lfs pull` in its repository, or download the file itself",
-        ),
-        (
-            b"<!doctype",
-            "a web page: the download went wrong; fetch the raw file",
-        ),
-        (
-            b"<html",
-            "a web page: the download went wrong; fetch the raw file",
-        ),
-        (
-            b"<?xml",
-            "XML (AMF, COLLADA or a web page); export it as STL",
-        ),
-        (
-            b"pk\x03\x04",
-            "a ZIP archive (a 3MF file is one); unpack it, or export it as STL",
-        ),
-        (b"\x1f\x8b", "compressed with gzip; unpack it"),
-        (
-            b"iso-10303-21",
-            "a STEP file; save the body as STL in the CAD program",
-        ),
-        (
-            b"\xd0\xcf\x11\xe0",
-            "an OLE document (a SOLIDWORKS part up to 2014 is one); save it as STL",
-        ),
-        (b"ply", "a PLY file; export it as STL"),
-        (b"glTF", "a glTF file; export it as STL"),
-        (b"\xff\xfe", "text in UTF-16; save it as plain ASCII"),
-        (b"\xfe\xff", "text in UTF-16; save it as plain ASCII"),
-    ];
-    let body = ascii::after_mark(bytes).trim_ascii_start();
-    let begins =
-        |sign: &[u8]| body.len() >= sign.len() && body[..sign.len()].eq_ignore_ascii_case(sign);
-    if body.is_empty() {
-        return Some("blank; the export failed");
-    }
-    SIGNS
-        .iter()
-        .find(|(sign, _)| begins(sign))
-        .map(|(_, what)| *what)
 }

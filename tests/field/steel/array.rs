@@ -1,5 +1,6 @@
 //! Arrays of cored coils: every core answers every coil.
 
+use fluxform_field::components::Components;
 use std::f64::consts::{PI, TAU};
 use std::time::Instant;
 
@@ -11,7 +12,7 @@ use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::{ArrayResolution, CoupledArray};
 use fluxform_field::steel::cored_coil::CoredCoil;
 use fluxform_field::steel::coupling::Coupling;
-use fluxform_field::steel::equivalent_dipoles::{ArraySources, Parts};
+use fluxform_field::steel::equivalent_dipoles::ArraySources;
 use fluxform_field::steel::exchange::Grading;
 use fluxform_field::steel::generatrix::{Face, Generatrix};
 use fluxform_field::steel::magnetized::MagnetizedCore;
@@ -59,10 +60,11 @@ fn solve(positions: &[[f64; 2]], tolerance: f64) -> CoupledArray {
 /// The steel's part per ampere of `drive` at a point: dB_z/dz and B_z.
 fn steel(array: &CoupledArray, points: &[[f64; 3]], drive: usize) -> Vec<[f64; 2]> {
     let sources = ArraySources::of_array(array, LOWEST_M, LOWEST_M, 1e-8);
-    let mut out = vec![0.0; array.positions_m.len() * Parts::All.count() * points.len()];
-    sources.sample(points, Parts::All, &mut out);
-    let component =
-        |part: usize, point: usize| out[(drive * Parts::All.count() + part) * points.len() + point];
+    let mut out = vec![0.0; array.positions_m.len() * Components::All.count() * points.len()];
+    sources.sample(points, Components::All, &mut out);
+    let component = |part: usize, point: usize| {
+        out[(drive * Components::All.count() + part) * points.len() + point]
+    };
     (0..points.len())
         .map(|i| [component(4, i), component(7, i)])
         .collect()
@@ -463,8 +465,8 @@ fn near_fields_by_dipoles_are_those_by_loops() {
         let points: Vec<[f64; 3]> = [0.0, 0.0031, 0.0089, 0.0117, 0.0163, 0.041]
             .map(|r| [0.6 * r, -0.8 * r, distance_m])
             .to_vec();
-        let mut out = vec![0.0; Parts::All.count() * points.len()];
-        sources.sample(&points, Parts::All, &mut out);
+        let mut out = vec![0.0; Components::All.count() * points.len()];
+        sources.sample(&points, Components::All, &mut out);
         let fields: Vec<_> = points
             .iter()
             .map(|[x, y, z]| to_cartesian(&core.field(x.hypot(*y), *z), *x, *y))
@@ -510,8 +512,8 @@ fn the_field_of_an_array_is_divergence_free_and_a_gradient() {
         }
     }
     let count = points.len();
-    let mut out = vec![0.0; SCATTER.len() * Parts::All.count() * count];
-    sources.sample(&points, Parts::All, &mut out);
+    let mut out = vec![0.0; SCATTER.len() * Components::All.count() * count];
+    sources.sample(&points, Components::All, &mut out);
     for drive in 0..SCATTER.len() {
         let value = |part: usize, point: usize| out[(drive * 8 + part) * count + point];
         // d B_i / d x_j by differences of fourth order.

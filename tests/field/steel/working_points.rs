@@ -4,10 +4,11 @@
 use super::claims::{covered, random_cores};
 use super::saturation::curves;
 use super::support::Design;
+use fluxform_field::components::Components;
 use fluxform_field::steel::CoreShape;
 use fluxform_field::steel::array::{ArrayResolution, closest_m};
 use fluxform_field::steel::bh_curve::BhCurve;
-use fluxform_field::steel::equivalent_dipoles::{ArraySources, Parts};
+use fluxform_field::steel::equivalent_dipoles::ArraySources;
 use fluxform_field::steel::generatrix::Resolution;
 use fluxform_field::steel::permeability::Permeability;
 use fluxform_field::steel::saturated::Convergence;
@@ -96,8 +97,8 @@ fn gradients(case: &Case, array: &SaturatedArray) -> (Vec<f64>, Vec<f64>) {
             PLACES.map(|[dx, dy]| [x + reach * dx, y + reach * dy, z_m])
         };
         let points: Vec<[f64; 3]> = case.positions_m.iter().flat_map(|p| about(*p)).collect();
-        let mut values = vec![0.0; Parts::Gradient.count() * points.len()];
-        sources.sample(&points, Parts::Gradient, &mut values);
+        let mut values = vec![0.0; Components::Gradient.count() * points.len()];
+        sources.sample(&points, Components::Gradient, &mut values);
         let total = |(place, [x, y, z]): (usize, &[f64; 3])| {
             let coils = case.positions_m.iter().zip(&case.currents_a);
             let air: f64 = coils

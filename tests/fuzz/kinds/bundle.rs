@@ -8,10 +8,10 @@ use fluxform::bundle::artefact::{FileEntry, Input as Named, sha256_hex};
 use fluxform::bundle::json::to_json;
 use fluxform::bundle::load::Bundle;
 use fluxform::bundle::npz::to_npz;
-use fluxform::bundle::table::{write_currents, write_points};
+use fluxform::bundle::table::{CurrentRow, PointRow, write_rows};
 use fluxform::bundle::trajectory::Trajectory;
 use fluxform::commands::calibrate::{self, CalibrateOptions};
-use fluxform::commands::replay::{self, Opened, summary::Told};
+use fluxform::commands::replay::{self, Opened, summary::TrajectorySource};
 use fluxform::commands::verify;
 use fluxform::design::{Design, Need};
 use fluxform::progress::Silent;
@@ -122,10 +122,15 @@ fn packed((sample, design): &(Sample, &str)) -> Option<Input> {
     let mut put = |name: &str, bytes: Vec<u8>| input.put(name, Content::Bytes(bytes));
     put(MAP, to_npz(&sample.map).ok()?);
     let mut table = Vec::new();
-    write_points(&mut table, &sample.points).ok()?;
+    write_rows(&mut table, PointRow::COLUMNS, sample.points.iter().copied()).ok()?;
     put("points.csv", table);
     let mut table = Vec::new();
-    write_currents(&mut table, &sample.currents).ok()?;
+    write_rows(
+        &mut table,
+        CurrentRow::COLUMNS,
+        sample.currents.iter().copied(),
+    )
+    .ok()?;
     put("currents.csv", table);
     put("lambda.json", to_json(&sample.lambda).ok()?);
     put("design.toml", design.as_bytes().to_vec());
@@ -589,7 +594,7 @@ fn give(input: &Input, folder: &Path) -> Result<bool, String> {
         ],
     };
     for dynamics in [false, true] {
-        let told = Told {
+        let told = TrajectorySource {
             source: "made up".into(),
             input: None,
             synthesis: None,

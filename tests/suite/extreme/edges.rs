@@ -10,7 +10,7 @@ use super::geometry::{DISC, FILM, LEAF, NEEDLE, SOLID};
 use super::{Case, case};
 use fluxform::coil::inductance::self_inductance_h;
 use fluxform::coil::mutual::mutual_inductance_h;
-use fluxform::field::batch::Quantities;
+use fluxform::field::components::Components;
 use fluxform::field::winding::{AxialField, Winding};
 use fluxform::units::MU_0_T_M_PER_A;
 
@@ -102,7 +102,7 @@ fn batch(z_m: f64, tolerance: f64) -> Outcome {
     let r: Vec<f64> = (0..300).map(|i| 0.000_37 * f64::from(i)).collect();
     let z = vec![z_m; r.len()];
     let many = SEED
-        .gradients(&r, &z, tolerance, Quantities::Gradient)
+        .gradients(&r, &z, tolerance, Components::Gradient)
         .map_err(told)?;
     let sure: Result<Vec<AxialField>, _> = r.iter().map(|&r| SEED.field(r, z_m)).collect();
     let sure = sure.map_err(told)?;

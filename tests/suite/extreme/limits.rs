@@ -20,17 +20,16 @@ pub fn cases() -> Vec<Case> {
     [decades(), scaled(), parallel(), impossible(), as_designs()].concat()
 }
 
-const SEED: Limits = Limits {
-    resistance_max_ohm: Some(6.0),
-    settling_max_s: Some(0.1),
-    outer_diameter_max_m: Some(0.038),
-    inner_diameter_min_m: None,
-    length_max_m: Some(0.1),
-    power_max_w: None,
-    mass_max_kg: None,
-    wire_length_max_m: None,
-    core_field_max_t: None,
-};
+/// The seed's limits.
+fn seed() -> Limits {
+    Limits {
+        resistance_max_ohm: Some(6.0),
+        settling_max_s: Some(0.1),
+        outer_diameter_max_m: Some(0.038),
+        length_max_m: Some(0.1),
+        ..Limits::default()
+    }
+}
 
 /// The optimum under `limits` with the target `height_m` up and wire of `wire_m`.
 fn found(limits: Limits, height_m: f64, wire_m: f64) -> Result<Optimum, String> {
@@ -91,7 +90,7 @@ fn resistance(ohm: f64) -> Outcome {
     proven(
         Limits {
             resistance_max_ohm: Some(ohm),
-            ..SEED
+            ..seed()
         },
         0.03,
     )
@@ -108,7 +107,7 @@ fn decades() -> Vec<Case> {
             proven(
                 Limits {
                     settling_max_s: Some(1e-3),
-                    ..SEED
+                    ..seed()
                 },
                 0.03,
             )
@@ -117,13 +116,15 @@ fn decades() -> Vec<Case> {
             proven(
                 Limits {
                     settling_max_s: Some(1e3),
-                    ..SEED
+                    ..seed()
                 },
                 0.03,
             )
         }),
-        case("limits: target 1 mm up", words, GAP, || proven(SEED, 0.001)),
-        case("limits: target 1 m up", words, GAP, || proven(SEED, 1.0)),
+        case("limits: target 1 mm up", words, GAP, || {
+            proven(seed(), 0.001)
+        }),
+        case("limits: target 1 m up", words, GAP, || proven(seed(), 1.0)),
         case(
             "limits: more resistance allowed, six decades",
             "the force never falls",
@@ -134,7 +135,7 @@ fn decades() -> Vec<Case> {
                     .map(|&ohm| {
                         Ok(best(Limits {
                             resistance_max_ohm: Some(ohm),
-                            ..SEED
+                            ..seed()
                         })?
                         .force_n)
                     })
@@ -156,9 +157,9 @@ fn decades() -> Vec<Case> {
                     mass_max_kg: Some(1e9),
                     wire_length_max_m: Some(1e9),
                     inner_diameter_min_m: Some(1e-12),
-                    ..SEED
+                    ..seed()
                 };
-                close(best(loose)?.force_n, best(SEED)?.force_n, "N")
+                close(best(loose)?.force_n, best(seed())?.force_n, "N")
             },
         ),
     ]
@@ -172,13 +173,13 @@ fn of_size(k: f64) -> Outcome {
         settling_max_s: Some(0.1 * k * k),
         outer_diameter_max_m: Some(0.038 * k),
         length_max_m: Some(0.1 * k),
-        ..SEED
+        ..seed()
     };
     let outcome = found(limits, 0.03 * k, 7e-4 * k)?;
     let coil = outcome
         .best
         .ok_or_else(|| format!("{:?}", outcome.status))?;
-    close(coil.force_n * k * k, best(SEED)?.force_n, "N")
+    close(coil.force_n * k * k, best(seed())?.force_n, "N")
 }
 
 fn scaled() -> Vec<Case> {
@@ -209,7 +210,7 @@ fn parallel() -> Vec<Case> {
                 let one = Limits {
                     resistance_max_ohm: None,
                     wire_length_max_m: Some(90.0),
-                    ..SEED
+                    ..seed()
                 };
                 let both = Limits {
                     mass_max_kg: Some(90.0 * PER_M),
@@ -226,7 +227,7 @@ fn parallel() -> Vec<Case> {
                 let one = Limits {
                     resistance_max_ohm: None,
                     wire_length_max_m: Some(90.0),
-                    ..SEED
+                    ..seed()
                 };
                 let both = Limits {
                     mass_max_kg: Some(90.0 * PER_M * (1.0 - 1e-9)),
@@ -242,9 +243,9 @@ fn parallel() -> Vec<Case> {
             || {
                 let both = Limits {
                     power_max_w: Some(24.0),
-                    ..SEED
+                    ..seed()
                 };
-                close(best(both)?.force_n, best(SEED)?.force_n, "N")
+                close(best(both)?.force_n, best(seed())?.force_n, "N")
             },
         ),
         case(
@@ -257,9 +258,9 @@ fn parallel() -> Vec<Case> {
                     power_max_w: Some(24.0 * (1.0 + 1e-10)),
                     wire_length_max_m: Some(metres * (1.0 - 1e-10)),
                     mass_max_kg: Some(metres * PER_M * (1.0 + 2e-10)),
-                    ..SEED
+                    ..seed()
                 };
-                close(best(all)?.force_n, best(SEED)?.force_n, "N")
+                close(best(all)?.force_n, best(seed())?.force_n, "N")
             },
         ),
         case(
@@ -267,7 +268,7 @@ fn parallel() -> Vec<Case> {
             "that coil, N, to the proof's 1e-6",
             GAP,
             || {
-                let coil = best(SEED)?;
+                let coil = best(seed())?;
                 let value =
                     |name: LimitName| coil.limits.iter().find(|l| l.name == name).map(|l| l.value);
                 let tight = Limits {
@@ -276,7 +277,7 @@ fn parallel() -> Vec<Case> {
                     outer_diameter_max_m: value(LimitName::OuterDiameter),
                     length_max_m: value(LimitName::Length),
                     inner_diameter_min_m: Some(2.0 * coil.window.inner_radius_m),
-                    ..SEED
+                    ..seed()
                 };
                 close(best(tight)?.force_n, coil.force_n, "N")
             },
@@ -294,7 +295,7 @@ fn impossible() -> Vec<Case> {
                 let outcome = found(
                     Limits {
                         inner_diameter_min_m: Some(0.039),
-                        ..SEED
+                        ..seed()
                     },
                     0.03,
                     7e-4,
@@ -330,7 +331,7 @@ fn impossible() -> Vec<Case> {
             || {
                 let limits = Limits {
                     resistance_max_ohm: Some(1e-9),
-                    ..SEED
+                    ..seed()
                 };
                 let outcome = found(limits, 0.03, 7e-4)?;
                 match (&outcome.status, &outcome.best) {
@@ -355,7 +356,7 @@ fn impossible() -> Vec<Case> {
                 let outcome = found(
                     Limits {
                         inner_diameter_min_m: Some(0.038),
-                        ..SEED
+                        ..seed()
                     },
                     0.03,
                     7e-4,
@@ -374,7 +375,7 @@ fn impossible() -> Vec<Case> {
             || {
                 let limits = Limits {
                     inner_diameter_min_m: Some(0.037_999),
-                    ..SEED
+                    ..seed()
                 };
                 match found(limits, 0.03, 7e-4)?.status {
                     OptimumStatus::Contradictory(c) => holds(

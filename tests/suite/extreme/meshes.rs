@@ -4,7 +4,7 @@ use super::check::{Outcome, close, measured, refused, told, worst};
 use super::shapes::{against, binary, grid, mesh, plane, sheet};
 use super::{Case, case};
 use fluxform::progress::Silent;
-use fluxform::shape::deviation::{Faces, Lattice, vertical};
+use fluxform::shape::deviation::{Faces, Lattice, Looks, vertical};
 use fluxform::shape::document::Placement;
 use fluxform::shape::height::{Grid, heights};
 use fluxform::shape::mesh::{Mesh, Triangle};
@@ -127,7 +127,7 @@ fn deviation(triangles: Vec<Triangle>, grid: &Grid) -> Result<f64, String> {
     let m = mesh(triangles)?;
     let found = heights(&m, grid, &Silent).map_err(told)?;
     let nodes: Vec<Option<f64>> = found.iter().map(|s| s.map(|s| s.height_m)).collect();
-    let faces = Faces::new(&m, grid);
+    let faces = Faces::new(&m, grid, Looks::endless());
     let lattice = Lattice::new(&faces, grid, &nodes);
     let told_m = vertical(&m, grid, &lattice, &Silent).map_err(told)?;
     Ok(told_m.worst().value_m.max(0.0))

@@ -50,8 +50,14 @@ fn of_size(k: f64) -> Outcome {
     let (one, other) = (evaluated(1.0, "1.1579e6")?, evaluated(k, "1.1579e6")?);
     worst(
         [
-            off(other.coil.resistance_ohm * k, one.coil.resistance_ohm),
-            off(other.coil.inductance_h / k, one.coil.inductance_h),
+            off(
+                other.coil.circuit.resistance_ohm * k,
+                one.coil.circuit.resistance_ohm,
+            ),
+            off(
+                other.coil.circuit.inductance_h / k,
+                one.coil.circuit.inductance_h,
+            ),
             off(other.target.field_t_per_a * k, one.target.field_t_per_a),
             off(
                 other.target.gradient_t_per_m_per_a * k * k,
@@ -208,8 +214,11 @@ fn designs() -> Vec<Case> {
                 match design(&tiny).and_then(|d| evaluate(&d.0, vec![], None).map_err(told)) {
                     Err(message) => holds(true, format!("refused: {message}")),
                     Ok(e) => holds(
-                        e.coil.inductance_h.is_finite() && e.target.force_n.is_finite(),
-                        format!("{:e} H, {:e} N", e.coil.inductance_h, e.target.force_n),
+                        e.coil.circuit.inductance_h.is_finite() && e.target.force_n.is_finite(),
+                        format!(
+                            "{:e} H, {:e} N",
+                            e.coil.circuit.inductance_h, e.target.force_n
+                        ),
                     ),
                 }
             },

@@ -184,7 +184,10 @@ fn windings() -> Vec<Case> {
             "a voltage would be absurd, R is not: 4 rho depth L (a1 + a2) / d^4 ohm",
             1e-12,
             || {
-                let found = evaluated("diameter_mm = 0.02", "")?.coil.resistance_ohm;
+                let found = evaluated("diameter_mm = 0.02", "")?
+                    .coil
+                    .circuit
+                    .resistance_ohm;
                 close(
                     found,
                     4.0 * 1.68e-8 * 0.007 * 0.1 * 0.031 / 2e-5_f64.powi(4),
@@ -237,8 +240,8 @@ fn windings() -> Vec<Case> {
                 let cold = evaluated(&format!("diameter_mm = 0.7\ntemperature_c = {t:?}"), "")?;
                 let warm = evaluated("diameter_mm = 0.7", "")?;
                 close(
-                    cold.coil.resistance_ohm,
-                    1e-3 * warm.coil.resistance_ohm,
+                    cold.coil.circuit.resistance_ohm,
+                    1e-3 * warm.coil.circuit.resistance_ohm,
                     "ohm",
                 )
             },
@@ -261,8 +264,14 @@ fn windings() -> Vec<Case> {
                 let one = evaluated("diameter_mm = 0.7", "turns = 1")?;
                 worst(
                     [
-                        off(few.coil.resistance_ohm, 1e-6 * one.coil.resistance_ohm),
-                        off(few.coil.inductance_h, 1e-12 * one.coil.inductance_h),
+                        off(
+                            few.coil.circuit.resistance_ohm,
+                            1e-6 * one.coil.circuit.resistance_ohm,
+                        ),
+                        off(
+                            few.coil.circuit.inductance_h,
+                            1e-12 * one.coil.circuit.inductance_h,
+                        ),
                         off(
                             few.target.gradient_t_per_m_per_a,
                             1e-6 * one.target.gradient_t_per_m_per_a,
@@ -295,13 +304,14 @@ fn whole(d: f64) -> Outcome {
     let best = outcome
         .best
         .ok_or_else(|| format!("{:?}", outcome.status))?;
-    let continuous = outcome.continuous_n.ok_or("no continuous coil")?;
+    let continuous = outcome.continuous_force_n.ok_or("no continuous coil")?;
     // Without limits on resistance or heat the fullest winding is the strongest.
     let (layers, turns) = ((0.014 / d + 1e-9).floor(), (0.1 / d + 1e-9).floor());
-    if (best.layers as f64, best.turns_per_layer as f64) != (layers, turns) {
+    let whole = best.whole.ok_or("turns that are not whole")?;
+    if (whole.layers as f64, whole.turns_per_layer as f64) != (layers, turns) {
         return Err(format!(
             "{} layers of {} turns",
-            best.layers, best.turns_per_layer
+            whole.layers, whole.turns_per_layer
         ));
     }
     if best.force_n > continuous * (1.0 + 1e-9) {

@@ -20,8 +20,9 @@ use fluxform::numerics::axis::Axis;
 use fluxform::numerics::random::Random;
 use fluxform::progress::Silent;
 use fluxform::scene::Scene;
-use fluxform::scene::steel::{self, COUPLED_TOLERANCE};
-use fluxform::shape::deviation::{Faces, Lattice, vertical};
+use fluxform::scene::steel;
+use fluxform::scene::tolerances::COUPLED_TOLERANCE;
+use fluxform::shape::deviation::{Faces, Lattice, Looks, vertical};
 use fluxform::shape::height::heights;
 
 /// Size and seconds.
@@ -274,7 +275,7 @@ fn places(samples: usize) -> Vec<[f64; 3]> {
 fn force_points(samples: usize, effort: &Effort) -> Sized {
     let design = SEED_AIR.design(Need::CALIBRATE)?;
     let scene = Scene::new(&design)?;
-    let solved = steel::solve(&scene, None, 1e-12, 0.03)?;
+    let solved = steel::solve(&scene, scene.tolerances.field, 0.03)?;
     let points = places(samples);
     let work = || scene.forces_n_per_a(&solved, &points, &Silent);
     Ok((points.len() as f64, measure(effort, work)?.1))
@@ -283,7 +284,7 @@ fn force_points(samples: usize, effort: &Effort) -> Sized {
 fn coupled_points(samples: usize, effort: &Effort) -> Sized {
     let design = SEED.design(Need::CALIBRATE)?;
     let scene = Scene::new(&design)?;
-    let solved = steel::solve(&scene, None, 1e-12, 0.03)?;
+    let solved = steel::solve(&scene, scene.tolerances.field, 0.03)?;
     let points = places(samples);
     let work = || scene.forces_n_per_a(&solved, &points, &Silent);
     Ok((points.len() as f64, measure(effort, work)?.1))
@@ -341,7 +342,7 @@ fn deviation(side: usize, samples: usize, effort: &Effort) -> Result<(usize, Tim
     let plan = grid(samples);
     let work = || {
         let known = known(&heights(&mesh, &plan, &Silent)?);
-        let faces = Faces::new(&mesh, &plan);
+        let faces = Faces::new(&mesh, &plan, Looks::endless());
         let lattice = Lattice::new(&faces, &plan, &known);
         Ok::<_, RunError>(vertical(&mesh, &plan, &lattice, &Silent)?)
     };

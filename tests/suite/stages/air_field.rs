@@ -13,7 +13,7 @@ use crate::reference::{AXIAL_ERROR, axial_gradient};
 use crate::stages::Measured;
 use fluxform::RunError;
 use fluxform::design::Need;
-use fluxform::field::batch::Quantities;
+use fluxform::field::components::Components;
 use fluxform::field::winding::KERNEL_ERROR;
 use fluxform::field::winding::{AxialField, Winding};
 use fluxform::numerics::random::Random;
@@ -157,7 +157,7 @@ fn batch(winding: &Winding, pace: &Pace, progress: &dyn Progress) -> Result<Curv
     let mut rows = Vec::new();
     for &tolerance in pace.settings(&TOLERANCES, TOLERANCES.len()) {
         let (found, timing) = pace.time(progress, || {
-            Ok(winding.gradients(&r_m, &z_m, tolerance, Quantities::Gradient)?)
+            Ok(winding.gradients(&r_m, &z_m, tolerance, Components::Gradient)?)
         })?;
         let error = (0..exact.len()).fold(0.0_f64, |most, k| {
             let at = 8 * k;

@@ -15,7 +15,7 @@ use fluxform::field::steel::generatrix::Resolution;
 use fluxform::field::winding::Winding;
 use fluxform::progress::Progress;
 use fluxform::scene::Scene;
-use fluxform::scene::steel::CORED_TOLERANCE;
+use fluxform::scene::tolerances::CORED_TOLERANCE;
 
 const TOLERANCES: [f64; 9] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
 /// Lowest height of the seed's maps, m.

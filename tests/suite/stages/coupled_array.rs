@@ -6,11 +6,12 @@ use crate::file::{Curve, StageCurves};
 use crate::inputs::SEED;
 use fluxform::RunError;
 use fluxform::design::Need;
+use fluxform::field::components::Components;
 use fluxform::field::steel::array::{ArrayResolution, CoupledArray, closest_m};
-use fluxform::field::steel::equivalent_dipoles::{ArraySources, Parts};
+use fluxform::field::steel::equivalent_dipoles::ArraySources;
 use fluxform::progress::Progress;
 use fluxform::scene::Scene;
-use fluxform::scene::steel::COUPLED_TOLERANCE;
+use fluxform::scene::tolerances::COUPLED_TOLERANCE;
 
 const TOLERANCES: [f64; 6] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
 /// Rows of a quick run.
@@ -67,8 +68,8 @@ struct Values {
 fn values(array: &CoupledArray) -> Values {
     let drives = array.positions_m.len();
     let sources = ArraySources::of_array(array, LOWEST_M, LOWEST_M, EVALUATION);
-    let mut gradients = vec![0.0; drives * Parts::Gradient.count() * PLACES.len()];
-    sources.sample(&PLACES, Parts::Gradient, &mut gradients);
+    let mut gradients = vec![0.0; drives * Components::Gradient.count() * PLACES.len()];
+    sources.sample(&PLACES, Components::Gradient, &mut gradients);
     Values {
         gradients,
         added_inductance_h: array.added_inductance_h.iter().copied().collect(),

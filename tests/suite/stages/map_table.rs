@@ -6,9 +6,8 @@ use crate::file::{Curve, StageCurves};
 use crate::inputs::{SEED, SEED_AIR};
 use crate::reference::{AXIAL_ERROR, axial_gradient};
 use fluxform::RunError;
-use fluxform::commands::map::MAP_TOLERANCE;
 use fluxform::design::{Design, Need};
-use fluxform::field::steel::equivalent_dipoles::{ArraySources, Parts};
+use fluxform::field::steel::equivalent_dipoles::ArraySources;
 use fluxform::map::coupled_map::SampledField;
 use fluxform::map::tabulate::{Grid, tabulate};
 use fluxform::map::{Components, FieldMap};
@@ -17,8 +16,10 @@ use fluxform::numerics::lagrange::locate;
 use fluxform::numerics::random::Random;
 use fluxform::progress::{Progress, Silent};
 use fluxform::scene::Scene;
-use fluxform::scene::maps::{Felt, SceneMap};
-use fluxform::scene::steel::{self, COUPLED_TOLERANCE, Steel};
+use fluxform::scene::maps::{MagnetMean, SceneMap};
+use fluxform::scene::steel;
+use fluxform::scene::tolerances::COUPLED_TOLERANCE;
+use fluxform::scene::tolerances::MAP_TOLERANCE;
 
 const AIR: [f64; 12] = [
     1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13,
@@ -187,8 +188,8 @@ fn coupled(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curv
     let scene = Scene::new(design)?;
     let grid = grid(design, None);
     let lowest_m = grid.z_m[0];
-    let solved = steel::solve(&scene, None, MAP_TOLERANCE, lowest_m)?;
-    let Steel::Coupled(array) = &solved.steel else {
+    let solved = steel::solve(&scene, scene.tolerances.map, lowest_m)?;
+    let Some(array) = solved.steel().coupled() else {
         return Err(super::no_core());
     };
     let looked = looked_at(&grid, scene.coils.len());
@@ -199,7 +200,7 @@ fn coupled(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curv
         .map(|[_, z, y, x]| [grid.x_m[*x], grid.y_m[*y], grid.z_m[*z]])
         .collect();
     let mut exact = vec![0.0; scene.coils.len() * points.len()];
-    finest.sample(&points, Parts::Gz, &mut exact);
+    finest.sample(&points, Components::Gz, &mut exact);
     let mut sizes = Vec::with_capacity(points.len());
     for (k, point) in points.iter().enumerate() {
         let column = exact.iter().skip(k).step_by(points.len());
@@ -242,7 +243,7 @@ fn coupled(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curv
 /// Interpolation between the nodes, against their number.
 fn between(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
     let scene = Scene::new(design)?;
-    let solved = steel::solve(&scene, None, MAP_TOLERANCE, 0.0)?;
+    let solved = steel::solve(&scene, scene.tolerances.map, 0.0)?;
     let mut numbers = Random::new(13);
     let whole = grid(design, None);
     let ends = |nodes: &[f64]| [nodes[0], nodes[nodes.len() - 1]];
@@ -282,7 +283,7 @@ fn between(design: &Design, pace: &Pace, progress: &dyn Progress) -> Result<Curv
                 &scene.coils,
                 &grid,
                 Components::Gz,
-                &Felt::field(),
+                &MagnetMean::field(),
                 &Silent,
             )
         })?;

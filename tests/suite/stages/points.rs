@@ -8,7 +8,7 @@ use fluxform::RunError;
 use fluxform::numerics::axis::Axis;
 use fluxform::progress::{Progress, Silent};
 use fluxform::shape::Surface;
-use fluxform::shape::deviation::{Faces, Lattice, vertical};
+use fluxform::shape::deviation::{Faces, Lattice, Looks, vertical};
 use fluxform::shape::height::{Grid, heights};
 use fluxform::shape::scattered::Probe;
 use fluxform::shape::scattered::adaptive::{Grading, adaptive};
@@ -104,7 +104,7 @@ fn on_grid(surface: &Surface, pace: &Pace, progress: &dyn Progress) -> Result<Cu
         let plan = grid(samples);
         let ((known, bound_m), timing) = pace.time(progress, || {
             let known = known(&heights(mesh, &plan, &Silent)?);
-            let faces = Faces::new(mesh, &plan);
+            let faces = Faces::new(mesh, &plan, Looks::endless());
             let lattice = Lattice::new(&faces, &plan, &known);
             let bound_m = vertical(mesh, &plan, &lattice, &Silent)?.bound_m();
             Ok((known, bound_m))

@@ -97,7 +97,7 @@ fn with_nodes(nodes: usize) -> String {
 fn curves(pace: &Pace, progress: &dyn Progress) -> Result<[Curve; 2], RunError> {
     let design = SEED_AIR.design(Need::CALIBRATE)?;
     let scene = Scene::new(&design)?;
-    let solved = steel::solve(&scene, None, KERNEL_ERROR, 0.03)?;
+    let solved = steel::solve(&scene, scene.tolerances.field, 0.03)?;
     let scratch = Scratch::new()?;
     let (mut rows, mut optimal) = (Vec::new(), Vec::new());
     let mut finger: Option<Vec<[f64; 3]>> = None;

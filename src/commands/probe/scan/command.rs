@@ -10,7 +10,7 @@ use crate::cli::describe;
 use crate::cli::documents;
 use crate::cli::failure::Failure;
 use crate::cli::layout::{Sheet, Side, table};
-use crate::cli::printer::{Place, Printer};
+use crate::cli::printer::{Printer, Stream};
 use crate::cli::quantity::{count, number, number_to, percent, si};
 use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
@@ -21,7 +21,7 @@ use crate::design::Need;
 /// How every table of residuals begins.
 const HEADER: &str = "x_m,y_m,z_m,";
 
-/// Explanations beyond this many are told in the JSON object alone.
+/// Explanations beyond this many are in the JSON object alone.
 const EXPLANATIONS: usize = 8;
 
 /// A measured scan in the points' place.
@@ -96,12 +96,12 @@ impl Probe {
         for warning in &report.warnings {
             printer.warning(warning);
         }
-        let mut place = Place::Output;
+        let mut place = Stream::Output;
         match out {
             None => {}
             Some(FileArgument::Standard) => {
                 printer.data(|out| scan.write_residuals(out, &report.predicted, &report.fitted))?;
-                place = Place::Error;
+                place = Stream::Error;
             }
             Some(FileArgument::Path(path)) => {
                 atomic::write(path, &overwrite, |out| {
@@ -111,12 +111,12 @@ impl Probe {
             }
         }
         let json = printer.with_warnings(&report.file);
-        printer.summary(place, &json, || told(&report.file, &name, out))?;
+        printer.summary(place, &json, || text(&report.file, &name, out))?;
         accuracy_check(&report.accuracy_missed)
     }
 }
 
-fn told(file: &ScanFile, name: &str, out: Option<&FileArgument>) -> String {
+fn text(file: &ScanFile, name: &str, out: Option<&FileArgument>) -> String {
     let mut sheet = Sheet::new(&format!(
         "{name} against {}: {} of {} in {}",
         file.design,
@@ -268,7 +268,10 @@ fn explained(found: Option<&Explanation>, name: &str) -> String {
     let alike = if found.alike.is_empty() {
         String::new()
     } else {
-        format!("; this scan cannot tell it from {}", found.alike.join(", "))
+        format!(
+            "; this scan cannot distinguish it from {}",
+            found.alike.join(", ")
+        )
     };
     format!(
         "{name}, which takes {} of the residuals' squares away{alike}",

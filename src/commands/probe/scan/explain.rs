@@ -5,7 +5,7 @@
 //! design computed again at every step. The share of the residuals' squares that it takes away is
 //! reported, and a standard error that holds where the field bends: the larger side of the interval in
 //! which the likelihood stays within the 95 % of one number, over 1.96. Candidates with as many free
-//! numbers whose likelihoods differ by less than [`DISTINCT`] cannot be told apart by this scan and are
+//! numbers whose likelihoods differ by less than [`DISTINCT`] cannot be distinguished by this scan and are
 //! named together.
 
 use super::fit::{self, Fitted, Parameter, parameters};
@@ -15,7 +15,6 @@ use super::{ScanRequest, Weighted, noises};
 use crate::RunError;
 use crate::bundle::scan::{Explanation, Scan};
 use crate::design::Design;
-use crate::field::winding::KERNEL_ERROR;
 use crate::numerics::least_squares::{self, norm};
 use crate::progress::Progress;
 use crate::scene::Scene;
@@ -79,7 +78,7 @@ pub(super) fn explain(task: &Task) -> Result<(Vec<Explanation>, Option<String>),
     let candidates = task.candidates()?;
     let total = squares(&task.residuals.values);
     let count = task.residuals.values.len() as f64;
-    // Below the computed field's own error nothing is told apart.
+    // Below the computed field's own error nothing is distinguished.
     let floor = (task.relative_error * task.computed()).powi(2) + 1e-24 * task.measured().powi(2);
     let share = |c: &Settled| {
         if total > 0.0 {
@@ -183,8 +182,8 @@ impl Task<'_> {
             rotation: true,
         };
         let all = parameters(all, self.scan, coils);
-        let of = |wanted: &dyn Fn(&Parameter) -> bool| -> Vec<Parameter> {
-            all.iter().copied().filter(|p| wanted(p)).collect()
+        let of = |chosen: &dyn Fn(&Parameter) -> bool| -> Vec<Parameter> {
+            all.iter().copied().filter(|p| chosen(p)).collect()
         };
         let mut list = Vec::new();
         list.extend(self.scaled("scale", 1.0));
@@ -273,9 +272,9 @@ impl Task<'_> {
 
     /// What the scan would show of another design, [row, quantity].
     fn computed_for(&self, design: &Design) -> Result<Vec<f64>, RunError> {
-        let scene = Scene::new(design)?;
+        let scene = Scene::with_tolerance(design, self.request.tolerance)?;
         let lowest_m = super::lowest_m(self.scan);
-        let solved = steel::solve(&scene, self.request.tolerance, KERNEL_ERROR, lowest_m)?;
+        let solved = steel::solve(&scene, scene.tolerances.field, lowest_m)?;
         let model = Model::new(&scene, &solved, self.scan);
         let places = model.places(Pose::default())?;
         let contributions = model.contributions(&places, Pose::default(), self.progress)?;

@@ -232,8 +232,8 @@ impl Task<'_> {
     /// Where the measured numbers of a field component stand.
     fn of_component(&self, component: usize) -> impl Iterator<Item = usize> {
         let count = self.scan.quantities.len();
-        let wanted = Measured::Field(component);
-        let place = self.scan.quantities.iter().position(|q| *q == wanted);
+        let sought = Measured::Field(component);
+        let place = self.scan.quantities.iter().position(|q| *q == sought);
         let rows = self.scan.rows();
         place
             .into_iter()

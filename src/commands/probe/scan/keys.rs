@@ -103,36 +103,7 @@ pub(super) fn keys(design: &Design, turns: f64) -> Vec<Key<'_>> {
         ),
     ];
     if let Some(core) = &design.core {
-        let with_core = move |change: &dyn Fn(&mut Core)| {
-            let mut changed = design.clone();
-            if let Some(core) = &mut changed.core {
-                change(core);
-            }
-            changed
-        };
-        match core.steel {
-            Steel::Linear(mu_r) => list.push(factor(
-                "core.relative_permeability",
-                mu_r,
-                [mu_r.recip(), PERMEABILITIES],
-                step,
-                move |by| with_core(&|core| core.steel = Steel::Linear(mu_r * by)),
-            )),
-            Steel::Curve(_) => {}
-        }
-        let reach_mm = 250.0 * coil.length_m;
-        list.push(offset(
-            "core.above_mm",
-            core.above_m * 1e3,
-            reach_mm,
-            move |by_m| with_core(&|core| core.above_m += by_m),
-        ));
-        list.push(offset(
-            "core.below_mm",
-            core.below_m * 1e3,
-            reach_mm,
-            move |by_m| with_core(&|core| core.below_m += by_m),
-        ));
+        list.extend(core_keys(design, core, 250.0 * coil.length_m, step));
     }
     let grid = design.array.grid;
     if let Some(grid) = grid.filter(|grid| grid.rows * grid.columns > 1) {
@@ -145,5 +116,40 @@ pub(super) fn keys(design: &Design, turns: f64) -> Vec<Key<'_>> {
         let pitch_mm = grid.pitch_m * 1e3;
         list.push(factor("array.pitch_mm", pitch_mm, lengths, step, changed));
     }
+    list
+}
+
+/// The numbers of a core.
+fn core_keys<'a>(design: &'a Design, core: &'a Core, reach_mm: f64, step: f64) -> Vec<Key<'a>> {
+    let with_core = move |change: &dyn Fn(&mut Core)| {
+        let mut changed = design.clone();
+        if let Some(core) = &mut changed.core {
+            change(core);
+        }
+        changed
+    };
+    let mut list = Vec::new();
+    match core.steel {
+        Steel::Linear(mu_r) => list.push(factor(
+            "core.relative_permeability",
+            mu_r,
+            [mu_r.recip(), PERMEABILITIES],
+            step,
+            move |by| with_core(&|core| core.steel = Steel::Linear(mu_r * by)),
+        )),
+        Steel::Curve(_) => {}
+    }
+    list.push(offset(
+        "core.above_mm",
+        core.above_m * 1e3,
+        reach_mm,
+        move |by_m| with_core(&|core| core.above_m += by_m),
+    ));
+    list.push(offset(
+        "core.below_mm",
+        core.below_m * 1e3,
+        reach_mm,
+        move |by_m| with_core(&|core| core.below_m += by_m),
+    ));
     list
 }

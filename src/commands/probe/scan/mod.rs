@@ -2,7 +2,7 @@
 //!
 //! The residuals of the design as it stands; scales of the coils, a background and the sensor's
 //! frame fitted all at once, with standard errors; and which single parameter would explain the
-//! residuals. What the scan does not determine is told and left open.
+//! residuals. What the scan does not determine is stated and left open.
 
 use std::collections::BTreeMap;
 
@@ -14,12 +14,12 @@ use crate::bundle::scan::{
     ScanPlace,
 };
 use crate::design::Design;
-use crate::field::winding::KERNEL_ERROR;
 use crate::numerics::least_squares::CUTOFF;
 use crate::progress::Progress;
 use crate::scene::Scene;
+use crate::scene::core_material::Material;
 use crate::scene::steel;
-use crate::scene::steel::{Material, Solved};
+use crate::scene::steel::Solved;
 
 pub(crate) mod command;
 mod explain;
@@ -59,7 +59,7 @@ pub struct ScanReport {
     pub fitted: Vec<f64>,
     /// Warnings for the user.
     pub warnings: Vec<String>,
-    /// Whether the tolerance asked for was reached.
+    /// Whether the requested tolerance was reached.
     pub accuracy_reached: bool,
     /// What misses it.
     pub accuracy_missed: Vec<String>,
@@ -74,6 +74,19 @@ struct Weighted {
 }
 
 impl Weighted {
+    fn of(scan: &Scan, predicted: Vec<f64>, weights: Vec<f64>) -> Self {
+        let pairs = scan.values.iter().zip(&predicted);
+        let residuals = pairs.map(|(measured, predicted)| measured - predicted);
+        let mut weighted = Self {
+            values: residuals.collect(),
+            predicted,
+            weights,
+        };
+        let residuals = std::mem::take(&mut weighted.values);
+        weighted.values = weighted.weighted(residuals);
+        weighted
+    }
+
     fn weighted(&self, mut values: Vec<f64>) -> Vec<f64> {
         let pairs = values.iter_mut().zip(&self.weights);
         pairs.for_each(|(value, weight)| *value *= weight);
@@ -95,7 +108,7 @@ pub fn compare(
     progress: &dyn Progress,
 ) -> Result<ScanReport, RunError> {
     let refused = |why: String| RunError::Scan(format!("{name}: {why}"));
-    let scene = Scene::new(design)?;
+    let scene = Scene::with_tolerance(design, request.tolerance)?;
     let parameters = fit::parameters(request.fitted, scan, scene.coils.len());
     large_enough(scan, &parameters).map_err(refused)?;
     if let Some(hint) = units::coordinates(design, scan) {
@@ -103,7 +116,7 @@ pub fn compare(
     }
     // For any place, as `probe` does: a fit moves the places, and what `probe` printed must be found
     // again to the last digits.
-    let solved = steel::solve(&scene, request.tolerance, KERNEL_ERROR, f64::NEG_INFINITY)?;
+    let solved = steel::solve(&scene, scene.tolerances.field, f64::NEG_INFINITY)?;
     let model = Model::new(&scene, &solved, scan);
     progress.begin("scan", 0);
     let places = model.places(Pose::default())?;
@@ -112,24 +125,10 @@ pub fn compare(
     if let Some(hint) = units::magnitudes(scan, &predicted) {
         return Err(refused(hint));
     }
-    let weights = weights(scan, request);
-    let residuals = scan.values.iter().zip(&predicted).map(|(m, p)| m - p);
-    let mut weighted = Weighted {
-        values: residuals.collect(),
-        predicted,
-        weights,
-    };
-    let residuals = std::mem::take(&mut weighted.values);
-    weighted.values = weighted.weighted(residuals);
+    let weighted = Weighted::of(scan, predicted, weights(scan, request));
     let field_t = rms(scan, &scan.values, field).unwrap_or(1e-3).max(1e-9);
-    let fit = fit::fit(
-        &model,
-        scan,
-        &parameters,
-        &weighted.weights,
-        field_t,
-        progress,
-    )?;
+    let weights = &weighted.weights;
+    let fit = fit::fit(&model, scan, &parameters, weights, field_t, progress)?;
     let relative_error = solved.point_error();
     let task = explain::Task {
         design,
@@ -144,22 +143,13 @@ pub fn compare(
     let (explanations, best_explanation) = explain::explain(&task)?;
     progress.end();
 
-    let told = Told {
+    let report = ResidualReport {
         scan,
         request,
         model_errors: model_errors(scan, &weighted.predicted, relative_error),
     };
     let noise_known = noises(scan, request).is_some();
-    let mut warnings = Vec::new();
-    if let Some(core) = &scene.core
-        && matches!(core.material, Material::Curve(_))
-    {
-        warnings.push(
-            "the steel follows a B-H curve and was solved at the rated current: a scan at other \
-             currents may differ by what saturation changes"
-                .to_owned(),
-        );
-    }
+    let mut warnings: Vec<String> = curve_warning(&scene).into_iter().collect();
     let file = ScanFile {
         schema_version: SCHEMA_VERSION.to_owned(),
         fluxform_version: FLUXFORM_VERSION.to_owned(),
@@ -169,22 +159,50 @@ pub fn compare(
         values: scan.values.len(),
         measured: scan.quantities.iter().map(|q| q.column()).collect(),
         residuals: Residuals {
-            as_designed: told.left(&weighted.predicted),
-            fitted: told.left(&fit.fitted),
+            as_designed: report.left(&weighted.predicted),
+            fitted: report.left(&fit.fitted),
         },
         fit: fit_file(design, &parameters, &fit, noise_known, scan, &mut warnings),
         explanations,
         best_explanation,
         accuracy: BTreeMap::from([("field".to_owned(), accuracy(&solved, relative_error))]),
     };
-    let accuracy_missed = missed(&file.accuracy, solved.tolerance);
-    Ok(ScanReport {
+    let predicted = weighted.predicted;
+    Ok(ScanReport::new(
         file,
-        fitted: fit.fitted,
-        predicted: weighted.predicted,
+        [fit.fitted, predicted],
         warnings,
-        accuracy_reached: accuracy_missed.is_empty(),
-        accuracy_missed,
+        solved.tolerance,
+    ))
+}
+
+impl ScanReport {
+    /// `file` and its warnings, with the values that were fitted and those of the design as it is.
+    fn new(
+        file: ScanFile,
+        [fitted, predicted]: [Vec<f64>; 2],
+        warnings: Vec<String>,
+        tolerance: f64,
+    ) -> Self {
+        let accuracy_missed = missed(&file.accuracy, tolerance);
+        Self {
+            file,
+            fitted,
+            predicted,
+            warnings,
+            accuracy_reached: accuracy_missed.is_empty(),
+            accuracy_missed,
+        }
+    }
+}
+
+/// Along a B-H curve the field per ampere depends on the current.
+fn curve_warning(scene: &Scene) -> Option<String> {
+    let core = scene.core.as_ref()?;
+    matches!(core.material, Material::Curve(_)).then(|| {
+        "the steel follows a B-H curve and was solved at the rated current: a scan at other \
+         currents may differ by what saturation changes"
+            .to_owned()
     })
 }
 
@@ -295,13 +313,14 @@ fn model_errors(scan: &Scan, predicted: &[f64], relative_error: f64) -> [f64; 2]
     })
 }
 
-struct Told<'a> {
+/// States what is left of a measurement.
+struct ResidualReport<'a> {
     scan: &'a Scan,
     request: &'a ScanRequest,
     model_errors: [f64; 2],
 }
 
-impl Told<'_> {
+impl ResidualReport<'_> {
     /// What `given` leaves of the measurement.
     fn left(&self, given: &[f64]) -> Left {
         let scan = self.scan;
@@ -374,19 +393,59 @@ fn fit_file(
     } else {
         chi_square.sqrt()
     };
-    let found = |wanted: Parameter| -> (Option<f64>, Option<f64>) {
-        let place = parameters.iter().position(|p| *p == wanted);
+    let found = |sought: Parameter| -> (Option<f64>, Option<f64>) {
+        let place = parameters.iter().position(|p| *p == sought);
         let error = place.and_then(|k| fit.linear.unit_errors[k].map(|e| e * fit.steps[k] * noise));
         let value = place.filter(|_| error.is_some()).map(|k| fit.values[k]);
         (value, error)
     };
-    let three = |wanted: fn(usize) -> Parameter, unit: f64| {
-        let fitted = (0..3).any(|i| parameters.contains(&wanted(i)));
-        let both: [_; 3] = std::array::from_fn(|i| found(wanted(i)));
+    let three = |sought: fn(usize) -> Parameter, unit: f64| {
+        let fitted = (0..3).any(|i| parameters.contains(&sought(i)));
+        let both: [_; 3] = std::array::from_fn(|i| found(sought(i)));
         let values = both.map(|(value, _)| value.map(|v| v * unit));
         let errors = both.map(|(_, error)| error.map(|e| e * unit));
         (fitted.then_some(values), fitted.then_some(errors))
     };
+    let (scales, gain_toml) = coil_scales(design, parameters, &found, warnings);
+    if !fit.converged {
+        warnings.push(
+            "the fit did not settle: its numbers are those of the last step; fit less with --fit, \
+             or correct the scan's coordinates first"
+                .to_owned(),
+        );
+    }
+    let (background_t, background_error_t) = three(Parameter::Background, 1.0);
+    let (position_m, position_error_m) = three(Parameter::Shift, 1.0);
+    let (rotation_deg, rotation_error_deg) = three(Parameter::Angle, 1f64.to_degrees());
+    let alone = fit.linear.without_effect.iter().map(|k| vec![*k]);
+    let sets = alone.chain(fit.linear.degenerate.iter().cloned());
+    FitFile {
+        scales,
+        gain_toml,
+        background_t,
+        background_error_t,
+        position_m,
+        position_error_m,
+        rotation_deg,
+        rotation_error_deg,
+        undetermined: sets
+            .map(|set| set.into_iter().map(|k| parameters[k].name()).collect())
+            .collect(),
+        cutoff: CUTOFF,
+        degrees_of_freedom: freedom,
+        reduced_chi_square: noise_known.then_some(chi_square),
+        iterations: fit.iterations,
+        converged: fit.converged,
+    }
+}
+
+/// The fitted scales of the coils, and the gains that follow as a line of a design.
+fn coil_scales(
+    design: &Design,
+    parameters: &[Parameter],
+    found: &dyn Fn(Parameter) -> (Option<f64>, Option<f64>),
+    warnings: &mut Vec<String>,
+) -> (Vec<CoilScale>, Option<String>) {
     let mut scales = Vec::new();
     let mut gains = design.array.gain.clone();
     for parameter in parameters {
@@ -408,36 +467,8 @@ fn fit_file(
     }
     let any = scales.iter().any(|scale| scale.gain.is_some());
     let listed: Vec<String> = gains.iter().map(|gain| format!("{gain:.6}")).collect();
-    if !fit.converged {
-        warnings.push(
-            "the fit did not settle: its numbers are those of the last step; fit less with --fit, \
-             or correct the scan's coordinates first"
-                .to_owned(),
-        );
-    }
-    let (background_t, background_error_t) = three(Parameter::Background, 1.0);
-    let (position_m, position_error_m) = three(Parameter::Shift, 1.0);
-    let (rotation_deg, rotation_error_deg) = three(Parameter::Angle, 1f64.to_degrees());
-    let alone = fit.linear.without_effect.iter().map(|k| vec![*k]);
-    let sets = alone.chain(fit.linear.degenerate.iter().cloned());
-    FitFile {
-        scales,
-        gain_toml: any.then(|| format!("gain = [{}]", listed.join(", "))),
-        background_t,
-        background_error_t,
-        position_m,
-        position_error_m,
-        rotation_deg,
-        rotation_error_deg,
-        undetermined: sets
-            .map(|set| set.into_iter().map(|k| parameters[k].name()).collect())
-            .collect(),
-        cutoff: CUTOFF,
-        degrees_of_freedom: freedom,
-        reduced_chi_square: noise_known.then_some(chi_square),
-        iterations: fit.iterations,
-        converged: fit.converged,
-    }
+    let line = any.then(|| format!("gain = [{}]", listed.join(", ")));
+    (scales, line)
 }
 
 /// A scale that betrays a mistake of the set-up.

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::RunError;
 use crate::bundle::scan::{Measured, Scan};
-use crate::commands::probe::Places;
+use crate::commands::probe::FieldAt;
 use crate::field::frame::CartesianField;
 use crate::numerics::vec3::dot;
 use crate::progress::Progress;
@@ -99,9 +99,9 @@ impl<'a> Model<'a> {
     ///
     /// # Errors
     /// A point on the steel.
-    pub(super) fn places(&self, pose: Pose) -> Result<Places<'a>, RunError> {
+    pub(super) fn places(&self, pose: Pose) -> Result<FieldAt<'a>, RunError> {
         let positions_m = self.positions_m(pose);
-        Places::new(self.scene, self.solved, &positions_m, 3.0 * STEP_M)
+        FieldAt::new(self.scene, self.solved, &positions_m, 3.0 * STEP_M)
     }
 
     /// What each driven coil adds to each measured number, [pair, quantity], T or T/m.
@@ -110,7 +110,7 @@ impl<'a> Model<'a> {
     /// A point on a winding's edge; interruption.
     pub(super) fn contributions(
         &self,
-        places: &Places,
+        places: &FieldAt,
         pose: Pose,
         progress: &dyn Progress,
     ) -> Result<Vec<f64>, RunError> {

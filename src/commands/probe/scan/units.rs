@@ -36,8 +36,8 @@ pub(super) fn coordinates(design: &Design, scan: &Scan) -> Option<String> {
 pub(super) fn magnitudes(scan: &Scan, predicted: &[f64]) -> Option<String> {
     let field = exponent(scan, predicted, |q| matches!(q, Measured::Field(_)));
     let gradient = exponent(scan, predicted, |q| matches!(q, Measured::Gradient(..)));
-    let near = |exponent: Option<f64>, wanted: f64| {
-        exponent.is_some_and(|found| (found - wanted).abs() < CLOSE)
+    let near = |exponent: Option<f64>, expected: f64| {
+        exponent.is_some_and(|found| (found - expected).abs() < CLOSE)
     };
     if near(field.or(gradient), -3.0) {
         return Some(
@@ -76,7 +76,7 @@ pub(super) fn magnitudes(scan: &Scan, predicted: &[f64]) -> Option<String> {
     ];
     let found = units
         .into_iter()
-        .find(|(found, wanted, _)| near(*found, *wanted));
+        .find(|(found, expected, _)| near(*found, *expected));
     found.map(|(found, _, words)| {
         let ratio = 10f64.powf(found.unwrap_or(0.0));
         format!("measured over computed is {ratio:.3e}: {words}")

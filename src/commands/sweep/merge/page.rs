@@ -13,14 +13,14 @@ pub(super) fn html(
     briefs: &[Brief],
     best: &[(u64, [bool; 3])],
 ) -> String {
-    let mut told = Vec::new();
+    let mut designs = Vec::new();
     for (index, on) in best {
-        // Briefs stand in the plan's order.
+        // Briefs are in the plan's order.
         let Ok(at) = briefs.binary_search_by_key(index, |brief| brief.index) else {
             continue;
         };
         let brief = &briefs[at];
-        told.push(BestDesign {
+        designs.push(BestDesign {
             index: *index,
             values: plan.values_at(*index).into_iter().map(value_text).collect(),
             force_n: brief.force_n,
@@ -48,7 +48,7 @@ pub(super) fn html(
         among_met: summary.front_meets_limits,
         largest_force_n: summary.largest_force_n,
         keys: plan.axes.iter().map(|axis| axis.key.as_str()).collect(),
-        best: told,
+        best: designs,
         designs: briefs.iter().map(|brief| brief.index).collect(),
         plot,
     })

@@ -1,16 +1,18 @@
-//! A page of made-up facts with names that want to be more than names.
+//! A page of a made-up object with names that want to be more than names.
 
-use fluxform_base::force_constant::{Criterion, NamedConstant};
+use std::collections::BTreeMap;
+
+use fluxform_bundle::lambda_file::LambdaFile;
+use fluxform_bundle::manifest::Manifest;
+use fluxform_bundle::npz::{MapArrays, Runtime};
+use fluxform_bundle::table::PointRow;
+use fluxform_coil::limits::LimitCheck;
+use serde_json::{Value, from_value, json};
 
 use super::page;
-use crate::plot::lambda::LambdaPlot;
-use crate::report::data::{
-    Breakpoint, BudgetPart, BundleFacts, Chosen, CoilFacts, Deciding, ErrorTime, LimitRow,
-    StageFacts, WorstPlace,
-};
-use crate::report::field::{Field, Layer};
+use crate::plot::lambda::{ChosenForces, ErrorMap, LambdaPlot};
+use crate::report::data::{CalibratedObject, ErrorTime};
 use crate::report::measured::{MeasuredCurve, MeasuredRow};
-use crate::report::surface::Surface;
 
 const HOSTILE: &str = "</script><img src=x onerror=alert(1)>\u{202e}\u{0}\"'&<!--";
 
@@ -24,7 +26,16 @@ fn plot() -> LambdaPlot {
         currents_a: vec![vec![0.0, 0.0], vec![0.7, 1.3], vec![1.3, 1.3]],
         breakpoint: vec![true, true, false],
         constants: Vec::new(),
-        chosen: None,
+        chosen: Some(ChosenForces {
+            lambda_n_per_m: 0.7,
+            wanted_n: vec![0.021, 0.028, 0.035],
+            static_n: vec![0.020, 0.029, 0.032],
+            feedback_n: Vec::new(),
+            map: ErrorMap::Scattered {
+                points_mm: Vec::new(),
+                errors_mn: Vec::new(),
+            },
+        }),
     }
 }
 
@@ -39,113 +50,160 @@ fn measured((error, seconds): &(f64, f64)) -> MeasuredRow {
     }
 }
 
-fn facts<'a>(plot: &'a LambdaPlot, rows: &[(f64, f64)], notes: &'a [String]) -> BundleFacts<'a> {
-    let coil = |x: f64, current_a: f64| CoilFacts {
-        axis_m: [x, 0.0],
-        radius_m: 0.019,
-        current_a,
-        min_a: 0.0,
-        max_a: 1.3,
-    };
-    BundleFacts {
-        design: HOSTILE,
-        shape: HOSTILE,
-        version: "0.1.0",
-        inputs: vec![(HOSTILE, "00")],
-        criterion: Criterion::Jnd,
-        jnd: 0.07,
-        chosen: Some(Chosen {
-            lambda_n_per_m: 0.7,
-            rms_error_n: 1e-3,
-            worst_error_n: 3e-3,
-            relative_rms_error: Some(0.13),
-            duality_gap_n2: 1e-18,
-            worst_at: Some(WorstPlace {
-                position_m: [0.01, -0.02, 0.03],
-                wanted_n: 0.02,
-                given_n: 0.017,
-            }),
-        }),
-        rank: 2,
-        points: 4,
-        constants: vec![NamedConstant {
-            name: "jnd",
-            meaning: "the chosen one",
+/// Files of a bundle as any program may have written them.
+fn lambda_file() -> LambdaFile {
+    let constants = json!({
+        "lambda_linear_n_per_m": 0.5, "lambda_jnd_n_per_m": 0.7, "lambda_saturation_n_per_m": null,
+        "lambda_floor_n_per_m": null,
+    });
+    let mut file = json!({
+        "schema_version": "1.0.0", "fluxform_version": "0.1.0",
+        "design": HOSTILE, "shape": HOSTILE, "inputs": [{"path": HOSTILE, "sha256": "00"}],
+        "lambda_n_per_m": 0.7, "criterion": "jnd", "jnd": 0.07, "currents_a": [0.7, 1.3],
+        "rms_error_n": 1e-3, "worst_error_n": 3e-3, "relative_rms_error": 0.13,
+        "duality_gap_n2": 1e-18, "rank": 2, "points": 3,
+        "path": [{"lambda_n_per_m": 0.7, "currents_a": [0.7, 1.3], "event": HOSTILE}],
+        "worst_point": {
+            "lambda_linear_n_per_m": null, "lambda_jnd_n_per_m": null, "relative_floor": null,
+            "worst_error_n": null, "relative_worst_error": null, "currents_a": null,
+            "gap_n": null, "active": [{"point": 0, "multiplier": -0.7}],
+            "path": [
+                {"lambda_n_per_m": 0.0, "worst_error_n": 0.0, "currents_a": [0.0, 0.0],
+                 "active_points": [0], "event": HOSTILE},
+                {"lambda_n_per_m": 1.3, "worst_error_n": 7e-3, "currents_a": [1.3, 1.3],
+                 "active_points": [0], "event": HOSTILE},
+            ],
+        },
+        "accuracy": {},
+    });
+    let both = file.as_object_mut().unwrap();
+    both.extend(constants.as_object().unwrap().clone());
+    from_value(file).unwrap()
+}
+
+fn manifest() -> Manifest {
+    let axis = |from: f64, to: f64| json!({"from_m": from, "to_m": to, "samples": 2});
+    let interpolation = json!({
+        "name": HOSTILE, "order": 3, "borders": HOSTILE, "largest_error": 3e-5,
+        "largest_error_definition": HOSTILE,
+    });
+    let stage = json!({"estimate": 3e-5, "relative_to": HOSTILE, "method": HOSTILE});
+    let manifest: Value = json!({
+        "schema_version": "1.0.0", "fluxform_version": "0.1.0",
+        "design": HOSTILE, "shape": HOSTILE, "inputs": [], "units": HOSTILE,
+        "array": {"positions_m": [[-0.025, 0.0], [0.025, 0.0]], "coupling": HOSTILE,
+                  "gain": [1.0, 1.0]},
+        "limits": {"current_min_a": [0.0, 0.0], "current_max_a": [1.3, 1.3],
+                   "total_current_max_a": 2.6},
+        "resistance_ohm": [6.0, 6.0],
+        "magnet": {"moment_a_m2": [0.0, 0.0, -0.909], "model": HOSTILE, "polarity": HOSTILE,
+                   "diameter_m": 0.01, "length_m": 0.01},
+        "lambda": {"lambda_n_per_m": 0.7, "criterion": "jnd"},
+        "points": {"x_m": axis(-0.05, 0.05), "y_m": axis(-0.05, 0.05), "count": 3,
+                   "present": ["10", "11"]},
+        "map": {"x_m": axis(-0.05, 0.05), "y_m": axis(-0.05, 0.05), "z_m": axis(0.03, 0.03),
+                "coil": [0, 1], "components": HOSTILE, "interpolation": interpolation},
+        "left_out": [{"what": HOSTILE, "why": HOSTILE, "error_cost": 0.0}],
+        "accuracy": {HOSTILE: stage}, "files": [],
+    });
+    from_value(manifest).unwrap()
+}
+
+fn map() -> MapArrays<'static> {
+    MapArrays {
+        x_m: vec![-0.05, 0.05].into(),
+        y_m: vec![-0.05, 0.05].into(),
+        z_m: vec![0.03].into(),
+        coil: vec![0, 1].into(),
+        gz_t_per_m_per_a: vec![0.1, 0.2, 0.3, 0.4, 0.4, 0.3, 0.2, 0.1].into(),
+        gradient_t_per_m_per_a: None,
+        field_t_per_a: None,
+        passive_force_n: None,
+        working_point_gz_t_per_m: None,
+        runtime: Runtime {
+            moment_a_m2: [0.0, 0.0, -0.909],
+            current_min_a: vec![],
+            current_max_a: vec![],
+            resistance_ohm: vec![],
+            total_current_max_a: None,
             lambda_n_per_m: None,
-        }],
-        coils: vec![coil(-0.025, 0.7), coil(0.025, 1.3)],
-        total_max_a: Some(2.6),
-        limits: vec![LimitRow {
-            name: "resistance_ohm",
+            rendering: None,
+        },
+    }
+}
+
+fn point(x_m: f64, y_m: f64, height_m: f64) -> PointRow {
+    PointRow {
+        x_m,
+        y_m,
+        height_m,
+        normal: [0.0, 0.0, 1.0],
+    }
+}
+
+/// The parts of a bundle.
+struct Parts {
+    lambda: LambdaFile,
+    manifest: Manifest,
+    points: [PointRow; 3],
+    map: MapArrays<'static>,
+    curves: LambdaPlot,
+    warnings: Vec<String>,
+}
+
+impl Parts {
+    fn new() -> Self {
+        Self {
+            lambda: lambda_file(),
+            manifest: manifest(),
+            points: [
+                point(-0.05, -0.05, 0.03),
+                point(-0.05, 0.05, 0.04),
+                point(0.05, 0.05, 0.05),
+            ],
+            map: map(),
+            curves: plot(),
+            warnings: vec![HOSTILE.to_owned()],
+        }
+    }
+
+    fn object(&self, rows: &[(f64, f64)]) -> CalibratedObject<'_> {
+        let missed = LimitCheck {
             value: 6.075,
             limit: 6.0,
             met: false,
-        }],
-        unchecked: vec!["core field"],
-        deciding: vec![Deciding {
-            position_m: [0.0, 0.0, 0.03],
-            share: -0.7,
-        }],
-        accuracy: vec![StageFacts {
-            name: HOSTILE,
-            estimate: 3e-5,
-            relative_to: HOSTILE,
-            method: HOSTILE,
-        }],
-        budget: vec![BudgetPart {
-            name: "field",
-            part: 3e-5,
-            basis: "made up",
-        }],
-        left_out: vec![(HOSTILE, HOSTILE, 0.0)],
-        breakpoints: vec![Breakpoint {
-            lambda_n_per_m: 0.7,
-            event: HOSTILE,
-        }],
-        curves: plot,
-        worst_turns: vec![(0.0, 0.0), (1.3, 7e-3)],
-        surface: Surface {
-            x_m: [-0.05, 0.05],
-            y_m: [-0.05, 0.05],
-            columns: 2,
-            height_m: vec![Some(0.03), None, Some(0.04), Some(0.05)],
-            error_n: vec![Some(-1e-3), None, Some(1e-3), Some(3e-3)],
-        },
-        field: Field {
-            x_m: [-0.05, 0.05],
-            y_m: [-0.05, 0.05],
-            layers: vec![Layer {
-                name: HOSTILE.to_owned(),
-                unit: "T/m",
-                columns: 2,
-                height_m: vec![0.03],
-                values: vec![0.1, 0.2, 0.3, 0.4],
-            }],
-            first_m: 0.03,
-            force_a_m2: Some(-0.909),
-        },
-        warnings: notes,
-        files: vec![HOSTILE],
-        error_time: Some(ErrorTime {
-            curve: MeasuredCurve {
-                name: HOSTILE.to_owned(),
-                knob: HOSTILE,
-                peer: false,
-                rows: rows.iter().map(measured).collect(),
-            },
-            timed: HOSTILE,
-            error_of: HOSTILE,
-            tolerance: 1e-4,
-            version: HOSTILE,
-            machine: HOSTILE,
-        }),
+        };
+        CalibratedObject {
+            lambda: &self.lambda,
+            manifest: &self.manifest,
+            points: &self.points,
+            map: &self.map,
+            curves: &self.curves,
+            coil_radius_m: 0.019,
+            limits: BTreeMap::from([("resistance_ohm", missed)]),
+            unchecked: vec!["core field"],
+            warnings: &self.warnings,
+            error_time: Some(ErrorTime {
+                curve: MeasuredCurve {
+                    name: HOSTILE.to_owned(),
+                    knob: HOSTILE,
+                    peer: false,
+                    rows: rows.iter().map(measured).collect(),
+                },
+                timed: HOSTILE,
+                error_of: HOSTILE,
+                tolerance: 1e-4,
+                version: HOSTILE,
+                machine: HOSTILE,
+            }),
+        }
     }
 }
 
 #[test]
 fn names_stay_names_everywhere() {
-    let (plot, notes) = (plot(), [HOSTILE.to_owned()]);
-    let html = page(&facts(&plot, &[(1e-3, 0.01), (1e-6, 0.1)], &notes));
+    let parts = Parts::new();
+    let html = page(&parts.object(&[(1e-3, 0.01), (1e-6, 0.1)]), &[HOSTILE]);
     assert_eq!(html.matches("<script").count(), 2);
     assert_eq!(html.matches("</script>").count(), 2);
     assert!(!html.contains("<img") && !html.contains("<!--"));
@@ -154,12 +212,12 @@ fn names_stay_names_everywhere() {
 }
 
 #[test]
-fn the_same_facts_give_the_same_bytes_with_every_part() {
-    let (plot, rows) = (plot(), [(1e-3, 0.01), (1e-6, 0.1)]);
-    let facts = facts(&plot, &rows, &[]);
-    let html = page(&facts);
-    assert!(html == page(&facts));
-    for told in [
+fn the_same_object_gives_the_same_bytes_with_every_part() {
+    let mut parts = Parts::new();
+    let object = parts.object(&[(1e-3, 0.01), (1e-6, 0.1)]);
+    let html = page(&object, &[]);
+    assert!(html == page(&object, &[]));
+    for text in [
         "draw-cost",
         "too weak",
         "misses its limit of resistance",
@@ -169,13 +227,14 @@ fn the_same_facts_give_the_same_bytes_with_every_part() {
         "1 of 2 coils at the limit: 1.",
         "too strong 70 %",
     ] {
-        assert!(html.contains(told), "{told}");
+        assert!(html.contains(text), "{text}");
     }
-    let without = BundleFacts {
+    parts.lambda.lambda_n_per_m = None;
+    parts.curves.chosen = None;
+    let without = CalibratedObject {
         error_time: None,
-        chosen: None,
-        ..facts
+        ..parts.object(&[])
     };
-    let html = page(&without);
+    let html = page(&without, &[]);
     assert!(!html.contains("draw-cost") && html.contains("There is no force constant"));
 }

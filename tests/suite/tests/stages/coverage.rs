@@ -19,7 +19,7 @@ use fluxform::numerics::axis::Axis;
 use fluxform::numerics::lagrange::locate;
 use fluxform::progress::Silent;
 use fluxform::scene::Scene;
-use fluxform::scene::maps::{Felt, SceneMap};
+use fluxform::scene::maps::{MagnetMean, SceneMap};
 use fluxform::scene::steel::{self, Solved};
 use fluxform::shape::Surface;
 use fluxform::shape::document::ShapeDocument;
@@ -133,7 +133,7 @@ fn truth(scene: &Scene, kind: Kind, lowest_m: f64) -> Solved {
         Kind::Cored => 1e-9,
         Kind::Coupled => 2e-6,
     };
-    steel::solve(scene, Some(tolerance), tolerance, lowest_m).unwrap()
+    steel::solve(scene, tolerance, lowest_m).unwrap()
 }
 
 /// |grad B| on the axis of coil 0, per height, T/m/A: at most the largest there.
@@ -157,7 +157,7 @@ fn map_claims(scene: &Scene, solved: &Solved, exact: &Solved, n: &mut Random) ->
         y_m: workspace.y_m.nodes(),
         z_m: workspace.z_m.nodes(),
     };
-    let felt = Felt::field();
+    let felt = MagnetMean::field();
     let (coils, wanted) = (&scene.coils, Components::Gz);
     let made = SceneMap::new(scene, solved, coils, &grid, wanted, &felt, &Silent).unwrap();
     let (nx, ny, nz) = (grid.x_m.len(), grid.y_m.len(), grid.z_m.len());
@@ -270,9 +270,10 @@ fn deviation_m(
 /// Points, forces and lambda, as `lambda` tells them.
 fn lambda_claims(scene: &Scene, exact: &Solved, document: &ShapeDocument) -> Vec<Claim> {
     let options = LambdaOptions::default();
-    let report = run(scene.design, document, Vec::new(), &options, &Silent).unwrap();
+    let solved = run(scene.design, document, Vec::new(), &options, &Silent);
+    let (points, report) = solved.unwrap();
     let claimed = |stage: &str| report.file.accuracy[stage].estimate;
-    let points = &report.points.discretized.points;
+    let points = &points.discretized.points;
     let plan = points.grid;
     let rows = points.row_of_grid_point();
     let height = |k: usize| rows[k].map(|row| points.height_m[row]);
@@ -286,7 +287,7 @@ fn lambda_claims(scene: &Scene, exact: &Solved, document: &ShapeDocument) -> Vec
         .map(|k| [points.x_m[k], points.y_m[k], points.height_m[k]])
         .collect();
     let lowest_m = points.height_m.iter().fold(f64::INFINITY, |m, h| m.min(*h));
-    let solved = steel::solve(scene, None, 1e-12, lowest_m).unwrap();
+    let solved = steel::solve(scene, scene.tolerances.field, lowest_m).unwrap();
     let ours = scene.forces_n_per_a(&solved, &positions, &Silent).unwrap();
     let direct = scene.forces_n_per_a(exact, &positions, &Silent).unwrap();
     let moment = scene.moment_a_m2[2].abs();
@@ -337,7 +338,7 @@ fn claims(number: u64) -> Vec<Claim> {
     let scene = Scene::new(&design).unwrap();
     let lowest_m = design.workspace.z_m.from;
     let exact = truth(&scene, kind, lowest_m);
-    let solved = steel::solve(&scene, None, 1e-9, lowest_m).unwrap();
+    let solved = steel::solve(&scene, scene.tolerances.map, lowest_m).unwrap();
     let mut all = Vec::from(map_claims(&scene, &solved, &exact, &mut n));
     all.extend(lambda_claims(&scene, &exact, &document));
     all

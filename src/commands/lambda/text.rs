@@ -1,0 +1,306 @@
+//! The result of `lambda` for people.
+
+use super::LambdaReport;
+use crate::bundle::lambda_file::{
+    AtLambda, FeedbackFile, FeedbackPlace, FeedbackShell, LambdaFile, LambdaVariant,
+    TolerancePoint, WorkingPointForces, WorstPointFile,
+};
+use crate::cli::describe;
+use crate::cli::layout::{Sheet, headed_table};
+use crate::cli::quantity::{count, force, mm, number, number_to, percent};
+use crate::commands::discretize::PointsReport;
+use crate::design::Design;
+use crate::lambda::feedback::Rendered;
+use crate::lambda::{Criterion, Precision, Wiring};
+
+/// The result for people.
+pub(super) fn summary(design: &Design, points: &PointsReport, report: &LambdaReport) -> String {
+    let file = &report.file;
+    let mut sheet = Sheet::new(&format!(
+        "{} on {}: lambda {}",
+        file.shape,
+        file.design,
+        describe::force_constant(file.lambda_n_per_m)
+    ));
+    let constants = file.constants.named().into_iter().map(|one| {
+        let lambda = one.lambda_n_per_m.map_or_else(|| "none".to_owned(), number);
+        format!("{} {lambda}", one.name)
+    });
+    let constants: Vec<String> = constants.collect();
+    sheet.line("lambda", &format!("{} N/m", constants.join(", ")));
+    sheet.line("chosen by", &file.criterion.described(&percent(file.jnd)));
+    operating_point(&mut sheet, points, file);
+    if let Some(worst) = &file.worst_point {
+        sheet.line("worst point", &worst_point(worst));
+    }
+    if let Some(wiring) = &file.wiring {
+        sheet.line("wiring", &wired(wiring));
+    }
+    if let Some(tolerance) = &file.tolerance {
+        sheet.line("not felt", &not_felt(tolerance));
+    }
+    if let Some(point) = &file.working_point {
+        sheet.line("steel", &along_the_curve(point));
+    }
+    if let Some(with_feedback) = &file.feedback {
+        feedback_lines(&mut sheet, design, with_feedback);
+    }
+    if let Some(currents) = &file.currents_a {
+        sheet.line("currents", &describe::currents(design, currents));
+    }
+    if let Some(at) = &file.at {
+        at_lines(&mut sheet, design, at);
+    }
+    sheet.line(
+        "path",
+        &format!(
+            "{}; rank {} of {}{}",
+            count(file.path.len(), "breakpoint"),
+            file.rank,
+            count(design.array.positions_m.len(), "coil"),
+            match report.precision {
+                Precision::Double => "",
+                Precision::DoubleDouble => "; in 31 digits, for nearly dependent coils",
+            }
+        ),
+    );
+    sheet.line("points", &points_line(points, file));
+    let stages = file.accuracy.iter();
+    let stages = stages.map(|(name, stage)| (name.as_str(), stage));
+    sheet.line("accuracy", &describe::accuracy(stages));
+    if let Some(variants) = &file.variants {
+        sheet.gap();
+        sheet.raw(&table_of(variants));
+    }
+    sheet.finish()
+}
+
+/// Currents and errors at the lambda of `--at`.
+fn at_lines(sheet: &mut Sheet, design: &Design, at: &AtLambda) {
+    let least = at.worst_point.as_ref().map_or_else(String::new, |worst| {
+        format!(", at least {}", force(worst.worst_error_n))
+    });
+    let text = format!(
+        "{} N/m: error rms {}, worst {}{least}",
+        number(at.lambda_n_per_m),
+        force(at.rms_error_n),
+        force(at.worst_error_n),
+    );
+    sheet.line("at", &text);
+    sheet.line("", &describe::currents(design, &at.currents_a));
+}
+
+/// The result with currents of their own at every point, beside the static ones.
+fn feedback_lines(sheet: &mut Sheet, design: &Design, file: &FeedbackFile) {
+    let constant = largest(file.lambda_n_per_m, file.reason.as_deref(), file.decided_at);
+    let mut lines = vec![format!("lambda {constant}")];
+    lines.extend(file.at_chosen.iter().map(rendering));
+    lines.extend(file.without.iter().map(|fixed| {
+        format!(
+            "without, at {} N/m: error rms {}, worst {}\n  currents up to {} A; {} W",
+            number(fixed.lambda_n_per_m),
+            force(fixed.rms_error_n),
+            force(fixed.worst_error_n),
+            number_to(fixed.largest_current_a, 4),
+            number_to(fixed.power_w, 4)
+        )
+    }));
+    lines.extend(file.at_largest.iter().map(rendering));
+    sheet.line("feedback", &lines.join("\n"));
+    if let Some(rendered) = file.at_chosen.as_ref().or(file.at_largest.as_ref()) {
+        let shares: Vec<f64> = rendered.active_share.iter().map(|s| s * 100.0).collect();
+        let unit = format!(
+            "% of the points, at {} N/m",
+            number(rendered.lambda_n_per_m)
+        );
+        sheet.line("active", &describe::per_coil(design, &unit, &shares, 1));
+    }
+    if let Some(shell) = &file.shell {
+        sheet.line("shell", &shell_of(shell));
+    }
+}
+
+fn largest(lambda: Option<f64>, reason: Option<&str>, place: Option<FeedbackPlace>) -> String {
+    match (lambda, place) {
+        (Some(lambda), Some(place)) => {
+            let [x, y, z] = place.position_m.map(|v| number(v * 1e3));
+            format!(
+                "up to {} N/m at every place; point {} decides, at x {x}, y {y}, z {z} mm",
+                number(lambda),
+                place.point
+            )
+        }
+        _ => format!("none: {}", reason.unwrap_or("no force is wanted")),
+    }
+}
+
+fn rendering(rendered: &Rendered) -> String {
+    let unreached = match rendered.points_unreached {
+        0 => String::new(),
+        some => format!(" ({} out of reach)", count(some, "point")),
+    };
+    format!(
+        "at {} N/m: error rms {}, worst {}{unreached}\n  currents up to {} A; {} W on average, \
+         up to {} W; {} coils active on average, {} to {}",
+        number(rendered.lambda_n_per_m),
+        force(rendered.rms_error_n),
+        force(rendered.worst_error_n),
+        number_to(rendered.largest_current_a, 4),
+        number_to(rendered.mean_power_w, 4),
+        number_to(rendered.max_power_w, 4),
+        number_to(rendered.active_mean, 3),
+        rendered.active_min,
+        rendered.active_max
+    )
+}
+
+/// The demand above and below the surface.
+fn shell_of(shell: &FeedbackShell) -> String {
+    let clipped = match shell.clipped {
+        0 => String::new(),
+        some => format!(
+            "; {} of {} places below {} looked at there",
+            some,
+            shell.places,
+            mm(shell.floor_m)
+        ),
+    };
+    format!(
+        "within {} of the surface, {}: lambda {}{clipped}",
+        mm(shell.reach_m),
+        count(shell.layers, "layer"),
+        largest(
+            shell.lambda_n_per_m,
+            shell.reason.as_deref(),
+            shell.decided_at
+        )
+    )
+}
+
+fn wired(wiring: &Wiring) -> String {
+    let broken = wiring.broken.iter().map(|coil| format!("{coil} broken"));
+    let series = wiring.series.iter();
+    let series = series.map(|[a, b]| format!("{a}+{b} in series"));
+    broken.chain(series).collect::<Vec<_>>().join(", ")
+}
+
+/// Up to where errors stay below what is felt.
+fn not_felt(tolerance: &TolerancePoint) -> String {
+    let limit = format!(
+        "the larger of {} of its force and {}",
+        percent(tolerance.share),
+        force(tolerance.threshold_n)
+    );
+    match (tolerance.lambda_n_per_m, tolerance.point) {
+        (Some(lambda), Some(point)) => format!(
+            "up to {} N/m currents keep every error within {limit}; point {point} decides",
+            number(lambda)
+        ),
+        _ => format!("no largest lambda keeps every error within {limit}"),
+    }
+}
+
+/// One row per variant.
+fn table_of(variants: &[LambdaVariant]) -> String {
+    let or_none =
+        |value: Option<f64>, show: fn(f64) -> String| value.map_or_else(|| "none".to_owned(), show);
+    let lambda = |value| or_none(value, |v| number_to(v, 4));
+    let row = |v: &LambdaVariant| {
+        let constants = Criterion::ALL
+            .iter()
+            .map(|&criterion| (criterion.name(), lambda(v.constants.of(criterion))));
+        let mut row = vec![
+            ("N/m, W", v.name.clone()),
+            ("lambda", lambda(v.lambda_n_per_m)),
+            ("change", or_none(v.relative_change, percent)),
+        ];
+        row.extend(constants);
+        row.extend([
+            ("worst-point jnd", lambda(v.worst_point_lambda_jnd_n_per_m)),
+            ("rms error", or_none(v.relative_rms_error, percent)),
+            ("worst error", or_none(v.worst_error_n, force)),
+            ("power", lambda(v.power_w)),
+        ]);
+        row
+    };
+    headed_table(variants.iter().map(row))
+}
+
+/// The result of currents for the worst point.
+fn worst_point(worst: &WorstPointFile) -> String {
+    let constant = |lambda: Option<f64>| lambda.map_or_else(|| "none".to_owned(), number);
+    let least = worst.worst_error_n.map_or_else(String::new, |least| {
+        let relative = worst.relative_worst_error.map_or_else(String::new, |part| {
+            format!(" ({} of the largest force)", percent(part))
+        });
+        format!("error at least {}{relative}; ", force(least))
+    });
+    format!(
+        "{least}lambda by the worst point: linear {}, jnd {} N/m",
+        constant(worst.lambda_linear_n_per_m),
+        constant(worst.lambda_jnd_n_per_m)
+    )
+}
+
+/// The steel at the chosen currents, along its curve.
+fn along_the_curve(point: &WorkingPointForces) -> String {
+    let peak_t = point.peak_field_t.iter().copied().fold(0.0, f64::max);
+    format!(
+        "along its B-H curve forces {} off those added up: error rms {}, worst {}; \
+         |B| up to {} T",
+        percent(point.deviation_from_linear),
+        force(point.rms_error_n),
+        force(point.worst_error_n),
+        number_to(peak_t, 4)
+    )
+}
+
+fn operating_point(sheet: &mut Sheet, points: &PointsReport, file: &LambdaFile) {
+    let heights = &points.discretized.points.height_m;
+    let mean_m = heights.iter().sum::<f64>() / heights.len() as f64;
+    if let Some(lambda) = file.lambda_n_per_m {
+        sheet.line(
+            "force",
+            &format!(
+                "{} wanted at the mean height, {}",
+                force(lambda * mean_m),
+                mm(mean_m)
+            ),
+        );
+    }
+    if let (Some(rms), Some(worst)) = (file.rms_error_n, file.worst_error_n) {
+        let relative = file.relative_rms_error.map_or_else(String::new, |part| {
+            format!(" ({} of the rms force)", percent(part))
+        });
+        sheet.line(
+            "error",
+            &format!("rms {}{relative}, worst {}", force(rms), force(worst)),
+        );
+    }
+}
+
+/// How many points there are, how high, and what was left out.
+fn points_line(points: &PointsReport, file: &LambdaFile) -> String {
+    let points = &points.summary;
+    if let Some(sampled) = &file.sampling {
+        let change = sampled.relative_change.map_or_else(String::new, |change| {
+            let sign = if change < 0.0 { "-" } else { "+" };
+            format!("; lambda {sign}{} against those", percent(change.abs()))
+        });
+        return format!(
+            "{} {}, weighted by area, instead of the grid's {}{change}",
+            file.points, sampled.sampling, sampled.grid_points
+        );
+    }
+    let outside = if points.outside > 0 {
+        let outside = count(points.outside, "grid point");
+        format!("; {outside} without surface left out")
+    } else {
+        String::new()
+    };
+    format!(
+        "{}, {} high{outside}",
+        points.points,
+        describe::heights(points.min_height_m, points.max_height_m)
+    )
+}

@@ -1,0 +1,134 @@
+//! The result of `replay` for people.
+
+use super::ReplayReport;
+use super::summary::{ErrorSummary, ReplaySummary};
+use crate::cli::layout::Sheet;
+use crate::cli::quantity::{count, error, force, number, percent, si};
+
+/// Forces below this are rounding, N.
+const NOTHING_N: f64 = 1e-12;
+
+/// The result for people; `written` names the files.
+pub(super) fn summary(report: &ReplayReport, written: Option<&str>) -> String {
+    let summary = &report.summary;
+    let trajectory = &summary.trajectory;
+    let mut sheet = Sheet::new(&format!(
+        "{} on {}: {} in {} s ({})",
+        summary.shape,
+        summary.design,
+        count(trajectory.positions, "position"),
+        number(trajectory.duration_s),
+        trajectory.source
+    ));
+    sheet.line(
+        "wanted",
+        &format!(
+            "{} N/m times the height, at most {}",
+            number(summary.lambda_n_per_m),
+            force(summary.force.wanted_max_n)
+        ),
+    );
+    sheet.line("feedback", &errors(&summary.force.feedback));
+    sheet.line(
+        "fixed",
+        &format!(
+            "{} (the bundle's static currents)",
+            errors(&summary.force.fixed)
+        ),
+    );
+    sheet.line("currents", &currents(summary));
+    let power = &summary.power;
+    sheet.line(
+        "heat",
+        &format!(
+            "{} on the average, at most {}; fixed currents {}",
+            si(power.mean_w, "W"),
+            si(power.max_w, "W"),
+            si(power.static_w, "W")
+        ),
+    );
+    limits(&mut sheet, summary);
+    if let Some(written) = written {
+        sheet.line("written to", written);
+    }
+    if let Some(step_s) = report.step_s {
+        sheet.line("step", &format!("{} each on this machine", si(step_s, "s")));
+    }
+    sheet.finish()
+}
+
+/// The limits, the lag of the currents and the accuracy.
+fn limits(sheet: &mut Sheet, summary: &ReplaySummary) {
+    sheet.line(
+        "limits",
+        &format!(
+            "bind {} of the time; outside the map {}",
+            percent(summary.saturated_time_fraction),
+            percent(summary.outside_time_fraction)
+        ),
+    );
+    if let Some(dynamics) = &summary.dynamics {
+        let voltage = dynamics
+            .voltage_v
+            .map_or_else(String::new, |v| format!(", voltages up to {} V", number(v)));
+        sheet.line(
+            "lag",
+            &format!(
+                "time constants from {} to {}{voltage}",
+                si(dynamics.time_constant_min_s, "s"),
+                si(dynamics.time_constant_max_s, "s")
+            ),
+        );
+    }
+    if let Some(stage) = summary.accuracy.get("force").filter(|s| s.estimate > 0.0) {
+        sheet.line(
+            "accuracy",
+            &format!(
+                "forces to {} N by the map's stated errors; optimality of the currents {}",
+                error(stage.estimate),
+                summary
+                    .accuracy
+                    .get("allocation")
+                    .map_or_else(String::new, |stage| error(stage.estimate))
+            ),
+        );
+    }
+}
+
+fn newton(force_n: f64) -> String {
+    if force_n < NOTHING_N {
+        "none".to_owned()
+    } else {
+        force(force_n)
+    }
+}
+
+fn errors(errors: &ErrorSummary) -> String {
+    if errors.worst_error_n < NOTHING_N {
+        return "no error".to_owned();
+    }
+    let relative = errors
+        .relative_rms_error
+        .map_or_else(String::new, |part| format!(" ({})", percent(part)));
+    let place = errors.worst_at.map_or_else(String::new, |place| {
+        let at = [place.x_m, place.y_m, place.z_m].map(|c| number(c * 1e3));
+        format!(" at {} s, ({}) mm", number(place.t_s), at.join(", "))
+    });
+    format!(
+        "error rms {}{relative}, worst {}{place}",
+        newton(errors.rms_error_n),
+        newton(errors.worst_error_n)
+    )
+}
+
+fn currents(summary: &ReplaySummary) -> String {
+    let currents = &summary.currents;
+    let most = currents.max_a.iter().copied().fold(0.0, f64::max);
+    let rms = currents.rms_a.iter().copied().fold(0.0, f64::max);
+    format!(
+        "at most {} a coil and {} in all; rms at most {} a coil",
+        si(most, "A"),
+        si(currents.max_sum_a, "A"),
+        si(rms, "A")
+    )
+}

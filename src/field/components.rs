@@ -1,0 +1,59 @@
+//! Which components of a field are computed.
+
+use serde::Serialize;
+use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
+
+/// The components of a field per ampere, the same for sources, maps and tables. The name in artefacts and on the command line is the variant's in lower
+/// case, its meaning the first line of the variant's comment.
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Default,
+    EnumMessage,
+    EnumString,
+    IntoStaticStr,
+    VariantArray,
+    Serialize,
+)]
+#[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
+pub enum Components {
+    /// dBz/dz
+    #[default]
+    Gz,
+    /// dBz/dz and the gradient tensor
+    Gradient,
+    /// dBz/dz, the gradient tensor and the field
+    All,
+}
+
+impl Components {
+    /// All of them.
+    pub const ALL: &[Self] = Self::VARIANTS;
+
+    /// The name in artefacts and on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+
+    /// The components in words.
+    #[must_use]
+    pub fn meaning(self) -> &'static str {
+        self.get_documentation().unwrap_or_default()
+    }
+
+    /// Number of independent components outside the sources, where the tensor is symmetric and has
+    /// no trace: dB_z/dz; dB_x/dx, dB_x/dy, dB_x/dz, dB_y/dz, dB_z/dz; then B_x, B_y, B_z.
+    #[must_use]
+    pub fn count(self) -> usize {
+        match self {
+            Self::Gz => 1,
+            Self::Gradient => 5,
+            Self::All => 8,
+        }
+    }
+}

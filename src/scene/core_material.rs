@@ -1,0 +1,88 @@
+//! The steel of a design's cores: where it is and how it magnetises.
+
+use crate::RunError;
+use crate::design::bh_table::BhTable;
+use crate::design::{Core, Steel as Described, source};
+use crate::field::steel::CoreShape;
+use crate::field::steel::bh_curve::BhCurve;
+use crate::field::winding::Winding;
+
+/// More permeable steel changes no field by more than its inverse.
+const MOST_PERMEABLE: f64 = 1e9;
+
+/// The steel of every core of a design.
+#[derive(Debug, Clone)]
+pub struct SceneCore {
+    /// Each core, its winding's axis at the origin.
+    pub shape: CoreShape,
+    /// How the steel magnetises.
+    pub material: Material,
+    /// Flux density above which a warning is due, T.
+    pub knee_t: f64,
+    /// S/m.
+    pub conductivity_s_per_m: f64,
+    /// The table of the magnetisation curve as it was parsed.
+    pub curve_text: Option<String>,
+    /// Warnings about the material.
+    pub warnings: Vec<String>,
+}
+
+/// How the steel magnetises.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub enum Material {
+    /// A constant relative permeability.
+    Linear(f64),
+    /// A curve.
+    Curve(Box<BhCurve>),
+}
+
+impl SceneCore {
+    /// The core that `core` describes in the bore of `winding`.
+    ///
+    /// # Errors
+    /// A B-H table that cannot be read or cannot be a steel's.
+    pub fn new(core: &Core, winding: &Winding) -> Result<Self, RunError> {
+        let shape = CoreShape {
+            radius_m: winding.inner_radius_m - core.clearance_m,
+            bottom_m: -(winding.length_m + core.below_m),
+            top_m: core.above_m,
+        };
+        let mut warnings = Vec::new();
+        let mut curve_text = None;
+        let (material, knee_t) = match &core.steel {
+            Described::Linear(mu_r) => (Material::Linear(*mu_r), core.knee_t),
+            Described::Curve(path) => {
+                let text = source::table_text_of(path);
+                let text = text.map_err(|fault| RunError::Input(fault.to_string()))?;
+                let table = BhTable::from_csv(&text, path)
+                    .map_err(|fault| RunError::Input(fault.to_string()))?;
+                curve_text = Some(text);
+                let curve = BhCurve::new(&table.b_t, &table.h_a_per_m).map_err(|fault| {
+                    RunError::Input(format!("core.bh_curve {}: {fault}", path.display()))
+                })?;
+                warnings.extend(curve.warnings().iter().map(ToString::to_string));
+                let knee_t = core.knee_t.unwrap_or_else(|| curve.knee_t());
+                (Material::Curve(Box::new(curve)), Some(knee_t))
+            }
+        };
+        Ok(Self {
+            shape,
+            material,
+            knee_t: knee_t.unwrap_or(f64::INFINITY),
+            conductivity_s_per_m: core.conductivity_s_per_m,
+            curve_text,
+            warnings,
+        })
+    }
+
+    /// The permeability that linear solutions use: the constant one, or the curve's at the origin;
+    /// of a curve that starts level one at which they have come to their limit.
+    #[must_use]
+    pub fn relative_permeability(&self) -> f64 {
+        match &self.material {
+            Material::Linear(mu_r) => *mu_r,
+            Material::Curve(curve) => curve.initial_relative_permeability().min(MOST_PERMEABLE),
+        }
+    }
+}

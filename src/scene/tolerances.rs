@@ -1,0 +1,153 @@
+//! To what accuracy each stage of a scene is computed: the user's tolerance, or the default of the
+//! scene's physics.
+
+use super::core_material::{Material, SceneCore};
+use super::coupled;
+use crate::design::{Design, MagnetModel};
+use crate::field::winding::KERNEL_ERROR;
+
+/// The finest accuracy of a magnet's dipoles.
+pub(crate) const MAGNET_FINEST: f64 = 1e-9;
+/// Maps in air, relative to the largest |grad B| at each height: a million times finer than their
+/// interpolation.
+pub const MAP_TOLERANCE: f64 = 1e-9;
+/// One linear core with its winding, and its maps.
+pub const CORED_TOLERANCE: f64 = 1e-6;
+/// One core along its B-H curve, whose kinks cross the elements, so that digits are dear.
+pub const SATURATED_TOLERANCE: f64 = 1e-4;
+/// The cores of an array that magnetise each other.
+pub const COUPLED_TOLERANCE: f64 = 1e-4;
+/// The steel at a working point, relative to the largest |grad B| at a height: the modes that are
+/// taken as linear leave an error of this order.
+pub const WORKING_POINT_TOLERANCE: f64 = 1e-3;
+
+/// The accuracy of each stage, relative to what the stage's own function names.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct Tolerances {
+    /// One coil alone, its field at the target.
+    pub coil: f64,
+    /// The field at points.
+    pub field: f64,
+    /// The forces at points.
+    pub forces: f64,
+    /// Maps.
+    pub map: f64,
+    /// The inductances of an array.
+    pub inductances: f64,
+    /// The steel at given currents along its B-H curve.
+    pub working_point: f64,
+}
+
+impl Tolerances {
+    /// Of `design`, whose core is `core` and whose coils have the rated current `rated_a`; all as
+    /// `requested` if the user did.
+    pub(super) fn new(
+        design: &Design,
+        core: Option<&SceneCore>,
+        rated_a: f64,
+        requested: Option<f64>,
+    ) -> Self {
+        let of_core = |in_air: f64| match core.map(|core| &core.material) {
+            None => in_air,
+            Some(Material::Curve(_)) if rated_a > 0.0 => SATURATED_TOLERANCE,
+            Some(Material::Curve(_) | Material::Linear(_)) => CORED_TOLERANCE,
+        };
+        let of_array = |in_air: f64| {
+            if coupled(design) {
+                COUPLED_TOLERANCE
+            } else {
+                of_core(in_air)
+            }
+        };
+        let forces_in_air = match design.magnet.model {
+            MagnetModel::Dipole => KERNEL_ERROR,
+            MagnetModel::Cylinder => MAGNET_FINEST,
+        };
+        let or = |default: f64| requested.unwrap_or(default);
+        Self {
+            coil: or(of_core(KERNEL_ERROR)),
+            field: or(of_array(KERNEL_ERROR)),
+            forces: or(of_array(forces_in_air)),
+            map: or(of_array(MAP_TOLERANCE)),
+            inductances: Self::of_inductances(requested),
+            working_point: or(WORKING_POINT_TOLERANCE).max(WORKING_POINT_TOLERANCE),
+        }
+    }
+
+    /// The accuracy of an array's inductances, and of its coupled cores.
+    #[must_use]
+    pub fn of_inductances(requested: Option<f64>) -> f64 {
+        requested.unwrap_or(COUPLED_TOLERANCE)
+    }
+
+    /// The accuracy of the magnet's dipoles where the best coil is searched.
+    #[must_use]
+    pub fn of_optimum(requested: Option<f64>) -> f64 {
+        requested.unwrap_or(KERNEL_ERROR).max(MAGNET_FINEST)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::design::Need;
+    use crate::scene::Scene;
+
+    /// A design of two coils with `more` at its end.
+    fn of(more: &str, requested: Option<f64>) -> Tolerances {
+        let text = format!(
+            "name = \"two\"\n[coil]\ninner_diameter_mm = 7.0\nouter_diameter_mm = 13.0\n\
+             length_mm = 17.0\n[wire]\ndiameter_mm = 0.7\n[array]\npositions_mm = [[0.0, 0.0], \
+             [23.0, 0.0]]\n{more}"
+        );
+        let (design, _) =
+            Design::from_toml(&text, Path::new("two.toml"), Need::EVALUATE).expect("a design");
+        let scene = Scene::with_tolerance(&design, requested).expect("a scene");
+        scene.tolerances
+    }
+
+    #[test]
+    fn defaults_are_those_of_the_physics() {
+        let air = of("", None);
+        assert_eq!((air.coil, air.field), (KERNEL_ERROR, KERNEL_ERROR));
+        assert_eq!((air.forces, air.map), (KERNEL_ERROR, MAP_TOLERANCE));
+        let finite = of("[magnet]\nmodel = \"cylinder\"\n", None);
+        assert_eq!((finite.field, finite.forces), (KERNEL_ERROR, MAGNET_FINEST));
+        let coupled = of("coupling = \"full\"\n[core]\n", None);
+        assert_eq!(
+            (coupled.coil, coupled.field),
+            (CORED_TOLERANCE, COUPLED_TOLERANCE)
+        );
+        assert_eq!(
+            (coupled.forces, coupled.map),
+            (COUPLED_TOLERANCE, COUPLED_TOLERANCE)
+        );
+        let alone = of("coupling = \"none\"\n[core]\n", None);
+        assert_eq!((alone.coil, alone.map), (CORED_TOLERANCE, CORED_TOLERANCE));
+        assert_eq!(alone.inductances, COUPLED_TOLERANCE);
+    }
+
+    #[test]
+    fn a_requested_tolerance_reaches_every_stage() {
+        for more in ["", "coupling = \"full\"\n[core]\n"] {
+            let all = of(more, Some(7e-3));
+            let Tolerances {
+                coil,
+                field,
+                forces,
+                map,
+                inductances,
+                working_point,
+            } = all;
+            assert_eq!(
+                [coil, field, forces, map, inductances, working_point],
+                [7e-3; 6]
+            );
+        }
+        // What is taken as linear at a working point leaves more than a finer one.
+        assert_eq!(of("", Some(1.3e-7)).working_point, WORKING_POINT_TOLERANCE);
+    }
+}

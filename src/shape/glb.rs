@@ -1,0 +1,221 @@
+//! Binary glTF (GLB): the triangles of its scene, placed by its nodes; metres, y upwards.
+//!
+//! The `gltf` crate parses and checks the document; here what it claims is held against the
+//! file's length. Read are meshes of triangles, strips and fans; z is made to point upwards.
+
+use gltf::accessor::{DataType, Dimensions};
+use gltf::json::Root;
+use gltf::mesh::Mode;
+use gltf::{Document, Node, Semantic};
+
+use crate::assembly::{Affine, Body, corner, lay_out};
+use crate::mesh::{FileMesh, Triangle};
+use crate::number::F32_ROUNDING;
+use crate::read_error::ReadError;
+
+/// glTF's y upwards becomes z.
+const UPWARDS: Affine = Affine {
+    rows: [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
+    shift: [0.0; 3],
+};
+
+/// True for bytes that begin as GLB files do.
+pub(crate) fn begins(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"glTF")
+}
+
+/// Reads a GLB file's bytes.
+///
+/// # Errors
+/// [`ReadError`]: a document that does not verify, data in other files or compressed, no triangle.
+pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
+    if !begins(bytes) {
+        let what = "this is not a binary glTF file (.glb): it does not begin with `glTF`";
+        return Err(ReadError::file(what));
+    }
+    let (json, blob) = chunks(bytes).ok_or_else(|| {
+        ReadError::file("the GLB file does not hold what its header states: it was cut short")
+    })?;
+    let damaged = |text: String| {
+        let text: String = text.chars().take(200).collect();
+        ReadError::file(format!("the GLB file is damaged: {text}"))
+    };
+    let root: Root =
+        gltf::json::deserialize::from_slice(json).map_err(|error| damaged(error.to_string()))?;
+    // The check that follows takes these indices on trust.
+    let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+    let mut indices = primitives.flat_map(|p| p.attributes.values().chain(p.indices.iter()));
+    if indices.any(|index| index.value() >= root.accessors.len()) {
+        let what = "the GLB file is damaged: a mesh names data that are missing";
+        return Err(ReadError::file(what));
+    }
+    let file = Document::from_json(root).map_err(|error| damaged(error.to_string()))?;
+    let mut warnings = Vec::new();
+    let mut bodies = Vec::with_capacity(file.meshes().len());
+    for mesh in file.meshes() {
+        let mut body = Body::default();
+        for primitive in mesh.primitives() {
+            fluxform_base::progress::poll();
+            triangles(&primitive, blob, &mut body.triangles).map_err(ReadError::file)?;
+        }
+        bodies.push(body);
+    }
+    let meshes = bodies.len();
+    bodies.resize(meshes + file.nodes().len(), Body::default());
+    for node in file.nodes() {
+        bodies[meshes + node.index()].children = children(&node, meshes);
+        if node.skin().is_some() {
+            let what = "the file bends meshes by skins; they are read as they are at rest";
+            warnings.push(what.to_owned());
+        }
+    }
+    warnings.dedup();
+    let scene = file.default_scene().or_else(|| file.scenes().next());
+    let scene = scene.ok_or_else(|| ReadError::file("the GLB file shows no scene"))?;
+    let roots: Vec<(usize, Affine)> = scene
+        .nodes()
+        .map(|node| (meshes + node.index(), UPWARDS))
+        .collect();
+    let triangles = lay_out(&bodies, &roots).map_err(ReadError::file)?;
+    if triangles.is_empty() {
+        let what = "the GLB file's scene holds no triangle: export a body as a mesh";
+        return Err(ReadError::file(what));
+    }
+    let coordinates = triangles.as_flattened().as_flattened().iter();
+    let largest = coordinates.fold(0.0, |m: f64, c| m.max(c.abs()));
+    Ok(FileMesh {
+        triangles,
+        coordinate_rounding: largest * F32_ROUNDING,
+        unit_m: Some(1.0),
+        warnings,
+        ..FileMesh::default()
+    })
+}
+
+/// The document and the data behind it: each a length, a type and so many bytes.
+fn chunks(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
+    let word = |at: usize| {
+        let word = bytes.get(at..)?.first_chunk()?;
+        Some(u32::from_le_bytes(*word) as usize)
+    };
+    let whole = bytes.get(..word(8)?)?;
+    let chunk = |at: usize, kind: &[u8]| {
+        let start = at + 8;
+        let known = whole.get(at + 4..start)? == kind;
+        let chunk = whole.get(start..start.checked_add(word(at)?)?)?;
+        known.then_some(chunk)
+    };
+    let json = chunk(12, b"JSON")?;
+    let next = 20 + json.len();
+    let blob = match next < whole.len() {
+        true => chunk(next, b"BIN\0")?,
+        false => &[],
+    };
+    Some((json, blob))
+}
+
+/// A node's mesh and nodes, placed by its own transformation.
+fn children(node: &Node<'_>, meshes: usize) -> Vec<(usize, Affine)> {
+    let m = node
+        .transform()
+        .matrix()
+        .map(|column| column.map(f64::from));
+    let columns: Vec<f64> = m.iter().flat_map(|column| column[..3].to_vec()).collect();
+    let place = Affine::from_columns(columns.try_into().unwrap_or([0.0; 12]));
+    let own = node.mesh().map(|mesh| (mesh.index(), place));
+    let nodes = node.children().map(|child| (meshes + child.index(), place));
+    own.into_iter().chain(nodes).collect()
+}
+
+/// Adds a primitive's triangles.
+fn triangles(
+    primitive: &gltf::Primitive<'_>,
+    blob: &[u8],
+    triangles: &mut Vec<Triangle>,
+) -> Result<(), String> {
+    let fans = match primitive.mode() {
+        Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan => primitive.mode(),
+        // Points and lines are no surface.
+        Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => return Ok(()),
+    };
+    let missing = || {
+        "the GLB file holds a mesh whose data are missing, compressed or in another \
+         file: save it again as one file without compression (Draco, meshopt)"
+            .to_owned()
+    };
+    let positions = primitive.get(&Semantic::Positions).ok_or_else(missing)?;
+    let held = |accessor: &gltf::Accessor<'_>| {
+        let view = accessor.view()?;
+        let in_file = matches!(view.buffer().source(), gltf::buffer::Source::Bin);
+        let end = view.offset().checked_add(view.length())?;
+        let stride = view.stride().unwrap_or(accessor.size());
+        let last = accessor.count().checked_sub(1)?.checked_mul(stride)?;
+        let reach = accessor
+            .offset()
+            .checked_add(last)?
+            .checked_add(accessor.size())?;
+        (in_file && end <= blob.len() && reach <= view.length() && stride >= accessor.size())
+            .then_some(())
+    };
+    held(&positions).ok_or_else(missing)?;
+    if (positions.data_type(), positions.dimensions()) != (DataType::F32, Dimensions::Vec3) {
+        return Err("the GLB file holds positions that are not three floats each".into());
+    }
+    if positions.sparse().is_some() || primitive.indices().is_some_and(|i| i.sparse().is_some()) {
+        return Err("the GLB file holds sparse data, which are not read".into());
+    }
+    let reader = primitive.reader(|_| Some(blob));
+    let points: Vec<[f64; 3]> = reader
+        .read_positions()
+        .ok_or_else(missing)?
+        .map(|p| p.map(f64::from))
+        .collect();
+    if points.as_flattened().iter().any(|c| !c.is_finite()) {
+        return Err("a position is not a finite number; repair the mesh".into());
+    }
+    let indices: Vec<u32> = match primitive.indices() {
+        None => (0..points.len() as u32).collect(),
+        Some(accessor) => {
+            held(&accessor).ok_or_else(missing)?;
+            let whole = matches!(
+                accessor.data_type(),
+                DataType::U8 | DataType::U16 | DataType::U32
+            );
+            if !whole || accessor.dimensions() != Dimensions::Scalar {
+                return Err("the GLB file holds indices that are not whole numbers".into());
+            }
+            reader
+                .read_indices()
+                .ok_or_else(missing)?
+                .into_u32()
+                .collect()
+        }
+    };
+    let mut add = |a: u32, b: u32, c: u32| -> Result<(), String> {
+        let mut triangle = [[0.0; 3]; 3];
+        for (slot, index) in triangle.iter_mut().zip([a, b, c]) {
+            *slot = corner(&points, index as usize)?;
+        }
+        triangles.push(triangle);
+        Ok(())
+    };
+    match fans {
+        Mode::TriangleStrip => {
+            for (k, w) in indices.windows(3).enumerate() {
+                // Every other triangle of a strip runs the other way.
+                add(w[k % 2], w[1 - k % 2], w[2])?;
+            }
+        }
+        Mode::TriangleFan => {
+            for w in indices.windows(2).skip(1) {
+                add(indices[0], w[0], w[1])?;
+            }
+        }
+        _ => {
+            for [a, b, c] in indices.as_chunks::<3>().0 {
+                add(*a, *b, *c)?;
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,133 @@
+//! Geomview's OFF, ASCII: vertices, then faces by their corners' indices. Colours, normals and
+//! texture coordinates are passed over. The file carries no unit.
+
+use crate::format::starts;
+use crate::mesh::FileMesh;
+use crate::number::{Numbers, shown};
+use crate::polygon::{Faces, MOST_CORNERS};
+use crate::read_error::{Place, ReadError};
+use crate::text::narrow;
+use crate::tokens::Lines;
+
+/// Heads of files whose vertices begin with x, y and z.
+const HEADS: [&[u8]; 8] = [
+    b"OFF", b"COFF", b"NOFF", b"STOFF", b"CNOFF", b"STCOFF", b"STNOFF", b"STCNOFF",
+];
+
+/// True for bytes that begin as OFF files do.
+pub(crate) fn begins(bytes: &[u8]) -> bool {
+    let first = bytes.trim_ascii_start().split(|b| *b <= b' ').next();
+    HEADS.iter().any(|head| first == Some(*head))
+}
+
+/// Reads an OFF file's bytes.
+///
+/// # Errors
+/// [`ReadError`] with the line: counts that the file does not hold, a number or an index that is
+/// none, no face.
+pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
+    let bytes = narrow(bytes);
+    let mut lines = Lines::new(&bytes);
+    // Without comments and blank lines; the head may be followed by the counts.
+    let mut next = move || loop {
+        fluxform_base::progress::poll();
+        let line = lines.next_line()?;
+        let words: Vec<&[u8]> = line.words().collect();
+        if !words.is_empty() {
+            return Some((line.number, words));
+        }
+    };
+    let ends = || ReadError::file("the OFF file ends before its last face: it was cut short");
+    let (number, mut words) = next().ok_or_else(ends)?;
+    if !begins(&bytes) || starts(words.get(1).unwrap_or(&&b""[..]), b"BINARY") {
+        let what = format!(
+            "expected an OFF file in ASCII, which begins with `OFF`, found `{}`",
+            shown(words[0])
+        );
+        return Err(ReadError::new(Place::Line(number), what));
+    }
+    words.remove(0);
+    let (number, words) = match words.is_empty() {
+        true => next().ok_or_else(ends)?,
+        false => (number, words),
+    };
+    let counts: Vec<usize> = words.iter().map_while(|word| whole(word)).collect();
+    let [vertices, faces, ..] = counts[..] else {
+        let what = "expected the numbers of vertices, faces and edges";
+        return Err(ReadError::new(Place::Line(number), what));
+    };
+    // A vertex takes six bytes at least, a face eight.
+    let least = vertices
+        .saturating_mul(6)
+        .saturating_add(faces.saturating_mul(8));
+    if least > bytes.len() + 8 {
+        let what = format!(
+            "the file claims {vertices} vertices and {faces} faces, more than its {} bytes hold: \
+             it was cut short",
+            bytes.len()
+        );
+        return Err(ReadError::new(Place::Line(number), what));
+    }
+    let mut numbers = Numbers::default();
+    let mut points = Vec::with_capacity(vertices);
+    for _ in 0..vertices {
+        let (number, words) = next().ok_or_else(ends)?;
+        let told = |what: String| ReadError::new(Place::Line(number), what);
+        let [x, y, z, ..] = words[..] else {
+            return Err(told(
+                "a vertex has three coordinates; here are fewer".into(),
+            ));
+        };
+        let mut point = [0.0; 3];
+        for (slot, word) in point.iter_mut().zip([x, y, z]) {
+            *slot = numbers.read(word).map_err(told)?;
+        }
+        points.push(point);
+    }
+    let mut all = Faces::default();
+    for _ in 0..faces {
+        let (number, mut words) = next().ok_or_else(ends)?;
+        let told = |what: String| ReadError::new(Place::Line(number), what);
+        let corners = whole(words[0]).filter(|corners| *corners <= MOST_CORNERS);
+        // Some programs break a face over lines.
+        while corners.is_some_and(|corners| words.len() <= corners) {
+            words.extend(next().ok_or_else(ends)?.1);
+        }
+        let indices = corners.and_then(|corners| words.get(1..=corners));
+        let indices = indices.ok_or_else(|| {
+            told(format!(
+                "expected a face's number of corners, at most {MOST_CORNERS}, and as many indices"
+            ))
+        })?;
+        for word in indices {
+            let index = whole(word).filter(|index| *index < vertices);
+            let index = index.ok_or_else(|| {
+                told(format!(
+                    "a face has the index `{}`, but the file has {vertices} vertices (indices \
+                     count from 0)",
+                    shown(word)
+                ))
+            })?;
+            all.push_index(index as u32);
+        }
+        all.end_face(number);
+    }
+    let place =
+        |(line, _)| ReadError::new(Place::Line(line), "a face has an index without a vertex");
+    let (triangles, _) = all.cut(&points).map_err(place)?;
+    if triangles.is_empty() {
+        let what = format!(
+            "the OFF file holds {vertices} vertices and no face: there is no surface, only points"
+        );
+        return Err(ReadError::file(what));
+    }
+    Ok(FileMesh {
+        triangles,
+        coordinate_rounding: numbers.rounding(),
+        ..FileMesh::default()
+    })
+}
+
+fn whole(word: &[u8]) -> Option<usize> {
+    std::str::from_utf8(word).ok()?.parse().ok()
+}

@@ -1,0 +1,222 @@
+//! OFF, GLB, height images, and what scanners and old programs write, on files made here.
+
+use std::io::{Seek, SeekFrom, Write};
+use std::path::Path;
+
+use fluxform_shape::document::SurfaceFormat;
+use fluxform_shape::{MeshReport, ShapeError, surface};
+
+use crate::formats::{read, refusal};
+use fluxform_testing::surface_files::{
+    amf, glb, height_image, obj, off, ply_ascii, ply_strips, sldprt, step, three_dxml, three_mf,
+};
+use fluxform_testing::surfaces::binary;
+
+const VOLUME: f64 = 0.7 * 1.3 * 2.9 / 6.0;
+
+fn wide(text: &[u8], order: fn(u16) -> [u8; 2]) -> Vec<u8> {
+    let text = std::str::from_utf8(text).unwrap();
+    let units = "\u{feff}".encode_utf16().chain(text.encode_utf16());
+    units.flat_map(order).collect()
+}
+
+#[test]
+fn every_further_format_gives_the_same_body() {
+    use SurfaceFormat::{Amf, Glb, Obj, Off, Ply};
+    let blender = String::from_utf8(ply_ascii()).unwrap();
+    let blender = blender.replace(
+        "comment made here",
+        "Created by Blender3D 247 - www.blender.org, source file: a.blend",
+    );
+    let broken = String::from_utf8(off()).unwrap().replace("\n3 0", "\n3\n0");
+    let samples: [(SurfaceFormat, Vec<u8>, Option<f64>); 8] = [
+        (Off, off(), None),
+        (Off, broken.into_bytes(), None),
+        (Glb, glb(), Some(1.0)),
+        (Ply, ply_strips(), None),
+        (Ply, blender.into_bytes(), None),
+        (Obj, wide(&obj(), u16::to_le_bytes), None),
+        (Obj, wide(&obj(), u16::to_be_bytes), None),
+        (
+            Amf,
+            wide(amf("mm").as_bytes(), u16::to_le_bytes),
+            Some(1e-3),
+        ),
+    ];
+    for (format, bytes, unit_m) in samples {
+        let report = MeshReport::new(format, read(format, &bytes).unwrap());
+        assert_eq!((report.triangles, report.unit_m), (4, unit_m), "{format:?}");
+        assert!(
+            report.watertight && report.inconsistent_edges == 0,
+            "{report:?}"
+        );
+        assert!((report.volume.unwrap() - VOLUME).abs() < 1e-6, "{report:?}");
+        for (k, corner) in [0.7, 1.3, 2.9].iter().enumerate() {
+            assert!((report.bounds_max[k] - corner).abs() < 1e-6, "{report:?}");
+        }
+    }
+}
+
+/// Its message showed the parser's own structures.
+#[test]
+fn a_damaged_ply_header_is_refused_in_plain_words() {
+    let text = String::from_utf8(ply_ascii()).unwrap();
+    let bad = text.replace("property uchar red", "property uchar");
+    let message = refusal(SurfaceFormat::Ply, bad.as_bytes());
+    assert!(
+        message.contains("damaged") && !message.contains('{'),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_height_image_is_a_surface_over_its_pixels() {
+    // Three columns, two rows: the upper row is the higher y.
+    let levels = [0, 65535, 13107, 6553, 65535, 0];
+    let bytes = height_image(3, &levels, png::BitDepth::Sixteen);
+    let mesh = read(SurfaceFormat::HeightImage, &bytes).unwrap();
+    assert_eq!(mesh.triangles.len(), 4);
+    let height = |x: f64, y: f64| {
+        let mut vertices = mesh.triangles.as_flattened().iter();
+        vertices.find(|v| v[0] == x && v[1] == y).unwrap()[2]
+    };
+    for (k, level) in levels.iter().enumerate() {
+        let (x, y) = ((k % 3) as f64, (1 - k / 3) as f64);
+        assert_eq!(height(x, y), f64::from(*level) / 65535.0);
+    }
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle;
+        let turn = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+        assert_eq!(turn, 1.0, "seen from above, counter-clockwise");
+    }
+    let coarse = height_image(2, &[0, 255, 51, 3], png::BitDepth::Eight);
+    let mesh = read(SurfaceFormat::HeightImage, &coarse).unwrap();
+    assert!(mesh.warnings[0].contains("8 bit"), "{:?}", mesh.warnings);
+    let thin = height_image(1, &[0, 255], png::BitDepth::Eight);
+    assert!(refusal(SurfaceFormat::HeightImage, &thin).contains("2 x 2"));
+    // The last chunk, of twelve bytes, only says that it is the last.
+    for length in 0..bytes.len() - 12 {
+        refusal(SurfaceFormat::HeightImage, &bytes[..length]);
+    }
+}
+
+#[test]
+fn a_glb_file_that_claims_more_than_it_holds_is_refused() {
+    let good = glb();
+    for length in 0..good.len() {
+        refusal(SurfaceFormat::Glb, &good[..length]);
+    }
+    for (from, to) in [
+        ("\"count\":4", "\"count\":9"),
+        ("\"byteLength\":48", "\"byteLength\":99"),
+        ("\"count\":9", "\"count\":99"),
+        ("\"buffer\":0", "\"buffer\":7"),
+        ("\"children\":[1]", "\"children\":[0]"),
+    ] {
+        let at = good
+            .windows(from.len())
+            .position(|w| w == from.as_bytes())
+            .unwrap();
+        let mut bytes = good.clone();
+        // One byte longer takes one of the blanks that follow the document.
+        bytes.splice(at..at + from.len(), to.bytes());
+        let json = u32::from_le_bytes(good[12..16].try_into().unwrap()) as usize;
+        if to.len() > from.len() {
+            let blank = 20 + json;
+            if bytes[blank] != b' ' {
+                continue;
+            }
+            bytes.remove(blank);
+        }
+        refusal(SurfaceFormat::Glb, &bytes);
+    }
+}
+
+/// STL without an ending was refused, whatever it held.
+#[test]
+fn a_file_without_an_ending_is_known_by_its_content() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("part");
+    let one = [[[0.7f32, -1.3, 2.9], [10.1, 0.3, 3.1], [-4.7, 8.3, 2.3]]];
+    let ascii = b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n\
+                  vertex 0 1 0\nendloop\nendfacet\nendsolid a\n";
+    let image = height_image(2, &[1, 2, 3, 4], png::BitDepth::Sixteen);
+    for (name, bytes) in [
+        ("STL", binary(&one)),
+        ("STL", ascii.to_vec()),
+        ("OBJ", obj()),
+        ("PLY", ply_ascii()),
+        ("OFF", off()),
+        ("GLB", glb()),
+        ("height image", image),
+        ("3MF", three_mf("inch")),
+        ("AMF", amf("mm").into_bytes()),
+        ("3DXML", three_dxml()),
+        ("STEP", step()),
+        ("SOLIDWORKS", sldprt()),
+    ] {
+        let found = SurfaceFormat::of_content(&bytes).map(SurfaceFormat::name);
+        assert_eq!(found, Some(name));
+        // This is a test's own file.
+        #[allow(clippy::disallowed_methods)]
+        std::fs::write(&path, &bytes).unwrap();
+        if cfg!(feature = "step") || name != "STEP" {
+            let report = MeshReport::of_file(&path).unwrap();
+            assert_eq!(report.format, name);
+        }
+    }
+    #[allow(clippy::disallowed_methods)]
+    std::fs::write(&path, off()).unwrap();
+    let unit = surface::read(&path, None).unwrap_err();
+    assert!(matches!(unit, ShapeError::UnitMissing { .. }), "{unit}");
+    #[allow(clippy::disallowed_methods)]
+    std::fs::write(&path, b"some text").unwrap();
+    let unknown = MeshReport::of_file(&path).unwrap_err();
+    assert!(matches!(unknown, ShapeError::Format { .. }), "{unknown}");
+}
+
+#[test]
+fn what_is_not_read_comes_with_advice() {
+    for (name, advice) in [
+        ("a.igs", "STEP"),
+        ("a.IGES", "STEP"),
+        ("a.x_t", "STL"),
+        ("a.gltf", ".glb"),
+    ] {
+        let message = MeshReport::of_file(Path::new(name))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            message.contains(advice) && message.contains("; "),
+            "{message}"
+        );
+    }
+}
+
+/// Two gigabytes of a hole were read, and more was held, before a word of it was looked at.
+#[test]
+fn a_file_with_a_hole_is_refused_where_the_hole_begins() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut stl = binary(&[[[0.0f32; 3]; 3]; 3]);
+    stl[80..84].copy_from_slice(&40_000_000u32.to_le_bytes());
+    for (name, head, length) in [
+        ("a.obj", obj(), 2_000_000_000),
+        ("a.ply", ply_ascii(), 2_000_000_000),
+        ("a.stl", b"solid a\n".to_vec(), 2_000_000_000),
+        ("b.stl", stl, 84 + 50 * 40_000_000),
+        ("a.step", step(), 2_000_000_000),
+        ("a.3mf", three_mf("inch"), 2_000_000_000),
+        ("a.sldprt", sldprt(), 2_000_000_000),
+        ("a", off(), 2_000_000_000),
+    ] {
+        let path = folder.path().join(name);
+        #[allow(clippy::disallowed_methods)]
+        let mut file = std::fs::File::create(&path).unwrap();
+        file.write_all(&head).unwrap();
+        file.set_len(length).unwrap();
+        file.seek(SeekFrom::End(-1)).unwrap();
+        file.write_all(b"\n").unwrap();
+        let message = MeshReport::of_file(&path).unwrap_err().to_string();
+        assert!(message.contains("zeros alone"), "{name}: {message}");
+    }
+}
