@@ -172,9 +172,6 @@ pub struct CoupledArray {
 
 /// Refinements after which a tolerance that is not reached is given up, with its estimate.
 const MOST_REFINEMENTS: usize = 4;
-/// An error so many times the aim is no beginning of a convergence: all refinements together aim at a
-/// hundredth of the first.
-const HOPELESS: f64 = 1e3;
 /// The first resolution's aim, in tolerances: resolutions do better than they aim at as a rule.
 const FIRST_AIM: f64 = 2.0;
 /// Distance above the cores, in radii, below which no error is estimated.
@@ -239,11 +236,10 @@ impl CoupledArray {
                 .as_ref()
                 .is_none_or(|b| fine.relative_error < b.relative_error);
             let reached = fine.relative_error <= tolerance;
-            let hopeless = fine.relative_error > HOPELESS * aim;
             if better {
                 best = Some(fine);
             }
-            if reached || hopeless || !better || exchange > tolerance {
+            if reached || !better || exchange > tolerance {
                 break;
             }
             aim *= 0.3;
