@@ -325,7 +325,8 @@ impl<'a> Scene<'a> {
             of_rules(MagnetRule::amplification),
         );
         let mut forces = vec![[0.0; N]; points_m.len() * coils];
-        progress.begin("forces", points_m.len() as u64);
+        let stage = if N > 1 { "sideways" } else { "forces" };
+        progress.begin(stage, points_m.len() as u64);
         // As fine as the nearest of all points needs, whatever the portion.
         let sources = solved.sources(self, points_m, reach_m, amplification)?;
         // Many dipoles take a winding and its own core from one table.

@@ -64,7 +64,8 @@ const POWERS: &[Power] = &[
             "stdout (",
             "stderr (",
         ],
-        holders: &["cli/bar.rs", "cli/printer.rs"],
+        // Of the process that reads STEP it is the pipe.
+        holders: &["cli/bar.rs", "cli/printer.rs", "shape/step/kernel.rs"],
     },
     Power {
         name: "reading a clock",
@@ -106,6 +107,7 @@ const POWERS: &[Power] = &[
             "cli/documents.rs",
             "design/named_file.rs",
             "design/source.rs",
+            "shape/step/kernel.rs",
             "suite/memory.rs",
         ],
     },

@@ -81,9 +81,12 @@ fn what_cannot_be_inspected_says_why() {
     let ran = place.run(&["discretize", "ball.toml", "--inspect"]).ends(2);
     assert!(ran.err.contains("no file to inspect"), "{ran:?}");
     let raw = ["discretize", "shapes/flat.stl", "--inspect"];
-    for flags in [&["--translate", "0,0,3"][..], &["--grid", "9x9"]] {
-        let ran = place.run(&[&raw[..], flags].concat()).ends(2);
-        assert!(ran.err.contains("as it is"), "{ran:?}");
+    for (flag, value, reason) in [
+        ("--translate", "0,0,3", "--unit"),
+        ("--grid", "9x9", "makes no points"),
+    ] {
+        let ran = place.run(&[&raw[..], &[flag, value]].concat()).ends(2);
+        assert!(ran.err.contains(reason), "{ran:?}");
     }
     place.run(&[&raw[..], &["--out", "a.csv"]].concat()).ends(2);
     let ran = place.run(&["discretize", "none.obj", "--inspect"]).ends(3);

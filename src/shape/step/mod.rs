@@ -82,6 +82,8 @@ pub fn read(
 }
 
 /// The bodies of a reply in their places.
+///
+/// Long because what a body states of itself is taken over entry by entry.
 fn laid_out(reply: kernel::Reply, options: &BodyOptions) -> Result<FileMesh, String> {
     let kernel::Reply {
         version,
