@@ -302,7 +302,7 @@ impl Table {
         out
     }
 
-    /// Every component of every drive at one point within the box, [series].
+    /// Every component of every drive at one point within the box, \[series\].
     #[must_use]
     pub fn at(&self, [x_m, y_m, z_m]: [f64; 3]) -> Vec<f64> {
         let mut out = vec![0.0; self.values.len()];

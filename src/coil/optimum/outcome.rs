@@ -188,7 +188,7 @@ pub enum Advantage {
 }
 
 impl Advantage {
-    /// Every one, in the order of [`Advantage::amounts`].
+    /// Every one, in the order of `Advantage::amounts`.
     pub const ALL: [Self; 3] = [Self::Shorter, Self::Lighter, Self::Cooler];
 
     /// The word in artefacts, on screen and on pages.

@@ -1,8 +1,8 @@
 //! STEP (AP203, AP214, AP242): the solid bodies of parts and assemblies, through OpenCASCADE.
 //!
-//! The kernel runs in a process of its own ([`kernel`]), where Python has it; this program links
+//! The kernel runs in a process of its own (`kernel`), where Python has it; this program links
 //! nothing of it. What comes back is judged: there each facet against the exact face it stands for,
-//! here ([`gates`]) whether the facets close the body and hold its volume.
+//! here (`gates`) whether the facets close the body and hold its volume.
 
 mod gates;
 mod kernel;
