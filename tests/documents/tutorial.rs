@@ -209,7 +209,7 @@ fn the_warnings_of_the_table_are_what_is_said() {
             "sed s/repel/attract/ desk.toml > a.toml; fluxform lambda a.toml plate.toml",
         ),
         (
-            "lie outside the design's workspace",
+            "outside the design's workspace",
             "sed 's/height_mm = 25/height_mm = 60/' plate.toml > high.toml
              fluxform calibrate desk.toml high.toml --no-report --out high",
         ),
