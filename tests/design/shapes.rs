@@ -136,7 +136,7 @@ fn a_shape_is_a_surface_or_a_primitive() {
         ),
         (
             "name = \"a\"\nsurface = \"a.dae\"\nunit = \"mm\"\n",
-            "s.toml:2:11: error: surface: expected a file ending in .stl, .obj, .ply, .3mf, .amf, .3dxml, .step, .stp, .sldprt, found \"a.dae\" (convert the surface to one of these)",
+            "s.toml:2:11: error: surface: expected a file ending in .stl, .obj, .ply, .off, .glb, .png, .3mf, .amf, .3dxml, .step, .stp, .sldprt, .sldasm, found \"a.dae\" (such files are not read: export the body as STL, OBJ, PLY or 3MF (Blender does))",
         ),
         (
             "name = \"a\"\nprimitive = \"flat\"\nunit = \"mm\"\n",
@@ -258,7 +258,7 @@ fn a_raw_surface_names_what_it_lacks() {
     let error = refusal(&raw("a.txt", Some("mm")));
     assert_eq!(
         error.to_string(),
-        "a.txt: not a surface that is read: expected a shape file (.toml) or .stl, .obj, .ply, .3mf, .amf, .3dxml, .step, .stp, .sldprt"
+        "a.txt: not a surface that is read: expected a shape file (.toml) or .stl, .obj, .ply, .off, .glb, .png, .3mf, .amf, .3dxml, .step, .stp, .sldprt, .sldasm"
     );
     let mut surface = raw("a.stl", Some("mm"));
     surface.y_m = Some([0.7, -0.7]);
