@@ -195,7 +195,8 @@ fn no_other_currents_give_the_same_force_with_less_power() {
         }
         let found = render(&case.problem(), force / 0.7).unwrap();
         assert_eq!(found.points_unreached, 0, "{seed}");
-        assert!(found.mean_power_w <= power * (1.0 + 1e-9), "{seed}");
+        // Where two forces agree to nine digits, rounding decides how they share a sum that binds.
+        assert!(found.mean_power_w <= power * (1.0 + 2e-6), "{seed}");
     }
 }
 

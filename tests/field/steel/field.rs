@@ -35,6 +35,9 @@ fn the_gradient_is_the_fields_derivative_outside_and_inside() {
             let along_z =
                 |pick: fn(&AxialField) -> f64| derivative(|d| pick(&core.field(r_m, z_m + d)), h);
             let size = at.gradient_norm();
+            // Deep in a long core the gradient is small against the field, whose last digits the
+            // difference magnifies.
+            let limit = 2e-8 + 2e-13 * at.b_r.hypot(at.b_z) / (h * size);
             for (name, value, expected) in [
                 ("dBr/dr", at.dbr_dr, along_r(|f| f.b_r)),
                 ("dBr/dz", at.dbr_dz, along_z(|f| f.b_r)),
@@ -46,7 +49,7 @@ fn the_gradient_is_the_fields_derivative_outside_and_inside() {
             ] {
                 let off = (value - expected).abs() / size;
                 assert!(
-                    off < 2e-8,
+                    off < limit,
                     "{design:?} at {r_m} {z_m}: {name} is off by {off:e}"
                 );
             }
