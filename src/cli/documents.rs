@@ -14,8 +14,8 @@ use crate::bundle::sweep::PlanFile;
 use crate::bundle::trajectory::Trajectory;
 use crate::design::{Design, Faults, InvalidDocument, Need, source};
 use crate::scene::sources::ShapeSource;
+use crate::shape::bodies::BodyOptions;
 use crate::shape::document::{Fit, Placement, RawSurface, RawSurfaceError, Seat, ShapeDocument};
-use crate::shape::step::BodyOptions;
 
 /// Samples of a surface that says nothing of its grid.
 const SAMPLES: GridSize = GridSize([61, 61]);

@@ -1,6 +1,6 @@
 //! Bodies placed in bodies: an assembly's tree laid out as triangles, bounded.
 
-use crate::mesh::Triangle;
+use crate::file_mesh::Triangle;
 
 /// Placing bodies several times may add so many triangles to those of the file,
 const MOST_ADDED: u64 = 10_000_000;

@@ -8,7 +8,7 @@ pub use read::keys;
 
 use std::path::PathBuf;
 
-use crate::step::BodyOptions;
+use crate::bodies::BodyOptions;
 use fluxform_numerics::axis::Axis;
 
 pub use crate::format::SurfaceFormat;

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::mesh::Triangle;
+use crate::file_mesh::Triangle;
 
 /// Two programs may round the same vertex to neighbouring numbers: roundings that are not told
 /// apart.

@@ -7,10 +7,11 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::height::Grid;
-use crate::mesh::{Mesh, cross, dot, minus};
+use crate::mesh::Mesh;
 use crate::scattered::Probe;
 use crate::surface::Surface;
 use fluxform_numerics::axis::Axis;
+use fluxform_numerics::vec3::{cross, dot, minus};
 
 /// Points that are looked at.
 const POINTS: usize = 20_000;
@@ -108,7 +109,7 @@ fn of_mesh(surface: &Surface, mesh: &Mesh) -> Hidden {
 mod tests {
     use super::*;
     use crate::document::Placement;
-    use crate::mesh::{FileMesh, Triangle};
+    use crate::file_mesh::{FileMesh, Triangle};
     use crate::placement::Transform;
 
     /// A body of revolution: its outline's radii and heights, mm, counterclockwise about its inside.

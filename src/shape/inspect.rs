@@ -8,18 +8,20 @@ use std::path::Path;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::bodies::{BodyOptions, NamedBody};
 use crate::crossings::crossings;
 use crate::document::{Placement, SurfaceFormat};
 use crate::edges::{Edges, WELD_ROUNDINGS, bodies, weld};
 use crate::error::ShapeError;
+use crate::file_mesh::{FileMesh, Triangle};
 use crate::height::Grid;
-use crate::mesh::{FileMesh, Mesh, Triangle, cross, minus};
+use crate::mesh::Mesh;
 use crate::placement::Transform;
 use crate::scattered::Probe;
-use crate::step::{BodyOptions, NamedBody};
 use crate::surface::{ByteObserver, Surface, read_mesh};
 use fluxform_base::progress::Progress;
 use fluxform_numerics::axis::Axis;
+use fluxform_numerics::vec3::{cross, minus};
 
 /// What a surface file holds. Lengths are in the file's unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]

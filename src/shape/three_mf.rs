@@ -9,7 +9,7 @@ use std::collections::{HashMap, HashSet};
 use crate::archive::Archive;
 use crate::assembly::{Affine, Body, corner, lay_out};
 use crate::document::parse_unit;
-use crate::mesh::FileMesh;
+use crate::file_mesh::FileMesh;
 use crate::number::Numbers;
 use crate::read_error::{Place, ReadError};
 use crate::xml::{Document, Element, Step};

@@ -12,15 +12,15 @@ use crate::design::Design;
 use crate::numerics::axis::Axis;
 use crate::plot::plane::PlanePlot;
 use crate::progress::Progress;
+use crate::shape::bodies::BodyOptions;
 use crate::shape::certificate::by_cell;
 use crate::shape::document::{
     AxisRequest, GridRequest, Placement, ShapeDocument, SurfaceFormat, SurfaceSource,
 };
+use crate::shape::file_mesh::Bounds;
 use crate::shape::height::Grid;
 use crate::shape::hidden::Hidden;
-use crate::shape::mesh::Bounds;
 use crate::shape::scattered::Probe;
-use crate::shape::step::BodyOptions;
 use crate::shape::{MeshReport, ShapeError, Surface};
 
 /// Points along either side of the picture.

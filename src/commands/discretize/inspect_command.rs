@@ -15,8 +15,8 @@ use crate::cli::start::begin;
 use crate::cli::values::FileArgument;
 use crate::design::Need;
 use crate::shape::MeshReport;
+use crate::shape::bodies::NamedBody;
 use crate::shape::document::{SurfaceSource, unit_name};
-use crate::shape::step::NamedBody;
 
 impl Discretize {
     pub(crate) fn inspected(&self, printer: &Printer) -> Result<(), Failure> {

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::document::Placement;
-use crate::mesh::{FileMesh, Triangle};
+use crate::file_mesh::{FileMesh, Triangle};
 use crate::placement::Transform;
 use fluxform_base::progress::Silent;
 

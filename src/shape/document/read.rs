@@ -6,8 +6,8 @@ use super::unit::{parse_unit, unit_names};
 use super::{
     AxisRequest, Fit, GridRequest, Placement, Primitive, Seat, ShapeDocument, SurfaceSource, Up,
 };
+use crate::bodies::BodyOptions;
 use crate::format::SurfaceFormat;
-use crate::step::BodyOptions;
 use fluxform_base::units::m_from_mm;
 use fluxform_design::diagnostics::{Faults, InvalidDocument};
 use fluxform_design::keys::{Key, with_meanings};

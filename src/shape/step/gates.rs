@@ -5,7 +5,8 @@
 use super::longest_side;
 use crate::crossings::crossings;
 use crate::edges::{Edges, WELD_ROUNDINGS, weld};
-use crate::mesh::{Triangle, cross, dot, minus};
+use crate::file_mesh::Triangle;
+use fluxform_numerics::vec3::{cross, dot, minus};
 
 /// Vertices of neighbouring faces agree to this, against the body's size.
 pub(super) const WELD: f64 = 1e-7;

@@ -9,46 +9,13 @@ mod kernel;
 
 use std::sync::{Mutex, PoisonError};
 
-use serde::Serialize;
-
 use crate::assembly::{Affine, Body, lay_out};
-use crate::mesh::{FileMesh, Triangle};
+use crate::bodies::{BodyOptions, NamedBody};
+use crate::file_mesh::{FileMesh, Triangle};
 use crate::read_error::ReadError;
 use fluxform_base::progress::Progress;
 
 pub use kernel::{Kernel, STEP_SECONDS, configure};
-
-/// How the bodies of a file are cut into facets, and which.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct BodyOptions {
-    /// The farthest that a facet may lie from its face, m; `None`: a 4000th of the diagonal of the
-    /// box of the bodies.
-    pub chord_m: Option<f64>,
-    /// The body that is read, by its number from 1 or its name; `None`: all of them.
-    pub body: Option<String>,
-}
-
-impl BodyOptions {
-    /// Whether nothing was asked for.
-    #[must_use]
-    pub fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
-}
-
-/// A body that a file names.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct NamedBody {
-    /// Its name, or that of its part; empty where the file has none.
-    pub name: String,
-    /// Names of the assemblies that hold it, the outermost first.
-    pub within: Vec<String>,
-    /// Red, green and blue, 0 to 1, where the file has them.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub color: Option<[f64; 3]>,
-    /// Its triangles.
-    pub triangles: usize,
-}
 
 /// What was read last: a picture, a report and points of one file need it once.
 static LAST: Mutex<Option<(Vec<u8>, BodyOptions, FileMesh)>> = Mutex::new(None);
