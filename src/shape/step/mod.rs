@@ -59,7 +59,7 @@ fn laid_out(reply: kernel::Reply, options: &BodyOptions) -> Result<FileMesh, Str
         loose,
         moved_roots,
         bodies,
-        parts,
+        mut parts,
     } = reply;
     if bodies.is_empty() {
         return Err("it holds no solid body; save one, not surfaces or drawings".into());
@@ -68,7 +68,7 @@ fn laid_out(reply: kernel::Reply, options: &BodyOptions) -> Result<FileMesh, Str
     let mut warnings = Vec::new();
     let mut deviation_mm = 0.0f64;
     let mut crossing = 0;
-    for (index, part) in parts.iter().enumerate() {
+    for (index, part) in parts.iter_mut().enumerate() {
         let name = bodies.iter().find(|body| body.part == index);
         let verdict = gates::check(part)
             .map_err(|what| format!("body `{}`: {what}", name.map_or("", |body| &body.name)))?;
