@@ -7,7 +7,8 @@
 A file is right when every height is that of the exact bodies: vertical lines through each point, and
 through points around it at most twice as far away as the deviation that the program states, meet the
 bodies at heights that enclose it, to that deviation. OpenCASCADE intersects the lines with the exact
-faces; no mesh takes part. Points are taken in a fixed random order until they are through or
+faces; no mesh takes part. Where the file repeats bodies that its assembly places, unplaced ones do
+not count: the product structure says where each is. Points are taken in a fixed random order until they are through or
 `--seconds` of judging are spent; of a file that is called right at least 30 were judged, or all, else
 it is `not judged`. Files of equal content count once, files without a solid not at all. The exporter is
 what the file's header says. Prints a table for each program; `--rows` also a line for each file.
@@ -34,10 +35,14 @@ from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 from OCP.gp import gp_Dir, gp_Lin, gp_Pnt
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.IntCurvesFace import IntCurvesFace_ShapeIntersector
+from OCP.STEPCAFControl import STEPCAFControl_Reader
 from OCP.STEPControl import STEPControl_Reader
+from OCP.TCollection import TCollection_ExtendedString
+from OCP.TDocStd import TDocStd_Document
 from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS_Compound
+from OCP.XCAFDoc import XCAFDoc_DocumentTool
 
 SOLIDS = (b"MANIFOLD_SOLID_BREP", b"BREP_WITH_VOIDS", b"FACETED_BREP")
 EXPORTERS = [
@@ -59,6 +64,29 @@ def exporter(data):
     return next((name for name, sign in EXPORTERS if re.search(sign, text)), "others")
 
 
+def count_solids(shape):
+    count, solids = 0, TopExp_Explorer(shape, TopAbs_SOLID)
+    while solids.More():
+        count += 1
+        solids.Next()
+    return count
+
+
+def by_structure(path):
+    """The shapes that the file's product structure places; None without one."""
+    reader = STEPCAFControl_Reader()
+    document = TDocStd_Document(TCollection_ExtendedString("XmlXCAF"))
+    if reader.ReadFile(str(path)) != IFSelect_RetDone or not reader.Transfer(document):
+        return None
+    tool = static(XCAFDoc_DocumentTool, "ShapeTool")(document.Main())
+    return tool.GetOneShape()
+
+
+def static(owner, name):
+    """A static method under its name of this or of another version of OCP."""
+    return getattr(owner, name + "_s", None) or getattr(owner, name)
+
+
 class Exact:
     """The solids of a file: heights of their faces over points, distances from them; mm."""
 
@@ -67,7 +95,10 @@ class Exact:
         if reader.ReadFile(str(path)) != IFSelect_RetDone:
             raise ValueError("OpenCASCADE cannot read it")
         reader.TransferRoots()
-        solids = TopExp_Explorer(reader.OneShape(), TopAbs_SOLID)
+        whole, placed = reader.OneShape(), by_structure(path)
+        if placed is not None and 0 < count_solids(placed) < count_solids(whole):
+            whole = placed
+        solids = TopExp_Explorer(whole, TopAbs_SOLID)
         bodies, builder = TopoDS_Compound(), BRep_Builder()
         builder.MakeCompound(bodies)
         while solids.More():

@@ -106,6 +106,14 @@ pub(super) fn lay_out(bodies: &[Body], roots: &[(usize, Affine)]) -> Result<Vec<
     Ok(triangles)
 }
 
+/// How many triangles [`lay_out`] makes of each root.
+pub(super) fn counts(bodies: &[Body], roots: &[(usize, Affine)]) -> Vec<usize> {
+    let mut visits = vec![None; bodies.len()];
+    let mut below = |root: &usize| weight(bodies, *root, &mut visits, 0).map_or(0, |w| w.triangles);
+    let roots = roots.iter().map(|(root, _)| below(root));
+    roots.map(|count| count as usize).collect()
+}
+
 /// What is laid out below a body.
 #[derive(Clone, Copy, Default)]
 struct Weight {

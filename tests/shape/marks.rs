@@ -221,6 +221,7 @@ fn holes_of_a_file_are_skipped_filled_or_refused() {
             marks: true,
             cells: false,
             known: None,
+            ..Settings::default()
         };
         discretize_with(&document, &settings, &Silent)
     };

@@ -23,6 +23,7 @@ use crate::cli::start::begin;
 use crate::cli::values::FileArgument;
 use crate::scene::cost::of_points;
 use crate::shape::certificate::Certify;
+use crate::shape::deviation::CERTIFY_SECONDS;
 use crate::shape::holes::Holes;
 
 /// Turn a surface into constraint points with heights and normals
@@ -53,8 +54,8 @@ use crate::shape::holes::Holes;
      "what a file holds: unit, size, holes, faults; and a picture from above"),
 ]))]
 pub struct Discretize {
-    /// Shape file (TOML, `-` for standard input) or the surface itself: STL, OBJ, PLY, 3MF, AMF,
-    /// 3DXML, STEP, SLDPRT
+    /// Shape file (TOML, `-` for standard input) or the surface itself: STL, OBJ, PLY, OFF, GLB, PNG,
+    /// 3MF, AMF, 3DXML, STEP, SLDPRT, SLDASM
     #[arg(value_name = "SHAPE")]
     pub(super) shape: FileArgument,
     /// Where the points go; `-` is standard output, and then there is no JSON file
@@ -67,12 +68,17 @@ pub struct Discretize {
     /// Compare the points with the surface: vertically, by the Hausdorff distance too, or not
     #[arg(long, value_enum, default_value_t = CertifyFlag::Vertical)]
     certify: CertifyFlag,
+    /// What --certify may take, in seconds of one core about; where it is spent, the points come
+    /// without a certificate and a warning says so
+    #[arg(long, value_name = "N", default_value_t = CERTIFY_SECONDS,
+          value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    certify_seconds: u64,
     #[command(flatten)]
     pub(super) sampling: SamplingFlags,
     /// Report what the surface's file holds and make no points
     #[arg(
         long,
-        conflicts_with_all = ["holes", "certify", "max_deviation", "poisson", "out"]
+        conflicts_with_all = ["holes", "certify", "certify_seconds", "max_deviation", "poisson", "out"]
     )]
     pub(super) inspect: bool,
     /// With --inspect: report and draw where the part lies over this design's array and workspace
@@ -181,6 +187,7 @@ impl Discretize {
                 CertifyFlag::Vertical => Certify::Vertical,
                 CertifyFlag::Distance => Certify::Distance,
             },
+            certify_seconds: self.certify_seconds,
             picture: self.plot.is_some(),
         }
     }

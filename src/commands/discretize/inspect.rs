@@ -14,6 +14,7 @@ use crate::plot::plane::PlanePlot;
 use crate::progress::Progress;
 use crate::shape::bodies::BodyOptions;
 use crate::shape::certificate::by_cell;
+use crate::shape::deviation::CERTIFY_SECONDS;
 use crate::shape::document::{
     AxisRequest, GridRequest, Placement, ShapeDocument, SurfaceFormat, SurfaceSource,
 };
@@ -207,7 +208,7 @@ fn drawn(
         .collect();
     let heights: Vec<_> = samples.iter().map(|s| s.map(|s| s.height_m)).collect();
     // Where its effort is spent the picture is without bounds.
-    let cells = by_cell(surface, &grid, &samples, progress)?.unwrap_or_default();
+    let cells = by_cell(surface, &grid, &samples, CERTIFY_SECONDS, progress)?.unwrap_or_default();
     Ok(picture(&PictureData {
         title: document.name.clone(),
         scale,

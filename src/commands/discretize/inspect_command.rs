@@ -217,7 +217,7 @@ fn unit(found: &MeshReport) -> String {
 }
 
 fn closed(found: &MeshReport) -> String {
-    let bodies = count(found.bodies, "part");
+    let bodies = count(found.bodies, "connected part");
     if found.watertight {
         let through = found.bodies as i64 - found.euler / 2;
         let through = usize::try_from(through).unwrap_or(0);

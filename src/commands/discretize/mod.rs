@@ -20,6 +20,7 @@ use crate::plot::plane::PlanePlot;
 use crate::progress::Progress;
 use crate::scene::cached_field::ShapeField;
 use crate::shape::certificate::{Certificate, Certify, stated_tessellation};
+use crate::shape::deviation::CERTIFY_SECONDS;
 use crate::shape::document::{ShapeDocument, SurfaceSource};
 use crate::shape::hidden::Hidden;
 use crate::shape::holes::Holes;
@@ -194,6 +195,8 @@ pub struct PointsOptions {
     pub holes: Holes,
     /// How the points are compared with the surface.
     pub certify: Certify,
+    /// What that may take, s of one core about.
+    pub certify_seconds: u64,
     /// Whether a picture will be drawn.
     pub picture: bool,
 }
@@ -204,6 +207,7 @@ impl PointsOptions {
         let PointsOptions {
             holes,
             certify,
+            certify_seconds,
             picture: _,
         } = *self;
         let holes = match holes {
@@ -219,6 +223,7 @@ impl PointsOptions {
         Options::of(&PointsAsked {
             holes: Some(holes),
             certify: Some(certify),
+            certify_seconds: (certify_seconds != CERTIFY_SECONDS).then_some(certify_seconds),
             max_deviation_m: None,
             widest_m: None,
             spacing_m: None,
@@ -233,6 +238,7 @@ impl Default for PointsOptions {
         Self {
             holes: Holes::Skip,
             certify: Certify::Vertical,
+            certify_seconds: CERTIFY_SECONDS,
             picture: false,
         }
     }
@@ -330,6 +336,7 @@ impl OpenedSurface {
         let settings = Settings {
             holes: options.holes,
             certify: options.certify,
+            certify_seconds: options.certify_seconds,
             known,
             marks: true,
             cells: options.picture,
