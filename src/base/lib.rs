@@ -3,5 +3,6 @@
 
 pub mod accuracy;
 pub mod force_constant;
+pub mod point_weights;
 pub mod progress;
 pub mod units;

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::artefact::Input;
 use fluxform_base::accuracy::StageAccuracy;
+use fluxform_base::point_weights::Weights;
 use fluxform_lambda::feedback::Rendered;
 pub use fluxform_lambda::sideways::Sideways;
 use fluxform_lambda::worst::ActivePoint;
@@ -50,6 +51,9 @@ pub struct LambdaFile {
     pub rank: usize,
     /// Number of constraint points.
     pub points: usize,
+    /// How they count in the mean; absent where all count alike.
+    #[serde(default, skip_serializing_if = "Weights::is_equal")]
+    pub weights: Weights,
     /// Breakpoints, lambda ascending; between them the currents are linear in lambda.
     pub path: Vec<PathStep>,
     /// The same by the largest error at any point; absent in files of programs without it.

@@ -5,6 +5,7 @@ use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
 use super::values;
+use crate::point_weights::Weights;
 use crate::scene::sources::Sampling;
 use crate::shape::document::Up;
 use crate::shape::step::STEP_SECONDS;
@@ -75,6 +76,15 @@ pub struct Tolerance {
     pub tolerance: Option<f64>,
 }
 
+/// How the points of a grid count.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct WeightsFlag {
+    /// How the points of a grid count in the mean over the object [default: as the shape file says,
+    /// else equal]
+    #[arg(long, value_name = "RULE", value_parser = values::weights())]
+    pub weights: Option<Weights>,
+}
+
 /// Where what is written may replace what is there.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Writing {
@@ -143,7 +153,12 @@ pub struct SurfaceFlags {
 #[derive(Debug, Clone, Copy, Args)]
 pub struct SamplingFlags {
     /// Choose points until bilinear patches between them lie this near to the surface (0.1mm)
-    #[arg(long, value_name = "LENGTH", value_parser = values::length_with_unit)]
+    #[arg(
+        long,
+        value_name = "LENGTH",
+        value_parser = values::length_with_unit,
+        conflicts_with = "weights"
+    )]
     max_deviation: Option<f64>,
     /// No patch wider than this [default: for `discretize` no limit, for `lambda` a sixteenth of the
     /// lowest height, over which forces change little]
@@ -159,7 +174,7 @@ pub struct SamplingFlags {
         long,
         value_name = "SPACING",
         value_parser = values::length_with_unit,
-        conflicts_with = "max_deviation"
+        conflicts_with_all = ["max_deviation", "weights"]
     )]
     poisson: Option<f64>,
     /// Which random points

@@ -7,6 +7,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::lambda::Criterion;
 use crate::map::Components;
+use crate::point_weights::Weights;
 use crate::shape::document::{Up, parse_unit};
 use crate::units::m_from_mm;
 
@@ -15,6 +16,13 @@ pub fn criterion() -> impl TypedValueParser<Value = Criterion> {
     let of = |criterion: &Criterion| PossibleValue::new(criterion.name()).help(criterion.meaning());
     let names = PossibleValuesParser::new(Criterion::ALL.iter().map(of));
     names.try_map(|name| name.parse::<Criterion>())
+}
+
+/// How points count, by name.
+pub fn weights() -> impl TypedValueParser<Value = Weights> {
+    let of = |one: &Weights| PossibleValue::new(one.name()).help(one.meaning());
+    let names = PossibleValuesParser::new(Weights::ALL.iter().map(of));
+    names.try_map(|name| name.parse::<Weights>())
 }
 
 /// Any components of a map by their name.

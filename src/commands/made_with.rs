@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::bundle::artefact::Input;
 use crate::bundle::manifest::SurfaceOptions;
+use crate::point_weights::Weights;
 use crate::shape::document::{AxisRequest, ShapeDocument, SurfaceSource, Up};
 
 /// What the command line says of a surface; `None` where a shape file says it.
@@ -43,6 +44,8 @@ pub fn surface(document: &ShapeDocument, file: Option<&Input>) -> Option<Surface
 /// Those of `discretize`.
 #[derive(Serialize)]
 pub(crate) struct PointsAsked {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weights: Option<Weights>,
     pub holes: Option<&'static str>,
     pub certify: Option<&'static str>,
     pub max_deviation_m: Option<f64>,

@@ -55,6 +55,7 @@ mod criteria;
 pub mod feedback;
 mod given;
 mod homotopy;
+pub mod limit;
 mod model;
 mod path;
 mod power;

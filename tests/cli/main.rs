@@ -16,6 +16,7 @@ mod streams;
 mod surfaces;
 mod sweep;
 mod verify;
+mod weights;
 
 /// The array of the reference design without steel.
 const SEED: &str = "designs/seed_air.toml";

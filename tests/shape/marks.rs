@@ -449,6 +449,7 @@ fn a_grids_marks_agree_with_its_heights() {
             ..Placement::default()
         },
         grid: GridRequest { x: axis, y: axis },
+        weights: None,
     };
     let settings = Settings {
         marks: true,

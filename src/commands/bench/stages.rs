@@ -118,7 +118,7 @@ impl<'a> Bench<'a> {
             Points::Grid(samples) => {
                 let document = with_samples(document, samples);
                 let report = discretize::run(&document, Vec::new(), progress)?;
-                Ok(WantedPoints::of_grid(&report))
+                Ok(WantedPoints::of_grid(&report, self.request.lambda.weights))
             }
             Points::Graded {
                 max_deviation_m,
@@ -199,7 +199,10 @@ impl<'a> Bench<'a> {
         let grid = report.discretized.points.clone();
         self.inside(&shape.document.name, &grid)?;
         let (solved, steel_s) = self.steel(self.request.lambda.tolerance)?;
-        let (_, lambda_s) = self.lambda(&solved, &WantedPoints::of_grid(&report))?;
+        let (_, lambda_s) = self.lambda(
+            &solved,
+            &WantedPoints::of_grid(&report, self.request.lambda.weights),
+        )?;
         let samples = present_samples(self.scene.design);
         let (_, map_s) = self.map(&solved, &grid, samples)?;
         Ok(Present {

@@ -12,6 +12,7 @@ use crate::bundle::lambda_file::LambdaFile;
 use crate::bundle::manifest::Manifest;
 use crate::bundle::table::PointRow;
 use crate::bundle::write::{BundleContent, sealed_manifest};
+use crate::commands::lambda::WantedPoints;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::cached_field::FieldStore;
@@ -27,6 +28,8 @@ pub struct Expected {
     pub lambda: LambdaFile,
     /// `points.csv`.
     pub points: Vec<PointRow>,
+    /// How its points count in the mean; `None`: all alike.
+    pub weights: Option<Vec<f64>>,
 }
 
 /// Computes the bundle of `shape` on `scene` again. Nothing is written, and nothing that an
@@ -62,6 +65,9 @@ pub fn expected(
     let (manifest, lambda) = calibration.compute(&points, progress, seal)?;
     Ok(Expected {
         manifest,
+        weights: WantedPoints::of_grid(&points, options.lambda.weights)
+            .weights()
+            .map(<[f64]>::to_vec),
         points: point_rows(&points.discretized.points),
         lambda: lambda.file,
     })

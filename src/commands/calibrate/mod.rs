@@ -109,6 +109,7 @@ impl CalibrateOptions {
         let LambdaOptions {
             settings,
             tolerance,
+            weights,
             // Of `lambda` alone.
             sampling: _,
             wiring: _,
@@ -126,6 +127,7 @@ impl CalibrateOptions {
             jnd: Some(jnd_weight),
             at_n_per_m,
             tolerance: *tolerance,
+            weights: *weights,
             reach_m: *reach_m,
             report: *page,
             arithmetic: arithmetic(),
@@ -402,7 +404,7 @@ impl Calibration<'_> {
             picture: self.options.page,
             ..self.options.lambda.clone()
         };
-        let of_grid = WantedPoints::of_grid(points);
+        let of_grid = WantedPoints::of_grid(points, self.options.lambda.weights);
         let mut lambda = solve_at(scene, &solved.forces, field, &of_grid, &options, progress)?;
         sideways::add(
             &mut lambda.file,

@@ -101,6 +101,7 @@ impl Inspected {
                     x: extent,
                     y: extent,
                 },
+                weights: None,
             },
             stated_m,
             placed: false,

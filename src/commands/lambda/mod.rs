@@ -29,6 +29,7 @@ use crate::design::Design;
 use crate::lambda::worst::worst_point;
 use crate::lambda::{self, ForceProblem, Precision, Settings, Solution, Status, Wiring};
 use crate::plot::lambda::LambdaPlot;
+use crate::point_weights::Weights;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::cached_field::ShapeField;
@@ -50,6 +51,8 @@ pub struct LambdaOptions {
     pub settings: Settings,
     /// Tolerance of the forces; `None` for the default.
     pub tolerance: Option<f64>,
+    /// How the points of a grid count; `None`: as their shape's document says.
+    pub weights: Option<Weights>,
     /// Points on no grid, weighted by area, instead of the grid's; of [`run`] alone.
     pub sampling: Option<Sampling>,
     /// Coils broken or in series.
@@ -109,7 +112,7 @@ pub fn run(
 ) -> Result<(PointsReport, LambdaReport), RunError> {
     let scene = Scene::with_tolerance(design, options.tolerance)?;
     let points = discretize::run(document, inputs.clone(), progress)?;
-    let of_grid = WantedPoints::of_grid(&points);
+    let of_grid = WantedPoints::of_grid(&points, options.weights);
     let sampling = options
         .sampling
         .map(|how| resolving(how, of_grid.lowest_m()));
@@ -163,8 +166,10 @@ pub fn run(
     if let Some(coarser) = coarser {
         let other = solve_with(&coarser, &plain)?.file;
         let stage = quadrature(&report.file, &other);
-        let stage = stage.map(|stage| ("quadrature".to_owned(), stage));
-        report.file.accuracy.extend(stage);
+        for name in ["quadrature", "lambda_of_points"] {
+            let stage = stage.clone().map(|stage| (name.to_owned(), stage));
+            report.file.accuracy.extend(stage);
+        }
     }
     report.file.sampling = Some(against_grid(&sampled.summary, &report.file, &grid));
     Ok((points, report))
@@ -272,7 +277,7 @@ pub(crate) fn solve_at(
         forces_n_per_a: &forces_n_per_a,
         height_m: &points.height_m,
         offset_n: passive_n.as_deref().filter(|_| counts),
-        weights: points.weights.as_deref(),
+        weights: points.weights(),
         lower_a: &scene.lower_a,
         upper_a: &scene.upper_a,
         total_max_a: scene.design.supply.total_current_max_a,
@@ -342,8 +347,13 @@ impl PosedProblem<'_> {
             warnings.extend(along_curve.warning);
         }
         file.accuracy.extend(self.points.stages());
-        if let Some(moved) = self.effect_of_points(progress)? {
-            file.accuracy.insert("lambda_of_points".to_owned(), moved);
+        let effects = [
+            ("lambda_of_points", self.effect_of_number(&file)?),
+            ("lambda_of_heights", self.effect_of_heights(progress)?),
+        ];
+        for (name, moved) in effects {
+            file.accuracy
+                .extend(moved.map(|stage| (name.to_owned(), stage)));
         }
         Ok(LambdaReport {
             file,

@@ -147,6 +147,7 @@ pub(super) fn options(bundle: &Bundle) -> Result<CalibrateOptions, String> {
     options.lambda = LambdaOptions {
         settings,
         tolerance: made_with.and_then(|made| made.tolerance),
+        weights: made_with.and_then(|made| made.weights),
         ..LambdaOptions::default()
     };
     match made_with {

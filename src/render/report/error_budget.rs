@@ -47,24 +47,31 @@ pub(super) fn section(object: &CalibratedObject, data: &mut Map<String, Value>) 
 fn budget(object: &CalibratedObject) -> Vec<BudgetPart> {
     let (manifest, file) = (object.manifest, object.lambda);
     let estimate = |stage: &str| manifest.accuracy.get(stage).map_or(0.0, |s| s.estimate);
-    let heights = ["points_tessellation", "points_grid", "points"].map(estimate);
+    let heights = ["points_tessellation", "points"].map(estimate);
     let all: f64 = heights.iter().sum();
-    let (per_m, basis) = match manifest.accuracy.get("lambda_of_points") {
+    let lowest_m = object.lowest_m();
+    let over_lowest = if lowest_m > 0.0 { 1.0 / lowest_m } else { 0.0 };
+    let (per_m, basis) = match manifest.accuracy.get("lambda_of_heights") {
         Some(moved) if all > 0.0 => (
             moved.estimate / all,
             "height error, times what heights change in lambda",
         ),
-        Some(_) | None => {
-            let lowest = object.lowest_m();
-            let part = if lowest > 0.0 { 1.0 / lowest } else { 0.0 };
-            (part, "height error over the lowest height")
-        }
+        Some(_) | None => (over_lowest, "height error over the lowest height"),
     };
     let part = |name, part: f64, basis| BudgetPart { name, part, basis };
     let mut parts = vec![
         part("tessellation", heights[0] * per_m, basis),
-        part("grid of points", heights[1] * per_m, basis),
-        part("rounding in the file", heights[2] * per_m, basis),
+        part("rounding in the file", heights[1] * per_m, basis),
+        part(
+            "number of points",
+            estimate("lambda_of_points"),
+            "of lambda, against the limit of ever more points",
+        ),
+        part(
+            "between points",
+            estimate("points_grid") * over_lowest,
+            "how far a runtime's heights lie off the surface, over the lowest height",
+        ),
         part(
             "field",
             estimate("forces"),

@@ -117,6 +117,7 @@ impl ShapeDocument {
             bodies: surface.bodies.clone(),
             scale: surface.scale,
             placement: surface.placement,
+            weights: None,
         })
     }
 }
