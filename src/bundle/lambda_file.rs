@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::artefact::Input;
+use super::headline::Headline;
 use fluxform_base::accuracy::StageAccuracy;
 use fluxform_base::point_weights::Weights;
 use fluxform_lambda::feedback::Rendered;
@@ -91,6 +92,9 @@ pub struct LambdaFile {
     /// it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sideways: Option<Sideways>,
+    /// What the result comes to; absent without a lambda and in files of programs without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub headline: Option<Headline>,
     /// Each stage's estimated error.
     pub accuracy: BTreeMap<String, StageAccuracy>,
 }

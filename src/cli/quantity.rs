@@ -93,9 +93,15 @@ pub fn force(force_n: f64) -> String {
     }
 }
 
+/// Lengths' errors below this are rounding of doubles, m.
+const ROUNDING_M: f64 = 1e-12;
+
 /// A length's error: one or two digits.
 #[must_use]
 pub fn length_error(error_m: f64) -> String {
+    if error_m < ROUNDING_M {
+        return "below 1 pm".to_owned();
+    }
     si_to(error_m, "m", 2)
 }
 
@@ -181,6 +187,8 @@ mod tests {
         assert_eq!(force(0.000_641_3), "0.6413 mN");
         assert_eq!(force(-1.3), "-1.3 N");
         assert_eq!(length_error(2.980_2e-9), "3 nm");
+        // `5.6e-6 pm` was printed of a formula.
+        assert_eq!(length_error(5.6e-18), "below 1 pm");
         assert_eq!(count(1, "coil"), "1 coil");
     }
 }

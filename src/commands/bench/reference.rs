@@ -8,9 +8,9 @@ use crate::bundle::bench::Reference;
 use crate::lambda::{self, ForceProblem, Solution};
 use crate::map::FieldMap;
 use crate::numerics::axis::Axis;
-use crate::numerics::lagrange::locate;
 use crate::progress::Silent;
 use crate::scene::Scene;
+use crate::scene::felt_force::by_map;
 use crate::scene::passive;
 use crate::scene::sources::ShapeSource;
 use crate::scene::steel;
@@ -226,30 +226,21 @@ impl Places {
         lambda_n_per_m: f64,
         currents_a: &[f64],
     ) -> Result<f64, RunError> {
-        let nodes = map.x_m.len() * map.y_m.len() * map.z_m.len();
         let mut largest = 0.0_f64;
         for (place, direct) in self
             .position_m
             .iter()
             .zip(self.forces_n_per_a.chunks(self.coils))
         {
-            let cell = locate([&map.x_m, &map.y_m, &map.z_m], *place).ok_or_else(|| {
+            let by_map = by_map(map, self.moment_a_m2, currents_a, *place).ok_or_else(|| {
                 RunError::Input(format!(
                     "shape {:?}: a place of its surface lies outside the map",
                     self.shape
                 ))
             })?;
-            let mut difference = 0.0;
-            for (at, coil) in map.coils.iter().enumerate() {
-                let gz = cell.value(&map.gz_t_per_m_per_a[at * nodes..(at + 1) * nodes]);
-                let [m_x, m_y, m_z] = self.moment_a_m2;
-                let mut force = m_z * gz;
-                if let Some(gradient) = &map.gradient_t_per_m_per_a {
-                    let own = &gradient[9 * at * nodes..9 * (at + 1) * nodes];
-                    force += m_x * cell.component(own, 9, 2) + m_y * cell.component(own, 9, 5);
-                }
-                difference += currents_a[*coil] * (force - direct[*coil]);
-            }
+            // A coil that the map leaves out gives no force by it.
+            let direct: f64 = direct.iter().zip(currents_a).map(|(f, i)| f * i).sum();
+            let difference = by_map - direct;
             let target = lambda_n_per_m * place[2];
             largest = largest.max((difference / target).abs());
         }

@@ -11,7 +11,7 @@ use super::CalibrateReport;
 use super::DEFAULT_REACH_M;
 use super::plan::{Cost, Done, Plan, plan};
 use super::run;
-use crate::bundle::lambda_file::WorkingPointForces;
+use crate::bundle::lambda_file::{LambdaFile, WorkingPointForces};
 use crate::bundle::manifest::Manifest;
 use crate::cli::args::{SurfaceFlags, Tolerance, WeightsFlag, Writing};
 use crate::cli::budget::{allow, cost_origin, costs};
@@ -31,6 +31,7 @@ use crate::cli::values::{self, FileArgument};
 use crate::commands::lambda::LambdaOptions;
 use crate::commands::lambda::command::{CriterionFlags, rendered};
 use crate::design::{Design, Need};
+use crate::digits::with_error;
 use crate::scene::cost::{Components, of_map};
 use crate::scene::sources::DesignSource;
 
@@ -242,6 +243,7 @@ fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> String {
         ),
     );
     sheet.line("given", &given(report));
+    sheet.line("computed", &force_errors(report));
     sheet.line("sideways", &sideways(report));
     sheet.line("accuracy", &accuracies(report));
     if let Some(steel) = working_points(report) {
@@ -296,7 +298,7 @@ fn shapes_table(report: &CalibrateReport) -> String {
         vec![
             ("shape", file.shape.clone()),
             ("points", file.points.to_string()),
-            ("lambda N/m", or_none(file.lambda_n_per_m.map(number))),
+            ("lambda N/m", or_none(lambda(file))),
             (
                 "rms mN",
                 or_none(file.rms_error_n.map(|n| number(n * 1000.0))),
@@ -310,6 +312,13 @@ fn shapes_table(report: &CalibrateReport) -> String {
         ]
     };
     headed_table(report.bundles.iter().map(row))
+}
+
+/// lambda with its error, N/m.
+fn lambda(file: &LambdaFile) -> Option<String> {
+    let headline = file.headline.as_ref();
+    let known = headline.map(|of| with_error(of.lambda_n_per_m, of.lambda_error_n_per_m));
+    known.or_else(|| file.lambda_n_per_m.map(number))
 }
 
 /// Every force constant, one row per shape.
@@ -369,8 +378,18 @@ fn working_points(report: &CalibrateReport) -> Option<String> {
 fn given(report: &CalibrateReport) -> String {
     let lines = report.bundles.iter().filter_map(|bundle| {
         let file = &bundle.lambda.file;
-        let given = describe::given_force(file.given_force.as_ref()?);
-        Some(format!("{}: {given}", file.shape))
+        let given = describe::given_force(file.headline.as_ref()?);
+        Some(format!("{}: {}", file.shape, given.replace('\n', "\n  ")))
+    });
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// What the computation of every shape adds to the force.
+fn force_errors(report: &CalibrateReport) -> String {
+    let lines = report.bundles.iter().filter_map(|bundle| {
+        let file = &bundle.lambda.file;
+        let error = describe::force_error(file.headline.as_ref()?);
+        Some(format!("{}: {}", file.shape, error.replace('\n', "\n  ")))
     });
     lines.collect::<Vec<_>>().join("\n")
 }

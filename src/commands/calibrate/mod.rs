@@ -15,7 +15,9 @@ use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS, arithmetic};
 use crate::bundle::atomic::WriteError;
 use crate::bundle::cache::Store;
+use crate::bundle::headline::{BudgetName, BudgetPart};
 use crate::bundle::json::displayed;
+use crate::bundle::lambda_file::LambdaFile;
 use crate::bundle::manifest::{
     AxisSummary, CircuitSummary, Interpolation, LambdaSummary, LeftOut, MadeWith, Manifest,
     PassiveForce,
@@ -44,12 +46,14 @@ use crate::shape::points::ConstraintPoints;
 pub(crate) mod again;
 pub(crate) mod command;
 mod ignored_pull;
+mod map_effect;
 mod page;
 pub mod plan;
 mod recorded;
 
 pub use crate::report::bundle_files::PAGE_FILE;
 pub(crate) use ignored_pull::IgnoredPull;
+use map_effect::{MapEffect, between_points};
 use plan::Plan;
 
 /// The name under which a bundle keeps the design it was made from.
@@ -320,6 +324,12 @@ impl BothSolved {
     }
 }
 
+/// The stated error of the pull at the points.
+fn passive_estimate(file: &LambdaFile) -> f64 {
+    let stage = file.accuracy.get("passive_force");
+    stage.map_or(0.0, |stage| stage.estimate)
+}
+
 /// Where the bundle of `shape` goes.
 fn folder_of(scene: &Scene, shape: &ShapeSource, options: &CalibrateOptions) -> PathBuf {
     let design = options.out.join(&scene.design.name);
@@ -425,6 +435,7 @@ impl Calibration<'_> {
             lambda.warnings.extend(ignored.warning(lambda.file.jnd));
             needed.left_out.push(ignored.left_out());
         }
+        self.add_to_headline(&mut lambda, points, &needed, passive.as_ref(), progress)?;
         let manifest = self.manifest(&lambda, grid_points, &needed, passive.as_ref());
         lambda
             .warnings
@@ -452,6 +463,52 @@ impl Calibration<'_> {
         content.extra = &extra;
         let manifest = take(&content)?;
         Ok((manifest, lambda))
+    }
+
+    /// What a runtime adds to the error of lambda: heights and forces between points and nodes.
+    fn add_to_headline(
+        &self,
+        lambda: &mut LambdaReport,
+        points: &PointsReport,
+        needed: &NeededMap,
+        passive: Option<&PassiveMap>,
+        progress: &dyn Progress,
+    ) -> Result<(), RunError> {
+        let of_pull = passive_estimate(&lambda.file);
+        let currents_a = lambda.file.currents_a.as_deref();
+        let (Some(currents_a), Some(amplification)) = (currents_a, lambda.amplification) else {
+            return Ok(());
+        };
+        let Some(headline) = &mut lambda.file.headline else {
+            return Ok(());
+        };
+        let effect = MapEffect {
+            scene: self.scene,
+            solved: &self.solved.forces,
+            field: self.field,
+            points: &points.discretized.points,
+            lambda_n_per_m: headline.lambda_n_per_m,
+            currents_a,
+        };
+        let (heights, jumps) = between_points(points);
+        let made = &needed.made;
+        let nodes = amplification.part(BudgetName::MapNodes, made.accuracy.estimate);
+        let interpolation = effect.interpolation(&made.map, progress)?;
+        // The pull's own table: of the largest pull, which is relative to the same force.
+        let share = headline.error_of(BudgetName::Pull) / of_pull;
+        let pull = passive.filter(|_| share.is_finite()).map(|passive| BudgetPart {
+            part: BudgetName::PullMap,
+            error: share * (passive.accuracy.estimate + passive.between),
+            how: "the stated errors of the pull's map, times its largest share of the requested force"
+                .to_owned(),
+        });
+        headline.jumps = jumps;
+        headline.add(
+            [heights, Some(nodes), interpolation, pull]
+                .into_iter()
+                .flatten(),
+        );
+        Ok(())
     }
 
     /// The page and the plots beside `content`, if they are requested.

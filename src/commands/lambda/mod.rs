@@ -3,6 +3,7 @@
 mod accuracy;
 pub(crate) mod command;
 pub mod feedback;
+mod headline;
 mod picture;
 mod points;
 mod points_effect;
@@ -17,6 +18,7 @@ use serde::Serialize;
 
 pub(crate) use self::accuracy::proven_accuracy;
 use self::feedback::FeedbackOptions;
+use self::headline::Amplification;
 pub(crate) use self::points::WantedPoints;
 use super::discretize::scattered;
 use super::discretize::scattered::ScatteredSummary;
@@ -24,6 +26,7 @@ use super::discretize::{self, PointsReport};
 use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed};
 use crate::bundle::artefact::Input;
+use crate::bundle::headline::{BudgetName, BudgetPart};
 use crate::bundle::lambda_file::{LambdaFile, SampledPoints};
 use crate::design::Design;
 use crate::lambda::worst::worst_point;
@@ -72,6 +75,9 @@ pub struct LambdaReport {
     /// The JSON result.
     #[serde(flatten)]
     pub file: LambdaFile,
+    /// How errors relative to the largest gradient count in the force.
+    #[serde(skip)]
+    pub(crate) amplification: Option<Amplification>,
     /// The drawing, if one was requested.
     #[serde(skip)]
     pub picture: Option<LambdaPlot>,
@@ -166,6 +172,13 @@ pub fn run(
     if let Some(coarser) = coarser {
         let other = solve_with(&coarser, &plain)?.file;
         let stage = quadrature(&report.file, &other);
+        if let (Some(headline), Some(stage)) = (&mut report.file.headline, &stage) {
+            headline.add([BudgetPart {
+                part: BudgetName::Points,
+                error: stage.estimate,
+                how: stage.method.clone(),
+            }]);
+        }
         for name in ["quadrature", "lambda_of_points"] {
             let stage = stage.clone().map(|stage| (name.to_owned(), stage));
             report.file.accuracy.extend(stage);
@@ -295,21 +308,20 @@ pub(crate) fn solve_at(
             .as_ref()
             .map_or(unwired, |rewired| rewired.problem(&unwired)),
     };
-    let mut report = posed.report(passive_n.as_deref(), progress)?;
-    if let Some(pull) = pull.filter(|_| counts) {
-        let stage = passive::accuracy(&pull);
-        (report.file.accuracy).insert("passive_force".to_owned(), stage);
-    }
+    let pull = pull.filter(|_| counts).map(|pull| passive::accuracy(&pull));
+    let mut report = posed.report(passive_n.as_deref(), pull, progress)?;
     report.accuracy_missed = missed(&report.file.accuracy, solved.tolerance);
     Ok(report)
 }
 
 impl PosedProblem<'_> {
     /// Solves the problem and all that is requested with it; `progress` is within the stage
-    /// `lambda`. `passive_n` is the force without currents, whether or not the problem counts it.
+    /// `lambda`. `passive_n` is the force without currents, whether or not the problem counts it;
+    /// `pull` what is known of its error, where it does.
     fn report(
         &self,
         passive_n: Option<&[f64]>,
+        pull: Option<StageAccuracy>,
         progress: &dyn Progress,
     ) -> Result<LambdaReport, RunError> {
         let (options, problem) = (self.options, &self.problem);
@@ -322,6 +334,8 @@ impl PosedProblem<'_> {
         let mut warnings = warnings::all(self, &solution, &worst);
         warnings.extend(self.core_warnings(&solution)?);
         let mut file = self.file(&solution, &worst)?;
+        let pull = pull.map(|stage| ("passive_force".to_owned(), stage));
+        file.accuracy.extend(pull);
         if options.variants {
             file.variants = Some(variants::all(self, passive_n)?);
         }
@@ -355,8 +369,12 @@ impl PosedProblem<'_> {
             file.accuracy
                 .extend(moved.map(|stage| (name.to_owned(), stage)));
         }
+        let headline = self.headline(&file, progress)?;
+        let amplification = headline.as_ref().map(|(_, amplification)| *amplification);
+        file.headline = headline.map(|(headline, _)| headline);
         Ok(LambdaReport {
             file,
+            amplification,
             picture,
             status: solution.status,
             precision: solution.precision,
