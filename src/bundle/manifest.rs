@@ -73,6 +73,12 @@ pub struct MadeWith {
     pub at_n_per_m: Option<f64>,
     /// `--tolerance`; null for the default.
     pub tolerance: Option<f64>,
+    /// `--error`, relative; absent without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error: Option<f64>,
+    /// `--refine`; absent without it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub refine: bool,
     /// `--weights`; absent without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights: Option<Weights>,
@@ -115,6 +121,9 @@ pub struct SurfaceOptions {
     pub rotate_deg: [f64; 3],
     /// Samples of the grid along x and y.
     pub samples: [usize; 2],
+    /// Whether a flag gave them; absent where not.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub samples_are_given: bool,
     /// Ends of the grid along x, m; null for the surface's own extent.
     pub x_m: Option<[f64; 2]>,
     /// Ends of the grid along y, m; null for the surface's own extent.

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use super::values;
 use crate::point_weights::Weights;
 use crate::scene::sources::Sampling;
+use crate::scene::tolerances::ErrorTarget;
 use crate::shape::document::Up;
 use crate::shape::step::STEP_SECONDS;
 
@@ -83,6 +84,28 @@ pub struct WeightsFlag {
     /// else equal]
     #[arg(long, value_name = "RULE", value_parser = values::weights())]
     pub weights: Option<Weights>,
+}
+
+/// The largest error that the computation may add.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct ErrorFlags {
+    /// Largest error that the computation may add to the force, relative to the requested force, and
+    /// to lambda, like 1%: points, nodes and tolerances are chosen for it, points count by area;
+    /// grids that documents or flags give are obeyed, and what they cause is reported
+    #[arg(long, value_name = "PART", value_parser = values::error, allow_hyphen_values = true)]
+    error: Option<f64>,
+    /// With --error: choose the samples also where documents give them; extents stay
+    #[arg(long, requires = "error")]
+    refine: bool,
+}
+
+impl ErrorFlags {
+    /// What is requested, if anything is.
+    #[must_use]
+    pub fn target(self) -> Option<ErrorTarget> {
+        let refine = self.refine;
+        self.error.map(|error| ErrorTarget { error, refine })
+    }
 }
 
 /// Where what is written may replace what is there.

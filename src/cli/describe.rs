@@ -188,6 +188,37 @@ pub fn force_error(headline: &Headline) -> String {
     lines.join("\n")
 }
 
+/// What a requested error came to; `None` where none was requested.
+pub fn requested_error(headline: &Headline) -> Option<String> {
+    let requested = headline.requested.as_ref()?;
+    let grid = |points: &[usize]| {
+        let samples: Vec<String> = points.iter().map(usize::to_string).collect();
+        samples.join(" x ")
+    };
+    let chosen = |points: [usize; 2], nodes: Option<[usize; 3]>| {
+        let nodes = nodes.map_or_else(String::new, |nodes| format!(", {} nodes", grid(&nodes)));
+        format!("{} points{nodes}", grid(&points))
+    };
+    let holds = if requested.met { "holds" } else { "exceeds" };
+    let mut lines = vec![format!(
+        "{} {holds} the requested {}: {}, tolerance {}",
+        share(headline.force_error),
+        share(requested.error),
+        chosen(requested.points, requested.nodes),
+        error(requested.tolerance)
+    )];
+    lines.extend(requested.fixed.iter().cloned());
+    lines.extend(requested.elsewhere.iter().map(|run| {
+        format!(
+            "at {} about {} times the work: {} (an estimate)",
+            share(run.error),
+            number_to(run.work, 2),
+            chosen(run.points, run.nodes)
+        )
+    }));
+    Some(lines.join("\n"))
+}
+
 /// An error's share of a whole, in two digits.
 fn share(part: f64) -> String {
     if part < 1e-5 {

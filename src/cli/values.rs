@@ -8,6 +8,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use crate::lambda::Criterion;
 use crate::map::Components;
 use crate::point_weights::Weights;
+use crate::scene::tolerances::ErrorTarget;
 use crate::shape::document::{Up, parse_unit};
 use crate::units::m_from_mm;
 
@@ -188,6 +189,23 @@ pub fn tolerance(text: &str) -> Result<f64, String> {
              field gradient |grad B|, like 1e-9",
             TOLERANCE.start(),
             TOLERANCE.end()
+        ))
+    }
+}
+
+/// A relative error: a part, or per cent with a `%`.
+pub fn error(text: &str) -> Result<f64, String> {
+    let value = match text.strip_suffix('%') {
+        Some(percent) => number(percent)? / 100.0,
+        None => number(text)?,
+    };
+    if ErrorTarget::RANGE.contains(&value) {
+        Ok(value)
+    } else {
+        Err(format!(
+            "invalid error {text}: expected a part of the force from {:e} to {}, like 1% or 0.01",
+            ErrorTarget::RANGE.start(),
+            ErrorTarget::RANGE.end()
         ))
     }
 }

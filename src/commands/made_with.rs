@@ -29,6 +29,7 @@ pub fn surface(document: &ShapeDocument, file: Option<&Input>) -> Option<Surface
         translate_m: document.placement.translate_m,
         rotate_deg: document.placement.rotate_deg,
         samples: [parts(x).0, parts(y).0],
+        samples_are_given: document.grid_is_given,
         x_m: parts(x).1,
         y_m: parts(y).1,
         up: (seat.up != Up::default()).then(|| seat.up.name().to_owned()),

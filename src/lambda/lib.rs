@@ -73,6 +73,6 @@ pub use fluxform_base::force_constant::{Criterion, ForceConstants, NamedConstant
 pub use given::{GivenForce, lowest_requested_m};
 pub use path::{Breakpoint, Event, Path};
 pub use problem::{ForceProblem, ProblemError, Settings};
-pub use solve::{OperatingPoint, Precision, Solution, Status, solve};
+pub use solve::{OperatingPoint, Precision, Solution, Status, constant, solve};
 pub use vector_allocation::{VectorAllocation, VectorAllocator};
 pub use wiring::{Rewired, Wiring, WiringError};

@@ -240,10 +240,7 @@ pub fn solve(problem: &ForceProblem, settings: &Settings) -> Result<Solution, Pr
 ///
 /// # Errors
 /// As [`solve`].
-pub(super) fn constant(
-    problem: &ForceProblem,
-    settings: &Settings,
-) -> Result<Option<f64>, ProblemError> {
+pub fn constant(problem: &ForceProblem, settings: &Settings) -> Result<Option<f64>, ProblemError> {
     problem.validate(settings)?;
     let largest = largest_entries(problem);
     problem.comparable(&largest)?;

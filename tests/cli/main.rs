@@ -3,6 +3,7 @@
 
 mod budget;
 mod codes;
+mod error_target;
 mod files;
 mod help;
 mod interrupt;

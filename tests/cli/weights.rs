@@ -51,7 +51,7 @@ fn the_wedge_at_61_points_is_off_by_what_is_stated() {
     assert!((1.7..2.4).contains(&order), "{order}");
     for one in [&equal, &coarse, &fine] {
         let (stated, off) = (stated(one), off(one));
-        assert!(stated >= off && stated < 10.0 * off, "{stated} of {off}");
+        assert!(stated >= off && stated < 40.0 * off, "{stated} of {off}");
     }
 }
 

@@ -62,6 +62,7 @@ fn exactly(primitive: Primitive, placement: Placement, grid: GridRequest) -> Sha
         placement,
         grid,
         weights: None,
+        grid_is_given: true,
     }
 }
 

@@ -86,6 +86,7 @@ pub fn file(path: &Path, unit_m: f64, placement: Placement, grid: GridRequest) -
         placement,
         grid,
         weights: None,
+        grid_is_given: true,
     }
 }
 

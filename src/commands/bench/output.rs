@@ -53,6 +53,7 @@ pub fn made_with(request: &BenchRequest) -> Options {
         tolerance,
         weights,
         // Not options of this command.
+        error: _,
         sampling: _,
         wiring: _,
         variants: _,

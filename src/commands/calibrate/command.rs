@@ -13,7 +13,7 @@ use super::plan::{Cost, Done, Plan, plan};
 use super::run;
 use crate::bundle::lambda_file::{LambdaFile, WorkingPointForces};
 use crate::bundle::manifest::Manifest;
-use crate::cli::args::{SurfaceFlags, Tolerance, WeightsFlag, Writing};
+use crate::cli::args::{ErrorFlags, SurfaceFlags, Tolerance, WeightsFlag, Writing};
 use crate::cli::budget::{allow, cost_origin, costs};
 use crate::cli::describe;
 use crate::cli::documents;
@@ -50,6 +50,8 @@ use crate::scene::sources::DesignSource;
      "a surface given directly; its bundle is called wedge"),
     ("fluxform calibrate designs/seed_air.toml shapes/flat.toml --explain",
      "report first what will be computed, what left out, and what that costs"),
+    ("fluxform calibrate designs/seed_air.toml shapes/flat.toml --error 1% --refine --out budget",
+     "points, nodes and tolerances for an error of the force of 1 %"),
     ("fluxform calibrate designs/seed.toml shapes/flat.toml --criterion linear --out linear",
      "another criterion beside it; --force would replace what is there"),
 ]))]
@@ -80,6 +82,8 @@ pub struct Calibrate {
     #[command(flatten)]
     criterion: CriterionFlags,
     #[command(flatten)]
+    error: ErrorFlags,
+    #[command(flatten)]
     weights: WeightsFlag,
     #[command(flatten)]
     writing: Writing,
@@ -98,6 +102,7 @@ impl Calibrate {
         let out = folder(&self.out)?;
         let lambda = LambdaOptions {
             weights: self.weights.weights,
+            error: self.error.target(),
             ..self.criterion.options(self.tolerance.tolerance)
         };
         let (document, shapes) = documents::design_and_shapes(
@@ -226,6 +231,16 @@ fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> String {
         design.name,
         describe::array(design)
     ));
+    for bundle in &report.bundles {
+        let file = &bundle.lambda.file;
+        let requested = file.headline.as_ref().and_then(describe::requested_error);
+        if let Some(requested) = requested {
+            sheet.line(
+                "error",
+                &format!("{}: {}", file.shape, requested.replace('\n', "\n  ")),
+            );
+        }
+    }
     sheet.gap();
     sheet.raw(&shapes_table(report));
     sheet.gap();

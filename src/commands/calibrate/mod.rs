@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::discretize::{self, PointsReport, point_rows, points_grid};
+use super::lambda::error_target::{ChosenGrid, ErrorTarget, Trial};
+use super::lambda::map_error::{MapEffect, between_points};
 use super::lambda::{LambdaOptions, LambdaReport, WantedPoints, sideways, solve_at};
 use super::made_with::surface;
 use super::map::{arrays, runtime, summary, workspace_grid};
@@ -41,19 +43,18 @@ use crate::scene::passive_map::PassiveMap;
 use crate::scene::sources::{DesignSource, ShapeSource};
 use crate::scene::steel::Solved;
 use crate::scene::{MAGNET_SHARE, Scene};
+use crate::shape::document::ShapeDocument;
 use crate::shape::points::ConstraintPoints;
 
 pub(crate) mod again;
 pub(crate) mod command;
 mod ignored_pull;
-mod map_effect;
 mod page;
 pub mod plan;
 mod recorded;
 
 pub use crate::report::bundle_files::PAGE_FILE;
 pub(crate) use ignored_pull::IgnoredPull;
-use map_effect::{MapEffect, between_points};
 use plan::Plan;
 
 /// The name under which a bundle keeps the design it was made from.
@@ -114,6 +115,7 @@ impl CalibrateOptions {
             settings,
             tolerance,
             weights,
+            error,
             // Of `lambda` alone.
             sampling: _,
             wiring: _,
@@ -132,6 +134,8 @@ impl CalibrateOptions {
             at_n_per_m,
             tolerance: *tolerance,
             weights: *weights,
+            error: error.map(|target| target.error),
+            refine: error.is_some_and(|target| target.refine),
             reach_m: *reach_m,
             report: *page,
             arithmetic: arithmetic(),
@@ -198,7 +202,8 @@ pub fn run(
     progress: &dyn Progress,
 ) -> Result<CalibrateReport, RunError> {
     check_names(shapes)?;
-    let scene = Scene::with_tolerance(source.design, options.lambda.tolerance)?;
+    let tolerance = options.lambda.tolerance_for(source.design);
+    let scene = Scene::with_tolerance(source.design, tolerance)?;
     let curve = curve_table(&scene);
     // Before anything is computed, cleared or kept: a run that is refused changes nothing.
     for shape in shapes {
@@ -370,7 +375,11 @@ impl Calibration<'_> {
             self.options,
             folder_of(self.scene, self.shape, self.options),
         );
-        let points = self.points(progress)?;
+        let search = self.search(progress)?;
+        let document = search
+            .as_ref()
+            .map_or(&self.shape.document, |(_, chosen)| &chosen.document);
+        let points = self.points(document, progress)?;
         // Checked again with the digest of the surface that was parsed.
         let made_with = options.made_with(self.shape);
         let inputs = &points.summary.inputs;
@@ -386,7 +395,7 @@ impl Calibration<'_> {
             progress.end();
             Ok(manifest)
         };
-        let (manifest, lambda) = self.compute(&points, progress, write)?;
+        let (manifest, lambda) = self.compute(&points, search.as_ref(), progress, write)?;
         Ok(BundleReport {
             folder,
             outside: points.summary.outside,
@@ -396,9 +405,61 @@ impl Calibration<'_> {
     }
 
     /// The object's points; their inputs are those of the whole bundle.
-    fn points(&self, progress: &dyn Progress) -> Result<PointsReport, RunError> {
+    fn points(
+        &self,
+        document: &ShapeDocument,
+        progress: &dyn Progress,
+    ) -> Result<PointsReport, RunError> {
         let inputs = inputs(self.source, self.curve, self.shape);
-        discretize::run_cached(&self.shape.document, inputs, self.field, progress)
+        discretize::run_cached(document, inputs, self.field, progress)
+    }
+
+    /// The grid for the requested error, where there is one.
+    fn search(
+        &self,
+        progress: &dyn Progress,
+    ) -> Result<Option<(ErrorTarget, ChosenGrid)>, RunError> {
+        let Some(target) = self.options.lambda.error else {
+            return Ok(None);
+        };
+        let trial = Trial {
+            scene: self.scene,
+            solved: &self.solved.forces,
+            field: ShapeField::default(),
+            options: &self.options.lambda,
+            for_runtime: true,
+        };
+        let chosen = trial.grid(&self.shape.document, target, progress)?;
+        Ok(Some((target, chosen)))
+    }
+
+    /// The workspace's samples for the requested error; `None`: the design's own.
+    fn nodes(
+        &self,
+        search: Option<&(ErrorTarget, ChosenGrid)>,
+        lambda: &LambdaReport,
+        points: &ConstraintPoints,
+        progress: &dyn Progress,
+    ) -> Result<Option<[usize; 3]>, RunError> {
+        let design = self.scene.design;
+        let (Some((target, _)), Some(currents_a)) = (search, &lambda.file.currents_a) else {
+            return Ok(None);
+        };
+        let Some(headline) = &lambda.file.headline else {
+            return Ok(None);
+        };
+        if design.workspace.is_given && !target.refine {
+            return Ok(None);
+        }
+        let effect = MapEffect {
+            scene: self.scene,
+            solved: &self.solved.forces,
+            field: ShapeField::default(),
+            points,
+            lambda_n_per_m: headline.lambda_n_per_m,
+            currents_a,
+        };
+        effect.nodes(target.of_interpolation(), progress).map(Some)
     }
 
     /// Computes everything that a bundle holds and hands it to `take`, which returns the manifest
@@ -406,6 +467,7 @@ impl Calibration<'_> {
     fn compute(
         &self,
         points: &PointsReport,
+        search: Option<&(ErrorTarget, ChosenGrid)>,
         progress: &dyn Progress,
         take: impl FnOnce(&BundleContent) -> Result<Manifest, RunError>,
     ) -> Result<(Manifest, LambdaReport), RunError> {
@@ -414,7 +476,7 @@ impl Calibration<'_> {
             picture: self.options.page,
             ..self.options.lambda.clone()
         };
-        let of_grid = WantedPoints::of_grid(points, self.options.lambda.weights);
+        let of_grid = WantedPoints::of_grid(points, self.options.lambda.weights_of(points));
         let mut lambda = solve_at(scene, &solved.forces, field, &of_grid, &options, progress)?;
         sideways::add(
             &mut lambda.file,
@@ -426,7 +488,11 @@ impl Calibration<'_> {
         )?;
         let grid_points = &points.discretized.points;
         let reach_m = self.options.reach_m;
-        let mut needed = NeededMap::new(scene, &solved.map, field, grid_points, reach_m, progress)?;
+        let nodes = self.nodes(search, &lambda, grid_points, progress)?;
+        let gridded = nodes.map(|nodes| scene.design.with_nodes(nodes));
+        let design = gridded.as_ref().unwrap_or(scene.design);
+        let grid = (design, grid_points, reach_m);
+        let mut needed = NeededMap::new(scene, &solved.map, field, grid, progress)?;
         let passive = passive_map(scene, &needed.made.map, progress)?;
         progress.begin("passive force", 1);
         let ignored = IgnoredPull::new(scene, &lambda, &of_grid, field)?;
@@ -436,6 +502,10 @@ impl Calibration<'_> {
             needed.left_out.push(ignored.left_out());
         }
         self.add_to_headline(&mut lambda, points, &needed, passive.as_ref(), progress)?;
+        if let Some((target, chosen)) = search {
+            let tolerance = solved.forces.tolerance;
+            lambda.requested(*target, chosen, Some(&design.workspace), tolerance);
+        }
         let manifest = self.manifest(&lambda, grid_points, &needed, passive.as_ref());
         lambda
             .warnings
@@ -631,12 +701,11 @@ impl NeededMap {
         scene: &Scene,
         solved: &Solved,
         field: ShapeField,
-        points: &ConstraintPoints,
-        reach_m: f64,
+        (design, points, reach_m): (&Design, &ConstraintPoints, f64),
         progress: &dyn Progress,
     ) -> Result<Self, RunError> {
         let mut left_out = Vec::new();
-        let grid = needed_grid(scene.design, points, reach_m, &mut left_out);
+        let grid = needed_grid(design, points, reach_m, &mut left_out);
         let components = if scene.tilted() {
             Components::Gradient
         } else {

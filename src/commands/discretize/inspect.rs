@@ -102,6 +102,7 @@ impl Inspected {
                     y: extent,
                 },
                 weights: None,
+                grid_is_given: true,
             },
             stated_m,
             placed: false,

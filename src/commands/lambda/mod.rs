@@ -2,8 +2,10 @@
 
 mod accuracy;
 pub(crate) mod command;
+pub mod error_target;
 pub mod feedback;
 mod headline;
+pub(crate) mod map_error;
 mod picture;
 mod points;
 mod points_effect;
@@ -17,6 +19,7 @@ mod working_point;
 use serde::Serialize;
 
 pub(crate) use self::accuracy::proven_accuracy;
+use self::error_target::{ErrorTarget, Trial};
 use self::feedback::FeedbackOptions;
 use self::headline::Amplification;
 pub(crate) use self::points::WantedPoints;
@@ -56,6 +59,8 @@ pub struct LambdaOptions {
     pub tolerance: Option<f64>,
     /// How the points of a grid count; `None`: as their shape's document says.
     pub weights: Option<Weights>,
+    /// The largest error that the computation may add.
+    pub error: Option<ErrorTarget>,
     /// Points on no grid, weighted by area, instead of the grid's; of [`run`] alone.
     pub sampling: Option<Sampling>,
     /// Coils broken or in series.
@@ -95,6 +100,25 @@ pub struct LambdaReport {
     pub accuracy_missed: Vec<String>,
 }
 
+impl LambdaOptions {
+    /// How the points of a grid count: as requested, else as the document says, else equally, or by
+    /// area where an error is requested, since lambda of the object is meant then.
+    pub(crate) fn weights_of(&self, points: &PointsReport) -> Weights {
+        let default = match self.error {
+            None => Weights::Equal,
+            Some(_) => Weights::Area,
+        };
+        self.weights.or(points.weights).unwrap_or(default)
+    }
+
+    /// The tolerance of the field: as requested, else what a requested error leaves to steel. Air has
+    /// its default, which costs nothing.
+    pub(crate) fn tolerance_for(&self, design: &Design) -> Option<f64> {
+        let of_error = self.error.filter(|_| design.core.is_some());
+        self.tolerance.or(of_error.map(ErrorTarget::tolerance))
+    }
+}
+
 impl LambdaReport {
     /// Whether a force can be rendered: a force constant above zero, to the requested tolerance.
     #[must_use]
@@ -116,9 +140,28 @@ pub fn run(
     options: &LambdaOptions,
     progress: &dyn Progress,
 ) -> Result<(PointsReport, LambdaReport), RunError> {
-    let scene = Scene::with_tolerance(design, options.tolerance)?;
+    let scene = Scene::with_tolerance(design, options.tolerance_for(design))?;
+    let chosen;
+    let (document, search) = match options.error.filter(|_| options.sampling.is_none()) {
+        None => (document, None),
+        Some(target) => {
+            let lowest_m = design.workspace.z_m.from;
+            progress.begin("steel", 1);
+            let solved = steel::solve(&scene, scene.tolerances.forces, lowest_m)?;
+            progress.end();
+            let trial = Trial {
+                scene: &scene,
+                solved: &solved,
+                field: ShapeField::default(),
+                options,
+                for_runtime: false,
+            };
+            chosen = trial.grid(document, target, progress)?;
+            (&chosen.document, Some((target, &chosen)))
+        }
+    };
     let points = discretize::run(document, inputs.clone(), progress)?;
-    let of_grid = WantedPoints::of_grid(&points, options.weights);
+    let of_grid = WantedPoints::of_grid(&points, options.weights_of(&points));
     let sampling = options
         .sampling
         .map(|how| resolving(how, of_grid.lowest_m()));
@@ -143,6 +186,9 @@ pub fn run(
     };
     let (Some(chosen), Some(sampled)) = (chosen, sampled) else {
         let mut report = solve_with(&of_grid, options)?;
+        if let Some((target, chosen)) = search {
+            report.requested(target, chosen, None, scene.tolerances.forces);
+        }
         sideways::add(
             &mut report.file,
             &scene,

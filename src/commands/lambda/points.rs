@@ -29,8 +29,6 @@ pub(crate) struct WantedPoints {
     pub(crate) inputs: Vec<Input>,
     /// Each part of the heights' error; `points` is the rounding.
     pub(crate) accuracy: BTreeMap<&'static str, StageAccuracy>,
-    /// All parts together, m; `None` where the surface between the points was not looked at.
-    pub(crate) budget_m: Option<f64>,
     /// Where the points lie in their grid, if they are those of one.
     pub(super) grid: Option<GridPlaces>,
     /// Warnings for the user.
@@ -51,20 +49,19 @@ pub(super) struct GridPlaces {
 }
 
 impl WantedPoints {
-    /// Those of a grid, weighted as `requested`, else as their document says.
-    pub(crate) fn of_grid(report: &PointsReport, requested: Option<Weights>) -> Self {
+    /// Those of a grid, which count by `rule`.
+    pub(crate) fn of_grid(report: &PointsReport, rule: Weights) -> Self {
         let points = &report.discretized.points;
         let summary = &report.summary;
         Self {
             positions_m: positions_m(&points.x_m, &points.y_m, &points.height_m),
             height_m: points.height_m.clone(),
-            rule: requested.or(report.weights).unwrap_or_default(),
+            rule,
             areas: points.area_m2.clone(),
             graded: false,
             shape: summary.shape.clone(),
             inputs: summary.inputs.clone(),
             accuracy: summary.accuracy.clone(),
-            budget_m: summary.deviation.map(|deviation| deviation.budget_m),
             grid: Some(GridPlaces {
                 columns: points.grid.x_m.samples,
                 rows: points.grid.y_m.samples,
@@ -79,7 +76,6 @@ impl WantedPoints {
         let (points, summary) = (&report.points, &report.summary);
         // The patches' deviation is in it; without patches nothing is known between the points.
         let patches = summary.accuracy.contains_key("patches");
-        let budget_m = summary.accuracy.values().map(|stage| stage.estimate).sum();
         Self {
             positions_m: positions_m(&points.x_m, &points.y_m, &points.height_m),
             height_m: points.height_m.clone(),
@@ -89,7 +85,6 @@ impl WantedPoints {
             shape: summary.shape.clone(),
             inputs: summary.inputs.clone(),
             accuracy: summary.accuracy.clone(),
-            budget_m: patches.then_some(budget_m),
             grid: None,
             warnings: summary.warnings.clone(),
         }

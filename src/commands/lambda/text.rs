@@ -25,6 +25,9 @@ pub(super) fn summary(design: &Design, points: &PointsReport, report: &LambdaRep
             None => describe::force_constant(file.lambda_n_per_m),
         }
     ));
+    if let Some(requested) = file.headline.as_ref().and_then(describe::requested_error) {
+        sheet.line("error", &requested);
+    }
     let constants = file.constants.named().into_iter().map(|one| {
         let lambda = one.lambda_n_per_m.map_or_else(|| "none".to_owned(), number);
         format!("{} {lambda}", one.name)

@@ -28,6 +28,7 @@ use self::route::{FINER, Route};
 use super::calibrate::CalibrateOptions;
 use super::calibrate::PASSIVE_STAGE;
 use super::calibrate::again::{Expected, expected};
+use super::lambda::error_target::ErrorTarget;
 use crate::RunError;
 use crate::bundle::artefact::{Input, UNITS};
 use crate::bundle::load::Bundle;
@@ -157,7 +158,11 @@ impl Verifier {
             return Ok(());
         };
         let made_with = bundle.manifest.made_with.as_ref();
-        let tolerance = made_with.and_then(|made| made.tolerance);
+        let of_error = made_with.and_then(|made| made.error).map(|error| {
+            let refine = false;
+            ErrorTarget { error, refine }.tolerance()
+        });
+        let tolerance = made_with.and_then(|made| made.tolerance).or(of_error);
         // Solved again as the bundle was made, and to judge that a finer time.
         let finer = Tolerances::of_inductances(tolerance).min(CLAIMED_MAX) * FINER;
         let steel = cost::of_steel(design, Some(finer));

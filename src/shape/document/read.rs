@@ -80,7 +80,11 @@ fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
         seat: seat(root),
     };
     let bodies = bodies(root);
-    let (grid, weights) = points(root.section("points"));
+    let Points {
+        grid,
+        is_given,
+        weights,
+    } = points(root.section("points"));
     Some(ShapeDocument {
         name: name?,
         source: source?,
@@ -89,6 +93,7 @@ fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
         placement,
         grid: grid?,
         weights,
+        grid_is_given: is_given,
     })
 }
 
@@ -362,7 +367,15 @@ fn level(root: &mut Section<'_>, key: &'static str, default_mm: f64) -> f64 {
     m_from_mm(root.number_or(key, &BODY_MM, default_mm).value)
 }
 
-fn points(mut s: Section<'_>) -> (Option<GridRequest>, Option<Weights>) {
+/// `[points]`.
+struct Points {
+    grid: Option<GridRequest>,
+    is_given: bool,
+    weights: Option<Weights>,
+}
+
+fn points(mut s: Section<'_>) -> Points {
+    let is_given = s.has("x_mm") || s.has("y_mm");
     let x = s.axis_or("x_mm", &BODY_MM, SEED_SIDE_MM);
     let y = s.axis_or("y_mm", &BODY_MM, SEED_SIDE_MM);
     s.choice_or_first("outside", &[("skip", ())]);
@@ -385,5 +398,9 @@ fn points(mut s: Section<'_>) -> (Option<GridRequest>, Option<Weights>) {
         let [x, y] = axes.map(|axis| AxisRequest::Given(axis_m(axis)));
         GridRequest { x, y }
     });
-    (grid, weights)
+    Points {
+        grid,
+        is_given,
+        weights,
+    }
 }

@@ -6,6 +6,7 @@ use crate::bundle::headline::{BudgetName, BudgetPart};
 use crate::commands::discretize::PointsReport;
 use crate::lambda::lowest_requested_m;
 use crate::map::FieldMap;
+use crate::numerics::lagrange::stencil;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::cached_field::ShapeField;
@@ -28,7 +29,7 @@ const JUMP_SLOPE: f64 = 1.0;
 /// grid. A place is a jump where the slope changes by more than 1 (45 degrees) from one side of a node
 /// to the other; those are left out, their share is stated, and the rest is estimated from the second
 /// differences: of a bend anywhere in a cell interpolation is off by half of them at most.
-pub(super) fn between_points(points: &PointsReport) -> (Option<BudgetPart>, Option<f64>) {
+pub(crate) fn between_points(points: &PointsReport) -> (Option<BudgetPart>, Option<f64>) {
     let found = &points.discretized.points;
     let Some(lowest_m) = lowest_requested_m(&found.height_m) else {
         return (None, None);
@@ -127,21 +128,119 @@ fn middles(points: &ConstraintPoints) -> Vec<[f64; 3]> {
 }
 
 /// A map against the field itself, over the surface between its points.
-pub(super) struct MapEffect<'a> {
-    pub(super) scene: &'a Scene<'a>,
-    pub(super) solved: &'a Solved,
-    pub(super) field: ShapeField<'a>,
-    pub(super) points: &'a ConstraintPoints,
-    pub(super) lambda_n_per_m: f64,
-    pub(super) currents_a: &'a [f64],
+pub(crate) struct MapEffect<'a> {
+    pub(crate) scene: &'a Scene<'a>,
+    pub(crate) solved: &'a Solved,
+    pub(crate) field: ShapeField<'a>,
+    pub(crate) points: &'a ConstraintPoints,
+    pub(crate) lambda_n_per_m: f64,
+    pub(crate) currents_a: &'a [f64],
 }
 
+/// Places at which a map's samples are chosen: few, because each needs the field at 64 nodes.
+const CHOOSING_PLACES: usize = 32;
+/// Share of the design's samples that is tried first.
+const FIRST: f64 = 0.3;
+/// Attempts at most.
+const ATTEMPTS: usize = 6;
+/// The interpolation's order.
+const ORDER: f64 = 4.0;
+/// A little more than the law says, so that the next attempt holds.
+const SPARE: f64 = 1.08;
+/// Samples along an axis at most.
+const MOST_NODES: usize = 385;
+
 impl MapEffect<'_> {
+    /// The workspace's samples with which interpolation stays below `error`, as few as do.
+    ///
+    /// # Errors
+    /// Forces that cannot be computed; interruption.
+    pub(crate) fn nodes(
+        &self,
+        error: f64,
+        progress: &dyn Progress,
+    ) -> Result<[usize; 3], RunError> {
+        let workspace = &self.scene.design.workspace;
+        let axes = [workspace.x_m, workspace.y_m, workspace.z_m];
+        let all = middles(self.points);
+        let every = all.len().div_ceil(CHOOSING_PLACES).max(1);
+        let places: Vec<[f64; 3]> = all.into_iter().step_by(every).collect();
+        let mut factor = FIRST;
+        let mut samples = axes.map(|axis| axis.samples);
+        for _ in 0..ATTEMPTS {
+            progress.check()?;
+            samples = axes.map(|axis| match axis.samples {
+                1 => 1,
+                more => (((more - 1) as f64 * factor).round() as usize + 1).clamp(4, MOST_NODES),
+            });
+            let off = MARGIN * self.interpolated_off(samples, &places, progress)?;
+            if off <= error || samples.iter().all(|n| *n >= MOST_NODES) {
+                break;
+            }
+            factor *= (SPARE * (off / error).powf(1.0 / ORDER)).clamp(1.1, 2.0);
+        }
+        Ok(samples)
+    }
+
+    /// The largest relative difference between the field at `places` and its interpolation from a grid
+    /// of so many samples, of which only the nodes that take part are computed.
+    fn interpolated_off(
+        &self,
+        samples: [usize; 3],
+        places: &[[f64; 3]],
+        progress: &dyn Progress,
+    ) -> Result<f64, RunError> {
+        let workspace = &self.scene.design.workspace;
+        let [mut x, mut y, mut z] = [workspace.x_m, workspace.y_m, workspace.z_m];
+        (x.samples, y.samples, z.samples) = (samples[0], samples[1], samples[2]);
+        let nodes = [x.nodes(), y.nodes(), z.nodes()];
+        let mut positions = Vec::new();
+        let mut weights: Vec<Option<Vec<f64>>> = Vec::new();
+        for place in places {
+            let along = [0, 1, 2].map(|axis| stencil(&nodes[axis], place[axis]));
+            let [Some(x), Some(y), Some(z)] = along else {
+                weights.push(None);
+                continue;
+            };
+            let mut own = Vec::new();
+            for k in 0..z.count {
+                for j in 0..y.count {
+                    for i in 0..x.count {
+                        own.push(x.weights[i] * y.weights[j] * z.weights[k]);
+                        let at = [x.start + i, y.start + j, z.start + k];
+                        positions.push([0, 1, 2].map(|axis| nodes[axis][at[axis]]));
+                    }
+                }
+            }
+            positions.push(*place);
+            weights.push(Some(own));
+        }
+        let forces = (self.scene).forces_n_per_a(self.solved, &positions, progress)?;
+        let rows = forces.chunks_exact(self.scene.coils.len());
+        let total = rows.map(|row| {
+            row.iter()
+                .zip(self.currents_a)
+                .map(|(f, i)| f * i)
+                .sum::<f64>()
+        });
+        let totals: Vec<f64> = total.collect();
+        let (mut largest, mut first) = (0.0_f64, 0);
+        for (place, own) in places.iter().zip(&weights) {
+            let Some(own) = own else { continue };
+            let interpolated: f64 = own.iter().zip(&totals[first..]).map(|(w, f)| w * f).sum();
+            let direct = totals[first + own.len()];
+            let off = (interpolated - direct).abs() / (self.lambda_n_per_m * place[2]);
+            largest = largest.max(off);
+            first += own.len() + 1;
+        }
+        Ok(largest)
+    }
+
     /// The part of interpolation; `None` without a cell of four points within the map.
     ///
     /// # Errors
     /// Forces that cannot be computed; interruption.
-    pub(super) fn interpolation(
+    pub(crate) fn interpolation(
         &self,
         map: &FieldMap,
         progress: &dyn Progress,
