@@ -2,12 +2,12 @@
 #![cfg(unix)] // signals, /dev/full, links
 
 mod budget;
+mod cache;
 mod codes;
 mod error_target;
 mod files;
 mod help;
 mod interrupt;
-mod kept;
 mod lambda;
 mod messages;
 mod optimize;
