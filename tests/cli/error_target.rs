@@ -63,9 +63,9 @@ fn grids_that_are_given_are_obeyed_and_what_they_cause_is_said() {
     let ran = place
         .run(&["lambda", SEED, &given, "--error", "0.1%"])
         .ends(0);
-    ran.says(&["exceeded", "number of points", "--refine"]);
     let first = ran.out.lines().nth(1).unwrap();
     assert!(first.contains("exceeds the requested 0.1 %"), "{first}");
+    ran.says(&["exceeded", "number of points", "--refine"]);
     let chosen = [
         "lambda", SEED, &given, "--error", "0.1%", "--refine", "--format", "json",
     ];

@@ -7,54 +7,52 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::discretize::{self, PointsReport, point_rows, points_grid};
-use super::lambda::error_target::{ChosenGrid, ErrorTarget, Trial};
-use super::lambda::map_error::{MapEffect, between_points};
+use super::lambda::error_target::{ChosenGrid, ErrorTarget};
 use super::lambda::{LambdaOptions, LambdaReport, WantedPoints, sideways, solve_at};
 use super::made_with::surface;
-use super::map::{arrays, runtime, summary, workspace_grid};
+use super::map::{arrays, runtime, summary};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS, arithmetic};
 use crate::bundle::atomic::WriteError;
 use crate::bundle::cache::Store;
-use crate::bundle::headline::{BudgetName, BudgetPart};
 use crate::bundle::json::displayed;
-use crate::bundle::lambda_file::LambdaFile;
 use crate::bundle::manifest::{
-    AxisSummary, CircuitSummary, Interpolation, LambdaSummary, LeftOut, MadeWith, Manifest,
-    PassiveForce,
+    AxisSummary, CircuitSummary, Interpolation, LambdaSummary, MadeWith, Manifest, PassiveForce,
 };
 use crate::bundle::npz::{PASSIVE, Runtime};
 use crate::bundle::rendering::{HeightGrid, Rendering};
 use crate::bundle::table::{CurrentRow, PointRow};
 use crate::bundle::timing::StageSeconds;
 use crate::bundle::write::{BundleContent, check_bundle_target, write_bundle};
-use crate::design::Design;
 use crate::lambda::Settings;
-use crate::map::tabulate::{Grid, PlacedCoil};
-use crate::map::{Components, FieldMap};
+use crate::map::FieldMap;
+use crate::map::tabulate::Grid;
 use crate::progress::Progress;
 use crate::report::bundle_files;
+use crate::scene::Scene;
 use crate::scene::cached_field::{FieldStore, STORE_FOLDER, ShapeField};
-use crate::scene::maps::{MagnetMean, SceneMap};
 use crate::scene::neighbours;
 use crate::scene::passive::PASSIVE_TOLERANCE;
 use crate::scene::passive_map::PassiveMap;
 use crate::scene::sources::{DesignSource, ShapeSource};
 use crate::scene::steel::Solved;
-use crate::scene::{MAGNET_SHARE, Scene};
 use crate::shape::document::ShapeDocument;
 use crate::shape::points::ConstraintPoints;
 
 pub(crate) mod again;
+mod budget;
 pub(crate) mod command;
 mod ignored_pull;
+mod needed_map;
 mod page;
 pub mod plan;
 mod recorded;
 
 pub use crate::report::bundle_files::PAGE_FILE;
 pub(crate) use ignored_pull::IgnoredPull;
+use needed_map::NeededMap;
+pub(crate) use needed_map::{needed_coils, needed_nodes};
 use plan::Plan;
 
 /// The name under which a bundle keeps the design it was made from.
@@ -329,12 +327,6 @@ impl BothSolved {
     }
 }
 
-/// The stated error of the pull at the points.
-fn passive_estimate(file: &LambdaFile) -> f64 {
-    let stage = file.accuracy.get("passive_force");
-    stage.map_or(0.0, |stage| stage.estimate)
-}
-
 /// Where the bundle of `shape` goes.
 fn folder_of(scene: &Scene, shape: &ShapeSource, options: &CalibrateOptions) -> PathBuf {
     let design = options.out.join(&scene.design.name);
@@ -414,54 +406,6 @@ impl Calibration<'_> {
         discretize::run_cached(document, inputs, self.field, progress)
     }
 
-    /// The grid for the requested error, where there is one.
-    fn search(
-        &self,
-        progress: &dyn Progress,
-    ) -> Result<Option<(ErrorTarget, ChosenGrid)>, RunError> {
-        let Some(target) = self.options.lambda.error else {
-            return Ok(None);
-        };
-        let trial = Trial {
-            scene: self.scene,
-            solved: &self.solved.forces,
-            field: ShapeField::default(),
-            options: &self.options.lambda,
-            for_runtime: true,
-        };
-        let chosen = trial.grid(&self.shape.document, target, progress)?;
-        Ok(Some((target, chosen)))
-    }
-
-    /// The workspace's samples for the requested error; `None`: the design's own.
-    fn nodes(
-        &self,
-        search: Option<&(ErrorTarget, ChosenGrid)>,
-        lambda: &LambdaReport,
-        points: &ConstraintPoints,
-        progress: &dyn Progress,
-    ) -> Result<Option<[usize; 3]>, RunError> {
-        let design = self.scene.design;
-        let (Some((target, _)), Some(currents_a)) = (search, &lambda.file.currents_a) else {
-            return Ok(None);
-        };
-        let Some(headline) = &lambda.file.headline else {
-            return Ok(None);
-        };
-        if design.workspace.is_given && !target.refine {
-            return Ok(None);
-        }
-        let effect = MapEffect {
-            scene: self.scene,
-            solved: &self.solved.forces,
-            field: ShapeField::default(),
-            points,
-            lambda_n_per_m: headline.lambda_n_per_m,
-            currents_a,
-        };
-        effect.nodes(target.of_interpolation(), progress).map(Some)
-    }
-
     /// Computes everything that a bundle holds and hands it to `take`, which returns the manifest
     /// with its list of files.
     fn compute(
@@ -533,52 +477,6 @@ impl Calibration<'_> {
         content.extra = &extra;
         let manifest = take(&content)?;
         Ok((manifest, lambda))
-    }
-
-    /// What a runtime adds to the error of lambda: heights and forces between points and nodes.
-    fn add_to_headline(
-        &self,
-        lambda: &mut LambdaReport,
-        points: &PointsReport,
-        needed: &NeededMap,
-        passive: Option<&PassiveMap>,
-        progress: &dyn Progress,
-    ) -> Result<(), RunError> {
-        let of_pull = passive_estimate(&lambda.file);
-        let currents_a = lambda.file.currents_a.as_deref();
-        let (Some(currents_a), Some(amplification)) = (currents_a, lambda.amplification) else {
-            return Ok(());
-        };
-        let Some(headline) = &mut lambda.file.headline else {
-            return Ok(());
-        };
-        let effect = MapEffect {
-            scene: self.scene,
-            solved: &self.solved.forces,
-            field: self.field,
-            points: &points.discretized.points,
-            lambda_n_per_m: headline.lambda_n_per_m,
-            currents_a,
-        };
-        let (heights, jumps) = between_points(points);
-        let made = &needed.made;
-        let nodes = amplification.part(BudgetName::MapNodes, made.accuracy.estimate);
-        let interpolation = effect.interpolation(&made.map, progress)?;
-        // The pull's own table: of the largest pull, which is relative to the same force.
-        let share = headline.error_of(BudgetName::Pull) / of_pull;
-        let pull = passive.filter(|_| share.is_finite()).map(|passive| BudgetPart {
-            part: BudgetName::PullMap,
-            error: share * (passive.accuracy.estimate + passive.between),
-            how: "the stated errors of the pull's map, times its largest share of the requested force"
-                .to_owned(),
-        });
-        headline.jumps = jumps;
-        headline.add(
-            [heights, Some(nodes), interpolation, pull]
-                .into_iter()
-                .flatten(),
-        );
-        Ok(())
     }
 
     /// The page and the plots beside `content`, if they are requested.
@@ -687,183 +585,6 @@ fn passive_map(
     let passive = PassiveMap::new(scene, &grid, PASSIVE_TOLERANCE)?;
     progress.end();
     Ok(passive)
-}
-
-/// The part of the maps that an object needs, and what was left out of it.
-struct NeededMap {
-    made: SceneMap,
-    components: Components,
-    left_out: Vec<LeftOut>,
-}
-
-impl NeededMap {
-    fn new(
-        scene: &Scene,
-        solved: &Solved,
-        field: ShapeField,
-        (design, points, reach_m): (&Design, &ConstraintPoints, f64),
-        progress: &dyn Progress,
-    ) -> Result<Self, RunError> {
-        let mut left_out = Vec::new();
-        let grid = needed_grid(design, points, reach_m, &mut left_out);
-        let components = if scene.tilted() {
-            Components::Gradient
-        } else {
-            left_out.push(LeftOut {
-                what: "field and transverse gradient".to_owned(),
-                why: "an upright dipole's vertical force needs dB_z/dz alone (eq. 5)".to_owned(),
-                error_cost: 0.0,
-            });
-            Components::Gz
-        };
-        let driven = needed_coils(scene);
-        if driven.len() < scene.coils.len() {
-            left_out.push(LeftOut {
-                what: format!("{} coils", scene.coils.len() - driven.len()),
-                why: "their current limits are zero".to_owned(),
-                error_cost: 0.0,
-            });
-        }
-        let felt = MagnetMean::by_magnet(scene, &grid.z_m, MAGNET_SHARE * solved.tolerance)?;
-        let mut made = field.map(scene, solved, &driven, &grid, components, &felt, progress)?;
-        drop_weak_coils(
-            scene,
-            &mut made.map,
-            &driven,
-            solved.tolerance,
-            &mut left_out,
-        );
-        Ok(Self {
-            made,
-            components,
-            left_out,
-        })
-    }
-}
-
-/// The coils that may carry current.
-pub(crate) fn needed_coils(scene: &Scene) -> Vec<PlacedCoil> {
-    let coils = scene.coils.iter();
-    coils
-        .filter(|coil| largest_current_a(scene, coil.number) > 0.0)
-        .copied()
-        .collect()
-}
-
-fn largest_current_a(scene: &Scene, coil: usize) -> f64 {
-    scene.upper_a[coil].max(-scene.lower_a[coil])
-}
-
-/// Removes coils whose largest force anywhere on the map stays below `tolerance` of the largest
-/// that any coil can give.
-fn drop_weak_coils(
-    scene: &Scene,
-    map: &mut FieldMap,
-    coils: &[PlacedCoil],
-    tolerance: f64,
-    left_out: &mut Vec<LeftOut>,
-) {
-    let nodes = map.x_m.len() * map.y_m.len() * map.z_m.len();
-    let strength: Vec<f64> = coils
-        .iter()
-        .zip(map.gz_t_per_m_per_a.chunks_exact(nodes.max(1)))
-        .map(|(coil, gz)| {
-            let largest = gz.iter().fold(0.0_f64, |most, g| most.max(g.abs()));
-            largest * largest_current_a(scene, coil.number)
-        })
-        .collect();
-    let strongest = strength.iter().copied().fold(0.0, f64::max);
-    let keep: Vec<bool> = strength
-        .iter()
-        .map(|s| *s > tolerance * strongest)
-        .collect();
-    if keep.iter().all(|keep| *keep) || strongest == 0.0 {
-        return;
-    }
-    let weak: f64 = strength
-        .iter()
-        .zip(&keep)
-        .filter(|(_, keep)| !**keep)
-        .map(|(s, _)| s)
-        .sum();
-    left_out.push(LeftOut {
-        what: format!("{} coils", keep.iter().filter(|keep| !**keep).count()),
-        why: "at their largest currents together they change no force on the map by more than \
-              this part of the largest that one coil gives"
-            .to_owned(),
-        error_cost: weak / strongest,
-    });
-    let retain = |values: &mut Vec<f64>, components: usize| {
-        let size = (nodes * components).max(1);
-        let kept: Vec<f64> = values
-            .chunks_exact(size)
-            .zip(&keep)
-            .filter(|(_, keep)| **keep)
-            .flat_map(|(block, _)| block.iter().copied())
-            .collect();
-        *values = kept;
-    };
-    retain(&mut map.gz_t_per_m_per_a, 1);
-    if let Some(gradient) = &mut map.gradient_t_per_m_per_a {
-        retain(gradient, 9);
-    }
-    map.coils = coils
-        .iter()
-        .zip(&keep)
-        .filter(|(_, keep)| **keep)
-        .map(|(coil, _)| coil.number)
-        .collect();
-}
-
-/// The nodes of the workspace within reach of the object's points, one cell beyond.
-pub(crate) fn needed_nodes(design: &Design, points: &ConstraintPoints, reach_m: f64) -> Grid {
-    let whole = workspace_grid(design);
-    let part = |nodes: &[f64], values: &[f64]| -> Vec<f64> {
-        let lowest = values.iter().copied().fold(f64::INFINITY, f64::min) - reach_m;
-        let highest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max) + reach_m;
-        // The last node at or below the range, the first at or above it; four nodes at least,
-        // so that the interpolation keeps its degree.
-        let mut start = nodes
-            .partition_point(|node| *node <= lowest)
-            .saturating_sub(1);
-        let mut end = (nodes.partition_point(|node| *node < highest) + 1).min(nodes.len());
-        while end - start < 4.min(nodes.len()) {
-            start = start.saturating_sub(1);
-            end = (end + 1).min(nodes.len());
-        }
-        nodes[start..end].to_vec()
-    };
-    Grid {
-        x_m: part(&whole.x_m, &points.x_m),
-        y_m: part(&whole.y_m, &points.y_m),
-        z_m: part(&whole.z_m, &points.height_m),
-    }
-}
-
-fn needed_grid(
-    design: &Design,
-    points: &ConstraintPoints,
-    reach_m: f64,
-    left_out: &mut Vec<LeftOut>,
-) -> Grid {
-    let whole = workspace_grid(design);
-    let grid = needed_nodes(design, points, reach_m);
-    let count = |grid: &Grid| grid.x_m.len() * grid.y_m.len() * grid.z_m.len();
-    if count(&grid) < count(&whole) {
-        left_out.push(LeftOut {
-            what: format!(
-                "{} of {} workspace nodes",
-                count(&whole) - count(&grid),
-                count(&whole)
-            ),
-            why: format!(
-                "farther than {} mm from every point of the object",
-                reach_m * 1000.0
-            ),
-            error_cost: 0.0,
-        });
-    }
-    grid
 }
 
 /// Static currents, zero where there is no force constant.

@@ -19,7 +19,7 @@ mod working_point;
 use serde::Serialize;
 
 pub(crate) use self::accuracy::proven_accuracy;
-use self::error_target::{ErrorTarget, Trial};
+use self::error_target::{ChosenGrid, ErrorTarget, Trial};
 use self::feedback::FeedbackOptions;
 use self::headline::Amplification;
 pub(crate) use self::points::WantedPoints;
@@ -120,6 +120,23 @@ impl LambdaOptions {
 }
 
 impl LambdaReport {
+    /// States how far lambda of graded points is off, from that of wider patches.
+    fn add_quadrature(&mut self, coarser: &LambdaFile) {
+        let Some(stage) = quadrature(&self.file, coarser) else {
+            return;
+        };
+        if let Some(headline) = &mut self.file.headline {
+            headline.add([BudgetPart {
+                part: BudgetName::Points,
+                error: stage.estimate,
+                how: stage.method.clone(),
+            }]);
+        }
+        for name in ["quadrature", "lambda_of_points"] {
+            (self.file.accuracy).insert(name.to_owned(), stage.clone());
+        }
+    }
+
     /// Whether a force can be rendered: a force constant above zero, to the requested tolerance.
     #[must_use]
     pub fn meets_request(&self) -> bool {
@@ -141,25 +158,10 @@ pub fn run(
     progress: &dyn Progress,
 ) -> Result<(PointsReport, LambdaReport), RunError> {
     let scene = Scene::with_tolerance(design, options.tolerance_for(design))?;
-    let chosen;
-    let (document, search) = match options.error.filter(|_| options.sampling.is_none()) {
-        None => (document, None),
-        Some(target) => {
-            let lowest_m = design.workspace.z_m.from;
-            progress.begin("steel", 1);
-            let solved = steel::solve(&scene, scene.tolerances.forces, lowest_m)?;
-            progress.end();
-            let trial = Trial {
-                scene: &scene,
-                solved: &solved,
-                field: ShapeField::default(),
-                options,
-                for_runtime: false,
-            };
-            chosen = trial.grid(document, target, progress)?;
-            (&chosen.document, Some((target, &chosen)))
-        }
-    };
+    let search = search(&scene, document, options, progress)?;
+    let document = search
+        .as_ref()
+        .map_or(document, |(_, chosen)| &chosen.document);
     let points = discretize::run(document, inputs.clone(), progress)?;
     let of_grid = WantedPoints::of_grid(&points, options.weights_of(&points));
     let sampling = options
@@ -186,8 +188,8 @@ pub fn run(
     };
     let (Some(chosen), Some(sampled)) = (chosen, sampled) else {
         let mut report = solve_with(&of_grid, options)?;
-        if let Some((target, chosen)) = search {
-            report.requested(target, chosen, None, scene.tolerances.forces);
+        if let Some((target, chosen)) = &search {
+            report.requested(*target, chosen, None, scene.tolerances.forces);
         }
         sideways::add(
             &mut report.file,
@@ -217,21 +219,35 @@ pub fn run(
     )?;
     if let Some(coarser) = coarser {
         let other = solve_with(&coarser, &plain)?.file;
-        let stage = quadrature(&report.file, &other);
-        if let (Some(headline), Some(stage)) = (&mut report.file.headline, &stage) {
-            headline.add([BudgetPart {
-                part: BudgetName::Points,
-                error: stage.estimate,
-                how: stage.method.clone(),
-            }]);
-        }
-        for name in ["quadrature", "lambda_of_points"] {
-            let stage = stage.clone().map(|stage| (name.to_owned(), stage));
-            report.file.accuracy.extend(stage);
-        }
+        report.add_quadrature(&other);
     }
     report.file.sampling = Some(against_grid(&sampled.summary, &report.file, &grid));
     Ok((points, report))
+}
+
+/// The grid for the requested error, where one is requested and the points are those of a grid.
+fn search(
+    scene: &Scene,
+    document: &ShapeDocument,
+    options: &LambdaOptions,
+    progress: &dyn Progress,
+) -> Result<Option<(ErrorTarget, ChosenGrid)>, RunError> {
+    let Some(target) = options.error.filter(|_| options.sampling.is_none()) else {
+        return Ok(None);
+    };
+    let lowest_m = scene.design.workspace.z_m.from;
+    progress.begin("steel", 1);
+    let solved = steel::solve(scene, scene.tolerances.forces, lowest_m)?;
+    progress.end();
+    let trial = Trial {
+        scene,
+        solved: &solved,
+        field: ShapeField::default(),
+        options,
+        for_runtime: false,
+    };
+    let chosen = trial.grid(document, target, progress)?;
+    Ok(Some((target, chosen)))
 }
 
 /// Patches of the points over which forces change little, where no width is requested.

@@ -1,6 +1,7 @@
 //! The page of a calibrated object.
 
 use fluxform_bundle::artefact::Input;
+use fluxform_bundle::lambda_file::LambdaFile;
 use fluxform_bundle::manifest::LeftOut;
 use serde_json::{Map, Value, json};
 
@@ -62,9 +63,8 @@ fn lead(object: &CalibratedObject) -> Html {
             "p class=\"lead\"",
             &format!(
                 "A finger at height h above the coils is to feel the force \u{3bb}h. With one set \
-                 of static currents for the whole object \u{3bb} is {} N/m, and the force is off by \
-                 {}.",
-                figures(lambda, 5),
+                 of static currents for the whole object \u{3bb} is {}, and the force is off by {}.",
+                stated_lambda(file, lambda),
                 rms_error(rms_n, file.relative_rms_error)
             ),
         ),
@@ -74,6 +74,12 @@ fn lead(object: &CalibratedObject) -> Html {
         ),
     };
     html
+}
+
+/// lambda in the digits that its error leaves; five in bundles of programs that did not state it.
+fn stated_lambda(file: &LambdaFile, lambda_n_per_m: f64) -> String {
+    let headline = file.headline.as_ref().map(|of| of.lambda.clone());
+    headline.unwrap_or_else(|| format!("{} N/m", figures(lambda_n_per_m, 5)))
 }
 
 fn rms_error(rms_n: f64, relative: Option<f64>) -> String {
@@ -103,7 +109,7 @@ fn answer(object: &CalibratedObject) -> Section {
     let coils = object.coils();
     let lambda = match file.lambda_n_per_m {
         None => "none".to_owned(),
-        Some(lambda) => format!("{} N/m", figures(lambda, 5)),
+        Some(lambda) => stated_lambda(file, lambda),
     };
     tile(&mut body, "force constant \u{3bb}", &lambda, &by);
     if let (Some(rms_n), Some(worst_n)) = (file.rms_error_n, file.worst_error_n) {
@@ -115,6 +121,19 @@ fn answer(object: &CalibratedObject) -> Section {
             format!("of {} wanted there", force(at.wanted_n))
         });
         tile(&mut body, "worst error", &force(worst_n), &at);
+        if let Some(given) = &file.given_force {
+            let range = format!(
+                "{} to {} over the points",
+                percent(given.least),
+                percent(given.most)
+            );
+            let name = if given.above_saturation {
+                "force given (lambda above saturation)"
+            } else {
+                "force given"
+            };
+            tile(&mut body, name, &percent(given.mean), &range);
+        }
         let bound = coils.iter().filter(|coil| coil.at_limit()).count();
         let sum: f64 = coils.iter().map(|coil| coil.current_a).sum();
         tile(
