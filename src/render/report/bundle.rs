@@ -70,9 +70,8 @@ fn lead(object: &CalibratedObject) -> Html {
             "p class=\"lead\"",
             &format!(
                 "A finger at height h above the coils is to feel the force \u{3bb}h. With one set \
-                 of static currents for the whole object \u{3bb} is {} N/m, and the force is off by \
-                 {}.",
-                figures(lambda, 5),
+                 of static currents for the whole object \u{3bb} is {}, and the force is off by {}.",
+                stated_lambda(file, lambda),
                 rms_error(rms_n, file.relative_rms_error)
             ),
         ),
@@ -82,6 +81,12 @@ fn lead(object: &CalibratedObject) -> Html {
         ),
     };
     html
+}
+
+/// lambda in the digits that its error leaves; five in bundles of programs that did not state it.
+fn stated_lambda(file: &LambdaFile, lambda_n_per_m: f64) -> String {
+    let headline = file.headline.as_ref().map(|of| of.lambda.clone());
+    headline.unwrap_or_else(|| format!("{} N/m", figures(lambda_n_per_m, 5)))
 }
 
 fn rms_error(rms_n: f64, relative: Option<f64>) -> String {
@@ -110,7 +115,7 @@ fn answer(object: &CalibratedObject) -> Section {
     let by = format!("chosen by {by}");
     let lambda = match file.lambda_n_per_m {
         None => "none".to_owned(),
-        Some(lambda) => format!("{} N/m", figures(lambda, 5)),
+        Some(lambda) => stated_lambda(file, lambda),
     };
     tile(&mut body, "force constant \u{3bb}", &lambda, &by);
     if let (Some(rms_n), Some(worst_n)) = (file.rms_error_n, file.worst_error_n) {
