@@ -114,7 +114,7 @@ pub(super) fn counts(bodies: &[Body], roots: &[(usize, Affine)]) -> Vec<usize> {
     roots.map(|count| count as usize).collect()
 }
 
-/// What is laid out below a body.
+/// The bodies below a body.
 #[derive(Clone, Copy, Default)]
 struct Weight {
     triangles: u64,

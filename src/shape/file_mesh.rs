@@ -15,11 +15,11 @@ pub struct FileMesh {
     /// Metres per unit of the coordinates, where the file itself says so.
     pub unit_m: Option<f64>,
     /// Estimate of how far the triangles may lie from the body they stand for, in the file's
-    /// unit; 0 where the file tells nothing of it.
+    /// unit; 0 where the file states none.
     pub deviation: f64,
     /// Whether the deviation is known, because the triangles were made here to hold it.
     pub deviation_is_known: bool,
-    /// What a careful reader would mention.
+    /// Warnings.
     pub warnings: Vec<String>,
     /// The bodies that the file names, in its order; empty where the format names none.
     pub bodies: Vec<NamedBody>,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-/// What kind of file a surface is in.
+/// Formats of surface files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SurfaceFormat {
     /// STL, binary or ASCII; carries no unit.
@@ -157,7 +157,7 @@ impl SurfaceFormat {
         endings.join(", ")
     }
 
-    /// What to do with a file of this name, which is not read.
+    /// Advice on a file of this name, which is not read.
     #[must_use]
     pub fn advice(path: &Path) -> Option<&'static str> {
         let ending = ending(path)?;

@@ -1,4 +1,4 @@
-//! What a height map cannot show: how much of a surface is not seen from above.
+//! The share of a surface that is hidden from above, which a height map cannot show.
 //!
 //! Points spread evenly over the area (by an additive recurrence, so always the same ones) are looked
 //! at along vertical lines: one that lies below what such a line meets first is hidden.
@@ -17,7 +17,7 @@ use fluxform_numerics::vec3::{cross, dot, minus};
 /// Points that are looked at.
 const POINTS: usize = 20_000;
 /// Triangles that all lines together may be compared with, about: two seconds of one core.
-const MOST_MET: usize = 20_000_000;
+pub(super) const MOST_MET: usize = 20_000_000;
 /// Cells along x, and as many along y, in which triangles are looked up.
 const CELLS: usize = 101;
 /// Of a facet's area this share at least must show in plan for it to face up or down.

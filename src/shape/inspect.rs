@@ -1,6 +1,6 @@
-//! What a surface file holds, told without placing it: size, holes, faults, a guess at its unit.
+//! Contents of a surface file as it is, before placing: size, holes, faults, a guess at its unit.
 //!
-//! Vertices are one when their coordinates agree to what the file's number format can tell apart.
+//! Vertices are one when their coordinates agree to what the file's number format can distinguish.
 //! Nothing here changes the surface, and the guessed unit is never used.
 
 use std::path::Path;
@@ -15,6 +15,7 @@ use crate::edges::{Edges, WELD_ROUNDINGS, bodies, weld};
 use crate::error::ShapeError;
 use crate::file_mesh::{FileMesh, Triangle};
 use crate::height::Grid;
+use crate::hidden::MOST_MET;
 use crate::mesh::Mesh;
 use crate::placement::Transform;
 use crate::scattered::Probe;
@@ -23,7 +24,7 @@ use fluxform_base::progress::Progress;
 use fluxform_numerics::axis::Axis;
 use fluxform_numerics::vec3::{cross, minus};
 
-/// What a surface file holds. Lengths are in the file's unit.
+/// Contents of a surface file. Lengths are in the file's unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MeshReport {
     /// The format's usual name.
@@ -37,11 +38,11 @@ pub struct MeshReport {
     /// Metres of the file's unit, where the format carries it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit_m: Option<f64>,
-    /// What the unit may be, likeliest first, where the format carries none. Never used.
+    /// Possible units, likeliest first, where the format carries none. Never used.
     pub unit_guesses: Vec<UnitGuess>,
     /// How far a coordinate may lie from what was meant, because of the file's number format.
     pub coordinate_rounding: f64,
-    /// Estimate of how far the triangles may lie from their body; 0 where nothing tells.
+    /// Estimate of how far the triangles may lie from their body; 0 where unknown.
     pub deviation: f64,
     /// Every edge has exactly two triangles.
     pub watertight: bool,
@@ -298,6 +299,10 @@ fn layers(file: FileMesh) -> Option<u32> {
     let surface = Surface::Mesh(mesh);
     let probe = Probe::new(&surface, &grid);
     let at = |k: usize| probe.at([x[k % LINES], y[k / LINES]]);
+    // Where triangles lie over each other many times, a line meets all of them: fewer lines.
+    let met = |k: usize| probe.near([x[k % LINES], y[k / LINES]]);
+    let met: usize = (0..grid.len()).into_par_iter().map(met).sum();
     let lines = (0..grid.len()).into_par_iter();
+    let lines = lines.step_by((met / MOST_MET).max(1));
     lines.filter_map(at).map(|(_, marks)| marks.layers).max()
 }

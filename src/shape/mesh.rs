@@ -9,7 +9,7 @@ use crate::placement::Transform;
 /// Coordinates beyond this are no length of a haptic surface, m; below it no predicate overflows.
 const FARTHEST_M: f64 = 1e9;
 
-/// What a mesh file holds.
+/// Contents of a mesh file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeshFacts {
     /// Triangles in the file.
@@ -21,7 +21,7 @@ pub struct MeshFacts {
     /// How far a coordinate may lie from what was meant, because of the file's number format, m.
     pub coordinate_rounding_m: f64,
     /// Estimate of how far the triangles may lie from the body they stand for, m; 0 where the
-    /// file tells nothing of it.
+    /// file states none.
     pub deviation_m: f64,
     /// Whether that is known rather than estimated.
     pub deviation_is_known: bool,
@@ -103,7 +103,7 @@ impl Mesh {
         self.read_by.as_deref()
     }
 
-    /// What the file holds.
+    /// Contents of the file.
     #[must_use]
     pub fn facts(&self) -> &MeshFacts {
         &self.facts

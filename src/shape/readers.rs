@@ -14,7 +14,7 @@ use fluxform_base::progress::Silent;
 /// Whether bytes begin as files of a format do (never true for two formats), and its reader.
 type Reader = (fn(&[u8]) -> bool, fn(&[u8]) -> Result<FileMesh, ReadError>);
 
-/// What is no surface of any format, by its first bytes in lower case.
+/// Kinds of files that are no surface of any format, by their first bytes in lower case.
 const OTHER: [(&[u8], &str); 4] = [
     (
         b"version https://git-lfs",

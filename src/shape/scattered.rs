@@ -29,7 +29,7 @@ pub struct Scattered {
     pub height_m: Vec<f64>,
     /// Unit normal of each point, n_z >= 0.
     pub normal: Vec<[f64; 3]>,
-    /// What each point is besides.
+    /// Flags of each point.
     pub marks: Vec<Marks>,
     /// Plan area each point stands for, m^2: its weight in a sum over the surface.
     pub weight_m2: Vec<f64>,
@@ -120,6 +120,14 @@ impl<'a> Probe<'a> {
                 mesh, index, rules, ..
             } => point_flags::at(mesh.triangles(), index.at(p), p, *rules),
             Kind::Primitive(primitive) => Some((primitive.sample(p[0], p[1])?, Marks::PLAIN)),
+        }
+    }
+
+    /// How many triangles a look at a point compares it with.
+    pub(super) fn near(&self, p: [f64; 2]) -> usize {
+        match &self.kind {
+            Kind::Mesh { index, .. } => index.at(p).len(),
+            Kind::Primitive(_) => 1,
         }
     }
 

@@ -9,7 +9,7 @@ use super::{DeviationSummary, PointsOptions, PointsSummary, TableFiles, run_with
 use crate::RunError;
 use crate::bundle::artefact::Input;
 use crate::bundle::atomic::{self, Overwrite, check_distinct};
-use crate::cli::args::{SamplingFlags, SurfaceFlags, Writing};
+use crate::cli::args::{SamplingFlags, SurfaceFlags, WeightsFlag, Writing};
 use crate::cli::budget::{allow, cost_origin};
 use crate::cli::describe;
 use crate::cli::documents;
@@ -73,6 +73,8 @@ pub struct Discretize {
     #[arg(long, value_name = "N", default_value_t = CERTIFY_SECONDS,
           value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     certify_seconds: u64,
+    #[command(flatten)]
+    weights: WeightsFlag,
     #[command(flatten)]
     pub(super) sampling: SamplingFlags,
     /// Report what the surface's file holds and make no points
@@ -189,6 +191,7 @@ impl Discretize {
             },
             certify_seconds: self.certify_seconds,
             picture: self.plot.is_some(),
+            weights: self.weights.weights,
         }
     }
 

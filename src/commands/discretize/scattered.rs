@@ -31,6 +31,7 @@ impl Sampling {
             Sampling::Poisson { spacing_m, seed } => (None, Some((spacing_m, seed))),
         };
         Options::of(&PointsAsked {
+            weights: None,
             holes: None,
             certify: None,
             certify_seconds: None,

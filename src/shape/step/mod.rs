@@ -17,7 +17,7 @@ use fluxform_base::progress::Progress;
 
 pub use kernel::{Kernel, STEP_SECONDS, configure};
 
-/// What was read last: a picture, a report and points of one file need it once.
+/// The file read last: a picture, a report and points of one file need it once.
 static LAST: Mutex<Option<(Vec<u8>, BodyOptions, FileMesh)>> = Mutex::new(None);
 
 /// Reads a STEP file's bytes; coordinates are in its own unit.
