@@ -113,7 +113,7 @@ impl Solved {
             None => {
                 "a-priori quadrature bound; rounding sampled against 40-digit values".to_owned()
             }
-            Some(steel) => format!("{steel}; a-priori bound of its evaluation"),
+            Some(steel) => format!("{steel}; bound of its evaluation"),
         }
     }
 

@@ -408,6 +408,7 @@ impl Calibration<'_> {
             &mut lambda.file,
             scene,
             &solved.forces,
+            field,
             &of_grid,
             &options.wiring,
             progress,
