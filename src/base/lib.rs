@@ -1,7 +1,9 @@
-//! What every room uses: physical constants and the millimetre border, progress and interruption,
+//! Parts used by every room: physical constants and the millimetre border, progress and interruption,
 //! the error statement that every stage attaches to its numbers, and the force constants' names.
 
 pub mod accuracy;
+pub mod digits;
 pub mod force_constant;
+pub mod point_weights;
 pub mod progress;
 pub mod units;

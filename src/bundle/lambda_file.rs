@@ -6,7 +6,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::artefact::Input;
+use super::headline::Headline;
 use fluxform_base::accuracy::StageAccuracy;
+use fluxform_base::point_weights::Weights;
 use fluxform_lambda::feedback::Rendered;
 pub use fluxform_lambda::sideways::Sideways;
 use fluxform_lambda::worst::ActivePoint;
@@ -24,9 +26,9 @@ pub struct LambdaFile {
     pub design: String,
     /// Name of the shape.
     pub shape: String,
-    /// What went in, paths as given on the command line.
+    /// Inputs, paths as given on the command line.
     pub inputs: Vec<Input>,
-    /// What eq. 10 reads off the path.
+    /// Force constants that eq. 10 reads off the path.
     #[serde(flatten)]
     pub constants: ForceConstants,
     /// The one chosen, N/m.
@@ -50,6 +52,9 @@ pub struct LambdaFile {
     pub rank: usize,
     /// Number of constraint points.
     pub points: usize,
+    /// How they count in the mean; absent where all count alike.
+    #[serde(default, skip_serializing_if = "Weights::is_equal")]
+    pub weights: Weights,
     /// Breakpoints, lambda ascending; between them the currents are linear in lambda.
     pub path: Vec<PathStep>,
     /// The same by the largest error at any point; absent in files of programs without it.
@@ -75,7 +80,7 @@ pub struct LambdaFile {
     /// Where the points are not the grid's: what that changes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sampling: Option<SampledPoints>,
-    /// What the steel really does at the chosen currents; with a B-H curve only, along which
+    /// Response of the steel at the chosen currents; with a B-H curve only, along which
     /// forces of several currents do not add up.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub working_point: Option<WorkingPointForces>,
@@ -87,6 +92,9 @@ pub struct LambdaFile {
     /// it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sideways: Option<Sideways>,
+    /// What the result comes to; absent without a lambda and in files of programs without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub headline: Option<Headline>,
     /// Each stage's estimated error.
     pub accuracy: BTreeMap<String, StageAccuracy>,
 }
@@ -100,11 +108,11 @@ pub struct SampledPoints {
     pub area_m2: f64,
     /// Points of the grid.
     pub grid_points: usize,
-    /// What the grid's points give, N/m.
+    /// Value on the grid's points, N/m.
     pub grid_lambda_linear_n_per_m: Option<f64>,
-    /// What the grid's points give, N/m.
+    /// Value on the grid's points, N/m.
     pub grid_lambda_jnd_n_per_m: Option<f64>,
-    /// What the grid's points give, N/m.
+    /// Value on the grid's points, N/m.
     pub grid_lambda_saturation_n_per_m: Option<f64>,
     /// The chosen one by the grid's points, N/m.
     pub grid_lambda_n_per_m: Option<f64>,
@@ -208,7 +216,7 @@ pub struct TolerancePoint {
 /// The force constants with one change.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LambdaVariant {
-    /// What is changed.
+    /// The change.
     pub name: String,
     /// Its wiring.
     #[serde(flatten)]
@@ -217,7 +225,7 @@ pub struct LambdaVariant {
     pub passive_force: bool,
     /// Whether any coil may carry a negative current.
     pub pulls: bool,
-    /// What eq. 10 reads off the path.
+    /// Force constants that eq. 10 reads off the path.
     #[serde(flatten)]
     pub constants: ForceConstants,
     /// N/m.
@@ -261,7 +269,7 @@ pub struct PathStep {
     pub lambda_n_per_m: f64,
     /// A, one a coil of the array.
     pub currents_a: Vec<f64>,
-    /// What happens here, such as "coil 4 meets its upper limit".
+    /// The event, such as "coil 4 meets its upper limit".
     pub event: String,
 }
 
@@ -317,7 +325,7 @@ pub struct WorstPointStep {
     pub currents_a: Vec<f64>,
     /// The points that decide from here on, rows of `points.csv` from 0.
     pub active_points: Vec<usize>,
-    /// What happens here, such as "coil 4 meets its upper limit".
+    /// The event, such as "coil 4 meets its upper limit".
     pub event: String,
 }
 

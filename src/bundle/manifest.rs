@@ -9,12 +9,13 @@ use super::artefact::{FileEntry, Input, Options, sha256_hex};
 use super::json::to_json;
 use fluxform_base::accuracy::StageAccuracy;
 use fluxform_base::force_constant::Criterion;
+use fluxform_base::point_weights::Weights;
 use fluxform_numerics::axis::Axis;
 
 /// The interpolation between nodes that every loader implements.
 pub(crate) const INTERPOLATION: &str = "tricubic-lagrange";
 
-/// What a runtime reads first.
+/// The file that a runtime reads first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Manifest {
     /// Layout, `major.minor.patch`.
@@ -25,7 +26,7 @@ pub struct Manifest {
     pub design: String,
     /// Name of the shape.
     pub shape: String,
-    /// What went in, paths as given on the command line.
+    /// Inputs, paths as given on the command line.
     pub inputs: Vec<Input>,
     /// The options of the run, as far as no other file states them; absent from bundles of schema
     /// 1.2 and before. With the inputs they decide every byte of the bundle.
@@ -33,7 +34,7 @@ pub struct Manifest {
     pub made_with: Option<MadeWith>,
     /// A sentence on units.
     pub units: String,
-    /// Where the coils stand.
+    /// Positions of the coils.
     pub array: ArrayGeometry,
     /// Limits of the currents.
     pub limits: CurrentLimits,
@@ -50,7 +51,7 @@ pub struct Manifest {
     pub points: PointsGrid,
     /// The map's grid, coils and interpolation.
     pub map: MapSummary,
-    /// What was left out because the object does not need it.
+    /// Parts left out because the object does not need them.
     pub left_out: Vec<LeftOut>,
     /// Each stage's estimated error.
     pub accuracy: BTreeMap<String, StageAccuracy>,
@@ -72,6 +73,15 @@ pub struct MadeWith {
     pub at_n_per_m: Option<f64>,
     /// `--tolerance`; null for the default.
     pub tolerance: Option<f64>,
+    /// `--error`, relative; absent without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error: Option<f64>,
+    /// `--refine`; absent without it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub refine: bool,
+    /// `--weights`; absent without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weights: Option<Weights>,
     /// How far from the object's points the map reaches, m.
     pub reach_m: f64,
     /// Whether `report.html` and `plots/` were requested.
@@ -98,7 +108,7 @@ impl MadeWith {
     }
 }
 
-/// What the command line says of a surface that is given directly.
+/// Options on the command line of a surface that is given directly.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SurfaceOptions {
     /// Metres per unit of the file's coordinates; null where its format says it.
@@ -111,6 +121,9 @@ pub struct SurfaceOptions {
     pub rotate_deg: [f64; 3],
     /// Samples of the grid along x and y.
     pub samples: [usize; 2],
+    /// Whether a flag gave them; absent where not.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub samples_are_given: bool,
     /// Ends of the grid along x, m; null for the surface's own extent.
     pub x_m: Option<[f64; 2]>,
     /// Ends of the grid along y, m; null for the surface's own extent.
@@ -138,7 +151,7 @@ pub struct SurfaceOptions {
     pub body: Option<String>,
 }
 
-/// What lies in the `map.npz` beside it.
+/// Contents of the `map.npz` beside it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MapSidecar {
     /// Layout, `major.minor.patch`.
@@ -147,14 +160,14 @@ pub struct MapSidecar {
     pub fluxform_version: String,
     /// Name of the design.
     pub design: String,
-    /// What went in, paths as given on the command line.
+    /// Inputs, paths as given on the command line.
     pub inputs: Vec<Input>,
     /// The options of the run; absent from maps of schema 1.3 and before.
     #[serde(default, skip_serializing_if = "Options::is_empty")]
     pub made_with: Options,
     /// A sentence on units.
     pub units: String,
-    /// Where the coils stand.
+    /// Positions of the coils.
     pub array: ArrayGeometry,
     /// The magnet.
     pub magnet: MagnetSummary,
@@ -166,7 +179,7 @@ pub struct MapSidecar {
     pub files: Vec<FileEntry>,
 }
 
-/// Where the coils stand; index = row * columns + column for a rectangular array.
+/// Positions of the coils; index = row * columns + column for a rectangular array.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ArrayGeometry {
     /// The axes' x and y, m, in coil order.
@@ -388,11 +401,11 @@ pub struct Interpolation {
     pub name: String,
     /// Degree along each axis that has nodes enough.
     pub order: u32,
-    /// What happens at and beyond the borders.
+    /// Behaviour at and beyond the borders.
     pub borders: String,
     /// Its largest error.
     pub largest_error: f64,
-    /// What the largest error is relative to and how it was found.
+    /// Reference of the largest error and how it was found.
     pub largest_error_definition: String,
 }
 

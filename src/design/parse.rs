@@ -54,7 +54,7 @@ impl Design {
 }
 
 impl Draft {
-    /// The design in SI; `None` where an error stands in the way.
+    /// The design in SI; `None` where an error prevents it.
     fn design(self, path: &Path, sink: &Sink) -> Option<Design> {
         if sink.has_errors() {
             return None;
@@ -158,5 +158,6 @@ fn workspace_m(draft: &WorkspaceDraft) -> Option<Workspace> {
         x_m: axis_m(draft.x.as_ref()?.value),
         y_m: axis_m(draft.y.as_ref()?.value),
         z_m: axis_m(draft.z.as_ref()?.value),
+        is_given: draft.is_given,
     })
 }

@@ -1,6 +1,6 @@
 //! The design file's keys: one line each, with its rule and its default.
 //!
-//! What is read here is a draft in the file's own units, with the place of every value that a
+//! The sections are read into a draft in the file's own units, with the place of every value that a
 //! check may speak of.
 
 use super::array::{COILS_MAX, grid_positions_m};
@@ -154,7 +154,7 @@ pub enum Layout {
     Grid(ArrayGrid, Located<f64>),
     /// A list, mm.
     Listed(Vec<Located<[f64; 2]>>),
-    /// What the file says of it is at fault.
+    /// The file's statement on it is at fault.
     Unknown,
 }
 
@@ -310,6 +310,7 @@ pub struct WorkspaceDraft {
     pub x: Option<Located<Axis>>,
     pub y: Option<Located<Axis>>,
     pub z: Option<Located<Axis>>,
+    pub is_given: bool,
 }
 
 /// The seed's grid along x and y, mm.
@@ -325,7 +326,9 @@ pub fn workspace(mut s: Section<'_>) -> WorkspaceDraft {
         to: 80.0,
         samples: 29,
     };
+    let is_given = ["x_mm", "y_mm", "z_mm"].iter().any(|key| s.has(key));
     let draft = WorkspaceDraft {
+        is_given,
         x: s.axis_or("x_mm", &BODY_MM, SEED_SIDE_MM),
         y: s.axis_or("y_mm", &BODY_MM, SEED_SIDE_MM),
         z: s.axis_or("z_mm", &BODY_MM, heights),

@@ -9,6 +9,7 @@ use crate::height::{Grid, Sample};
 use crate::hidden::Hidden;
 use crate::holes::{self, Holes};
 use crate::mesh::{Bounds, MeshFacts};
+use crate::point_areas::areas_m2;
 use crate::point_flags::Marks;
 use crate::scattered::Probe;
 use crate::surface::Surface;
@@ -40,8 +41,10 @@ pub struct ConstraintPoints {
     pub normal: Vec<[f64; 3]>,
     /// Each point's place in the grid: row * columns + column; ascending.
     pub grid_index: Vec<usize>,
-    /// What each point is besides a height.
+    /// Flags of each point.
     pub marks: Vec<Marks>,
+    /// Plan area that each point stands for, m^2; empty where points are not marked.
+    pub area_m2: Vec<f64>,
     /// Grid points without surface, skipped.
     pub outside: usize,
     /// Of the grid points without surface those that lie inside the silhouette, skipped or filled.
@@ -113,14 +116,14 @@ impl ConstraintPoints {
     }
 }
 
-/// What discretising a document gives.
+/// Result of discretising a document.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Discretized {
     /// The constraint points.
     pub points: ConstraintPoints,
     /// The surface's own box, placed, m.
     pub bounds: Bounds,
-    /// What the mesh file holds; `None` for a primitive.
+    /// Contents of the mesh file; `None` for a primitive.
     pub mesh: Option<MeshFacts>,
     /// Another program that made the mesh file's triangles, with its version.
     pub read_by: Option<String>,
@@ -134,22 +137,22 @@ pub struct Discretized {
     /// How much of the surface a height map cannot show; `None` for a formula and where points are
     /// not marked.
     pub hidden: Option<Hidden>,
-    /// What the user should know though it stops nothing.
+    /// Warnings.
     pub warnings: Vec<String>,
 }
 
-/// What is done besides sampling.
+/// Options of discretising.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Settings {
     /// Grid points without surface inside the silhouette.
     pub holes: Holes,
     /// How the points are compared with the surface.
     pub certify: Certify,
-    /// What an earlier comparison of these points with this surface found; it is not done again.
+    /// Result of an earlier comparison of these points with this surface; it is not repeated.
     pub known: Option<Certificate>,
-    /// Whether walls, rims, creases and overhangs are looked for.
+    /// Whether walls, rims, creases, overhangs and the points' areas are looked for.
     pub marks: bool,
-    /// Whether the vertical difference is told for every cell.
+    /// Whether the vertical difference is reported for every cell.
     pub cells: bool,
 }
 
@@ -242,7 +245,9 @@ pub fn discretize_surface(
     let mut points = collect(&grid, &samples, rounding_m, &bounds)?;
     points.holes = found.len();
     if settings.marks {
-        mark(&mut points, &surface, &found, progress)?;
+        let probe = Probe::new(&surface, &points.grid);
+        mark(&mut points, &probe, &found, progress)?;
+        points.area_m2 = point_areas_m2(&points, &probe, progress)?;
     }
     let hidden = Hidden::of(&surface).filter(|_| settings.marks);
     if let Some(share) = hidden
@@ -310,14 +315,13 @@ pub fn discretize_surface(
     })
 }
 
-/// Looks for what each point is besides a height; `filled` holds grid indices, ascending.
+/// Finds the flags of each point; `filled` holds grid indices, ascending.
 fn mark(
     points: &mut ConstraintPoints,
-    surface: &Surface,
+    probe: &Probe<'_>,
     filled: &[usize],
     progress: &dyn Progress,
 ) -> Result<(), ShapeError> {
-    let probe = Probe::new(surface, &points.grid);
     let places = (0..points.len()).into_par_iter();
     let marks: Result<Vec<Marks>, Interrupted> = places
         .map(|row| {
@@ -334,6 +338,21 @@ fn mark(
         .collect();
     points.marks = marks?;
     Ok(())
+}
+
+/// The plan area of each point, m^2.
+fn point_areas_m2(
+    points: &ConstraintPoints,
+    probe: &Probe<'_>,
+    progress: &dyn Progress,
+) -> Result<Vec<f64>, ShapeError> {
+    let mut present = vec![false; points.grid.len()];
+    for &place in &points.grid_index {
+        present[place] = true;
+    }
+    let covered = |p: [f64; 2]| probe.at(p).is_some();
+    let all = areas_m2(&points.grid, &present, &covered, progress)?;
+    Ok(points.grid_index.iter().map(|&place| all[place]).collect())
 }
 
 /// The requested axis; its nodes ascend.
@@ -410,6 +429,7 @@ fn collect(
         normal: Vec::with_capacity(found),
         grid_index: Vec::with_capacity(found),
         marks: vec![Marks::PLAIN; found],
+        area_m2: Vec::new(),
         outside: samples.len() - found,
         holes: 0,
     };

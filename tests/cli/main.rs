@@ -2,11 +2,12 @@
 #![cfg(unix)] // signals, /dev/full, links
 
 mod budget;
+mod cache;
 mod codes;
+mod error_target;
 mod files;
 mod help;
 mod interrupt;
-mod kept;
 mod lambda;
 mod messages;
 mod optimize;
@@ -16,6 +17,7 @@ mod streams;
 mod surfaces;
 mod sweep;
 mod verify;
+mod weights;
 
 /// The array of the reference design without steel.
 const SEED: &str = "designs/seed_air.toml";

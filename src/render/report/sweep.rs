@@ -94,7 +94,7 @@ pub fn page(facts: &SweepFacts) -> String {
             answer(facts),
             Section {
                 id: "limits",
-                title: "What limits it",
+                title: "Limits",
                 body: limits,
             },
             sources(&facts.inputs),
@@ -108,7 +108,7 @@ pub fn page(facts: &SweepFacts) -> String {
     .html()
 }
 
-/// What the drawings show; each front with the numbers of its designs.
+/// Data of the drawings; each front with the numbers of its designs.
 fn drawn(facts: &SweepFacts) -> Value {
     let cloud = |points: &[(f64, f64)]| {
         let (x, y): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();
@@ -165,7 +165,7 @@ fn answer(facts: &SweepFacts) -> Section {
     }
     Section {
         id: "answer",
-        title: "The answer",
+        title: "Result",
         body,
     }
 }

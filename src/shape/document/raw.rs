@@ -9,7 +9,7 @@ use crate::step::BodyOptions;
 use fluxform_design::message_text::axis_fault;
 use fluxform_numerics::axis::Axis;
 
-/// What the command line says of a surface.
+/// A surface's options on the command line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RawSurface {
     /// The surface file.
@@ -25,13 +25,15 @@ pub struct RawSurface {
     pub placement: Placement,
     /// Samples along x and y.
     pub samples: [usize; 2],
+    /// Whether a flag gives them.
+    pub samples_are_given: bool,
     /// Ends along x, m; `None`: the surface's own extent.
     pub x_m: Option<[f64; 2]>,
     /// Ends along y, m; `None`: the surface's own extent.
     pub y_m: Option<[f64; 2]>,
 }
 
-/// Why a surface on the command line cannot be taken as it stands: wrong usage.
+/// Why a surface on the command line cannot be taken as it is: wrong usage.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RawSurfaceError {
     /// The format carries no unit and none was given.
@@ -64,9 +66,9 @@ pub enum RawSurfaceError {
         path: PathBuf,
         /// `x` or `y`.
         axis: &'static str,
-        /// What is wrong.
+        /// The fault.
         fault: String,
-        /// What to do.
+        /// The advice.
         help: &'static str,
     },
     /// More points than any grid may have.
@@ -117,6 +119,8 @@ impl ShapeDocument {
             bodies: surface.bodies.clone(),
             scale: surface.scale,
             placement: surface.placement,
+            weights: None,
+            grid_is_given: surface.samples_are_given,
         })
     }
 }
