@@ -426,6 +426,7 @@ impl Calibration<'_> {
             &mut lambda.file,
             scene,
             &solved.forces,
+            field,
             &of_grid,
             &options.wiring,
             progress,

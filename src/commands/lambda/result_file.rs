@@ -28,7 +28,7 @@ impl PosedProblem<'_> {
             self.solved,
             &points.positions_m,
             self.unwired.forces_n_per_a,
-        );
+        )?;
         let accuracy = BTreeMap::from([
             ("points".to_owned(), points.accuracy["points"].clone()),
             ("forces".to_owned(), forces),

@@ -214,8 +214,7 @@ fn accuracy(table: &ProbeTable) -> BTreeMap<&'static str, StageAccuracy> {
     let field = stage(table.relative_error, relative_to, &table.method);
     let force = table.force_error.map(|estimate| {
         let to = "the moment times the largest |grad B| at the point's height";
-        let method = "the field's error and the a-priori bound of the magnet's dipoles";
-        ("force", stage(estimate, to, method))
+        ("force", stage(estimate, to, &table.force_method))
     });
     std::iter::once(("field", field)).chain(force).collect()
 }
