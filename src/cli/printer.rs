@@ -14,6 +14,7 @@ use serde::Serialize;
 use super::args::{Colour, Common, Format};
 use super::code::Code;
 use super::failure::{Failure, FaultEntry};
+use super::terminal;
 use crate::bundle::json::to_json;
 use crate::design::Faults;
 use crate::design::message_text::{shown_path, visible};
@@ -306,8 +307,25 @@ pub fn say(text: &str) {
     let _ = io::stderr().lock().write_all(text.as_bytes());
 }
 
+/// Asks at the terminal; an empty answer, or none, is `default`.
+///
+/// # Errors
+/// Standard input that cannot be read.
+pub fn ask(question: &str, default: &str) -> Result<String, Failure> {
+    let mut stderr = io::stderr().lock();
+    let _ = write!(stderr, "{question}[{default}] ").and_then(|()| stderr.flush());
+    drop(stderr);
+    let mut answer = String::new();
+    io::stdin()
+        .read_line(&mut answer)
+        .map_err(|error| Failure::Input(format!("standard input cannot be read: {error}")))?;
+    match answer.trim() {
+        "" => Ok(default.to_owned()),
+        answer => Ok(answer.to_owned()),
+    }
+}
+
 /// Columns at which messages are wrapped.
 fn width() -> usize {
-    let columns = std::env::var("COLUMNS").ok().and_then(|c| c.parse().ok());
-    columns.unwrap_or(100).clamp(40, 160)
+    terminal::columns().unwrap_or(100)
 }

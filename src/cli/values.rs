@@ -279,6 +279,20 @@ pub fn box_of(text: &str) -> Result<[[f64; 2]; 3], String> {
     }
 }
 
+/// `KEY=VALUE`: a dotted key and its value, a number, list or truth value as in TOML, or a text.
+pub fn setting(text: &str) -> Result<(String, toml::Value), String> {
+    let Some((key, value)) = text
+        .split_once('=')
+        .filter(|(key, _)| !key.trim().is_empty())
+    else {
+        return Err("expected KEY=VALUE, like array.pitch_mm=40".to_owned());
+    };
+    let table: Option<toml::Table> = format!("value = {}", value.trim()).parse().ok();
+    let parsed = table.and_then(|mut table| table.remove("value"));
+    let value = parsed.unwrap_or_else(|| toml::Value::String(value.trim().to_owned()));
+    Ok((key.trim().to_owned(), value))
+}
+
 /// A number of threads.
 pub fn threads(text: &str) -> Result<usize, String> {
     match text.parse() {

@@ -7,7 +7,7 @@
 use super::draft::{Draft, Need};
 use super::reader::list_keys;
 
-pub use super::key::{Key, Without, with_meanings};
+pub use super::key::{Accepts, Key, Without, with_meanings};
 
 /// The keys of a design.
 #[must_use]
@@ -157,12 +157,12 @@ mod tests {
         let keys = of_designs();
         let key = |path: &str| keys.iter().find(|key| key.path() == path).unwrap();
         let length = key("coil.length_mm");
-        assert_eq!(length.value, "number, mm");
-        assert_eq!(length.range, "> 0");
+        assert_eq!(length.accepts.words(), "number, mm");
+        assert_eq!(length.accepts.range, "> 0");
         assert_eq!(length.default, Without::Refused);
         let polarity = key("magnet.polarity");
-        assert_eq!(polarity.value, "`\"repel\"` or `\"attract\"`");
-        assert_eq!(polarity.default, Without::Value("`\"repel\"`".to_owned()));
+        assert_eq!(polarity.accepts.words(), "`\"repel\"` or `\"attract\"`");
+        assert_eq!(polarity.default, Without::Value("\"repel\"".to_owned()));
         assert_eq!(
             key("supply.current_max_a").default,
             Without::Value("2".to_owned())

@@ -15,7 +15,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::diagnostics::{Fault, Faults, InvalidDocument, Severity};
-use super::key::{Key, Keys, Without};
+use super::key::{Accepts, Key, Keys, Without};
 use super::message_text::{QUOTED_MAX, escaped, nearest, quoted};
 
 /// A value and its bytes in the text (those of its section where it is a default).
@@ -211,16 +211,14 @@ impl<'a> Section<'a> {
     pub(super) fn list(
         &self,
         name: &'static str,
-        value: impl FnOnce() -> (String, String),
+        accepts: impl FnOnce() -> Accepts,
         default: impl FnOnce() -> Without,
     ) {
         if let Some(keys) = &self.sink.keys {
-            let (value, range) = value();
             keys.add(Key {
                 section: self.path.clone(),
                 name,
-                value,
-                range,
+                accepts: accepts(),
                 default: default(),
                 meaning: "",
             });

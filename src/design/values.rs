@@ -5,7 +5,7 @@ use toml::de::DeValue;
 
 use super::diagnostics::Fault;
 use super::gauge::awg_mm;
-use super::key::Without;
+use super::key::{Accepts, Without};
 use super::message_text::{axis_fault, nearest, number, quoted};
 use super::reader::{Located, Section, ValueRef};
 use super::rule::{Bound, Rule};
@@ -105,12 +105,19 @@ impl<'a> Section<'a> {
 
     /// Exactly `N` numbers, zeros where absent; NaN where at fault.
     pub fn tuple<const N: usize>(&mut self, key: &'static str, rule: &Rule) -> [f64; N] {
-        let value = || of_rule(&format!("{N} numbers"), rule);
         let zeros = || Without::Value(format!("[{}]", ["0"; N].join(", ")));
-        self.list(key, value, zeros);
-        let Some(found) = self.found(key) else {
-            return [0.0; N];
-        };
+        self.list(key, || of_tuple(N, rule), zeros);
+        self.tuple_if_given(key, rule).unwrap_or([0.0; N])
+    }
+
+    /// Exactly `N` numbers; `None` where absent, NaN where at fault.
+    pub fn tuple_if_given<const N: usize>(
+        &mut self,
+        key: &'static str,
+        rule: &Rule,
+    ) -> Option<[f64; N]> {
+        self.list(key, || of_tuple(N, rule), || Without::Nothing);
+        let found = self.found(key)?;
         let mut values = [f64::NAN; N];
         let wanted = format!("a list of {N} numbers");
         let items = self.items(key, found, &wanted);
@@ -121,7 +128,7 @@ impl<'a> Section<'a> {
             let message = format!("expected {wanted}, found {}", items.len());
             self.fault(key, message, "write them in square brackets, with commas");
         }
-        values
+        Some(values)
     }
 
     /// A list of at most `most` pairs `[a, b]`, each with its place; empty where at fault.
@@ -179,7 +186,10 @@ impl<'a> Section<'a> {
 
     /// A whole number of at least 1 with a default; `None` where at fault.
     pub(crate) fn count_or(&mut self, key: &'static str, default: usize) -> Option<usize> {
-        let value = || ("whole number".to_owned(), ">= 1".to_owned());
+        let value = || Accepts {
+            range: ">= 1".to_owned(),
+            ..Accepts::any("whole number")
+        };
         self.list(key, value, || Without::Value(default.to_string()));
         match self.found(key) {
             Some(found) => self.whole(&self.path_of(key), found),
@@ -241,11 +251,7 @@ impl<'a> Section<'a> {
 
     /// A text; `None` where absent or at fault.
     pub fn text(&mut self, key: &'static str) -> Option<Located<String>> {
-        self.list(
-            key,
-            || ("text".to_owned(), String::new()),
-            || Without::Nothing,
-        );
+        self.list(key, || Accepts::any("text"), || Without::Nothing);
         let found = self.found(key)?;
         match found.get_ref() {
             DeValue::String(text) => Some(located(text.to_string(), found)),
@@ -262,11 +268,7 @@ impl<'a> Section<'a> {
         key: &'static str,
         help: &str,
     ) -> Option<Located<String>> {
-        self.list(
-            key,
-            || ("text".to_owned(), String::new()),
-            || Without::Refused,
-        );
+        self.list(key, || Accepts::any("text"), || Without::Refused);
         if !self.has(key) {
             self.missing(key, help);
         }
@@ -304,8 +306,8 @@ impl<'a> Section<'a> {
         options: &[(&'static str, T)],
     ) -> T {
         let (first, value) = options[0];
-        let without = || Without::Value(format!("`{first:?}`"));
-        self.list(key, || (choices(options), String::new()), without);
+        let without = || Without::Value(format!("{first:?}"));
+        self.list(key, || Accepts::any(choices(options)), without);
         self.choice(key, options).unwrap_or(value)
     }
 
@@ -315,11 +317,7 @@ impl<'a> Section<'a> {
         key: &'static str,
         options: &[(&'static str, T)],
     ) -> Option<T> {
-        self.list(
-            key,
-            || (choices(options), String::new()),
-            || Without::Nothing,
-        );
+        self.list(key, || Accepts::any(choices(options)), || Without::Nothing);
         let text = self.text(key)?;
         if let Some((_, value)) = options.iter().find(|(name, _)| *name == text.value) {
             return Some(*value);
@@ -342,7 +340,7 @@ impl<'a> Section<'a> {
 
     /// True or false; the default where absent or at fault.
     pub fn flag_or(&mut self, key: &'static str, default: bool) -> bool {
-        let value = || ("true or false".to_owned(), String::new());
+        let value = || Accepts::any("true or false");
         self.list(key, value, || Without::Value(default.to_string()));
         match self.found(key).map(|found| (found, found.get_ref())) {
             None => default,
@@ -438,15 +436,18 @@ impl<'a> Section<'a> {
     }
 }
 
-/// What a rule accepts, in words, and its range.
-fn of_rule(what: &str, rule: &Rule) -> (String, String) {
-    let gauge = if rule.gauges { ", or a gauge" } else { "" };
-    let unit = if rule.unit.is_empty() {
-        String::new()
-    } else {
-        format!(", {}", rule.unit)
-    };
-    (format!("{what}{unit}{gauge}"), rule.bound.symbols())
+/// The values of this kind that a rule accepts.
+fn of_rule(kind: &str, rule: &Rule) -> Accepts {
+    Accepts {
+        kind: kind.to_owned(),
+        unit: rule.unit,
+        gauges: rule.gauges,
+        range: rule.bound.symbols(),
+    }
+}
+
+fn of_tuple(count: usize, rule: &Rule) -> Accepts {
+    of_rule(&format!("{count} numbers"), rule)
 }
 
 fn choices<T>(options: &[(&'static str, T)]) -> String {

@@ -4,7 +4,7 @@ mod raw;
 mod read;
 mod unit;
 
-pub use read::keys;
+pub use read::{keys, keys_of};
 
 use std::path::PathBuf;
 

@@ -4,6 +4,7 @@
 mod budget;
 mod codes;
 mod files;
+mod first_contact;
 mod help;
 mod interrupt;
 mod kept;
