@@ -40,6 +40,9 @@ pub struct Common {
     #[arg(long, global = true, value_name = "N", default_value_t = STEP_SECONDS,
           value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub step_seconds: u64,
+    /// Refuse a design that leaves a physical number to its default, naming every such key
+    #[arg(long, global = true)]
+    pub strict_inputs: bool,
     /// Colours in messages; `auto` means on terminals, unless NO_COLOR is set
     #[arg(long, global = true, value_enum, default_value_t = Colour::Auto, value_name = "WHEN")]
     pub color: Colour,

@@ -12,7 +12,8 @@ use crate::bundle::read_table::{TABLE_MAX_BYTES, read_columns};
 use crate::bundle::scan::Scan;
 use crate::bundle::sweep::PlanFile;
 use crate::bundle::trajectory::Trajectory;
-use crate::design::{Design, Faults, InvalidDocument, Need, source};
+use crate::design::keys::Assumed;
+use crate::design::{Design, Fault, Faults, InvalidDocument, Need, source};
 use crate::scene::sources::ShapeSource;
 use crate::shape::document::{Fit, Placement, RawSurface, RawSurfaceError, Seat, ShapeDocument};
 use crate::shape::step::BodyOptions;
@@ -49,8 +50,30 @@ pub fn design(
 ) -> Result<DesignDocument, Failure> {
     let (document, warnings) =
         read_design(file, need).map_err(|fault| Failure::Documents(vec![fault]))?;
-    printer.document_warnings(&warnings);
+    taken(&document, &warnings, printer)?;
     Ok(document)
+}
+
+/// Reports what there is to say of a design that was read.
+///
+/// # Errors
+/// With `--strict-inputs`, every default that decides a number.
+fn taken(document: &DesignDocument, warnings: &Faults, printer: &Printer) -> Result<(), Failure> {
+    let assumed = &document.design.assumed;
+    printer.document_warnings(warnings);
+    if !printer.strict_inputs() || assumed.is_empty() {
+        printer.assumed(assumed);
+        return Ok(());
+    }
+    let named = |one: &Assumed| format!("{} = {}", one.key, one.value);
+    let message = format!(
+        "expected every number to be written (--strict-inputs); not written, with their defaults: {}",
+        assumed.iter().map(named).collect::<Vec<_>>().join(", ")
+    );
+    let help = "write these keys; `fluxform keys` explains each";
+    let fault = Fault::error("", message).help(help);
+    let faults = Faults::new(Path::new(&document.input.path), &document.text, vec![fault]);
+    Err(Failure::Documents(vec![InvalidDocument { faults }]))
 }
 
 /// A design and shapes.
@@ -69,7 +92,7 @@ pub fn design_and_shapes(
     let shapes = read_shapes(shape_files, flags);
     match (design, shapes) {
         (Ok((design, warnings)), Ok(shapes)) => {
-            printer.document_warnings(&warnings);
+            taken(&design, &warnings, printer)?;
             Ok((design, with_warnings(shapes, printer)))
         }
         (Err(fault), Err(Failure::Documents(mut faults))) => {

@@ -55,6 +55,8 @@ pub enum Wish {
     Limits,
     /// One with a force constant.
     ForceConstant,
+    /// An object where the array can render it.
+    Placement,
     /// The requested accuracy.
     Accuracy,
     /// A coil.
@@ -79,6 +81,7 @@ impl Failure {
             Self::Unmet(wish, _) => match wish {
                 Wish::Limits => Code::Limits,
                 Wish::ForceConstant => Code::NoForceConstant,
+                Wish::Placement => Code::Placement,
                 Wish::Accuracy => Code::Accuracy,
                 Wish::Coil => Code::NoCoil,
                 Wish::Sweep => Code::Sweep,
@@ -139,6 +142,7 @@ fn code_of(error: &RunError) -> Code {
         }
         RunError::Bundle(_) => Code::Damaged,
         RunError::NoForceConstant(_) => Code::NoForceConstant,
+        RunError::Misplaced(_) => Code::Placement,
         RunError::Unmet(_) => Code::Measurement,
         RunError::Interrupted(_) => Code::Interrupted,
     }

@@ -17,6 +17,7 @@ use super::failure::{Failure, FaultEntry};
 use super::terminal;
 use crate::bundle::json::to_json;
 use crate::design::Faults;
+use crate::design::keys::Assumed;
 use crate::design::message_text::{shown_path, visible};
 
 /// Bytes gathered before standard output is written to.
@@ -28,7 +29,10 @@ pub struct Printer {
     format: Format,
     quiet: bool,
     colour: bool,
+    strict_inputs: bool,
     warnings: RefCell<Vec<String>>,
+    /// The defaults of the design that was read; `None` where none was.
+    assumed: RefCell<Option<Vec<AssumedEntry>>>,
     /// A summary as JSON that is due on standard error.
     pending: RefCell<Option<Vec<u8>>>,
 }
@@ -47,7 +51,17 @@ pub enum Stream {
 pub struct WithWarnings<'a, T> {
     #[serde(flatten)]
     result: &'a T,
+    /// Keys of the design that decide numbers, were not written, and have these values.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    assumed: Option<Vec<AssumedEntry>>,
     warnings: Vec<String>,
+}
+
+/// A key that has its default, for programs.
+#[derive(Debug, Clone, Serialize)]
+struct AssumedEntry {
+    key: String,
+    value: Option<toml::Value>,
 }
 
 #[derive(Serialize)]
@@ -109,7 +123,9 @@ impl Printer {
             format: common.format,
             quiet: common.quiet,
             colour,
+            strict_inputs: common.strict_inputs,
             warnings: RefCell::default(),
+            assumed: RefCell::default(),
             pending: RefCell::default(),
         }
     }
@@ -161,6 +177,29 @@ impl Printer {
         }
     }
 
+    /// Whether defaults that decide numbers are refused.
+    #[must_use]
+    pub fn strict_inputs(&self) -> bool {
+        self.strict_inputs
+    }
+
+    /// Reports the defaults that a design leaves to the program: on one line, and in the JSON object.
+    pub fn assumed(&self, assumed: &[Assumed]) {
+        let named: Vec<String> = assumed
+            .iter()
+            .map(|one| format!("{} = {}", one.key, one.value))
+            .collect();
+        if !named.is_empty() {
+            self.notice(&format!("assumed: {}", named.join(", ")));
+        }
+        let entry = |one: &Assumed| AssumedEntry {
+            key: one.key.clone(),
+            value: one.typed(),
+        };
+        self.assumed
+            .replace(Some(assumed.iter().map(entry).collect()));
+    }
+
     /// The warnings that go into the JSON object.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
@@ -172,6 +211,7 @@ impl Printer {
     pub fn with_warnings<'a, T>(&self, result: &'a T) -> WithWarnings<'a, T> {
         WithWarnings {
             result,
+            assumed: self.assumed.borrow().clone(),
             warnings: self.warnings.borrow().clone(),
         }
     }

@@ -98,6 +98,7 @@ fn told_early(args: &[OsString]) -> Common {
             Some("json") => Format::Json,
             _ => Format::Human,
         },
+        strict_inputs: false,
         quiet: false,
         threads: None,
         memory: None,

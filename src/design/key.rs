@@ -62,6 +62,39 @@ pub enum Without {
     Nothing,
 }
 
+/// A key that decides a number, was not written, and so has its default.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assumed {
+    /// Its dotted path; a section alone where that as a whole is not given.
+    pub key: String,
+    /// The value, as TOML.
+    pub value: String,
+}
+
+impl Assumed {
+    /// The value by its type.
+    #[must_use]
+    pub fn typed(&self) -> Option<toml::Value> {
+        typed(&self.value)
+    }
+}
+
+impl Without {
+    /// The default by its type; `None` where there is none.
+    #[must_use]
+    pub fn typed(&self) -> Option<toml::Value> {
+        match self {
+            Self::Value(text) => typed(text),
+            Self::Refused | Self::Nothing => None,
+        }
+    }
+}
+
+fn typed(text: &str) -> Option<toml::Value> {
+    let mut table: toml::Table = format!("value = {text}").parse().ok()?;
+    table.remove("value")
+}
+
 impl Key {
     /// The dotted path: section and name.
     #[must_use]

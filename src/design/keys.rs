@@ -7,7 +7,7 @@
 use super::draft::{Draft, Need};
 use super::reader::list_keys;
 
-pub use super::key::{Accepts, Key, Without, with_meanings};
+pub use super::key::{Accepts, Assumed, Key, Without, with_meanings};
 
 /// The keys of a design.
 #[must_use]
@@ -65,7 +65,7 @@ const MEANINGS: &[(&str, &str)] = &[
     ),
     (
         "core.knee_t",
-        "flux density from which the steel saturates; without it 1.5 T, or the curve's own",
+        "flux density from which the steel saturates; of a curve its own",
     ),
     (
         "core.conductivity_s_per_m",

@@ -15,7 +15,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::diagnostics::{Fault, Faults, InvalidDocument, Severity};
-use super::key::{Accepts, Key, Keys, Without};
+use super::key::{Accepts, Assumed, Key, Keys, Without};
 use super::message_text::{QUOTED_MAX, escaped, nearest, quoted};
 
 /// A value and its bytes in the text (those of its section where it is a default).
@@ -31,6 +31,7 @@ pub struct Located<T> {
 #[derive(Debug, Default)]
 pub struct Sink {
     faults: RefCell<Vec<Fault>>,
+    assumed: RefCell<Vec<Assumed>>,
     keys: Option<Keys>,
 }
 
@@ -38,6 +39,12 @@ impl Sink {
     /// Adds a fault.
     pub fn add(&self, fault: Fault) {
         self.faults.borrow_mut().push(fault);
+    }
+
+    /// The keys that have defaults because they were not written, in the order in which they were read.
+    #[must_use]
+    pub fn assumed(&self) -> Vec<Assumed> {
+        self.assumed.borrow().clone()
     }
 
     /// True when one of the faults is an error.
@@ -223,6 +230,22 @@ impl<'a> Section<'a> {
                 meaning: "",
             });
         }
+    }
+
+    /// Records that `key` is not written and has `value`, as TOML, by default.
+    pub(super) fn assume(&self, key: &str, value: impl Into<String>) {
+        self.sink.assumed.borrow_mut().push(Assumed {
+            key: self.path_of(key),
+            value: value.into(),
+        });
+    }
+
+    /// Records that this whole section is not written.
+    pub(super) fn assume_whole(&self, value: impl Into<String>) {
+        self.sink.assumed.borrow_mut().push(Assumed {
+            key: self.path.clone(),
+            value: value.into(),
+        });
     }
 
     /// Accepts `keys` without reading them.

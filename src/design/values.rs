@@ -43,10 +43,12 @@ impl<'a> Section<'a> {
     pub fn number_or(&mut self, key: &'static str, rule: &Rule, default: f64) -> Located<f64> {
         let without = || Without::Value(number(default));
         self.list(key, || of_rule("number", rule), without);
-        let span = self.span();
-        self.number(key, rule).unwrap_or(Located {
-            value: default,
-            span,
+        self.number(key, rule).unwrap_or_else(|| {
+            self.assume(key, number(default));
+            Located {
+                value: default,
+                span: self.span(),
+            }
         })
     }
 
@@ -97,6 +99,9 @@ impl<'a> Section<'a> {
             };
             Some(located(value, found))
         });
+        if !self.has(key) {
+            self.assume(key, number(default));
+        }
         given.unwrap_or(Located {
             value: OneOrMany::One(default),
             span: self.span(),
@@ -193,7 +198,10 @@ impl<'a> Section<'a> {
         self.list(key, value, || Without::Value(default.to_string()));
         match self.found(key) {
             Some(found) => self.whole(&self.path_of(key), found),
-            None => Some(default),
+            None => {
+                self.assume(key, default.to_string());
+                Some(default)
+            }
         }
     }
 
@@ -204,17 +212,21 @@ impl<'a> Section<'a> {
         rule: &Rule,
         default: Axis,
     ) -> Option<Located<Axis>> {
-        let without = || {
+        let shown = || {
             let ends = [default.from, default.to].map(number).join(", ");
-            Without::Value(format!("[{ends}, {}]", default.samples))
+            format!("[{ends}, {}]", default.samples)
         };
+        let without = || Without::Value(shown());
         self.list(key, || of_rule("[from, to, samples]", rule), without);
         match self.found(key) {
             Some(found) => self.axis_in(key, found, rule),
-            None => Some(Located {
-                value: default,
-                span: self.span(),
-            }),
+            None => {
+                self.assume(key, shown());
+                Some(Located {
+                    value: default,
+                    span: self.span(),
+                })
+            }
         }
     }
 
@@ -308,6 +320,9 @@ impl<'a> Section<'a> {
         let (first, value) = options[0];
         let without = || Without::Value(format!("{first:?}"));
         self.list(key, || Accepts::any(choices(options)), without);
+        if !self.has(key) {
+            self.assume(key, format!("{first:?}"));
+        }
         self.choice(key, options).unwrap_or(value)
     }
 

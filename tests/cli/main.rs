@@ -1,6 +1,7 @@
 //! The binary as its users meet it: exit codes, streams, files, messages.
 #![cfg(unix)] // signals, /dev/full, links
 
+mod assumed;
 mod budget;
 mod codes;
 mod files;
@@ -11,6 +12,7 @@ mod kept;
 mod lambda;
 mod messages;
 mod optimize;
+mod placement;
 mod scan;
 mod steel;
 mod streams;

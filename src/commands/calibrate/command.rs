@@ -28,7 +28,7 @@ use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
 use crate::cli::start::folder;
 use crate::cli::values::{self, FileArgument};
-use crate::commands::lambda::command::{CriterionFlags, rendered};
+use crate::commands::lambda::command::{CriterionFlags, rendered, well_placed};
 use crate::design::{Design, Need};
 use crate::scene::cost::{Components, of_map};
 use crate::scene::sources::DesignSource;
@@ -141,6 +141,10 @@ impl Calibrate {
         let missed = |b: &BundleReport| b.lambda.accuracy_missed.clone();
         let missed: Vec<String> = report.bundles.iter().flat_map(missed).collect();
         accuracy_check(&missed)?;
+        report
+            .bundles
+            .iter()
+            .try_for_each(|bundle| well_placed(&bundle.lambda))?;
         let constants: Vec<(&str, Option<f64>)> = report
             .bundles
             .iter()

@@ -65,7 +65,7 @@ pub struct KeyEntry {
     /// Whether a document without it is refused.
     pub required: bool,
     /// Its value where it is not given; `None` where there is none.
-    pub default: Option<serde_json::Value>,
+    pub default: Option<toml::Value>,
     /// What it means.
     pub meaning: &'static str,
     /// Value, range and meaning on one line.
@@ -84,10 +84,7 @@ impl KeyEntry {
             unit: Some(key.accepts.unit).filter(|unit| !unit.is_empty()),
             range: Some(key.accepts.range).filter(|range| !range.is_empty()),
             required: key.default == Without::Refused,
-            default: match key.default {
-                Without::Value(text) => json_of(&text),
-                Without::Refused | Without::Nothing => None,
-            },
+            default: key.default.typed(),
             meaning: key.meaning,
         }
     }
@@ -100,12 +97,6 @@ impl KeyEntry {
             section => format!("{section}.{}", self.key),
         }
     }
-}
-
-/// A value of TOML as one of JSON.
-fn json_of(text: &str) -> Option<serde_json::Value> {
-    let table: toml::Table = format!("value = {text}").parse().ok()?;
-    serde_json::to_value(table.get("value")?).ok()
 }
 
 /// The keys of every document, or of those that `section` selects: a document, a section, or part of

@@ -4,6 +4,7 @@ use std::slice::from_ref;
 
 use clap::Args;
 
+use super::LambdaReport;
 use super::feedback::FeedbackOptions;
 use super::text::summary;
 use super::{LambdaOptions, run};
@@ -187,9 +188,24 @@ impl Lambda {
             printer.summary(place, &json, || summary(design, &points, &report))?;
             accuracy_check(&report.accuracy_missed)?;
             let file = &report.file;
+            well_placed(&report)?;
             rendered(&[(file.shape.as_str(), file.lambda_n_per_m)])?;
         }
         Ok(())
+    }
+}
+
+/// Fails where the array cannot render the object where it is.
+///
+/// # Errors
+/// Why, and what would bring it there.
+pub fn well_placed(report: &LambdaReport) -> Result<(), Failure> {
+    match &report.misplaced {
+        Some(message) => {
+            let message = format!("{}: {message}", report.file.shape);
+            Err(Failure::Unmet(Wish::Placement, message))
+        }
+        None => Ok(()),
     }
 }
 

@@ -4,6 +4,7 @@ mod accuracy;
 pub(crate) mod command;
 pub mod feedback;
 mod picture;
+pub(crate) mod placement;
 mod points;
 mod points_effect;
 mod result_file;
@@ -17,6 +18,7 @@ use serde::Serialize;
 
 pub(crate) use self::accuracy::proven_accuracy;
 use self::feedback::FeedbackOptions;
+use self::placement::Placed;
 pub(crate) use self::points::WantedPoints;
 use super::discretize::scattered;
 use super::discretize::scattered::ScatteredSummary;
@@ -84,6 +86,9 @@ pub struct LambdaReport {
     /// The stages that miss the requested tolerance.
     #[serde(skip)]
     pub accuracy_missed: Vec<String>,
+    /// Why the array cannot render the object where it is, and what would bring it there.
+    #[serde(skip)]
+    pub misplaced: Option<String>,
 }
 
 impl LambdaReport {
@@ -91,7 +96,7 @@ impl LambdaReport {
     #[must_use]
     pub fn meets_request(&self) -> bool {
         let rendered = self.file.lambda_n_per_m.is_some_and(|lambda| lambda > 0.0);
-        rendered && self.accuracy_missed.is_empty()
+        rendered && self.accuracy_missed.is_empty() && self.misplaced.is_none()
     }
 }
 
@@ -132,6 +137,14 @@ pub fn run(
     let solve_with = |points: &WantedPoints, options: &LambdaOptions| {
         solve_at(&scene, &solved, none, points, options, progress)
     };
+    let misplaced = |points: &WantedPoints, report: &LambdaReport| {
+        Placed {
+            design,
+            document,
+            points,
+        }
+        .unfelt(report.file.lambda_n_per_m)
+    };
     let (Some(chosen), Some(sampled)) = (chosen, sampled) else {
         let mut report = solve_with(&of_grid, options)?;
         sideways::add(
@@ -142,6 +155,7 @@ pub fn run(
             &options.wiring,
             progress,
         )?;
+        report.misplaced = misplaced(&of_grid, &report);
         return Ok((points, report));
     };
     // Feedback and picture are of the chosen points alone.
@@ -166,6 +180,7 @@ pub fn run(
         let stage = stage.map(|stage| ("quadrature".to_owned(), stage));
         report.file.accuracy.extend(stage);
     }
+    report.misplaced = misplaced(&chosen, &report);
     report.file.sampling = Some(against_grid(&sampled.summary, &report.file, &grid));
     Ok((points, report))
 }
@@ -352,6 +367,7 @@ impl PosedProblem<'_> {
             precision: solution.precision,
             warnings,
             accuracy_missed: Vec::new(),
+            misplaced: None,
         })
     }
 
