@@ -1,6 +1,7 @@
 //! Why a command did not end well: its exit code, its message, and every fault found.
 
 use std::io;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
@@ -11,6 +12,7 @@ use crate::bundle::atomic::WriteError;
 use crate::bundle::json::JsonError;
 use crate::bundle::load::BundleError;
 use crate::bundle::read_table::TableError;
+use crate::design::message_text::shown_path;
 use crate::design::{Faults, InvalidDocument};
 
 /// Why a command did not end well.
@@ -107,6 +109,18 @@ impl Failure {
             Self::Job(RunError::Interrupted(_)) => {
                 "interrupted; what was finished is kept, nothing is half written".to_owned()
             }
+            Self::Job(RunError::Bundle(BundleError::NoBundle { path })) => {
+                let below = bundles_below(path);
+                let named: Vec<String> = below
+                    .iter()
+                    .take(BUNDLES_NAMED)
+                    .map(|p| shown_path(p))
+                    .collect();
+                match named.as_slice() {
+                    [] => self.to_string(),
+                    _ => format!("{self}; the bundles below it: {}", named.join(", ")),
+                }
+            }
             _ => self.to_string(),
         }
     }
@@ -124,6 +138,33 @@ impl Failure {
             _ => Vec::new(),
         }
     }
+}
+
+/// Bundles that are named where a folder above them was given; a folder holds a design's, one below
+/// another.
+const BUNDLES_NAMED: usize = 8;
+const BUNDLES_DEPTH: usize = 2;
+
+/// The bundles below `folder`, in the order of their names.
+fn bundles_below(folder: &Path) -> Vec<PathBuf> {
+    fn add(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) {
+        let Ok(entries) = std::fs::read_dir(folder) else {
+            return;
+        };
+        let folders = entries.filter_map(|entry| Some(entry.ok()?.path()));
+        let mut folders: Vec<PathBuf> = folders.filter(|path| path.is_dir()).collect();
+        folders.sort();
+        for path in folders {
+            if path.join("manifest.json").is_file() {
+                found.push(path);
+            } else if depth > 1 {
+                add(&path, depth - 1, found);
+            }
+        }
+    }
+    let mut found = Vec::new();
+    add(folder, BUNDLES_DEPTH, &mut found);
+    found
 }
 
 fn code_of(error: &RunError) -> Code {

@@ -55,7 +55,7 @@ static LONG_VERSION: LazyLock<String> =
     override_usage = "fluxform [OPTIONS] <COMMAND>\n       fluxform --explain <CODE>",
     arg_required_else_help = true,
     disable_help_subcommand = true,
-    after_help = help::main()
+    after_long_help = help::main()
 )]
 struct Arguments {
     /// What every command takes.

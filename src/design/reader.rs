@@ -78,7 +78,7 @@ pub fn read_document<T>(
     let sink = Sink::default();
     errors
         .iter()
-        .for_each(|error| sink.add(syntax_fault(error)));
+        .for_each(|error| sink.add(syntax_fault(error, text)));
     let mut value = None;
     if !sink.has_errors() {
         let mut root = Section::root(table.get_ref(), &sink);
@@ -116,9 +116,41 @@ fn parsed(text: &str) -> (Spanned<DeTable<'_>>, Vec<toml::de::Error>) {
     DeTable::parse_recoverable(text)
 }
 
-fn syntax_fault(error: &toml::de::Error) -> Fault {
+fn syntax_fault(error: &toml::de::Error, text: &str) -> Fault {
     let message = format!("not valid TOML: {}", escaped(error.message().trim(), 200));
-    Fault::error("", message).at(&error.span().unwrap_or(0..0))
+    let span = error.span().unwrap_or(0..0);
+    let fault = Fault::error("", message).at(&span);
+    match slip_in_line(text, span.start) {
+        Some(help) => fault.help(help),
+        None => fault,
+    }
+}
+
+/// Advice for a line of another notation: `length_mm = 40,5` or `length_mm = 40.5;`.
+fn slip_in_line(text: &str, at: usize) -> Option<String> {
+    let at = (0..=at.min(text.len()))
+        .rev()
+        .find(|at| text.is_char_boundary(*at))?;
+    let start = text[..at].rfind('\n').map_or(0, |end| end + 1);
+    let line = text[start..].lines().next()?;
+    let (key, value) = line.split_once('=')?;
+    let (key, value) = (key.trim(), value.split('#').next()?.trim());
+    let plain = value.trim_end_matches([';', ',']).trim_end();
+    if plain.parse::<f64>().is_ok() && plain != value {
+        return Some(format!(
+            "write {key} = {plain}, with nothing behind the number"
+        ));
+    }
+    let point = plain.replacen(',', ".", 1);
+    let decimal = point != plain && point.parse::<f64>().is_ok();
+    if decimal {
+        return Some(format!("write a decimal point: {key} = {point}"));
+    }
+    // A number and its unit.
+    let number = plain.split(char::is_whitespace).next()?;
+    let unit = plain.strip_prefix(number)?.trim();
+    (number.parse::<f64>().is_ok() && unit.chars().all(char::is_alphabetic) && !unit.is_empty())
+        .then(|| format!("write {key} = {number}: the unit is in the key's name"))
 }
 
 /// One table of the document.

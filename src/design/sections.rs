@@ -301,8 +301,34 @@ pub fn magnet(mut s: Section<'_>) -> MagnetDraft {
         tilt_deg: s.tuple("tilt_deg", &tilt),
         passive_force: s.flag_or("passive_force", false),
     };
+    remanence(&mut s);
     s.finish();
     draft
+}
+
+/// Magnets are sold by their remanence: how much magnetisation that is.
+fn remanence(s: &mut Section<'_>) {
+    const NAMES: [(&str, f64); 7] = [
+        ("remanence_t", 1.0),
+        ("br_t", 1.0),
+        ("b_r_t", 1.0),
+        ("remanence_mt", 1e-3),
+        ("br_mt", 1e-3),
+        ("remanence", 1.0),
+        ("br", 1.0),
+    ];
+    for (name, tesla) in NAMES {
+        if let Some(given) = s.unlisted(name) {
+            let magnetisation = given * tesla / MU_0_T_M_PER_A;
+            let help = if magnetisation.is_finite() {
+                format!("write magnetization_a_per_m = {magnetisation:.4e}, which is B_r / mu_0")
+            } else {
+                "write magnetization_a_per_m, which is B_r / mu_0".to_owned()
+            };
+            let message = "a magnet is given by its magnetisation, not by its remanence";
+            s.fault(name, message, &help);
+        }
+    }
 }
 
 /// `[supply]`.

@@ -39,6 +39,16 @@ impl<'a> Section<'a> {
         Some(located(value, found))
     }
 
+    /// The number of a key that is no key of the document, but which somebody may write; NaN where
+    /// it holds something else.
+    pub(super) fn unlisted(&mut self, key: &'static str) -> Option<f64> {
+        self.has(key).then(|| {
+            self.found(key)
+                .and_then(|found| float(found.get_ref()))
+                .unwrap_or(f64::NAN)
+        })
+    }
+
     /// A number with a default.
     pub fn number_or(&mut self, key: &'static str, rule: &Rule, default: f64) -> Located<f64> {
         let without = || Without::Value(number(default));
@@ -407,7 +417,13 @@ impl<'a> Section<'a> {
             } else {
                 "a number"
             };
-            self.add_wrong_type(path, found, wanted);
+            let message = format!("expected {wanted}, found {}", described(found.get_ref()));
+            let fault = Fault::error(path, message).at(&found.span());
+            self.sink
+                .add(match quoted_number(found.get_ref(), rule.unit) {
+                    Some(help) => fault.help(help),
+                    None => fault,
+                });
             return f64::NAN;
         };
         match rule.error(path, value, &found.span()) {
@@ -491,6 +507,24 @@ fn float(value: &DeValue<'_>) -> Option<f64> {
         }
         _ => None,
     }
+}
+
+/// Advice for a number that was written as a text: `"40 mm"`.
+fn quoted_number(value: &DeValue<'_>, unit: &str) -> Option<String> {
+    let DeValue::String(text) = value else {
+        return None;
+    };
+    let text = text.trim().replacen(',', ".", 1);
+    let end = text.find(|c: char| c.is_alphabetic() && !matches!(c, 'e' | 'E'));
+    let (digits, given) = text.split_at(end.unwrap_or(text.len()));
+    let value: f64 = digits.trim().parse().ok()?;
+    if given.is_empty() || given.trim() == unit {
+        return Some(format!("write {} without quotes and unit", number(value)));
+    }
+    let unit = if unit.is_empty() { "no unit" } else { unit };
+    Some(format!(
+        "write a number without quotes: the key's name holds its unit, {unit}"
+    ))
 }
 
 fn described(value: &DeValue<'_>) -> String {

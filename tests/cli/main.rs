@@ -11,6 +11,7 @@ mod interrupt;
 mod kept;
 mod lambda;
 mod messages;
+mod mistakes;
 mod optimize;
 mod placement;
 mod scan;

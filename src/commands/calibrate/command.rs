@@ -41,7 +41,7 @@ use crate::scene::sources::DesignSource;
 /// the next begins. What the object does not need is left out of the map, and what that costs is
 /// reported.
 #[derive(Debug, Args)]
-#[command(after_help = page(Codes::Writing, &[
+#[command(after_long_help = page(Codes::Writing, &[
     ("fluxform calibrate designs/seed.toml shapes/flat.toml shapes/half_sphere.toml",
      "two objects; the bundles go to results/seed/"),
     ("fluxform calibrate designs/seed.toml shapes/wedge.stl --unit mm --translate 0,0,30",
@@ -61,15 +61,17 @@ pub struct Calibrate {
     /// Folder under which <design>/<shape>/ is written
     #[arg(long, value_name = "DIR", default_value = "results")]
     out: FileArgument,
-    /// How far from the object's points the maps reach within the workspace, millimetres
-    /// [default: 20]
-    #[arg(long, value_name = "MM", value_parser = values::length, allow_hyphen_values = true)]
+    /// How far from the object's points the maps reach within the workspace, like 2cm [default:
+    /// 20mm]
+    #[arg(long, value_name = "LENGTH", value_parser = values::length, allow_hyphen_values = true)]
     reach: Option<f64>,
     /// Compute the field of coils and steel again, and remove what earlier runs kept of it in
     /// OUT/<design>/.fluxform-kept
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     no_cache: bool,
-    /// Report first what will be computed and what left out, why, and what leaving it out costs
+    /// Report first what will be computed and what left out
+    ///
+    /// Why, and what leaving it out costs.
     #[arg(long)]
     explain: bool,
     /// Leave out report.html and the folder plots

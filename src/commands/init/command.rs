@@ -25,7 +25,7 @@ use crate::cli::values::{FileArgument, setting};
 /// comments, with unit, range, default and meaning. At a terminal, without TEMPLATE, what to begin
 /// with is asked. Files that differ are replaced only with --force.
 #[derive(Debug, Args)]
-#[command(after_help = page(Codes::Pages, &[
+#[command(after_long_help = page(Codes::Pages, &[
     ("fluxform init desk", "a small array in air, and a plate"),
     ("fluxform init seed --name mine --object wedge --out mine",
      "the reference array and a wedge, in a folder"),

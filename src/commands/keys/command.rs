@@ -13,7 +13,7 @@ use crate::cli::printer::{Printer, Stream};
 /// Prints every key that a design or a shape file may hold: its unit, the range of its values, what
 /// holds without it, and what it means. The list is that of the program's own readers.
 #[derive(Debug, Args)]
-#[command(after_help = page(Codes::None, &[
+#[command(after_long_help = page(Codes::None, &[
     ("fluxform keys", "all of them"),
     ("fluxform keys magnet", "those of one section"),
     ("fluxform keys shape --format json", "those of shape files, for a program"),

@@ -29,7 +29,7 @@ use crate::cli::values::FileArgument;
 /// unless --partial asks for what there is: then the exit code is 0 and the missing are reported as a
 /// warning. Points of another plan are refused.
 #[derive(Debug, Args)]
-#[command(after_help = page(Codes::Writing, &[
+#[command(after_long_help = page(Codes::Writing, &[
     ("fluxform sweep merge wires.json wires --out wires.csv", "all points of one folder"),
     ("fluxform sweep merge wires.json wires more --partial --out - > so_far.csv",
      "what there is so far, from two folders"),
