@@ -29,6 +29,7 @@ pub struct Printer {
     format: Format,
     quiet: bool,
     colour: bool,
+    colour_of_output: bool,
     strict_inputs: bool,
     warnings: RefCell<Vec<String>>,
     /// The defaults of the design that was read; `None` where none was.
@@ -111,18 +112,19 @@ impl Printer {
     /// A printer that does as the arguments say.
     #[must_use]
     pub fn new(common: &Common) -> Self {
-        let colour = match common.color {
+        let colour_on = |terminal: bool| match common.color {
             Colour::Always => true,
             Colour::Never => false,
             Colour::Auto => {
                 let no_colour = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty());
-                !no_colour && io::stderr().is_terminal()
+                !no_colour && terminal
             }
         };
         Self {
             format: common.format,
             quiet: common.quiet,
-            colour,
+            colour: colour_on(io::stderr().is_terminal()),
+            colour_of_output: colour_on(io::stdout().is_terminal()),
             strict_inputs: common.strict_inputs,
             warnings: RefCell::default(),
             assumed: RefCell::default(),
@@ -146,6 +148,13 @@ impl Printer {
     #[must_use]
     pub fn draws(&self) -> bool {
         !self.quiet && io::stderr().is_terminal()
+    }
+
+    /// Erases the line that a progress bar was drawn on, where nothing else will.
+    pub fn erase_line(&self) {
+        if self.draws() {
+            let _ = io::stderr().lock().write_all(b"\r\x1b[2K");
+        }
     }
 
     /// Prints a warning.
@@ -229,7 +238,14 @@ impl Printer {
         let text = match self.format {
             Format::Json => to_json(json)?,
             Format::Human if self.quiet => return Ok(()),
-            Format::Human => visible(&human()).into_owned().into_bytes(),
+            Format::Human => {
+                let text = visible(&human()).into_owned();
+                match place {
+                    Stream::Output => emphasised(text, self.colour_of_output),
+                    Stream::Error => emphasised(text, self.colour),
+                }
+                .into_bytes()
+            }
         };
         match place {
             Stream::Output => self.data(|out| out.write_all(&text)),
@@ -336,6 +352,19 @@ impl Printer {
             format!("{word}:")
         }
     }
+}
+
+/// Words of summaries that a person must not miss.
+const URGENT: [&str; 2] = ["NOT met", "FAILED"];
+
+/// `text` with its urgent words in bold red, where colours are shown.
+fn emphasised(text: String, colour: bool) -> String {
+    if !colour {
+        return text;
+    }
+    URGENT.iter().fold(text, |text, word| {
+        text.replace(word, &format!("\u{1b}[1;31m{word}\u{1b}[0m"))
+    })
 }
 
 /// Writes to standard error. Where that is closed nobody reads it.

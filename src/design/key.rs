@@ -11,9 +11,9 @@ pub struct Key {
     pub name: &'static str,
     /// The values that may be written.
     pub accepts: Accepts,
-    /// What holds without it.
+    /// Default.
     pub default: Without,
-    /// What it means.
+    /// Meaning.
     pub meaning: &'static str,
 }
 
@@ -51,14 +51,14 @@ impl Accepts {
     }
 }
 
-/// What holds where a key is not given.
+/// Value of a key that is not given.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Without {
     /// The document is refused.
     Refused,
     /// This value, as TOML.
     Value(String),
-    /// What the meaning says, or nothing.
+    /// Described in the meaning, or none.
     Nothing,
 }
 

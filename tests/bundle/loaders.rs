@@ -311,7 +311,7 @@ fn extreme_limits_give_the_same_currents_in_c() {
     currents_at_extreme_limits(Some(&Loader::C));
 }
 
-/// What the library answers at a position, in the order of the other loaders' lines.
+/// The library's values at a position, in the order of the other loaders' lines.
 fn answered(bundle: &Bundle, renderer: &mut Renderer, position: [f64; 3]) -> Vec<f64> {
     let mut line = vec![f64::NAN; bundle.coil_count()];
     bundle.force_per_ampere(position, &mut line);

@@ -3,18 +3,19 @@
 
 mod assumed;
 mod budget;
+mod cache;
 mod codes;
 mod files;
 mod first_contact;
 mod help;
 mod interrupt;
-mod kept;
 mod lambda;
 mod messages;
 mod mistakes;
 mod optimize;
 mod placement;
 mod scan;
+mod screen;
 mod steel;
 mod streams;
 mod surfaces;

@@ -323,7 +323,11 @@ impl Discretize {
             );
         }
         if let FileArgument::Path(path) = &self.out {
-            sheet.line("written to", &path.display().to_string());
+            let summary = path.with_extension("json");
+            sheet.line(
+                "written to",
+                &format!("{}, {}", path.display(), summary.display()),
+            );
         }
         if let Some(FileArgument::Path(path)) = &self.plot {
             sheet.line("drawn in", &path.display().to_string());
