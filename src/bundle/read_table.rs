@@ -142,16 +142,7 @@ pub(crate) fn read_numbered(
             }
         };
         if record.len() != header.len() {
-            let commas = if record.len() == 2 * header.len() {
-                "; write decimal points, 0.7 for 0,7"
-            } else {
-                ""
-            };
-            fault(format!(
-                "{} cells, expected {} as in the header{commas}",
-                record.len(),
-                header.len()
-            ));
+            fault(other_cells(record.len(), header.len()));
             continue;
         }
         lines.push(line);
@@ -160,17 +151,7 @@ pub(crate) fn read_numbered(
             match cell.parse::<f64>() {
                 Ok(value) if value.is_finite() => column.push(value),
                 _ => {
-                    let shown: String = cell.chars().take(40).collect();
-                    let point = cell.replacen(',', ".", 1);
-                    let decimal = point != cell && point.parse::<f64>().is_ok();
-                    let advice = if decimal {
-                        format!("; write a decimal point, {point}")
-                    } else {
-                        String::new()
-                    };
-                    fault(format!(
-                        "column {wanted}: expected a finite number, found {shown:?}{advice}"
-                    ));
+                    fault(not_a_number(wanted, cell));
                 }
             }
         }
@@ -183,6 +164,27 @@ pub(crate) fn read_numbered(
     } else {
         Err(TableError { faults })
     }
+}
+
+fn other_cells(found: usize, expected: usize) -> String {
+    let commas = if found == 2 * expected {
+        "; write decimal points, 0.7 for 0,7"
+    } else {
+        ""
+    };
+    format!("{found} cells, expected {expected} as in the header{commas}")
+}
+
+fn not_a_number(column: &str, cell: &str) -> String {
+    let shown: String = cell.chars().take(40).collect();
+    let point = cell.replacen(',', ".", 1);
+    let decimal = point != cell && point.parse::<f64>().is_ok();
+    let advice = if decimal {
+        format!("; write a decimal point, {point}")
+    } else {
+        String::new()
+    };
+    format!("column {column}: expected a finite number, found {shown:?}{advice}")
 }
 
 /// What is wrong with a table that is empty, or whose first line has the expected columns and another

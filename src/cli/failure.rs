@@ -1,7 +1,6 @@
 //! Why a command did not end well: its exit code, its message, and every fault found.
 
 use std::io;
-use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
@@ -10,7 +9,7 @@ use super::exit::Exit;
 use crate::RunError;
 use crate::bundle::atomic::WriteError;
 use crate::bundle::json::JsonError;
-use crate::bundle::load::BundleError;
+use crate::bundle::load::{BundleError, bundles_below};
 use crate::bundle::read_table::TableError;
 use crate::design::message_text::shown_path;
 use crate::design::{Faults, InvalidDocument};
@@ -140,32 +139,8 @@ impl Failure {
     }
 }
 
-/// Bundles that are named where a folder above them was given; a folder holds a design's, one below
-/// another.
+/// Bundles that are named where a folder above them was given.
 const BUNDLES_NAMED: usize = 8;
-const BUNDLES_DEPTH: usize = 2;
-
-/// The bundles below `folder`, in the order of their names.
-fn bundles_below(folder: &Path) -> Vec<PathBuf> {
-    fn add(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) {
-        let Ok(entries) = std::fs::read_dir(folder) else {
-            return;
-        };
-        let folders = entries.filter_map(|entry| Some(entry.ok()?.path()));
-        let mut folders: Vec<PathBuf> = folders.filter(|path| path.is_dir()).collect();
-        folders.sort();
-        for path in folders {
-            if path.join("manifest.json").is_file() {
-                found.push(path);
-            } else if depth > 1 {
-                add(&path, depth - 1, found);
-            }
-        }
-    }
-    let mut found = Vec::new();
-    add(folder, BUNDLES_DEPTH, &mut found);
-    found
-}
 
 fn code_of(error: &RunError) -> Code {
     match error {

@@ -376,6 +376,16 @@ pub fn say(text: &str) {
     let _ = io::stderr().lock().write_all(text.as_bytes());
 }
 
+/// Whether a person can be asked.
+pub fn can_ask() -> bool {
+    io::stdin().is_terminal() && io::stderr().is_terminal()
+}
+
+/// Whether standard output is a terminal.
+pub fn shows_output() -> bool {
+    io::stdout().is_terminal()
+}
+
 /// Asks at the terminal; an empty answer, or none, is `default`.
 ///
 /// # Errors

@@ -1,6 +1,6 @@
 //! `man`: the manual pages.
 
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, Write};
 use std::process::{Command, Stdio};
 
 use clap::{Args, CommandFactory};
@@ -12,7 +12,7 @@ use crate::bundle::atomic::{FileSet, Overwrite};
 use crate::cli::args::Writing;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
-use crate::cli::printer::{Printer, say};
+use crate::cli::printer::{Printer, say, shows_output};
 use crate::cli::quantity::count;
 use crate::cli::start::folder;
 use crate::cli::values::FileArgument;
@@ -44,7 +44,7 @@ impl Man {
         command.build();
         let Some(out) = &self.out else {
             let main = rendered(&command)?;
-            if io::stdout().is_terminal() && shown_by_man(&main).is_ok() {
+            if shows_output() && shown_by_man(&main).is_ok() {
                 return Ok(());
             }
             return printer.data(|out| out.write_all(&main));

@@ -1,6 +1,5 @@
 //! `init`: its arguments, its questions and its text.
 
-use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 
 use clap::Args;
@@ -14,7 +13,7 @@ use crate::bundle::atomic::{FileSet, Overwrite};
 use crate::cli::args::Writing;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
-use crate::cli::printer::{Printer, Stream, ask};
+use crate::cli::printer::{Printer, Stream, ask, can_ask};
 use crate::cli::start::folder;
 use crate::cli::values::{FileArgument, setting};
 
@@ -82,7 +81,7 @@ impl Init {
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
         let folder = folder(&self.out)?;
         let asks = self.template.is_none() && !printer.json() && !printer.quiet();
-        let request = if asks && io::stdin().is_terminal() && io::stderr().is_terminal() {
+        let request = if asks && can_ask() {
             self.asked()?
         } else {
             self.request(Start::Seed, Object::Flat)

@@ -8,7 +8,7 @@ use crate::units::DETECTION_THRESHOLD_N;
 
 /// An object with a larger part of its points outside the workspace is not what was meant: there a
 /// runtime gives no force.
-pub const OUTSIDE_MAX: f64 = 0.5;
+pub const OUTSIDE_MAX: f64 = 2.0 / 3.0;
 
 /// An object this many times larger or smaller than the workspace is in another unit.
 const OUT_OF_PROPORTION: f64 = 8.0;

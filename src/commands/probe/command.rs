@@ -71,7 +71,7 @@ pub struct Probe {
     /// Report force and torque on the magnet too
     ///
     /// Six columns more, per ampere.
-    #[arg(long, conflicts_with = "compare")]
+    #[arg(long, hide_short_help = true, conflicts_with = "compare")]
     pub(super) magnet_force: bool,
     /// Where the table goes; `-` is standard output [default: -, with --compare nowhere]
     #[arg(long, value_name = "FILE")]
