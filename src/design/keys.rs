@@ -129,7 +129,7 @@ const MEANINGS: &[(&str, &str)] = &[
     ),
     (
         "limits.inner_diameter_min_mm",
-        "bore of the winding, at least",
+        "bore of the winding, at least; without it `optimize --wound` takes that of a bobbin",
     ),
     ("limits.length_max_mm", "length of the winding"),
     ("limits.power_max_w", "heat at the rated current"),

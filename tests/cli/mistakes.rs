@@ -237,7 +237,6 @@ fn help_is_a_command_and_fits_on_one_screen() {
         assert_eq!(brief.code, Some(0), "{line}: {}", brief.err);
         lengths.push((brief.out.lines().count(), path.join(" ")));
     }
-    println!("{lengths:?}");
     let long: Vec<_> = lengths
         .iter()
         .filter(|(lines, _)| *lines > SCREEN)
