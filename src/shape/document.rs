@@ -4,7 +4,7 @@ mod raw;
 mod read;
 mod unit;
 
-pub use read::keys;
+pub use read::{keys, keys_of};
 
 use std::path::PathBuf;
 
@@ -14,7 +14,7 @@ use fluxform_numerics::axis::Axis;
 
 pub use crate::format::SurfaceFormat;
 pub use raw::{RawSurface, RawSurfaceError};
-pub use unit::{parse_unit, unit_name};
+pub use unit::{parse_unit, unit_name, unit_names};
 
 /// A validated shape document, or a raw surface with its flags.
 #[derive(Debug, Clone, PartialEq)]

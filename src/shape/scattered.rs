@@ -69,7 +69,7 @@ enum Kind<'a> {
         mesh: &'a Mesh,
         index: Index,
         /// Sorted when they are first asked for: points of a grid need none.
-        faces: OnceLock<Faces>,
+        faces: Box<OnceLock<Faces>>,
         grid: Grid,
         rules: Rules,
     },
@@ -93,7 +93,7 @@ impl<'a> Probe<'a> {
                 Kind::Mesh {
                     mesh,
                     index: Index::new(mesh, reach),
-                    faces: OnceLock::new(),
+                    faces: Box::default(),
                     grid: *grid,
                     rules: Rules {
                         reach_m: reach,
