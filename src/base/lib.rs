@@ -2,6 +2,8 @@
 //! the error statement that every stage attaches to its numbers, and the force constants' names.
 
 pub mod accuracy;
+pub mod digits;
 pub mod force_constant;
+pub mod point_weights;
 pub mod progress;
 pub mod units;

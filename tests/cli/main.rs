@@ -5,6 +5,7 @@ mod assumed;
 mod budget;
 mod cache;
 mod codes;
+mod error_target;
 mod files;
 mod first_contact;
 mod help;
@@ -21,6 +22,7 @@ mod streams;
 mod surfaces;
 mod sweep;
 mod verify;
+mod weights;
 
 /// The array of the reference design without steel.
 const SEED: &str = "designs/seed_air.toml";

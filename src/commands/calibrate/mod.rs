@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::discretize::{self, PointsReport, point_rows, points_grid};
+use super::lambda::error_target::{ChosenGrid, ErrorTarget};
 use super::lambda::placement::{Outside, Placed};
 use super::lambda::{LambdaOptions, LambdaReport, WantedPoints, sideways, solve_at};
 use super::made_with::surface;
-use super::map::{arrays, runtime, summary, workspace_grid};
+use super::map::{arrays, runtime, summary};
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS, arithmetic};
@@ -18,38 +19,41 @@ use crate::bundle::atomic::WriteError;
 use crate::bundle::cache::Store;
 use crate::bundle::json::displayed;
 use crate::bundle::manifest::{
-    CircuitSummary, Interpolation, LambdaSummary, LeftOut, MadeWith, Manifest, PassiveForce,
+    CircuitSummary, Interpolation, LambdaSummary, MadeWith, Manifest, PassiveForce,
 };
 use crate::bundle::npz::{PASSIVE, Runtime};
 use crate::bundle::rendering::{HeightGrid, Rendering};
 use crate::bundle::table::{CurrentRow, PointRow};
 use crate::bundle::timing::StageSeconds;
 use crate::bundle::write::{BundleContent, check_bundle_target, write_bundle};
-use crate::design::Design;
 use crate::lambda::Settings;
-use crate::map::tabulate::{Grid, PlacedCoil};
-use crate::map::{Components, FieldMap};
+use crate::map::FieldMap;
+use crate::map::tabulate::Grid;
 use crate::progress::Progress;
 use crate::report::bundle_files;
+use crate::scene::Scene;
 use crate::scene::cached_field::{FieldStore, STORE_FOLDER, ShapeField};
-use crate::scene::maps::{MagnetMean, SceneMap};
 use crate::scene::neighbours;
 use crate::scene::passive::PASSIVE_TOLERANCE;
 use crate::scene::passive_map::PassiveMap;
 use crate::scene::sources::{DesignSource, ShapeSource};
 use crate::scene::steel::Solved;
-use crate::scene::{MAGNET_SHARE, Scene};
+use crate::shape::document::ShapeDocument;
 use crate::shape::points::ConstraintPoints;
 
 pub(crate) mod again;
+mod budget;
 pub(crate) mod command;
 mod ignored_pull;
+mod needed_map;
 mod page;
 pub mod plan;
 mod recorded;
 
 pub use crate::report::bundle_files::PAGE_FILE;
 pub(crate) use ignored_pull::IgnoredPull;
+use needed_map::NeededMap;
+pub(crate) use needed_map::{needed_coils, needed_nodes};
 use plan::Plan;
 
 /// The name under which a bundle keeps the design it was made from.
@@ -109,6 +113,8 @@ impl CalibrateOptions {
         let LambdaOptions {
             settings,
             tolerance,
+            weights,
+            error,
             // Of `lambda` alone.
             sampling: _,
             wiring: _,
@@ -126,6 +132,9 @@ impl CalibrateOptions {
             jnd: Some(jnd_weight),
             at_n_per_m,
             tolerance: *tolerance,
+            weights: *weights,
+            error: error.map(|target| target.error),
+            refine: error.is_some_and(|target| target.refine),
             reach_m: *reach_m,
             report: *page,
             arithmetic: arithmetic(),
@@ -192,7 +201,8 @@ pub fn run(
     progress: &dyn Progress,
 ) -> Result<CalibrateReport, RunError> {
     check_names(shapes)?;
-    let scene = Scene::with_tolerance(source.design, options.lambda.tolerance)?;
+    let tolerance = options.lambda.tolerance_for(source.design);
+    let scene = Scene::with_tolerance(source.design, tolerance)?;
     let curve = curve_table(&scene);
     // Before anything is computed, cleared or kept: a run that is refused changes nothing.
     for shape in shapes {
@@ -358,7 +368,11 @@ impl Calibration<'_> {
             self.options,
             folder_of(self.scene, self.shape, self.options),
         );
-        let points = self.points(progress)?;
+        let search = self.search(progress)?;
+        let document = search
+            .as_ref()
+            .map_or(&self.shape.document, |(_, chosen)| &chosen.document);
+        let points = self.points(document, progress)?;
         // Checked again with the digest of the surface that was parsed.
         let made_with = options.made_with(self.shape);
         let inputs = &points.summary.inputs;
@@ -380,7 +394,7 @@ impl Calibration<'_> {
             progress.end();
             Ok(manifest)
         };
-        let (manifest, lambda) = self.compute(&points, progress, write)?;
+        let (manifest, lambda) = self.compute(&points, search.as_ref(), progress, write)?;
         Ok(BundleReport {
             folder,
             outside: points.summary.outside,
@@ -390,9 +404,13 @@ impl Calibration<'_> {
     }
 
     /// The object's points; their inputs are those of the whole bundle.
-    fn points(&self, progress: &dyn Progress) -> Result<PointsReport, RunError> {
+    fn points(
+        &self,
+        document: &ShapeDocument,
+        progress: &dyn Progress,
+    ) -> Result<PointsReport, RunError> {
         let inputs = inputs(self.source, self.curve, self.shape);
-        discretize::run_cached(&self.shape.document, inputs, self.field, progress)
+        discretize::run_cached(document, inputs, self.field, progress)
     }
 
     /// Computes everything that a bundle holds and hands it to `take`, which returns the manifest
@@ -400,6 +418,7 @@ impl Calibration<'_> {
     fn compute(
         &self,
         points: &PointsReport,
+        search: Option<&(ErrorTarget, ChosenGrid)>,
         progress: &dyn Progress,
         take: impl FnOnce(&BundleContent, &LambdaReport) -> Result<Manifest, RunError>,
     ) -> Result<(Manifest, LambdaReport), RunError> {
@@ -408,7 +427,7 @@ impl Calibration<'_> {
             picture: self.options.page,
             ..self.options.lambda.clone()
         };
-        let of_grid = WantedPoints::of_grid(points);
+        let of_grid = WantedPoints::of_grid(points, self.options.lambda.weights_of(points));
         let mut lambda = solve_at(scene, &solved.forces, field, &of_grid, &options, progress)?;
         sideways::add(
             &mut lambda.file,
@@ -420,7 +439,11 @@ impl Calibration<'_> {
         )?;
         let grid_points = &points.discretized.points;
         let reach_m = self.options.reach_m;
-        let mut needed = NeededMap::new(scene, &solved.map, field, grid_points, reach_m, progress)?;
+        let nodes = self.nodes(search, &lambda, grid_points, progress)?;
+        let gridded = nodes.map(|nodes| scene.design.with_nodes(nodes));
+        let design = gridded.as_ref().unwrap_or(scene.design);
+        let grid = (design, grid_points, reach_m);
+        let mut needed = NeededMap::new(scene, &solved.map, field, grid, progress)?;
         let passive = passive_map(scene, &needed.made.map, progress)?;
         progress.begin("passive force", 1);
         let ignored = IgnoredPull::new(scene, &lambda, &of_grid, field)?;
@@ -428,6 +451,11 @@ impl Calibration<'_> {
         if let Some(ignored) = ignored {
             lambda.warnings.extend(ignored.warning(lambda.file.jnd));
             needed.left_out.push(ignored.left_out());
+        }
+        self.add_to_headline(&mut lambda, points, &needed, passive.as_ref(), progress)?;
+        if let Some((target, chosen)) = search {
+            let tolerance = solved.forces.tolerance;
+            lambda.requested(*target, chosen, Some(&design.workspace), tolerance);
         }
         let manifest = self.manifest(&lambda, grid_points, &needed, passive.as_ref());
         let placed = Placed {
@@ -575,184 +603,6 @@ fn passive_map(
     let passive = PassiveMap::new(scene, &grid, PASSIVE_TOLERANCE)?;
     progress.end();
     Ok(passive)
-}
-
-/// The part of the maps that an object needs, and what was left out of it.
-struct NeededMap {
-    made: SceneMap,
-    components: Components,
-    left_out: Vec<LeftOut>,
-}
-
-impl NeededMap {
-    fn new(
-        scene: &Scene,
-        solved: &Solved,
-        field: ShapeField,
-        points: &ConstraintPoints,
-        reach_m: f64,
-        progress: &dyn Progress,
-    ) -> Result<Self, RunError> {
-        let mut left_out = Vec::new();
-        let grid = needed_grid(scene.design, points, reach_m, &mut left_out);
-        let components = if scene.tilted() {
-            Components::Gradient
-        } else {
-            left_out.push(LeftOut {
-                what: "field and transverse gradient".to_owned(),
-                why: "an upright dipole's vertical force needs dB_z/dz alone (eq. 5)".to_owned(),
-                error_cost: 0.0,
-            });
-            Components::Gz
-        };
-        let driven = needed_coils(scene);
-        if driven.len() < scene.coils.len() {
-            left_out.push(LeftOut {
-                what: format!("{} coils", scene.coils.len() - driven.len()),
-                why: "their current limits are zero".to_owned(),
-                error_cost: 0.0,
-            });
-        }
-        let felt = MagnetMean::by_magnet(scene, &grid.z_m, MAGNET_SHARE * solved.tolerance)?;
-        let mut made = field.map(scene, solved, &driven, &grid, components, &felt, progress)?;
-        drop_weak_coils(
-            scene,
-            &mut made.map,
-            &driven,
-            solved.tolerance,
-            &mut left_out,
-        );
-        Ok(Self {
-            made,
-            components,
-            left_out,
-        })
-    }
-}
-
-/// The coils that may carry current.
-pub(crate) fn needed_coils(scene: &Scene) -> Vec<PlacedCoil> {
-    let coils = scene.coils.iter();
-    coils
-        .filter(|coil| largest_current_a(scene, coil.number) > 0.0)
-        .copied()
-        .collect()
-}
-
-fn largest_current_a(scene: &Scene, coil: usize) -> f64 {
-    scene.upper_a[coil].max(-scene.lower_a[coil])
-}
-
-/// Removes coils whose largest force anywhere on the map stays below `tolerance` of the largest
-/// that any coil can give.
-fn drop_weak_coils(
-    scene: &Scene,
-    map: &mut FieldMap,
-    coils: &[PlacedCoil],
-    tolerance: f64,
-    left_out: &mut Vec<LeftOut>,
-) {
-    let nodes = map.x_m.len() * map.y_m.len() * map.z_m.len();
-    let strength: Vec<f64> = coils
-        .iter()
-        .zip(map.gz_t_per_m_per_a.chunks_exact(nodes.max(1)))
-        .map(|(coil, gz)| {
-            let largest = gz.iter().fold(0.0_f64, |most, g| most.max(g.abs()));
-            largest * largest_current_a(scene, coil.number)
-        })
-        .collect();
-    let strongest = strength.iter().copied().fold(0.0, f64::max);
-    let keep: Vec<bool> = strength
-        .iter()
-        .map(|s| *s > tolerance * strongest)
-        .collect();
-    if keep.iter().all(|keep| *keep) || strongest == 0.0 {
-        return;
-    }
-    let weak: f64 = strength
-        .iter()
-        .zip(&keep)
-        .filter(|(_, keep)| !**keep)
-        .map(|(s, _)| s)
-        .sum();
-    left_out.push(LeftOut {
-        what: format!("{} coils", keep.iter().filter(|keep| !**keep).count()),
-        why: "at their largest currents together they change no force on the map by more than \
-              this part of the largest that one coil gives"
-            .to_owned(),
-        error_cost: weak / strongest,
-    });
-    let retain = |values: &mut Vec<f64>, components: usize| {
-        let size = (nodes * components).max(1);
-        let kept: Vec<f64> = values
-            .chunks_exact(size)
-            .zip(&keep)
-            .filter(|(_, keep)| **keep)
-            .flat_map(|(block, _)| block.iter().copied())
-            .collect();
-        *values = kept;
-    };
-    retain(&mut map.gz_t_per_m_per_a, 1);
-    if let Some(gradient) = &mut map.gradient_t_per_m_per_a {
-        retain(gradient, 9);
-    }
-    map.coils = coils
-        .iter()
-        .zip(&keep)
-        .filter(|(_, keep)| **keep)
-        .map(|(coil, _)| coil.number)
-        .collect();
-}
-
-/// The nodes of the workspace within reach of the object's points, one cell beyond.
-pub(crate) fn needed_nodes(design: &Design, points: &ConstraintPoints, reach_m: f64) -> Grid {
-    let whole = workspace_grid(design);
-    let part = |nodes: &[f64], values: &[f64]| -> Vec<f64> {
-        let lowest = values.iter().copied().fold(f64::INFINITY, f64::min) - reach_m;
-        let highest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max) + reach_m;
-        // The last node at or below the range, the first at or above it; four nodes at least,
-        // so that the interpolation keeps its degree.
-        let mut start = nodes
-            .partition_point(|node| *node <= lowest)
-            .saturating_sub(1);
-        let mut end = (nodes.partition_point(|node| *node < highest) + 1).min(nodes.len());
-        while end - start < 4.min(nodes.len()) {
-            start = start.saturating_sub(1);
-            end = (end + 1).min(nodes.len());
-        }
-        nodes[start..end].to_vec()
-    };
-    Grid {
-        x_m: part(&whole.x_m, &points.x_m),
-        y_m: part(&whole.y_m, &points.y_m),
-        z_m: part(&whole.z_m, &points.height_m),
-    }
-}
-
-fn needed_grid(
-    design: &Design,
-    points: &ConstraintPoints,
-    reach_m: f64,
-    left_out: &mut Vec<LeftOut>,
-) -> Grid {
-    let whole = workspace_grid(design);
-    let grid = needed_nodes(design, points, reach_m);
-    let count = |grid: &Grid| grid.x_m.len() * grid.y_m.len() * grid.z_m.len();
-    if count(&grid) < count(&whole) {
-        left_out.push(LeftOut {
-            what: format!(
-                "{} of {} workspace nodes",
-                count(&whole) - count(&grid),
-                count(&whole)
-            ),
-            why: format!(
-                "farther than {} mm from every point of the object",
-                reach_m * 1000.0
-            ),
-            error_cost: 0.0,
-        });
-    }
-    grid
 }
 
 /// Static currents, zero where there is no force constant.

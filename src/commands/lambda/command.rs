@@ -8,7 +8,7 @@ use super::LambdaReport;
 use super::feedback::FeedbackOptions;
 use super::text::summary;
 use super::{LambdaOptions, run};
-use crate::cli::args::{SamplingFlags, SurfaceFlags, Tolerance, Writing};
+use crate::cli::args::{ErrorFlags, SamplingFlags, SurfaceFlags, Tolerance, WeightsFlag, Writing};
 use crate::cli::budget::{allow, cost_origin, costs};
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
@@ -65,6 +65,10 @@ pub struct Lambda {
     writing: Writing,
     #[command(flatten)]
     tolerance: Tolerance,
+    #[command(flatten)]
+    error: ErrorFlags,
+    #[command(flatten)]
+    weights: WeightsFlag,
     #[command(flatten)]
     sampling: SamplingFlags,
     #[command(flatten)]
@@ -147,6 +151,8 @@ impl Lambda {
     /// See [`Failure`].
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
         let options = LambdaOptions {
+            weights: self.weights.weights,
+            error: self.error.target(),
             sampling: self.sampling.sampling(),
             wiring: Wiring {
                 broken: self.wiring.broken.clone(),

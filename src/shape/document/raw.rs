@@ -25,6 +25,8 @@ pub struct RawSurface {
     pub placement: Placement,
     /// Samples along x and y.
     pub samples: [usize; 2],
+    /// Whether a flag gives them.
+    pub samples_are_given: bool,
     /// Ends along x, m; `None`: the surface's own extent.
     pub x_m: Option<[f64; 2]>,
     /// Ends along y, m; `None`: the surface's own extent.
@@ -117,6 +119,8 @@ impl ShapeDocument {
             bodies: surface.bodies.clone(),
             scale: surface.scale,
             placement: surface.placement,
+            weights: None,
+            grid_is_given: surface.samples_are_given,
         })
     }
 }

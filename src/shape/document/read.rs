@@ -8,6 +8,7 @@ use super::{
 };
 use crate::format::SurfaceFormat;
 use crate::step::BodyOptions;
+use fluxform_base::point_weights::Weights;
 use fluxform_base::units::m_from_mm;
 use fluxform_design::diagnostics::{Faults, InvalidDocument};
 use fluxform_design::keys::{Key, with_meanings};
@@ -79,7 +80,11 @@ fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
         seat: seat(root),
     };
     let bodies = bodies(root);
-    let grid = points(root.section("points"));
+    let Points {
+        grid,
+        is_given,
+        weights,
+    } = points(root.section("points"));
     Some(ShapeDocument {
         name: name?,
         source: source?,
@@ -87,6 +92,8 @@ fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
         scale: scale?,
         placement,
         grid: grid?,
+        weights,
+        grid_is_given: is_given,
     })
 }
 
@@ -225,6 +232,10 @@ const MEANINGS: &[(&str, &str)] = &[
     (
         "points.outside",
         "what becomes of grid points beside the surface: there is no point",
+    ),
+    (
+        "points.weights",
+        "how points count in lambda's mean: `equal`, or `area`, by the area each stands for",
     ),
 ];
 
@@ -371,10 +382,20 @@ fn level(root: &mut Section<'_>, key: &'static str, default_mm: f64) -> f64 {
     m_from_mm(root.number_or(key, &BODY_MM, default_mm).value)
 }
 
-fn points(mut s: Section<'_>) -> Option<GridRequest> {
+/// `[points]`.
+struct Points {
+    grid: Option<GridRequest>,
+    is_given: bool,
+    weights: Option<Weights>,
+}
+
+fn points(mut s: Section<'_>) -> Points {
+    let is_given = s.has("x_mm") || s.has("y_mm");
     let x = s.axis_or("x_mm", &BODY_MM, SEED_SIDE_MM);
     let y = s.axis_or("y_mm", &BODY_MM, SEED_SIDE_MM);
     s.choice_or_first("outside", &[("skip", ())]);
+    let names = [Weights::Equal, Weights::Area].map(|weights| (weights.name(), weights));
+    let weights = s.choice("weights", &names);
     let grid = x.zip(y).map(|(x, y)| [x.value, y.value]);
     if let Some([x, y]) = &grid
         && x.samples
@@ -388,6 +409,13 @@ fn points(mut s: Section<'_>) -> Option<GridRequest> {
         s.fault("x_mm", message, "ask for fewer samples");
     }
     s.finish();
-    let [x, y] = grid?.map(|axis| AxisRequest::Given(axis_m(axis)));
-    Some(GridRequest { x, y })
+    let grid = grid.map(|axes| {
+        let [x, y] = axes.map(|axis| AxisRequest::Given(axis_m(axis)));
+        GridRequest { x, y }
+    });
+    Points {
+        grid,
+        is_given,
+        weights,
+    }
 }
