@@ -133,6 +133,7 @@
 //! computes, its arguments and its text.
 
 pub use fluxform_base::accuracy;
+pub use fluxform_base::force_direction;
 pub use fluxform_base::progress;
 pub use fluxform_base::units;
 

@@ -24,6 +24,8 @@ pub enum Components {
     /// dBz/dz
     #[default]
     Gz,
+    /// dBx/dz, dBy/dz and dBz/dz, all of the force; of a tilted magnet the gradient tensor too
+    Force,
     /// dBz/dz and the gradient tensor
     Gradient,
     /// dBz/dz, the gradient tensor and the field
@@ -52,7 +54,7 @@ impl Components {
     pub fn count(self) -> usize {
         match self {
             Self::Gz => 1,
-            Self::Gradient => 5,
+            Self::Force | Self::Gradient => 5,
             Self::All => 8,
         }
     }

@@ -73,5 +73,5 @@ pub use given::GivenForce;
 pub use path::{Breakpoint, Event, Path};
 pub use problem::{ForceProblem, ProblemError, Settings};
 pub use solve::{OperatingPoint, Precision, Solution, Status, solve};
-pub use vector_allocation::{VectorAllocation, VectorAllocator};
+pub use vector_allocation::{MET as VECTOR_MET, VectorAllocation, VectorAllocator};
 pub use wiring::{Rewired, Wiring, WiringError};

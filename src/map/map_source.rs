@@ -38,7 +38,7 @@ pub const GRADIENT: usize = 5;
 pub(super) fn gz(components: Components) -> usize {
     match components {
         Components::Gz => 0,
-        Components::Gradient | Components::All => GRADIENT - 1,
+        Components::Force | Components::Gradient | Components::All => GRADIENT - 1,
     }
 }
 

@@ -9,6 +9,7 @@ pub use read::keys;
 use std::path::PathBuf;
 
 use crate::step::BodyOptions;
+use fluxform_base::force_direction::RequestedForce;
 use fluxform_numerics::axis::Axis;
 
 pub use crate::format::SurfaceFormat;
@@ -31,6 +32,8 @@ pub struct ShapeDocument {
     /// Grid of constraint points: of a document 61 x 61 over [-50, 50] mm unless it says
     /// otherwise, of a raw surface 61 x 61 over its own extent.
     pub grid: GridRequest,
+    /// The force that is requested over it.
+    pub force: RequestedForce,
 }
 
 /// Where a surface comes from.

@@ -80,6 +80,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
         z_m: z.nodes().into(),
         coil: coil.clone().into(),
         gz_t_per_m_per_a: gz.into(),
+        sides_t_per_m_per_a: None,
         gradient_t_per_m_per_a: tilted.then(|| all.into()),
         field_t_per_a: None,
         passive_force_n: None,
@@ -117,6 +118,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
         static_current_a: currents_a.clone(),
         inductance_h: inductance_h.concat(),
         voltage_v: Some(36.0),
+        requested: None,
     });
     let accuracy = BTreeMap::from([(
         "map".to_owned(),
@@ -218,6 +220,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
             lambda_n_per_m: Some(5.9878),
             criterion: Criterion::Saturation,
         },
+        force: None,
         points: points_grid,
         map: MapSummary {
             x_m: x.into(),
@@ -229,6 +232,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
                 1.3e-6,
                 "relative to the largest |g| at that height, sampled",
             ),
+            sides: None,
             passive_force: None,
             working_point: None,
         },

@@ -13,7 +13,7 @@ use super::plan::{Cost, Done, Plan, plan};
 use super::run;
 use crate::bundle::lambda_file::WorkingPointForces;
 use crate::bundle::manifest::Manifest;
-use crate::cli::args::{SurfaceFlags, Tolerance, Writing};
+use crate::cli::args::{ForceFlags, SurfaceFlags, Tolerance, Writing};
 use crate::cli::budget::{allow, cost_origin, costs};
 use crate::cli::describe;
 use crate::cli::documents;
@@ -28,6 +28,7 @@ use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
 use crate::cli::start::folder;
 use crate::cli::values::{self, FileArgument};
+use crate::commands::lambda::LambdaOptions;
 use crate::commands::lambda::command::{CriterionFlags, rendered};
 use crate::design::{Design, Need};
 use crate::scene::cost::{Components, of_map};
@@ -78,6 +79,8 @@ pub struct Calibrate {
     #[command(flatten)]
     criterion: CriterionFlags,
     #[command(flatten)]
+    requested: ForceFlags,
+    #[command(flatten)]
     writing: Writing,
     #[command(flatten)]
     tolerance: Tolerance,
@@ -92,7 +95,10 @@ impl Calibrate {
     /// See [`Failure`].
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
         let out = folder(&self.out)?;
-        let lambda = self.criterion.options(self.tolerance.tolerance);
+        let lambda = LambdaOptions {
+            force: self.requested.into(),
+            ..self.criterion.options(self.tolerance.tolerance)
+        };
         let (document, shapes) = documents::design_and_shapes(
             &self.design,
             Need::CALIBRATE,

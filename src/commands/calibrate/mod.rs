@@ -26,6 +26,7 @@ use crate::bundle::table::{CurrentRow, PointRow};
 use crate::bundle::timing::StageSeconds;
 use crate::bundle::write::{BundleContent, check_bundle_target, write_bundle};
 use crate::design::Design;
+use crate::force_direction::RequestedForce;
 use crate::lambda::Settings;
 use crate::map::tabulate::{Grid, PlacedCoil};
 use crate::map::{Components, FieldMap};
@@ -47,6 +48,7 @@ mod ignored_pull;
 mod page;
 pub mod plan;
 mod recorded;
+mod requested_force;
 
 pub use crate::report::bundle_files::PAGE_FILE;
 pub(crate) use ignored_pull::IgnoredPull;
@@ -115,6 +117,7 @@ impl CalibrateOptions {
             variants: _,
             feedback: _,
             picture: _,
+            force,
         } = lambda;
         let Settings {
             criterion,
@@ -126,6 +129,8 @@ impl CalibrateOptions {
             jnd: Some(jnd_weight),
             at_n_per_m,
             tolerance: *tolerance,
+            force_direction: force.direction,
+            normal_force: force.normal_force,
             reach_m: *reach_m,
             report: *page,
             arithmetic: arithmetic(),
@@ -413,8 +418,7 @@ impl Calibration<'_> {
             progress,
         )?;
         let grid_points = &points.discretized.points;
-        let reach_m = self.options.reach_m;
-        let mut needed = NeededMap::new(scene, &solved.map, field, grid_points, reach_m, progress)?;
+        let mut needed = self.needed_map(grid_points, progress)?;
         let passive = passive_map(scene, &needed.made.map, progress)?;
         progress.begin("passive force", 1);
         let ignored = IgnoredPull::new(scene, &lambda, &of_grid, field)?;
@@ -430,8 +434,8 @@ impl Calibration<'_> {
         let rows = point_rows(grid_points);
         let currents = current_rows(scene, &lambda);
         let mut map = arrays(
-            &needed.made.map,
-            self.runtime(&lambda, &manifest, &rows, &currents),
+            &needed.made,
+            self.runtime(&lambda, &manifest, grid_points, (&rows, &currents)),
         );
         map.passive_force_n = passive.as_ref().map(|p| Cow::Borrowed(&*p.force_z_n));
         let mut extra = vec![(DESIGN_FILE, self.source.text.as_bytes())];
@@ -472,13 +476,18 @@ impl Calibration<'_> {
         Ok(files)
     }
 
+    /// The force that is requested over the shape.
+    fn force(&self) -> RequestedForce {
+        (self.options.lambda.force).over(self.shape.document.force)
+    }
+
     /// The numbers that a runtime needs beside the map.
     fn runtime(
         &self,
         lambda: &LambdaReport,
         manifest: &Manifest,
-        rows: &[PointRow],
-        currents: &[CurrentRow],
+        points: &ConstraintPoints,
+        (rows, currents): (&[PointRow], &[CurrentRow]),
     ) -> Runtime {
         let circuit = &self.circuit.circuit;
         let rendering = HeightGrid::of_points(&manifest.points, rows).map(|heights| Rendering {
@@ -486,6 +495,7 @@ impl Calibration<'_> {
             static_current_a: currents.iter().map(|row| row.current_a).collect(),
             inductance_h: circuit.inductance_h.concat(),
             voltage_v: circuit.voltage_v,
+            requested: requested_force::on_grid(self.force(), points),
         });
         Runtime {
             rendering,
@@ -505,7 +515,7 @@ impl Calibration<'_> {
         let mut accuracy = file.accuracy.clone();
         accuracy.insert("map".to_owned(), needed.made.accuracy.clone());
         accuracy.insert("inductances".to_owned(), self.circuit.accuracy.clone());
-        let mut map = summary(&needed.made.map, needed.components, needed.made.between);
+        let mut map = summary(&needed.made, needed.components);
         if let Some(passive) = passive {
             accuracy.insert(PASSIVE_STAGE.to_owned(), passive.accuracy.clone());
             map.passive_force = Some(PassiveForce {
@@ -531,6 +541,7 @@ impl Calibration<'_> {
                 lambda_n_per_m: file.lambda_n_per_m,
                 criterion: file.criterion,
             },
+            force: requested_force::summary(self.force(), points),
             points: points_grid(points),
             map,
             left_out: needed.left_out.clone(),
@@ -567,27 +578,39 @@ struct NeededMap {
     left_out: Vec<LeftOut>,
 }
 
-impl NeededMap {
-    fn new(
-        scene: &Scene,
-        solved: &Solved,
-        field: ShapeField,
+impl Calibration<'_> {
+    fn needed_map(
+        &self,
         points: &ConstraintPoints,
-        reach_m: f64,
         progress: &dyn Progress,
-    ) -> Result<Self, RunError> {
+    ) -> Result<NeededMap, RunError> {
+        let (scene, solved) = (self.scene, &self.solved.map);
         let mut left_out = Vec::new();
-        let grid = needed_grid(scene.design, points, reach_m, &mut left_out);
-        let components = if scene.tilted() {
-            Components::Gradient
-        } else {
+        let grid = needed_grid(scene.design, points, self.options.reach_m, &mut left_out);
+        let vector = self.force().direction.is_vector();
+        let components = match (vector, scene.tilted()) {
+            (true, _) => Components::Force,
+            (false, true) => Components::Gradient,
+            (false, false) => Components::Gz,
+        };
+        if !scene.tilted() {
+            let (what, why) = if vector {
+                (
+                    "field and gradient but for its column along z",
+                    "the force on an upright magnet needs that column alone (eq. 4)",
+                )
+            } else {
+                (
+                    "field and transverse gradient",
+                    "an upright dipole's vertical force needs dB_z/dz alone (eq. 5)",
+                )
+            };
             left_out.push(LeftOut {
-                what: "field and transverse gradient".to_owned(),
-                why: "an upright dipole's vertical force needs dB_z/dz alone (eq. 5)".to_owned(),
+                what: what.to_owned(),
+                why: why.to_owned(),
                 error_cost: 0.0,
             });
-            Components::Gz
-        };
+        }
         let driven = needed_coils(scene);
         if driven.len() < scene.coils.len() {
             left_out.push(LeftOut {
@@ -597,15 +620,10 @@ impl NeededMap {
             });
         }
         let felt = MagnetMean::by_magnet(scene, &grid.z_m, MAGNET_SHARE * solved.tolerance)?;
+        let field = self.field;
         let mut made = field.map(scene, solved, &driven, &grid, components, &felt, progress)?;
-        drop_weak_coils(
-            scene,
-            &mut made.map,
-            &driven,
-            solved.tolerance,
-            &mut left_out,
-        );
-        Ok(Self {
+        drop_weak_coils(scene, &mut made, &driven, solved.tolerance, &mut left_out);
+        Ok(NeededMap {
             made,
             components,
             left_out,
@@ -630,11 +648,12 @@ fn largest_current_a(scene: &Scene, coil: usize) -> f64 {
 /// that any coil can give.
 fn drop_weak_coils(
     scene: &Scene,
-    map: &mut FieldMap,
+    made: &mut SceneMap,
     coils: &[PlacedCoil],
     tolerance: f64,
     left_out: &mut Vec<LeftOut>,
 ) {
+    let map = &mut made.map;
     let nodes = map.x_m.len() * map.y_m.len() * map.z_m.len();
     let strength: Vec<f64> = coils
         .iter()
@@ -676,6 +695,9 @@ fn drop_weak_coils(
         *values = kept;
     };
     retain(&mut map.gz_t_per_m_per_a, 1);
+    for side in made.sides.iter_mut().flatten() {
+        retain(side, 1);
+    }
     if let Some(gradient) = &mut map.gradient_t_per_m_per_a {
         retain(gradient, 9);
     }

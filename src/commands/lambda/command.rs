@@ -7,7 +7,7 @@ use clap::Args;
 use super::feedback::FeedbackOptions;
 use super::text::summary;
 use super::{LambdaOptions, run};
-use crate::cli::args::{SamplingFlags, SurfaceFlags, Tolerance, Writing};
+use crate::cli::args::{ForceFlags, SamplingFlags, SurfaceFlags, Tolerance, Writing};
 use crate::cli::budget::{allow, cost_origin, costs};
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
@@ -56,6 +56,8 @@ pub struct Lambda {
     wiring: WiringFlags,
     #[command(flatten)]
     feedback: FeedbackFlags,
+    #[command(flatten)]
+    requested: ForceFlags,
     /// Draw error and currents over lambda, the errors over the surface and force against wanted
     /// force (SVG); `-` for standard output
     #[arg(long, value_name = "FILE")]
@@ -148,6 +150,7 @@ impl Lambda {
                 shell_m: self.feedback.shell,
             }),
             picture: self.plot.is_some(),
+            force: self.requested.into(),
             ..self.criterion.options(self.tolerance.tolerance)
         };
         let (document, shapes) = documents::design_and_shapes(

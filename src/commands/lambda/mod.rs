@@ -26,6 +26,7 @@ use crate::accuracy::{StageAccuracy, missed};
 use crate::bundle::artefact::Input;
 use crate::bundle::lambda_file::{LambdaFile, SampledPoints};
 use crate::design::Design;
+use crate::force_direction::ForceOverride;
 use crate::lambda::worst::worst_point;
 use crate::lambda::{self, ForceProblem, Precision, Settings, Solution, Status, Wiring};
 use crate::plot::lambda::LambdaPlot;
@@ -60,6 +61,8 @@ pub struct LambdaOptions {
     pub feedback: Option<FeedbackOptions>,
     /// Whether the data of a picture are computed.
     pub picture: bool,
+    /// What takes the place of the requested force that the shape states.
+    pub force: ForceOverride,
 }
 
 /// The force constant of one object. Serialised it is the JSON result.

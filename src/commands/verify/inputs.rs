@@ -14,6 +14,7 @@ use crate::commands::calibrate::DESIGN_FILE;
 use crate::commands::calibrate::PAGE_FILE;
 use crate::commands::lambda::LambdaOptions;
 use crate::design::{Design, Need, Steel as Described, source};
+use crate::force_direction::ForceOverride;
 use crate::lambda::Settings;
 use crate::scene::sources::ShapeSource;
 use crate::shape::document::{Fit, Placement, RawSurface, Seat, ShapeDocument, SurfaceSource, Up};
@@ -153,6 +154,10 @@ pub(super) fn options(bundle: &Bundle) -> Result<CalibrateOptions, String> {
         Some(made) => {
             options.reach_m = made.reach_m;
             options.page = made.report;
+            options.lambda.force = ForceOverride {
+                direction: made.force_direction,
+                normal_force: made.normal_force,
+            };
         }
         // Older bundles do not name their options; what they hold states one of them.
         None => {

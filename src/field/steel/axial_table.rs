@@ -170,7 +170,7 @@ impl AxialTable {
                 out.copy_from_slice(&values[0]);
                 return Ok(());
             }
-            Components::Gradient => &GRADIENT,
+            Components::Force | Components::Gradient => &GRADIENT,
             Components::All => &[
                 Quantity::DbzDz,
                 Quantity::DbrDzOverR,
@@ -422,7 +422,7 @@ impl AxialSource for AxialTable {
     ) -> Result<Gradients, OnEdge> {
         let quantities: &[Quantity] = match components {
             Components::Gz => &[Quantity::DbzDz],
-            Components::Gradient | Components::All => &GRADIENT,
+            Components::Force | Components::Gradient | Components::All => &GRADIENT,
         };
         let mut values = self.sample(r_m, z_m, quantities)?.into_iter();
         let mut next = || values.next().unwrap_or_default();

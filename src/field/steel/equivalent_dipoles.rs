@@ -255,7 +255,7 @@ impl Kernel for Pass<'_> {
     fn run<const FMA: bool>(self) -> Vec<f64> {
         match self.parts {
             Components::Gz => self.run_parts::<FMA, 1>(),
-            Components::Gradient => self.run_parts::<FMA, 5>(),
+            Components::Force | Components::Gradient => self.run_parts::<FMA, 5>(),
             Components::All => self.run_parts::<FMA, 8>(),
         }
     }

@@ -6,6 +6,7 @@ use super::unit::unit_names;
 use super::{AxisRequest, GridRequest, Placement, ShapeDocument, SurfaceSource};
 use crate::format::SurfaceFormat;
 use crate::step::BodyOptions;
+use fluxform_base::force_direction::RequestedForce;
 use fluxform_design::message_text::axis_fault;
 use fluxform_numerics::axis::Axis;
 
@@ -117,6 +118,7 @@ impl ShapeDocument {
             bodies: surface.bodies.clone(),
             scale: surface.scale,
             placement: surface.placement,
+            force: RequestedForce::default(),
         })
     }
 }

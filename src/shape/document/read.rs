@@ -8,6 +8,7 @@ use super::{
 };
 use crate::format::SurfaceFormat;
 use crate::step::BodyOptions;
+use fluxform_base::force_direction::{ForceDirection, NormalForce, RequestedForce};
 use fluxform_base::units::m_from_mm;
 use fluxform_design::diagnostics::{Faults, InvalidDocument};
 use fluxform_design::keys::{Key, with_meanings};
@@ -79,6 +80,7 @@ fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
         seat: seat(root),
     };
     let bodies = bodies(root);
+    let force = force(root);
     let grid = points(root.section("points"));
     Some(ShapeDocument {
         name: name?,
@@ -87,6 +89,7 @@ fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
         scale: scale?,
         placement,
         grid: grid?,
+        force,
     })
 }
 
@@ -132,6 +135,24 @@ fn seat(root: &mut Section<'_>) -> Seat {
         center,
         rest_on_m: rest_on.map(|length| m_from_mm(length.value)),
         fit,
+    }
+}
+
+/// The force that is requested over the surface.
+fn force(root: &mut Section<'_>) -> RequestedForce {
+    let directions = ForceDirection::ALL.iter().map(|d| (d.name(), *d));
+    let sizes = NormalForce::ALL.iter().map(|s| (s.name(), *s));
+    let directions: Vec<_> = directions.collect();
+    let sizes: Vec<_> = sizes.collect();
+    let direction = root.choice_or_first("force", &directions);
+    let normal_force = root.choice_or_first("normal_force", &sizes);
+    if root.has("normal_force") && direction != ForceDirection::Normal {
+        let message = "the force is not along the normal";
+        root.fault("normal_force", message, "add force = \"normal\"");
+    }
+    RequestedForce {
+        direction,
+        normal_force,
     }
 }
 
@@ -207,6 +228,14 @@ const MEANINGS: &[(&str, &str)] = &[
     ("high_mm", "of `wedge`: its height at the high side"),
     ("points.x_mm", "grid of constraint points along x"),
     ("points.y_mm", "grid of constraint points along y"),
+    (
+        "force",
+        "`vertical`: upward, sideways not controlled; `vertical-only`: no sideways force; `normal`: along the surface's normal; the last two with feedback",
+    ),
+    (
+        "normal_force",
+        "of `normal`: lambda times the height is the force's `magnitude`, or its `upward` part",
+    ),
     (
         "points.outside",
         "what becomes of grid points beside the surface: there is no point",
