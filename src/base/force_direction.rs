@@ -117,6 +117,15 @@ pub struct RequestedForce {
 }
 
 impl RequestedForce {
+    /// The size of a force along the normal; `None` where it points elsewhere.
+    #[must_use]
+    pub fn along_normal(self) -> Option<NormalForce> {
+        match self.direction {
+            ForceDirection::Vertical | ForceDirection::VerticalOnly => None,
+            ForceDirection::Normal => Some(self.normal_force),
+        }
+    }
+
     /// The requested force over lambda times the height, for the unit normal (`n_z >= 0`) given. At a crease
     /// `other` is the unit normal of the other face; the mean of both counts.
     ///
@@ -152,6 +161,16 @@ pub struct ForceOverride {
     pub direction: Option<ForceDirection>,
     /// How large it is along the normal.
     pub normal_force: Option<NormalForce>,
+}
+
+impl From<RequestedForce> for ForceOverride {
+    /// One that takes the place of all of a shape's own request.
+    fn from(force: RequestedForce) -> Self {
+        Self {
+            direction: Some(force.direction),
+            normal_force: Some(force.normal_force),
+        }
+    }
 }
 
 impl ForceOverride {

@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 
 use super::number::push_number;
+pub use fluxform_lambda::vector_feedback::angle_deg;
 
 /// Rows are gathered to blocks of about this size.
 const BLOCK_BYTES: usize = 64 << 10;
@@ -168,21 +169,6 @@ impl ReplayRows {
         block.push(b',');
         Ok(())
     }
-}
-
-/// Angle between the `given` force and the `requested` one, degrees; 0 where none is requested, 180 where
-/// none is given.
-#[must_use]
-pub fn angle_deg(requested: [f64; 3], given: [f64; 3]) -> f64 {
-    let [[a, b, c], [x, y, z]] = [requested, given];
-    if requested == [0.0; 3] {
-        return 0.0;
-    }
-    if given == [0.0; 3] {
-        return 180.0;
-    }
-    let across = (b * z - c * y).hypot((c * x - a * z).hypot(a * y - b * x));
-    across.atan2(a * x + b * y + c * z).to_degrees()
 }
 
 /// A column of `replay.csv`.

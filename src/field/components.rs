@@ -49,12 +49,13 @@ impl Components {
     }
 
     /// Number of independent components outside the sources, where the tensor is symmetric and has
-    /// no trace: dB_z/dz; dB_x/dx, dB_x/dy, dB_x/dz, dB_y/dz, dB_z/dz; then B_x, B_y, B_z.
+    /// no trace: dB_z/dz; dB_x/dz, dB_y/dz, dB_z/dz; dB_x/dx, dB_x/dy, dB_x/dz, dB_y/dz, dB_z/dz; then B_x, B_y, B_z.
     #[must_use]
     pub fn count(self) -> usize {
         match self {
             Self::Gz => 1,
-            Self::Force | Self::Gradient => 5,
+            Self::Force => 3,
+            Self::Gradient => 5,
             Self::All => 8,
         }
     }

@@ -64,6 +64,7 @@ mod rest;
 pub mod sideways;
 mod solve;
 mod vector_allocation;
+pub mod vector_feedback;
 mod wiring;
 pub mod worst;
 

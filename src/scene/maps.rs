@@ -148,7 +148,8 @@ impl MapTask<'_> {
             one: &one,
             means: means.as_ref(),
         };
-        let map = mean(&one, magnet, coils, grid, components, progress)?;
+        let kernels = of_kernels(scene, components);
+        let map = mean(&one, magnet, coils, grid, kernels, progress)?;
         progress.begin("interpolation error", 1);
         // In air the field between the nodes is had as finely as the map itself, at once.
         let of_air = magnet.is_field() && !solved.has_steel();
@@ -183,7 +184,8 @@ impl MapTask<'_> {
         // A grid through every place that a node of the magnet can take.
         let widest = widest(grid, magnet);
         let visits = magnet.visits();
-        let sampled = SampledField::new(steel, &widest, components, tolerance, visits, progress)?;
+        let kernels = of_kernels(scene, components);
+        let sampled = SampledField::new(steel, &widest, kernels, tolerance, visits, progress)?;
         let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
             let mut map = tabulate(&scene.winding, coils, grid, components, tolerance, &Silent)?;
             add(&mut map, &sampled.map(coils, grid, p)?, 1.0);
@@ -193,10 +195,18 @@ impl MapTask<'_> {
             one: &one,
             means: None,
         };
-        let map = mean(&one, magnet, coils, grid, components, progress)?;
+        let map = mean(&one, magnet, coils, grid, kernels, progress)?;
         progress.begin("interpolation error", 1);
         let between = between(&one, magnet, coils, (grid, &map), components)?;
         Ok((Some(sampled.report), map, between))
+    }
+}
+
+/// What is computed for a map of these components: the force on a tilted magnet needs the whole gradient.
+fn of_kernels(scene: &Scene, components: Components) -> Components {
+    match components {
+        Components::Force if scene.tilted() => Components::Gradient,
+        Components::Force | Components::Gz | Components::Gradient | Components::All => components,
     }
 }
 

@@ -12,5 +12,6 @@ mod oracle;
 mod power;
 mod saturation;
 mod vector_allocation;
+mod vector_feedback;
 mod vertices;
 mod worst;

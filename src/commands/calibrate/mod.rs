@@ -44,6 +44,7 @@ use crate::shape::points::ConstraintPoints;
 
 pub(crate) mod again;
 pub(crate) mod command;
+mod directions;
 mod ignored_pull;
 mod page;
 pub mod plan;
@@ -448,7 +449,7 @@ impl Calibration<'_> {
             lambda: &lambda.file,
             extra: &extra,
         };
-        let pages = self.pages(&content, &lambda, progress)?;
+        let pages = self.pages(&content, &lambda, grid_points, progress)?;
         let pages = pages.iter().map(|(name, bytes)| (*name, &bytes[..]));
         let extra: Vec<(&str, &[u8])> = extra.iter().copied().chain(pages).collect();
         content.extra = &extra;
@@ -461,14 +462,19 @@ impl Calibration<'_> {
         &self,
         content: &BundleContent,
         lambda: &LambdaReport,
+        points: &ConstraintPoints,
         progress: &dyn Progress,
     ) -> Result<Vec<(&'static str, Vec<u8>)>, RunError> {
         let Some(picture) = &lambda.picture else {
             return Ok(Vec::new());
         };
+        let directions = self.directions(points, lambda, progress)?;
         progress.begin("report", 1);
         let tolerance = self.solved.map.tolerance;
-        let object = page::object(self.scene, content, picture, &lambda.warnings, tolerance);
+        let warnings = &lambda.warnings;
+        let object = page::object(
+            self.scene, content, picture, directions, warnings, tolerance,
+        );
         let others: Vec<&str> = content.extra.iter().map(|(name, _)| *name).collect();
         let files = bundle_files::files(&object, &others)
             .map_err(|error| WriteError::from_io("write", Path::new(PAGE_FILE), error))?;

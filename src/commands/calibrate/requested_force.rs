@@ -2,24 +2,23 @@
 
 use crate::bundle::manifest::ForceSummary;
 use crate::bundle::rendering::Requested;
-use crate::force_direction::{ForceDirection, RequestedForce};
+use crate::force_direction::RequestedForce;
 use crate::lambda::sideways::SIDEWAYS_WEIGHT;
 use crate::shape::points::ConstraintPoints;
 
 /// What a bundle states of the request; `None` where the upward component alone is requested.
 pub(super) fn summary(force: RequestedForce, points: &ConstraintPoints) -> Option<ForceSummary> {
-    let along_normal = match force.direction {
-        ForceDirection::Vertical => return None,
-        ForceDirection::VerticalOnly => false,
-        ForceDirection::Normal => true,
-    };
+    if !force.direction.is_vector() {
+        return None;
+    }
+    let normal_force = force.along_normal();
     let count = |is: fn(&crate::shape::point_flags::Marks) -> bool| {
         let marked = points.marks.iter().filter(|marks| is(marks));
-        if along_normal { marked.count() } else { 0 }
+        normal_force.map_or(0, |_| marked.count())
     };
     Some(ForceSummary {
         direction: force.direction,
-        normal_force: along_normal.then_some(force.normal_force),
+        normal_force,
         sideways_weight: SIDEWAYS_WEIGHT,
         crease_points: count(|marks| marks.crease.is_some()),
         rim_points: count(|marks| marks.rim || marks.wall),

@@ -26,7 +26,7 @@ use crate::accuracy::{StageAccuracy, missed};
 use crate::bundle::artefact::Input;
 use crate::bundle::lambda_file::{LambdaFile, SampledPoints};
 use crate::design::Design;
-use crate::force_direction::ForceOverride;
+use crate::force_direction::{ForceOverride, RequestedForce};
 use crate::lambda::worst::worst_point;
 use crate::lambda::{self, ForceProblem, Precision, Settings, Solution, Status, Wiring};
 use crate::plot::lambda::LambdaPlot;
@@ -111,6 +111,10 @@ pub fn run(
     progress: &dyn Progress,
 ) -> Result<(PointsReport, LambdaReport), RunError> {
     let scene = Scene::with_tolerance(design, options.tolerance)?;
+    let options = &LambdaOptions {
+        force: options.force.over(document.force).into(),
+        ..options.clone()
+    };
     let points = discretize::run(document, inputs.clone(), progress)?;
     let of_grid = WantedPoints::of_grid(&points);
     let sampling = options
@@ -242,6 +246,8 @@ struct PosedProblem<'a> {
     unwired: ForceProblem<'a>,
     /// The same as wired.
     problem: ForceProblem<'a>,
+    /// The requested force.
+    force: RequestedForce,
 }
 
 /// The force constant for points that are known.
@@ -289,6 +295,7 @@ pub(crate) fn solve_at(
         points,
         options,
         unwired,
+        force: options.force.over(RequestedForce::default()),
         problem: rewired
             .as_ref()
             .map_or(unwired, |rewired| rewired.problem(&unwired)),

@@ -6,6 +6,7 @@ use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::Input;
 use crate::commands::discretize::PointsReport;
 use crate::commands::discretize::scattered::ScatteredReport;
+use crate::force_direction::RequestedForce;
 
 /// Places, what is wanted there, and what is known of their error.
 #[derive(Debug, Clone)]
@@ -14,6 +15,10 @@ pub(crate) struct WantedPoints {
     pub(crate) positions_m: Vec<[f64; 3]>,
     /// z of each, m.
     pub(crate) height_m: Vec<f64>,
+    /// Unit normal of each.
+    normals: Vec<[f64; 3]>,
+    /// Normal of the other face, of each that lies on a crease; empty where creases are not known.
+    other_normals: Vec<Option<[f64; 3]>>,
     /// Area each stands for, m^2; `None`: all alike.
     pub(crate) weights: Option<Vec<f64>>,
     /// Name of the shape.
@@ -50,6 +55,8 @@ impl WantedPoints {
         Self {
             positions_m: positions_m(&points.x_m, &points.y_m, &points.height_m),
             height_m: points.height_m.clone(),
+            normals: points.normal.clone(),
+            other_normals: points.marks.iter().map(|marks| marks.crease).collect(),
             weights: None,
             shape: summary.shape.clone(),
             inputs: summary.inputs.clone(),
@@ -73,6 +80,8 @@ impl WantedPoints {
         Self {
             positions_m: positions_m(&points.x_m, &points.y_m, &points.height_m),
             height_m: points.height_m.clone(),
+            normals: points.normal.clone(),
+            other_normals: Vec::new(),
             weights: Some(points.weight_m2.clone()),
             shape: summary.shape.clone(),
             inputs: summary.inputs.clone(),
@@ -81,6 +90,15 @@ impl WantedPoints {
             grid: None,
             warnings: summary.warnings.clone(),
         }
+    }
+
+    /// The requested force over lambda times the height, at each point.
+    pub(super) fn directions(&self, force: RequestedForce) -> Vec<[f64; 3]> {
+        let normals = self.normals.iter().enumerate();
+        let other = |row: usize| self.other_normals.get(row).copied().flatten();
+        normals
+            .map(|(row, normal)| force.vector(*normal, other(row)))
+            .collect()
     }
 
     /// Plan area of each point against an inner one's, where they are those of a grid: on its border

@@ -8,7 +8,7 @@ use super::data::{CalibratedObject, DrivenCoil};
 use super::frame::{Page, Section};
 use super::html::{Cell, Html, Table};
 use super::number::{count, figures, force, percent};
-use super::{error_budget, field, limits, path, surface};
+use super::{directions, error_budget, field, limits, path, surface};
 
 /// The page.
 #[must_use]
@@ -16,15 +16,15 @@ pub fn page(object: &CalibratedObject, files: &[&str]) -> String {
     let file = object.lambda;
     let mut data = Map::new();
     data.insert("coils".to_owned(), coils(object));
-    let sections = vec![
+    let mut sections = vec![
         answer(object),
         error_budget::section(object, &mut data),
         limits::section(object),
         path::section(object, &mut data),
         surface::section(object, &mut data),
-        field::section(object, &mut data),
-        sources(object, files),
     ];
+    sections.extend(directions::section(object));
+    sections.extend([field::section(object, &mut data), sources(object, files)]);
     Page {
         kind: "Calibration",
         title: format!("{} on {}", file.shape, file.design),
