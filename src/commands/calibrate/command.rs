@@ -129,10 +129,15 @@ impl Calibrate {
         if let Some(plan) = plan.as_ref().filter(|_| !printer.json()) {
             printer.summary(Stream::Output, plan, || explained(plan))?;
         }
+        let components = if options.requests_vector(&shapes) {
+            Components::Force
+        } else {
+            Components::Gz
+        };
         allow(
             costs(design, &shapes, self.tolerance.tolerance)
                 .into_iter()
-                .chain([of_map(design, Components::Gz)]),
+                .chain([of_map(design, components)]),
             cost_origin(&shapes),
             printer,
         )?;

@@ -98,6 +98,14 @@ impl CalibrateOptions {
         }
     }
 
+    /// Whether any of `shapes` requests a force vector.
+    pub(crate) fn requests_vector(&self, shapes: &[ShapeSource]) -> bool {
+        let force = |shape: &ShapeSource| self.lambda.force.over(shape.document.force);
+        shapes
+            .iter()
+            .any(|shape| force(shape).direction.is_vector())
+    }
+
     /// The options that `verify` needs beside the inputs to compute the same bundle again. A new option does not
     /// compile before it is recorded or left out on purpose.
     pub(crate) fn made_with(&self, shape: &ShapeSource) -> MadeWith {
