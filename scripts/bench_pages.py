@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Copies the tables of results/bench into tests/README.md and src/DESIGN.md.
+"""Copies the tables of results/bench into tests/README.md.
 
     cargo run --release -p fluxform-bench -- --peers --out results/bench
     FLUXFORM_COVERAGE=results/bench/coverage.md cargo test --locked -p fluxform-bench --test stages a_hundred
     cargo run --release -p fluxform-bench -- --stage inductance --scaling --out results/bench/scaling
     python3 scripts/bench_pages.py
 
-Between the lines `<!-- bench: NAME -->` and `<!-- bench: end -->` of a page stands what the summary
-says: `curves` (a line a curve of fluxform's own), `peers` (the ratios of times), `scaling`, `defaults`,
-and `coverage` (what the stages claim of their errors against the truth).
+Between the lines `<!-- bench: NAME -->` and `<!-- bench: end -->` of that page is the summary's
+part of that name: `curves` (a line a curve of fluxform's own), `peers` (the ratios of times), `scaling`, `defaults`,
+and `coverage` (the stages' stated errors against the truth).
 """
 
 import pathlib
@@ -18,7 +18,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 SUMMARY = ROOT / "results" / "bench" / "summary.md"
 SCALING = ROOT / "results" / "bench" / "scaling" / "summary.md"
 COVERAGE = ROOT / "results" / "bench" / "coverage.md"
-PAGES = [ROOT / "tests" / "README.md", ROOT / "src" / "DESIGN.md"]
+PAGE = ROOT / "tests" / "README.md"
 
 
 def section(text, title):
@@ -45,15 +45,14 @@ def parts(text):
 
 
 def main():
-    told = parts(SUMMARY.read_text(encoding="utf-8"))
-    told["scaling"] = section(SCALING.read_text(encoding="utf-8"), "Time and memory against size")
-    told["coverage"] = COVERAGE.read_text(encoding="utf-8").strip()
-    for page in PAGES:
-        text = page.read_text(encoding="utf-8")
-        for name, content in told.items():
-            pattern = rf"(<!-- bench: {name} -->\n).*?(<!-- bench: end -->)"
-            text = re.sub(pattern, lambda m, c=content: f"{m[1]}\n{c}\n\n{m[2]}", text, flags=re.DOTALL)
-        page.write_text(text, encoding="utf-8")
+    tables = parts(SUMMARY.read_text(encoding="utf-8"))
+    tables["scaling"] = section(SCALING.read_text(encoding="utf-8"), "Time and memory against size")
+    tables["coverage"] = COVERAGE.read_text(encoding="utf-8").strip()
+    text = PAGE.read_text(encoding="utf-8")
+    for name, content in tables.items():
+        pattern = rf"(<!-- bench: {name} -->\n).*?(<!-- bench: end -->)"
+        text = re.sub(pattern, lambda m, c=content: f"{m[1]}\n{c}\n\n{m[2]}", text, flags=re.DOTALL)
+    PAGE.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -170,10 +170,10 @@ fn the_cheapest_settings_meet_their_target_and_can_be_pasted() {
 #[test]
 fn the_files_hold_every_run_and_fit_their_schema() {
     let place = place(ARRAY);
-    let told = bench(&place, &ASKED).ends(0).json();
+    let reported = bench(&place, &ASKED).ends(0).json();
     let read = |name: &str| place.text(&format!("b/{name}"));
     let written: Value = serde_json::from_str(&read("bench.json")).unwrap();
-    assert_eq!(written["shapes"], told["shapes"]);
+    assert_eq!(written["shapes"], reported["shapes"]);
     let schema = SCHEMAS
         .iter()
         .find(|(name, _)| *name == "bench.schema.json");
@@ -202,8 +202,8 @@ fn the_files_hold_every_run_and_fit_their_schema() {
     ] {
         assert!(page.contains(part), "{part}");
     }
-    // What the scene does not have is said.
-    let why = told["left_out"].to_string();
+    // The report names the parts that the scene lacks.
+    let why = reported["left_out"].to_string();
     assert!(
         why.contains("steel resolution") && why.contains("no [core]"),
         "{why}"

@@ -22,7 +22,7 @@ fn main() -> ExitCode {
             sources_of_coupled_cores_stand_on_all_axes,
             an_unmet_tolerance_ends_with_four_and_the_files,
             the_same_bytes_on_any_number_of_threads_and_over_our_own_files,
-            wrong_usage_and_workspaces_that_do_not_do_are_told,
+            wrong_usage_and_unsuitable_workspaces_are_reported,
         ],
         missing() => [mag_manip_reads_what_is_stated],
     })
@@ -64,7 +64,7 @@ struct Made {
     folder: tempfile::TempDir,
     design: String,
     code: Option<i32>,
-    told: Value,
+    report_text: Value,
 }
 
 impl Made {
@@ -79,12 +79,13 @@ impl Made {
         words.extend(more);
         let run = fluxform(&words);
         let errors = String::from_utf8(run.stderr).unwrap();
-        let told = serde_json::from_slice(&run.stdout).unwrap_or_else(|_| panic!("{errors}"));
+        let report_text =
+            serde_json::from_slice(&run.stdout).unwrap_or_else(|_| panic!("{errors}"));
         Self {
             folder,
             design,
             code: run.status.code(),
-            told,
+            report_text,
         }
     }
 
@@ -115,7 +116,9 @@ impl Made {
     }
 
     fn stated(&self, stage: &str) -> f64 {
-        self.told["accuracy"][stage]["estimate"].as_f64().unwrap()
+        self.report_text["accuracy"][stage]["estimate"]
+            .as_f64()
+            .unwrap()
     }
 }
 
@@ -271,7 +274,7 @@ fn read_sources(text: &str) -> Vec<Vec<(Source, Vec<f64>)>> {
 fn multipoles(made: &Made, tolerance: f64) {
     let coils = read_sources(&made.text("mpem.yaml"));
     assert_eq!(coils.len(), 9);
-    assert_eq!(made.told["mpem"]["sources"], coils[0].len());
+    assert_eq!(made.report_text["mpem"]["sources"], coils[0].len());
     let heights = [0.0200001, 0.023, 0.035, 0.0599];
     let mut points_m = Vec::new();
     for z in heights {
@@ -342,14 +345,14 @@ fn sources_of_coupled_cores_stand_on_all_axes() {
     // Fewer do for less.
     let looser = Made::new("seed.toml", &["--mpem-tolerance", "3e-2"]);
     multipoles(&looser, 3e-2);
-    let terms = |made: &Made| made.told["mpem"]["coefficients"].as_u64().unwrap();
+    let terms = |made: &Made| made.report_text["mpem"]["coefficients"].as_u64().unwrap();
     assert!(terms(&looser) < terms(&made));
 }
 
 fn an_unmet_tolerance_ends_with_four_and_the_files() {
     let made = Made::new("seed_air.toml", &["--mpem-tolerance", "1e-13"]);
     assert_eq!(made.code, Some(4));
-    assert_eq!(made.told["mpem"]["tolerance_met"], false);
+    assert_eq!(made.report_text["mpem"]["tolerance_met"], false);
     assert!(made.text("mpem.yaml").len() > 1000);
 }
 
@@ -362,7 +365,7 @@ fn the_same_bytes_on_any_number_of_threads_and_over_our_own_files() {
         .iter()
         .map(|file| file["path"].as_str().unwrap())
         .collect();
-    // What lies elsewhere is not the folder's.
+    // A path elsewhere is not the folder's.
     assert_eq!(listed, ["map.npz", "nodes.yaml"]);
     let path = |name: &str| made.folder.path().join(name).display().to_string();
     let (out, nodes, mpem) = (path("map"), path("map/nodes.yaml"), path("mpem.yaml"));
@@ -391,7 +394,7 @@ fn the_same_bytes_on_any_number_of_threads_and_over_our_own_files() {
     assert_eq!(made.text("mpem.yaml"), before.1);
 }
 
-fn wrong_usage_and_workspaces_that_do_not_do_are_told() {
+fn wrong_usage_and_unsuitable_workspaces_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let design = coarse("seed_air.toml", folder.path());
     let out = folder.path().join("map").display().to_string();

@@ -95,7 +95,7 @@ fn file_of(folder: &Path, name: &str, content: &Value) -> String {
     path.to_str().unwrap().to_owned()
 }
 
-/// What `optimize` says of a design, as the script's `--judge` takes it.
+/// Output of `optimize` on a design, as the script's `--judge` takes it.
 fn claim(design: &Path) -> Value {
     let run = Command::new(program())
         .args(["optimize", "--format", "json"])
@@ -156,18 +156,18 @@ fn random_design(numbers: &mut Random, core: bool) -> Value {
     );
     let path = Path::new("random.toml");
     let (design, _) = Design::from_toml(&text, path, Need::EVALUATE).unwrap();
-    let told = evaluate(&design, Vec::new(), None).unwrap();
+    let report_text = evaluate(&design, Vec::new(), None).unwrap();
     json!({
         "name": text.replace('\n', " "),
-        "inner_diameter_m": told.coil.size.inner_diameter_m,
-        "outer_diameter_m": told.coil.size.outer_diameter_m,
-        "length_m": told.coil.size.length_m,
+        "inner_diameter_m": report_text.coil.size.inner_diameter_m,
+        "outer_diameter_m": report_text.coil.size.outer_diameter_m,
+        "length_m": report_text.coil.size.length_m,
         "wire_diameter_m": design.wire.diameter_m,
-        "current_a": told.target.current_a,
+        "current_a": report_text.target.current_a,
         "core": core,
-        "force_n": told.target.force_n,
-        "resistance_ohm": told.coil.circuit.resistance_ohm,
-        "inductance_h": told.coil.circuit.inductance_h,
+        "force_n": report_text.target.force_n,
+        "resistance_ohm": report_text.coil.circuit.resistance_ohm,
+        "inductance_h": report_text.coil.circuit.inductance_h,
     })
 }
 

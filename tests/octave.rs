@@ -38,7 +38,7 @@ fn octave(folder: &Path, script: &str) -> Output {
     command(folder, script).output().unwrap()
 }
 
-/// What Octave prints, as rows of numbers.
+/// Output of Octave, as rows of numbers.
 fn rows(output: &Output) -> Vec<Vec<f64>> {
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{errors}");
@@ -167,7 +167,7 @@ fn octave_and_rust_give_the_same_forces_heights_and_currents() {
     }
 }
 
-/// What Octave brings along is enough for the tables and the JSON files.
+/// Octave's own functions are enough for the tables and the JSON files.
 const TABLES: &str = "\
 manifest = jsondecode(fileread('bundle/manifest.json'));
 lambda = jsondecode(fileread('bundle/lambda.json'));
@@ -200,17 +200,17 @@ fn octave_reads_the_tables_and_the_json_files_by_its_own_functions() {
     let currents: Vec<f64> = bundle.currents.iter().map(|row| row.current_a).collect();
     assert_eq!(found[1], currents);
     let lambda = bundle.lambda.lambda_n_per_m.unwrap();
-    let mut told = vec![lambda];
-    told.extend(&currents);
-    told.push(lambda);
+    let mut reported = vec![lambda];
+    reported.extend(&currents);
+    reported.push(lambda);
     // Its reader of JSON may lose the last digit.
-    for (found, want) in found[2].iter().zip(&told) {
+    for (found, want) in found[2].iter().zip(&reported) {
         assert!(
             (found - want).abs() <= 4.0 * f64::EPSILON * want.abs(),
             "{found} and {want}"
         );
     }
-    assert_eq!(found[2].len(), told.len());
+    assert_eq!(found[2].len(), reported.len());
     assert_eq!(found[3], [1.0, bundle.manifest.files.len() as f64]);
 }
 

@@ -9,13 +9,13 @@ use serde_json::Value;
 
 fn main() -> ExitCode {
     needs::run(trials! {
-        None => [a_bundle_holds_its_page_and_verify_checks_it, the_page_tells_what_the_files_hold, pages_are_the_same_bytes_whatever_the_threads, a_hostile_path_stays_text, a_page_can_be_left_out_and_is_there_without_a_force_constant, optimize_and_sweep_write_pages],
+        None => [a_bundle_holds_its_page_and_verify_checks_it, the_page_agrees_with_the_files, pages_are_the_same_bytes_whatever_the_threads, a_hostile_path_stays_text, a_page_can_be_left_out_and_is_there_without_a_force_constant, optimize_and_sweep_write_pages],
         no_browser() => [a_browser_draws_the_page_and_answers, a_browser_draws_the_pages_of_a_null_constant_of_optimize_and_of_a_sweep],
     })
 }
 
 const DESIGN: &str = "designs/seed_air.toml";
-/// What a page may weigh, bytes.
+/// Largest size of a page, bytes.
 const MOST_BYTES: usize = 600_000;
 
 fn run(place: &Place, arguments: &[&str], code: i32) -> String {
@@ -70,7 +70,7 @@ fn a_bundle_holds_its_page_and_verify_checks_it() {
     }
     let html = place.text(&format!("{bundle}/report.html"));
     is_a_page(&html);
-    for told in [
+    for reported in [
         "<h1>wedge on seed_air</h1>",
         "The answer",
         "How good it is",
@@ -84,7 +84,7 @@ fn a_bundle_holds_its_page_and_verify_checks_it() {
         "id=\"draw-field\"",
         "shapes/wedge.stl",
     ] {
-        assert!(html.contains(told), "{told}");
+        assert!(html.contains(reported), "{reported}");
     }
     // The shipped curve says that it is not this run's.
     assert!(html.contains("id=\"draw-cost\"") && html.contains("Not measured in this run"));
@@ -96,7 +96,7 @@ fn a_bundle_holds_its_page_and_verify_checks_it() {
     run(&place, &["verify", bundle], 5);
 }
 
-fn the_page_tells_what_the_files_hold() {
+fn the_page_agrees_with_the_files() {
     let place = Place::new();
     run(&place, &["calibrate", DESIGN, "shapes/flat.toml"], 0);
     let bundle = "results/seed_air/flat";
@@ -169,8 +169,8 @@ fn a_hostile_path_stays_text() {
         &["calibrate", DESIGN, &hostile_at, "--format", "json"],
         0,
     );
-    let told: Value = serde_json::from_str(&shown).unwrap();
-    let folder = told["bundles"][0]["folder"].as_str().unwrap();
+    let reported: Value = serde_json::from_str(&shown).unwrap();
+    let folder = reported["bundles"][0]["folder"].as_str().unwrap();
     let html = place.text(&format!("{folder}/report.html"));
     is_a_page(&html);
     assert!(html.contains("&lt;img src=x onerror=&quot;alert(&#39;1&#39;)&quot;&gt;&amp;amp;"));
@@ -256,13 +256,13 @@ fn optimize_and_sweep_write_pages() {
     run(&place, &["optimize", DESIGN, "--report", "best.html"], 0);
     let html = place.text("best.html");
     is_a_page(&html);
-    for told in [
+    for reported in [
         "Certificate: global",
         "held back by",
         "1 % more",
         "as given",
     ] {
-        assert!(html.contains(told), "{told}");
+        assert!(html.contains(reported), "{reported}");
     }
     run(&place, &["optimize", DESIGN, "--report", "best.html"], 0);
     place.write("other.html", "mine");
@@ -275,12 +275,12 @@ fn optimize_and_sweep_write_pages() {
     let place = swept();
     let html = place.text("sweep.html");
     is_a_page(&html);
-    for told in ["12 of 12 designs", "wire.diameter_mm", "draw-front-2"] {
-        assert!(html.contains(told), "{told}");
+    for reported in ["12 of 12 designs", "wire.diameter_mm", "draw-front-2"] {
+        assert!(html.contains(reported), "{reported}");
     }
 }
 
-/// What the script that drives a browser says.
+/// Output of the script that drives a browser.
 fn browser(page: &Path) -> Output {
     let mut python = Command::new("python3");
     let script = python.arg(root().join("tests/report/browser.py"));

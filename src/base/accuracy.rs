@@ -85,7 +85,7 @@ impl CertificateKind {
         }
     }
 
-    /// What the result is the best of.
+    /// The set in which the result is the best.
     #[must_use]
     pub fn scope(self) -> &'static str {
         match self {
@@ -99,7 +99,7 @@ impl CertificateKind {
         }
     }
 
-    /// What remains open where no bound on the force is stated.
+    /// Open question where no bound on the force is stated.
     #[must_use]
     pub fn open_question(self) -> &'static str {
         match self {

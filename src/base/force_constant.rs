@@ -65,7 +65,7 @@ impl Criterion {
         }
     }
 
-    /// What the constant that it chooses means.
+    /// Meaning of the constant that it chooses.
     #[must_use]
     pub fn meaning(self) -> &'static str {
         self.get_documentation().unwrap_or_default()

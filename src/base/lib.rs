@@ -1,4 +1,4 @@
-//! What every room uses: physical constants and the millimetre border, progress and interruption,
+//! Parts used by every room: physical constants and the millimetre border, progress and interruption,
 //! the error statement that every stage attaches to its numbers, the force constants' names,
 //! and which force is requested.
 

@@ -1,6 +1,6 @@
-//! What every array of a `map.npz` must be, and what is wrong with one that is not.
+//! Conditions on every array of a `map.npz`, and the faults of one that breaks them.
 
-/// What is wrong with a `map.npz`.
+/// Faults of a `map.npz`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NpzError {
     /// Not a zip archive, or cut short.
@@ -14,7 +14,7 @@ pub enum NpzError {
     Array {
         /// Its name.
         name: &'static str,
-        /// What was expected and found.
+        /// Expectation and result.
         message: String,
     },
 }

@@ -1,4 +1,4 @@
-//! What every artefact says about itself: versions, inputs, files.
+//! Record that every artefact carries: versions, inputs, files.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Read};

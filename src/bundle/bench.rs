@@ -31,9 +31,9 @@ pub struct BenchFile {
     pub criterion: Criterion,
     /// Whether ladders and reference were shortened by `--quick`.
     pub quick: bool,
-    /// What the errors are and what they are relative to.
+    /// Meaning of the errors and their reference.
     pub error_of: String,
-    /// What the seconds are.
+    /// Meaning of the seconds.
     pub timed: String,
     /// One entry per object.
     pub shapes: Vec<ShapeBench>,
@@ -50,7 +50,7 @@ pub struct BenchFile {
 pub struct ShapeBench {
     /// Its name.
     pub shape: String,
-    /// What the errors are held against.
+    /// Reference of the errors.
     pub reference: Reference,
     /// The knobs, each from its coarsest setting to its finest.
     pub knobs: Vec<Knob>,
@@ -82,7 +82,7 @@ pub struct Reference {
     pub cpu_s: f64,
 }
 
-/// What can be set.
+/// Parameters that can be set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum KnobName {
@@ -97,7 +97,7 @@ pub enum KnobName {
 }
 
 impl KnobName {
-    /// What it is, for people, with its unit.
+    /// Description with its unit.
     #[must_use]
     pub const fn label(self) -> &'static str {
         match self {
@@ -201,7 +201,7 @@ pub struct LeftOutKnob {
 /// Runs in the order in which they are drawn as one curve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve<'a> {
-    /// What is swept, and where the others are.
+    /// The parameter that is swept, and the values of the others.
     pub name: String,
     /// The knob; `None` for the cheapest of all.
     pub knob: Option<KnobName>,

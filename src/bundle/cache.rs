@@ -24,7 +24,7 @@ const DIGEST: usize = 32;
 /// Larger entries are not read.
 const ENTRY_MAX_BYTES: u64 = 16 << 30;
 
-/// What a value is computed from, as a digest.
+/// Digest of the inputs of a value.
 #[derive(Debug, Clone)]
 pub struct Origin(Sha256);
 
@@ -124,7 +124,7 @@ impl Store {
             return;
         };
         atomic::clean_leftovers(&dir);
-        // What is there and is no entry is left alone.
+        // A file that is no entry is left alone.
         if matches!(dir.status(name), Ok(Some(_))) && !is_entry(&dir, OsStr::new(name)) {
             return;
         }
@@ -164,7 +164,7 @@ fn payload(folder: &Dir, name: &str, origin: &Origin) -> Option<Vec<u8>> {
         return None;
     }
     let mut file = folder.file(name).ok()?;
-    // What is large and none of ours is not read to its end.
+    // A large file that is none of ours is not read to its end.
     let mut head = [0; MAGIC.len() + 2 * DIGEST];
     file.read_exact(&mut head).ok()?;
     let (magic, digests) = head.split_at(MAGIC.len());

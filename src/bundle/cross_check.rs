@@ -54,7 +54,7 @@ pub(super) fn check(
     check_rendering(manifest, map, points, currents)
 }
 
-/// What `map.npz` repeats for runtimes that read nothing else.
+/// Entries that `map.npz` repeats for runtimes that read nothing else.
 fn check_rendering(
     manifest: &Manifest,
     map: &MapArrays,

@@ -33,7 +33,7 @@ pub fn to_json<T: Serialize + ?Sized>(value: &T) -> Result<Vec<u8>, JsonError> {
     Ok(text)
 }
 
-/// What is wrong with JSON that was read. It may quote a text of any length: the middle of a long
+/// The fault in JSON that was read. It may quote a text of any length: the middle of a long
 /// message is left out, its end names line and column.
 pub(crate) fn fault(error: &serde_json::Error) -> String {
     const HALF: usize = 400;

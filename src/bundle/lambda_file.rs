@@ -26,9 +26,9 @@ pub struct LambdaFile {
     pub design: String,
     /// Name of the shape.
     pub shape: String,
-    /// What went in, paths as given on the command line.
+    /// Inputs, paths as given on the command line.
     pub inputs: Vec<Input>,
-    /// What eq. 10 reads off the path.
+    /// Force constants that eq. 10 reads off the path.
     #[serde(flatten)]
     pub constants: ForceConstants,
     /// The one chosen, N/m.
@@ -77,7 +77,7 @@ pub struct LambdaFile {
     /// Where the points are not the grid's: what that changes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sampling: Option<SampledPoints>,
-    /// What the steel really does at the chosen currents; with a B-H curve only, along which
+    /// Response of the steel at the chosen currents; with a B-H curve only, along which
     /// forces of several currents do not add up.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub working_point: Option<WorkingPointForces>,
@@ -102,11 +102,11 @@ pub struct SampledPoints {
     pub area_m2: f64,
     /// Points of the grid.
     pub grid_points: usize,
-    /// What the grid's points give, N/m.
+    /// Value on the grid's points, N/m.
     pub grid_lambda_linear_n_per_m: Option<f64>,
-    /// What the grid's points give, N/m.
+    /// Value on the grid's points, N/m.
     pub grid_lambda_jnd_n_per_m: Option<f64>,
-    /// What the grid's points give, N/m.
+    /// Value on the grid's points, N/m.
     pub grid_lambda_saturation_n_per_m: Option<f64>,
     /// The chosen one by the grid's points, N/m.
     pub grid_lambda_n_per_m: Option<f64>,
@@ -238,7 +238,7 @@ pub struct TolerancePoint {
 /// The force constants with one change.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LambdaVariant {
-    /// What is changed.
+    /// The change.
     pub name: String,
     /// Its wiring.
     #[serde(flatten)]
@@ -247,7 +247,7 @@ pub struct LambdaVariant {
     pub passive_force: bool,
     /// Whether any coil may carry a negative current.
     pub pulls: bool,
-    /// What eq. 10 reads off the path.
+    /// Force constants that eq. 10 reads off the path.
     #[serde(flatten)]
     pub constants: ForceConstants,
     /// N/m.
@@ -291,7 +291,7 @@ pub struct PathStep {
     pub lambda_n_per_m: f64,
     /// A, one a coil of the array.
     pub currents_a: Vec<f64>,
-    /// What happens here, such as "coil 4 meets its upper limit".
+    /// The event, such as "coil 4 meets its upper limit".
     pub event: String,
 }
 
@@ -347,7 +347,7 @@ pub struct WorstPointStep {
     pub currents_a: Vec<f64>,
     /// The points that decide from here on, rows of `points.csv` from 0.
     pub active_points: Vec<usize>,
-    /// What happens here, such as "coil 4 meets its upper limit".
+    /// The event, such as "coil 4 meets its upper limit".
     pub event: String,
 }
 

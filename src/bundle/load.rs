@@ -53,7 +53,7 @@ pub enum BundleError {
     Schema {
         /// The manifest.
         path: PathBuf,
-        /// What was found and expected.
+        /// Result and expectation.
         message: String,
     },
     /// The manifest lists a file that it must not.
@@ -79,7 +79,7 @@ pub enum BundleError {
     Content {
         /// The file.
         path: PathBuf,
-        /// What was expected and found.
+        /// Expectation and result.
         message: String,
     },
 }
@@ -256,7 +256,7 @@ impl Bundle {
         })
     }
 
-    /// What the unpowered steel adds to the force on the magnet's centre at (x, y, z) m, N,
+    /// Force of the unpowered steel on the magnet's centre at (x, y, z) m, N,
     /// positive upwards, interpolated: zero for bundles without it. `None` outside the map.
     #[must_use]
     pub fn passive_force_n(&self, position_m: [f64; 3]) -> Option<f64> {
@@ -287,7 +287,7 @@ impl Bundle {
     }
 }
 
-/// What every bundle has.
+/// Parts of every bundle.
 const REQUIRED: [&str; 4] = ["map.npz", "points.csv", "currents.csv", "lambda.json"];
 
 fn read_manifest(folder: &Path, path: &Path) -> Result<(Manifest, Vec<u8>), BundleError> {

@@ -15,7 +15,7 @@ use fluxform_numerics::axis::Axis;
 /// The interpolation between nodes that every loader implements.
 pub(crate) const INTERPOLATION: &str = "tricubic-lagrange";
 
-/// What a runtime reads first.
+/// The file that a runtime reads first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Manifest {
     /// Layout, `major.minor.patch`.
@@ -26,7 +26,7 @@ pub struct Manifest {
     pub design: String,
     /// Name of the shape.
     pub shape: String,
-    /// What went in, paths as given on the command line.
+    /// Inputs, paths as given on the command line.
     pub inputs: Vec<Input>,
     /// The options of the run, as far as no other file states them; absent from bundles of schema
     /// 1.2 and before. With the inputs they decide every byte of the bundle.
@@ -34,7 +34,7 @@ pub struct Manifest {
     pub made_with: Option<MadeWith>,
     /// A sentence on units.
     pub units: String,
-    /// Where the coils stand.
+    /// Positions of the coils.
     pub array: ArrayGeometry,
     /// Limits of the currents.
     pub limits: CurrentLimits,
@@ -54,7 +54,7 @@ pub struct Manifest {
     pub points: PointsGrid,
     /// The map's grid, coils and interpolation.
     pub map: MapSummary,
-    /// What was left out because the object does not need it.
+    /// Parts left out because the object does not need them.
     pub left_out: Vec<LeftOut>,
     /// Each stage's estimated error.
     pub accuracy: BTreeMap<String, StageAccuracy>,
@@ -108,7 +108,7 @@ impl MadeWith {
     }
 }
 
-/// What the command line says of a surface that is given directly.
+/// Options on the command line of a surface that is given directly.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SurfaceOptions {
     /// Metres per unit of the file's coordinates; null where its format says it.
@@ -148,7 +148,7 @@ pub struct SurfaceOptions {
     pub body: Option<String>,
 }
 
-/// What lies in the `map.npz` beside it.
+/// Contents of the `map.npz` beside it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MapSidecar {
     /// Layout, `major.minor.patch`.
@@ -157,14 +157,14 @@ pub struct MapSidecar {
     pub fluxform_version: String,
     /// Name of the design.
     pub design: String,
-    /// What went in, paths as given on the command line.
+    /// Inputs, paths as given on the command line.
     pub inputs: Vec<Input>,
     /// The options of the run; absent from maps of schema 1.3 and before.
     #[serde(default, skip_serializing_if = "Options::is_empty")]
     pub made_with: Options,
     /// A sentence on units.
     pub units: String,
-    /// Where the coils stand.
+    /// Positions of the coils.
     pub array: ArrayGeometry,
     /// The magnet.
     pub magnet: MagnetSummary,
@@ -176,7 +176,7 @@ pub struct MapSidecar {
     pub files: Vec<FileEntry>,
 }
 
-/// Where the coils stand; index = row * columns + column for a rectangular array.
+/// Positions of the coils; index = row * columns + column for a rectangular array.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ArrayGeometry {
     /// The axes' x and y, m, in coil order.
@@ -428,11 +428,11 @@ pub struct Interpolation {
     pub name: String,
     /// Degree along each axis that has nodes enough.
     pub order: u32,
-    /// What happens at and beyond the borders.
+    /// Behaviour at and beyond the borders.
     pub borders: String,
     /// Its largest error.
     pub largest_error: f64,
-    /// What the largest error is relative to and how it was found.
+    /// Reference of the largest error and how it was found.
     pub largest_error_definition: String,
 }
 

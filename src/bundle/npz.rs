@@ -54,7 +54,7 @@ pub struct MapArrays<'a> {
     pub passive_force_n: Option<Cow<'a, [f64]>>,
     /// dB_z/dz of all coils at the working point's currents, `[z, y, x]`, T/m.
     pub working_point_gz_t_per_m: Option<Cow<'a, [f64]>>,
-    /// What a runtime needs in addition to the maps.
+    /// Data that a runtime needs in addition to the maps.
     pub runtime: Runtime,
 }
 
@@ -73,7 +73,7 @@ pub struct Runtime {
     pub total_current_max_a: Option<f64>,
     /// The chosen force constant, N/m.
     pub lambda_n_per_m: Option<f64>,
-    /// What position feedback needs; `None` for maps without an object and for older bundles.
+    /// Data for position feedback; `None` for maps without an object and for older bundles.
     pub rendering: Option<Rendering>,
 }
 
@@ -215,7 +215,7 @@ impl MapArrays<'_> {
         if rendering.requested.is_some() && self.sides_t_per_m_per_a.is_none() {
             return Err(NpzError::Missing(SIDES[0]));
         }
-        // What follows a finger divides by resistances, and may always command no current.
+        // Position feedback divides by resistances, and may always command no current.
         if !runtime.resistance_ohm.iter().all(|&r| r >= 1.0 / LARGEST) {
             return Err(bad(RESISTANCE, "must be above 0"));
         }

@@ -72,7 +72,7 @@ fn open_plain(path: &Path, max_bytes: u64) -> io::Result<(File, u64)> {
 /// The bytes of the plain file at `path`, links followed, no more than `max_bytes`.
 ///
 /// # Errors
-/// What the system says; those of [`check_plain`]; a file of holes.
+/// The system's error; those of [`check_plain`]; a file of holes.
 pub(crate) fn read_plain(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     let (file, bytes) = open_plain(path, max_bytes)?;
     let mut content = Vec::new();

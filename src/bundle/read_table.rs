@@ -9,7 +9,7 @@ use super::table::{CurrentRow, RowColumn};
 /// No more faults than this are reported.
 const MAX_FAULTS: usize = 20;
 
-/// What is wrong with a table.
+/// Faults of a table.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{}", .faults.join("\n"))]
 pub struct TableError {

@@ -1,4 +1,4 @@
-//! What rendering with position feedback needs in addition to the map, as arrays of `map.npz`: the
+//! Data for rendering with position feedback in addition to the map, as arrays of `map.npz`: the
 //! heights on their grid, the static currents, and the coils' circuit.
 //!
 //! `height_x_m`, `height_y_m`, `height_m` `[y, x]` and `has_height` `[y, x]` (1 where there is a

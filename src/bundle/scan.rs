@@ -16,7 +16,7 @@ const FIELD: [&str; 3] = ["bx_t", "by_t", "bz_t"];
 /// Columns of where the sensor was, m.
 const PLACE: [&str; 3] = ["x_m", "y_m", "z_m"];
 
-/// What a column of the scan holds.
+/// Kinds of columns of a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measured {
     /// A component of the field, T.
@@ -260,29 +260,29 @@ pub struct ScanFile {
     pub values: usize,
     /// The measured columns.
     pub measured: Vec<String>,
-    /// What is left of the measurement.
+    /// Residuals of the measurement.
     pub residuals: Residuals,
-    /// What was fitted.
+    /// Fitted parameters.
     pub fit: FitFile,
-    /// What one parameter, or one group of them, would explain of the residuals as designed; the
+    /// Part of the residuals that one parameter, or one group of them, would explain; the
     /// most first.
     pub explanations: Vec<Explanation>,
     /// The explanation that is best for its number of parameters; null where none is worth it.
     pub best_explanation: Option<String>,
-    /// What is claimed of the computed field.
+    /// Stated error of the computed field.
     pub accuracy: BTreeMap<String, StageAccuracy>,
 }
 
 /// Residuals before and after the fit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Residuals {
-    /// Measured minus computed from the design as it stands.
+    /// Measured minus computed from the design as it is.
     pub as_designed: Left,
     /// Measured minus fitted.
     pub fitted: Left,
 }
 
-/// What is left of the measured quantities.
+/// Residuals of the measured quantities.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Left {
     /// Of the field.
@@ -293,7 +293,7 @@ pub struct Left {
     pub gradient: Option<GradientLeft>,
 }
 
-/// What is left of the measured field.
+/// Residuals of the measured field.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FieldLeft {
     /// Root mean square over all components, T.
@@ -311,7 +311,7 @@ pub struct FieldLeft {
     pub noise_t: Option<f64>,
 }
 
-/// What is left of the measured gradient.
+/// Residuals of the measured gradient.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct GradientLeft {
     /// Root mean square over all components, T/m.
@@ -344,7 +344,7 @@ pub struct ScanPlace {
     pub z_m: f64,
 }
 
-/// What was fitted, all at once.
+/// Parameters fitted together.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FitFile {
     /// One a coil that carried current; empty where scales were not fitted.
@@ -355,7 +355,7 @@ pub struct FitFile {
     pub background_t: Option<[Option<f64>; 3]>,
     /// Its standard errors, T.
     pub background_error_t: Option<[Option<f64>; 3]>,
-    /// What is to be added to the scan's coordinates to get those of the design, m.
+    /// Offset from the scan's coordinates to those of the design, m.
     pub position_m: Option<[Option<f64>; 3]>,
     /// Its standard errors, m.
     pub position_error_m: Option<[Option<f64>; 3]>,
@@ -392,7 +392,7 @@ pub struct CoilScale {
     pub gain: Option<f64>,
 }
 
-/// What one parameter would explain.
+/// Part that one parameter would explain.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Explanation {
     /// The design's key, or `scale`, `scale of each coil`, `background`, `position`, `height`,
@@ -408,7 +408,7 @@ pub struct Explanation {
     /// Its standard error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub standard_error: Option<f64>,
-    /// Parameters that this scan cannot tell from it.
+    /// Parameters that this scan cannot distinguish from it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[serde(default)]
     pub alike: Vec<String>,

@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_told_with_their_line() {
+    fn faults_are_reported_with_their_line() {
         for (text, words) in [
             ("", "finger.csv:1: column t_s is missing"),
             (

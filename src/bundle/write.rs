@@ -185,7 +185,7 @@ pub struct Beside<'a> {
     pub content: BesideContent<'a>,
 }
 
-/// What such a file holds.
+/// Contents of such a file.
 #[derive(Debug, Clone, Copy)]
 pub enum BesideContent<'a> {
     /// The field on nodes.

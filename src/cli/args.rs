@@ -10,7 +10,7 @@ use crate::scene::sources::Sampling;
 use crate::shape::document::Up;
 use crate::shape::step::STEP_SECONDS;
 
-/// What every command takes.
+/// Options of every command.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Common options")]
 pub struct Common {
@@ -189,7 +189,7 @@ pub struct SamplingFlags {
 }
 
 impl SamplingFlags {
-    /// What is asked for, if it is not the grid's points.
+    /// Requested places, if they are not the grid's points.
     #[must_use]
     pub fn sampling(self) -> Option<Sampling> {
         let graded = self

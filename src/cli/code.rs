@@ -180,7 +180,7 @@ mod tests {
     use super::Code;
 
     #[test]
-    fn names_are_unique_and_tell_the_exit_code() {
+    fn names_are_unique_and_determine_the_exit_code() {
         for (i, code) in Code::ALL.into_iter().enumerate() {
             assert!(Code::ALL[..i].iter().all(|c| c.name() != code.name()));
             let digits = &code.name()[1..];

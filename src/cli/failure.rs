@@ -191,7 +191,7 @@ pub struct FaultEntry {
 }
 
 impl FaultEntry {
-    /// What a line `file:line: column name: message` or `file: message` says. A message that names
+    /// Parts of a line `file:line: column name: message` or `file: message`. A message that names
     /// no file is taken whole.
     fn line(text: &str) -> Self {
         let mut entry = Self {

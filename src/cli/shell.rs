@@ -1,4 +1,4 @@
-//! What programs of this workspace share on the command line: common options, messages, exit
+//! Command-line parts that programs of this workspace share: common options, messages, exit
 //! codes, the progress bar, interruption.
 
 use std::ffi::OsString;
@@ -45,7 +45,7 @@ pub trait Program: CommandFactory + FromArgMatches {
 /// Runs a program and returns the process's exit code.
 pub fn main<P: Program>(args: impl Iterator<Item = OsString>) -> ExitCode {
     let args: Vec<OsString> = args.collect();
-    let early = told_early(&args);
+    let early = common_before_parsing(&args);
     std::panic::set_hook(Box::new(move |panic| {
         Printer::new(&early).mistake(&panic_message(panic));
     }));
@@ -91,8 +91,8 @@ fn prepare(common: &Common) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What can be known of the common options before the arguments are parsed.
-fn told_early(args: &[OsString]) -> Common {
+/// Common options, as far as they are known before the arguments are parsed.
+fn common_before_parsing(args: &[OsString]) -> Common {
     Common {
         format: match value_of(args, "--format") {
             Some("json") => Format::Json,
@@ -120,7 +120,7 @@ fn not_parsed(error: &clap::Error, args: &[OsString]) -> Exit {
             | ErrorKind::DisplayVersion
             | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
     );
-    let printer = Printer::new(&told_early(args));
+    let printer = Printer::new(&common_before_parsing(args));
     if !help || (error.use_stderr() && printer.json()) {
         printer.usage(error);
     } else {

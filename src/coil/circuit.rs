@@ -53,7 +53,7 @@ impl From<&Coil> for CoilSize {
     }
 }
 
-/// What a coil is to its driver.
+/// A coil as its driver sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Circuit {
     /// Number of turns N.

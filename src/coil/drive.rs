@@ -47,7 +47,7 @@ pub struct Drive {
     /// Amplitudes of the modes.
     now: Vec<f64>,
     goal: Vec<f64>,
-    /// What is gone and what is left of a difference after the step, 1 together.
+    /// Parts of a difference that are gone and left after the step, 1 together.
     shares: Vec<[f64; 2]>,
     /// The step that `shares` are for, s.
     step_s: f64,

@@ -11,7 +11,7 @@ use fluxform_design::{Coil, Design, Limits};
 /// Relative difference between turns and turns that fit that counts as none.
 const FULL: f64 = 1e-12;
 
-/// What bounds a coil: the design file's limits, then what follows from the supply, from the wire and from
+/// The limits of a coil: the design file's, then those that follow from supply, wire and
 /// dimensions that are given. In the order of [`LIMITS`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum LimitName {
@@ -73,7 +73,7 @@ pub struct Limit {
     pub name: LimitName,
     /// Its name in artefacts.
     pub key: &'static str,
-    /// What sets it in a design file.
+    /// Key that sets it in a design file.
     pub design_key: &'static str,
     /// Its name on screen.
     pub label: &'static str,
@@ -89,7 +89,7 @@ pub struct Limit {
     pub ends_growth: bool,
     /// The limit that a design sets, SI.
     pub of: fn(&Limits) -> Option<f64>,
-    /// What an evaluated coil has of it, SI.
+    /// Its value in an evaluated coil, SI.
     pub value: fn(&Evaluated<'_>) -> Option<f64>,
 }
 
@@ -142,7 +142,7 @@ const SIZE: Limit = Limit {
     value: |at| Some(at.coil()?.outer_diameter_m),
 };
 
-/// What follows from more than the coil's design file says of limits.
+/// Limits that follow from more than the coil's design file.
 const IMPLIED: Limit = Limit {
     of: |_| None,
     value: |_| None,

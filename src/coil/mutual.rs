@@ -80,7 +80,7 @@ pub(crate) fn estimated_mutual_inductance_h(
         if error <= tolerance {
             break;
         }
-        // What two rules differ by is the coarser one's error: the finer is at least as good.
+        // The difference of two rules is the coarser one's error: the finer is at least as good.
         value = finer;
     }
     (value, error)

@@ -67,7 +67,7 @@ pub struct SectionIntegrals {
     pub value: f64,
     /// Derivative by the depth, inner radius held, m^4.
     pub by_depth: f64,
-    /// What moving the inner face outwards takes away, m^4: the derivative by the inner radius,
+    /// Loss as the inner face moves outwards, m^4: the derivative by the inner radius,
     /// depth held, is `by_depth - inner`.
     pub inner: f64,
     /// Derivative by the length, m^4.
@@ -140,7 +140,7 @@ pub fn section_integrals(
         let eta = 0.5 * (1.0 + x);
         add(first * eta * eta * eta, 1.5 * weight * first * eta * eta);
     }
-    // What a rounding leaves beyond is nothing, and has no loops between its two faces.
+    // A residue of rounding is nothing, and has no loops between its two faces.
     if depth - first > ROUNDING * depth {
         gauss::graded(first, depth, first, tolerance, add);
     }

@@ -39,7 +39,7 @@ use fluxform_field::winding::Winding;
 use fluxform_numerics::bessel::{j0_j1, zero_of_j1};
 use fluxform_numerics::gauss;
 
-/// What is left of a step when it counts as settled.
+/// Remainder of a step when it counts as settled.
 const LEFT: f64 = 0.05;
 /// Modes that have decayed by exp(-45) at the earliest settling time are left out.
 const DECAYED: f64 = 45.0;

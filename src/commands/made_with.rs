@@ -1,4 +1,4 @@
-//! What several commands' options have in common in the record's `made_with`: what they change in the
+//! Common entries of several commands' options in the record's `made_with`: those that change the
 //! files, and nothing else. Where files go and what is drawn beside them is no option of theirs.
 //!
 //! `sweep merge` has none: its table follows from the plan and the points that there are. What `optimize`
@@ -10,7 +10,7 @@ use crate::bundle::artefact::Input;
 use crate::bundle::manifest::SurfaceOptions;
 use crate::shape::document::{AxisRequest, ShapeDocument, SurfaceSource, Up};
 
-/// What the command line says of a surface; `None` where a shape file says it.
+/// A surface's options on the command line; `None` where a shape file states them.
 #[must_use]
 pub fn surface(document: &ShapeDocument, file: Option<&Input>) -> Option<SurfaceOptions> {
     let (None, SurfaceSource::File { unit_m, .. }) = (file, &document.source) else {

@@ -56,7 +56,7 @@ static LONG_VERSION: LazyLock<String> =
     after_help = help::main()
 )]
 struct Arguments {
-    /// What every command takes.
+    /// Options of every command.
     #[command(flatten)]
     common: Common,
     /// Explain an error code, like E301, or an exit code; `list` names all of them
@@ -67,7 +67,7 @@ struct Arguments {
     command: Option<Command>,
 }
 
-/// The commands; each tells of itself in its own file.
+/// The commands; each is described in its own file.
 #[derive(Debug, Subcommand)]
 enum Command {
     Evaluate(evaluate::command::Evaluate),

@@ -22,7 +22,7 @@ const QUOTED_LINE_MAX: usize = 1000;
 pub enum Severity {
     /// The document is refused.
     Error,
-    /// The document is read as it stands.
+    /// The document is read as it is.
     Warning,
 }
 
@@ -42,9 +42,9 @@ pub struct Fault {
     pub severity: Severity,
     /// Dotted path of the key, like `coil.inner_diameter_mm`; empty for the document itself.
     pub key: String,
-    /// What was expected and what was found.
+    /// Expectation and result.
     pub message: String,
-    /// What to do about it.
+    /// Advice.
     pub help: Option<String>,
     /// Its bytes in the source text; `None` where there is no text.
     pub span: Option<Range<usize>>,
@@ -345,7 +345,7 @@ impl SourceCode for QuotedSource<'_> {
     }
 }
 
-/// What miette renders: a headline, then each fault against the named source.
+/// Report for miette: a headline, then each fault against the named source.
 #[derive(Debug)]
 pub struct Report<'a> {
     faults: &'a Faults,

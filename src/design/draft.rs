@@ -5,7 +5,7 @@ use super::reader::{Located, Section};
 use super::sections::{self, ArrayDraft, CoilDraft, CoreDraft, MagnetDraft};
 use super::sections::{SupplyDraft, WireDraft, WorkspaceDraft};
 
-/// What a command needs of a design. What it does not place may overlap: then that is a warning.
+/// A command's requirements on a design. Coils that it does not place may overlap, with a warning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Need {
     /// The coil as given: `[coil]` is required.

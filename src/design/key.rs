@@ -9,24 +9,24 @@ pub struct Key {
     pub section: String,
     /// Its name, the unit of a number last.
     pub name: &'static str,
-    /// What may be written, in words.
+    /// Accepted values, in words.
     pub value: String,
     /// The range of its numbers in words; empty where any will do.
     pub range: String,
-    /// What holds without it.
+    /// Default.
     pub default: Without,
-    /// What it means.
+    /// Meaning.
     pub meaning: &'static str,
 }
 
-/// What holds where a key is not given.
+/// Value of a key that is not given.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Without {
     /// The document is refused.
     Refused,
     /// This value.
     Value(String),
-    /// What the meaning says, or nothing.
+    /// Described in the meaning, or none.
     Nothing,
 }
 

@@ -121,7 +121,7 @@ pub fn nearest<'n>(text: &str, names: &[&'n str]) -> Option<&'n str> {
     (best.0 >= NEAR).then_some(best.1)
 }
 
-/// What is wrong with an axis, and what to do; `None` where it is sound.
+/// The fault of an axis and the advice; `None` where it is sound.
 #[must_use]
 pub fn axis_fault(axis: &Axis, unit: &str) -> Option<(String, &'static str)> {
     let Axis { from, to, samples } = *axis;

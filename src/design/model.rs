@@ -1,4 +1,4 @@
-//! What a design file says, validated, in SI units.
+//! The contents of a design file, validated, in SI units.
 
 use super::limits::Limits;
 use std::path::{Path, PathBuf};

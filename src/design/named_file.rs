@@ -86,7 +86,7 @@ pub fn read_watched(
     let mut bytes = Vec::new();
     loop {
         let from = bytes.len();
-        // What is never read is never held: room is made as the file turns out to be one.
+        // Memory grows with the bytes read: a claimed size is not trusted.
         if bytes.capacity() == from {
             let room = (stated + 1 - from as u64).min((from as u64).max(PIECE));
             bytes

@@ -54,7 +54,7 @@ impl Design {
 }
 
 impl Draft {
-    /// The design in SI; `None` where an error stands in the way.
+    /// The design in SI; `None` where an error prevents it.
     fn design(self, path: &Path, sink: &Sink) -> Option<Design> {
         if sink.has_errors() {
             return None;

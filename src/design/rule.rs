@@ -1,4 +1,4 @@
-//! What a number in a document may be: its unit, its range, and values that betray another unit.
+//! Rules on a number in a document: its unit, its range, and values that betray another unit.
 
 use std::ops::Range;
 

@@ -1,6 +1,6 @@
 //! The design file's keys: one line each, with its rule and its default.
 //!
-//! What is read here is a draft in the file's own units, with the place of every value that a
+//! The sections are read into a draft in the file's own units, with the place of every value that a
 //! check may speak of.
 
 use super::array::{COILS_MAX, grid_positions_m};
@@ -154,7 +154,7 @@ pub enum Layout {
     Grid(ArrayGrid, Located<f64>),
     /// A list, mm.
     Listed(Vec<Located<[f64; 2]>>),
-    /// What the file says of it is at fault.
+    /// The file's statement on it is at fault.
     Unknown,
 }
 

@@ -10,7 +10,7 @@ use super::named_file::{self, NamedFileError};
 /// Largest document that is read, bytes (4 MiB): several times what ten thousand coils need.
 pub(crate) const DOCUMENT_MAX_BYTES: u64 = 4 << 20;
 
-/// What a text is, for the messages about one that cannot be read.
+/// Kinds of text, for the messages about one that cannot be read.
 #[derive(Debug, Clone, Copy)]
 struct Kind {
     too_large: &'static str,
@@ -33,7 +33,7 @@ const TABLE: Kind = Kind {
 /// A missing file, a directory, a file over 4 MiB or not in UTF-8, or what the system says.
 pub fn text_of(path: &Path) -> Result<String, InvalidDocument> {
     let refuse = |fault| InvalidDocument::unreadable(path, fault);
-    // What a person names may be a pipe.
+    // A file named by a person may be a pipe.
     if fs::metadata(path).is_ok_and(|found| found.is_dir()) {
         let fault = Fault::error("", "expected a TOML file, found a directory");
         return Err(refuse(fault.help("name the file inside it")));
@@ -45,7 +45,7 @@ pub fn text_of(path: &Path) -> Result<String, InvalidDocument> {
 /// The text of the CSV table at `path`, which a document names.
 ///
 /// # Errors
-/// What is no regular file of at most 4 MiB ([`named_file`]) or is not in UTF-8.
+/// Anything but a regular file of at most 4 MiB ([`named_file`]) in UTF-8.
 pub fn table_text_of(path: &Path) -> Result<String, InvalidDocument> {
     let read = named_file::read(path, DOCUMENT_MAX_BYTES).map_err(|error| not_a_table(&error));
     read.and_then(|bytes| text_of_bytes(bytes, TABLE))

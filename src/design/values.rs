@@ -438,7 +438,7 @@ impl<'a> Section<'a> {
     }
 }
 
-/// What a rule accepts, in words, and its range.
+/// The values that a rule accepts, in words, and its range.
 fn of_rule(what: &str, rule: &Rule) -> (String, String) {
     let gauge = if rule.gauges { ", or a gauge" } else { "" };
     let unit = if rule.unit.is_empty() {

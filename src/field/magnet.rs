@@ -138,7 +138,7 @@ pub enum NoRule {
     TooClose {
         /// Gap between magnet and source, m.
         gap_m: f64,
-        /// What was requested.
+        /// The request.
         tolerance: f64,
     },
 }

@@ -1,4 +1,4 @@
-//! What a map needs of an axisymmetric source, be it a winding alone or one with its core.
+//! The interface between a map and an axisymmetric source: a winding with or without a core.
 
 use super::batch::Gradients;
 use super::components::Components;

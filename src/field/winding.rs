@@ -338,7 +338,7 @@ impl Winding {
     }
 }
 
-/// What the axial quadrature must give.
+/// Quantities that the axial quadrature must give.
 #[derive(Clone, Copy)]
 enum Want {
     FieldOnly,

@@ -53,7 +53,7 @@ pub enum Reach {
     Saturated,
 }
 
-/// What an allocation says of itself: `I_i = clamp(mu (G_i - center) / R_i + nu / R_i)`.
+/// Multipliers that prove an allocation: `I_i = clamp(mu (G_i - center) / R_i + nu / R_i)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Allocation {
     /// Whether the requested force was within reach.
@@ -257,7 +257,7 @@ impl Allocator {
             }
             held += coefficients[i] * self.bound_towards(i, coefficients[i]);
         }
-        // What rounding alone leaves open is met with every coil at its limit.
+        // A residue of rounding alone is met with every coil at its limit.
         let last = self.order.last()?.0;
         (held >= target).then_some(last)
     }
@@ -295,7 +295,7 @@ impl Allocator {
         self.order
             .extend(self.row.iter().enumerate().map(|(i, &g)| (-g, i)));
         self.order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-        // What the coils from a place on give back at their lower limits. All terms of this and of
+        // Sum that the coils from a place on return at their lower limits. All terms of this and of
         // the next sum have one sign: a limit of 1e30 A beside one of 1 A takes no digit of it.
         let mut back = 0.0;
         for (place, &(_, i)) in self.order.iter().enumerate().rev() {
@@ -316,7 +316,7 @@ impl Allocator {
                 upper.add(self.upper_a[self.order[end].1]);
                 end += 1;
             }
-            // What the sum allows this group, its own lower limits left out of account.
+            // Share of the sum for this group, without its own lower limits.
             let mut left = Careful::of(self.total_a);
             left.add(self.tail.get(end).copied().unwrap_or(0.0));
             left.add(-spent.head);

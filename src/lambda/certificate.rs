@@ -9,7 +9,7 @@ use super::problem::ForceProblem;
 /// Rows summed together: fixed, so that sums do not depend on the number of threads.
 const CHUNK_POINTS: usize = 4096;
 
-/// What the forces at given currents are worth.
+/// Quality of the forces at given currents.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Check {
     /// Mean square of requested minus given force, N^2.

@@ -111,7 +111,7 @@ fn advance(value: &[Num], rate: &[Num], by: Num) -> Vec<Num> {
     value.iter().zip(rate).map(|(&v, &r)| v + by * r).collect()
 }
 
-/// What a problem needs to be followed.
+/// A problem whose path is followed.
 pub(super) struct Follower<'a> {
     pub model: &'a Model,
     pub bounds: &'a Bounds,

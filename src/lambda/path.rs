@@ -11,7 +11,7 @@ use super::power;
 use super::problem::ForceProblem;
 use super::qr_reduction::{Reduced, power_of_two, times_power};
 
-/// What changes at a breakpoint. Coils are numbered from 0.
+/// Changes at a breakpoint. Coils are numbered from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Event {
     /// A coil begins to carry current.
@@ -54,7 +54,7 @@ pub struct Breakpoint {
     pub lambda_n_per_m: f64,
     /// Currents there, A.
     pub currents_a: Vec<f64>,
-    /// What changes there; several at once are common.
+    /// Changes there; several at once are common.
     pub events: Vec<Event>,
 }
 
@@ -91,7 +91,7 @@ struct SiPiece {
     standing: Vec<Standing>,
 }
 
-/// What least-power currents need where the currents of a minimiser are not unique.
+/// Data for least-power currents where the currents of a minimiser are not unique.
 #[derive(Debug, Clone)]
 struct Ambiguous {
     model: Model,
@@ -394,7 +394,7 @@ impl Limits {
         standing
     }
 
-    /// What brings entry `i` from one standing to the other.
+    /// Change that brings entry `i` from one state to the other.
     pub fn changes(&self, i: usize, before: Standing, after: Standing, events: &mut Vec<Event>) {
         if before == after {
             return;

@@ -1,4 +1,4 @@
-//! What is solved: forces per ampere at the points, heights and limits.
+//! The problem to be solved: forces per ampere at the points, heights and limits.
 
 use fluxform_base::force_constant::Criterion;
 use rayon::prelude::*;
@@ -113,7 +113,7 @@ pub enum ProblemError {
         index: usize,
         /// The value found.
         value: f64,
-        /// What was expected.
+        /// The expectation.
         expected: &'static str,
     },
 }

@@ -237,7 +237,7 @@ impl Reduced {
         &self.columns[self.coils]
     }
 
-    /// What the currents must make up for at lambda = 0.
+    /// Force that the currents must balance at lambda = 0.
     pub fn offset(&self) -> Option<Vec<Num>> {
         let column = self.columns.get(self.coils + 1)?;
         let factor = Num::of(times_power(

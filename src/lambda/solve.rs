@@ -65,7 +65,7 @@ pub struct OperatingPoint {
 /// The path, the force constants and the currents of one object.
 #[derive(Debug, Clone)]
 pub struct Solution {
-    /// What eq. 10 reads off the path.
+    /// Force constants that eq. 10 reads off the path.
     pub constants: ForceConstants,
     /// The points that decide maxmin: no currents within the limits give all of them more.
     pub maxmin_points: Vec<usize>,

@@ -20,7 +20,7 @@ pub struct SampledField<'a> {
     pub report: TableReport,
 }
 
-/// What a table cost and how well it does.
+/// Cost and error of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct TableReport {
     /// Lowest height of the table, m; below it planes are sampled. `None` without a table.

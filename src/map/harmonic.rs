@@ -267,7 +267,7 @@ impl Table {
         &self.sizes
     }
 
-    /// What evaluation on a grid within the box has in common for all drives and components.
+    /// Tables for evaluation on a grid within the box, common to all drives and components.
     #[must_use]
     pub fn stencil(&self, x_m: &[f64], y_m: &[f64], z_m: &[f64]) -> Stencil {
         let layers = (self.layers.iter())

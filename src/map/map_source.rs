@@ -1,4 +1,4 @@
-//! What a map needs of a source without symmetry: an array whose cores all answer to every coil.
+//! The interface between a map and a source without symmetry: an array of coupled cores.
 
 use fluxform_field::steel::equivalent_dipoles::ArraySources;
 

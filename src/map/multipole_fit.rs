@@ -103,7 +103,7 @@ pub struct Samples {
     pub points_m: Vec<[f64; 3]>,
     /// Parts per coil, then per point.
     pub parts: Vec<Vec<[f64; PARTS]>>,
-    /// What an error of field and gradient is relative to at each point, T/A and T/m/A.
+    /// Reference of the error of field and gradient at each point, T/A and T/m/A.
     pub sizes: Vec<[f64; 2]>,
 }
 

@@ -61,7 +61,7 @@ impl DoubleDouble {
         self.hi
     }
 
-    /// What the nearest double leaves.
+    /// Residue of the nearest double.
     #[must_use]
     #[inline]
     pub fn remainder(self) -> f64 {

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Div, Mul, Sub};
 
-/// What the generic kernels need of a number.
+/// Operations of a number in the generic kernels.
 pub trait Number:
     Copy
     + Add<Output = Self>

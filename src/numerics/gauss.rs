@@ -108,7 +108,7 @@ const PANEL_SCALE: f64 = 4.0 * PI;
 /// outside each panel's ellipse of Bernstein radius 2.8; each panel's order then follows
 /// from its own radius by [`order_for`].
 pub fn graded(lo: f64, hi: f64, distance: f64, tolerance: f64, mut visit: impl FnMut(f64, f64)) {
-    // What lies closer than that to a singularity at zero is no part of the sum in doubles.
+    // An abscissa closer than that to a singularity at zero adds nothing to the sum in doubles.
     let distance = distance.abs().max(NEAREST * lo.abs().max(hi.abs()));
     if lo < 0.0 && hi > 0.0 {
         panels(lo, 0.0, distance, tolerance, &mut visit);

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// What a run of [`gmres`] gives.
+/// Result of a run of [`gmres`].
 #[derive(Debug, Clone)]
 pub struct Outcome {
     /// Solutions, one column a right-hand side.

@@ -56,7 +56,7 @@ impl Interval {
         Self::new(lo, self.hi.max(0.0).sqrt().next_up())
     }
 
-    /// What lies in both; `self` where they are disjoint, which two enclosures of one number
+    /// Intersection; `self` where they are disjoint, which two enclosures of one number
     /// never are.
     #[must_use]
     #[inline]

@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn equalities_hold_and_contradictions_are_told() {
+    fn equalities_hold_and_contradictions_are_reported() {
         let one = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let mut rows = vec![Row {
             equality: true,

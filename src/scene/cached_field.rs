@@ -1,6 +1,6 @@
 //! A design's field, cached from run to run beside its bundles.
 //!
-//! What coils, steel and magnet give does not depend on current limits, criteria or the
+//! The field of coils, steel and magnet does not depend on current limits, criteria or the
 //! just-noticeable difference: as long as those alone change, steel, forces and maps are read and
 //! not computed. What is read is what was computed, to the bit.
 

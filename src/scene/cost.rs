@@ -1,4 +1,4 @@
-//! What a job will take in memory and time, before anything is computed.
+//! Cost of a run in memory and time, before anything is computed.
 //!
 //! The factors are measured: peak memory of `map`, `discretize` and `lambda` at sizes where it is
 //! proportional to the work.

@@ -146,7 +146,7 @@ pub fn direct_z_n(
     ))
 }
 
-/// What the pull's solvers need to know; `None` without steel.
+/// Arguments of the pull's solvers; `None` without steel.
 fn pulled<'a>(scene: &'a Scene, places_m: &[[f64; 3]], alone: bool) -> Option<Pulled<'a>> {
     let core = scene.core.as_ref()?;
     let [x_m, y_m, z_m] = region(places_m);

@@ -16,8 +16,8 @@ use crate::map::tabulate::Grid;
 
 /// Places at which a table for scattered places is compared with the pull itself.
 const COMPARED: usize = 24;
-/// What the nodes aim at beside what is wanted: the pull is a square of fields, whose singularities are
-/// strong.
+/// Share of the tolerance at which the nodes aim: the pull is a square of fields, with strong
+/// singularities.
 const NODES_AIM: f64 = 0.1;
 /// A table that is to be right to an aim may miss it by this factor where nothing else hangs on it.
 const MISSES: f64 = 3.0;
@@ -116,7 +116,7 @@ impl Nodes {
         self.middle + self.half * if 2 * k + 1 == self.count { 0.0 } else { unit }
     }
 
-    /// What every node's value counts at `position`: the barycentric formula.
+    /// Weight of every node's value at `position`: the barycentric formula.
     fn weights(self, position: f64) -> Vec<f64> {
         if self.count == 1 {
             return vec![1.0];
@@ -384,7 +384,7 @@ fn tabulated_z_n(
     if !holds {
         return None;
     }
-    // What is reported is the pull itself: the largest, and the largest beside the height, which is
+    // The report is of the pull itself: the largest, and the largest beside the height, which is
     // what a force constant multiplies.
     let of_height = |i: usize| forces_n[i].abs() / places_m[i][2];
     let mut decide = strongest(places_m.len(), |i| forces_n[i].abs());

@@ -352,7 +352,7 @@ impl Single {
             gradients.push(field.gradient_t_per_m_per_a);
         }
         let mut force_n = rule.force_n(&gradients);
-        // What a design does not ask for is not computed.
+        // Quantities that a design does not request are not computed.
         let mut passive_force_n = None;
         if scene.design.magnet.passive_force {
             let place = [0.0, 0.0, height_m];

@@ -147,7 +147,7 @@ mod tests {
                 [7e-3; 6]
             );
         }
-        // What is taken as linear at a working point leaves more than a finer one.
+        // Linearisation at a working point leaves more than a finer one.
         assert_eq!(of("", Some(1.3e-7)).working_point, WORKING_POINT_TOLERANCE);
     }
 }

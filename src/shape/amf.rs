@@ -41,7 +41,7 @@ struct Reader {
     /// Objects and constellations by their ids.
     ids: HashMap<String, usize>,
     bodies: Vec<Body>,
-    /// What every body places, yet by id.
+    /// Placements of every body, still by id.
     instances: Vec<Vec<(String, Affine)>>,
     vertices: Vec<[f64; 3]>,
     vertex: [Option<f64>; 3],
@@ -177,7 +177,7 @@ impl Reader {
                 body.children.push((child, place));
             }
         }
-        // What nothing places stands where it is.
+        // A body that nothing places is read where it is.
         let roots: Vec<(usize, Affine)> = (0..self.bodies.len())
             .filter(|k| !is_child[*k])
             .map(|k| (k, Affine::IDENTITY))

@@ -88,7 +88,7 @@ impl<'a> Archive<'a> {
         }
         let reserved = claimed.min(RESERVED_RATIO * self.length);
         let mut bytes = Vec::with_capacity(usize::try_from(reserved).unwrap_or(0));
-        // What goes on beyond its claim is refused by the unpacker.
+        // The unpacker refuses data beyond the stated size.
         let read = part.read_to_end(&mut bytes);
         read.map_err(|error| fault(format!("it cannot be unpacked: {error}")))?;
         self.left -= claimed;

@@ -106,7 +106,7 @@ pub(super) fn lay_out(bodies: &[Body], roots: &[(usize, Affine)]) -> Result<Vec<
     Ok(triangles)
 }
 
-/// What is laid out below a body.
+/// The bodies below a body.
 #[derive(Clone, Copy, Default)]
 struct Weight {
     triangles: u64,

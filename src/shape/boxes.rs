@@ -37,7 +37,7 @@ impl BoxTree {
         tree
     }
 
-    /// Appends the tree of the triangles in `order`, which stands at `offset` of the whole.
+    /// Appends the tree of the triangles in `order`, which is at `offset` of the whole.
     fn build(&mut self, triangles: &[Triangle], order: &mut [u32], offset: usize) {
         let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
         for vertex in order.iter().flat_map(|k| &triangles[*k as usize]) {

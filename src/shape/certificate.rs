@@ -24,7 +24,7 @@ pub enum Certify {
     No,
     /// The vertical difference and the tessellation.
     Vertical,
-    /// The Hausdorff distance besides.
+    /// Also the Hausdorff distance.
     Distance,
 }
 
@@ -46,7 +46,7 @@ impl Tessellation {
         Self::stated(mesh.facts()).unwrap_or_else(|| (Self::Angles, estimated_deviation_m(mesh)))
     }
 
-    /// What the file itself tells.
+    /// Deviation that the file itself states.
     fn stated(facts: &MeshFacts) -> Option<(Self, f64)> {
         let from = if facts.deviation_is_known {
             Self::Known
@@ -80,7 +80,7 @@ impl Tessellation {
     }
 }
 
-/// The deviation of the facets that a file itself tells, where points are not compared.
+/// The deviation of the facets that a file itself states, where points are not compared.
 #[must_use]
 pub fn stated_tessellation(facts: &MeshFacts) -> Option<StageAccuracy> {
     Tessellation::stated(facts).map(|(from, deviation_m)| from.stage(deviation_m))
@@ -98,7 +98,7 @@ pub struct Certificate {
     pub tessellation_m: f64,
     /// Where that comes from.
     pub tessellation: Tessellation,
-    /// What the file's number format rounds away, m.
+    /// Rounding error of the file's number format, m.
     pub rounding_m: f64,
     /// Diagonal of a cell: so far in plan the silhouette is uncertain, m.
     pub silhouette_m: f64,
@@ -111,7 +111,7 @@ impl Certificate {
         self.vertical.bound_m() + self.tessellation_m + self.rounding_m
     }
 
-    /// The parts of the budget, as artefacts tell them.
+    /// The parts of the budget, as artefacts state them.
     #[must_use]
     pub fn stages(&self) -> BTreeMap<&'static str, StageAccuracy> {
         let stage = |estimate: f64, method: &str| StageAccuracy {

@@ -16,7 +16,7 @@ const PARTS: usize = 256;
 const MOST_PAIRS: usize = 8_000;
 const TRIANGLES_A_PAIR: usize = 4;
 
-/// What was found.
+/// The result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Crossings {
     /// Pairs of triangles.
@@ -28,7 +28,7 @@ pub struct Crossings {
 }
 
 /// `names` holds each triangle's corners, equal where vertices are one; `reach` is the length below
-/// which nothing is told apart.
+/// which nothing is distinguished.
 #[must_use]
 pub fn crossings(triangles: &[Triangle], names: &[[u32; 3]], reach: f64) -> Crossings {
     let tree = BoxTree::new(triangles);
@@ -146,7 +146,7 @@ impl Search<'_> {
             return false;
         }
         let [mine, other] = pair.map(|k| self.names[k]);
-        // The same three corners are told as a duplicate.
+        // The same three corners are reported as a duplicate.
         if mine.iter().all(|name| other.contains(name)) {
             return false;
         }

@@ -1,4 +1,4 @@
-//! What a shape file says, validated, in SI units.
+//! The contents of a shape file, validated, in SI units.
 
 mod raw;
 mod read;

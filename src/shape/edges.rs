@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use crate::mesh::Triangle;
 
-/// Two programs may round the same vertex to neighbouring numbers: roundings that are not told
+/// Two programs may round the same vertex to neighbouring numbers: roundings that are not
 /// apart.
 pub(super) const WELD_ROUNDINGS: f64 = 2.0;
 

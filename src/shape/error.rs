@@ -1,4 +1,4 @@
-//! What can go wrong between a shape document and its points, and what to do about it.
+//! Faults between a shape document and its points, and advice on them.
 
 use std::path::PathBuf;
 
@@ -14,7 +14,7 @@ pub enum ShapeError {
     Unreadable {
         /// Path as given.
         path: PathBuf,
-        /// What was found and what to do.
+        /// Result and advice.
         what: String,
     },
     /// The name's ending belongs to no surface format.

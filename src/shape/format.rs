@@ -9,7 +9,7 @@ use crate::step::{self, BodyOptions};
 use crate::{amf, glb, height_image, obj, off, ply, sldprt, stl, three_dxml, three_mf};
 use fluxform_base::progress::Silent;
 
-/// What kind of file a surface is in.
+/// Formats of surface files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SurfaceFormat {
     /// STL, binary or ASCII; carries no unit.
@@ -182,7 +182,7 @@ const ADVICE: [(&[&str], &str); 5] = [
     ),
 ];
 
-/// What is no surface of any format, by its first bytes in lower case.
+/// Kinds of files that are no surface of any format, by their first bytes in lower case.
 const OTHER: [(&[u8], &str); 4] = [
     (
         b"version https://git-lfs",
@@ -239,7 +239,7 @@ impl SurfaceFormat {
         endings.join(", ")
     }
 
-    /// What to do with a file of this name, which is not read.
+    /// Advice on a file of this name, which is not read.
     #[must_use]
     pub fn advice(path: &Path) -> Option<&'static str> {
         let ending = ending(path)?;

@@ -183,7 +183,7 @@ const NOTHING: Hit = Hit {
     triangle: u32::MAX,
 };
 
-/// What touches a point without covering it.
+/// Facets that touch a point without covering it.
 #[derive(Clone, Copy)]
 struct Touch {
     hit: Hit,
@@ -279,7 +279,7 @@ impl<'a> Layer<'a> {
         self
     }
 
-    /// Decides every point: what covers it, unless nothing does or a wall stands there.
+    /// Decides every point: what covers it, unless nothing does or a wall is there.
     fn samples(mut self) -> Vec<Option<Sample>> {
         let triangles = self.triangles;
         for (point, touch) in &self.touching {

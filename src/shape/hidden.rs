@@ -1,4 +1,4 @@
-//! What a height map cannot show: how much of a surface is not seen from above.
+//! The share of a surface that is hidden from above, which a height map cannot show.
 //!
 //! Points spread evenly over the area (by an additive recurrence, so always the same ones) are looked
 //! at along vertical lines: one that lies below what such a line meets first is hidden.

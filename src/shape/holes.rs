@@ -2,7 +2,7 @@
 
 use crate::height::{Grid, Sample};
 
-/// What is done with holes.
+/// Treatment of holes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Holes {
     /// They give no points, like what lies outside.

@@ -40,7 +40,7 @@ impl Buckets {
         Self { starts, members }
     }
 
-    /// What belongs to a bucket.
+    /// Members of a bucket.
     pub(super) fn of(&self, bucket: usize) -> &[u32] {
         &self.members[self.starts[bucket]..self.starts[bucket + 1]]
     }

@@ -1,6 +1,6 @@
-//! What a surface file holds, told without placing it: size, holes, faults, a guess at its unit.
+//! Contents of a surface file as it is, before placing: size, holes, faults, a guess at its unit.
 //!
-//! Vertices are one when their coordinates agree to what the file's number format can tell apart.
+//! Vertices are one when their coordinates agree to what the file's number format can distinguish.
 //! Nothing here changes the surface, and the guessed unit is never used.
 
 use std::path::Path;
@@ -21,7 +21,7 @@ use crate::surface::{ByteObserver, Surface, read_mesh};
 use fluxform_base::progress::Progress;
 use fluxform_numerics::axis::Axis;
 
-/// What a surface file holds. Lengths are in the file's unit.
+/// Contents of a surface file. Lengths are in the file's unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MeshReport {
     /// The format's usual name.
@@ -35,11 +35,11 @@ pub struct MeshReport {
     /// Metres of the file's unit, where the format carries it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit_m: Option<f64>,
-    /// What the unit may be, likeliest first, where the format carries none. Never used.
+    /// Possible units, likeliest first, where the format carries none. Never used.
     pub unit_guesses: Vec<UnitGuess>,
     /// How far a coordinate may lie from what was meant, because of the file's number format.
     pub coordinate_rounding: f64,
-    /// Estimate of how far the triangles may lie from their body; 0 where nothing tells.
+    /// Estimate of how far the triangles may lie from their body; 0 where unknown.
     pub deviation: f64,
     /// Every edge has exactly two triangles.
     pub watertight: bool,

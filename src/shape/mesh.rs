@@ -22,11 +22,11 @@ pub struct FileMesh {
     /// Metres per unit of the coordinates, where the file itself says so.
     pub unit_m: Option<f64>,
     /// Estimate of how far the triangles may lie from the body they stand for, in the file's
-    /// unit; 0 where the file tells nothing of it.
+    /// unit; 0 where the file states none.
     pub deviation: f64,
     /// Whether the deviation is known, because the triangles were made here to hold it.
     pub deviation_is_known: bool,
-    /// What a careful reader would mention.
+    /// Warnings.
     pub warnings: Vec<String>,
     /// The bodies that the file names, in its order; empty where the format names none.
     pub bodies: Vec<NamedBody>,
@@ -67,7 +67,7 @@ impl Bounds {
     }
 }
 
-/// What a mesh file holds.
+/// Contents of a mesh file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeshFacts {
     /// Triangles in the file.
@@ -79,7 +79,7 @@ pub struct MeshFacts {
     /// How far a coordinate may lie from what was meant, because of the file's number format, m.
     pub coordinate_rounding_m: f64,
     /// Estimate of how far the triangles may lie from the body they stand for, m; 0 where the
-    /// file tells nothing of it.
+    /// file states none.
     pub deviation_m: f64,
     /// Whether that is known rather than estimated.
     pub deviation_is_known: bool,
@@ -161,7 +161,7 @@ impl Mesh {
         self.read_by.as_deref()
     }
 
-    /// What the file holds.
+    /// Contents of the file.
     #[must_use]
     pub fn facts(&self) -> &MeshFacts {
         &self.facts

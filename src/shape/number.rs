@@ -9,7 +9,7 @@ const FLOAT_DIGITS: usize = 9;
 /// Relative rounding of a coordinate stored as f32.
 pub(super) const F32_ROUNDING: f64 = 1.0 / 16_777_216.0;
 
-/// Reads coordinates and remembers what they tell of the file's number format.
+/// Reads coordinates and derives the file's number format from them.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Numbers {
     /// Most significant digits of any coordinate.

@@ -88,7 +88,7 @@ fn each<E: PropertyAccess>(
     Ok(())
 }
 
-/// What is read of faces and strips.
+/// Faces and strips as read.
 #[derive(Default)]
 struct Read {
     faces: Faces,
@@ -353,7 +353,7 @@ impl PropertyAccess for Vertex {
     }
 }
 
-/// Indices of a face's corners, as they stand in the file.
+/// Indices of a face's corners, as they are in the file.
 struct Face(Vec<i64>);
 
 impl PropertyAccess for Face {

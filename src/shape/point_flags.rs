@@ -1,4 +1,4 @@
-//! What a point is besides a height: on a wall, a rim, a crease, under or over other sheets.
+//! Flags of a point: on a wall, a rim, a crease, under or over other sheets.
 
 use crate::height::{Sample, sample_of};
 use crate::mesh::{Triangle, dot, minus};
@@ -11,7 +11,7 @@ const SAME_ANGLE: f64 = 1e-9;
 /// Heights nearer than this times the larger one are the same sheet.
 const SAME_HEIGHT: f64 = 1e-9;
 
-/// What a point is besides a height.
+/// Flags of a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Marks {
     /// A vertical wall passes through it; the height is the wall's top.
@@ -40,7 +40,7 @@ impl Marks {
     };
 }
 
-/// What does not change from point to point.
+/// Data common to all points.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rules {
     /// How far from an edge a point touches it, m.

@@ -40,7 +40,7 @@ pub struct ConstraintPoints {
     pub normal: Vec<[f64; 3]>,
     /// Each point's place in the grid: row * columns + column; ascending.
     pub grid_index: Vec<usize>,
-    /// What each point is besides a height.
+    /// Flags of each point.
     pub marks: Vec<Marks>,
     /// Grid points without surface, skipped.
     pub outside: usize,
@@ -113,14 +113,14 @@ impl ConstraintPoints {
     }
 }
 
-/// What discretising a document gives.
+/// Result of discretising a document.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Discretized {
     /// The constraint points.
     pub points: ConstraintPoints,
     /// The surface's own box, placed, m.
     pub bounds: Bounds,
-    /// What the mesh file holds; `None` for a primitive.
+    /// Contents of the mesh file; `None` for a primitive.
     pub mesh: Option<MeshFacts>,
     /// Another program that made the mesh file's triangles, with its version.
     pub read_by: Option<String>,
@@ -134,22 +134,22 @@ pub struct Discretized {
     /// How much of the surface a height map cannot show; `None` for a formula and where points are
     /// not marked.
     pub hidden: Option<Hidden>,
-    /// What the user should know though it stops nothing.
+    /// Warnings.
     pub warnings: Vec<String>,
 }
 
-/// What is done besides sampling.
+/// Options of discretising.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Settings {
     /// Grid points without surface inside the silhouette.
     pub holes: Holes,
     /// How the points are compared with the surface.
     pub certify: Certify,
-    /// What an earlier comparison of these points with this surface found; it is not done again.
+    /// Result of an earlier comparison of these points with this surface; it is not repeated.
     pub known: Option<Certificate>,
     /// Whether walls, rims, creases and overhangs are looked for.
     pub marks: bool,
-    /// Whether the vertical difference is told for every cell.
+    /// Whether the vertical difference is reported for every cell.
     pub cells: bool,
 }
 
@@ -310,7 +310,7 @@ pub fn discretize_surface(
     })
 }
 
-/// Looks for what each point is besides a height; `filled` holds grid indices, ascending.
+/// Finds the flags of each point; `filled` holds grid indices, ascending.
 fn mark(
     points: &mut ConstraintPoints,
     surface: &Surface,

@@ -186,7 +186,7 @@ fn constrained(plan: &[[f64; 2]]) -> Vec<u32> {
         .collect()
 }
 
-/// Polygons by their corners' indices, and where each stands in its file.
+/// Polygons by their corners' indices, and where each is in its file.
 #[derive(Default)]
 pub(super) struct Faces {
     /// Indices of all corners.

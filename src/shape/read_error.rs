@@ -23,7 +23,7 @@ pub enum Place {
 pub struct ReadError {
     /// Where it lies.
     pub place: Place,
-    /// What was expected, what was found and what to do.
+    /// Expectation, result and advice.
     pub what: String,
 }
 

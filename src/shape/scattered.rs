@@ -27,7 +27,7 @@ pub struct Scattered {
     pub height_m: Vec<f64>,
     /// Unit normal of each point, n_z >= 0.
     pub normal: Vec<[f64; 3]>,
-    /// What each point is besides.
+    /// Flags of each point.
     pub marks: Vec<Marks>,
     /// Plan area each point stands for, m^2: its weight in a sum over the surface.
     pub weight_m2: Vec<f64>,

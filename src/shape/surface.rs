@@ -251,7 +251,7 @@ pub(super) fn read_mesh(
 }
 
 /// `None` for what is no whole binary STL file, and where the file system fails: reading it
-/// otherwise tells why.
+/// otherwise reports why.
 fn streamed(path: &Path, observer: &mut dyn ByteObserver) -> Option<Result<FileMesh, ReadError>> {
     let (source, length) = named_file::open(path, LARGEST_FILE).ok()?;
     observer.restart();

@@ -16,7 +16,7 @@ const SHARPEST_IN_FACE_DEG: f64 = 90.0;
 /// A side of a triangle: its ends' name, the triangle, which of the three.
 type Side = (u64, u32, u8);
 
-/// One number for two ends; sides that share it are compared besides.
+/// One number for two ends; sides that share it are compared too.
 fn name(ends: &[[u64; 3]; 2]) -> u64 {
     ends.as_flattened()
         .iter()

@@ -214,7 +214,7 @@ fn representation(e: &Element<'_>) -> Result<String, String> {
     }
 }
 
-/// What is being read of one representation: bags hold others.
+/// A representation while it is read: bags hold others.
 #[derive(Default)]
 struct Rep {
     positions: Option<Vec<[f64; 3]>>,

@@ -82,19 +82,19 @@ type Key = (String, u32);
 #[derive(Default)]
 struct Model {
     unit: Option<String>,
-    /// Name of every object, and where it stands among the bodies.
+    /// Name of every object, and where it is among the bodies.
     objects: HashMap<Key, usize>,
     bodies: Vec<Body>,
     /// Components of every body, yet by name.
     components: Vec<Vec<(Key, Affine)>>,
-    /// What the root part builds.
+    /// Items that the root part builds.
     items: Vec<(Key, Affine)>,
     supports: usize,
     numbers: Numbers,
     parts: HashSet<String>,
 }
 
-/// What is being read of one object.
+/// An object while it is read.
 #[derive(Default)]
 struct Open {
     id: u32,
@@ -310,7 +310,7 @@ fn triangle(e: &Element<'_>, object: &mut Open) -> Result<(), String> {
     Ok(())
 }
 
-/// What a component or an item places, and how.
+/// The object that a component or an item places, and its transform.
 fn placed(e: &Element<'_>, part: &str) -> Result<(Key, Affine), String> {
     let path = e.get("path").unwrap_or(part.into());
     let key = (path.into_owned(), whole(e, "objectid")?);

@@ -192,7 +192,7 @@ impl Seen {
     }
 }
 
-/// Whether a triangle stands upright, or as nearly as the file's rounding can make a wall that did.
+/// Whether a triangle is upright, or as nearly as the file's rounding can make a wall that did.
 pub(super) fn is_wall(triangle: &Triangle, reach: f64) -> bool {
     let vertices = ordered(triangle);
     let [a, b, c] = vertices;
@@ -272,7 +272,7 @@ fn edge_height(a: Vertex, b: Vertex, p: Point) -> f64 {
     edge_height_at(a, b, k, p[k])
 }
 
-/// Height of the edge where its coordinate `k` is `at`; the top of an edge that stands upright.
+/// Height of the edge where its coordinate `k` is `at`; the top of an edge that is upright.
 fn edge_height_at(a: Vertex, b: Vertex, k: usize, at: f64) -> f64 {
     let span = b[k] - a[k];
     if span == 0.0 {

@@ -11,7 +11,7 @@ use crate::read_error::{Place, ReadError};
 /// Elements nested deeper than this belong to no surface.
 const DEEPEST: usize = 256;
 
-/// What comes next in a document.
+/// The next event in a document.
 pub(super) enum Step<'a> {
     /// An element begins; an empty one ends with the next step.
     Start(Element<'a>),
@@ -53,7 +53,7 @@ impl<'a> Element<'a> {
         let found = attributes
             .flatten()
             .find(|attribute| is(attribute.key.into_inner()))?;
-        // With an entity that is not replaced it is shown as it stands.
+        // With an entity that is not replaced it is shown as it is.
         let value = found.normalized_value(XmlVersion::Implicit1_0);
         Some(value.unwrap_or_else(|_| found.value.clone()))
     }
@@ -86,7 +86,7 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// What comes next.
+    /// The next event.
     pub(super) fn step(&mut self) -> Result<Step<'a>, ReadError> {
         if std::mem::take(&mut self.ends) {
             return self.end();

@@ -6,7 +6,7 @@
 
 use crate::source::{files, read};
 
-/// What leads out, with the files that may.
+/// Uses of output functions, with the files that may hold them.
 const WAYS_OUT: &[(&str, &[&str])] = &[
     // The folder that all temporary files share; benches keep in it what breaks a reader.
     (

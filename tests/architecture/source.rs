@@ -155,7 +155,7 @@ fn after<'a>(text: &'a str, mark: &str) -> &'a str {
     text.find(mark).map_or("", |at| &text[at + mark.len()..])
 }
 
-/// What follows a block comment; such comments nest.
+/// The rest after a block comment; such comments nest.
 fn after_comment(mut text: &str) -> &str {
     let mut depth = 0;
     loop {
@@ -174,7 +174,7 @@ fn after_comment(mut text: &str) -> &str {
     }
 }
 
-/// What follows a text or character whose opening quote was read.
+/// The rest after a text or character whose opening quote was read.
 fn after_quote(text: &str, quote: char) -> &str {
     let mut escaped = false;
     for (at, c) in text.char_indices() {

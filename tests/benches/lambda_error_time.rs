@@ -4,7 +4,7 @@
 //! and for 41 along the curve: how far the currents' error is above the least one, and the seconds.
 //! At the one lambda the least mean square error is that of an exhaustive search over all sets of
 //! coils at their limits, in double-double, for the problems with few points; elsewhere and along the
-//! curve what is told is the duality gap, a bound. The least worst error is bounded from below by the multipliers' proof.
+//! curve the printed value is the duality gap, a bound. The least worst error is bounded from below by the multipliers' proof.
 //! `-- --json` prints the problems with both instead, for `scripts/peers/compare_lambda.py`, which
 //! gives them to other solvers. One thread.
 
@@ -196,7 +196,7 @@ fn main() -> Result<(), Failure> {
     let as_json = std::env::args().any(|argument| argument == "--json");
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     pool.install(|| {
-        let mut told = Vec::new();
+        let mut reported = Vec::new();
         if !as_json {
             println!("| problem | points | form | error, one | ms | error, {CURVE} | ms |");
             println!("|---|---|---|---|---|---|---|");
@@ -204,7 +204,7 @@ fn main() -> Result<(), Failure> {
         for (name, case) in cases()? {
             let result = measure(name, &case)?;
             if as_json {
-                told.push(result);
+                reported.push(result);
                 continue;
             }
             for form in ["mean", "worst"] {
@@ -221,7 +221,7 @@ fn main() -> Result<(), Failure> {
             }
         }
         if as_json {
-            println!("{}", json!({"problems": told}));
+            println!("{}", json!({"problems": reported}));
         }
         Ok(())
     })

@@ -6,7 +6,7 @@
 //!
 //! The upward force alone, and the force vector. Arrays of nine and of 64 air coils under a flat surface, positions of an exploring finger and
 //! positions at random. C is measured where there is a compiler called `cc`. The least of the
-//! repeats is told: on a machine with other work it is the better measure.
+//! repeats is printed: on a machine with other work it is the better measure.
 
 // A measurement: it prints.
 #![allow(clippy::print_stdout)]
@@ -126,8 +126,12 @@ fn in_c(program: &Path, bundle: &Path, positions: &[[f64; 3]]) -> Result<f64, Fa
         .ok_or("no input")?
         .write_all(text.as_bytes())?;
     let output = child.wait_with_output()?;
-    let told = String::from_utf8(output.stdout)?;
-    Ok(told.split_whitespace().next().ok_or("no time")?.parse()?)
+    let reported = String::from_utf8(output.stdout)?;
+    Ok(reported
+        .split_whitespace()
+        .next()
+        .ok_or("no time")?
+        .parse()?)
 }
 
 /// Nanoseconds an item, the least of the repeats.

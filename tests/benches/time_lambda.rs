@@ -6,7 +6,7 @@
 //!
 //! Default: 1e6 points, one thread. Each row is its own process, so that its peak memory
 //! (`VmHWM`, reset once the forces are there) is its own; 1e7 points of nine coils need 0.8 GB
-//! for the forces alone. The least processor time of a few runs is told.
+//! for the forces alone. The least processor time of a few runs is printed.
 
 // A measurement: it reads the clock and prints.
 #![allow(clippy::print_stdout, clippy::disallowed_methods)]
@@ -59,7 +59,7 @@ fn time<T>(
     repeats: usize,
     mut work: impl FnMut() -> Result<T, Failure>,
 ) -> Result<(T, f64, f64), Failure> {
-    // Resets VmHWM; without that right the peak tells the whole process.
+    // Resets VmHWM; without that right the peak is that of the whole process.
     let _ = std::fs::write("/proc/self/clear_refs", "5");
     let before = status_kb("VmRSS");
     let mut least = f64::INFINITY;

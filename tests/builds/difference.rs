@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use fluxform_testing::tree::Tree;
 
-/// What no artefact claims to be better than: the tolerance of fields in air.
+/// Least error that an artefact states: the tolerance of fields in air.
 const LEAST: f64 = 1e-12;
 /// How much a force constant or a current may move with its forces' stated error.
 const FORCES_MOVE: f64 = 10.0;
@@ -37,7 +37,7 @@ pub struct Difference {
     largest: f64,
     /// Where it is.
     key: String,
-    /// What the two state together.
+    /// Sum of the two statements.
     stated: f64,
 }
 

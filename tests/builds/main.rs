@@ -29,7 +29,7 @@ fn main() -> ExitCode {
         None => [threads_change_no_byte, the_c_library_may_do_without_avx2_and_fma],
         no_emulator() => [
             a_processor_without_avx2_and_fma_agrees,
-            what_another_processor_kept_is_not_used,
+            values_cached_by_another_processor_are_not_used,
         ],
         no_other_build() => [another_build_agrees],
     })
@@ -67,7 +67,7 @@ impl Way {
         output.stdout
     }
 
-    /// What every command that computes makes of the same inputs.
+    /// Outputs of every command that computes, from the same inputs.
     fn artefacts(&self) -> Tree {
         let place = scenes();
         for args in [
@@ -128,7 +128,7 @@ impl Way {
         ] {
             tree.insert(name.to_owned(), self.run(&place, args));
         }
-        // What is kept for the next run is no artefact, and seconds are no numbers of the model.
+        // Cached values are no artefacts, and seconds are no numbers of the model.
         tree.retain(|path, _| !path.contains(".fluxform-kept") && !path.contains("timing"));
         tree
     }
@@ -179,7 +179,7 @@ fn the_c_library_may_do_without_avx2_and_fma() {
 
 const EMULATOR: &str = "qemu-x86_64";
 
-/// What emulates a processor without AVX, where it is missing.
+/// Reason to skip where no program emulates a processor without AVX.
 fn no_emulator() -> Option<String> {
     let found = Command::new(EMULATOR).arg("--version").output();
     let there = cfg!(target_arch = "x86_64") && found.is_ok_and(|output| output.status.success());
@@ -199,7 +199,7 @@ fn a_processor_without_avx2_and_fma_agrees() {
     agree("a processor without AVX2 and FMA", &old_processor());
 }
 
-fn what_another_processor_kept_is_not_used() {
+fn values_cached_by_another_processor_are_not_used() {
     let way = old_processor();
     let args = [
         "calibrate",

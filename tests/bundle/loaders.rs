@@ -350,7 +350,7 @@ fn vector_of(bundle: &Bundle, step: &Step, position: [f64; 3]) -> Vec<f64> {
     all
 }
 
-/// What the library answers at a position, in the order of the other loaders' lines.
+/// The library's values at a position, in the order of the other loaders' lines.
 fn answered(bundle: &Bundle, renderer: &mut Renderer, position: [f64; 3]) -> Vec<f64> {
     let mut line = vec![f64::NAN; bundle.coil_count()];
     bundle.force_per_ampere(position, &mut line);

@@ -1,4 +1,4 @@
-//! What is written: bytes, schemas, formats, and what is refused.
+//! Output: bytes, schemas, formats, and refusals.
 
 use std::fs;
 

@@ -1,4 +1,4 @@
-//! What would take more memory than there is, is refused before anything is computed.
+//! A request for more memory than the machine has is refused before anything is computed.
 
 use crate::SEED;
 use fluxform_testing::place::Place;

@@ -1,4 +1,4 @@
-//! Every error code: what it says, on both kinds of standard error, and what `--explain` tells.
+//! Every error code: what it says, on both kinds of standard error, and the text of `--explain`.
 
 use std::collections::BTreeSet;
 
@@ -273,7 +273,7 @@ fn prepared() -> Place {
 }
 
 #[test]
-fn every_code_is_told_with_its_words() {
+fn every_code_is_printed_with_its_explanation() {
     let place = prepared();
     let mut met: BTreeSet<String> = NOT_HERE.map(str::to_owned).into();
     for (code, args, words) in CASES {
@@ -282,15 +282,15 @@ fn every_code_is_told_with_its_words() {
         let human = place.run(args).ends(exit);
         let marked = format!("error[{code}]:");
         assert!(human.err.contains(&marked), "{args:?}: {}", human.err);
-        let told = place.run(&[args, &["--format", "json"][..]].concat());
-        let told = told.ends(exit);
+        let reported = place.run(&[args, &["--format", "json"][..]].concat());
+        let reported = reported.ends(exit);
         assert_eq!(
-            told.err.trim_end().lines().count(),
+            reported.err.trim_end().lines().count(),
             1,
             "{args:?}: {}",
-            told.err
+            reported.err
         );
-        let error = told.error()["error"].clone();
+        let error = reported.error()["error"].clone();
         assert_eq!(error["code"], *code, "{args:?}");
         assert_eq!(error["exit_code"], exit);
         let text = error.to_string().replace("\\\"", "\"");
@@ -322,16 +322,16 @@ fn every_code_is_told_with_its_words() {
 }
 
 #[test]
-fn a_fault_is_told_to_programs_with_its_place() {
+fn a_fault_is_reported_to_programs_with_its_place() {
     let place = prepared();
-    let told = place.run(&["probe", SEED, "bad.csv", "--format", "json"]);
-    let fault = told.ends(3).error()["error"]["faults"][0].clone();
+    let reported = place.run(&["probe", SEED, "bad.csv", "--format", "json"]);
+    let fault = reported.ends(3).error()["error"]["faults"][0].clone();
     assert_eq!(fault["file"], "bad.csv");
     assert_eq!(fault["line"], 3);
     assert_eq!(fault["key"], "z_m");
     assert_eq!(fault["expected"], "a finite number");
-    let told = place.run(&["evaluate", "bad.toml", "--format", "json"]);
-    let fault = told.ends(3).error()["error"]["faults"][0].clone();
+    let reported = place.run(&["evaluate", "bad.toml", "--format", "json"]);
+    let fault = reported.ends(3).error()["error"]["faults"][0].clone();
     assert_eq!(fault["file"], "bad.toml");
     assert_eq!(fault["key"], "array.pich_mm");
     assert_eq!(fault["advice"], "did you mean pitch_mm?");
@@ -372,22 +372,27 @@ fn codes_are_explained() {
     assert!(list.err.is_empty());
     for code in list.out.lines().skip(1) {
         let code = code.split_whitespace().next().unwrap();
-        let told = place.run(&["--explain", code]).ends(0).out;
-        assert!(told.starts_with(&format!("{code}: ")), "{told}");
+        let reported = place.run(&["--explain", code]).ends(0).out;
+        assert!(reported.starts_with(&format!("{code}: ")), "{reported}");
         for part in ["exit code", "Causes:", "What to do:", "Example:"] {
-            assert!(told.contains(part), "{code}: {part}");
+            assert!(reported.contains(part), "{code}: {part}");
         }
-        assert!(told.lines().all(|line| line.len() <= 110), "{told}");
+        assert!(reported.lines().all(|line| line.len() <= 110), "{reported}");
     }
     let three = place.run(&["--explain", "3"]).ends(0).out;
     assert!(three.contains("E301: ") && three.contains("E306: ") && !three.contains("E401: "));
     let json = place
         .run(&["--explain", "e405", "--format", "json"])
         .ends(0);
-    let told = json.json()["codes"][0].clone();
-    assert_eq!(told["code"], "E405");
-    assert_eq!(told["exit_code"], 4);
-    assert!(told["explanation"].as_str().unwrap().contains("--force"));
+    let reported = json.json()["codes"][0].clone();
+    assert_eq!(reported["code"], "E405");
+    assert_eq!(reported["exit_code"], 4);
+    assert!(
+        reported["explanation"]
+            .as_str()
+            .unwrap()
+            .contains("--force")
+    );
     // The subcommand's own --explain is another matter.
     let plan = ["calibrate", SEED, "shapes/flat.toml", "--explain"];
     place.run(&plan).ends(0);

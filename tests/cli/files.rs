@@ -27,21 +27,21 @@ fn what_is_not_ours_is_replaced_only_with_force() {
 
     place.run(&["calibrate", SEED, "shapes/flat.toml"]).ends(0);
     place.run(&["calibrate", SEED, "shapes/flat.toml"]).ends(0);
-    let told = place.run(&[
+    let reported = place.run(&[
         "calibrate",
         "other.toml",
         "shapes/flat.toml",
         "--format",
         "json",
     ]);
-    assert_eq!(told.ends(4).error()["error"]["exit_code"], 4);
+    assert_eq!(reported.ends(4).error()["error"]["exit_code"], 4);
     place.write("points_in.csv", "x_m,y_m,z_m\n0.007,0.013,0.03\n");
     let probe = ["probe", SEED, "points_in.csv", "--out", "points.csv"];
     place.run(&probe).ends(4).says(&["points.csv"]);
 }
 
 #[test]
-fn an_output_folder_that_cannot_be_is_told() {
+fn an_impossible_output_folder_is_reported() {
     let place = Place::new();
     place.write("file", "");
     place
@@ -114,8 +114,8 @@ fn a_bundle_is_verified_and_a_changed_one_fails() {
         .run(&["verify", bundle])
         .ends(5)
         .says(&["currents.csv"]);
-    let told = place.run(&["verify", bundle, "--format", "json"]).ends(5);
-    assert_eq!(told.error()["error"]["exit_code"], 5);
+    let reported = place.run(&["verify", bundle, "--format", "json"]).ends(5);
+    assert_eq!(reported.error()["error"]["exit_code"], 5);
 }
 
 #[test]

@@ -85,8 +85,8 @@ fn no_command_is_wrong_usage_and_so_is_an_unknown_one() {
     let place = Place::new();
     place.run(&[]).ends(2).says(&["Usage:"]);
     place.run(&["evaluat", "x"]).ends(2).says(&["evaluate"]);
-    let told = place.run(&["map", "--format", "json"]).ends(2).error();
-    assert_eq!(told["error"]["exit_code"], 2);
+    let reported = place.run(&["map", "--format", "json"]).ends(2).error();
+    assert_eq!(reported["error"]["exit_code"], 2);
 }
 
 #[test]

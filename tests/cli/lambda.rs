@@ -29,13 +29,13 @@ fn calibrate_reports_everything_that_lambda_does() {
 }
 
 #[test]
-fn variants_are_told_beside_the_design_as_given() {
+fn variants_are_listed_beside_the_design_as_given() {
     let place = Place::new();
-    let told = place
+    let reported = place
         .run(&["lambda", AIR, WEDGE, "--variants", "--format", "json"])
         .ends(0)
         .json();
-    let variants = told["variants"].as_array().unwrap();
+    let variants = reported["variants"].as_array().unwrap();
     let named = |name: &str| variants.iter().find(|v| v["name"] == name).unwrap();
     let given = named("as given");
     for key in [
@@ -47,10 +47,10 @@ fn variants_are_told_beside_the_design_as_given() {
         "rms_error_n",
         "worst_error_n",
     ] {
-        assert_eq!(given[key], told[key], "{key}");
+        assert_eq!(given[key], reported[key], "{key}");
     }
     assert_eq!(given["relative_change"], 0.0);
-    let worst = &told["worst_point"]["lambda_jnd_n_per_m"];
+    let worst = &reported["worst_point"]["lambda_jnd_n_per_m"];
     assert_eq!(given["worst_point_lambda_jnd_n_per_m"], *worst);
     for coil in 0..9 {
         let broken = named(&format!("{coil} broken"));
@@ -92,8 +92,8 @@ fn the_effect_of_the_points_is_that_of_the_wired_coils() {
     let place = Place::new();
     let estimate = |flags: &[&str]| {
         let command = [&["lambda", AIR, WEDGE, "--format", "json"], flags].concat();
-        let told = place.run(&command).ends(0).json();
-        told["accuracy"]["lambda_of_points"]["estimate"]
+        let reported = place.run(&command).ends(0).json();
+        reported["accuracy"]["lambda_of_points"]["estimate"]
             .as_f64()
             .expect("a number")
     };
@@ -118,7 +118,7 @@ fn wiring_that_cannot_be_is_refused() {
 }
 
 #[test]
-fn nothing_to_render_is_told_not_computed() {
+fn nothing_to_render_is_reported_not_computed() {
     let place = Place::new();
     let air = String::from_utf8(place.read(AIR)).unwrap();
     // Coils that pull only.
@@ -132,13 +132,14 @@ fn nothing_to_render_is_told_not_computed() {
         "json",
     ]);
     let ran = ran.ends(4).says(&["pushes the magnet up"]);
-    let told = ran.json();
+    let reported = ran.json();
     assert!(
-        told["lambda_n_per_m"].is_null() && told["worst_point"]["lambda_jnd_n_per_m"].is_null()
+        reported["lambda_n_per_m"].is_null()
+            && reported["worst_point"]["lambda_jnd_n_per_m"].is_null()
     );
     // Everything below what is felt is within the tolerances all the same.
-    assert!(told["tolerance"]["lambda_n_per_m"].as_f64().unwrap() > 0.0);
-    let variants = told["variants"].as_array().unwrap();
+    assert!(reported["tolerance"]["lambda_n_per_m"].as_f64().unwrap() > 0.0);
+    let variants = reported["variants"].as_array().unwrap();
     assert!(variants[0]["relative_change"].is_null());
     let both = variants
         .iter()
@@ -165,13 +166,13 @@ fn few_points() -> Place {
 }
 
 #[test]
-fn feedback_is_told_beside_static_currents() {
+fn feedback_is_reported_beside_static_currents() {
     let place = few_points();
     let base = ["lambda", AIR, FEW, "--format", "json"];
-    let told = |more: &[&str]| place.run(&[&base[..], more].concat()).ends(0).json();
-    let plain = told(&[]);
+    let reported = |more: &[&str]| place.run(&[&base[..], more].concat()).ends(0).json();
+    let plain = reported(&[]);
     assert!(plain["feedback"].is_null());
-    let with = told(&["--feedback"]);
+    let with = reported(&["--feedback"]);
     assert_eq!(with["lambda_n_per_m"], plain["lambda_n_per_m"]);
     let feedback = &with["feedback"];
     let number = |value: &serde_json::Value| value.as_f64().unwrap();
@@ -196,24 +197,24 @@ fn feedback_is_told_beside_static_currents() {
     // A shell holds the surface, and a wider one the narrower: lambda only falls.
     let mut before = largest;
     for (length, layers) in [("1mm", 5), ("6mm", 9), ("14mm", 17)] {
-        let told = told(&["--feedback", "--shell", length]);
-        let shell = &told["feedback"]["shell"];
-        assert_eq!(number(&told["feedback"]["lambda_n_per_m"]), largest);
+        let reported = reported(&["--feedback", "--shell", length]);
+        let shell = &reported["feedback"]["shell"];
+        assert_eq!(number(&reported["feedback"]["lambda_n_per_m"]), largest);
         assert_eq!(shell["layers"], layers);
         let here = number(&shell["lambda_n_per_m"]);
         assert!(here > 0.0 && here <= before, "{length}: {here}");
-        let error = number(&told["accuracy"]["feedback_shell"]["estimate"]);
+        let error = number(&reported["accuracy"]["feedback_shell"]["estimate"]);
         assert!((0.0..0.05).contains(&error), "{length}: {error}");
         assert_eq!(shell["clipped"], 0);
         before = here;
     }
     // A broken coil costs no less with feedback.
-    let broken = told(&["--feedback", "--broken", "4"]);
+    let broken = reported(&["--feedback", "--broken", "4"]);
     let broken = &broken["feedback"];
     assert!(number(&broken["lambda_n_per_m"]) < largest);
     assert_eq!(broken["at_largest"]["current_max_a"][4], 0.0);
     // Below the workspace nothing is looked at.
-    let deep = told(&["--feedback", "--shell", "60mm"]);
+    let deep = reported(&["--feedback", "--shell", "60mm"]);
     assert!(number(&deep["feedback"]["shell"]["clipped"]) > 0.0);
     assert_eq!(deep["feedback"]["shell"]["floor_m"], 0.01);
     let shown = place
@@ -275,7 +276,7 @@ fn a_picture_shows_the_path_and_is_not_written_over_a_stranger() {
         .ends(4)
         .says(&["wedge.svg", "--force"]);
     plot("lifted.toml", "wedge.svg", &["--force"]).ends(0);
-    // On standard output the drawing stands alone.
+    // On standard output the drawing is alone.
     let alone = plot(FEW, "-", &[]).ends(0);
     assert!(alone.out.ends_with("</svg>") && !alone.out.contains("with feedback"));
     // Points on no grid, and nothing to draw at all.
@@ -296,9 +297,9 @@ fn a_picture_shows_the_path_and_is_not_written_over_a_stranger() {
         "--format",
         "json",
     ];
-    let told = place.run(&args).ends(4).json();
+    let reported = place.run(&args).ends(4).json();
     // Static currents push nothing up on average; beside a coil that pulls, feedback still does.
-    let feedback = &told["feedback"];
+    let feedback = &reported["feedback"];
     assert!(feedback["without"].is_null() && feedback["at_chosen"].is_null());
     assert!(feedback["lambda_n_per_m"].as_f64().unwrap() > 0.0);
     let reason = feedback["shell"]["reason"].as_str().unwrap();
@@ -362,7 +363,7 @@ fn attracted_and_repelled_magnets_mirror_each_other() {
         "rms_error_n",
         "worst_error_n",
     ] {
-        let of = |told: &serde_json::Value| told[key].as_f64().unwrap();
+        let of = |reported: &serde_json::Value| reported[key].as_f64().unwrap();
         let off = (of(repel) - of(attract)).abs();
         assert!(
             off <= 1e-12 * of(repel),
@@ -372,7 +373,7 @@ fn attracted_and_repelled_magnets_mirror_each_other() {
         );
     }
     for coil in 0..9 {
-        let of = |told: &serde_json::Value| told["currents_a"][coil].as_f64().unwrap();
+        let of = |reported: &serde_json::Value| reported["currents_a"][coil].as_f64().unwrap();
         assert!((of(repel) + of(attract)).abs() < 1e-12);
     }
 }
@@ -387,11 +388,11 @@ fn a_sum_that_binds_has_a_saturation_that_verifies() {
     assert_ne!(design, seed);
     place.write("five.toml", &design);
     let shape = "shapes/half_sphere.toml";
-    let told = place
+    let reported = place
         .run(&["lambda", "five.toml", shape, "--format", "json"])
         .ends(0)
         .json();
-    let of = |key: &str| told[key].as_f64().unwrap();
+    let of = |key: &str| reported[key].as_f64().unwrap();
     let (jnd, last) = (of("lambda_jnd_n_per_m"), of("lambda_saturation_n_per_m"));
     assert!(jnd < last && last < 10.0 * jnd, "{jnd} {last}");
     place

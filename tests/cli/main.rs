@@ -2,11 +2,11 @@
 #![cfg(unix)] // signals, /dev/full, links
 
 mod budget;
+mod cache;
 mod codes;
 mod files;
 mod help;
 mod interrupt;
-mod kept;
 mod lambda;
 mod messages;
 mod optimize;

@@ -20,11 +20,11 @@ fn every_fault_is_shown_with_its_line_and_a_caret() {
     ]);
     assert!(ran.out.is_empty() && !ran.err.contains('\u{1b}'), "{ran:?}");
 
-    let told = place
+    let reported = place
         .run(&["evaluate", "bad.toml", "--format", "json"])
         .ends(3);
-    assert!(told.out.is_empty());
-    let error = &told.error()["error"];
+    assert!(reported.out.is_empty());
+    let error = &reported.error()["error"];
     assert_eq!(error["exit_code"], 3);
     let faults = error["faults"].as_array().unwrap();
     assert_eq!(faults.len(), 2);
@@ -36,7 +36,7 @@ fn every_fault_is_shown_with_its_line_and_a_caret() {
 }
 
 #[test]
-fn faults_of_all_documents_are_told_in_one_run() {
+fn faults_of_all_documents_are_reported_in_one_run() {
     let place = Place::new();
     place.write("design.toml", &place.text(SEED).replace("turns", "tunrs"));
     place.write("shape.toml", "name = \"a\"\nprimitive = \"flatt\"\n");
@@ -93,8 +93,8 @@ fn a_raw_surface_needs_its_unit() {
             .ends(2)
             .says(&["shapes/wedge.stl", "--unit", "mm"]);
     }
-    let told = place.run(&["discretize", "shapes/wedge.stl", "--format", "json"]);
-    assert_eq!(told.ends(2).error()["error"]["exit_code"], 2);
+    let reported = place.run(&["discretize", "shapes/wedge.stl", "--format", "json"]);
+    assert_eq!(reported.ends(2).error()["error"]["exit_code"], 2);
     assert!(!place.path("points.csv").exists());
 }
 
@@ -194,9 +194,9 @@ fn what_cannot_be_read_is_named() {
         .ends(3)
         .says(&["manifest.json"]);
     place.write("points.csv", "x_m,y_m,z_m\n0.1,0.2,far\n0.1,0.2\n");
-    let told = place.run(&["probe", SEED, "points.csv", "--format", "json"]);
-    let told = told.ends(3).error();
-    assert_eq!(told["error"]["faults"].as_array().unwrap().len(), 2);
+    let reported = place.run(&["probe", SEED, "points.csv", "--format", "json"]);
+    let reported = reported.ends(3).error();
+    assert_eq!(reported["error"]["faults"].as_array().unwrap().len(), 2);
 }
 
 #[test]
@@ -221,7 +221,7 @@ fn two_shapes_of_one_name_are_an_error() {
 }
 
 #[test]
-fn a_result_not_meets_request_is_told_and_ends_with_4() {
+fn a_result_that_misses_the_request_is_reported_and_ends_with_4() {
     let place = Place::new();
     let strict = place.run(&["evaluate", SEED, "--strict"]).ends(4);
     assert!(strict.out.contains("NOT met"), "{}", strict.out);

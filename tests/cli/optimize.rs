@@ -62,7 +62,7 @@ fn the_keys_that_scripts_rely_on_are_there() {
         let held = limit["active"] == true;
         assert_eq!(held, number(limit, "sensitivity_n_per_unit") != 0.0);
     }
-    // The seed's own coil is told of, and that it is not within its limits.
+    // The seed's own coil is reported, and that it is not within its limits.
     near(number(&result, "given/force_n"), 0.099709, 1e-4);
     assert_eq!(result["given"]["limits"]["resistance_ohm"]["met"], false);
     assert!(number(&result, "objective/force_n") > 0.13);
@@ -79,7 +79,7 @@ fn evaluate_says_the_same_of_the_design_that_was_written() {
         args.extend(options);
         let best = place.run(&args).ends(0).json();
         let args = ["evaluate", name, "--strict", "--format", "json"];
-        let told = place.run(&args).ends(0).json();
+        let reported = place.run(&args).ends(0).json();
         for (ours, theirs) in [
             ("objective/force_n", "target/force_n"),
             ("objective/current_a", "target/current_a"),
@@ -94,7 +94,7 @@ fn evaluate_says_the_same_of_the_design_that_was_written() {
             ("coil/power_w", "coil/power_w"),
             ("coil/turns", "coil/turns"),
         ] {
-            assert_eq!(number(&best, ours), number(&told, theirs), "{ours}");
+            assert_eq!(number(&best, ours), number(&reported, theirs), "{ours}");
         }
         assert!(number(&best, "accuracy/optimiser/estimate") < 1e-12);
         // The rest of the design is the design's.
@@ -198,7 +198,7 @@ fn a_sensitivity_is_what_a_little_more_gives() {
 }
 
 #[test]
-fn dimensions_can_be_kept() {
+fn dimensions_can_be_fixed() {
     let place = Place::new();
     for keys in [
         &["inner_diameter_mm"][..],
@@ -300,7 +300,7 @@ fn another_file_is_not_replaced() {
     assert_eq!(place.read("mine.toml"), b"precious");
     place.run(&[&args[..], &["--force"]].concat()).ends(0);
     let first = place.read("mine.toml");
-    // What came of the same design may be.
+    // Results of the same design may be.
     place.run(&args).ends(0);
     assert_eq!(place.read("mine.toml"), first);
     let ran = place.run(&["optimize", SEED, "--out", "-"]).ends(0);

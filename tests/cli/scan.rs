@@ -59,9 +59,11 @@ impl Made {
                 std::array::from_fn(|i| middle[i] + from[i] + self.shift_m[i]);
             table.push_str(&format!("{x},{y},{z}\n"));
         }
-        let told = place.run_with_input(&["probe", self.design, "-", "-q"], &table);
-        let told = told.ends(0).out;
-        let mut lines = told.lines().map(|line| line.split(',').collect::<Vec<_>>());
+        let report_text = place.run_with_input(&["probe", self.design, "-", "-q"], &table);
+        let report_text = report_text.ends(0).out;
+        let mut lines = report_text
+            .lines()
+            .map(|line| line.split(',').collect::<Vec<_>>());
         let header = lines.next().unwrap();
         let rows: Vec<Vec<&str>> = lines.collect();
         let mut noise = Random::new(self.seed);
@@ -158,8 +160,8 @@ fn what_was_changed_is_found_within_the_stated_errors() {
     for seed in [7, 13, 29] {
         made.seed = seed;
         made.write(&place, "scan.csv", &grid());
-        let told = compare(&place, "scan.csv", &["--noise-t", "3e-6"]);
-        let fit = &told["fit"];
+        let report_text = compare(&place, "scan.csv", &["--noise-t", "3e-6"]);
+        let fit = &report_text["fit"];
         let mut hold = |found: f64, error: f64, truth: f64| {
             let off = (found - truth) / error;
             assert!(off.abs() < 4.5, "{found} +- {error} against {truth}");
@@ -190,8 +192,8 @@ fn what_was_changed_is_found_within_the_stated_errors() {
     assert!((0.4..2.0).contains(&mean), "{mean}");
 
     // The gains put into the design leave the rest to the frame.
-    let told = compare(&place, "scan.csv", &[]);
-    let line = told["fit"]["gain_toml"].as_str().unwrap();
+    let report_text = compare(&place, "scan.csv", &[]);
+    let line = report_text["fit"]["gain_toml"].as_str().unwrap();
     let design = place
         .text(SEED)
         .replace("[array]\n", &format!("[array]\n{line}\n"));
@@ -223,8 +225,8 @@ fn a_turned_sensor_is_found_over_coils_with_steel() {
     made.background_t = [9e-6, -21e-6, 33e-6];
     made.write(&place, "scan.csv", &grid());
     let what = "scale,background,position,rotation";
-    let told = compare_with(&place, made.design, "scan.csv", &["--fit", what]);
-    let fit = &told["fit"];
+    let report_text = compare_with(&place, made.design, "scan.csv", &["--fit", what]);
+    let fit = &report_text["fit"];
     // The fit solves the steel as `probe` does.
     for (found, turn) in numbers(&fit["rotation_deg"]).iter().zip(made.turn_deg) {
         assert!((found - turn).abs() < 1e-5, "{fit:#}");
@@ -251,18 +253,18 @@ fn gradients_count_and_an_upright_sensor_is_not_turned() {
     made.shift_m = [-0.0003, 0.0008, -0.0006];
     made.write(&place, "scan.csv", &grid());
     let what = "scale,background,position,rotation";
-    let told = compare(&place, "scan.csv", &["--fit", what]);
-    for angle in numbers(&told["fit"]["rotation_deg"]) {
+    let report_text = compare(&place, "scan.csv", &["--fit", what]);
+    for angle in numbers(&report_text["fit"]["rotation_deg"]) {
         assert!(angle.abs() < 1e-4, "{angle}");
     }
-    let shifts = numbers(&told["fit"]["position_m"]);
+    let shifts = numbers(&report_text["fit"]["position_m"]);
     for (found, shift) in shifts.iter().zip(made.shift_m) {
         assert!((found - shift).abs() < 1e-8, "{found} {shift}");
     }
-    assert!(told["residuals"]["fitted"]["gradient"]["rms_t_per_m"].is_number());
+    assert!(report_text["residuals"]["fitted"]["gradient"]["rms_t_per_m"].is_number());
     // Only the background that was measured.
-    assert!(told["fit"]["background_t"][0].is_null());
-    assert!(told["fit"]["background_t"][2].is_number());
+    assert!(report_text["fit"]["background_t"][0].is_null());
+    assert!(report_text["fit"]["background_t"][2].is_number());
 }
 
 #[test]
@@ -271,13 +273,13 @@ fn noise_alone_is_explained_by_nothing() {
     let mut made = Made::new(&FIELD, &[(4, 1.0), (0, 1.0)]);
     made.noise_t = 2e-6;
     made.write(&place, "scan.csv", &grid());
-    let told = compare(&place, "scan.csv", &["--noise-t", "2e-6"]);
-    assert!(told["best_explanation"].is_null(), "{told:#}");
-    for scale in told["fit"]["scales"].as_array().unwrap() {
+    let report_text = compare(&place, "scan.csv", &["--noise-t", "2e-6"]);
+    assert!(report_text["best_explanation"].is_null(), "{report_text:#}");
+    for scale in report_text["fit"]["scales"].as_array().unwrap() {
         let off = scale["scale"].as_f64().unwrap() - 1.0;
         assert!(off.abs() < 4.0 * scale["standard_error"].as_f64().unwrap());
     }
-    let left = &told["residuals"]["as_designed"]["field"];
+    let left = &report_text["residuals"]["as_designed"]["field"];
     let rms = left["rms_t"].as_f64().unwrap();
     assert!((1.6e-6..2.4e-6).contains(&rms), "{rms}");
     assert!(left["model_error_t"].as_f64().unwrap() < 1e-12);
@@ -288,14 +290,14 @@ fn noise_alone_is_explained_by_nothing() {
 #[test]
 fn the_parameter_at_fault_is_named() {
     let place = Place::new();
-    let best = |told: &Value| {
-        told["best_explanation"]
+    let best = |report_text: &Value| {
+        report_text["best_explanation"]
             .as_str()
             .unwrap_or("none")
             .to_owned()
     };
-    let share = |told: &Value, name: &str| {
-        let list = told["explanations"].as_array().unwrap();
+    let share = |report_text: &Value, name: &str| {
+        let list = report_text["explanations"].as_array().unwrap();
         let found = list.iter().find(|e| e["parameter"] == name).unwrap();
         (found["share"].as_f64().unwrap(), found.clone())
     };
@@ -304,22 +306,22 @@ fn the_parameter_at_fault_is_named() {
     high.shift_m[2] = 0.0009;
     high.noise_t = 1e-6;
     high.write(&place, "high.csv", &grid());
-    let told = compare(&place, "high.csv", &[]);
-    assert_eq!(best(&told), "height");
-    let (part, found) = share(&told, "height");
+    let report_text = compare(&place, "high.csv", &[]);
+    assert_eq!(best(&report_text), "height");
+    let (part, found) = share(&report_text, "height");
     assert!(part > 0.99);
     let change = found["change"].as_f64().unwrap();
     assert!((change - 0.0009).abs() < 5e-5, "{change}");
 
-    // More turns are a larger scale: told, not chosen between.
+    // More turns are a larger scale: both are reported.
     let mut strong = Made::new(&FIELD, &coils.map(|(coil, _)| (coil, 1.021)));
     strong.noise_t = 1e-6;
     strong.write(&place, "strong.csv", &grid());
-    let told = compare(&place, "strong.csv", &[]);
-    assert_eq!(best(&told), "scale");
-    let (_, found) = share(&told, "scale");
+    let report_text = compare(&place, "strong.csv", &[]);
+    assert_eq!(best(&report_text), "scale");
+    let (_, found) = share(&report_text, "scale");
     assert_eq!(found["alike"][0], "coil.turns");
-    let (_, turns) = share(&told, "coil.turns");
+    let (_, turns) = share(&report_text, "coil.turns");
     let (change, error) = (&turns["change"], &turns["standard_error"]);
     let off = change.as_f64().unwrap() - 0.021 * 1429.0;
     assert!(off.abs() < 4.0 * error.as_f64().unwrap(), "{turns}");
@@ -342,13 +344,13 @@ fn the_parameter_at_fault_is_named() {
         "--format",
         "json",
     ];
-    let told = place.run(&args).ends(0).json();
-    let (part, found) = share(&told, "coil.length_mm");
-    assert!(found["change"].is_number() && part > 0.0, "{told:#}");
+    let report_text = place.run(&args).ends(0).json();
+    let (part, found) = share(&report_text, "coil.length_mm");
+    assert!(found["change"].is_number() && part > 0.0, "{report_text:#}");
 }
 
 #[test]
-fn what_a_scan_cannot_tell_apart_is_told() {
+fn indistinguishable_parameters_of_a_scan_are_reported() {
     let place = Place::new();
     // On one coil's axis, vertical component: x and y change nothing.
     let axis: Vec<[f64; 3]> = (0..14)
@@ -357,8 +359,8 @@ fn what_a_scan_cannot_tell_apart_is_told() {
     let mut made = Made::new(&["bz_t"], &[(4, 1.02)]);
     made.noise_t = 1e-7;
     made.write(&place, "axis.csv", &axis);
-    let told = compare(&place, "axis.csv", &[]);
-    let named: Vec<String> = told["fit"]["undetermined"]
+    let report_text = compare(&place, "axis.csv", &[]);
+    let named: Vec<String> = report_text["fit"]["undetermined"]
         .as_array()
         .unwrap()
         .iter()
@@ -366,8 +368,11 @@ fn what_a_scan_cannot_tell_apart_is_told() {
         .collect();
     assert!(named.contains(&"[\"position x\"]".to_owned()), "{named:?}");
     assert!(named.contains(&"[\"position y\"]".to_owned()), "{named:?}");
-    assert!(told["fit"]["position_m"][0].is_null() && told["fit"]["position_m"][2].is_number());
-    let scale = &told["fit"]["scales"][0];
+    assert!(
+        report_text["fit"]["position_m"][0].is_null()
+            && report_text["fit"]["position_m"][2].is_number()
+    );
+    let scale = &report_text["fit"]["scales"][0];
     let off = scale["scale"].as_f64().unwrap() - 1.02;
     assert!(
         off.abs() < 4.0 * scale["standard_error"].as_f64().unwrap(),
@@ -382,9 +387,18 @@ fn what_a_scan_cannot_tell_apart_is_told() {
 
     // One place again and again: scale, background and height are one number.
     made.write(&place, "one.csv", &[[0.003, 0.004, 0.02]; 12]);
-    let told = compare(&place, "one.csv", &["--fit", "scale,background"]);
-    assert_eq!(told["fit"]["undetermined"][0].as_array().unwrap().len(), 2);
-    assert!(told["fit"]["scales"][0]["scale"].is_null() && told["fit"]["gain_toml"].is_null());
+    let report_text = compare(&place, "one.csv", &["--fit", "scale,background"]);
+    assert_eq!(
+        report_text["fit"]["undetermined"][0]
+            .as_array()
+            .unwrap()
+            .len(),
+        2
+    );
+    assert!(
+        report_text["fit"]["scales"][0]["scale"].is_null()
+            && report_text["fit"]["gain_toml"].is_null()
+    );
 }
 
 #[test]
@@ -476,8 +490,8 @@ fn currents_may_flow_in_all_coils_and_residuals_are_written() {
     }
     place.write("both.csv", &both);
     let args = ["--out", "left.csv"];
-    let told = compare(&place, "both.csv", &args);
-    assert_eq!(told["rows"], 36);
+    let report_text = compare(&place, "both.csv", &args);
+    assert_eq!(report_text["rows"], 36);
     let left = String::from_utf8(place.read("left.csv")).unwrap();
     assert!(left.starts_with("x_m,y_m,z_m,bz_t,bz_design_t,bz_residual_t,bz_fitted_residual_t\n"));
     for row in left.lines().skip(1) {
@@ -487,13 +501,13 @@ fn currents_may_flow_in_all_coils_and_residuals_are_written() {
             "{row}"
         );
     }
-    // A table does not tell what it was made from. The same bytes with one thread.
+    // A table does not state its inputs. The same bytes with one thread.
     let again = compare(
         &place,
         "both.csv",
         &[&args[..], &["--force", "--threads", "1"]].concat(),
     );
-    assert_eq!(told, again);
+    assert_eq!(report_text, again);
     let piped = place
         .run(&["probe", SEED, "--compare", "both.csv", "--out", "-"])
         .ends(0);
@@ -517,7 +531,7 @@ fn the_object_is_as_its_schema_says() {
     let mut made = Made::new(&["bz_t"], &[(4, 1.0)]);
     made.noise_t = 1e-6;
     made.write(&place, "scan.csv", &grid());
-    let told = compare(&place, "scan.csv", &["--noise-t", "1e-6"]);
+    let report_text = compare(&place, "scan.csv", &["--noise-t", "1e-6"]);
     let (_, schema) = fluxform::bundle::schema::SCHEMAS
         .iter()
         .find(|(name, _)| *name == "scan.schema.json")
@@ -525,7 +539,7 @@ fn the_object_is_as_its_schema_says() {
     let schema: Value = serde_json::from_str(schema).unwrap();
     let validator = jsonschema::validator_for(&schema).unwrap();
     let faults: Vec<String> = validator
-        .iter_errors(&told)
+        .iter_errors(&report_text)
         .map(|e| e.to_string())
         .collect();
     assert!(faults.is_empty(), "{faults:?}");
@@ -537,9 +551,11 @@ fn scan_of(place: &Place, truth: &str, points_m: &[[f64; 3]], noise_t: f64, seed
     for [x, y, z] in points_m {
         table.push_str(&format!("{x},{y},{z}\n"));
     }
-    let told = place.run_with_input(&["probe", truth, "-", "-q"], &table);
-    let told = told.ends(0).out;
-    let mut lines = told.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let report_text = place.run_with_input(&["probe", truth, "-", "-q"], &table);
+    let report_text = report_text.ends(0).out;
+    let mut lines = report_text
+        .lines()
+        .map(|line| line.split(',').collect::<Vec<_>>());
     let header = lines.next().unwrap();
     let columns = FIELD.map(|column| {
         let name = format!("{column}_per_a");
@@ -566,10 +582,10 @@ fn alone(design: &str) -> String {
 }
 
 /// The explanation by `key`, and whether it is the best or alike to it.
-fn explained_by(told: &Value, key: &str) -> (Value, bool) {
-    let list = told["explanations"].as_array().unwrap();
+fn explained_by(report_text: &Value, key: &str) -> (Value, bool) {
+    let list = report_text["explanations"].as_array().unwrap();
     let found = list.iter().find(|e| e["parameter"] == key).unwrap();
-    let best = told["best_explanation"].as_str().unwrap_or("none");
+    let best = report_text["best_explanation"].as_str().unwrap_or("none");
     let alike = found["alike"].as_array();
     let named = best == key || alike.is_some_and(|all| all.iter().any(|other| other == best));
     (found.clone(), named)
@@ -603,9 +619,9 @@ fn large_changes_are_fitted_to_their_end() {
         place.write("truth.toml", &truth);
         place.write("scan.csv", &scan_of(&place, "truth.toml", &grid(), 2e-7, 7));
         let more = ["--noise-t", "2e-7"];
-        let told = compare_with(&place, "design.toml", "scan.csv", &more);
-        let (found, named) = explained_by(&told, key);
-        assert!(named, "{key}: {told:#}");
+        let report_text = compare_with(&place, "design.toml", "scan.csv", &more);
+        let (found, named) = explained_by(&report_text, key);
+        assert!(named, "{key}: {report_text:#}");
         let error = found["standard_error"].as_f64().unwrap();
         let off = found["change"].as_f64().unwrap() - change;
         assert!(off.abs() <= 2.5 * error, "{key}: {found:#}");
@@ -635,8 +651,8 @@ fn stated_intervals_hold_random_truths() {
         place.write("truth.toml", &truth);
         let scan = scan_of(&place, "truth.toml", &grid(), 3e-6, run as u64 + 100);
         place.write("scan.csv", &scan);
-        let told = compare_with(&place, "design.toml", "scan.csv", &[]);
-        let (found, _) = explained_by(&told, key);
+        let report_text = compare_with(&place, "design.toml", "scan.csv", &[]);
+        let (found, _) = explained_by(&report_text, key);
         let error = found["standard_error"].as_f64().unwrap();
         let off = found["change"].as_f64().unwrap() - change;
         held += usize::from(off.abs() <= 1.96 * error);

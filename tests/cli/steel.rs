@@ -1,4 +1,4 @@
-//! Designs with steel: what is refused, what is warned of, what the summaries tell.
+//! Designs with steel: what is refused, what is warned of, the summaries.
 
 use fluxform_testing::place::Place;
 use fluxform_testing::run::Ran;
@@ -136,8 +136,8 @@ fn a_table_in_another_unit_is_warned_of() {
         .ends(0)
         .says(&["warning: ", "kA/m", "multiply h_a_per_m by 1000"]);
     let json = place.run(&["evaluate", "design.toml", "--format", "json"]);
-    let told = json.ends(0).json()["warnings"][0].clone();
-    assert!(told.as_str().unwrap().contains("kA/m"), "{told}");
+    let reported = json.ends(0).json()["warnings"][0].clone();
+    assert!(reported.as_str().unwrap().contains("kA/m"), "{reported}");
 }
 
 #[test]
@@ -170,10 +170,10 @@ fn a_core_above_its_knee_is_warned_of() {
 }
 
 #[test]
-fn the_steel_s_part_stands_in_the_summary() {
+fn the_steel_s_part_is_in_the_summary() {
     let place = Place::new();
     let linear = place.run(&["evaluate", CORED]).ends(0).out;
-    for told in [
+    for reported in [
         "778.87 mN up",
         "476.14 g and 391.63 g of steel",
         "relative permeability 1000",
@@ -182,38 +182,38 @@ fn the_steel_s_part_stands_in_the_summary() {
         "core peak",
         "core mean",
     ] {
-        assert!(linear.contains(told), "{told}: {linear}");
+        assert!(linear.contains(reported), "{reported}: {linear}");
     }
     let curve = place.run(&["evaluate", "designs/seed_1010.toml"]).ends(0);
-    for told in [
+    for reported in [
         "flux linkage 371.",
         "a B-H curve",
         "less than with",
         "off that along the B-H curve",
     ] {
-        assert!(curve.out.contains(told), "{told}: {}", curve.out);
+        assert!(curve.out.contains(reported), "{reported}: {}", curve.out);
     }
     let lambda = ["lambda", "designs/seed_1010.toml", "shapes/flat.toml"];
     let lambda = place.run(&lambda).ends(0).out;
     assert!(lambda.contains("% off those added up"), "{lambda}");
     let felt = "tilt_deg = [10.0, 5.0]\npassive_force = true\nmodel = \"cylinder\"";
     let tilted = evaluate(&place, "model = \"dipole\"", felt).ends(0).out;
-    for told in [
+    for reported in [
         "down by the unpowered steel",
         "force along x, y, z ",
         "torque about x, y, z ",
         "passive force",
     ] {
-        assert!(tilted.contains(told), "{told}: {tilted}");
+        assert!(tilted.contains(reported), "{reported}: {tilted}");
     }
 }
 
 #[test]
-fn the_compact_form_of_a_map_is_told() {
+fn the_compact_form_of_a_map_is_reported() {
     let place = Place::new();
     let args = ["map", CORED, "--out", "maps"];
-    let told = place.run(&args).ends(0).out;
-    assert!(told.contains("by a harmonic function"), "{told}");
+    let reported = place.run(&args).ends(0).out;
+    assert!(reported.contains("by a harmonic function"), "{reported}");
     let json = place.run(&[&args[..], &["--format", "json"]].concat());
     let table = json.ends(0).json()["table"].clone();
     let number = |key: &str| table[key].as_f64().unwrap();
@@ -234,7 +234,7 @@ fn the_compact_form_of_a_map_is_told() {
 }
 
 #[test]
-fn a_probe_tells_the_force_on_the_magnet() {
+fn a_probe_reports_the_force_on_the_magnet() {
     let place = Place::new();
     let points = "x_m,y_m,z_m\n0.007,0.013,0.031\n0.03,-0.02,0.047\n";
     let probe = |design: &str, more: &[&str]| {
@@ -282,7 +282,7 @@ fn a_probe_tells_the_force_on_the_magnet() {
             .iter()
             .all(|t| *t == 0.0)
     );
-    // The magnet's size changes the force a little, and its error is told.
+    // The magnet's size changes the force a little, and its error is printed.
     changed(&place, "model = \"dipole\"", "model = \"cylinder\"");
     let cylinder = probe("design.toml", &["--magnet-force"]);
     let (small, large) = (
@@ -333,7 +333,7 @@ fn a_probe_reaches_its_tolerance_or_says_that_it_does_not() {
     let place = Place::new();
     two_coils(&place);
     place.write("points.csv", "x_m,y_m,z_m\n0,0,0.01\n0.01,0,0.03\n");
-    let told = |tolerance: &str| {
+    let reported = |tolerance: &str| {
         let arguments = [
             "probe",
             "design.toml",
@@ -346,7 +346,7 @@ fn a_probe_reaches_its_tolerance_or_says_that_it_does_not() {
         place.run(&arguments)
     };
     for tolerance in [1e-5, 1e-6] {
-        let ran = told(&format!("{tolerance:e}"));
+        let ran = reported(&format!("{tolerance:e}"));
         let json = ran.ends(0).json();
         let stated = json["accuracy"]["field"]["estimate"].as_f64().unwrap();
         assert!(stated <= tolerance, "{stated:e} for {tolerance:e}");

@@ -57,7 +57,7 @@ fn json_is_one_object_with_the_fixed_keys() {
 }
 
 #[test]
-fn data_on_standard_output_stands_alone() {
+fn data_is_alone_on_standard_output() {
     let place = Place::new();
     let piped = place.run(&["discretize", "shapes/wedge.toml", "--out", "-"]);
     let piped = piped.ends(0).says(&["wedge: 3721 constraint points"]);

@@ -9,19 +9,19 @@ fn a_file_is_inspected_without_its_unit_and_the_guess_is_never_used() {
     let place = Place::new();
     let args = ["discretize", "shapes/half_sphere.stl", "--inspect"];
     place.run(&args).ends(0).says(&[]);
-    let told = place
+    let reported = place
         .run(&[&args[..], &["--format", "json"]].concat())
         .json();
-    let surface = &told["surface"];
+    let surface = &reported["surface"];
     assert_eq!(surface["format"], "STL");
     assert_eq!(surface["watertight"], true);
     assert_eq!(surface["self_intersections"], 0);
     assert_eq!(surface["layers"], 2);
     assert_eq!(surface["unit_guesses"][0]["unit"], "mm");
     assert!(surface.get("unit_m").is_none());
-    assert_eq!(told["inputs"][0]["path"], "shapes/half_sphere.stl");
+    assert_eq!(reported["inputs"][0]["path"], "shapes/half_sphere.stl");
     assert!(!place.path("points.csv").exists());
-    // What it guesses, discretising still asks for.
+    // Discretising still requires a unit that it guesses.
     place
         .run(&["discretize", "shapes/half_sphere.stl", "--out", "-"])
         .ends(2)
@@ -188,11 +188,11 @@ fn a_force_constant_of_weighted_points_is_held_against_the_grids() {
         lambda(&["--max-deviation", "0.2mm"]),
         lambda(&["--poisson", "1.3mm", "--seed", "5"]),
     ];
-    let constant = |told: &serde_json::Value| number(&told["lambda_n_per_m"]);
-    for told in [&coarse, &fine, &noise] {
-        let sampling = &told["sampling"];
+    let constant = |reported: &serde_json::Value| number(&reported["lambda_n_per_m"]);
+    for reported in [&coarse, &fine, &noise] {
+        let sampling = &reported["sampling"];
         assert_eq!(sampling["grid_lambda_n_per_m"], grid["lambda_n_per_m"]);
-        let change = constant(told) / constant(&grid) - 1.0;
+        let change = constant(reported) / constant(&grid) - 1.0;
         assert!((number(&sampling["relative_change"]) - change).abs() < 1e-12);
     }
     assert_eq!(fine["sampling"]["sampling"], "adaptive");
@@ -209,7 +209,7 @@ fn a_force_constant_of_weighted_points_is_held_against_the_grids() {
     assert!(coarse["points"].as_u64() < fine["points"].as_u64());
     assert!(fine["accuracy"]["lambda_of_points"]["estimate"].is_number());
     assert!(number(&fine["accuracy"]["quadrature"]["estimate"]) < 5e-3);
-    // A plane needs few points, its forces more: what wide patches miss is told.
+    // A plane needs few points, its forces more: what wide patches miss is printed.
     let plane = |flags: &[&str]| {
         let args = [
             "lambda",

@@ -122,8 +122,8 @@ fn a_row_is_what_evaluate_says() {
         .replace("diameter_mm = 0.7", "diameter_mm = 0.55");
     let design = design.replace("length_mm = 100.0", "length_mm = 70.0");
     place.write("design.toml", &design);
-    let told = place.run(&["evaluate", "design.toml", "--format", "json"]);
-    let told = told.ends(0).json();
+    let reported = place.run(&["evaluate", "design.toml", "--format", "json"]);
+    let reported = reported.ends(0).json();
     let row = &text["row"];
     for key in [
         "turns",
@@ -134,12 +134,12 @@ fn a_row_is_what_evaluate_says() {
         "mass_kg",
         "wire_length_m",
     ] {
-        assert_eq!(row[key], told["coil"][key], "{key}");
+        assert_eq!(row[key], reported["coil"][key], "{key}");
     }
     for key in ["current_a", "gradient_t_per_m_per_a", "force_n"] {
-        assert_eq!(row[key], told["target"][key], "{key}");
+        assert_eq!(row[key], reported["target"][key], "{key}");
     }
-    let limits = told["limits"].as_object().unwrap();
+    let limits = reported["limits"].as_object().unwrap();
     let met = limits.values().all(|limit| limit["met"] == true);
     assert_eq!(row["limits_met"], met);
 }
@@ -242,7 +242,7 @@ fn an_interrupted_run_keeps_its_points() {
         .ends(4)
         .says(&["of 1800 points are missing", "-1799", "--partial"]);
     assert!(!place.path("sweep.csv").exists());
-    let told = place.run(&[
+    let reported = place.run(&[
         "sweep",
         "merge",
         "plan.json",
@@ -251,14 +251,14 @@ fn an_interrupted_run_keeps_its_points() {
         "--format",
         "json",
     ]);
-    let told = told.ends(0).json();
+    let reported = reported.ends(0).json();
     assert!(
-        told["warnings"][0]
+        reported["warnings"][0]
             .as_str()
             .unwrap()
             .contains("are missing")
     );
-    let sum = told["rows"].as_u64().unwrap() + told["missing"].as_u64().unwrap();
+    let sum = reported["rows"].as_u64().unwrap() + reported["missing"].as_u64().unwrap();
     assert_eq!(sum, 1800);
     // The same plan's fuller table replaces it.
     place
@@ -282,8 +282,8 @@ fn torn_points_are_computed_again_and_foreign_ones_are_left_alone() {
         .run(&["sweep", "merge", "plan.json", "p", "--out", "b.csv"])
         .ends(4)
         .says(&["3 of 273 points are missing: 7-9"]);
-    let told = place.run(&[&run[..], &["--format", "json"]].concat());
-    assert_eq!(told.ends(0).json()["computed"], 3);
+    let reported = place.run(&[&run[..], &["--format", "json"]].concat());
+    assert_eq!(reported.ends(0).json()["computed"], 3);
     assert!(whole == merged(&place, "p", "b"));
 
     // An edited point is the user's.

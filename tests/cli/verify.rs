@@ -25,7 +25,7 @@ fn design(core: &str, array: &str, magnet: &str, supply: &str) -> String {
 const SLOPE: &str = "name = \"slope\"\nprimitive = \"wedge\"\nlow_mm = 31\nhigh_mm = 43\n[points]\n\
                      x_mm = [-33, 37, 6]\ny_mm = [-23, 27, 5]\n";
 
-/// What is calibrated: core, array, magnet, supply, and the arguments behind the design.
+/// The scene to calibrate: core, array, magnet, supply, and the arguments behind the design.
 type Case = (
     &'static str,
     [&'static str; 4],

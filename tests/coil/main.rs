@@ -1,3 +1,3 @@
-//! What a coil's circuit does: against direct integration and limits.
+//! A coil's circuit against direct integration and limits.
 
 mod transient;

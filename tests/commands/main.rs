@@ -147,11 +147,14 @@ fn what_an_object_does_not_need_is_left_out() {
     let report = calibrate_text(&text, &SHAPES[..1], out.path()).expect("calibrates");
     let manifest = &report.bundles[0].manifest;
     assert_eq!(manifest.map.coil, (0..8).collect::<Vec<i64>>());
-    let told: Vec<&str> = manifest.left_out.iter().map(|l| l.what.as_str()).collect();
-    assert!(told.iter().any(|what| what.contains("1 coils")), "{told:?}");
+    let reported: Vec<&str> = manifest.left_out.iter().map(|l| l.what.as_str()).collect();
     assert!(
-        told.iter().any(|what| what.contains("workspace nodes")),
-        "{told:?}"
+        reported.iter().any(|what| what.contains("1 coils")),
+        "{reported:?}"
+    );
+    assert!(
+        reported.iter().any(|what| what.contains("workspace nodes")),
+        "{reported:?}"
     );
     assert!(
         verify::run(&report.bundles[0].folder, &Silent)
@@ -212,7 +215,7 @@ fn points_outside_the_workspace_are_reported() {
 }
 
 #[test]
-fn a_probe_on_an_edge_is_told_with_its_number_and_coil() {
+fn a_probe_on_an_edge_is_reported_with_its_number_and_coil() {
     let (design, _) = Design::read(&here("designs/seed_air.toml"), Need::PROBE).expect("valid");
     let points = vec![[0.0, 0.0, 0.03], [0.012, 0.0, 0.0]];
     let request = ProbeRequest {
@@ -273,12 +276,12 @@ fn forge(folder: &Path, name: &str, bytes: &[u8]) {
     let before = std::fs::read(folder.join(name)).expect("a file of the bundle");
     assert_eq!(before.len(), bytes.len(), "the manifest tells the size too");
     let manifest = folder.join("manifest.json");
-    let told = std::fs::read_to_string(&manifest).expect("manifest");
-    let forged = told.replace(
+    let reported = std::fs::read_to_string(&manifest).expect("manifest");
+    let forged = reported.replace(
         &Input::of_bytes("", &before).sha256,
         &Input::of_bytes("", bytes).sha256,
     );
-    assert_ne!(told, forged);
+    assert_ne!(reported, forged);
     std::fs::write(&manifest, forged).expect("writable");
     std::fs::write(folder.join(name), bytes).expect("writable");
 }
@@ -295,8 +298,8 @@ fn the_steels_pull_is_kept_in_the_bundle_and_verified() {
     let shape = small_shape(out.path());
     let report = calibrate_text(&text, &[&shape], out.path()).expect("calibrates");
     let folder = &report.bundles[0].folder;
-    let told = report.bundles[0].manifest.map.passive_force.as_ref();
-    assert!(told.expect("a pull").interpolation.largest_error < 0.05);
+    let reported = report.bundles[0].manifest.map.passive_force.as_ref();
+    assert!(reported.expect("a pull").interpolation.largest_error < 0.05);
     let verified = verify::run(folder, &Silent).expect("opens");
     assert_eq!(failed(&verified), [""; 0], "{:?}", verified.checks);
 

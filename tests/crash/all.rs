@@ -53,8 +53,8 @@ fn main() {
     for reason in &all.skipped {
         println!("skipped: {reason}");
     }
-    for told in &all.failed {
-        println!("failed: {told}");
+    for reported in &all.failed {
+        println!("failed: {reported}");
     }
     if !all.failed.is_empty() {
         std::process::exit(1);
@@ -80,7 +80,7 @@ mod unix {
         (How::Plain, 1),
     ];
 
-    /// What is done and what came of it so far.
+    /// Task and results so far.
     pub struct All {
         kills: usize,
         every: usize,
@@ -147,7 +147,7 @@ mod unix {
             for scenario in scenarios {
                 match Prepared::new(scenario) {
                     Ok(prepared) => all.push(prepared),
-                    Err(told) => self.keep(scenario.name, Err(told)),
+                    Err(reported) => self.keep(scenario.name, Err(reported)),
                 }
             }
             all
@@ -169,9 +169,9 @@ mod unix {
                     self.rows.push(row);
                 }
                 Err(reason) if reason.starts_with("no disk") => self.skip(reason),
-                Err(told) => {
-                    println!("failed: {name}: {told}");
-                    self.failed.push(format!("{name}: {told}"));
+                Err(reported) => {
+                    println!("failed: {name}: {reported}");
+                    self.failed.push(format!("{name}: {reported}"));
                 }
             }
         }

@@ -109,7 +109,7 @@ pub fn small_disk(prepared: &Prepared, steps: usize, random: &mut Random) -> Res
 
 /// Files may not grow beyond a limit.
 pub fn file_limit(prepared: &Prepared, steps: usize, random: &mut Random) -> Result<Row, String> {
-    // What is kept for the next run may go unkept without a word.
+    // A failed write to the cache is silent: the next run computes the value again.
     let artefacts = prepared
         .after
         .iter()

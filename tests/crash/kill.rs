@@ -80,7 +80,7 @@ impl How {
         }
     }
 
-    fn told(self) -> &'static str {
+    fn reported(self) -> &'static str {
         match self {
             Self::Kill => "SIGKILL before the n-th call that changes files",
             Self::Full => "disk full from the n-th call on",
@@ -155,13 +155,13 @@ impl Strike {
         every: usize,
         random: &mut Random,
     ) -> Result<Row, String> {
-        let mut row = Row::new(prepared.scenario.name, how.told());
+        let mut row = Row::new(prepared.scenario.name, how.reported());
         for at in (1 + random.below(every)..=self.calls(prepared, how)?).step_by(every) {
             let place = prepared.fresh();
             let (ran, _) = self.run(&place, how.mode(), at as i64, prepared.scenario.args);
             let found = self.judged(prepared, how, &place, &ran);
             row.struck += usize::from(ran.code != Some(0));
-            row.add(found.map_err(|told| format!("call {at}, {}: {told}", how.mode()))?);
+            row.add(found.map_err(|reported| format!("call {at}, {}: {reported}", how.mode()))?);
         }
         Ok(row)
     }
@@ -176,7 +176,7 @@ impl Strike {
         match how {
             // Threads may have done a little more, or all of it.
             How::Kill | How::Renames | How::Plain => ran.ended_with(&[137, 0])?,
-            // What is kept for the next run may go unkept without a word.
+            // A failed write to the cache is silent: the next run computes the value again.
             How::Full | How::Denied | How::Broken => ran.ended_with(&[4, 0])?,
         }
         if ran.code == Some(4) {

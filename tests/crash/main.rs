@@ -35,17 +35,17 @@ fn trials() -> Vec<Trial> {
         None => [
             every_scenario_is_tried,
             a_kill_at_a_random_moment_leaves_whole_files,
-            a_file_limit_is_told_and_leaves_whole_files,
+            a_file_limit_is_reported_and_leaves_whole_files,
             two_runs_at_once_do_not_mix,
             a_run_that_is_asked_to_stop_leaves_nothing_half_done,
         ],
         Strike::new().err() => [
             a_kill_before_any_call_leaves_whole_files,
             a_kill_while_bundles_are_exchanged_leaves_one_of_them,
-            a_disk_or_folder_that_gives_out_is_told_and_leaves_whole_files,
+            a_failing_disk_or_folder_is_reported_and_leaves_whole_files,
         ],
-        mounter().err() => [a_small_disk_is_told_and_leaves_whole_files],
-        Somebody::new().err() => [a_closed_folder_is_told_and_leaves_whole_files],
+        mounter().err() => [a_small_disk_is_reported_and_leaves_whole_files],
+        Somebody::new().err() => [a_closed_folder_is_reported_and_leaves_whole_files],
     }
 }
 
@@ -59,7 +59,7 @@ fn with(
     let mut random = Random::new(seed);
     for scenario in MAIN.iter().chain(MORE).filter(|s| names.contains(&s.name)) {
         let outcome = Prepared::new(scenario).and_then(|prepared| act(&prepared, &mut random));
-        let row = outcome.unwrap_or_else(|told| panic!("{}: {told}", scenario.name));
+        let row = outcome.unwrap_or_else(|reported| panic!("{}: {reported}", scenario.name));
         eprintln!("{}", table::line(&row));
     }
 }
@@ -104,7 +104,7 @@ fn a_kill_while_bundles_are_exchanged_leaves_one_of_them() {
     }
 }
 
-fn a_disk_or_folder_that_gives_out_is_told_and_leaves_whole_files() {
+fn a_failing_disk_or_folder_is_reported_and_leaves_whole_files() {
     let strike = Strike::new().unwrap();
     for how in [How::Full, How::Denied, How::Broken] {
         with(&EVERY, 3, |prepared, random| {
@@ -114,19 +114,19 @@ fn a_disk_or_folder_that_gives_out_is_told_and_leaves_whole_files() {
     }
 }
 
-fn a_small_disk_is_told_and_leaves_whole_files() {
+fn a_small_disk_is_reported_and_leaves_whole_files() {
     with(&["calibrate", "map"], 4, |prepared, random| {
         small_disk(prepared, 3, random)
     });
 }
 
-fn a_file_limit_is_told_and_leaves_whole_files() {
+fn a_file_limit_is_reported_and_leaves_whole_files() {
     with(&["calibrate", "map"], 5, |prepared, random| {
         file_limit(prepared, 3, random)
     });
 }
 
-fn a_closed_folder_is_told_and_leaves_whole_files() {
+fn a_closed_folder_is_reported_and_leaves_whole_files() {
     let somebody = Somebody::new().unwrap();
     with(&["calibrate", "map", "sweep run"], 6, |prepared, random| {
         somebody.closed(prepared, 2, random)
@@ -139,8 +139,8 @@ fn two_runs_at_once_do_not_mix() {
     });
     let mut random = Random::new(8);
     for rivals in RIVALS {
-        if let Err(told) = other_inputs(rivals, 2, &mut random) {
-            panic!("{}: {told}", rivals.name);
+        if let Err(reported) = other_inputs(rivals, 2, &mut random) {
+            panic!("{}: {reported}", rivals.name);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What broke, each by its name.
+//! Regression tests, each named by its fault.
 
 use std::process::Command;
 use std::thread::sleep;
@@ -84,7 +84,7 @@ fn a_map_leaves_no_other_format_of_an_older_one_beside_it() {
         ["map.csv", "map.json", "map.npz", "map.vti"]
     );
     assert_eq!(map(&["--vtk"]), ["map.json", "map.npz", "map.vti"]);
-    // What is not the program's own stays, whatever its name.
+    // A file that is not the program's own stays, whatever its name.
     place.write("out/map.csv", "mine\n");
     assert_eq!(map(&[]), ["map.csv", "map.json", "map.npz"]);
     assert_eq!(written(&place)["map.csv"], b"mine\n");

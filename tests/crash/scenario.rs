@@ -1,4 +1,4 @@
-//! What is disturbed, and what must be true of its files afterwards.
+//! The disturbed runs, and the conditions on their files afterwards.
 
 use std::time::Instant;
 
@@ -28,7 +28,7 @@ const CALIBRATE: &[&str] = &[
     "--out",
     "out",
 ];
-/// What other options made is replaced with force alone.
+/// Output of other options is replaced with `--force` alone.
 const CALIBRATE_OVER: &[&str] = &[
     "calibrate",
     "two.toml",
@@ -145,7 +145,7 @@ pub const MORE: &[Scenario] = &[
     },
 ];
 
-/// What a place's output folder holds.
+/// Contents of a place's output folder.
 pub fn written(place: &Place) -> Tree {
     tree(&place.path(OUT))
 }
@@ -260,7 +260,7 @@ impl Prepared {
         Ok(())
     }
 
-    /// What `verify` says of every bundle.
+    /// Output of `verify` on every bundle.
     pub fn verified(&self, place: &Place) -> Result<usize, String> {
         let bundles = bundles(&written(place));
         for manifest in &bundles {
@@ -275,11 +275,11 @@ impl Prepared {
     pub fn runs_again(&self, place: &Place) -> Result<(), String> {
         let ran = place.run(self.scenario.args);
         ran.ended_with(&[0])
-            .map_err(|told| format!("again: {told}"))?;
+            .map_err(|reported| format!("again: {reported}"))?;
         self.agrees(place)
     }
 
-    /// What lies there is what an undisturbed run leaves.
+    /// The files are those of an undisturbed run.
     pub fn agrees(&self, place: &Place) -> Result<(), String> {
         same(&written(place), &self.after)
     }
@@ -305,7 +305,7 @@ impl Prepared {
         Ok(found)
     }
 
-    /// What lies there is in order, no bundle is gone; nothing is run again.
+    /// The files are in order, no bundle is gone; nothing is run again.
     pub fn survived_as_it_is(&self, place: &Place) -> Result<Found, String> {
         let found = self.whole_or_absent(place)?;
         found.no_bundle_is_absent()?;
@@ -314,7 +314,7 @@ impl Prepared {
     }
 }
 
-/// What lay there after a run was disturbed.
+/// Files after a run was disturbed.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct Found {
     pub whole: usize,

@@ -1,4 +1,4 @@
-//! What was done and what came of it, as a table.
+//! Tasks and their outcomes, as a table.
 
 use crate::scenario::Found;
 
@@ -12,7 +12,7 @@ pub struct Row {
     pub struck: usize,
     /// Runs after which the same command, undisturbed, ended well and left what it always leaves.
     pub again: usize,
-    /// What lay there afterwards.
+    /// Files afterwards.
     pub found: Found,
 }
 

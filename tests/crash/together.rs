@@ -156,12 +156,12 @@ fn unmixed(now: &Tree, alone: &[Tree], units: &[&str]) -> Result<(), String> {
                 .map(|(path, bytes)| (path.clone(), bytes.clone()))
                 .collect()
         };
-        let told: Vec<String> = alone
+        let reported: Vec<String> = alone
             .iter()
             .filter_map(|tree| same(&part(now), &part(tree)).err())
             .collect();
-        if told.len() == alone.len() {
-            return Err(format!("{unit:?} is of neither run alone: {told:?}"));
+        if reported.len() == alone.len() {
+            return Err(format!("{unit:?} is of neither run alone: {reported:?}"));
         }
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! What a design means where it says nothing.
+//! Defaults of a design.
 
 use std::path::{Path, PathBuf};
 
@@ -34,7 +34,7 @@ fn keys_left_out_take_the_values_that_every_key_shows() {
     );
     assert_eq!(least.wire.resistivity_ohm_m, every.wire.resistivity_ohm_m);
     assert_eq!(least.wire.temperature_c, every.wire.temperature_c);
-    // What has no default is absent.
+    // Keys without a default are absent.
     assert_eq!(
         (least.supply.total_current_max_a, least.supply.voltage_v),
         (None, None)
@@ -146,7 +146,7 @@ fn the_committed_designs_differ_by_the_core() {
 }
 
 #[test]
-fn one_number_stands_for_all_coils_and_a_list_for_each() {
+fn one_number_holds_for_all_coils_and_a_list_for_each() {
     let one = sound(&format!(
         "{CORED}[supply]\ncurrent_max_a = 3\ncurrent_min_a = [0, -1, 0, -1.3, 0, 0]\n"
     ));

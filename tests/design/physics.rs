@@ -365,7 +365,7 @@ fn the_magnet_clears_core_and_winding_at_the_target() {
     );
     // Touching.
     assert_eq!(warned(&at(CORED, "height_mm = 5"), Need::EVALUATE), [""; 0]);
-    // A core that stands out.
+    // A core that protrudes.
     let proud = but(CORED, "[core]", "[core]\nabove_mm = 3.3");
     let said = refused(&at(&proud, "height_mm = 8.2"), Need::EVALUATE);
     assert!(

@@ -30,7 +30,7 @@ enum Tool {
     Python,
 }
 
-/// What a script needs.
+/// Requirements of a script.
 fn tool(script: &str) -> Option<Tool> {
     if script.contains("octave-cli") {
         Some(Tool::Octave)
@@ -179,14 +179,14 @@ fn the_table_of_what_one_percent_changes_is_true() {
         };
         let edited = design.replace(line, &line.replacen(value, &format!("{more:?}"), 1));
         let changed = evaluated(&place, &edited);
-        for (column, told) in cells[2..5].iter().enumerate() {
+        for (column, reported) in cells[2..5].iter().enumerate() {
             let found = 100.0 * (changed[column] / as_given[column] - 1.0);
             let found = if found.abs() < 0.005 {
                 "0".to_owned()
             } else {
                 format!("{found:+.1} %")
             };
-            assert_eq!(*told, found, "{row}");
+            assert_eq!(*reported, found, "{row}");
         }
         checked += 1;
     }

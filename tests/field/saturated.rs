@@ -202,7 +202,7 @@ fn one_coil_is_the_single_coil() {
     assert!((array.fields[0].peak_b_t / field.peak_b_t - 1.0).abs() < 1e-9);
 }
 
-/// What a core feels of another falls like the inverse cube of the distance.
+/// The field of one core at another falls like the inverse cube of the distance.
 #[test]
 fn coils_far_apart_are_single_coils() {
     let current_a = 6.3;

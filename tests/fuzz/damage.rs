@@ -5,14 +5,14 @@ use fluxform_testing::Random;
 /// A damaged document.
 pub struct Mutant {
     pub number: usize,
-    /// What was done.
+    /// The task.
     pub what: String,
     /// The name under which it lies.
     pub file: String,
     pub bytes: Vec<u8>,
 }
 
-/// What a value becomes.
+/// Changed values.
 const VALUES: [&str; 34] = [
     "0",
     "-0.0",

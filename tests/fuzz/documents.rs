@@ -109,7 +109,7 @@ mod linux {
         write("curved.toml", &curved);
     }
 
-    /// What became of the runs of one command.
+    /// Counts of the runs of one command.
     #[derive(Default)]
     struct Tally {
         runs: usize,

@@ -11,7 +11,7 @@ use peak_alloc::PeakAlloc;
 
 use fluxform_testing::Random;
 
-/// What is at a name of an input.
+/// Object at a name of an input.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Content {
     Bytes(Vec<u8>),
@@ -118,7 +118,7 @@ pub struct Kind {
     pub give: Give,
 }
 
-/// What the watch sees: milliseconds since the start when the input began, 0 between inputs.
+/// Time read by the watch: milliseconds since the start when the input began, 0 between inputs.
 pub static BEGAN: AtomicU64 = AtomicU64::new(0);
 
 pub fn millis() -> u64 {
@@ -126,7 +126,7 @@ pub fn millis() -> u64 {
     START.get_or_init(Instant::now).elapsed().as_millis() as u64
 }
 
-/// What became of a kind's inputs.
+/// Counts of a kind's inputs.
 #[derive(Default)]
 pub struct Tally {
     pub inputs: u64,

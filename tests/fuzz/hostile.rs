@@ -213,7 +213,7 @@ fn xml(good: &str, root: &str) -> Vec<(&'static str, String)> {
     ]
 }
 
-/// What unpacks to a thousand times its size.
+/// An archive that unpacks to a thousand times its size.
 fn bomb(names: &[&str], content: &str) -> Vec<Hostile> {
     let blank = format!("{content}{}", " ".repeat(100 << 20));
     let tags = format!("{content}{}", "<a/>".repeat(20 << 20));

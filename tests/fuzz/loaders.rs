@@ -76,7 +76,7 @@ fn the_c_loader_reads_or_refuses_the_same_bundles_under_sanitizers() {
         let _ = child.stdin.take().unwrap().write_all(POSITIONS.as_bytes());
         let output = child.wait_with_output().unwrap();
         let words = String::from_utf8_lossy(&output.stderr);
-        let told = String::from_utf8_lossy(&output.stdout);
+        let reported = String::from_utf8_lossy(&output.stdout);
         let code = output.status.code();
         assert!(matches!(code, Some(0 | 3)), "{what}: {code:?}: {words}");
         assert!(
@@ -88,8 +88,8 @@ fn the_c_loader_reads_or_refuses_the_same_bundles_under_sanitizers() {
             "{what}: no words"
         );
         assert!(
-            !told.contains("nan") && !told.contains("inf"),
-            "{what}: {told}"
+            !reported.contains("nan") && !reported.contains("inf"),
+            "{what}: {reported}"
         );
         if what.starts_with("the map") {
             assert_eq!(code, Some(3), "{what}");
@@ -175,10 +175,10 @@ fn the_python_loader_reads_or_refuses_the_same_bundles_with_its_own_error() {
             .write_all(batch.as_bytes())
             .unwrap();
         let output = child.wait_with_output().unwrap();
-        let told = String::from_utf8_lossy(&output.stdout);
-        assert!(output.status.success(), "Python ended: {told}");
-        assert_eq!(told.lines().count(), names.len(), "{told}");
-        for ((what, bundle), answer) in names.iter().zip(told.lines()) {
+        let reported = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success(), "Python ended: {reported}");
+        assert_eq!(reported.lines().count(), names.len(), "{reported}");
+        for ((what, bundle), answer) in names.iter().zip(reported.lines()) {
             inputs += 1;
             assert!(!answer.contains("FAULT"), "{what}: {answer}");
             if what.contains("the path")
@@ -214,12 +214,12 @@ for k = 1:numel(folders)
             [current, force] = bundle.currents(points);
             found = [found, current, force];
         end
-        told = {'FAULT not finite', 'read'}{1 + all(isfinite(found(:)))};
+        reported = {'FAULT not finite', 'read'}{1 + all(isfinite(found(:)))};
     catch problem
         kind = {'FAULT', 'refused'}{1 + strcmp(problem.identifier, 'fluxform:bundle')};
-        told = [kind, ' ', strrep(problem.message, "\n", ' ')];
+        reported = [kind, ' ', strrep(problem.message, "\n", ' ')];
     end
-    printf('%s\n', told(1:min(end, 300)));
+    printf('%s\n', reported(1:min(end, 300)));
 end
 "#;
 
@@ -244,9 +244,9 @@ fn the_octave_loader_reads_or_refuses_the_same_bundles_with_its_own_error() {
         .current_dir(folder.path())
         .output()
         .unwrap();
-    let told = String::from_utf8_lossy(&output.stdout);
+    let reported = String::from_utf8_lossy(&output.stdout);
     let errors = String::from_utf8_lossy(&output.stderr);
-    let last = told.lines().count();
+    let last = reported.lines().count();
     assert_eq!(
         last,
         names.len(),
@@ -254,7 +254,7 @@ fn the_octave_loader_reads_or_refuses_the_same_bundles_with_its_own_error() {
         names.get(last)
     );
     let mut read = 0;
-    for ((what, bundle), answer) in names.iter().zip(told.lines()) {
+    for ((what, bundle), answer) in names.iter().zip(reported.lines()) {
         assert!(!answer.contains("FAULT"), "{what}: {answer}");
         if what.contains("the path")
             || what.starts_with("the map")

@@ -44,8 +44,8 @@ const MUTANTS: u64 = 60;
 /// into the seconds that `FLUXFORM_HOSTILE_SECONDS` gives each kind and loader.
 pub(crate) fn another(mutants: u64, start: Instant) -> bool {
     match std::env::var("FLUXFORM_HOSTILE_SECONDS") {
-        Ok(told) => {
-            let seconds: f64 = told.parse().expect("a number of seconds");
+        Ok(reported) => {
+            let seconds: f64 = reported.parse().expect("a number of seconds");
             start.elapsed().as_secs_f64() < seconds
         }
         Err(_) => mutants < MUTANTS,
@@ -94,8 +94,8 @@ fn every_kind_of_input_is_read_or_refused_within_its_limits() {
             tally.largest
         );
         assert!(tally.read > 0, "{}: nothing is read", kind.name);
-        let told = |(fault, count)| format!("{}: {count} x {fault}", kind.name);
-        faults.extend(tally.faults.into_iter().map(told));
+        let reported = |(fault, count)| format!("{}: {count} x {fault}", kind.name);
+        faults.extend(tally.faults.into_iter().map(reported));
     }
     drop(std::panic::take_hook());
     assert!(faults.is_empty(), "{}", faults.join("\n"));

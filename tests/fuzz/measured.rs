@@ -17,7 +17,7 @@ pub struct Measured {
     pub seconds: f64,
     /// The most memory that it was seen to hold, KiB.
     pub kib: u64,
-    /// What it printed, on both streams.
+    /// Its output, on both streams.
     pub said: String,
 }
 
@@ -44,7 +44,7 @@ pub fn measured(place: &Path, words: &[&str]) -> Measured {
     let seconds = loop {
         let status = facts("status").unwrap_or_default();
         kib = kib.max(number_after(&status, "VmHWM:"));
-        // What ended keeps its times until it is waited for.
+        // A process that ended keeps its times until it is waited for.
         let stat = facts("stat").unwrap_or_default();
         let after_name = stat.rsplit(") ").next().unwrap_or("");
         let words: Vec<&str> = after_name.split(' ').collect();

@@ -48,7 +48,7 @@ const FORMATS: [&str; 10] = [
     "stl", "obj", "ply", "off", "glb", "png", "3mf", "amf", "3dxml", "sldprt",
 ];
 
-/// What the watch sees: milliseconds since the start when the input began, 0 between inputs.
+/// Time read by the watch: milliseconds since the start when the input began, 0 between inputs.
 static BEGAN: AtomicU64 = AtomicU64::new(0);
 
 fn seeds(format: SurfaceFormat) -> Vec<Seed> {

@@ -15,7 +15,7 @@ struct Problem {
     wanted_n: f64,
 }
 
-/// What an exhaustive search finds.
+/// Result of an exhaustive search.
 struct Exhaustive {
     /// The largest force in the wanted direction.
     most_n: f64,
@@ -95,7 +95,7 @@ impl Problem {
                 .collect();
             let sum: f64 = at_limits.iter().sum();
             let force: f64 = (0..n).map(|i| at_limits[i] * self.force_n_per_a[i]).sum();
-            // The largest force stands at a corner: at most one coil is free, by the sum.
+            // The largest force is at a corner: at most one coil is free, by the sum.
             if free.len() <= 1 {
                 let mut corner = at_limits.clone();
                 if let (Some(&i), Some(total)) = (free.first(), self.total_a) {

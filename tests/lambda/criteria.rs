@@ -1,7 +1,7 @@
 //! Every criterion of thousands of small problems against a second exact method: all vertices,
 //! or proofs from both sides that share no code with the path.
 
-// The largest errors found are told with --nocapture.
+// The largest errors found are printed with --nocapture.
 #![allow(clippy::print_stdout)]
 
 use fluxform_base::units::DETECTION_THRESHOLD_N;
@@ -16,7 +16,7 @@ fn top(case: &Case) -> f64 {
     case.heights.iter().fold(0.0, |most, &h| most.max(h))
 }
 
-/// What the limits let the coils push at any point, at most.
+/// Largest force that the limits allow at any point.
 fn reach(case: &Case) -> f64 {
     let m = case.coils();
     let push = |i: usize| {
@@ -163,14 +163,14 @@ fn worst_point_constants_stand_between_proofs() {
         if linear <= 0.0 || jnd <= 0.0 || solution.accuracy.estimate > 1e-11 {
             continue;
         }
-        let told = [
+        let reported = [
             linear * (1.0 - 1e-9),
             linear * 1.01,
             jnd,
             jnd * 1.001,
             jnd * 3.0,
         ];
-        let Some(found) = told.map(excess).into_iter().collect::<Option<Vec<_>>>() else {
+        let Some(found) = reported.map(excess).into_iter().collect::<Option<Vec<_>>>() else {
             continue;
         };
         let gap = found.iter().fold(0.0_f64, |most, f| most.max(f.1));

@@ -26,7 +26,7 @@ fn all_lambdas(s: &Solution) -> [Option<f64>; 3] {
 }
 
 #[test]
-fn nothing_to_render_and_nothing_wanted_are_results() {
+fn nothing_to_render_and_no_force_requested_are_results() {
     let mut attract = plain_case();
     attract.forces.iter_mut().for_each(|v| *v = -*v);
     let solution = attract.solve();
@@ -51,7 +51,7 @@ fn nothing_to_render_and_nothing_wanted_are_results() {
 
 /// Nothing is wanted there, so no error can be a share of it.
 #[test]
-fn an_error_is_relative_only_where_something_is_wanted() {
+fn an_error_is_relative_only_where_a_force_is_requested() {
     let at = |lambda: f64| {
         let settings = Settings {
             at_n_per_m: Some(lambda),
@@ -260,7 +260,7 @@ fn a_gain_beyond_what_can_be_computed_is_refused() {
 }
 
 #[test]
-fn a_value_that_is_no_number_is_refused_wherever_it_stands() {
+fn nan_is_refused_in_every_place() {
     for points in 1..=4 {
         let mut case = plain_case();
         case.heights = vec![0.05; points];

@@ -43,9 +43,9 @@ fn check_small(seed: u64) {
         );
     }
     let breakpoints = solution.path.breakpoints();
-    let told = breakpoints.iter().skip(1).all(|b| !b.events.is_empty());
+    let reported = breakpoints.iter().skip(1).all(|b| !b.events.is_empty());
     assert!(
-        told || solution.rank < case.coils(),
+        reported || solution.rank < case.coils(),
         "{seed}: {breakpoints:?}"
     );
     check_criteria(seed, &case, &search, &solution);

@@ -64,7 +64,7 @@ fn check(case: &Case, what: &str) -> WorstSolution {
         let scale = lambda * top(case) + most_offset;
         let point = solution.at(&case.problem(), lambda);
         assert_within_limits(case, &point.currents_a, what);
-        let told = solution.path.worst_error_n(lambda);
+        let reported = solution.path.worst_error_n(lambda);
         let sum = |amperes: &dyn Fn(usize) -> f64| -> f64 {
             let column = |i: usize| case.forces.iter().skip(i).step_by(case.coils());
             let most = |i: usize| column(i).fold(0.0_f64, |m, g| m.max(g.abs()));
@@ -74,8 +74,8 @@ fn check(case: &Case, what: &str) -> WorstSolution {
         // Rounded multipliers leave forces times what the limits allow.
         let proof = rounding + 1e-15 * sum(&|i| case.upper[i] - case.lower[i]);
         assert!(
-            (point.worst_error_n - told).abs() <= rounding,
-            "{what} at {lambda}: currents give {:e}, path {told:e}; {case:?}",
+            (point.worst_error_n - reported).abs() <= rounding,
+            "{what} at {lambda}: currents give {:e}, path {reported:e}; {case:?}",
             point.worst_error_n
         );
         assert!(
@@ -86,8 +86,8 @@ fn check(case: &Case, what: &str) -> WorstSolution {
         if let (Some(vertices), true) = (&vertices, scale > 0.0) {
             let exact = vertices.least(lambda, scale);
             assert!(
-                (exact - told).abs() <= rounding,
-                "{what} at {lambda}: {told:e} not {exact:e}; {case:?}"
+                (exact - reported).abs() <= rounding,
+                "{what} at {lambda}: {reported:e} not {exact:e}; {case:?}"
             );
         }
     }
@@ -130,7 +130,7 @@ fn scales_copies_and_order_do_not_matter() {
         let m = base.coils();
         turned.heights.reverse();
         turned.forces = base.forces.chunks(m).rev().flatten().copied().collect();
-        let told = solved(&base);
+        let reported = solved(&base);
         for (case, factor, size) in [
             (scaled, force * current / height, force * current),
             (twice, 1.0, 1.0),
@@ -138,10 +138,10 @@ fn scales_copies_and_order_do_not_matter() {
         ] {
             let other = solved(&case);
             assert!(other.complete);
-            let part = 4e-12 + 4.0 * told.accuracy.estimate;
+            let part = 4e-12 + 4.0 * reported.accuracy.estimate;
             let pairs = [
-                (told.lambda_linear_n_per_m, other.lambda_linear_n_per_m),
-                (told.lambda_jnd_n_per_m, other.lambda_jnd_n_per_m),
+                (reported.lambda_linear_n_per_m, other.lambda_linear_n_per_m),
+                (reported.lambda_jnd_n_per_m, other.lambda_jnd_n_per_m),
             ];
             for (a, b) in pairs {
                 assert_eq!(a.is_some(), b.is_some(), "{seed}: {base:?}");
@@ -151,9 +151,9 @@ fn scales_copies_and_order_do_not_matter() {
                     "{seed}: {a} {b} {base:?}"
                 );
             }
-            for lambda in telling(&told) {
+            for lambda in telling(&reported) {
                 let (a, b) = (
-                    told.path.worst_error_n(lambda) * size,
+                    reported.path.worst_error_n(lambda) * size,
                     other.path.worst_error_n(lambda * factor),
                 );
                 let scale = lambda * top(&base) * size;
@@ -190,7 +190,7 @@ fn the_path_is_convex_and_its_constants_are_where_they_are_defined() {
             let scale = lambda * top(&case);
             (limited.least(lambda, scale) - free.least(lambda, scale)) / scale
         };
-        // Currents that nearly cancel leave rounding in forces, which the estimate tells.
+        // Currents that nearly cancel leave rounding in forces, which the estimate states.
         if solution.accuracy.estimate > 1e-12 {
             continue;
         }
@@ -261,7 +261,7 @@ fn maxmin_leaves_no_point_too_weak_and_nothing_better_is_found() {
             least(&found.currents_a, lambda) >= -1e-13 * size,
             "{seed}: {case:?}"
         );
-        // With an offset of -lambda h and no height, t* tells whether a lambda can be held.
+        // With an offset of -lambda h and no height, t* decides whether a lambda can be held.
         let beyond = lambda * (1.0 + 1e-9) + 1e-9;
         let reachable = |lambda: f64| {
             // |t - (G I + offset - lambda h)| <= t for large t: one-sided by a shift.
@@ -466,8 +466,8 @@ fn forces_without_an_inverse_do_not_hide_missed_points() {
     let solution = solved(&case);
     assert!(solution.complete);
     let point = solution.at(&case.problem(), 3.0);
-    let told = solution.path.worst_error_n(3.0);
-    assert!((point.worst_error_n - told).abs() < 1e-14, "{told}");
+    let reported = solution.path.worst_error_n(3.0);
+    assert!((point.worst_error_n - reported).abs() < 1e-14, "{reported}");
     assert!(point.active.iter().any(|active| active.point == 7000));
 }
 
@@ -537,7 +537,7 @@ fn a_twin_of_an_active_point_does_not_hide_the_one_missed_next() {
 /// Only so many twins are asked for before a step: one that is too long must be taken back. t* was
 /// off by up to 3 % of lambda max h where it was not.
 #[test]
-fn more_twins_than_are_asked_for_do_not_hide_the_one_missed_next() {
+fn more_twins_than_requested_do_not_hide_the_next_miss() {
     let mut numbers = Random::new(31);
     for round in 0..30 {
         let size = [1e-14, 3e-14, 1e-13][round % 3];
@@ -603,7 +603,7 @@ fn a_coil_of_next_to_no_force_at_the_highest_point_does_not_stop_the_path() {
 }
 
 #[test]
-fn turns_tell_what_the_currents_do() {
+fn turns_report_the_change_of_the_currents() {
     // One coil under one point: it leaves zero at once and meets 1.3 A at 0.7 * 1.3 / 0.05 N/m.
     let case = Case {
         forces: vec![0.7],

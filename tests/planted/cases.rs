@@ -1,4 +1,4 @@
-//! What is planted where: one case is one run of one command with one thing in its way.
+//! The planted cases: one case is one run of one command with one object in its way.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -18,7 +18,7 @@ pub const VICTIMS: &str = "victims";
 /// Where commands write.
 const OUT: &str = "out";
 
-/// What is laid at a name.
+/// Object planted at a name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Plant {
     LinkToFile,
@@ -97,7 +97,7 @@ impl Plant {
     }
 }
 
-/// What kind of name it is that something is planted at.
+/// Kinds of names at which something is planted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// A file that the command writes.
@@ -308,7 +308,7 @@ pub struct Case {
 /// A place with the thing planted; `None` where it cannot be.
 pub struct Laid {
     pub place: PathBuf,
-    /// What an earlier run of ours wrote and nobody touched since.
+    /// Files that an earlier run wrote and nobody changed since.
     pub ours: BTreeSet<String>,
 }
 

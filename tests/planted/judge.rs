@@ -21,7 +21,7 @@ pub struct Row {
     pub force: bool,
     pub refused: bool,
     pub code: Option<i32>,
-    /// What of the user's changed that must not.
+    /// Files of the user that changed and must not.
     pub changed: Vec<String>,
     pub said: String,
 }
@@ -88,7 +88,7 @@ fn row(
     }
 }
 
-/// What the program may replace or remove.
+/// Files that the program may replace or remove.
 fn may_change(prepared: &Prepared, case: &Case, laid: &Laid, ran: &Ran, path: &str) -> bool {
     let writes = &prepared.writes;
     // Leftovers of killed runs have names that nobody else uses.
@@ -110,7 +110,7 @@ fn may_change(prepared: &Prepared, case: &Case, laid: &Laid, ran: &Ran, path: &s
             | Plant::Closed => false,
         };
     }
-    // What an earlier run wrote is replaced by a run that is not refused; what is cached goes when it
+    // Output of an earlier run is replaced by a run that is not refused; the cache goes when it
     // is of no use any more.
     if laid.ours.contains(path) {
         return !case.refused || path.contains("/.fluxform-kept");

@@ -1,11 +1,11 @@
-//! What lies in a folder: kind, mode, bytes and link target of every entry.
+//! Contents of a folder: kind, mode, bytes and link target of every entry.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::fs::{FileTypeExt, PermissionsExt};
 use std::path::Path;
 
-/// What is at a name.
+/// Object at a name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Kind {
     File(Vec<u8>),

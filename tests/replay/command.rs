@@ -90,15 +90,15 @@ fn streams_and_json_hold_one_thing_each() {
     assert!(header.contains(",commanded_0_a,") && header.ends_with(",status"));
     assert_eq!(ran.out.lines().count(), 4);
     assert!(!place.path("replay.csv").exists());
-    let told = replay(
+    let reported = replay(
         &place,
         "flat --synthesize circle --format json --duration 2",
     )
     .ends(0);
-    let told = told.json();
-    assert_eq!(told["trajectory"]["positions"], 101);
-    assert_eq!(told["trajectory"]["source"], "a circle");
-    assert_eq!(told["warnings"], serde_json::json!([]));
+    let reported = reported.json();
+    assert_eq!(reported["trajectory"]["positions"], 101);
+    assert_eq!(reported["trajectory"]["source"], "a circle");
+    assert_eq!(reported["warnings"], serde_json::json!([]));
 }
 
 #[test]
@@ -112,7 +112,7 @@ fn a_made_up_trajectory_replays_to_the_same_table() {
 }
 
 #[test]
-fn bad_trajectories_are_told_with_their_line() {
+fn bad_trajectories_are_reported_with_their_line() {
     let place = with_a_bundle();
     for (text, words) in [
         ("", &["bad.csv:1: column t_s is missing"][..]),

@@ -1,4 +1,4 @@
-//! What a replay must do: meet the force where it can, at least power, and let currents lag.
+//! Requirements on a replay: meet the force where it can, at least power, and let currents lag.
 
 use fluxform::bundle::replay::Answer;
 use fluxform::bundle::trajectory::Trajectory;
@@ -12,7 +12,7 @@ use fluxform_testing::Random;
 
 use crate::support::{coupled, in_air};
 
-fn told() -> TrajectorySource {
+fn reported() -> TrajectorySource {
     TrajectorySource {
         source: "a test".to_owned(),
         input: None,
@@ -21,7 +21,7 @@ fn told() -> TrajectorySource {
 }
 
 fn replayed(opened: &Opened, trajectory: &Trajectory, dynamics: bool) -> ReplayReport {
-    run(opened, trajectory, told(), dynamics, &Silent).expect("replays")
+    run(opened, trajectory, reported(), dynamics, &Silent).expect("replays")
 }
 
 fn explored(opened: &Opened, seed: u64) -> Trajectory {
@@ -303,7 +303,7 @@ fn older_bundles_replay_but_know_no_lag() {
         replayed(&reopened, &trajectory, false),
     );
     assert!(now.rows == then.rows);
-    let refused = run(&reopened, &trajectory, told(), true, &Silent).unwrap_err();
+    let refused = run(&reopened, &trajectory, reported(), true, &Silent).unwrap_err();
     assert_eq!(refused.exit_code(), 3);
     let words = refused.to_string();
     assert!(

@@ -56,7 +56,7 @@ fn a_twisted_cell_differs_by_a_quarter_of_its_twist() {
 
 #[test]
 fn a_roof_differs_at_its_ridge() {
-    // The ridge stands at x = 0.3 of a cell from 0 to 1, over level ground.
+    // The ridge is at x = 0.3 of a cell from 0 to 1, over level ground.
     let mesh = exact(roof(
         &[[-2.0, 0.5], [0.0, 0.5], [0.3, 0.74], [1.0, 0.5], [3.0, 0.5]],
         [-1.0, 2.0],
@@ -210,7 +210,7 @@ fn random_soups_match_a_ray_caster() {
             let sign = [1.0, -1.0][k];
             let mut beside = f64::NEG_INFINITY;
             for n in 0..4000 {
-                // A sliver is so steep that only the nearest places tell.
+                // A sliver is so steep that only the nearest places decide.
                 let hair = [3e-9, 3e-12, 3e-14][n % 3];
                 let p = extreme
                     .at_m
@@ -339,7 +339,7 @@ fn fans_t_junctions_and_doubled_faces_change_nothing() {
     let base: Vec<Triangle> = (1..299).map(|k| [rim[0], rim[k], rim[k + 1]]).collect();
     let plan = grid((0.0, 1.0, 7), (0.0, 1.0, 6));
     let (wanted, _) = certified(&exact(fan.clone()), &plan);
-    // The apex stands out of its cell.
+    // The apex protrudes of its cell.
     assert!(wanted.above.at_m == [0.51, 0.47], "{wanted:?}");
     let mut closed = [fan.clone(), base].concat();
     closed.extend_from_slice(&fan[..50]);
@@ -487,18 +487,18 @@ fn a_turned_body_is_certified_alike_on_any_number_of_threads() {
 }
 
 #[test]
-fn a_certificate_holds_what_was_asked_for() {
+fn a_certificate_holds_the_requested_distances() {
     let mesh = exact(roof(&[[-2.0, 0.5], [0.3, 0.7], [3.0, 0.5]], [-1.0, 2.0]));
     let plan = grid((-1.0, 1.0, 3), (-0.5, 0.5, 3));
     let samples = sample(&mesh, &plan);
     let surface = Surface::Mesh(mesh);
-    let told = |how| {
+    let reported = |how| {
         let found = certify(&surface, &plan, &samples, how, &Silent).unwrap();
         found.map(|certificate| certificate.hausdorff.is_some())
     };
-    assert_eq!(told(Certify::No), None);
-    assert_eq!(told(Certify::Vertical), Some(false));
-    assert_eq!(told(Certify::Distance), Some(true));
+    assert_eq!(reported(Certify::No), None);
+    assert_eq!(reported(Certify::Vertical), Some(false));
+    assert_eq!(reported(Certify::Distance), Some(true));
 }
 
 /// The largest over all cells is the whole grid's; a cell without its four points has none.

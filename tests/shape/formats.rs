@@ -414,7 +414,7 @@ fn more_elements_than_are_made_at_once_are_all_read() {
     }
 }
 
-/// What Blender, MeshLab, CAD programs and scanners write around the same tetrahedron.
+/// Files as Blender, MeshLab, CAD programs and scanners write them around the same tetrahedron.
 #[test]
 fn the_oddities_of_writers_change_nothing() {
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();

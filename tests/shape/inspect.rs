@@ -1,4 +1,4 @@
-//! What is told of a surface's file before anything is made of it.
+//! Report on a surface's file before it is placed.
 
 use fluxform_shape::MeshReport;
 use fluxform_shape::document::SurfaceFormat;

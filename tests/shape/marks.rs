@@ -1,4 +1,4 @@
-//! What points are besides heights, holes, and points on no grid.
+//! Flags of points, holes, and points on no grid.
 
 use std::f64::consts::PI;
 
@@ -107,7 +107,7 @@ fn a_table_has_an_overhang() {
 }
 
 #[test]
-fn holes_are_told_and_filled_only_when_asked() {
+fn holes_are_reported_and_filled_only_on_request() {
     // A tilted plate with a square hole from -0.3 to 0.3.
     let z = |x: f64, y: f64| 0.5 + 0.2 * x - 0.1 * y;
     let quad = |[x, p]: [f64; 2], [y, q]: [f64; 2]| {
@@ -154,7 +154,7 @@ fn random_holes_are_those_that_no_flood_reaches() {
         &exact(block([-1.0; 3], [1.0; 3])),
         &grid((0.0, 1.0, 2), (0.0, 1.0, 2)),
     )[0];
-    let mut told = 0;
+    let mut reported = 0;
     for _ in 0..1000 {
         let (columns, rows) = (1 + random.below(7), 1 + random.below(7));
         let plan = grid((0.0, 1.3, columns), (0.0, 0.7, rows));
@@ -183,9 +183,9 @@ fn random_holes_are_those_that_no_flood_reaches() {
         let dry = |k: &usize| samples[*k].is_none() && !wet[k / columns + 1][k % columns + 1];
         let wanted: Vec<usize> = (0..samples.len()).filter(dry).collect();
         assert_eq!(holes(&plan, &samples), wanted, "{columns} x {rows}");
-        told += wanted.len();
+        reported += wanted.len();
     }
-    assert!(told > 200, "{told}");
+    assert!(reported > 200, "{reported}");
 }
 
 #[test]

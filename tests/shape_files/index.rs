@@ -10,7 +10,7 @@ use fluxform_testing::needs::{self, Trial, corpus_folder};
 use fluxform_testing::trials;
 
 pub fn trials() -> Vec<Trial> {
-    trials! { needs::corpus() => [real_files_have_the_indexs_facts, components_in_other_parts_are_placed, an_amf_body_is_whole, a_native_part_is_its_stl_within_the_stated_deviation, open_edges_and_units_are_told] }
+    trials! { needs::corpus() => [real_files_have_the_indexs_facts, components_in_other_parts_are_placed, an_amf_body_is_whole, a_native_part_is_its_stl_within_the_stated_deviation, open_edges_and_units_are_reported] }
 }
 
 /// One line of the index, by the names of its columns.
@@ -77,7 +77,7 @@ fn real_files_have_the_indexs_facts() {
         if !differs("watertight") {
             assert_eq!(report.watertight, entry["watertight"] == "True", "{name}");
         }
-        // The index tells native parts in millimetres.
+        // The index lists native parts in millimetres.
         let unit = if name.ends_with("SLDPRT") {
             1000.0
         } else {
@@ -152,7 +152,7 @@ fn a_native_part_is_its_stl_within_the_stated_deviation() {
     );
 }
 
-fn open_edges_and_units_are_told() {
+fn open_edges_and_units_are_reported() {
     let (holes, metres) = (
         report("assimp__sphereWithHole.stl"),
         report("swurdf__base_link.STL"),

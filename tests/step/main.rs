@@ -14,7 +14,7 @@ fn main() -> ExitCode {
     needs::run(trials! {
         None => [
             without_opencascade_the_message_names_how_step_is_read,
-            what_is_no_step_file_is_refused_before_python_is_asked,
+            anything_but_a_step_file_is_refused_before_python_starts,
             a_reader_that_answers_nonsense_is_refused,
             a_chord_and_a_body_are_for_step_alone,
         ],
@@ -142,7 +142,7 @@ fn without_opencascade_the_message_names_how_step_is_read() {
     }
 }
 
-fn what_is_no_step_file_is_refused_before_python_is_asked() {
+fn anything_but_a_step_file_is_refused_before_python_starts() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("part.stp"), "solid x").unwrap();
     let arguments = ["--python", "no-such-python", "discretize", "part.stp"];
@@ -305,7 +305,7 @@ fn an_assembly_has_its_placements_names_and_colours() {
         &[40.0, 30.0, 14.0],
         1e-9,
     );
-    // The second pin is turned: 2 mm along x, to the left of where it stands, 8 mm along y.
+    // The second pin is turned: 2 mm along x, to the left of where it is, 8 mm along y.
     let grid = ["--grid", "81x61", "--rest-on", "0mm"];
     let (rows, _) = heights("assembly.step", &grid, folder.path());
     let inside = |x: f64, [from, to]: [f64; 2]| x > from + 1e-6 && x < to - 1e-6;

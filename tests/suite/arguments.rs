@@ -77,7 +77,7 @@ pub struct Arguments {
 const WHOLE: &str = "results/bench";
 const PART: &str = "results/bench-part";
 
-/// What a process of its own measures.
+/// Quantities measured by a separate process.
 #[derive(Debug, Clone)]
 struct SizeRowArgument {
     stage: String,
@@ -178,7 +178,7 @@ impl Arguments {
             write_catalogue(&rows, made_with.clone(), out, self.writing.force)?;
         }
         let table = catalogue_file(&rows, made_with);
-        printer.summary(Stream::Output, &table, || told_cases(&table.cases))?;
+        printer.summary(Stream::Output, &table, || cases_text(&table.cases))?;
         let failed: Vec<&str> = (table.cases.iter())
             .filter(|row| !row.pass)
             .map(|row| row.name.as_str())
@@ -196,7 +196,7 @@ impl Arguments {
 }
 
 /// Every case in a line, what was expected and what came out where they differ.
-fn told_cases(rows: &[CaseRow]) -> String {
+fn cases_text(rows: &[CaseRow]) -> String {
     let passed = rows.iter().filter(|row| row.pass).count();
     let mut sheet = Sheet::new(&format!(
         "the stability catalogue: {passed} of {} as expected",
@@ -251,7 +251,7 @@ fn summary(file: &BenchFile, folder: &str) -> String {
                 curve.knob.clone(),
             ];
             for row in [curve.rows.first(), default, curve.rows.last()] {
-                cells.extend(told(row));
+                cells.extend(reported(row));
             }
             rows.push(cells);
         }
@@ -273,7 +273,7 @@ fn summary(file: &BenchFile, folder: &str) -> String {
 }
 
 /// Error and time of a row.
-fn told(row: Option<&Row>) -> [String; 2] {
+fn reported(row: Option<&Row>) -> [String; 2] {
     row.map_or_else(<[String; 2]>::default, |row| {
         [number_to(row.error, 2), si(row.seconds, "s")]
     })

@@ -28,14 +28,14 @@ pub struct CatalogueFile {
     pub files: Vec<FileEntry>,
 }
 
-/// What became of a case.
+/// Outcome of a case.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct CaseRow {
     /// The case's name.
     pub name: String,
-    /// What must come out.
+    /// Expected result.
     pub expected: String,
-    /// What came out.
+    /// The outcome.
     pub got: String,
     /// How far off it is, in the unit that `expected` names; null where there is no number.
     #[serde(serialize_with = "finite_or_null")]

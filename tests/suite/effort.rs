@@ -63,14 +63,14 @@ impl Pace {
     }
 }
 
-/// What a row says besides its seconds.
+/// Entries of a row in addition to its seconds.
 #[derive(Debug, Clone, Copy)]
 pub struct Found {
     /// The knob.
     pub knob: f64,
     /// Whether it is the default.
     pub default: bool,
-    /// What the seconds are for.
+    /// Work that the seconds measure.
     pub items: usize,
     /// Largest error found.
     pub error: f64,

@@ -32,7 +32,7 @@ pub struct BenchFile {
     pub scaling: Vec<Law>,
     /// Why peers that were asked for have no curve.
     pub peers_missing: Vec<String>,
-    /// What every stage says of its error at the default knob.
+    /// The error that every stage states at the default knob.
     pub accuracy: BTreeMap<String, StageAccuracy>,
     /// Table, plots and summary.
     pub files: Vec<FileEntry>,
@@ -43,11 +43,11 @@ pub struct BenchFile {
 pub struct StageCurves {
     /// Name on the command line.
     pub stage: String,
-    /// What is timed.
+    /// Work that is timed.
     pub timed: String,
-    /// What the error is relative to, or its unit.
+    /// Reference of the error, or its unit.
     pub error_of: String,
-    /// What the program does by default, and why, in words.
+    /// Default behaviour and its reason, in words.
     pub default: String,
     /// Curves: of each knob, route or problem, and of peers.
     pub curves: Vec<Curve>,
@@ -56,13 +56,13 @@ pub struct StageCurves {
 /// Rows along one knob.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Curve {
-    /// What is computed how.
+    /// Method of the computation.
     pub name: String,
     /// `fluxform`, or the peer's name and version.
     pub program: String,
-    /// What is swept, with its unit.
+    /// The parameter that is swept, with its unit.
     pub knob: String,
-    /// What the error is measured against.
+    /// Reference of the error.
     pub reference: String,
     /// The reference's own error, like the rows'.
     pub reference_error: f64,
@@ -104,9 +104,9 @@ pub struct Row {
 /// Time and memory of one stage against one size: `seconds = a size^slope`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Law {
-    /// What is computed.
+    /// The quantity computed.
     pub stage: String,
-    /// What grows.
+    /// The size that grows.
     pub axis: String,
     /// Its value on the seed.
     pub seed_size: f64,
@@ -139,11 +139,11 @@ pub struct SizeRow {
     pub seconds_high: f64,
     /// Time by the clock, the least, s.
     pub elapsed_s: f64,
-    /// Most memory that the process held, bytes; 0 where the system does not tell.
+    /// Most memory that the process held, bytes; 0 where the system does not report it.
     pub peak_bytes: u64,
 }
 
-/// What a law says of a size that was not measured.
+/// Extrapolation to a size that was not measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Outlook {
     /// Times the seed's size.
@@ -152,7 +152,7 @@ pub struct Outlook {
     pub seconds: f64,
     /// Bytes.
     pub bytes: f64,
-    /// What gives way first: `time` (an hour), `memory` (24 GiB), or nothing.
+    /// The limit met first: `time` (an hour), `memory` (24 GiB), or none.
     pub breaks: Option<String>,
 }
 
@@ -174,7 +174,7 @@ pub const BENCH_COLUMNS: [&str; 14] = [
     "reference",
 ];
 
-/// Writes every row of every curve; the reference with its own error stands in each.
+/// Writes every row of every curve; the reference with its own error is in each.
 ///
 /// # Errors
 /// The writer's.

@@ -59,7 +59,7 @@ impl BuiltIn {
     /// The design that it describes.
     ///
     /// # Errors
-    /// A design that cannot be read: a mistake of the program, told like a user's.
+    /// A design that cannot be read: a mistake of the program, reported like a user's.
     pub fn design(&self, need: Need) -> Result<Design, RunError> {
         let read = Design::from_toml(self.text, Path::new(self.path), need);
         read.map(|(design, _)| design)

@@ -34,7 +34,7 @@ use fluxform::RunError;
 use fluxform::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
 use fluxform::progress::Progress;
 
-/// What is asked.
+/// The request.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BenchRequest {
     /// How much of every curve.
@@ -58,7 +58,7 @@ fn chosen(request: &BenchRequest) -> impl Iterator<Item = &'static Stage> {
     })
 }
 
-/// What goes into them, each once.
+/// Their inputs, each once.
 fn inputs(request: &BenchRequest) -> Vec<Input> {
     let mut all: Vec<Input> = Vec::new();
     for input in chosen(request).flat_map(Stage::inputs) {

@@ -1,4 +1,4 @@
-//! The most memory that this process held, as the system tells it.
+//! The most memory that this process held, as the system reports it.
 
 /// The peak of the resident memory (`VmHWM`), bytes; 0 where there is no `/proc`.
 #[must_use]

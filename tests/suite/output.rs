@@ -1,4 +1,4 @@
-//! The files of a run: table, plots, summary, and the JSON that tells of all.
+//! The files of a run: table, plots, summary, and the JSON that describes all.
 
 use std::path::Path;
 
@@ -98,8 +98,8 @@ pub fn write(file: &mut BenchFile, folder: &Path, force: bool) -> Result<(), Run
         entries.push(FileEntry::new(name, drawn));
     }
     let text = markdown(file);
-    let told = set.write("summary.md", |out| out.write_all(text.as_bytes()))?;
-    entries.push(FileEntry::new("summary.md", told));
+    let reported = set.write("summary.md", |out| out.write_all(text.as_bytes()))?;
+    entries.push(FileEntry::new("summary.md", reported));
     let html = page::html(file);
     let shown = set.write(PAGE, |out| out.write_all(html.as_bytes()))?;
     entries.push(FileEntry::new(PAGE, shown));
@@ -137,7 +137,7 @@ pub fn write_catalogue(
     Ok(set.commit()?)
 }
 
-/// The catalogue as `extreme.json` and standard output tell it.
+/// The catalogue as `extreme.json` and standard output give it.
 #[must_use]
 pub fn catalogue_file(cases: &[CaseRow], made_with: Options) -> CatalogueFile {
     CatalogueFile {

@@ -13,7 +13,7 @@ use crate::summary::ratios;
 
 /// Name of a page.
 pub const PAGE: &str = "report.html";
-/// What rounding may add to a stated error, relative to it.
+/// Largest part of rounding in a stated error, relative to it.
 const ROUNDING: f64 = 1e-6;
 
 /// A default on a curve.
@@ -58,7 +58,7 @@ pub fn html(file: &BenchFile) -> String {
         .collect();
     sections.push(sources(&inputs));
     let mut lead = Html::default();
-    lead.element("p class=\"lead\"", &told(&standings));
+    lead.element("p class=\"lead\"", &reported(&standings));
     Page {
         kind: "Measurement",
         title: "Error against processor time".to_owned(),
@@ -100,7 +100,7 @@ fn worst<'a, 'b>(all: &'b [Standing<'a>]) -> Option<&'b Standing<'a>> {
     stating.max_by(|a, b| used(a).total_cmp(&used(b)))
 }
 
-fn told(all: &[Standing]) -> String {
+fn reported(all: &[Standing]) -> String {
     let stating = all.iter().filter(|one| one.kept().is_some()).count();
     let kept = all.iter().filter(|one| one.kept() == Some(true)).count();
     let Some(worst) = worst(all) else {
@@ -355,7 +355,7 @@ fn name(curve: &Curve) -> String {
 }
 
 fn drawn(stage: &StageCurves) -> Value {
-    // What it is relative to stands below the drawing.
+    // Its reference is printed below the drawing.
     let label = if unit_of(&stage.error_of).starts_with("error / m") {
         "error / m"
     } else {

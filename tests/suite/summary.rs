@@ -123,7 +123,7 @@ fn stage_table(stage: &StageCurves) -> String {
 /// or, where that is coarser, as the reference; a sentence a peer.
 #[must_use]
 pub fn ratios(stage: &StageCurves) -> Vec<String> {
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     for curve in stage.curves.iter().filter(|c| c.is_peer()) {
         let least = curve.rows.iter().map(|row| row.error);
         let least = least.fold(f64::INFINITY, f64::min);
@@ -144,7 +144,7 @@ pub fn ratios(stage: &StageCurves) -> Vec<String> {
         let same = |c: &&Curve| !c.is_peer() && c.name == curve.name;
         let ours = stage.curves.iter().find(same);
         if let Some(ours) = ours.and_then(|ours| first(ours, Some(theirs.items))) {
-            told.push(format!(
+            reported.push(format!(
                 "{}, {} {}: error {} in {}; fluxform: error {} in {}. Ratio of times {} ({} to {} \
                  by the quartiles).",
                 curve.program,
@@ -160,7 +160,7 @@ pub fn ratios(stage: &StageCurves) -> Vec<String> {
             ));
         }
     }
-    told
+    reported
 }
 
 /// The exponent of the error against the knob over the rows that are above the reference's own
@@ -315,7 +315,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_told_with_three_digits_and_a_unit() {
+    fn numbers_have_three_digits_and_a_unit() {
         assert_eq!(seconds(0.012345), "12.3 ms");
         assert_eq!(seconds(3.2e-6), "3.20 us");
         assert_eq!(seconds(7.0), "7.00 s");

@@ -1,4 +1,4 @@
-//! What tests and benches of several targets share. No user needs it; nothing of it is published.
+//! Common parts of tests and benches of several targets. Nothing of it is published.
 // A test's own files, folders and messages.
 #![allow(missing_docs, clippy::disallowed_methods, clippy::print_stderr)]
 

@@ -59,7 +59,7 @@ pub fn answers(program: impl AsRef<OsStr>, arguments: &[&str]) -> bool {
         .is_ok_and(|status| status.success())
 }
 
-/// What a test needs, where `there` says that it is missing; asked once.
+/// A tool that a test needs, where `there` reports that it is missing; evaluated once.
 fn missing(what: &str, asked: &OnceLock<bool>, there: impl FnOnce() -> bool) -> Option<String> {
     (!asked.get_or_init(there)).then(|| what.to_owned())
 }

@@ -110,7 +110,7 @@ pub fn three_mf(unit: &str) -> Vec<u8> {
     three_mf_of(&String::from_utf8(three_mf_model(unit)).unwrap())
 }
 
-/// What comes before and after a constellation.
+/// Text before and after a constellation.
 pub fn amf_parts(unit: &str) -> [String; 2] {
     let mut text = format!(
         "\u{feff}<?xml version=\"1.0\"?>\n<amf unit=\"{unit}\"><object id=\"1\"><mesh><vertices>\n"

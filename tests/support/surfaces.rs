@@ -23,7 +23,7 @@ pub fn binary(triangles: &[[[f32; 3]; 3]]) -> Vec<u8> {
     bytes
 }
 
-/// The twelve triangles of a closed box, in order outwards; bit k of a corner's number tells
+/// The twelve triangles of a closed box, in order outwards; bit k of a corner's number gives
 /// whether it lies at the upper end of axis k.
 pub fn box_of<T>(corner: impl Fn(usize) -> T) -> Vec<[T; 3]> {
     let faces = [

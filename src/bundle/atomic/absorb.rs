@@ -1,4 +1,4 @@
-//! What of a folder is ours, and moving the rest from an old folder into the new one.
+//! Finds the files of a folder that are ours, and moves the rest from an old folder into a new one.
 
 use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
@@ -21,7 +21,7 @@ const NAMES_MAX: u32 = 10_000;
 pub(super) struct Owned {
     /// Those of the manifest, where it is one of ours.
     listed: Option<BTreeMap<String, FileEntry>>,
-    /// What this run reads.
+    /// Inputs of this run.
     inputs: Vec<EntryStatus>,
 }
 
@@ -143,13 +143,13 @@ impl Owned {
     }
 }
 
-/// What a new file of a folder meets under its name.
+/// State of the name at which a new file of a folder is written.
 enum State {
     /// Nothing, or what may go.
     Free,
-    /// What this run reads.
+    /// Inputs of this run.
     Input,
-    /// What is not known to be ours.
+    /// Files not known to be ours.
     Foreign(Kind),
 }
 

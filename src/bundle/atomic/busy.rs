@@ -1,4 +1,4 @@
-//! What the process is writing or waiting for, so that a request to stop never cuts a write in two.
+//! The process's current write or wait, so that a request to stop never cuts a write in two.
 
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};

@@ -30,7 +30,7 @@ impl MadeFolders {
     /// Makes the folder `name` in `parent` where nothing is and opens it. A link is refused.
     ///
     /// # Errors
-    /// What the system reports.
+    /// The system's error.
     fn child(&mut self, parent: &Dir, name: impl AsRef<OsStr>) -> io::Result<Dir> {
         let name = name.as_ref();
         match parent.make(name, 0o777) {
@@ -100,7 +100,7 @@ pub(super) enum MadeError {
     NotFolder(PathBuf),
     /// The folder cannot be made.
     Folder(PathBuf, io::Error),
-    /// What was to be made in it cannot be.
+    /// Nothing can be created in it.
     Inside(io::Error),
 }
 
@@ -139,7 +139,7 @@ pub(super) fn made_in<T>(
     }
 }
 
-/// Makes a folder and its parents; the error names the path that stands in the way.
+/// Makes a folder and its parents; the error names the path in the way.
 fn make_folder(folder: &Path) -> Result<MadeFolders, MadeError> {
     let mut made = MadeFolders::default();
     let mut missing: Vec<&Path> = folder

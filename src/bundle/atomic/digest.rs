@@ -7,11 +7,11 @@ use sha2::{Digest, Sha256};
 
 /// Writes of at least this size pass through unbuffered.
 const BUFFER_BYTES: usize = 1 << 20;
-/// What waits for the disk at most where a file is forced to it: one call that waits for gigabytes
+/// Largest part of a file that is forced to the disk at once: one call that waits for gigabytes
 /// hears no request to stop, and what is given up with them in memory takes as long to remove.
 const UNFORCED_BYTES: u64 = 8 << 20;
 
-/// What was written: size and digest of the bytes.
+/// Size and digest of the bytes written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Written {
     /// Number of bytes.
@@ -83,7 +83,7 @@ struct Hashing<'a> {
 
 impl Write for Hashing<'_> {
     fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
-        // What is half written is temporary, and goes as it is dropped.
+        // An incomplete file is temporary, and is removed as it is dropped.
         fluxform_base::progress::poll();
         let count = self.file.write(&buffer[..buffer.len().min(BUFFER_BYTES)])?;
         self.sha256.update(&buffer[..count]);

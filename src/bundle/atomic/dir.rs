@@ -100,10 +100,10 @@ impl EntryStatus {
     }
 }
 
-/// What is at `path`, links followed; `None` where nothing is.
+/// Kind of file at `path`, links followed; `None` where nothing is.
 ///
 /// # Errors
-/// What the system reports otherwise.
+/// The system's error otherwise.
 pub(super) fn followed(path: &Path) -> io::Result<Option<EntryStatus>> {
     found(statat(CWD, path, AtFlags::empty()))
 }
@@ -128,7 +128,7 @@ impl Dir {
     /// The folder at `path`, links followed: the user named it.
     ///
     /// # Errors
-    /// What the system reports.
+    /// The system's error.
     pub fn open(path: &Path) -> io::Result<Self> {
         let path = if path.as_os_str().is_empty() {
             Path::new(".")
@@ -146,7 +146,7 @@ impl Dir {
     /// The folder of the file or folder at `path`, and its name there.
     ///
     /// # Errors
-    /// What the system reports; a path without a name.
+    /// The system's error; a path without a name.
     pub fn of(path: &Path) -> io::Result<(Self, OsString)> {
         let name = path.file_name().ok_or(io::ErrorKind::InvalidInput)?;
         Ok((Self::open(parent_of(path))?, name.to_owned()))
@@ -160,7 +160,7 @@ impl Dir {
     /// The folder `name` in it; a link is an error.
     ///
     /// # Errors
-    /// What the system reports: [`io::ErrorKind::NotADirectory`] for anything but a folder.
+    /// The system's error: [`io::ErrorKind::NotADirectory`] for anything but a folder.
     pub fn child(&self, name: impl AsRef<OsStr>) -> io::Result<Self> {
         let name = name.as_ref();
         let flags = OFlags::RDONLY | OFlags::DIRECTORY | OFlags::NOFOLLOW | OFlags::CLOEXEC;
@@ -188,7 +188,7 @@ impl Dir {
     /// Makes the folder `name`, whose mode the umask may narrow.
     ///
     /// # Errors
-    /// What the system reports, also where something of that name is.
+    /// The system's error, also where something of that name is.
     pub fn make(&self, name: impl AsRef<OsStr>, mode: u32) -> io::Result<Self> {
         mkdirat(&self.fd, name.as_ref(), Mode::from_raw_mode(mode as _))?;
         self.child(name)
@@ -197,7 +197,7 @@ impl Dir {
     /// The names in it, in order.
     ///
     /// # Errors
-    /// What the system reports.
+    /// The system's error.
     pub fn names(&self) -> io::Result<Vec<OsString>> {
         let mut names = Vec::new();
         for entry in rustix::fs::Dir::read_from(&self.fd)? {
@@ -214,7 +214,7 @@ impl Dir {
     /// The kind of thing that `name` refers to; `None` where nothing is. A link is a link.
     ///
     /// # Errors
-    /// What the system reports otherwise.
+    /// The system's error otherwise.
     pub fn status(&self, name: impl AsRef<OsStr>) -> io::Result<Option<EntryStatus>> {
         found(statat(&self.fd, name.as_ref(), AtFlags::SYMLINK_NOFOLLOW))
     }
@@ -222,7 +222,7 @@ impl Dir {
     /// Itself.
     ///
     /// # Errors
-    /// What the system reports.
+    /// The system's error.
     pub(crate) fn own_status(&self) -> io::Result<EntryStatus> {
         Ok(fstat(&self.fd)?.into())
     }
@@ -239,7 +239,7 @@ impl Dir {
     /// The regular file `name`, for reading; anything else, a link included, is an error.
     ///
     /// # Errors
-    /// What the system reports; [`io::ErrorKind::InvalidInput`] for what is no regular file.
+    /// The system's error; [`io::ErrorKind::InvalidInput`] for anything but a regular file.
     pub fn file(&self, name: impl AsRef<OsStr>) -> io::Result<File> {
         // Without waiting for the other end of a pipe.
         let flags = OFlags::RDONLY | OFlags::NOFOLLOW | OFlags::NONBLOCK | OFlags::CLOEXEC;
@@ -253,7 +253,7 @@ impl Dir {
     /// A new file, for writing; the umask may narrow its mode.
     ///
     /// # Errors
-    /// What the system reports, also where something of that name is.
+    /// The system's error, also where something of that name is.
     pub(crate) fn new_file(&self, name: impl AsRef<OsStr>, mode: u32) -> io::Result<File> {
         let flags = OFlags::RDWR | OFlags::CREATE | OFlags::EXCL | OFlags::CLOEXEC;
         let mode = Mode::from_raw_mode(mode as _);
@@ -263,7 +263,7 @@ impl Dir {
     /// Removes a name that refers to anything but a folder.
     ///
     /// # Errors
-    /// What the system reports.
+    /// The system's error.
     pub fn remove_file(&self, name: impl AsRef<OsStr>) -> io::Result<()> {
         Ok(unlinkat(&self.fd, name.as_ref(), AtFlags::empty())?)
     }
@@ -271,7 +271,7 @@ impl Dir {
     /// Removes a folder with nothing in it.
     ///
     /// # Errors
-    /// What the system reports.
+    /// The system's error.
     pub(crate) fn remove_empty(&self, name: impl AsRef<OsStr>) -> io::Result<()> {
         Ok(unlinkat(&self.fd, name.as_ref(), AtFlags::REMOVEDIR)?)
     }
@@ -279,7 +279,7 @@ impl Dir {
     /// Removes all that is in it; links are removed themselves.
     ///
     /// # Errors
-    /// What the system reports; folders nested without end.
+    /// The system's error; folders nested without end.
     pub(crate) fn remove_content(&self) -> io::Result<()> {
         self.remove_content_below(DEPTH_MAX)
     }
@@ -304,7 +304,7 @@ impl Dir {
     /// Renames, replacing a file of the new name.
     ///
     /// # Errors
-    /// What the system reports.
+    /// The system's error.
     pub fn rename(
         &self,
         from: impl AsRef<OsStr>,
@@ -343,7 +343,7 @@ impl Dir {
     /// `false` where the kernel or the file system knows no exchange; all is then as it was.
     ///
     /// # Errors
-    /// What the system reports otherwise; all is then as it was.
+    /// The system's error otherwise; all is then as it was.
     #[cfg(target_os = "linux")]
     pub fn exchange(&self, one: impl AsRef<OsStr>, other: impl AsRef<OsStr>) -> io::Result<bool> {
         use rustix::fs::{RenameFlags, renameat_with};
@@ -365,7 +365,7 @@ impl Dir {
     /// Makes its names durable, where the system knows how.
     ///
     /// # Errors
-    /// What the system reports.
+    /// The system's error.
     pub fn sync(&self) -> io::Result<()> {
         match rustix::fs::fsync(&self.fd) {
             Err(Errno::INVAL) => Ok(()), // some network disks
@@ -376,7 +376,7 @@ impl Dir {
     /// A handle that can be locked.
     ///
     /// # Errors
-    /// What the system reports.
+    /// The system's error.
     pub(crate) fn handle(&self) -> io::Result<File> {
         Ok(self.fd.try_clone()?.into())
     }

@@ -54,7 +54,7 @@ pub fn is_stream(path: &Path) -> bool {
 /// system may leave it empty or cut short, which its reader must recognise, by a checksum.
 ///
 /// # Errors
-/// What the system reports; the target is then as it was.
+/// The system's error; the target is then as it was.
 pub(crate) fn put(
     dir: &Dir,
     name: &str,
@@ -98,7 +98,7 @@ pub struct FileSet {
     folder: PathBuf,
     overwrite: Overwrite,
     staged: Vec<Staged>,
-    /// What an earlier set had and this one has not.
+    /// Names that an earlier set had and this one has not.
     outdated: Vec<PathBuf>,
     /// Dropped last: what is still empty then goes again.
     made: Vec<MadeFolders>,
@@ -571,7 +571,7 @@ mod tests {
         for name in ["plan.json", "plate.csv", "a.svg"] {
             assert_eq!(std::fs::read(path("theirs").join(name)).unwrap(), b"years");
         }
-        // What is new or ours is written there.
+        // A new name, or one of ours, is written there.
         put_both(&path("out"), "new.csv", "1", false).unwrap();
         put_both(&path("out"), "new.csv", "2", true).unwrap();
         let ours = path("theirs").join("b.svg");

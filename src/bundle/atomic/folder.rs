@@ -40,7 +40,7 @@ pub struct FolderDraft {
     place: TargetPlace,
     overwrite: Overwrite,
     draft: TemporaryFolder,
-    /// What was written so far.
+    /// Files written so far.
     written: Vec<FileEntry>,
     /// Dropped after the draft: what is still empty then goes again.
     _made: MadeFolders,

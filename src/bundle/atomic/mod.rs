@@ -91,7 +91,7 @@ pub enum WriteError {
     Content {
         /// The target.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         message: String,
     },
     /// A name that is not allowed inside a bundle.
@@ -103,7 +103,7 @@ pub enum WriteError {
     /// Anything else the operating system said.
     #[error("cannot {action} {path}: {source}")]
     Io {
-        /// What was being done.
+        /// The operation.
         action: &'static str,
         /// The target.
         path: PathBuf,

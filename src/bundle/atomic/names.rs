@@ -7,7 +7,7 @@ use super::WriteError;
 /// The file whose presence makes a folder a bundle.
 pub(super) const MANIFEST: &str = "manifest.json";
 
-/// What the name of a folder or note that a run puts aside ends with.
+/// Ending of the name of a folder or note that a run puts aside.
 pub(super) const OLD: &str = ".fluxform-old";
 
 /// The folder that `path` is in, as it is spelt; `.` for a bare name.

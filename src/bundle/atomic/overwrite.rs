@@ -16,7 +16,7 @@ const KIND_BYTES: usize = 16;
 
 /// The policy for outputs that exist already.
 ///
-/// What a run reads is never replaced. A regular file is replaced when it is known to be this
+/// An input of a run is never replaced. A regular file is replaced when it is known to be this
 /// program's own and unchanged, or with `force`; anything else never.
 #[derive(Debug, Clone)]
 pub struct Overwrite {
@@ -24,11 +24,11 @@ pub struct Overwrite {
     evidence: Evidence,
     /// This run's inputs.
     inputs: Vec<Input>,
-    /// What else must not be replaced: files, and folders with all that is in them.
+    /// Other paths that must not be replaced: files, and folders with all that is in them.
     protected: Vec<PathBuf>,
 }
 
-/// What shows that an existing file is this program's own.
+/// Evidence that an existing file is this program's own.
 #[derive(Debug, Clone)]
 enum Evidence {
     /// A sealed JSON artefact of the same inputs and options, or a file that it lists, unchanged since.

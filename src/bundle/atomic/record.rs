@@ -22,7 +22,7 @@ const RECORD_MAX_BYTES: u64 = 64 << 20;
 /// Records of this schema version and later carry a seal.
 const SEALED_FROM: [u32; 3] = [1, 4, 0];
 
-/// What a manifest or sidecar states, as far as it decides what may be replaced.
+/// The statements of a manifest or sidecar that decide which files may be replaced.
 #[derive(Debug, Clone, Default, Deserialize)]
 pub(super) struct Record {
     schema_version: String,
@@ -95,12 +95,12 @@ impl Record {
         digests(&self.inputs) == digests(inputs)
     }
 
-    /// What it lists.
+    /// Its list.
     pub fn files(self) -> Vec<FileEntry> {
         self.files
     }
 
-    /// What it lists, by name.
+    /// Its list, by name.
     pub fn listed(self) -> BTreeMap<String, FileEntry> {
         let entries = self.files.into_iter();
         entries.map(|file| (file.path.clone(), file)).collect()

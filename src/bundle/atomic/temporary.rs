@@ -43,7 +43,7 @@ impl TemporaryFile {
     /// In `dir`; the umask may narrow the mode.
     ///
     /// # Errors
-    /// What the system reports.
+    /// The system's error.
     pub fn new(dir: &Dir, mode: u32) -> io::Result<Self> {
         loop {
             let name = random_name();
@@ -65,7 +65,7 @@ impl TemporaryFile {
     /// Gives it the name `name` in its folder, replacing a file of that name.
     ///
     /// # Errors
-    /// What the system reports; it is then removed.
+    /// The system's error; the file is then removed.
     pub(crate) fn persist(mut self, name: &OsStr) -> io::Result<()> {
         if let Some(from) = &self.name {
             self.dir.rename(from, &self.dir, name)?;
@@ -110,7 +110,7 @@ impl TemporaryFolder {
     /// In `parent`; the umask may narrow the mode.
     ///
     /// # Errors
-    /// What the system reports.
+    /// The system's error.
     pub fn new(parent: &Dir, mode: u32) -> io::Result<Self> {
         let mut attempts = 0;
         loop {
@@ -180,7 +180,7 @@ fn claim(dir: &Dir, handle: &File, made: Option<&OsStr>) -> io::Result<Option<Os
 pub(crate) fn clean_leftovers(dir: &Dir) {
     for name in dir.names().unwrap_or_default() {
         if name.to_str().is_some_and(is_temporary) {
-            // What cannot be removed now is left to the next run.
+            // A file that cannot be removed now is left to the next run.
             let _ = clean(dir, &name);
         }
     }

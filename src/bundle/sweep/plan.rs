@@ -12,7 +12,7 @@ pub const POINTS_MAX: u64 = 100_000_000;
 /// Larger files are no plan.
 pub(crate) const PLAN_MAX_BYTES: u64 = 256 << 20;
 
-/// What is done with each design of a sweep.
+/// Task for each design of a sweep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Mode {
@@ -61,7 +61,7 @@ pub struct PlanFile {
     pub design: String,
     /// The design, then the B-H tables that its variants name; paths as given.
     pub inputs: Vec<Input>,
-    /// What is done with each design.
+    /// Task for each design.
     pub mode: Mode,
     /// Where randomness in a point begins, together with its index.
     pub seed: u64,
@@ -69,7 +69,7 @@ pub struct PlanFile {
     pub tolerance: Option<f64>,
     /// Number of designs.
     pub points: u64,
-    /// What varies.
+    /// Keys that vary.
     pub axes: Vec<Axis>,
     /// The design file's text.
     pub design_text: String,
@@ -109,7 +109,7 @@ impl PlanFile {
     /// Reads a plan.
     ///
     /// # Errors
-    /// What is wrong with it and what to do; `name` names the file.
+    /// The fault and the advice; `name` names the file.
     pub fn parse(name: &str, bytes: &[u8]) -> Result<Self, String> {
         let plan: Self = serde_json::from_slice(bytes).map_err(|error| {
             let error = fault(&error);

@@ -44,7 +44,7 @@ impl Status {
     }
 }
 
-/// What is tabulated of one design: one coil alone at its rated current, SI.
+/// Row of one design: one coil alone at its rated current, SI.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Row {
     /// Number of turns.
@@ -76,7 +76,7 @@ pub struct Row {
     pub optimum: Option<OptimumRow>,
 }
 
-/// What was found for a design.
+/// Result for a design.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct OptimumRow {
     /// Inner diameter.
@@ -119,7 +119,7 @@ pub struct PointFile {
     pub point_sha256: String,
 }
 
-/// What every point's file begins with.
+/// Head of every point's file.
 const OPENING: &[u8] = b"{\n  \"schema_version\": \"";
 
 impl PointFile {

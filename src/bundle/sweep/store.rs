@@ -31,7 +31,7 @@ pub struct PointStore {
     folder: PathBuf,
 }
 
-/// What is at the place of a point's file.
+/// State of a point's file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum StoredPoint {
     /// The point, by this version of the program.
@@ -98,7 +98,7 @@ impl PointStore {
         Ok(folders)
     }
 
-    /// What is at the place of point `index` of the plan with this digest.
+    /// State of the file of point `index` of the plan with this digest.
     ///
     /// # Errors
     /// A file that is there and cannot be read.

@@ -33,11 +33,11 @@ pub(super) trait CoilSets: Sync {
     /// Sets that hold every coil whose ln F may reach `enough_ln`.
     fn all(&self, enough_ln: f64) -> Parts<Self::Set>;
 
-    /// What a set holds that may reach `enough_ln`.
+    /// Parts of a set that may reach `enough_ln`.
     fn parts(&self, set: &Self::Set, enough_ln: f64) -> Parts<Self::Set>;
 }
 
-/// What a set of coils was taken apart into.
+/// Parts into which a set of coils was divided.
 pub(super) struct Parts<S> {
     /// Smaller sets, each with an upper bound of ln F.
     pub sets: Vec<(f64, S)>,
@@ -65,7 +65,7 @@ enum Content<S> {
     Coil(Leaf),
 }
 
-/// What waits to be taken apart or listed: strongest first, then earliest.
+/// A set that waits to be divided or listed: strongest first, then earliest.
 struct Waiting<S> {
     bound_ln: f64,
     order: usize,

@@ -22,7 +22,7 @@ const PORTIONS: usize = 64;
 /// Cells yet to be bounded, each with a bound that holds for it already.
 type Stack = Vec<(Cell, f64)>;
 
-/// What a search over cells proved.
+/// Proof by a search over cells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proof {
     /// No coil's ln F exceeds this.
@@ -67,7 +67,7 @@ pub(crate) fn finite_domain(problem: &Problem<'_>, force_n: f64) -> Option<Domai
     // A loop's force over its volume is 3/4 a u / rho^5 <= 3/8 rho^-3. A coil with a2 beyond
     // these radii is either hollow, hence far, or flat, hence spread over a disc of area a2^2.
     let outer = (ratio * 2.0 / (3.0 * z)).sqrt().max((3.0 * ratio).cbrt());
-    // What lies deeper than `deep` gives at most a third, and the rest, deep/length of the
+    // The part deeper than `deep` gives at most a third, and the rest, deep/length of the
     // volume, at most another third.
     let deep = (1.125 * ratio).cbrt();
     let length = 1.125 * ratio * deep / (z * z * z);
@@ -199,7 +199,7 @@ impl Search<'_> {
                 hand_on((low, bound));
                 hand_on((high, bound));
             }
-            // Too small to be cut: the bound stands.
+            // Too small to be cut: the bound remains.
             None => proof.upper_ln = proof.upper_ln.max(bound),
         }
     }
@@ -257,7 +257,7 @@ mod tests {
     /// The best coil of the seed's limits without that on the settling time, N.
     const BEST_N: f64 = 0.137_773_265_65;
 
-    /// What is proven of the seed's limits, without multipliers: slowly.
+    /// The proof at the seed's limits, without multipliers: slow.
     fn proven(best_ln: f64, budget: usize) -> (Proof, bool) {
         let limits = Limits {
             settling_max_s: None,

@@ -121,7 +121,7 @@ pub struct CoredModel {
     relative_error: f64,
 }
 
-/// What the tables' values are multiplied by, as found at one coil.
+/// Factors of the tables' values, as found at one coil.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Factors {
     /// Neighbours on force and inductance; nothing without them.
@@ -170,7 +170,7 @@ const STEP: f64 = -0.1;
 /// Exponents are kept while no coordinate has moved farther than this.
 const KEPT: f64 = 0.05;
 
-/// What one cored coil does per ampere-turn, solved for itself.
+/// Values of one cored coil per ampere-turn, solved for itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Direct {
     /// The steel's force over the air coil's.
@@ -229,7 +229,7 @@ impl CoredModel {
         &self.rule
     }
 
-    /// What the steel adds for several depths of winding around one core.
+    /// The steel's part for several depths of winding around one core.
     fn solve(
         &self,
         radius_m: f64,
@@ -282,7 +282,7 @@ impl CoredModel {
             .collect()
     }
 
-    /// What `added` holds.
+    /// Entries of `added`.
     fn line(&self, ln_radius: f64, ln_length: f64, shares: &[f64]) -> Line {
         let (radius_m, length_m) = (ln_radius.exp(), ln_length.exp());
         let depths_m = self.depths_m(radius_m, shares);
@@ -299,7 +299,7 @@ impl CoredModel {
         Some(solved.iter().zip(peaks).map(values).collect())
     }
 
-    /// What `sharp_peaks` holds.
+    /// Entries of `sharp_peaks`.
     fn peak_line(&self, ln_radius: f64, ln_length: f64, shares: &[f64]) -> Line {
         let (radius_m, length_m) = (ln_radius.exp(), ln_length.exp());
         let depths_m = self.depths_m(radius_m, shares);
@@ -455,7 +455,7 @@ impl CoredModel {
         Some(factors)
     }
 
-    /// What the neighbours multiply force and inductance of the coil at table coordinates by.
+    /// Factors of the neighbours in force and inductance of the coil at table coordinates.
     fn among_factors(&self, neighbours: &Neighbours, at: [f64; 3]) -> Option<[f64; 2]> {
         let (radius_m, length_m) = (at[0].exp(), at[1].exp());
         let depths_m = self.depths_m(radius_m, &[at[2]]);

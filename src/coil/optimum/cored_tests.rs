@@ -192,9 +192,9 @@ fn meets_the_reference_optima() {
             };
             assert!(worse <= 1.0 + 1e-9, "{name}: {limit:?}");
             let key = limit.name.key();
-            let told = &wanted["active"][key]["sensitivity_n_per_unit"];
-            if let (true, Some(told)) = (limit.active, told.as_f64()) {
-                let ratio = limit.sensitivity_n_per_unit / told;
+            let reported = &wanted["active"][key]["sensitivity_n_per_unit"];
+            if let (true, Some(reported)) = (limit.active, reported.as_f64()) {
+                let ratio = limit.sensitivity_n_per_unit / reported;
                 assert!((ratio - 1.0).abs() < 2e-3, "{name} {key}: {ratio}");
             }
         }
@@ -216,13 +216,13 @@ fn a_limit_moved_moves_the_force_by_its_sensitivity() {
     let (less, more) = (best(0.0995), best(0.1005));
     let slope = (more.force_n - less.force_n) / 0.001;
     let at = best(0.1);
-    let told = at
+    let reported = at
         .limits
         .iter()
         .find(|limit| limit.name == LimitName::Settling)
         .expect("limited");
-    assert!(told.active);
-    let ratio = slope / told.sensitivity_n_per_unit;
+    assert!(reported.active);
+    let ratio = slope / reported.sensitivity_n_per_unit;
     assert!((ratio - 1.0).abs() < 2e-3, "{ratio}");
 }
 
@@ -304,7 +304,7 @@ fn a_limit_on_the_core_s_field_is_met_and_costs_force() {
         field.active && field.value <= 0.5 * (1.0 + 1e-9),
         "{field:?}"
     );
-    // What the solver itself says of that coil.
+    // Result of the solver itself for that coil.
     let window = limited.window;
     let winding = Winding {
         inner_radius_m: window.inner_radius_m,
@@ -366,7 +366,7 @@ fn neighbours_are_taken_into_account() {
 }
 
 #[test]
-fn what_cannot_be_is_told() {
+fn impossible_requests_are_reported() {
     let model = model(rule(), false);
     let impossible = Limits {
         settling_max_s: Some(1e-5),
@@ -463,7 +463,7 @@ fn drawn(count: usize) -> Vec<(CoreRule, Window)> {
         .collect()
 }
 
-/// What the search drops on the draft's word is what its measured error rules out.
+/// The search drops only those coils of the draft that its measured error rules out.
 #[test]
 fn the_draft_is_as_good_as_it_measures() {
     let mut widest = 0.0_f64;
@@ -505,7 +505,7 @@ fn the_limited_flux_density_is_what_an_evaluation_prints() {
         let depth_m = fluxform_field::steel::core_flux_density::peak_depth_m(shape);
         let told_t = coil.core_field(1.3, depth_m).expect("inside").peak_t;
         let wrong = response.core_field_t.value / told_t - 1.0;
-        // What a written design gives way by is ten times that.
+        // A written design gives way by ten times that.
         assert!(wrong.abs() < 1e-6, "{wrong:e} {rule:?} {window:?}");
     }
 }

@@ -114,7 +114,7 @@ pub(super) fn why_none(
     })
 }
 
-/// What a window breaks, worst first.
+/// Limits that a window breaks, worst first.
 pub(super) fn violations(problem: &Problem<'_>, window: Window) -> Vec<Violation> {
     let Some(rated) = problem.rate(window) else {
         return Vec::new();

@@ -75,7 +75,7 @@ impl Multipliers {
     }
 }
 
-/// What bounds the cells of one problem.
+/// Bounds for the cells of one problem.
 #[derive(Clone, Copy)]
 pub struct Bounding<'a> {
     problem: &'a Problem<'a>,

@@ -205,7 +205,7 @@ impl Cells {
         Some(self.interpolate(&cell.as_ref()?.values, key, at))
     }
 
-    /// What the functions may be off by at `at`: the largest errors met in its cell, in terms of
+    /// Error of the functions at `at`: the largest errors met in its cell, in terms of
     /// `error` of a value and an exact one, next to the edges along the third axis and between the nodes
     /// there; less off the edges, as the polynomial of the nodes is. `None` where the cell is
     /// not filled, infinite where the functions are not defined beside its nodes.

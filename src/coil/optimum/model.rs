@@ -1,4 +1,4 @@
-//! What the optimiser asks of a coil's physics, so that air and cored coils are solved alike.
+//! The optimiser's view of a coil's physics, so that air and cored coils are solved alike.
 
 use fluxform_base::units::{
     COPPER_DENSITY_KG_PER_M3, COPPER_TEMPERATURE_COEFFICIENT_PER_K, REFERENCE_TEMPERATURE_C,
@@ -152,7 +152,7 @@ impl Strand {
     }
 }
 
-/// What a coil does at a current, with derivatives by window and current.
+/// Values of a coil at a current, with derivatives by window and current.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Response {
     /// |force| on the magnet at the target, N.

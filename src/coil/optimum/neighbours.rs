@@ -1,4 +1,4 @@
-//! What an array's other cores, unpowered, do to one coil: factors of its force and inductance.
+//! Effect of an array's other, unpowered cores on one coil: factors of its force and inductance.
 //!
 //! Factors vary slowly with the coil's dimensions. They are computed at one coil, with their slopes,
 //! and taken as powers of the dimensions while the coil alone is optimised; again at what comes
@@ -56,7 +56,7 @@ impl Neighbours {
         self.drive
     }
 
-    /// What the neighbours multiply the steel's and winding's force on dipoles (height, moment)
+    /// Factor of the neighbours in the steel's and winding's force on dipoles (height, moment)
     /// above the coil's own axis by, and its inductance, of which the winding's own is
     /// `air_inductance_h`; `None` where cores touch or the solution fails.
     #[must_use]

@@ -15,7 +15,7 @@ pub enum OptimumStatus {
     Optimal,
     /// No coil meets the limits: those that the least violating coil breaks, worst first.
     Infeasible {
-        /// What it breaks.
+        /// Limits that it breaks.
         violations: Vec<Violation>,
         /// That coil.
         least: Window,
@@ -168,7 +168,7 @@ impl BestCoil {
         self.current_a * self.current_a * resistance_ohm
     }
 
-    /// What is known of a limit.
+    /// State of a limit.
     #[must_use]
     pub fn limit(&self, name: LimitName) -> Option<&LimitUse> {
         self.limits.iter().find(|used| used.name == name)
@@ -271,7 +271,7 @@ impl Alternative {
 /// How sure it is that no coil is better.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Certificate {
-    /// What was proven, or searched.
+    /// The proof, or the search.
     pub kind: CertificateKind,
     /// No coil within the limits exceeds this force, N; `None` where nothing is proven.
     pub upper_bound_n: Option<f64>,
@@ -282,7 +282,7 @@ pub struct Certificate {
 }
 
 impl Certificate {
-    /// What `starts` local searches say; `cells` boxes were bounded in vain.
+    /// Result of `starts` local searches; `cells` boxes were bounded in vain.
     #[must_use]
     pub fn of_searches(starts: usize, cells: usize) -> Self {
         Self {
@@ -326,7 +326,7 @@ pub struct Outcome {
     /// Coils a little weaker, and shorter, lighter or cooler: of coils that can be wound none
     /// beaten by another in force, length, mass and heat together, strongest first.
     pub alternatives: Vec<Alternative>,
-    /// What is proven about it.
+    /// Its proof.
     pub certificate: Certificate,
     /// Every wire's best; empty for coils that can be wound.
     pub wires: Vec<WireOutcome>,

@@ -41,7 +41,7 @@ impl Fixed {
     }
 }
 
-/// What is requested, for one coil.
+/// The request, for one coil.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Task {
     /// The limits.

@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn finds_a_root_and_tells_of_none() {
+    fn finds_a_root_or_reports_none() {
         let x = root(|x| x * x * x - 0.7, 0.0, 1.3, 1e-14).expect("brackets it");
         assert!((x - 0.7_f64.cbrt()).abs() < 1e-13);
         assert_eq!(root(|x| x * x + 0.7, -1.3, 0.7, 1e-14), None);

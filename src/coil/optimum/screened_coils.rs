@@ -47,7 +47,7 @@ pub(super) fn optimise(
         .as_deref()
         .map(|sharp| surrogate::restated(sharp, task, coarse));
     let sharp = restated.as_deref().unwrap_or(coarse);
-    // What the search did not know, of neighbours say, is screened for too.
+    // Effects unknown to the search, of neighbours say, are screened for too.
     let blunt_model = sharp_model.as_deref().and_then(CoilModel::blunted);
     let blunt = blunt_model.as_deref().unwrap_or(model);
     let draft_model = blunt.draft();

@@ -451,7 +451,7 @@ mod tests {
         }
     }
 
-    /// What an air coil's ln F lacks, as a function of the length, is not known to the coarse
+    /// The defect of an air coil's ln F, as a function of the length, is not known to the coarse
     /// model; to the sharp one as a straight line about one length; to the exact one throughout.
     enum Known {
         Nothing,
@@ -502,7 +502,7 @@ mod tests {
     }
 
     #[test]
-    fn sharpening_goes_on_until_the_optimum_stands() {
+    fn refinement_continues_until_the_optimum_is_stable() {
         let limits = Limits {
             settling_max_s: None,
             length_max_m: None,

@@ -13,7 +13,7 @@ use fluxform_numerics::vec3::dot;
 /// A smooth problem's values and slopes at a point: minimise `objective` with `rows` <= 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Point {
-    /// What is minimised.
+    /// The objective.
     pub objective: f64,
     /// Its slope.
     pub slope: [f64; 3],

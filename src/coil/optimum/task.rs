@@ -8,7 +8,7 @@ use super::problem::{Fixed, Task};
 use fluxform_design::{Coil, Core, Design, Steel};
 use fluxform_field::magnet::MagnetRule;
 
-/// What cannot be optimised.
+/// Problems that cannot be optimised.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum NoTask {
     /// The drivers give no current.

@@ -359,7 +359,7 @@ fn without_a_box_the_wire_alone_bounds_the_coil() {
 }
 
 #[test]
-fn extremes_are_solved_or_told() {
+fn extremes_are_solved_or_refused() {
     // Thin wire, far target.
     let far = Task {
         strands: Strand::choices(&wire(0.000_05)),
@@ -453,7 +453,7 @@ fn a_settling_time_that_any_length_meets_leaves_the_length_without_an_end() {
         let outcome = optimise(&air(HEIGHT_M), &task(limits, None), &settings, &Silent);
         outcome.expect("runs")
     };
-    // What a solid coil of 32.6 mm approaches: 5 mu_0 a^2 pi / 24 over the resistivity.
+    // Limit of a solid coil of 32.6 mm: 5 mu_0 a^2 pi / 24 over the resistivity.
     for (inner_m, approached_s) in [(None, 0.013_008), (Some(0.02), 0.010_457)] {
         let status = of(1.02 * approached_s, inner_m).status;
         let missing = vec![LimitName::Length];
@@ -464,7 +464,7 @@ fn a_settling_time_that_any_length_meets_leaves_the_length_without_an_end() {
 }
 
 #[test]
-fn given_dimensions_are_kept() {
+fn given_dimensions_stay_fixed() {
     let fixed = Fixed {
         inner_diameter_m: Some(0.024),
         ..Fixed::default()

@@ -64,7 +64,7 @@ pub struct Present {
 pub struct ToleranceRung {
     /// Its value.
     pub value: f64,
-    /// What is passed on: nothing where the default is in force.
+    /// Arguments passed on: none where the default is in force.
     pub asked: Option<f64>,
     /// Whether it is in force now.
     pub present: bool,

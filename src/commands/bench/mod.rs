@@ -37,7 +37,7 @@ use crate::scene::sources::ShapeSource;
 /// The errors for which the cheapest settings are named.
 pub const TARGETS: [f64; 3] = [0.1, 0.01, 0.001];
 
-/// What is measured, how, and where to.
+/// Measurement, method and destination.
 #[derive(Debug, Clone)]
 pub struct BenchRequest<'a> {
     /// The design.
@@ -63,7 +63,7 @@ pub struct BenchRequest<'a> {
 pub struct Estimate {
     /// Processor time, s.
     pub cpu_s: f64,
-    /// What ladders are shortened to where possible, s.
+    /// Time to which ladders are shortened where possible, s.
     pub bound_s: f64,
     /// Combinations of settings.
     pub runs: usize,

@@ -107,7 +107,7 @@ pub fn html(file: &BenchFile) -> String {
     .html()
 }
 
-/// What the present settings give.
+/// Result at the present settings.
 fn sentence(shape: &ShapeBench) -> String {
     let error = |error: Option<f64>| error.map_or_else(|| "no number".to_owned(), percent);
     match shape.present() {

@@ -40,11 +40,11 @@ impl Progress for Within<'_> {
     }
 }
 
-/// What every stage needs.
+/// Common inputs of the stages.
 pub struct Bench<'a> {
     /// The scene.
     pub scene: &'a Scene<'a>,
-    /// What is asked.
+    /// The request.
     pub request: &'a BenchRequest<'a>,
     effort: Effort,
     progress: &'a dyn Progress,

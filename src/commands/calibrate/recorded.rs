@@ -88,7 +88,7 @@ fn of_stage(name: &str, tolerance: f64) -> Option<ErrorTime<'static>> {
             rows: rows.collect(),
         },
         timed: &stage.timed,
-        // What follows in brackets is about other curves of the stage.
+        // The text in brackets is about other curves of the stage.
         error_of: stage.error_of.split([';', '(']).next()?.trim(),
         tolerance,
         version: &file.fluxform_version,

@@ -47,8 +47,8 @@ pub struct Compare {
     #[arg(long, value_name = "LAMBDA", value_parser = values::force_constant,
           allow_hyphen_values = true)]
     lambda: Option<f64>,
-    /// Just-noticeable difference: the part of a force by which another must differ to be told
-    /// apart; also what each object's own lambda is chosen by
+    /// Just-noticeable difference: the part of a force by which another must differ to be
+    /// distinguished; also what each object's own lambda is chosen by
     #[arg(long, value_name = "PART", default_value_t = crate::units::FORCE_JND,
           value_parser = values::jnd, allow_hyphen_values = true)]
     jnd: f64,

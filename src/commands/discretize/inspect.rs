@@ -64,7 +64,7 @@ pub struct Placed {
     pub inside: Option<bool>,
 }
 
-/// What is looked at.
+/// The object inspected.
 #[derive(Debug, Clone)]
 pub struct Inspected {
     /// The surface, placed as it is drawn; of [`Inspected::bare`] as the file has it.
@@ -136,7 +136,7 @@ pub fn inspect(
         MeshReport::of_file_observed(inspected.path(), &document.bodies, &mut parsed, progress)
             .map_err(failed)?;
     parsed.add_to(&mut inputs, inspected.path());
-    // What has no area is no surface, and is reported as that.
+    // A mesh without area is no surface, and is reported as that.
     let surface = match Surface::open(document, progress) {
         Ok((surface, _)) => Some(surface),
         Err(error) if draw || inspected.placed => return Err(failed(error)),

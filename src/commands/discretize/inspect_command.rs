@@ -36,7 +36,7 @@ impl Discretize {
         printer.summary(place, &inspection, || self.report(&inspection))
     }
 
-    /// What to look at: the file as it is, unless flags place it.
+    /// The surface to inspect: the file as it is, unless flags place it.
     fn looked_at(&self, printer: &Printer) -> Result<(Inspected, Vec<Input>), Failure> {
         // These say what the file is, and place nothing.
         const OF_THE_FILE: [&str; 3] = ["--unit", "--chord", "--body"];

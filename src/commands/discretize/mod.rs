@@ -122,7 +122,7 @@ pub struct MarkCounts {
 /// cells of which all four corners are points.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DeviationSummary {
-    /// The most by which the surface stands above the interpolation, m.
+    /// The most by which the surface lies above the interpolation, m.
     pub above_m: f64,
     /// Where, x and y, m.
     pub above_at_m: [f64; 2],

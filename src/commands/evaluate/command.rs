@@ -229,7 +229,7 @@ fn at_target(target: &TargetSummary) -> String {
     let [x, y, _] = target.force_vector_n;
     if x != 0.0 || y != 0.0 {
         let vector = |values: [f64; 3], unit: &str| {
-            // What rounding leaves of a zero is not worth its digits.
+            // The rounding residue of a zero is printed as zero.
             let largest = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
             let rounded = |v: f64| if v.abs() < 1e-12 * largest { 0.0 } else { v };
             values.map(|v| si(rounded(v), unit)).join(", ")

@@ -49,7 +49,7 @@ pub struct Map {
     /// Design file (TOML), `-` for standard input
     #[arg(value_name = "DESIGN")]
     design: FileArgument,
-    /// What the map holds
+    /// Contents of the map
     #[arg(long, default_value = Components::default().name(), value_parser = values::components())]
     components: Components,
     /// Currents at which cores with a B-H curve are mapped together too, A: one for all coils, or

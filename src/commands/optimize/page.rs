@@ -185,7 +185,7 @@ fn limits(result: &Optimization) -> Section {
             .raw("</li>");
     }
     body.raw("</ul>");
-    // What one percent more of a limit would give compares limits of different units.
+    // The gain per percent compares limits of different units.
     let gain = |limit: &LimitUse| 0.01 * limit.limit * limit.sensitivity_n_per_unit;
     let most = limits.iter().map(|l| gain(l).abs()).fold(0.0, f64::max);
     let row = |limit: &&LimitUse| -> Vec<Cell> {

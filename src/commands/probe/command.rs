@@ -44,7 +44,7 @@ const HEADER: &str = "x_m,y_m,z_m,coil,";
 /// With --compare a Gauss-meter's scan takes the points' place: a CSV table with x_m, y_m, z_m, any of
 /// bx_t, by_t, bz_t, dbx_dx_t_per_m to dbz_dz_t_per_m, and the currents that flowed, either as coil
 /// and current_a or as current_0_a, current_1_a and so on. Reported are the residuals, the scale of each
-/// coil with the line for `[array] gain`, a constant background, where the sensor's frame stands, and
+/// coil with the line for `[array] gain`, a constant background, the pose of the sensor's frame, and
 /// which parameter of the design would explain the residuals; --out takes the residuals as a table.
 #[derive(Debug, Args)]
 #[command(after_help = page(Codes::Reading, &[
@@ -64,7 +64,7 @@ pub struct Probe {
     /// CSV table with the columns x_m, y_m, z_m; `-` for standard input
     #[arg(value_name = "POINTS", required_unless_present = "compare")]
     pub(super) points: Option<FileArgument>,
-    /// What is reported at each point
+    /// Quantities reported at each point
     #[arg(long, value_enum, default_value_t = ComponentsArgument::All, conflicts_with = "compare")]
     components: ComponentsArgument,
     /// Report force and torque on the magnet per ampere too: six columns
@@ -91,7 +91,7 @@ enum ComponentsArgument {
     Gz,
 }
 
-/// What is reported about the table; with its columns where standard output holds nothing else.
+/// Report on the table; with its columns where standard output holds nothing else.
 #[derive(Serialize)]
 struct ProbeSummary {
     schema_version: &'static str,

@@ -1,4 +1,4 @@
-//! What `--set` says: `KEY=FROM:TO:STEP` or `KEY=A,B,C`.
+//! The argument of `--set`: `KEY=FROM:TO:STEP` or `KEY=A,B,C`.
 
 use crate::bundle::sweep::{Axis, Value};
 
@@ -86,7 +86,7 @@ fn steps([from, to, step]: [f64; 3]) -> Result<Vec<Value>, String> {
     let count = (steps + SLACK).max(0.0).floor() as usize + 1;
     let value = |k: usize| {
         let value = twelve_digits(from + k as f64 * step);
-        // What cancellation leaves of a zero.
+        // Residue of cancellation at a zero.
         if value.abs() < SLACK * step.abs() {
             0.0
         } else {

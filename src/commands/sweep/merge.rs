@@ -129,7 +129,7 @@ pub fn merge(
         folder.join(name("_merge.json")),
         &summary.inputs,
     )
-    // What `sweep run` wrote is read here.
+    // Reads the output of `sweep run`.
     .protecting(request.folders.iter().map(|folder| folder.join("points")))
     .protecting(
         request
@@ -199,7 +199,7 @@ fn write_front(
         let mut table =
             TableWriter::begin(out, plan.mode, keys, &COSTS.map(|(_, _, column)| column))?;
         for ((index, flags), point) in best.iter().zip(&points) {
-            // What was there a moment ago may be gone.
+            // A file that existed a moment ago may be gone.
             let point = point.as_ref().ok_or(io::ErrorKind::NotFound)?;
             table.row(&plan.values_at(*index), point, flags)?;
         }

@@ -124,7 +124,7 @@ fn check_values(text: &str, path: &Path, axes: &[Axis]) -> Result<(), RunError> 
                 fault_of(&template, path, axes, &values, varied)
             })
             .collect();
-        // What is wrong at the first value of every axis is found once for each axis.
+        // A fault at the first value of every axis is found once for each axis.
         found.retain(|fault| !faults.contains(fault));
         faults.append(&mut found);
     }

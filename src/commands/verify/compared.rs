@@ -51,7 +51,7 @@ pub(super) struct Compared {
     pub(super) exact: bool,
 }
 
-/// What a bundle says of the program that made it.
+/// Statement of a bundle on the program that made it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum MadeBy {
     /// This program, with this platform's arithmetic: it writes the same bytes.

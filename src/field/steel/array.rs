@@ -158,7 +158,7 @@ pub struct CoupledArray {
     pub own_layer: DVector<f64>,
     /// Potential sent to every core by all others, [drive][core][exchange grid], A/A.
     pub potentials: Vec<Vec<Vec<f64>>>,
-    /// What the steel adds to self and mutual inductances, [coil, drive], H.
+    /// Steel's part of self and mutual inductances, [coil, drive], H.
     pub added_inductance_h: DMatrix<f64>,
     /// Estimated error: of the gradients above, relative to the largest |grad B| at the height,
     /// and of the inductances, relative to the largest; the larger. The difference from the next

@@ -1,4 +1,4 @@
-//! What solving an array of coupled cores takes, from its shape alone.
+//! Cost of solving an array of coupled cores, from its shape alone.
 
 use super::CoreShape;
 use super::array::{ArrayResolution, representatives};

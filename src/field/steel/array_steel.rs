@@ -86,7 +86,7 @@ impl ArraySteel for NoSteel {
 pub struct AloneCore {
     /// Its layer per ampere.
     pub layer: MagnetizedCore,
-    /// What it adds to the winding's inductance, H.
+    /// Its part of the winding's inductance, H.
     pub added_inductance_h: f64,
     /// Whether it follows its B-H curve.
     pub along_curve: bool,

@@ -35,7 +35,7 @@ const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// The gradient's components, in the order in which cells hold them.
 const GRADIENT: [Quantity; 3] = [Quantity::DbzDz, Quantity::DbrDzOverR, Quantity::BrOverR];
 
-/// What a table gives at a point.
+/// Values of a table at a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// B_z, T.

@@ -1,4 +1,4 @@
-//! What a magnetisation table must be, and what in it betrays another unit.
+//! Requirements on a magnetisation table, and the signs of another unit in it.
 
 use fluxform_base::units::MU_0_T_M_PER_A;
 
@@ -107,7 +107,7 @@ pub enum BhCurveError {
     },
 }
 
-/// What looks wrong with a magnetisation table. The numbers are used as they stand all the same.
+/// Doubtful features of a magnetisation table. The numbers are used as they are all the same.
 #[derive(Debug, Clone, PartialEq)]
 pub enum BhWarning {
     /// B looks like another unit.
@@ -276,7 +276,7 @@ pub(super) struct Slopes {
     pub(super) steepest: Vec<f64>,
 }
 
-/// What looks wrong with a table through which the curve has `slopes`.
+/// Doubtful features of a table through which the curve has `slopes`.
 pub(super) fn warnings(slopes: &Slopes, b: &[f64], h: &[f64]) -> Vec<BhWarning> {
     let (largest_b_t, largest_h_a_per_m) = (b[b.len() - 1], h[h.len() - 1]);
     if largest_b_t > GAUSS_BELOW

@@ -61,7 +61,7 @@ impl BhCurve {
         })
     }
 
-    /// What looks wrong with the table without refusing it: units, steps, where it ends.
+    /// Warnings about the table, which is used all the same: units, steps, where it ends.
     #[must_use]
     pub fn warnings(&self) -> Vec<BhWarning> {
         let slopes = Slopes {

@@ -1,7 +1,7 @@
 //! Flux density inside linear cores: the largest |B| below the surface, and the mean.
 //!
 //! B = B_incident + mu_0 grad(D v), v being the core's double layer. The core's own winding is
-//! evaluated as it stands. What all else sends is known as a potential phi on the outline; inside
+//! evaluated as it is. What all else sends is known as a potential phi on the outline; inside
 //! it is the potential of another layer there,
 //!
 //! ```text
@@ -30,7 +30,7 @@ use crate::winding::{OnEdge, Winding};
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::gauss;
 
-/// What the layers' last degrees give at the peak counts so many times in its error, where the
+/// Factor by which the layers' last degrees count in the peak's error, where the
 /// difference of two solutions is known as well and where it is not: alone it is at times a
 /// thirtieth of the error, the rest coming from all of the outline. By the table of
 /// `cargo test --test field steel -- --ignored --nocapture claimed_in_full`.
@@ -224,7 +224,7 @@ impl CoupledArray {
             .collect())
     }
 
-    /// What all other modes add to the largest |B| of the axisymmetric one in every core, T.
+    /// Part of all other modes in the largest |B| of every core, beyond the axisymmetric mode's, T.
     ///
     /// # Errors
     /// As [`CoupledArray::core_fields`].
@@ -276,7 +276,7 @@ impl CoupledArray {
     }
 }
 
-/// What looking into the cores of one array takes, whatever the currents.
+/// Tables for the flux density in the cores of one array, whatever the currents.
 #[derive(Debug)]
 pub struct Inspection {
     incident: Incident,

@@ -95,7 +95,7 @@ impl Excitation {
 }
 
 impl Excitation {
-    /// What a layer of one ampere on each node adds to the flux through the winding, Wb/A.
+    /// Flux through the winding from a layer of one ampere on each node, Wb/A.
     #[must_use]
     pub(crate) fn flux_weights_wb_per_a(&self, outline: &Generatrix) -> DVector<f64> {
         let weights = outline
@@ -113,7 +113,7 @@ pub struct CoredCoil {
     pub winding: Winding,
     /// The magnetised core, per ampere.
     pub core: MagnetizedCore,
-    /// What the core adds to the winding's inductance, H.
+    /// The core's part of the winding's inductance, H.
     pub added_inductance_h: f64,
     /// Estimated error: of the gradient above, relative to the largest |grad B| at its height,
     /// and of the added inductance; the larger. Twice the difference from the next coarser

@@ -1,4 +1,4 @@
-//! What sources send to the exchange grid of a core some way off, and the cores of an array
+//! The field of sources on the exchange grid of a core some way off, and the cores of an array
 //! coupled by it.
 
 use nalgebra::{DMatrix, DMatrixViewMut, Dyn};
@@ -22,7 +22,7 @@ const MOST_STEPS: usize = 120;
 const ROWS: usize = 256;
 const PAIRS: usize = 64;
 
-/// What a winding sends to a core's exchange grid, per ampere.
+/// The field of a winding on a core's exchange grid, per ampere.
 #[derive(Debug, Clone)]
 pub struct Sent {
     /// Potential, A/A.
@@ -31,7 +31,7 @@ pub struct Sent {
     pub normal_field_t: Vec<f64>,
 }
 
-/// What the coils of an array do to each other's cores, ready to be solved for any currents.
+/// Exchange between an array's coils and each other's cores, ready to be solved for any currents.
 #[derive(Debug)]
 pub struct Coupling {
     cores: usize,
@@ -93,7 +93,7 @@ impl Coupling {
         }
     }
 
-    /// What the winding of coil `sender` sends to the core of another, `receiver`.
+    /// The field of the winding of coil `sender` at the core of another, `receiver`.
     #[must_use]
     pub fn winding(&self, receiver: usize, sender: usize) -> &Sent {
         &self.windings[self.links.index[receiver * self.cores + sender]]

@@ -1,6 +1,6 @@
 //! Panels of the exchange rings along a core's side: short where fields vary, longer far from there.
 //!
-//! What a neighbour sends varies over the gap between the cores only near the ends of cores and
+//! The field of a neighbour varies over the gap between the cores only near the ends of cores and
 //! windings. At a distance s from all of these the layers, and so what they send, are analytic
 //! within about s: panels as long as s keep the error of those of a gap's length beside an end, and
 //! their number grows like the logarithm of length over gap. The kernel itself still varies over

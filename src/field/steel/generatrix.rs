@@ -105,7 +105,7 @@ impl Resolution {
         }
     }
 
-    /// What [`Resolution::near_steel`] is compared with: its error is that of more than a node a
+    /// Reference of [`Resolution::near_steel`]: its error is that of more than a node a
     /// panel, so that two may not lie close to each other by chance.
     #[must_use]
     pub(crate) fn coarser_near_steel(&self) -> Self {

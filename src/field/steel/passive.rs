@@ -64,7 +64,7 @@ pub enum NoPull {
     Magnet(#[from] NoRule),
 }
 
-/// What [`PassivePull::new`] needs to know.
+/// Arguments of [`PassivePull::new`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pulled<'a> {
     /// Every core, about its axis.
@@ -336,7 +336,7 @@ fn check(pulled: &Pulled, tolerance: f64) -> Result<f64, NoPull> {
     Ok(closest_m)
 }
 
-/// What the coupling must be solved to at least where the force is asked for to `tolerance`: the
+/// Tolerance of the coupling where the force is requested to `tolerance`: the
 /// first solution and one that judges it.
 #[must_use]
 pub fn coupling_tolerance(tolerance: f64) -> f64 {

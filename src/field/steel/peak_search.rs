@@ -322,7 +322,7 @@ impl<'a> Polynomials<'a> {
         at
     }
 
-    /// What a panel's polynomials miss of the field, T: from one degree to the next a panel's
+    /// Part of the field that a panel's polynomials miss, T: from one degree to the next a panel's
     /// terms fall by 3.4 or more.
     fn missed_t(&self, panel: usize) -> f64 {
         let weights = &gauss::rule(self.order).weights;

@@ -1,4 +1,4 @@
-//! What the solvers ask of a material: an isotropic, single-valued B(H).
+//! The solvers' view of a material: an isotropic, single-valued B(H).
 
 use super::bh_curve::BhCurve;
 use fluxform_base::units::MU_0_T_M_PER_A;

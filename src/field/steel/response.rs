@@ -1,6 +1,6 @@
 //! The linear response of one core to a smooth field from outside.
 //!
-//! What neighbours send varies slowly over a core, and a core's own double layer acts on its
+//! The field of neighbours varies slowly over a core, and a core's own double layer acts on its
 //! neighbours through kernels that are smooth over it. Both pass through a few rings: the
 //! potential sent is sampled there, and the layer is felt as moments there, whatever its shape
 //! at the edges. The azimuth is a regular grid of angles, in which one core is block-circulant.

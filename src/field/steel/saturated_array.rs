@@ -127,7 +127,7 @@ struct State {
     cores: Vec<Option<Solution>>,
 }
 
-/// What one resolution needs for any permeability of reference.
+/// Tables of one resolution for any reference permeability.
 struct Setup {
     outline: Generatrix,
     excitation: Excitation,
@@ -190,7 +190,7 @@ impl SaturatedArray {
         let coarsest = sequence.at(&linear, Some(&initial.state));
         let modes_error =
             MODES_SAFETY * coarsest.difference(&initial, sequence.lowest_m, tolerance)?;
-        // What the modes do wrong, no resolution mends.
+        // No resolution reduces the error of the modes.
         let left = tolerance - modes_error;
         let left = if left > 0.0 {
             left.max(MODES_LEAVE * tolerance)
@@ -515,7 +515,7 @@ struct Problem<'a> {
     alike: Vec<usize>,
 }
 
-/// What the iteration ends with.
+/// Result of the iteration.
 struct Solved {
     status: Convergence,
     steps: Vec<f64>,
@@ -625,7 +625,7 @@ impl Problem<'_> {
             .collect()
     }
 
-    /// What the layers of mode 0 have beyond the linear ones.
+    /// Layers of mode 0 less the linear ones.
     fn corrections(&self, sent_a: &DMatrix<f64>, layers: &[DVector<f64>]) -> Vec<DVector<f64>> {
         layers
             .iter()

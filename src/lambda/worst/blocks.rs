@@ -207,7 +207,7 @@ impl Tree {
             let mixture = (1.0 - share) * self.limits[from] + share * self.limits[to];
             limit = limit.max(mixture - self.limits[k]);
         }
-        // What rounding leaves in a bound, in the same terms.
+        // Rounding residue in a bound, in the same terms.
         for d in 0..n {
             drift[d] += ROUNDINGS * f64::EPSILON * most[d];
         }

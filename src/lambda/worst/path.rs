@@ -27,7 +27,7 @@ pub struct Turn {
     pub currents_a: Vec<f64>,
     /// The points that decide from here to the next turn.
     pub active: Vec<ActivePoint>,
-    /// What changes in the currents.
+    /// Change in the currents.
     pub events: Vec<Event>,
 }
 

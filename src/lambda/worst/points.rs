@@ -127,7 +127,7 @@ mod tests {
 
     /// Rows held one by one come in the order in which they are missed.
     #[test]
-    fn points_are_told_in_the_order_in_which_the_path_misses_them() {
+    fn points_are_reported_in_the_order_in_which_the_path_misses_them() {
         let mut random = fluxform_numerics::random::Random::new(9);
         let mut next = || random.between(-1.0, 1.0);
         let count = 40;

@@ -27,7 +27,7 @@ const TWINS: usize = 4;
 /// Exchanges after which the inverse is recomputed.
 const FRESH: usize = 16;
 
-/// What a row's left-hand side is.
+/// Kinds of a row's left-hand side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     /// `x_i`.

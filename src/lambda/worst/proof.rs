@@ -1,4 +1,4 @@
-//! What worst-point currents are worth, from the points themselves.
+//! Quality of worst-point currents, from the points themselves.
 
 use rayon::prelude::*;
 

@@ -10,7 +10,7 @@ use super::program::Program;
 use crate::problem::ForceProblem;
 use crate::qr_reduction::{exponent_of, times_power};
 
-/// What rounding leaves of a scaled current, or force per ampere, of zero.
+/// Rounding residue of a scaled current, or force per ampere, of zero.
 pub(super) const NOTHING: f64 = 1e-24;
 
 /// Which rows a point contributes.

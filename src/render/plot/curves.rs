@@ -33,7 +33,7 @@ pub struct Line {
     pub defaults: Vec<usize>,
 }
 
-/// What is drawn.
+/// Data of the drawing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CurvesPlot {
     /// Above the plane.

@@ -74,7 +74,7 @@ pub struct ChosenForces {
     pub map: ErrorMap,
 }
 
-/// What is drawn.
+/// Data of the drawing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LambdaPlot {
     /// Above all panels.

@@ -1,4 +1,4 @@
-//! What every two of a few things have to do with each other, as coloured squares with numbers.
+//! A matrix of pairs, as coloured squares with numbers.
 
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ const MOST: [f64; 3] = [230.0, 120.0, 20.0];
 /// One matrix.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
-    /// What is shown.
+    /// The quantity shown.
     pub title: String,
     /// Row by row, as many rows and columns as names; `None` where there is none.
     pub values: Vec<Option<f64>>,

@@ -41,13 +41,13 @@ pub struct ParetoPlot {
     pub gains: Vec<f64>,
     /// Whether a point meets its limits.
     pub limits_met: Vec<bool>,
-    /// What the front's points are.
+    /// Meaning of the front's points.
     pub front: &'static str,
     /// The costs.
     pub panels: [Panel; 3],
 }
 
-/// What a panel shows: cost along x, gain along y.
+/// Axes of a panel: cost along x, gain along y.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DrawnPanel {
     /// Of cost and gain.
@@ -87,7 +87,7 @@ impl ParetoPlot {
         renumbered(&SvgBackend::default().render_scene(&figure.render()))
     }
 
-    /// What the panels show, in units that suit the values; of points that would lie on each other
+    /// Values of the panels, in units that suit them; of points that would lie on each other
     /// only the first.
     #[must_use]
     pub fn drawn(&self) -> [DrawnPanel; 3] {

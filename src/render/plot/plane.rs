@@ -42,7 +42,7 @@ pub struct Cells {
     pub columns: usize,
     /// One value a cell, x fastest; `None` where there is none.
     pub values: Vec<Option<f64>>,
-    /// What to do with more cells than can be drawn.
+    /// Treatment of more cells than can be drawn.
     pub together: Together,
 }
 
@@ -67,11 +67,11 @@ pub struct Arrows {
 /// One picture of the region.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
-    /// What is shown, with its unit.
+    /// The quantity shown, with its unit.
     pub title: String,
     /// The values; `None` for an empty plan.
     pub cells: Option<Cells>,
-    /// What lies over them.
+    /// Marks over them.
     pub marks: Vec<Mark>,
     /// Arrows over both.
     pub arrows: Vec<Arrows>,

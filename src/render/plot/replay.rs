@@ -29,7 +29,7 @@ pub(super) const COILS: [&str; 9] = [
     "#762a83",
 ];
 
-/// What is drawn; one entry a position.
+/// Data of the drawing; one entry per position.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReplayPlot<'a> {
     /// Above all panels.

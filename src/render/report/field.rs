@@ -23,7 +23,7 @@ const COILS: usize = 64;
 
 /// Values on planes above the coils.
 struct Layer {
-    /// What is shown.
+    /// The quantity shown.
     name: String,
     /// Unit of the values.
     unit: &'static str,

@@ -1,4 +1,4 @@
-//! What every page has: head, policy, style, title, contents, data, script.
+//! Parts of every page: head, policy, style, title, contents, data, script.
 
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -31,7 +31,7 @@ pub struct Section {
 /// A page before it is put together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Page {
-    /// What kind of page it is.
+    /// Kind of page.
     pub kind: &'static str,
     /// Its title.
     pub title: String,
@@ -39,7 +39,7 @@ pub struct Page {
     pub lead: Html,
     /// Its parts.
     pub sections: Vec<Section>,
-    /// What the script draws.
+    /// Data that the script draws.
     pub data: Value,
     /// The last line.
     pub foot: String,

@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_tells_heads_and_kinds() {
+    fn a_table_marks_heads_and_kinds() {
         let mut html = Html::default();
         html.table(&Table {
             caption: "a < b".to_owned(),

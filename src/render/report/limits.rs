@@ -1,4 +1,4 @@
-//! What limits a result: coils, points, the design's own limits.
+//! Limits of a result: coils, points, the design's own limits.
 
 use std::collections::BTreeMap;
 

@@ -7,9 +7,9 @@ use super::pack::f32s;
 /// One curve: what is swept, how wrong it is there, how long it takes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredCurve<'a> {
-    /// What is computed how, and by which program.
+    /// Method and program of the computation.
     pub name: String,
-    /// What is swept.
+    /// The parameter that is swept.
     pub knob: &'a str,
     /// Whether another program's.
     pub peer: bool,
@@ -26,7 +26,7 @@ pub struct MeasuredRow {
     pub marked: bool,
     /// Largest error found.
     pub error: f64,
-    /// What the stage itself states of it.
+    /// Error that the stage itself states.
     pub stated: Option<f64>,
     /// Processor time, the median, s.
     pub seconds: f64,

@@ -92,7 +92,7 @@ impl Surface {
             )
         };
         let mm = |[from, to]: [f64; 2], samples: usize| {
-            // The first point of every block stands where the grid's ends tell.
+            // The first point of every block stands given by the grid's ends.
             let last = samples.div_ceil(step).max(1) - 1;
             let share = (last * step) as f64 / (samples.max(2) - 1) as f64;
             [from * 1e3, (from + (to - from) * share) * 1e3]

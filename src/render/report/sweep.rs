@@ -108,7 +108,7 @@ pub fn page(facts: &SweepFacts) -> String {
     .html()
 }
 
-/// What the drawings show; each front with the numbers of its designs.
+/// Data of the drawings; each front with the numbers of its designs.
 fn drawn(facts: &SweepFacts) -> Value {
     let cloud = |points: &[(f64, f64)]| {
         let (x, y): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();

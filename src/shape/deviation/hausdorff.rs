@@ -63,7 +63,7 @@ pub fn hausdorff(
     };
     progress.begin("distance", 2);
     progress.check()?;
-    // What the cells' centres and the worst places tell spares most pieces a closer look.
+    // The values at the cells' centres and the worst places spare most pieces a closer look.
     for (_, patch) in &patches {
         search.bound_of_rect(&patch.rect, patch);
     }
@@ -140,7 +140,7 @@ fn triangulated(patches: &[(usize, Patch)], wanted_m: f64) -> (Vec<Triangle>, f6
     (triangles, slop_m)
 }
 
-/// What is still open in a search.
+/// Open intervals of a search.
 struct Open<T> {
     bound_m: f64,
     /// Of equal bounds the earliest comes first.

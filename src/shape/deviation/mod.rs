@@ -42,7 +42,7 @@ const DEEPEST: u32 = 9;
 /// Quarters over which all faces lie count as so many halvings: sheets over each other, or the same
 /// one many times, would else be looked at in every smallest part.
 const NO_NEARER: u32 = 5;
-/// Places nearer than this times the largest coordinate are not told apart.
+/// Places nearer than this times the largest coordinate are not distinguished.
 const HAIR: f64 = 1e-12;
 /// So many faces of cells, on average over the faces, are held at most: where faces lie over many cells
 /// each, blocks of cells share a list,
@@ -55,15 +55,15 @@ const ROUNDINGS: f64 = 16.0;
 /// The vertical difference between the surface and the points, cells of four points.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Vertical {
-    /// The most by which the surface stands above the interpolated points, m.
+    /// The most by which the surface lies above the interpolated points, m.
     pub above: Extreme,
     /// The most by which it lies below them, m.
     pub below: Extreme,
-    /// What rounding may add to either, m.
+    /// Largest part of rounding in either, m.
     pub rounding_m: f64,
-    /// What a bound of limited effort may lack, m; 0 where the supremum is exact.
+    /// Largest distance of a bound of limited effort to the supremum, m; 0 where that is exact.
     pub slack_m: f64,
-    /// What the cells are.
+    /// Kind of the cells.
     pub cells: Cells,
 }
 
@@ -128,7 +128,7 @@ impl Looks {
         })
     }
 
-    /// What a certificate may take.
+    /// Limits on the effort of a certificate.
     #[must_use]
     pub fn usual() -> Arc<Self> {
         Self::new(USUAL_LOOKS)
@@ -332,7 +332,7 @@ impl Faces {
             if part.width() <= self.hair.plan_m / 4.0 {
                 continue;
             }
-            // A face that is hidden stands lower than the one that hides it: no visibility needed.
+            // A face that is hidden is lower than the one that hides it: no visibility needed.
             let above = part.supremum(|p| face.height(p) - patch.height_m(p));
             worst.above = worst.above.or(above);
             let below = part.supremum(|p| patch.height_m(p) - face.height(p));

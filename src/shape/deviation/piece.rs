@@ -1,7 +1,7 @@
 //! Convex pieces of the plan, and the extremes of a plane minus a bilinear patch over them.
 //!
 //! The difference is a saddle: inside a polygon it has no extremum, along an edge it is quadratic.
-//! So its supremum stands at a corner or at the stationary point of an edge, in closed form.
+//! So its supremum is at a corner or at the stationary point of an edge, in closed form.
 
 use crate::mesh::Triangle;
 use serde::{Deserialize, Serialize};
@@ -95,7 +95,7 @@ impl Patch {
         usize::from(lengths[1] > lengths[0])
     }
 
-    /// What remains of the corners' heights after the best plane: zero for a flat patch.
+    /// Residual of the corners' heights about the best plane: zero for a flat patch.
     pub(super) fn twist_m(&self) -> f64 {
         let [a, b, c, d] = self.corners_m;
         (a - b) - (c - d)
@@ -225,7 +225,7 @@ impl Face {
         polygon
     }
 
-    /// The part of `polygon` over which this triangle stands higher than `other` by more than
+    /// The part of `polygon` over which this triangle is higher than `other` by more than
     /// `margin`.
     pub(super) fn hides(&self, other: &Self, polygon: &Polygon, margin: f64) -> Polygon {
         if self.heights[1] <= other.heights[0] + margin {
@@ -345,7 +345,7 @@ impl Polygon {
     }
 }
 
-/// A value and where it stands.
+/// A value and where it is.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Extreme {
     /// The value; minus infinity for none.

@@ -2,7 +2,7 @@
 //!
 //! Each of them is a concave function. Along either axis the bilinear interpolant is linear, so
 //! interpolant minus surface is convex along each axis and largest at the corners, where it
-//! vanishes: the surface never lies below. How far it stands above is bounded on a rectangle by the
+//! vanishes: the surface never lies below. How far it lies above is bounded on a rectangle by the
 //! tangent plane at its centre, whose difference from the interpolant is largest at a corner.
 
 use rayon::prelude::*;

@@ -15,7 +15,7 @@ const MOST_SHEETS: usize = 4;
 /// How far the ratio of areas may be off a whole number by rounding.
 const RATIO: f64 = 1e-6;
 
-/// What may be seen in a rectangle.
+/// Sheets that may be seen in a rectangle.
 pub(super) struct Sheets {
     /// Faces without those below sheets that cover the rectangle.
     pub(super) faces: Vec<u32>,
@@ -148,7 +148,7 @@ fn passes(a: Point, b: Point, rect: &Rect) -> bool {
     let side = |p: Point| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
     let sides = rect.corners().map(side);
     let largest = sides.iter().fold(0.0, |m: f64, s| m.max(s.abs()));
-    // What rounding may turn counts as both sides.
+    // A sign that rounding may turn counts as both sides.
     let slack = 1e-12 * largest;
     sides.iter().any(|s| *s < slack) && sides.iter().any(|s| *s > -slack)
 }

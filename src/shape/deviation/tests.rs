@@ -131,7 +131,7 @@ fn blocks_of_any_size_give_the_same_faces_and_the_same_bounds() {
     let known = heights(&mesh, &grid, &Silent).unwrap();
     let known: Vec<Option<f64>> = known.iter().map(|s| s.map(|s| s.height_m)).collect();
     let fine = Lattice::new(&faces, &grid, &known);
-    let told = |lattice: &Lattice| {
+    let reported = |lattice: &Lattice| {
         let worst = vertical(&mesh, &grid, lattice, &Silent).unwrap();
         (worst, vertical_by_cell(lattice, &Silent).unwrap())
     };
@@ -141,7 +141,7 @@ fn blocks_of_any_size_give_the_same_faces_and_the_same_bounds() {
         for cell in 0..fine.len() {
             assert_eq!(coarse.members(cell), fine.members(cell), "{most}: {cell}");
         }
-        assert_eq!(told(&coarse), told(&fine));
+        assert_eq!(reported(&coarse), reported(&fine));
         sides.push(coarse.block);
     }
     assert_eq!(fine.block, 1);

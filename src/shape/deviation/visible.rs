@@ -1,6 +1,6 @@
 //! The part of a triangle that is seen from above, among the triangles over it.
 //!
-//! The visible part of a piece is the piece without the convex regions where others stand higher.
+//! The visible part of a piece is the piece without the convex regions where others are higher.
 //! A supremum over it needs its border alone: parts of the piece's own sides, and parts of the
 //! hiding regions' sides. Which parts, is decided on lines beside them, a hair inside the piece or
 //! outside the region, so that what is shared with a neighbour needs no exact arithmetic.
@@ -8,7 +8,7 @@
 use super::Looks;
 use super::piece::{Extreme, Face, Point, Polygon, along};
 
-/// Lengths below which two places in plan are not told apart.
+/// Lengths below which two places in plan are not distinguished.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Hair {
     /// m.
@@ -17,7 +17,7 @@ pub(super) struct Hair {
     pub(super) height_m: f64,
 }
 
-/// How a piece is looked at: what is not told apart, and how much may yet be looked at.
+/// How a piece is looked at: the resolution, and how much may yet be looked at.
 #[derive(Clone, Copy)]
 pub(super) struct Look<'a> {
     pub(super) hair: Hair,

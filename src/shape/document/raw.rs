@@ -10,7 +10,7 @@ use fluxform_base::force_direction::RequestedForce;
 use fluxform_design::message_text::axis_fault;
 use fluxform_numerics::axis::Axis;
 
-/// What the command line says of a surface.
+/// A surface's options on the command line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RawSurface {
     /// The surface file.
@@ -32,7 +32,7 @@ pub struct RawSurface {
     pub y_m: Option<[f64; 2]>,
 }
 
-/// Why a surface on the command line cannot be taken as it stands: wrong usage.
+/// Why a surface on the command line cannot be taken as it is: wrong usage.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RawSurfaceError {
     /// The format carries no unit and none was given.
@@ -65,9 +65,9 @@ pub enum RawSurfaceError {
         path: PathBuf,
         /// `x` or `y`.
         axis: &'static str,
-        /// What is wrong.
+        /// The fault.
         fault: String,
-        /// What to do.
+        /// The advice.
         help: &'static str,
     },
     /// More points than any grid may have.

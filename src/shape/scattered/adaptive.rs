@@ -33,7 +33,7 @@ pub struct Adaptive {
     pub border_m: f64,
 }
 
-/// What patches hold.
+/// Contents of patches.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grading {
     /// How far, vertically, a patch may lie from the surface, m.

@@ -121,7 +121,7 @@ pub fn poisson(
     })
 }
 
-/// What the counted places of the surface tell.
+/// Statistics of the counted places of the surface.
 struct Counted {
     /// The area nearest to each dart, by its cell.
     areas_m2: Vec<f64>,

@@ -104,7 +104,7 @@ fn position(bytes: &[u8]) -> Option<usize> {
     }
 }
 
-/// The block whose marker stands at `at`; `None` where chance put the marker there.
+/// The block whose marker is at `at`; `None` where chance put the marker there.
 fn block(bytes: &[u8], at: usize) -> Option<Block> {
     let word = |k: usize| {
         let from = at + MARKER.len() + 4 * k;

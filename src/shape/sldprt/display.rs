@@ -39,7 +39,7 @@ pub(super) struct Table {
     end: usize,
 }
 
-/// The table that stands at `at`.
+/// The table that is at `at`.
 fn table(stream: &[u8], at: usize) -> Option<Table> {
     if [0, 1, 2].map(|k| word(stream, at + 4 * k)) != LENGTHS.map(Some) {
         return None;

@@ -21,7 +21,7 @@ use crate::number::F32_ROUNDING;
 use crate::read_error::{Place, ReadError};
 use crate::tessellation::face_deviation;
 
-/// What to do instead, for messages.
+/// Advice on another way, for messages.
 const ADVICE: &str = "open it in SOLIDWORKS and save the body as STEP, STL (binary, fine \
                       resolution) or 3MF";
 /// The stream with what is shown.

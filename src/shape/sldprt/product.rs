@@ -1,4 +1,4 @@
-//! Assemblies: which parts stand where, and which of the display's tables are theirs.
+//! Assemblies: the placement of each part, and which of the display's tables are theirs.
 //!
 //! The document `swXmlContents/COMPINSTANCETREE` names the files, the models made of them (one
 //! per file and configuration, with its box) and the references that place models in models. The

@@ -1,4 +1,4 @@
-//! What the mesh of a body must hold before it is believed: it closes the body, looks to one side,
+//! Conditions on the mesh of a body before it is accepted: it closes the body, looks to one side,
 //! and encloses the body's exact volume with its exact area, as far as the facets' distance from the
 //! faces allows. That each facet lies on its face was measured where the faces are known.
 
@@ -9,7 +9,7 @@ use crate::mesh::{Triangle, cross, dot, minus};
 
 /// Vertices of neighbouring faces agree to this, against the body's size.
 pub(super) const WELD: f64 = 1e-7;
-/// What the exact volume and area may be wrong by: OpenCASCADE integrates numerically.
+/// Error of the exact volume and area: OpenCASCADE integrates numerically.
 const INTEGRATED: f64 = 2e-3;
 /// Bodies not much larger than the chord may lose so much of their volume and area.
 const MOST_APART: f64 = 0.15;
@@ -29,7 +29,7 @@ pub(super) struct Part {
     pub(super) volume: f64,
 }
 
-/// What is known of a mesh that passed.
+/// Properties of a mesh that passed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Verdict {
     /// Pairs of facets that pass through each other.

@@ -122,7 +122,7 @@ struct PartFigures {
     volume: f64,
 }
 
-/// What the thread that listens passes on.
+/// Messages of the thread that listens.
 enum Heard {
     Line(Line),
     Parts(Vec<Part>),

@@ -50,7 +50,7 @@ pub struct NamedBody {
     pub triangles: usize,
 }
 
-/// What was read last: a picture, a report and points of one file need it once.
+/// The file read last: a picture, a report and points of one file need it once.
 static LAST: Mutex<Option<(Vec<u8>, BodyOptions, FileMesh)>> = Mutex::new(None);
 
 /// Reads a STEP file's bytes; coordinates are in its own unit.

@@ -90,7 +90,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// What follows `facet`. The normal is not trusted and not even parsed.
+    /// Reads the rest of a `facet` line. The normal is not trusted and not even parsed.
     fn facet(&mut self) -> Result<Triangle, StlError> {
         let mut word = self.words.next();
         if is(word, "normal") {
@@ -163,7 +163,7 @@ fn is(word: Option<&[u8]>, wanted: &str) -> bool {
     word.is_some_and(|w| w.eq_ignore_ascii_case(wanted.as_bytes()))
 }
 
-/// Words between white space, and where they stand.
+/// Words between white space, and where they are.
 struct Words<'a> {
     bytes: &'a [u8],
     /// First byte not yet looked at.

@@ -105,7 +105,7 @@ pub(super) enum StlError {
         line: usize,
         /// Number of the triangle, from 1; 0 outside one.
         triangle: usize,
-        /// What was expected and what was found.
+        /// Expectation and result.
         what: String,
     },
 }

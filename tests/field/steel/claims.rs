@@ -1,4 +1,4 @@
-//! What is claimed of |B| in linear cores against much finer solutions, searched differently.
+//! The stated error of |B| in linear cores against much finer solutions, searched differently.
 
 use super::support::Design;
 use fluxform_field::steel::CoreShape;

@@ -1,4 +1,4 @@
-//! What is claimed of coils along a magnetisation curve against far finer solutions.
+//! The stated errors of coils along a magnetisation curve against far finer solutions.
 
 use super::claims::{covered, random_cores};
 use super::support::{Design, SEED_COIL, SEED_CORE};

@@ -1,4 +1,4 @@
-//! What the tests share: designs, the oracles, and how a difference is measured.
+//! Common parts of the tests: designs, the oracles, and how a difference is measured.
 
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_field::steel::CoreShape;

@@ -1,4 +1,4 @@
-//! What is claimed of arrays and of single coils along a magnetisation curve, each as an array,
+//! The stated errors of arrays and of single coils along a magnetisation curve, each as an array,
 //! against solutions two resolutions finer.
 
 use super::claims::{covered, random_cores};

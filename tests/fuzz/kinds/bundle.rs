@@ -59,7 +59,7 @@ struct Honest {
     bundle: Bundle,
 }
 
-/// What upright and tilted designs give. The shape is not found again, so that `verify` goes on to
+/// Results of upright and tilted designs. The shape is not found again, so that `verify` goes on to
 /// its independent route; the bundles' files are found in `with_inputs`.
 fn honest(tilted: bool) -> &'static Honest {
     static MADE: [OnceLock<Honest>; 2] = [const { OnceLock::new() }; 2];
@@ -594,12 +594,12 @@ fn give(input: &Input, folder: &Path) -> Result<bool, String> {
         ],
     };
     for dynamics in [false, true] {
-        let told = TrajectorySource {
+        let report_text = TrajectorySource {
             source: "made up".into(),
             input: None,
             synthesis: None,
         };
-        let report = match replay::run(&opened, &trajectory, told, dynamics, &Silent) {
+        let report = match replay::run(&opened, &trajectory, report_text, dynamics, &Silent) {
             Err(error) => {
                 refusal(&error.to_string(), "")?;
                 continue;

@@ -27,7 +27,7 @@ const HEAD: usize = 8 + 2 * 32;
 /// The digest of the origin, which depends on the folder too: zeros in an input stand for the right one.
 const ORIGIN: std::ops::Range<usize> = 8..40;
 
-/// What an entry holds here: as the forces are, and as solutions hold them.
+/// The two forms of an entry: as the forces are, and as solutions hold them.
 type Value = (Vec<f64>, Vec<Vec<f64>>, String, Option<u64>);
 
 fn origin() -> Origin {
@@ -120,7 +120,7 @@ fn give(input: &Input, folder: &Path) -> Result<bool, String> {
     {
         return Err("an entry of another origin is used".to_owned());
     }
-    // What is no entry is left alone; what is one is written again.
+    // A file that is no entry is left alone; an entry is written again.
     store.keep(
         ENTRY,
         &origin(),

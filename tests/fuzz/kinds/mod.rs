@@ -38,17 +38,20 @@ pub fn refusal(words: &str, file: &str) -> Result<bool, String> {
     Ok(false)
 }
 
-/// What is accepted holds finite numbers alone, as `Debug` prints it.
-pub fn finite(told: &str) -> Result<(), String> {
-    for (at, _) in told.match_indices("NaN").chain(told.match_indices("inf")) {
-        let before = told[..at].chars().next_back().unwrap_or(' ');
-        let after = told[at + 3..].chars().next().unwrap_or(' ');
+/// An accepted value holds finite numbers alone, as `Debug` prints it.
+pub fn finite(reported: &str) -> Result<(), String> {
+    for (at, _) in reported
+        .match_indices("NaN")
+        .chain(reported.match_indices("inf"))
+    {
+        let before = reported[..at].chars().next_back().unwrap_or(' ');
+        let after = reported[at + 3..].chars().next().unwrap_or(' ');
         if " [(-".contains(before) && ",)]} \n".contains(after) {
-            let around: String = told[..at].chars().rev().take(60).collect();
+            let around: String = reported[..at].chars().rev().take(60).collect();
             let around: String = around.chars().rev().collect();
             return Err(format!(
                 "accepted, but not finite: {around}{}",
-                &told[at..at + 3]
+                &reported[at..at + 3]
             ));
         }
     }

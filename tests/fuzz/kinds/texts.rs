@@ -79,7 +79,7 @@ fn named(name: &str, content: impl Into<Vec<u8>>) -> (String, Input) {
     (name.to_owned(), Input::file(FILE, content))
 }
 
-/// What no reader of texts may choke on.
+/// Texts that are hard on readers.
 fn hostile_texts(head: &str) -> Vec<(String, Input)> {
     let with = |tail: String| format!("{head}{tail}");
     let mut found = vec![
@@ -288,7 +288,7 @@ fn refused(invalid: &InvalidDocument) -> Result<bool, String> {
     if !faults.has_errors() {
         return Err("refused without an error".to_owned());
     }
-    // What a terminal is shown.
+    // Text for a terminal.
     if faults.render(true, 60).is_empty() {
         return Err("a refusal without words".to_owned());
     }

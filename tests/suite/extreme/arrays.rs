@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::path::Path;
 
-use super::check::{Outcome, SEED, close, holds, measured, off, refused, told, worst};
+use super::check::{Outcome, SEED, close, holds, measured, off, refused, reported, worst};
 use super::{Case, case};
 use fluxform::coil::drive::Drive;
 use fluxform::coil::inductance::self_inductance_h;
@@ -40,7 +40,7 @@ fn by_flux(distance_m: f64) -> Outcome {
                 for k in 0..ANGLES {
                     let angle = PI * (k as f64 + 0.5) / ANGLES as f64;
                     let r = (distance_m + rho * angle.cos()).hypot(rho * angle.sin());
-                    let b_z = SEED.field(r, z).map_err(told)?.b_z;
+                    let b_z = SEED.field(r, z).map_err(reported)?.b_z;
                     sum += wx * wy * wt * rho * 0.5 * a * b_z;
                 }
             }
@@ -87,7 +87,7 @@ fn in_air() -> Vec<Case> {
             "every current has an energy above 0: nine time constants of their own",
             0.0,
             || {
-                let drive = Drive::new(&matrix(3, 3, 0.038), &[6.0; 9], None).map_err(told)?;
+                let drive = Drive::new(&matrix(3, 3, 0.038), &[6.0; 9], None).map_err(reported)?;
                 let [short, long] = drive.time_constants_s().ok_or("none")?;
                 holds(
                     short > 0.0 && long < 9.0 * short,
@@ -101,7 +101,7 @@ fn in_air() -> Vec<Case> {
             0.0,
             || {
                 let m = matrix(10, 10, 0.038);
-                let drive = Drive::new(&m, &[6.0; 100], None).map_err(told)?;
+                let drive = Drive::new(&m, &[6.0; 100], None).map_err(reported)?;
                 let [short, long] = drive.time_constants_s().ok_or("none")?;
                 let mean = self_inductance_h(&SEED) / 6.0;
                 holds(
@@ -152,11 +152,11 @@ fn in_air() -> Vec<Case> {
 }
 
 fn coupled(positions_m: &[[f64; 2]], tolerance: f64) -> Result<CoupledArray, String> {
-    CoupledArray::new(&SEED, CORE, 1000.0, positions_m, tolerance, 0.01).map_err(told)
+    CoupledArray::new(&SEED, CORE, 1000.0, positions_m, tolerance, 0.01).map_err(reported)
 }
 
 fn alone() -> Result<f64, String> {
-    let coil = CoredCoil::new(&SEED, CORE, 1000.0, 1e-6, 0.01).map_err(told)?;
+    let coil = CoredCoil::new(&SEED, CORE, 1000.0, 1e-6, 0.01).map_err(reported)?;
     Ok(coil.added_inductance_h)
 }
 
@@ -168,7 +168,7 @@ fn sound(array: &CoupledArray, positions_m: &[[f64; 2]]) -> Outcome {
     let whole: Vec<f64> = (0..count * count)
         .map(|k| air[k] + added[(k / count, k % count)])
         .collect();
-    Drive::new(&whole, &vec![6.0; count], None).map_err(told)?;
+    Drive::new(&whole, &vec![6.0; count], None).map_err(reported)?;
     let largest = added.amax();
     worst(
         (0..count * count).map(|k| {

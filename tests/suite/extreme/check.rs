@@ -1,4 +1,4 @@
-//! What the cases share: how an error is measured, generic numbers, the seed's coil, oracles.
+//! Common parts of the cases: how an error is measured, generic numbers, the seed's coil, oracles.
 
 use std::fmt::Display;
 
@@ -29,7 +29,7 @@ pub const fn winding(inner_m: f64, outer_m: f64, length_m: f64, turns: f64) -> W
 }
 
 /// The message of an error.
-pub fn told(error: impl Display) -> String {
+pub fn reported(error: impl Display) -> String {
     error.to_string()
 }
 
@@ -122,7 +122,7 @@ pub fn known_winding(name: &str) -> Result<(Value, Winding), String> {
 
 /// A committed table of reference values.
 pub fn oracle(text: &str) -> Result<Value, String> {
-    serde_json::from_str(text).map_err(told)
+    serde_json::from_str(text).map_err(reported)
 }
 
 /// A number of such a table, whether it stands there as text or not.

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::check::{
-    Outcome, SEED, close, holds, known_winding, measured, number, off, refused, told, winding,
+    Outcome, SEED, close, holds, known_winding, measured, number, off, refused, reported, winding,
     worst,
 };
 use super::geometry::{DISC, FILM, LEAF, NEEDLE, SOLID};
@@ -26,7 +26,7 @@ fn dipole(w: &Winding, r_m: f64, z_m: f64) -> Outcome {
     let z = z_m + 0.5 * w.length_m;
     let d = r_m.hypot(z);
     let scale = MU_0_T_M_PER_A * moment / (4.0 * PI);
-    let found = w.field(r_m, z_m).map_err(told)?;
+    let found = w.field(r_m, z_m).map_err(reported)?;
     let size = scale / d.powi(3);
     let share = 6.0 * (a2.hypot(0.5 * w.length_m) / d).powi(2);
     let b_z = scale * (2.0 * z * z - r_m * r_m) / d.powi(5);
@@ -103,9 +103,9 @@ fn batch(z_m: f64, tolerance: f64) -> Outcome {
     let z = vec![z_m; r.len()];
     let many = SEED
         .gradients(&r, &z, tolerance, Components::Gradient)
-        .map_err(told)?;
+        .map_err(reported)?;
     let sure: Result<Vec<AxialField>, _> = r.iter().map(|&r| SEED.field(r, z_m)).collect();
-    let sure = sure.map_err(told)?;
+    let sure = sure.map_err(reported)?;
     let size = sure
         .iter()
         .map(AxialField::gradient_norm)
@@ -206,8 +206,8 @@ fn singular_lines() -> Vec<Case> {
             1e-8,
             || {
                 let (up, down) = (
-                    SEED.field(0.0133, 1e-9).map_err(told)?,
-                    SEED.field(0.0133, -0.1 - 1e-9).map_err(told)?,
+                    SEED.field(0.0133, 1e-9).map_err(reported)?,
+                    SEED.field(0.0133, -0.1 - 1e-9).map_err(reported)?,
                 );
                 worst(
                     [off(up.b_z, down.b_z), off(up.dbz_dz, -down.dbz_dz)],
@@ -220,8 +220,8 @@ fn singular_lines() -> Vec<Case> {
 
 /// The growth of dB_z/dz on the way from 1 um to 1 nm off an edge.
 fn logarithm(r_m: f64, z_m: f64, side: f64, sign: f64) -> Outcome {
-    let near = SEED.field(r_m, z_m + side * 1e-9).map_err(told)?;
-    let far = SEED.field(r_m, z_m + side * 1e-6).map_err(told)?;
+    let near = SEED.field(r_m, z_m + side * 1e-9).map_err(reported)?;
+    let far = SEED.field(r_m, z_m + side * 1e-6).map_err(reported)?;
     let per_e = MU_0_T_M_PER_A * SEED.current_density_per_m2() / (2.0 * PI);
     close(
         near.dbz_dz - far.dbz_dz,
@@ -232,8 +232,8 @@ fn logarithm(r_m: f64, z_m: f64, side: f64, sign: f64) -> Outcome {
 
 /// Outside against inside, 2 nm apart.
 fn jump(outside: (f64, f64), inside: (f64, f64), of_face: bool) -> Outcome {
-    let out = SEED.field(outside.0, outside.1).map_err(told)?;
-    let within = SEED.field(inside.0, inside.1).map_err(told)?;
+    let out = SEED.field(outside.0, outside.1).map_err(reported)?;
+    let within = SEED.field(inside.0, inside.1).map_err(reported)?;
     let whole = MU_0_T_M_PER_A * SEED.current_density_per_m2();
     let found = if of_face {
         within.dbr_dz - out.dbr_dz
@@ -272,10 +272,10 @@ fn cut_across(gap_m: f64) -> Outcome {
     let (r, z) = (0.0149, gap_m - depth);
     sum_of(
         [
-            upper.field(r, z).map_err(told)?,
-            lower.field(r, z + depth).map_err(told)?,
+            upper.field(r, z).map_err(reported)?,
+            lower.field(r, z + depth).map_err(reported)?,
         ],
-        SEED.field(r, z).map_err(told)?,
+        SEED.field(r, z).map_err(reported)?,
     )
 }
 
@@ -286,10 +286,10 @@ fn cut_along(gap_m: f64) -> Outcome {
     let (r, z) = (at + gap_m, -0.043);
     sum_of(
         [
-            inner.field(r, z).map_err(told)?,
-            outer.field(r, z).map_err(told)?,
+            inner.field(r, z).map_err(reported)?,
+            outer.field(r, z).map_err(reported)?,
         ],
-        SEED.field(r, z).map_err(told)?,
+        SEED.field(r, z).map_err(reported)?,
     )
 }
 

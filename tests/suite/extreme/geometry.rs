@@ -2,13 +2,13 @@
 
 use std::f64::consts::PI;
 
-use super::check::{Outcome, SEED, known_winding, number, off, told, winding, worst};
+use super::check::{Outcome, SEED, known_winding, number, off, reported, winding, worst};
 use super::{Case, case};
 use fluxform::field::winding::{AxialField, Winding};
 use fluxform::numerics::gauss;
 use fluxform::units::MU_0_T_M_PER_A;
 
-/// What `Winding::field` states of itself.
+/// Error that `Winding::field` states.
 const STATED: f64 = 1e-12;
 pub const DISC: Winding = winding(0.010, 0.050, 1e-5, 37.0);
 pub const NEEDLE: Winding = winding(0.0005, 0.001, 1.0, 4100.0);
@@ -54,7 +54,7 @@ fn axis_closed(w: &Winding, z_m: f64) -> [f64; 2] {
 }
 
 fn axis(w: &Winding, z_m: f64) -> Outcome {
-    let found = w.field(0.0, z_m).map_err(told)?;
+    let found = w.field(0.0, z_m).map_err(reported)?;
     let [b, g] = axis_closed(w, z_m);
     // In a winding's middle the gradient vanishes: there the field over the radius is its size.
     let size = found.gradient_norm().max(b.abs() / w.outer_radius_m);
@@ -181,8 +181,8 @@ fn scaled(k: f64) -> Outcome {
         (0.0143, -0.021),
         (0.07, -0.013),
     ] {
-        let one = SEED.field(r, z).map_err(told)?;
-        let other = big.field(r * k, z * k).map_err(told)?;
+        let one = SEED.field(r, z).map_err(reported)?;
+        let other = big.field(r * k, z * k).map_err(reported)?;
         errors.push((other.b_z * k - one.b_z).abs() / one.b_z.hypot(one.b_r));
         errors.push((other.dbz_dz * k * k - one.dbz_dz).abs() / one.gradient_norm());
         errors.push((other.dbr_dz * k * k - one.dbr_dz).abs() / one.gradient_norm());
@@ -200,7 +200,7 @@ fn exact(name: &str, r: &str, z: &str) -> Outcome {
         .ok_or("no such point in the oracle")?;
     let found = w
         .field(number(&point["r_m"])?, number(&point["z_m"])?)
-        .map_err(told)?;
+        .map_err(reported)?;
     let of = |key: &str| number(&point[key]);
     let size = of("b_r")?.hypot(of("b_z")?);
     let norm = AxialField {
@@ -354,7 +354,7 @@ fn brute_force() -> Outcome {
         // mu_0 / (4 pi) times the step 2 pi / n, over a section of half-widths whose product
         // the density turns into turns.
         let scale = MU_0_T_M_PER_A * 0.5 / ANGLES as f64 * 0.25 * w.turns;
-        let found = w.field(r, z).map_err(told)?;
+        let found = w.field(r, z).map_err(reported)?;
         let size = found.b_z.hypot(found.b_r);
         errors.push((found.b_z - scale * sums[0]).abs() / size);
         errors.push((found.b_r - scale * sums[1]).abs() / size);

@@ -3,7 +3,9 @@
 
 use serde_json::Value;
 
-use super::check::{Outcome, close, holds, measured, number, numbers, off, oracle, told, worst};
+use super::check::{
+    Outcome, close, holds, measured, number, numbers, off, oracle, reported, worst,
+};
 use super::{Case, case};
 use fluxform::lambda::{ForceProblem, Settings, Solution, Status, solve};
 use fluxform::numerics::random::Random;
@@ -56,7 +58,7 @@ impl Problem {
     }
 
     pub fn solve(&self) -> Result<Solution, String> {
-        solve(&self.problem(), &Settings::default()).map_err(told)
+        solve(&self.problem(), &Settings::default()).map_err(reported)
     }
 
     fn mean_square(&self) -> f64 {
@@ -110,7 +112,7 @@ fn rational(name: &str) -> Outcome {
         let found = solution.path.error_n2(lambda) / (lambda * lambda * problem.mean_square());
         errors.push((found - number(&point["relative_error"])?).abs());
     }
-    // Force constants are told to 1e-11, errors to 1e-13.
+    // Force constants are printed to 1e-11, errors to 1e-13.
     for (found, key) in [
         (
             solution.constants.lambda_linear_n_per_m,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::check::{Outcome, close, holds, measured, off, refused, told, worst};
+use super::check::{Outcome, close, holds, measured, off, refused, reported, worst};
 use super::{Case, case};
 use fluxform::coil::optimum::air::AirCoil;
 use fluxform::coil::optimum::{
@@ -33,7 +33,8 @@ fn seed() -> Limits {
 
 /// The optimum under `limits` with the target `height_m` up and wire of `wire_m`.
 fn found(limits: Limits, height_m: f64, wire_m: f64) -> Result<Optimum, String> {
-    let model = AirCoil::new(height_m, &MagnetRule::dipole([0.0, 0.0, -0.909_41])).map_err(told)?;
+    let model =
+        AirCoil::new(height_m, &MagnetRule::dipole([0.0, 0.0, -0.909_41])).map_err(reported)?;
     let wire = Wire {
         diameter_m: wire_m,
         conductor_diameter_m: wire_m,
@@ -52,7 +53,7 @@ fn found(limits: Limits, height_m: f64, wire_m: f64) -> Result<Optimum, String> 
         valley: false,
         ..Settings::default()
     };
-    optimise(&model, &task, &settings, &Silent).map_err(told)
+    optimise(&model, &task, &settings, &Silent).map_err(reported)
 }
 
 fn best(limits: Limits) -> Result<BestCoil, String> {
@@ -420,7 +421,7 @@ fn as_designs() -> Vec<Case> {
         }),
         case(
             "limits: three faults at once",
-            "all three are told",
+            "all three are reported",
             0.0,
             || {
                 refused(

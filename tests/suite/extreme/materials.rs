@@ -1,7 +1,7 @@
 //! Steel from next to nothing to next to infinite, and curves with kinks from no current to any.
 
 use super::check::{
-    Outcome, SEED, holds, measured, number, numbers, off, oracle, refused, told, winding, worst,
+    Outcome, SEED, holds, measured, number, numbers, off, oracle, refused, reported, winding, worst,
 };
 use super::{Case, case};
 use fluxform::field::steel::CoreShape;
@@ -36,10 +36,10 @@ pub fn cases() -> Vec<Case> {
 }
 
 fn solved(relative_permeability: f64, tolerance: f64) -> Result<CoredCoil, String> {
-    CoredCoil::new(&SEED, CORE, relative_permeability, tolerance, 0.006).map_err(told)
+    CoredCoil::new(&SEED, CORE, relative_permeability, tolerance, 0.006).map_err(reported)
 }
 
-/// What steel of susceptibility `chi` adds, over chi.
+/// Part of steel of susceptibility `chi`, over chi.
 fn per_chi(chi: f64) -> Result<[f64; 2], String> {
     let mu_r = 1.0 + chi;
     let coil = solved(mu_r, 1e-8)?;
@@ -76,8 +76,8 @@ fn weak_and_strong() -> Vec<Case> {
         case("materials: mu_r = 1", "air: nothing added", 0.0, || {
             let coil = solved(1.0, 1e-6)?;
             let (with, without) = (
-                coil.field(0.007, 0.013).map_err(told)?,
-                SEED.field(0.007, 0.013).map_err(told)?,
+                coil.field(0.007, 0.013).map_err(reported)?,
+                SEED.field(0.007, 0.013).map_err(reported)?,
             );
             holds(
                 coil.added_inductance_h == 0.0 && with == without,
@@ -135,10 +135,10 @@ fn weak_and_strong() -> Vec<Case> {
             2e-3,
             || {
                 let w = winding(6e-5, 0.019, 0.1, 1000.0);
-                let coil =
-                    CoredCoil::new(&w, core(5e-5, -0.1, 0.0), 50.0, 1e-6, 1e-3).map_err(told)?;
-                let inside = coil.field(1.7e-5, -0.049).map_err(told)?.b_z;
-                let applied = w.field(1.7e-5, -0.049).map_err(told)?.b_z;
+                let coil = CoredCoil::new(&w, core(5e-5, -0.1, 0.0), 50.0, 1e-6, 1e-3)
+                    .map_err(reported)?;
+                let inside = coil.field(1.7e-5, -0.049).map_err(reported)?.b_z;
+                let applied = w.field(1.7e-5, -0.049).map_err(reported)?.b_z;
                 measured(
                     off(inside / applied, 50.0),
                     format!("{:.6} times", inside / applied),
@@ -152,9 +152,9 @@ fn weak_and_strong() -> Vec<Case> {
             || {
                 let w = winding(0.012, 0.019, 1.0, 1000.0);
                 let coil = CoredCoil::new(&w, core(0.01, -0.50001, -0.49999), 2.0, 1e-6, 1e-3)
-                    .map_err(told)?;
-                let inside = coil.field(0.001, -0.5).map_err(told)?.b_z;
-                let applied = w.field(0.001, -0.5).map_err(told)?.b_z;
+                    .map_err(reported)?;
+                let inside = coil.field(0.001, -0.5).map_err(reported)?.b_z;
+                let applied = w.field(0.001, -0.5).map_err(reported)?.b_z;
                 measured(
                     off(inside / applied, 1.0),
                     format!("{:.6} times", inside / applied),
@@ -173,9 +173,9 @@ fn shape(w: &Winding, shape: CoreShape, mu_r: f64) -> Outcome {
         quadrature: 1e-13,
     };
     let lowest_m = shape.top_m.max(0.0) + 0.5 * shape.radius_m;
-    let coil = CoredCoil::new(w, shape, mu_r, 1e-6, lowest_m).map_err(told)?;
-    let fine = CoredCoil::at_resolution(w, shape, mu_r, &finest).map_err(told)?;
-    let size = coil.field(0.0, lowest_m).map_err(told)?.gradient_norm();
+    let coil = CoredCoil::new(w, shape, mu_r, 1e-6, lowest_m).map_err(reported)?;
+    let fine = CoredCoil::at_resolution(w, shape, mu_r, &finest).map_err(reported)?;
+    let size = coil.field(0.0, lowest_m).map_err(reported)?.gradient_norm();
     let own = 0.1 * MU_0_T_M_PER_A * w.turns.powi(2) * w.inner_radius_m;
     let difference = (coil.added_inductance_h - fine.added_inductance_h).abs();
     let errors = [
@@ -248,14 +248,14 @@ fn table(name: &str) -> Result<(Vec<f64>, Vec<f64>), String> {
 
 fn curve(name: &str) -> Result<BhCurve, String> {
     let (b, h) = table(name)?;
-    BhCurve::new(&b, &h).map_err(told)
+    BhCurve::new(&b, &h).map_err(reported)
 }
 
 /// Steep, then a kink at 1.5 T, then as vacuum.
 fn kinked() -> Result<BhCurve, String> {
     let knee = 1.5 / (1e4 * MU_0_T_M_PER_A);
     let last = knee + 1.0 / MU_0_T_M_PER_A;
-    BhCurve::new(&[0.0, 0.75, 1.5, 2.5], &[0.0, 0.5 * knee, knee, last]).map_err(told)
+    BhCurve::new(&[0.0, 0.75, 1.5, 2.5], &[0.0, 0.5 * knee, knee, last]).map_err(reported)
 }
 
 fn back_and_forth(curve: &BhCurve) -> Outcome {
@@ -411,8 +411,8 @@ impl Permeability for Kinked {
 fn fluxes(law: &impl Permeability, currents_a: &[f64]) -> Result<Vec<f64>, String> {
     let resolution = Resolution::for_tolerance(1e-5);
     let outline = Generatrix::of_coil(&SEED, CORE, &resolution);
-    let excitation = Excitation::new(&SEED, &outline, resolution.quadrature).map_err(told)?;
-    let core = SaturatedCore::new(&outline, resolution.quadrature).map_err(told)?;
+    let excitation = Excitation::new(&SEED, &outline, resolution.quadrature).map_err(reported)?;
+    let core = SaturatedCore::new(&outline, resolution.quadrature).map_err(reported)?;
     currents_a
         .iter()
         .map(|&current_a| {
@@ -459,7 +459,7 @@ fn saturated() -> Vec<Case> {
                     let r = 0.5 * CORE.radius_m * (1.0 + x);
                     for (y, wy) in rule.nodes.iter().zip(&rule.weights) {
                         let z = -0.5 * 0.11 * (1.0 + y);
-                        let f = SEED.field(r, z).map_err(told)?;
+                        let f = SEED.field(r, z).map_err(reported)?;
                         sum += wx * wy * r * f.b_r.hypot(f.b_z);
                     }
                 }

@@ -1,6 +1,6 @@
 //! Up to ten million triangles, surface files that are none, and what lies between the points.
 
-use super::check::{Outcome, close, measured, refused, told, worst};
+use super::check::{Outcome, close, measured, refused, reported, worst};
 use super::shapes::{against, binary, grid, mesh, plane, sheet};
 use super::{Case, case};
 use fluxform::progress::Silent;
@@ -61,7 +61,7 @@ fn many() -> Vec<Case> {
                     }
                     let m = mesh(all)?;
                     let g = grid((-0.55, 0.55, 201), (-0.55, 0.55, 201));
-                    let found = heights(&m, &g, &Silent).map_err(told)?;
+                    let found = heights(&m, &g, &Silent).map_err(reported)?;
                     let mut sum = 0.0;
                     for (k, s) in found.iter().enumerate() {
                         let (x, y) = (g.x_m.node(k % 201), g.y_m.node(k / 201));
@@ -112,7 +112,7 @@ fn files() -> Vec<Case> {
             0.0,
             || {
                 let bytes = binary(&[[[0.0; 3], [f32::MAX, 0.0, 0.0], [0.0, 1.0, 0.0]]]);
-                let file = stl::read(&bytes).map_err(told)?;
+                let file = stl::read(&bytes).map_err(reported)?;
                 refused(
                     Mesh::place(file, &Transform::new(1e-3, &Placement::default())),
                     &["triangle 1"],
@@ -125,11 +125,11 @@ fn files() -> Vec<Case> {
 /// The largest vertical difference between a mesh and bilinear interpolation of its heights.
 fn deviation(triangles: Vec<Triangle>, grid: &Grid) -> Result<f64, String> {
     let m = mesh(triangles)?;
-    let found = heights(&m, grid, &Silent).map_err(told)?;
+    let found = heights(&m, grid, &Silent).map_err(reported)?;
     let nodes: Vec<Option<f64>> = found.iter().map(|s| s.map(|s| s.height_m)).collect();
     let faces = Faces::new(&m, grid, Looks::endless());
     let lattice = Lattice::new(&faces, grid, &nodes);
-    let told_m = vertical(&m, grid, &lattice, &Silent).map_err(told)?;
+    let told_m = vertical(&m, grid, &lattice, &Silent).map_err(reported)?;
     Ok(told_m.worst().value_m.max(0.0))
 }
 

@@ -1,7 +1,7 @@
 //! The stability catalogue: named cases at the limits of what may be asked, each with what must
 //! come out.
 //!
-//! What is expected comes from a closed form, a limit that physics knows, a symmetry, another
+//! Expectations come from a closed form, a limit that physics knows, a symmetry, another
 //! route or a committed oracle; the bound comes from that expectation (its own error, the stated
 //! accuracy of the stage, rounding) and is written down before the result is known. Where the
 //! right answer is a refusal, the message is what is expected.
@@ -30,7 +30,7 @@ use fluxform::progress::{Progress, pass_interruption};
 /// Seconds a case may take unless it says otherwise; unoptimised builds on busy machines included.
 const SECONDS: f64 = 60.0;
 
-/// What a case measured.
+/// Measurement of a case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Got {
     /// The result in words, with units.
@@ -45,7 +45,7 @@ pub struct Got {
 pub struct Case {
     /// Family and case, unique.
     pub name: &'static str,
-    /// What must come out, in words.
+    /// Expected result, in words.
     pub expected: String,
     /// The largest error that the expectation allows.
     pub bound: f64,

@@ -1,6 +1,8 @@
 //! Eddy diffusion against L/R, limits that are nearly parallel, errors weighed like penalties.
 
-use super::check::{Outcome, apart, holds, measured, number, off, oracle, refused, told, worst};
+use super::check::{
+    Outcome, apart, holds, measured, number, off, oracle, refused, reported, worst,
+};
 use super::{Case, case};
 use fluxform::coil::transient::VoltageStep;
 use fluxform::lambda::{ForceProblem, Settings, solve};
@@ -23,7 +25,7 @@ const STEP: VoltageStep = VoltageStep {
 };
 
 fn times(step: &VoltageStep) -> Result<[f64; 2], String> {
-    let settling = step.settling().map_err(told)?;
+    let settling = step.settling().map_err(reported)?;
     Ok([settling.current_95_s, settling.force_95_s])
 }
 
@@ -282,7 +284,7 @@ fn parallel() -> Vec<Case> {
                         },
                         &Settings::default(),
                     )
-                    .map_err(told)?;
+                    .map_err(reported)?;
                     let found = solution
                         .constants
                         .lambda_linear_n_per_m
@@ -317,7 +319,7 @@ fn heavy(weight: f64) -> Outcome {
             },
             &Settings::default(),
         )
-        .map_err(told)?;
+        .map_err(reported)?;
         let currents = solution.path.currents_a(2.0);
         let force: f64 = (0..4).map(|i| forces[11 * 4 + i] * currents[i]).sum();
         Ok((2.0 * heights[11] - force).abs())

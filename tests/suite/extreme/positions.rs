@@ -1,6 +1,6 @@
 //! The worst-point form, currents at one position, and problems that are none.
 
-use super::check::{close, holds, measured, off, refused, told, worst};
+use super::check::{close, holds, measured, off, refused, reported, worst};
 use super::lambda::{Problem, generic, square};
 use super::{Case, case};
 use fluxform::lambda::worst::{maxmin, worst_point};
@@ -18,7 +18,7 @@ fn worst_points() -> Vec<Case> {
             1e-13,
             || {
                 let p = Problem::new(vec![0.7, 0.3], vec![0.05, 0.08], vec![1.3]);
-                let w = worst_point(&p.problem(), &Settings::default()).map_err(told)?;
+                let w = worst_point(&p.problem(), &Settings::default()).map_err(reported)?;
                 let wanted = (0.05_f64 * 0.3 - 0.08 * 0.7).abs() / (0.7 + 0.3);
                 let found = w.path.worst_error_n(0.1) / 0.1;
                 close(found, wanted, "m")
@@ -30,7 +30,7 @@ fn worst_points() -> Vec<Case> {
             1e-13,
             || {
                 let p = square();
-                let w = worst_point(&p.problem(), &Settings::default()).map_err(told)?;
+                let w = worst_point(&p.problem(), &Settings::default()).map_err(reported)?;
                 let wanted = 1.3 * 0.47 / 0.05;
                 close(w.lambda_linear_n_per_m.ok_or("no limit")?, wanted, "N/m")
             },
@@ -45,7 +45,7 @@ fn worst_points() -> Vec<Case> {
                 twice.forces.extend_from_slice(&p.forces);
                 twice.heights.extend_from_slice(&p.heights);
                 let of =
-                    |p: &Problem| worst_point(&p.problem(), &Settings::default()).map_err(told);
+                    |p: &Problem| worst_point(&p.problem(), &Settings::default()).map_err(reported);
                 let (a, b) = (of(&p)?, of(&twice)?);
                 worst(
                     [0.3, 1.7, 20.0].map(|l| off(b.path.worst_error_n(l), a.path.worst_error_n(l))),
@@ -60,7 +60,7 @@ fn worst_points() -> Vec<Case> {
             || {
                 let mut p = generic(17, 4, 5);
                 p.heights = vec![0.0; 17];
-                let w = worst_point(&p.problem(), &Settings::default()).map_err(told)?;
+                let w = worst_point(&p.problem(), &Settings::default()).map_err(reported)?;
                 measured(w.path.worst_error_n(7.0), "N at 7 N/m")
             },
         ),
@@ -70,7 +70,7 @@ fn worst_points() -> Vec<Case> {
             1e-13,
             || {
                 let p = Problem::new(vec![0.7, 3e-7], vec![0.05, 0.08], vec![1.3]);
-                let found = maxmin(&p.problem()).map_err(told)?.ok_or("none")?;
+                let found = maxmin(&p.problem()).map_err(reported)?.ok_or("none")?;
                 close(found.lambda_n_per_m, 1.3 * 3e-7 / 0.08, "N/m")
             },
         ),
@@ -80,7 +80,7 @@ fn worst_points() -> Vec<Case> {
             0.0,
             || {
                 let p = Problem::new(vec![0.7, 0.0], vec![0.05, 0.08], vec![1.3]);
-                let found = maxmin(&p.problem()).map_err(told)?;
+                let found = maxmin(&p.problem()).map_err(reported)?;
                 measured(
                     found.map_or(0.0, |m| m.lambda_n_per_m),
                     "at the point without force",
@@ -99,12 +99,12 @@ fn one_position() -> Vec<Case> {
             || {
                 let ohm = [1e-3, 1.0, 1e3];
                 let forces = [0.3, 0.2, 0.7];
-                let mut a = Allocator::new(&ohm, &[-1e9; 3], &[1e9; 3], None).map_err(told)?;
+                let mut a = Allocator::new(&ohm, &[-1e9; 3], &[1e9; 3], None).map_err(reported)?;
                 let mut found = [0.0; 3];
-                let told = a.allocate(&forces, 0.4, &mut found);
+                let reported = a.allocate(&forces, 0.4, &mut found);
                 let scale: f64 = (0..3).map(|i| forces[i] * forces[i] / ohm[i]).sum();
                 let wanted = |i: usize| 0.4 * forces[i] / ohm[i] / scale;
-                if told.reach != Reach::Reached {
+                if reported.reach != Reach::Reached {
                     return Err("not reached".to_owned());
                 }
                 worst(
@@ -118,11 +118,11 @@ fn one_position() -> Vec<Case> {
             "all coils give their most in the right direction, N",
             1e-14,
             || {
-                let mut a =
-                    Allocator::new(&[6.0; 3], &[-0.5; 3], &[2.0, 1.0, 0.3], None).map_err(told)?;
+                let mut a = Allocator::new(&[6.0; 3], &[-0.5; 3], &[2.0, 1.0, 0.3], None)
+                    .map_err(reported)?;
                 let mut found = [0.0; 3];
-                let told = a.allocate(&[0.3, -0.2, 0.7], 1e9, &mut found);
-                close(told.force_n, 0.3 * 2.0 + 0.2 * 0.5 + 0.7 * 0.3, "N")
+                let reported = a.allocate(&[0.3, -0.2, 0.7], 1e9, &mut found);
+                close(reported.force_n, 0.3 * 2.0 + 0.2 * 0.5 + 0.7 * 0.3, "N")
             },
         ),
         case(
@@ -130,12 +130,13 @@ fn one_position() -> Vec<Case> {
             "no current, saturated",
             0.0,
             || {
-                let mut a = Allocator::new(&[6.0; 3], &[0.0; 3], &[2.0; 3], None).map_err(told)?;
+                let mut a =
+                    Allocator::new(&[6.0; 3], &[0.0; 3], &[2.0; 3], None).map_err(reported)?;
                 let mut found = [9.0; 3];
-                let told = a.allocate(&[0.0; 3], 0.1, &mut found);
+                let reported = a.allocate(&[0.0; 3], 0.1, &mut found);
                 holds(
-                    found == [0.0; 3] && told.reach == Reach::Saturated,
-                    format!("{found:?} A, {:?}", told.reach),
+                    found == [0.0; 3] && reported.reach == Reach::Saturated,
+                    format!("{found:?} A, {:?}", reported.reach),
                 )
             },
         ),
@@ -144,12 +145,13 @@ fn one_position() -> Vec<Case> {
             "no current, saturated",
             0.0,
             || {
-                let mut a = Allocator::new(&[6.0; 3], &[0.0; 3], &[2.0; 3], None).map_err(told)?;
+                let mut a =
+                    Allocator::new(&[6.0; 3], &[0.0; 3], &[2.0; 3], None).map_err(reported)?;
                 let mut found = [9.0; 3];
-                let told = a.allocate(&[0.3, 0.2, 0.7], f64::NAN, &mut found);
+                let reported = a.allocate(&[0.3, 0.2, 0.7], f64::NAN, &mut found);
                 holds(
-                    found == [0.0; 3] && told.reach == Reach::Saturated,
-                    format!("{found:?} A, {:?}", told.reach),
+                    found == [0.0; 3] && reported.reach == Reach::Saturated,
+                    format!("{found:?} A, {:?}", reported.reach),
                 )
             },
         ),
@@ -159,7 +161,7 @@ fn one_position() -> Vec<Case> {
             1e-13,
             || {
                 let mut a = Allocator::new(&[6.0; 100], &[0.0; 100], &[2.0; 100], Some(7.0))
-                    .map_err(told)?;
+                    .map_err(reported)?;
                 let mut found = [0.0; 100];
                 a.allocate(&[0.3; 100], 0.3 * 7.0 * (1.0 - 1e-12), &mut found);
                 worst(

@@ -1,6 +1,6 @@
 //! Surfaces: one triangle, needles, far offsets, heights of 1 nm to 1 m, ten million triangles.
 
-use super::check::{Outcome, close, holds, off, refused, told, worst};
+use super::check::{Outcome, close, holds, off, refused, reported, worst};
 use super::{Case, case};
 use fluxform::numerics::axis::Axis;
 use fluxform::progress::Silent;
@@ -20,7 +20,7 @@ pub fn mesh(triangles: Vec<Triangle>) -> Result<Mesh, String> {
         triangles,
         ..FileMesh::default()
     };
-    Mesh::place(file, &Transform::new(1.0, &Placement::default())).map_err(told)
+    Mesh::place(file, &Transform::new(1.0, &Placement::default())).map_err(reported)
 }
 
 pub fn grid(x: (f64, f64, usize), y: (f64, f64, usize)) -> Grid {
@@ -32,7 +32,7 @@ pub fn grid(x: (f64, f64, usize), y: (f64, f64, usize)) -> Grid {
 }
 
 fn sampled(triangles: Vec<Triangle>, grid: &Grid) -> Result<Vec<Option<Sample>>, String> {
-    heights(&mesh(triangles)?, grid, &Silent).map_err(told)
+    heights(&mesh(triangles)?, grid, &Silent).map_err(reported)
 }
 
 /// Heights of a mesh over a grid that it covers, against `wanted`, over `size`.
@@ -165,7 +165,8 @@ fn few() -> Vec<Case> {
                 let mut errors = Vec::new();
                 for k in 1..100 {
                     let (x, y) = (cos * 0.01 * f64::from(k), sin * 0.01 * f64::from(k));
-                    let found = heights(&m, &grid((x, x, 1), (y, y, 1)), &Silent).map_err(told)?;
+                    let found =
+                        heights(&m, &grid((x, x, 1), (y, y, 1)), &Silent).map_err(reported)?;
                     let height = found[0].ok_or("a gap in the needle")?.height_m;
                     errors.push((height - plane(x, y)).abs());
                 }
@@ -276,15 +277,15 @@ fn offsets() -> Vec<Case> {
                     .into_iter()
                     .map(|t| t.map(|[x, y, z]| [(x + 1e6) as f32, (y + 1e6) as f32, z as f32]))
                     .collect();
-                let file = stl::read(&binary(&far)).map_err(told)?;
+                let file = stl::read(&binary(&far)).map_err(reported)?;
                 let back = Placement {
                     translate_m: [-1000.0, -1000.0, 0.0],
                     rotate_deg: [0.0; 3],
                     ..Placement::default()
                 };
-                let m = Mesh::place(file, &Transform::new(1e-3, &back)).map_err(told)?;
+                let m = Mesh::place(file, &Transform::new(1e-3, &back)).map_err(reported)?;
                 let g = grid((-0.05, 0.05, 61), (-0.05, 0.05, 61));
-                let found = heights(&m, &g, &Silent).map_err(told)?;
+                let found = heights(&m, &g, &Silent).map_err(reported)?;
                 if count(&found) != g.len() {
                     return Err(format!("{} of {} points", count(&found), g.len()));
                 }
@@ -299,11 +300,13 @@ fn offsets() -> Vec<Case> {
         ),
         case(
             "shapes: 1e6 mm away, what 32 bits round away",
-            "half a unit in the last place of 1e6 mm, 0.03125 mm, is told; no more than twice that",
+            "half a unit in the last place of 1e6 mm, 0.03125 mm, is reported; no more than twice that",
             0.0,
             || {
                 let far = [[[1e6_f32, 0.0, 0.0], [1e6, 9.0, 0.0], [999_990.0, 0.0, 1.0]]];
-                let rounding = stl::read(&binary(&far)).map_err(told)?.coordinate_rounding;
+                let rounding = stl::read(&binary(&far))
+                    .map_err(reported)?
+                    .coordinate_rounding;
                 holds(
                     (0.031..=0.0626).contains(&rounding),
                     format!("{rounding} mm"),
@@ -330,7 +333,7 @@ fn offsets() -> Vec<Case> {
 }
 
 fn primitive(p: Primitive) -> Result<PlacedPrimitive, String> {
-    PlacedPrimitive::new(p, &Placement::default()).map_err(told)
+    PlacedPrimitive::new(p, &Placement::default()).map_err(reported)
 }
 
 fn height_of(p: Primitive, x: f64, y: f64) -> Result<f64, String> {

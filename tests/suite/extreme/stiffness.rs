@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::check::{Outcome, SEED, apart, close, holds, measured, off, refused, told, worst};
+use super::check::{Outcome, SEED, apart, close, holds, measured, off, refused, reported, worst};
 use super::{Case, case};
 use fluxform::coil::drive::Drive;
 use fluxform::coil::inductance::self_inductance_h;
@@ -23,7 +23,7 @@ const COMMAND_A: [f64; 3] = [1.7, -0.6, 0.3];
 
 /// Currents after holding `COMMAND_A` for `steps` times `step_s`.
 fn held(inductance_h: &[f64], ohm: &[f64], step_s: f64, steps: usize) -> Result<Vec<f64>, String> {
-    let mut drive = Drive::new(inductance_h, ohm, None).map_err(told)?;
+    let mut drive = Drive::new(inductance_h, ohm, None).map_err(reported)?;
     for _ in 0..steps {
         drive.hold(&COMMAND_A[..ohm.len()], step_s);
     }
@@ -48,7 +48,7 @@ fn euler(until_s: f64, steps: usize) -> Result<Vec<f64>, String> {
 
 /// Two equal coils of 1 H and 1 ohm, coupled by k: modes of (1 +- k) s.
 fn pair(k: f64, at_s: f64, bound_of: impl Fn(f64) -> f64) -> Outcome {
-    let mut drive = Drive::new(&[1.0, k, k, 1.0], &[1.0, 1.0], None).map_err(told)?;
+    let mut drive = Drive::new(&[1.0, k, k, 1.0], &[1.0, 1.0], None).map_err(reported)?;
     drive.hold(&[1.0, 0.0], at_s);
     let mut found = [0.0; 2];
     drive.currents(&mut found);
@@ -191,7 +191,7 @@ fn circuits() -> Vec<Case> {
                     .map(|i| [0.038 * f64::from(i % 3), 0.038 * f64::from(i / 3)])
                     .collect();
                 let matrix = inductance_matrix_h(&SEED, self_inductance_h(&SEED), &axes).concat();
-                let mut drive = Drive::new(&matrix, &[6.0753; 9], Some(36.0)).map_err(told)?;
+                let mut drive = Drive::new(&matrix, &[6.0753; 9], Some(36.0)).map_err(reported)?;
                 drive.settle(&[2.0, 0.0, 1.3, 0.7, 2.0, 0.0, 0.4, 1.9, 0.1]);
                 let mut currents = [0.0; 9];
                 let mut before = f64::INFINITY;
@@ -213,7 +213,7 @@ fn circuits() -> Vec<Case> {
             "their sum is the trace of L / R, s",
             1e-14,
             || {
-                let drive = Drive::new(&STIFF_H, &STIFF_OHM, None).map_err(told)?;
+                let drive = Drive::new(&STIFF_H, &STIFF_OHM, None).map_err(reported)?;
                 let [short, long] = drive.time_constants_s().ok_or("none")?;
                 let trace: f64 = (0..3).map(|i| STIFF_H[4 * i] / STIFF_OHM[i]).sum();
                 // The middle one from the determinant.
@@ -232,7 +232,7 @@ fn circuits() -> Vec<Case> {
             "the last pivot of L / R by elimination, s, to (1e-3)^2 of the coupling's share",
             1e-9,
             || {
-                let drive = Drive::new(&STIFF_H, &STIFF_OHM, None).map_err(told)?;
+                let drive = Drive::new(&STIFF_H, &STIFF_OHM, None).map_err(reported)?;
                 let [short, _] = drive.time_constants_s().ok_or("none")?;
                 // A mode a thousand times faster than the others sees them as held: the Schur
                 // complement, corrected by its own share of their inverse squared.
@@ -308,7 +308,7 @@ fn refusals() -> Vec<Case> {
             "no currents, no time constants",
             0.0,
             || {
-                let mut drive = Drive::new(&[], &[], None).map_err(told)?;
+                let mut drive = Drive::new(&[], &[], None).map_err(reported)?;
                 drive.hold(&[], 1.0);
                 holds(drive.time_constants_s().is_none(), "nothing to follow")
             },

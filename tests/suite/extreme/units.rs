@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::check::{Outcome, close, holds, measured, off, refused, told, worst};
+use super::check::{Outcome, close, holds, measured, off, refused, reported, worst};
 use super::{Case, case};
 use fluxform::bundle::json::to_json;
 use fluxform::commands::evaluate::{Evaluation, evaluate};
@@ -45,7 +45,7 @@ fn design(text: &str) -> Result<(Design, bool), String> {
 }
 
 fn evaluated(k: f64, magnetization: &str) -> Result<Evaluation, String> {
-    evaluate(&design(&text(k, magnetization))?.0, vec![], None).map_err(told)
+    evaluate(&design(&text(k, magnetization))?.0, vec![], None).map_err(reported)
 }
 
 /// R ~ 1/k, L ~ k, gradient ~ 1/k^2, field ~ 1/k at the same current; the moment ~ k^3.
@@ -209,7 +209,7 @@ fn designs() -> Vec<Case> {
             0.0,
             || {
                 let tiny = text(1.0, "1.1579e6").replace("length_mm = 100.0", "length_mm = 1e-300");
-                match design(&tiny).and_then(|d| evaluate(&d.0, vec![], None).map_err(told)) {
+                match design(&tiny).and_then(|d| evaluate(&d.0, vec![], None).map_err(reported)) {
                     Err(message) => holds(true, format!("refused: {message}")),
                     Ok(e) => holds(
                         e.coil.circuit.inductance_h.is_finite() && e.target.force_n.is_finite(),
@@ -225,8 +225,8 @@ fn designs() -> Vec<Case> {
 }
 
 fn back(value: f64) -> Outcome {
-    let json = to_json(&[value]).map_err(told)?;
-    let read: Vec<f64> = serde_json::from_slice(&json).map_err(told)?;
+    let json = to_json(&[value]).map_err(reported)?;
+    let read: Vec<f64> = serde_json::from_slice(&json).map_err(reported)?;
     holds(
         read == [value],
         format!(

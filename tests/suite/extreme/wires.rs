@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::path::Path;
 
-use super::check::{Outcome, close, holds, measured, off, refused, told, worst};
+use super::check::{Outcome, close, holds, measured, off, refused, reported, worst};
 use super::{Case, case};
 use fluxform::coil::circuit::{Circuit, turns_that_fit};
 use fluxform::coil::optimum::air::AirCoil;
@@ -151,7 +151,7 @@ fn design(wire: &str, turns: &str) -> Result<Design, String> {
 }
 
 fn evaluated(wire: &str, turns: &str) -> Result<Evaluation, String> {
-    evaluate(&design(wire, turns)?, vec![], None).map_err(told)
+    evaluate(&design(wire, turns)?, vec![], None).map_err(reported)
 }
 
 fn windings() -> Vec<Case> {
@@ -197,7 +197,7 @@ fn windings() -> Vec<Case> {
         ),
         case(
             "wires: ten times the turns that fit",
-            "told, not refused: winding_fill 10 of 1, not met",
+            "reported, not refused: winding_fill 10 of 1, not met",
             1e-12,
             || {
                 let found = evaluated("diameter_mm = 0.7", "turns = 14285.714285714286")?;
@@ -210,7 +210,7 @@ fn windings() -> Vec<Case> {
         ),
         case(
             "wires: a conductor thicker than its insulation",
-            "refused: which is thicker is told",
+            "refused: which is thicker is reported",
             0.0,
             || {
                 refused(
@@ -287,7 +287,7 @@ fn windings() -> Vec<Case> {
 /// The best coil of whole layers and turns: whole, within its limits, below the continuous one's
 /// force, and no worse than the coil that rounding that one down gives.
 fn whole(d: f64) -> Outcome {
-    let model = AirCoil::new(0.03, &MagnetRule::dipole([0.0, 0.0, -0.909_41])).map_err(told)?;
+    let model = AirCoil::new(0.03, &MagnetRule::dipole([0.0, 0.0, -0.909_41])).map_err(reported)?;
     let task = Task {
         limits: Limits {
             outer_diameter_max_m: Some(0.038),
@@ -300,7 +300,7 @@ fn whole(d: f64) -> Outcome {
         voltage_v: None,
         strands: Strand::choices(&wire(d)),
     };
-    let outcome = optimise_wound(&model, &task, &Settings::default(), &Silent).map_err(told)?;
+    let outcome = optimise_wound(&model, &task, &Settings::default(), &Silent).map_err(reported)?;
     let best = outcome
         .best
         .ok_or_else(|| format!("{:?}", outcome.status))?;

@@ -2,7 +2,7 @@
 //!
 //! Every peer has a script under `scripts/peers` that reads a problem as JSON, solves it at several
 //! settings of its own knob and prints rows of error and seconds. A script whose packages are not
-//! installed says so; that is told, and no error.
+//! installed says so; that is reported, and no error.
 
 mod problems;
 
@@ -23,7 +23,7 @@ pub const PYTHON: &str = "FLUXFORM_PYTHON";
 /// Where the scripts lie, seen from the repository's root.
 const SCRIPTS: &str = "scripts/peers";
 
-/// What a script prints.
+/// Output of a script.
 #[derive(Deserialize)]
 struct Answer {
     #[serde(default)]
@@ -90,7 +90,7 @@ pub fn add(
             stage
                 .curves
                 .curves
-                .extend(curves.map(|curve| told(curve, &problem)));
+                .extend(curves.map(|curve| reported(curve, &problem)));
         }
         progress.advance(1);
     }
@@ -100,7 +100,7 @@ pub fn add(
     Ok(missing)
 }
 
-fn told(found: PeerCurve, problem: &problems::Posed) -> Curve {
+fn reported(found: PeerCurve, problem: &problems::Posed) -> Curve {
     let rows = found.rows.into_iter().map(|row| Row {
         knob: row.knob,
         default: false,
@@ -181,7 +181,7 @@ fn ask(
             }
         }
     }
-    // What one interpreter lacks another may have.
+    // A module that one interpreter lacks another may have.
     let found: Vec<&str> = all.curves.iter().map(|curve| curve.peer.as_str()).collect();
     let still = all.missing.iter().filter(|lacking| {
         !found

@@ -13,9 +13,9 @@ pub struct Posed {
     pub stage: &'static str,
     /// File under `scripts/peers`.
     pub script: &'static str,
-    /// What the script reads.
+    /// Input of the script.
     pub content: Value,
-    /// What the errors are against.
+    /// Reference of the errors.
     pub reference: String,
     /// Its own error.
     pub reference_error: f64,

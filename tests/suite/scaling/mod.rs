@@ -14,7 +14,7 @@ use fluxform::RunError;
 use fluxform::commands::bench::clock::{Effort, Timing};
 use fluxform::progress::Progress;
 
-/// What a scene may take: an hour of processor time, and memory.
+/// Limits of a scene: an hour of processor time, and memory.
 const HOUR_S: f64 = 3600.0;
 const MEMORY_BYTES: f64 = 24.0 * 1024.0 * 1024.0 * 1024.0;
 /// Times the seed's size.
@@ -157,7 +157,7 @@ fn child(stage: &str, axis: &str, setting: usize, threads: usize) -> Result<Size
 /// Exponents and outlook of the sizes of one law.
 #[must_use]
 pub fn law(spec: &Spec, sizes: Vec<SizeRow>, idle_bytes: u64) -> Law {
-    // Small sizes tell of the fixed cost, not of the exponent.
+    // Small sizes show the fixed cost, not of the exponent.
     let larger = &sizes[sizes.len() / 2 - usize::from(sizes.len() == 2)..];
     let larger = if larger.len() < 3 {
         &sizes[sizes.len().saturating_sub(3)..]

@@ -1,4 +1,4 @@
-//! What grows, how far, and the work that is measured at each size.
+//! The sizes that grow, their ranges, and the work that is measured at each size.
 
 use super::THREADS;
 use crate::force::{forces, with_coils};
@@ -31,9 +31,9 @@ type Sized = Result<(f64, Timing), RunError>;
 /// One law: what is computed, against what, at which settings.
 #[derive(Debug, Clone, Copy)]
 pub struct Spec {
-    /// What is computed.
+    /// The quantity computed.
     pub stage: &'static str,
-    /// What grows.
+    /// The size that grows.
     pub axis: &'static str,
     /// Its value on the seed.
     pub seed_size: f64,

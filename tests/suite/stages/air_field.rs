@@ -189,10 +189,10 @@ fn batch(winding: &Winding, pace: &Pace, progress: &dyn Progress) -> Result<Curv
 fn kernel(pace: &Pace, progress: &dyn Progress) -> Result<Curve, RunError> {
     let points = exact_points()?;
     // Inside thin discs the gradient's digits are lost to their size.
-    let told = |winding: &Winding| {
+    let reported = |winding: &Winding| {
         winding.length_m > 0.01 * (winding.outer_radius_m - winding.inner_radius_m)
     };
-    let points: Vec<_> = points.into_iter().filter(|(w, ..)| told(w)).collect();
+    let points: Vec<_> = points.into_iter().filter(|(w, ..)| reported(w)).collect();
     let (found, timing) = pace.time(progress, || {
         let fields = points.iter().map(|(w, [r, z], _)| Ok(w.field(*r, *z)?));
         fields.collect::<Result<Vec<AxialField>, RunError>>()

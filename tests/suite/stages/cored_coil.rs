@@ -20,7 +20,7 @@ use fluxform::scene::tolerances::CORED_TOLERANCE;
 const TOLERANCES: [f64; 9] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
 /// Lowest height of the seed's maps, m.
 const LOWEST_M: f64 = 0.010;
-/// The reference's resolution, and the one that tells its error.
+/// The reference's resolution, and the one that gives its error.
 const FINEST: [f64; 2] = [1e-11, 1e-10];
 /// Where the seed's coil is compared: radius, height, m.
 const PLACES: [[f64; 2]; 6] = [

@@ -16,7 +16,7 @@ use fluxform::scene::tolerances::COUPLED_TOLERANCE;
 const TOLERANCES: [f64; 6] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
 /// Rows of a quick run.
 const QUICK: usize = 4;
-/// Tolerances of the reference and of the one that tells its error, and the same in a quick run.
+/// Tolerances of the reference and of the one that gives its error, and the same in a quick run.
 const FINEST: [f64; 2] = [1e-7, 1e-6];
 const QUICK_FINEST: [f64; 2] = [1e-5, 1e-4];
 /// Lowest height, m.
@@ -59,7 +59,7 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, RunError> {
     })
 }
 
-/// What is compared: the gradients of every drive at the places, and the inductances.
+/// Quantities compared: the gradients of every drive at the places, and the inductances.
 struct Values {
     gradients: Vec<f64>,
     added_inductance_h: Vec<f64>,

@@ -28,12 +28,12 @@ use fluxform::field::winding::Winding;
 use fluxform::progress::Progress;
 use serde_json::{Value, json};
 
-/// What a stage's measurement gives.
+/// Result of a stage's measurement.
 #[derive(Debug, Clone)]
 pub struct Measured {
     /// The curves.
     pub curves: StageCurves,
-    /// What the stage says of its error by default.
+    /// The error that the stage states by default.
     pub accuracy: StageAccuracy,
 }
 
@@ -109,7 +109,7 @@ fn stage(estimate: f64, relative_to: &str, method: &str) -> StageAccuracy {
     }
 }
 
-/// The seed's design has a core; a copy that lost it is told like a user's.
+/// The seed's design has a core; a copy that lost it is reported like a user's.
 fn no_core() -> RunError {
     RunError::Input("the built-in design has no [core]".to_owned())
 }

@@ -44,7 +44,7 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, RunError> {
     Ok(Measured {
         curves: StageCurves {
             stage: "coil-optimum".to_owned(),
-            timed: "equation 11 from a design's limits: search, and certificate where told"
+            timed: "equation 11 from a design's limits: search, and certificate where reported"
                 .to_owned(),
             error_of: "the best force (certificate: how far above it the proven bound lies)"
                 .to_owned(),

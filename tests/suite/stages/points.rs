@@ -16,7 +16,7 @@ use fluxform::shape::scattered::adaptive::{Grading, adaptive};
 /// Points along either axis.
 const SAMPLES: [usize; 6] = [16, 31, 61, 121, 241, 481];
 const DEFAULT: usize = 61;
-/// What the graded points keep, m.
+/// Distance that the graded points keep, m.
 const DEVIATIONS_M: [f64; 7] = [3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6];
 /// Squares of the mesh along either axis.
 const SIDE: usize = 128;
@@ -45,7 +45,7 @@ pub fn run(pace: &Pace, progress: &dyn Progress) -> Result<Measured, RunError> {
         accuracy: stage(
             1e-12,
             "1 m",
-            "the deviation told is an exact supremum plus rounding",
+            "the deviation reported is an exact supremum plus rounding",
         ),
     })
 }

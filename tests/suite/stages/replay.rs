@@ -136,13 +136,13 @@ fn curves(pace: &Pace, progress: &dyn Progress) -> Result<[Curve; 2], RunError> 
                 error = error.max((found - direct).abs() / size);
             }
         }
-        let told = &opened.bundle.manifest.map.interpolation;
+        let reported = &opened.bundle.manifest.map.interpolation;
         let found = Found {
             knob: nodes as f64,
             default: nodes == DEFAULT,
             items: positions.len(),
             error,
-            stated: Some(told.largest_error),
+            stated: Some(reported.largest_error),
         };
         rows.push(found.timed(&timing));
         let proven = Found {

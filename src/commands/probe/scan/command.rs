@@ -31,7 +31,7 @@ pub struct ScanFlags {
     /// Hold this Gauss-meter's scan against the design (CSV; `-` for standard input)
     #[arg(long, value_name = "SCAN", conflicts_with = "points")]
     pub compare: Option<FileArgument>,
-    /// What is fitted: any of scale, background, position, rotation
+    /// Parameters to fit: any of scale, background, position, rotation
     #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',', requires = "compare",
           default_values = ["scale", "background", "position"])]
     fit: Vec<What>,
@@ -49,7 +49,7 @@ enum What {
     Scale,
     /// A constant field
     Background,
-    /// Where the sensor's frame stands
+    /// Pose of the sensor's frame
     Position,
     /// How the sensor's frame is turned
     Rotation,

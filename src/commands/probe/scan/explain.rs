@@ -49,7 +49,7 @@ struct Settled {
     standard_error: Option<f64>,
 }
 
-/// What every candidate is fitted to.
+/// Data to which every candidate is fitted.
 pub(super) struct Task<'a> {
     pub design: &'a Design,
     pub model: &'a Model<'a>,
@@ -270,7 +270,7 @@ impl Task<'_> {
         }
     }
 
-    /// What the scan would show of another design, [row, quantity].
+    /// Values of another design at the scan's places, [row, quantity].
     fn computed_for(&self, design: &Design) -> Result<Vec<f64>, RunError> {
         let scene = Scene::with_tolerance(design, self.request.tolerance)?;
         let lowest_m = super::lowest_m(self.scan);
@@ -281,7 +281,7 @@ impl Task<'_> {
         Ok(model.sum(&contributions, |_| 1.0))
     }
 
-    /// What one unit of the key changes there, by differences to both sides, or to one at the range's end.
+    /// Change there per unit of the key, by central differences, one-sided at the range's end.
     fn slope(&self, key: &Key, at: &At) -> Result<Option<Vec<f64>>, RunError> {
         let up = self.at(key, at.by + key.step)?;
         let down = self.at(key, at.by - key.step)?;

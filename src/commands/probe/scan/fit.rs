@@ -16,14 +16,14 @@ const SETTLED: f64 = 1e-9;
 /// Most halvings of a step.
 const HALVINGS: usize = 8;
 
-/// What may be fitted.
+/// Parameters that may be fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Fitted {
     /// A scale for each coil.
     pub scale: bool,
     /// A constant field.
     pub background: bool,
-    /// Where the sensor's frame stands.
+    /// Pose of the sensor's frame.
     pub position: bool,
     /// How it is turned.
     pub rotation: bool,
@@ -59,7 +59,7 @@ impl Parameter {
     }
 }
 
-/// What is fitted to this scan.
+/// Parameters fitted to this scan.
 pub(super) fn parameters(fitted: Fitted, scan: &Scan, coils: usize) -> Vec<Parameter> {
     let mut list = Vec::new();
     if fitted.scale {
@@ -87,7 +87,7 @@ pub(super) struct Fit {
     pub(super) linear: Solution,
     /// The steps.
     pub(super) steps: Vec<f64>,
-    /// What the fit gives, [row, quantity].
+    /// Values of the fit, [row, quantity].
     pub(super) fitted: Vec<f64>,
     /// Weighted sum of the squares that are left.
     pub(super) left: f64,
@@ -151,7 +151,7 @@ pub(super) fn fit(
     })
 }
 
-/// The design as it stands.
+/// The design as it is.
 fn start(parameters: &[Parameter]) -> Vec<f64> {
     let value = |parameter: &Parameter| match parameter {
         Parameter::Scale(_) => 1.0,
@@ -245,7 +245,7 @@ impl Task<'_> {
         pairs.map(|((m, g), w)| (m - g) * w).collect()
     }
 
-    /// What a step of every parameter changes, weighted.
+    /// Change by a step of every parameter, weighted.
     fn columns(&self, state: &State, steps: &[f64]) -> Result<Vec<Vec<f64>>, RunError> {
         let pose = self.pose(&state.values);
         let places = self.model.places(pose)?;

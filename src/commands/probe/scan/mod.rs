@@ -1,6 +1,6 @@
 //! `probe --compare`: a Gauss-meter scan held against a design.
 //!
-//! The residuals of the design as it stands; scales of the coils, a background and the sensor's
+//! The residuals of the design as it is; scales of the coils, a background and the sensor's
 //! frame fitted all at once, with standard errors; and which single parameter would explain the
 //! residuals. What the scan does not determine is stated and left open.
 
@@ -35,10 +35,10 @@ use model::{Model, Pose};
 /// Measured numbers that must be there beyond those fitted, so that an error can be estimated.
 const SPARE: usize = 3;
 
-/// What is asked.
+/// The request.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScanRequest {
-    /// What is fitted.
+    /// Parameters that are fitted.
     pub fitted: Fitted,
     /// The sensor's noise, T, where known.
     pub noise_t: Option<f64>,
@@ -53,19 +53,19 @@ pub struct ScanRequest {
 pub struct ScanReport {
     /// The JSON result.
     pub file: ScanFile,
-    /// What the design gives, [row, quantity].
+    /// Values of the design, [row, quantity].
     pub predicted: Vec<f64>,
-    /// What the fit gives, [row, quantity].
+    /// Values of the fit, [row, quantity].
     pub fitted: Vec<f64>,
     /// Warnings for the user.
     pub warnings: Vec<String>,
     /// Whether the requested tolerance was reached.
     pub accuracy_reached: bool,
-    /// What misses it.
+    /// Points that miss it.
     pub accuracy_missed: Vec<String>,
 }
 
-/// Residuals of the design as it stands, and the weights of all measured numbers.
+/// Residuals of the design as it is, and the weights of all measured numbers.
 struct Weighted {
     predicted: Vec<f64>,
     /// Measured minus predicted, times the weight.
@@ -321,7 +321,7 @@ struct ResidualReport<'a> {
 }
 
 impl ResidualReport<'_> {
-    /// What `given` leaves of the measurement.
+    /// Residuals of the measurement less `given`.
     fn left(&self, given: &[f64]) -> Left {
         let scan = self.scan;
         let left: Vec<f64> = scan.values.iter().zip(given).map(|(m, g)| m - g).collect();

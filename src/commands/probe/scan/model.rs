@@ -1,4 +1,4 @@
-//! What a scan would have measured: the field of the driven coils where the sensor was.
+//! The predicted scan: the field of the driven coils where the sensor was.
 
 use rayon::prelude::*;
 
@@ -18,7 +18,7 @@ pub(super) const STEP_M: f64 = 1e-4;
 
 type Matrix = [[f64; 3]; 3];
 
-/// Where the sensor's frame stands: turned about the scan's middle, then shifted.
+/// Pose of the sensor's frame: turned about the scan's middle, then shifted.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Pose {
     /// m.
@@ -95,7 +95,7 @@ impl<'a> Model<'a> {
         self.scan.positions_m.iter().map(placed).collect()
     }
 
-    /// What gives the field at and around `pose`.
+    /// Source of the field at and around `pose`.
     ///
     /// # Errors
     /// A point on the steel.
@@ -104,7 +104,7 @@ impl<'a> Model<'a> {
         FieldAt::new(self.scene, self.solved, &positions_m, 3.0 * STEP_M)
     }
 
-    /// What each driven coil adds to each measured number, [pair, quantity], T or T/m.
+    /// Part of each driven coil in each measured number, [pair, quantity], T or T/m.
     ///
     /// # Errors
     /// A point on a winding's edge; interruption.

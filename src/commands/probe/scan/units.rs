@@ -10,7 +10,7 @@ const CLOSE: f64 = 0.35;
 /// Least cosine between measured and computed for a ratio to mean a unit.
 const ALIKE: f64 = 0.7;
 
-/// What the coordinates look like, if not like metres.
+/// Probable unit of the coordinates, if not metres.
 pub(super) fn coordinates(design: &Design, scan: &Scan) -> Option<String> {
     let axes = &design.array.positions_m;
     let coils = axes
@@ -31,7 +31,7 @@ pub(super) fn coordinates(design: &Design, scan: &Scan) -> Option<String> {
     })
 }
 
-/// What the measured numbers, or the currents, look like if not like tesla and ampere; `predicted`
+/// Probable unit of the measured numbers, or the currents, if not tesla and ampere; `predicted`
 /// is [row, quantity].
 pub(super) fn magnitudes(scan: &Scan, predicted: &[f64]) -> Option<String> {
     let field = exponent(scan, predicted, |q| matches!(q, Measured::Field(_)));

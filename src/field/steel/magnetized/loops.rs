@@ -105,7 +105,7 @@ impl MagnetizedCore {
             rectangle,
             order,
             basis: Basis::new(gauss::rule(order)),
-            // What is left of a panel is a polynomial times an analytic function.
+            // The rest of a panel is a polynomial times an analytic function.
             rule: gauss::rule(
                 (self.outline.order + order)
                     .div_ceil(2)

@@ -1,6 +1,6 @@
-//! What the cores' magnetising each other adds to the pull.
+//! The part of the pull that comes from the cores magnetising each other.
 //!
-//! What neighbours send to a core is smooth: a few potentials x_mu, mode by mode, carry it. Write
+//! The neighbours' field at a core is smooth: a few potentials x_mu, mode by mode, carry it. Write
 //! <a, b> = int (T a) db/dn dS for one core's response T, symmetric by reciprocity. With
 //! b = <x, phi> for the magnet's potential phi on every core, R = <x, x'>, and L the components
 //! of 1/(4 pi |x - y|) between two cores,
@@ -205,7 +205,7 @@ fn exchange_system(
     (system, links)
 }
 
-/// What a wave of azimuthal number `mode` on the grid's angles is divided by.
+/// Divisor of a wave of azimuthal number `mode` on the grid's angles.
 fn norm_of(mode: usize, angles: usize) -> f64 {
     (if mode == 0 { 1.0 } else { 2.0 } / angles as f64).sqrt()
 }

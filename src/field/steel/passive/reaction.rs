@@ -27,7 +27,7 @@ pub struct Dipole {
     pub moment_a_m2: [f64; 3],
 }
 
-/// What the steel sends back to a point.
+/// The steel's reaction at a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Induced {
     /// B, T.

@@ -134,7 +134,7 @@ impl SaturatedCore {
                     *value *= 0.5;
                 }
             } else {
-                // What is not a number lies too far.
+                // NaN counts as too far.
                 after = Some((length, if found.is_finite() { found } else { -before.1 }));
                 before.1 *= 0.5;
             }

@@ -266,7 +266,7 @@ fn what_has_no_solution_ends_as_stalled() {
     );
 }
 
-/// What the core adds to the inductance is that of an infinite permeability less a part of 1 / mu.
+/// The core's part of the inductance is that of an infinite permeability less a part of 1 / mu.
 /// At 1e8 rounding once took 8e-5 of it.
 #[test]
 fn any_constant_permeability() {

@@ -19,21 +19,21 @@ fn json(output: &Output) -> serde_json::Value {
 }
 
 #[test]
-fn a_stage_is_measured_and_told_as_json() {
+fn a_stage_is_measured_and_reported_as_json() {
     let folder = tempfile::tempdir().unwrap();
     let stage = ["--quick", "--stage", "inductance"];
-    let told = json(&bench(
+    let reported = json(&bench(
         folder.path(),
         &[&stage[..], &["--format", "json"]].concat(),
     ));
-    assert_eq!(told["stages"][0]["stage"], "inductance");
-    let rows = &told["stages"][0]["curves"][0]["rows"];
+    assert_eq!(reported["stages"][0]["stage"], "inductance");
+    let rows = &reported["stages"][0]["curves"][0]["rows"];
     assert_eq!(rows.as_array().unwrap().len(), 3);
     // A part of the curves leaves the tables of a whole run alone; the same is written, warnings aside.
     assert!(!folder.path().join("results/bench").exists());
     let written = std::fs::read(folder.path().join("results/bench-part/bench.json")).unwrap();
     let written: serde_json::Value = serde_json::from_slice(&written).unwrap();
-    assert_eq!(written["stages"], told["stages"]);
+    assert_eq!(written["stages"], reported["stages"]);
     let human = bench(folder.path(), &[&stage[..], &["--out", "b"]].concat());
     let said = String::from_utf8(human.stdout).unwrap();
     assert!(
@@ -47,9 +47,9 @@ fn a_stage_is_measured_and_told_as_json() {
 }
 
 #[test]
-fn only_a_whole_run_goes_where_its_tables_are_kept() {
+fn only_a_whole_run_replaces_the_recorded_tables() {
     let folder = tempfile::tempdir().unwrap();
-    // What is there already and is no output of ours stops a run before it measures anything.
+    // An existing file that is no output of ours stops a run before it measures anything.
     let kept = ["results/bench", "results/bench-part"].map(|at| folder.path().join(at));
     for at in &kept {
         std::fs::create_dir_all(at).unwrap();
@@ -83,7 +83,7 @@ fn only_a_whole_run_goes_where_its_tables_are_kept() {
 }
 
 #[test]
-fn the_catalogue_is_written_where_asked_and_nowhere_else() {
+fn the_catalogue_is_written_to_the_given_folder_only() {
     let folder = tempfile::tempdir().unwrap();
     let asked = ["--extreme", "--case", "wires: wound of 0.7 mm"];
     let without = bench(folder.path(), &asked);
@@ -95,8 +95,8 @@ fn the_catalogue_is_written_where_asked_and_nowhere_else() {
         assert!(run.status.success(), "{run:?}");
     }
     let read = |name: &str| std::fs::read_to_string(folder.path().join("c").join(name)).unwrap();
-    let told: serde_json::Value = serde_json::from_str(&read("extreme.json")).unwrap();
-    assert_eq!(told["cases"].as_array().unwrap().len(), 1);
+    let reported: serde_json::Value = serde_json::from_str(&read("extreme.json")).unwrap();
+    assert_eq!(reported["cases"].as_array().unwrap().len(), 1);
     assert_eq!(read("extreme.csv").lines().count(), 2);
     assert!(read("report.html").contains("1 of 1 case at the limits"));
     // Another's page is not replaced.
@@ -107,7 +107,7 @@ fn the_catalogue_is_written_where_asked_and_nowhere_else() {
 }
 
 #[test]
-fn a_missing_peer_is_told_and_no_error() {
+fn a_missing_peer_is_reported_and_no_error() {
     let folder = tempfile::tempdir().unwrap();
     let scripts = folder.path().join("scripts/peers");
     std::fs::create_dir_all(&scripts).unwrap();
@@ -127,10 +127,10 @@ fn a_missing_peer_is_told_and_no_error() {
             .contains("there is no")
     );
     std::fs::write(scripts.join("inductance_cfsem.py"), "").unwrap();
-    let told = json(&bench(folder.path(), &asked));
-    let missing = told["peers_missing"][0].as_str().unwrap();
+    let reported = json(&bench(folder.path(), &asked));
+    let missing = reported["peers_missing"][0].as_str().unwrap();
     assert!(missing.starts_with("inductance_cfsem.py: "), "{missing}");
-    assert_eq!(told["stages"][0]["curves"].as_array().unwrap().len(), 3);
+    assert_eq!(reported["stages"][0]["curves"].as_array().unwrap().len(), 3);
 }
 
 #[test]

@@ -33,7 +33,7 @@ const SCENES: u64 = 100;
 /// A true error below this is the reference's own rounding and counts as so much.
 const ROUNDING: f64 = 2.2e-16;
 const MOST_MEDIAN: f64 = 100.0;
-/// What stands in the bore.
+/// Contents of the bore.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Kind {
     Air,
@@ -267,7 +267,7 @@ fn deviation_m(
     worst
 }
 
-/// Points, forces and lambda, as `lambda` tells them.
+/// Points, forces and lambda, as `lambda` prints them.
 fn lambda_claims(scene: &Scene, exact: &Solved, document: &ShapeDocument) -> Vec<Claim> {
     let options = LambdaOptions::default();
     let solved = run(scene.design, document, Vec::new(), &options, &Silent);

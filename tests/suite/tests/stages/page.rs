@@ -36,14 +36,14 @@ fn in_a_browser(html: &str) {
 }
 
 #[test]
-fn the_recorded_run_is_told_as_a_page_that_a_browser_draws() {
+fn the_recorded_run_makes_a_page_that_a_browser_draws() {
     let mut file = recorded("results/bench/bench.json").expect("the table of a whole run");
     file.scaling =
         recorded("results/bench/scaling/bench.json").map_or_else(Vec::new, |f| f.scaling);
     let page = html(&file);
     assert!(page == html(&file), "not the same bytes twice");
     assert!(page.len() < 600_000, "{} bytes", page.len());
-    for told in [
+    for reported in [
         "All keep it",
         "closest to its promise",
         "NGSolve",
@@ -51,7 +51,7 @@ fn the_recorded_run_is_told_as_a_page_that_a_browser_draws() {
         "id=\"draw-stage-10\"",
         "Error against time",
     ] {
-        assert!(page.contains(told), "{told}");
+        assert!(page.contains(reported), "{reported}");
     }
     if let Some(law) = file.scaling.first() {
         assert!(page.contains("Against size") && page.contains(&law.stage));
@@ -64,7 +64,7 @@ fn the_recorded_run_is_told_as_a_page_that_a_browser_draws() {
 }
 
 #[test]
-fn a_default_that_breaks_its_promise_is_told_first() {
+fn a_default_that_exceeds_its_stated_error_is_reported_first() {
     let mut file = recorded("results/bench/bench.json").expect("the table of a whole run");
     let stage = file.stages.iter_mut().find(|s| s.stage == "coupled-array");
     let rows = &mut stage.unwrap().curves[0].rows;
@@ -73,7 +73,7 @@ fn a_default_that_breaks_its_promise_is_told_first() {
     let page = html(&file);
     assert!(page.contains("1 do not keep it; closest to its promise is coupled-array"));
     assert!(page.contains("not kept: "));
-    // Nothing measured, nothing told.
+    // Nothing measured, nothing reported.
     file.stages.clear();
     assert!(html(&file).contains("No default that states its error"));
 }

@@ -95,7 +95,7 @@ fn a_coupled_array_keeps_what_it_states() {
 }
 
 #[test]
-fn the_files_tell_the_same_and_fit_their_schema() {
+fn the_files_agree_and_fit_their_schema() {
     let folder = tempfile::tempdir().unwrap();
     let stages = ["air-field", "inductance", "lambda-path"];
     let mut asked = request(&stages, 9);

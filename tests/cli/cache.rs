@@ -1,4 +1,4 @@
-//! `calibrate`: what is kept of a design's field, and the plan told before.
+//! `calibrate`: the cache of a design's field, and the plan printed first.
 
 use std::path::Path;
 
@@ -54,7 +54,7 @@ fn computed(place: &Place) -> bool {
 }
 
 #[test]
-fn what_is_kept_is_what_was_computed() {
+fn cached_values_are_those_computed() {
     let place = small();
     let first = calibrate(&place, &[]);
     assert!(computed(&place) && place.path(KEPT).join("steel").is_file());
@@ -72,7 +72,7 @@ fn what_is_kept_is_what_was_computed() {
 }
 
 #[test]
-fn another_field_is_computed_anew() {
+fn another_field_is_computed_again() {
     for (from, to) in [
         ("turns = 1429", "turns = 1300"),
         (
@@ -148,11 +148,11 @@ fn damaged_entries_are_not_used_and_foreign_files_stay() {
 }
 
 #[test]
-fn the_plan_tells_what_is_left_out_and_its_cost() {
+fn the_plan_lists_the_parts_left_out_and_its_cost() {
     let place = small();
     let args = ["calibrate", "two.toml", "bump.toml", "--explain"];
-    let told = place.run(&args).ends(0).out;
-    assert!(told.starts_with("plan\n"), "{told}");
+    let reported = place.run(&args).ends(0).out;
+    assert!(reported.starts_with("plan\n"), "{reported}");
     let json = place
         .run(&[&args[..], &["--format", "json"]].concat())
         .ends(0)
@@ -164,15 +164,15 @@ fn the_plan_tells_what_is_left_out_and_its_cost() {
     assert_eq!(term("finite magnet")["done"], "left_out");
     // A 10 mm cylinder 37 mm up differs from its dipole by (3/8) (a/r)^2-like parts of the force.
     let cost = |what: &str| term(what)["cost"]["of_the_force"].as_f64().unwrap();
-    assert!((1e-4..2e-2).contains(&cost("finite magnet")), "{told}");
+    assert!((1e-4..2e-2).contains(&cost("finite magnet")), "{reported}");
     assert!(
         (1e-2..1.0).contains(&cost("coupling between the cores")),
-        "{told}"
+        "{reported}"
     );
     let pull = term("pull of the unpowered steel")["cost"]["force_n"]
         .as_f64()
         .unwrap();
-    assert!((1e-3..3e-2).contains(&pull), "{told}");
+    assert!((1e-3..3e-2).contains(&pull), "{reported}");
     // The map holds what the object needs, no more.
     let shape = &json["plan"]["shapes"][0];
     let nodes = |key: &str| -> u64 {
