@@ -3,8 +3,9 @@
 
 use fluxform::bundle::replay::Answer;
 use fluxform::commands::replay::renderer::{Renderer, Step};
+use fluxform::commands::replay::run;
+use fluxform::commands::replay::summary::TrajectorySource;
 use fluxform::commands::replay::synthesize::{Kind, Synthesis};
-use fluxform::commands::replay::{TrajectorySource, run};
 use fluxform::design::{Design, Need};
 use fluxform::progress::Silent;
 use fluxform::scene::Scene;
