@@ -150,7 +150,9 @@ fn neither_force_nor_current_jumps_along_a_hundred_lines() {
         let (r, turn) = (0.042 * random.unit().sqrt(), 6.3 * random.unit());
         let [x, y] = [r * turn.cos(), r * turn.sin()];
         let height = renderer.heights().height_m(x, y).unwrap();
-        [x, y, (height + 0.02 * (random.unit() - 0.5)).max(0.02)]
+        // Within the map, which ends at the sphere's top.
+        let z = height + 0.02 * (random.unit() - 0.5);
+        [x, y, z.clamp(0.02, 0.0799)]
     };
     let mut worst_per_um = [0.0_f64; 2];
     for line in 0..100 {

@@ -5,6 +5,7 @@ use crate::RunError;
 use crate::commands::lambda::LambdaReport;
 use crate::lambda::VectorAllocator;
 use crate::lambda::sideways::SIDEWAYS_WEIGHT;
+use crate::numerics::axis::Axis;
 use crate::progress::Progress;
 use crate::report::data::{DirectionCell, DirectionField};
 use crate::scene::passive;
@@ -71,15 +72,7 @@ impl Calibration<'_> {
                 .vector(points.normal[*row], points.marks[*row].crease)
                 .map(|part| size * part);
             let [wanted_x, wanted_y, wanted_z] = requested_n;
-            let given = |currents: &[f64]| {
-                let mut sum = [0.0, 0.0, pull_n];
-                for (force, current) in per_ampere.iter().zip(currents) {
-                    for (sum, part) in sum.iter_mut().zip(force) {
-                        *sum += part * current;
-                    }
-                }
-                sum
-            };
+            let given = |currents: &[f64]| given_n(per_ampere, pull_n, currents);
             let wanted = [wanted_x, wanted_y, wanted_z - pull_n];
             allocator.allocate(per_ampere, wanted, &mut currents);
             let node = points.grid_index[*row];
@@ -91,10 +84,6 @@ impl Calibration<'_> {
                 feedback_n: given(&currents),
             });
         }
-        let ends = |axis: &crate::numerics::axis::Axis, step: usize| {
-            let last = axis.samples.saturating_sub(1) / step * step;
-            [axis.from, axis.node(last)]
-        };
         Ok(Some(DirectionField {
             x_m: ends(x, steps[0]),
             y_m: ends(y, steps[1]),
@@ -102,4 +91,21 @@ impl Calibration<'_> {
             cells,
         }))
     }
+}
+
+/// The force of given currents, N.
+fn given_n(per_ampere: &[[f64; 3]], pull_n: f64, currents_a: &[f64]) -> [f64; 3] {
+    let mut sum = [0.0, 0.0, pull_n];
+    for (force, current) in per_ampere.iter().zip(currents_a) {
+        for (sum, part) in sum.iter_mut().zip(force) {
+            *sum += part * current;
+        }
+    }
+    sum
+}
+
+/// The first node of an axis and the last of every `step`-th.
+fn ends(axis: &Axis, step: usize) -> [f64; 2] {
+    let last = axis.samples.saturating_sub(1) / step * step;
+    [axis.from, axis.node(last)]
 }
