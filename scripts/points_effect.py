@@ -54,7 +54,7 @@ def main():
         print(f"| {shape.replace('_', '-')} | {sampling['grid_points']} | "
               f"{sampling['grid_lambda_n_per_m']:.4f} | {told['points']} | "
               f"{told['lambda_n_per_m']:.4f} | {percent('quadrature')} | "
-              f"{percent('lambda_of_points')} | {100 * change:+.2f} % |")
+              f"{percent('lambda_of_heights')} | {100 * change:+.2f} % |")
 
 
 if __name__ == "__main__":

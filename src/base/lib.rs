@@ -3,7 +3,9 @@
 //! and which force is requested.
 
 pub mod accuracy;
+pub mod digits;
 pub mod force_constant;
 pub mod force_direction;
+pub mod point_weights;
 pub mod progress;
 pub mod units;

@@ -6,8 +6,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::artefact::Input;
+use super::headline::Headline;
 use fluxform_base::accuracy::StageAccuracy;
 use fluxform_base::force_direction::{ForceDirection, NormalForce};
+use fluxform_base::point_weights::Weights;
 use fluxform_lambda::feedback::Rendered;
 pub use fluxform_lambda::sideways::Sideways;
 use fluxform_lambda::vector_feedback::VectorRendering;
@@ -52,6 +54,9 @@ pub struct LambdaFile {
     pub rank: usize,
     /// Number of constraint points.
     pub points: usize,
+    /// How they count in the mean; absent where all count alike.
+    #[serde(default, skip_serializing_if = "Weights::is_equal")]
+    pub weights: Weights,
     /// Breakpoints, lambda ascending; between them the currents are linear in lambda.
     pub path: Vec<PathStep>,
     /// The same by the largest error at any point; absent in files of programs without it.
@@ -89,6 +94,9 @@ pub struct LambdaFile {
     /// it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sideways: Option<Sideways>,
+    /// What the result comes to; absent without a lambda and in files of programs without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub headline: Option<Headline>,
     /// Each stage's estimated error.
     pub accuracy: BTreeMap<String, StageAccuracy>,
 }

@@ -24,6 +24,7 @@ pub mod bench;
 pub mod cache;
 mod cross_check;
 pub mod force_map;
+pub mod headline;
 pub mod json;
 pub mod lambda_file;
 pub mod load;

@@ -10,6 +10,7 @@ use super::json::to_json;
 use fluxform_base::accuracy::StageAccuracy;
 use fluxform_base::force_constant::Criterion;
 use fluxform_base::force_direction::{ForceDirection, NormalForce};
+use fluxform_base::point_weights::Weights;
 use fluxform_numerics::axis::Axis;
 
 /// The interpolation between nodes that every loader implements.
@@ -82,6 +83,15 @@ pub struct MadeWith {
     /// `--normal-force`; absent without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normal_force: Option<NormalForce>,
+    /// `--error`, relative; absent without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error: Option<f64>,
+    /// `--refine`; absent without it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub refine: bool,
+    /// `--weights`; absent without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weights: Option<Weights>,
     /// How far from the object's points the map reaches, m.
     pub reach_m: f64,
     /// Whether `report.html` and `plots/` were requested.
@@ -121,6 +131,9 @@ pub struct SurfaceOptions {
     pub rotate_deg: [f64; 3],
     /// Samples of the grid along x and y.
     pub samples: [usize; 2],
+    /// Whether a flag gave them; absent where not.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub samples_are_given: bool,
     /// Ends of the grid along x, m; null for the surface's own extent.
     pub x_m: Option<[f64; 2]>,
     /// Ends of the grid along y, m; null for the surface's own extent.

@@ -6,7 +6,9 @@ use std::path::PathBuf;
 
 use super::values;
 use crate::force_direction::{ForceDirection, ForceOverride, NormalForce};
+use crate::point_weights::Weights;
 use crate::scene::sources::Sampling;
+use crate::scene::tolerances::ErrorTarget;
 use crate::shape::document::Up;
 use crate::shape::step::STEP_SECONDS;
 
@@ -74,6 +76,37 @@ pub struct Tolerance {
     /// core 1e-6, arrays with coupled cores 1e-4; along a B-H curve 3e-4]
     #[arg(long, value_name = "T", value_parser = values::tolerance, allow_hyphen_values = true)]
     pub tolerance: Option<f64>,
+}
+
+/// How the points of a grid count.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct WeightsFlag {
+    /// How the points of a grid count in the mean over the object [default: as the shape file says,
+    /// else equal]
+    #[arg(long, value_name = "RULE", value_parser = values::weights())]
+    pub weights: Option<Weights>,
+}
+
+/// The largest error that the computation may add.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct ErrorFlags {
+    /// Largest error that the computation may add to the force, relative to the requested force, and
+    /// to lambda, like 1%: points, nodes and tolerances are chosen for it, points count by area;
+    /// grids that documents or flags give are obeyed, and what they cause is reported
+    #[arg(long, value_name = "PART", value_parser = values::error, allow_hyphen_values = true)]
+    error: Option<f64>,
+    /// With --error: choose the samples also where documents give them; extents stay
+    #[arg(long, requires = "error")]
+    refine: bool,
+}
+
+impl ErrorFlags {
+    /// What is requested, if anything is.
+    #[must_use]
+    pub fn target(self) -> Option<ErrorTarget> {
+        let refine = self.refine;
+        self.error.map(|error| ErrorTarget { error, refine })
+    }
 }
 
 /// Where what is written may replace what is there.
@@ -164,7 +197,12 @@ impl From<ForceFlags> for ForceOverride {
 #[derive(Debug, Clone, Copy, Args)]
 pub struct SamplingFlags {
     /// Choose points until bilinear patches between them lie this near to the surface (0.1mm)
-    #[arg(long, value_name = "LENGTH", value_parser = values::length_with_unit)]
+    #[arg(
+        long,
+        value_name = "LENGTH",
+        value_parser = values::length_with_unit,
+        conflicts_with = "weights"
+    )]
     max_deviation: Option<f64>,
     /// No patch wider than this [default: for `discretize` no limit, for `lambda` a sixteenth of the
     /// lowest height, over which forces change little]
@@ -180,7 +218,7 @@ pub struct SamplingFlags {
         long,
         value_name = "SPACING",
         value_parser = values::length_with_unit,
-        conflicts_with = "max_deviation"
+        conflicts_with_all = ["max_deviation", "weights"]
     )]
     poisson: Option<f64>,
     /// Which random points

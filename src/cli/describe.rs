@@ -2,6 +2,7 @@
 
 use super::quantity::{count, error, length_error, mm, number, number_to, percent};
 use crate::accuracy::StageAccuracy;
+use crate::bundle::headline::{BudgetPart, Headline};
 use crate::bundle::lambda_file::Sideways;
 use crate::bundle::manifest::{AxisSummary, LeftOut};
 use crate::cli::layout::grid;
@@ -130,19 +131,100 @@ pub fn force_constant(lambda_n_per_m: Option<f64>) -> String {
     )
 }
 
-/// How much of the requested force the static currents give.
-pub fn given_force(given: &GivenForce) -> String {
-    let above = if given.above_saturation {
-        "; lambda is above saturation: all currents are at their limits"
-    } else {
-        ""
-    };
+/// How much of the requested force is given, on average and over the points.
+fn given_range(given: &GivenForce) -> String {
     format!(
-        "{} of the requested force on average, {} to {} over the points{above}",
+        "{} of the requested force on average, {} to {} over the points",
         percent(given.mean),
         number_to(given.least * 100.0, 3),
         percent(given.most)
     )
+}
+
+/// How much of the requested force static currents give, and currents with feedback.
+pub fn given_force(headline: &Headline) -> String {
+    let mut lines = Vec::new();
+    if let Some(given) = &headline.static_currents {
+        let above = if given.above_saturation {
+            "; lambda is above saturation: all currents are at their limits"
+        } else {
+            ""
+        };
+        lines.push(format!("{}{above}", given_range(given)));
+    }
+    let feedback = headline.feedback.as_ref();
+    lines.extend(feedback.map(|given| format!("with feedback {}", given_range(given))));
+    lines.join("\n")
+}
+
+/// What the computation adds to the force, who adds it, and what would halve it.
+pub fn force_error(headline: &Headline) -> String {
+    // What is below a hundredth of the whole is not read.
+    let counts = |part: &&BudgetPart| part.error > 0.01 * headline.force_error;
+    let parts: Vec<String> = headline
+        .budget
+        .iter()
+        .filter(counts)
+        .map(|part| format!("{} {}", part.part.words(), share(part.error)))
+        .collect();
+    let mut lines = vec![format!(
+        "the computation adds up to {} of the requested force: {}",
+        share(headline.force_error),
+        parts.join(", ")
+    )];
+    lines.extend(
+        headline
+            .to_halve
+            .iter()
+            .map(|what| format!("to halve the largest part: {what}")),
+    );
+    lines.extend(headline.jumps.map(|jumps| {
+        format!(
+            "left out: {} of the points, where the surface jumps; there the force goes from one side's \
+             to the other's within a cell",
+            percent(jumps)
+        )
+    }));
+    lines.join("\n")
+}
+
+/// What a requested error came to; `None` where none was requested.
+pub fn requested_error(headline: &Headline) -> Option<String> {
+    let requested = headline.requested.as_ref()?;
+    let grid = |points: &[usize]| {
+        let samples: Vec<String> = points.iter().map(usize::to_string).collect();
+        samples.join(" x ")
+    };
+    let chosen = |points: [usize; 2], nodes: Option<[usize; 3]>| {
+        let nodes = nodes.map_or_else(String::new, |nodes| format!(", {} nodes", grid(&nodes)));
+        format!("{} points{nodes}", grid(&points))
+    };
+    let holds = if requested.met { "holds" } else { "exceeds" };
+    let mut lines = vec![format!(
+        "{} {holds} the requested {}: {}, tolerance {}",
+        share(headline.force_error),
+        share(requested.error),
+        chosen(requested.points, requested.nodes),
+        error(requested.tolerance)
+    )];
+    lines.extend(requested.fixed.iter().cloned());
+    lines.extend(requested.elsewhere.iter().map(|run| {
+        format!(
+            "at {} about {} times the work: {} (an estimate)",
+            share(run.error),
+            number_to(run.work, 2),
+            chosen(run.points, run.nodes)
+        )
+    }));
+    Some(lines.join("\n"))
+}
+
+/// An error's share of a whole, in two digits.
+fn share(part: f64) -> String {
+    if part < 1e-5 {
+        return error(part);
+    }
+    format!("{} %", number_to(part * 100.0, 2))
 }
 
 /// The sideways force that the chosen currents and feedback leave.

@@ -331,6 +331,7 @@ fn raw_surface(path: &Path, flags: &SurfaceFlags) -> Result<ShapeSource, Failure
             seat: seat(flags)?,
         },
         samples: flags.grid.unwrap_or(SAMPLES).0,
+        samples_are_given: flags.grid.is_some(),
         x_m: flags.x.map(|ends| ends.0),
         y_m: flags.y.map(|ends| ends.0),
     };

@@ -1,5 +1,7 @@
 //! Numbers for people: nice units, few digits.
 
+use crate::digits::with_error;
+
 /// Significant digits on screen.
 const DIGITS: i32 = 5;
 
@@ -64,6 +66,31 @@ pub fn si(value: f64, unit: &str) -> String {
     si_to(value, unit, DIGITS)
 }
 
+/// The same in the digits that a relative error leaves, with that error: `93 +- 6 ms`.
+#[must_use]
+pub fn si_with_error(value: f64, relative: f64, unit: &str) -> String {
+    let known = relative > 0.0 && relative.is_finite();
+    if !known || value == 0.0 || !value.is_finite() {
+        return si(value, unit);
+    }
+    let exponent = value.abs().log10().floor() as i32;
+    let (power, prefix) = prefix_of(exponent);
+    let scaled = value / 10f64.powi(power);
+    format!(
+        "{} {prefix}{unit}",
+        with_error(scaled, relative * scaled.abs())
+    )
+}
+
+/// The prefix for a number of this power of ten, and its own.
+fn prefix_of(exponent: i32) -> (i32, &'static str) {
+    PREFIXES
+        .into_iter()
+        .rev()
+        .find(|(power, _)| *power <= exponent)
+        .unwrap_or(PREFIXES[0])
+}
+
 fn si_to(value: f64, unit: &str, digits: i32) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value} {unit}");
@@ -72,11 +99,7 @@ fn si_to(value: f64, unit: &str, digits: i32) -> String {
         .parse()
         .unwrap_or(value);
     let exponent = rounded.abs().log10().floor() as i32;
-    let (power, prefix) = PREFIXES
-        .into_iter()
-        .rev()
-        .find(|(power, _)| *power <= exponent)
-        .unwrap_or(PREFIXES[0]);
+    let (power, prefix) = prefix_of(exponent);
     format!(
         "{} {prefix}{unit}",
         number_to(value / 10f64.powi(power), digits)
@@ -93,9 +116,15 @@ pub fn force(force_n: f64) -> String {
     }
 }
 
+/// Lengths' errors below this are rounding of doubles, m.
+const ROUNDING_M: f64 = 1e-12;
+
 /// A length's error: one or two digits.
 #[must_use]
 pub fn length_error(error_m: f64) -> String {
+    if error_m < ROUNDING_M {
+        return "below 1 pm".to_owned();
+    }
     si_to(error_m, "m", 2)
 }
 
@@ -161,6 +190,8 @@ mod tests {
         assert_eq!(si(999.9, "V"), "999.9 V");
         assert_eq!(si(2.0, "A"), "2 A");
         assert_eq!(si(0.0, "A"), "0 A");
+        assert_eq!(si_with_error(0.093_242, 0.0541, "s"), "93 +- 6 ms");
+        assert_eq!(si_with_error(0.093_242, 0.0, "s"), "93.242 ms");
         assert_eq!(si(3.1e-16, "T"), "0.00031 pT");
     }
 
@@ -181,6 +212,8 @@ mod tests {
         assert_eq!(force(0.000_641_3), "0.6413 mN");
         assert_eq!(force(-1.3), "-1.3 N");
         assert_eq!(length_error(2.980_2e-9), "3 nm");
+        // `5.6e-6 pm` was printed of a formula.
+        assert_eq!(length_error(5.6e-18), "below 1 pm");
         assert_eq!(count(1, "coil"), "1 coil");
     }
 }

@@ -8,6 +8,8 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use crate::force_direction::{ForceDirection, NormalForce};
 use crate::lambda::Criterion;
 use crate::map::Components;
+use crate::point_weights::Weights;
+use crate::scene::tolerances::ErrorTarget;
 use crate::shape::document::{Up, parse_unit};
 use crate::units::m_from_mm;
 
@@ -30,6 +32,13 @@ pub fn normal_force() -> impl TypedValueParser<Value = NormalForce> {
     let of = |one: &NormalForce| PossibleValue::new(one.name()).help(one.meaning());
     let names = PossibleValuesParser::new(NormalForce::ALL.iter().map(of));
     names.try_map(|name| name.parse::<NormalForce>())
+}
+
+/// How points count, by name.
+pub fn weights() -> impl TypedValueParser<Value = Weights> {
+    let of = |one: &Weights| PossibleValue::new(one.name()).help(one.meaning());
+    let names = PossibleValuesParser::new(Weights::ALL.iter().map(of));
+    names.try_map(|name| name.parse::<Weights>())
 }
 
 /// Any components of a map by their name.
@@ -195,6 +204,23 @@ pub fn tolerance(text: &str) -> Result<f64, String> {
              field gradient |grad B|, like 1e-9",
             TOLERANCE.start(),
             TOLERANCE.end()
+        ))
+    }
+}
+
+/// A relative error: a part, or per cent with a `%`.
+pub fn error(text: &str) -> Result<f64, String> {
+    let value = match text.strip_suffix('%') {
+        Some(percent) => number(percent)? / 100.0,
+        None => number(text)?,
+    };
+    if ErrorTarget::RANGE.contains(&value) {
+        Ok(value)
+    } else {
+        Err(format!(
+            "invalid error {text}: expected a part of the force from {:e} to {}, like 1% or 0.01",
+            ErrorTarget::RANGE.start(),
+            ErrorTarget::RANGE.end()
         ))
     }
 }

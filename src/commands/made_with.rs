@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::bundle::artefact::Input;
 use crate::bundle::manifest::SurfaceOptions;
+use crate::point_weights::Weights;
 use crate::shape::document::{AxisRequest, ShapeDocument, SurfaceSource, Up};
 
 /// A surface's options on the command line; `None` where a shape file states them.
@@ -28,6 +29,7 @@ pub fn surface(document: &ShapeDocument, file: Option<&Input>) -> Option<Surface
         translate_m: document.placement.translate_m,
         rotate_deg: document.placement.rotate_deg,
         samples: [parts(x).0, parts(y).0],
+        samples_are_given: document.grid_is_given,
         x_m: parts(x).1,
         y_m: parts(y).1,
         up: (seat.up != Up::default()).then(|| seat.up.name().to_owned()),
@@ -43,6 +45,8 @@ pub fn surface(document: &ShapeDocument, file: Option<&Input>) -> Option<Surface
 /// Those of `discretize`.
 #[derive(Serialize)]
 pub(crate) struct PointsAsked {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weights: Option<Weights>,
     pub holes: Option<&'static str>,
     pub certify: Option<&'static str>,
     pub max_deviation_m: Option<f64>,

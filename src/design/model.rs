@@ -180,6 +180,20 @@ pub struct Supply {
     pub voltage_v: Option<f64>,
 }
 
+impl Design {
+    /// The same with other samples of the workspace along x, y and z.
+    #[must_use]
+    pub fn with_nodes(&self, samples: [usize; 3]) -> Self {
+        let mut design = self.clone();
+        let workspace = &mut design.workspace;
+        let axes = [&mut workspace.x_m, &mut workspace.y_m, &mut workspace.z_m];
+        for (axis, samples) in axes.into_iter().zip(samples) {
+            axis.samples = samples;
+        }
+        design
+    }
+}
+
 /// The workspace grid, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Workspace {
@@ -189,4 +203,6 @@ pub struct Workspace {
     pub y_m: Axis,
     /// z axis, m; from the windings' top face up.
     pub z_m: Axis,
+    /// Whether the document gives any of them.
+    pub is_given: bool,
 }

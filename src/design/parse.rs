@@ -158,5 +158,6 @@ fn workspace_m(draft: &WorkspaceDraft) -> Option<Workspace> {
         x_m: axis_m(draft.x.as_ref()?.value),
         y_m: axis_m(draft.y.as_ref()?.value),
         z_m: axis_m(draft.z.as_ref()?.value),
+        is_given: draft.is_given,
     })
 }

@@ -310,6 +310,7 @@ pub struct WorkspaceDraft {
     pub x: Option<Located<Axis>>,
     pub y: Option<Located<Axis>>,
     pub z: Option<Located<Axis>>,
+    pub is_given: bool,
 }
 
 /// The seed's grid along x and y, mm.
@@ -325,7 +326,9 @@ pub fn workspace(mut s: Section<'_>) -> WorkspaceDraft {
         to: 80.0,
         samples: 29,
     };
+    let is_given = ["x_mm", "y_mm", "z_mm"].iter().any(|key| s.has(key));
     let draft = WorkspaceDraft {
+        is_given,
         x: s.axis_or("x_mm", &BODY_MM, SEED_SIDE_MM),
         y: s.axis_or("y_mm", &BODY_MM, SEED_SIDE_MM),
         z: s.axis_or("z_mm", &BODY_MM, heights),

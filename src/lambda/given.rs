@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::allocation::{Allocator, AllocatorError};
 use super::problem::ForceProblem;
 
 /// Ratios are looked at where at least this share of the largest force is requested: towards none
@@ -22,6 +23,58 @@ pub struct GivenForce {
     pub above_saturation: bool,
 }
 
+/// Points of feedback at most: means and ranges of a force that changes over centimetres.
+const MOST_POINTS: usize = 1000;
+
+/// Sums of forces and their ratios over the points.
+struct Ratios {
+    highest_m: f64,
+    given: f64,
+    requested: f64,
+    least: f64,
+    most: f64,
+}
+
+impl Ratios {
+    fn new(problem: &ForceProblem) -> Self {
+        Self {
+            highest_m: problem.height_m.iter().copied().fold(0.0, f64::max),
+            given: 0.0,
+            requested: 0.0,
+            least: f64::INFINITY,
+            most: f64::NEG_INFINITY,
+        }
+    }
+
+    fn add(&mut self, problem: &ForceProblem, point: usize, force_n: f64, request_n: f64) {
+        let weight = problem.weights.map_or(1.0, |all| all[point]);
+        self.given += weight * force_n;
+        self.requested += weight * request_n;
+        if problem.height_m[point] > LEAST_REQUEST * self.highest_m {
+            self.least = self.least.min(force_n / request_n);
+            self.most = self.most.max(force_n / request_n);
+        }
+    }
+
+    fn of_force(&self, above_saturation: bool) -> Option<GivenForce> {
+        (self.requested > 0.0 && self.least.is_finite()).then(|| GivenForce {
+            mean: self.given / self.requested,
+            least: self.least,
+            most: self.most,
+            above_saturation,
+        })
+    }
+}
+
+/// The lowest height at which ratios to the requested force are looked at, m; `None` where no force is
+/// requested.
+#[must_use]
+pub fn lowest_requested_m(height_m: &[f64]) -> Option<f64> {
+    let highest_m = height_m.iter().copied().fold(0.0, f64::max);
+    let counted = height_m.iter().filter(|h| **h > LEAST_REQUEST * highest_m);
+    counted.copied().reduce(f64::min)
+}
+
 impl GivenForce {
     /// Of `currents_a` at `lambda_n_per_m`; `None` where no force is requested.
     #[must_use]
@@ -31,29 +84,49 @@ impl GivenForce {
         currents_a: &[f64],
         lambda_saturation_n_per_m: Option<f64>,
     ) -> Option<Self> {
-        let highest_m = problem.height_m.iter().copied().fold(0.0, f64::max);
-        let (mut given, mut requested) = (0.0, 0.0);
-        let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+        let mut ratios = Ratios::new(problem);
         let rows = problem.forces_n_per_a.chunks_exact(problem.coils());
         for (point, (row, height_m)) in rows.zip(problem.height_m).enumerate() {
-            let weight = problem.weights.map_or(1.0, |all| all[point]);
             let offset_n = problem.offset_n.map_or(0.0, |offset| offset[point]);
             let coils_n: f64 = row.iter().zip(currents_a).map(|(f, i)| f * i).sum();
-            let (force_n, request_n) = (coils_n + offset_n, lambda_n_per_m * height_m);
-            given += weight * force_n;
-            requested += weight * request_n;
-            if *height_m > LEAST_REQUEST * highest_m {
-                least = least.min(force_n / request_n);
-                most = most.max(force_n / request_n);
-            }
+            ratios.add(
+                problem,
+                point,
+                coils_n + offset_n,
+                lambda_n_per_m * height_m,
+            );
         }
-        (requested > 0.0 && least.is_finite()).then(|| Self {
-            mean: given / requested,
-            least,
-            most,
-            above_saturation: lambda_saturation_n_per_m
-                .is_some_and(|saturation| lambda_n_per_m > saturation * (1.0 + 1e-12)),
-        })
+        let above = |saturation: f64| lambda_n_per_m > saturation * (1.0 + 1e-12);
+        ratios.of_force(lambda_saturation_n_per_m.is_some_and(above))
+    }
+
+    /// With currents of least power of their own at every point (at a thousand of many); `None` where
+    /// no force is requested.
+    ///
+    /// # Errors
+    /// Limits or resistances out of their domain.
+    pub fn with_feedback(
+        problem: &ForceProblem,
+        lambda_n_per_m: f64,
+    ) -> Result<Option<Self>, AllocatorError> {
+        let mut allocator = Allocator::new(
+            problem.resistance_ohm,
+            problem.lower_a,
+            problem.upper_a,
+            problem.total_max_a,
+        )?;
+        let coils = problem.coils();
+        let mut currents_a = vec![0.0; coils];
+        let mut ratios = Ratios::new(problem);
+        let every = problem.points().div_ceil(MOST_POINTS).max(1);
+        for point in (0..problem.points()).step_by(every) {
+            let offset_n = problem.offset_n.map_or(0.0, |offset| offset[point]);
+            let request_n = lambda_n_per_m * problem.height_m[point];
+            let row = &problem.forces_n_per_a[point * coils..(point + 1) * coils];
+            let found = allocator.allocate(row, request_n - offset_n, &mut currents_a);
+            ratios.add(problem, point, found.force_n + offset_n, request_n);
+        }
+        Ok(ratios.of_force(false))
     }
 }
 
@@ -85,5 +158,16 @@ mod tests {
         let below = GivenForce::of(&problem, 6.5, &currents, Some(6.5)).unwrap();
         assert!(!below.above_saturation);
         assert_eq!(GivenForce::of(&problem, 0.0, &currents, None), None);
+        // Both coils of their own at every point: within reach everywhere.
+        let followed = GivenForce::with_feedback(&problem, 1.3).unwrap().unwrap();
+        for ratio in [followed.mean, followed.least, followed.most] {
+            assert!((ratio - 1.0).abs() < 1e-12, "{followed:?}");
+        }
+        // The most that they give is less than 40 N/m asks for at the first point.
+        let beyond = GivenForce::with_feedback(&problem, 40.0).unwrap().unwrap();
+        assert!(
+            (beyond.least - (0.6 + 0.01) / 2.0).abs() < 1e-12,
+            "{beyond:?}"
+        );
     }
 }

@@ -236,6 +236,43 @@ pub fn solve(problem: &ForceProblem, settings: &Settings) -> Result<Solution, Pr
     ))
 }
 
+/// The chosen force constant alone, N/m, as [`solve`] has it.
+///
+/// # Errors
+/// As [`solve`].
+pub fn constant(problem: &ForceProblem, settings: &Settings) -> Result<Option<f64>, ProblemError> {
+    problem.validate(settings)?;
+    let largest = largest_entries(problem);
+    problem.comparable(&largest)?;
+    let (solved, rank) = match solve_plainly(problem, &largest) {
+        Some(plain) => (plain, problem.coils()),
+        None => {
+            let solved = solve_finely(problem, &largest);
+            let rank = solved.reduced.rank();
+            (solved, rank)
+        }
+    };
+    let heights = solved.reduced.heights();
+    let comparison = Comparison {
+        limited: &solved.limited,
+        unlimited: &solved.unlimited,
+        mean_square: Num::dot(heights, heights),
+    };
+    if status(&solved, &comparison) == Status::NothingRendered {
+        return Ok(None);
+    }
+    let (linear, jnd) = first_and_jnd(problem, settings, &solved, &comparison, rank);
+    Ok(match settings.criterion {
+        Criterion::Linear => linear,
+        Criterion::Jnd => jnd,
+        Criterion::Saturation => {
+            let path = Path::new(problem, &solved.reduced, &solved.bounds, &solved.limited);
+            path.last_turn().or(linear.filter(|&lambda| lambda == 0.0))
+        }
+        Criterion::Maxmin => worst::largest(problem, &largest).map(|most| most.lambda_n_per_m),
+    })
+}
+
 /// Reduced in doubles, where that is enough.
 fn solve_plainly(problem: &ForceProblem, largest: &[f64]) -> Option<Solved> {
     if problem.points() < problem.coils() || largest[..problem.coils()].contains(&0.0) {

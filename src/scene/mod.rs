@@ -5,6 +5,7 @@ pub mod cached_field;
 pub mod core_material;
 pub mod cost;
 pub mod evaluation_sample;
+pub mod felt_force;
 pub mod maps;
 pub mod neighbours;
 pub mod passive;

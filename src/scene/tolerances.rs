@@ -21,6 +21,56 @@ pub const COUPLED_TOLERANCE: f64 = 1e-4;
 /// taken as linear leave an error of this order.
 pub const WORKING_POINT_TOLERANCE: f64 = 1e-3;
 
+/// The largest error that a computation may add to the force, relative to the requested force where at
+/// least a twentieth of the largest is requested, and to lambda.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ErrorTarget {
+    /// Relative.
+    pub error: f64,
+    /// Whether samples that documents or flags give are chosen all the same.
+    pub refine: bool,
+}
+
+impl ErrorTarget {
+    /// Errors that make sense: below, steel and kinks cost more than anybody waits for.
+    pub const RANGE: std::ops::RangeInclusive<f64> = 1e-5..=0.5;
+    /// The share of the number of points.
+    const OF_POINTS: f64 = 0.4;
+    /// The share of heights between the points.
+    const BETWEEN_POINTS: f64 = 0.25;
+    /// The share of the map's interpolation.
+    const OF_INTERPOLATION: f64 = 0.2;
+    /// The field's tolerance over the error: forces and map nodes count about ten times, since all
+    /// coils may be off to the same side, and have a tenth of the budget between them.
+    const OF_FIELD: f64 = 0.005;
+    /// No steel needs to be solved more coarsely.
+    const COARSEST: f64 = 1e-3;
+
+    /// What the number of points may add.
+    #[must_use]
+    pub fn of_points(self) -> f64 {
+        Self::OF_POINTS * self.error
+    }
+
+    /// What heights between the points may add.
+    #[must_use]
+    pub fn between_points(self) -> f64 {
+        Self::BETWEEN_POINTS * self.error
+    }
+
+    /// What interpolation of the map may add.
+    #[must_use]
+    pub fn of_interpolation(self) -> f64 {
+        Self::OF_INTERPOLATION * self.error
+    }
+
+    /// The tolerance of steel.
+    #[must_use]
+    pub fn tolerance(self) -> f64 {
+        (Self::OF_FIELD * self.error).min(Self::COARSEST)
+    }
+}
+
 /// The accuracy of each stage, relative to what the stage's own function names.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]

@@ -10,6 +10,7 @@ use std::path::PathBuf;
 
 use crate::step::BodyOptions;
 use fluxform_base::force_direction::RequestedForce;
+use fluxform_base::point_weights::Weights;
 use fluxform_numerics::axis::Axis;
 
 pub use crate::format::SurfaceFormat;
@@ -34,6 +35,10 @@ pub struct ShapeDocument {
     pub grid: GridRequest,
     /// The force that is requested over it.
     pub force: RequestedForce,
+    /// Whether the document or a flag gives that grid's samples.
+    pub grid_is_given: bool,
+    /// How the points count in the mean over the object; `None` where nothing says it.
+    pub weights: Option<Weights>,
 }
 
 /// Where a surface comes from.
@@ -193,6 +198,19 @@ pub struct GridRequest {
     pub x: AxisRequest,
     /// The same along y.
     pub y: AxisRequest,
+}
+
+impl ShapeDocument {
+    /// The same with other samples along x and y.
+    #[must_use]
+    pub fn with_samples(&self, samples: [usize; 2]) -> Self {
+        let mut document = self.clone();
+        let axes = [&mut document.grid.x, &mut document.grid.y];
+        for (axis, samples) in axes.into_iter().zip(samples) {
+            *axis = axis.with_samples(samples);
+        }
+        document
+    }
 }
 
 /// One axis of the requested grid.

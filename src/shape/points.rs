@@ -9,6 +9,7 @@ use crate::height::{Grid, Sample};
 use crate::hidden::Hidden;
 use crate::holes::{self, Holes};
 use crate::mesh::{Bounds, MeshFacts};
+use crate::point_areas::areas_m2;
 use crate::point_flags::Marks;
 use crate::scattered::Probe;
 use crate::surface::Surface;
@@ -42,6 +43,8 @@ pub struct ConstraintPoints {
     pub grid_index: Vec<usize>,
     /// Flags of each point.
     pub marks: Vec<Marks>,
+    /// Plan area that each point stands for, m^2; empty where points are not marked.
+    pub area_m2: Vec<f64>,
     /// Grid points without surface, skipped.
     pub outside: usize,
     /// Of the grid points without surface those that lie inside the silhouette, skipped or filled.
@@ -147,7 +150,7 @@ pub struct Settings {
     pub certify: Certify,
     /// Result of an earlier comparison of these points with this surface; it is not repeated.
     pub known: Option<Certificate>,
-    /// Whether walls, rims, creases and overhangs are looked for.
+    /// Whether walls, rims, creases, overhangs and the points' areas are looked for.
     pub marks: bool,
     /// Whether the vertical difference is reported for every cell.
     pub cells: bool,
@@ -242,7 +245,9 @@ pub fn discretize_surface(
     let mut points = collect(&grid, &samples, rounding_m, &bounds)?;
     points.holes = found.len();
     if settings.marks {
-        mark(&mut points, &surface, &found, progress)?;
+        let probe = Probe::new(&surface, &points.grid);
+        mark(&mut points, &probe, &found, progress)?;
+        points.area_m2 = point_areas_m2(&points, &probe, progress)?;
     }
     let hidden = Hidden::of(&surface).filter(|_| settings.marks);
     if let Some(share) = hidden
@@ -313,11 +318,10 @@ pub fn discretize_surface(
 /// Finds the flags of each point; `filled` holds grid indices, ascending.
 fn mark(
     points: &mut ConstraintPoints,
-    surface: &Surface,
+    probe: &Probe<'_>,
     filled: &[usize],
     progress: &dyn Progress,
 ) -> Result<(), ShapeError> {
-    let probe = Probe::new(surface, &points.grid);
     let places = (0..points.len()).into_par_iter();
     let marks: Result<Vec<Marks>, Interrupted> = places
         .map(|row| {
@@ -334,6 +338,21 @@ fn mark(
         .collect();
     points.marks = marks?;
     Ok(())
+}
+
+/// The plan area of each point, m^2.
+fn point_areas_m2(
+    points: &ConstraintPoints,
+    probe: &Probe<'_>,
+    progress: &dyn Progress,
+) -> Result<Vec<f64>, ShapeError> {
+    let mut present = vec![false; points.grid.len()];
+    for &place in &points.grid_index {
+        present[place] = true;
+    }
+    let covered = |p: [f64; 2]| probe.at(p).is_some();
+    let all = areas_m2(&points.grid, &present, &covered, progress)?;
+    Ok(points.grid_index.iter().map(|&place| all[place]).collect())
 }
 
 /// The requested axis; its nodes ascend.
@@ -410,6 +429,7 @@ fn collect(
         normal: Vec::with_capacity(found),
         grid_index: Vec::with_capacity(found),
         marks: vec![Marks::PLAIN; found],
+        area_m2: Vec::new(),
         outside: samples.len() - found,
         holes: 0,
     };

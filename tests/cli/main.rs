@@ -4,6 +4,7 @@
 mod budget;
 mod cache;
 mod codes;
+mod error_target;
 mod files;
 mod help;
 mod interrupt;
@@ -16,6 +17,7 @@ mod streams;
 mod surfaces;
 mod sweep;
 mod verify;
+mod weights;
 
 /// The array of the reference design without steel.
 const SEED: &str = "designs/seed_air.toml";

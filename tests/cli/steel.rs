@@ -178,7 +178,7 @@ fn the_steel_s_part_is_in_the_summary() {
         "476.14 g and 391.63 g of steel",
         "relative permeability 1000",
         "|B| up to 0.7128 T",
-        "95 % of the current after 93.24",
+        "95 % of the current after 93 +- ",
         "core peak",
         "core mean",
     ] {

@@ -210,6 +210,7 @@ fn raw(path: &str, unit: Option<&str>) -> RawSurface {
             rotate_deg: [0.0; 3],
             ..Placement::default()
         },
+        samples_are_given: true,
         samples: [61, 7],
         x_m: None,
         y_m: Some([-0.013, 0.07]),

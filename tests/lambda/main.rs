@@ -7,6 +7,7 @@ mod criteria;
 mod edges;
 mod exhaustive;
 mod feedback;
+mod limit;
 mod mirror;
 mod oracle;
 mod power;

@@ -450,6 +450,8 @@ fn a_grids_marks_agree_with_its_heights() {
             ..Placement::default()
         },
         grid: GridRequest { x: axis, y: axis },
+        weights: None,
+        grid_is_given: true,
     };
     let settings = Settings {
         marks: true,

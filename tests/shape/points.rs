@@ -62,6 +62,8 @@ fn exactly(primitive: Primitive, placement: Placement, grid: GridRequest) -> Sha
         scale: [1.0; 3],
         placement,
         grid,
+        weights: None,
+        grid_is_given: true,
     }
 }
 

@@ -164,6 +164,8 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
         duality_gap_n2: Some(1.3e-19),
         rank: 3,
         points: points.len(),
+        weights: fluxform_base::point_weights::Weights::Equal,
+        headline: None,
         path: vec![PathStep {
             lambda_n_per_m: 4.9429,
             currents_a: vec![2.0, 0.7, 0.0, 1.3],

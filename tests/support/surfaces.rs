@@ -86,6 +86,8 @@ pub fn file(path: &Path, unit_m: f64, placement: Placement, grid: GridRequest) -
         scale: [1.0; 3],
         placement,
         grid,
+        weights: None,
+        grid_is_given: true,
     }
 }
 

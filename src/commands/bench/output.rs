@@ -13,6 +13,7 @@ use crate::bundle::seal::to_record;
 use crate::commands::lambda::LambdaOptions;
 use crate::commands::made_with::surface;
 use crate::lambda::{Criterion, Settings};
+use crate::point_weights::Weights;
 
 /// Name of the JSON file.
 const JSON: &str = "bench.json";
@@ -31,6 +32,8 @@ pub fn made_with(request: &BenchRequest) -> Options {
         criterion: Criterion,
         jnd: f64,
         tolerance: Option<f64>,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        weights: Option<Weights>,
         max_deviation_m: Option<f64>,
         quick: bool,
         surfaces: Vec<Option<SurfaceOptions>>,
@@ -48,7 +51,9 @@ pub fn made_with(request: &BenchRequest) -> Options {
     let LambdaOptions {
         settings,
         tolerance,
+        weights,
         // Not options of this command.
+        error: _,
         sampling: _,
         wiring: _,
         variants: _,
@@ -67,6 +72,7 @@ pub fn made_with(request: &BenchRequest) -> Options {
         criterion,
         jnd: jnd_weight,
         tolerance: *tolerance,
+        weights: *weights,
         max_deviation_m: *max_deviation_m,
         quick: *quick,
         surfaces: surfaces.collect(),

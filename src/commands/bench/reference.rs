@@ -5,12 +5,12 @@ use super::ladder::Ladders;
 use super::stages::Bench;
 use crate::RunError;
 use crate::bundle::bench::Reference;
-use crate::lambda::{self, ForceProblem, Settings, Solution};
+use crate::lambda::{self, ForceProblem, Solution};
 use crate::map::FieldMap;
 use crate::numerics::axis::Axis;
-use crate::numerics::lagrange::locate;
 use crate::progress::Silent;
 use crate::scene::Scene;
+use crate::scene::felt_force::by_map;
 use crate::scene::passive;
 use crate::scene::sources::ShapeSource;
 use crate::scene::steel;
@@ -63,8 +63,8 @@ struct Rows {
 }
 
 impl Rows {
-    fn solve(&self, scene: &Scene, settings: &Settings) -> Result<Solution, RunError> {
-        let problem = ForceProblem {
+    fn problem<'a>(&'a self, scene: &'a Scene, resistance_ohm: &'a [f64]) -> ForceProblem<'a> {
+        ForceProblem {
             forces_n_per_a: &self.forces_n_per_a,
             height_m: &self.height_m,
             offset_n: self.offset_n.as_deref(),
@@ -72,21 +72,7 @@ impl Rows {
             lower_a: &scene.lower_a,
             upper_a: &scene.upper_a,
             total_max_a: scene.design.supply.total_current_max_a,
-            resistance_ohm: &scene.resistances_ohm(),
-        };
-        Ok(lambda::solve(&problem, settings)?)
-    }
-
-    /// Some of the rows; areas keep their proportions, but for the border's.
-    fn only(&self, rows: &[usize], coils: usize) -> Self {
-        let pick = |values: &Vec<f64>| rows.iter().map(|row| values[*row]).collect();
-        let forces = rows.iter();
-        let forces = forces.flat_map(|row| &self.forces_n_per_a[row * coils..(row + 1) * coils]);
-        Self {
-            forces_n_per_a: forces.copied().collect(),
-            height_m: pick(&self.height_m),
-            offset_n: self.offset_n.as_ref().map(pick),
-            weights: self.weights.as_ref().map(pick),
+            resistance_ohm,
         }
     }
 }
@@ -121,7 +107,7 @@ pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<R
         None
     };
     let offset_n = pull.map(|pull| pull.forces_z_n(&points.positions_m));
-    let weights = points.weights.clone().or_else(|| points.area_weights());
+    let weights = Some(points.areas.clone());
     let all = Rows {
         forces_n_per_a: forces,
         height_m: points.height_m.clone(),
@@ -129,7 +115,8 @@ pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<R
         weights,
     };
     let settings = &bench.request.lambda.settings;
-    let solution = all.solve(scene, settings)?;
+    let resistance_ohm = scene.resistances_ohm();
+    let solution = lambda::solve(&all.problem(scene, &resistance_ohm), settings)?;
     let lambda_n_per_m = chosen(&solution).ok_or_else(|| {
         RunError::NoForceConstant(format!(
             "{:?} has no force constant in the refined run, so there is nothing to hold errors \
@@ -137,11 +124,11 @@ pub fn refine(bench: &Bench, shape: &ShapeSource, ladders: &Ladders) -> Result<R
             shape.document.name
         ))
     })?;
-    let half = points.every_second();
-    let half = half.map(|rows| all.only(&rows, scene.coils.len()).solve(scene, settings));
-    let half = half.transpose()?;
-    let half = half.as_ref().and_then(chosen);
-    let own_error = half.map(|half| (half / lambda_n_per_m - 1.0).abs());
+    let own_error = points.error_against_limit(
+        &all.problem(scene, &resistance_ohm),
+        lambda_n_per_m,
+        settings,
+    )?;
     let position_m = places(shape, ladders, bench)?;
     let places = Places {
         forces_n_per_a: scene.forces_n_per_a(&solved, &position_m, &bench.within())?,
@@ -239,30 +226,21 @@ impl Places {
         lambda_n_per_m: f64,
         currents_a: &[f64],
     ) -> Result<f64, RunError> {
-        let nodes = map.x_m.len() * map.y_m.len() * map.z_m.len();
         let mut largest = 0.0_f64;
         for (place, direct) in self
             .position_m
             .iter()
             .zip(self.forces_n_per_a.chunks(self.coils))
         {
-            let cell = locate([&map.x_m, &map.y_m, &map.z_m], *place).ok_or_else(|| {
+            let by_map = by_map(map, self.moment_a_m2, currents_a, *place).ok_or_else(|| {
                 RunError::Input(format!(
                     "shape {:?}: a place of its surface lies outside the map",
                     self.shape
                 ))
             })?;
-            let mut difference = 0.0;
-            for (at, coil) in map.coils.iter().enumerate() {
-                let gz = cell.value(&map.gz_t_per_m_per_a[at * nodes..(at + 1) * nodes]);
-                let [m_x, m_y, m_z] = self.moment_a_m2;
-                let mut force = m_z * gz;
-                if let Some(gradient) = &map.gradient_t_per_m_per_a {
-                    let own = &gradient[9 * at * nodes..9 * (at + 1) * nodes];
-                    force += m_x * cell.component(own, 9, 2) + m_y * cell.component(own, 9, 5);
-                }
-                difference += currents_a[*coil] * (force - direct[*coil]);
-            }
+            // A coil that the map leaves out gives no force by it.
+            let direct: f64 = direct.iter().zip(currents_a).map(|(f, i)| f * i).sum();
+            let difference = by_map - direct;
             let target = lambda_n_per_m * place[2];
             largest = largest.max((difference / target).abs());
         }

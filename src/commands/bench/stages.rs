@@ -11,7 +11,6 @@ use crate::commands::calibrate::needed_nodes;
 use crate::commands::discretize::scattered;
 use crate::commands::discretize::{self, PointsReport};
 use crate::commands::lambda::{LambdaOptions, WantedPoints, resolving, solve_at};
-use crate::design::Design;
 use crate::map::{Components, FieldMap};
 use crate::progress::Progress;
 use crate::scene::cached_field::ShapeField;
@@ -116,9 +115,12 @@ impl<'a> Bench<'a> {
     ) -> Result<WantedPoints, RunError> {
         match points {
             Points::Grid(samples) => {
-                let document = with_samples(document, samples);
+                let document = document.with_samples(samples);
                 let report = discretize::run(&document, Vec::new(), progress)?;
-                Ok(WantedPoints::of_grid(&report))
+                Ok(WantedPoints::of_grid(
+                    &report,
+                    self.request.lambda.weights_of(&report),
+                ))
             }
             Points::Graded {
                 max_deviation_m,
@@ -172,7 +174,7 @@ impl<'a> Bench<'a> {
         points: &ConstraintPoints,
         samples: [usize; 3],
     ) -> Result<(FieldMap, f64), RunError> {
-        let design = with_nodes(self.scene.design, samples);
+        let design = self.scene.design.with_nodes(samples);
         let grid = needed_nodes(&design, points, DEFAULT_REACH_M);
         let coils = needed_coils(self.scene);
         let components = if self.scene.tilted() {
@@ -199,7 +201,10 @@ impl<'a> Bench<'a> {
         let grid = report.discretized.points.clone();
         self.inside(&shape.document.name, &grid)?;
         let (solved, steel_s) = self.steel(self.request.lambda.tolerance)?;
-        let (_, lambda_s) = self.lambda(&solved, &WantedPoints::of_grid(&report))?;
+        let (_, lambda_s) = self.lambda(
+            &solved,
+            &WantedPoints::of_grid(&report, self.request.lambda.weights_of(&report)),
+        )?;
         let samples = present_samples(self.scene.design);
         let (_, map_s) = self.map(&solved, &grid, samples)?;
         Ok(Present {
@@ -234,24 +239,4 @@ impl<'a> Bench<'a> {
         }
         Ok(())
     }
-}
-
-fn with_nodes(design: &Design, samples: [usize; 3]) -> Design {
-    let mut design = design.clone();
-    let workspace = &mut design.workspace;
-    workspace.x_m.samples = samples[0];
-    workspace.y_m.samples = samples[1];
-    workspace.z_m.samples = samples[2];
-    design
-}
-
-fn with_samples(document: &ShapeDocument, samples: [usize; 2]) -> ShapeDocument {
-    let mut document = document.clone();
-    for (axis, samples) in [&mut document.grid.x, &mut document.grid.y]
-        .into_iter()
-        .zip(samples)
-    {
-        *axis = axis.with_samples(samples);
-    }
-    document
 }

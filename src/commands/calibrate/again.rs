@@ -12,6 +12,7 @@ use crate::bundle::lambda_file::LambdaFile;
 use crate::bundle::manifest::Manifest;
 use crate::bundle::table::PointRow;
 use crate::bundle::write::{BundleContent, sealed_manifest};
+use crate::commands::lambda::WantedPoints;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::cached_field::FieldStore;
@@ -27,6 +28,8 @@ pub struct Expected {
     pub lambda: LambdaFile,
     /// `points.csv`.
     pub points: Vec<PointRow>,
+    /// How its points count in the mean; `None`: all alike.
+    pub weights: Option<Vec<f64>>,
 }
 
 /// Computes the bundle of `shape` on `scene` again. Nothing is written, and nothing that an
@@ -42,7 +45,7 @@ pub fn expected(
     options: &CalibrateOptions,
     progress: &dyn Progress,
 ) -> Result<Expected, RunError> {
-    let scene = &scene.to_tolerance(options.lambda.tolerance);
+    let scene = &scene.to_tolerance(options.lambda.tolerance_for(scene.design));
     let table = curve.map(|(_, text)| text.as_str());
     let field = FieldStore::new(scene, table, Store::none());
     let solved = BothSolved::new(scene, &field, progress)?;
@@ -57,11 +60,18 @@ pub fn expected(
         shape,
         options,
     };
-    let points = calibration.points(progress)?;
+    let search = calibration.search(progress)?;
+    let document = search
+        .as_ref()
+        .map_or(&shape.document, |(_, chosen)| &chosen.document);
+    let points = calibration.points(document, progress)?;
     let seal = |content: &BundleContent| Ok(sealed_manifest(content)?);
-    let (manifest, lambda) = calibration.compute(&points, progress, seal)?;
+    let (manifest, lambda) = calibration.compute(&points, search.as_ref(), progress, seal)?;
     Ok(Expected {
         manifest,
+        weights: WantedPoints::of_grid(&points, options.lambda.weights_of(&points))
+            .weights()
+            .map(<[f64]>::to_vec),
         points: point_rows(&points.discretized.points),
         lambda: lambda.file,
     })

@@ -11,9 +11,9 @@ use super::CalibrateReport;
 use super::DEFAULT_REACH_M;
 use super::plan::{Cost, Done, Plan, plan};
 use super::run;
-use crate::bundle::lambda_file::WorkingPointForces;
+use crate::bundle::lambda_file::{LambdaFile, WorkingPointForces};
 use crate::bundle::manifest::Manifest;
-use crate::cli::args::{ForceFlags, SurfaceFlags, Tolerance, Writing};
+use crate::cli::args::{ErrorFlags, ForceFlags, SurfaceFlags, Tolerance, WeightsFlag, Writing};
 use crate::cli::budget::{allow, cost_origin, costs};
 use crate::cli::describe;
 use crate::cli::documents;
@@ -31,6 +31,7 @@ use crate::cli::values::{self, FileArgument};
 use crate::commands::lambda::LambdaOptions;
 use crate::commands::lambda::command::{CriterionFlags, rendered};
 use crate::design::{Design, Need};
+use crate::digits::with_error;
 use crate::scene::cost::{Components, of_map};
 use crate::scene::sources::DesignSource;
 
@@ -49,6 +50,8 @@ use crate::scene::sources::DesignSource;
      "a surface given directly; its bundle is called wedge"),
     ("fluxform calibrate designs/seed_air.toml shapes/flat.toml --explain",
      "report first what will be computed, what left out, and what that costs"),
+    ("fluxform calibrate designs/seed_air.toml shapes/flat.toml --error 1% --refine --out budget",
+     "points, nodes and tolerances for an error of the force of 1 %"),
     ("fluxform calibrate designs/seed.toml shapes/flat.toml --criterion linear --out linear",
      "another criterion beside it; --force would replace what is there"),
 ]))]
@@ -81,6 +84,10 @@ pub struct Calibrate {
     #[command(flatten)]
     requested: ForceFlags,
     #[command(flatten)]
+    error: ErrorFlags,
+    #[command(flatten)]
+    weights: WeightsFlag,
+    #[command(flatten)]
     writing: Writing,
     #[command(flatten)]
     tolerance: Tolerance,
@@ -97,6 +104,8 @@ impl Calibrate {
         let out = folder(&self.out)?;
         let lambda = LambdaOptions {
             force: self.requested.into(),
+            weights: self.weights.weights,
+            error: self.error.target(),
             ..self.criterion.options(self.tolerance.tolerance)
         };
         let (document, shapes) = documents::design_and_shapes(
@@ -230,6 +239,16 @@ fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> String {
         design.name,
         describe::array(design)
     ));
+    for bundle in &report.bundles {
+        let file = &bundle.lambda.file;
+        let requested = file.headline.as_ref().and_then(describe::requested_error);
+        if let Some(requested) = requested {
+            sheet.line(
+                "error",
+                &format!("{}: {}", file.shape, requested.replace('\n', "\n  ")),
+            );
+        }
+    }
     sheet.gap();
     sheet.raw(&shapes_table(report));
     sheet.gap();
@@ -247,6 +266,7 @@ fn summary(design: &Design, report: &CalibrateReport, folder: &Path) -> String {
         ),
     );
     sheet.line("given", &given(report));
+    sheet.line("computed", &force_errors(report));
     sheet.line("sideways", &sideways(report));
     sheet.line("accuracy", &accuracies(report));
     if let Some(steel) = working_points(report) {
@@ -301,7 +321,7 @@ fn shapes_table(report: &CalibrateReport) -> String {
         vec![
             ("shape", file.shape.clone()),
             ("points", file.points.to_string()),
-            ("lambda N/m", or_none(file.lambda_n_per_m.map(number))),
+            ("lambda N/m", or_none(lambda(file))),
             (
                 "rms mN",
                 or_none(file.rms_error_n.map(|n| number(n * 1000.0))),
@@ -315,6 +335,13 @@ fn shapes_table(report: &CalibrateReport) -> String {
         ]
     };
     headed_table(report.bundles.iter().map(row))
+}
+
+/// lambda with its error, N/m.
+fn lambda(file: &LambdaFile) -> Option<String> {
+    let headline = file.headline.as_ref();
+    let known = headline.map(|of| with_error(of.lambda_n_per_m, of.lambda_error_n_per_m));
+    known.or_else(|| file.lambda_n_per_m.map(number))
 }
 
 /// Every force constant, one row per shape.
@@ -374,8 +401,18 @@ fn working_points(report: &CalibrateReport) -> Option<String> {
 fn given(report: &CalibrateReport) -> String {
     let lines = report.bundles.iter().filter_map(|bundle| {
         let file = &bundle.lambda.file;
-        let given = describe::given_force(file.given_force.as_ref()?);
-        Some(format!("{}: {given}", file.shape))
+        let given = describe::given_force(file.headline.as_ref()?);
+        Some(format!("{}: {}", file.shape, given.replace('\n', "\n  ")))
+    });
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// What the computation of every shape adds to the force.
+fn force_errors(report: &CalibrateReport) -> String {
+    let lines = report.bundles.iter().filter_map(|bundle| {
+        let file = &bundle.lambda.file;
+        let error = describe::force_error(file.headline.as_ref()?);
+        Some(format!("{}: {}", file.shape, error.replace('\n', "\n  ")))
     });
     lines.collect::<Vec<_>>().join("\n")
 }

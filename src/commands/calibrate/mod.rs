@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::discretize::{self, PointsReport, point_rows, points_grid};
+use super::lambda::error_target::{ChosenGrid, ErrorTarget};
 use super::lambda::{LambdaOptions, LambdaReport, WantedPoints, sideways, solve_at};
 use super::made_with::surface;
 use super::map::{arrays, runtime, summary};
@@ -37,9 +38,11 @@ use crate::scene::passive::PASSIVE_TOLERANCE;
 use crate::scene::passive_map::PassiveMap;
 use crate::scene::sources::{DesignSource, ShapeSource};
 use crate::scene::steel::Solved;
+use crate::shape::document::ShapeDocument;
 use crate::shape::points::ConstraintPoints;
 
 pub(crate) mod again;
+mod budget;
 pub(crate) mod command;
 mod directions;
 mod ignored_pull;
@@ -120,6 +123,8 @@ impl CalibrateOptions {
         let LambdaOptions {
             settings,
             tolerance,
+            weights,
+            error,
             // Of `lambda` alone.
             sampling: _,
             wiring: _,
@@ -140,6 +145,9 @@ impl CalibrateOptions {
             tolerance: *tolerance,
             force_direction: force.direction,
             normal_force: force.normal_force,
+            weights: *weights,
+            error: error.map(|target| target.error),
+            refine: error.is_some_and(|target| target.refine),
             reach_m: *reach_m,
             report: *page,
             arithmetic: arithmetic(),
@@ -206,7 +214,8 @@ pub fn run(
     progress: &dyn Progress,
 ) -> Result<CalibrateReport, RunError> {
     check_names(shapes)?;
-    let scene = Scene::with_tolerance(source.design, options.lambda.tolerance)?;
+    let tolerance = options.lambda.tolerance_for(source.design);
+    let scene = Scene::with_tolerance(source.design, tolerance)?;
     let curve = curve_table(&scene);
     // Before anything is computed, cleared or kept: a run that is refused changes nothing.
     for shape in shapes {
@@ -372,7 +381,11 @@ impl Calibration<'_> {
             self.options,
             folder_of(self.scene, self.shape, self.options),
         );
-        let points = self.points(progress)?;
+        let search = self.search(progress)?;
+        let document = search
+            .as_ref()
+            .map_or(&self.shape.document, |(_, chosen)| &chosen.document);
+        let points = self.points(document, progress)?;
         // Checked again with the digest of the surface that was parsed.
         let made_with = options.made_with(self.shape);
         let inputs = &points.summary.inputs;
@@ -388,7 +401,7 @@ impl Calibration<'_> {
             progress.end();
             Ok(manifest)
         };
-        let (manifest, lambda) = self.compute(&points, progress, write)?;
+        let (manifest, lambda) = self.compute(&points, search.as_ref(), progress, write)?;
         Ok(BundleReport {
             folder,
             outside: points.summary.outside,
@@ -398,9 +411,13 @@ impl Calibration<'_> {
     }
 
     /// The object's points; their inputs are those of the whole bundle.
-    fn points(&self, progress: &dyn Progress) -> Result<PointsReport, RunError> {
+    fn points(
+        &self,
+        document: &ShapeDocument,
+        progress: &dyn Progress,
+    ) -> Result<PointsReport, RunError> {
         let inputs = inputs(self.source, self.curve, self.shape);
-        discretize::run_cached(&self.shape.document, inputs, self.field, progress)
+        discretize::run_cached(document, inputs, self.field, progress)
     }
 
     /// Computes everything that a bundle holds and hands it to `take`, which returns the manifest
@@ -408,6 +425,7 @@ impl Calibration<'_> {
     fn compute(
         &self,
         points: &PointsReport,
+        search: Option<&(ErrorTarget, ChosenGrid)>,
         progress: &dyn Progress,
         take: impl FnOnce(&BundleContent) -> Result<Manifest, RunError>,
     ) -> Result<(Manifest, LambdaReport), RunError> {
@@ -416,7 +434,7 @@ impl Calibration<'_> {
             picture: self.options.page,
             ..self.options.lambda.clone()
         };
-        let of_grid = WantedPoints::of_grid(points);
+        let of_grid = WantedPoints::of_grid(points, self.options.lambda.weights_of(points));
         let mut lambda = solve_at(scene, &solved.forces, field, &of_grid, &options, progress)?;
         sideways::add(
             &mut lambda.file,
@@ -427,7 +445,13 @@ impl Calibration<'_> {
             progress,
         )?;
         let grid_points = &points.discretized.points;
-        let mut needed = self.needed_map(grid_points, progress)?;
+        let reach_m = self.options.reach_m;
+        let nodes = self.nodes(search, &lambda, grid_points, progress)?;
+        let gridded = nodes.map(|nodes| scene.design.with_nodes(nodes));
+        let design = gridded.as_ref().unwrap_or(scene.design);
+        let grid = (design, grid_points, reach_m);
+        let vector = self.force().direction.is_vector();
+        let mut needed = NeededMap::new(scene, (&solved.map, vector), field, grid, progress)?;
         let passive = passive_map(scene, &needed.made.map, progress)?;
         progress.begin("passive force", 1);
         let ignored = IgnoredPull::new(scene, &lambda, &of_grid, field)?;
@@ -435,6 +459,11 @@ impl Calibration<'_> {
         if let Some(ignored) = ignored {
             lambda.warnings.extend(ignored.warning(lambda.file.jnd));
             needed.left_out.push(ignored.left_out());
+        }
+        self.add_to_headline(&mut lambda, points, &needed, passive.as_ref(), progress)?;
+        if let Some((target, chosen)) = search {
+            let tolerance = solved.forces.tolerance;
+            lambda.requested(*target, chosen, Some(&design.workspace), tolerance);
         }
         let manifest = self.manifest(&lambda, grid_points, &needed, passive.as_ref());
         lambda

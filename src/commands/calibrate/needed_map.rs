@@ -1,6 +1,5 @@
-//! The part of the maps that a bundle's object needs, and what is left out of it.
+//! The part of the maps that an object needs.
 
-use super::Calibration;
 use crate::RunError;
 use crate::bundle::manifest::LeftOut;
 use crate::commands::map::workspace_grid;
@@ -8,7 +7,9 @@ use crate::design::Design;
 use crate::map::Components;
 use crate::map::tabulate::{Grid, PlacedCoil};
 use crate::progress::Progress;
+use crate::scene::cached_field::ShapeField;
 use crate::scene::maps::{MagnetMean, SceneMap};
+use crate::scene::steel::Solved;
 use crate::scene::{MAGNET_SHARE, Scene};
 use crate::shape::points::ConstraintPoints;
 
@@ -19,16 +20,17 @@ pub(super) struct NeededMap {
     pub(super) left_out: Vec<LeftOut>,
 }
 
-impl Calibration<'_> {
-    pub(super) fn needed_map(
-        &self,
-        points: &ConstraintPoints,
+impl NeededMap {
+    /// With all three components of the force where a `vector` is requested.
+    pub(super) fn new(
+        scene: &Scene,
+        (solved, vector): (&Solved, bool),
+        field: ShapeField,
+        (design, points, reach_m): (&Design, &ConstraintPoints, f64),
         progress: &dyn Progress,
-    ) -> Result<NeededMap, RunError> {
-        let (scene, solved) = (self.scene, &self.solved.map);
+    ) -> Result<Self, RunError> {
         let mut left_out = Vec::new();
-        let grid = needed_grid(scene.design, points, self.options.reach_m, &mut left_out);
-        let vector = self.force().direction.is_vector();
+        let grid = needed_grid(design, points, reach_m, &mut left_out);
         let components = match (vector, scene.tilted()) {
             (true, _) => Components::Force,
             (false, true) => Components::Gradient,
@@ -61,10 +63,9 @@ impl Calibration<'_> {
             });
         }
         let felt = MagnetMean::by_magnet(scene, &grid.z_m, MAGNET_SHARE * solved.tolerance)?;
-        let field = self.field;
         let mut made = field.map(scene, solved, &driven, &grid, components, &felt, progress)?;
         drop_weak_coils(scene, &mut made, &driven, solved.tolerance, &mut left_out);
-        Ok(NeededMap {
+        Ok(Self {
             made,
             components,
             left_out,

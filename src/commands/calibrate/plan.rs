@@ -111,11 +111,11 @@ pub fn plan(
     options: &CalibrateOptions,
     progress: &dyn Progress,
 ) -> Result<Plan, RunError> {
-    let scene = Scene::with_tolerance(source.design, options.lambda.tolerance)?;
+    let tolerance = options.lambda.tolerance_for(source.design);
+    let scene = Scene::with_tolerance(source.design, tolerance)?;
     let curve = curve_table(&scene);
     let field = field_store(&scene, curve.as_ref(), options);
     let cached = field.holds_steel();
-    let tolerance = options.lambda.tolerance;
     let whole = workspace_grid(source.design);
     let size = |grid: &crate::map::tabulate::Grid| [grid.x_m.len(), grid.y_m.len(), grid.z_m.len()];
     let heights = PointsOptions {

@@ -9,7 +9,7 @@ use super::{DeviationSummary, PointsOptions, PointsSummary, TableFiles, run_with
 use crate::RunError;
 use crate::bundle::artefact::Input;
 use crate::bundle::atomic::{self, Overwrite, check_distinct};
-use crate::cli::args::{SamplingFlags, SurfaceFlags, Writing};
+use crate::cli::args::{SamplingFlags, SurfaceFlags, WeightsFlag, Writing};
 use crate::cli::budget::{allow, cost_origin};
 use crate::cli::describe;
 use crate::cli::documents;
@@ -67,6 +67,8 @@ pub struct Discretize {
     /// Compare the points with the surface: vertically, by the Hausdorff distance too, or not
     #[arg(long, value_enum, default_value_t = CertifyFlag::Vertical)]
     certify: CertifyFlag,
+    #[command(flatten)]
+    weights: WeightsFlag,
     #[command(flatten)]
     pub(super) sampling: SamplingFlags,
     /// Report what the surface's file holds and make no points
@@ -182,6 +184,7 @@ impl Discretize {
                 CertifyFlag::Distance => Certify::Distance,
             },
             picture: self.plot.is_some(),
+            weights: self.weights.weights,
         }
     }
 

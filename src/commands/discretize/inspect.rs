@@ -103,6 +103,8 @@ impl Inspected {
                     x: extent,
                     y: extent,
                 },
+                weights: None,
+                grid_is_given: true,
             },
             stated_m,
             placed: false,

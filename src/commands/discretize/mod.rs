@@ -17,6 +17,7 @@ use crate::bundle::manifest::{AxisSummary, PointsGrid};
 use crate::bundle::seal::to_record;
 use crate::bundle::table::PointRow;
 use crate::plot::plane::PlanePlot;
+use crate::point_weights::Weights;
 use crate::progress::Progress;
 use crate::scene::cached_field::ShapeField;
 use crate::shape::certificate::{Certificate, Certify, stated_tessellation};
@@ -44,6 +45,8 @@ use picture::{PictureData, Scale};
 pub struct PointsReport {
     /// The points.
     pub discretized: Discretized,
+    /// How the document says that they count.
+    pub weights: Option<Weights>,
     /// The JSON result.
     pub summary: PointsSummary,
 }
@@ -65,6 +68,9 @@ pub struct PointsSummary {
     pub made_with: Options,
     /// Number of points.
     pub points: usize,
+    /// How they count in lambda's mean; absent where all count alike.
+    #[serde(skip_serializing_if = "Weights::is_equal")]
+    pub weights: Weights,
     /// Grid points without surface, skipped.
     pub outside: usize,
     /// Of the grid points without surface those inside the silhouette, skipped or filled.
@@ -196,6 +202,8 @@ pub struct PointsOptions {
     pub certify: Certify,
     /// Whether a picture will be drawn.
     pub picture: bool,
+    /// How the points count, instead of what the document says.
+    pub weights: Option<Weights>,
 }
 
 impl PointsOptions {
@@ -205,6 +213,7 @@ impl PointsOptions {
             holes,
             certify,
             picture: _,
+            weights,
         } = *self;
         let holes = match holes {
             Holes::Skip => "skip",
@@ -217,6 +226,7 @@ impl PointsOptions {
             Certify::Distance => "distance",
         };
         Options::of(&PointsAsked {
+            weights,
             holes: Some(holes),
             certify: Some(certify),
             max_deviation_m: None,
@@ -234,6 +244,7 @@ impl Default for PointsOptions {
             holes: Holes::Skip,
             certify: Certify::Vertical,
             picture: false,
+            weights: None,
         }
     }
 }
@@ -337,7 +348,12 @@ impl OpenedSurface {
         let surface = (self.surface, self.warnings);
         let discretized = discretize_surface(document, surface, &settings, progress)
             .map_err(|source| shape_error(document, source))?;
-        Ok(report(document, self.inputs, discretized))
+        let mut report = report(document, self.inputs, discretized);
+        if let Some(weights) = options.weights {
+            report.weights = Some(weights);
+            report.summary.weights = weights;
+        }
+        Ok(report)
     }
 }
 
@@ -395,6 +411,7 @@ fn report(document: &ShapeDocument, inputs: Vec<Input>, discretized: Discretized
         inputs,
         made_with: Options::default(),
         points: facts.points,
+        weights: document.weights.unwrap_or_default(),
         outside: facts.outside,
         holes: discretized.points.holes,
         marks: MarkCounts::of(&discretized.points.marks),
@@ -415,6 +432,7 @@ fn report(document: &ShapeDocument, inputs: Vec<Input>, discretized: Discretized
     };
     PointsReport {
         discretized,
+        weights: document.weights,
         summary,
     }
 }
@@ -475,7 +493,7 @@ impl PointsReport {
     /// # Errors
     /// The writer's.
     pub fn write_csv(&self, out: &mut dyn Write) -> io::Result<()> {
-        table::of_grid(out, &self.discretized.points)
+        table::of_grid(out, &self.discretized.points, self.summary.weights)
     }
 
     /// The points' heights and flags, and how far the surface departs between them.

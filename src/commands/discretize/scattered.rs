@@ -31,6 +31,7 @@ impl Sampling {
             Sampling::Poisson { spacing_m, seed } => (None, Some((spacing_m, seed))),
         };
         Options::of(&PointsAsked {
+            weights: None,
             holes: None,
             certify: None,
             max_deviation_m: adaptive.map(|(deviation_m, _)| deviation_m),

@@ -4,6 +4,7 @@ use std::io::{self, Write};
 
 use super::point_row;
 use crate::bundle::table::{PointRow, RowColumn, write_joined_rows};
+use crate::point_weights::Weights;
 use crate::shape::ConstraintPoints;
 use crate::shape::point_flags::Marks;
 use crate::shape::scattered::Scattered;
@@ -21,7 +22,7 @@ fn flag(is: bool) -> f64 {
     f64::from(u8::from(is))
 }
 
-/// The columns of weighted points; of those of a grid all but the last.
+/// The columns of weighted points; of those that count alike all but the last.
 const COLUMNS: [RowColumn<Flags>; 10] = [
     RowColumn::written("wall", "", |p| flag(p.marks.wall)),
     RowColumn::written("rim", "", |p| flag(p.marks.rim)),
@@ -35,10 +36,19 @@ const COLUMNS: [RowColumn<Flags>; 10] = [
     RowColumn::written("weight_m2", "m^2", |p| p.weight_m2),
 ];
 
-/// The points of a grid.
-pub(super) fn of_grid(out: &mut dyn Write, points: &ConstraintPoints) -> io::Result<()> {
-    let rows = (0..points.len()).map(|k| with_flags(point_row(points, k), points.marks[k], 0.0));
-    write_joined_rows(out, PointRow::COLUMNS, &COLUMNS[..COLUMNS.len() - 1], rows)
+/// The points of a grid, with the area each stands for where they count by it.
+pub(super) fn of_grid(
+    out: &mut dyn Write,
+    points: &ConstraintPoints,
+    weights: Weights,
+) -> io::Result<()> {
+    let rows = (0..points.len())
+        .map(|k| with_flags(point_row(points, k), points.marks[k], points.area_m2[k]));
+    let columns = match weights {
+        Weights::Equal => &COLUMNS[..COLUMNS.len() - 1],
+        Weights::Area => &COLUMNS[..],
+    };
+    write_joined_rows(out, PointRow::COLUMNS, columns, rows)
 }
 
 /// Points on no grid, with the area each stands for.

@@ -13,7 +13,7 @@ use crate::cli::help::{Codes, page};
 use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::limits::{label, limit_row};
 use crate::cli::printer::{Printer, Stream};
-use crate::cli::quantity::{force, mass, mm, number, number_to, percent, si};
+use crate::cli::quantity::{force, mass, mm, number, number_to, percent, si, si_with_error};
 use crate::cli::start::accuracy_check;
 use crate::cli::start::begin;
 use crate::cli::values::FileArgument;
@@ -192,16 +192,11 @@ fn steel_core(core: &CoreSummary, target: &TargetSummary) -> String {
 
 /// After a voltage step.
 fn step(transient: &Transient, stage: Option<&StageAccuracy>) -> String {
-    let error = match stage {
-        Some(stage) if stage.estimate > 0.0 => {
-            format!(", +/- {}", percent(stage.estimate))
-        }
-        _ => String::new(),
-    };
+    let relative = stage.map_or(0.0, |stage| stage.estimate);
     format!(
-        "with eddy currents in the steel 95 % of the current after {}, of the force after {}{error}",
-        si(transient.current_95_s, "s"),
-        si(transient.force_95_s, "s")
+        "with eddy currents in the steel 95 % of the current after {}, of the force after {}",
+        si_with_error(transient.current_95_s, relative, "s"),
+        si_with_error(transient.force_95_s, relative, "s")
     )
 }
 

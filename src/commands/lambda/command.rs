@@ -7,7 +7,9 @@ use clap::Args;
 use super::feedback::FeedbackOptions;
 use super::text::summary;
 use super::{LambdaOptions, run};
-use crate::cli::args::{ForceFlags, SamplingFlags, SurfaceFlags, Tolerance, Writing};
+use crate::cli::args::{
+    ErrorFlags, ForceFlags, SamplingFlags, SurfaceFlags, Tolerance, WeightsFlag, Writing,
+};
 use crate::cli::budget::{allow, cost_origin, costs};
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
@@ -66,6 +68,10 @@ pub struct Lambda {
     writing: Writing,
     #[command(flatten)]
     tolerance: Tolerance,
+    #[command(flatten)]
+    error: ErrorFlags,
+    #[command(flatten)]
+    weights: WeightsFlag,
     #[command(flatten)]
     sampling: SamplingFlags,
     #[command(flatten)]
@@ -140,6 +146,8 @@ impl Lambda {
     /// See [`Failure`].
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
         let options = LambdaOptions {
+            weights: self.weights.weights,
+            error: self.error.target(),
             sampling: self.sampling.sampling(),
             wiring: Wiring {
                 broken: self.wiring.broken.clone(),

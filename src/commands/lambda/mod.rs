@@ -2,7 +2,10 @@
 
 mod accuracy;
 pub(crate) mod command;
+pub mod error_target;
 pub mod feedback;
+mod headline;
+pub(crate) mod map_error;
 mod picture;
 mod points;
 mod points_effect;
@@ -16,7 +19,9 @@ mod working_point;
 use serde::Serialize;
 
 pub(crate) use self::accuracy::proven_accuracy;
+use self::error_target::{ChosenGrid, ErrorTarget, Trial};
 use self::feedback::FeedbackOptions;
+use self::headline::Amplification;
 pub(crate) use self::points::WantedPoints;
 use super::discretize::scattered;
 use super::discretize::scattered::ScatteredSummary;
@@ -24,12 +29,14 @@ use super::discretize::{self, PointsReport};
 use crate::RunError;
 use crate::accuracy::{StageAccuracy, missed};
 use crate::bundle::artefact::Input;
+use crate::bundle::headline::{BudgetName, BudgetPart};
 use crate::bundle::lambda_file::{LambdaFile, SampledPoints};
 use crate::design::Design;
 use crate::force_direction::{ForceOverride, RequestedForce};
 use crate::lambda::worst::worst_point;
 use crate::lambda::{self, ForceProblem, Precision, Settings, Solution, Status, Wiring};
 use crate::plot::lambda::LambdaPlot;
+use crate::point_weights::Weights;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::cached_field::ShapeField;
@@ -51,6 +58,10 @@ pub struct LambdaOptions {
     pub settings: Settings,
     /// Tolerance of the forces; `None` for the default.
     pub tolerance: Option<f64>,
+    /// How the points of a grid count; `None`: as their shape's document says.
+    pub weights: Option<Weights>,
+    /// The largest error that the computation may add.
+    pub error: Option<ErrorTarget>,
     /// Points on no grid, weighted by area, instead of the grid's; of [`run`] alone.
     pub sampling: Option<Sampling>,
     /// Coils broken or in series.
@@ -72,6 +83,9 @@ pub struct LambdaReport {
     /// The JSON result.
     #[serde(flatten)]
     pub file: LambdaFile,
+    /// How errors relative to the largest gradient count in the force.
+    #[serde(skip)]
+    pub(crate) amplification: Option<Amplification>,
     /// The drawing, if one was requested.
     #[serde(skip)]
     pub picture: Option<LambdaPlot>,
@@ -89,7 +103,43 @@ pub struct LambdaReport {
     pub accuracy_missed: Vec<String>,
 }
 
+impl LambdaOptions {
+    /// How the points of a grid count: as requested, else as the document says, else equally, or by
+    /// area where an error is requested, since lambda of the object is meant then.
+    pub(crate) fn weights_of(&self, points: &PointsReport) -> Weights {
+        let default = match self.error {
+            None => Weights::Equal,
+            Some(_) => Weights::Area,
+        };
+        self.weights.or(points.weights).unwrap_or(default)
+    }
+
+    /// The tolerance of the field: as requested, else what a requested error leaves to steel. Air has
+    /// its default, which costs nothing.
+    pub(crate) fn tolerance_for(&self, design: &Design) -> Option<f64> {
+        let of_error = self.error.filter(|_| design.core.is_some());
+        self.tolerance.or(of_error.map(ErrorTarget::tolerance))
+    }
+}
+
 impl LambdaReport {
+    /// States how far lambda of graded points is off, from that of wider patches.
+    fn add_quadrature(&mut self, coarser: &LambdaFile) {
+        let Some(stage) = quadrature(&self.file, coarser) else {
+            return;
+        };
+        if let Some(headline) = &mut self.file.headline {
+            headline.add([BudgetPart {
+                part: BudgetName::Points,
+                error: stage.estimate,
+                how: stage.method.clone(),
+            }]);
+        }
+        for name in ["quadrature", "lambda_of_points"] {
+            (self.file.accuracy).insert(name.to_owned(), stage.clone());
+        }
+    }
+
     /// Whether a force can be rendered: a force constant above zero, to the requested tolerance.
     #[must_use]
     pub fn meets_request(&self) -> bool {
@@ -110,13 +160,17 @@ pub fn run(
     options: &LambdaOptions,
     progress: &dyn Progress,
 ) -> Result<(PointsReport, LambdaReport), RunError> {
-    let scene = Scene::with_tolerance(design, options.tolerance)?;
+    let scene = Scene::with_tolerance(design, options.tolerance_for(design))?;
+    let search = search(&scene, document, options, progress)?;
+    let document = search
+        .as_ref()
+        .map_or(document, |(_, chosen)| &chosen.document);
     let options = &LambdaOptions {
         force: options.force.over(document.force).into(),
         ..options.clone()
     };
     let points = discretize::run(document, inputs.clone(), progress)?;
-    let of_grid = WantedPoints::of_grid(&points);
+    let of_grid = WantedPoints::of_grid(&points, options.weights_of(&points));
     let sampling = options
         .sampling
         .map(|how| resolving(how, of_grid.lowest_m()));
@@ -141,6 +195,9 @@ pub fn run(
     };
     let (Some(chosen), Some(sampled)) = (chosen, sampled) else {
         let mut report = solve_with(&of_grid, options)?;
+        if let Some((target, chosen)) = &search {
+            report.requested(*target, chosen, None, scene.tolerances.forces);
+        }
         sideways::add(
             &mut report.file,
             &scene,
@@ -169,12 +226,35 @@ pub fn run(
     )?;
     if let Some(coarser) = coarser {
         let other = solve_with(&coarser, &plain)?.file;
-        let stage = quadrature(&report.file, &other);
-        let stage = stage.map(|stage| ("quadrature".to_owned(), stage));
-        report.file.accuracy.extend(stage);
+        report.add_quadrature(&other);
     }
     report.file.sampling = Some(against_grid(&sampled.summary, &report.file, &grid));
     Ok((points, report))
+}
+
+/// The grid for the requested error, where one is requested and the points are those of a grid.
+fn search(
+    scene: &Scene,
+    document: &ShapeDocument,
+    options: &LambdaOptions,
+    progress: &dyn Progress,
+) -> Result<Option<(ErrorTarget, ChosenGrid)>, RunError> {
+    let Some(target) = options.error.filter(|_| options.sampling.is_none()) else {
+        return Ok(None);
+    };
+    let lowest_m = scene.design.workspace.z_m.from;
+    progress.begin("steel", 1);
+    let solved = steel::solve(scene, scene.tolerances.forces, lowest_m)?;
+    progress.end();
+    let trial = Trial {
+        scene,
+        solved: &solved,
+        field: ShapeField::default(),
+        options,
+        for_runtime: false,
+    };
+    let chosen = trial.grid(document, target, progress)?;
+    Ok(Some((target, chosen)))
 }
 
 /// Patches of the points over which forces change little, where no width is requested.
@@ -281,7 +361,7 @@ pub(crate) fn solve_at(
         forces_n_per_a: &forces_n_per_a,
         height_m: &points.height_m,
         offset_n: passive_n.as_deref().filter(|_| counts),
-        weights: points.weights.as_deref(),
+        weights: points.weights(),
         lower_a: &scene.lower_a,
         upper_a: &scene.upper_a,
         total_max_a: scene.design.supply.total_current_max_a,
@@ -300,21 +380,20 @@ pub(crate) fn solve_at(
             .as_ref()
             .map_or(unwired, |rewired| rewired.problem(&unwired)),
     };
-    let mut report = posed.report(passive_n.as_deref(), progress)?;
-    if let Some(pull) = pull.filter(|_| counts) {
-        let stage = passive::accuracy(&pull);
-        (report.file.accuracy).insert("passive_force".to_owned(), stage);
-    }
+    let pull = pull.filter(|_| counts).map(|pull| passive::accuracy(&pull));
+    let mut report = posed.report(passive_n.as_deref(), pull, progress)?;
     report.accuracy_missed = missed(&report.file.accuracy, solved.tolerance);
     Ok(report)
 }
 
 impl PosedProblem<'_> {
     /// Solves the problem and all that is requested with it; `progress` is within the stage
-    /// `lambda`. `passive_n` is the force without currents, whether or not the problem counts it.
+    /// `lambda`. `passive_n` is the force without currents, whether or not the problem counts it;
+    /// `pull` what is known of its error, where it does.
     fn report(
         &self,
         passive_n: Option<&[f64]>,
+        pull: Option<StageAccuracy>,
         progress: &dyn Progress,
     ) -> Result<LambdaReport, RunError> {
         let (options, problem) = (self.options, &self.problem);
@@ -327,6 +406,8 @@ impl PosedProblem<'_> {
         let mut warnings = warnings::all(self, &solution, &worst);
         warnings.extend(self.core_warnings(&solution)?);
         let mut file = self.file(&solution, &worst)?;
+        let pull = pull.map(|stage| ("passive_force".to_owned(), stage));
+        file.accuracy.extend(pull);
         if options.variants {
             file.variants = Some(variants::all(self, passive_n)?);
         }
@@ -352,11 +433,20 @@ impl PosedProblem<'_> {
             warnings.extend(along_curve.warning);
         }
         file.accuracy.extend(self.points.stages());
-        if let Some(moved) = self.effect_of_points(progress)? {
-            file.accuracy.insert("lambda_of_points".to_owned(), moved);
+        let effects = [
+            ("lambda_of_points", self.effect_of_number(&file)?),
+            ("lambda_of_heights", self.effect_of_heights(progress)?),
+        ];
+        for (name, moved) in effects {
+            file.accuracy
+                .extend(moved.map(|stage| (name.to_owned(), stage)));
         }
+        let headline = self.headline(&file, progress)?;
+        let amplification = headline.as_ref().map(|(_, amplification)| *amplification);
+        file.headline = headline.map(|(headline, _)| headline);
         Ok(LambdaReport {
             file,
+            amplification,
             picture,
             status: solution.status,
             precision: solution.precision,

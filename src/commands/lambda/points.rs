@@ -7,6 +7,9 @@ use crate::bundle::artefact::Input;
 use crate::commands::discretize::PointsReport;
 use crate::commands::discretize::scattered::ScatteredReport;
 use crate::force_direction::RequestedForce;
+use crate::lambda::limit::{self, limit_error};
+use crate::lambda::{ForceProblem, ProblemError, Settings};
+use crate::point_weights::Weights;
 
 /// Places, what is wanted there, and what is known of their error.
 #[derive(Debug, Clone)]
@@ -19,16 +22,18 @@ pub(crate) struct WantedPoints {
     normals: Vec<[f64; 3]>,
     /// Normal of the other face, of each that lies on a crease; empty where creases are not known.
     other_normals: Vec<Option<[f64; 3]>>,
-    /// Area each stands for, m^2; `None`: all alike.
-    pub(crate) weights: Option<Vec<f64>>,
+    /// How they count in the mean.
+    pub(crate) rule: Weights,
+    /// Plan area each stands for, m^2.
+    pub(crate) areas: Vec<f64>,
+    /// Whether they are as dense as the surface needs them, on no grid.
+    pub(super) graded: bool,
     /// Name of the shape.
     pub(crate) shape: String,
     /// Input files.
     pub(crate) inputs: Vec<Input>,
     /// Each part of the heights' error; `points` is the rounding.
     pub(crate) accuracy: BTreeMap<&'static str, StageAccuracy>,
-    /// All parts together, m; `None` where the surface between the points was not looked at.
-    pub(crate) budget_m: Option<f64>,
     /// Where the points lie in their grid, if they are those of one.
     pub(super) grid: Option<GridPlaces>,
     /// Warnings for the user.
@@ -49,7 +54,8 @@ pub(super) struct GridPlaces {
 }
 
 impl WantedPoints {
-    pub(crate) fn of_grid(report: &PointsReport) -> Self {
+    /// Those of a grid, which count by `rule`.
+    pub(crate) fn of_grid(report: &PointsReport, rule: Weights) -> Self {
         let points = &report.discretized.points;
         let summary = &report.summary;
         Self {
@@ -57,11 +63,12 @@ impl WantedPoints {
             height_m: points.height_m.clone(),
             normals: points.normal.clone(),
             other_normals: points.marks.iter().map(|marks| marks.crease).collect(),
-            weights: None,
+            rule,
+            areas: points.area_m2.clone(),
+            graded: false,
             shape: summary.shape.clone(),
             inputs: summary.inputs.clone(),
             accuracy: summary.accuracy.clone(),
-            budget_m: summary.deviation.map(|deviation| deviation.budget_m),
             grid: Some(GridPlaces {
                 columns: points.grid.x_m.samples,
                 rows: points.grid.y_m.samples,
@@ -76,17 +83,17 @@ impl WantedPoints {
         let (points, summary) = (&report.points, &report.summary);
         // The patches' deviation is in it; without patches nothing is known between the points.
         let patches = summary.accuracy.contains_key("patches");
-        let budget_m = summary.accuracy.values().map(|stage| stage.estimate).sum();
         Self {
             positions_m: positions_m(&points.x_m, &points.y_m, &points.height_m),
             height_m: points.height_m.clone(),
             normals: points.normal.clone(),
             other_normals: Vec::new(),
-            weights: Some(points.weight_m2.clone()),
+            rule: Weights::Area,
+            areas: points.weight_m2.clone(),
+            graded: patches,
             shape: summary.shape.clone(),
             inputs: summary.inputs.clone(),
             accuracy: summary.accuracy.clone(),
-            budget_m: patches.then_some(budget_m),
             grid: None,
             warnings: summary.warnings.clone(),
         }
@@ -101,26 +108,42 @@ impl WantedPoints {
             .collect()
     }
 
-    /// Plan area of each point against an inner one's, where they are those of a grid: on its border
-    /// half, in its corners a quarter. What a rim cuts off inside counts as whole: on average it is.
-    pub(crate) fn area_weights(&self) -> Option<Vec<f64>> {
-        let grid = self.grid.as_ref()?;
-        let part = |at: usize, count: usize| if at == 0 || at + 1 == count { 0.5 } else { 1.0 };
-        let weight = |k: &usize| {
-            let (column, row) = (k % grid.columns, k / grid.columns);
-            part(column, grid.columns) * part(row, grid.rows)
-        };
-        Some(grid.index.iter().map(weight).collect())
+    /// Weights in the mean; `None`: all alike.
+    pub(crate) fn weights(&self) -> Option<&[f64]> {
+        match self.rule {
+            Weights::Equal => None,
+            Weights::Area => Some(&self.areas),
+        }
     }
 
-    /// Every second point along both axes of a grid, its ends among them.
-    pub(crate) fn every_second(&self) -> Option<Vec<usize>> {
-        let grid = self.grid.as_ref()?;
-        let even =
-            |k: usize| (k % grid.columns).is_multiple_of(2) && (k / grid.columns).is_multiple_of(2);
-        let places = grid.index.iter().enumerate();
-        let chosen = places.filter(|(_, k)| even(**k));
-        Some(chosen.map(|(row, _)| row).collect())
+    /// How far the constant of these points is from the limit of ever more of them, relative; `None`
+    /// for graded points, whose patches are compared with wider ones instead, and for too few.
+    ///
+    /// # Errors
+    /// A malformed problem.
+    pub(crate) fn error_against_limit(
+        &self,
+        problem: &ForceProblem,
+        lambda_n_per_m: f64,
+        settings: &Settings,
+    ) -> Result<Option<f64>, ProblemError> {
+        if self.areas.len() != problem.points() || self.graded {
+            return Ok(None);
+        }
+        let grid = self.grid.as_ref().map(|grid| limit::GridPlaces {
+            columns: grid.columns,
+            rows: grid.rows,
+            index: &grid.index,
+        });
+        let found = limit_error(problem, lambda_n_per_m, &self.areas, grid, settings)?;
+        Ok(found.map(|found| found.estimate))
+    }
+
+    /// The error of the heights at the points themselves, m: tessellation and rounding.
+    pub(super) fn heights_error_m(&self) -> f64 {
+        let parts = ["points", "tessellation"].map(|name| self.accuracy.get(name));
+        let stages = parts.into_iter().flatten();
+        stages.map(|stage| stage.estimate).sum()
     }
 
     /// The lowest of the points, m.

@@ -1,35 +1,66 @@
-//! The effect of the constraint points' error on the force constant.
+//! The effect of the constraint points on the force constant: of their number, and of the error of
+//! their heights.
 //!
-//! The points' error budget moves surface and magnet together. Points are lifted by it and the
-//! problem is solved again with the forces there: a first-order estimate of how far lambda may
-//! move, not a bound, because the errors of single points need not agree.
+//! Their number: lambda against the limit of ever more points (`lambda::limit`). Their heights: the
+//! error of the surface itself (tessellation, rounding) moves surface and magnet together. Points are
+//! lifted and the problem is solved again with the forces there: a first-order estimate, because the
+//! errors of single points need not agree.
 
 use super::PosedProblem;
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
+use crate::bundle::lambda_file::LambdaFile;
 use crate::lambda::{self, ForceProblem, Settings, Wiring};
 use crate::progress::Progress;
 
-/// The share of the lowest height by which points are moved at most: beyond, first order ends.
-const MOST_OF_HEIGHT: f64 = 0.02;
+/// Points are lifted by this share of the lowest height: small enough for first order, and large
+/// beside what forces are rounded to.
+const LIFTED_BY: f64 = 1e-3;
 /// Of more points than twice this many every second, third and so on is taken: some of them,
 /// lifted and not, show a shift of all as well.
 const ENOUGH_POINTS: usize = 600;
 
 impl PosedProblem<'_> {
-    /// How far lambda moves with the points' error budget; `None` without a lambda or a budget.
+    /// How far lambda is from the limit of ever more points; `None` without a lambda, for graded
+    /// points, whose patches are compared with wider ones instead, and for too few points.
+    ///
+    /// # Errors
+    /// A problem that cannot be solved.
+    pub(super) fn effect_of_number(
+        &self,
+        file: &LambdaFile,
+    ) -> Result<Option<StageAccuracy>, RunError> {
+        let Some(lambda) = file.lambda_n_per_m.filter(|lambda| *lambda > 0.0) else {
+            return Ok(None);
+        };
+        let settings = &self.options.settings;
+        let found = (self.points).error_against_limit(&self.problem, lambda, settings)?;
+        Ok(found.map(|estimate| StageAccuracy {
+            estimate,
+            relative_to: "lambda".to_owned(),
+            method: format!(
+                "an estimate against the limit of ever more points: what every second point in four \
+                 ways changes{}",
+                if self.problem.weights.is_some() {
+                    ""
+                } else {
+                    ", and what weights by area would"
+                }
+            ),
+        }))
+    }
+
+    /// How far lambda moves with the error of the heights at the points; `None` without a lambda.
     ///
     /// # Errors
     /// A problem that cannot be solved; interruption.
-    pub(super) fn effect_of_points(
+    pub(super) fn effect_of_heights(
         &self,
         progress: &dyn Progress,
     ) -> Result<Option<StageAccuracy>, RunError> {
-        let Some(budget_m) = self.points.budget_m else {
-            return Ok(None);
-        };
-        let step_m = budget_m.min(MOST_OF_HEIGHT * self.points.lowest_m());
-        if step_m.is_nan() || step_m <= 0.0 {
+        let error_m = self.points.heights_error_m();
+        let step_m = LIFTED_BY * self.points.lowest_m();
+        if step_m.is_nan() || step_m <= 0.0 || error_m <= 0.0 {
             return Ok(None);
         }
         let unwired = &self.unwired;
@@ -69,11 +100,11 @@ impl PosedProblem<'_> {
             format!("one point of {every}")
         };
         Ok(Some(StageAccuracy {
-            estimate: (there / here - 1.0).abs() * (budget_m / step_m),
+            estimate: (there / here - 1.0).abs() * (error_m / step_m),
             relative_to: "lambda".to_owned(),
             method: format!(
-                "an estimate: {all} lifted by the points' error budget (grid, tessellation, \
-                 rounding), forces and lambda computed again, to first order"
+                "an estimate: {all} lifted, forces and lambda computed again, to first order in the \
+                 heights' error (tessellation, rounding)"
             ),
         }))
     }

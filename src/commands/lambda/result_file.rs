@@ -52,6 +52,7 @@ impl PosedProblem<'_> {
             duality_gap_n2: chosen.map(|point| point.duality_gap_n2),
             rank: solution.rank,
             points: points.height_m.len(),
+            weights: points.rule,
             path: solution.path.breakpoints().into_iter().map(step).collect(),
             at: solution.at.as_ref().map(|point| self.at(point, worst)),
             worst_point: Some(self.worst_point(solution, worst)),
@@ -63,6 +64,7 @@ impl PosedProblem<'_> {
             working_point: None,
             given_force: chosen.and_then(|point| self.given(point, solution)),
             sideways: None,
+            headline: None,
             accuracy,
         };
         if let Some(wiring) = &file.wiring {

@@ -34,7 +34,7 @@ pub(crate) fn add(
     let rows = || (0..points.height_m.len()).step_by(every);
     let positions_m: Vec<_> = rows().map(|row| points.positions_m[row]).collect();
     let height_m: Vec<_> = rows().map(|row| points.height_m[row]).collect();
-    let all = points.weights.as_ref();
+    let all = points.weights();
     let weights: Option<Vec<_>> = all.map(|all| rows().map(|row| all[row]).collect());
     let pull = if scene.design.magnet.passive_force {
         passive::pull(scene, &positions_m, false)?

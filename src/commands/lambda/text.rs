@@ -21,8 +21,14 @@ pub(super) fn summary(design: &Design, points: &PointsReport, report: &LambdaRep
         "{} on {}: lambda {}",
         file.shape,
         file.design,
-        describe::force_constant(file.lambda_n_per_m)
+        match &file.headline {
+            Some(headline) => headline.lambda.clone(),
+            None => describe::force_constant(file.lambda_n_per_m),
+        }
     ));
+    if let Some(requested) = file.headline.as_ref().and_then(describe::requested_error) {
+        sheet.line("error", &requested);
+    }
     let constants = file.constants.named().into_iter().map(|one| {
         let lambda = one.lambda_n_per_m.map_or_else(|| "none".to_owned(), number);
         format!("{} {lambda}", one.name)
@@ -312,8 +318,9 @@ fn operating_point(sheet: &mut Sheet, points: &PointsReport, file: &LambdaFile) 
             ),
         );
     }
-    if let Some(given) = &file.given_force {
-        sheet.line("given", &describe::given_force(given));
+    if let Some(headline) = &file.headline {
+        sheet.line("given", &describe::given_force(headline));
+        sheet.line("computed", &describe::force_error(headline));
     }
     if let (Some(rms), Some(worst)) = (file.rms_error_n, file.worst_error_n) {
         let relative = file.relative_rms_error.map_or_else(String::new, |part| {

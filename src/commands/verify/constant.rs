@@ -18,11 +18,13 @@ const FORCES_MOVE: f64 = 10.0;
 /// Largest duality gap, relative to the mean square of the wanted force.
 const GAP_ALLOWED: f64 = 1e-10;
 
-/// The force constant, the currents and their errors from forces computed again.
+/// The force constant, the currents and their errors from forces computed again. `weights` are those
+/// that the inputs give; `None`: all points alike.
 pub(super) fn checks(
     bundle: &Bundle,
     route: &Route,
     bounds: &Bounds,
+    weights: Option<&[f64]>,
     progress: &dyn Progress,
 ) -> Result<Vec<Check>, RunError> {
     let scene = route.scene;
@@ -52,7 +54,7 @@ pub(super) fn checks(
         forces_n_per_a: &forces,
         height_m: &heights,
         offset_n: offset_n.as_deref(),
-        weights: None,
+        weights,
         lower_a: &scene.lower_a,
         upper_a: &scene.upper_a,
         total_max_a: scene.design.supply.total_current_max_a,
@@ -107,10 +109,15 @@ fn currents_checks(
             lambda * heights[point] - pull - pushed
         })
         .collect();
-    let n = heights.len() as f64;
-    let mean_square_force = lambda * lambda * heights.iter().map(|h| h * h).sum::<f64>() / n;
+    let mean_square_of = |values: &[f64]| {
+        let weight = |point: usize| problem.weights.map_or(1.0, |all| all[point]);
+        let squares = values.iter().enumerate();
+        let sum: f64 = squares.map(|(point, v)| weight(point) * v * v).sum();
+        sum / (0..values.len()).map(weight).sum::<f64>()
+    };
+    let mean_square_force = lambda * lambda * mean_square_of(heights);
     let rms_force = mean_square_force.sqrt();
-    let mean_square = residual.iter().map(|e| e * e).sum::<f64>() / n;
+    let mean_square = mean_square_of(&residual);
     let largest = residual.iter().fold(0.0_f64, |most, e| most.max(e.abs()));
     let against = |name, stored: Option<f64>, again: f64, how: &str| {
         let off = stored.map_or(f64::INFINITY, |stored| (stored - again).abs());
@@ -194,15 +201,17 @@ fn sampled_forces(
     Ok(check("forces", ratio(worst, largest), allowed, how))
 }
 
-/// 2 (max over the feasible z of s'z - s'x), s = G'r/n: a fractional knapsack (physics of the
+/// 2 (max over the feasible z of s'z - s'x), s = G'r/n, weighted where points are: a fractional knapsack (physics of the
 /// bound: the error is convex, so no feasible currents lie below its tangent).
 fn duality_gap(problem: &ForceProblem, residual: &[f64], currents: &[f64]) -> f64 {
     let coils = currents.len();
-    let n = residual.len() as f64;
+    let weight = |point: usize| problem.weights.map_or(1.0, |all| all[point]);
+    let whole: f64 = (0..residual.len()).map(weight).sum();
     let mut slope = vec![0.0; coils];
-    for (row, r) in problem.forces_n_per_a.chunks_exact(coils).zip(residual) {
+    let rows = problem.forces_n_per_a.chunks_exact(coils);
+    for (point, (row, r)) in rows.zip(residual).enumerate() {
         for (s, g) in slope.iter_mut().zip(row) {
-            *s += g * r / n;
+            *s += weight(point) * g * r / whole;
         }
     }
     // Start every coil at its better end, then give back the cheapest ones until the sum fits.

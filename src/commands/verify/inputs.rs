@@ -13,6 +13,7 @@ use crate::commands::calibrate::CalibrateOptions;
 use crate::commands::calibrate::DESIGN_FILE;
 use crate::commands::calibrate::PAGE_FILE;
 use crate::commands::lambda::LambdaOptions;
+use crate::commands::lambda::error_target::ErrorTarget;
 use crate::design::{Design, Need, Steel as Described, source};
 use crate::force_direction::ForceOverride;
 use crate::lambda::Settings;
@@ -148,6 +149,11 @@ pub(super) fn options(bundle: &Bundle) -> Result<CalibrateOptions, String> {
     options.lambda = LambdaOptions {
         settings,
         tolerance: made_with.and_then(|made| made.tolerance),
+        weights: made_with.and_then(|made| made.weights),
+        error: made_with.and_then(|made| {
+            let refine = made.refine;
+            made.error.map(|error| ErrorTarget { error, refine })
+        }),
         ..LambdaOptions::default()
     };
     match made_with {
@@ -172,6 +178,10 @@ pub(super) fn options(bundle: &Bundle) -> Result<CalibrateOptions, String> {
         && settings
             .at_n_per_m
             .is_none_or(|at| at >= 0.0 && at.is_finite())
+        && options
+            .lambda
+            .error
+            .is_none_or(|target| ErrorTarget::RANGE.contains(&target.error))
         && options
             .lambda
             .tolerance
@@ -282,6 +292,7 @@ fn raw(path: &Path, surface: &SurfaceOptions) -> RawSurface {
             body: surface.body.clone(),
         },
         samples: surface.samples,
+        samples_are_given: surface.samples_are_given,
         x_m: surface.x_m,
         y_m: surface.y_m,
     }

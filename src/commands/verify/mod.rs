@@ -28,6 +28,7 @@ use self::route::{FINER, Route};
 use super::calibrate::CalibrateOptions;
 use super::calibrate::PASSIVE_STAGE;
 use super::calibrate::again::{Expected, expected};
+use super::lambda::error_target::ErrorTarget;
 use crate::RunError;
 use crate::bundle::artefact::{Input, UNITS};
 use crate::bundle::load::Bundle;
@@ -157,7 +158,11 @@ impl Verifier {
             return Ok(());
         };
         let made_with = bundle.manifest.made_with.as_ref();
-        let tolerance = made_with.and_then(|made| made.tolerance);
+        let of_error = made_with.and_then(|made| made.error).map(|error| {
+            let refine = false;
+            ErrorTarget { error, refine }.tolerance()
+        });
+        let tolerance = made_with.and_then(|made| made.tolerance).or(of_error);
         // Solved again as the bundle was made, and to judge that a finer time.
         let finer = Tolerances::of_inductances(tolerance).min(CLAIMED_MAX) * FINER;
         let steel = cost::of_steel(design, Some(finer));
@@ -218,8 +223,14 @@ impl Verifier {
         all.add(nodes.into_iter().chain(between));
         progress.advance(1);
         progress.check()?;
-        let constant = constant::checks(&all.bundle, &route, &bounds, progress)?;
-        all.add(constant);
+        let weights = expected.as_ref().and_then(|e| e.weights.as_deref());
+        if weights.is_some() || all.bundle.lambda.weights.is_equal() {
+            let constant = constant::checks(&all.bundle, &route, &bounds, weights, progress)?;
+            all.add(constant);
+        } else {
+            let what = "the force constant: its points count by areas that follow from the shape";
+            all.unchecked.push(what.to_owned());
+        }
         progress.advance(1);
         progress.check()?;
         let pull = passive::checks(&all.bundle, &scene, &bounds)?;

@@ -28,8 +28,8 @@ pub struct CalibratedObject<'a> {
     pub curves: &'a LambdaPlot,
     /// Where the forces point; `None` where the upward one alone is requested.
     pub directions: Option<DirectionField>,
-    /// Outer radius of a winding, m.
-    pub coil_radius_m: f64,
+    /// A coil in plan.
+    pub section: CoilPlan,
     /// The design's limits on one coil.
     pub limits: BTreeMap<&'static str, LimitCheck>,
     /// Limits that are not evaluated here.
@@ -108,6 +108,17 @@ pub struct DirectionCell {
     pub static_n: [f64; 3],
     /// With feedback of all three components, N.
     pub feedback_n: [f64; 3],
+}
+
+/// A coil seen from above.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CoilPlan {
+    /// Of the winding, m.
+    pub inner_radius_m: f64,
+    /// Of the winding, m.
+    pub outer_radius_m: f64,
+    /// Of the core, m; `None` in air.
+    pub core_radius_m: Option<f64>,
 }
 
 /// The point whose force is most wrong.

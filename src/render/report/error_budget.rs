@@ -6,22 +6,23 @@ use super::html::{Cell, Html, Table};
 use super::measured::MeasuredRow;
 use super::number::{figures, force, percent, si};
 use fluxform_base::accuracy::StageAccuracy;
+use fluxform_bundle::headline::{GivenForce, Headline};
 use serde_json::{Map, Value, json};
 
 /// A part of the error that a force gathers.
-struct BudgetPart {
+struct Part<'a> {
     /// The step that adds it.
-    name: &'static str,
+    name: &'a str,
     /// Relative to the force, as `basis` states.
     part: f64,
     /// How it follows from the stages' estimates.
-    basis: &'static str,
+    basis: &'a str,
 }
 
 /// The axis of the budget: from ten to this power up to the whole force.
 const LEAST: f64 = -16.0;
 
-pub(super) fn section(object: &CalibratedObject, data: &mut Map<String, Value>) -> Section {
+pub(super) fn section(object: &CalibratedObject) -> Section {
     let mut body = Html::default();
     let parts = budget(object);
     summary(&mut body, object, &parts);
@@ -33,78 +34,76 @@ pub(super) fn section(object: &CalibratedObject, data: &mut Map<String, Value>) 
               1e-16 at the left, the whole force at the right</p>",
     );
     body.folded_table(&stages(object));
-    if let Some(curve) = &object.error_time {
-        error_time(&mut body, curve, data);
-    }
     Section {
         id: "good",
-        title: "How good it is",
+        title: "Accuracy",
         body,
     }
 }
 
-/// The errors that a force gathers from the file to the finger, relative to it.
-fn budget(object: &CalibratedObject) -> Vec<BudgetPart> {
-    let (manifest, file) = (object.manifest, object.lambda);
-    let estimate = |stage: &str| manifest.accuracy.get(stage).map_or(0.0, |s| s.estimate);
-    let heights = ["points_tessellation", "points_grid", "points"].map(estimate);
-    let all: f64 = heights.iter().sum();
-    let (per_m, basis) = match manifest.accuracy.get("lambda_of_points") {
-        Some(moved) if all > 0.0 => (
-            moved.estimate / all,
-            "height error, times what heights change in lambda",
-        ),
-        Some(_) | None => {
-            let lowest = object.lowest_m();
-            let part = if lowest > 0.0 { 1.0 / lowest } else { 0.0 };
-            (part, "height error over the lowest height")
-        }
-    };
-    let part = |name, part: f64, basis| BudgetPart { name, part, basis };
-    let mut parts = vec![
-        part("tessellation", heights[0] * per_m, basis),
-        part("grid of points", heights[1] * per_m, basis),
-        part("rounding in the file", heights[2] * per_m, basis),
-        part(
-            "field",
-            estimate("forces"),
-            "of the largest gradient at the point's height",
-        ),
-        part(
-            "map nodes",
-            estimate("map"),
-            "of the largest gradient at the node's height",
-        ),
-        part(
-            "map interpolation",
-            manifest.map.interpolation.largest_error,
-            "largest between nodes, of the largest gradient at the height",
-        ),
-    ];
-    if let (Some(rms_n), Some(relative), Some(gap_n2)) = (
-        file.rms_error_n,
-        file.relative_rms_error,
-        file.duality_gap_n2,
-    ) && relative > 0.0
-    {
-        // sqrt(e^2 + gap) - e, at most either of these.
-        let more_n = (gap_n2 / (2.0 * rms_n)).min(gap_n2.sqrt());
-        parts.push(part(
-            "lambda's optimality",
-            more_n * relative / rms_n,
-            "what the duality gap leaves open of the rms error, over the rms force",
-        ));
-    }
+/// The errors that a force gathers from the file to the finger, relative to it, the largest first; none
+/// in bundles of programs that did not state them.
+fn budget<'a>(object: &'a CalibratedObject) -> Vec<Part<'a>> {
+    let headline = object.lambda.headline.as_ref();
+    let parts = headline.into_iter().flat_map(|headline| &headline.budget);
     parts
+        .map(|part| Part {
+            name: part.part.words(),
+            part: part.error,
+            basis: &part.how,
+        })
+        .collect()
 }
 
-fn summary(body: &mut Html, object: &CalibratedObject, parts: &[BudgetPart]) {
+/// lambda, the force that is given, and what the computation adds to it.
+fn said_first(body: &mut Html, headline: &Headline) {
+    let given = |name: &str, given: &GivenForce| {
+        let above = if given.above_saturation {
+            " (lambda is above saturation: all currents are at their limits)"
+        } else {
+            ""
+        };
+        format!(
+            "{name} {} of the requested force on average, {} to {} over the points{above}",
+            percent(given.mean),
+            percent(given.least),
+            percent(given.most)
+        )
+    };
+    let fixed = headline.static_currents.as_ref();
+    let followed = headline.feedback.as_ref();
+    let both = fixed
+        .map(|of| given("static currents give", of))
+        .into_iter();
+    let both: Vec<String> = both
+        .chain(followed.map(|of| given("with feedback", of)))
+        .collect();
+    let text = format!("lambda is {}: {}.", headline.lambda, both.join("; "));
+    body.element("li", &text);
+    if let Some(to_halve) = &headline.to_halve {
+        let text = format!("To halve the largest part of the numerical error: {to_halve}.");
+        body.element("li", &text);
+    }
+    if let Some(jumps) = headline.jumps {
+        let text = format!(
+            "At {} of the points the surface jumps: there the force goes from one side's to the other's \
+             within a cell, whatever the grid, and the budget leaves that out.",
+            percent(jumps)
+        );
+        body.element("li", &text);
+    }
+}
+
+fn summary(body: &mut Html, object: &CalibratedObject, parts: &[Part<'_>]) {
     let file = object.lambda;
     let mut parts = parts.iter();
     let largest = parts
         .next()
         .map(|first| parts.fold(first, |a, b| if b.part > a.part { b } else { a }));
     body.raw("<ul class=\"said\">");
+    if let Some(headline) = &file.headline {
+        said_first(body, headline);
+    }
     if let Some(largest) = largest {
         let text = format!(
             "The largest numerical error on the way from file to finger is that of {}: {} of the \
@@ -134,11 +133,11 @@ fn summary(body: &mut Html, object: &CalibratedObject, parts: &[BudgetPart]) {
 }
 
 /// One row a part, from file to finger.
-fn budget_table(object: &CalibratedObject, parts: &[BudgetPart]) -> Table {
+fn budget_table(object: &CalibratedObject, parts: &[Part<'_>]) -> Table {
     let file = object.lambda;
-    let row = |part: &BudgetPart, class: &str| -> Vec<Cell> {
+    let row = |part: &Part<'_>, class: &str| -> Vec<Cell> {
         vec![
-            part.name.into(),
+            part.name.to_owned().into(),
             Cell::Markup(bar(part.part, file.jnd, class)),
             if part.part > 0.0 {
                 percent(part.part)
@@ -146,12 +145,12 @@ fn budget_table(object: &CalibratedObject, parts: &[BudgetPart]) -> Table {
                 "none".to_owned()
             }
             .into(),
-            part.basis.into(),
+            part.basis.to_owned().into(),
         ]
     };
     let mut rows: Vec<Vec<Cell>> = parts.iter().map(|p| row(p, "numeric")).collect();
     if file.lambda_n_per_m.is_some() {
-        let finger = BudgetPart {
+        let finger = Part {
             name: "static currents",
             part: file.relative_rms_error.unwrap_or(0.0),
             basis: "rms force error over the rms force: the coils, not the computation",
@@ -217,11 +216,12 @@ fn stages(object: &CalibratedObject) -> Table {
     }
 }
 
-fn error_time(body: &mut Html, shipped: &ErrorTime, data: &mut Map<String, Value>) {
+/// A curve that was recorded beforehand: it comes after all that this run measured.
+pub(super) fn recorded_section(shipped: &ErrorTime, data: &mut Map<String, Value>) -> Section {
     let curve = &shipped.curve;
-    body.element("h3", "What accuracy costs");
+    let mut body = Html::default();
     figure(
-        body,
+        &mut body,
         "cost",
         "Error against processor time, both axes logarithmic",
         &format!(
@@ -261,6 +261,11 @@ fn error_time(body: &mut Html, shipped: &ErrorTime, data: &mut Map<String, Value
             ),
         }),
     );
+    Section {
+        id: "recorded",
+        title: "Error against run time",
+        body,
+    }
 }
 
 /// The worst point in words.

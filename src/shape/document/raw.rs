@@ -26,6 +26,8 @@ pub struct RawSurface {
     pub placement: Placement,
     /// Samples along x and y.
     pub samples: [usize; 2],
+    /// Whether a flag gives them.
+    pub samples_are_given: bool,
     /// Ends along x, m; `None`: the surface's own extent.
     pub x_m: Option<[f64; 2]>,
     /// Ends along y, m; `None`: the surface's own extent.
@@ -119,6 +121,8 @@ impl ShapeDocument {
             scale: surface.scale,
             placement: surface.placement,
             force: RequestedForce::default(),
+            weights: None,
+            grid_is_given: surface.samples_are_given,
         })
     }
 }

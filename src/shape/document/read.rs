@@ -9,6 +9,7 @@ use super::{
 use crate::format::SurfaceFormat;
 use crate::step::BodyOptions;
 use fluxform_base::force_direction::{ForceDirection, NormalForce, RequestedForce};
+use fluxform_base::point_weights::Weights;
 use fluxform_base::units::m_from_mm;
 use fluxform_design::diagnostics::{Faults, InvalidDocument};
 use fluxform_design::keys::{Key, with_meanings};
@@ -81,7 +82,11 @@ fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
     };
     let bodies = bodies(root);
     let force = force(root);
-    let grid = points(root.section("points"));
+    let Points {
+        grid,
+        is_given,
+        weights,
+    } = points(root.section("points"));
     Some(ShapeDocument {
         name: name?,
         source: source?,
@@ -90,6 +95,8 @@ fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
         placement,
         grid: grid?,
         force,
+        weights,
+        grid_is_given: is_given,
     })
 }
 
@@ -240,6 +247,10 @@ const MEANINGS: &[(&str, &str)] = &[
         "points.outside",
         "what becomes of grid points beside the surface: there is no point",
     ),
+    (
+        "points.weights",
+        "how points count in lambda's mean: `equal`, or `area`, by the area each stands for",
+    ),
 ];
 
 /// Factors of size; `None` where they are at fault.
@@ -385,10 +396,20 @@ fn level(root: &mut Section<'_>, key: &'static str, default_mm: f64) -> f64 {
     m_from_mm(root.number_or(key, &BODY_MM, default_mm).value)
 }
 
-fn points(mut s: Section<'_>) -> Option<GridRequest> {
+/// `[points]`.
+struct Points {
+    grid: Option<GridRequest>,
+    is_given: bool,
+    weights: Option<Weights>,
+}
+
+fn points(mut s: Section<'_>) -> Points {
+    let is_given = s.has("x_mm") || s.has("y_mm");
     let x = s.axis_or("x_mm", &BODY_MM, SEED_SIDE_MM);
     let y = s.axis_or("y_mm", &BODY_MM, SEED_SIDE_MM);
     s.choice_or_first("outside", &[("skip", ())]);
+    let names = [Weights::Equal, Weights::Area].map(|weights| (weights.name(), weights));
+    let weights = s.choice("weights", &names);
     let grid = x.zip(y).map(|(x, y)| [x.value, y.value]);
     if let Some([x, y]) = &grid
         && x.samples
@@ -402,6 +423,13 @@ fn points(mut s: Section<'_>) -> Option<GridRequest> {
         s.fault("x_mm", message, "ask for fewer samples");
     }
     s.finish();
-    let [x, y] = grid?.map(|axis| AxisRequest::Given(axis_m(axis)));
-    Some(GridRequest { x, y })
+    let grid = grid.map(|axes| {
+        let [x, y] = axes.map(|axis| AxisRequest::Given(axis_m(axis)));
+        GridRequest { x, y }
+    });
+    Points {
+        grid,
+        is_given,
+        weights,
+    }
 }

@@ -17,6 +17,7 @@ use fluxform::map::Components;
 use fluxform::map::tabulate::Grid;
 use fluxform::numerics::axis::Axis;
 use fluxform::numerics::lagrange::locate;
+use fluxform::point_weights::Weights;
 use fluxform::progress::Silent;
 use fluxform::scene::Scene;
 use fluxform::scene::maps::{MagnetMean, SceneMap};
@@ -327,7 +328,38 @@ fn lambda_claims(scene: &Scene, exact: &Solved, document: &ShapeDocument) -> Vec
         claimed: claimed("lambda"),
         found,
     });
+    claims.extend(points_claims(scene, document));
     claims
+}
+
+/// lambda of few points, equal and by area, against eight times as many along each axis.
+fn points_claims(scene: &Scene, document: &ShapeDocument) -> Vec<Claim> {
+    let solved = |document: &ShapeDocument, weights: Weights| {
+        let options = LambdaOptions {
+            weights: Some(weights),
+            ..LambdaOptions::default()
+        };
+        let solved = run(scene.design, document, Vec::new(), &options, &Silent);
+        solved.unwrap().1.file
+    };
+    let grid = [document.grid.x, document.grid.y];
+    let fine = document.with_samples(grid.map(|axis| 8 * (axis.samples() - 1) + 1));
+    let limit = solved(&fine, Weights::Area).lambda_n_per_m;
+    let rules = [
+        ("lambda of points", Weights::Equal),
+        ("lambda of points by area", Weights::Area),
+    ];
+    let claims = rules.into_iter().filter_map(|(stage, weights)| {
+        let file = solved(document, weights);
+        let claimed = file.accuracy.get("lambda_of_points")?.estimate;
+        let (lambda, limit) = file.lambda_n_per_m.zip(limit)?;
+        Some(Claim {
+            stage,
+            claimed,
+            found: (lambda / limit - 1.0).abs(),
+        })
+    });
+    claims.collect()
 }
 
 fn claims(number: u64) -> Vec<Claim> {

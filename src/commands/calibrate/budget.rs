@@ -1,0 +1,118 @@
+//! The error budget of a bundle: what is chosen for a requested error, and what a runtime adds to
+//! lambda's own.
+
+use super::Calibration;
+use super::needed_map::NeededMap;
+use crate::RunError;
+use crate::bundle::headline::{BudgetName, BudgetPart};
+use crate::bundle::lambda_file::LambdaFile;
+use crate::commands::discretize::PointsReport;
+use crate::commands::lambda::LambdaReport;
+use crate::commands::lambda::error_target::{ChosenGrid, ErrorTarget, Trial};
+use crate::commands::lambda::map_error::{MapEffect, between_points};
+use crate::progress::Progress;
+use crate::scene::cached_field::ShapeField;
+use crate::scene::passive_map::PassiveMap;
+use crate::shape::points::ConstraintPoints;
+
+impl Calibration<'_> {
+    /// The grid for the requested error, where there is one.
+    pub(super) fn search(
+        &self,
+        progress: &dyn Progress,
+    ) -> Result<Option<(ErrorTarget, ChosenGrid)>, RunError> {
+        let Some(target) = self.options.lambda.error else {
+            return Ok(None);
+        };
+        let trial = Trial {
+            scene: self.scene,
+            solved: &self.solved.forces,
+            field: ShapeField::default(),
+            options: &self.options.lambda,
+            for_runtime: true,
+        };
+        let chosen = trial.grid(&self.shape.document, target, progress)?;
+        Ok(Some((target, chosen)))
+    }
+
+    /// The workspace's samples for the requested error; `None`: the design's own.
+    pub(super) fn nodes(
+        &self,
+        search: Option<&(ErrorTarget, ChosenGrid)>,
+        lambda: &LambdaReport,
+        points: &ConstraintPoints,
+        progress: &dyn Progress,
+    ) -> Result<Option<[usize; 3]>, RunError> {
+        let design = self.scene.design;
+        let (Some((target, _)), Some(currents_a)) = (search, &lambda.file.currents_a) else {
+            return Ok(None);
+        };
+        let Some(headline) = &lambda.file.headline else {
+            return Ok(None);
+        };
+        if design.workspace.is_given && !target.refine {
+            return Ok(None);
+        }
+        let effect = MapEffect {
+            scene: self.scene,
+            solved: &self.solved.forces,
+            field: ShapeField::default(),
+            points,
+            lambda_n_per_m: headline.lambda_n_per_m,
+            currents_a,
+        };
+        effect.nodes(target.of_interpolation(), progress).map(Some)
+    }
+
+    /// What a runtime adds to the error of lambda: heights and forces between points and nodes.
+    pub(super) fn add_to_headline(
+        &self,
+        lambda: &mut LambdaReport,
+        points: &PointsReport,
+        needed: &NeededMap,
+        passive: Option<&PassiveMap>,
+        progress: &dyn Progress,
+    ) -> Result<(), RunError> {
+        let of_pull = passive_estimate(&lambda.file);
+        let currents_a = lambda.file.currents_a.as_deref();
+        let (Some(currents_a), Some(amplification)) = (currents_a, lambda.amplification) else {
+            return Ok(());
+        };
+        let Some(headline) = &mut lambda.file.headline else {
+            return Ok(());
+        };
+        let effect = MapEffect {
+            scene: self.scene,
+            solved: &self.solved.forces,
+            field: self.field,
+            points: &points.discretized.points,
+            lambda_n_per_m: headline.lambda_n_per_m,
+            currents_a,
+        };
+        let (heights, jumps) = between_points(points);
+        let made = &needed.made;
+        let nodes = amplification.part(BudgetName::MapNodes, made.accuracy.estimate);
+        let interpolation = effect.interpolation(&made.map, progress)?;
+        // The pull's own table: of the largest pull, which is relative to the same force.
+        let share = headline.error_of(BudgetName::Pull) / of_pull;
+        let pull = passive.filter(|_| share.is_finite()).map(|passive| BudgetPart {
+            part: BudgetName::PullMap,
+            error: share * (passive.accuracy.estimate + passive.between),
+            how: "the stated errors of the pull's map, times its largest share of the requested force"
+                .to_owned(),
+        });
+        headline.jumps = jumps;
+        headline.add(
+            [heights, Some(nodes), interpolation, pull]
+                .into_iter()
+                .flatten(),
+        );
+        Ok(())
+    }
+}
+
+/// The stated error of the pull at the points.
+fn passive_estimate(file: &LambdaFile) -> f64 {
+    let stage = file.accuracy.get("passive_force");
+    stage.map_or(0.0, |stage| stage.estimate)
+}

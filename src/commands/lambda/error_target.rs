@@ -1,0 +1,295 @@
+//! Points for a requested error: as few as hold it.
+
+pub use crate::scene::tolerances::ErrorTarget;
+
+use super::LambdaReport;
+use super::points::WantedPoints;
+use super::{LambdaOptions, map_error};
+use crate::RunError;
+use crate::bundle::headline::{RequestedError, RunAtError};
+use crate::commands::discretize;
+use crate::design::Workspace;
+use crate::lambda::{ForceProblem, constant};
+use crate::progress::Progress;
+use crate::scene::Scene;
+use crate::scene::cached_field::ShapeField;
+use crate::scene::passive;
+use crate::scene::steel::Solved;
+use crate::shape::document::{AxisRequest, ShapeDocument};
+
+/// Samples along the longer side of the first grid.
+const FIRST: usize = 17;
+/// Samples along either side, at most: beyond, tables and files are of no use to a runtime.
+const MOST: usize = 769;
+/// Attempts at most.
+const ATTEMPTS: usize = 8;
+/// How much finer a grid becomes from one attempt to the next.
+const FINER: std::ops::RangeInclusive<f64> = 1.2..=3.0;
+/// Orders of convergence that an attempt is trusted to show.
+const ORDERS: std::ops::RangeInclusive<f64> = 0.7..=2.0;
+/// A grid that uses less of its share is wasteful, unless one a little coarser fails.
+const WASTE: f64 = 0.5;
+const CLOSE: f64 = 1.25;
+/// A little more than the law says, so that the next attempt holds.
+const SPARE: f64 = 1.08;
+/// Other errors for which a run is estimated, against this one's.
+const ELSEWHERE: [f64; 2] = [0.1, 10.0];
+/// The order with which the map's interpolation falls.
+const MAP_ORDER: f64 = 4.0;
+
+/// The grid that was chosen.
+#[derive(Debug, Clone)]
+pub(crate) struct ChosenGrid {
+    /// The shape with that grid.
+    pub(crate) document: ShapeDocument,
+    /// Whether documents or flags gave it.
+    fixed: bool,
+    /// With which power of the spacing the error fell.
+    order: f64,
+}
+
+/// What points are tried on.
+#[derive(Clone, Copy)]
+pub(crate) struct Trial<'a> {
+    pub(crate) scene: &'a Scene<'a>,
+    pub(crate) solved: &'a Solved,
+    pub(crate) field: ShapeField<'a>,
+    pub(crate) options: &'a LambdaOptions,
+    /// Whether a runtime interpolates heights between the points.
+    pub(crate) for_runtime: bool,
+}
+
+impl Trial<'_> {
+    /// The grid of `document` for the requested error: its own where it gives one.
+    ///
+    /// # Errors
+    /// Points or forces that cannot be computed; interruption.
+    pub(crate) fn grid(
+        &self,
+        document: &ShapeDocument,
+        target: ErrorTarget,
+        progress: &dyn Progress,
+    ) -> Result<ChosenGrid, RunError> {
+        let mut chosen = ChosenGrid {
+            document: document.clone(),
+            fixed: document.grid_is_given && !target.refine,
+            order: *ORDERS.end(),
+        };
+        if chosen.fixed {
+            return Ok(chosen);
+        }
+        let of_document = [document.grid.x, document.grid.y].map(AxisRequest::samples);
+        let longest = of_document[0].max(of_document[1]).saturating_sub(1).max(1);
+        let sampled = |intervals: f64| {
+            let factor = intervals / longest as f64;
+            of_document.map(|samples| match samples {
+                1 => 1,
+                more => (((more - 1) as f64 * factor).round() as usize + 1).clamp(5, MOST),
+            })
+        };
+        let most = (MOST - 1) as f64;
+        let mut search = Search::new((FIRST - 1) as f64);
+        for _ in 0..ATTEMPTS {
+            progress.check()?;
+            chosen.document = document.with_samples(sampled(search.intervals));
+            let Some(excess) = self.excess(&chosen.document, target, progress)? else {
+                return Ok(chosen);
+            };
+            if !search.tried(excess, most) {
+                break;
+            }
+        }
+        let intervals = search
+            .fewest
+            .map_or(search.intervals, |(intervals, _)| intervals);
+        chosen.document = document.with_samples(sampled(intervals));
+        chosen.order = search.order;
+        Ok(chosen)
+    }
+
+    /// How many times the points of `document` exceed what they may add; `None` where nothing is
+    /// rendered.
+    fn excess(
+        &self,
+        document: &ShapeDocument,
+        target: ErrorTarget,
+        progress: &dyn Progress,
+    ) -> Result<Option<f64>, RunError> {
+        let (scene, options) = (self.scene, self.options);
+        let report = discretize::run(document, Vec::new(), progress)?;
+        let points = WantedPoints::of_grid(&report, options.weights_of(&report));
+        let positions = &points.positions_m;
+        let forces_n_per_a =
+            (self.field).forces_n_per_a("trial", scene, self.solved, positions, progress)?;
+        let pull = if scene.design.magnet.passive_force {
+            passive::pull(scene, positions, false)?
+        } else {
+            None
+        };
+        let offset_n = pull.map(|pull| pull.forces_z_n(positions));
+        let resistance_ohm = scene.resistances_ohm();
+        let unwired = ForceProblem {
+            forces_n_per_a: &forces_n_per_a,
+            height_m: &points.height_m,
+            offset_n: offset_n.as_deref(),
+            weights: points.weights(),
+            lower_a: &scene.lower_a,
+            upper_a: &scene.upper_a,
+            total_max_a: scene.design.supply.total_current_max_a,
+            resistance_ohm: &resistance_ohm,
+        };
+        let rewired = options.wiring.apply(&unwired);
+        let problem = rewired.problem(&unwired);
+        let lambda = constant(&problem, &options.settings)?;
+        let Some(lambda) = lambda.filter(|lambda| *lambda > 0.0) else {
+            return Ok(None);
+        };
+        // Too few points to say.
+        let of_points = points
+            .error_against_limit(&problem, lambda, &options.settings)?
+            .unwrap_or(1.0);
+        let between = match self.for_runtime {
+            true => map_error::between_points(&report).0,
+            false => None,
+        };
+        let between = between.map_or(0.0, |part| part.error);
+        Ok(Some(
+            (of_points / target.of_points()).max(between / target.between_points()),
+        ))
+    }
+}
+
+/// A search for the fewest intervals whose excess is 1 or less.
+struct Search {
+    /// Those to be tried.
+    intervals: f64,
+    /// With which power of the spacing the excess falls.
+    order: f64,
+    /// The most that fail, with their excess.
+    most: Option<(f64, f64)>,
+    /// The fewest that hold.
+    fewest: Option<(f64, f64)>,
+}
+
+impl Search {
+    fn new(intervals: f64) -> Self {
+        Self {
+            intervals,
+            order: *ORDERS.end(),
+            most: None,
+            fewest: None,
+        }
+    }
+
+    /// Takes the excess of the intervals that were tried; whether others are worth a try. There are
+    /// at most `most` of them.
+    fn tried(&mut self, excess: f64, most: f64) -> bool {
+        let now = (self.intervals, excess);
+        let before = self.most.or(self.fewest);
+        if let Some((intervals, other)) = before
+            && excess > 0.0
+        {
+            let order = (other / excess).ln() / (now.0 / intervals).ln();
+            if order.is_finite() {
+                self.order = order.clamp(*ORDERS.start(), *ORDERS.end());
+            }
+        }
+        let fails = excess > 1.0;
+        if fails {
+            self.most = Some(now);
+        } else {
+            self.fewest = Some(now);
+        }
+        match (self.most, self.fewest) {
+            // Between what fails and what holds, unless that holds closely.
+            (Some((few, _)), Some((many, excess))) => {
+                self.intervals = (few * many).sqrt().round();
+                excess < WASTE && many > CLOSE * few && self.intervals < many
+            }
+            (Some((few, excess)), None) => {
+                let finer = SPARE * excess.powf(1.0 / self.order);
+                self.intervals = (few * finer.clamp(*FINER.start(), *FINER.end())).min(most);
+                few < most
+            }
+            // The first one holds.
+            (None, _) => false,
+        }
+    }
+}
+
+impl LambdaReport {
+    /// States what became of the requested error, with a warning where it is exceeded. `workspace` is
+    /// that of the map, where there is one.
+    pub(crate) fn requested(
+        &mut self,
+        target: ErrorTarget,
+        chosen: &ChosenGrid,
+        workspace: Option<&Workspace>,
+        tolerance: f64,
+    ) {
+        let Some(headline) = &mut self.file.headline else {
+            return;
+        };
+        let samples = [chosen.document.grid.x, chosen.document.grid.y].map(AxisRequest::samples);
+        let nodes = workspace.map(|w| [w.x_m, w.y_m, w.z_m].map(|axis| axis.samples));
+        let nodes_fixed = workspace.is_some_and(|w| w.is_given && !target.refine);
+        let mut fixed = Vec::new();
+        if chosen.fixed {
+            fixed.push(
+                "the shape gives its points, which are obeyed (--refine chooses them)".to_owned(),
+            );
+        }
+        if nodes_fixed {
+            fixed.push(
+                "the design gives the nodes of [workspace], which are obeyed (--refine chooses them)"
+                    .to_owned(),
+            );
+        }
+        let met = headline.force_error <= target.error;
+        let all_fixed = chosen.fixed && (nodes_fixed || nodes.is_none());
+        let others = ELSEWHERE
+            .into_iter()
+            .filter(|share| !all_fixed && ErrorTarget::RANGE.contains(&(share * target.error)));
+        let elsewhere = others.map(|share| {
+            let scaled = |samples: usize, order: f64, fixed: bool| match samples {
+                1 => 1,
+                same if fixed => same,
+                more => (((more - 1) as f64 * share.powf(-1.0 / order)).ceil() as usize + 1).max(5),
+            };
+            let points = samples.map(|n| scaled(n, chosen.order, chosen.fixed));
+            let other = nodes.map(|nodes| nodes.map(|n| scaled(n, MAP_ORDER, nodes_fixed)));
+            let count = |points: [usize; 2], nodes: Option<[usize; 3]>| {
+                let product =
+                    |samples: &[usize]| samples.iter().map(|n| *n as f64).product::<f64>();
+                product(&points) + nodes.map_or(0.0, |nodes| product(&nodes))
+            };
+            RunAtError {
+                error: share * target.error,
+                points,
+                nodes: other,
+                work: count(points, other) / count(samples, nodes),
+            }
+        });
+        let over = (!met).then(|| {
+            format!(
+                "the requested error of {:.2} % is exceeded: the computation may add {:.2} %, most of it \
+                 from {}{}{}",
+                100.0 * target.error,
+                100.0 * headline.force_error,
+                headline.budget.first().map_or("nothing", |part| part.part.words()),
+                if fixed.is_empty() { "" } else { "; " },
+                fixed.join("; ")
+            )
+        });
+        headline.requested = Some(RequestedError {
+            error: target.error,
+            met,
+            fixed,
+            points: samples,
+            nodes,
+            tolerance,
+            elsewhere: elsewhere.collect(),
+        });
+        self.warnings.extend(over);
+    }
+}

@@ -1,0 +1,266 @@
+//! What a runtime adds to the force beside lambda's own error: heights between the points, nodes of
+//! the map, and interpolation between them.
+
+use crate::RunError;
+use crate::bundle::headline::{BudgetName, BudgetPart};
+use crate::commands::discretize::PointsReport;
+use crate::lambda::lowest_requested_m;
+use crate::map::FieldMap;
+use crate::numerics::lagrange::stencil;
+use crate::progress::Progress;
+use crate::scene::Scene;
+use crate::scene::cached_field::ShapeField;
+use crate::scene::felt_force::by_map;
+use crate::scene::steel::Solved;
+use crate::shape::points::ConstraintPoints;
+
+/// Cells in whose middle the map is compared with the field, at most.
+const MOST_PLACES: usize = 600;
+/// The largest difference found, times this, stands for the largest anywhere.
+const MARGIN: f64 = 1.5;
+/// A change of slope beyond this from one node to the next is a jump: no grid of this spacing follows
+/// it.
+const JUMP_SLOPE: f64 = 1.0;
+
+/// The part of heights between the points, and the share of places where the surface jumps.
+///
+/// A runtime interpolates heights between points, and requests lambda times that. The certificate
+/// bounds how far that is off; where the surface jumps it is off by as much as it jumps, whatever the
+/// grid. A place is a jump where the slope changes by more than 1 (45 degrees) from one side of a node
+/// to the other; those are left out, their share is stated, and the rest is estimated from the second
+/// differences: of a bend anywhere in a cell interpolation is off by half of them at most.
+pub(crate) fn between_points(points: &PointsReport) -> (Option<BudgetPart>, Option<f64>) {
+    let found = &points.discretized.points;
+    let Some(lowest_m) = lowest_requested_m(&found.height_m) else {
+        return (None, None);
+    };
+    let (bends, jumps) = second_differences(found, lowest_m);
+    let certified = points
+        .summary
+        .deviation
+        .map(|deviation| deviation.above_m.max(deviation.below_m));
+    let part = |error: f64, how: &str| BudgetPart {
+        part: BudgetName::BetweenPoints,
+        error,
+        how: how.to_owned(),
+    };
+    match certified {
+        Some(deviation_m) if jumps == 0 => (
+            Some(part(
+                deviation_m / lowest_m,
+                "the certified deviation of the interpolated heights over the lowest requested one",
+            )),
+            None,
+        ),
+        _ => (
+            Some(part(
+                bends,
+                "an estimate from the second differences of the heights, jumps left out",
+            )),
+            (jumps > 0).then(|| jumps as f64 / found.len() as f64),
+        ),
+    }
+}
+
+/// The largest half of the second differences at any node but jumps, relative to its height, and the
+/// number of jumps.
+fn second_differences(points: &ConstraintPoints, lowest_m: f64) -> (f64, usize) {
+    let rows = points.row_of_grid_point();
+    let columns = points.grid.x_m.samples;
+    let steps = [points.grid.x_m, points.grid.y_m].map(|axis| match axis.samples {
+        1 => f64::INFINITY,
+        more => (axis.to - axis.from) / (more - 1) as f64,
+    });
+    let (mut largest, mut jumps) = (0.0_f64, 0);
+    for (row, &place) in points.grid_index.iter().enumerate() {
+        let height_m = points.height_m[row];
+        let (i, last) = (place % columns, rows.len());
+        let beside = [
+            (i > 0 && i + 1 < columns).then(|| [place - 1, place + 1]),
+            (place >= columns && place + columns < last)
+                .then(|| [place - columns, place + columns]),
+        ];
+        let mut off_m = 0.0;
+        let mut jump = false;
+        for (beside, step_m) in beside.into_iter().zip(steps) {
+            let [Some(a), Some(b)] = beside.map_or([None; 2], |both| both.map(|at| rows[at]))
+            else {
+                continue;
+            };
+            let bend_m = (height_m - 0.5 * (points.height_m[a] + points.height_m[b])).abs();
+            jump |= bend_m > 0.5 * JUMP_SLOPE * step_m;
+            off_m += 0.5 * bend_m;
+        }
+        if jump {
+            jumps += 1;
+        } else if height_m >= lowest_m {
+            largest = largest.max(off_m / height_m);
+        }
+    }
+    (largest, jumps)
+}
+
+/// Middles of cells whose four corners are points, with the mean of their heights.
+fn middles(points: &ConstraintPoints) -> Vec<[f64; 3]> {
+    let Some(lowest_m) = lowest_requested_m(&points.height_m) else {
+        return Vec::new();
+    };
+    let rows = points.row_of_grid_point();
+    let columns = points.grid.x_m.samples;
+    let all: Vec<[f64; 3]> = (0..rows.len().saturating_sub(columns + 1))
+        .filter(|place| place % columns + 1 < columns)
+        .filter_map(|place| {
+            let corners = [place, place + 1, place + columns, place + columns + 1];
+            let mut middle = [0.0; 3];
+            for corner in corners {
+                let row = rows[corner]?;
+                let at = [points.x_m[row], points.y_m[row], points.height_m[row]];
+                middle
+                    .iter_mut()
+                    .zip(at)
+                    .for_each(|(sum, v)| *sum += 0.25 * v);
+            }
+            (middle[2] >= lowest_m).then_some(middle)
+        })
+        .collect();
+    let every = all.len().div_ceil(MOST_PLACES).max(1);
+    all.into_iter().step_by(every).collect()
+}
+
+/// A map against the field itself, over the surface between its points.
+pub(crate) struct MapEffect<'a> {
+    pub(crate) scene: &'a Scene<'a>,
+    pub(crate) solved: &'a Solved,
+    pub(crate) field: ShapeField<'a>,
+    pub(crate) points: &'a ConstraintPoints,
+    pub(crate) lambda_n_per_m: f64,
+    pub(crate) currents_a: &'a [f64],
+}
+
+/// Places at which a map's samples are chosen: few, because each needs the field at 64 nodes.
+const CHOOSING_PLACES: usize = 32;
+/// Share of the design's samples that is tried first.
+const FIRST: f64 = 0.3;
+/// Attempts at most.
+const ATTEMPTS: usize = 6;
+/// The interpolation's order.
+const ORDER: f64 = 4.0;
+/// A little more than the law says, so that the next attempt holds.
+const SPARE: f64 = 1.08;
+/// Samples along an axis at most.
+const MOST_NODES: usize = 385;
+
+impl MapEffect<'_> {
+    /// The workspace's samples with which interpolation stays below `error`, as few as do.
+    ///
+    /// # Errors
+    /// Forces that cannot be computed; interruption.
+    pub(crate) fn nodes(
+        &self,
+        error: f64,
+        progress: &dyn Progress,
+    ) -> Result<[usize; 3], RunError> {
+        let workspace = &self.scene.design.workspace;
+        let axes = [workspace.x_m, workspace.y_m, workspace.z_m];
+        let all = middles(self.points);
+        let every = all.len().div_ceil(CHOOSING_PLACES).max(1);
+        let places: Vec<[f64; 3]> = all.into_iter().step_by(every).collect();
+        let mut factor = FIRST;
+        let mut samples = axes.map(|axis| axis.samples);
+        for _ in 0..ATTEMPTS {
+            progress.check()?;
+            samples = axes.map(|axis| match axis.samples {
+                1 => 1,
+                more => (((more - 1) as f64 * factor).round() as usize + 1).clamp(4, MOST_NODES),
+            });
+            let off = MARGIN * self.interpolated_off(samples, &places, progress)?;
+            if off <= error || samples.iter().all(|n| *n >= MOST_NODES) {
+                break;
+            }
+            factor *= (SPARE * (off / error).powf(1.0 / ORDER)).clamp(1.1, 2.0);
+        }
+        Ok(samples)
+    }
+
+    /// The largest relative difference between the field at `places` and its interpolation from a grid
+    /// of so many samples, of which only the nodes that take part are computed.
+    fn interpolated_off(
+        &self,
+        samples: [usize; 3],
+        places: &[[f64; 3]],
+        progress: &dyn Progress,
+    ) -> Result<f64, RunError> {
+        let workspace = &self.scene.design.workspace;
+        let [mut x, mut y, mut z] = [workspace.x_m, workspace.y_m, workspace.z_m];
+        (x.samples, y.samples, z.samples) = (samples[0], samples[1], samples[2]);
+        let nodes = [x.nodes(), y.nodes(), z.nodes()];
+        let mut positions = Vec::new();
+        let mut weights: Vec<Option<Vec<f64>>> = Vec::new();
+        for place in places {
+            let along = [0, 1, 2].map(|axis| stencil(&nodes[axis], place[axis]));
+            let [Some(x), Some(y), Some(z)] = along else {
+                weights.push(None);
+                continue;
+            };
+            let mut own = Vec::new();
+            for k in 0..z.count {
+                for j in 0..y.count {
+                    for i in 0..x.count {
+                        own.push(x.weights[i] * y.weights[j] * z.weights[k]);
+                        let at = [x.start + i, y.start + j, z.start + k];
+                        positions.push([0, 1, 2].map(|axis| nodes[axis][at[axis]]));
+                    }
+                }
+            }
+            positions.push(*place);
+            weights.push(Some(own));
+        }
+        let forces = (self.scene).forces_n_per_a(self.solved, &positions, progress)?;
+        let rows = forces.chunks_exact(self.scene.coils.len());
+        let total = rows.map(|row| {
+            row.iter()
+                .zip(self.currents_a)
+                .map(|(f, i)| f * i)
+                .sum::<f64>()
+        });
+        let totals: Vec<f64> = total.collect();
+        let (mut largest, mut first) = (0.0_f64, 0);
+        for (place, own) in places.iter().zip(&weights) {
+            let Some(own) = own else { continue };
+            let interpolated: f64 = own.iter().zip(&totals[first..]).map(|(w, f)| w * f).sum();
+            let direct = totals[first + own.len()];
+            let off = (interpolated - direct).abs() / (self.lambda_n_per_m * place[2]);
+            largest = largest.max(off);
+            first += own.len() + 1;
+        }
+        Ok(largest)
+    }
+
+    /// The part of interpolation; `None` without a cell of four points within the map.
+    ///
+    /// # Errors
+    /// Forces that cannot be computed; interruption.
+    pub(crate) fn interpolation(
+        &self,
+        map: &FieldMap,
+        progress: &dyn Progress,
+    ) -> Result<Option<BudgetPart>, RunError> {
+        let places = middles(self.points);
+        let (scene, solved) = (self.scene, self.solved);
+        let forces = (self.field).forces_n_per_a("middles", scene, solved, &places, progress)?;
+        let direct = forces.chunks_exact(scene.coils.len());
+        let off = places.iter().zip(direct).filter_map(|(place, row)| {
+            let by_map = by_map(map, scene.moment_a_m2, self.currents_a, *place)?;
+            let direct: f64 = row.iter().zip(self.currents_a).map(|(f, i)| f * i).sum();
+            Some((by_map - direct).abs() / (self.lambda_n_per_m * place[2]))
+        });
+        Ok(off.reduce(f64::max).map(|largest| BudgetPart {
+            part: BudgetName::Interpolation,
+            error: MARGIN * largest,
+            how: format!(
+                "an estimate: {MARGIN} times the largest difference between map and field at up to \
+                 {MOST_PLACES} places of the surface between its points"
+            ),
+        }))
+    }
+}
