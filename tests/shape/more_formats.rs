@@ -11,6 +11,7 @@ use fluxform_shape::{MeshReport, ShapeError, surface};
 use crate::formats::{read, refusal};
 use fluxform_testing::surface_files::{
     amf, glb, height_image, obj, off, ply_ascii, ply_strips, sldprt, step, three_dxml, three_mf,
+    three_mf_model, three_mf_of,
 };
 use fluxform_testing::surfaces::binary;
 
@@ -20,6 +21,31 @@ fn wide(text: &[u8], order: fn(u16) -> [u8; 2]) -> Vec<u8> {
     let text = std::str::from_utf8(text).unwrap();
     let units = "\u{feff}".encode_utf16().chain(text.encode_utf16());
     units.flat_map(order).collect()
+}
+
+#[test]
+fn the_items_that_a_3mf_file_builds_are_listed() {
+    let model = String::from_utf8(three_mf_model("inch")).unwrap();
+    let report = |model: &str| {
+        let file = read(SurfaceFormat::ThreeMf, &three_mf_of(model)).unwrap();
+        let bodies = file.bodies.clone();
+        (
+            bodies,
+            MeshReport::new(SurfaceFormat::ThreeMf, file).triangles,
+        )
+    };
+    // One item of one component, in two objects, is one body.
+    let (bodies, triangles) = report(&model);
+    assert_eq!((bodies.len(), triangles), (1, 4), "{bodies:?}");
+    assert_eq!((&*bodies[0].name, bodies[0].triangles), ("object 2", 4));
+    let two = model.replace(
+        "<item objectid=\"2\"/>",
+        "<item objectid=\"2\"/><item objectid=\"1\" transform=\"1 0 0 0 1 0 0 0 1 9 0 0\"/>",
+    );
+    let two = two.replace("<object id=\"1\">", "<object id=\"1\" name=\" a lid \">");
+    let (bodies, triangles) = report(&two);
+    let names: Vec<&str> = bodies.iter().map(|body| &*body.name).collect();
+    assert_eq!((names, triangles), (vec!["object 2", "a lid"], 8));
 }
 
 #[test]

@@ -16,6 +16,7 @@ fn main() -> ExitCode {
             without_opencascade_the_message_names_how_step_is_read,
             anything_but_a_step_file_is_refused_before_python_starts,
             a_reader_that_answers_nonsense_is_refused,
+            a_python_that_never_starts_is_not_waited_for,
             a_chord_and_a_body_are_for_step_alone,
         ],
         missing() => [
@@ -208,6 +209,34 @@ fn a_reader_that_answers_nonsense_is_refused() {
 
 #[cfg(not(unix))]
 fn a_reader_that_answers_nonsense_is_refused() {}
+
+/// It uses no processor time, so its own limit never ends it.
+#[cfg(unix)]
+fn a_python_that_never_starts_is_not_waited_for() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = boxed(&|text| text);
+    let fake = folder.path().join("fake");
+    std::fs::write(&fake, "#!/bin/sh\nexec sleep 100000\n").unwrap();
+    std::fs::set_permissions(&fake, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let fake = fake.display().to_string();
+    let arguments = [
+        "--python",
+        &fake,
+        "--step-seconds",
+        "1",
+        "discretize",
+        "part.step",
+    ];
+    let said = fluxform(&arguments, folder.path());
+    assert_eq!(said.status.code(), Some(3));
+    let said = text(&said);
+    for part in ["does not start", "pip install cadquery-ocp", "3MF or STL"] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+}
+
+#[cfg(not(unix))]
+fn a_python_that_never_starts_is_not_waited_for() {}
 
 fn a_chord_and_a_body_are_for_step_alone() {
     let flat = root().join("shapes/flat.stl").display().to_string();

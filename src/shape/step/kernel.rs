@@ -22,6 +22,10 @@ use fluxform_base::progress::{Progress, poll, stop_requested};
 const PROGRAM: &str = include_str!("opencascade.py");
 /// Pause between two looks whether to stop.
 const LOOK: Duration = Duration::from_millis(10);
+/// A Python that says nothing for this many times the processor time that it may take does not start.
+const SILENT_TIMES: u64 = 10;
+/// No longer than this is waited for its first line, s.
+const LONGEST_SILENCE_S: u64 = 120;
 /// Longest line of its report, bytes.
 const LONGEST_LINE: u64 = 64 << 20;
 /// Most facets that are taken of one file.
@@ -159,7 +163,7 @@ pub(super) fn mesh(
     thread::scope(|scope| {
         scope.spawn(move || feed(stdin, bytes));
         scope.spawn(move || listen(stdout, &sender));
-        let reply = converse(&heard, progress);
+        let reply = converse(&heard, kernel, progress);
         let reply = match reply {
             Ok(reply) => Ok(reply),
             Err(Some(why)) => Err(why),
@@ -239,8 +243,15 @@ impl Drop for Stages<'_> {
 }
 
 /// Follows the report until the result or the end.
-fn converse(heard: &Receiver<Heard>, progress: &dyn Progress) -> Result<Reply, Option<String>> {
+fn converse(
+    heard: &Receiver<Heard>,
+    kernel: &Kernel,
+    progress: &dyn Progress,
+) -> Result<Reply, Option<String>> {
     let mut version = String::new();
+    // Its limit of processor time ends what computes; what waits before it begins uses none.
+    let patience_s = LONGEST_SILENCE_S.min(SILENT_TIMES.saturating_mul(kernel.cpu_seconds));
+    let mut looks = u128::from(patience_s) * 1000 / LOOK.as_millis();
     let mut stages = Stages {
         progress,
         open: None,
@@ -251,7 +262,15 @@ fn converse(heard: &Receiver<Heard>, progress: &dyn Progress) -> Result<Reply, O
             Err(RecvTimeoutError::Timeout) if stop_requested() || progress.interrupted() => {
                 return Err(Some("it was interrupted".into()));
             }
-            Err(RecvTimeoutError::Timeout) => continue,
+            Err(RecvTimeoutError::Timeout) if version.is_empty() && looks == 0 => {
+                return Err(Some(format!(
+                    "Python does not start: it said nothing for {patience_s} s; {INSTALL}; or {ADVICE}"
+                )));
+            }
+            Err(RecvTimeoutError::Timeout) => {
+                looks = looks.saturating_sub(1);
+                continue;
+            }
             Err(RecvTimeoutError::Disconnected) => return Err(None),
             Ok(Heard::Garbled) => return Err(Some(garbled())),
             Ok(Heard::Parts(parts)) => {
