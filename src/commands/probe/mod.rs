@@ -142,16 +142,6 @@ pub fn probe(
         None
     };
     let force_method = force_error.as_ref().map(|error| error.method.clone());
-    let stage = StageAccuracy {
-        estimate: solved.point_error(),
-        relative_to: if solved.has_steel() {
-            "the largest |grad B| at the point's height"
-        } else {
-            "|grad B| at the point"
-        }
-        .to_owned(),
-        method: String::new(),
-    };
     Ok(ProbeTable {
         components: request.components,
         coils,
@@ -163,8 +153,22 @@ pub fn probe(
         relative_to_height: solved.has_steel(),
         force_error: force_error.map(|error| error.estimate),
         force_method: force_method.unwrap_or_default(),
-        accuracy_missed: missed([(&"field", &stage)], solved.tolerance),
+        accuracy_missed: missed([(&"field", &field_error(&solved))], solved.tolerance),
     })
+}
+
+/// The error of the field.
+fn field_error(solved: &Solved) -> StageAccuracy {
+    StageAccuracy {
+        estimate: solved.point_error(),
+        relative_to: if solved.has_steel() {
+            "the largest |grad B| at the point's height"
+        } else {
+            "|grad B| at the point"
+        }
+        .to_owned(),
+        method: String::new(),
+    }
 }
 
 /// The error of the forces, [point, coil]: that of the steel, which grows by `growth` over the magnet, and

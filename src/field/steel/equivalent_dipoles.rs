@@ -58,7 +58,7 @@ impl Near<'_> {
     }
 
     /// Distance of the places from what lies at the height `z_m`, at least, m.
-    fn from_m(&self, shape: CoreShape, z_m: f64) -> f64 {
+    fn clearance_m(&self, shape: CoreShape, z_m: f64) -> f64 {
         self.floor_m(shape).max(self.lowest_m - z_m)
     }
 
@@ -173,7 +173,7 @@ impl DipoleTask<'_> {
         layers: &(impl Fn(usize, usize) -> DMatrix<f64> + Sync),
     ) -> ArraySources {
         let shape = self.outline.shape;
-        let distance = |z_m: f64| self.near.from_m(shape, z_m);
+        let distance = |z_m: f64| self.near.clearance_m(shape, z_m);
         let of_panel: Vec<f64> = (self.slack.iter())
             .map(|slack| (slack * tolerance).min(MOST_TOLERANCE))
             .collect();
@@ -346,7 +346,7 @@ impl ArraySources {
     ) -> Self {
         let shape = outline.shape;
         let floor_m = near.floor_m(shape);
-        let distance = |z_m: f64| near.from_m(shape, z_m);
+        let distance = |z_m: f64| near.clearance_m(shape, z_m);
         // A layer's parts cancel (a constant layer has no field at all), so that an error relative
         // to one ring's field is a larger one relative to the field that is left.
         let largest = largest_layer(outline, positions_m.len(), drives, &layers);
