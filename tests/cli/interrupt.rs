@@ -143,6 +143,38 @@ fn stops(place: &Place, args: &[&str], after_ms: &[u64]) {
     assert!(reached > 0, "{args:?} ended before every signal");
 }
 
+/// However long the machine takes to answer: a stop that comes while millions of rows are written ends the
+/// command and leaves neither the table nor what was half written of it.
+#[test]
+fn a_stop_while_a_large_table_is_written_leaves_nothing() {
+    let place = Place::new();
+    let args = [
+        "discretize",
+        "shapes/half_sphere.stl",
+        "--unit",
+        "mm",
+        "--grid",
+        "1200x1200",
+        "--out",
+        "out/points.csv",
+    ];
+    let mut child = place
+        .command(&args)
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let entries = || place.path("out").read_dir().map_or(0, Iterator::count);
+    while entries() == 0 {
+        assert!(child.try_wait().unwrap().is_none(), "ended before it wrote");
+        sleep(Duration::from_millis(1));
+    }
+    terminate(&child);
+    let (code, said) = wait(child);
+    assert_eq!(code, Some(130), "{said}");
+    assert_eq!(entries(), 0, "nothing is half written");
+}
+
 /// A design of `count` x `count` coils, flat and close, with or without cores.
 fn array(count: usize, core: &str, length_mm: f64) -> String {
     format!(

@@ -136,31 +136,12 @@ pub fn probe(
     }
     progress.end();
     let force_error = if request.force {
-        let proven = Evaluation {
-            estimate: evaluation,
-            method: "the field's error and the a-priori bound of the magnet's dipoles".to_owned(),
-        };
-        let given = |point: usize, coil: usize| {
-            let [x, y, z, ..] = forces[point * coils + coil];
-            [x, y, z]
-        };
-        let mut sampled = sharper_forces(&scene, &solved, &points_m, given, proven)?;
-        sampled.estimate += solved.steel_error * growth;
-        Some(sampled)
+        let proven = (growth, evaluation);
+        Some(force_error(&scene, &solved, &points_m, &forces, proven)?)
     } else {
         None
     };
     let force_method = force_error.as_ref().map(|error| error.method.clone());
-    let stage = StageAccuracy {
-        estimate: solved.point_error(),
-        relative_to: if solved.has_steel() {
-            "the largest |grad B| at the point's height"
-        } else {
-            "|grad B| at the point"
-        }
-        .to_owned(),
-        method: String::new(),
-    };
     Ok(ProbeTable {
         components: request.components,
         coils,
@@ -172,8 +153,44 @@ pub fn probe(
         relative_to_height: solved.has_steel(),
         force_error: force_error.map(|error| error.estimate),
         force_method: force_method.unwrap_or_default(),
-        accuracy_missed: missed([(&"field", &stage)], solved.tolerance),
+        accuracy_missed: missed([(&"field", &field_error(&solved))], solved.tolerance),
     })
+}
+
+/// The error of the field.
+fn field_error(solved: &Solved) -> StageAccuracy {
+    StageAccuracy {
+        estimate: solved.point_error(),
+        relative_to: if solved.has_steel() {
+            "the largest |grad B| at the point's height"
+        } else {
+            "|grad B| at the point"
+        }
+        .to_owned(),
+        method: String::new(),
+    }
+}
+
+/// The error of the forces, [point, coil]: that of the steel, which grows by `growth` over the magnet, and
+/// of evaluating them, `evaluation` at most.
+fn force_error(
+    scene: &Scene,
+    solved: &Solved,
+    points_m: &[[f64; 3]],
+    forces: &[[f64; 6]],
+    (growth, evaluation): (f64, f64),
+) -> Result<Evaluation, RunError> {
+    let proven = Evaluation {
+        estimate: evaluation,
+        method: "the field's error and the a-priori bound of the magnet's dipoles".to_owned(),
+    };
+    let given = |point: usize, coil: usize| {
+        let [x, y, z, ..] = forces[point * scene.coils.len() + coil];
+        [x, y, z]
+    };
+    let mut sampled = sharper_forces(scene, solved, points_m, given, proven)?;
+    sampled.estimate += solved.steel_error * growth;
+    Ok(sampled)
 }
 
 /// Rows that are evaluated alike, whatever other rows there are.

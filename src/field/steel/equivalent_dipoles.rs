@@ -58,7 +58,7 @@ impl Near<'_> {
     }
 
     /// Distance of the places from what lies at the height `z_m`, at least, m.
-    fn least_distance_m(&self, shape: CoreShape, z_m: f64) -> f64 {
+    fn clearance_m(&self, shape: CoreShape, z_m: f64) -> f64 {
         self.floor_m(shape).max(self.lowest_m - z_m)
     }
 
@@ -173,7 +173,7 @@ impl DipoleTask<'_> {
         layers: &(impl Fn(usize, usize) -> DMatrix<f64> + Sync),
     ) -> ArraySources {
         let shape = self.outline.shape;
-        let distance = |z_m: f64| self.near.least_distance_m(shape, z_m);
+        let distance = |z_m: f64| self.near.clearance_m(shape, z_m);
         let of_panel: Vec<f64> = (self.slack.iter())
             .map(|slack| (slack * tolerance).min(MOST_TOLERANCE))
             .collect();
@@ -346,7 +346,7 @@ impl ArraySources {
     ) -> Self {
         let shape = outline.shape;
         let floor_m = near.floor_m(shape);
-        let distance = |z_m: f64| near.least_distance_m(shape, z_m);
+        let distance = |z_m: f64| near.clearance_m(shape, z_m);
         // A layer's parts cancel (a constant layer has no field at all), so that an error relative
         // to one ring's field is a larger one relative to the field that is left.
         let largest = largest_layer(outline, positions_m.len(), drives, &layers);
@@ -459,7 +459,6 @@ impl Kernel for Pass<'_> {
     fn run<const FMA: bool>(self) -> Vec<f64> {
         match self.parts {
             Components::Gz => self.run_parts::<FMA, 1>(),
-            Components::Force => self.run_parts::<FMA, 3>(),
             Components::Gradient => self.run_parts::<FMA, 5>(),
             Components::All => self.run_parts::<FMA, 8>(),
         }
@@ -543,8 +542,6 @@ fn dipole<const FMA: bool, const PARTS: usize>(
         parts[6] = strength * dy + even * ny;
         parts[7] = strength * dz + even * nz;
     }
-    // Those along z alone: the last of the gradient's.
-    let first = if PARTS == 3 { 2 } else { 0 };
-    out.copy_from_slice(&parts[first..first + PARTS]);
+    out.copy_from_slice(&parts[..PARTS]);
     out
 }
