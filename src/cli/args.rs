@@ -87,20 +87,22 @@ pub struct Tolerance {
 pub struct WeightsFlag {
     /// How the points of a grid count in the mean over the object [default: as the shape file says,
     /// else equal]
-    #[arg(long, value_name = "RULE", value_parser = values::weights())]
+    #[arg(long, hide_short_help = true, value_name = "RULE", value_parser = values::weights())]
     pub weights: Option<Weights>,
 }
 
 /// The largest error that the computation may add.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct ErrorFlags {
-    /// Largest error that the computation may add to the force, relative to the requested force, and
-    /// to lambda, like 1%: points, nodes and tolerances are chosen for it, points count by area;
-    /// grids that documents or flags give are obeyed, and what they cause is reported
+    /// Largest error of force and lambda, like 1%
+    ///
+    /// What the computation may add to the force, relative to the requested force, and to lambda:
+    /// points, nodes and tolerances are chosen for it, points count by area; grids that documents or
+    /// flags give are obeyed, and what they cause is reported.
     #[arg(long, value_name = "PART", value_parser = values::error, allow_hyphen_values = true)]
     error: Option<f64>,
     /// With --error: choose the samples also where documents give them; extents stay
-    #[arg(long, requires = "error")]
+    #[arg(long, hide_short_help = true, requires = "error")]
     refine: bool,
 }
 
@@ -130,7 +132,7 @@ pub struct Writing {
     next_help_heading = "Surfaces given directly (not for shape files, which say it themselves)"
 )]
 pub struct SurfaceFlags {
-    /// Unit of the surface's coordinates: mm, cm, m, in, ft or um; required for STL, OBJ and PLY
+    /// mm, cm, m, in, ft or um; required for STL, OBJ and PLY
     #[arg(long, value_name = "UNIT", value_parser = values::unit)]
     pub unit: Option<f64>,
     /// Enlarge by a factor, or by factors along x, y and z, before anything else
