@@ -32,6 +32,9 @@ const TURNS: usize = 100;
 /// Steps below this share are none.
 const STILL: f64 = 1e-12;
 
+/// Ends below this share of what the force along the request allows are none.
+const NOTHING: f64 = 1e-9;
+
 /// Points whose requested force is a vector.
 #[derive(Debug, Clone, Copy)]
 pub struct VectorProblem<'a> {
@@ -199,9 +202,14 @@ impl<'a> Search<'a> {
                 Asked::Crosses(_) => (1.0, 1.0),
             };
         }
-        let Some(most) = self.end(&rows, self.bound(&rows), |next, now| next < now) else {
+        let bound = self.bound(&rows);
+        let Some(most) = self.end(&rows, bound, |next, now| next < now) else {
             return (0.0, -height);
         };
+        // Beside the cone of all forces the cuts come ever nearer to no force at all.
+        if most <= NOTHING * bound {
+            return (0.0, 0.0);
+        }
         let least = if most > 0.0 {
             self.end(&rows, 0.0, |next, now| next > now)
         } else {
