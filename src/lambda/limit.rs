@@ -109,17 +109,22 @@ impl GridPlaces<'_> {
         }
         let first = [which % 2, which / 2];
         let is_point = |place: usize| row_of[place] != usize::MAX;
-        // The nodes that take over from one along an axis, `step` apart. Ends of the surface stay: a rule
-        // that reaches beyond its nodes has other errors, which may cancel those it is to show.
+        // The nodes that take over from one along an axis, `step` apart. Ends of the grid stay: a rule that
+        // reaches beyond its nodes has other errors, which may cancel those it is to show. Where the
+        // surface ends inside the grid all points together reach beyond theirs, so a subset does too.
         let takes = |axis: usize, place: usize| -> [Option<usize>; 2] {
             let (step, samples) = [(1, self.columns), (self.columns, self.rows)][axis];
             let at = place / step % samples;
-            let inner =
-                at > 0 && at + 1 < samples && is_point(place - step) && is_point(place + step);
-            if at % 2 != first[axis] && inner {
-                [Some(place - step), Some(place + step)]
+            let inner = at > 0 && at + 1 < samples;
+            let heirs = if at % 2 != first[axis] && inner {
+                [place - step, place + step].map(|heir| Some(heir).filter(|heir| is_point(*heir)))
             } else {
+                [None; 2]
+            };
+            if heirs == [None; 2] {
                 [Some(place), None]
+            } else {
+                heirs
             }
         };
         let mut weights = vec![0.0; areas.len()];
