@@ -45,7 +45,7 @@ pub fn html(cases: &[CaseRow]) -> String {
         lead,
         sections: vec![Section {
             id: "answer",
-            title: "The answer",
+            title: "Result",
             body,
         }],
         data: Value::Object(Map::new()),

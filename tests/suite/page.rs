@@ -207,7 +207,7 @@ fn answer(file: &BenchFile, all: &[Standing]) -> Section {
     }
     Section {
         id: "answer",
-        title: "The answer",
+        title: "Result",
         body,
     }
 }

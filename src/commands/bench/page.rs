@@ -194,7 +194,7 @@ fn answer(file: &BenchFile) -> Section {
     });
     Section {
         id: "answer",
-        title: "The answer",
+        title: "Result",
         body,
     }
 }

@@ -6,7 +6,7 @@ use super::recorded;
 use crate::bundle::write::BundleContent;
 use crate::coil::limits::{self, Evaluated, LimitCheck};
 use crate::plot::lambda::LambdaPlot;
-use crate::report::data::CalibratedObject;
+use crate::report::data::{CalibratedObject, CoilPlan};
 use crate::scene::Scene;
 use crate::units::STEEL_DENSITY_KG_PER_M3;
 
@@ -26,7 +26,11 @@ pub(super) fn object<'a>(
         points: content.points,
         map: content.map,
         curves,
-        coil_radius_m: 0.5 * scene.coil.outer_diameter_m,
+        section: CoilPlan {
+            inner_radius_m: 0.5 * scene.coil.inner_diameter_m,
+            outer_radius_m: 0.5 * scene.coil.outer_diameter_m,
+            core_radius_m: scene.core.as_ref().map(|core| core.shape.radius_m),
+        },
         limits,
         unchecked,
         warnings,

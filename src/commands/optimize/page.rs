@@ -155,7 +155,7 @@ fn answer(result: &Optimization) -> Section {
     }
     Section {
         id: "answer",
-        title: "The answer",
+        title: "Result",
         body,
     }
 }

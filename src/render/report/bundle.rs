@@ -17,15 +17,20 @@ pub fn page(object: &CalibratedObject, files: &[&str]) -> String {
     let file = object.lambda;
     let mut data = Map::new();
     data.insert("coils".to_owned(), coils(object));
-    let sections = vec![
-        answer(object),
-        error_budget::section(object, &mut data),
-        limits::section(object),
-        path::section(object, &mut data),
-        surface::section(object, &mut data),
-        field::section(object, &mut data),
-        sources(object, files),
+    let sections = [
+        Some(answer(object)),
+        Some(surface::section(object, &mut data)),
+        Some(error_budget::section(object)),
+        Some(limits::section(object)),
+        Some(path::section(object, &mut data)),
+        Some(field::section(object, &mut data)),
+        object
+            .error_time
+            .as_ref()
+            .map(|recorded| error_budget::recorded_section(recorded, &mut data)),
+        Some(sources(object, files)),
     ];
+    let sections = sections.into_iter().flatten().collect();
     Page {
         kind: "Calibration",
         title: format!("{} on {}", file.shape, file.design),
@@ -46,7 +51,9 @@ fn coils(object: &CalibratedObject) -> Value {
         json!({
             "x": coil.axis_m[0] * 1e3,
             "y": coil.axis_m[1] * 1e3,
-            "radius": object.coil_radius_m * 1e3,
+            "radius": object.section.outer_radius_m * 1e3,
+            "bore": object.section.inner_radius_m * 1e3,
+            "core": object.section.core_radius_m.map(|radius_m| radius_m * 1e3),
             "current": coil.current_a,
             "min": coil.min_a,
             "max": coil.max_a,
@@ -106,7 +113,6 @@ fn answer(object: &CalibratedObject) -> Section {
     let file = object.lambda;
     let by = file.criterion.described(&percent(file.jnd));
     let by = format!("chosen by {by}");
-    let coils = object.coils();
     let lambda = match file.lambda_n_per_m {
         None => "none".to_owned(),
         Some(lambda) => stated_lambda(file, lambda),
@@ -118,39 +124,45 @@ fn answer(object: &CalibratedObject) -> Section {
         });
         tile(&mut body, "rms error", &force(rms_n), &relative);
         let at = object.worst_place().map_or_else(String::new, |at| {
-            format!("of {} wanted there", force(at.wanted_n))
+            format!("of {} requested there", force(at.wanted_n))
         });
         tile(&mut body, "worst error", &force(worst_n), &at);
-        if let Some(given) = &file.given_force {
-            let range = format!(
-                "{} to {} over the points",
-                percent(given.least),
-                percent(given.most)
-            );
-            let name = if given.above_saturation {
-                "force given (lambda above saturation)"
-            } else {
-                "force given"
-            };
-            tile(&mut body, name, &percent(given.mean), &range);
-        }
-        let bound = coils.iter().filter(|coil| coil.at_limit()).count();
-        let sum: f64 = coils.iter().map(|coil| coil.current_a).sum();
-        tile(
-            &mut body,
-            "coils at limit",
-            &format!("{bound} of {}", coils.len()),
-            &format!("{} A in all", figures(sum, 4)),
-        );
+        given(&mut body, file);
     }
     body.raw("</dl>");
-    if file.lambda_n_per_m.is_some() {
-        body.table(&limits::currents(&coils));
-    }
     Section {
         id: "answer",
-        title: "The answer",
+        title: "Result",
         body,
+    }
+}
+
+/// The force that the static currents give: its share of the requested one, and its direction.
+fn given(body: &mut Html, file: &LambdaFile) {
+    if let Some(given) = &file.given_force {
+        let limits = format!(
+            "{} to {} over the points{}",
+            percent(given.least),
+            percent(given.most),
+            if given.above_saturation {
+                "; lambda is above saturation"
+            } else {
+                ""
+            }
+        );
+        tile(body, "given force", &percent(given.mean), &limits);
+    }
+    if let Some(sideways) = &file.sideways {
+        tile(
+            body,
+            "sideways force",
+            &percent(sideways.static_share),
+            &format!(
+                "of the push, {} degrees off; with feedback {}",
+                figures(sideways.static_median_deg, 2),
+                percent(sideways.feedback_share)
+            ),
+        );
     }
 }
 
@@ -179,7 +191,7 @@ fn sources(object: &CalibratedObject, files: &[&str]) -> Section {
             ]
         };
         body.table(&Table {
-            caption: "What was left out because the object does not need it".to_owned(),
+            caption: "Left out because the object does not need it".to_owned(),
             head: vec![("what", false), ("error it costs", true), ("why", false)],
             rows: object.manifest.left_out.iter().map(row).collect(),
             prose: true,
@@ -201,7 +213,7 @@ fn sources(object: &CalibratedObject, files: &[&str]) -> Section {
     );
     Section {
         id: "sources",
-        title: "What went in",
+        title: "Inputs",
         body,
     }
 }

@@ -26,8 +26,8 @@ pub struct CalibratedObject<'a> {
     pub map: &'a MapArrays<'a>,
     /// Error and currents over lambda, and the forces at the chosen one.
     pub curves: &'a LambdaPlot,
-    /// Outer radius of a winding, m.
-    pub coil_radius_m: f64,
+    /// A coil in plan.
+    pub section: CoilPlan,
     /// The design's limits on one coil.
     pub limits: BTreeMap<&'static str, LimitCheck>,
     /// Limits that are not evaluated here.
@@ -80,6 +80,17 @@ impl CalibratedObject<'_> {
             given_n: forces.static_n[worst],
         })
     }
+}
+
+/// A coil seen from above.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CoilPlan {
+    /// Of the winding, m.
+    pub inner_radius_m: f64,
+    /// Of the winding, m.
+    pub outer_radius_m: f64,
+    /// Of the core, m; `None` in air.
+    pub core_radius_m: Option<f64>,
 }
 
 /// The point whose force is most wrong.

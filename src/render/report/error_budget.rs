@@ -22,7 +22,7 @@ struct Part<'a> {
 /// The axis of the budget: from ten to this power up to the whole force.
 const LEAST: f64 = -16.0;
 
-pub(super) fn section(object: &CalibratedObject, data: &mut Map<String, Value>) -> Section {
+pub(super) fn section(object: &CalibratedObject) -> Section {
     let mut body = Html::default();
     let parts = budget(object);
     summary(&mut body, object, &parts);
@@ -34,12 +34,9 @@ pub(super) fn section(object: &CalibratedObject, data: &mut Map<String, Value>) 
               1e-16 at the left, the whole force at the right</p>",
     );
     body.folded_table(&stages(object));
-    if let Some(curve) = &object.error_time {
-        error_time(&mut body, curve, data);
-    }
     Section {
         id: "good",
-        title: "How good it is",
+        title: "Accuracy",
         body,
     }
 }
@@ -219,11 +216,12 @@ fn stages(object: &CalibratedObject) -> Table {
     }
 }
 
-fn error_time(body: &mut Html, shipped: &ErrorTime, data: &mut Map<String, Value>) {
+/// A curve that was recorded beforehand: it comes after all that this run measured.
+pub(super) fn recorded_section(shipped: &ErrorTime, data: &mut Map<String, Value>) -> Section {
     let curve = &shipped.curve;
-    body.element("h3", "What accuracy costs");
+    let mut body = Html::default();
     figure(
-        body,
+        &mut body,
         "cost",
         "Error against processor time, both axes logarithmic",
         &format!(
@@ -263,6 +261,11 @@ fn error_time(body: &mut Html, shipped: &ErrorTime, data: &mut Map<String, Value
             ),
         }),
     );
+    Section {
+        id: "recorded",
+        title: "Error against run time",
+        body,
+    }
 }
 
 /// The worst point in words.

@@ -17,7 +17,7 @@ pub fn sources(inputs: &[(&str, &str)]) -> Section {
     });
     Section {
         id: "sources",
-        title: "What went in",
+        title: "Inputs",
         body,
     }
 }

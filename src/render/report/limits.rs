@@ -32,13 +32,16 @@ pub(super) fn section(object: &CalibratedObject) -> Section {
             .raw("</li>");
     }
     body.raw("</ul>");
+    if object.lambda.lambda_n_per_m.is_some() {
+        body.table(&currents(&object.coils()));
+    }
     if !object.limits.is_empty() {
         body.table(&table(&object.limits));
         let mut note =
             "One coil at its rated current, its inductance among its neighbours.".to_owned();
         if !object.unchecked.is_empty() {
             note += &format!(
-                " Not looked at here: {}; `fluxform evaluate` tells it.",
+                " Not looked at here: {}; `fluxform evaluate` reports it.",
                 object.unchecked.join(", ")
             );
         }
@@ -46,7 +49,7 @@ pub(super) fn section(object: &CalibratedObject) -> Section {
     }
     Section {
         id: "limits",
-        title: "What limits it",
+        title: "Limits",
         body,
     }
 }
@@ -200,7 +203,7 @@ fn table(limits: &Checks) -> Table {
 }
 
 /// The currents as bars against their limits.
-pub(super) fn currents(coils: &[DrivenCoil]) -> Table {
+fn currents(coils: &[DrivenCoil]) -> Table {
     let low = coils.iter().map(|coil| coil.min_a).fold(0.0, f64::min);
     let high = coils.iter().map(|coil| coil.max_a).fold(0.0, f64::max);
     let span = if high > low { high - low } else { 1.0 };

@@ -92,7 +92,7 @@ impl Surface {
             )
         };
         let mm = |[from, to]: [f64; 2], samples: usize| {
-            // The first point of every block stands given by the grid's ends.
+            // The first point of every block is given by the grid's ends.
             let last = samples.div_ceil(step).max(1) - 1;
             let share = (last * step) as f64 / (samples.max(2) - 1) as f64;
             [from * 1e3, (from + (to - from) * share) * 1e3]
@@ -127,8 +127,9 @@ pub(super) fn section(
         "turn",
         "The surface with its constraint points above the coils, in three dimensions",
         &format!(
-            "The surface that the finger's magnet follows, its {} and the coils below; \
-             the ring is where the force is most wrong. Drag, use the arrow keys or the buttons \
+            "The surface that the finger's magnet follows, its {} and the coils below, \
+             windings darker with more current; the ring is where the force is most wrong. Faces \
+             that plunge at a rim are left open. Drag, use the arrow keys or the buttons \
              to turn it.{thinned}",
             count(object.points.len(), "constraint point")
         ),
@@ -138,8 +139,8 @@ pub(super) fn section(
             &mut body,
             "errors",
             "Map of the force error over the surface, seen from above",
-            "Force given by the static currents minus force wanted, seen from above. Bright: too \
-             strong; dark: too weak; the line is where it is right.",
+            "Force given by the static currents minus the requested force, seen from above. Red: too \
+             strong; blue: too weak; the line is where it is right.",
         );
         data.insert("errors".to_owned(), json!(true));
     }

@@ -94,7 +94,7 @@ pub fn page(facts: &SweepFacts) -> String {
             answer(facts),
             Section {
                 id: "limits",
-                title: "What limits it",
+                title: "Limits",
                 body: limits,
             },
             sources(&facts.inputs),
@@ -165,7 +165,7 @@ fn answer(facts: &SweepFacts) -> Section {
     }
     Section {
         id: "answer",
-        title: "The answer",
+        title: "Result",
         body,
     }
 }

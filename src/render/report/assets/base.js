@@ -81,10 +81,23 @@ const STOPS = [
   [39, 173, 129], [92, 200, 99], [170, 220, 50], [253, 231, 37],
 ];
 
-function colour(part) {
-  const at = Math.max(0, Math.min(1, part)) * (STOPS.length - 1);
-  const k = Math.min(STOPS.length - 2, Math.floor(at));
-  return STOPS[k].map((from, i) => Math.round(from + (at - k) * (STOPS[k + 1][i] - from)));
+// Blue below zero, red above it, pale at it: the sign is seen before the size.
+const SIGNED = [
+  [33, 102, 172], [103, 169, 207], [209, 229, 240], [247, 247, 247],
+  [253, 219, 199], [239, 138, 98], [178, 24, 43],
+];
+
+// The colours of values from lo to hi; of signed values zero lies in the middle of both.
+function palette([lo, hi], isSigned) {
+  const most = Math.max(Math.abs(lo), Math.abs(hi)) || 1;
+  const [from, to] = isSigned ? [-most, most] : hi > lo ? [lo, hi] : [lo - 0.5, hi + 0.5];
+  const stops = isSigned ? SIGNED : STOPS;
+  const colour = (value) => {
+    const at = Math.max(0, Math.min(1, (value - from) / (to - from))) * (stops.length - 1);
+    const k = Math.min(stops.length - 2, Math.floor(at));
+    return stops[k].map((a, i) => Math.round(a + (at - k) * (stops[k + 1][i] - a)));
+  };
+  return { lo: from, hi: to, colour };
 }
 
 const css = (rgb) => `rgb(${rgb.join(",")})`;

@@ -11,18 +11,18 @@ function heat(place, holder, spec) {
     const width = Math.max(280, Math.min(640, holder.clientWidth || place.clientWidth));
     const pad = { left: 46, right: 76, top: 8, bottom: 38 };
     const ratio = (s.y[1] - s.y[0]) / (s.x[1] - s.x[0] || 1) || 1;
-    const w = Math.min(width - pad.left - pad.right, 460 / Math.min(1, Math.max(ratio, 0.2)));
-    const h = Math.max(80, Math.min(460, w * ratio));
+    // A millimetre is as long along x as along y, unless the strip were too thin to read.
+    const w = Math.min(width - pad.left - pad.right, 460 / ratio);
+    const h = Math.max(80, w * ratio);
     const pen = sharp(canvas, width, h + pad.top + pad.bottom);
     frame = { s, pad, w, h, width };
-    let [lo, hi] = range(s.values);
-    if (!(hi > lo)) [lo, hi] = [lo - 0.5, hi + 0.5];
-    frame.ends = [lo, hi];
-    cells(pen, s, pad, w, h, lo, hi);
+    const [lo, hi] = range(s.values);
+    const colours = palette([lo, hi], s.zero);
+    cells(pen, s, pad, w, h, colours);
     if (s.zero && lo < 0 && hi > 0) contour(pen, s, pad, w, h);
     circles(pen, s, pad, w, h);
     axes(pen, s, pad, w, h);
-    bar(pen, s, pad, w, h, lo, hi);
+    bar(pen, s, pad, w, h, colours);
     if (at !== null) cross(pen, pad, w, h);
     canvas.setAttribute("aria-label", `${place.dataset.what}; from ${say(lo)} to ${say(hi)} ${s.unit}. Arrow keys read the values.`);
   }
@@ -30,13 +30,13 @@ function heat(place, holder, spec) {
   const cw = () => frame.w / frame.s.columns;
   const ch = () => frame.h / frame.s.rows;
 
-  function cells(pen, s, pad, w, h, lo, hi) {
+  function cells(pen, s, pad, w, h, colours) {
     const image = new ImageData(s.columns, s.rows);
     s.values.forEach((v, k) => {
       const row = s.rows - 1 - Math.floor(k / s.columns);
       const to = 4 * (row * s.columns + (k % s.columns));
       if (!Number.isFinite(v)) return;
-      image.data.set([...colour((v - lo) / (hi - lo)), 255], to);
+      image.data.set([...colours.colour(v), 255], to);
     });
     const small = document.createElement("canvas");
     small.width = s.columns;
@@ -125,10 +125,10 @@ function heat(place, holder, spec) {
     pen.restore();
   }
 
-  function bar(pen, s, pad, w, h, lo, hi) {
+  function bar(pen, s, pad, w, h, { lo, hi, colour }) {
     const x = pad.left + w + 14;
     for (let k = 0; k < 100; k += 1) {
-      pen.fillStyle = css(colour(k / 99));
+      pen.fillStyle = css(colour(lo + (k / 99) * (hi - lo)));
       pen.fillRect(x, pad.top + h * (1 - (k + 1) / 100), 13, h / 100 + 0.6);
     }
     pen.fillStyle = style("--soft");

@@ -21,13 +21,24 @@ function surfaceOf(s) {
     return [on(s.x, c, s.columns), on(s.y, r, s.rows), height[k]];
   };
   const nodes = Array.from(height, (h, k) => node(k));
+  const there = (c, r) => c >= 0 && r >= 0 && c < s.columns && r < s.rows && Number.isFinite(height[r * s.columns + c]);
+  const cell = Math.hypot((s.x[1] - s.x[0]) / (s.columns - 1 || 1), (s.y[1] - s.y[0]) / (s.rows - 1 || 1));
+  // A face that plunges at a rim hangs from few points: it would show the grid, not the surface.
+  const plunges = (face) => {
+    const [lo, hi] = range(face.map((k) => height[k]));
+    const atRim = face.some((k) => {
+      const [c, r] = [k % s.columns, Math.floor(k / s.columns)];
+      return [[1, 0], [-1, 0], [0, 1], [0, -1]].some(([dc, dr]) => !there(c + dc, r + dr));
+    });
+    return atRim && hi - lo > 2 * cell;
+  };
   const faces = [];
   for (let r = 0; r + 1 < s.rows; r += 1) {
     for (let c = 0; c + 1 < s.columns; c += 1) {
       const k = r * s.columns + c;
       const corners = [k, k + 1, k + s.columns + 1, k + s.columns];
-      const there = corners.filter((i) => Number.isFinite(height[i]));
-      if (there.length > 2) faces.push(there);
+      const face = corners.filter((i) => Number.isFinite(height[i]));
+      if (face.length > 2 && !plunges(face)) faces.push(face);
     }
   }
   return { ...s, height, error, nodes, faces };
@@ -38,8 +49,7 @@ function paintScene(pen, scene, view, look) {
   const spots = surface.nodes.map((n) => (Number.isFinite(n[2]) ? view(...n) : null));
   const shapes = [];
   const values = look.byError ? surface.error : surface.height;
-  const [lo, hi] = scene.ends[look.byError ? 1 : 0];
-  const span = hi - lo || 1;
+  const { colour } = scene.colours[look.byError ? 1 : 0];
   for (const face of surface.faces) {
     let value = 0;
     let depth = 0;
@@ -47,7 +57,7 @@ function paintScene(pen, scene, view, look) {
       value += values[k] / face.length;
       depth += spots[k][2] / face.length;
     }
-    shapes.push({ depth, face, fill: css(colour((value - lo) / span)) });
+    shapes.push({ depth, face, fill: css(colour(value)) });
   }
   shapes.sort((a, b) => b.depth - a.depth);
   // The coils stand below every point, so they are behind as long as one looks from above.
@@ -82,20 +92,34 @@ function paintScene(pen, scene, view, look) {
 
 function paintCoil(pen, coil, view) {
   const part = coil.max > 0 ? coil.current / coil.max : 0;
-  pen.beginPath();
-  for (let k = 0; k <= 40; k += 1) {
-    const angle = (2 * Math.PI * k) / 40;
-    const [x, y] = view(coil.x + coil.radius * Math.cos(angle), coil.y + coil.radius * Math.sin(angle), 0);
-    if (k) pen.lineTo(x, y);
-    else pen.moveTo(x, y);
-  }
-  pen.globalAlpha = 0.1 + 0.6 * Math.min(1, Math.abs(part));
-  pen.fillStyle = style("--c1");
-  pen.fill();
-  pen.globalAlpha = 1;
+  const ring = (radius) => {
+    for (let k = 0; k <= 40; k += 1) {
+      const angle = (2 * Math.PI * k) / 40;
+      const [x, y] = view(coil.x + radius * Math.cos(angle), coil.y + radius * Math.sin(angle), 0);
+      if (k) pen.lineTo(x, y);
+      else pen.moveTo(x, y);
+    }
+    pen.closePath();
+  };
   pen.strokeStyle = style("--soft");
   pen.lineWidth = 1;
+  pen.beginPath();
+  ring(coil.radius);
+  ring(coil.bore);
+  pen.globalAlpha = 0.1 + 0.6 * Math.min(1, Math.abs(part));
+  pen.fillStyle = style("--c1");
+  pen.fill("evenodd");
+  pen.globalAlpha = 1;
   pen.stroke();
+  if (coil.core > 0) {
+    pen.beginPath();
+    ring(coil.core);
+    pen.globalAlpha = 0.35;
+    pen.fillStyle = style("--soft");
+    pen.fill();
+    pen.globalAlpha = 1;
+    pen.stroke();
+  }
 }
 
 // Axes along those edges of the floor that are nearest to the eye, the height at the leftmost corner.

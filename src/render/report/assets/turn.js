@@ -3,8 +3,8 @@
 function turn(place) {
   const START = { yaw: 0.55, pitch: 0.5 };
   const scene = { surface: surfaceOf(data.surface), coils: data.coils };
-  scene.ends = [range(scene.surface.height), range(scene.surface.error)];
-  scene.top = Math.max(1, scene.ends[0][1]);
+  scene.colours = [palette(range(scene.surface.height), false), palette(range(scene.surface.error), true)];
+  scene.top = Math.max(1, range(scene.surface.height)[1]);
   // The floor holds the surface and every coil.
   scene.floor = ["x", "y"].map((axis) => {
     const reach = data.coils.flatMap((coil) => [coil[axis] - coil.radius, coil[axis] + coil.radius]);
@@ -65,10 +65,10 @@ function turn(place) {
     const up = Math.sin(view.pitch) * across + Math.cos(view.pitch) * scene.top;
     const scale = Math.min((width - 60) / across, (height - 70) / up);
     spots = paintScene(pen, scene, projector(view.yaw, view.pitch, scale, middle, width / 2, (height - 26) / 2), look);
-    const [lo, hi] = scene.ends[look.byError ? 1 : 0];
+    const { lo, hi, colour } = scene.colours[look.byError ? 1 : 0];
     const unit = look.byError ? "mN" : "mm";
     for (let k = 0; k < 60; k += 1) {
-      pen.fillStyle = css(colour(k / 59));
+      pen.fillStyle = css(colour(lo + (k / 59) * (hi - lo)));
       pen.fillRect(8 + k * 1.6, height - 14, 2.2, 8);
     }
     pen.fillStyle = style("--soft");

@@ -11,7 +11,7 @@ use serde_json::{Value, from_value, json};
 
 use super::page;
 use crate::plot::lambda::{ChosenForces, ErrorMap, LambdaPlot};
-use crate::report::data::{CalibratedObject, ErrorTime};
+use crate::report::data::{CalibratedObject, CoilPlan, ErrorTime};
 use crate::report::measured::{MeasuredCurve, MeasuredRow};
 
 const HOSTILE: &str = "</script><img src=x onerror=alert(1)>\u{202e}\u{0}\"'&<!--";
@@ -179,7 +179,11 @@ impl Parts {
             points: &self.points,
             map: &self.map,
             curves: &self.curves,
-            coil_radius_m: 0.019,
+            section: CoilPlan {
+                inner_radius_m: 0.012,
+                outer_radius_m: 0.019,
+                core_radius_m: Some(0.011),
+            },
             limits: BTreeMap::from([("resistance_ohm", missed)]),
             unchecked: vec!["core field"],
             warnings: &self.warnings,
