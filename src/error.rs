@@ -47,6 +47,9 @@ pub enum RunError {
     /// A bundle whose force constant is null.
     #[error("{0}")]
     NoForceConstant(String),
+    /// An object that the array cannot render where it is.
+    #[error("{0}")]
+    Misplaced(String),
     /// There is a result, but not one to go on with.
     #[error("{0}")]
     Unmet(String),
@@ -71,7 +74,11 @@ impl RunError {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Interrupted(_) => 130,
-            Self::Write(_) | Self::Sweep(_) | Self::NoForceConstant(_) | Self::Unmet(_) => 4,
+            Self::Write(_)
+            | Self::Sweep(_)
+            | Self::NoForceConstant(_)
+            | Self::Misplaced(_)
+            | Self::Unmet(_) => 4,
             Self::Bundle(BundleError::NoBundle { .. } | BundleError::Schema { .. }) => 3,
             Self::Bundle(_) => 5,
             _ => 3,

@@ -1,14 +1,17 @@
 #!/usr/bin/env python3
-"""Which surface files fluxform reads, and whether as other readers do: a table for each format.
+"""Which surface files fluxform and other readers read right: a table for each format.
 
-    python3 scripts/peers/compare_readers.py FOLDER [--fluxform BINARY] [--python PYTHON]
+    pip install -r scripts/peers/requirements_readers.txt
+    python3 scripts/peers/compare_readers.py FOLDER [--fluxform BINARY] [--python PYTHON] [--rows]
 
-Every surface file below FOLDER (files of equal content once) goes through `discretize --inspect`
-and, where PYTHON has them, trimesh, meshio and pymeshlab. A file is right where its area and box
-agree with those of a peer to 1e-4 of their size, wrong where every peer that read triangles of it
-disagrees, else nobody else read it. Peers keep a file's own units and repeat nothing else.
-Prints a Markdown table, then the reasons of refusals with a count and an example of each, then
-the files that are wrong.
+Every surface file below FOLDER (files of equal content once) goes through `discretize --inspect` and
+through the peers of its format that PYTHON has; OpenSCAD reads AMF where it is installed. What two
+readers at least agree on, in area and box to 1e-4 of their size, is the truth, of several the one that
+most agree on. A reader is right where it agrees, wrong where it does not, and refuses where it
+finds no triangle. Where no two agree a file counts under `no truth`, with how many of these fluxform
+reads; where nobody finds a triangle (points, empty or broken files) under `no surface`. Peers are
+given the file's own units. Prints a Markdown table, then fluxform's refusals by reason with an
+example of each (* where the truth is known), then the files that it reads wrong.
 """
 
 import argparse
@@ -16,67 +19,165 @@ import collections
 import hashlib
 import json
 import re
+import select
+import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 PEER = r"""
-import json, sys, warnings
+import json, os, sys, warnings
 warnings.filterwarnings("ignore")
-name, path = sys.argv[1:]
+out = os.fdopen(os.dup(1), "w")
+os.dup2(2, 1)
+name = sys.argv[1]
 import numpy as np
 if name == "trimesh":
     import trimesh
-    mesh = trimesh.load(path, force="mesh", process=False)
-    points, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    def read(path):
+        mesh = trimesh.load(path, force="mesh", process=False)
+        return np.asarray(mesh.vertices), np.asarray(mesh.faces)
 elif name == "meshio":
     import meshio
-    mesh = meshio.read(path)
-    points, faces = mesh.points, []
-    for cells in mesh.cells:
-        if cells.type in ("triangle", "quad"):
-            data = cells.data
-            faces.append(data[:, :3])
-            if cells.type == "quad":
-                faces.append(data[:, [0, 2, 3]])
-    faces = np.concatenate(faces)
+    def read(path):
+        mesh = meshio.read(path)
+        faces = []
+        for cells in mesh.cells:
+            if cells.type in ("triangle", "quad"):
+                faces.append(cells.data[:, :3])
+                if cells.type == "quad":
+                    faces.append(cells.data[:, [0, 2, 3]])
+        return np.asarray(mesh.points, float), np.concatenate(faces)
+elif name == "open3d":
+    import open3d
+    open3d.utility.set_verbosity_level(open3d.utility.VerbosityLevel.Error)
+    def read(path):
+        mesh = open3d.io.read_triangle_mesh(path)
+        return np.asarray(mesh.vertices), np.asarray(mesh.triangles)
+elif name == "lib3mf":
+    import lib3mf
+    wrapper = lib3mf.get_wrapper()
+    def read(path):
+        model = wrapper.CreateModel()
+        model.QueryReader("3mf").ReadFromFile(path)
+        points, faces, count = [], [], 0
+        def place(item, known):
+            f = item.GetTransform().Fields if hasattr(item, "GetTransform") else item.GetObjectTransform().Fields
+            rows = np.array([[f[i][k] for k in range(3)] for i in range(4)])
+            return [rows] + known
+        def add(obj, moves):
+            nonlocal count
+            if obj.IsComponentsObject():
+                for k in range(obj.GetComponentCount()):
+                    component = obj.GetComponent(k)
+                    add(component.GetObjectResource(), place(component, moves))
+                return
+            own = np.array([v.Coordinates[:] for v in obj.GetVertices()], float).reshape(-1, 3)
+            for rows in moves:
+                own = own @ rows[:3] + rows[3]
+            points.append(own)
+            faces.append(np.array([t.Indices[:] for t in obj.GetTriangleIndices()], int).reshape(-1, 3) + count)
+            count += len(own)
+        items = model.GetBuildItems()
+        while items.MoveNext():
+            item = items.GetCurrent()
+            add(item.GetObjectResource(), place(item, []))
+        return np.concatenate(points), np.concatenate(faces)
 else:
     import pymeshlab
-    meshes = pymeshlab.MeshSet()
-    meshes.load_new_mesh(path)
-    mesh = meshes.current_mesh()
-    points, faces = mesh.vertex_matrix(), mesh.face_matrix()
-corners = points[faces]
-cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-used = points[np.unique(faces)]
-print(json.dumps({"area": float(0.5 * np.linalg.norm(cross, axis=1).sum()),
-                  "size": (used.max(0) - used.min(0)).tolist(), "triangles": len(faces)}))
+    def read(path):
+        meshes = pymeshlab.MeshSet()
+        meshes.load_new_mesh(path)
+        points, faces, count = [], [], 0
+        for k in range(meshes.mesh_number()):
+            mesh = meshes.mesh(k)
+            points.append(mesh.vertex_matrix())
+            faces.append(mesh.face_matrix() + count)
+            count += len(points[-1])
+        return np.concatenate(points), np.concatenate(faces)
+print("ready", file=out, flush=True)
+for line in sys.stdin:
+    try:
+        points, faces = read(json.loads(line))
+        corners = points[faces]
+        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        used = points[np.unique(faces)]
+        found = {"area": float(0.5 * np.linalg.norm(cross, axis=1).sum()),
+                 "size": (used.max(0) - used.min(0)).tolist(), "triangles": len(faces)}
+    except Exception as error:
+        found = {"triangles": 0, "area": 0.0, "why": str(error)[:200]}
+    print(json.dumps(found), file=out, flush=True)
 """
-PEERS = ["trimesh", "meshio", "pymeshlab"]
-ENDINGS = "stl obj ply off glb 3mf amf 3dxml sldprt sldasm step stp png".split()
+PEERS = {
+    "trimesh": "stl obj ply off glb 3mf 3dxml",
+    "meshio": "stl obj ply off",
+    "open3d": "stl obj ply off glb",
+    "pymeshlab": "stl obj ply off glb 3mf",
+    "lib3mf": "3mf",
+}
+ENDINGS = "stl obj ply off glb 3mf amf 3dxml".split()
 PATIENCE_S = 60
 SAME = 1e-4
 
 
-def run(command):
+class Peer:
+    """A reader in a process of its own, which is started again after a crash or a hang."""
+
+    def __init__(self, python, name):
+        self.command, self.process = [python, "-c", PEER, name], None
+
+    def line(self):
+        ready, _, _ = select.select([self.process.stdout], [], [], PATIENCE_S)
+        return self.process.stdout.readline() if ready else ""
+
+    def read(self, path):
+        if self.process is None:
+            self.process = subprocess.Popen(self.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                            stderr=subprocess.DEVNULL, text=True)
+            if self.line().strip() != "ready":
+                sys.exit(f"{self.command[-1]} cannot be started")
+        try:
+            self.process.stdin.write(json.dumps(path) + "\n")
+            self.process.stdin.flush()
+            line = self.line()
+        except OSError:
+            line = ""
+        if not line:
+            self.process.kill()
+            self.process.wait()
+            self.process = None
+            return None
+        found = json.loads(line)
+        return found if found["triangles"] > 0 and found["area"] > 0.0 else None
+
+
+class OpenScad:
+    """What OpenSCAD makes of an AMF file, through OFF."""
+
+    def __init__(self, through):
+        self.through = through
+
+    def read(self, path):
+        with tempfile.TemporaryDirectory() as folder:
+            off = f"{folder}/a.off"
+            command = ["openscad", "-q", "-o", off, "-D", f"path={json.dumps(path)}", "/dev/stdin"]
+            try:
+                subprocess.run(command, input="import(path);", text=True, capture_output=True, timeout=PATIENCE_S)
+            except subprocess.TimeoutExpired:
+                return None
+            return self.through.read(off) if Path(off).exists() else None
+
+
+def ours(binary, path):
+    command = [binary, "discretize", path, "--inspect", "--format", "json"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S)
     except subprocess.TimeoutExpired:
         return None, f"longer than {PATIENCE_S} s"
     if done.returncode != 0:
-        lines = (done.stderr or done.stdout).strip().splitlines()
-        return None, " ".join(lines)[:400] or f"exit code {done.returncode}"
-    try:
-        return json.loads(done.stdout), ""
-    except json.JSONDecodeError:
-        return None, "no JSON"
-
-
-def ours(binary, path):
-    found, why = run([binary, "discretize", path, "--inspect", "--format", "json"])
-    if found is None:
-        return None, why
-    surface = found["surface"]
+        return None, " ".join((done.stderr or done.stdout).split())[:600] or f"exit code {done.returncode}"
+    surface = json.loads(done.stdout)["surface"]
     size = [b - a for a, b in zip(surface["bounds_min"], surface["bounds_max"])]
     return {"area": surface["area"], "size": size, "triangles": surface["triangles"]}, ""
 
@@ -89,66 +190,79 @@ def agree(mine, other):
             and all(abs(a - b) <= SAME * largest for a, b in pairs))
 
 
+def truth(readings):
+    """The reading that most agree on, if two do."""
+    votes = [(sum(agree(one, other) for other in readings), k) for k, one in enumerate(readings)]
+    most, k = max(votes, default=(0, 0), key=lambda vote: vote[0])
+    return readings[k] if most >= 2 else None
+
+
 def reason(text):
     """A refusal without names and numbers of its file."""
-    text = re.sub(r"^.*?\.\w{2,6}: ", "", text.replace("\n", " "))
+    text = re.sub(r'^.*?"message": ?"', "", text)
+    text = re.sub(r"^.*?\.\w{2,6}: ", "", re.sub(r"^.*?\.\w{2,6}\W*: ", "", text))
     return re.sub(r"`[^`]*`|\d[\d.e+-]*", "_", text)[:90]
 
 
 def main():
-    parser = argparse.ArgumentParser()
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--fluxform", default="target/release/fluxform")
     parser.add_argument("--python", default=sys.executable)
+    parser.add_argument("--rows", action="store_true", help="a line for each file")
     arguments = parser.parse_args()
     seen, files = set(), collections.defaultdict(list)
     for path in sorted(p for p in arguments.folder.rglob("*") if p.is_file()):
         ending = path.suffix[1:].lower()
-        if ending in ENDINGS:
-            digest = hashlib.sha256(path.read_bytes()).digest()
-            if digest not in seen:
-                seen.add(digest)
-                files[ending].append(str(path))
-    there = [peer for peer in PEERS
-             if subprocess.run([arguments.python, "-c", f"import {peer}"],
-                               capture_output=True).returncode == 0]
-    print("| format | files | read | right | wrong | nobody else | refused | "
-          + " | ".join(f"{peer} reads" for peer in there) + " |")
-    print("|---" * (7 + len(there)) + "|", flush=True)
+        digest = hashlib.sha256(path.read_bytes()).digest() if ending in ENDINGS else None
+        if digest is not None and digest not in seen:
+            seen.add(digest)
+            files[ending].append(str(path.resolve()))
+    command = [arguments.python, "-c", "import importlib.metadata as m,sys;print(m.version(sys.argv[1]))"]
+    versions = {name: subprocess.run([*command, name], capture_output=True, text=True).stdout.strip() for name in PEERS}
+    peers = {name: (Peer(arguments.python, name), PEERS[name].split()) for name in PEERS if versions[name]}
+    if shutil.which("openscad"):
+        version = subprocess.run(["openscad", "--version"], capture_output=True, text=True)
+        versions["openscad"] = (version.stdout + version.stderr).split()[-1]
+        peers["openscad"] = (OpenScad(peers["trimesh"][0]), ["amf"])
+    print("Right / wrong / refused: " + ", ".join(f"{name} {versions[name]}" for name in peers) + "\n")
+    print("| format | files | fluxform | " + " | ".join(peers) + " | no truth (read) | no surface |")
+    print("|---" * (5 + len(peers)) + "|", flush=True)
     reasons, wrong = collections.defaultdict(list), []
-    for ending in ENDINGS:
+    for ending in filter(files.get, ENDINGS):
         count = collections.Counter()
         for path in files[ending]:
             mine, why = ours(arguments.fluxform, path)
-            others = {}
-            for peer in there:
-                if not ending.startswith(("sld", "st")) or ending == "stl":
-                    found, _ = run([arguments.python, "-c", PEER, peer, path])
-                    if found is not None and found["triangles"] > 0 and found["area"] > 0:
-                        others[peer] = found
-                        count[peer] += 1
+            found = {name: peer.read(path) for name, (peer, takes) in peers.items() if ending in takes}
+            found["fluxform"] = mine
+            known = truth([reading for reading in found.values() if reading is not None])
             if mine is None:
-                count["refused"] += 1
-                reasons[ending, reason(why)].append(path + (" *" if others else ""))
-            elif not others:
-                count["alone"] += 1
-            elif any(agree(mine, other) for other in others.values()):
-                count["right"] += 1
+                reasons[ending, reason(why)].append(path + (" *" if known else ""))
+            if known is None:
+                count["no truth" if any(found.values()) else "no surface"] += 1
+                count["alone"] += mine is not None
+                verdicts = {}
             else:
-                count["wrong"] += 1
-                wrong.append((path, mine, others))
-        if files[ending]:
-            total = len(files[ending])
-            row = [total, total - count["refused"], count["right"], count["wrong"],
-                   count["alone"], count["refused"]] + [count[peer] for peer in there]
-            print(f"| {ending} | " + " | ".join(map(str, row)) + " |", flush=True)
-    print("\nRefused (* where a peer read triangles):\n")
+                verdicts = {name: "refused" if reading is None else "right" if agree(known, reading) else "wrong"
+                            for name, reading in found.items()}
+                count.update(verdicts.items())
+            if verdicts.get("fluxform") == "wrong":
+                wrong.append((path, found))
+            if arguments.rows:
+                print(path, verdicts, file=sys.stderr, flush=True)
+        kinds = ("right", "wrong", "refused")
+        takes = {name: ending in formats for name, (_, formats) in peers.items()} | {"fluxform": True}
+        cells = [" / ".join(str(count[name, kind]) for kind in kinds) if takes[name] else ""
+                 for name in ("fluxform", *peers)]
+        cells += [f"{count['no truth']} ({count['alone']})", count["no surface"]]
+        print(f"| {ending} | {len(files[ending])} | " + " | ".join(map(str, cells)) + " |", flush=True)
+    print("\nRefused by fluxform (* where the truth is known):\n")
     for (ending, why), paths in sorted(reasons.items()):
-        stars = sum(path.endswith("*") for path in paths)
-        print(f"- {ending}, {len(paths)} ({stars} *): {why} ({Path(paths[0]).name})")
+        stars = sorted(path for path in paths if path.endswith("*"))
+        print(f"- {ending}, {len(paths)} ({len(stars)} *): {why} ({Path((stars or paths)[0]).name})")
     print("\nWrong:\n")
-    for path, mine, others in wrong:
-        print(f"- {Path(path).name}: {mine} against {others}")
+    for path, found in wrong:
+        print(f"- {Path(path).name}: {found}")
 
 
 if __name__ == "__main__":

@@ -312,6 +312,10 @@ pub struct WorstPointFile {
     pub active: Option<Vec<ActivePoint>>,
     /// Where t* turns, lambda ascending; between them t* and the currents are linear in lambda.
     pub path: Vec<WorstPointStep>,
+    /// Present and true where `path` is empty because it turns too often to be followed; the
+    /// constants and currents hold all the same.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub path_left_out: bool,
 }
 
 /// A turn of t*.

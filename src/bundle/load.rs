@@ -254,6 +254,32 @@ impl Bundle {
     }
 }
 
+/// Folders between the one of all results and a bundle: a design's, and the bundle.
+const BUNDLES_DEPTH: usize = 2;
+
+/// The bundles below `folder`, in the order of their names.
+#[must_use]
+pub fn bundles_below(folder: &Path) -> Vec<PathBuf> {
+    fn add(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) {
+        let Ok(entries) = std::fs::read_dir(folder) else {
+            return;
+        };
+        let folders = entries.filter_map(|entry| Some(entry.ok()?.path()));
+        let mut folders: Vec<PathBuf> = folders.filter(|path| path.is_dir()).collect();
+        folders.sort();
+        for path in folders {
+            if path.join("manifest.json").is_file() {
+                found.push(path);
+            } else if depth > 1 {
+                add(&path, depth - 1, found);
+            }
+        }
+    }
+    let mut found = Vec::new();
+    add(folder, BUNDLES_DEPTH, &mut found);
+    found
+}
+
 /// Parts of every bundle.
 const REQUIRED: [&str; 4] = ["map.npz", "points.csv", "currents.csv", "lambda.json"];
 

@@ -7,7 +7,7 @@ use csv::{ByteRecord, ReaderBuilder, Trim};
 use super::table::{CurrentRow, RowColumn};
 
 /// No more faults than this are reported.
-const MAX_FAULTS: usize = 20;
+const MAX_FAULTS: usize = 5;
 
 /// Faults of a table.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -86,7 +86,7 @@ impl<'a> Line<'a> {
 /// A byte order mark, CRLF and blanks around cells are tolerated.
 ///
 /// # Errors
-/// Every missing or doubled column, or every cell that is not a finite number (the first twenty).
+/// Every missing or doubled column, or every cell that is not a finite number (the first five).
 pub fn read_columns(
     name: &str,
     source: impl Read,
@@ -105,6 +105,8 @@ pub(crate) fn read_numbered(
     wanted: &[&str],
 ) -> Result<(Vec<Vec<f64>>, Vec<u64>), TableError> {
     let text = whole(name, source)?;
+    let separator = separated_by_commas(name, &text, wanted);
+    separator.map_or(Ok(()), |fault| Err(TableError::one(fault)))?;
     let mut reader = ReaderBuilder::new()
         .trim(Trim::All)
         .flexible(true)
@@ -140,11 +142,7 @@ pub(crate) fn read_numbered(
             }
         };
         if record.len() != header.len() {
-            fault(format!(
-                "{} cells, expected {} as in the header",
-                record.len(),
-                header.len()
-            ));
+            fault(other_cells(record.len(), header.len()));
             continue;
         }
         lines.push(line);
@@ -153,10 +151,7 @@ pub(crate) fn read_numbered(
             match cell.parse::<f64>() {
                 Ok(value) if value.is_finite() => column.push(value),
                 _ => {
-                    let shown: String = cell.chars().take(40).collect();
-                    fault(format!(
-                        "column {wanted}: expected a finite number, found {shown:?}"
-                    ));
+                    fault(not_a_number(wanted, cell));
                 }
             }
         }
@@ -169,6 +164,54 @@ pub(crate) fn read_numbered(
     } else {
         Err(TableError { faults })
     }
+}
+
+fn other_cells(found: usize, expected: usize) -> String {
+    let commas = if found == 2 * expected {
+        "; write decimal points, 0.7 for 0,7"
+    } else {
+        ""
+    };
+    format!("{found} cells, expected {expected} as in the header{commas}")
+}
+
+fn not_a_number(column: &str, cell: &str) -> String {
+    let shown: String = cell.chars().take(40).collect();
+    let point = cell.replacen(',', ".", 1);
+    let decimal = point != cell && point.parse::<f64>().is_ok();
+    let advice = if decimal {
+        format!("; write a decimal point, {point}")
+    } else {
+        String::new()
+    };
+    format!("column {column}: expected a finite number, found {shown:?}{advice}")
+}
+
+/// What is wrong with a table that is empty, or whose first line has the expected columns and another
+/// separator than commas.
+fn separated_by_commas(name: &str, text: &[u8], wanted: &[&str]) -> Option<String> {
+    let first = text
+        .split(|byte| matches!(byte, b'\n' | b'\r'))
+        .find(|line| !line.is_empty());
+    let Some(first) = first else {
+        let columns = wanted.join(",");
+        return Some(format!(
+            "{name}: the table is empty; expected a header line with {columns}"
+        ));
+    };
+    let line = String::from_utf8_lossy(first);
+    let other = [(';', "semicolons"), ('\t', "tabs")]
+        .into_iter()
+        .find(|(separator, _)| {
+            let cells: Vec<&str> = line.split(*separator).map(str::trim).collect();
+            cells.len() > 1 && wanted.iter().any(|column| cells.contains(column))
+        });
+    other.map(|(_, separators)| {
+        format!(
+            "{name}:1: the columns are separated by {separators}, expected commas; save it as CSV with \
+             commas between the columns and decimal points in the numbers"
+        )
+    })
 }
 
 fn find_columns(name: &str, header: &[String], wanted: &[&str]) -> Result<Vec<usize>, TableError> {
@@ -337,8 +380,8 @@ mod tests {
         assert_eq!(error.faults.len(), 3);
         let many = format!("x_m,y_m,z_m\n{}", "a,b,c\n".repeat(50));
         let error = read_positions("p.csv", many.as_bytes()).unwrap_err();
-        assert_eq!(error.faults.len(), 21);
-        assert_eq!(error.faults[20], "p.csv: and 130 faults more");
+        assert_eq!(error.faults.len(), 6);
+        assert_eq!(error.faults[5], "p.csv: and 145 faults more");
         assert!(read_positions("p.csv", "".as_bytes()).is_err());
         assert!(read_positions("p.csv", &b"\xff\xfe\x00,1\n"[..]).is_err());
     }

@@ -16,34 +16,38 @@ use crate::shape::step::STEP_SECONDS;
 #[command(next_help_heading = "Common options")]
 pub struct Common {
     /// How results are printed: a summary for people, or one JSON object in SI units
-    #[arg(long, global = true, value_enum, default_value_t = Format::Human)]
+    #[arg(long, global = true, hide_short_help = true, value_enum, default_value_t = Format::Human)]
     pub format: Format,
     /// Say nothing but errors and the data asked for (JSON, CSV, `--out -`)
-    #[arg(short, long, global = true)]
+    #[arg(short, long, global = true, hide_short_help = true)]
     pub quiet: bool,
     /// Threads to compute with [default: all cores]; results do not depend on it
-    #[arg(long, global = true, value_name = "N", value_parser = values::threads, allow_hyphen_values = true)]
+    #[arg(long, global = true, hide_short_help = true, value_name = "N", value_parser = values::threads, allow_hyphen_values = true)]
     pub threads: Option<usize>,
     /// Memory that the run may take, like 20GB [default: three quarters of what is free]; more is
     /// refused before anything is computed
-    #[arg(long, global = true, value_name = "SIZE", value_parser = values::memory)]
+    #[arg(long, global = true, hide_short_help = true, value_name = "SIZE", value_parser = values::memory)]
     pub memory: Option<u64>,
     /// Python that has OpenCASCADE (`pip install cadquery-ocp`), which reads STEP files [default:
     /// python3]
     #[arg(
         long,
         global = true,
+        hide_short_help = true,
         value_name = "FILE",
         env = "FLUXFORM_PYTHON",
         hide_env_values = true
     )]
     pub python: Option<PathBuf>,
     /// Processor time that reading a STEP file may take, in seconds
-    #[arg(long, global = true, value_name = "N", default_value_t = STEP_SECONDS,
+    #[arg(long, global = true, hide_short_help = true, value_name = "N", default_value_t = STEP_SECONDS,
           value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub step_seconds: u64,
+    /// Refuse a design that leaves a physical number to its default, naming every such key
+    #[arg(long, global = true, hide_short_help = true)]
+    pub strict_inputs: bool,
     /// Colours in messages; `auto` means on terminals, unless NO_COLOR is set
-    #[arg(long, global = true, value_enum, default_value_t = Colour::Auto, value_name = "WHEN")]
+    #[arg(long, global = true, hide_short_help = true, value_enum, default_value_t = Colour::Auto, value_name = "WHEN")]
     pub color: Colour,
 }
 
@@ -73,7 +77,7 @@ pub struct Tolerance {
     /// Allowed error relative to |grad B| at the point (maps and steel: to the largest |grad B| at
     /// that height), 1e-15 to 1e-1 [default: in air 1e-12, its maps 1e-9; one coil with a steel
     /// core 1e-6, arrays with coupled cores 1e-4; along a B-H curve 3e-4]
-    #[arg(long, value_name = "T", value_parser = values::tolerance, allow_hyphen_values = true)]
+    #[arg(long, hide_short_help = true, value_name = "T", value_parser = values::tolerance, allow_hyphen_values = true)]
     pub tolerance: Option<f64>,
 }
 
@@ -111,8 +115,10 @@ impl ErrorFlags {
 /// Where what is written may replace what is there.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Writing {
-    /// Replace existing files too that are not known to be output of the same inputs and options,
-    /// unchanged since; never what is read
+    /// Replace existing files too
+    ///
+    /// Also those that are not known to be output of the same inputs and options, unchanged since;
+    /// never what is read.
     #[arg(long)]
     pub force: bool,
 }
@@ -127,48 +133,53 @@ pub struct SurfaceFlags {
     #[arg(long, value_name = "UNIT", value_parser = values::unit)]
     pub unit: Option<f64>,
     /// Enlarge by a factor, or by factors along x, y and z, before anything else
-    #[arg(long, value_name = "S|X,Y,Z", value_parser = values::scale)]
+    #[arg(long, hide_short_help = true, value_name = "S|X,Y,Z", value_parser = values::scale)]
     pub scale: Option<values::Scale>,
     /// Allow factors that differ, which change the surface's form
-    #[arg(long, requires = "scale")]
+    #[arg(long, hide_short_help = true, requires = "scale")]
     pub stretch: bool,
     /// Rotate about x, then y, then z, in degrees, before translating
-    #[arg(long, value_name = "X,Y,Z", value_parser = values::rotation, allow_hyphen_values = true)]
+    #[arg(long, hide_short_help = true, value_name = "X,Y,Z", value_parser = values::rotation, allow_hyphen_values = true)]
     pub rotate: Option<values::Rotation>,
-    /// Move by so many millimetres
-    #[arg(long, value_name = "X,Y,Z", value_parser = values::translation, allow_hyphen_values = true)]
+    /// Move by so much, in millimetres or with units (0,0,3cm)
+    #[arg(long, hide_short_help = true, value_name = "X,Y,Z", value_parser = values::translation, allow_hyphen_values = true)]
     pub translate: Option<values::Translation>,
     /// The file's direction that points up: x, y, z, -x, -y or -z [default: z]
-    #[arg(long, value_name = "AXIS", value_parser = values::up, allow_hyphen_values = true)]
+    #[arg(long, hide_short_help = true, value_name = "AXIS", value_parser = values::up, allow_hyphen_values = true)]
     pub up: Option<Up>,
     /// Bring the middle of the surface's box to x = y = 0
-    #[arg(long, conflicts_with = "fit")]
+    #[arg(long, hide_short_help = true, conflicts_with = "fit")]
     pub center: bool,
     /// Put the lowest point of the surface at this height above the windings, like 20mm
-    #[arg(long, value_name = "LENGTH", value_parser = values::height, allow_hyphen_values = true)]
+    #[arg(long, hide_short_help = true, value_name = "LENGTH", value_parser = values::height, allow_hyphen_values = true)]
     pub rest_on: Option<f64>,
     /// Move the surface into a box: to its middle in x and y, onto its lower end in z; a design
-    /// (TOML) for its workspace, or X0,X1,Y0,Y1,Z0,Z1 in millimetres
-    #[arg(long, value_name = "DESIGN|BOX", allow_hyphen_values = true)]
+    /// (TOML) for its workspace, or X0,X1,Y0,Y1,Z0,Z1
+    #[arg(
+        long,
+        hide_short_help = true,
+        value_name = "DESIGN|BOX",
+        allow_hyphen_values = true
+    )]
     pub fit: Option<String>,
     /// Also scale it to fill that box
-    #[arg(long, requires = "fit")]
+    #[arg(long, hide_short_help = true, requires = "fit")]
     pub scale_to_fit: bool,
     /// STEP: farthest that a facet may lie from its face, like 0.01mm [default: a 4000th of the
     /// diagonal of the bodies' box]
-    #[arg(long, value_name = "LENGTH", value_parser = values::length_with_unit)]
+    #[arg(long, hide_short_help = true, value_name = "LENGTH", value_parser = values::length_with_unit)]
     pub chord: Option<f64>,
     /// STEP: the one body or assembly to read, by name or number (see --inspect)
-    #[arg(long, value_name = "N|NAME")]
+    #[arg(long, hide_short_help = true, value_name = "N|NAME")]
     pub body: Option<String>,
     /// Constraint points along x and y [default: 61x61]
-    #[arg(long, value_name = "NxM", value_parser = values::grid_size)]
+    #[arg(long, hide_short_help = true, value_name = "NxM", value_parser = values::grid_size)]
     pub grid: Option<values::GridSize>,
-    /// Extent of the points along x in millimetres [default: the surface's own]
-    #[arg(long, value_name = "FROM,TO", value_parser = values::ends, allow_hyphen_values = true)]
+    /// Extent of the points along x, like -50,50 or -5cm,5cm [default: the surface's own]
+    #[arg(long, hide_short_help = true, value_name = "FROM,TO", value_parser = values::ends, allow_hyphen_values = true)]
     pub x: Option<values::Ends>,
-    /// Extent of the points along y in millimetres [default: the surface's own]
-    #[arg(long, value_name = "FROM,TO", value_parser = values::ends, allow_hyphen_values = true)]
+    /// Extent of the points along y [default: the surface's own]
+    #[arg(long, hide_short_help = true, value_name = "FROM,TO", value_parser = values::ends, allow_hyphen_values = true)]
     pub y: Option<values::Ends>,
 }
 
@@ -178,6 +189,7 @@ pub struct SamplingFlags {
     /// Choose points until bilinear patches between them lie this near to the surface (0.1mm)
     #[arg(
         long,
+        hide_short_help = true,
         value_name = "LENGTH",
         value_parser = values::length_with_unit,
         conflicts_with = "weights"
@@ -187,6 +199,7 @@ pub struct SamplingFlags {
     /// lowest height, over which forces change little]
     #[arg(
         long,
+        hide_short_help = true,
         value_name = "LENGTH",
         value_parser = values::length_with_unit,
         requires = "max_deviation"
@@ -195,13 +208,20 @@ pub struct SamplingFlags {
     /// Choose points at random, none nearer to another than this (2mm)
     #[arg(
         long,
+        hide_short_help = true,
         value_name = "SPACING",
         value_parser = values::length_with_unit,
         conflicts_with_all = ["max_deviation", "weights"]
     )]
     poisson: Option<f64>,
     /// Which random points
-    #[arg(long, value_name = "N", default_value_t = 0, requires = "poisson")]
+    #[arg(
+        long,
+        hide_short_help = true,
+        value_name = "N",
+        default_value_t = 0,
+        requires = "poisson"
+    )]
     seed: u64,
 }
 

@@ -45,6 +45,8 @@ pub enum Code {
     Sweep,
     /// A measurement that could not be made.
     Measurement,
+    /// An object that the array cannot render where it is.
+    Placement,
     /// A check of `verify` or a case of `fluxform-bench --extreme` failed.
     Check,
     /// A bundle that was changed or damaged.
@@ -55,7 +57,7 @@ pub enum Code {
 
 impl Code {
     /// Every code, in the order of their names.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 22] = [
         Self::Internal,
         Self::Arguments,
         Self::SurfaceUnit,
@@ -74,6 +76,7 @@ impl Code {
         Self::Output,
         Self::Sweep,
         Self::Measurement,
+        Self::Placement,
         Self::Check,
         Self::Damaged,
         Self::Interrupted,
@@ -129,6 +132,11 @@ impl Code {
                 "points of a sweep that failed, are missing or belong to another one",
             ),
             Self::Measurement => ("E408", Some(Unmet), "a measurement that could not be made"),
+            Self::Placement => (
+                "E409",
+                Some(Unmet),
+                "an object that the array cannot render where it is",
+            ),
             Self::Check => ("E501", Some(Verification), "a check failed"),
             Self::Damaged => (
                 "E502",

@@ -12,10 +12,14 @@ use crate::bundle::read_table::{TABLE_MAX_BYTES, read_columns};
 use crate::bundle::scan::Scan;
 use crate::bundle::sweep::PlanFile;
 use crate::bundle::trajectory::Trajectory;
-use crate::design::{Design, Faults, InvalidDocument, Need, source};
+use crate::design::keys::Assumed;
+use crate::design::message_text::shown_path;
+use crate::design::{Design, Fault, Faults, InvalidDocument, Need, source};
 use crate::scene::sources::ShapeSource;
-use crate::shape::document::{Fit, Placement, RawSurface, RawSurfaceError, Seat, ShapeDocument};
-use crate::shape::step::BodyOptions;
+use crate::shape::bodies::BodyOptions;
+use crate::shape::document::{
+    Fit, Placement, RawSurface, RawSurfaceError, Seat, ShapeDocument, SurfaceFormat,
+};
 
 /// Samples of a surface that says nothing of its grid.
 const SAMPLES: GridSize = GridSize([61, 61]);
@@ -47,10 +51,97 @@ pub fn design(
     need: Need,
     printer: &Printer,
 ) -> Result<DesignDocument, Failure> {
+    in_order(Some(file), &[])?;
     let (document, warnings) =
         read_design(file, need).map_err(|fault| Failure::Documents(vec![fault]))?;
-    printer.document_warnings(&warnings);
+    taken(&document, &warnings, printer)?;
     Ok(document)
+}
+
+/// Reports what there is to say of a design that was read.
+///
+/// # Errors
+/// With `--strict-inputs`, every default that decides a number.
+fn taken(document: &DesignDocument, warnings: &Faults, printer: &Printer) -> Result<(), Failure> {
+    let assumed = &document.design.assumed;
+    printer.document_warnings(warnings);
+    if !printer.strict_inputs() || assumed.is_empty() {
+        printer.assumed(assumed);
+        return Ok(());
+    }
+    let named = |one: &Assumed| format!("{} = {}", one.key, one.value);
+    let message = format!(
+        "expected every number to be written (--strict-inputs); not written, with their defaults: {}",
+        assumed.iter().map(named).collect::<Vec<_>>().join(", ")
+    );
+    let help = "write these keys; `fluxform keys` explains each";
+    let fault = Fault::error("", message).help(help);
+    let faults = Faults::new(Path::new(&document.input.path), &document.text, vec![fault]);
+    Err(Failure::Documents(vec![InvalidDocument { faults }]))
+}
+
+/// What a file is, as far as its name and its first keys say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum FileKind {
+    Design,
+    Shape,
+    Unknown,
+}
+
+impl FileKind {
+    /// A surface by its ending, a document by the keys that only one kind has.
+    fn of(file: &FileArgument) -> Self {
+        let FileArgument::Path(path) = file else {
+            return Self::Unknown;
+        };
+        if SurfaceFormat::of(path).is_some() {
+            return Self::Shape;
+        }
+        let text = source::text_of(path).ok();
+        let Some(table) = text.and_then(|text| text.parse::<toml::Table>().ok()) else {
+            return Self::Unknown;
+        };
+        let has = |keys: &[&str]| keys.iter().any(|key| table.contains_key(*key));
+        match (
+            has(&["coil", "wire", "magnet", "supply"]),
+            has(&["surface", "primitive"]),
+        ) {
+            (true, false) => Self::Design,
+            (false, true) => Self::Shape,
+            _ => Self::Unknown,
+        }
+    }
+}
+
+/// Refuses a shape where a design was expected, and a design where a shape was.
+fn in_order(design: Option<&FileArgument>, shapes: &[FileArgument]) -> Result<(), Failure> {
+    let shown = |file: &FileArgument| shown_path(file.as_given());
+    if let Some(design) = design.filter(|file| FileKind::of(file) == FileKind::Shape) {
+        let order = if shapes.is_empty() {
+            "expected a DESIGN"
+        } else {
+            "the order is DESIGN SHAPE"
+        };
+        return Err(Failure::Usage(format!(
+            "{} is a shape: {order}",
+            shown(design)
+        )));
+    }
+    match shapes
+        .iter()
+        .find(|file| FileKind::of(file) == FileKind::Design)
+    {
+        Some(shape) => Err(Failure::Usage(format!(
+            "{} is a design: expected a SHAPE{}",
+            shown(shape),
+            if design.is_some() {
+                " here; the order is DESIGN SHAPE"
+            } else {
+                ""
+            }
+        ))),
+        None => Ok(()),
+    }
 }
 
 /// A design and shapes.
@@ -65,11 +156,12 @@ pub fn design_and_shapes(
     printer: &Printer,
 ) -> Result<(DesignDocument, Vec<ShapeSource>), Failure> {
     one_standard_input(std::iter::once(design_file).chain(shape_files))?;
+    in_order(Some(design_file), shape_files)?;
     let design = read_design(design_file, need);
     let shapes = read_shapes(shape_files, flags);
     match (design, shapes) {
         (Ok((design, warnings)), Ok(shapes)) => {
-            printer.document_warnings(&warnings);
+            taken(&design, &warnings, printer)?;
             Ok((design, with_warnings(shapes, printer)))
         }
         (Err(fault), Err(Failure::Documents(mut faults))) => {
@@ -91,6 +183,7 @@ pub fn shapes(
     flags: &SurfaceFlags,
     printer: &Printer,
 ) -> Result<Vec<ShapeSource>, Failure> {
+    in_order(None, files)?;
     Ok(with_warnings(read_shapes(files, flags)?, printer))
 }
 
@@ -102,6 +195,10 @@ pub fn points(file: &FileArgument) -> Result<(Vec<[f64; 3]>, Input), Failure> {
     let name = file.as_given().display().to_string();
     let bytes = bytes_of(file, "a CSV table with columns x_m,y_m,z_m")?;
     let columns = read_columns(&name, bytes.as_slice(), &["x_m", "y_m", "z_m"])?;
+    if columns[0].is_empty() {
+        let message = format!("{name}: the table has a header and no rows: expected a point a row");
+        return Err(Failure::Input(message));
+    }
     let points = (0..columns[0].len())
         .map(|row| [columns[0][row], columns[1][row], columns[2][row]])
         .collect();

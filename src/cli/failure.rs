@@ -9,8 +9,9 @@ use super::exit::Exit;
 use crate::RunError;
 use crate::bundle::atomic::WriteError;
 use crate::bundle::json::JsonError;
-use crate::bundle::load::BundleError;
+use crate::bundle::load::{BundleError, bundles_below};
 use crate::bundle::read_table::TableError;
+use crate::design::message_text::shown_path;
 use crate::design::{Faults, InvalidDocument};
 
 /// Why a command did not end well.
@@ -55,6 +56,8 @@ pub enum Wish {
     Limits,
     /// One with a force constant.
     ForceConstant,
+    /// An object where the array can render it.
+    Placement,
     /// The requested accuracy.
     Accuracy,
     /// A coil.
@@ -79,6 +82,7 @@ impl Failure {
             Self::Unmet(wish, _) => match wish {
                 Wish::Limits => Code::Limits,
                 Wish::ForceConstant => Code::NoForceConstant,
+                Wish::Placement => Code::Placement,
                 Wish::Accuracy => Code::Accuracy,
                 Wish::Coil => Code::NoCoil,
                 Wish::Sweep => Code::Sweep,
@@ -104,6 +108,18 @@ impl Failure {
             Self::Job(RunError::Interrupted(_)) => {
                 "interrupted; what was finished is kept, nothing is half written".to_owned()
             }
+            Self::Job(RunError::Bundle(BundleError::NoBundle { path })) => {
+                let below = bundles_below(path);
+                let named: Vec<String> = below
+                    .iter()
+                    .take(BUNDLES_NAMED)
+                    .map(|p| shown_path(p))
+                    .collect();
+                match named.as_slice() {
+                    [] => self.to_string(),
+                    _ => format!("{self}; the bundles below it: {}", named.join(", ")),
+                }
+            }
             _ => self.to_string(),
         }
     }
@@ -123,6 +139,9 @@ impl Failure {
     }
 }
 
+/// Bundles that are named where a folder above them was given.
+const BUNDLES_NAMED: usize = 8;
+
 fn code_of(error: &RunError) -> Code {
     match error {
         RunError::NotModelled(_)
@@ -139,6 +158,7 @@ fn code_of(error: &RunError) -> Code {
         }
         RunError::Bundle(_) => Code::Damaged,
         RunError::NoForceConstant(_) => Code::NoForceConstant,
+        RunError::Misplaced(_) => Code::Placement,
         RunError::Unmet(_) => Code::Measurement,
         RunError::Interrupted(_) => Code::Interrupted,
     }

@@ -87,6 +87,7 @@ fn guard(common: &Common) {
                 return;
             }
             let printer = Printer::new(common);
+            printer.erase_line();
             printer.warning(NO_POLL);
             printer.failure(&Failure::Job(RunError::Interrupted(Interrupted)));
             std::process::exit(i32::from(Exit::Interrupted.code()));

@@ -19,4 +19,5 @@ pub mod quantity;
 #[doc(hidden)]
 pub mod shell;
 pub mod start;
+pub mod terminal;
 pub mod values;

@@ -11,6 +11,7 @@ use super::values::FileArgument;
 use crate::RunError;
 use crate::bundle::artefact::Input;
 use crate::bundle::atomic::{self, Overwrite, write};
+use crate::design::message_text::shown_path;
 
 /// How the first line of a drawing or a page begins.
 const MARK: &str = "<!-- fluxform, drawn of ";
@@ -77,6 +78,7 @@ impl<'a> Picture<'a> {
             out.write_all(text.as_bytes())
         })
         .map_err(RunError::from)?;
+        printer.notice(&format!("written: {}", shown_path(path)));
         Ok(Stream::Output)
     }
 

@@ -14,8 +14,10 @@ use serde::Serialize;
 use super::args::{Colour, Common, Format};
 use super::code::Code;
 use super::failure::{Failure, FaultEntry};
+use super::terminal;
 use crate::bundle::json::to_json;
 use crate::design::Faults;
+use crate::design::keys::Assumed;
 use crate::design::message_text::{shown_path, visible};
 
 /// Bytes gathered before standard output is written to.
@@ -27,7 +29,11 @@ pub struct Printer {
     format: Format,
     quiet: bool,
     colour: bool,
+    colour_of_output: bool,
+    strict_inputs: bool,
     warnings: RefCell<Vec<String>>,
+    /// The defaults of the design that was read; `None` where none was.
+    assumed: RefCell<Option<Vec<AssumedEntry>>>,
     /// A summary as JSON that is due on standard error.
     pending: RefCell<Option<Vec<u8>>>,
 }
@@ -46,7 +52,17 @@ pub enum Stream {
 pub struct WithWarnings<'a, T> {
     #[serde(flatten)]
     result: &'a T,
+    /// Keys of the design that decide numbers, were not written, and have these values.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    assumed: Option<Vec<AssumedEntry>>,
     warnings: Vec<String>,
+}
+
+/// A key that has its default, for programs.
+#[derive(Debug, Clone, Serialize)]
+struct AssumedEntry {
+    key: String,
+    value: Option<toml::Value>,
 }
 
 #[derive(Serialize)]
@@ -96,19 +112,22 @@ impl Printer {
     /// A printer that does as the arguments say.
     #[must_use]
     pub fn new(common: &Common) -> Self {
-        let colour = match common.color {
+        let colour_on = |terminal: bool| match common.color {
             Colour::Always => true,
             Colour::Never => false,
             Colour::Auto => {
                 let no_colour = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty());
-                !no_colour && io::stderr().is_terminal()
+                !no_colour && terminal
             }
         };
         Self {
             format: common.format,
             quiet: common.quiet,
-            colour,
+            colour: colour_on(io::stderr().is_terminal()),
+            colour_of_output: colour_on(io::stdout().is_terminal()),
+            strict_inputs: common.strict_inputs,
             warnings: RefCell::default(),
+            assumed: RefCell::default(),
             pending: RefCell::default(),
         }
     }
@@ -129,6 +148,13 @@ impl Printer {
     #[must_use]
     pub fn draws(&self) -> bool {
         !self.quiet && io::stderr().is_terminal()
+    }
+
+    /// Erases the line that a progress bar was drawn on, where nothing else will.
+    pub fn erase_line(&self) {
+        if self.draws() {
+            let _ = io::stderr().lock().write_all(b"\r\x1b[2K");
+        }
     }
 
     /// Prints a warning.
@@ -160,6 +186,29 @@ impl Printer {
         }
     }
 
+    /// Whether defaults that decide numbers are refused.
+    #[must_use]
+    pub fn strict_inputs(&self) -> bool {
+        self.strict_inputs
+    }
+
+    /// Reports the defaults that a design leaves to the program: on one line, and in the JSON object.
+    pub fn assumed(&self, assumed: &[Assumed]) {
+        let named: Vec<String> = assumed
+            .iter()
+            .map(|one| format!("{} = {}", one.key, one.value))
+            .collect();
+        if !named.is_empty() {
+            self.notice(&format!("assumed: {}", named.join(", ")));
+        }
+        let entry = |one: &Assumed| AssumedEntry {
+            key: one.key.clone(),
+            value: one.typed(),
+        };
+        self.assumed
+            .replace(Some(assumed.iter().map(entry).collect()));
+    }
+
     /// The warnings that go into the JSON object.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
@@ -171,6 +220,7 @@ impl Printer {
     pub fn with_warnings<'a, T>(&self, result: &'a T) -> WithWarnings<'a, T> {
         WithWarnings {
             result,
+            assumed: self.assumed.borrow().clone(),
             warnings: self.warnings.borrow().clone(),
         }
     }
@@ -188,7 +238,14 @@ impl Printer {
         let text = match self.format {
             Format::Json => to_json(json)?,
             Format::Human if self.quiet => return Ok(()),
-            Format::Human => visible(&human()).into_owned().into_bytes(),
+            Format::Human => {
+                let text = visible(&human()).into_owned();
+                match place {
+                    Stream::Output => emphasised(text, self.colour_of_output),
+                    Stream::Error => emphasised(text, self.colour),
+                }
+                .into_bytes()
+            }
         };
         match place {
             Stream::Output => self.data(|out| out.write_all(&text)),
@@ -297,6 +354,19 @@ impl Printer {
     }
 }
 
+/// Words of summaries that a person must not miss.
+const URGENT: [&str; 2] = ["NOT met", "FAILED"];
+
+/// `text` with its urgent words in bold red, where colours are shown.
+fn emphasised(text: String, colour: bool) -> String {
+    if !colour {
+        return text;
+    }
+    URGENT.iter().fold(text, |text, word| {
+        text.replace(word, &format!("\u{1b}[1;31m{word}\u{1b}[0m"))
+    })
+}
+
 /// Writes to standard error. Where that is closed nobody reads it.
 pub fn say(text: &str) {
     let mut text = text.to_owned();
@@ -306,8 +376,35 @@ pub fn say(text: &str) {
     let _ = io::stderr().lock().write_all(text.as_bytes());
 }
 
+/// Whether a person can be asked.
+pub fn can_ask() -> bool {
+    io::stdin().is_terminal() && io::stderr().is_terminal()
+}
+
+/// Whether standard output is a terminal.
+pub fn shows_output() -> bool {
+    io::stdout().is_terminal()
+}
+
+/// Asks at the terminal; an empty answer, or none, is `default`.
+///
+/// # Errors
+/// Standard input that cannot be read.
+pub fn ask(question: &str, default: &str) -> Result<String, Failure> {
+    let mut stderr = io::stderr().lock();
+    let _ = write!(stderr, "{question}[{default}] ").and_then(|()| stderr.flush());
+    drop(stderr);
+    let mut answer = String::new();
+    io::stdin()
+        .read_line(&mut answer)
+        .map_err(|error| Failure::Input(format!("standard input cannot be read: {error}")))?;
+    match answer.trim() {
+        "" => Ok(default.to_owned()),
+        answer => Ok(answer.to_owned()),
+    }
+}
+
 /// Columns at which messages are wrapped.
 fn width() -> usize {
-    let columns = std::env::var("COLUMNS").ok().and_then(|c| c.parse().ok());
-    columns.unwrap_or(100).clamp(40, 160)
+    terminal::columns().unwrap_or(100)
 }

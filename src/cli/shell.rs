@@ -44,7 +44,7 @@ pub trait Program: CommandFactory + FromArgMatches {
 
 /// Runs a program and returns the process's exit code.
 pub fn main<P: Program>(args: impl Iterator<Item = OsString>) -> ExitCode {
-    let args: Vec<OsString> = args.collect();
+    let args = help_as_option(args.collect());
     let early = common_before_parsing(&args);
     std::panic::set_hook(Box::new(move |panic| {
         Printer::new(&early).mistake(&panic_message(panic));
@@ -74,6 +74,15 @@ pub fn main<P: Program>(args: impl Iterator<Item = OsString>) -> ExitCode {
     }
 }
 
+/// `help COMMAND` as `COMMAND --help`.
+fn help_as_option(mut args: Vec<OsString>) -> Vec<OsString> {
+    if args.get(1).is_some_and(|first| first == "help") {
+        args.remove(1);
+        args.push("--help".into());
+    }
+    args
+}
+
 /// Threads and memory, as requested.
 fn prepare(common: &Common) -> Result<(), Failure> {
     if let Some(threads) = common.threads {
@@ -98,6 +107,7 @@ fn common_before_parsing(args: &[OsString]) -> Common {
             Some("json") => Format::Json,
             _ => Format::Human,
         },
+        strict_inputs: false,
         quiet: false,
         threads: None,
         memory: None,

@@ -9,7 +9,7 @@ use crate::lambda::Criterion;
 use crate::map::Components;
 use crate::point_weights::Weights;
 use crate::scene::tolerances::ErrorTarget;
-use crate::shape::document::{Up, parse_unit};
+use crate::shape::document::{Up, parse_unit, unit_names};
 use crate::units::m_from_mm;
 
 /// Any criterion by its name.
@@ -78,7 +78,7 @@ impl FileArgument {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct GridSize(pub [usize; 2]);
 
-/// Lengths, m, of three comma-separated millimetres.
+/// Lengths along x, y and z, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Translation(pub [f64; 3]);
 
@@ -90,7 +90,7 @@ pub struct Scale(pub [f64; 3]);
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rotation(pub [f64; 3]);
 
-/// Two ends, m, of two comma-separated millimetres.
+/// Two ends, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ends(pub [f64; 2]);
 
@@ -113,9 +113,47 @@ fn numbers<const N: usize>(text: &str, expected: &str) -> Result<[f64; N], Strin
     Ok(values)
 }
 
-/// `X,Y,Z` in millimetres.
+/// A length of either sign, m: a number with its unit, or of millimetres.
+fn metres(text: &str) -> Result<f64, String> {
+    let text = text.trim();
+    let digits = text.trim_end_matches(|c: char| c.is_alphabetic() || c == '\u{b5}');
+    let name = &text[digits.len()..];
+    let value = number(digits.trim_end()).map_err(|_| {
+        format!("invalid length {text:?}: expected a number, in millimetres or with its unit (2cm)")
+    })?;
+    match name {
+        "" | "mm" => Ok(m_from_mm(value)),
+        name => parse_unit(name)
+            .map(|unit_m| value * unit_m)
+            .ok_or_else(|| {
+                format!(
+                    "invalid length {text:?}: the unit is one of {}",
+                    unit_names().join(", ")
+                )
+            }),
+    }
+}
+
+/// `N` lengths, m.
+fn lengths<const N: usize>(text: &str, expected: &str) -> Result<[f64; N], String> {
+    let parts: Vec<&str> = text.split(',').collect();
+    if parts.len() != N {
+        return Err(format!("expected {expected}, found {} values", parts.len()));
+    }
+    let mut values = [0.0; N];
+    for (value, part) in values.iter_mut().zip(parts) {
+        *value = metres(part).map_err(|fault| format!("expected {expected}: {fault}"))?;
+    }
+    Ok(values)
+}
+
+/// `X,Y,Z`, in millimetres or with units.
 pub fn translation(text: &str) -> Result<Translation, String> {
-    numbers(text, "X,Y,Z in millimetres, like 0,0,30").map(|v| Translation(v.map(m_from_mm)))
+    lengths(
+        text,
+        "X,Y,Z in millimetres or with units, like 0,0,30 or 0,0,3cm",
+    )
+    .map(Translation)
 }
 
 /// The noise of a sensor, greater than 0.
@@ -149,14 +187,16 @@ pub fn rotation(text: &str) -> Result<Rotation, String> {
     numbers(text, "X,Y,Z in degrees, like 0,0,45").map(Rotation)
 }
 
-/// `FROM,TO` in millimetres.
+/// `FROM,TO`, in millimetres or with units.
 pub fn ends(text: &str) -> Result<Ends, String> {
-    let [from, to] = numbers(text, "FROM,TO in millimetres, like -50,50")?;
+    let [from, to] = lengths(text, "FROM,TO in millimetres or with units, like -50,50")?;
     if from <= to {
-        Ok(Ends([from, to].map(m_from_mm)))
+        Ok(Ends([from, to]))
     } else {
         Err(format!(
-            "runs backwards, from {from} to {to} mm: write the smaller end first"
+            "runs backwards, from {} to {} mm: write the smaller end first",
+            1e3 * from,
+            1e3 * to
         ))
     }
 }
@@ -243,48 +283,29 @@ pub fn pair(text: &str) -> Result<[usize; 2], String> {
     found.ok_or_else(|| format!("invalid pair of coils {text:?}: expected two numbers, like 0+8"))
 }
 
-/// A length in millimetres, 0 or more; m.
+/// A distance, m, 0 or more: a number with its unit, or of millimetres.
 pub fn length(text: &str) -> Result<f64, String> {
-    let value = number(text)?;
-    if value >= 0.0 {
-        Ok(m_from_mm(value))
-    } else {
-        Err(format!(
-            "invalid distance {value}: expected millimetres, 0 or more"
-        ))
+    match metres(text)? {
+        length_m if length_m >= 0.0 => Ok(length_m),
+        _ => Err(format!(
+            "invalid distance {text}: expected 0 or more, in millimetres or with its unit (2cm)"
+        )),
     }
 }
 
-/// A length, m, of a number with its unit, or of millimetres.
+/// A length above 0, m: a number with its unit, or of millimetres.
 pub fn length_with_unit(text: &str) -> Result<f64, String> {
-    let digits = text.trim_end_matches(|c: char| c.is_alphabetic());
-    // `1e` of `1em` would be no number; a unit begins after the last digit.
-    let name = &text[digits.len()..];
-    let metres = if name.is_empty() {
-        Some(1e-3)
-    } else {
-        parse_unit(name)
-    };
-    match (number(digits), metres) {
-        (Ok(value), Some(_)) if value > 0.0 && name.is_empty() => Ok(m_from_mm(value)),
-        (Ok(value), Some(metres)) if value > 0.0 => Ok(value * metres),
+    match metres(text)? {
+        length_m if length_m > 0.0 => Ok(length_m),
         _ => Err(format!(
             "invalid length {text:?}: expected a number above 0 and a unit, like 0.1mm"
         )),
     }
 }
 
-/// A height, m, of a number with its unit, or of millimetres; of either sign.
+/// A height of either sign, m: a number with its unit, or of millimetres.
 pub fn height(text: &str) -> Result<f64, String> {
-    let (sign, size) = match text.strip_prefix('-') {
-        Some(size) => (-1.0, size),
-        None => (1.0, text),
-    };
-    let digits = size.trim_end_matches(|c: char| c.is_alphabetic());
-    match number(digits) {
-        Ok(0.0) => Ok(0.0),
-        _ => length_with_unit(size).map(|length_m| sign * length_m),
-    }
+    metres(text)
 }
 
 /// A direction that points up.
@@ -293,16 +314,30 @@ pub fn up(text: &str) -> Result<Up, String> {
         .ok_or_else(|| format!("invalid direction {text:?}: expected x, y, z, -x, -y or -z"))
 }
 
-/// `X0,X1,Y0,Y1,Z0,Z1` in millimetres, each smaller end first; m.
+/// `X0,X1,Y0,Y1,Z0,Z1`, in millimetres or with units, each smaller end first; m.
 pub fn box_of(text: &str) -> Result<[[f64; 2]; 3], String> {
-    let expected = "X0,X1,Y0,Y1,Z0,Z1 in millimetres, like -50,50,-50,50,20,70";
-    let [a, b, c, d, e, f] = numbers(text, expected)?.map(m_from_mm);
+    let expected = "X0,X1,Y0,Y1,Z0,Z1 in millimetres or with units, like -50,50,-50,50,20,7cm";
+    let [a, b, c, d, e, f] = lengths(text, expected)?;
     let ends = [[a, b], [c, d], [e, f]];
     if ends.iter().all(|[from, to]| from < to) {
         Ok(ends)
     } else {
         Err(format!("a side ends before it begins: expected {expected}"))
     }
+}
+
+/// `KEY=VALUE`: a dotted key and its value, a number, list or truth value as in TOML, or a text.
+pub fn setting(text: &str) -> Result<(String, toml::Value), String> {
+    let Some((key, value)) = text
+        .split_once('=')
+        .filter(|(key, _)| !key.trim().is_empty())
+    else {
+        return Err("expected KEY=VALUE, like array.pitch_mm=40".to_owned());
+    };
+    let table: Option<toml::Table> = format!("value = {}", value.trim()).parse().ok();
+    let parsed = table.and_then(|mut table| table.remove("value"));
+    let value = parsed.unwrap_or_else(|| toml::Value::String(value.trim().to_owned()));
+    Ok((key.trim().to_owned(), value))
 }
 
 /// A number of threads.
@@ -349,13 +384,36 @@ mod tests {
         assert_eq!(unit("in").unwrap(), 0.0254);
     }
 
+    /// `--reach 2cm` was refused where `--shell 14` was taken as millimetres.
+    #[test]
+    fn every_length_takes_a_unit_and_a_bare_number_is_millimetres() {
+        for parse in [length, length_with_unit, height] {
+            assert_eq!(parse("14").unwrap(), 0.014);
+            assert_eq!(parse("14mm").unwrap(), 0.014);
+            assert_eq!(parse("2cm").unwrap(), 0.02);
+            assert_eq!(parse(" 0.5 in").unwrap(), 0.0127);
+            assert!(
+                parse("2 furlongs")
+                    .unwrap_err()
+                    .contains("mm, cm, m, in, ft, um")
+            );
+            assert!(parse("far").unwrap_err().contains("invalid length"));
+        }
+        assert_eq!(height("-2cm").unwrap(), -0.02);
+        assert!(length("-2cm").is_err() && length_with_unit("0mm").is_err());
+        let moved = translation("0,-1cm,0.03m").unwrap();
+        assert_eq!(moved, Translation([0.0, -0.01, 0.03]));
+        assert_eq!(ends("-5cm,50").unwrap(), Ends([-0.05, 0.05]));
+        assert_eq!(box_of("-1,1,-1,1,0,3cm").unwrap()[2], [0.0, 0.03]);
+    }
+
     #[test]
     fn what_is_no_value_is_refused_with_what_was_expected() {
         assert!(translation("1,2").unwrap_err().contains("found 2 values"));
         assert!(
             translation("1,2,nan")
                 .unwrap_err()
-                .contains("\"nan\" is not a finite number")
+                .contains("invalid length")
         );
         assert!(ends("3,-3").unwrap_err().contains("smaller end first"));
         for bad in ["61", "0x3", "3x-3", "1x2x3", "axb", ""] {

@@ -45,6 +45,8 @@ pub enum LimitName {
     OneTurn,
     /// The inner radius is not negative.
     Axis,
+    /// Distance of the array's nearest axes, m: wider coils overlap.
+    Pitch,
     /// A given inner diameter.
     FixedInner,
     /// A given outer diameter.
@@ -150,7 +152,7 @@ const IMPLIED: Limit = Limit {
 };
 
 /// Every limit, in the order of [`LimitName`].
-pub static LIMITS: [Limit; 18] = [
+pub static LIMITS: [Limit; 19] = [
     SIZE,
     Limit {
         name: LimitName::InnerDiameter,
@@ -305,6 +307,13 @@ pub static LIMITS: [Limit; 18] = [
         ..IMPLIED
     },
     Limit {
+        name: LimitName::Pitch,
+        key: "pitch_m",
+        design_key: "array.pitch_mm",
+        label: "the array's pitch",
+        ..IMPLIED
+    },
+    Limit {
         name: LimitName::FixedInner,
         key: "inner_diameter_m",
         design_key: "coil.inner_diameter_mm",
@@ -365,7 +374,7 @@ impl LimitName {
         self.is_geometry()
             || matches!(
                 self,
-                Self::OuterDiameter | Self::InnerDiameter | Self::Length
+                Self::OuterDiameter | Self::InnerDiameter | Self::Length | Self::Pitch
             )
     }
 
@@ -380,6 +389,20 @@ impl LimitName {
 #[must_use]
 pub fn by_key(key: &str) -> Option<&'static Limit> {
     LIMITS.iter().find(|limit| limit.key == key)
+}
+
+/// The thinnest mandrel that a coil is wound on where the design names no least bore, m: thinner ones
+/// bend under the wire's tension.
+pub const MANDREL_M: f64 = 0.003;
+
+/// Diameters of its wire that a mandrel has at least. Enamel is tested for cracks around a mandrel as
+/// thick as the wire (the flexibility test of IEC 60851-3); four times that keeps a margin.
+pub const WIRES_A_MANDREL: f64 = 4.0;
+
+/// The smallest bore, m, of a coil that is to be wound of wire of this diameter over its insulation, m.
+#[must_use]
+pub fn bobbin_bore_m(wire_diameter_m: f64) -> f64 {
+    MANDREL_M.max(WIRES_A_MANDREL * wire_diameter_m)
 }
 
 /// A limit beside the value it bounds, SI.

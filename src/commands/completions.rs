@@ -13,7 +13,7 @@ use crate::cli::printer::Printer;
 /// Prints a script that lets a shell complete commands, options and their values. Where it goes
 /// depends on the shell; the examples show the usual places.
 #[derive(Debug, Args)]
-#[command(after_help = page(Codes::None, &[
+#[command(after_long_help = page(Codes::None, &[
     ("fluxform completions bash > fluxform.bash  # then: source fluxform.bash", "bash"),
     ("fluxform completions zsh > _fluxform  # in a folder of $fpath", "zsh"),
     ("fluxform completions fish > fluxform.fish  # in ~/.config/fish/completions", "fish"),

@@ -49,6 +49,8 @@ pub(crate) struct PointsAsked {
     pub weights: Option<Weights>,
     pub holes: Option<&'static str>,
     pub certify: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub certify_seconds: Option<u64>,
     pub max_deviation_m: Option<f64>,
     pub widest_m: Option<f64>,
     pub spacing_m: Option<f64>,

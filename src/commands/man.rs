@@ -1,6 +1,7 @@
 //! `man`: the manual pages.
 
-use std::io;
+use std::io::{self, Write};
+use std::process::{Command, Stdio};
 
 use clap::{Args, CommandFactory};
 use clap_mangen::Man as Page;
@@ -11,17 +12,17 @@ use crate::bundle::atomic::{FileSet, Overwrite};
 use crate::cli::args::Writing;
 use crate::cli::failure::Failure;
 use crate::cli::help::{Codes, page};
-use crate::cli::printer::{Printer, say};
+use crate::cli::printer::{Printer, say, shows_output};
 use crate::cli::quantity::count;
 use crate::cli::start::folder;
 use crate::cli::values::FileArgument;
 
 /// Print the manual page, or write all of them
 ///
-/// Prints the main manual page; with --out writes it and one page a command into a folder, as
-/// fluxform.1, fluxform-calibrate.1 and so on.
+/// Shows the main manual page at a terminal, as `man` does, and prints its source elsewhere; with --out
+/// writes it and one page a command into a folder, as fluxform.1, fluxform-calibrate.1 and so on.
 #[derive(Debug, Args)]
-#[command(after_help = page(Codes::Pages, &[
+#[command(after_long_help = page(Codes::Pages, &[
     ("fluxform man > fluxform.1", "the main page; read it with: man ./fluxform.1"),
     ("fluxform man --out man1", "all pages"),
 ]))]
@@ -43,6 +44,9 @@ impl Man {
         command.build();
         let Some(out) = &self.out else {
             let main = rendered(&command)?;
+            if shows_output() && shown_by_man(&main).is_ok() {
+                return Ok(());
+            }
             return printer.data(|out| out.write_all(&main));
         };
         let folder = folder(out)?;
@@ -60,6 +64,22 @@ impl Man {
             say(&format!("{}: {pages}", folder.display()));
         }
         Ok(())
+    }
+}
+
+/// Shows a page as the system's `man` does.
+fn shown_by_man(page: &[u8]) -> io::Result<()> {
+    let mut viewer = Command::new("man")
+        .args(["-l", "-"])
+        .stdin(Stdio::piped())
+        .spawn()?;
+    if let Some(mut input) = viewer.stdin.take() {
+        // A reader who leaves early closes the pipe.
+        let _ = input.write_all(page);
+    }
+    match viewer.wait()?.success() {
+        true => Ok(()),
+        false => Err(io::Error::other("man does not show the page")),
     }
 }
 

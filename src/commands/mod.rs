@@ -6,6 +6,8 @@ pub mod compare;
 mod completions;
 pub mod discretize;
 pub mod evaluate;
+pub mod init;
+pub mod keys;
 pub mod lambda;
 pub mod made_with;
 mod man;
@@ -53,7 +55,7 @@ static LONG_VERSION: LazyLock<String> =
     override_usage = "fluxform [OPTIONS] <COMMAND>\n       fluxform --explain <CODE>",
     arg_required_else_help = true,
     disable_help_subcommand = true,
-    after_help = help::main()
+    after_long_help = help::main()
 )]
 struct Arguments {
     /// Options of every command.
@@ -70,6 +72,8 @@ struct Arguments {
 /// The commands; each is described in its own file.
 #[derive(Debug, Subcommand)]
 enum Command {
+    Init(init::command::Init),
+    Keys(keys::command::Keys),
     Evaluate(evaluate::command::Evaluate),
     Probe(probe::command::Probe),
     #[command(visible_alias = "tabulate")]
@@ -124,6 +128,8 @@ pub fn command() -> clap::Command {
 
 fn run(command: &Command, printer: &Printer) -> Result<(), Failure> {
     match command {
+        Command::Init(command) => command.run(printer),
+        Command::Keys(command) => command.run(printer),
         Command::Evaluate(command) => command.run(printer),
         Command::Probe(command) => command.run(printer),
         Command::Map(command) => command.run(printer),

@@ -58,6 +58,15 @@ impl Need {
         target: false,
         workspace: false,
     };
+
+    /// Whether a key decides anything that the command computes.
+    pub(super) fn uses(self, key: &str) -> bool {
+        match key.split('.').next() {
+            Some("target") => self.target,
+            Some("workspace") => self.workspace,
+            _ => true,
+        }
+    }
 }
 
 /// The sections as read, in the file's units.

@@ -9,14 +9,46 @@ pub struct Key {
     pub section: String,
     /// Its name, the unit of a number last.
     pub name: &'static str,
-    /// Accepted values, in words.
-    pub value: String,
-    /// The range of its numbers in words; empty where any will do.
-    pub range: String,
+    /// The values that may be written.
+    pub accepts: Accepts,
     /// Default.
     pub default: Without,
     /// Meaning.
     pub meaning: &'static str,
+}
+
+/// The values that a key may hold.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Accepts {
+    /// Their kind in words.
+    pub kind: String,
+    /// The unit of numbers; empty where they have none.
+    pub unit: &'static str,
+    /// Whether a wire gauge is accepted for a number.
+    pub gauges: bool,
+    /// The range of numbers in words; empty where any is accepted.
+    pub range: String,
+}
+
+impl Accepts {
+    /// Values of this kind, of any range and without a unit.
+    pub(super) fn any(kind: impl Into<String>) -> Self {
+        Self {
+            kind: kind.into(),
+            ..Self::default()
+        }
+    }
+
+    /// Kind and unit in words: `number, mm`.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let unit = match self.unit {
+            "" => String::new(),
+            unit => format!(", {unit}"),
+        };
+        let gauge = if self.gauges { ", or a gauge" } else { "" };
+        format!("{}{unit}{gauge}", self.kind)
+    }
 }
 
 /// Value of a key that is not given.
@@ -24,10 +56,43 @@ pub struct Key {
 pub enum Without {
     /// The document is refused.
     Refused,
-    /// This value.
+    /// This value, as TOML.
     Value(String),
     /// Described in the meaning, or none.
     Nothing,
+}
+
+/// A key that decides a number, was not written, and so has its default.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assumed {
+    /// Its dotted path; a section alone where that as a whole is not given.
+    pub key: String,
+    /// The value, as TOML.
+    pub value: String,
+}
+
+impl Assumed {
+    /// The value by its type.
+    #[must_use]
+    pub fn typed(&self) -> Option<toml::Value> {
+        typed(&self.value)
+    }
+}
+
+impl Without {
+    /// The default by its type; `None` where there is none.
+    #[must_use]
+    pub fn typed(&self) -> Option<toml::Value> {
+        match self {
+            Self::Value(text) => typed(text),
+            Self::Refused | Self::Nothing => None,
+        }
+    }
+}
+
+fn typed(text: &str) -> Option<toml::Value> {
+    let mut table: toml::Table = format!("value = {text}").parse().ok()?;
+    table.remove("value")
 }
 
 impl Key {
@@ -39,6 +104,17 @@ impl Key {
         } else {
             format!("{}.{}", self.section, self.name)
         }
+    }
+
+    /// What may be written, its range and its meaning, on one line without marks.
+    #[must_use]
+    pub fn remark(&self) -> String {
+        let range = match self.accepts.range.as_str() {
+            "" => String::new(),
+            range => format!(" {range}"),
+        };
+        let text = format!("{}{range}: {}", self.accepts.words(), self.meaning);
+        text.replace('`', "")
     }
 }
 

@@ -7,7 +7,7 @@
 use super::draft::{Draft, Need};
 use super::reader::list_keys;
 
-pub use super::key::{Key, Without, with_meanings};
+pub use super::key::{Accepts, Assumed, Key, Without, with_meanings};
 
 /// The keys of a design.
 #[must_use]
@@ -65,7 +65,7 @@ const MEANINGS: &[(&str, &str)] = &[
     ),
     (
         "core.knee_t",
-        "flux density from which the steel saturates; without it 1.5 T, or the curve's own",
+        "flux density from which the steel saturates; of a curve its own",
     ),
     (
         "core.conductivity_s_per_m",
@@ -129,7 +129,7 @@ const MEANINGS: &[(&str, &str)] = &[
     ),
     (
         "limits.inner_diameter_min_mm",
-        "bore of the winding, at least",
+        "bore of the winding, at least; without it `optimize --wound` takes that of a bobbin",
     ),
     ("limits.length_max_mm", "length of the winding"),
     ("limits.power_max_w", "heat at the rated current"),
@@ -157,12 +157,12 @@ mod tests {
         let keys = of_designs();
         let key = |path: &str| keys.iter().find(|key| key.path() == path).unwrap();
         let length = key("coil.length_mm");
-        assert_eq!(length.value, "number, mm");
-        assert_eq!(length.range, "> 0");
+        assert_eq!(length.accepts.words(), "number, mm");
+        assert_eq!(length.accepts.range, "> 0");
         assert_eq!(length.default, Without::Refused);
         let polarity = key("magnet.polarity");
-        assert_eq!(polarity.value, "`\"repel\"` or `\"attract\"`");
-        assert_eq!(polarity.default, Without::Value("`\"repel\"`".to_owned()));
+        assert_eq!(polarity.accepts.words(), "`\"repel\"` or `\"attract\"`");
+        assert_eq!(polarity.default, Without::Value("\"repel\"".to_owned()));
         assert_eq!(
             key("supply.current_max_a").default,
             Without::Value("2".to_owned())

@@ -30,6 +30,7 @@
 pub mod array;
 pub mod bh_table;
 mod checks;
+pub mod commented;
 pub mod diagnostics;
 mod draft;
 pub mod gauge;

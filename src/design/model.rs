@@ -1,5 +1,6 @@
 //! The contents of a design file, validated, in SI units.
 
+use super::key::Assumed;
 use super::limits::Limits;
 use std::path::{Path, PathBuf};
 
@@ -28,6 +29,9 @@ pub struct Design {
     pub target_height_m: f64,
     /// Grid on which maps are tabulated.
     pub workspace: Workspace,
+    /// The keys that decide numbers of the command that reads the design and have their defaults,
+    /// because they were not written.
+    pub assumed: Vec<Assumed>,
 }
 
 /// The winding: uniform current density over `[inner, outer] x [-length, 0]`.

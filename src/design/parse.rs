@@ -7,7 +7,7 @@ use super::diagnostics::{Faults, InvalidDocument};
 use super::draft::{Draft, Need};
 use super::model::{Array, Coil, Core, Coupling, Design, Magnet, Steel, Supply, Wire, Workspace};
 use super::reader::{Sink, read_document};
-use super::sections::{self, CoilDraft, CoreDraft, Layout, MagnetDraft};
+use super::sections::{CoilDraft, CoreDraft, Layout, MagnetDraft};
 use super::sections::{SupplyDraft, WireDraft, WorkspaceDraft, axis_m};
 use super::source;
 use super::values::OneOrMany;
@@ -27,7 +27,7 @@ impl Design {
         read_document(text, path, |root, sink| {
             let draft = Draft::read(root, need);
             checks::check(&draft, need, sink);
-            draft.design(path, sink)
+            draft.design(path, need, sink)
         })
     }
 
@@ -55,7 +55,7 @@ impl Design {
 
 impl Draft {
     /// The design in SI; `None` where an error prevents it.
-    fn design(self, path: &Path, sink: &Sink) -> Option<Design> {
+    fn design(self, path: &Path, need: Need, sink: &Sink) -> Option<Design> {
         if sink.has_errors() {
             return None;
         }
@@ -87,6 +87,11 @@ impl Draft {
             limits: self.limits,
             target_height_m: m_from_mm(self.target_height.value),
             workspace: workspace_m(&self.workspace)?,
+            assumed: sink
+                .assumed()
+                .into_iter()
+                .filter(|one| need.uses(&one.key))
+                .collect(),
         })
     }
 }
@@ -116,10 +121,7 @@ fn core_m(draft: CoreDraft, path: &Path) -> Core {
         clearance_m: m_from_mm(draft.clearance.value),
         above_m: m_from_mm(draft.above.value),
         below_m: m_from_mm(draft.below.value),
-        knee_t: match draft.bh_curve {
-            Some(_) => draft.knee_t,
-            None => draft.knee_t.or(Some(sections::LOW_CARBON_KNEE_T)),
-        },
+        knee_t: draft.knee_t,
         steel: match draft.bh_curve {
             Some(file) => Steel::Curve(beside(file)),
             None => Steel::Linear(draft.relative_permeability),

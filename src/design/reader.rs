@@ -15,7 +15,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::diagnostics::{Fault, Faults, InvalidDocument, Severity};
-use super::key::{Key, Keys, Without};
+use super::key::{Accepts, Assumed, Key, Keys, Without};
 use super::message_text::{QUOTED_MAX, escaped, nearest, quoted};
 
 /// A value and its bytes in the text (those of its section where it is a default).
@@ -31,6 +31,7 @@ pub struct Located<T> {
 #[derive(Debug, Default)]
 pub struct Sink {
     faults: RefCell<Vec<Fault>>,
+    assumed: RefCell<Vec<Assumed>>,
     keys: Option<Keys>,
 }
 
@@ -38,6 +39,12 @@ impl Sink {
     /// Adds a fault.
     pub fn add(&self, fault: Fault) {
         self.faults.borrow_mut().push(fault);
+    }
+
+    /// The keys that have defaults because they were not written, in the order in which they were read.
+    #[must_use]
+    pub fn assumed(&self) -> Vec<Assumed> {
+        self.assumed.borrow().clone()
     }
 
     /// True when one of the faults is an error.
@@ -71,7 +78,7 @@ pub fn read_document<T>(
     let sink = Sink::default();
     errors
         .iter()
-        .for_each(|error| sink.add(syntax_fault(error)));
+        .for_each(|error| sink.add(syntax_fault(error, text)));
     let mut value = None;
     if !sink.has_errors() {
         let mut root = Section::root(table.get_ref(), &sink);
@@ -109,9 +116,41 @@ fn parsed(text: &str) -> (Spanned<DeTable<'_>>, Vec<toml::de::Error>) {
     DeTable::parse_recoverable(text)
 }
 
-fn syntax_fault(error: &toml::de::Error) -> Fault {
+fn syntax_fault(error: &toml::de::Error, text: &str) -> Fault {
     let message = format!("not valid TOML: {}", escaped(error.message().trim(), 200));
-    Fault::error("", message).at(&error.span().unwrap_or(0..0))
+    let span = error.span().unwrap_or(0..0);
+    let fault = Fault::error("", message).at(&span);
+    match slip_in_line(text, span.start) {
+        Some(help) => fault.help(help),
+        None => fault,
+    }
+}
+
+/// Advice for a line of another notation: `length_mm = 40,5` or `length_mm = 40.5;`.
+fn slip_in_line(text: &str, at: usize) -> Option<String> {
+    let at = (0..=at.min(text.len()))
+        .rev()
+        .find(|at| text.is_char_boundary(*at))?;
+    let start = text[..at].rfind('\n').map_or(0, |end| end + 1);
+    let line = text[start..].lines().next()?;
+    let (key, value) = line.split_once('=')?;
+    let (key, value) = (key.trim(), value.split('#').next()?.trim());
+    let plain = value.trim_end_matches([';', ',']).trim_end();
+    if plain.parse::<f64>().is_ok() && plain != value {
+        return Some(format!(
+            "write {key} = {plain}, with nothing behind the number"
+        ));
+    }
+    let point = plain.replacen(',', ".", 1);
+    let decimal = point != plain && point.parse::<f64>().is_ok();
+    if decimal {
+        return Some(format!("write a decimal point: {key} = {point}"));
+    }
+    // A number and its unit.
+    let number = plain.split(char::is_whitespace).next()?;
+    let unit = plain.strip_prefix(number)?.trim();
+    (number.parse::<f64>().is_ok() && unit.chars().all(char::is_alphabetic) && !unit.is_empty())
+        .then(|| format!("write {key} = {number}: the unit is in the key's name"))
 }
 
 /// One table of the document.
@@ -211,20 +250,34 @@ impl<'a> Section<'a> {
     pub(super) fn list(
         &self,
         name: &'static str,
-        value: impl FnOnce() -> (String, String),
+        accepts: impl FnOnce() -> Accepts,
         default: impl FnOnce() -> Without,
     ) {
         if let Some(keys) = &self.sink.keys {
-            let (value, range) = value();
             keys.add(Key {
                 section: self.path.clone(),
                 name,
-                value,
-                range,
+                accepts: accepts(),
                 default: default(),
                 meaning: "",
             });
         }
+    }
+
+    /// Records that `key` is not written and has `value`, as TOML, by default.
+    pub(super) fn assume(&self, key: &str, value: impl Into<String>) {
+        self.sink.assumed.borrow_mut().push(Assumed {
+            key: self.path_of(key),
+            value: value.into(),
+        });
+    }
+
+    /// Records that this whole section is not written.
+    pub(super) fn assume_whole(&self, value: impl Into<String>) {
+        self.sink.assumed.borrow_mut().push(Assumed {
+            key: self.path.clone(),
+            value: value.into(),
+        });
     }
 
     /// Accepts `keys` without reading them.

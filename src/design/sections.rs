@@ -4,6 +4,7 @@
 //! check may speak of.
 
 use super::array::{COILS_MAX, grid_positions_m};
+use super::message_text::number;
 use super::model::{ArrayGrid, Coupling, MagnetModel, Polarity};
 use super::reader::{Located, Section};
 use super::rule::{BODY_MM, Bound, Rule, metres_below, slip};
@@ -15,7 +16,10 @@ use fluxform_numerics::axis::Axis;
 const ABSOLUTE_ZERO_C: f64 = -273.15;
 
 /// Knee of low-carbon steel that is described by its permeability alone, T.
-pub(crate) const LOW_CARBON_KNEE_T: f64 = 1.5;
+const LOW_CARBON_KNEE_T: f64 = 1.5;
+
+/// Relative permeability of the reference design's steel.
+const RELATIVE_PERMEABILITY_DEFAULT: f64 = 1000.0;
 
 /// Resistivity of copper at 20 C, ohm m.
 const COPPER_RESISTIVITY_OHM_M: f64 = 1.68e-8;
@@ -83,7 +87,10 @@ pub fn wire(mut s: Section<'_>) -> WireDraft {
     let diameter = s.required("diameter_mm", &WIRE_MM.positive());
     let conductor = s.number("conductor_diameter_mm", &WIRE_MM.positive());
     let draft = WireDraft {
-        conductor: conductor.unwrap_or_else(|| diameter.clone()),
+        conductor: conductor.unwrap_or_else(|| {
+            s.assume("conductor_diameter_mm", number(diameter.value));
+            diameter.clone()
+        }),
         diameter,
         resistivity_ohm_m: s.number_or(
             "resistivity_ohm_m",
@@ -116,13 +123,20 @@ pub fn core(mut s: Section<'_>) -> Option<CoreDraft> {
         clearance: s.number_or("clearance_mm", &OFFSET_MM, 0.0),
         above: s.number_or("above_mm", &OFFSET_MM, 0.0),
         below: s.number_or("below_mm", &OFFSET_MM, 10.0),
-        relative_permeability: s
-            .number_or("relative_permeability", &RELATIVE_PERMEABILITY, 1000.0)
-            .value,
+        relative_permeability: of_linear(
+            &mut s,
+            "relative_permeability",
+            &RELATIVE_PERMEABILITY,
+            RELATIVE_PERMEABILITY_DEFAULT,
+        )
+        .unwrap_or(RELATIVE_PERMEABILITY_DEFAULT),
         bh_curve: s.text("bh_curve").map(|text| text.value),
-        knee_t: s
-            .number("knee_t", &Rule::any("T").positive())
-            .map(|knee| knee.value),
+        knee_t: of_linear(
+            &mut s,
+            "knee_t",
+            &Rule::any("T").positive(),
+            LOW_CARBON_KNEE_T,
+        ),
         conductivity_s_per_m: s
             .number_or("conductivity_s_per_m", &CONDUCTIVITY_S_PER_M, 5.8e6)
             .value,
@@ -143,6 +157,14 @@ pub fn core(mut s: Section<'_>) -> Option<CoreDraft> {
     }
     s.finish();
     draft
+}
+
+/// A number that has a default for steel without a magnetisation curve alone.
+fn of_linear(s: &mut Section<'_>, key: &'static str, rule: &Rule, default: f64) -> Option<f64> {
+    if s.has("bh_curve") {
+        return s.number(key, rule).map(|number| number.value);
+    }
+    Some(s.number_or(key, rule, default).value)
 }
 
 /// How the axes of the array are given.
@@ -179,28 +201,38 @@ pub struct ArrayDraft {
 }
 
 pub fn array(mut s: Section<'_>) -> ArrayDraft {
-    let listed = s.pairs("positions_mm", &BODY_MM, COILS_MAX);
-    let rows = s.count_or("rows", 3);
-    let columns = s.count_or("columns", 3);
-    let pitch = s.number_or("pitch_mm", &BODY_MM.positive(), 50.0);
+    const OF_GRIDS: [&str; 3] = ["rows", "columns", "pitch_mm"];
+    let layout = match s.pairs("positions_mm", &BODY_MM, COILS_MAX) {
+        _ if !s.is_present() => {
+            s.assume_whole("\"one coil at the origin\"");
+            Layout::Single
+        }
+        Some(list) => {
+            for key in OF_GRIDS.into_iter().filter(|key| s.has(key)) {
+                let message = format!("{key} and positions_mm exclude each other");
+                s.fault(key, message, "give a grid, or give the positions");
+            }
+            s.ignore(&OF_GRIDS);
+            if list.is_empty() {
+                Layout::Unknown
+            } else {
+                Layout::Listed(list)
+            }
+        }
+        None => {
+            let (rows, columns) = (s.count_or("rows", 3), s.count_or("columns", 3));
+            let pitch = s.number_or("pitch_mm", &BODY_MM.positive(), 50.0);
+            match rows.zip(columns) {
+                Some((rows, columns)) => grid(&s, rows, columns, pitch),
+                None => Layout::Unknown,
+            }
+        }
+    };
     let coupling = s.choice(
         "coupling",
         &[("full", Coupling::Full), ("none", Coupling::None)],
     );
     let gain = s.numbers("gain", &Rule::any(""));
-    for key in ["rows", "columns", "pitch_mm"] {
-        if listed.is_some() && s.has(key) {
-            let message = format!("{key} and positions_mm exclude each other");
-            s.fault(key, message, "give a grid, or give the positions");
-        }
-    }
-    let layout = match (listed, rows, columns) {
-        _ if !s.is_present() => Layout::Single,
-        (Some(list), ..) if list.is_empty() => Layout::Unknown,
-        (Some(list), ..) => Layout::Listed(list),
-        (None, Some(rows), Some(columns)) => grid(&s, rows, columns, pitch),
-        _ => Layout::Unknown,
-    };
     s.finish();
     ArrayDraft {
         layout,
@@ -269,8 +301,34 @@ pub fn magnet(mut s: Section<'_>) -> MagnetDraft {
         tilt_deg: s.tuple("tilt_deg", &tilt),
         passive_force: s.flag_or("passive_force", false),
     };
+    remanence(&mut s);
     s.finish();
     draft
+}
+
+/// Magnets are sold by their remanence: how much magnetisation that is.
+fn remanence(s: &mut Section<'_>) {
+    const NAMES: [(&str, f64); 7] = [
+        ("remanence_t", 1.0),
+        ("br_t", 1.0),
+        ("b_r_t", 1.0),
+        ("remanence_mt", 1e-3),
+        ("br_mt", 1e-3),
+        ("remanence", 1.0),
+        ("br", 1.0),
+    ];
+    for (name, tesla) in NAMES {
+        if let Some(given) = s.unlisted(name) {
+            let magnetisation = given * tesla / MU_0_T_M_PER_A;
+            let help = if magnetisation.is_finite() {
+                format!("write magnetization_a_per_m = {magnetisation:.4e}, which is B_r / mu_0")
+            } else {
+                "write magnetization_a_per_m, which is B_r / mu_0".to_owned()
+            };
+            let message = "a magnet is given by its magnetisation, not by its remanence";
+            s.fault(name, message, &help);
+        }
+    }
 }
 
 /// `[supply]`.

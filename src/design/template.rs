@@ -29,6 +29,12 @@ impl Template {
         Ok(Self { table })
     }
 
+    /// The document as a table.
+    #[must_use]
+    pub fn into_table(self) -> Table {
+        self.table
+    }
+
     /// Takes a dotted key out, where it is there.
     pub fn remove(&mut self, key: &str) {
         let mut here = &mut self.table;

@@ -5,7 +5,7 @@ use toml::de::DeValue;
 
 use super::diagnostics::Fault;
 use super::gauge::awg_mm;
-use super::key::Without;
+use super::key::{Accepts, Without};
 use super::message_text::{axis_fault, nearest, number, quoted};
 use super::reader::{Located, Section, ValueRef};
 use super::rule::{Bound, Rule};
@@ -39,14 +39,26 @@ impl<'a> Section<'a> {
         Some(located(value, found))
     }
 
+    /// The number of a key that is no key of the document, but which somebody may write; NaN where
+    /// it holds something else.
+    pub(super) fn unlisted(&mut self, key: &'static str) -> Option<f64> {
+        self.has(key).then(|| {
+            self.found(key)
+                .and_then(|found| float(found.get_ref()))
+                .unwrap_or(f64::NAN)
+        })
+    }
+
     /// A number with a default.
     pub fn number_or(&mut self, key: &'static str, rule: &Rule, default: f64) -> Located<f64> {
         let without = || Without::Value(number(default));
         self.list(key, || of_rule("number", rule), without);
-        let span = self.span();
-        self.number(key, rule).unwrap_or(Located {
-            value: default,
-            span,
+        self.number(key, rule).unwrap_or_else(|| {
+            self.assume(key, number(default));
+            Located {
+                value: default,
+                span: self.span(),
+            }
         })
     }
 
@@ -97,6 +109,9 @@ impl<'a> Section<'a> {
             };
             Some(located(value, found))
         });
+        if !self.has(key) {
+            self.assume(key, number(default));
+        }
         given.unwrap_or(Located {
             value: OneOrMany::One(default),
             span: self.span(),
@@ -105,12 +120,19 @@ impl<'a> Section<'a> {
 
     /// Exactly `N` numbers, zeros where absent; NaN where at fault.
     pub fn tuple<const N: usize>(&mut self, key: &'static str, rule: &Rule) -> [f64; N] {
-        let value = || of_rule(&format!("{N} numbers"), rule);
         let zeros = || Without::Value(format!("[{}]", ["0"; N].join(", ")));
-        self.list(key, value, zeros);
-        let Some(found) = self.found(key) else {
-            return [0.0; N];
-        };
+        self.list(key, || of_tuple(N, rule), zeros);
+        self.tuple_if_given(key, rule).unwrap_or([0.0; N])
+    }
+
+    /// Exactly `N` numbers; `None` where absent, NaN where at fault.
+    pub fn tuple_if_given<const N: usize>(
+        &mut self,
+        key: &'static str,
+        rule: &Rule,
+    ) -> Option<[f64; N]> {
+        self.list(key, || of_tuple(N, rule), || Without::Nothing);
+        let found = self.found(key)?;
         let mut values = [f64::NAN; N];
         let wanted = format!("a list of {N} numbers");
         let items = self.items(key, found, &wanted);
@@ -121,7 +143,7 @@ impl<'a> Section<'a> {
             let message = format!("expected {wanted}, found {}", items.len());
             self.fault(key, message, "write them in square brackets, with commas");
         }
-        values
+        Some(values)
     }
 
     /// A list of at most `most` pairs `[a, b]`, each with its place; empty where at fault.
@@ -179,11 +201,17 @@ impl<'a> Section<'a> {
 
     /// A whole number of at least 1 with a default; `None` where at fault.
     pub(crate) fn count_or(&mut self, key: &'static str, default: usize) -> Option<usize> {
-        let value = || ("whole number".to_owned(), ">= 1".to_owned());
+        let value = || Accepts {
+            range: ">= 1".to_owned(),
+            ..Accepts::any("whole number")
+        };
         self.list(key, value, || Without::Value(default.to_string()));
         match self.found(key) {
             Some(found) => self.whole(&self.path_of(key), found),
-            None => Some(default),
+            None => {
+                self.assume(key, default.to_string());
+                Some(default)
+            }
         }
     }
 
@@ -194,17 +222,21 @@ impl<'a> Section<'a> {
         rule: &Rule,
         default: Axis,
     ) -> Option<Located<Axis>> {
-        let without = || {
+        let shown = || {
             let ends = [default.from, default.to].map(number).join(", ");
-            Without::Value(format!("[{ends}, {}]", default.samples))
+            format!("[{ends}, {}]", default.samples)
         };
+        let without = || Without::Value(shown());
         self.list(key, || of_rule("[from, to, samples]", rule), without);
         match self.found(key) {
             Some(found) => self.axis_in(key, found, rule),
-            None => Some(Located {
-                value: default,
-                span: self.span(),
-            }),
+            None => {
+                self.assume(key, shown());
+                Some(Located {
+                    value: default,
+                    span: self.span(),
+                })
+            }
         }
     }
 
@@ -241,11 +273,7 @@ impl<'a> Section<'a> {
 
     /// A text; `None` where absent or at fault.
     pub fn text(&mut self, key: &'static str) -> Option<Located<String>> {
-        self.list(
-            key,
-            || ("text".to_owned(), String::new()),
-            || Without::Nothing,
-        );
+        self.list(key, || Accepts::any("text"), || Without::Nothing);
         let found = self.found(key)?;
         match found.get_ref() {
             DeValue::String(text) => Some(located(text.to_string(), found)),
@@ -262,11 +290,7 @@ impl<'a> Section<'a> {
         key: &'static str,
         help: &str,
     ) -> Option<Located<String>> {
-        self.list(
-            key,
-            || ("text".to_owned(), String::new()),
-            || Without::Refused,
-        );
+        self.list(key, || Accepts::any("text"), || Without::Refused);
         if !self.has(key) {
             self.missing(key, help);
         }
@@ -304,8 +328,11 @@ impl<'a> Section<'a> {
         options: &[(&'static str, T)],
     ) -> T {
         let (first, value) = options[0];
-        let without = || Without::Value(format!("`{first:?}`"));
-        self.list(key, || (choices(options), String::new()), without);
+        let without = || Without::Value(format!("{first:?}"));
+        self.list(key, || Accepts::any(choices(options)), without);
+        if !self.has(key) {
+            self.assume(key, format!("{first:?}"));
+        }
         self.choice(key, options).unwrap_or(value)
     }
 
@@ -315,11 +342,7 @@ impl<'a> Section<'a> {
         key: &'static str,
         options: &[(&'static str, T)],
     ) -> Option<T> {
-        self.list(
-            key,
-            || (choices(options), String::new()),
-            || Without::Nothing,
-        );
+        self.list(key, || Accepts::any(choices(options)), || Without::Nothing);
         let text = self.text(key)?;
         if let Some((_, value)) = options.iter().find(|(name, _)| *name == text.value) {
             return Some(*value);
@@ -342,7 +365,7 @@ impl<'a> Section<'a> {
 
     /// True or false; the default where absent or at fault.
     pub fn flag_or(&mut self, key: &'static str, default: bool) -> bool {
-        let value = || ("true or false".to_owned(), String::new());
+        let value = || Accepts::any("true or false");
         self.list(key, value, || Without::Value(default.to_string()));
         match self.found(key).map(|found| (found, found.get_ref())) {
             None => default,
@@ -394,7 +417,13 @@ impl<'a> Section<'a> {
             } else {
                 "a number"
             };
-            self.add_wrong_type(path, found, wanted);
+            let message = format!("expected {wanted}, found {}", described(found.get_ref()));
+            let fault = Fault::error(path, message).at(&found.span());
+            self.sink
+                .add(match quoted_number(found.get_ref(), rule.unit) {
+                    Some(help) => fault.help(help),
+                    None => fault,
+                });
             return f64::NAN;
         };
         match rule.error(path, value, &found.span()) {
@@ -438,15 +467,18 @@ impl<'a> Section<'a> {
     }
 }
 
-/// The values that a rule accepts, in words, and its range.
-fn of_rule(what: &str, rule: &Rule) -> (String, String) {
-    let gauge = if rule.gauges { ", or a gauge" } else { "" };
-    let unit = if rule.unit.is_empty() {
-        String::new()
-    } else {
-        format!(", {}", rule.unit)
-    };
-    (format!("{what}{unit}{gauge}"), rule.bound.symbols())
+/// The values of this kind that a rule accepts.
+fn of_rule(kind: &str, rule: &Rule) -> Accepts {
+    Accepts {
+        kind: kind.to_owned(),
+        unit: rule.unit,
+        gauges: rule.gauges,
+        range: rule.bound.symbols(),
+    }
+}
+
+fn of_tuple(count: usize, rule: &Rule) -> Accepts {
+    of_rule(&format!("{count} numbers"), rule)
 }
 
 fn choices<T>(options: &[(&'static str, T)]) -> String {
@@ -475,6 +507,24 @@ fn float(value: &DeValue<'_>) -> Option<f64> {
         }
         _ => None,
     }
+}
+
+/// Advice for a number that was written as a text: `"40 mm"`.
+fn quoted_number(value: &DeValue<'_>, unit: &str) -> Option<String> {
+    let DeValue::String(text) = value else {
+        return None;
+    };
+    let text = text.trim().replacen(',', ".", 1);
+    let end = text.find(|c: char| c.is_alphabetic() && !matches!(c, 'e' | 'E'));
+    let (digits, given) = text.split_at(end.unwrap_or(text.len()));
+    let value: f64 = digits.trim().parse().ok()?;
+    if given.is_empty() || given.trim() == unit {
+        return Some(format!("write {} without quotes and unit", number(value)));
+    }
+    let unit = if unit.is_empty() { "no unit" } else { unit };
+    Some(format!(
+        "write a number without quotes: the key's name holds its unit, {unit}"
+    ))
 }
 
 fn described(value: &DeValue<'_>) -> String {

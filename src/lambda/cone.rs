@@ -75,7 +75,7 @@ pub(super) fn solve(model: &Model, roles: &[Role], likely: &[bool], target: &[Nu
                 basis.extend(first_of_the_sum(model, roles, target));
             }
             entered = None;
-            factor = Factor::new(model, &basis);
+            factor = factor.of(model, &basis);
             continue;
         }
         if entered.take().is_some() {

@@ -93,6 +93,8 @@ pub(super) struct Factor {
     triangle: Vec<Num>,
     /// Smallest share of a member's column that lies outside the span of those before it.
     independence: f64,
+    /// The same of every member and those before it.
+    independences: Vec<f64>,
 }
 
 /// The minimiser over the members of a factor.
@@ -106,26 +108,72 @@ pub(super) struct Minimiser {
 impl Factor {
     /// Factorises the listed variables in order, leaving out those that depend on earlier ones.
     pub fn new(model: &Model, variables: &[usize]) -> Self {
-        let pivot = model.weight.as_ref().and_then(|w| {
-            let per_weight = |i: usize| model.norm[i] / w[i];
-            variables
-                .iter()
-                .copied()
-                .reduce(|p, i| if per_weight(i) < per_weight(p) { i } else { p })
-        });
         let mut factor = Self {
             rows: model.rows,
-            pivot,
+            pivot: Self::pivot_of(model, variables),
             members: Vec::with_capacity(variables.len()),
             reflectors: Vec::new(),
             scales: Vec::new(),
             triangle: Vec::new(),
             independence: 1.0,
+            independences: Vec::new(),
         };
         for &i in variables {
             factor.push(model, i);
         }
         factor
+    }
+
+    /// The factor of `variables`: what this one has of them in the same order, up to the first
+    /// difference, is not factorised again.
+    pub fn of(self, model: &Model, variables: &[usize]) -> Self {
+        if self.pivot != Self::pivot_of(model, variables) {
+            return Self::new(model, variables);
+        }
+        // Variables that this factor left out are tried again where they differ.
+        let mut members = self.members.iter().peekable();
+        let mut shared = 0;
+        for &i in variables {
+            if Some(i) == self.pivot {
+                continue;
+            }
+            if members.next_if_eq(&&i).is_none() {
+                break;
+            }
+            shared += 1;
+        }
+        let mut factor = self;
+        factor.truncate(shared);
+        let rest = variables
+            .iter()
+            .filter(|&&i| !factor.members.contains(&i))
+            .copied()
+            .collect::<Vec<_>>();
+        for i in rest {
+            factor.push(model, i);
+        }
+        factor
+    }
+
+    /// Leaves the first `rank` members.
+    fn truncate(&mut self, rank: usize) {
+        self.members.truncate(rank);
+        self.scales.truncate(rank);
+        self.independences.truncate(rank);
+        self.reflectors.truncate(rank * self.rows);
+        self.triangle.truncate(rank * self.rows);
+        self.independence = self.independences.last().copied().unwrap_or(1.0);
+    }
+
+    /// The variable of the smallest column per weight, with an equality.
+    fn pivot_of(model: &Model, variables: &[usize]) -> Option<usize> {
+        model.weight.as_ref().and_then(|w| {
+            let per_weight = |i: usize| model.norm[i] / w[i];
+            variables
+                .iter()
+                .copied()
+                .reduce(|p, i| if per_weight(i) < per_weight(p) { i } else { p })
+        })
     }
 
     /// Adds `variable` to a factor of `before`; `None` if it depends on them.
@@ -227,6 +275,7 @@ impl Factor {
         self.reflectors.extend(reflector);
         column[rank] = diagonal;
         self.triangle.extend(column);
+        self.independences.push(self.independence);
         self.members.push(variable);
     }
 

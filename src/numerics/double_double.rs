@@ -5,6 +5,7 @@
 //! Relative errors: sum 3 x 2^-106, product 8 x 2^-106, quotient and root 16 x 2^-106,
 //! for magnitudes between 1e-140 and 1e140; outside it low parts may be lost.
 
+use crate::dispatch::{self, Kernel};
 use std::cmp::Ordering;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -16,7 +17,7 @@ pub struct DoubleDouble {
 }
 
 /// `a + b = s + e` exactly.
-#[inline]
+#[inline(always)]
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let s = a + b;
     let part = s - a;
@@ -24,7 +25,7 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
 }
 
 /// The same where `|a| >= |b|`.
-#[inline]
+#[inline(always)]
 fn fast_two_sum(a: f64, b: f64) -> (f64, f64) {
     let s = a + b;
     (s, b - (s - a))
@@ -81,9 +82,101 @@ impl DoubleDouble {
     }
 }
 
+/// `a b`; a fused product gives the residue that splitting gives, exactly, in one operation.
+#[inline(always)]
+fn product<const FMA: bool>(a: DoubleDouble, b: DoubleDouble) -> DoubleDouble {
+    if !FMA {
+        return a * b;
+    }
+    let p = a.hi * b.hi;
+    let e = a.hi.mul_add(b.hi, -p);
+    let (hi, lo) = fast_two_sum(p, e + (a.hi * b.lo + a.lo * b.hi));
+    DoubleDouble { hi, lo }
+}
+
+/// A sum of products in four running sums, whose parts the compiler keeps in vector registers.
+struct Dot<'a>(&'a [DoubleDouble], &'a [DoubleDouble]);
+
+impl Kernel for Dot<'_> {
+    type Output = DoubleDouble;
+
+    #[inline(always)]
+    fn run<const FMA: bool>(self) -> DoubleDouble {
+        let (a4, a_rest) = self.0.as_chunks::<4>();
+        let (b4, b_rest) = self.1.as_chunks::<4>();
+        let (mut high, mut low) = ([0.0; 4], [0.0; 4]);
+        for (x, y) in a4.iter().zip(b4) {
+            let (x_high, x_low) = (x.map(|v| v.hi), x.map(|v| v.lo));
+            let (y_high, y_low) = (y.map(|v| v.hi), y.map(|v| v.lo));
+            let (mut next_high, mut next_low) = ([0.0; 4], [0.0; 4]);
+            for k in 0..4 {
+                let at = |hi: &[f64; 4], lo: &[f64; 4]| DoubleDouble {
+                    hi: hi[k],
+                    lo: lo[k],
+                };
+                let sum =
+                    at(&high, &low) + product::<FMA>(at(&x_high, &x_low), at(&y_high, &y_low));
+                (next_high[k], next_low[k]) = (sum.hi, sum.lo);
+            }
+            (high, low) = (next_high, next_low);
+        }
+        let rest = a_rest
+            .iter()
+            .zip(b_rest)
+            .fold(DoubleDouble::exactly(0.0), |sum, (&x, &y)| {
+                sum + product::<FMA>(x, y)
+            });
+        let sum = |k: usize| DoubleDouble {
+            hi: high[k],
+            lo: low[k],
+        };
+        (sum(0) + sum(1)) + (sum(2) + sum(3)) + rest
+    }
+}
+
+/// Numbers of one vector loop.
+const BLOCK: usize = 32;
+
+/// `y += factor x`.
+struct AddMultiple<'a>(&'a mut [DoubleDouble], DoubleDouble, &'a [DoubleDouble]);
+
+impl Kernel for AddMultiple<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<const FMA: bool>(self) {
+        let Self(y, factor, x) = self;
+        let (y_blocks, y_rest) = y.as_chunks_mut::<BLOCK>();
+        let (x_blocks, x_rest) = x.as_chunks::<BLOCK>();
+        for (y, x) in y_blocks.iter_mut().zip(x_blocks) {
+            for k in 0..BLOCK {
+                y[k] = y[k] + product::<FMA>(factor, x[k]);
+            }
+        }
+        for (y, &x) in y_rest.iter_mut().zip(x_rest) {
+            *y = *y + product::<FMA>(factor, x);
+        }
+    }
+}
+
+impl DoubleDouble {
+    /// Sum of products over the shorter length; the same bits on every machine.
+    #[must_use]
+    pub fn sum_of_products(a: &[Self], b: &[Self]) -> Self {
+        let count = a.len().min(b.len());
+        dispatch::run(Dot(&a[..count], &b[..count]))
+    }
+
+    /// `y += factor x` over the shorter length; the same bits on every machine.
+    pub fn add_multiple(y: &mut [Self], factor: Self, x: &[Self]) {
+        let count = y.len().min(x.len());
+        dispatch::run(AddMultiple(&mut y[..count], factor, &x[..count]));
+    }
+}
+
 impl Add for DoubleDouble {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn add(self, rhs: Self) -> Self {
         let (s, e) = two_sum(self.hi, rhs.hi);
         let (t, f) = two_sum(self.lo, rhs.lo);
@@ -212,5 +305,33 @@ mod tests {
         let third = DoubleDouble::exactly(1.0) / DoubleDouble::exactly(3.0);
         let back = third * DoubleDouble::exactly(3.0) - DoubleDouble::exactly(1.0);
         assert!(back.hi.abs() <= 4.0 * ULP);
+    }
+
+    /// Vector instructions change nothing: sums and multiples have the bits of the plain operations.
+    #[test]
+    fn sums_over_lists_have_the_bits_of_one_operation_after_another() {
+        let mut random = crate::random::Random::new(3);
+        let mut next = || {
+            let value = random.between(-1.0, 1.0);
+            DoubleDouble::exactly(value) + DoubleDouble::exactly(value * 1e-17 * random.unit())
+        };
+        for count in 0..80 {
+            let a: Vec<DoubleDouble> = (0..count).map(|_| next()).collect();
+            let b: Vec<DoubleDouble> = (0..count + 1).map(|_| next()).collect();
+            let mut lanes = [DoubleDouble::exactly(0.0); 5];
+            for k in 0..count {
+                let lane = if k < count / 4 * 4 { k % 4 } else { 4 };
+                lanes[lane] += a[k] * b[k];
+            }
+            let [p, q, r, s, rest] = lanes;
+            let sum = (p + q) + (r + s) + rest;
+            assert_eq!(DoubleDouble::sum_of_products(&a, &b), sum, "{count}");
+            let factor = next();
+            let mut y = a.clone();
+            DoubleDouble::add_multiple(&mut y, factor, &b);
+            for k in 0..count {
+                assert_eq!(y[k], a[k] + factor * b[k], "{count} {k}");
+            }
+        }
     }
 }

@@ -150,21 +150,14 @@ impl Real for DoubleDouble {
         if self < Self::ZERO { -self } else { self }
     }
 
-    /// Four running sums hide the latency of the long additions.
+    #[inline]
     fn dot(a: &[Self], b: &[Self]) -> Self {
-        let (a4, a_rest) = a.as_chunks::<4>();
-        let (b4, b_rest) = b.as_chunks::<4>();
-        let mut lanes = [Self::ZERO; 4];
-        for (x, y) in a4.iter().zip(b4) {
-            for k in 0..4 {
-                lanes[k] += x[k] * y[k];
-            }
-        }
-        let rest = a_rest
-            .iter()
-            .zip(b_rest)
-            .fold(Self::ZERO, |sum, (&x, &y)| sum + x * y);
-        (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]) + rest
+        DoubleDouble::sum_of_products(a, b)
+    }
+
+    #[inline]
+    fn add_scaled(y: &mut [Self], factor: Self, x: &[Self]) {
+        DoubleDouble::add_multiple(y, factor, x);
     }
 }
 

@@ -6,6 +6,9 @@
 
 use std::sync::OnceLock;
 
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
 use super::Scene;
 use super::maps::{MagnetMean, SceneMap};
 use super::passive;
@@ -127,7 +130,34 @@ impl<'a> ShapeField<'a> {
         points_m: &[[f64; 3]],
         progress: &dyn Progress,
     ) -> Result<Vec<f64>, RunError> {
-        let compute = || scene.forces_n_per_a(solved, points_m, progress);
+        self.at_points(what, points_m, || {
+            scene.forces_n_per_a(solved, points_m, progress)
+        })
+    }
+
+    /// As [`Scene::force_vectors_n_per_a`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn force_vectors_n_per_a(
+        self,
+        scene: &Scene,
+        solved: &Solved,
+        points_m: &[[f64; 3]],
+        progress: &dyn Progress,
+    ) -> Result<Vec<[f64; 3]>, RunError> {
+        self.at_points("vectors", points_m, || {
+            scene.force_vectors_n_per_a(solved, points_m, progress)
+        })
+    }
+
+    /// What `compute` gives at points of the shape, by its name.
+    fn at_points<T: Serialize + DeserializeOwned>(
+        self,
+        what: &str,
+        points_m: &[[f64; 3]],
+        compute: impl FnOnce() -> Result<T, RunError>,
+    ) -> Result<T, RunError> {
         let Some((FieldStore { store, field, .. }, shape)) = self.cached else {
             return compute();
         };
@@ -146,14 +176,7 @@ impl<'a> ShapeField<'a> {
         scene: &Scene,
         points_m: &[[f64; 3]],
     ) -> Result<Vec<f64>, RunError> {
-        let compute = || passive::left_out_z_n(scene, points_m);
-        let Some((FieldStore { store, field, .. }, shape)) = self.cached else {
-            return compute();
-        };
-        let origin = field
-            .clone()
-            .and_numbers(points_m.iter().flatten().copied());
-        store.remember(&format!("{shape}.pull"), &origin, compute)
+        self.at_points("pull", points_m, || passive::left_out_z_n(scene, points_m))
     }
 
     /// The largest |B| in any core of the design's `array` at these currents, T, as

@@ -6,6 +6,9 @@
 
 use super::Scene;
 use super::steel::Solved;
+use super::tolerances::MAGNET_FINEST;
+use crate::RunError;
+use crate::progress::Silent;
 
 /// The estimate is this multiple of the largest difference that was found.
 const SAFETY: f64 = 30.0;
@@ -65,6 +68,74 @@ pub(crate) fn sharper(
             proven.estimate, proven.method
         ),
     }
+}
+
+/// Tolerance of the forces that others are compared with, in that of these.
+const FINER: f64 = 1e-2;
+/// Places at which forces are compared.
+const FORCES: usize = 24;
+
+/// `proven` of forces on the magnet, with what those of a finer rule for it and of finer sources say
+/// at some of `points_m` in its place: `given` is the last `N` components of the force of every coil
+/// there, N/A, [point, coil], errors being relative to the moment times the gradient at the height.
+/// Itself where nothing finer is to be had.
+///
+/// # Errors
+/// Interruption.
+pub(crate) fn sharper_forces<const N: usize>(
+    scene: &Scene,
+    solved: &Solved,
+    points_m: &[[f64; 3]],
+    given: impl Fn(usize, usize) -> [f64; N],
+    proven: Evaluation,
+) -> Result<Evaluation, RunError> {
+    let finer = solved.to_tolerance(FINER * solved.tolerance);
+    if finer.tolerance < MAGNET_FINEST {
+        return Ok(proven);
+    }
+    let rows = spread(points_m.len(), FORCES);
+    let places_m: Vec<[f64; 3]> = rows.iter().map(|row| points_m[*row]).collect();
+    let sure = match scene.forces::<N>(&finer, &places_m, &Silent) {
+        Ok(sure) => sure,
+        Err(RunError::Interrupted(stop)) => return Err(stop.into()),
+        // So close that a finer rule would have too many dipoles.
+        Err(_) => return Ok(proven),
+    };
+    let [x, y, z] = scene.moment_a_m2;
+    let moment = x.hypot(y).hypot(z);
+    let mut largest = 0.0_f64;
+    for ((row, place_m), sure) in rows
+        .iter()
+        .zip(&places_m)
+        .zip(sure.chunks(scene.coils.len()))
+    {
+        let Ok(above) = scene.winding.field(0.0, place_m[2]) else {
+            return Ok(proven);
+        };
+        let size = moment * above.gradient_norm();
+        for (coil, sure) in sure.iter().enumerate() {
+            let gain = scene.coils[coil].gain.abs();
+            for (a, b) in given(*row, coil).iter().zip(sure) {
+                if gain > 0.0 {
+                    largest = largest.max((a - b).abs() / (size * gain));
+                }
+            }
+        }
+    }
+    let estimate = SAFETY * largest + ROUNDING;
+    if rows.is_empty() || estimate.is_nan() || estimate >= proven.estimate {
+        return Ok(proven);
+    }
+    Ok(Evaluation {
+        estimate,
+        method: format!(
+            "{SAFETY} times the largest difference from a hundred times finer forces at {} places; \
+             proven below {:e}: {}",
+            rows.len(),
+            proven.estimate,
+            proven.method
+        ),
+    })
 }
 
 /// Indices spread evenly and irregularly over 0..count: multiples of the golden ratio.

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use crate::archive::{Archive, text_of};
 use crate::assembly::{Affine, Body, corner, lay_out};
 use crate::document::parse_unit;
-use crate::mesh::FileMesh;
+use crate::file_mesh::FileMesh;
 use crate::number::Numbers;
 use crate::placement::sin_cos_deg;
 use crate::read_error::ReadError;

@@ -1,6 +1,6 @@
 //! Bodies placed in bodies: an assembly's tree laid out as triangles, bounded.
 
-use crate::mesh::Triangle;
+use crate::file_mesh::Triangle;
 
 /// Placing bodies several times may add so many triangles to those of the file,
 const MOST_ADDED: u64 = 10_000_000;
@@ -104,6 +104,14 @@ pub(super) fn lay_out(bodies: &[Body], roots: &[(usize, Affine)]) -> Result<Vec<
         return Err("a placement moves a body beyond all numbers".into());
     }
     Ok(triangles)
+}
+
+/// How many triangles [`lay_out`] makes of each root.
+pub(super) fn counts(bodies: &[Body], roots: &[(usize, Affine)]) -> Vec<usize> {
+    let mut visits = vec![None; bodies.len()];
+    let mut below = |root: &usize| weight(bodies, *root, &mut visits, 0).map_or(0, |w| w.triangles);
+    let roots = roots.iter().map(|(root, _)| below(root));
+    roots.map(|count| count as usize).collect()
 }
 
 /// The bodies below a body.

@@ -1,6 +1,6 @@
 //! A tree of boxes over triangles: halved along the longest side, down to a few.
 
-use crate::mesh::Triangle;
+use crate::file_mesh::Triangle;
 
 /// Triangles in a leaf.
 const LEAF: usize = 4;

@@ -134,7 +134,7 @@ impl Certificate {
 }
 
 /// Compares the points with the surface they were taken from; `None` where that was not asked for,
-/// or its effort is spent.
+/// or what one core looks at in `seconds` is spent.
 ///
 /// # Errors
 /// [`ShapeError::Interrupted`] when the user asked to stop.
@@ -143,6 +143,7 @@ pub fn certify(
     grid: &Grid,
     samples: &[Option<Sample>],
     how: Certify,
+    seconds: u64,
     progress: &dyn Progress,
 ) -> Result<Option<Certificate>, ShapeError> {
     if how == Certify::No {
@@ -159,7 +160,7 @@ pub fn certify(
             (Tessellation::None, 0.0),
         ),
         Surface::Mesh(mesh) => {
-            let effort = Looks::usual();
+            let effort = Looks::of_seconds(seconds);
             let faces = Faces::new(mesh, grid, Arc::clone(&effort));
             let lattice = Lattice::new(&faces, grid, &heights);
             let found = vertical(mesh, grid, &lattice, progress)?;
@@ -185,7 +186,7 @@ pub fn certify(
 }
 
 /// For every cell of the grid, x fastest, a bound of the vertical difference, m; `None` for cells
-/// of which a corner has no surface. No result where the effort of it is spent.
+/// of which a corner has no surface. No result where what one core looks at in `seconds` is spent.
 ///
 /// # Errors
 /// [`Interrupted`] when the user asked to stop.
@@ -193,6 +194,7 @@ pub fn by_cell(
     surface: &Surface,
     grid: &Grid,
     samples: &[Option<Sample>],
+    seconds: u64,
     progress: &dyn Progress,
 ) -> Result<Option<Vec<Option<f64>>>, Interrupted> {
     let heights: Vec<Option<f64>> = samples
@@ -205,7 +207,7 @@ pub fn by_cell(
             Ok(Some(primitive_by_cell(shape, grid, &heights)))
         }
         Surface::Mesh(mesh) => {
-            let effort = Looks::usual();
+            let effort = Looks::of_seconds(seconds);
             let faces = Faces::new(mesh, grid, Arc::clone(&effort));
             let cells = vertical_by_cell(&Lattice::new(&faces, grid, &heights), progress)?;
             Ok((!effort.is_spent()).then_some(cells))

@@ -7,7 +7,8 @@
 use rayon::prelude::*;
 
 use crate::boxes::{Box3, BoxTree};
-use crate::mesh::{Triangle, cross, minus};
+use crate::file_mesh::Triangle;
+use fluxform_numerics::vec3::{cross, minus};
 
 /// Parts into which the search is cut, about.
 const PARTS: usize = 256;

@@ -4,17 +4,17 @@ mod raw;
 mod read;
 mod unit;
 
-pub use read::keys;
+pub use read::{keys, keys_of};
 
 use std::path::PathBuf;
 
-use crate::step::BodyOptions;
+use crate::bodies::BodyOptions;
 use fluxform_base::point_weights::Weights;
 use fluxform_numerics::axis::Axis;
 
 pub use crate::format::SurfaceFormat;
 pub use raw::{RawSurface, RawSurfaceError};
-pub use unit::{parse_unit, unit_name};
+pub use unit::{parse_unit, unit_name, unit_names};
 
 /// A validated shape document, or a raw surface with its flags.
 #[derive(Debug, Clone, PartialEq)]

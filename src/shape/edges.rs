@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::mesh::Triangle;
+use crate::file_mesh::Triangle;
 
 /// Two programs may round the same vertex to neighbouring numbers: roundings that are not
 /// apart.
@@ -43,6 +43,8 @@ pub(super) struct Edges {
     pub(super) open: usize,
     pub(super) crowded: usize,
     pub(super) inconsistent: usize,
+    /// Edges that more triangles run along one way than the other, with how often and which way.
+    pub(super) unbalanced: Vec<([u32; 2], usize)>,
     pub(super) euler: i64,
 }
 
@@ -72,6 +74,13 @@ impl Edges {
         found.euler = met.len() as i64 + corners.len() as i64;
         for group in edges.chunk_by(|a, b| a.0 == b.0) {
             found.euler -= 1;
+            let up = group.iter().filter(|(_, up)| *up).count();
+            let down = group.len() - up;
+            if up != down {
+                let [low, high] = [(group[0].0 >> 32) as u32, group[0].0 as u32];
+                let way = if up > down { [low, high] } else { [high, low] };
+                found.unbalanced.push((way, up.abs_diff(down)));
+            }
             match group {
                 [_] => found.open += 1,
                 [a, b] => found.inconsistent += usize::from(a.1 == b.1),

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::document::SurfaceFormat;
+use crate::format::SurfaceFormat;
 use crate::read_error::ReadError;
 use fluxform_base::progress::Interrupted;
 

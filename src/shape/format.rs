@@ -1,13 +1,6 @@
-//! The surface formats: one table of their names, endings, signs and readers.
+//! The surface formats: one table of their names, endings and units.
 
 use std::path::Path;
-
-use crate::error::ShapeError;
-use crate::mesh::FileMesh;
-use crate::read_error::ReadError;
-use crate::step::{self, BodyOptions};
-use crate::{amf, glb, height_image, obj, off, ply, sldprt, stl, three_dxml, three_mf};
-use fluxform_base::progress::Silent;
 
 /// Formats of surface files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,7 +29,7 @@ pub enum SurfaceFormat {
     Sldprt,
 }
 
-/// All that is to be known of a format.
+/// What is known of a format without its reader.
 struct Row {
     format: SurfaceFormat,
     /// Its usual name.
@@ -45,101 +38,40 @@ struct Row {
     endings: &'static [&'static str],
     /// Whether the file itself says what its unit is.
     carries_unit: bool,
-    /// Whether bytes begin as such files do: never true for two formats.
-    begins: fn(&[u8]) -> bool,
-    read: fn(&[u8]) -> Result<FileMesh, ReadError>,
+}
+
+const fn row(
+    format: SurfaceFormat,
+    name: &'static str,
+    endings: &'static [&'static str],
+    carries_unit: bool,
+) -> Row {
+    Row {
+        format,
+        name,
+        endings,
+        carries_unit,
+    }
 }
 
 /// In the order of [`SurfaceFormat`].
 const TABLE: [Row; 11] = [
-    Row {
-        format: SurfaceFormat::Stl,
-        name: "STL",
-        endings: &["stl"],
-        carries_unit: false,
-        begins: stl::begins,
-        read: stl::read,
-    },
-    Row {
-        format: SurfaceFormat::Obj,
-        name: "OBJ",
-        endings: &["obj"],
-        carries_unit: false,
-        begins: obj::begins,
-        read: obj::read,
-    },
-    Row {
-        format: SurfaceFormat::Ply,
-        name: "PLY",
-        endings: &["ply"],
-        carries_unit: false,
-        begins: ply::begins,
-        read: ply::read,
-    },
-    Row {
-        format: SurfaceFormat::Off,
-        name: "OFF",
-        endings: &["off"],
-        carries_unit: false,
-        begins: off::begins,
-        read: off::read,
-    },
-    Row {
-        format: SurfaceFormat::Glb,
-        name: "GLB",
-        endings: &["glb"],
-        carries_unit: true,
-        begins: glb::begins,
-        read: glb::read,
-    },
-    Row {
-        format: SurfaceFormat::HeightImage,
-        name: "height image",
-        endings: &["png"],
-        carries_unit: false,
-        begins: height_image::begins,
-        read: height_image::read,
-    },
-    Row {
-        format: SurfaceFormat::ThreeMf,
-        name: "3MF",
-        endings: &["3mf"],
-        carries_unit: true,
-        begins: three_mf::begins,
-        read: three_mf::read,
-    },
-    Row {
-        format: SurfaceFormat::Amf,
-        name: "AMF",
-        endings: &["amf"],
-        carries_unit: true,
-        begins: amf::begins,
-        read: amf::read,
-    },
-    Row {
-        format: SurfaceFormat::ThreeDxml,
-        name: "3DXML",
-        endings: &["3dxml"],
-        carries_unit: true,
-        begins: three_dxml::begins,
-        read: three_dxml::read,
-    },
-    Row {
-        format: SurfaceFormat::Step,
-        name: "STEP",
-        endings: &["step", "stp"],
-        carries_unit: true,
-        begins: |bytes| starts(bytes, b"ISO-10303-21"),
-        read: |bytes| step::read(bytes, &BodyOptions::default(), &Silent),
-    },
-    Row {
-        format: SurfaceFormat::Sldprt,
-        name: "SOLIDWORKS",
-        endings: &["sldprt", "sldasm"],
-        carries_unit: true,
-        begins: sldprt::begins,
-        read: sldprt::read,
-    },
+    row(SurfaceFormat::Stl, "STL", &["stl"], false),
+    row(SurfaceFormat::Obj, "OBJ", &["obj"], false),
+    row(SurfaceFormat::Ply, "PLY", &["ply"], false),
+    row(SurfaceFormat::Off, "OFF", &["off"], false),
+    row(SurfaceFormat::Glb, "GLB", &["glb"], true),
+    row(SurfaceFormat::HeightImage, "height image", &["png"], false),
+    row(SurfaceFormat::ThreeMf, "3MF", &["3mf"], true),
+    row(SurfaceFormat::Amf, "AMF", &["amf"], true),
+    row(SurfaceFormat::ThreeDxml, "3DXML", &["3dxml"], true),
+    row(SurfaceFormat::Step, "STEP", &["step", "stp"], true),
+    row(
+        SurfaceFormat::Sldprt,
+        "SOLIDWORKS",
+        &["sldprt", "sldasm"],
+        true,
+    ),
 ];
 
 /// Files that users have, which are not read: their endings, and what to do.
@@ -182,23 +114,6 @@ const ADVICE: [(&[&str], &str); 5] = [
     ),
 ];
 
-/// Kinds of files that are no surface of any format, by their first bytes in lower case.
-const OTHER: [(&[u8], &str); 4] = [
-    (
-        b"version https://git-lfs",
-        "a git-LFS pointer to one: run `git lfs pull` in its repository, or download the file itself",
-    ),
-    (
-        b"<!doctype",
-        "a web page: the download went wrong; fetch the raw file",
-    ),
-    (
-        b"<html",
-        "a web page: the download went wrong; fetch the raw file",
-    ),
-    (b"\x1f\x8b", "compressed with gzip; unpack it"),
-];
-
 impl SurfaceFormat {
     fn row(self) -> &'static Row {
         &TABLE[self as usize]
@@ -212,13 +127,6 @@ impl SurfaceFormat {
         Some(row.format)
     }
 
-    /// The format of a file's bytes, for names without an ending; `None` where they show none.
-    #[must_use]
-    pub fn of_content(bytes: &[u8]) -> Option<Self> {
-        let row = TABLE.iter().find(|row| (row.begins)(bytes))?;
-        Some(row.format)
-    }
-
     /// Its usual name.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -229,6 +137,16 @@ impl SurfaceFormat {
     #[must_use]
     pub fn carries_unit(self) -> bool {
         self.row().carries_unit
+    }
+
+    /// Every format.
+    pub(super) fn all() -> impl Iterator<Item = Self> {
+        TABLE.iter().map(|row| row.format)
+    }
+
+    /// The ending that its files usually have.
+    pub(super) fn usual_ending(self) -> &'static str {
+        self.row().endings[0]
     }
 
     /// The endings that are read, for a message.
@@ -248,66 +166,11 @@ impl SurfaceFormat {
             .find(|(endings, _)| endings.contains(&&*ending));
         found.map(|(_, advice)| *advice)
     }
-
-    /// The triangles of a file's bytes, in the file's unit; `path` names it in messages.
-    ///
-    /// # Errors
-    /// [`ShapeError::Content`] with the place.
-    pub fn read(self, path: &Path, bytes: &[u8]) -> Result<FileMesh, ShapeError> {
-        self.read_bytes(bytes)
-            .map_err(|source| ShapeError::Content {
-                path: path.into(),
-                source,
-            })
-    }
-
-    fn read_bytes(self, bytes: &[u8]) -> Result<FileMesh, ReadError> {
-        if bytes.is_empty() {
-            return Err(ReadError::file(
-                "the file is empty (0 bytes): the export or the download failed",
-            ));
-        }
-        let row = self.row();
-        let other = |what: &str| ReadError::file(format!("this is not {} {what}", row.article()));
-        if let Some((_, what)) = OTHER.iter().find(|(sign, _)| starts(bytes, sign)) {
-            return Err(other(&format!("file but {what}")));
-        }
-        let result = (row.read)(bytes);
-        // A file of another format under this name fails somewhere: the name is the fault then.
-        if result.is_err()
-            && !(row.begins)(bytes)
-            && let Some(format) = Self::of_content(bytes)
-        {
-            let real = format.row();
-            return Err(other(&format!(
-                "file but {} file: give it the ending .{}",
-                real.article(),
-                real.endings[0]
-            )));
-        }
-        result
-    }
-}
-
-impl Row {
-    /// Its name with an article.
-    fn article(&self) -> String {
-        let vowel = self.name.starts_with(['A', 'E', 'I', 'O']) || self.name == "STL";
-        format!("{} {}", if vowel { "an" } else { "a" }, self.name)
-    }
 }
 
 /// The ending of a path, in lower case.
 fn ending(path: &Path) -> Option<String> {
     Some(path.extension()?.to_str()?.to_ascii_lowercase())
-}
-
-/// Whether bytes begin with a sign, in any case, after a byte-order mark and blanks.
-pub(super) fn starts(bytes: &[u8], sign: &[u8]) -> bool {
-    let body = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let body = body.trim_ascii_start();
-    body.get(..sign.len())
-        .is_some_and(|first| first.eq_ignore_ascii_case(sign))
 }
 
 #[cfg(test)]

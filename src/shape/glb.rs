@@ -9,7 +9,7 @@ use gltf::mesh::Mode;
 use gltf::{Document, Node, Semantic};
 
 use crate::assembly::{Affine, Body, corner, lay_out};
-use crate::mesh::{FileMesh, Triangle};
+use crate::file_mesh::{FileMesh, Triangle};
 use crate::number::F32_ROUNDING;
 use crate::read_error::ReadError;
 

@@ -10,7 +10,8 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use crate::mesh::{Mesh, Triangle};
+use crate::file_mesh::Triangle;
+use crate::mesh::Mesh;
 use crate::vertical_hit::{Contact, Seen, WALL_NORMAL_Z, upward_normal};
 use fluxform_base::progress::{Interrupted, Progress};
 use fluxform_numerics::axis::Axis;

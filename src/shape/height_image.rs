@@ -8,7 +8,7 @@ use std::io::Cursor;
 
 use png::{ColorType, Decoder, Limits, Transformations};
 
-use crate::mesh::{FileMesh, Triangle};
+use crate::file_mesh::{FileMesh, Triangle};
 use crate::read_error::ReadError;
 
 /// More pixels than this are more triangles than a computer holds.

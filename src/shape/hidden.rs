@@ -6,14 +6,18 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::height::Grid;
-use crate::mesh::{Mesh, cross, dot, minus};
-use crate::scattered::Probe;
+use crate::height::{Grid, reach_m};
+use crate::index::Index;
+use crate::mesh::Mesh;
+use crate::point_flags::{self, Rules};
 use crate::surface::Surface;
 use fluxform_numerics::axis::Axis;
+use fluxform_numerics::vec3::{cross, dot, minus};
 
 /// Points that are looked at.
 const POINTS: usize = 20_000;
+/// Triangles that all lines together may be compared with, about: two seconds of one core.
+pub(super) const MOST_MET: usize = 20_000_000;
 /// Cells along x, and as many along y, in which triangles are looked up.
 const CELLS: usize = 101;
 /// Of a facet's area this share at least must show in plan for it to face up or down.
@@ -35,13 +39,13 @@ impl Hidden {
     #[must_use]
     pub fn of(surface: &Surface) -> Option<Self> {
         match surface {
-            Surface::Mesh(mesh) => Some(of_mesh(surface, mesh)),
+            Surface::Mesh(mesh) => Some(of_mesh(mesh)),
             Surface::Primitive(_) => None,
         }
     }
 }
 
-fn of_mesh(surface: &Surface, mesh: &Mesh) -> Hidden {
+fn of_mesh(mesh: &Mesh) -> Hidden {
     let triangles = mesh.triangles();
     let normal = |k: usize| {
         let [a, b, c] = triangles[k];
@@ -65,16 +69,20 @@ fn of_mesh(surface: &Surface, mesh: &Mesh) -> Hidden {
         samples: if to > from { CELLS } else { 1 },
     });
     let grid = Grid { x_m, y_m };
-    let probe = Probe::new(surface, &grid);
+    // Heights alone are asked for: of layers nothing.
+    let rules = Rules {
+        reach_m: reach_m(mesh, &grid),
+        plain_layers: 1,
+    };
+    let index = Index::new(mesh, rules.reach_m);
     let depth_m =
         DEPTH * (bounds.max_m[2] - bounds.min_m[2]) + 2.0 * mesh.facts().coordinate_rounding_m;
     // Counts of points: all, hidden, facing up, of these hidden.
-    let look = |k: usize| -> [usize; 4] {
+    let place = |k: usize| {
         let at = area * (k as f64 + 0.5) / POINTS as f64;
-        let index = ends
-            .partition_point(|end| *end < at)
-            .min(triangles.len() - 1);
-        let [a, b, c] = triangles[index];
+        let first = ends.partition_point(|end| *end < at);
+        let facet = first.min(triangles.len() - 1);
+        let [a, b, c] = triangles[facet];
         // The plastic number's recurrence fills a square evenly; folded, a triangle.
         let [mut s, mut t] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2]
             .map(|step: f64| (0.5 + step * k as f64).fract());
@@ -82,9 +90,15 @@ fn of_mesh(surface: &Surface, mesh: &Mesh) -> Hidden {
             (s, t) = (1.0 - s, 1.0 - t);
         }
         let point = [0, 1, 2].map(|i| a[i] + s * (b[i] - a[i]) + t * (c[i] - a[i]));
-        let normal = normal(index);
+        (facet, point)
+    };
+    let look = |k: usize| -> [usize; 4] {
+        fluxform_base::progress::poll();
+        let (facet, point) = place(k);
+        let normal = normal(facet);
         let level = LEVEL * dot(normal, normal).sqrt();
-        let top = probe.at([point[0], point[1]]);
+        let p = [point[0], point[1]];
+        let top = point_flags::at(triangles, index.at(p), p, rules);
         let covered = top.is_some_and(|(top, _)| top.height_m > point[2] + depth_m);
         // A wall, seen edge-on, hides nothing by itself.
         if normal[2].abs() <= level {
@@ -93,8 +107,15 @@ fn of_mesh(surface: &Surface, mesh: &Mesh) -> Hidden {
         let up = usize::from(outward * normal[2] > 0.0);
         [1, usize::from(covered), up, up * usize::from(covered)]
     };
+    // Where triangles lie over each other many times, a line meets all of them: fewer lines.
+    let met = |k: usize| {
+        let (_, point) = place(k);
+        index.at([point[0], point[1]]).len()
+    };
+    let met: usize = (0..POINTS).into_par_iter().map(met).sum();
     let sums = (0..POINTS)
         .into_par_iter()
+        .step_by((met / MOST_MET).max(1))
         .map(look)
         .reduce(|| [0; 4], |a, b| [0, 1, 2, 3].map(|i| a[i] + b[i]));
     let share = |part: usize, whole: usize| part as f64 / whole.max(1) as f64;
@@ -108,7 +129,7 @@ fn of_mesh(surface: &Surface, mesh: &Mesh) -> Hidden {
 mod tests {
     use super::*;
     use crate::document::Placement;
-    use crate::mesh::{FileMesh, Triangle};
+    use crate::file_mesh::{FileMesh, Triangle};
     use crate::placement::Transform;
 
     /// A body of revolution: its outline's radii and heights, mm, counterclockwise about its inside.

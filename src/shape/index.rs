@@ -4,7 +4,8 @@ use std::ops::RangeInclusive;
 
 use rayon::prelude::*;
 
-use crate::mesh::{Mesh, Triangle};
+use crate::file_mesh::Triangle;
+use crate::mesh::Mesh;
 use crate::vertical_hit::Seen;
 
 /// Buckets a side, at most.
@@ -165,7 +166,7 @@ impl Raster {
 mod tests {
     use super::*;
     use crate::document::Placement;
-    use crate::mesh::FileMesh;
+    use crate::file_mesh::FileMesh;
     use crate::placement::Transform;
     use crate::vertical_hit::Contact;
 

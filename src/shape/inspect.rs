@@ -8,18 +8,21 @@ use std::path::Path;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::bodies::{BodyOptions, NamedBody};
 use crate::crossings::crossings;
 use crate::document::{Placement, SurfaceFormat};
 use crate::edges::{Edges, WELD_ROUNDINGS, bodies, weld};
 use crate::error::ShapeError;
+use crate::file_mesh::{FileMesh, Triangle};
 use crate::height::Grid;
-use crate::mesh::{FileMesh, Mesh, Triangle, cross, minus};
+use crate::hidden::MOST_MET;
+use crate::mesh::Mesh;
 use crate::placement::Transform;
 use crate::scattered::Probe;
-use crate::step::{BodyOptions, NamedBody};
 use crate::surface::{ByteObserver, Surface, read_mesh};
 use fluxform_base::progress::Progress;
 use fluxform_numerics::axis::Axis;
+use fluxform_numerics::vec3::{cross, minus};
 
 /// Contents of a surface file. Lengths are in the file's unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -296,6 +299,10 @@ fn layers(file: FileMesh) -> Option<u32> {
     let surface = Surface::Mesh(mesh);
     let probe = Probe::new(&surface, &grid);
     let at = |k: usize| probe.at([x[k % LINES], y[k / LINES]]);
+    // Where triangles lie over each other many times, a line meets all of them: fewer lines.
+    let met = |k: usize| probe.near([x[k % LINES], y[k / LINES]]);
+    let met: usize = (0..grid.len()).into_par_iter().map(met).sum();
     let lines = (0..grid.len()).into_par_iter();
+    let lines = lines.step_by((met / MOST_MET).max(1));
     lines.filter_map(at).map(|(_, marks)| marks.layers).max()
 }

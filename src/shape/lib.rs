@@ -32,10 +32,12 @@
 //! ```
 
 pub mod amf;
+pub mod bodies;
 pub mod certificate;
 pub mod deviation;
 pub mod document;
 pub mod error;
+pub mod file_mesh;
 pub mod format;
 pub mod glb;
 pub mod height;
@@ -70,10 +72,12 @@ mod edges;
 mod index;
 mod number;
 mod polygon;
+mod readers;
 mod text;
 mod tokens;
 mod vertical_hit;
 mod xml;
+mod zeros;
 
 pub use error::ShapeError;
 pub use inspect::MeshReport;

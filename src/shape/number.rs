@@ -1,6 +1,6 @@
 //! Coordinates written as text: their values, and how finely the text states them.
 
-use crate::mesh::Triangle;
+use crate::file_mesh::Triangle;
 
 /// A text whose numbers all have fewer digits than a printed float wrote them exactly.
 const PRINTED_DIGITS: usize = 6;

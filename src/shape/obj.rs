@@ -3,7 +3,7 @@
 //! Indices count from 1, negative ones back from the last vertex so far. Colours after a vertex,
 //! texture and normal indices are not used. The file carries no unit.
 
-use crate::mesh::FileMesh;
+use crate::file_mesh::FileMesh;
 use crate::number::{Numbers, shown};
 use crate::polygon::{Faces, MOST_CORNERS};
 use crate::read_error::{Place, ReadError};

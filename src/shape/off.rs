@@ -1,12 +1,11 @@
 //! Geomview's OFF, ASCII: vertices, then faces by their corners' indices. Colours, normals and
 //! texture coordinates are passed over. The file carries no unit.
 
-use crate::format::starts;
-use crate::mesh::FileMesh;
+use crate::file_mesh::FileMesh;
 use crate::number::{Numbers, shown};
 use crate::polygon::{Faces, MOST_CORNERS};
 use crate::read_error::{Place, ReadError};
-use crate::text::narrow;
+use crate::text::{narrow, starts};
 use crate::tokens::Lines;
 
 /// Heads of files whose vertices begin with x, y and z.

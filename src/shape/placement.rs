@@ -4,7 +4,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::document::{Fit, Placement};
-use crate::mesh::{Bounds, Triangle};
+use crate::file_mesh::{Bounds, Triangle};
 
 /// Unit and placement as one map of points; right angles rotate exactly.
 #[derive(Debug, Clone, PartialEq)]

@@ -12,7 +12,7 @@ use ply_rs_bw::ply::{
     ScalarType,
 };
 
-use crate::mesh::FileMesh;
+use crate::file_mesh::FileMesh;
 use crate::number::{F32_ROUNDING, shown};
 use crate::polygon::{Faces, MOST_CORNERS};
 use crate::read_error::ReadError;

@@ -1,8 +1,9 @@
 //! Flags of a point: on a wall, a rim, a crease, under or over other sheets.
 
+use crate::file_mesh::Triangle;
 use crate::height::{Sample, sample_of};
-use crate::mesh::{Triangle, dot, minus};
 use crate::vertical_hit::{Contact, Seen, WALL_NORMAL_Z, upward_normal};
+use fluxform_numerics::vec3::{dot, minus};
 
 /// Faces that turn by less are neighbours on a curved surface, degrees.
 pub const CREASE_DEG: f64 = 20.0;

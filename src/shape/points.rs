@@ -3,12 +3,14 @@
 use rayon::prelude::*;
 
 use crate::certificate::{Certificate, Certify, by_cell, certify};
+use crate::deviation::CERTIFY_SECONDS;
 use crate::document::{AxisRequest, ShapeDocument};
 use crate::error::ShapeError;
+use crate::file_mesh::Bounds;
 use crate::height::{Grid, Sample};
 use crate::hidden::Hidden;
 use crate::holes::{self, Holes};
-use crate::mesh::{Bounds, MeshFacts};
+use crate::mesh::MeshFacts;
 use crate::point_areas::areas_m2;
 use crate::point_flags::Marks;
 use crate::scattered::Probe;
@@ -142,18 +144,33 @@ pub struct Discretized {
 }
 
 /// Options of discretising.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// Grid points without surface inside the silhouette.
     pub holes: Holes,
     /// How the points are compared with the surface.
     pub certify: Certify,
+    /// What that may take, s of one core about; counted, so that every machine stops at the same place.
+    pub certify_seconds: u64,
     /// Result of an earlier comparison of these points with this surface; it is not repeated.
     pub known: Option<Certificate>,
     /// Whether walls, rims, creases, overhangs and the points' areas are looked for.
     pub marks: bool,
     /// Whether the vertical difference is reported for every cell.
     pub cells: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            holes: Holes::default(),
+            certify: Certify::default(),
+            certify_seconds: CERTIFY_SECONDS,
+            known: None,
+            marks: false,
+            cells: false,
+        }
+    }
 }
 
 /// Opens the document's surface, places it and samples it over the requested grid.
@@ -260,7 +277,7 @@ pub fn discretize_surface(
             100.0 * share
         ));
     }
-    let mut how = settings.certify;
+    let (mut how, seconds) = (settings.certify, settings.certify_seconds);
     if how != Certify::No && grid.len() > MOST_CERTIFIED {
         how = Certify::No;
         warnings.push(format!(
@@ -270,18 +287,18 @@ pub fn discretize_surface(
     }
     let certificate = match &settings.known {
         Some(known) if how != Certify::No => Some(known.clone()),
-        _ => certify(&surface, &grid, &samples, how, progress)?,
+        _ => certify(&surface, &grid, &samples, how, seconds, progress)?,
     };
     if how != Certify::No && certificate.is_none() {
         warnings.push(
             "the effort of a certificate is spent: so many triangles lie over each other that how \
              far the points depart from the surface between them is not computed; the heights are \
-             exact all the same (repair or coarsen the mesh, or certify = no)"
+             exact all the same (--certify-seconds grants more; or repair or coarsen the mesh)"
                 .into(),
         );
     }
     let cells_m = if settings.cells && grid.len() <= MOST_CERTIFIED {
-        by_cell(&surface, &grid, &samples, progress)?
+        by_cell(&surface, &grid, &samples, seconds, progress)?
     } else {
         None
     };

@@ -5,7 +5,8 @@ use std::collections::HashMap;
 use earcut::Earcut;
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
 
-use crate::mesh::{Triangle, cross, dot, minus};
+use crate::file_mesh::Triangle;
+use fluxform_numerics::vec3::{cross, dot, minus};
 
 /// A face with more corners was not written by a program that draws faces, and to cut it could
 /// take minutes.

@@ -2,8 +2,8 @@
 
 use crate::document::{Placement, Primitive, Seat};
 use crate::error::ShapeError;
+use crate::file_mesh::Bounds;
 use crate::height::Sample;
-use crate::mesh::Bounds;
 use crate::placement::sin_cos_deg;
 
 /// Roundings of the largest coordinate within which a point lies on a border.

@@ -3,6 +3,8 @@
 pub mod adaptive;
 pub mod poisson;
 
+use std::sync::OnceLock;
+
 use crate::deviation::{Faces, Looks, Patch, Rect, primitive};
 use crate::edges::{Edges, WELD_ROUNDINGS, weld};
 use crate::error::ShapeError;
@@ -66,7 +68,9 @@ enum Kind<'a> {
     Mesh {
         mesh: &'a Mesh,
         index: Index,
-        faces: Faces,
+        /// Sorted when they are first asked for: points of a grid need none.
+        faces: Box<OnceLock<Faces>>,
+        grid: Grid,
         rules: Rules,
     },
     Primitive(&'a PlacedPrimitive),
@@ -89,7 +93,8 @@ impl<'a> Probe<'a> {
                 Kind::Mesh {
                     mesh,
                     index: Index::new(mesh, reach),
-                    faces: Faces::new(mesh, grid, Looks::endless()),
+                    faces: Box::default(),
+                    grid: *grid,
                     rules: Rules {
                         reach_m: reach,
                         plain_layers: 1 + u32::from(closed),
@@ -118,20 +123,34 @@ impl<'a> Probe<'a> {
         }
     }
 
+    /// How many triangles a look at a point compares it with.
+    pub(super) fn near(&self, p: [f64; 2]) -> usize {
+        match &self.kind {
+            Kind::Mesh { index, .. } => index.at(p).len(),
+            Kind::Primitive(_) => 1,
+        }
+    }
+
+    /// A mesh's faces; `None` for a formula.
+    fn sorted(&self) -> Option<&Faces> {
+        match &self.kind {
+            Kind::Mesh {
+                mesh, faces, grid, ..
+            } => Some(faces.get_or_init(|| Faces::new(mesh, grid, Looks::endless()))),
+            Kind::Primitive(_) => None,
+        }
+    }
+
     /// Indices of the faces over the whole region; empty for a formula.
     fn faces(&self) -> Vec<u32> {
-        match &self.kind {
-            Kind::Mesh { faces, .. } => faces.over(&self.plan_m, &faces.all()),
-            Kind::Primitive(_) => Vec::new(),
-        }
+        let over = |faces: &Faces| faces.over(&self.plan_m, &faces.all());
+        self.sorted().map_or_else(Vec::new, over)
     }
 
     /// Of `among`, the faces over a rectangle.
     fn faces_over(&self, rect: &Rect, among: &[u32]) -> Vec<u32> {
-        match &self.kind {
-            Kind::Mesh { faces, .. } => faces.over(rect, among),
-            Kind::Primitive(_) => Vec::new(),
-        }
+        let over = |faces: &Faces| faces.over(rect, among);
+        self.sorted().map_or_else(Vec::new, over)
     }
 
     /// Whether a rectangle without point may still have surface over it.
@@ -148,7 +167,9 @@ impl<'a> Probe<'a> {
     /// A bound of the vertical difference between surface and patch, m.
     fn deviation_m(&self, patch: &Patch, among: &[u32]) -> f64 {
         match &self.kind {
-            Kind::Mesh { faces, .. } => faces.deviation_m(patch, among),
+            Kind::Mesh { .. } => self
+                .sorted()
+                .map_or(0.0, |faces| faces.deviation_m(patch, among)),
             Kind::Primitive(shape) => {
                 let axis = |k: usize| fluxform_numerics::axis::Axis {
                     from: patch.rect.low_m[k],

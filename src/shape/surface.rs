@@ -5,15 +5,18 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
+use crate::bodies::BodyOptions;
 use crate::document::{Placement, ShapeDocument, SurfaceFormat, SurfaceSource, unit_name};
 use crate::error::ShapeError;
+use crate::file_mesh::{Bounds, FileMesh};
 use crate::height::{self, Grid, Sample};
-use crate::mesh::{Bounds, FileMesh, Mesh, MeshFacts};
+use crate::mesh::{Mesh, MeshFacts};
 use crate::placement::Transform;
 use crate::primitive::PlacedPrimitive;
 use crate::read_error::ReadError;
-use crate::step::{self, BodyOptions};
+use crate::step;
 use crate::stl;
+use crate::zeros::Zeros;
 use fluxform_base::progress::Progress;
 use fluxform_design::named_file::{self, NamedFileError};
 
@@ -318,37 +321,5 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>, ShapeError> {
     match read.map_err(|error| unreadable(what(error)))? {
         Some(bytes) => Ok(bytes),
         None => Err(unreadable(zeros.what())),
-    }
-}
-
-/// No surface file holds so many zeros in a row, bytes: a copy that broke off leaves them, and so
-/// does a file that is longer than what was written to it.
-const LONGEST_HOLE: u64 = 16 << 20;
-
-/// Looks for holes in a file that is read piece by piece.
-#[derive(Default)]
-pub(super) struct Zeros {
-    seen: u64,
-    run: u64,
-}
-
-impl Zeros {
-    /// Sees the next piece; false where a hole is too long.
-    pub(super) fn see(&mut self, piece: &[u8]) -> bool {
-        self.seen += piece.len() as u64;
-        match piece.iter().rposition(|byte| *byte != 0) {
-            None => self.run += piece.len() as u64,
-            Some(last) => self.run = (piece.len() - 1 - last) as u64,
-        }
-        self.run < LONGEST_HOLE
-    }
-
-    /// Where the hole is, and what to do.
-    pub(super) fn what(&self) -> String {
-        format!(
-            "from byte {} on there are zeros alone: the copy or the download broke off; copy it \
-             again",
-            self.seen - self.run
-        )
     }
 }

@@ -6,7 +6,9 @@
 
 use rayon::prelude::*;
 
-use crate::mesh::{Mesh, Triangle, cross, dot, minus};
+use crate::file_mesh::Triangle;
+use crate::mesh::Mesh;
+use fluxform_numerics::vec3::{cross, dot, minus};
 
 /// Turns beyond this are edges of the body, not of the tessellation, degrees.
 const SHARPEST_DEG: f64 = 20.0;

@@ -16,6 +16,14 @@ pub(super) fn narrow(bytes: &[u8]) -> Cow<'_, [u8]> {
     Cow::Owned(text.into_bytes())
 }
 
+/// Whether bytes begin with a sign, in any case, after a byte-order mark and blanks.
+pub(super) fn starts(bytes: &[u8], sign: &[u8]) -> bool {
+    let body = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let body = body.trim_ascii_start();
+    body.get(..sign.len())
+        .is_some_and(|first| first.eq_ignore_ascii_case(sign))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

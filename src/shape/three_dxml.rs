@@ -9,7 +9,7 @@ use std::collections::HashMap;
 
 use crate::archive::Archive;
 use crate::assembly::{Affine, Body, corner, lay_out};
-use crate::mesh::{FileMesh, Triangle};
+use crate::file_mesh::{FileMesh, Triangle};
 use crate::number::Numbers;
 use crate::read_error::{Place, ReadError};
 use crate::three_mf::transform;

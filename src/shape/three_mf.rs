@@ -7,9 +7,10 @@
 use std::collections::{HashMap, HashSet};
 
 use crate::archive::Archive;
-use crate::assembly::{Affine, Body, corner, lay_out};
+use crate::assembly::{Affine, Body, corner, counts, lay_out};
+use crate::bodies::NamedBody;
 use crate::document::parse_unit;
-use crate::mesh::FileMesh;
+use crate::file_mesh::FileMesh;
 use crate::number::Numbers;
 use crate::read_error::{Place, ReadError};
 use crate::xml::{Document, Element, Step};
@@ -79,12 +80,17 @@ fn root_part(archive: &mut Archive<'_>) -> Result<String, ReadError> {
 /// An object's name: its part and its number there.
 type Key = (String, u32);
 
+/// Characters of an object's name that are reported: a file may place it a million times.
+const LONGEST_NAME: usize = 60;
+
 #[derive(Default)]
 struct Model {
     unit: Option<String>,
     /// Name of every object, and where it is among the bodies.
     objects: HashMap<Key, usize>,
     bodies: Vec<Body>,
+    /// Their names.
+    names: Vec<String>,
     /// Components of every body, yet by name.
     components: Vec<Vec<(Key, Affine)>>,
     /// Items that the root part builds.
@@ -98,6 +104,7 @@ struct Model {
 #[derive(Default)]
 struct Open {
     id: u32,
+    name: String,
     support: bool,
     vertices: Vec<[f64; 3]>,
     body: Body,
@@ -208,6 +215,7 @@ impl Model {
             body.triangles.clear();
         }
         self.bodies.push(body);
+        self.names.push(object.name);
         self.components.push(object.components);
         Ok(())
     }
@@ -239,6 +247,16 @@ impl Model {
             let what = "the 3MF file's build has no triangle: export a body as a mesh";
             return Err(fault(what.into()));
         }
+        let counts = counts(&self.bodies, &roots);
+        let named = roots
+            .iter()
+            .zip(counts)
+            .map(|((body, _), triangles)| NamedBody {
+                name: self.names[*body].clone(),
+                within: Vec::new(),
+                color: None,
+                triangles,
+            });
         let mut warnings = Vec::new();
         if roots.len() > 1 {
             warnings.push(format!(
@@ -256,6 +274,7 @@ impl Model {
             coordinate_rounding: self.numbers.rounding_placed(&triangles),
             triangles,
             unit_m: Some(unit_m),
+            bodies: named.collect(),
             warnings,
             ..FileMesh::default()
         })
@@ -294,8 +313,14 @@ fn unknown_unit(name: &str) -> String {
 
 fn object(e: &Element<'_>) -> Result<Open, String> {
     let kind = e.get_exact("type").unwrap_or_default();
+    let id = whole(e, "id")?;
+    let name = e.get_exact("name").unwrap_or_default();
     Ok(Open {
-        id: whole(e, "id")?,
+        id,
+        name: match name.trim() {
+            "" => format!("object {id}"),
+            name => name.chars().take(LONGEST_NAME).collect(),
+        },
         support: matches!(&*kind, "support" | "solidsupport"),
         ..Open::default()
     })

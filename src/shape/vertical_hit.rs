@@ -6,7 +6,8 @@
 use fluxform_numerics::double_double::DoubleDouble;
 use robust::{Coord, orient2d};
 
-use crate::mesh::{Triangle, cross, minus};
+use crate::file_mesh::Triangle;
+use fluxform_numerics::vec3::{cross, minus};
 
 /// |n_z| below which a sliver in plan is taken as a vertical wall.
 pub(super) const WALL_NORMAL_Z: f64 = 1e-4;

@@ -92,6 +92,7 @@ const POWERS: &[Power] = &[
         ],
         holders: &[
             "cli/printer.rs",
+            "cli/terminal.rs",
             "main.rs",
             "suite/main.rs",
             "suite/peers/mod.rs",
@@ -105,6 +106,10 @@ const POWERS: &[Power] = &[
             "bundle/",
             "cli/budget.rs",
             "cli/documents.rs",
+            // Answers at a terminal.
+            "cli/printer.rs",
+            // Of the process that shows a page it is the pipe.
+            "commands/man.rs",
             "design/named_file.rs",
             "design/source.rs",
             "shape/step/kernel.rs",

@@ -141,11 +141,12 @@ fn measure(name: &str, case: &Case) -> Result<Value, Failure> {
     })?;
     let (_, worst_one_s) = time(|| {
         let worst = worst_point(&problem, &settings)?;
-        Ok(worst.path.currents_a(curve[ONE]))
+        Ok(worst.path.ok_or("no path")?.currents_a(curve[ONE]))
     })?;
     let (_, worst_curve_s) = time(|| {
         let worst = worst_point(&problem, &settings)?;
-        let currents = curve.iter().map(|&at| worst.path.currents_a(at));
+        let path = worst.path.ok_or("no path")?;
+        let currents = curve.iter().map(|&at| path.currents_a(at));
         Ok(currents.collect::<Vec<_>>())
     })?;
     let mut least = Vec::with_capacity(CURVE);

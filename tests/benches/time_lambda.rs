@@ -129,7 +129,7 @@ fn row(
         pitch_m * 1e3,
         heights.len(),
         solution.path.breakpoints().len(),
-        worst.path.turns().len(),
+        worst.path.as_ref().map_or(0, |path| path.turns().len()),
         worst.complete,
     );
     Ok(())

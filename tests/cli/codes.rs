@@ -196,6 +196,19 @@ const CASES: &[Case] = &[
         &["2 of 2 points are missing", "sweep run", "--partial"],
     ),
     (
+        "E409",
+        &[
+            "calibrate",
+            SEED,
+            "shapes/wedge.stl",
+            "--unit",
+            "m",
+            "--grid",
+            "3x3",
+        ],
+        &["wholly outside", "--unit mm"],
+    ),
+    (
         "E501",
         &["verify", "edited"],
         &["edited", "failed", "inputs"],

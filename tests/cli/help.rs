@@ -5,7 +5,7 @@ use fluxform::bundle::artefact::SCHEMA_VERSION;
 use fluxform_testing::place::Place;
 
 /// Every command that the program takes, with the commands below it: `sweep`, `sweep plan`.
-fn commands() -> Vec<Vec<String>> {
+pub fn commands() -> Vec<Vec<String>> {
     fn below(command: &clap::Command, path: &[String], all: &mut Vec<Vec<String>>) {
         for next in command.get_subcommands() {
             let mut path = path.to_vec();

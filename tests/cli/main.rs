@@ -1,17 +1,22 @@
 //! The binary as its users meet it: exit codes, streams, files, messages.
 #![cfg(unix)] // signals, /dev/full, links
 
+mod assumed;
 mod budget;
 mod cache;
 mod codes;
 mod error_target;
 mod files;
+mod first_contact;
 mod help;
 mod interrupt;
 mod lambda;
 mod messages;
+mod mistakes;
 mod optimize;
+mod placement;
 mod scan;
+mod screen;
 mod steel;
 mod streams;
 mod surfaces;

@@ -412,7 +412,7 @@ fn scans_that_cannot_be_fitted_are_refused_with_what_to_do() {
         let args = ["probe", SEED, "--compare", name];
         let ran = place.run(&args).ends(3).says(words);
         assert!(
-            ran.err.starts_with("error[E307]:") && ran.err.contains(name),
+            ran.err.contains("\nerror[E307]:") && ran.err.contains(name),
             "{}",
             ran.err
         );

@@ -181,8 +181,23 @@ fn the_claimed_error_of_a_force_over_cores_covers_it_without_the_weights() {
                     off / claimed
                 );
                 assert!(off <= claimed, "{core} {point}: {off:e} of {claimed:e}");
-                assert!(claimed <= 6.0 * loose, "{core} {point}: {claimed:e}");
+                // More than half of the tolerance was claimed, whatever the error.
+                assert!(claimed <= 0.4 * loose, "{core} {point}: {claimed:e}");
             }
         }
     }
+}
+
+/// Four cores of a kilometre once took three quarters of a minute to miss every tolerance.
+#[test]
+fn coupled_cores_without_an_end_are_refused_before_they_are_solved() {
+    let design = design("below_mm = 1e6", 2, "");
+    let refused = probe(
+        &design,
+        vec![[0.0, 0.0, 0.03]],
+        ProbeRequest::default(),
+        &Silent,
+    );
+    let message = refused.expect_err("too long").to_string();
+    assert!(message.contains("radii long"), "{message}");
 }

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use fluxform_numerics::axis::Axis;
+use fluxform_shape::bodies::BodyOptions;
 use fluxform_shape::document::{
     AxisRequest, Placement, Primitive, RawSurface, RawSurfaceError, ShapeDocument, SurfaceSource,
     parse_unit,
 };
-use fluxform_shape::step::BodyOptions;
 
 fn read(text: &str) -> (ShapeDocument, String) {
     match ShapeDocument::from_toml(text, Path::new("shapes/s.toml")) {

@@ -38,10 +38,11 @@ fn table(keys: &[Key]) -> String {
         }
         let default = match &key.default {
             Without::Refused => "required",
+            Without::Value(value) if value.starts_with('"') => &format!("`{value}`"),
             Without::Value(value) => value,
             Without::Nothing => "",
         };
-        let (name, value, range) = (key.name, &key.value, &key.range);
+        let (name, value, range) = (key.name, key.accepts.words(), &key.accepts.range);
         writeln!(
             text,
             "| `{name}` | {value} | {range} | {default} | {} |",

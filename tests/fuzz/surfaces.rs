@@ -64,7 +64,11 @@ fn seeds(format: SurfaceFormat) -> Vec<Seed> {
                 Seed::Plain(ascii.repeat(2).into_bytes()),
             ]
         }
-        SurfaceFormat::Obj => vec![text(surface_files::obj())],
+        SurfaceFormat::Obj => vec![
+            text(surface_files::obj()),
+            Seed::Plain(wide(&surface_files::obj(), u16::to_le_bytes)),
+            Seed::Plain(wide(&surface_files::obj(), u16::to_be_bytes)),
+        ],
         SurfaceFormat::Ply => vec![
             text(surface_files::ply_ascii()),
             text(surface_files::ply_binary(false)),
@@ -117,6 +121,15 @@ fn seeds(format: SurfaceFormat) -> Vec<Seed> {
         }
     }
     seeds
+}
+
+/// A text in UTF-16, with its byte-order mark.
+fn wide(text: &[u8], order: fn(u16) -> [u8; 2]) -> Vec<u8> {
+    let units = text.iter().map(|byte| u16::from(*byte));
+    std::iter::once(0xfeff)
+        .chain(units)
+        .flat_map(order)
+        .collect()
 }
 
 #[derive(Default)]

@@ -12,6 +12,7 @@ mod mirror;
 mod oracle;
 mod power;
 mod saturation;
+mod scale;
 mod vector_allocation;
 mod vertices;
 mod worst;

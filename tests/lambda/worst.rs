@@ -1,6 +1,6 @@
 //! The worst-point form against every vertex of small problems, and on degenerate ones.
 
-use fluxform_lambda::worst::{WorstSolution, maxmin, worst_point};
+use fluxform_lambda::worst::{WorstPath, WorstSolution, maxmin, worst_point};
 use fluxform_lambda::{Event, Settings, solve};
 
 use crate::vertices::Vertices;
@@ -11,6 +11,11 @@ fn solved(case: &Case) -> WorstSolution {
     worst_point(&case.problem(), &Settings::default()).expect("a well-formed problem")
 }
 
+/// The path, where it was not too long to be followed.
+fn followed(solution: &WorstSolution) -> &WorstPath {
+    solution.path.as_ref().expect("a path")
+}
+
 fn top(case: &Case) -> f64 {
     case.heights
         .iter()
@@ -19,8 +24,7 @@ fn top(case: &Case) -> f64 {
 
 /// Force constants at, between and beyond the turns.
 fn telling(solution: &WorstSolution) -> Vec<f64> {
-    let turns: Vec<f64> = solution
-        .path
+    let turns: Vec<f64> = followed(solution)
         .turns()
         .iter()
         .map(|t| t.lambda_n_per_m)
@@ -64,7 +68,7 @@ fn check(case: &Case, what: &str) -> WorstSolution {
         let scale = lambda * top(case) + most_offset;
         let point = solution.at(&case.problem(), lambda);
         assert_within_limits(case, &point.currents_a, what);
-        let reported = solution.path.worst_error_n(lambda);
+        let reported = followed(&solution).worst_error_n(lambda);
         let sum = |amperes: &dyn Fn(usize) -> f64| -> f64 {
             let column = |i: usize| case.forces.iter().skip(i).step_by(case.coils());
             let most = |i: usize| column(i).fold(0.0_f64, |m, g| m.max(g.abs()));
@@ -153,8 +157,8 @@ fn scales_copies_and_order_do_not_matter() {
             }
             for lambda in telling(&reported) {
                 let (a, b) = (
-                    reported.path.worst_error_n(lambda) * size,
-                    other.path.worst_error_n(lambda * factor),
+                    followed(&reported).worst_error_n(lambda) * size,
+                    followed(&other).worst_error_n(lambda * factor),
                 );
                 let scale = lambda * top(&base) * size;
                 assert!(
@@ -174,7 +178,7 @@ fn the_path_is_convex_and_its_constants_are_where_they_are_defined() {
             continue;
         }
         let solution = solved(&case);
-        let turns = solution.path.turns();
+        let turns = followed(&solution).turns();
         let slope = |k: usize| {
             let (a, b) = (&turns[k], &turns[k + 1]);
             (b.worst_error_n - a.worst_error_n) / (b.lambda_n_per_m - a.lambda_n_per_m)
@@ -288,7 +292,7 @@ fn maxmin_leaves_no_point_too_weak_and_nothing_better_is_found() {
                 .iter_mut()
                 .flatten()
                 .for_each(|o| *o = 2.0 * shift - *o);
-            shift - solved(&sided).path.worst_error_n(0.0)
+            shift - followed(&solved(&sided)).worst_error_n(0.0)
         };
         if case.heights.iter().all(|&h| h > 0.0) {
             assert!(
@@ -340,7 +344,7 @@ fn degenerate_problems_have_their_closed_answers() {
         (solution.lambda_linear_n_per_m, solution.floor),
         (None, None)
     );
-    assert_eq!(solution.path.worst_error_n(3.0), 0.0);
+    assert_eq!(followed(&solution).worst_error_n(3.0), 0.0);
     assert_eq!(maxmin(&flat.problem()).expect("well formed"), None);
     let mut attract = one.clone();
     attract.forces.iter_mut().for_each(|g| *g = -*g);
@@ -355,8 +359,8 @@ fn degenerate_problems_have_their_closed_answers() {
     let solution = solved(&broken);
     assert_eq!(solution.lambda_linear_n_per_m, Some(0.0));
     assert_eq!(solution.lambda_jnd_n_per_m, Some(0.0));
-    assert_eq!(solution.path.currents_a(2.0), [0.0, 0.0]);
-    assert!((solution.path.worst_error_n(2.0) - 0.1).abs() < 1e-16);
+    assert_eq!(followed(&solution).currents_a(2.0), [0.0, 0.0]);
+    assert!((followed(&solution).worst_error_n(2.0) - 0.1).abs() < 1e-16);
 }
 
 #[test]
@@ -466,7 +470,7 @@ fn forces_without_an_inverse_do_not_hide_missed_points() {
     let solution = solved(&case);
     assert!(solution.complete);
     let point = solution.at(&case.problem(), 3.0);
-    let reported = solution.path.worst_error_n(3.0);
+    let reported = followed(&solution).worst_error_n(3.0);
     assert!((point.worst_error_n - reported).abs() < 1e-14, "{reported}");
     assert!(point.active.iter().any(|active| active.point == 7000));
 }
@@ -509,7 +513,7 @@ fn twins(numbers: &mut Random, size: f64, copies: usize) -> Case {
 fn assert_whole(case: &Case, turns_at_least: usize, what: &str) {
     let solution = solved(case);
     assert!(solution.complete, "{what}");
-    let turns = solution.path.turns();
+    let turns = followed(&solution).turns();
     assert!(turns.len() >= turns_at_least, "{what}: {}", turns.len());
     for pair in turns.windows(2) {
         let [a, b] = [&pair[0], &pair[1]];
@@ -615,7 +619,7 @@ fn turns_report_the_change_of_the_currents() {
         ohm: vec![6.0],
     };
     let solution = solved(&case);
-    let turns = solution.path.turns();
+    let turns = followed(&solution).turns();
     assert!(turns[0].events.contains(&Event::LeavesZero(0)), "{turns:?}");
     let meets = turns
         .iter()

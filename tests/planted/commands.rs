@@ -134,6 +134,10 @@ pub const COMMANDS: &[Writes] = &[
         spoils: "",
         ..writes("man", "man --out out")
     },
+    Writes {
+        spoils: "",
+        ..writes("init", "init desk --out out")
+    },
 ];
 
 /// Measures, which take seconds: only in the whole run.

@@ -2,10 +2,13 @@
 
 use fluxform_base::progress::{Progress, Silent};
 use fluxform_shape::certificate::{Certify, certify};
-use fluxform_shape::deviation::{Faces, Interval, Lattice, Looks, Vertical, hausdorff, vertical};
+use fluxform_shape::deviation::{
+    CERTIFY_SECONDS, Faces, Interval, Lattice, Looks, Vertical, hausdorff, vertical,
+};
 use fluxform_shape::document::{Placement, Primitive};
+use fluxform_shape::file_mesh::Triangle;
 use fluxform_shape::height::Grid;
-use fluxform_shape::mesh::{Mesh, Triangle};
+use fluxform_shape::mesh::Mesh;
 use fluxform_shape::placement::Transform;
 use fluxform_shape::primitive::PlacedPrimitive;
 use fluxform_shape::tessellation::estimated_deviation_m;
@@ -487,13 +490,35 @@ fn a_turned_body_is_certified_alike_on_any_number_of_threads() {
 }
 
 #[test]
+fn a_certificate_that_may_take_nothing_is_none_and_the_points_stand() {
+    let mesh = exact(roof(&[[-2.0, 0.5], [0.3, 0.7], [3.0, 0.5]], [-1.0, 2.0]));
+    let plan = grid((-1.0, 1.0, 3), (-0.5, 0.5, 3));
+    let samples = sample(&mesh, &plan);
+    assert!(samples.iter().all(Option::is_some));
+    let surface = Surface::Mesh(mesh);
+    let certified = |seconds| {
+        certify(
+            &surface,
+            &plan,
+            &samples,
+            Certify::Vertical,
+            seconds,
+            &Silent,
+        )
+        .unwrap()
+    };
+    assert_eq!(certified(0), None);
+    assert!(certified(1).is_some());
+}
+
+#[test]
 fn a_certificate_holds_the_requested_distances() {
     let mesh = exact(roof(&[[-2.0, 0.5], [0.3, 0.7], [3.0, 0.5]], [-1.0, 2.0]));
     let plan = grid((-1.0, 1.0, 3), (-0.5, 0.5, 3));
     let samples = sample(&mesh, &plan);
     let surface = Surface::Mesh(mesh);
     let reported = |how| {
-        let found = certify(&surface, &plan, &samples, how, &Silent).unwrap();
+        let found = certify(&surface, &plan, &samples, how, CERTIFY_SECONDS, &Silent).unwrap();
         found.map(|certificate| certificate.hausdorff.is_some())
     };
     assert_eq!(reported(Certify::No), None);

@@ -6,7 +6,7 @@ use fluxform_base::progress::Silent;
 use fluxform_shape::document::{
     AxisRequest, GridRequest, ShapeDocument, SurfaceFormat, SurfaceSource,
 };
-use fluxform_shape::mesh::FileMesh;
+use fluxform_shape::file_mesh::FileMesh;
 use fluxform_shape::{MeshReport, discretize};
 
 use fluxform_testing::surface_files::{

@@ -1,8 +1,9 @@
 //! Heights against exact arithmetic, and against what must not matter.
 
 use fluxform_shape::document::Placement;
+use fluxform_shape::file_mesh::{FileMesh, Triangle};
 use fluxform_shape::height::{Grid, Sample};
-use fluxform_shape::mesh::{FileMesh, Mesh, Triangle};
+use fluxform_shape::mesh::Mesh;
 use fluxform_shape::placement::Transform;
 use fluxform_shape::stl;
 

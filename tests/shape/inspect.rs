@@ -2,7 +2,7 @@
 
 use fluxform_shape::MeshReport;
 use fluxform_shape::document::SurfaceFormat;
-use fluxform_shape::mesh::{FileMesh, Triangle};
+use fluxform_shape::file_mesh::{FileMesh, Triangle};
 
 use fluxform_testing::surfaces::block;
 

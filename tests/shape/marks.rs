@@ -4,21 +4,22 @@ use std::f64::consts::PI;
 
 use fluxform_base::progress::Silent;
 use fluxform_numerics::axis::Axis;
+use fluxform_shape::bodies::BodyOptions;
 use fluxform_shape::certificate::Certify;
 use fluxform_shape::deviation::{Faces, Lattice, Looks, vertical};
 use fluxform_shape::document::{
     AxisRequest, GridRequest, Placement, Primitive, ShapeDocument, SurfaceSource,
 };
+use fluxform_shape::file_mesh::Triangle;
 use fluxform_shape::height::Grid;
 use fluxform_shape::holes::{Holes, fill, holes};
-use fluxform_shape::mesh::{Mesh, Triangle};
+use fluxform_shape::mesh::Mesh;
 use fluxform_shape::placement::Transform;
 use fluxform_shape::point_flags::Marks;
 use fluxform_shape::primitive::PlacedPrimitive;
 use fluxform_shape::scattered::Probe;
 use fluxform_shape::scattered::adaptive::{Adaptive, Grading, adaptive};
 use fluxform_shape::scattered::poisson::poisson;
-use fluxform_shape::step::BodyOptions;
 use fluxform_shape::{Settings, Surface, discretize_with, stl};
 
 use fluxform_testing::surfaces::{block, exact, file, grid, lifted, sample, seed_grid};
@@ -220,6 +221,7 @@ fn holes_of_a_file_are_skipped_filled_or_refused() {
             marks: true,
             cells: false,
             known: None,
+            ..Settings::default()
         };
         discretize_with(&document, &settings, &Silent)
     };

@@ -4,8 +4,8 @@ use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 
 use fluxform_base::progress::Silent;
+use fluxform_shape::bodies::BodyOptions;
 use fluxform_shape::document::SurfaceFormat;
-use fluxform_shape::step::BodyOptions;
 use fluxform_shape::{MeshReport, ShapeError, surface};
 
 use crate::formats::{read, refusal};

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use fluxform_base::progress::{Progress, Silent};
 use fluxform_numerics::axis::Axis;
+use fluxform_shape::bodies::BodyOptions;
 use fluxform_shape::document::{
     AxisRequest, GridRequest, Placement, Primitive, ShapeDocument, SurfaceSource,
 };
-use fluxform_shape::step::BodyOptions;
 use fluxform_shape::{ConstraintPoints, Discretized, ShapeError, discretize};
 
 use fluxform_testing::root;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use fluxform_shape::document::SurfaceFormat;
-use fluxform_shape::mesh::FileMesh;
+use fluxform_shape::file_mesh::FileMesh;
 
 use crate::formats::{read, refusal};
 use fluxform_testing::surface_files::{

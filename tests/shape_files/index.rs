@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use fluxform_base::progress::Silent;
 use fluxform_shape::MeshReport;
-use fluxform_shape::step::BodyOptions;
+use fluxform_shape::bodies::BodyOptions;
 
 use fluxform_testing::needs::{self, Trial, corpus_folder};
 use fluxform_testing::trials;

@@ -35,7 +35,7 @@ use crate::{BenchRequest, run, scaling};
 /// each with what must come out and a bound; --out writes extreme.csv, extreme.json and
 /// report.html. Code 5 if one fails.
 #[derive(Debug, Parser)]
-#[command(name = "fluxform-bench", version, max_term_width = 100, after_help = page(Codes::Measuring, &[
+#[command(name = "fluxform-bench", version, max_term_width = 100, after_long_help = page(Codes::Measuring, &[
     ("fluxform-bench --quick --stage air-field --out air", "one stage, in a second"),
     ("fluxform-bench --quick --stage air-field --stage inductance --out two --format json",
      "two stages, for a program"),

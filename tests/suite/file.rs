@@ -156,6 +156,15 @@ pub struct Outlook {
     pub breaks: Option<String>,
 }
 
+impl Law {
+    /// Whether an outlook lies beyond the sizes that were measured.
+    #[must_use]
+    pub fn extrapolates(&self, outlook: &Outlook) -> bool {
+        let measured = self.sizes.iter().map(|row| row.size);
+        outlook.factor * self.seed_size > measured.fold(0.0, f64::max)
+    }
+}
+
 /// Columns of `bench.csv`.
 pub const BENCH_COLUMNS: [&str; 14] = [
     "stage",

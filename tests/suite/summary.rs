@@ -229,7 +229,16 @@ fn laws(laws: &[Law]) -> String {
                 Some(breaks) => format!("breaks: {breaks}"),
                 None => "holds".to_owned(),
             };
-            format!("{what} ({}, {})", seconds(at.seconds), bytes(at.bytes))
+            let extrapolated = if law.extrapolates(at) {
+                ", extrapolated"
+            } else {
+                ""
+            };
+            format!(
+                "{what} ({}, {}{extrapolated})",
+                seconds(at.seconds),
+                bytes(at.bytes)
+            )
         });
         let _ = writeln!(
             text,

@@ -3,8 +3,9 @@
 use fluxform::RunError;
 use fluxform::numerics::axis::Axis;
 use fluxform::shape::document::Placement;
+use fluxform::shape::file_mesh::FileMesh;
 use fluxform::shape::height::{Grid, Sample};
-use fluxform::shape::mesh::{FileMesh, Mesh};
+use fluxform::shape::mesh::Mesh;
 use fluxform::shape::placement::Transform;
 
 /// Half the side of the plan that is sampled, m.

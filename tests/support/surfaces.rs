@@ -4,11 +4,12 @@ use std::path::Path;
 
 use fluxform_base::progress::Silent;
 use fluxform_numerics::axis::Axis;
+use fluxform_shape::bodies::BodyOptions;
 use fluxform_shape::document::{AxisRequest, GridRequest, Placement, ShapeDocument, SurfaceSource};
+use fluxform_shape::file_mesh::{FileMesh, Triangle};
 use fluxform_shape::height::{Grid, Sample, heights};
-use fluxform_shape::mesh::{FileMesh, Mesh, Triangle};
+use fluxform_shape::mesh::Mesh;
 use fluxform_shape::placement::Transform;
-use fluxform_shape::step::BodyOptions;
 
 pub fn binary(triangles: &[[[f32; 3]; 3]]) -> Vec<u8> {
     let mut bytes = vec![b' '; 80];

@@ -57,19 +57,13 @@ impl SharedFolders {
     /// # Errors
     /// [`WriteError`] where they cannot be made.
     pub fn make(&mut self, folder: &Path, below: &[&str]) -> Result<(), WriteError> {
-        let (dir, made) =
-            made_in(folder, Dir::open).map_err(|error| error.of("open the folder", folder))?;
-        self.0.push(made);
-        let mut made = MadeFolders::default();
-        let mut dir = dir;
-        for name in below {
-            let path = dir.path().join(name);
-            dir = made
-                .child(&dir, name)
-                .map_err(|error| WriteError::from_io("make the folder", &path, error))?;
-        }
+        let path = below
+            .iter()
+            .fold(folder.to_owned(), |path, name| path.join(name));
+        let ((dir, below), made) =
+            made_below(folder, below).map_err(|error| error.of("make the folder", &path))?;
         super::temporary::clean_leftovers(&dir);
-        self.0.push(made);
+        self.0.extend([made, below]);
         Ok(())
     }
 }
@@ -88,9 +82,10 @@ pub(crate) fn open_made(parent: &Path, name: &OsStr) -> io::Result<(Dir, impl Dr
         MadeError::NotFolder(_) => io::ErrorKind::NotADirectory.into(),
         MadeError::Folder(_, error) | MadeError::Inside(error) => error,
     };
-    let (parent, mut made) = made_in(parent, Dir::open).map_err(fail)?;
-    let dir = made.child(&parent, name)?;
-    Ok((dir, made))
+    let ((dir, below), made) = made_below(parent, &[name]).map_err(fail)?;
+    let mut folders = SharedFolders::default();
+    folders.0.extend([made, below]);
+    Ok((dir, folders))
 }
 
 /// Why nothing could be made.
@@ -137,6 +132,22 @@ pub(super) fn made_in<T>(
             Err(error) => return Err(MadeError::Inside(error)),
         }
     }
+}
+
+/// Makes `folder` and its parents where needed, then the folders `below` in one another, which are never
+/// links, and opens the last: all of it again where another run takes one of them away meanwhile.
+fn made_below(
+    folder: &Path,
+    below: &[impl AsRef<OsStr>],
+) -> Result<((Dir, MadeFolders), MadeFolders), MadeError> {
+    made_in(folder, |folder| {
+        let mut made = MadeFolders::default();
+        let mut dir = Dir::open(folder)?;
+        for name in below {
+            dir = made.child(&dir, name)?;
+        }
+        Ok((dir, made))
+    })
 }
 
 /// Makes a folder and its parents; the error names the path in the way.
@@ -196,6 +207,29 @@ mod tests {
         drop(folders);
         assert!(!out.exists());
         assert!(own.join("points/000/b").is_file());
+    }
+
+    /// A sweep once failed because another, which had nothing to write, took the folder away between
+    /// its making and the next one's in it.
+    #[test]
+    fn a_folder_that_another_run_takes_away_meanwhile_is_made_again() {
+        let place = tempfile::tempdir().unwrap();
+        let out = place.path().join("out");
+        let round = |_| {
+            let mut folders = SharedFolders::default();
+            folders.make(&out, &["points", "000"])?;
+            drop(folders);
+            open_made(&out, OsStr::new("kept"))
+                .map(drop)
+                .map_err(|error| WriteError::from_io("make the folder", &out, error))
+        };
+        std::thread::scope(|scope| {
+            let run = || (0..2000).try_for_each(round);
+            let runs: Vec<_> = (0..4).map(|_| scope.spawn(run)).collect();
+            for run in runs {
+                run.join().unwrap().unwrap();
+            }
+        });
     }
 
     #[test]

@@ -21,7 +21,8 @@ const SAME: f64 = 1e-3;
 
 /// For each of length, mass and heat the coil of `best`'s wire that has least of it and lacks at
 /// most [`SHARE`] of the force, to about 1e-4 and as far as a local search can say; none where the
-/// force falls at once or where nothing is to be gained. Coils that hardly differ are one.
+/// force falls at once or where nothing is to be gained. Coils that hardly differ are one. All of them
+/// have a bore that a bobbin allows; where the best has not, the strongest of those is the first.
 ///
 /// # Errors
 /// Interruption.
@@ -32,13 +33,57 @@ pub fn alternatives(
     progress: &dyn Progress,
 ) -> Result<Vec<Alternative>, Interrupted> {
     let mut list: Vec<Alternative> = Vec::new();
+    let task = &Task {
+        bobbin: task.fixed.inner_diameter_m.is_none(),
+        ..task.clone()
+    };
+    let bore_min_m = task.bore_min_m(&best.strand).unwrap_or(0.0);
+    let windable = bore_min_m > 2.0 * best.window.inner_radius_m * (1.0 + SAME);
+    if windable {
+        let strongest = wound_on_a_bobbin(model, task, best);
+        list.extend(strongest.map(|coil| Alternative::new(&coil, best, None)));
+    }
     for (sought, coil) in reduced_coils(model, task, best, progress)? {
         let coil = Alternative::new(&coil, best, Some(sought));
         if !list.iter().any(|known| known.is_near(&coil, SAME)) {
             list.push(coil);
         }
     }
+    if windable {
+        list.iter_mut()
+            .for_each(|coil| coil.better.insert(0, Advantage::Windable));
+    }
     Ok(list)
+}
+
+/// The strongest coil within `task`, where it lacks at most [`SHARE`] of the force of `best`.
+fn wound_on_a_bobbin(model: &dyn CoilModel, task: &Task, best: &BestCoil) -> Option<BestCoil> {
+    let problem = of_regime(model, task, best)?;
+    let local = best_near(&problem, &[Problem::coordinates(&best.window)])?;
+    let coil = coil_of(&problem, &local, best)?;
+    (coil.force_n >= best.force_n * (1.0 - SHARE)).then_some(coil)
+}
+
+/// The problem of `best`'s wire and regime.
+fn of_regime<'a>(model: &'a dyn CoilModel, task: &'a Task, best: &BestCoil) -> Option<Problem<'a>> {
+    Problem::of_wire(model, task, best.strand)
+        .into_iter()
+        .find(|problem| problem.regime == best.regime)
+}
+
+/// A local optimum of `problem` as a coil like `best`.
+fn coil_of(problem: &Problem<'_>, local: &Local, best: &BestCoil) -> Option<BestCoil> {
+    let window = Problem::window(local.x);
+    Some(BestCoil {
+        window,
+        strand: best.strand,
+        turns: best.strand.turns(&window),
+        whole: None,
+        regime: best.regime,
+        force_n: (-local.point.objective).exp(),
+        current_a: problem.rate(window)?.current_a,
+        limits: Vec::new(),
+    })
 }
 
 /// The coil that has least of each, where there is one.
@@ -81,6 +126,7 @@ fn least(
         Advantage::Shorter => best.window.length_m,
         Advantage::Lighter => volume * best.strand.mass_per_volume() + core_kg,
         Advantage::Cooler => best.current_a * best.current_a * resistance_ohm,
+        Advantage::Windable => return None,
     };
     let enough = best.force_n.ln() + (-SHARE).ln_1p();
     let margin = |share: f64| {
@@ -104,20 +150,8 @@ fn least(
     if share > 1.0 - 2.0 * TOLERANCE {
         return None;
     }
-    let (window, local) = under(model, task, best, sought, share * value)?;
-    let regime = Problem::of_wire(model, task, best.strand)
-        .into_iter()
-        .find(|problem| problem.regime == best.regime)?;
-    Some(BestCoil {
-        window,
-        strand: best.strand,
-        turns: best.strand.turns(&window),
-        whole: None,
-        regime: best.regime,
-        force_n: (-local.point.objective).exp(),
-        current_a: regime.rate(window)?.current_a,
-        limits: Vec::new(),
-    })
+    let (_, local) = under(model, task, best, sought, share * value)?;
+    coil_of(&of_regime(model, task, best)?, &local, best)
 }
 
 /// The best coil that has `most` or less of what is `sought`.
@@ -143,14 +177,13 @@ fn under(
             power_max_w: tighter(limits.power_max_w),
             ..*limits
         },
+        Advantage::Windable => *limits,
     };
     let task = Task {
         limits,
         ..task.clone()
     };
-    let problem = Problem::of_wire(model, &task, best.strand)
-        .into_iter()
-        .find(|problem| problem.regime == best.regime)?;
+    let problem = of_regime(model, &task, best)?;
     let local = best_near(&problem, &[Problem::coordinates(&best.window)])?;
     Some((Problem::window(local.x), local))
 }
@@ -196,6 +229,7 @@ mod tests {
                 Advantage::Lighter | Advantage::Cooler => {
                     volume(&found.window) / volume(&top.window)
                 }
+                Advantage::Windable => unreachable!("not of ALL"),
             };
             assert!(amount < 0.99, "{found:?} {amount}");
             // No coil with so little of it is stronger.
@@ -213,6 +247,7 @@ mod tests {
                     power_max_w: Some(4.0 * volume(&window) * top.strand.resistance_per_volume()),
                     ..limits
                 },
+                Advantage::Windable => limits,
             };
             let ratio = best(tighter).force_n / found.force_n;
             assert!((ratio - 1.0).abs() < 1e-8, "{found:?} {ratio}");

@@ -153,7 +153,10 @@ pub(super) fn snapped(problem: &Problem<'_>, local: &Local) -> Window {
         window.inner_radius_m = 0.5 * inner_m;
         window.depth_m = outer_m - window.inner_radius_m;
     }
-    if let Some(outer_m) = active(LimitName::FixedOuter).or(active(LimitName::OuterDiameter)) {
+    if let Some(outer_m) = active(LimitName::FixedOuter)
+        .or(active(LimitName::OuterDiameter))
+        .or(active(LimitName::Pitch))
+    {
         window.depth_m = 0.5 * outer_m - window.inner_radius_m;
     }
     if let Some(length_m) = active(LimitName::FixedLength).or(active(LimitName::Length)) {

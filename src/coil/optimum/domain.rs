@@ -81,10 +81,13 @@ impl Domain {
             .map_or([half(LimitName::InnerDiameter, 0.0), f64::INFINITY], |v| {
                 [0.5 * v; 2]
             });
-        let outer_m = limit(LimitName::FixedOuter)
-            .map_or([0.0, half(LimitName::OuterDiameter, f64::INFINITY)], |v| {
-                [0.5 * v; 2]
-            });
+        let outer_m = limit(LimitName::FixedOuter).map_or_else(
+            || {
+                let most = limit(LimitName::OuterDiameter).or(limit(LimitName::Pitch));
+                [0.0, most.map_or(f64::INFINITY, |v| 0.5 * v)]
+            },
+            |v| [0.5 * v; 2],
+        );
         let length_m = limit(LimitName::FixedLength).map_or(
             [wire_m, limit(LimitName::Length).unwrap_or(f64::INFINITY)],
             |v| [v; 2],
@@ -202,7 +205,10 @@ fn mm(length_m: f64) -> String {
 }
 
 /// Of two limits on one size the first that is set, with its value in metres.
-fn either(problem: &Problem<'_>, names: [LimitName; 2]) -> Option<(LimitName, f64)> {
+fn either<const N: usize>(
+    problem: &Problem<'_>,
+    names: [LimitName; N],
+) -> Option<(LimitName, f64)> {
     let limit = |name| problem.limit_of(name).map(|value| (name, value));
     names.into_iter().find_map(limit)
 }
@@ -220,6 +226,11 @@ fn given_outside_its_limit(problem: &Problem<'_>) -> Option<Contradiction> {
         (
             (LimitName::OuterDiameter, LimitName::FixedOuter),
             (fixed.outer_diameter_m, limits.outer_diameter_max_m),
+            1.0,
+        ),
+        (
+            (LimitName::Pitch, LimitName::FixedOuter),
+            (fixed.outer_diameter_m, problem.task.pitch_m),
             1.0,
         ),
         (
@@ -248,7 +259,14 @@ fn given_outside_its_limit(problem: &Problem<'_>) -> Option<Contradiction> {
 
 fn no_room_for_a_layer(problem: &Problem<'_>) -> Option<Contradiction> {
     let wire_m = problem.strand.diameter_m;
-    let (outer_name, outer_m) = either(problem, [LimitName::FixedOuter, LimitName::OuterDiameter])?;
+    let (outer_name, outer_m) = either(
+        problem,
+        [
+            LimitName::FixedOuter,
+            LimitName::OuterDiameter,
+            LimitName::Pitch,
+        ],
+    )?;
     let (inner_name, inner_m) = either(problem, [LimitName::FixedInner, LimitName::InnerDiameter])
         .unwrap_or((LimitName::OneLayer, 0.0));
     let missing = inner_m + 2.0 * wire_m - outer_m;

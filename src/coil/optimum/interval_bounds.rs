@@ -65,7 +65,7 @@ impl Multipliers {
                     | LimitName::WireLength,
                     _,
                 ) => sums.most += lambda.max(0.0),
-                (LimitName::OuterDiameter, _) => sums.outer += lambda.max(0.0),
+                (LimitName::OuterDiameter | LimitName::Pitch, _) => sums.outer += lambda.max(0.0),
                 (LimitName::FixedOuter, _) => sums.outer += lambda,
                 (LimitName::Settling, _) => sums.settling += lambda.max(0.0),
                 _ => {}

@@ -185,10 +185,12 @@ pub enum Advantage {
     Lighter,
     /// Heat at the rated current.
     Cooler,
+    /// Its bore, which a bobbin needs and the best coil has not.
+    Windable,
 }
 
 impl Advantage {
-    /// Every one, in the order of `Advantage::amounts`.
+    /// Every one that has less of something, in the order of `Advantage::amounts`.
     pub const ALL: [Self; 3] = [Self::Shorter, Self::Lighter, Self::Cooler];
 
     /// The word in artefacts, on screen and on pages.
@@ -198,6 +200,7 @@ impl Advantage {
             Self::Shorter => "shorter",
             Self::Lighter => "lighter",
             Self::Cooler => "cooler",
+            Self::Windable => "windable",
         }
     }
 

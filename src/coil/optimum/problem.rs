@@ -10,8 +10,8 @@ use serde::Serialize;
 use super::model::{CoilModel, Sloped, Strand, Window};
 use super::sqp::{Local, Point, Smooth};
 use crate::circuit::SETTLING_TIME_CONSTANTS;
-use crate::limits::LIMITS;
 pub use crate::limits::LimitName;
+use crate::limits::{LIMITS, bobbin_bore_m};
 use fluxform_design::Limits;
 
 /// Dimensions that are given, not sought; diameters and length in m.
@@ -48,12 +48,37 @@ pub struct Task {
     pub limits: Limits,
     /// Dimensions that are given.
     pub fixed: Fixed,
+    /// Distance of the array's nearest axes, m: no coil is wider.
+    pub pitch_m: Option<f64>,
+    /// Whether a bore is at least that of a bobbin, where the limits name none.
+    pub bobbin: bool,
     /// The driver's limit, A; > 0.
     pub current_max_a: f64,
     /// The supply's voltage, V.
     pub voltage_v: Option<f64>,
     /// The wires to choose among.
     pub strands: Vec<Strand>,
+}
+
+impl Task {
+    /// What limits the outer diameter, and the limit, m: of array and limits the tighter one.
+    #[must_use]
+    pub fn outer_max(&self) -> Option<(LimitName, f64)> {
+        let limit = self.limits.outer_diameter_max_m;
+        match self.pitch_m {
+            Some(pitch_m) if limit.is_none_or(|limit_m| pitch_m < limit_m) => {
+                Some((LimitName::Pitch, pitch_m))
+            }
+            _ => limit.map(|limit_m| (LimitName::OuterDiameter, limit_m)),
+        }
+    }
+
+    /// The smallest bore of a coil of `strand`, m.
+    #[must_use]
+    pub fn bore_min_m(&self, strand: &Strand) -> Option<f64> {
+        let bobbin = self.bobbin.then(|| bobbin_bore_m(strand.diameter_m));
+        self.limits.inner_diameter_min_m.or(bobbin)
+    }
 }
 
 /// A limit and its size, SI.
@@ -131,8 +156,15 @@ impl<'a> Problem<'a> {
         add(LimitName::FixedLength, fixed.length_m);
         for limit in &LIMITS {
             // A least bore of zero is the axis.
-            let set = (limit.of)(limits).filter(|&value| value > 0.0 || !limit.name.is_lower());
-            add(limit.name, set.filter(|_| !fixed.settles(limit.name)));
+            let (name, set) = match limit.name {
+                LimitName::InnerDiameter => (limit.name, task.bore_min_m(&strand)),
+                LimitName::OuterDiameter => task
+                    .outer_max()
+                    .map_or((limit.name, None), |(name, most_m)| (name, Some(most_m))),
+                name => (name, (limit.of)(limits)),
+            };
+            let set = set.filter(|&value| value > 0.0 || !name.is_lower());
+            add(name, set.filter(|_| !fixed.settles(limit.name)));
         }
         match regime {
             Regime::Driver => add(LimitName::Voltage, task.voltage_v),
@@ -247,7 +279,7 @@ impl<'a> Problem<'a> {
                 LimitName::Resistance => resistance,
                 LimitName::Settling => ratio(response.inductance_h.along(current), resistance)
                     .times(SETTLING_TIME_CONSTANTS),
-                LimitName::OuterDiameter | LimitName::FixedOuter => {
+                LimitName::OuterDiameter | LimitName::FixedOuter | LimitName::Pitch => {
                     along(2.0 * window.outer_radius_m(), [2.0, 2.0, 0.0])
                 }
                 LimitName::InnerDiameter | LimitName::FixedInner | LimitName::Axis => {

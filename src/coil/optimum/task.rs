@@ -52,10 +52,28 @@ pub fn of_design(design: &Design, fixed: Fixed) -> Result<Task, NoTask> {
     Ok(Task {
         limits: design.limits,
         fixed,
+        pitch_m: nearest_m(&design.array.positions_m),
+        bobbin: false,
         current_max_a,
         voltage_v: design.supply.voltage_v,
         strands: Strand::choices(&design.wire),
     })
+}
+
+/// The distance of the nearest two of these places, m; `None` of one.
+fn nearest_m(places: &[[f64; 2]]) -> Option<f64> {
+    let mut by_x = places.to_vec();
+    by_x.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut nearest = f64::INFINITY;
+    for (rank, a) in by_x.iter().enumerate() {
+        for b in &by_x[rank + 1..] {
+            if b[0] - a[0] >= nearest {
+                break;
+            }
+            nearest = nearest.min((a[0] - b[0]).hypot(a[1] - b[1]));
+        }
+    }
+    nearest.is_finite().then_some(nearest)
 }
 
 /// The neighbours of the coil that is optimised.

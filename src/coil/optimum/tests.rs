@@ -39,6 +39,8 @@ pub(super) fn task(limits: Limits, voltage_v: Option<f64>) -> Task {
     Task {
         limits,
         fixed: Fixed::default(),
+        pitch_m: None,
+        bobbin: false,
         current_max_a: 2.0,
         voltage_v,
         strands: Strand::choices(&wire(0.0007)),

@@ -33,7 +33,7 @@ use crate::scene::cost::{Components, of_map};
 /// object and report.html. How long it takes is said before it begins: with --quick within a minute
 /// of processor time, else within ten, where settings can be spared for it.
 #[derive(Debug, Args)]
-#[command(after_help = page(Codes::Writing, &[
+#[command(after_long_help = page(Codes::Writing, &[
     ("fluxform bench designs/seed_air.toml shapes/flat.toml --quick",
      "in a few seconds; files go to results/bench-scene/seed_air/"),
     ("fluxform bench designs/seed_air.toml shapes/flat.toml --quick --out f --format json",

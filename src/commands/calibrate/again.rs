@@ -4,7 +4,7 @@ use super::BothSolved;
 use super::CalibrateOptions;
 use super::Calibration;
 use super::Inductances;
-use super::point_rows;
+use super::{LambdaReport, point_rows};
 use crate::RunError;
 use crate::bundle::artefact::Input;
 use crate::bundle::cache::Store;
@@ -65,7 +65,7 @@ pub fn expected(
         .as_ref()
         .map_or(&shape.document, |(_, chosen)| &chosen.document);
     let points = calibration.points(document, progress)?;
-    let seal = |content: &BundleContent| Ok(sealed_manifest(content)?);
+    let seal = |content: &BundleContent, _: &LambdaReport| Ok(sealed_manifest(content)?);
     let (manifest, lambda) = calibration.compute(&points, search.as_ref(), progress, seal)?;
     Ok(Expected {
         manifest,

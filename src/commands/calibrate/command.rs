@@ -29,7 +29,7 @@ use crate::cli::start::begin;
 use crate::cli::start::folder;
 use crate::cli::values::{self, FileArgument};
 use crate::commands::lambda::LambdaOptions;
-use crate::commands::lambda::command::{CriterionFlags, rendered};
+use crate::commands::lambda::command::{CriterionFlags, rendered, well_placed};
 use crate::design::{Design, Need};
 use crate::digits::with_error;
 use crate::scene::cost::{Components, of_map};
@@ -43,7 +43,7 @@ use crate::scene::sources::DesignSource;
 /// the next begins. What the object does not need is left out of the map, and what that costs is
 /// reported.
 #[derive(Debug, Args)]
-#[command(after_help = page(Codes::Writing, &[
+#[command(after_long_help = page(Codes::Writing, &[
     ("fluxform calibrate designs/seed.toml shapes/flat.toml shapes/half_sphere.toml",
      "two objects; the bundles go to results/seed/"),
     ("fluxform calibrate designs/seed.toml shapes/wedge.stl --unit mm --translate 0,0,30",
@@ -65,15 +65,17 @@ pub struct Calibrate {
     /// Folder under which <design>/<shape>/ is written
     #[arg(long, value_name = "DIR", default_value = "results")]
     out: FileArgument,
-    /// How far from the object's points the maps reach within the workspace, millimetres
-    /// [default: 20]
-    #[arg(long, value_name = "MM", value_parser = values::length, allow_hyphen_values = true)]
+    /// How far from the object's points the maps reach within the workspace, like 2cm [default:
+    /// 20mm]
+    #[arg(long, value_name = "LENGTH", value_parser = values::length, allow_hyphen_values = true)]
     reach: Option<f64>,
     /// Compute the field of coils and steel again, and remove what earlier runs kept of it in
     /// OUT/<design>/.fluxform-kept
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     no_cache: bool,
-    /// Report first what will be computed and what left out, why, and what leaving it out costs
+    /// Report first what will be computed and what left out
+    ///
+    /// Why, and what leaving it out costs.
     #[arg(long)]
     explain: bool,
     /// Leave out report.html and the folder plots
@@ -153,6 +155,10 @@ impl Calibrate {
         let missed = |b: &BundleReport| b.lambda.accuracy_missed.clone();
         let missed: Vec<String> = report.bundles.iter().flat_map(missed).collect();
         accuracy_check(&missed)?;
+        report
+            .bundles
+            .iter()
+            .try_for_each(|bundle| well_placed(&bundle.lambda))?;
         let constants: Vec<(&str, Option<f64>)> = report
             .bundles
             .iter()

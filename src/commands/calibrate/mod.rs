@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::discretize::{self, PointsReport, point_rows, points_grid};
 use super::lambda::error_target::{ChosenGrid, ErrorTarget};
+use super::lambda::placement::{Outside, Placed};
 use super::lambda::{LambdaOptions, LambdaReport, WantedPoints, sideways, solve_at};
 use super::made_with::surface;
 use super::map::{arrays, runtime, summary};
@@ -18,7 +19,7 @@ use crate::bundle::atomic::WriteError;
 use crate::bundle::cache::Store;
 use crate::bundle::json::displayed;
 use crate::bundle::manifest::{
-    AxisSummary, CircuitSummary, Interpolation, LambdaSummary, MadeWith, Manifest, PassiveForce,
+    CircuitSummary, Interpolation, LambdaSummary, MadeWith, Manifest, PassiveForce,
 };
 use crate::bundle::npz::{PASSIVE, Runtime};
 use crate::bundle::rendering::{HeightGrid, Rendering};
@@ -376,7 +377,13 @@ impl Calibration<'_> {
         let made_with = options.made_with(self.shape);
         let inputs = &points.summary.inputs;
         check_bundle_target(&folder, options.force, inputs, Some(&made_with))?;
-        let write = |content: &BundleContent| {
+        let write = |content: &BundleContent, lambda: &LambdaReport| {
+            if let Some(message) = lambda.misplaced.as_ref().filter(|_| !options.force) {
+                let shape = &self.shape.document.name;
+                return Err(RunError::Misplaced(format!(
+                    "{shape}: {message}; no bundle was written, --force writes it all the same"
+                )));
+            }
             let seconds = progress.take_seconds().into_iter();
             let timing: Vec<StageSeconds> = seconds
                 .map(|(stage, seconds)| StageSeconds { stage, seconds })
@@ -413,7 +420,7 @@ impl Calibration<'_> {
         points: &PointsReport,
         search: Option<&(ErrorTarget, ChosenGrid)>,
         progress: &dyn Progress,
-        take: impl FnOnce(&BundleContent) -> Result<Manifest, RunError>,
+        take: impl FnOnce(&BundleContent, &LambdaReport) -> Result<Manifest, RunError>,
     ) -> Result<(Manifest, LambdaReport), RunError> {
         let (scene, solved, field) = (self.scene, self.solved, self.field);
         let options = LambdaOptions {
@@ -426,6 +433,7 @@ impl Calibration<'_> {
             &mut lambda.file,
             scene,
             &solved.forces,
+            field,
             &of_grid,
             &options.wiring,
             progress,
@@ -451,9 +459,20 @@ impl Calibration<'_> {
             lambda.requested(*target, chosen, Some(&design.workspace), tolerance);
         }
         let manifest = self.manifest(&lambda, grid_points, &needed, passive.as_ref());
-        lambda
-            .warnings
-            .extend(outside_warning(&manifest, grid_points));
+        let placed = Placed {
+            design: scene.design,
+            document: &self.shape.document,
+            points: &of_grid,
+        };
+        match placed.outside() {
+            Outside::None => lambda.misplaced = placed.unfelt(lambda.file.lambda_n_per_m),
+            Outside::Some(warning) => {
+                lambda.warnings.push(warning);
+                lambda.misplaced = placed.unfelt(lambda.file.lambda_n_per_m);
+            }
+            Outside::Most(message) => lambda.misplaced = Some(message),
+        }
+        lambda.warnings.extend(lambda.misplaced.clone());
         let rows = point_rows(grid_points);
         let currents = current_rows(scene, &lambda);
         let mut map = arrays(
@@ -475,7 +494,7 @@ impl Calibration<'_> {
         let pages = pages.iter().map(|(name, bytes)| (*name, &bytes[..]));
         let extra: Vec<(&str, &[u8])> = extra.iter().copied().chain(pages).collect();
         content.extra = &extra;
-        let manifest = take(&content)?;
+        let manifest = take(&content, &lambda)?;
         Ok((manifest, lambda))
     }
 
@@ -600,34 +619,4 @@ fn current_rows(scene: &Scene, lambda: &LambdaReport) -> Vec<CurrentRow> {
             current_a: currents.map_or(0.0, |currents| currents[coil.number]),
         })
         .collect()
-}
-
-/// A sentence on the points that lie outside the map, where a runtime gives no force.
-fn outside_warning(manifest: &Manifest, points: &ConstraintPoints) -> Option<String> {
-    let inside = |axis: &AxisSummary, value: f64| axis.from_m <= value && value <= axis.to_m;
-    let outside = (0..points.len())
-        .filter(|i| {
-            !(inside(&manifest.map.x_m, points.x_m[*i])
-                && inside(&manifest.map.y_m, points.y_m[*i])
-                && inside(&manifest.map.z_m, points.height_m[*i]))
-        })
-        .count();
-    if outside == points.len() {
-        let ends = [manifest.map.x_m, manifest.map.y_m, manifest.map.z_m];
-        let ends = ends.map(|axis| {
-            [axis.from_m, axis.to_m].map(|end| format!("{}", (end * 1e6).round() / 1e3))
-        });
-        return Some(format!(
-            "the object lies wholly outside the design's workspace, where a runtime gives no force: \
-             --fit DESIGN (fit_mm = [{}] in its shape file) moves it in",
-            ends.as_flattened().join(", ")
-        ));
-    }
-    (outside > 0).then(|| {
-        format!(
-            "{outside} of {} points lie outside the design's workspace: lambda counts them, but a \
-             runtime has no map there and gives no force; enlarge [workspace]",
-            points.len()
-        )
-    })
 }

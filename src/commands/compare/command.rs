@@ -28,7 +28,7 @@ use crate::design::Need;
 /// and the other a strong one it is 1/jnd, the most there is. A lambda that is null ends with exit
 /// code 4.
 #[derive(Debug, Args)]
-#[command(after_help = page(Codes::Writing, &[
+#[command(after_long_help = page(Codes::Writing, &[
     ("fluxform compare designs/seed_air.toml shapes/flat.toml shapes/wedge.toml",
      "two of the seed's objects on its array without cores"),
     ("fluxform compare designs/seed_air.toml shapes/*.toml --plot apart.svg",

@@ -23,6 +23,7 @@ use crate::cli::start::begin;
 use crate::cli::values::FileArgument;
 use crate::scene::cost::of_points;
 use crate::shape::certificate::Certify;
+use crate::shape::deviation::CERTIFY_SECONDS;
 use crate::shape::holes::Holes;
 
 /// Turn a surface into constraint points with heights and normals
@@ -41,7 +42,7 @@ use crate::shape::holes::Holes;
 /// With --inspect no points are made: the content of the surface's file is reported, in its own unit, with
 /// a guess at that unit, which is never used.
 #[derive(Debug, Args)]
-#[command(after_help = page(Codes::Writing, &[
+#[command(after_long_help = page(Codes::Writing, &[
     ("fluxform discretize shapes/half_sphere.toml --out points.csv", "a shape file"),
     ("fluxform discretize shapes/wedge.stl --unit mm --translate 0,0,30 --grid 31x31 --out -",
      "a surface given directly; the table goes to standard output"),
@@ -53,8 +54,8 @@ use crate::shape::holes::Holes;
      "what a file holds: unit, size, holes, faults; and a picture from above"),
 ]))]
 pub struct Discretize {
-    /// Shape file (TOML, `-` for standard input) or the surface itself: STL, OBJ, PLY, 3MF, AMF,
-    /// 3DXML, STEP, SLDPRT
+    /// Shape file (TOML, `-` for standard input) or the surface itself: STL, OBJ, PLY, OFF, GLB, PNG,
+    /// 3MF, AMF, 3DXML, STEP, SLDPRT, SLDASM
     #[arg(value_name = "SHAPE")]
     pub(super) shape: FileArgument,
     /// Where the points go; `-` is standard output, and then there is no JSON file
@@ -62,11 +63,16 @@ pub struct Discretize {
     pub(super) out: FileArgument,
     /// Grid points without surface inside the silhouette: leave them out, fill them from around,
     /// or refuse the surface
-    #[arg(long, value_enum, default_value_t = HolesFlag::Skip)]
+    #[arg(long, hide_short_help = true, value_enum, default_value_t = HolesFlag::Skip)]
     holes: HolesFlag,
     /// Compare the points with the surface: vertically, by the Hausdorff distance too, or not
-    #[arg(long, value_enum, default_value_t = CertifyFlag::Vertical)]
+    #[arg(long, hide_short_help = true, value_enum, default_value_t = CertifyFlag::Vertical)]
     certify: CertifyFlag,
+    /// What --certify may take, in seconds of one core about; where it is spent, the points come
+    /// without a certificate and a warning says so
+    #[arg(long, value_name = "N", default_value_t = CERTIFY_SECONDS,
+          value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    certify_seconds: u64,
     #[command(flatten)]
     weights: WeightsFlag,
     #[command(flatten)]
@@ -74,11 +80,16 @@ pub struct Discretize {
     /// Report what the surface's file holds and make no points
     #[arg(
         long,
-        conflicts_with_all = ["holes", "certify", "max_deviation", "poisson", "out"]
+        conflicts_with_all = ["holes", "certify", "certify_seconds", "max_deviation", "poisson", "out"]
     )]
     pub(super) inspect: bool,
     /// With --inspect: report and draw where the part lies over this design's array and workspace
-    #[arg(long, value_name = "DESIGN", requires = "inspect")]
+    #[arg(
+        long,
+        hide_short_help = true,
+        value_name = "DESIGN",
+        requires = "inspect"
+    )]
     pub(super) over: Option<FileArgument>,
     /// Draw heights, what each point is, and the deviation between them (SVG)
     #[arg(long, value_name = "FILE", conflicts_with_all = ["max_deviation", "poisson"])]
@@ -183,6 +194,7 @@ impl Discretize {
                 CertifyFlag::Vertical => Certify::Vertical,
                 CertifyFlag::Distance => Certify::Distance,
             },
+            certify_seconds: self.certify_seconds,
             picture: self.plot.is_some(),
             weights: self.weights.weights,
         }
@@ -321,7 +333,11 @@ impl Discretize {
             );
         }
         if let FileArgument::Path(path) = &self.out {
-            sheet.line("written to", &path.display().to_string());
+            let summary = path.with_extension("json");
+            sheet.line(
+                "written to",
+                &format!("{}, {}", path.display(), summary.display()),
+            );
         }
         if let Some(FileArgument::Path(path)) = &self.plot {
             sheet.line("drawn in", &path.display().to_string());

@@ -12,15 +12,16 @@ use crate::design::Design;
 use crate::numerics::axis::Axis;
 use crate::plot::plane::PlanePlot;
 use crate::progress::Progress;
+use crate::shape::bodies::BodyOptions;
 use crate::shape::certificate::by_cell;
+use crate::shape::deviation::CERTIFY_SECONDS;
 use crate::shape::document::{
     AxisRequest, GridRequest, Placement, ShapeDocument, SurfaceFormat, SurfaceSource,
 };
+use crate::shape::file_mesh::Bounds;
 use crate::shape::height::Grid;
 use crate::shape::hidden::Hidden;
-use crate::shape::mesh::Bounds;
 use crate::shape::scattered::Probe;
-use crate::shape::step::BodyOptions;
 use crate::shape::{MeshReport, ShapeError, Surface};
 
 /// Points along either side of the picture.
@@ -209,7 +210,7 @@ fn drawn(
         .collect();
     let heights: Vec<_> = samples.iter().map(|s| s.map(|s| s.height_m)).collect();
     // Where its effort is spent the picture is without bounds.
-    let cells = by_cell(surface, &grid, &samples, progress)?.unwrap_or_default();
+    let cells = by_cell(surface, &grid, &samples, CERTIFY_SECONDS, progress)?.unwrap_or_default();
     Ok(picture(&PictureData {
         title: document.name.clone(),
         scale,

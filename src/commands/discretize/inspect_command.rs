@@ -15,8 +15,8 @@ use crate::cli::start::begin;
 use crate::cli::values::FileArgument;
 use crate::design::Need;
 use crate::shape::MeshReport;
+use crate::shape::bodies::NamedBody;
 use crate::shape::document::{SurfaceSource, unit_name};
-use crate::shape::step::NamedBody;
 
 impl Discretize {
     pub(crate) fn inspected(&self, printer: &Printer) -> Result<(), Failure> {
@@ -217,7 +217,7 @@ fn unit(found: &MeshReport) -> String {
 }
 
 fn closed(found: &MeshReport) -> String {
-    let bodies = count(found.bodies, "part");
+    let bodies = count(found.bodies, "connected part");
     if found.watertight {
         let through = found.bodies as i64 - found.euler / 2;
         let through = usize::try_from(through).unwrap_or(0);

@@ -21,6 +21,7 @@ use crate::point_weights::Weights;
 use crate::progress::Progress;
 use crate::scene::cached_field::ShapeField;
 use crate::shape::certificate::{Certificate, Certify, stated_tessellation};
+use crate::shape::deviation::CERTIFY_SECONDS;
 use crate::shape::document::{ShapeDocument, SurfaceSource};
 use crate::shape::hidden::Hidden;
 use crate::shape::holes::Holes;
@@ -200,6 +201,8 @@ pub struct PointsOptions {
     pub holes: Holes,
     /// How the points are compared with the surface.
     pub certify: Certify,
+    /// What that may take, s of one core about.
+    pub certify_seconds: u64,
     /// Whether a picture will be drawn.
     pub picture: bool,
     /// How the points count, instead of what the document says.
@@ -212,6 +215,7 @@ impl PointsOptions {
         let PointsOptions {
             holes,
             certify,
+            certify_seconds,
             picture: _,
             weights,
         } = *self;
@@ -229,6 +233,7 @@ impl PointsOptions {
             weights,
             holes: Some(holes),
             certify: Some(certify),
+            certify_seconds: (certify_seconds != CERTIFY_SECONDS).then_some(certify_seconds),
             max_deviation_m: None,
             widest_m: None,
             spacing_m: None,
@@ -243,6 +248,7 @@ impl Default for PointsOptions {
         Self {
             holes: Holes::Skip,
             certify: Certify::Vertical,
+            certify_seconds: CERTIFY_SECONDS,
             picture: false,
             weights: None,
         }
@@ -341,6 +347,7 @@ impl OpenedSurface {
         let settings = Settings {
             holes: options.holes,
             certify: options.certify,
+            certify_seconds: options.certify_seconds,
             known,
             marks: true,
             cells: options.picture,

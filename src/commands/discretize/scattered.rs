@@ -34,6 +34,7 @@ impl Sampling {
             weights: None,
             holes: None,
             certify: None,
+            certify_seconds: None,
             max_deviation_m: adaptive.map(|(deviation_m, _)| deviation_m),
             widest_m: adaptive.and_then(|(_, widest_m)| widest_m),
             spacing_m: poisson.map(|(spacing_m, _)| spacing_m),

@@ -32,7 +32,7 @@ use crate::scene::single::{CoreSummary, MaterialKind, TargetSummary};
 /// coils at their rated currents. A core above its steel's knee is warned of. Limits that are not
 /// met are part of the result; with --strict they end with exit code 4.
 #[derive(Debug, Args)]
-#[command(after_help = page(Codes::Reading, &[
+#[command(after_long_help = page(Codes::Reading, &[
     ("fluxform evaluate designs/seed.toml", "the seed's coil"),
     ("fluxform evaluate designs/seed_1010.toml --format json",
      "its steel by a magnetisation curve, for a program"),

@@ -1,27 +1,37 @@
 //! The error of forces that are evaluated at the points directly.
 
+use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::design::MagnetModel;
 use crate::field::winding::KERNEL_ERROR;
-use crate::scene::evaluation_sample::{Evaluation, PLACES, Sample, sharper, spread};
+use crate::scene::evaluation_sample::{
+    Evaluation, PLACES, Sample, sharper, sharper_forces, spread,
+};
 use crate::scene::steel::{EVALUATION_SHARE, Solved};
 use crate::scene::tolerances::MAGNET_FINEST;
 use crate::scene::{AIR_SHARE, MAGNET_SHARE, Scene};
 
 /// The error of forces at some points: the proven bound, or a sharper estimate from samples.
+///
+/// # Errors
+/// Interruption.
 pub(super) fn forces_accuracy(
     scene: &Scene,
     solved: &Solved,
     points_m: &[[f64; 3]],
     forces_n_per_a: &[f64],
-) -> StageAccuracy {
+) -> Result<StageAccuracy, RunError> {
     let proven = evaluation(scene, solved);
     let [m_x, m_y, m_z] = scene.moment_a_m2;
-    let dipole = scene.design.magnet.model == MagnetModel::Dipole;
-    if !dipole || m_x != 0.0 || m_y != 0.0 || m_z == 0.0 {
-        return accuracy_of(scene, solved, proven);
-    }
     let coils = scene.coils.len();
+    if scene.design.magnet.model == MagnetModel::Cylinder {
+        let given = |point: usize, coil: usize| [forces_n_per_a[point * coils + coil]];
+        let estimate = sharper_forces(scene, solved, points_m, given, proven)?;
+        return Ok(accuracy_of(scene, solved, estimate));
+    }
+    if m_x != 0.0 || m_y != 0.0 || m_z == 0.0 {
+        return Ok(accuracy_of(scene, solved, proven));
+    }
     let samples = spread(forces_n_per_a.len(), PLACES)
         .into_iter()
         .filter_map(|index| {
@@ -32,7 +42,8 @@ pub(super) fn forces_accuracy(
                 gz: forces_n_per_a[index] / (coil.gain * m_z),
             })
         });
-    accuracy_of(scene, solved, sharper(scene, solved, samples, proven))
+    let estimate = sharper(scene, solved, samples, proven);
+    Ok(accuracy_of(scene, solved, estimate))
 }
 
 /// The proven error of the forces and the estimated one of the steel.

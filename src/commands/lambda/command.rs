@@ -4,6 +4,7 @@ use std::slice::from_ref;
 
 use clap::Args;
 
+use super::LambdaReport;
 use super::feedback::FeedbackOptions;
 use super::text::summary;
 use super::{LambdaOptions, run};
@@ -28,7 +29,7 @@ use crate::lambda::{Criterion, Settings, Wiring};
 /// and the constants are read off that path. Forces are computed at the points directly, not
 /// through a map. A lambda that is null ends with exit code 4.
 #[derive(Debug, Args)]
-#[command(after_help = page(Codes::Reading, &[
+#[command(after_long_help = page(Codes::Reading, &[
     ("fluxform lambda designs/seed.toml shapes/half_sphere.toml", "the seed's half-sphere"),
     ("fluxform lambda designs/seed.toml shapes/wedge.toml --criterion linear --at 2.0",
      "the constant at which the first limit binds, and what 2 N/m would give"),
@@ -78,13 +79,19 @@ pub struct Lambda {
 #[derive(Debug, Clone, Args)]
 struct WiringFlags {
     /// Coils that carry no current, like 3,5
-    #[arg(long, value_name = "COILS", value_delimiter = ',')]
+    #[arg(
+        long,
+        hide_short_help = true,
+        value_name = "COILS",
+        value_delimiter = ','
+    )]
     broken: Vec<usize>,
     /// Pairs of coils that carry one current, like 0+8,2+6
-    #[arg(long, value_name = "PAIRS", value_delimiter = ',', value_parser = values::pair)]
+    #[arg(long, hide_short_help = true, value_name = "PAIRS", value_delimiter = ',', value_parser = values::pair)]
     series: Vec<[usize; 2]>,
-    /// Also solve with one change at a time: passive force, push and pull, pairs in series (those
-    /// opposite each other), broken coils
+    /// Also solve with one change at a time
+    ///
+    /// Passive force, push and pull, pairs in series (those opposite each other), broken coils.
     #[arg(long)]
     variants: bool,
 }
@@ -92,12 +99,14 @@ struct WiringFlags {
 /// Currents that follow the magnet.
 #[derive(Debug, Clone, Copy, Args)]
 struct FeedbackFlags {
-    /// Also render with position feedback: at every point the currents of least power that give
-    /// its force, the largest lambda that all points can be given, and what static currents lose
+    /// Also render with position feedback
+    ///
+    /// At every point the currents of least power that give its force, the largest lambda that all
+    /// points can be given, and what static currents lose.
     #[arg(long)]
     feedback: bool,
     /// With --feedback: meet the same demand as far above and below the surface, like 14mm
-    #[arg(long, value_name = "LENGTH", requires = "feedback",
+    #[arg(long, hide_short_help = true, value_name = "LENGTH", requires = "feedback",
           value_parser = values::length_with_unit, allow_hyphen_values = true)]
     shell: Option<f64>,
 }
@@ -110,11 +119,11 @@ pub struct CriterionFlags {
           value_parser = values::criterion())]
     criterion: Criterion,
     /// Just-noticeable difference: the error that saturation may add, relative to the rms force
-    #[arg(long, value_name = "PART", default_value_t = crate::units::FORCE_JND,
+    #[arg(long, hide_short_help = true, value_name = "PART", default_value_t = crate::units::FORCE_JND,
           value_parser = values::jnd, allow_hyphen_values = true)]
     jnd: f64,
     /// Report currents and errors at this force constant too, N/m
-    #[arg(long, value_name = "LAMBDA", value_parser = values::force_constant,
+    #[arg(long, hide_short_help = true, value_name = "LAMBDA", value_parser = values::force_constant,
           allow_hyphen_values = true)]
     at: Option<f64>,
 }
@@ -193,9 +202,24 @@ impl Lambda {
             printer.summary(place, &json, || summary(design, &points, &report))?;
             accuracy_check(&report.accuracy_missed)?;
             let file = &report.file;
+            well_placed(&report)?;
             rendered(&[(file.shape.as_str(), file.lambda_n_per_m)])?;
         }
         Ok(())
+    }
+}
+
+/// Fails where the array cannot render the object where it is.
+///
+/// # Errors
+/// Why, and what would bring it there.
+pub fn well_placed(report: &LambdaReport) -> Result<(), Failure> {
+    match &report.misplaced {
+        Some(message) => {
+            let message = format!("{}: {message}", report.file.shape);
+            Err(Failure::Unmet(Wish::Placement, message))
+        }
+        None => Ok(()),
     }
 }
 

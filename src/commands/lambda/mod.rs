@@ -7,6 +7,7 @@ pub mod feedback;
 mod headline;
 pub(crate) mod map_error;
 mod picture;
+pub(crate) mod placement;
 mod points;
 mod points_effect;
 mod result_file;
@@ -22,6 +23,7 @@ pub(crate) use self::accuracy::proven_accuracy;
 use self::error_target::{ChosenGrid, ErrorTarget, Trial};
 use self::feedback::FeedbackOptions;
 use self::headline::Amplification;
+use self::placement::Placed;
 pub(crate) use self::points::WantedPoints;
 use super::discretize::scattered;
 use super::discretize::scattered::ScatteredSummary;
@@ -98,6 +100,9 @@ pub struct LambdaReport {
     /// The stages that miss the requested tolerance.
     #[serde(skip)]
     pub accuracy_missed: Vec<String>,
+    /// Why the array cannot render the object where it is, and what would bring it there.
+    #[serde(skip)]
+    pub misplaced: Option<String>,
 }
 
 impl LambdaOptions {
@@ -141,7 +146,7 @@ impl LambdaReport {
     #[must_use]
     pub fn meets_request(&self) -> bool {
         let rendered = self.file.lambda_n_per_m.is_some_and(|lambda| lambda > 0.0);
-        rendered && self.accuracy_missed.is_empty()
+        rendered && self.accuracy_missed.is_empty() && self.misplaced.is_none()
     }
 }
 
@@ -186,6 +191,14 @@ pub fn run(
     let solve_with = |points: &WantedPoints, options: &LambdaOptions| {
         solve_at(&scene, &solved, none, points, options, progress)
     };
+    let misplaced = |points: &WantedPoints, report: &LambdaReport| {
+        Placed {
+            design,
+            document,
+            points,
+        }
+        .unfelt(report.file.lambda_n_per_m)
+    };
     let (Some(chosen), Some(sampled)) = (chosen, sampled) else {
         let mut report = solve_with(&of_grid, options)?;
         if let Some((target, chosen)) = &search {
@@ -195,10 +208,12 @@ pub fn run(
             &mut report.file,
             &scene,
             &solved,
+            none,
             &of_grid,
             &options.wiring,
             progress,
         )?;
+        report.misplaced = misplaced(&of_grid, &report);
         return Ok((points, report));
     };
     // Feedback and picture are of the chosen points alone.
@@ -213,6 +228,7 @@ pub fn run(
         &mut report.file,
         &scene,
         &solved,
+        none,
         &chosen,
         &options.wiring,
         progress,
@@ -221,6 +237,7 @@ pub fn run(
         let other = solve_with(&coarser, &plain)?.file;
         report.add_quadrature(&other);
     }
+    report.misplaced = misplaced(&chosen, &report);
     report.file.sampling = Some(against_grid(&sampled.summary, &report.file, &grid));
     Ok((points, report))
 }
@@ -442,6 +459,7 @@ impl PosedProblem<'_> {
             precision: solution.precision,
             warnings,
             accuracy_missed: Vec::new(),
+            misplaced: None,
         })
     }
 

@@ -9,7 +9,7 @@ use crate::bundle::artefact::{FLUXFORM_VERSION, SCHEMA_VERSION};
 use crate::bundle::lambda_file::{
     AtLambda, LambdaFile, PathStep, TolerancePoint, WorstPointAt, WorstPointFile, WorstPointStep,
 };
-use crate::lambda::worst::{WorstSolution, felt};
+use crate::lambda::worst::{WorstPath, WorstSolution, felt};
 use crate::lambda::{Breakpoint, Event, GivenForce, OperatingPoint, Solution, Status};
 use crate::units::DETECTION_THRESHOLD_N;
 
@@ -28,7 +28,7 @@ impl PosedProblem<'_> {
             self.solved,
             &points.positions_m,
             self.unwired.forces_n_per_a,
-        );
+        )?;
         let accuracy = BTreeMap::from([
             ("points".to_owned(), points.accuracy["points"].clone()),
             ("forces".to_owned(), forces),
@@ -128,10 +128,11 @@ impl PosedProblem<'_> {
             currents_a: point.map(|point| point.currents_a.clone()),
             gap_n: point.map(|point| point.gap_n),
             active: point.map(|point| point.active.clone()),
+            path_left_out: worst.path.is_none(),
             path: worst
                 .path
-                .turns()
                 .iter()
+                .flat_map(WorstPath::turns)
                 .map(|turn| WorstPointStep {
                     lambda_n_per_m: turn.lambda_n_per_m,
                     worst_error_n: turn.worst_error_n,

@@ -7,6 +7,7 @@ use crate::lambda::sideways::sideways;
 use crate::lambda::{ForceProblem, Wiring};
 use crate::progress::Progress;
 use crate::scene::Scene;
+use crate::scene::cached_field::ShapeField;
 use crate::scene::passive;
 use crate::scene::steel::Solved;
 
@@ -23,6 +24,7 @@ pub(crate) fn add(
     file: &mut LambdaFile,
     scene: &Scene,
     solved: &Solved,
+    field: ShapeField,
     points: &WantedPoints,
     wiring: &Wiring,
     progress: &dyn Progress,
@@ -42,7 +44,7 @@ pub(crate) fn add(
         None
     };
     let offset_n = pull.map(|pull| pull.forces_z_n(&positions_m));
-    let vectors = scene.force_vectors_n_per_a(solved, &positions_m, progress)?;
+    let vectors = field.force_vectors_n_per_a(scene, solved, &positions_m, progress)?;
     let resistance_ohm = scene.resistances_ohm();
     let of_axis = |axis: usize| -> Vec<f64> { vectors.iter().map(|force| force[axis]).collect() };
     let [along_x, along_y, upward] = [0, 1, 2].map(of_axis);

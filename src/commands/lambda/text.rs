@@ -209,6 +209,18 @@ fn not_felt(tolerance: &TolerancePoint) -> String {
     }
 }
 
+/// How lambda changes. With a coil broken a larger lambda is no improvement: fewer coils give less of the
+/// force before the criterion ends it.
+fn change(variant: &LambdaVariant) -> String {
+    match variant.relative_change {
+        None => "none".to_owned(),
+        Some(change) if change > 0.0 && !variant.wiring.broken.is_empty() => {
+            format!("({}, fault)", percent(change))
+        }
+        Some(change) => percent(change),
+    }
+}
+
 /// One row per variant.
 fn table_of(variants: &[LambdaVariant]) -> String {
     let or_none =
@@ -221,7 +233,7 @@ fn table_of(variants: &[LambdaVariant]) -> String {
         let mut row = vec![
             ("N/m, W", v.name.clone()),
             ("lambda", lambda(v.lambda_n_per_m)),
-            ("change", or_none(v.relative_change, percent)),
+            ("change", change(v)),
         ];
         row.extend(constants);
         row.extend([

@@ -60,6 +60,13 @@ pub(super) fn all(posed: &PosedProblem, solution: &Solution, worst: &WorstSoluti
                 .to_owned(),
         );
     }
+    if worst.path.is_none() {
+        warnings.push(
+            "the worst-point path is left out: with so many coils, or so much symmetry, it turns \
+             too often to be followed; its force constants and currents hold all the same"
+                .to_owned(),
+        );
+    }
     warnings
 }
 

@@ -36,7 +36,7 @@ use crate::scene::cost;
 /// the nodes is stated, and sources on the coils' axes, whose error at places that the fit did not
 /// see is stated; the latter ends with code 4 where it exceeds --mpem-tolerance.
 #[derive(Debug, Args)]
-#[command(after_help = page(Codes::Writing, &[
+#[command(after_long_help = page(Codes::Writing, &[
     ("fluxform map designs/seed.toml --out maps", "dBz/dz of all coils"),
     ("fluxform map designs/seed_air.toml --out maps_vtk --vtk --tolerance 1e-6",
      "for ParaView, less accurate"),
@@ -56,6 +56,7 @@ pub struct Map {
     /// one a coil [default: the rated currents]
     #[arg(
         long,
+        hide_short_help = true,
         value_name = "A,...",
         value_delimiter = ',',
         allow_hyphen_values = true
@@ -71,18 +72,18 @@ pub struct Map {
     #[arg(long)]
     vtk: bool,
     /// Write the field per ampere on nodes for mag_manip's ForwardModelLinearVField too
-    #[arg(long, value_name = "FILE.yaml")]
+    #[arg(long, hide_short_help = true, value_name = "FILE.yaml")]
     vfield: Option<FileArgument>,
     /// Nodes of --vfield along each axis, 6 or more; mag_manip needs as many along all three
     /// [default: the most that the workspace has along one, but no more than 31]
-    #[arg(long, value_name = "N", requires = "vfield", value_parser = vfield_nodes)]
+    #[arg(long, hide_short_help = true, value_name = "N", requires = "vfield", value_parser = vfield_nodes)]
     vfield_nodes: Option<usize>,
     /// Write multipole sources fitted to the field for mag_manip's ForwardModelMPEM too
-    #[arg(long, value_name = "FILE.yaml")]
+    #[arg(long, hide_short_help = true, value_name = "FILE.yaml")]
     mpem: Option<FileArgument>,
     /// Allowed error of --mpem, of field and gradient relative to the largest at each height,
     /// 1e-15 to 1e-1: fewer sources do for a larger one [default: 1e-3]
-    #[arg(long, value_name = "T", requires = "mpem", value_parser = values::tolerance)]
+    #[arg(long, hide_short_help = true, value_name = "T", requires = "mpem", value_parser = values::tolerance)]
     mpem_tolerance: Option<f64>,
     #[command(flatten)]
     writing: Writing,

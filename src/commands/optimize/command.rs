@@ -29,7 +29,7 @@ use crate::design::Need;
 /// A certificate says how sure it is that no coil within the limits is better. The sensitivity
 /// of a limit is the force that one unit more of it would give.
 #[derive(Debug, Args)]
-#[command(after_help = page(Codes::Writing, &[
+#[command(after_long_help = page(Codes::Writing, &[
     ("fluxform optimize designs/seed_air.toml", "the best coil within the seed's limits, without steel"),
     ("fluxform optimize designs/seed_air.toml --wound --out best.toml && fluxform evaluate best.toml",
      "one that can be wound, as a design"),
@@ -48,16 +48,21 @@ pub struct Optimize {
     #[arg(long)]
     neighbours: bool,
     /// Local searches for every wire, in addition to that from the design's own coil
-    #[arg(long, value_name = "N", default_value_t = 24, value_parser = starts)]
+    #[arg(long, hide_short_help = true, value_name = "N", default_value_t = 24, value_parser = starts)]
     starts: usize,
     /// Where the sequence of starting points begins
-    #[arg(long, value_name = "S", default_value_t = 1)]
+    #[arg(long, hide_short_help = true, value_name = "S", default_value_t = 1)]
     seed: u64,
     /// Keep these dimensions of the design's [coil]
     #[arg(long, value_name = "KEY", value_enum, num_args = 1.., value_delimiter = ',')]
     fix: Vec<Key>,
     /// Boxes of coils that proving the best may take; 0 for no proof
-    #[arg(long, value_name = "N", default_value_t = 4_000_000)]
+    #[arg(
+        long,
+        hide_short_help = true,
+        value_name = "N",
+        default_value_t = 4_000_000
+    )]
     certificate_cells: usize,
     /// Write the design with the best coil here (TOML); `-` is standard output
     #[arg(long, value_name = "FILE")]

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use crate::RunError;
 use crate::coil::limits::{LimitCheck, LimitName, by_key};
-use crate::coil::optimum::problem::Regime;
+use crate::coil::optimum::problem::{Regime, Task};
 use crate::coil::optimum::{BestCoil, Fixed};
 use crate::design::template::Template;
 use crate::design::{Design, Need, Severity};
@@ -20,13 +20,6 @@ const ROUNDING: f64 = 1e-5;
 const ATTEMPTS: i32 = 12;
 /// The smallest bore, over the outer diameter: a design has one, a best coil may have none.
 const BORE_MIN: f64 = 1e-6;
-/// The coil alone at its target.
-const NEED: Need = Need {
-    coil: true,
-    array: false,
-    target: true,
-    workspace: false,
-};
 
 /// The document that the design was read from.
 #[derive(Debug, Clone, Copy)]
@@ -60,13 +53,12 @@ struct Sizes {
 }
 
 impl Sizes {
-    fn new(best: &BestCoil, design: &Design) -> Self {
-        let limits = &design.limits;
+    fn new(best: &BestCoil, task: &Task) -> Self {
         let window = &best.window;
-        let least = limits.inner_diameter_min_m.map_or(0.0, mm);
+        let least = task.bore_min_m(&best.strand).map_or(0.0, mm);
         let most = |limit: Option<f64>| limit.map_or(f64::INFINITY, mm);
-        let (outer_max, length_max) =
-            (most(limits.outer_diameter_max_m), most(limits.length_max_m));
+        let outer_max = most(task.outer_max().map(|(_, most_m)| most_m));
+        let length_max = most(task.limits.length_max_m);
         let within = |outer: f64| outer.min(outer_max);
         let outer = within(mm(2.0 * window.outer_radius_m()));
         let floor = least.max(BORE_MIN * outer);
@@ -120,10 +112,10 @@ fn rounded(value_mm: f64) -> f64 {
 pub(super) fn write(
     document: &Document<'_>,
     best: &BestCoil,
-    fixed: &Fixed,
+    task: &Task,
     tolerance: Option<f64>,
 ) -> Result<(WrittenDesign, Rated), RunError> {
-    let mut sizes = Sizes::new(best, document.design);
+    let mut sizes = Sizes::new(best, task);
     let mut attempt = 0;
     loop {
         let written = text_of(document, best, &sizes)?;
@@ -134,7 +126,7 @@ pub(super) fn write(
         }
         // The limits' own slopes are of order one.
         let by = (over.abs() * 2f64.powi(attempt)).max(2.3e-16);
-        sizes.shrink(by.copysign(over), best, fixed);
+        sizes.shrink(by.copysign(over), best, &task.fixed);
         attempt += 1;
     }
 }
@@ -190,17 +182,18 @@ fn text_of(
         settings.push(("wire.conductor_diameter_mm", conductor));
     }
     let text = template.with(settings).map_err(RunError::Input)?;
-    let (design, _) = Design::from_toml(&text, document.path, NEED).map_err(|refused| {
-        let faults = refused.faults.list().iter();
-        let faults: Vec<String> = faults
-            .filter(|fault| fault.severity == Severity::Error)
-            .map(ToString::to_string)
-            .collect();
-        RunError::Input(format!(
-            "the best coil makes no design of its own: {}",
-            faults.join("; ")
-        ))
-    })?;
+    let (design, _) =
+        Design::from_toml(&text, document.path, Need::EVALUATE).map_err(|refused| {
+            let faults = refused.faults.list().iter();
+            let faults: Vec<String> = faults
+                .filter(|fault| fault.severity == Severity::Error)
+                .map(ToString::to_string)
+                .collect();
+            RunError::Input(format!(
+                "the best coil makes no design of its own: {}",
+                faults.join("; ")
+            ))
+        })?;
     Ok(WrittenDesign { text, design })
 }
 

@@ -17,12 +17,14 @@ use crate::RunError;
 use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::coil::circuit::Circuit;
-use crate::coil::limits::{LimitCheck, LimitName, by_key};
+use crate::coil::limits::{LimitCheck, LimitName, bobbin_bore_m as bobbin_bore_m_of, by_key};
 use crate::coil::optimum::alternatives::alternatives;
 use crate::coil::optimum::neighbours::Neighbours;
+use crate::coil::optimum::problem::Task;
 use crate::coil::optimum::task::{self, Surroundings};
 use crate::coil::optimum::{
-    BestCoil, Fixed, LimitUse, Outcome, Settings, Window, optimise, optimise_wound,
+    Advantage, Alternative, BestCoil, Fixed, LimitUse, Outcome, Settings, Window, optimise,
+    optimise_wound,
 };
 use crate::design::Design;
 use crate::progress::{Progress, Silent};
@@ -104,7 +106,11 @@ pub fn optimize(
     let given = design
         .coil
         .map(|_| design_document::rated(design, request.tolerance));
-    let outcome = search(design, fixed, request, progress)?;
+    let mut task =
+        task::of_design(design, fixed).map_err(|refused| RunError::Input(refused.to_string()))?;
+    // Equation 11's own coil has any bore; one that is to be wound has that of a bobbin.
+    task.bobbin = request.wound;
+    let outcome = search(design, &task, request, progress)?;
     let mut result = Optimization {
         schema_version: SCHEMA_VERSION,
         fluxform_version: FLUXFORM_VERSION,
@@ -128,6 +134,7 @@ pub fn optimize(
         valley: outcome.valley,
         wires: outcome.wires,
         continuous_force_n: outcome.continuous_force_n,
+        bobbin_bore_m: bobbin_bore_m(&task, outcome.best.as_ref(), &outcome.alternatives),
         alternatives: Vec::new(),
         given: None,
         accuracy: BTreeMap::new(),
@@ -138,14 +145,13 @@ pub fn optimize(
     if let Some(best) = &outcome.best {
         // The optimiser's numbers are left behind here: the coil is written as a design and
         // evaluated as any other, so no number differs from what `evaluate` says of the file.
-        let (written, rated) = design_document::write(document, best, &fixed, request.tolerance)?;
+        let (written, rated) = design_document::write(document, best, &task, request.tolerance)?;
         result.alternatives = outcome.alternatives;
         result.take(best, rated);
         if surroundings(design, request.neighbours) == Surroundings::Neighbours {
             result.among_neighbours(&written.design, best, request.tolerance)?;
         }
         result.design_text = Some(written.text);
-        result.warnings.extend(too_wide(&written.design));
     }
     result.take_given(given);
     Ok(result)
@@ -332,12 +338,10 @@ fn surroundings(design: &Design, neighbours: bool) -> Surroundings {
 
 fn search(
     design: &Design,
-    fixed: Fixed,
+    task: &Task,
     request: &OptimizeRequest,
     progress: &dyn Progress,
 ) -> Result<Outcome, RunError> {
-    let refused = |error: task::NoTask| RunError::Input(error.to_string());
-    let task = task::of_design(design, fixed).map_err(refused)?;
     let model = model::coil_model(
         design,
         request.tolerance,
@@ -352,13 +356,24 @@ fn search(
         valley: request.around,
     };
     if request.wound {
-        return Ok(optimise_wound(model, &task, &settings, progress)?);
+        return Ok(optimise_wound(model, task, &settings, progress)?);
     }
-    let mut outcome = optimise(model, &task, &settings, progress)?;
+    let mut outcome = optimise(model, task, &settings, progress)?;
     if let Some(best) = outcome.best.as_ref().filter(|_| request.around) {
-        outcome.alternatives = alternatives(model, &task, best, progress)?;
+        outcome.alternatives = alternatives(model, task, best, progress)?;
     }
     Ok(outcome)
+}
+
+/// The least bore of a bobbin, m, where a coil in the result is limited by it.
+fn bobbin_bore_m(task: &Task, best: Option<&BestCoil>, others: &[Alternative]) -> Option<f64> {
+    let limits = task
+        .limits
+        .inner_diameter_min_m
+        .or(task.fixed.inner_diameter_m);
+    let windable = |other: &Alternative| other.better.contains(&Advantage::Windable);
+    let best = best.filter(|_| limits.is_none() && (task.bobbin || others.iter().any(windable)))?;
+    Some(bobbin_bore_m_of(best.strand.diameter_m))
 }
 
 /// Dimensions that were given, with the force that a metre more of each would add to `best`.
@@ -377,24 +392,4 @@ fn sensitivities(fixed: &Fixed, best: Option<&BestCoil>) -> BTreeMap<&'static st
         Some((name.key(), dimension))
     });
     given.collect()
-}
-
-/// A coil that is wider than the array's pitch fits nowhere.
-fn too_wide(design: &Design) -> Option<String> {
-    let coil = design.coil?;
-    let places = &design.array.positions_m;
-    let mut nearest = f64::INFINITY;
-    for (i, a) in places.iter().enumerate() {
-        for b in &places[..i] {
-            nearest = nearest.min((a[0] - b[0]).hypot(a[1] - b[1]));
-        }
-    }
-    (coil.outer_diameter_m > nearest * (1.0 + 1e-12)).then(|| {
-        format!(
-            "the best coil is {:.6} mm wide, but the array's coils are {:.6} mm apart: set \
-             limits.outer_diameter_max_mm, or the array wider",
-            coil.outer_diameter_m * 1e3,
-            nearest * 1e3
-        )
-    })
 }

@@ -60,6 +60,10 @@ pub struct Optimization {
     /// With whole turns: best force of a coil whose turns need not be whole, N.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub continuous_force_n: Option<f64>,
+    /// Least bore of a bobbin for the best coil's wire, m, where the design names no least bore and
+    /// coils are to be wound.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bobbin_bore_m: Option<f64>,
     /// Coils a little weaker, and shorter, lighter or cooler; their forces are upward ones.
     pub alternatives: Vec<Alternative>,
     /// The design's own coil as given; absent where it has none that can be computed.

@@ -8,7 +8,7 @@ use crate::cli::limits::{label, limit_row, limit_value};
 use crate::cli::quantity::{count, error, force, mass, mm, number, number_to, percent, si};
 use crate::cli::values::FileArgument;
 use crate::coil::circuit::CoilSize;
-use crate::coil::limits::LimitName;
+use crate::coil::limits::{LimitName, MANDREL_M, WIRES_A_MANDREL};
 use crate::coil::optimum::outcome::Alternative;
 use crate::coil::optimum::problem::Regime;
 use crate::coil::optimum::{LimitUse, WholeTurns};
@@ -89,6 +89,17 @@ fn best(sheet: &mut Sheet, result: &Optimization, coil: &BestCoilSummary, object
     if !held.is_empty() {
         sheet.line("worth", &held.join("\n"));
     }
+    if let Some(bore_m) = result.bobbin_bore_m {
+        sheet.line(
+            "bobbin",
+            &format!(
+                "a coil that is wound has a bore of {} at least: {WIRES_A_MANDREL} diameters of its wire, \
+                 and no mandrel under {}; limits.inner_diameter_min_mm sets another",
+                mm(bore_m),
+                mm(MANDREL_M)
+            ),
+        );
+    }
     if let Some(valley) = &result.valley {
         let [low, high] = valley.inner_diameter_m;
         sheet.line(
@@ -128,11 +139,16 @@ fn dimensions(coil: &BestCoilSummary) -> String {
             count(layers as usize, "layer"),
             number(coil.turns)
         ),
-        None => format!(
-            "{} {}",
-            number(coil.turns),
-            if coil.turns == 1.0 { "turn" } else { "turns" }
-        ),
+        None => {
+            let (size, wire_m) = (&coil.size, coil.wire_diameter_m);
+            let depth_m = 0.5 * (size.outer_diameter_m - size.inner_diameter_m);
+            format!(
+                "{} {} in {} layers (--wound for whole ones)",
+                number(coil.turns),
+                if coil.turns == 1.0 { "turn" } else { "turns" },
+                number_to(depth_m / wire_m, 3)
+            )
+        }
     };
     format!(
         "{} to {} diameter, {} long; {turns} of {} wire",

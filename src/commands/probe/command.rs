@@ -1,6 +1,7 @@
 //! `probe`: field and gradient at given points.
 
 use super::scan;
+use super::scan::units;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -47,7 +48,7 @@ const HEADER: &str = "x_m,y_m,z_m,coil,";
 /// coil with the line for `[array] gain`, a constant background, the pose of the sensor's frame, and
 /// which parameter of the design would explain the residuals; --out takes the residuals as a table.
 #[derive(Debug, Args)]
-#[command(after_help = page(Codes::Reading, &[
+#[command(after_long_help = page(Codes::Reading, &[
     ("printf 'x_m,y_m,z_m\\n0.007,0.013,0.03\\n' | fluxform probe designs/seed.toml -",
      "one point from standard input"),
     ("printf 'x_m,y_m,z_m\\n0,0,0.03\\n' | fluxform probe designs/seed.toml - --components gz -q",
@@ -67,8 +68,10 @@ pub struct Probe {
     /// Quantities reported at each point
     #[arg(long, value_enum, default_value_t = ComponentsArgument::All, conflicts_with = "compare")]
     components: ComponentsArgument,
-    /// Report force and torque on the magnet per ampere too: six columns
-    #[arg(long, conflicts_with = "compare")]
+    /// Report force and torque on the magnet too
+    ///
+    /// Six columns more, per ampere.
+    #[arg(long, hide_short_help = true, conflicts_with = "compare")]
     pub(super) magnet_force: bool,
     /// Where the table goes; `-` is standard output [default: -, with --compare nowhere]
     #[arg(long, value_name = "FILE")]
@@ -119,6 +122,9 @@ impl Probe {
         documents::one_standard_input([&self.design, points])?;
         let document = documents::design(&self.design, Need::PROBE, printer)?;
         let (points_m, points_input) = documents::points(points)?;
+        if let Some(hint) = units::coordinates(&document.design, &points_m) {
+            printer.warning(&hint);
+        }
         let points = points_m.len();
         let components = match self.components {
             ComponentsArgument::All => Components::All,
@@ -214,8 +220,7 @@ fn accuracy(table: &ProbeTable) -> BTreeMap<&'static str, StageAccuracy> {
     let field = stage(table.relative_error, relative_to, &table.method);
     let force = table.force_error.map(|estimate| {
         let to = "the moment times the largest |grad B| at the point's height";
-        let method = "the field's error and the a-priori bound of the magnet's dipoles";
-        ("force", stage(estimate, to, method))
+        ("force", stage(estimate, to, &table.force_method))
     });
     std::iter::once(("field", field)).chain(force).collect()
 }

@@ -18,6 +18,7 @@ use crate::field::magnet::MagnetRule;
 use crate::field::steel::CLOSEST;
 use crate::field::steel::array_steel::SteelField;
 use crate::progress::Progress;
+use crate::scene::evaluation_sample::{Evaluation, sharper_forces};
 use crate::scene::steel;
 use crate::scene::steel::{Solved, clearance_of_m};
 use crate::scene::tolerances::MAGNET_FINEST;
@@ -41,6 +42,8 @@ pub struct ProbeTable {
     pub relative_to_height: bool,
     /// Estimated error of the forces, relative to |m| times the largest |grad B| at the height.
     pub force_error: Option<f64>,
+    /// How it is known.
+    pub force_method: String,
     /// The stages that miss the tolerance.
     pub accuracy_missed: Vec<String>,
 }
@@ -91,7 +94,7 @@ pub fn probe(
     let coils = scene.coils.len();
     let mut fields = vec![CartesianField::default(); points_m.len() * coils];
     let mut forces = vec![[0.0; 6]; if request.force { fields.len() } else { 0 }];
-    let mut magnet_error = 0.0_f64;
+    let (mut growth, mut evaluation) = (1.0_f64, 0.0_f64);
     let finest = MAGNET_SHARE * solved.tolerance.max(MAGNET_FINEST);
     for group in groups.values() {
         let rule = request
@@ -126,12 +129,28 @@ pub fn probe(
             }
         }
         if let Some(rule) = &rule {
-            let growth = scene.magnet_growth(group.magnet_lowest_m);
-            let error = solved.force_error(growth, rule.amplification(), rule.bound());
-            magnet_error = magnet_error.max(error);
+            growth = growth.max(scene.magnet_growth(group.magnet_lowest_m));
+            let proven = solved.force_evaluation(rule.amplification(), rule.bound());
+            evaluation = evaluation.max(proven);
         }
     }
     progress.end();
+    let force_error = if request.force {
+        let proven = Evaluation {
+            estimate: evaluation,
+            method: "the field's error and the a-priori bound of the magnet's dipoles".to_owned(),
+        };
+        let given = |point: usize, coil: usize| {
+            let [x, y, z, ..] = forces[point * coils + coil];
+            [x, y, z]
+        };
+        let mut sampled = sharper_forces(&scene, &solved, &points_m, given, proven)?;
+        sampled.estimate += solved.steel_error * growth;
+        Some(sampled)
+    } else {
+        None
+    };
+    let force_method = force_error.as_ref().map(|error| error.method.clone());
     let stage = StageAccuracy {
         estimate: solved.point_error(),
         relative_to: if solved.has_steel() {
@@ -151,7 +170,8 @@ pub fn probe(
         relative_error: solved.point_error(),
         method: solved.point_method(),
         relative_to_height: solved.has_steel(),
-        force_error: request.force.then_some(magnet_error),
+        force_error: force_error.map(|error| error.estimate),
+        force_method: force_method.unwrap_or_default(),
         accuracy_missed: missed([(&"field", &stage)], solved.tolerance),
     })
 }

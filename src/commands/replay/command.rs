@@ -37,7 +37,7 @@ const MOST_POSITIONS: f64 = 1e8;
 /// beyond the limits (saturated) or outside the map. A position is held until the next one; with
 /// --dynamics its row states the end of that time.
 #[derive(Debug, Args)]
-#[command(after_help = page(Codes::Writing, &[
+#[command(after_long_help = page(Codes::Writing, &[
     ("fluxform calibrate designs/seed_air.toml shapes/flat.toml", "make a bundle"),
     ("fluxform replay results/seed_air/flat --synthesize explore --trajectory-out finger.csv",
      "an exploring finger made up"),
@@ -52,11 +52,7 @@ pub struct Replay {
     bundle: PathBuf,
     /// CSV table with the columns t_s, x_m, y_m, z_m of the magnet's centre, in seconds and metres;
     /// `-` for standard input
-    #[arg(
-        value_name = "TRAJECTORY",
-        required_unless_present = "synthesize",
-        conflicts_with = "synthesize"
-    )]
+    #[arg(value_name = "TRAJECTORY", conflicts_with = "synthesize")]
     trajectory: Option<FileArgument>,
     /// Make a trajectory up instead
     #[arg(long, value_enum, value_name = "KIND")]
@@ -64,16 +60,17 @@ pub struct Replay {
     /// Which random movements are made up
     #[arg(
         long,
+        hide_short_help = true,
         value_name = "N",
         default_value_t = 1,
         conflicts_with = "trajectory"
     )]
     seed: u64,
     /// How long the trajectory made up lasts, seconds
-    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = positive, conflicts_with = "trajectory", allow_hyphen_values = true)]
+    #[arg(long, hide_short_help = true, value_name = "S", default_value_t = 10.0, value_parser = positive, conflicts_with = "trajectory", allow_hyphen_values = true)]
     duration: f64,
     /// Positions a second of the trajectory made up
-    #[arg(long, value_name = "HZ", default_value_t = 50.0, value_parser = positive, conflicts_with = "trajectory", allow_hyphen_values = true)]
+    #[arg(long, hide_short_help = true, value_name = "HZ", default_value_t = 50.0, value_parser = positive, conflicts_with = "trajectory", allow_hyphen_values = true)]
     rate: f64,
     /// Write the trajectory made up to this file too
     #[arg(long, value_name = "FILE", conflicts_with = "trajectory")]
@@ -193,8 +190,15 @@ impl Replay {
             return Ok((trajectory, source));
         }
         let Some((synthesis, source)) = self.synthesis() else {
-            let message = "name a trajectory, or ask for one with --synthesize";
-            return Err(Failure::Usage(message.to_owned()));
+            let kinds: Vec<String> = KindFlag::value_variants()
+                .iter()
+                .filter_map(|kind| Some(kind.to_possible_value()?.get_name().to_owned()))
+                .collect();
+            return Err(Failure::Usage(format!(
+                "a trajectory is missing: name a CSV file with the columns t_s,x_m,y_m,z_m, or have one \
+                 made up with --synthesize {}",
+                kinds.join("|")
+            )));
         };
         let trajectory = opened.synthesize(&synthesis);
         let source = TrajectorySource {

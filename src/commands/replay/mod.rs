@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 use crate::RunError;
 use crate::bundle::artefact::Input;
-use crate::bundle::load::{Bundle, BundleError};
+use crate::bundle::load::Bundle;
 use crate::bundle::replay::{Answer, ReplayRows};
 use crate::bundle::trajectory::Trajectory;
 use crate::coil::drive::Drive;
@@ -46,12 +46,7 @@ impl Opened {
     /// A bundle that was changed, damaged or written by a newer program; one without a force
     /// constant.
     pub fn new(path: &Path) -> Result<Self, RunError> {
-        // Here a bundle is an input like any other.
-        let bundle = Bundle::open(path).map_err(|error| match error {
-            BundleError::NoBundle { .. } | BundleError::Schema { .. } => RunError::Bundle(error),
-            // A damaged bundle is a bad input here; `verify` is what passes judgement.
-            error => RunError::Input(error.to_string()),
-        })?;
+        let bundle = Bundle::open(path)?;
         let renderer = Renderer::new(&bundle).map_err(|error| {
             let message = format!("{}: {error}", bundle.folder.display());
             match error {

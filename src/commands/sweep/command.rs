@@ -18,7 +18,7 @@ use crate::cli::printer::Printer;
 #[command(
     subcommand_required = true,
     arg_required_else_help = true,
-    after_help = page(Codes::Writing, &[
+    after_long_help = page(Codes::Writing, &[
         ("fluxform sweep plan designs/seed_air.toml --set coil.turns=700:1300:300 --out plan.json",
          "three designs"),
         ("fluxform sweep run plan.json --out points", "compute them"),

@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::front::front;
 use crate::RunError;
@@ -12,7 +13,7 @@ use crate::bundle::artefact::{FLUXFORM_VERSION, FileEntry, Input, SCHEMA_VERSION
 use crate::bundle::atomic::{FileSet, Overwrite, WriteError, Written};
 use crate::bundle::seal::to_record;
 use crate::bundle::sweep::{
-    MergeSummary, PlanFile, PointFile, PointStore, StoredPoint, TableWriter,
+    MergeSummary, PlanFile, PointFile, PointStore, StoredPoint, TableWriter, value_text,
 };
 use crate::plot::pareto::{Panel, ParetoPlot};
 use crate::progress::Progress;
@@ -75,6 +76,43 @@ pub struct MergeReport {
     pub missing: String,
     /// The page, if one was requested.
     pub page: Option<String>,
+    /// The strongest design, of those that meet their limits where there are any.
+    pub best: Option<StrongestDesign>,
+}
+
+/// The strongest design of a sweep.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StrongestDesign {
+    /// Its index in the plan.
+    pub index: u64,
+    /// The swept keys and their values.
+    pub values: Vec<(String, String)>,
+    /// |force|, N.
+    pub force_n: f64,
+    /// Resistance, ohm, mass, kg, and settling time, s.
+    pub costs: [f64; 3],
+    /// Whether it meets its limits.
+    pub limits_met: bool,
+}
+
+impl StrongestDesign {
+    fn of(plan: &PlanFile, briefs: &[Brief]) -> Option<Self> {
+        // Of equal ones the first.
+        let stronger = |a: &&Brief, b: &&Brief| {
+            let force = a.force_n.total_cmp(&b.force_n);
+            a.met.cmp(&b.met).then(force).then(b.index.cmp(&a.index))
+        };
+        let best = briefs.iter().max_by(stronger)?;
+        let keys = plan.axes.iter().map(|axis| axis.key.clone());
+        let values = plan.values_at(best.index).into_iter().map(value_text);
+        Some(Self {
+            index: best.index,
+            values: keys.zip(values).collect(),
+            force_n: best.force_n,
+            costs: best.costs,
+            limits_met: best.met,
+        })
+    }
 }
 
 /// The few numbers of a point that are held: index, force, costs, whether limits are met.
@@ -179,7 +217,7 @@ pub fn merge(
     let page = request
         .page
         .then(|| page::html(plan, &summary, &plot, &gathered.briefs, &best));
-    Ok(report(summary, &gathered, page))
+    Ok(report(plan, summary, &gathered, page))
 }
 
 /// Writes the table of the designs on a front.
@@ -231,7 +269,7 @@ pub fn merge_table(
         let plot = plot(plan, &gathered.briefs, &fronts, among_met);
         page::html(plan, &summary, &plot, &gathered.briefs, &best)
     });
-    Ok((table, report(summary, &gathered, page)))
+    Ok((table, report(plan, summary, &gathered, page)))
 }
 
 /// Writes the table's rows in the points' order and collects what the fronts need.
@@ -436,10 +474,16 @@ fn count(summary: &mut MergeSummary, gathered: &Gathered, front: u64, among_met:
     summary.largest_force_n = gathered.briefs.iter().map(|b| b.force_n).reduce(f64::max);
 }
 
-fn report(summary: MergeSummary, gathered: &Gathered, page: Option<String>) -> MergeReport {
+fn report(
+    plan: &PlanFile,
+    summary: MergeSummary,
+    gathered: &Gathered,
+    page: Option<String>,
+) -> MergeReport {
     MergeReport {
         summary,
         page,
+        best: StrongestDesign::of(plan, &gathered.briefs),
         missing: named(&gathered.missing),
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use clap::Args;
 use serde::Serialize;
 
-use super::merge::{MergeFiles, MergeReport, MergeRequest, merge, merge_table};
+use super::merge::{MergeFiles, MergeReport, MergeRequest, StrongestDesign, merge, merge_table};
 use crate::RunError;
 use crate::bundle::atomic::check_distinct;
 use crate::bundle::sweep::MergeSummary;
@@ -16,7 +16,7 @@ use crate::cli::help::{Codes, page};
 use crate::cli::layout::Sheet;
 use crate::cli::pictures::Picture;
 use crate::cli::printer::{Printer, Stream};
-use crate::cli::quantity::{bytes, count, force};
+use crate::cli::quantity::{bytes, count, force, mass, si};
 use crate::cli::start::{begin, folder};
 use crate::cli::values::FileArgument;
 
@@ -29,7 +29,7 @@ use crate::cli::values::FileArgument;
 /// unless --partial asks for what there is: then the exit code is 0 and the missing are reported as a
 /// warning. Points of another plan are refused.
 #[derive(Debug, Args)]
-#[command(after_help = page(Codes::Writing, &[
+#[command(after_long_help = page(Codes::Writing, &[
     ("fluxform sweep merge wires.json wires --out wires.csv", "all points of one folder"),
     ("fluxform sweep merge wires.json wires more --partial --out - > so_far.csv",
      "what there is so far, from two folders"),
@@ -60,6 +60,9 @@ struct MergeJson<'a> {
     #[serde(flatten)]
     summary: &'a MergeSummary,
     table: String,
+    /// The strongest design, of those that meet their limits where there are any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    best: Option<&'a StrongestDesign>,
 }
 
 impl Merge {
@@ -136,6 +139,7 @@ impl Merge {
         let json = MergeJson {
             summary: &report.summary,
             table: self.out.as_given().display().to_string(),
+            best: report.best.as_ref(),
         };
         let json = printer.with_warnings(&json);
         printer.summary(place, &json, || self.text(&report))
@@ -152,6 +156,9 @@ impl Merge {
         let summary = &report.summary;
         let rows = count(summary.rows as usize, "design");
         let mut sheet = Sheet::new(&format!("{}: a sweep of {rows}", summary.design));
+        if let Some(best) = &report.best {
+            sheet.line("best", &strongest(best));
+        }
         let mut line = format!("{} meet their limits", summary.limits_met);
         if summary.failed > 0 {
             line += &format!(", {} cannot be computed", summary.failed);
@@ -167,7 +174,7 @@ impl Merge {
                 "all, because none meets its limits"
             };
             sheet.line(
-                "best",
+                "fronts",
                 &format!(
                     "{} on the fronts among {among}; largest force {} of all",
                     summary.front,
@@ -189,4 +196,28 @@ impl Merge {
         }
         sheet.finish()
     }
+}
+
+/// The strongest design and what it costs.
+fn strongest(best: &StrongestDesign) -> String {
+    let [resistance_ohm, mass_kg, settling_s] = best.costs;
+    let values: Vec<String> = best
+        .values
+        .iter()
+        .map(|(key, value)| format!("{key} = {value}"))
+        .collect();
+    let among = if best.limits_met {
+        "the strongest within its limits"
+    } else {
+        "the strongest; none meets its limits"
+    };
+    format!(
+        "design {}: {}\n{}, {}, {}, settled after {}: {among}",
+        best.index,
+        values.join(", "),
+        force(best.force_n),
+        si(resistance_ohm, "ohm"),
+        mass(mass_kg),
+        si(settling_s, "s")
+    )
 }

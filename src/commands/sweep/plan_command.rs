@@ -28,7 +28,7 @@ use crate::design::Need;
 /// numbers, lists as [0,0],[5,0]. The plan carries the design's text and a digest of itself, so
 /// that nothing else is needed to run it but the B-H tables that the design names.
 #[derive(Debug, Args)]
-#[command(after_help = page(Codes::Writing, &[
+#[command(after_long_help = page(Codes::Writing, &[
     ("fluxform sweep plan designs/seed_air.toml --set wire.diameter_mm=0.5:1.0:0.05 --out wires.json",
      "eleven wires"),
     ("fluxform sweep plan designs/seed_air.toml --set coil.length_mm=50:100:25 \\\n    \
@@ -41,7 +41,7 @@ pub struct Plan {
     /// Design file (TOML), `-` for standard input
     #[arg(value_name = "DESIGN")]
     design: FileArgument,
-    /// A key and its values; may be given several times
+    /// A key and its values, KEY=FROM:TO:STEP (TO included) or KEY=A,B,C; may be given several times
     #[arg(long = "set", value_name = "KEY=VALUES", required = true, value_parser = axis::parse)]
     axes: Vec<Axis>,
     /// Where the plan goes; `-` is standard output

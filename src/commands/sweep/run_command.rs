@@ -22,7 +22,7 @@ use crate::cli::values::FileArgument;
 /// then 4 when all points are done, unless --allow-failed is given. A file of another plan is never
 /// touched without --force.
 #[derive(Debug, Args)]
-#[command(after_help = page(Codes::Writing, &[
+#[command(after_long_help = page(Codes::Writing, &[
     ("fluxform sweep run wires.json --out wires", "all points, on all cores"),
     ("fluxform sweep run wires.json --out wires --shard 1/3 --threads 1",
      "the first of three parts"),

@@ -24,7 +24,7 @@ use crate::cli::start::begin;
 /// platform, the report states what could not be checked.
 /// Any check that fails or is not possible ends with exit code 5.
 #[derive(Debug, Args)]
-#[command(after_help = page(Codes::Verifying, &[
+#[command(after_long_help = page(Codes::Verifying, &[
     ("fluxform calibrate designs/seed.toml shapes/flat.toml", "make a bundle"),
     ("fluxform verify results/seed/flat", "verify it"),
     ("fluxform verify results/seed/flat --format json", "for a program"),

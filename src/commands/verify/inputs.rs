@@ -17,8 +17,8 @@ use crate::commands::lambda::error_target::ErrorTarget;
 use crate::design::{Design, Need, Steel as Described, source};
 use crate::lambda::Settings;
 use crate::scene::sources::ShapeSource;
+use crate::shape::bodies::BodyOptions;
 use crate::shape::document::{Fit, Placement, RawSurface, Seat, ShapeDocument, SurfaceSource, Up};
-use crate::shape::step::BodyOptions;
 
 /// Inputs that are read again: a bundle names them, and is not trusted with any number or size.
 const INPUTS_MAX: usize = 16;

@@ -156,7 +156,7 @@ impl ArraySteel for CoupledArray {
     }
 
     fn field(&self, lowest_m: f64, distance_m: f64, tolerance: f64) -> Option<SteelField> {
-        let sources = ArraySources::of_array(self, lowest_m, distance_m, tolerance);
+        let sources = ArraySources::for_many_points(self, lowest_m, distance_m, tolerance);
         Some(SteelField::Coupled(sources))
     }
 

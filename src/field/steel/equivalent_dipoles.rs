@@ -9,8 +9,9 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
+use super::CoreShape;
 use super::generatrix::Generatrix;
-use super::response::Rings;
+use super::response::{RingPanel, Rings, ring_panels};
 use crate::winding::Winding;
 use fluxform_base::units::MU_0_T_M_PER_A;
 use fluxform_numerics::dispatch::{self, Kernel, LANES, Lanes};
@@ -23,6 +24,18 @@ const PANEL: f64 = 1.5;
 const CLOSEST: f64 = 0.02;
 /// Most angles of a ring.
 const MOST_ANGLES: usize = 2000;
+/// Angles of a ring beyond its layer's modes, at least.
+const LEAST_ANGLES: usize = 3;
+/// Tolerance of a panel, at most.
+const MOST_TOLERANCE: f64 = 0.3;
+/// Drives for which fewer dipoles are compared with those that are sure to do.
+const COMPARED_DRIVES: usize = 3;
+/// Cores about which they are compared.
+const COMPARED_CORES: usize = 3;
+/// Powers of ten by which fewer dipoles may aim beside the tolerance.
+const MOST_LOOSENED: i32 = 6;
+/// The part of the tolerance that they may miss by at the places compared.
+const COMPARED_SHARE: f64 = 0.1;
 
 /// Most digits by which the layer's parts may cancel in the field that is left.
 const MOST_CANCELLATION: f64 = 1e12;
@@ -32,24 +45,54 @@ pub(super) struct Near<'a> {
     pub(super) lowest_m: f64,
     pub(super) distance_m: f64,
     pub(super) tolerance: f64,
+    /// Whether places are so many that it pays to find the fewest dipoles for them.
+    pub(super) many: bool,
     /// The winding, whose gradient is what errors are relative to.
     pub(super) winding: &'a Winding,
 }
 
-/// Largest gradients that the rings of a layer would have alone, added up, T/m: how far above the
-/// layer's field that is, so many digits cancel.
-fn parts_of_layer(outline: &Generatrix, largest: &[f64], distance: impl Fn(f64) -> f64) -> f64 {
-    outline
-        .areas_m2()
-        .zip(&outline.nodes)
-        .zip(largest)
-        .map(|((area, node), layer)| {
-            let d = distance(node.z_m);
-            // A ring's part near a point is as long as its distance, at most the whole ring.
-            let share = (d / (PI * node.r_m)).min(1.0);
-            area * layer * share * 6.0 * MU_0_T_M_PER_A / (4.0 * PI * d.powi(4))
-        })
-        .sum()
+impl Near<'_> {
+    /// The least distance from a core that counts, m.
+    fn floor_m(&self, shape: CoreShape) -> f64 {
+        self.distance_m.max(CLOSEST * shape.radius_m)
+    }
+
+    /// Distance of the places from what lies at the height `z_m`, at least, m.
+    fn least_distance_m(&self, shape: CoreShape, z_m: f64) -> f64 {
+        self.floor_m(shape).max(self.lowest_m - z_m)
+    }
+
+    /// The gradient that errors at a height are relative to, T/m/A.
+    fn size_at(&self, z_m: f64) -> f64 {
+        let field = self.winding.field(self.winding.outer_radius_m, z_m);
+        field.map_or(f64::INFINITY, |field| field.gradient_norm())
+    }
+}
+
+/// Largest gradients that the rings of a layer would have alone, added up on each of `panels`, T/m:
+/// how far above the layer's field their sum is, so many digits cancel.
+fn parts_of_layer(
+    outline: &Generatrix,
+    panels: &[RingPanel],
+    largest: &[f64],
+    distance: impl Fn(f64) -> f64,
+) -> Vec<f64> {
+    let areas_m2: Vec<f64> = outline.areas_m2().collect();
+    let mut parts = vec![0.0; panels.len()];
+    for (index, node) in outline.nodes.iter().enumerate() {
+        let own = &outline.panels[index / outline.order];
+        let at_m = own.coordinate_of(node);
+        let holds =
+            |(face, from, to): &RingPanel| *face == own.face && (*from..=*to).contains(&at_m);
+        let d = distance(node.z_m);
+        // A ring's part near a point is as long as its distance, at most the whole ring.
+        let share = (d / (PI * node.r_m)).min(1.0);
+        let dipole = 6.0 * MU_0_T_M_PER_A / (4.0 * PI * d.powi(4));
+        if let Some(panel) = panels.iter().position(holds) {
+            parts[panel] += areas_m2[index] * largest[index] * share * dipole;
+        }
+    }
+    parts
 }
 
 /// Dipoles around a ring whose points are `ratio` radii away.
@@ -59,8 +102,9 @@ fn angles_of(ratio: f64, modes: usize, tolerance: f64) -> usize {
     // The gradient of a dipole's field has azimuthal modes n^2.5 exp(-n decay).
     let digits = (1.0 / tolerance).ln();
     let growth = 2.5 * (digits / decay).max(1.0).ln();
-    let needed = modes + ((digits + growth) / decay).ceil() as usize;
-    needed.clamp(2 * modes + 1, MOST_ANGLES)
+    let needed = ((digits + growth) / decay).ceil() as usize;
+    // A mode m passes for the kernel's mode n - m.
+    (modes + needed.max(LEAST_ANGLES)).min(MOST_ANGLES)
 }
 
 /// Position (m) and outer normal of every dipole of every core.
@@ -108,6 +152,178 @@ fn dipole_moments(
     }
 }
 
+/// What dipoles are to stand for.
+struct DipoleTask<'a> {
+    outline: &'a Generatrix,
+    positions_m: &'a [[f64; 2]],
+    /// Azimuthal modes of a core's layer.
+    modes: usize,
+    near: &'a Near<'a>,
+    panels: Vec<RingPanel>,
+    /// By how much each panel's tolerance may be above the mean.
+    slack: Vec<f64>,
+}
+
+impl DipoleTask<'_> {
+    /// As many dipoles as `tolerance` asks for a priori, for some of the drives.
+    fn sources(
+        &self,
+        tolerance: f64,
+        drives: &[usize],
+        layers: &(impl Fn(usize, usize) -> DMatrix<f64> + Sync),
+    ) -> ArraySources {
+        let shape = self.outline.shape;
+        let distance = |z_m: f64| self.near.least_distance_m(shape, z_m);
+        let of_panel: Vec<f64> = (self.slack.iter())
+            .map(|slack| (slack * tolerance).min(MOST_TOLERANCE))
+            .collect();
+        let orders: Vec<usize> = (of_panel.iter())
+            .map(|tolerance| (4.0 - 1.3 * tolerance.log10()).ceil() as usize)
+            .collect();
+        let rings = Rings::on_panels(self.outline, &self.panels, &orders);
+        let of_ring = of_panel
+            .iter()
+            .zip(&orders)
+            .flat_map(|(tolerance, order)| std::iter::repeat_n(*tolerance, *order));
+        let angles: Vec<usize> = (rings.rings.iter().zip(of_ring))
+            .map(|(ring, aim)| angles_of(distance(ring.z_m) / ring.r_m, self.modes, aim))
+            .collect();
+        let places = dipole_places(&rings, &angles, self.positions_m);
+        let a_core = places.len() / self.positions_m.len().max(1);
+        let columns = drives.len();
+        let mut moments = vec![0.0; places.len() * columns];
+        moments
+            .par_chunks_mut((a_core * columns).max(1))
+            .enumerate()
+            .for_each(|(core, out)| {
+                for (column, drive) in drives.iter().enumerate() {
+                    fluxform_base::progress::poll();
+                    let by_mode = rings.moments(&layers(*drive, core));
+                    dipole_moments(&by_mode, self.modes, &angles, |place, moment| {
+                        out[place * columns + column] = moment;
+                    });
+                }
+            });
+        ArraySources {
+            drives: columns,
+            top_m: shape.top_m,
+            places,
+            moments,
+        }
+    }
+
+    /// By how much the tolerance may be loosened so that the dipoles that are left still give what
+    /// those of `tolerance` give, within a part of what is requested.
+    fn fewest(
+        &self,
+        tolerance: f64,
+        height_m: f64,
+        drives: &[usize],
+        layers: &(impl Fn(usize, usize) -> DMatrix<f64> + Sync),
+    ) -> f64 {
+        let shape = self.outline.shape;
+        let places = self.compared_places();
+        // Computed once: every comparison needs them.
+        let cores = self.positions_m.len();
+        let known: Vec<DMatrix<f64>> = (0..drives.len() * cores)
+            .into_par_iter()
+            .map(|i| layers(drives[i / cores], i % cores))
+            .collect();
+        let known = |drive: usize, core: usize| known[drive * cores + core].clone();
+        let columns: Vec<usize> = (0..drives.len()).collect();
+        let sizes: Vec<f64> = places
+            .iter()
+            .map(|[_, _, z]| self.near.size_at(z.max(shape.top_m.max(0.0)).max(height_m)))
+            .collect();
+        let values = |tolerance: f64| {
+            let sources = self.sources(tolerance, &columns, &known);
+            let mut out = vec![0.0; columns.len() * Components::Gradient.count() * places.len()];
+            sources.sample(&places, Components::Gradient, &mut out);
+            out
+        };
+        let sure = values(tolerance);
+        let loosened = |power: i32| 10_f64.powi(power);
+        let holds = |power: i32| {
+            let fewer = values(tolerance * loosened(power));
+            let rows = fewer
+                .chunks_exact(places.len())
+                .zip(sure.chunks_exact(places.len()));
+            rows.flat_map(|(fewer, sure)| fewer.iter().zip(sure).zip(&sizes))
+                .all(|((a, b), size)| (a - b).abs() <= COMPARED_SHARE * self.near.tolerance * size)
+        };
+        // The power that holds and the one that does not close in on each other.
+        let (mut good, mut bad) = (0, MOST_LOOSENED + 1);
+        while bad - good > 1 {
+            let middle = (good + bad).div_euclid(2);
+            if holds(middle) {
+                good = middle;
+            } else {
+                bad = middle;
+            }
+        }
+        loosened(good)
+    }
+
+    /// Places as close to some of the cores as any may be, and some farther ones.
+    fn compared_places(&self) -> Vec<[f64; 3]> {
+        let (shape, lowest_m) = (self.outline.shape, self.near.lowest_m);
+        let floor_m = self.near.floor_m(shape);
+        let edge = |part: f64, angle: f64| {
+            let (s, c) = angle.sin_cos();
+            [
+                part * shape.radius_m + floor_m * s,
+                shape.top_m + floor_m * c,
+            ]
+        };
+        // Above the top, about its edge, beside it.
+        let close = [
+            edge(0.0, 0.0),
+            edge(0.4, 0.0),
+            edge(0.8, 0.0),
+            edge(1.0, 0.0),
+            edge(1.0, 0.4),
+            edge(1.0, 0.8),
+            edge(1.0, 0.5 * PI),
+        ];
+        let beside = [0.1, 0.4, 1.0].map(|part| {
+            let z_m = shape.top_m - part * shape.length_m();
+            [shape.radius_m + floor_m, z_m]
+        });
+        let farther = [[0.0, 1.0], [1.0, 1.0], [2.0, 2.0]].map(|[r, z]| {
+            [
+                r * shape.radius_m,
+                shape.top_m + floor_m + z * shape.radius_m,
+            ]
+        });
+        let about = close.iter().chain(&beside).chain(&farther);
+        let mut places = Vec::new();
+        for core in spread_over(self.positions_m.len(), COMPARED_CORES) {
+            let [x, y] = self.positions_m[core];
+            for [r_m, z_m] in about.clone() {
+                // No two at one angle.
+                let (s, c) = (2.399_963 * places.len() as f64).sin_cos();
+                places.push([x + r_m * c, y + r_m * s, z_m.max(lowest_m)]);
+            }
+        }
+        let clear = |place: &[f64; 3]| {
+            self.positions_m.iter().all(|[x, y]| {
+                let r_m = (place[0] - x).hypot(place[1] - y);
+                shape.distance_m(r_m, place[2]) >= 0.999 * floor_m
+            })
+        };
+        places.retain(clear);
+        places
+    }
+}
+
+/// At most `most` of `count` indices, from the first to the last.
+fn spread_over(count: usize, most: usize) -> Vec<usize> {
+    let chosen = count.min(most);
+    (0..chosen)
+        .map(|k| k * (count - 1) / (chosen - 1).max(1))
+        .collect()
+}
+
 /// Dipoles that stand for all cores of an array, for every drive.
 #[derive(Debug, Clone)]
 pub struct ArraySources {
@@ -128,50 +344,38 @@ impl ArraySources {
         layers: impl Fn(usize, usize) -> DMatrix<f64> + Sync,
         near: Near<'_>,
     ) -> Self {
-        let Near {
-            lowest_m,
-            distance_m,
-            tolerance,
-            winding,
-        } = near;
         let shape = outline.shape;
-        let floor_m = distance_m.max(CLOSEST * shape.radius_m);
-        let distance = |z_m: f64| floor_m.max(lowest_m - z_m);
+        let floor_m = near.floor_m(shape);
+        let distance = |z_m: f64| near.least_distance_m(shape, z_m);
         // A layer's parts cancel (a constant layer has no field at all), so that an error relative
         // to one ring's field is a larger one relative to the field that is left.
         let largest = largest_layer(outline, positions_m.len(), drives, &layers);
-        let height_m = (shape.top_m.max(0.0) + floor_m).max(lowest_m);
-        let size = winding
-            .field(winding.outer_radius_m, height_m)
-            .map_or(f64::INFINITY, |field| field.gradient_norm());
-        let parts = parts_of_layer(outline, &largest, distance);
-        let tolerance = tolerance / (parts / size).clamp(1.0, MOST_CANCELLATION);
-        let order = (4.0 - 1.3 * tolerance.log10()).ceil().max(3.0) as usize;
-        let rings = Rings::new(outline, order, |z| PANEL * distance(z));
-        let angles: Vec<usize> = (rings.rings.iter())
-            .map(|ring| angles_of(distance(ring.z_m) / ring.r_m, modes, tolerance))
-            .collect();
-        let places = dipole_places(&rings, &angles, positions_m);
-        let a_core = places.len() / positions_m.len().max(1);
-        let mut moments = vec![0.0; places.len() * drives];
-        moments
-            .par_chunks_mut((a_core * drives).max(1))
-            .enumerate()
-            .for_each(|(core, out)| {
-                for drive in 0..drives {
-                    fluxform_base::progress::poll();
-                    let by_mode = rings.moments(&layers(drive, core));
-                    dipole_moments(&by_mode, modes, &angles, |place, moment| {
-                        out[place * drives + drive] = moment;
-                    });
-                }
-            });
-        Self {
-            drives,
-            top_m: shape.top_m,
-            places,
-            moments,
-        }
+        let height_m = (shape.top_m.max(0.0) + floor_m).max(near.lowest_m);
+        let size = near.size_at(height_m);
+        let panels = ring_panels(shape, |z| PANEL * distance(z));
+        let parts = parts_of_layer(outline, &panels, &largest, distance);
+        let sum: f64 = parts.iter().sum();
+        let tolerance = near.tolerance / (sum / size).clamp(1.0, MOST_CANCELLATION);
+        // Every panel may err by as much, whatever part of the sum it has.
+        let even = sum / parts.len() as f64;
+        let task = DipoleTask {
+            outline,
+            positions_m,
+            modes,
+            near: &near,
+            slack: parts.iter().map(|part| even / part).collect(),
+            panels,
+        };
+        // A priori every part counts as if it stood alone and its layer were as rough as can be;
+        // how much less does is seen by comparison.
+        let fewer = if near.many {
+            let compared = spread_over(drives, COMPARED_DRIVES);
+            task.fewest(tolerance, height_m, &compared, &layers)
+        } else {
+            1.0
+        };
+        let every: Vec<usize> = (0..drives).collect();
+        task.sources(tolerance * fewer, &every, &layers)
     }
 
     /// Number of drives.

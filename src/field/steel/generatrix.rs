@@ -37,6 +37,15 @@ impl Panel {
         (self.from_m.min(self.to_m), self.from_m.max(self.to_m))
     }
 
+    /// Coordinate of one of its nodes, m.
+    #[must_use]
+    pub fn coordinate_of(&self, node: &Node) -> f64 {
+        match self.face {
+            Face::Side => node.z_m,
+            Face::Bottom | Face::Top => node.r_m,
+        }
+    }
+
     /// Length, m.
     #[must_use]
     pub fn length_m(&self) -> f64 {

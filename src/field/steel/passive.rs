@@ -109,7 +109,7 @@ const FINER: f64 = 0.2;
 /// Refinements of the coupling.
 const MOST_COUPLINGS: usize = 3;
 /// Points a portion of work.
-const CHUNK: usize = 64;
+const CHUNK: usize = 16;
 
 /// The table of one core alone with its error: made finer until that is within `2 aim`, or the
 /// best of those tried. `None` if the core does not answer.
@@ -289,13 +289,16 @@ impl PassivePull {
     /// Vertical forces at many places, N.
     #[must_use]
     pub fn forces_z_n(&self, at_m: &[[f64; 3]]) -> Vec<f64> {
-        at_m.par_iter()
-            .with_min_len(CHUNK)
-            .map(|at| {
-                let added = self.neighbours.as_ref().map(|n| n.force_z_n(*at));
+        let of_chunk = |places_m: &[[f64; 3]]| -> Vec<f64> {
+            let added = self.neighbours.as_ref().map(|n| n.forces_z_n(places_m));
+            let place = |(k, at): (usize, &[f64; 3])| {
+                let added = added.as_ref().map(|added| added[k]);
                 self.each_n(*at).map(|f| f[2]).chain(added).sum()
-            })
-            .collect()
+            };
+            places_m.iter().enumerate().map(place).collect()
+        };
+        let chunks: Vec<Vec<f64>> = at_m.par_chunks(CHUNK).map(of_chunk).collect();
+        chunks.concat()
     }
 }
 

@@ -29,10 +29,10 @@ pub struct Ring {
 }
 
 /// A part of a face with rings on it: face, from and to in its coordinate, m.
-type RingPanel = (Face, f64, f64);
+pub(super) type RingPanel = (Face, f64, f64);
 
 /// Each face cut into panels at most `length_m(z)` long, the side from the top down.
-fn ring_panels(shape: CoreShape, length_m: impl Fn(f64) -> f64) -> Vec<RingPanel> {
+pub(super) fn ring_panels(shape: CoreShape, length_m: impl Fn(f64) -> f64) -> Vec<RingPanel> {
     let mut panels: Vec<RingPanel> = Vec::new();
     for (face, z_m) in [(Face::Bottom, shape.bottom_m), (Face::Top, shape.top_m)] {
         let pieces = (shape.radius_m / length_m(z_m)).ceil().max(1.0);
@@ -91,7 +91,7 @@ pub struct Rings {
     gather: DMatrix<f64>,
     /// Panels over parts of which kernels vary.
     pub stretched: Vec<Stretched>,
-    /// Rings a panel.
+    /// Rings a panel, at most.
     pub order: usize,
 }
 
@@ -100,25 +100,37 @@ impl Rings {
     /// z being the panel's height closest to where the rings are looked at from.
     #[must_use]
     pub fn new(outline: &Generatrix, order: usize, length_m: impl Fn(f64) -> f64) -> Self {
+        let panels = ring_panels(outline.shape, length_m);
+        let orders = vec![order; panels.len()];
+        Self::on_panels(outline, &panels, &orders)
+    }
+
+    /// The same on `panels` that cover the outline, of `orders`.
+    pub(super) fn on_panels(outline: &Generatrix, panels: &[RingPanel], orders: &[usize]) -> Self {
         let shape = outline.shape;
-        let rule = gauss::rule(order);
-        let basis = Basis::new(rule);
-        let panels = ring_panels(shape, length_m);
-        let mut rings = Vec::with_capacity(panels.len() * order);
-        for (face, from, to) in &panels {
-            rings.extend(rule.nodes.iter().map(|x| {
+        let bases: Vec<Basis> = (orders.iter())
+            .map(|order| Basis::new(gauss::rule(*order)))
+            .collect();
+        let firsts: Vec<usize> = (0..orders.len())
+            .map(|panel| orders[..panel].iter().sum())
+            .collect();
+        let mut rings = Vec::with_capacity(orders.iter().sum());
+        for ((face, from, to), order) in panels.iter().zip(orders) {
+            rings.extend(gauss::rule(*order).nodes.iter().map(|x| {
                 let (r_m, z_m, normal) = shape.on(*face, from + 0.5 * (to - from) * (1.0 + x));
                 Ring { r_m, z_m, normal }
             }));
         }
         // Weights of all rings at a place of a face; (ring, weight) of those that have one.
-        let mut weights = vec![0.0; order];
+        let most = orders.iter().copied().max().unwrap_or(0);
+        let mut weights = vec![0.0; most];
         let mut at = |face: Face, coordinate: f64, put: &mut dyn FnMut(usize, f64)| {
             for (index, (of, from, to)) in panels.iter().enumerate() {
                 if *of == face && (*from..=*to).contains(&coordinate) {
-                    basis.weights(2.0 * (coordinate - from) / (to - from) - 1.0, &mut weights);
+                    let weights = &mut weights[..orders[index]];
+                    bases[index].weights(2.0 * (coordinate - from) / (to - from) - 1.0, weights);
                     for (place, weight) in weights.iter().enumerate() {
-                        put(index * order + place, *weight);
+                        put(firsts[index] + place, *weight);
                     }
                     return;
                 }
@@ -126,7 +138,6 @@ impl Rings {
         };
         let mut to_nodes = DMatrix::zeros(outline.nodes.len(), rings.len());
         let mut gather = DMatrix::zeros(outline.nodes.len(), rings.len());
-        let product = gauss::rule((outline.order + order).div_ceil(2));
         let layer = Basis::new(gauss::rule(outline.order));
         for (index, panel) in outline.panels.iter().enumerate() {
             let first = index * outline.order;
@@ -134,20 +145,18 @@ impl Rings {
                 .iter()
                 .enumerate()
             {
-                let coordinate = if panel.face == Face::Side {
-                    node.z_m
-                } else {
-                    node.r_m
-                };
+                let coordinate = panel.coordinate_of(node);
                 at(panel.face, coordinate, &mut |ring, weight| {
                     to_nodes[(first + place, ring)] = weight;
                 });
             }
             for (of, to_ring) in panels.iter().enumerate() {
                 let add = |place: usize, ring: usize, share: f64| {
-                    gather[(first + place, of * order + ring)] += share;
+                    gather[(first + place, firsts[of] + ring)] += share;
                 };
-                gather_shared(shape, (panel, &layer), (to_ring, &basis), product, add);
+                let product = gauss::rule((outline.order + orders[of]).div_ceil(2));
+                let (panel, to_ring) = ((panel, &layer), (to_ring, &bases[of]));
+                gather_shared(shape, panel, to_ring, product, add);
             }
         }
         Self {
@@ -155,7 +164,7 @@ impl Rings {
             to_nodes,
             gather,
             stretched: Vec::new(),
-            order,
+            order: most,
         }
     }
 

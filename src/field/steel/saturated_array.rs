@@ -406,6 +406,7 @@ impl ArraySources {
                 lowest_m,
                 distance_m,
                 tolerance,
+                many: false,
                 winding: &array.winding,
             },
         )

@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 
 use super::blocks::{Blocks, misses};
 use super::points::{Course, Held, Points, Probe, bit, first_missed};
-use super::program::{End, Piece, Program, Stand};
+use super::program::{End, Piece, Program, Stand, Work};
 use super::scaled::{Form, Scaled};
 use crate::qr_reduction::times_power;
 use fluxform_numerics::double_double::DoubleDouble as Num;
@@ -21,6 +21,8 @@ const POOL: usize = 4096;
 const ROUNDINGS: f64 = 8.0;
 /// A force that is none, in scaled units: what rounding leaves at lambda = 0.
 const NOTHING: f64 = 1e-25;
+/// Forces of points that are looked at in the time that one entry of an inverse takes.
+const FORCES: usize = 40;
 /// More rounds than any problem needs.
 const ROUNDS: usize = 200;
 
@@ -121,7 +123,7 @@ impl<'a> Search<'a> {
     }
 
     /// Follows the program of all points under the limits of `scaled`.
-    pub fn follow(&mut self, scaled: &Scaled) -> Followed {
+    pub fn follow(&mut self, scaled: &Scaled, work: &mut Work) -> Followed {
         let form = self.form;
         let mut working = self.working.clone();
         for _ in 0..ROUNDS {
@@ -131,7 +133,7 @@ impl<'a> Search<'a> {
                 None => self.all,
             };
             let index = self.pool.as_ref().map(|pool| pool.index.as_slice());
-            let mut followed = solve(scaled, form, &working, near, index);
+            let mut followed = solve(scaled, form, &working, near, index, work);
             if followed.end != End::Whole {
                 return followed;
             }
@@ -204,6 +206,7 @@ fn solve(
     working: &[(usize, bool)],
     near: Points,
     index: Option<&[usize]>,
+    work: &mut Work,
 ) -> Followed {
     let mut program: Program = scaled.bounds();
     let first_row = program.rows();
@@ -236,7 +239,8 @@ fn solve(
         rows.push(Some(row));
         true
     };
-    let (pieces, end) = program.follow(&basis, ask);
+    let ask_work = near.forces_n_per_a.len() / FORCES;
+    let (pieces, end) = program.follow(&basis, work, ask_work, ask);
     Followed {
         pieces,
         rows,
@@ -350,7 +354,8 @@ mod tests {
             let largest = largest_entries(&problem);
             for form in [Form::Worst, Form::Least] {
                 let scaled = Scaled::new(&problem, &largest, form, Limits::All);
-                let mut followed = Search::new(&scaled, form).follow(&scaled);
+                let mut followed =
+                    Search::new(&scaled, form).follow(&scaled, &mut Work(usize::MAX));
                 assert_eq!(followed.end, End::Whole);
                 let (turns, beyond) = probes(&scaled, form, &mut followed);
                 assert_eq!(turns.len(), followed.pieces.len());

@@ -14,12 +14,18 @@
 //! Errors are judged by the largest requested force, not by that of their own point, so a surface
 //! that comes down to `h = 0` needs no exception.
 //!
+//! The path is followed where that is little work. Of arrays whose path turns more often than that,
+//! or stands still at turns where symmetry lets many points decide at once, the constants alone are
+//! solved for, and the currents at any one lambda.
+//!
 //! Where several currents are equally good, a vertex is returned: of coils that cannot pull, the one
 //! with the least sum of currents.
 
 mod blocks;
+mod constants;
 mod constraint_generation;
 mod criteria;
+mod doubles;
 mod free;
 mod maxmin;
 mod path;
@@ -36,19 +42,25 @@ pub use perceptual_tolerance::{WithinTolerance, felt};
 pub use proof::lower_bound_n;
 
 use fluxform_base::accuracy::StageAccuracy;
+use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
 use super::problem::{ForceProblem, ProblemError, Settings};
 use super::qr_reduction::{largest_entries, times_power};
+use constants::{Constants, constants};
 use constraint_generation::{Followed, Search};
 use criteria::Comparison;
+use doubles::{Doubles, Failure};
 use free::FreeProblem;
-use program::End;
+use program::{End, Work};
 use scaled::{Form, Limits, Scaled};
 
 /// Shares of lambda max h by which points may be missed where rounding leads a path astray that
 /// misses none; the estimated error states it.
 const LEEWAYS: [f64; 2] = [1e-12, 1e-10];
+
+/// Work that the path may take, both with the drivers' size and without.
+const WORK: Work = Work(10_000_000);
 
 /// Currents at one force constant by the worst-point form.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,15 +88,59 @@ pub struct WorstSolution {
     pub lambda_jnd_n_per_m: Option<f64>,
     /// t*/(lambda max h) as lambda goes to zero; `None` with an offset or without heights.
     pub floor: Option<f64>,
-    /// t* and the currents anywhere.
-    pub path: WorstPath,
-    /// False where the path could not be followed to its end.
+    /// t* and the currents anywhere; `None` where the path was left out as too much work: the
+    /// constants were solved for without it.
+    pub path: Option<WorstPath>,
+    /// False where the path could not be followed to its end, nor the constants be solved for
+    /// without it.
     pub complete: bool,
     /// Estimated error of t*.
     pub accuracy: StageAccuracy,
 }
 
-/// Follows t*(lambda) from 0 on, over all points.
+/// The paths of t* and of t_0.
+struct Paths {
+    limited: Followed,
+    unlimited: Followed,
+    complete: bool,
+}
+
+/// Follows both paths from 0 on, with points missed by more and more where rounding leads one that
+/// misses none astray. `other_columns`: the columns of `free` are not those of `scaled`.
+fn follow(scaled: &mut Scaled, free: &mut Scaled, other_columns: bool) -> Paths {
+    let whole = |followed: &Followed| followed.end == End::Whole && !followed.pieces.is_empty();
+    let mut work = WORK;
+    let mut follow = |leeway: f64| {
+        scaled.leeway = leeway;
+        free.leeway = leeway;
+        let mut search = Search::new(scaled, Form::Worst);
+        let limited = search.follow(scaled, &mut work);
+        // Other columns are other points to this search.
+        let unlimited = if other_columns {
+            Search::new(free, Form::Worst).follow(free, &mut work)
+        } else {
+            search.follow(free, &mut work)
+        };
+        let complete = whole(&limited) && whole(&unlimited);
+        Paths {
+            limited,
+            unlimited,
+            complete,
+        }
+    };
+    let mut paths = follow(0.0);
+    for leeway in LEEWAYS {
+        if !paths.complete {
+            paths = follow(leeway);
+        }
+    }
+    scaled.leeway = 0.0;
+    free.leeway = 0.0;
+    paths
+}
+
+/// Follows t*(lambda) from 0 on, over all points, where that is little work; else solves for the
+/// constants alone.
 ///
 /// A program over few points is solved exactly, in double-double; the points it misses by more
 /// than the rounding of their forces are added until there are none.
@@ -107,77 +163,108 @@ pub fn worst_point(
         Form::Worst,
         Limits::Lower,
     );
-    let whole = |followed: &Followed| followed.end == End::Whole && !followed.pieces.is_empty();
-    let mut follow = |leeway: f64| {
-        scaled.leeway = leeway;
-        free.leeway = leeway;
-        let mut search = Search::new(&scaled, Form::Worst);
-        let limited = search.follow(&scaled);
-        // Other columns are other points to this search.
-        let unlimited = match &open_problem {
-            Some(_) => Search::new(&free, Form::Worst).follow(&free),
-            None => search.follow(&free),
-        };
-        let complete = whole(&limited) && whole(&unlimited);
-        (limited, unlimited, complete)
-    };
-    let (mut limited, mut unlimited, mut complete) = follow(0.0);
-    for leeway in LEEWAYS {
-        if !complete {
-            (limited, unlimited, complete) = follow(leeway);
-        }
+    let paths = (scaled.within(WORK) && free.within(WORK))
+        .then(|| follow(&mut scaled, &mut free, open.is_some()));
+    if let Some(paths) = paths.as_ref().filter(|paths| paths.complete) {
+        return Ok(read_off(problem, settings, &scaled, paths));
     }
-    let doubt = limited.doubt.max(unlimited.doubt);
-    let comparison = Comparison {
-        limited: &limited.pieces,
-        unlimited: &unlimited.pieces,
-        top: scaled.top(),
-        doubt,
+    if let Ok(constants) = constants(&scaled, &free, settings.jnd_weight) {
+        return Ok(without_path(&scaled, &constants));
+    }
+    let nothing = || Followed {
+        pieces: Vec::new(),
+        rows: Vec::new(),
+        end: End::Stalled,
+        doubt: 0.0,
     };
-    let wanted = scaled.height_m() > 0.0 && complete;
-    let linear = if wanted { comparison.linear() } else { None };
+    let paths = paths.unwrap_or_else(|| Paths {
+        limited: nothing(),
+        unlimited: nothing(),
+        complete: false,
+    });
+    Ok(read_off(problem, settings, &scaled, &paths))
+}
+
+/// The constants on the followed paths.
+fn read_off(
+    problem: &ForceProblem,
+    settings: &Settings,
+    scaled: &Scaled,
+    paths: &Paths,
+) -> WorstSolution {
+    let comparison = Comparison {
+        limited: &paths.limited.pieces,
+        unlimited: &paths.unlimited.pieces,
+        top: scaled.top(),
+        doubt: paths.limited.doubt.max(paths.unlimited.doubt),
+    };
+    let expected = scaled.height_m() > 0.0 && paths.complete;
+    let linear = if expected { comparison.linear() } else { None };
     let jnd = match linear {
         None => None,
         Some(lambda) if settings.jnd_weight == 0.0 => Some(lambda),
         Some(_) => comparison.jnd(settings.jnd_weight),
     };
-    let si = |lambda: fluxform_numerics::double_double::DoubleDouble| {
-        times_power(lambda.to_f64(), scaled.lambda_unit())
+    let first = paths.unlimited.pieces.first().filter(|_| expected);
+    let slope = first.map(|piece| piece.rate[piece.rate.len() - 1]);
+    let path = Some(WorstPath::new(problem, scaled, &paths.limited));
+    let constants = Constants {
+        linear,
+        jnd,
+        floor: slope.filter(|_| scaled.offset_n() == 0.0),
+        doubt: comparison.doubt,
     };
-    let path = WorstPath::new(problem, &scaled, &limited);
-    let first = unlimited.pieces.first();
-    let floor = first
-        .filter(|_| wanted && scaled.offset_n() == 0.0)
-        .map(|piece| {
-            (piece.rate[piece.rate.len() - 1] / scaled.top())
-                .to_f64()
-                .max(0.0)
-        });
-    Ok(WorstSolution {
-        lambda_linear_n_per_m: linear.map(si),
-        lambda_jnd_n_per_m: jnd.map(si),
-        floor,
+    WorstSolution {
         path,
-        complete,
+        complete: paths.complete,
+        ..without_path(scaled, &constants)
+    }
+}
+
+/// The constants in SI units.
+fn without_path(scaled: &Scaled, constants: &Constants) -> WorstSolution {
+    let expected = scaled.height_m() > 0.0;
+    let si = |lambda: Num| times_power(lambda.to_f64(), scaled.lambda_unit());
+    let floor = |slope: Num| (slope / scaled.top()).to_f64().max(0.0);
+    WorstSolution {
+        lambda_linear_n_per_m: constants.linear.filter(|_| expected).map(si),
+        lambda_jnd_n_per_m: constants.jnd.filter(|_| expected).map(si),
+        floor: constants.floor.filter(|_| expected).map(floor),
+        path: None,
+        complete: true,
         accuracy: StageAccuracy {
-            estimate: doubt,
+            estimate: constants.doubt,
             relative_to: "lambda max h".to_owned(),
             method: "rounding of the forces of the points that are not in the program".to_owned(),
         },
-    })
+    }
 }
 
 impl WorstSolution {
     /// Currents and their proof at a force constant.
     #[must_use]
     pub fn at(&self, problem: &ForceProblem, lambda_n_per_m: f64) -> WorstPoint {
-        let currents_a = self.path.currents_a(lambda_n_per_m);
-        let active = self.path.active(lambda_n_per_m).to_vec();
+        let Some(path) = &self.path else {
+            return least_worst_error(problem, lambda_n_per_m);
+        };
+        let currents_a = path.currents_a(lambda_n_per_m);
+        let active = path.active(lambda_n_per_m).to_vec();
+        WorstPoint::new(problem, lambda_n_per_m, currents_a, active)
+    }
+}
+
+impl WorstPoint {
+    fn new(
+        problem: &ForceProblem,
+        lambda_n_per_m: f64,
+        currents_a: Vec<f64>,
+        active: Vec<ActivePoint>,
+    ) -> Self {
         let worst_error_n = proof::worst_error_n(problem, lambda_n_per_m, &currents_a);
         let least_n = lower_bound_n(problem, lambda_n_per_m, &active);
         let heights = problem.height_m.iter();
         let scale = lambda_n_per_m * heights.fold(0.0_f64, |most, h| most.max(h.abs()));
-        WorstPoint {
+        Self {
             lambda_n_per_m,
             currents_a,
             worst_error_n,
@@ -186,4 +273,22 @@ impl WorstSolution {
             active,
         }
     }
+}
+
+/// The least largest error at one force constant, without the path. Where doubles do not lead to it
+/// there are no currents, which the proof then shows. The problem must be well formed.
+#[must_use]
+pub fn least_worst_error(problem: &ForceProblem, lambda_n_per_m: f64) -> WorstPoint {
+    let largest = largest_entries(problem);
+    let scaled = Scaled::new(problem, &largest, Form::Worst, Limits::All);
+    let mut doubles = Doubles::new(&scaled, Form::Worst);
+    let lambda = Num::of(times_power(lambda_n_per_m, -scaled.lambda_unit()));
+    let (currents_a, active) = match doubles.at(lambda) {
+        Ok(optimum) => (
+            scaled.currents_a(&optimum.piece.z),
+            path::active(doubles.rows(), &optimum.piece),
+        ),
+        Err(Failure::Infeasible | Failure::Stalled) => (vec![0.0; problem.coils()], Vec::new()),
+    };
+    WorstPoint::new(problem, lambda_n_per_m, currents_a, active)
 }

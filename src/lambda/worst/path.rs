@@ -70,7 +70,7 @@ impl WorstPath {
                 lambda_n_per_m: unit(piece),
                 worst_error_n: error(piece.z[last].to_f64().max(0.0)),
                 currents_a: scaled.currents_a(&piece.z),
-                active: active(followed, piece),
+                active: active(&followed.rows, piece),
                 events: Vec::new(),
             };
             let close = |last: &Turn| {
@@ -193,12 +193,12 @@ impl WorstPath {
     }
 }
 
-pub(super) fn active(followed: &Followed, piece: &Piece) -> Vec<ActivePoint> {
+pub(super) fn active(rows: &[Option<(usize, bool)>], piece: &Piece) -> Vec<ActivePoint> {
     let mut all: Vec<ActivePoint> = piece
         .active
         .iter()
         .filter_map(|&(row, multiplier)| {
-            let (point, up) = followed.rows[row]?;
+            let (point, up) = rows[row]?;
             let size = multiplier.to_f64();
             (size > NO_MULTIPLIER).then_some(ActivePoint {
                 point,

@@ -76,6 +76,22 @@ pub(super) enum End {
     Infeasible,
     /// The iteration limit was met.
     Stalled,
+    /// The work that was allowed is done.
+    Costly,
+}
+
+/// Work that a path may still take, in entries of an inverse that are changed: a measure of time
+/// that does not depend on the machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Work(pub usize);
+
+impl Work {
+    /// Takes as much; false where that is more than is left.
+    pub fn take(&mut self, entries: usize) -> bool {
+        let enough = self.0 >= entries;
+        self.0 = self.0.saturating_sub(entries);
+        enough
+    }
 }
 
 impl Program {
@@ -141,7 +157,30 @@ impl Program {
         }
     }
 
-    fn coefficients(&self, r: usize) -> Vec<Num> {
+    /// Sizes of the bounds: of constants, and of slopes.
+    pub fn size(&self) -> [f64; 2] {
+        self.size
+    }
+
+    /// Constant and slope of the bound of row `r`.
+    pub fn bound(&self, r: usize) -> (Num, Num) {
+        (self.constant[r], self.slope[r])
+    }
+
+    /// Left-hand side of row `r` in doubles.
+    pub fn rough_times(&self, r: usize, z: &[f64]) -> f64 {
+        match self.kinds[r] {
+            Kind::Rising(i) => z[i],
+            Kind::Falling(i) => -z[i],
+            Kind::Dense(number) => f64::dot(
+                &self.rough[number * self.width..(number + 1) * self.width],
+                z,
+            ),
+        }
+    }
+
+    /// Left-hand side of row `r`, one coefficient a variable.
+    pub fn coefficients(&self, r: usize) -> Vec<Num> {
         let mut row = vec![Num::ZERO; self.width];
         match self.kinds[r] {
             Kind::Rising(i) => row[i] = Num::ONE,
@@ -154,10 +193,13 @@ impl Program {
     /// Follows the minimiser from `lambda = 0` on. The rows of `basis` must be independent and
     /// their multipliers, the second objective's where those are zero, not negative. Before the
     /// minimiser moves on, `ask` is given its position, its rate, and the step to the next turn
-    /// if there is one; it adds a row that seems to end the step earlier, or returns false.
+    /// if there is one; it adds a row that seems to end the step earlier, or returns false: that
+    /// costs `ask_work`.
     pub fn follow(
         &mut self,
         basis: &[usize],
+        work: &mut Work,
+        ask_work: usize,
         mut ask: impl FnMut(&mut Self, &Stand) -> bool,
     ) -> (Vec<Piece>, End) {
         let mut pieces: Vec<Piece> = Vec::new();
@@ -170,12 +212,18 @@ impl Program {
         let patience = 40 + 4 * self.width;
         // Far more than there are turns: it ends what rounding keeps going in circles.
         let limit = 20_000 + 1000 * self.width;
+        let entries = self.width * self.width;
+        // Turning at one lambda never takes more than a part of the work that is left.
+        let standing = (50 * patience).min(work.0 / (4 * entries));
         for _ in 0..limit {
             fluxform_base::progress::poll();
             vertex.place(self, lambda);
             let cautious = exchanges_here > patience;
             let (mut entering, next, asked) =
                 self.look_further(&mut vertex, lambda, cautious, &mut ask);
+            if !work.take(entries + asked * ask_work) {
+                return (pieces, End::Costly);
+            }
             // A row that the last step did not know and that is violated where it led ended it
             // earlier.
             if let Some(before) = hasty.take_if(|h| entering.is_some_and(|row| row >= h.rows)) {
@@ -210,7 +258,7 @@ impl Program {
                 entering = Some(row);
             }
             exchanges_here += 1;
-            if exchanges_here > 50 * patience {
+            if exchanges_here > standing {
                 break;
             }
             let Some(row) = entering else { break };
@@ -319,14 +367,7 @@ impl Program {
 
     /// Slack of row `r` and its rate in doubles.
     fn roughly(&self, r: usize, z: &[f64], rate: &[f64], lambda: f64) -> (f64, f64) {
-        let (value, speed) = match self.kinds[r] {
-            Kind::Rising(i) => (z[i], rate[i]),
-            Kind::Falling(i) => (-z[i], -rate[i]),
-            Kind::Dense(number) => {
-                let row = &self.rough[number * self.width..(number + 1) * self.width];
-                (f64::dot(row, z), f64::dot(row, rate))
-            }
-        };
+        let (value, speed) = (self.rough_times(r, z), self.rough_times(r, rate));
         let slope = self.slope[r].to_f64();
         (
             value - self.constant[r].to_f64() - lambda * slope,

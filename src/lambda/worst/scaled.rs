@@ -6,12 +6,14 @@
 use fluxform_numerics::double_double::DoubleDouble as Num;
 use fluxform_numerics::real::Real;
 
-use super::program::Program;
+use super::program::{Program, Work};
 use crate::problem::ForceProblem;
 use crate::qr_reduction::{exponent_of, times_power};
 
 /// Rounding residue of a scaled current, or force per ampere, of zero.
 pub(super) const NOTHING: f64 = 1e-24;
+/// Exchanges per variable that a program takes at least.
+const EXCHANGES: usize = 4;
 
 /// Which rows a point contributes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,6 +82,12 @@ impl<'a> Scaled<'a> {
             leeway: 0.0,
             live,
         }
+    }
+
+    /// Whether about as many exchanges as programs of this size take are within `work`.
+    pub fn within(&self, work: Work) -> bool {
+        let width = self.live.len() + 1;
+        EXCHANGES * width.pow(3) <= work.0
     }
 
     /// Largest |height|, m.

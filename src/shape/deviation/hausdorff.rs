@@ -14,7 +14,8 @@ use super::nearest::Tree;
 use super::piece::{Face, Patch, Point, Polygon, Rect};
 use super::visible::supremum_over_visible;
 use super::{DEEPEST, Extreme, Faces, Lattice, Leaf, Vertical, Worst};
-use crate::mesh::{Mesh, Triangle};
+use crate::file_mesh::Triangle;
+use crate::mesh::Mesh;
 use fluxform_base::progress::{Interrupted, Progress};
 
 /// Relative width at which a search ends.

@@ -114,8 +114,10 @@ pub struct Looks {
     left: AtomicI64,
 }
 
-/// Looks, about ten seconds of one core.
-const USUAL_LOOKS: i64 = 1 << 30;
+/// Seconds of one core that a certificate may take unasked, about.
+pub const CERTIFY_SECONDS: u64 = 10;
+/// Looks of one such second.
+const LOOKS_A_SECOND: u64 = (1 << 30) / 10;
 /// Looks that cutting a face to a part of a cell and sorting it among others takes.
 const LOOKS_A_LEAF: usize = 16;
 
@@ -128,10 +130,10 @@ impl Looks {
         })
     }
 
-    /// Limits on the effort of a certificate.
+    /// What one core looks at in so many seconds, about: the same count on every machine.
     #[must_use]
-    pub fn usual() -> Arc<Self> {
-        Self::new(USUAL_LOOKS)
+    pub fn of_seconds(seconds: u64) -> Arc<Self> {
+        Self::new(i64::try_from(seconds.saturating_mul(LOOKS_A_SECOND)).unwrap_or(i64::MAX))
     }
 
     /// As much as it takes.
@@ -592,16 +594,20 @@ pub fn vertical_by_cell(
     lattice: &Lattice<'_>,
     progress: &dyn Progress,
 ) -> Result<Vec<Option<f64>>, Interrupted> {
-    (0..lattice.len())
+    progress.begin("deviation of cells", lattice.len() as u64);
+    let cells = (0..lattice.len())
         .into_par_iter()
         .map(|cell| {
             if cell % CELLS_BETWEEN_LOOKS == 0 {
                 progress.check()?;
+                progress.advance(CELLS_BETWEEN_LOOKS as u64);
             }
             let patch = lattice.patch(cell);
             Ok(patch.map(|patch| lattice.faces.deviation_m(&patch, &lattice.members(cell))))
         })
-        .collect()
+        .collect();
+    progress.end();
+    cells
 }
 
 /// The differences at the cells' centres: with them most pieces need no closer look.

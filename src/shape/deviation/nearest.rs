@@ -1,7 +1,8 @@
 //! The distance from a point to a set of triangles: by a tree of boxes, nearest first.
 
 use crate::boxes::{Box3, BoxTree};
-use crate::mesh::{Triangle, dot, minus};
+use crate::file_mesh::Triangle;
+use fluxform_numerics::vec3::{dot, minus};
 
 /// A tree of boxes over triangles, and the triangles in its order.
 pub(super) struct Tree {

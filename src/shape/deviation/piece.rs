@@ -3,7 +3,7 @@
 //! The difference is a saddle: inside a polygon it has no extremum, along an edge it is quadratic.
 //! So its supremum is at a corner or at the stationary point of an edge, in closed form.
 
-use crate::mesh::Triangle;
+use crate::file_mesh::Triangle;
 use serde::{Deserialize, Serialize};
 
 /// Corners of a triangle cut by a rectangle, by three lines and by a plane.

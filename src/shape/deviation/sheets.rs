@@ -158,8 +158,9 @@ mod tests {
     use super::*;
     use crate::deviation::Looks;
     use crate::document::Placement;
+    use crate::file_mesh::{FileMesh, Triangle};
     use crate::height::Grid;
-    use crate::mesh::{FileMesh, Mesh, Triangle};
+    use crate::mesh::Mesh;
     use crate::placement::Transform;
     use fluxform_numerics::axis::Axis;
 

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::document::Placement;
-use crate::mesh::{FileMesh, Triangle};
+use crate::file_mesh::{FileMesh, Triangle};
 use crate::placement::Transform;
 use fluxform_base::progress::Silent;
 
@@ -103,7 +103,7 @@ fn a_spent_effort_is_reported_with_any_number_of_threads() {
 fn sheets_over_the_whole_grid_share_their_lists() {
     let faces = placed((0..70_000).map(sheet).collect());
     let grid = grid([61, 51]);
-    let faces = Faces::new(&faces, &grid, Looks::usual());
+    let faces = Faces::new(&faces, &grid, Looks::of_seconds(CERTIFY_SECONDS));
     let heights = vec![None; grid.len()];
     let lattice = Lattice::new(&faces, &grid, &heights);
     let side = lattice.block;
@@ -127,7 +127,7 @@ fn blocks_of_any_size_give_the_same_faces_and_the_same_bounds() {
     };
     let mesh = placed((0..40).map(bump).chain((0..3).map(sheet)).collect());
     let grid = grid([11, 8]);
-    let faces = Faces::new(&mesh, &grid, Looks::usual());
+    let faces = Faces::new(&mesh, &grid, Looks::of_seconds(CERTIFY_SECONDS));
     let known = heights(&mesh, &grid, &Silent).unwrap();
     let known: Vec<Option<f64>> = known.iter().map(|s| s.map(|s| s.height_m)).collect();
     let fine = Lattice::new(&faces, &grid, &known);
@@ -156,7 +156,7 @@ fn a_grid_without_cells_has_no_faces() {
     let mesh = placed((0..3).map(sheet).collect());
     for samples in [[1, 7], [7, 1], [1, 1]] {
         let grid = grid(samples);
-        let faces = Faces::new(&mesh, &grid, Looks::usual());
+        let faces = Faces::new(&mesh, &grid, Looks::of_seconds(CERTIFY_SECONDS));
         let known = vec![Some(0.01); grid.len()];
         let lattice = Lattice::new(&faces, &grid, &known);
         assert_eq!(lattice.len(), 0);

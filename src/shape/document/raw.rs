@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::unit::unit_names;
 use super::{AxisRequest, GridRequest, Placement, ShapeDocument, SurfaceSource};
+use crate::bodies::BodyOptions;
 use crate::format::SurfaceFormat;
-use crate::step::BodyOptions;
 use fluxform_design::message_text::axis_fault;
 use fluxform_numerics::axis::Axis;
 

@@ -6,8 +6,8 @@ use super::unit::{parse_unit, unit_names};
 use super::{
     AxisRequest, Fit, GridRequest, Placement, Primitive, Seat, ShapeDocument, SurfaceSource, Up,
 };
+use crate::bodies::BodyOptions;
 use crate::format::SurfaceFormat;
-use crate::step::BodyOptions;
 use fluxform_base::point_weights::Weights;
 use fluxform_base::units::m_from_mm;
 use fluxform_design::diagnostics::{Faults, InvalidDocument};
@@ -113,7 +113,7 @@ fn seat(root: &mut Section<'_>) -> Seat {
     let up = root.choice("up", &Up::NAMES).unwrap_or_default();
     let center = root.flag_or("center", false);
     let rest_on = root.number("rest_on_mm", &BODY_MM);
-    let ends = root.tuple::<6>("fit_mm", &BODY_MM);
+    let ends = root.tuple_if_given::<6>("fit_mm", &BODY_MM);
     let scale = root.flag_or("scale_to_fit", false);
     if scale && !root.has("fit_mm") {
         let message = "there is no box to scale to";
@@ -123,7 +123,7 @@ fn seat(root: &mut Section<'_>) -> Seat {
         let message = "fit_mm puts the surface into the middle of its box";
         root.fault("center", message, "leave one of the two out");
     }
-    let fit = root.has("fit_mm").then(|| {
+    let fit = ends.map(|ends| {
         let [a, b, c, d, e, f] = ends.map(m_from_mm);
         Fit {
             box_m: [[a, b], [c, d], [e, f]],
@@ -150,17 +150,13 @@ fn bodies(root: &mut Section<'_>) -> BodyOptions {
         body: root.text("body").map(|body| body.value),
     }
 }
+
 /// The keys of a shape: those of a surface file, then those of the primitives.
 #[must_use]
 pub fn keys() -> Vec<Key> {
     let mut all: Vec<Key> = Vec::new();
-    let surface = std::iter::once("surface = \"a.stl\"\n[points]\n".to_owned());
-    let primitive = |(name, _): &(&str, Kind)| format!("primitive = {name:?}\n[points]\n");
-    for text in surface.chain(KINDS.iter().map(primitive)) {
-        let read = |root: &mut Section<'_>| {
-            document(root, Path::new(""));
-        };
-        for key in list_keys(&text, read) {
+    for source in std::iter::once("surface").chain(KINDS.iter().map(|(name, _)| *name)) {
+        for key in keys_read(source) {
             if !all.iter().any(|known| known.path() == key.path()) {
                 all.push(key);
             }
@@ -169,6 +165,25 @@ pub fn keys() -> Vec<Key> {
     // The top level before its section.
     all.sort_by_key(|key| !key.section.is_empty());
     with_meanings(all, MEANINGS)
+}
+
+/// The keys of a shape with this primitive, or with a surface file where that is `None`.
+#[must_use]
+pub fn keys_of(primitive: Option<&str>) -> Vec<Key> {
+    let read = keys_read(primitive.unwrap_or("surface"));
+    let path = |key: &Key| read.iter().any(|one| one.path() == key.path());
+    keys().into_iter().filter(path).collect()
+}
+
+/// Without their meanings.
+fn keys_read(source: &str) -> Vec<Key> {
+    let text = match source {
+        "surface" => "surface = \"a.stl\"\n[points]\n".to_owned(),
+        primitive => format!("primitive = {primitive:?}\n[points]\n"),
+    };
+    list_keys(&text, |root| {
+        document(root, Path::new(""));
+    })
 }
 
 const MEANINGS: &[(&str, &str)] = &[

@@ -12,7 +12,7 @@ const UNITS: [(&[&str], f64); 6] = [
 
 /// The units, for a message.
 #[must_use]
-pub(super) fn unit_names() -> Vec<&'static str> {
+pub fn unit_names() -> Vec<&'static str> {
     UNITS.iter().map(|(names, _)| names[0]).collect()
 }
 

@@ -4,7 +4,7 @@
 //! f32. The lengths add up to n, which no table of another kind does by chance.
 
 use super::ADVICE;
-use crate::mesh::Triangle;
+use crate::file_mesh::Triangle;
 use crate::read_error::{Place, ReadError};
 
 const LENGTHS: [u32; 3] = [4, 8, 2];

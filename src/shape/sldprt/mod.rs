@@ -16,7 +16,7 @@ use self::container::Blocks;
 use self::display::Table;
 use self::product::Product;
 use crate::archive::text_of;
-use crate::mesh::{FileMesh, Triangle};
+use crate::file_mesh::{FileMesh, Triangle};
 use crate::number::F32_ROUNDING;
 use crate::read_error::{Place, ReadError};
 use crate::tessellation::face_deviation;

@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, HashMap};
 use super::display::Table;
 use super::{ADVICE, box_of};
 use crate::assembly::{Affine, Body, lay_out};
-use crate::mesh::Triangle;
+use crate::file_mesh::Triangle;
 use crate::read_error::ReadError;
 use crate::xml::{Document, Element, Step};
 

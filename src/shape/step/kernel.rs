@@ -14,8 +14,8 @@ use std::time::Duration;
 
 use serde::Deserialize;
 
-use super::BodyOptions;
 use super::gates::Part;
+use crate::bodies::BodyOptions;
 use fluxform_base::progress::{Progress, poll, stop_requested};
 
 /// The program that the process runs.

@@ -9,46 +9,13 @@ mod kernel;
 
 use std::sync::{Mutex, PoisonError};
 
-use serde::Serialize;
-
 use crate::assembly::{Affine, Body, lay_out};
-use crate::mesh::{FileMesh, Triangle};
+use crate::bodies::{BodyOptions, NamedBody};
+use crate::file_mesh::{FileMesh, Triangle};
 use crate::read_error::ReadError;
 use fluxform_base::progress::Progress;
 
 pub use kernel::{Kernel, STEP_SECONDS, configure};
-
-/// How the bodies of a file are cut into facets, and which.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct BodyOptions {
-    /// The farthest that a facet may lie from its face, m; `None`: a 4000th of the diagonal of the
-    /// box of the bodies.
-    pub chord_m: Option<f64>,
-    /// The body that is read, by its number from 1 or its name; `None`: all of them.
-    pub body: Option<String>,
-}
-
-impl BodyOptions {
-    /// Whether nothing was asked for.
-    #[must_use]
-    pub fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
-}
-
-/// A body that a file names.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct NamedBody {
-    /// Its name, or that of its part; empty where the file has none.
-    pub name: String,
-    /// Names of the assemblies that hold it, the outermost first.
-    pub within: Vec<String>,
-    /// Red, green and blue, 0 to 1, where the file has them.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub color: Option<[f64; 3]>,
-    /// Its triangles.
-    pub triangles: usize,
-}
 
 /// The file read last: a picture, a report and points of one file need it once.
 static LAST: Mutex<Option<(Vec<u8>, BodyOptions, FileMesh)>> = Mutex::new(None);
@@ -92,7 +59,7 @@ fn laid_out(reply: kernel::Reply, options: &BodyOptions) -> Result<FileMesh, Str
         loose,
         moved_roots,
         bodies,
-        parts,
+        mut parts,
     } = reply;
     if bodies.is_empty() {
         return Err("it holds no solid body; save one, not surfaces or drawings".into());
@@ -101,7 +68,7 @@ fn laid_out(reply: kernel::Reply, options: &BodyOptions) -> Result<FileMesh, Str
     let mut warnings = Vec::new();
     let mut deviation_mm = 0.0f64;
     let mut crossing = 0;
-    for (index, part) in parts.iter().enumerate() {
+    for (index, part) in parts.iter_mut().enumerate() {
         let name = bodies.iter().find(|body| body.part == index);
         let verdict = gates::check(part)
             .map_err(|what| format!("body `{}`: {what}", name.map_or("", |body| &body.name)))?;

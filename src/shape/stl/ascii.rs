@@ -1,6 +1,6 @@
 //! ASCII STL: one pass over the words, whatever separates the lines.
 
-use crate::mesh::{FileMesh, Triangle};
+use crate::file_mesh::{FileMesh, Triangle};
 use crate::number::{Numbers, shown};
 use crate::stl::StlError;
 

@@ -2,10 +2,10 @@
 
 use std::io::{self, Read};
 
-use crate::mesh::{FileMesh, Triangle};
+use crate::file_mesh::{FileMesh, Triangle};
 use crate::number::F32_ROUNDING;
 use crate::stl::StlError;
-use crate::surface::Zeros;
+use crate::zeros::Zeros;
 
 const HEADER: usize = 84;
 const RECORD: usize = 50;

@@ -8,10 +8,9 @@ mod binary;
 
 use std::io::{self, Read};
 
-use crate::format::starts;
-use crate::mesh::FileMesh;
+use crate::file_mesh::FileMesh;
 use crate::read_error::ReadError;
-use crate::text::narrow;
+use crate::text::{narrow, starts};
 
 /// Why bytes are no STL mesh, and where: the message of a [`ReadError`].
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -45,6 +45,8 @@ fn found(limits: Limits, height_m: f64, wire_m: f64) -> Result<Optimum, String> 
     let task = Task {
         limits,
         fixed: Fixed::default(),
+        pitch_m: None,
+        bobbin: false,
         current_max_a: 2.0,
         voltage_v: None,
         strands: Strand::choices(&wire),

@@ -6,8 +6,9 @@ use super::{Case, case};
 use fluxform::progress::Silent;
 use fluxform::shape::deviation::{Faces, Lattice, Looks, vertical};
 use fluxform::shape::document::Placement;
+use fluxform::shape::file_mesh::Triangle;
 use fluxform::shape::height::{Grid, heights};
-use fluxform::shape::mesh::{Mesh, Triangle};
+use fluxform::shape::mesh::Mesh;
 use fluxform::shape::placement::{Transform, sin_cos_deg};
 use fluxform::shape::stl;
 

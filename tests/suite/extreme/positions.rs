@@ -46,9 +46,14 @@ fn worst_points() -> Vec<Case> {
                 twice.heights.extend_from_slice(&p.heights);
                 let of =
                     |p: &Problem| worst_point(&p.problem(), &Settings::default()).map_err(reported);
-                let (a, b) = (of(&p)?, of(&twice)?);
+                let path = |p: &Problem| {
+                    of(p)?
+                        .path
+                        .ok_or_else(|| "the path was left out".to_owned())
+                };
+                let (a, b) = (path(&p)?, path(&twice)?);
                 worst(
-                    [0.3, 1.7, 20.0].map(|l| off(b.path.worst_error_n(l), a.path.worst_error_n(l))),
+                    [0.3, 1.7, 20.0].map(|l| off(b.worst_error_n(l), a.worst_error_n(l))),
                     "t* at three force constants",
                 )
             },

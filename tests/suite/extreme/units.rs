@@ -9,10 +9,10 @@ use fluxform::commands::evaluate::{Evaluation, evaluate};
 use fluxform::design::{Design, Need};
 use fluxform::field::dipole::cylinder_moment_a_m2;
 use fluxform::progress::Silent;
+use fluxform::shape::bodies::BodyOptions;
 use fluxform::shape::document::{Placement, parse_unit};
-use fluxform::shape::mesh::FileMesh;
+use fluxform::shape::file_mesh::FileMesh;
 use fluxform::shape::placement::Transform;
-use fluxform::shape::step::BodyOptions;
 use fluxform::shape::{ShapeError, surface};
 use fluxform::units::m_from_mm;
 

@@ -296,6 +296,8 @@ fn whole(d: f64) -> Outcome {
             ..Limits::default()
         },
         fixed: Fixed::default(),
+        pitch_m: None,
+        bobbin: false,
         current_max_a: 2.0,
         voltage_v: None,
         strands: Strand::choices(&wire(d)),

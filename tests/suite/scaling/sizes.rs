@@ -141,7 +141,7 @@ pub const LAWS: [Spec; 20] = [
         "lambda-path",
         "coils",
         COILS,
-        &[1, 2, 3, 4, 5, 6, 8],
+        &[3, 4, 6, 8, 10, 12, 15],
         path_coils,
     ),
     spec(
@@ -151,7 +151,13 @@ pub const LAWS: [Spec; 20] = [
         &[11, 21, 31, 61, 121],
         worst_points,
     ),
-    spec("worst-point", "coils", COILS, &[1, 2, 3, 4], worst_coils),
+    spec(
+        "worst-point",
+        "coils",
+        COILS,
+        &[3, 4, 6, 8, 10, 12, 15],
+        worst_coils,
+    ),
     spec(
         "height-map",
         "triangles",

@@ -11,8 +11,9 @@ use fluxform::RunError;
 use fluxform::numerics::double_double::DoubleDouble as Num;
 use fluxform::numerics::random::Random;
 use fluxform::progress::{Progress, Silent};
+use fluxform::shape::file_mesh::Triangle;
 use fluxform::shape::height::heights;
-use fluxform::shape::mesh::{Mesh, Triangle};
+use fluxform::shape::mesh::Mesh;
 
 /// Squares along either axis; twice their square are triangles.
 const SIDES: [usize; 8] = [8, 16, 32, 64, 128, 256, 512, 1024];

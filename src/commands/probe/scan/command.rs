@@ -32,14 +32,14 @@ pub struct ScanFlags {
     #[arg(long, value_name = "SCAN", conflicts_with = "points")]
     pub compare: Option<FileArgument>,
     /// Parameters to fit: any of scale, background, position, rotation
-    #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',', requires = "compare",
+    #[arg(long, hide_short_help = true, value_name = "WHAT", value_enum, value_delimiter = ',', requires = "compare",
           default_values = ["scale", "background", "position"])]
     fit: Vec<What>,
     /// The sensor's noise in tesla, where known: errors and residuals are held against it
-    #[arg(long, value_name = "T", value_parser = values::noise, requires = "compare")]
+    #[arg(long, hide_short_help = true, value_name = "T", value_parser = values::noise, requires = "compare")]
     noise_t: Option<f64>,
     /// The noise of measured gradients in T/m
-    #[arg(long, value_name = "G", value_parser = values::noise, requires = "compare")]
+    #[arg(long, hide_short_help = true, value_name = "G", value_parser = values::noise, requires = "compare")]
     noise_t_per_m: Option<f64>,
 }
 

@@ -26,7 +26,7 @@ mod explain;
 mod fit;
 mod keys;
 mod model;
-mod units;
+pub(super) mod units;
 
 pub use fit::Fitted;
 use fit::{Fit, Parameter};
@@ -111,7 +111,7 @@ pub fn compare(
     let scene = Scene::with_tolerance(design, request.tolerance)?;
     let parameters = fit::parameters(request.fitted, scan, scene.coils.len());
     large_enough(scan, &parameters).map_err(refused)?;
-    if let Some(hint) = units::coordinates(design, scan) {
+    if let Some(hint) = units::coordinates(design, &scan.positions_m) {
         return Err(refused(hint));
     }
     // For any place, as `probe` does: a fit moves the places, and what `probe` printed must be found

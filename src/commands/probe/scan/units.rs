@@ -11,7 +11,10 @@ const CLOSE: f64 = 0.35;
 const ALIKE: f64 = 0.7;
 
 /// Probable unit of the coordinates, if not metres.
-pub(super) fn coordinates(design: &Design, scan: &Scan) -> Option<String> {
+pub(in crate::commands::probe) fn coordinates(
+    design: &Design,
+    positions_m: &[[f64; 3]],
+) -> Option<String> {
     let axes = &design.array.positions_m;
     let coils = axes
         .iter()
@@ -21,7 +24,7 @@ pub(super) fn coordinates(design: &Design, scan: &Scan) -> Option<String> {
     let space = &design.workspace;
     let ends = [space.x_m, space.y_m, space.z_m].map(|axis| axis.from.abs().max(axis.to.abs()));
     let reach_m = ends.into_iter().fold(coils + diameter_m, f64::max);
-    let places = scan.positions_m.iter().flatten();
+    let places = positions_m.iter().flatten();
     let most_m = places.fold(0.0_f64, |most, x| most.max(x.abs()));
     (most_m > BEYOND * reach_m).then(|| {
         format!(

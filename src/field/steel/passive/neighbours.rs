@@ -30,6 +30,8 @@ use fluxform_numerics::vec3::{dot, minus};
 const PANEL: f64 = 1.5;
 /// Shortest panel worth having, in radii: closer magnets are left to the estimate.
 const SHORTEST: f64 = 0.2;
+/// Places whose forces are computed together.
+const TOGETHER: usize = 8;
 /// Most angles of the exchange grid.
 const MOST_ANGLES: f64 = 48.0;
 
@@ -117,53 +119,87 @@ impl Neighbours {
     /// Force added to the magnet's with its centre at `at_m`, N.
     #[must_use]
     pub fn force_n(&self, at_m: [f64; 3]) -> [f64; 3] {
-        self.along(at_m, [0, 1, 2])
-    }
-
-    /// Its vertical component.
-    #[must_use]
-    pub fn force_z_n(&self, at_m: [f64; 3]) -> f64 {
-        let [force_n] = self.along(at_m, [2]);
+        let [force_n] = self.along([at_m], [0, 1, 2]);
         force_n
     }
 
-    fn along<const N: usize>(&self, at_m: [f64; 3], axes: [usize; N]) -> [f64; N] {
-        fluxform_base::progress::poll();
-        // Of every core the field, then of every core its slope along the first axis, and so on.
+    /// Its vertical component at several places.
+    #[must_use]
+    pub fn forces_z_n(&self, places_m: &[[f64; 3]]) -> Vec<f64> {
+        let mut forces_n = Vec::with_capacity(places_m.len());
+        let (together, rest) = places_m.as_chunks::<TOGETHER>();
+        for places_m in together {
+            forces_n.extend(self.along(*places_m, [2]).as_flattened());
+        }
+        for place_m in rest {
+            forces_n.extend(self.along([*place_m], [2]).as_flattened());
+        }
+        forces_n
+    }
+
+    /// Of `P` places the components of the force along `axes`.
+    fn along<const P: usize, const N: usize>(
+        &self,
+        places_m: [[f64; 3]; P],
+        axes: [usize; N],
+    ) -> [[f64; N]; P] {
+        // Of every place: of every core the field, then of every core its slope along the first axis,
+        // and so on.
         let cores = self.positions_m.len();
-        let mut grid = DMatrix::zeros(self.points.len(), cores * (1 + N));
-        for (core, [x, y]) in self.positions_m.iter().enumerate() {
-            let centre = [at_m[0] - x, at_m[1] - y, at_m[2]];
-            for (row, (point, n)) in self.points.iter().enumerate() {
-                let from = minus(*point, centre);
-                let (mut normal, mut slope) = (0.0, [0.0; N]);
-                for dipole in &self.magnet {
-                    let m = dipole.moment_a_m2;
-                    let d = minus(from, dipole.at_m);
-                    let inverse_square = 1.0 / dot(d, d);
-                    let inverse_cube = inverse_square * inverse_square.sqrt();
-                    let (along, out, both) = (dot(m, d), dot(*n, d), dot(*n, m));
-                    normal += inverse_cube * (both - 3.0 * along * out * inverse_square);
-                    // By the magnet's place: minus the derivative by the point's.
-                    let scale = 3.0 * inverse_cube * inverse_square;
-                    let radial = both - 5.0 * along * out * inverse_square;
-                    for (slope, axis) in slope.iter_mut().zip(axes) {
-                        *slope += scale * (radial * d[axis] + m[axis] * out + n[axis] * along);
+        let columns = cores * (1 + N);
+        let mut grid = DMatrix::zeros(self.points.len(), P * columns);
+        for (place, at_m) in places_m.iter().enumerate() {
+            fluxform_base::progress::poll();
+            let mut grid = grid.columns_mut(place * columns, columns);
+            for (core, [x, y]) in self.positions_m.iter().enumerate() {
+                let centre = [at_m[0] - x, at_m[1] - y, at_m[2]];
+                for (row, point) in self.points.iter().enumerate() {
+                    let (normal, slope) = self.field_of_magnet(*point, centre, axes);
+                    grid[(row, core)] = normal;
+                    for (place, s) in slope.iter().enumerate() {
+                        grid[(row, core + cores * (1 + place))] = *s;
                     }
-                }
-                grid[(row, core)] = normal;
-                for (place, s) in slope.iter().enumerate() {
-                    grid[(row, core + cores * (1 + place))] = *s;
                 }
             }
         }
-        // One product: packing the factor again for every core took longer than multiplying by it.
+        // One product: packing the factor again for every core and place takes longer than multiplying
+        // by it.
         let seen = &self.reduce * &grid;
         let size = self.reduce.nrows() * cores;
-        let seen = seen.reshape_generic(Dyn(size), Dyn(1 + N));
-        let answer: DVector<f64> = &self.form * seen.column(0);
+        let seen = seen.reshape_generic(Dyn(size), Dyn(P * (1 + N)));
         let scale = MU_0_T_M_PER_A / (16.0 * PI * PI);
-        std::array::from_fn(|place| scale * answer.dot(&seen.column(1 + place)))
+        std::array::from_fn(|place| {
+            let first = place * (1 + N);
+            let answer: DVector<f64> = &self.form * seen.column(first);
+            std::array::from_fn(|axis| scale * answer.dot(&seen.column(first + 1 + axis)))
+        })
+    }
+
+    /// Normal derivative of the potential of the magnet at `centre`, and its slopes by the magnet's place.
+    #[inline]
+    fn field_of_magnet<const N: usize>(
+        &self,
+        (point, n): GridPoint,
+        centre: [f64; 3],
+        axes: [usize; N],
+    ) -> (f64, [f64; N]) {
+        let from = minus(point, centre);
+        let (mut normal, mut slope) = (0.0, [0.0; N]);
+        for dipole in &self.magnet {
+            let m = dipole.moment_a_m2;
+            let d = minus(from, dipole.at_m);
+            let inverse_square = 1.0 / dot(d, d);
+            let inverse_cube = inverse_square * inverse_square.sqrt();
+            let (along, out, both) = (dot(m, d), dot(n, d), dot(n, m));
+            normal += inverse_cube * (both - 3.0 * along * out * inverse_square);
+            // By the magnet's place: minus the derivative by the point's.
+            let scale = 3.0 * inverse_cube * inverse_square;
+            let radial = both - 5.0 * along * out * inverse_square;
+            for (slope, axis) in slope.iter_mut().zip(axes) {
+                *slope += scale * (radial * d[axis] + m[axis] * out + n[axis] * along);
+            }
+        }
+        (normal, slope)
     }
 }
 
@@ -431,7 +467,7 @@ mod tests {
                     force[axis]
                 );
             }
-            assert!((added.force_z_n(at) - force[2]).abs() < 1e-12 * size);
+            assert!((added.forces_z_n(&[at])[0] - force[2]).abs() < 1e-12 * size);
         }
     }
 

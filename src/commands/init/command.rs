@@ -1,0 +1,173 @@
+//! `init`: its arguments, its questions and its text.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use serde::Serialize;
+use toml::Value;
+
+use super::{Documents, Object, Refusal, Request, Start, documents};
+use crate::RunError;
+use crate::bundle::atomic::{FileSet, Overwrite};
+use crate::cli::args::Writing;
+use crate::cli::failure::Failure;
+use crate::cli::help::{Codes, page};
+use crate::cli::printer::{Printer, Stream, ask, can_ask};
+use crate::cli::start::folder;
+use crate::cli::values::{FileArgument, setting};
+
+/// Write a design and a shape to begin with
+///
+/// Writes NAME.toml, a design, and NAME_OBJECT.toml, a shape inside its workspace. Both calibrate as
+/// they are. Every key that the program knows is in them: those that are set, and the others as
+/// comments, with unit, range, default and meaning. At a terminal, without TEMPLATE, what to begin
+/// with is asked. Files that differ are replaced only with --force.
+#[derive(Debug, Args)]
+#[command(after_long_help = page(Codes::Pages, &[
+    ("fluxform init desk", "a small array in air, and a plate"),
+    ("fluxform init seed --name mine --object wedge --out mine",
+     "the reference array and a wedge, in a folder"),
+    ("fluxform init desk --set array.pitch_mm=25 --set supply.current_max_a=1.5 --name wide",
+     "with another pitch, which the workspace follows, and other drivers"),
+]))]
+pub struct Init {
+    /// What to begin with [default: asked at a terminal, else seed]
+    #[arg(value_name = "TEMPLATE", value_parser = start())]
+    template: Option<Start>,
+    /// The object
+    #[arg(long, value_name = "OBJECT", value_parser = object())]
+    object: Option<Object>,
+    /// Name of the design [default: that of the template]
+    #[arg(long, value_name = "NAME")]
+    name: Option<String>,
+    /// Set a key of the design, like array.pitch_mm=40; may be repeated (`fluxform keys design`)
+    #[arg(long, value_name = "KEY=VALUE", value_parser = setting)]
+    set: Vec<(String, Value)>,
+    /// Folder to write to
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    out: FileArgument,
+    #[command(flatten)]
+    writing: Writing,
+}
+
+fn start() -> impl TypedValueParser<Value = Start> {
+    let of = |one: &Start| PossibleValue::new(one.name()).help(one.meaning());
+    PossibleValuesParser::new(Start::ALL.iter().map(of)).try_map(|name| {
+        let found = Start::ALL.into_iter().find(|one| one.name() == name);
+        found.ok_or("no such template")
+    })
+}
+
+fn object() -> impl TypedValueParser<Value = Object> {
+    PossibleValuesParser::new(Object::ALL.map(Object::name)).try_map(|name| {
+        let found = Object::ALL.into_iter().find(|one| one.name() == name);
+        found.ok_or("no such object")
+    })
+}
+
+/// The files that were written.
+#[derive(Debug, Serialize)]
+struct Written {
+    design: PathBuf,
+    shape: PathBuf,
+}
+
+impl Init {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// Settings that make no design; a file that is there already.
+    pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
+        let folder = folder(&self.out)?;
+        let asks = self.template.is_none() && !printer.json() && !printer.quiet();
+        let request = if asks && can_ask() {
+            self.asked()?
+        } else {
+            self.request(Start::Seed, Object::Flat)
+        };
+        let Documents { design, shape } = documents(&request).map_err(|refusal| match refusal {
+            Refusal::Setting(message) => Failure::Usage(message),
+            Refusal::Design(fault) => Failure::Documents(vec![fault]),
+        })?;
+        let mut set = FileSet::begin(&folder, Overwrite::same_bytes(self.writing.force, &[]));
+        for (name, text) in [&design, &shape] {
+            set.write(name, |out| out.write_all(text.as_bytes()))
+                .map_err(RunError::from)?;
+        }
+        set.commit().map_err(RunError::from)?;
+        let beside = |name: &str| match folder.as_os_str() == "." {
+            true => PathBuf::from(name),
+            false => folder.join(name),
+        };
+        let written = Written {
+            design: beside(&design.0),
+            shape: beside(&shape.0),
+        };
+        printer.summary(Stream::Output, &written, || text(&written))
+    }
+
+    fn request(&self, start: Start, object: Object) -> Request {
+        Request {
+            start: self.template.unwrap_or(start),
+            object: self.object.unwrap_or(object),
+            name: self.name.clone(),
+            settings: self.set.clone(),
+        }
+    }
+
+    /// What is not given is asked; an empty answer takes what is in brackets.
+    fn asked(&self) -> Result<Request, Failure> {
+        let starts: Vec<String> = Start::ALL
+            .map(|one| format!("  {:6}{}", one.name(), one.meaning()))
+            .to_vec();
+        let question = format!("What to begin with?\n{}\n", starts.join("\n"));
+        let start = chosen(&question, &Start::ALL, Start::name)?;
+        let names = Object::ALL.map(Object::name).join(", ");
+        let object = match self.object {
+            Some(object) => object,
+            None => chosen(
+                &format!("The object: {names}? "),
+                &Object::ALL,
+                Object::name,
+            )?,
+        };
+        let mut request = self.request(start, object);
+        if request.name.is_none() {
+            request.name = Some(ask("Name of the design? ", start.name())?);
+        }
+        for (key, question) in [
+            ("array.pitch_mm", "Distance of neighbouring coils, mm? "),
+            ("supply.current_max_a", "Largest current of a coil, A? "),
+        ] {
+            let known = request.settings.iter().any(|(set, _)| set == key);
+            if known || (key.starts_with("array") && start == Start::Coil) {
+                continue;
+            }
+            let answer = ask(question, "as in the template")?;
+            if answer != "as in the template" {
+                request
+                    .settings
+                    .push(setting(&format!("{key}={answer}")).map_err(Failure::Usage)?);
+            }
+        }
+        Ok(request)
+    }
+}
+
+/// One of `all` by its name, the first where the answer is empty; asked again otherwise.
+fn chosen<T: Copy>(question: &str, all: &[T], name: fn(T) -> &'static str) -> Result<T, Failure> {
+    loop {
+        let answer = ask(question, name(all[0]))?;
+        if let Some(one) = all.iter().copied().find(|one| name(*one) == answer) {
+            return Ok(one);
+        }
+    }
+}
+
+fn text(written: &Written) -> String {
+    let (design, shape) = (written.design.display(), written.shape.display());
+    format!(
+        "wrote {design} and {shape}\nnext: fluxform evaluate {design}\n      fluxform calibrate {design} {shape}\n"
+    )
+}

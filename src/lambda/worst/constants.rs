@@ -1,0 +1,183 @@
+//! The worst-point force constants without the path: programs at one force constant each.
+//!
+//! t* is convex in lambda, and the multipliers at any lambda give a line below all of it. So
+//! from a lambda above every limit the lines lead down to where t* leaves the errors that are
+//! allowed (Newton's method, which ends on the piece that decides). t_0 is a line without an offset;
+//! with one it is convex too, and below the chord between any two of its values.
+
+use super::doubles::{Doubles, Failure};
+use super::scaled::{Form, Scaled};
+use fluxform_numerics::double_double::DoubleDouble as Num;
+use fluxform_numerics::real::Real;
+
+/// Above this share of lambda max h, or of what rounding may hide, t* has left t_0.
+const VISIBLE: f64 = 1e-12;
+/// A scaled lambda above which no limit begins to bind: 1 is a force near the largest of one coil.
+const FAR: f64 = (1 << 20) as f64;
+/// More lines than lead to any constant.
+const LINES: usize = 200;
+
+/// Force constants, in scaled units.
+pub(super) struct Constants {
+    /// Where t* leaves t_0.
+    pub linear: Option<Num>,
+    /// The largest lambda with `t* - t_0 <= weight lambda max h`.
+    pub jnd: Option<Num>,
+    /// t_0 at lambda = 1; `None` with an offset.
+    pub floor: Option<Num>,
+    /// Share of lambda max h plus the offset that rounding may hide.
+    pub doubt: f64,
+}
+
+/// A value and a slope.
+#[derive(Debug, Clone, Copy)]
+struct Line {
+    lambda: Num,
+    value: Num,
+    slope: Num,
+}
+
+impl Line {
+    fn at(&self, lambda: Num) -> Num {
+        self.value + (lambda - self.lambda) * self.slope
+    }
+}
+
+/// Solves for the constants of `limited` against `free`, the same without the drivers' size.
+///
+/// # Errors
+/// Where one of the programs has no solution in doubles.
+pub(super) fn constants(
+    limited: &Scaled,
+    free: &Scaled,
+    weight: f64,
+) -> Result<Constants, Failure> {
+    let mut errors = Errors {
+        limited: Doubles::new(limited, Form::Worst),
+        free: Doubles::new(free, Form::Worst),
+        proportional: None,
+        top: limited.top(),
+        without: Num::ZERO,
+        doubt: 0.0,
+    };
+    if free.offset_n() == 0.0 {
+        errors.proportional = Some(errors.free_line(Num::ONE)?);
+    }
+    errors.without = errors.limited_line(Num::ZERO)?.value.larger(Num::ZERO);
+    let linear = errors.largest_within(Num::ZERO)?;
+    let jnd = match linear {
+        Some(_) if weight > 0.0 => errors.largest_within(Num::of(weight))?,
+        other => other,
+    };
+    Ok(Constants {
+        linear,
+        jnd,
+        floor: errors.proportional.map(|line| line.value),
+        doubt: errors.doubt,
+    })
+}
+
+/// t* and t_0 at one lambda at a time.
+struct Errors<'s, 'a> {
+    limited: Doubles<'s, 'a>,
+    free: Doubles<'s, 'a>,
+    /// t_0 where it is a line.
+    proportional: Option<Line>,
+    top: Num,
+    /// t* without currents' need: at lambda = 0.
+    without: Num,
+    doubt: f64,
+}
+
+impl Errors<'_, '_> {
+    fn limited_line(&mut self, lambda: Num) -> Result<Line, Failure> {
+        let optimum = self.limited.at(lambda)?;
+        let size = (lambda * self.top + self.without).to_f64();
+        if size > 0.0 {
+            self.doubt = self.doubt.max(optimum.doubt / size);
+        }
+        Ok(optimum.line())
+    }
+
+    fn free_line(&mut self, lambda: Num) -> Result<Line, Failure> {
+        if let Some(line) = self.proportional {
+            return Ok(Line {
+                lambda,
+                value: line.at(lambda),
+                slope: line.slope,
+            });
+        }
+        Ok(self.free.at(lambda)?.line())
+    }
+
+    /// What counts as rounding in `t* - t_0` at `lambda`.
+    fn visible(&self, lambda: Num) -> Num {
+        Num::of(VISIBLE.max(4.0 * self.doubt)) * (self.top * lambda + self.without)
+    }
+
+    /// The largest lambda with `t* - t_0 <= weight lambda max h`; `None`: all are.
+    fn largest_within(&mut self, weight: Num) -> Result<Option<Num>, Failure> {
+        let share = weight * self.top;
+        let mut low = self.free_line(Num::ZERO)?;
+        let far = Num::of(FAR);
+        let mut high = [self.limited_line(far)?, self.free_line(far)?];
+        let excess = |[t, free]: [Line; 2]| t.value - free.value - share * t.lambda;
+        if excess(high) <= self.visible(far) {
+            return Ok(None);
+        }
+        for _ in 0..LINES {
+            fluxform_base::progress::poll();
+            let at = high[0].lambda;
+            let above = excess(high);
+            // Below the chord from `low` t_0 leaves t* no lower than this line.
+            let chord = (high[1].value - low.value) / (at - low.lambda);
+            let rate = high[0].slope - chord - share;
+            let by_chord = at - above / rate;
+            if above <= self.rounding(at, weight) || rate <= Num::ZERO {
+                return Ok(Some(at));
+            }
+            if by_chord <= low.lambda {
+                return Ok(Some(low.lambda.larger(Num::ZERO)));
+            }
+            // The tangent of t_0 leads further where t_0 bends: there the chord is steeper.
+            let by_tangent =
+                at - above / (high[0].slope - high[1].slope - share).larger(rate * Num::of(0.25));
+            let next = if by_tangent < by_chord && by_tangent > low.lambda {
+                let near = [self.limited_line(by_tangent)?, self.free_line(by_tangent)?];
+                if excess(near) <= self.rounding(by_tangent, weight) {
+                    low = near[1];
+                    by_chord
+                } else if near[0].slope - near[1].slope >= share {
+                    high = near;
+                    continue;
+                } else {
+                    by_chord
+                }
+            } else {
+                by_chord
+            };
+            high = [self.limited_line(next)?, self.free_line(next)?];
+        }
+        Ok(Some(high[0].lambda))
+    }
+
+    /// An excess that ends the search: with a weight t* crosses what is allowed at an angle.
+    fn rounding(&self, lambda: Num, weight: Num) -> Num {
+        if weight > Num::ZERO {
+            Num::of(1e-3) * self.visible(lambda)
+        } else {
+            self.visible(lambda)
+        }
+    }
+}
+
+impl super::doubles::Optimum {
+    fn line(&self) -> Line {
+        let last = self.piece.z.len() - 1;
+        Line {
+            lambda: self.piece.start,
+            value: self.piece.z[last],
+            slope: self.piece.rate[last],
+        }
+    }
+}
