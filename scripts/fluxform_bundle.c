@@ -437,6 +437,26 @@ static int load_grid(const archive *a, const char *name, size_t rows, size_t col
     return (*values = copy(a, name, &from)) ? 0 : -1;
 }
 
+/* The force vector that a bundle requests, where it does. */
+static int load_requested(fluxform_bundle *b, const archive *a)
+{
+    const char *name = "requested_direction";
+    array from;
+    int found = find_array(a, name, "<f8", 3, &from);
+    if (found <= 0)
+        return found;
+    if (from.shape[0] != b->height_ny || from.shape[1] != b->height_nx || from.shape[2] != 3)
+        return fail(a, name, "does not have the expected shape");
+    if (!b->gx_t_per_m_per_a)
+        return fail(a, "gx_t_per_m_per_a", "is missing");
+    if (!(b->requested_direction = copy(a, name, &from)))
+        return -1;
+    found = load_scalar(a, "sideways_weight", &b->sideways_weight);
+    if (found <= 0 || !(b->sideways_weight >= 1e-6 && b->sideways_weight <= 1))
+        return found < 0 ? -1 : fail(a, "sideways_weight", "must lie between 1e-6 and 1");
+    return 0;
+}
+
 static int load_rendering(fluxform_bundle *b, const archive *a)
 {
     array from;
@@ -455,7 +475,9 @@ static int load_rendering(fluxform_bundle *b, const archive *a)
     for (size_t i = 0; i < b->height_nx * b->height_ny; i++)
         if (b->has_height[i] != 0 && b->has_height[i] != 1)
             return fail(a, "has_height", "must hold 0 or 1");
-    if (!(b->scratch = calloc(b->coil_count + 1, 8 * sizeof(double)))) /* see fluxform_currents.c */
+    if (load_requested(b, a))
+        return -1;
+    if (!(b->scratch = calloc(b->coil_count + 1, 21 * sizeof(double)))) /* see fluxform_currents.c */
         return fail(a, "", "no memory");
     b->has_rendering = 1;
     return 0;
@@ -492,7 +514,7 @@ static int check_others(const fluxform_bundle *b, const archive *a)
 static int load_all(fluxform_bundle *b, archive *a)
 {
     array from;
-    int tilted;
+    int tilted, found;
     if (check_archive(a))
         return -1;
     if (need(a, "schema_version", "<i8", 1, &from))
@@ -515,6 +537,12 @@ static int load_all(fluxform_bundle *b, archive *a)
         return -1;
     tilted = b->moment_a_m2[0] != 0 || b->moment_a_m2[1] != 0;
     if (tilted && load_map(b, a, "gradient_t_per_m_per_a", 6, &b->gradient_t_per_m_per_a))
+        return -1;
+    found = find_array(a, "gx_t_per_m_per_a", "<f8", 4, &from);
+    if (found < 0 || (found == 0 && find_array(a, "gy_t_per_m_per_a", "<f8", 4, &from) != 0))
+        return found < 0 ? -1 : fail(a, "gx_t_per_m_per_a", "is missing");
+    if (found && (load_map(b, a, "gx_t_per_m_per_a", 4, &b->gx_t_per_m_per_a) ||
+                  load_map(b, a, "gy_t_per_m_per_a", 4, &b->gy_t_per_m_per_a)))
         return -1;
     if (load_passive(b, a))
         return -1;
@@ -550,6 +578,9 @@ void fluxform_bundle_close(fluxform_bundle *bundle)
     free(bundle->z_m);
     free(bundle->coil);
     free(bundle->gz_t_per_m_per_a);
+    free(bundle->gx_t_per_m_per_a);
+    free(bundle->gy_t_per_m_per_a);
+    free(bundle->requested_direction);
     free(bundle->gradient_t_per_m_per_a);
     free(bundle->passive_force_n);
     free(bundle->current_min_a);
@@ -662,6 +693,31 @@ int fluxform_force_per_ampere(const fluxform_bundle *b, double x, double y, doub
         force[b->coil[i]] = m[0] * interpolate(b, &c, block + 2, 9) +
                             m[1] * interpolate(b, &c, block + 5, 9) +
                             m[2] * interpolate(b, &c, block + 8, 9);
+    }
+    return 1;
+}
+
+int fluxform_force_vectors_per_ampere(const fluxform_bundle *b, double x, double y, double z, double *force)
+{
+    const size_t nodes = b->nx * b->ny * b->nz;
+    const double *m = b->moment_a_m2;
+    cell c;
+    for (size_t i = 0; i < 3 * b->coil_count; i++)
+        force[i] = 0;
+    if (!b->gx_t_per_m_per_a || !find_cell(b, x, y, z, &c))
+        return 0;
+    for (size_t i = 0; i < b->map_count; i++) {
+        const double *maps[] = {b->gx_t_per_m_per_a, b->gy_t_per_m_per_a, b->gz_t_per_m_per_a};
+        double *own = force + 3 * b->coil[i];
+        for (size_t k = 0; k < 3; k++)
+            own[k] = m[2] * interpolate(b, &c, maps[k] + i * nodes, 1);
+        if (b->gradient_t_per_m_per_a) {
+            /* F = grad (m . B): of a tilted magnet all of the gradient counts. */
+            const double *block = b->gradient_t_per_m_per_a + 9 * i * nodes;
+            for (size_t k = 0; k < 3; k++)
+                own[k] = m[0] * interpolate(b, &c, block + k, 9) + m[1] * interpolate(b, &c, block + 3 + k, 9) +
+                         m[2] * interpolate(b, &c, block + 6 + k, 9);
+        }
     }
     return 1;
 }

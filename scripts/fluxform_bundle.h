@@ -31,6 +31,8 @@ typedef struct fluxform_bundle {
     size_t map_count;             /* coils whose maps were kept ... */
     size_t *coil;                 /* ... and their indices in the array */
     double *gz_t_per_m_per_a;     /* [map][z][y][x] */
+    double *gx_t_per_m_per_a;     /* dB_x/dz, as gz; NULL where the upward force alone is held, as the next */
+    double *gy_t_per_m_per_a;
     double *passive_force_n;      /* [z][y][x]; NULL where the unpowered steel's pull is left out */
     double *gradient_t_per_m_per_a; /* [map][z][y][x][3][3]; NULL unless the magnet is tilted */
     double moment_a_m2[3];        /* the magnet */
@@ -49,6 +51,8 @@ typedef struct fluxform_bundle {
     double *height_m;             /* [y][x] */
     double *has_height;           /* [y][x]: 1 where there is a surface, else 0 */
     double *static_current_a;     /* the bundle's fixed currents, one a coil of the array */
+    double *requested_direction;  /* [y][x][3]: force vector over lambda times the height; NULL: upward alone */
+    double sideways_weight;       /* out of reach a sideways error counts as this share of an upward one */
     double *scratch;              /* for the functions below that change the bundle */
 } fluxform_bundle;
 
@@ -63,9 +67,12 @@ enum {
 /* What fluxform_currents found. */
 typedef struct fluxform_step {
     double height_m;  /* of the surface; 0 where there is none */
-    double wanted_n;  /* lambda times that height */
-    double force_n;   /* given by the currents, the unpowered steel's pull included */
+    double wanted_n;  /* upward: lambda times that height, or that part of a force along the normal */
+    double force_n;   /* upward, given by the currents, the unpowered steel's pull included */
     double passive_n; /* that pull */
+    /* Sideways; 0 for bundles that request the upward force alone. */
+    double wanted_x_n, wanted_y_n;
+    double force_x_n, force_y_n;
 } fluxform_step;
 
 /* Loads map.npz. Returns 0, or -1 with a message; then nothing needs closing. */
@@ -81,6 +88,11 @@ int fluxform_gz_per_ampere(const fluxform_bundle *bundle, double x_m, double y_m
 /* Upward force on the magnet's centre [N/A], in the same manner. */
 int fluxform_force_per_ampere(const fluxform_bundle *bundle, double x_m, double y_m, double z_m, double *force);
 
+/* Force on the magnet's centre along x, y and z [N/A]: three numbers a coil, in the same manner. For bundles
+ * that hold the upward force alone 0, with all zeros. */
+int fluxform_force_vectors_per_ampere(const fluxform_bundle *bundle, double x_m, double y_m, double z_m,
+                                      double *force);
+
 /* What the unpowered steel adds to that force whatever the currents [N], up positive: zero for
  * bundles without it. Returns 1; outside the map 0, with zero. */
 int fluxform_passive_force(const fluxform_bundle *bundle, double x_m, double y_m, double z_m, double *force);
@@ -89,10 +101,19 @@ int fluxform_passive_force(const fluxform_bundle *bundle, double x_m, double y_m
  * surface 0, with 0. */
 int fluxform_height(const fluxform_bundle *bundle, double x_m, double y_m, double *height);
 
+/* The same with the direction of the force that is requested there, over lambda times the height: three
+ * numbers, upward for bundles that request no other. */
+int fluxform_direction(const fluxform_bundle *bundle, double x_m, double y_m, double *height, double *direction);
+
 /* The currents [A] of least power that give wanted_n for the forces per ampere given, within the
  * limits of every current and of their sum (equation 8), or the nearest force; none for a force that
  * is no number. Returns FLUXFORM_OK or FLUXFORM_SATURATED. */
 int fluxform_allocate(fluxform_bundle *bundle, const double *force_per_ampere, double wanted_n, double *currents);
+
+/* The same for a force vector: three numbers a coil, three wanted. The nearest force is the one whose
+ * difference is shortest, its sideways parts times the bundle's sideways_weight. */
+int fluxform_allocate_vector(fluxform_bundle *bundle, const double *force_per_ampere, const double *wanted_n,
+                             double *currents);
 
 /* The currents [A] to command at a position in m, coil_count numbers; `step` may be NULL. Returns
  * one of the answers above; but for the first two all currents are zero. */

@@ -29,11 +29,24 @@ static int find_between(const double *nodes, size_t n, double position, size_t *
     return 1;
 }
 
-int fluxform_height(const fluxform_bundle *b, double x, double y, double *height)
+/* A value between four nodes, `stride` numbers apart. */
+static double bilinear(const double *values, size_t stride, const size_t *node, double s, double t)
+{
+    double h[4];
+    for (size_t k = 0; k < 4; k++)
+        h[k] = values[stride * node[k]];
+    return (1 - t) * ((1 - s) * h[0] + s * h[1]) + t * ((1 - s) * h[2] + s * h[3]);
+}
+
+/* Bilinear between the nodes of the surface: the height, and where there is a `direction` its three
+ * components too. Returns 1; where there is no surface 0, with nothing. */
+static int on_surface(const fluxform_bundle *b, double x, double y, double *height, double *direction)
 {
     size_t column, row, node[4];
-    double s, t, h[4];
+    double s, t;
     *height = 0;
+    for (size_t k = 0; direction && k < 3; k++)
+        direction[k] = 0;
     if (!b->has_rendering || !find_between(b->height_x_m, b->height_nx, x, &column, &s) ||
         !find_between(b->height_y_m, b->height_ny, y, &row, &t))
         return 0;
@@ -46,13 +59,27 @@ int fluxform_height(const fluxform_bundle *b, double x, double y, double *height
         double weight = (k & 1 ? s : 1 - s) * (k & 2 ? t : 1 - t);
         if (weight > 0 && b->has_height[node[k]] == 0)
             return 0;
-        h[k] = b->height_m[node[k]];
     }
-    *height = (1 - t) * ((1 - s) * h[0] + s * h[1]) + t * ((1 - s) * h[2] + s * h[3]);
+    *height = bilinear(b->height_m, 1, node, s, t);
+    for (size_t k = 0; direction && k < 3; k++)
+        direction[k] = bilinear(b->requested_direction + k, 3, node, s, t);
     return 1;
 }
 
-/* ---- currents of least power (the algorithm is told in src/lambda/allocate.rs) ---------------- */
+int fluxform_height(const fluxform_bundle *b, double x, double y, double *height)
+{
+    return on_surface(b, x, y, height, NULL);
+}
+
+int fluxform_direction(const fluxform_bundle *b, double x, double y, double *height, double *direction)
+{
+    int there = on_surface(b, x, y, height, b->requested_direction ? direction : NULL);
+    for (size_t k = 0; !b->requested_direction && k < 3; k++)
+        direction[k] = there && k == 2;
+    return there;
+}
+
+/* ---- currents of least power (the algorithm is told in src/lambda/allocation.rs) -------------- */
 
 /* A coil and where it is sorted to. */
 typedef struct {
@@ -60,7 +87,8 @@ typedef struct {
     size_t coil;
 } keyed;
 
-/* A bundle has room for eight numbers a coil: row, ones, tail and force, and two of these. */
+/* A bundle has room for 21 numbers a coil: row, ones, tail and force, and two of these; then force vector,
+ * conductance, limit and rows of the vector's dual, and two of these again. */
 typedef char keyed_fits[sizeof(keyed) <= 2 * sizeof(double) ? 1 : -1];
 
 #define ROUNDING 1e-14
@@ -373,13 +401,82 @@ int fluxform_allocate(fluxform_bundle *b, const double *force_per_ampere, double
     return FLUXFORM_OK;
 }
 
+#include "fluxform_vector.h"
+
+int fluxform_allocate_vector(fluxform_bundle *b, const double *force_per_ampere, const double *wanted, double *currents)
+{
+    size_t n = b->coil_count;
+    double largest = 0, least = INFINITY, weights[3];
+    int nothing = wanted[0] == 0 && wanted[1] == 0 && wanted[2] == 0;
+    vector_problem p;
+    weights[0] = weights[1] = b->sideways_weight;
+    weights[2] = 1;
+    for (size_t i = 0; i < n; i++) {
+        currents[i] = 0;
+        least = b->resistance_ohm[i] < least ? b->resistance_ohm[i] : least;
+        for (size_t k = 0; k < 3; k++)
+            if (fabs(force_per_ampere[3 * i + k]) > largest)
+                largest = fabs(force_per_ampere[3 * i + k]);
+    }
+    if (nothing || !b->scratch || !isfinite(wanted[0]) || !isfinite(wanted[1]) || !isfinite(wanted[2]) ||
+        !isfinite(1 / largest))
+        return nothing ? FLUXFORM_OK : FLUXFORM_SATURATED;
+    memset(&p, 0, sizeof p);
+    p.n = n;
+    p.lower = b->current_min_a;
+    p.upper = b->current_max_a;
+    p.currents = currents;
+    p.conductance = b->scratch + 11 * n;
+    p.at = p.conductance + n;
+    p.rows = p.at + n;
+    p.order = (keyed *)(void *)(p.rows + 4 * n);
+    for (size_t i = 0; i < n; i++) {
+        p.conductance[i] = least / b->resistance_ohm[i];
+        p.at[i] = AT_FREE;
+        for (size_t k = 0; k < 3; k++)
+            p.rows[4 * i + k] = force_per_ampere[3 * i + k] * weights[k] * (1 / largest);
+        p.rows[4 * i + 3] = 1;
+    }
+    for (size_t k = 0; k < 3; k++)
+        p.target[k] = wanted[k] * weights[k] * (1 / largest);
+    p.target[3] = b->has_total_current_max ? b->total_current_max_a : INFINITY;
+    return solve_vector(&p);
+}
+
+/* As fluxform_currents, for all three components of the force. */
+static int vector_currents(fluxform_bundle *b, double x, double y, double z, double *currents, fluxform_step *s)
+{
+    double *force = b->scratch + 8 * b->coil_count, direction[3], wanted[3], given[3] = {0, 0, 0};
+    int answer;
+    if (!fluxform_force_vectors_per_ampere(b, x, y, z, force))
+        return FLUXFORM_OUTSIDE;
+    fluxform_passive_force(b, x, y, z, &s->passive_n);
+    fluxform_direction(b, x, y, &s->height_m, direction);
+    for (size_t k = 0; k < 3; k++)
+        wanted[k] = b->lambda_n_per_m * s->height_m * direction[k];
+    s->wanted_x_n = wanted[0];
+    s->wanted_y_n = wanted[1];
+    s->wanted_n = wanted[2];
+    wanted[2] -= s->passive_n;
+    answer = fluxform_allocate_vector(b, force, wanted, currents);
+    for (size_t i = 0; i < b->coil_count; i++)
+        for (size_t k = 0; k < 3; k++)
+            given[k] += force[3 * i + k] * currents[i];
+    s->force_x_n = given[0];
+    s->force_y_n = given[1];
+    s->force_n = given[2] + s->passive_n;
+    return answer;
+}
+
 int fluxform_currents(fluxform_bundle *b, double x, double y, double z, double *currents, fluxform_step *step)
 {
-    fluxform_step s = {0, 0, 0, 0};
+    fluxform_step s = {0, 0, 0, 0, 0, 0, 0, 0};
     int answer = FLUXFORM_UNABLE;
     for (size_t i = 0; i < b->coil_count; i++)
         currents[i] = 0;
-    if (b->has_rendering && b->has_lambda) {
+    if (b->has_rendering && b->has_lambda && b->requested_direction)
+        answer = vector_currents(b, x, y, z, currents, &s);
+    else if (b->has_rendering && b->has_lambda) {
         double *force = b->scratch + 3 * b->coil_count;
         answer = FLUXFORM_OUTSIDE;
         if (fluxform_force_per_ampere(b, x, y, z, force)) {

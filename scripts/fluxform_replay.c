@@ -2,7 +2,8 @@
  *
  * `program map.npz` reads lines "x y z" (m) and prints for each the force per ampere [N/A] of every
  * coil, the unpowered steel's pull [N], the surface's height [m] (0 outside the map), the answer (0 ok, 1 saturated,
- * 2 outside, -1 unable), the force given [N] and the current [A] of every coil.
+ * 2 outside, -1 unable), the force given [N] and the current [A] of every coil; for bundles that request a force
+ * vector also the vector wanted, the sideways force given [N] and the vectors of force per ampere of every coil.
  * `program map.npz REPEATS` reads the same lines and prints the nanoseconds that a step takes:
  *   cc -std=c99 -O2 fluxform_replay.c fluxform_bundle.c fluxform_currents.c -o replay -lm
  */
@@ -14,7 +15,7 @@
 
 static int tell(fluxform_bundle *bundle, double *force, double *current)
 {
-    double x, y, z, pull;
+    double x, y, z, pull, *vectors = current + bundle->coil_count;
     fluxform_step step;
     while (scanf("%lf %lf %lf", &x, &y, &z) == 3) {
         int answer;
@@ -26,6 +27,13 @@ static int tell(fluxform_bundle *bundle, double *force, double *current)
         printf("%.17g %.17g %d %.17g", pull, step.height_m, answer, step.force_n);
         for (size_t i = 0; i < bundle->coil_count; i++)
             printf(" %.17g", current[i]);
+        if (bundle->requested_direction) {
+            fluxform_force_vectors_per_ampere(bundle, x, y, z, vectors);
+            printf(" %.17g %.17g %.17g %.17g %.17g", step.wanted_x_n, step.wanted_y_n, step.wanted_n,
+                   step.force_x_n, step.force_y_n);
+            for (size_t i = 0; i < 3 * bundle->coil_count; i++)
+                printf(" %.17g", vectors[i]);
+        }
         printf("\n");
     }
     return 0;
@@ -77,7 +85,7 @@ int main(int argc, char **argv)
         fprintf(stderr, "%s\n", message);
         return 3;
     }
-    if (!(force = calloc(2 * bundle.coil_count + 1, sizeof *force))) {
+    if (!(force = calloc(5 * bundle.coil_count + 1, sizeof *force))) {
         fluxform_bundle_close(&bundle);
         return 3;
     }

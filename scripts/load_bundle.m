@@ -8,13 +8,16 @@ function bundle = load_bundle(folder)
 %   total = total + bundle.passive_force([0.01, 0, 0.05]);   % N, the unpowered steel's pull
 %   h = bundle.height([0.01, 0]);                       % m, NaN where there is no surface
 %   [current, force, answer] = bundle.currents([0.01, 0, 0.05]);   % with position feedback (eq. 8)
+%   force = bundle.force_vectors_per_ampere([0.01, 0, 0.05]);   % N/A: point, coil, then x, y, z
+%   wanted = bundle.requested_force([0.01, 0]);         % N along x, y, z
 %
 % Fields: manifest and lambda (manifest.json, lambda.json), points (the columns of points.csv by
 % name), currents_a (one row a coil), lambda_n_per_m (empty if none), map: the arrays of map.npz,
 % gz_t_per_m_per_a as [coil, z, y, x]. Coils are numbered from 0 as everywhere, so coil k is row
 % or column k + 1. Points are rows of x, y, z in m. What lies outside the map has no force.
 % Currents are those of least power whose force is lambda times the height, or the nearest force:
-% A, one row a point, one column a coil; the force they give, N; 'ok', 'saturated' or 'outside'.
+% A, one row a point, one column a coil; the force they give, N; 'ok', 'saturated' or 'outside'. Of bundles
+% that request a force vector the force has three columns.
 %
 % Bundles are not trusted: what is wrong with one ends in an error 'fluxform:bundle'. Sizes are checked, and SHA-256 digests where there is a way to compute them (Octave, or MATLAB
 % with Java). JSON may lose the last digit of a number; map.npz and the tables do not.
@@ -44,6 +47,8 @@ function bundle = loaded(folder)
         bundle.lambda_n_per_m = map.lambda_n_per_m;
     end
     bundle.force_per_ampere = @(points_m) force_per_ampere(map, points_m);
+    bundle.force_vectors_per_ampere = @(points_m) force_vectors_per_ampere(map, points_m);
+    bundle.requested_force = @(points_m) requested_force(map, points_m);
     bundle.passive_force = @(points_m) passive_force(map, points_m);
     bundle.height = @(points_m) height(map, points_m);
     bundle.currents = @(points_m) feedback(map, points_m);
@@ -63,6 +68,41 @@ function force = force_per_ampere(map, points_m)
         end
     end
     force(:, map.coil + 1) = found.';
+end
+
+function force = force_vectors_per_ampere(map, points_m)
+% Force on the magnet's centre, N/A: point, coil, then x, y, z.
+    if ~isfield(map, 'gx_t_per_m_per_a')
+        error('fluxform:bundle', 'map.npz holds the upward force alone: calibrate with force = "vertical-only"');
+    end
+    m = map.moment_a_m2;
+    force = zeros(size(points_m, 1), numel(map.current_max_a), 3);
+    maps = {map.gx_t_per_m_per_a, map.gy_t_per_m_per_a, map.gz_t_per_m_per_a};
+    for axis = 1:3
+        if m(1) == 0 && m(2) == 0
+            found = m(3) * interpolate(map, maps{axis}, points_m);
+        else
+            found = 0;                            % F = grad(m . B): all of the gradient counts
+            for i = 1:3
+                part = map.gradient_t_per_m_per_a(:, :, :, :, i, axis);
+                found = found + m(i) * interpolate(map, part, points_m);
+            end
+        end
+        force(:, map.coil + 1, axis) = found.';
+    end
+end
+
+function wanted = requested_force(map, points_m)
+% The force vector requested, N: lambda times the height, upward unless the bundle requests another
+% direction; zero where there is no surface.
+    direction = repmat([0, 0, 1], size(points_m, 1), 1);
+    if isfield(map, 'requested_direction')
+        for k = 1:3
+            direction(:, k) = on_surface(map, map.requested_direction(:, :, k), points_m);
+        end
+    end
+    wanted = map.lambda_n_per_m * height(map, points_m) .* direction;
+    wanted(isnan(wanted)) = 0;
 end
 
 function force = passive_force(map, points_m)
@@ -111,9 +151,14 @@ end
 function found = height(map, points_m)
 % The surface's height, m, bilinear between the bundle's points; NaN where there is none.
     found = NaN(size(points_m, 1), 1);
-    if ~isfield(map, 'height_m')
-        return
+    if isfield(map, 'height_m')
+        found = on_surface(map, map.height_m, points_m);
     end
+end
+
+function found = on_surface(map, values, points_m)
+% Values [y, x] at points, bilinear; NaN where there is no surface.
+    found = NaN(size(points_m, 1), 1);
     for p = 1:size(points_m, 1)
         [column, s] = between(map.height_x_m, points_m(p, 1));
         [row, t] = between(map.height_y_m, points_m(p, 2));
@@ -124,7 +169,7 @@ function found = height(map, points_m)
         columns = column + [0, s > 0];
         rows = row + [0, t > 0];
         if all(all(map.has_height(rows, columns)))
-            found(p) = [1 - t, t] * map.height_m(rows, columns) * [1 - s; s];
+            found(p) = [1 - t, t] * values(rows, columns) * [1 - s; s];
         end
     end
 end
@@ -151,29 +196,314 @@ function [currents, force, answers] = feedback(map, points_m)
     if isfield(map, 'total_current_max_a')
         total = map.total_current_max_a;
     end
+    vector = isfield(map, 'requested_direction');
+    if vector
+        vectors = force_vectors_per_ampere(map, points_m);
+        requested = requested_force(map, points_m);
+    end
     per_ampere = force_per_ampere(map, points_m);
     passive = passive_force(map, points_m);
     wanted = map.lambda_n_per_m * height(map, points_m);
     wanted(isnan(wanted)) = 0;
     count = size(points_m, 1);
     currents = zeros(count, numel(map.current_max_a));
-    force = zeros(count, 1);
+    force = zeros(count, 1 + 2 * vector);
+    words = {'saturated', 'ok'};
     answers = repmat({'outside'}, count, 1);
     axes_m = {map.x_m, map.y_m, map.z_m};
     for p = 1:count
         if ~all(arrayfun(@(k) axes_m{k}(1) <= points_m(p, k) && points_m(p, k) <= axes_m{k}(end), 1:3))
             continue
         end
+        if vector
+            own = reshape(vectors(p, :, :), [], 3);
+            pull = [0, 0, passive(p)];
+            [currents(p, :), met] = allocate_vector(own, requested(p, :) - pull, map.resistance_ohm, ...
+                                                    map.current_min_a, map.current_max_a, total, ...
+                                                    map.sideways_weight);
+            force(p, :) = currents(p, :) * own + pull;
+            answers{p} = words{1 + met};
+            continue
+        end
         [currents(p, :), met] = allocate(per_ampere(p, :), wanted(p) - passive(p), map.resistance_ohm, ...
                                          map.current_min_a, map.current_max_a, total);
         force(p) = per_ampere(p, :) * currents(p, :).' + passive(p);
-        words = {'saturated', 'ok'};
         answers{p} = words{1 + met};
     end
 end
 
+% Currents of least power for a force vector: the algorithm of src/lambda/vector_allocation.rs.
+
+function [currents, met] = allocate_vector(per_ampere, wanted, r, lower, upper, total, sideways_weight)
+% The currents that give the vector for the forces per ampere, [coil, axis], or the nearest force,
+% sideways errors times the weight; and whether they do.
+    largest = max(abs(per_ampere(:)));
+    currents = zeros(size(r));
+    met = ~any(wanted);
+    if met || ~all(isfinite(wanted)) || largest == 0 || isinf(1 / largest)
+        return
+    end
+    weights = [sideways_weight, sideways_weight, 1];
+    d.rows = [per_ampere .* weights * (1 / largest), ones(numel(r), 1)];
+    d.target = [wanted .* weights * (1 / largest), total].';
+    d.conductance = (min(r) ./ r).';
+    d.lower = lower.';
+    d.upper = upper.';
+    d.at = zeros(numel(r), 1);
+    d.currents = zeros(numel(r), 1);
+    size_of_force = sum(d.conductance .* sum(d.rows(:, 1:3) .^ 2, 2));
+    stiffness = sum(d.conductance);
+    y = zeros(4, 1);
+    share = 1e-7;
+    while true
+        d.eps = share * [size_of_force; size_of_force; size_of_force; 1e-6 * stiffness];
+        n = 3;
+        y(4) = 0;
+        [d, y] = climb(d, y, n);
+        if sum(d.currents) > d.target(4)
+            n = 4;
+            [d, y] = climb(d, y, n);
+        end
+        [d, met] = finish_exactly(d, y, n);
+        if met
+            break
+        end
+        [d, nearest] = finish_nearest(d, n);
+        if ~nearest && share * 1e-3 >= 1e-14
+            share = share * 1e-3;
+            continue
+        end
+        if ~nearest
+            d.currents = min(max(d.conductance .* (d.rows(:, 1:n) * y(1:n)), d.lower), d.upper);
+        end
+        met = vector_met(d);
+        break
+    end
+    currents = d.currents.';
+end
+
+function [d, slope, curvature, changed] = dual_place(d, y, n, all_free)
+% Currents, slope and curvature of the dual at y, and whether another coil is at a limit than before.
+    alone = d.conductance .* (d.rows(:, 1:n) * y(1:n));
+    at = (alone >= d.upper) - (alone <= d.lower);
+    at(alone <= d.lower) = -1;
+    if all_free
+        at(:) = 0;
+    end
+    d.currents = alone;
+    d.currents(at < 0) = d.lower(at < 0);
+    d.currents(at > 0) = d.upper(at > 0);
+    changed = all_free || any(at ~= d.at);
+    d.at = at;
+    free = d.rows(at == 0, 1:n);
+    slope = d.target(1:n) - d.eps(1:n) .* y(1:n) - d.rows(:, 1:n).' * d.currents;
+    curvature = diag(d.eps(1:n)) + free.' * (d.conductance(at == 0) .* free);
+end
+
+function [d, y] = climb(d, y, n)
+% Newton's steps to the top of the dual.
+    [d, slope, curvature] = dual_place(d, y, n, ~any(y(1:n)));
+    for turn = 1:60
+        step = cholesky(curvature, slope, 0);
+        uphill = sum(step .* slope(1:numel(step)));
+        if isempty(step) || ~(uphill > 0 && isfinite(uphill))
+            break
+        end
+        there = y;
+        there(1:n) = y(1:n) + step;
+        [d, next_slope, next_curvature, changed] = dual_place(d, there, n, false);
+        if abs(sum(step .* next_slope)) <= 0.1 * uphill
+            y = there;
+            slope = next_slope;
+            curvature = next_curvature;
+            if ~changed
+                break
+            end
+            continue
+        end
+        y(1:n) = y(1:n) + top_along(d, y, step, n) * step;
+        [d, slope, curvature] = dual_place(d, y, n, false);
+    end
+end
+
+function length = top_along(d, y, step, n)
+% Where the dual is highest along a step: its slope falls piecewise linearly.
+    alone = d.conductance .* (d.rows(:, 1:n) * y(1:n));
+    per_step = d.rows(:, 1:n) * step;
+    speed = d.conductance .* per_step;
+    slope = sum(step .* (d.target(1:n) - d.eps(1:n) .* y(1:n)));
+    slope = slope - sum(per_step .* min(max(alone, d.lower), d.upper));
+    fall = sum(d.eps(1:n) .* step .^ 2);
+    near = d.lower;
+    near(speed < 0) = d.upper(speed < 0);
+    far = d.upper;
+    far(speed < 0) = d.lower(speed < 0);
+    leaves = (near - alone) ./ speed;
+    meets = (far - alone) ./ speed;
+    bend = speed .* per_step;
+    use = speed ~= 0 & meets > 0;
+    fall = fall + sum(bend(use & leaves <= 0));
+    later = use & leaves > 0;
+    kinks = sortrows([leaves(later), bend(later); meets(use), -bend(use)]);
+    since = 0;
+    for k = 1:size(kinks, 1)
+        to = kinks(k, 1);
+        if slope <= fall * (to - since)
+            break
+        end
+        slope = slope - fall * (to - since);
+        fall = fall + kinks(k, 2);
+        since = to;
+    end
+    length = since;
+    if fall > 0
+        length = since + slope / fall;
+    end
+end
+
+function [left, size_of_terms] = missing_force(d)
+% What is missing of force and sum, and the size of the force's terms.
+    sizes = sqrt(sum(d.rows(:, 1:3) .^ 2, 2)) .* abs(d.currents);
+    left = d.target - d.rows.' * d.currents;
+    size_of_terms = norm(d.target(1:3)) + sum(sizes);
+end
+
+function met = vector_met(d)
+    [left, size_of_terms] = missing_force(d);
+    met = norm(left(1:3)) <= 1e-11 * size_of_terms;
+end
+
+function [d, optimal] = finish_exactly(d, climbed, n)
+% Solves the free currents without eps; whether that is optimal.
+    optimal = false;
+    free = d.at == 0;
+    rows = d.rows(free, 1:n);
+    system = rows.' * (d.conductance(free) .* rows);
+    right = d.target(1:n) - d.rows(~free, 1:n).' * d.currents(~free);
+    y = climbed;
+    for turn = 1:3
+        step = cholesky(system + diag(d.eps(1:n)), right - system * y(1:n), 0);
+        if isempty(step)
+            return
+        end
+        y(1:n) = y(1:n) + step;
+    end
+    size_of_y = sum(abs(y));
+    if n == 4 && y(4) > 1e-11 * size_of_y
+        return
+    end
+    alone = d.conductance .* (d.rows(:, 1:n) * y(1:n));
+    slack = 1e-11 * max(d.conductance * size_of_y, d.upper - d.lower);
+    low = alone >= d.lower - slack;
+    high = alone <= d.upper + slack;
+    at_lower = d.at < 0;
+    at_upper = d.at > 0;
+    if ~all(low(free) & high(free)) || ~all(alone(at_lower) <= d.lower(at_lower) + slack(at_lower)) || ...
+       ~all(alone(at_upper) >= d.upper(at_upper) - slack(at_upper))
+        return
+    end
+    clipped = min(max(alone, d.lower), d.upper);
+    d.currents(free) = clipped(free);
+    terms = sum(abs(d.currents));
+    optimal = vector_met(d) && sum(d.currents) <= d.target(4) + 1e-11 * terms;
+end
+
+function [d, nearest] = finish_nearest(d, n)
+% Solves the free currents, few as they are, for the nearest force; whether it is.
+    nearest = false;
+    free = find(d.at == 0);
+    if numel(free) > 4
+        return
+    end
+    d.currents(free) = 0;
+    left = missing_force(d);
+    % With a sum that binds, the last free coil takes what the others leave of it.
+    last = free([]);
+    if n == 4
+        last = free(max(numel(free), 1):end);
+    end
+    others = free(1:numel(free) - numel(last));
+    base = sum(d.rows(last, 1:3), 1);
+    rest = 0;
+    if ~isempty(last)
+        rest = left(4);
+    end
+    columns = d.rows(others, 1:3) - base;
+    if ~isempty(others)
+        solved = cholesky(columns * columns.', columns * (left(1:3) - base.' * rest), 1e-13);
+        if isempty(solved)
+            return
+        end
+        d.currents(others) = solved;
+    end
+    if ~isempty(last)
+        d.currents(last) = left(4) - sum(d.currents(others));
+    end
+    slack = 1e-11 * (d.upper(free) - d.lower(free));
+    found = d.currents(free);
+    if ~all(found >= d.lower(free) - slack & found <= d.upper(free) + slack)
+        return
+    end
+    d.currents(free) = min(max(found, d.lower(free)), d.upper(free));
+    nearest = is_nearest(d, n);
+end
+
+function nearest = is_nearest(d, n)
+% Whether what is missing pulls every coil against the limit it is at, the sum's included.
+    nearest = false;
+    [left, size_of_terms] = missing_force(d);
+    missing = norm(left(1:3));
+    if missing <= 1e-11 * size_of_terms
+        return
+    end
+    slack = 1e-9 * missing + 1e-14 * size_of_terms;
+    pull = d.rows(:, 1:3) * left(1:3);
+    if n == 4
+        price = max([pull(d.at == 0); -Inf]);
+        if price < -slack
+            return
+        end
+        pull = pull - price;
+    elseif sum(d.currents) > d.target(4) * (1 + 1e-11)
+        return
+    end
+    nearest = all(abs(pull(d.at == 0)) <= slack) && all(d.at .* pull >= -slack | d.at == 0);
+end
+
+function x = cholesky(matrix, right, least)
+% Solves a symmetric positive definite system; empty where a pivot is at most `least` of its entry.
+    x = [];
+    scale = sqrt(diag(matrix));
+    if ~isreal(scale) || ~all(scale > 0 & isfinite(scale))
+        return
+    end
+    n = numel(scale);
+    scaled = matrix ./ (scale * scale.');
+    factor = zeros(n);
+    for a = 1:n
+        for b = 1:a
+            value = scaled(a, b) - sum(factor(a, 1:b - 1) .* factor(b, 1:b - 1));
+            if a ~= b
+                factor(a, b) = value / factor(b, b);
+            elseif ~(value > least)
+                return
+            else
+                factor(a, a) = sqrt(value);
+            end
+        end
+    end
+    found = right ./ scale;
+    for a = 1:n
+        found(a) = (found(a) - sum(factor(a, 1:a - 1).' .* found(1:a - 1, 1))) / factor(a, a);
+    end
+    for a = n:-1:1
+        found(a) = (found(a) - sum(factor(a + 1:n, a) .* found(a + 1:n, 1))) / factor(a, a);
+    end
+    x = found ./ scale;
+end
+
 % Currents of least power: I_i = clip((mu (g_i - center) + nu) / R_i). The algorithm is told in
-% src/lambda/allocate.rs; here it is written for clearness, not for speed.
+% src/lambda/allocation.rs; here it is written for clearness, not for speed.
 
 function [best, met] = allocate(per_ampere, wanted, r, lower, upper, total)
 % The currents of least power that give `wanted` N, or the nearest force, and whether they do.
@@ -498,7 +828,8 @@ function map = read_npz(path)
     names = {'x_m', 'y_m', 'z_m', 'coil', 'gz_t_per_m_per_a', 'moment_a_m2', 'current_min_a', ...
              'current_max_a', 'resistance_ohm', 'gradient_t_per_m_per_a', 'field_t_per_a', 'passive_force_n', ...
              'working_point_gz_t_per_m', 'total_current_max_a', 'lambda_n_per_m', 'height_x_m', 'height_y_m', ...
-             'height_m', 'has_height', 'static_current_a', 'inductance_h', 'voltage_v', 'schema_version'};
+             'height_m', 'has_height', 'static_current_a', 'inductance_h', 'voltage_v', 'schema_version', ...
+             'gx_t_per_m_per_a', 'gy_t_per_m_per_a', 'requested_direction', 'sideways_weight'};
     file = fopen(path, 'r', 'ieee-le');
     closing = onCleanup(@() fclose(file));
     fseek(file, 0, 'eof');
@@ -618,7 +949,9 @@ function check(map, bundle)
         end
     end
     grid = [numel(map.z_m), numel(map.y_m), numel(map.x_m)];
-    wanted = {'gz_t_per_m_per_a', [numel(map.coil), grid]; ...
+    wanted = {'gz_t_per_m_per_a', [numel(map.coil), grid]; 'gx_t_per_m_per_a', [numel(map.coil), grid]; ...
+              'gy_t_per_m_per_a', [numel(map.coil), grid]; 'requested_direction', [surface, 3]; ...
+              'sideways_weight', [1, 1]; ...
               'gradient_t_per_m_per_a', [numel(map.coil), grid, 3, 3]; ...
               'passive_force_n', grid; 'moment_a_m2', [1, 3]; 'current_max_a', [1, coils]; ...
               'current_min_a', [1, coils]; 'resistance_ohm', [1, coils]; 'lambda_n_per_m', [1, 1]; ...
@@ -636,6 +969,13 @@ function check(map, bundle)
     end
     if any(map.moment_a_m2(1:2)) && ~isfield(map, 'gradient_t_per_m_per_a')
         error('fluxform:bundle', 'a tilted magnet needs gradient_t_per_m_per_a in map.npz');
+    end
+    if isfield(map, 'gx_t_per_m_per_a') ~= isfield(map, 'gy_t_per_m_per_a')
+        error('fluxform:bundle', 'map.npz: gx_t_per_m_per_a and gy_t_per_m_per_a belong together');
+    end
+    if isfield(map, 'requested_direction') && ~(isfield(map, 'gx_t_per_m_per_a') && isfield(map, 'height_m') && ...
+       isfield(map, 'sideways_weight') && map.sideways_weight >= 1e-6 && map.sideways_weight <= 1)
+        error('fluxform:bundle', 'map.npz: requested_direction needs gx_t_per_m_per_a and a sideways_weight of 1e-6 to 1');
     end
     if isfield(map, 'height_m')
         if ~isfield(map, 'has_height') || ~all(map.has_height(:) == 0 | map.has_height(:) == 1)

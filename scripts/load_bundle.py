@@ -7,6 +7,7 @@
     total = force @ bundle.currents_a                      # N
     total += bundle.passive_force([[0.01, 0.0, 0.05]])     # N, the unpowered steel's pull; 0 without
     currents, force, answer = bundle.currents([[0.01, 0.0, 0.05]])   # with position feedback (eq. 8)
+    force = bundle.force_vectors_per_ampere([[0.01, 0.0, 0.05]])     # N/A along x, y, z, where it has them
 
 or on the command line: lambda, and the force of the static currents at points given as x,y,z in m:
 
@@ -37,7 +38,8 @@ ARRAYS = (
     "current_max_a", "resistance_ohm",
 )
 OPTIONAL_ARRAYS = (
-    "schema_version", "gradient_t_per_m_per_a", "field_t_per_a", "passive_force_n",
+    "schema_version", "gx_t_per_m_per_a", "gy_t_per_m_per_a", "requested_direction", "sideways_weight",
+    "gradient_t_per_m_per_a", "field_t_per_a", "passive_force_n",
     "working_point_gz_t_per_m", "total_current_max_a", "lambda_n_per_m", "height_x_m",
     "height_y_m", "height_m", "has_height", "static_current_a", "inductance_h", "voltage_v",
 )
@@ -108,6 +110,10 @@ class Bundle:
         coils = (self.coil_count,)
         for key, shape in (
             ("gz_t_per_m_per_a", grid),
+            ("gx_t_per_m_per_a", grid),
+            ("gy_t_per_m_per_a", grid),
+            ("requested_direction", self._surface() + (3,)),
+            ("sideways_weight", ()),
             ("gradient_t_per_m_per_a", grid + (3, 3)),
             ("field_t_per_a", grid + (3,)),
             ("passive_force_n", grid[1:]),
@@ -139,6 +145,8 @@ class Bundle:
         moment = self.map["moment_a_m2"]
         if np.any(moment[:2] != 0) and "gradient_t_per_m_per_a" not in self.map:
             raise BundleError("map.npz: a tilted magnet needs gradient_t_per_m_per_a")
+        if ("gx_t_per_m_per_a" in self.map) != ("gy_t_per_m_per_a" in self.map):
+            raise BundleError("map.npz: gx_t_per_m_per_a and gy_t_per_m_per_a belong together")
         if "height_x_m" in self.map:
             self._check_rendering()
 
@@ -153,6 +161,11 @@ class Bundle:
         low, high = self.map["current_min_a"], self.map["current_max_a"]
         if np.any(low > 0) or np.any(high < 0) or self.map.get("total_current_max_a", 0.0) < 0:
             raise BundleError("map.npz: current_max_a: limits must enclose 0")
+        if "requested_direction" in self.map:
+            if "gx_t_per_m_per_a" not in self.map:
+                raise BundleError("map.npz: array gx_t_per_m_per_a is missing")
+            if not 1e-6 <= float(self.map["sideways_weight"]) <= 1:
+                raise BundleError("map.npz: sideways_weight must lie between 1e-6 and 1")
 
     def _surface(self):
         return tuple(len(self.map.get(key, ())) for key in ("height_y_m", "height_x_m"))
@@ -187,6 +200,33 @@ class Bundle:
             for row, moment in enumerate((m_x, m_y, m_z))
         )
 
+    def force_vectors_per_ampere(self, points_m):
+        """Force on the magnet [N/A]: point, coil, then x, y, z; zero outside. An error for bundles that
+        hold the upward force alone."""
+        if "gx_t_per_m_per_a" not in self.map:
+            raise BundleError("map.npz holds the upward force alone: calibrate with force = \"vertical-only\"")
+        m_x, m_y, m_z = self.map["moment_a_m2"]
+        parts = []
+        for axis, name in enumerate(("gx", "gy", "gz")):
+            if m_x == 0 and m_y == 0:
+                parts.append(m_z * self._interpolate(self.map[f"{name}_t_per_m_per_a"], points_m))
+                continue
+            # F = grad (m . B): of a tilted magnet all of the gradient counts.
+            gradient = self.map["gradient_t_per_m_per_a"]
+            parts.append(sum(
+                moment * self._interpolate(gradient[..., row, axis], points_m)
+                for row, moment in enumerate((m_x, m_y, m_z))
+            ))
+        return np.stack(parts, axis=2)
+
+    def requested_force(self, points_m):
+        """The force vector requested [N] at x, y: lambda times the height, upward unless the bundle requests
+        another direction; zero where there is no surface."""
+        points_m = np.atleast_2d(np.asarray(points_m, dtype=float))
+        height, direction = self._on_surface(points_m)
+        size = self.lambda_n_per_m * np.nan_to_num(height)
+        return size[:, None] * np.nan_to_num(direction)
+
     def passive_force(self, points_m):
         """What the unpowered steel adds to the force [N], up positive; zero outside or without it."""
         points_m = np.atleast_2d(np.asarray(points_m, dtype=float))
@@ -200,29 +240,44 @@ class Bundle:
         points_m = np.atleast_2d(np.asarray(points_m, dtype=float))
         if "height_m" not in self.map:
             raise BundleError("map.npz holds no heights: it is of a schema before 1.2; calibrate again")
+        return self._on_surface(points_m)[0]
+
+    def _on_surface(self, points_m):
+        """Heights [m] and directions of the requested force, bilinear between the nodes; NaN where none is."""
         nodes = self.map["height_x_m"], self.map["height_y_m"]
         (column, s, in_x), (row, t, in_y) = (_between(n, points_m[:, k]) for k, n in enumerate(nodes))
-        result = np.full(len(points_m), np.nan)
-        height, has = self.map["height_m"], self.map["has_height"]
+        has = self.map["has_height"]
         right, above = column + (s > 0), row + (t > 0)
-        low = (1 - s) * height[row, column] + s * height[row, right]
-        high = (1 - s) * height[above, column] + s * height[above, right]
         # A node of no weight has a neighbour of its own as its twin, so all four may be asked.
         there = has[row, column] * has[row, right] * has[above, column] * has[above, right]
         where = in_x & in_y & (there > 0)
-        result[where] = ((1 - t) * low + t * high)[where]
-        return result
+
+        def between(values):
+            result = np.full(len(points_m), np.nan)
+            low = (1 - s) * values[row, column] + s * values[row, right]
+            high = (1 - s) * values[above, column] + s * values[above, right]
+            result[where] = ((1 - t) * low + t * high)[where]
+            return result
+
+        height = between(self.map["height_m"])
+        if "requested_direction" not in self.map:
+            return height, np.where(where[:, None], [0.0, 0.0, 1.0], np.nan)
+        direction = self.map["requested_direction"]
+        return height, np.stack([between(direction[..., k]) for k in range(3)], axis=1)
 
     def currents(self, points_m):
         """Currents [A] of least power whose force is lambda times the height (eq. 8), or the nearest.
 
         Returns one row a point of currents, one column a coil, the force they give [N], and the
-        answers: "ok", "saturated" or "outside" (of the map: no currents).
+        answers: "ok", "saturated" or "outside" (of the map: no currents). Of bundles that request a
+        force vector the force has three columns.
         """
         if self.lambda_n_per_m is None:
             raise BundleError("the bundle has no force constant: nothing can be rendered")
         points_m = np.atleast_2d(np.asarray(points_m, dtype=float))
         inside = self.inside(points_m)
+        if "requested_direction" in self.map:
+            return self._vector_currents(points_m, inside)
         per_ampere = self.force_per_ampere(points_m)
         passive = self.passive_force(points_m)
         wanted = self.lambda_n_per_m * np.nan_to_num(self.height(points_m))
@@ -233,6 +288,29 @@ class Bundle:
             answers[k] = "ok" if reached else "saturated"
         force = np.where(inside, np.sum(per_ampere * currents, axis=1) + passive, 0.0)
         return currents, force, answers
+
+    def _vector_currents(self, points_m, inside):
+        per_ampere = self.force_vectors_per_ampere(points_m)
+        pull = np.zeros((len(points_m), 3))
+        pull[:, 2] = self.passive_force(points_m)
+        wanted = self.requested_force(points_m) - pull
+        currents = np.zeros((len(points_m), self.coil_count))
+        answers = np.full(len(points_m), "outside", dtype=object)
+        for k in np.flatnonzero(inside):
+            currents[k], reached = self.allocate_vector(per_ampere[k], wanted[k])
+            answers[k] = "ok" if reached else "saturated"
+        force = np.einsum("pck,pc->pk", per_ampere, currents) + pull
+        force[~inside] = 0.0
+        return currents, force, answers
+
+    def allocate_vector(self, force_per_ampere, wanted_n):
+        """Currents [A] of least power that give the vector wanted_n for the forces per ampere [coil, axis],
+        or the nearest force, sideways errors times the bundle's sideways_weight; and whether they do."""
+        return _allocate_vector(
+            np.asarray(force_per_ampere, dtype=float), np.asarray(wanted_n, dtype=float),
+            self.map["resistance_ohm"], self.map["current_min_a"], self.map["current_max_a"],
+            float(self.map.get("total_current_max_a", np.inf)), float(self.map["sideways_weight"]),
+        )
 
     def allocate(self, force_per_ampere, wanted_n):
         """Currents [A] of least power that give wanted_n, or the nearest force, and whether they do."""
@@ -507,6 +585,22 @@ def _allocate(force_per_ampere, wanted, r, lower, upper, total):
         if not low < sigma < high:
             break
     return (most_currents if best[0] > 1 - target / most else best[1]), True
+
+
+def _allocate_vector(force_per_ampere, wanted, r, lower, upper, total, sideways_weight):
+    largest = np.max(np.abs(force_per_ampere), initial=0.0)
+    nothing = not np.any(wanted)
+    if nothing or not np.all(np.isfinite(wanted)) or largest == 0 or not np.isfinite(1 / largest):
+        return np.zeros(len(r)), nothing
+    weights = np.array([sideways_weight, sideways_weight, 1.0])
+    rows = np.column_stack([force_per_ampere * weights * (1 / largest), np.ones(len(r))])
+    target = np.append(wanted * weights * (1 / largest), total)
+    # Beside this file; bundles that request the upward force alone do without it.
+    from vector_dual import Dual
+    dual = Dual(rows, target, np.min(r) / r, lower, upper)
+    with np.errstate(over="ignore", invalid="ignore"):
+        reached = dual.solve()
+    return dual.currents, reached
 
 
 def _table(content, name):

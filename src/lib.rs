@@ -134,6 +134,7 @@
 
 pub use fluxform_base::accuracy;
 pub use fluxform_base::digits;
+pub use fluxform_base::force_direction;
 pub use fluxform_base::point_weights;
 pub use fluxform_base::progress;
 pub use fluxform_base::units;

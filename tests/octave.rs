@@ -78,7 +78,7 @@ points = csvread('positions.csv');
 [current, force, answer] = bundle.currents(points);
 [~, code] = ismember(answer, {'ok', 'saturated', 'outside'});
 found = [bundle.force_per_ampere(points), bundle.passive_force(points), bundle.height(points), ...
-         current, force, code];
+         current, force(:, end), code];
 found(isnan(found)) = 0;
 format = [repmat('%.17g ', 1, columns(found)), '\\n'];
 printf(format, found.');
@@ -89,11 +89,16 @@ fn octave_and_rust_give_the_same_forces_heights_and_currents() {
         ("upright", false, false, [13, 17, 11]),
         ("tilted with pull", true, true, [13, 9, 11]),
         ("short axes", false, true, [2, 3, 1]),
+        ("upright vector", false, false, [13, 17, 11]),
+        ("tilted vector with pull", true, true, [13, 9, 11]),
     ] {
         let folder = tempfile::tempdir().unwrap();
         let mut sample = sample(tilted, samples);
         if pulled {
             sample = sample.with_pull();
+        }
+        if name.contains("vector") {
+            sample = sample.with_vectors();
         }
         let target = folder.path().join("bundle");
         sample.write(&target, false).unwrap();

@@ -1,9 +1,11 @@
 //! Parts used by every room: physical constants and the millimetre border, progress and interruption,
-//! the error statement that every stage attaches to its numbers, and the force constants' names.
+//! the error statement that every stage attaches to its numbers, the force constants' names,
+//! and which force is requested.
 
 pub mod accuracy;
 pub mod digits;
 pub mod force_constant;
+pub mod force_direction;
 pub mod point_weights;
 pub mod progress;
 pub mod units;

@@ -3,7 +3,7 @@
 use super::array_check::LARGEST;
 use super::lambda_file::LambdaFile;
 use super::manifest::{AxisSummary, INTERPOLATION, Manifest};
-use super::npz::{MapArrays, PASSIVE};
+use super::npz::{MapArrays, PASSIVE, SIDES};
 use super::rendering::HeightGrid;
 use super::table::{CurrentRow, PointRow};
 
@@ -81,6 +81,12 @@ fn check_rendering(
         Some(rendering.inductance_h.as_slice()),
         circuit.map(|c| c.inductance_h.concat()).as_deref(),
     )?;
+    let requested = rendering.requested.as_ref();
+    same(
+        "map.npz and the manifest agree on the requested force",
+        requested.map(|requested| requested.sideways_weight),
+        manifest.force.as_ref().map(|force| force.sideways_weight),
+    )?;
     same(
         "map.npz and the manifest agree on voltage_v",
         rendering.voltage_v,
@@ -96,6 +102,7 @@ fn check_errors(manifest: &Manifest) -> Result<(), String> {
     let passive = passive.map(|p| [p.interpolation.largest_error, p.largest_n]);
     let stated = stages
         .chain([map.interpolation.largest_error])
+        .chain(map.sides.iter().flat_map(|sides| sides.largest_error))
         .chain(passive.into_iter().flatten());
     for number in stated {
         if number.abs() > LARGEST {
@@ -217,6 +224,18 @@ fn check_map(manifest: &Manifest, map: &MapArrays) -> Result<(), String> {
         map.passive_force_n.is_some(),
         told.passive_force.is_some(),
     )?;
+    same(
+        "map.npz has gx and gy where the manifest states them",
+        map.sides_t_per_m_per_a.is_some(),
+        told.sides.is_some(),
+    )?;
+    if let Some(sides) = &told.sides {
+        same(
+            "the arrays of the sideways force are known",
+            sides.arrays.each_ref().map(String::as_str),
+            SIDES,
+        )?;
+    }
     if let Some(passive) = &told.passive_force {
         same(
             "the passive force's array is known",

@@ -22,6 +22,8 @@ pub struct ForceMap {
     kept: Vec<usize>,
     /// `[z, y, x, group of kept coils]`, N/A; beyond the last coil zero.
     force_n_per_a: Vec<[f64; GROUP]>,
+    /// The same along x and y, where the bundle holds them.
+    sides_n_per_a: Option<[Vec<[f64; GROUP]>; 2]>,
     /// `[z, y, x]`, N.
     passive_n: Option<Vec<f64>>,
     /// The largest |force per ampere| of any coil on every plane of nodes, N/A.
@@ -41,16 +43,24 @@ impl ForceMap {
             .as_deref()
             .filter(|_| m_x != 0.0 || m_y != 0.0);
         let groups = kept.div_ceil(GROUP);
-        let mut force_n_per_a = vec![[0.0; GROUP]; nodes * groups];
-        for coil in 0..kept {
-            for node in 0..nodes {
-                let at = coil * nodes + node;
-                force_n_per_a[node * groups + coil / GROUP][coil % GROUP] = match gradient {
-                    Some(g) => m_x * g[9 * at + 2] + m_y * g[9 * at + 5] + m_z * g[9 * at + 8],
-                    None => m_z * map.gz_t_per_m_per_a[at],
-                };
+        let arranged = |axis: usize, along_z: &[f64]| {
+            let mut force_n_per_a = vec![[0.0; GROUP]; nodes * groups];
+            for coil in 0..kept {
+                for node in 0..nodes {
+                    let at = coil * nodes + node;
+                    force_n_per_a[node * groups + coil / GROUP][coil % GROUP] = match gradient {
+                        Some(g) => {
+                            let column = &g[9 * at..9 * at + 9];
+                            m_x * column[axis] + m_y * column[3 + axis] + m_z * column[6 + axis]
+                        }
+                        None => m_z * along_z[at],
+                    };
+                }
             }
-        }
+            force_n_per_a
+        };
+        let force_n_per_a = arranged(2, &map.gz_t_per_m_per_a);
+        let sides = map.sides();
         let plane = (ny * nx * groups).max(1);
         let size = |most: f64, value: &f64| most.max(value.abs());
         Self {
@@ -62,6 +72,7 @@ impl ForceMap {
                 .map(|values| values.as_flattened().iter().fold(0.0, size))
                 .collect(),
             force_n_per_a,
+            sides_n_per_a: sides.map(|[gx, gy]| [arranged(0, gx), arranged(1, gy)]),
             passive_n: map.passive_force_n.as_deref().map(<[f64]>::to_vec),
         }
     }
@@ -90,46 +101,87 @@ impl ForceMap {
     /// # Panics
     /// When `force_n_per_a` is shorter than the array.
     pub fn at(&self, position_m: [f64; 3], force_n_per_a: &mut [f64]) -> Option<f64> {
+        let near = self.near(position_m)?;
+        let force = &mut force_n_per_a[..self.coils];
+        if self.kept.len() < self.coils {
+            force.fill(0.0);
+        }
+        self.each_sum(&near, &self.force_n_per_a, |coil, sum| force[coil] = sum);
+        Some(self.pull_n(&near))
+    }
+
+    /// Whether the map holds all three components of the force.
+    #[must_use]
+    pub fn has_vectors(&self) -> bool {
+        self.sides_n_per_a.is_some()
+    }
+
+    /// As [`ForceMap::at`], along x, y and z; `None` also where the map holds the upward component alone.
+    ///
+    /// # Panics
+    /// When `force_n_per_a` is shorter than the array.
+    pub fn vectors_at(&self, position_m: [f64; 3], force_n_per_a: &mut [[f64; 3]]) -> Option<f64> {
+        let [along_x, along_y] = self.sides_n_per_a.as_ref()?;
+        let near = self.near(position_m)?;
+        let force = &mut force_n_per_a[..self.coils];
+        if self.kept.len() < self.coils {
+            force.fill([0.0; 3]);
+        }
+        for (axis, values) in [along_x, along_y, &self.force_n_per_a]
+            .into_iter()
+            .enumerate()
+        {
+            self.each_sum(&near, values, |coil, sum| force[coil][axis] = sum);
+        }
+        Some(self.pull_n(&near))
+    }
+
+    /// The nodes that take part at a position; `None` outside.
+    fn near(&self, position_m: [f64; 3]) -> Option<Near> {
         let [x, y, z] = &self.axes_m;
         let (row, rows) = (x.len(), y.len());
         let x = stencil(x, position_m[0])?;
         let y = stencil(y, position_m[1])?;
         let z = stencil(z, position_m[2])?;
-        let mut nodes = [(0, 0.0); MOST_NODES];
-        let mut count = 0;
+        let mut near = Near {
+            nodes: [(0, 0.0); MOST_NODES],
+            count: 0,
+        };
         for k in 0..z.count {
             for j in 0..y.count {
                 let share = z.weights[k] * y.weights[j];
                 let first = ((z.start + k) * rows + y.start + j) * row + x.start;
                 for i in 0..x.count {
-                    nodes[count] = (first + i, share * x.weights[i]);
-                    count += 1;
+                    near.nodes[near.count] = (first + i, share * x.weights[i]);
+                    near.count += 1;
                 }
             }
         }
-        let nodes = &nodes[..count];
-        let force = &mut force_n_per_a[..self.coils];
-        if self.kept.len() < self.coils {
-            force.fill(0.0);
-        }
+        Some(near)
+    }
+
+    /// Hands the interpolated value of every coil with a map to `put`.
+    fn each_sum(&self, near: &Near, values: &[[f64; GROUP]], mut put: impl FnMut(usize, f64)) {
         let groups = self.kept.len().div_ceil(GROUP);
         for (group, coils) in self.kept.chunks(GROUP).enumerate() {
             let mut sums = [0.0; GROUP];
-            for &(node, weight) in nodes {
-                let values = &self.force_n_per_a[node * groups + group];
+            for &(node, weight) in near.nodes() {
+                let values = &values[node * groups + group];
                 for (sum, value) in sums.iter_mut().zip(values) {
                     *sum += weight * value;
                 }
             }
             for (&coil, sum) in coils.iter().zip(sums) {
-                force[coil] = sum;
+                put(coil, sum);
             }
         }
-        let pull = self.passive_n.as_ref().map_or(0.0, |passive| {
-            let terms = nodes.iter().map(|&(node, weight)| weight * passive[node]);
-            terms.sum()
-        });
-        Some(pull)
+    }
+
+    fn pull_n(&self, near: &Near) -> f64 {
+        self.passive_n.as_ref().map_or(0.0, |passive| {
+            let terms = near.nodes().iter();
+            terms.map(|&(node, weight)| weight * passive[node]).sum()
+        })
     }
 
     /// The largest |force per ampere| of any coil on the planes of nodes around a height, N/A.
@@ -142,5 +194,17 @@ impl ForceMap {
             .iter()
             .copied()
             .fold(0.0, f64::max)
+    }
+}
+
+/// Nodes with their weights at a position.
+struct Near {
+    nodes: [(usize, f64); MOST_NODES],
+    count: usize,
+}
+
+impl Near {
+    fn nodes(&self) -> &[(usize, f64)] {
+        &self.nodes[..self.count]
     }
 }

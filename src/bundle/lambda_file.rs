@@ -8,9 +8,11 @@ use serde::{Deserialize, Serialize};
 use super::artefact::Input;
 use super::headline::Headline;
 use fluxform_base::accuracy::StageAccuracy;
+use fluxform_base::force_direction::{ForceDirection, NormalForce};
 use fluxform_base::point_weights::Weights;
 use fluxform_lambda::feedback::Rendered;
 pub use fluxform_lambda::sideways::Sideways;
+use fluxform_lambda::vector_feedback::VectorRendering;
 use fluxform_lambda::worst::ActivePoint;
 use fluxform_lambda::{Criterion, ForceConstants, GivenForce, Wiring};
 
@@ -142,6 +144,34 @@ pub struct FeedbackFile {
     /// The same demand above and below the surface; absent when not asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shell: Option<FeedbackShell>,
+    /// The force vector; absent where the upward force alone is requested.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vector: Option<VectorFeedbackFile>,
+}
+
+/// A force vector rendered with position feedback, beside what other currents make of the same request.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct VectorFeedbackFile {
+    /// Where the requested force points.
+    pub direction: ForceDirection,
+    /// How large a force along the normal is; absent for other directions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal_force: Option<NormalForce>,
+    /// The largest at which every point gets its vector, N/m; null where there is none above zero.
+    pub lambda_n_per_m: Option<f64>,
+    /// Why there is none; null where there is one.
+    pub reason: Option<String>,
+    /// Where the largest is decided.
+    pub decided_at: Option<FeedbackPlace>,
+    /// The static currents at the chosen lambda; null without one, as the next two.
+    #[serde(rename = "static")]
+    pub fixed: Option<VectorRendering>,
+    /// Feedback of the upward part alone, at the chosen lambda.
+    pub upward: Option<VectorRendering>,
+    /// Feedback of all three components, at the chosen lambda.
+    pub vector: Option<VectorRendering>,
+    /// The same at its own largest lambda; null without one.
+    pub at_largest: Option<VectorRendering>,
 }
 
 /// A place that decides.

@@ -223,6 +223,39 @@ impl Bundle {
         }
     }
 
+    /// Force per ampere of every coil of the array on the magnet's centre at (x, y, z) m along x, y and z, N/A:
+    /// F = grad(m.B), interpolated. `None` for bundles that hold the upward component alone; outside the map:
+    /// all zero, and false.
+    ///
+    /// # Panics
+    /// When `force_n_per_a` is shorter than the array.
+    pub fn force_vector_per_ampere(
+        &self,
+        position_m: [f64; 3],
+        force_n_per_a: &mut [[f64; 3]],
+    ) -> Option<bool> {
+        let map = &self.map;
+        let sides = map.sides()?;
+        let [m_x, m_y, m_z] = map.runtime.moment_a_m2;
+        let nodes = self.nodes();
+        let tensors = map.gradient_t_per_m_per_a.as_deref();
+        Some(match tensors.filter(|_| m_x != 0.0 || m_y != 0.0) {
+            Some(gradient) => self.each_coil(position_m, force_n_per_a, |cell, place| {
+                let block = &gradient[9 * place * nodes..9 * (place + 1) * nodes];
+                std::array::from_fn(|axis| {
+                    m_x * cell.component(block, 9, axis)
+                        + m_y * cell.component(block, 9, 3 + axis)
+                        + m_z * cell.component(block, 9, 6 + axis)
+                })
+            }),
+            None => self.each_coil(position_m, force_n_per_a, |cell, place| {
+                let [gx, gy] = sides;
+                [gx, gy, &map.gz_t_per_m_per_a]
+                    .map(|all| m_z * cell.value(&all[place * nodes..(place + 1) * nodes]))
+            }),
+        })
+    }
+
     /// Force of the unpowered steel on the magnet's centre at (x, y, z) m, N,
     /// positive upwards, interpolated: zero for bundles without it. `None` outside the map.
     #[must_use]
@@ -236,14 +269,14 @@ impl Bundle {
         self.map.x_m.len() * self.map.y_m.len() * self.map.z_m.len()
     }
 
-    fn each_coil(
+    fn each_coil<T: Copy + Default>(
         &self,
         position_m: [f64; 3],
-        values: &mut [f64],
-        value: impl Fn(&Cell, usize) -> f64,
+        values: &mut [T],
+        value: impl Fn(&Cell, usize) -> T,
     ) -> bool {
         let values = &mut values[..self.coil_count()];
-        values.fill(0.0);
+        values.fill(T::default());
         let Some(cell) = locate([&self.map.x_m, &self.map.y_m, &self.map.z_m], position_m) else {
             return false;
         };

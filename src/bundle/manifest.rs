@@ -9,6 +9,7 @@ use super::artefact::{FileEntry, Input, Options, sha256_hex};
 use super::json::to_json;
 use fluxform_base::accuracy::StageAccuracy;
 use fluxform_base::force_constant::Criterion;
+use fluxform_base::force_direction::{ForceDirection, NormalForce};
 use fluxform_base::point_weights::Weights;
 use fluxform_numerics::axis::Axis;
 
@@ -47,6 +48,9 @@ pub struct Manifest {
     pub magnet: MagnetSummary,
     /// The force constant.
     pub lambda: LambdaSummary,
+    /// The force vector that feedback gives; absent where the upward component alone is requested.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force: Option<ForceSummary>,
     /// The grid the constraint points lie on.
     pub points: PointsGrid,
     /// The map's grid, coils and interpolation.
@@ -73,6 +77,12 @@ pub struct MadeWith {
     pub at_n_per_m: Option<f64>,
     /// `--tolerance`; null for the default.
     pub tolerance: Option<f64>,
+    /// `--force-direction`; absent without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force_direction: Option<ForceDirection>,
+    /// `--normal-force`; absent without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal_force: Option<NormalForce>,
     /// `--error`, relative; absent without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<f64>,
@@ -234,6 +244,24 @@ pub struct LambdaSummary {
     pub criterion: Criterion,
 }
 
+/// The force vector that position feedback gives.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ForceSummary {
+    /// Where it points.
+    pub direction: ForceDirection,
+    /// How large a force along the normal is; absent for other directions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal_force: Option<NormalForce>,
+    /// Out of reach a sideways error counts as this share of an upward one.
+    pub sideways_weight: f64,
+    /// Points at creases, where the direction is the mean of both faces' normals.
+    pub crease_points: usize,
+    /// Points at rims and walls, where it is the normal of the face that is seen from above.
+    pub rim_points: usize,
+    /// What the static currents render.
+    pub static_currents: String,
+}
+
 /// Equally spaced nodes: node i is ((n - 1 - i) from + i to) / (n - 1), n the samples.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct AxisSummary {
@@ -353,16 +381,28 @@ pub struct MapSummary {
     pub z_m: AxisSummary,
     /// Indices of the coils whose maps were kept.
     pub coil: Vec<i64>,
-    /// `gz`, `gradient` or `all`.
+    /// `gz`, `force`, `gradient` or `all`.
     pub components: String,
     /// Between the nodes.
     pub interpolation: Interpolation,
+    /// The maps of the sideways force, where `map.npz` holds them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sides: Option<SidesOfMap>,
     /// The unpowered steel's pull, where `map.npz` holds it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub passive_force: Option<PassiveForce>,
     /// The whole field at given currents, where `map.npz` holds it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub working_point: Option<WorkingPointMap>,
+}
+
+/// The maps of dB_x/dz and dB_y/dz, what the sideways force needs beside that of dB_z/dz.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SidesOfMap {
+    /// The arrays of `map.npz`, `[coil, z, y, x]`, T/m/A.
+    pub arrays: [String; 2],
+    /// Between the nodes, relative to the largest value of the component at the height.
+    pub largest_error: [f64; 2],
 }
 
 /// The map of all coils together at given currents, their steel along its B-H curve: there the

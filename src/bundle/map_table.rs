@@ -6,7 +6,7 @@ use super::npz::MapArrays;
 use super::table::{FIELD_COLUMNS, GRADIENT_COLUMNS, write_samples};
 
 /// Writes a map as `probe` would at its nodes: x fastest, then y, then z; field and gradient where
-/// the map has them, else dB_z/dz alone.
+/// the map has them, else dB_z/dz, with dB_x/dz and dB_y/dz where those are there.
 ///
 /// # Errors
 /// As [`super::table::write_columns`].
@@ -23,14 +23,20 @@ pub fn write_map(out: &mut dyn Write, map: &MapArrays) -> io::Result<()> {
     if field.is_some() {
         columns.extend(FIELD_COLUMNS);
     }
-    match gradient {
-        Some(_) => columns.extend(GRADIENT_COLUMNS),
-        None => columns.push(GRADIENT_COLUMNS[8]),
+    // Beside the whole tensor the components along z would be there twice.
+    let sides = map.sides().filter(|_| gradient.is_none());
+    match (gradient, sides) {
+        (Some(_), _) => columns.extend(GRADIENT_COLUMNS),
+        (None, Some(_)) => columns.extend([2, 5, 8].map(|place| GRADIENT_COLUMNS[place])),
+        (None, None) => columns.push(GRADIENT_COLUMNS[8]),
     }
     write_samples(out, &columns, points, &map.coil, |node, coil| {
         let at = coil * nodes + node;
         let mut row = Row::default();
         row.extend(field.map_or(&[], |values| &values[3 * at..3 * at + 3]));
+        for side in sides.into_iter().flatten() {
+            row.extend(&side[at..=at]);
+        }
         row.extend(match gradient {
             Some(values) => &values[9 * at..9 * at + 9],
             None => &map.gz_t_per_m_per_a[at..=at],
@@ -72,6 +78,7 @@ mod tests {
             z_m: vec![0.01].into(),
             coil: vec![1, 4].into(),
             gz_t_per_m_per_a: vec![0.5, 0.6, 0.7, 0.8].into(),
+            sides_t_per_m_per_a: None,
             gradient_t_per_m_per_a: None,
             field_t_per_a: None,
             passive_force_n: None,
@@ -92,6 +99,16 @@ mod tests {
             String::from_utf8(text).unwrap(),
             "x_m,y_m,z_m,coil,dbz_dz_t_per_m_per_a\n0.1,0.3,0.01,1,0.5\n0.1,0.3,0.01,4,0.7\n\
              0.2,0.3,0.01,1,0.6\n0.2,0.3,0.01,4,0.8\n"
+        );
+        map.sides_t_per_m_per_a =
+            Some([(10..14).map(f64::from), (20..24).map(f64::from)].map(Iterator::collect));
+        let mut text = Vec::new();
+        write_map(&mut text, &map).unwrap();
+        assert_eq!(
+            String::from_utf8(text).unwrap(),
+            "x_m,y_m,z_m,coil,dbx_dz_t_per_m_per_a,dby_dz_t_per_m_per_a,dbz_dz_t_per_m_per_a\n\
+             0.1,0.3,0.01,1,10,20,0.5\n0.1,0.3,0.01,4,12,22,0.7\n\
+             0.2,0.3,0.01,1,11,21,0.6\n0.2,0.3,0.01,4,13,23,0.8\n"
         );
         map.field_t_per_a = Some((0..12).map(f64::from).collect());
         map.gradient_t_per_m_per_a = Some((100..136).map(f64::from).collect());

@@ -20,8 +20,8 @@ use super::array_check::{BEYOND, LARGEST, all_finite, all_within, bad, check_nod
 use super::artefact::{SCHEMA_VERSION, check_version, parse_version};
 use super::npy;
 use super::rendering::{
-    HAS_HEIGHT, HEIGHT, HEIGHT_X, HEIGHT_Y, HeightGrid, INDUCTANCE, Rendering, STATIC_CURRENT,
-    VOLTAGE,
+    DIRECTION, HAS_HEIGHT, HEIGHT, HEIGHT_X, HEIGHT_Y, HeightGrid, INDUCTANCE, Rendering,
+    Requested, SIDEWAYS_WEIGHT, STATIC_CURRENT, VOLTAGE,
 };
 use super::stored;
 
@@ -43,6 +43,9 @@ pub struct MapArrays<'a> {
     pub coil: Cow<'a, [i64]>,
     /// dB_z/dz, `[coil, z, y, x]`, T/m/A.
     pub gz_t_per_m_per_a: Cow<'a, [f64]>,
+    /// dB_x/dz and dB_y/dz, each `[coil, z, y, x]`, T/m/A: with `gz_t_per_m_per_a` all three components
+    /// of the force on an upright magnet.
+    pub sides_t_per_m_per_a: Option<[Cow<'a, [f64]>; 2]>,
     /// dB_i/dx_j, `[coil, z, y, x, i, j]`, T/m/A.
     pub gradient_t_per_m_per_a: Option<Cow<'a, [f64]>>,
     /// B, `[coil, z, y, x, 3]`, T/A.
@@ -79,6 +82,8 @@ const Y: &str = "y_m";
 const Z: &str = "z_m";
 const COIL: &str = "coil";
 const GZ: &str = "gz_t_per_m_per_a";
+/// dB_x/dz and dB_y/dz.
+pub const SIDES: [&str; 2] = ["gx_t_per_m_per_a", "gy_t_per_m_per_a"];
 const GRADIENT: &str = "gradient_t_per_m_per_a";
 const FIELD: &str = "field_t_per_a";
 /// The pull of the unpowered steel.
@@ -105,6 +110,13 @@ impl MapArrays<'_> {
         ]
     }
 
+    /// dB_x/dz and dB_y/dz, where they are there.
+    #[must_use]
+    pub fn sides(&self) -> Option<[&[f64]; 2]> {
+        let [x, y] = self.sides_t_per_m_per_a.as_ref()?;
+        Some([x, y])
+    }
+
     /// Checks how many numbers every array holds, and that each is finite and in range.
     fn validate_numbers(&self, coils: usize) -> Result<(), NpzError> {
         let nodes = self
@@ -121,6 +133,8 @@ impl MapArrays<'_> {
         let lambda = runtime.lambda_n_per_m.as_slice();
         let gradient = self.gradient_t_per_m_per_a.as_deref();
         let field = self.field_t_per_a.as_deref();
+        let [gx, gy] = self.sides().unwrap_or_default();
+        let of_sides = self.sides_t_per_m_per_a.as_ref().map_or(0, |_| nodes);
         let passive = self.passive_force_n.as_deref();
         let working_point = self.working_point_gz_t_per_m.as_deref();
         for (name, values, count) in [
@@ -128,6 +142,8 @@ impl MapArrays<'_> {
             (Y, &*self.y_m, self.y_m.len()),
             (Z, &*self.z_m, self.z_m.len()),
             (GZ, &*self.gz_t_per_m_per_a, nodes),
+            (SIDES[0], gx, of_sides),
+            (SIDES[1], gy, of_sides),
             (
                 GRADIENT,
                 gradient.unwrap_or_default(),
@@ -196,6 +212,9 @@ impl MapArrays<'_> {
             return Ok(());
         };
         rendering.validate(coils)?;
+        if rendering.requested.is_some() && self.sides_t_per_m_per_a.is_none() {
+            return Err(NpzError::Missing(SIDES[0]));
+        }
         // Position feedback divides by resistances, and may always command no current.
         if !runtime.resistance_ohm.iter().all(|&r| r >= 1.0 / LARGEST) {
             return Err(bad(RESISTANCE, "must be above 0"));
@@ -215,7 +234,9 @@ impl MapArrays<'_> {
 /// As [`MapArrays::validate`].
 pub fn to_npz(map: &MapArrays) -> Result<Vec<u8>, NpzError> {
     map.validate()?;
+    let sides = map.sides().map_or(0, |[x, y]| x.len() + y.len());
     let numbers = map.gz_t_per_m_per_a.len()
+        + sides
         + map.gradient_t_per_m_per_a.as_ref().map_or(0, |a| a.len())
         + map.field_t_per_a.as_ref().map_or(0, |a| a.len())
         + map.passive_force_n.as_ref().map_or(0, |a| a.len())
@@ -248,6 +269,9 @@ impl Archive {
         self.put(Z, &[nz], &map.z_m)?;
         self.put_i64(COIL, &map.coil)?;
         self.put(GZ, &[coils, nz, ny, nx], &map.gz_t_per_m_per_a)?;
+        for (name, values) in SIDES.into_iter().zip(map.sides().into_iter().flatten()) {
+            self.put(name, &[coils, nz, ny, nx], values)?;
+        }
         if let Some(values) = &map.gradient_t_per_m_per_a {
             self.put(GRADIENT, &[coils, nz, ny, nx, 3, 3], values)?;
         }
@@ -294,9 +318,14 @@ impl Archive {
         self.put(HAS_HEIGHT, &[ny, nx], &heights.has_height)?;
         self.put(STATIC_CURRENT, &[coils], &rendering.static_current_a)?;
         self.put(INDUCTANCE, &[coils, coils], &rendering.inductance_h)?;
-        rendering
-            .voltage_v
-            .map_or(Ok(()), |voltage| self.put(VOLTAGE, &[], &[voltage]))
+        if let Some(voltage) = rendering.voltage_v {
+            self.put(VOLTAGE, &[], &[voltage])?;
+        }
+        let Some(requested) = &rendering.requested else {
+            return Ok(());
+        };
+        self.put(DIRECTION, &[ny, nx, 3], &requested.direction)?;
+        self.put(SIDEWAYS_WEIGHT, &[], &[requested.sideways_weight])
     }
 
     fn put(&mut self, name: &str, shape: &[usize], values: &[f64]) -> io::Result<()> {
@@ -353,6 +382,13 @@ pub fn from_npz(bytes: &[u8]) -> Result<MapArrays<'static>, NpzError> {
     let current_max_a: Vec<f64> = arrays.need(CURRENT_MAX, &[None])?;
     let coils = Some(current_max_a.len());
     let gz: Vec<f64> = arrays.need(GZ, &[c, z, y, x])?;
+    let sides = match SIDES.map(|name| arrays.get(name, &[c, z, y, x])) {
+        [Ok(None), Ok(None)] => None,
+        [Ok(Some(gx)), Ok(Some(gy))] => Some([Cow::Owned(gx), Cow::Owned(gy)]),
+        [Ok(None), Ok(Some(_))] => return Err(NpzError::Missing(SIDES[0])),
+        [Ok(Some(_)), Ok(None)] => return Err(NpzError::Missing(SIDES[1])),
+        [Err(error), _] | [_, Err(error)] => return Err(error),
+    };
     let gradient: Option<Vec<f64>> = arrays.get(GRADIENT, &[c, z, y, x, Some(3), Some(3)])?;
     let field: Option<Vec<f64>> = arrays.get(FIELD, &[c, z, y, x, Some(3)])?;
     let passive: Option<Vec<f64>> = arrays.get(PASSIVE, &[z, y, x])?;
@@ -363,6 +399,7 @@ pub fn from_npz(bytes: &[u8]) -> Result<MapArrays<'static>, NpzError> {
         z_m: z_m.into(),
         coil: coil.into(),
         gz_t_per_m_per_a: gz.into(),
+        sides_t_per_m_per_a: sides,
         gradient_t_per_m_per_a: gradient.map(Cow::Owned),
         field_t_per_a: field.map(Cow::Owned),
         passive_force_n: passive.map(Cow::Owned),
@@ -413,6 +450,16 @@ impl Arrays<'_> {
         };
         let y_m: Vec<f64> = self.need(HEIGHT_Y, &[None])?;
         let grid = [Some(y_m.len()), Some(x_m.len())];
+        let of_nodes = [grid[0], grid[1], Some(3)];
+        let requested = match self.get(DIRECTION, &of_nodes)? {
+            None => None,
+            Some(direction) => Some(Requested {
+                direction,
+                sideways_weight: self
+                    .scalar(SIDEWAYS_WEIGHT)?
+                    .ok_or(NpzError::Missing(SIDEWAYS_WEIGHT))?,
+            }),
+        };
         Ok(Some(Rendering {
             heights: HeightGrid {
                 height_m: self.need(HEIGHT, &grid)?,
@@ -423,6 +470,7 @@ impl Arrays<'_> {
             static_current_a: self.need(STATIC_CURRENT, &[coils])?,
             inductance_h: self.need(INDUCTANCE, &[coils, coils])?,
             voltage_v: self.scalar(VOLTAGE)?,
+            requested,
         }))
     }
 
@@ -467,6 +515,7 @@ mod tests {
             z_m: vec![0.01, 0.02, 0.04, 0.09].into(),
             coil: vec![0, 2].into(),
             gz_t_per_m_per_a: values(48, 0.7).into(),
+            sides_t_per_m_per_a: Some([values(48, 1.9).into(), values(48, 2.9).into()]),
             gradient_t_per_m_per_a: Some(values(48 * 9, 1.3).into()),
             field_t_per_a: Some(values(48 * 3, 2.1).into()),
             passive_force_n: Some(values(24, 1.7).into()),
@@ -488,6 +537,10 @@ mod tests {
                     static_current_a: vec![0.7, 0.0, 0.3],
                     inductance_h: values(9, 2.3),
                     voltage_v: Some(36.0),
+                    requested: Some(Requested {
+                        direction: values(18, 1.1).into_iter().map(|v| 0.5 * v).collect(),
+                        sideways_weight: 0.1,
+                    }),
                 }),
             },
         }
@@ -573,7 +626,8 @@ mod tests {
 
     /// A damaged name hides an optional array; the bundle's checksums see that.
     fn optional_lost(map: &MapArrays) -> bool {
-        map.gradient_t_per_m_per_a.is_none()
+        map.sides_t_per_m_per_a.is_none()
+            || map.gradient_t_per_m_per_a.is_none()
             || map.field_t_per_a.is_none()
             || map.passive_force_n.is_none()
             || map.working_point_gz_t_per_m.is_none()
@@ -582,7 +636,7 @@ mod tests {
                 .runtime
                 .rendering
                 .as_ref()
-                .is_none_or(|r| r.voltage_v.is_none())
+                .is_none_or(|r| r.voltage_v.is_none() || r.requested.is_none())
     }
 
     #[test]

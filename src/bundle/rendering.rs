@@ -5,6 +5,11 @@
 //! surface, 0 where not, and there the height is 0), `static_current_a` (one a coil),
 //! `inductance_h` `[coil, coil]`, and `voltage_v` (no dimension) where the supply's is known. All
 //! are f64, the flags too, so that loaders of older bundles pass over them. New in schema 1.2.
+//!
+//! Bundles that request all three components of the force hold `requested_direction` `[y, x, 3]` too, the
+//! requested force over lambda times the height, and `sideways_weight` (no dimension): out of reach
+//! the nearest force is given, a sideways error counting as that share of an upward one. Such
+//! bundles hold the maps of all three components.
 
 use super::array_check::{BEYOND, LARGEST, NpzError, all_within, bad, check_nodes};
 use super::manifest::PointsGrid;
@@ -17,6 +22,11 @@ pub(super) const HAS_HEIGHT: &str = "has_height";
 pub(super) const STATIC_CURRENT: &str = "static_current_a";
 pub(super) const INDUCTANCE: &str = "inductance_h";
 pub(super) const VOLTAGE: &str = "voltage_v";
+pub(super) const DIRECTION: &str = "requested_direction";
+pub(super) const SIDEWAYS_WEIGHT: &str = "sideways_weight";
+
+/// A smaller sideways weight could not be told from rounding.
+const LEAST_WEIGHT: f64 = 1e-6;
 
 /// Heights, static currents and circuit.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,6 +39,18 @@ pub struct Rendering {
     pub inductance_h: Vec<f64>,
     /// The supply's, V.
     pub voltage_v: Option<f64>,
+    /// What all three components of the force are to be; `None` where the upward one alone is requested.
+    pub requested: Option<Requested>,
+}
+
+/// The force vector that is requested over a surface.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Requested {
+    /// `[y, x, 3]` on the nodes of the heights: the force over lambda times the height; (0, 0, 1) where
+    /// there is no surface.
+    pub direction: Vec<f64>,
+    /// Out of reach a sideways error counts as this share of an upward one; above 0, at most 1.
+    pub sideways_weight: f64,
 }
 
 impl Rendering {
@@ -42,6 +64,10 @@ impl Rendering {
             }
         }
         let voltage = self.voltage_v.as_slice();
+        let requested = self.requested.as_ref();
+        let direction = requested.map_or(&[][..], |requested| &requested.direction);
+        let weight = requested.map(|requested| requested.sideways_weight);
+        let of_direction = requested.map_or(0, |_| nx.saturating_mul(ny).saturating_mul(3));
         for (name, values, count) in [
             (HEIGHT_X, &heights.x_m[..], nx),
             (HEIGHT_Y, &heights.y_m, ny),
@@ -50,6 +76,8 @@ impl Rendering {
             (STATIC_CURRENT, &self.static_current_a, coils),
             (INDUCTANCE, &self.inductance_h, coils.saturating_mul(coils)),
             (VOLTAGE, voltage, voltage.len()),
+            (DIRECTION, direction, of_direction),
+            (SIDEWAYS_WEIGHT, weight.as_slice(), weight.iter().len()),
         ] {
             if values.len() != count {
                 let message = format!("must hold {count} numbers, holds {}", values.len());
@@ -70,6 +98,9 @@ impl Rendering {
             .all(|&has| has == 0.0 || has == 1.0)
         {
             return Err(bad(HAS_HEIGHT, "must hold 0 or 1"));
+        }
+        if weight.is_some_and(|weight| !(LEAST_WEIGHT..=1.0).contains(&weight)) {
+            return Err(bad(SIDEWAYS_WEIGHT, "must lie between 1e-6 and 1"));
         }
         Ok(())
     }
@@ -114,6 +145,31 @@ impl HeightGrid {
     /// where a node that takes part has no surface. An axis of one node has a value on it alone.
     #[must_use]
     pub fn height_m(&self, x_m: f64, y_m: f64) -> Option<f64> {
+        let cell = self.cell(x_m, y_m)?;
+        Some(cell.value(|node| self.height_m[node]))
+    }
+
+    /// The height there and the direction of the force requested, bilinear between the nodes of `[y, x, 3]`
+    /// `direction`.
+    ///
+    /// # Panics
+    /// When `direction` is shorter than that.
+    #[must_use]
+    pub fn height_and_direction(
+        &self,
+        x_m: f64,
+        y_m: f64,
+        direction: &[f64],
+    ) -> Option<(f64, [f64; 3])> {
+        let cell = self.cell(x_m, y_m)?;
+        let height = cell.value(|node| self.height_m[node]);
+        Some((
+            height,
+            std::array::from_fn(|k| cell.value(|node| direction[3 * node + k])),
+        ))
+    }
+
+    fn cell(&self, x_m: f64, y_m: f64) -> Option<SurfaceCell> {
         let (column, s) = between(&self.x_m, x_m)?;
         let (row, t) = between(&self.y_m, y_m)?;
         let stride = self.x_m.len();
@@ -129,10 +185,25 @@ impl HeightGrid {
                 return None;
             }
         }
-        let h = nodes.map(|node| self.height_m[node]);
+        Some(SurfaceCell {
+            nodes,
+            share: [s, t],
+        })
+    }
+}
+
+/// Four nodes with surface around a position, and its shares of the cell's width along x and y.
+struct SurfaceCell {
+    nodes: [usize; 4],
+    share: [f64; 2],
+}
+
+impl SurfaceCell {
+    fn value(&self, at: impl Fn(usize) -> f64) -> f64 {
+        let ([s, t], h) = (self.share, self.nodes.map(at));
         let low = (1.0 - s) * h[0] + s * h[1];
         let high = (1.0 - s) * h[2] + s * h[3];
-        Some((1.0 - t) * low + t * high)
+        (1.0 - t) * low + t * high
     }
 }
 

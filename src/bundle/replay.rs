@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 
 use super::number::push_number;
+pub use fluxform_lambda::vector_feedback::angle_deg;
 
 /// Rows are gathered to blocks of about this size.
 const BLOCK_BYTES: usize = 64 << 10;
@@ -51,6 +52,10 @@ pub struct ReplayRows {
     pub commanded_a: Vec<f64>,
     /// Given with the bundle's fixed currents, N.
     pub static_force_n: Vec<f64>,
+    /// Requested along x and y, N; empty where the upward force alone is requested, as the next.
+    pub wanted_sideways_n: Vec<[f64; 2]>,
+    /// Given along x and y, N.
+    pub sideways_n: Vec<[f64; 2]>,
     /// How each position was answered.
     pub answer: Vec<Answer>,
 }
@@ -72,6 +77,17 @@ impl ReplayRows {
     #[must_use]
     pub fn error_n(&self, row: usize) -> f64 {
         self.wanted_force_n[row] - self.force_n[row]
+    }
+
+    /// Angle between the given force and the requested one at a position, degrees; 0 where none is requested,
+    /// 180 where none is given.
+    #[must_use]
+    pub fn direction_error_deg(&self, row: usize) -> f64 {
+        let ([wx, wy], [fx, fy]) = (self.wanted_sideways_n[row], self.sideways_n[row]);
+        angle_deg(
+            [wx, wy, self.wanted_force_n[row]],
+            [fx, fy, self.force_n[row]],
+        )
     }
 
     /// The same with the fixed currents, N.
@@ -96,7 +112,10 @@ impl ReplayRows {
         for row in 0..self.len() {
             for column in COLUMNS {
                 match column.cells {
-                    Cells::Number(value) => self.push(&mut block, row, value(self, row))?,
+                    Cells::OfVector(_) if self.sideways_n.is_empty() => {}
+                    Cells::Number(value) | Cells::OfVector(value) => {
+                        self.push(&mut block, row, value(self, row))?
+                    }
                     Cells::PerCoil(values) => {
                         let range = row * self.coils..(row + 1) * self.coils;
                         for value in values(self).get(range).unwrap_or_default() {
@@ -125,7 +144,10 @@ impl ReplayRows {
         let mut names = Vec::new();
         for column in COLUMNS {
             match column.cells {
-                Cells::Number(_) | Cells::Word(_) => names.push(column.name.to_owned()),
+                Cells::OfVector(_) if self.sideways_n.is_empty() => {}
+                Cells::Number(_) | Cells::OfVector(_) | Cells::Word(_) => {
+                    names.push(column.name.to_owned())
+                }
                 // Currents that were commanded are left out where they are those that flow.
                 Cells::PerCoil(values) if values(self).is_empty() => {}
                 Cells::PerCoil(_) => {
@@ -160,6 +182,8 @@ struct ReplayColumn {
 enum Cells {
     /// A number at every position.
     Number(fn(&ReplayRows, usize) -> f64),
+    /// A number at every position, where all three components of the force are requested.
+    OfVector(fn(&ReplayRows, usize) -> f64),
     /// A number for every coil at every position.
     PerCoil(fn(&ReplayRows) -> &[f64]),
     /// A word at every position.
@@ -170,6 +194,13 @@ const fn number(name: &'static str, value: fn(&ReplayRows, usize) -> f64) -> Rep
     ReplayColumn {
         name,
         cells: Cells::Number(value),
+    }
+}
+
+const fn of_vector(name: &'static str, value: fn(&ReplayRows, usize) -> f64) -> ReplayColumn {
+    ReplayColumn {
+        name,
+        cells: Cells::OfVector(value),
     }
 }
 
@@ -193,6 +224,11 @@ const COLUMNS: &[ReplayColumn] = &[
     number("static_force_n", |rows, at| rows.static_force_n[at]),
     number("static_error_n", ReplayRows::static_error_n),
     per_coil("commanded_{}_a", |rows| &rows.commanded_a),
+    of_vector("wanted_x_n", |rows, at| rows.wanted_sideways_n[at][0]),
+    of_vector("wanted_y_n", |rows, at| rows.wanted_sideways_n[at][1]),
+    of_vector("force_x_n", |rows, at| rows.sideways_n[at][0]),
+    of_vector("force_y_n", |rows, at| rows.sideways_n[at][1]),
+    of_vector("direction_error_deg", ReplayRows::direction_error_deg),
     ReplayColumn {
         name: "status",
         cells: Cells::Word(|rows, at| rows.answer[at].word()),
@@ -215,6 +251,8 @@ mod tests {
             current_a: vec![0.7, 1.3, 0.0, 0.0],
             commanded_a: Vec::new(),
             static_force_n: vec![0.3, 0.0],
+            wanted_sideways_n: Vec::new(),
+            sideways_n: Vec::new(),
             answer: vec![Answer::Saturated, Answer::Outside],
         };
         let text = |rows: &ReplayRows| {
@@ -232,6 +270,14 @@ mod tests {
         rows.commanded_a = vec![1.0; 4];
         let header = text(&rows).unwrap();
         assert!(header.contains("static_error_n,commanded_0_a,commanded_1_a,status\n"));
+        rows.commanded_a.clear();
+        rows.wanted_sideways_n = vec![[0.0, 0.0]; 2];
+        rows.sideways_n = vec![[0.0, -0.25], [0.0, 0.0]];
+        let vectors = text(&rows).unwrap();
+        assert!(vectors.contains(
+            "static_error_n,wanted_x_n,wanted_y_n,force_x_n,force_y_n,direction_error_deg,status\n"
+        ));
+        assert!(vectors.contains(",0,0,0,-0.25,45,saturated\n"), "{vectors}");
         rows.force_n[0] = f64::NAN;
         assert!(text(&rows).is_err());
         let page = include_str!("../../results/README.md");

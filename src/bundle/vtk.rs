@@ -5,7 +5,7 @@
 
 use std::io::{self, Write};
 
-use super::npz::MapArrays;
+use super::npz::{MapArrays, SIDES};
 
 /// Steps of an axis may differ by this, relative to the axis' length.
 const EVEN: f64 = 1e-9;
@@ -41,6 +41,8 @@ pub(crate) fn write_vti(out: &mut dyn Write, map: &MapArrays) -> io::Result<()> 
     let mut arrays: Vec<&[f64]> = Vec::new();
     let mut offset = 0usize;
     for (name, components, values) in [
+        (SIDES[0], 1, map.sides().map(|[x, _]| x)),
+        (SIDES[1], 1, map.sides().map(|[_, y]| y)),
         ("gz_t_per_m_per_a", 1, Some(&*map.gz_t_per_m_per_a)),
         (
             "gradient_t_per_m_per_a",

@@ -5,6 +5,7 @@ use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
 use super::values;
+use crate::force_direction::{ForceDirection, ForceOverride, NormalForce};
 use crate::point_weights::Weights;
 use crate::scene::sources::Sampling;
 use crate::scene::tolerances::ErrorTarget;
@@ -181,6 +182,26 @@ pub struct SurfaceFlags {
     /// Extent of the points along y [default: the surface's own]
     #[arg(long, hide_short_help = true, value_name = "FROM,TO", value_parser = values::ends, allow_hyphen_values = true)]
     pub y: Option<values::Ends>,
+}
+
+/// The force that is requested over a surface, in place of what its shape file states.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct ForceFlags {
+    /// Where the requested force points [default: the shape file's `force`, or vertical]
+    #[arg(long, value_name = "NAME", value_parser = values::force_direction())]
+    pub force_direction: Option<ForceDirection>,
+    /// How large a force along the normal is [default: the shape file's `normal_force`, or magnitude]
+    #[arg(long, value_name = "NAME", value_parser = values::normal_force())]
+    pub normal_force: Option<NormalForce>,
+}
+
+impl From<ForceFlags> for ForceOverride {
+    fn from(flags: ForceFlags) -> Self {
+        Self {
+            direction: flags.force_direction,
+            normal_force: flags.normal_force,
+        }
+    }
 }
 
 /// Points on no grid.

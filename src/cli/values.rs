@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
+use crate::force_direction::{ForceDirection, NormalForce};
 use crate::lambda::Criterion;
 use crate::map::Components;
 use crate::point_weights::Weights;
@@ -17,6 +18,20 @@ pub fn criterion() -> impl TypedValueParser<Value = Criterion> {
     let of = |criterion: &Criterion| PossibleValue::new(criterion.name()).help(criterion.meaning());
     let names = PossibleValuesParser::new(Criterion::ALL.iter().map(of));
     names.try_map(|name| name.parse::<Criterion>())
+}
+
+/// Any direction of the requested force by its name.
+pub fn force_direction() -> impl TypedValueParser<Value = ForceDirection> {
+    let of = |one: &ForceDirection| PossibleValue::new(one.name()).help(one.meaning());
+    let names = PossibleValuesParser::new(ForceDirection::ALL.iter().map(of));
+    names.try_map(|name| name.parse::<ForceDirection>())
+}
+
+/// Any size of a force along the normal by its name.
+pub fn normal_force() -> impl TypedValueParser<Value = NormalForce> {
+    let of = |one: &NormalForce| PossibleValue::new(one.name()).help(one.meaning());
+    let names = PossibleValuesParser::new(NormalForce::ALL.iter().map(of));
+    names.try_map(|name| name.parse::<NormalForce>())
 }
 
 /// How points count, by name.

@@ -147,7 +147,7 @@ impl Winding {
                         dbz_dz: &mut out.dbz_dz[range.clone()],
                         rest: match components {
                             Components::Gz => None,
-                            Components::Gradient | Components::All => Some((
+                            Components::Force | Components::Gradient | Components::All => Some((
                                 &mut out.dbr_dz_over_r[range.clone()],
                                 &mut out.br_over_r[range],
                             )),

@@ -65,6 +65,7 @@ mod rest;
 pub mod sideways;
 mod solve;
 mod vector_allocation;
+pub mod vector_feedback;
 mod wiring;
 pub mod worst;
 
@@ -74,5 +75,5 @@ pub use given::{GivenForce, lowest_requested_m};
 pub use path::{Breakpoint, Event, Path};
 pub use problem::{ForceProblem, ProblemError, Settings};
 pub use solve::{OperatingPoint, Precision, Solution, Status, constant, solve};
-pub use vector_allocation::{VectorAllocation, VectorAllocator};
+pub use vector_allocation::{MET as VECTOR_MET, VectorAllocation, VectorAllocator};
 pub use wiring::{Rewired, Wiring, WiringError};

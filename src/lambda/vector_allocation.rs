@@ -36,7 +36,7 @@ const STEPS: usize = 60;
 /// Share of the slope that a full step may leave without a search along it.
 const SLOPE_LEFT: f64 = 0.1;
 /// Force errors, bounds and multipliers below this share of the terms they are sums of are met.
-const MET: f64 = 1e-11;
+pub const MET: f64 = 1e-11;
 /// Corrections of the multipliers; each takes seven digits off what `eps` changed.
 const REFINEMENTS: usize = 3;
 /// Pulls below this share of the missing force are none.
@@ -114,6 +114,12 @@ impl VectorAllocator {
             at: vec![Limit::Free; coils],
             order: Vec::with_capacity(2 * coils),
         })
+    }
+
+    /// Number of coils.
+    #[must_use]
+    pub fn coils(&self) -> usize {
+        self.rows.len()
     }
 
     /// Writes the currents (A) of least power that give `requested_n`, or the nearest force within

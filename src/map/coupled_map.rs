@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use rayon::prelude::*;
 
 use super::harmonic::{Extent, Table, kind};
-use super::map_source::{GRADIENT, Sampler, gz, tensor};
+use super::map_source::{GRADIENT, Sampler, five, gz, tensor};
 use super::tabulate::{Components, FieldMap, Grid, MapError, PlacedCoil};
 use fluxform_base::progress::Progress;
 
@@ -199,7 +199,7 @@ impl<'a> SampledField<'a> {
                     .collect();
                 gz_out.copy_from_slice(&values[gz(self.components)]);
                 for (at, out) in gradient.chunks_exact_mut(9).enumerate() {
-                    out.copy_from_slice(&tensor(std::array::from_fn(|c| values[c][at])));
+                    out.copy_from_slice(&tensor(five(self.components, |c| values[c][at])));
                 }
                 for (at, out) in field.chunks_exact_mut(3).enumerate() {
                     for (value, component) in out.iter_mut().zip(&values[GRADIENT..]) {

@@ -2,12 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::tabulate::{Components, FieldMap, Grid, MapError, PlacedCoil, tabulate};
+use super::tabulate::{Components, Grid, MapError, PlacedCoil, tabulate};
 use fluxform_base::progress::Silent;
 use fluxform_field::source::AxialSource;
 use fluxform_numerics::lagrange;
 
-/// The largest error found, relative to the largest |dB_z/dz| at its height, and at how many
+/// The largest error found of a component, relative to its largest value at the height, and at how many
 /// places it was looked for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct InterpolationError {
@@ -26,10 +26,10 @@ const SAFETY: f64 = 1.25;
 const LOWEST: usize = 4;
 const HIGHEST: usize = 1;
 
-/// Direct maps of coils on a grid.
-pub type Direct<'a> = &'a dyn Fn(&[PlacedCoil], &Grid) -> Result<FieldMap, MapError>;
+/// Direct values of one or more components of the gradient of coils on a grid, each [coil, z, y, x].
+pub type Direct<'a> = &'a dyn Fn(&[PlacedCoil], &Grid) -> Result<Vec<Vec<f64>>, MapError>;
 
-/// [`interpolation_error_by`] for identical coils, each with `source` about its axis.
+/// [`interpolation_errors_by`] of dB_z/dz for identical coils, each with `source` about its axis.
 ///
 /// # Errors
 /// See [`tabulate`].
@@ -41,9 +41,11 @@ pub fn interpolation_error(
     tolerance: f64,
 ) -> Result<InterpolationError, MapError> {
     let direct = |coils: &[PlacedCoil], places: &Grid| {
-        tabulate(source, coils, places, Components::Gz, tolerance, &Silent)
+        let map = tabulate(source, coils, places, Components::Gz, tolerance, &Silent)?;
+        Ok(vec![map.gz_t_per_m_per_a])
     };
-    interpolation_error_by(&direct, coils, grid, gz)
+    let found = interpolation_errors_by(&direct, coils, grid, &[gz])?;
+    Ok(found[0])
 }
 
 /// The middles of cells, faces and edges in the layers that decide.
@@ -85,26 +87,28 @@ fn staggered(grid: &Grid) -> [Grid; 7] {
     })
 }
 
-/// Compares the interpolated dB_z/dz ([coil, z, y, x] on `grid`) with direct values in the
+/// Compares interpolated components (each [coil, z, y, x] on `grid`) with direct values in the
 /// middle of cells, faces and edges, in the four lowest layers and the highest, for
-/// the innermost and the outermost coil.
+/// the innermost and the outermost coil: an error for each component, relative to its own largest value
+/// at the height.
 ///
 /// # Errors
 /// Those of `direct`.
-pub fn interpolation_error_by(
+pub fn interpolation_errors_by(
     direct: Direct<'_>,
     coils: &[PlacedCoil],
     grid: &Grid,
-    gz: &[f64],
-) -> Result<InterpolationError, MapError> {
+    maps: &[&[f64]],
+) -> Result<Vec<InterpolationError>, MapError> {
     let [x, y, z] = [&grid.x_m, &grid.y_m, &grid.z_m];
     let nodes = x.len() * y.len() * z.len();
     let watched = innermost_and_outermost(coils, grid);
     let placed: Vec<PlacedCoil> = watched.iter().map(|coil| coils[*coil]).collect();
-    let mut worst = InterpolationError {
+    let nothing = InterpolationError {
         largest: 0.0,
         samples: 0,
     };
+    let mut all = vec![nothing; maps.len()];
     for places in staggered(grid) {
         let exact = direct(&placed, &places)?;
         let plane = places.x_m.len() * places.y_m.len();
@@ -116,29 +120,28 @@ pub fn interpolation_error_by(
         let along_x = stencils(x, &places.x_m);
         let along_y = stencils(y, &places.y_m);
         let along_z = stencils(z, &places.z_m);
-        for (k, stencil_z) in along_z.iter().enumerate() {
-            let mut error = 0.0_f64;
-            let mut size = 0.0_f64;
-            for (place, coil) in watched.iter().enumerate() {
-                let map = &gz[coil * nodes..(coil + 1) * nodes];
-                let start = (place * places.z_m.len() + k) * plane;
-                let values =
-                    interpolate_plane(map, [x.len(), y.len()], stencil_z, &along_y, &along_x);
-                for (value, direct) in values
-                    .iter()
-                    .zip(&exact.gz_t_per_m_per_a[start..start + plane])
-                {
-                    error = error.max((value - direct).abs());
-                    size = size.max(direct.abs());
+        for ((worst, map), exact) in all.iter_mut().zip(maps).zip(&exact) {
+            for (k, stencil_z) in along_z.iter().enumerate() {
+                let mut error = 0.0_f64;
+                let mut size = 0.0_f64;
+                for (place, coil) in watched.iter().enumerate() {
+                    let map = &map[coil * nodes..(coil + 1) * nodes];
+                    let start = (place * places.z_m.len() + k) * plane;
+                    let values =
+                        interpolate_plane(map, [x.len(), y.len()], stencil_z, &along_y, &along_x);
+                    for (value, direct) in values.iter().zip(&exact[start..start + plane]) {
+                        error = error.max((value - direct).abs());
+                        size = size.max(direct.abs());
+                    }
                 }
+                if size > 0.0 {
+                    worst.largest = worst.largest.max(SAFETY * error / size);
+                }
+                worst.samples += plane * watched.len();
             }
-            if size > 0.0 {
-                worst.largest = worst.largest.max(SAFETY * error / size);
-            }
-            worst.samples += plane * watched.len();
         }
     }
-    Ok(worst)
+    Ok(all)
 }
 
 /// The coils nearest to the grid's centre and farthest from it, by index: the coils are alike,

@@ -14,7 +14,7 @@ pub trait Sampler: Sync {
     fn top_m(&self) -> f64;
 
     /// Values per ampere of every drive at `points_m`, into `out`, [drive, component, point],
-    /// with [`Components::count`] components per drive: dB_z/dz for [`Components::Gz`]; dB_x/dx, dB_x/dy,
+    /// with [`Components::count`] components per drive: dB_z/dz for [`Components::Gz`]; dB_x/dz, dB_y/dz, dB_z/dz for [`Components::Force`]; dB_x/dx, dB_x/dy,
     /// dB_x/dz, dB_y/dz, dB_z/dz for [`Components::Gradient`] (the tensor has no trace and is
     /// symmetric outside the sources), T/m/A; then B_x, B_y, B_z for [`Components::All`], T/A.
     ///
@@ -38,7 +38,17 @@ pub const GRADIENT: usize = 5;
 pub(super) fn gz(components: Components) -> usize {
     match components {
         Components::Gz => 0,
+        Components::Force => 2,
         Components::Gradient | Components::All => GRADIENT - 1,
+    }
+}
+
+/// The gradient's five components at a node from those sampled; those that are not are zero.
+pub(super) fn five(components: Components, sampled: impl Fn(usize) -> f64) -> [f64; GRADIENT] {
+    match components {
+        Components::Gz => [0.0, 0.0, 0.0, 0.0, sampled(0)],
+        Components::Force => [0.0, 0.0, sampled(0), sampled(1), sampled(2)],
+        Components::Gradient | Components::All => std::array::from_fn(sampled),
     }
 }
 

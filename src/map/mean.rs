@@ -334,7 +334,7 @@ fn interleaved(
 fn count(components: Components) -> Option<usize> {
     match components {
         Components::Gz => Some(1),
-        Components::Gradient => Some(GRADIENT),
+        Components::Force | Components::Gradient => Some(GRADIENT),
         Components::All => None,
     }
 }

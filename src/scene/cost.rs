@@ -45,6 +45,8 @@ pub struct Cost {
 pub fn of_map(design: &Design, components: Components) -> Cost {
     let parts = match components {
         Components::Gz => 1.0,
+        // The tensor is computed first.
+        Components::Force => 12.0,
         Components::Gradient => 10.0,
         Components::All => 13.0,
     };

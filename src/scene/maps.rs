@@ -16,7 +16,8 @@ use crate::map::mean::MeanField;
 
 use crate::map::tabulate::{Grid, MapError, PlacedCoil};
 use crate::map::{
-    Components, FieldMap, InterpolationError, interpolation_error, interpolation_error_by, tabulate,
+    Components, FieldMap, InterpolationError, interpolation_error, interpolation_errors_by,
+    tabulate,
 };
 use crate::progress::{Progress, Silent};
 
@@ -25,8 +26,12 @@ use crate::progress::{Progress, Silent};
 pub struct SceneMap {
     /// The map.
     pub map: FieldMap,
+    /// dB_x/dz and dB_y/dz, `[coil, z, y, x]`, T/m/A: of [`Components::Force`] alone.
+    pub sides: Option<[Vec<f64>; 2]>,
     /// Error of interpolating it between its nodes.
     pub between: InterpolationError,
+    /// The same of `sides`.
+    pub sides_between: Option<[InterpolationError; 2]>,
     /// The steel's compact form, where there was one.
     pub table: Option<TableReport>,
     /// Estimated error of its nodes.
@@ -67,11 +72,19 @@ impl SceneMap {
         };
         let tolerance = share * solved.tolerance / magnet.amplification;
         let own = EVALUATION_SHARE * tolerance;
-        let (table, map, between) = match solved.steel().axial_source(scene.winding, own) {
+        let (table, mut map, errors) = match solved.steel().axial_source(scene.winding, own) {
             Some(source) => task.axial(&*source, share, tolerance, components, progress)?,
             None => task.coupled(tolerance, components, progress)?,
         };
         progress.end();
+        let sides = transverse(&map, components);
+        if sides.is_some() && !scene.tilted() {
+            map.gradient_t_per_m_per_a = None;
+        }
+        let sides_between = match errors[1..] {
+            [x, y] => Some([x, y]),
+            _ => None,
+        };
         let mut evaluation = evaluation(&map, solved);
         if magnet.is_field() {
             evaluation = sharper(scene, solved, samples(&map, coils), evaluation);
@@ -79,7 +92,9 @@ impl SceneMap {
         let accuracy = accuracy(evaluation, solved, magnet.bound);
         Ok(Self {
             map,
-            between,
+            sides,
+            between: errors[0],
+            sides_between,
             table,
             accuracy,
         })
@@ -96,7 +111,7 @@ struct MapTask<'a> {
 }
 
 /// A map with what is known of it before its accuracy.
-type Mapped = (Option<TableReport>, FieldMap, InterpolationError);
+type Mapped = (Option<TableReport>, FieldMap, Vec<InterpolationError>);
 
 impl MapTask<'_> {
     /// Coils each of which is a `source` about its own axis: a map over the distance from it.
@@ -133,13 +148,16 @@ impl MapTask<'_> {
             one: &one,
             means: means.as_ref(),
         };
-        let map = mean(&one, magnet, coils, grid, components, progress)?;
+        let kernels = of_kernels(scene, components);
+        let map = mean(&one, magnet, coils, grid, kernels, progress)?;
         progress.begin("interpolation error", 1);
         // In air the field between the nodes is had as finely as the map itself, at once.
-        let between = if magnet.is_field() && !solved.has_steel() {
-            interpolation_error(source, coils, grid, &map.gz_t_per_m_per_a, tolerance)?
+        let of_air = magnet.is_field() && !solved.has_steel();
+        let between = if of_air && components != Components::Force {
+            let gz = &map.gz_t_per_m_per_a;
+            vec![interpolation_error(source, coils, grid, gz, tolerance)?]
         } else {
-            between(&one, magnet, coils, grid, &map)?
+            between(&one, magnet, coils, (grid, &map), components)?
         };
         Ok((None, map, between))
     }
@@ -166,7 +184,8 @@ impl MapTask<'_> {
         // A grid through every place that a node of the magnet can take.
         let widest = widest(grid, magnet);
         let visits = magnet.visits();
-        let sampled = SampledField::new(steel, &widest, components, tolerance, visits, progress)?;
+        let kernels = of_kernels(scene, components);
+        let sampled = SampledField::new(steel, &widest, kernels, tolerance, visits, progress)?;
         let one = |coils: &[PlacedCoil], grid: &Grid, components, p: &dyn Progress| {
             let mut map = tabulate(&scene.winding, coils, grid, components, tolerance, &Silent)?;
             add(&mut map, &sampled.map(coils, grid, p)?, 1.0);
@@ -176,10 +195,18 @@ impl MapTask<'_> {
             one: &one,
             means: None,
         };
-        let map = mean(&one, magnet, coils, grid, components, progress)?;
+        let map = mean(&one, magnet, coils, grid, kernels, progress)?;
         progress.begin("interpolation error", 1);
-        let between = between(&one, magnet, coils, grid, &map)?;
+        let between = between(&one, magnet, coils, (grid, &map), components)?;
         Ok((Some(sampled.report), map, between))
+    }
+}
+
+/// What is computed for a map of these components: the force on a tilted magnet needs the whole gradient.
+fn of_kernels(scene: &Scene, components: Components) -> Components {
+    match components {
+        Components::Force if scene.tilted() => Components::Gradient,
+        Components::Force | Components::Gz | Components::Gradient | Components::All => components,
     }
 }
 
@@ -415,13 +442,36 @@ fn between(
     one: &Maker,
     magnet: &MagnetMean,
     coils: &[PlacedCoil],
-    grid: &Grid,
-    map: &FieldMap,
-) -> Result<InterpolationError, MapError> {
-    let direct = |coils: &[PlacedCoil], places: &Grid| {
-        mean(one, magnet, coils, places, Components::Gz, &Silent)
+    (grid, map): (&Grid, &FieldMap),
+    components: Components,
+) -> Result<Vec<InterpolationError>, MapError> {
+    let sides = transverse(map, components);
+    let parts = if sides.is_some() {
+        Components::Force
+    } else {
+        Components::Gz
     };
-    interpolation_error_by(&direct, coils, grid, &map.gz_t_per_m_per_a)
+    let direct = |coils: &[PlacedCoil], places: &Grid| {
+        let map = mean(one, magnet, coils, places, parts, &Silent)?;
+        let sides = transverse(&map, parts);
+        let gz = map.gz_t_per_m_per_a;
+        Ok(std::iter::once(gz)
+            .chain(sides.into_iter().flatten())
+            .collect())
+    };
+    let mut maps = vec![&*map.gz_t_per_m_per_a];
+    maps.extend(sides.iter().flatten().map(|side| &**side));
+    interpolation_errors_by(&direct, coils, grid, &maps)
+}
+
+/// dB_x/dz and dB_y/dz of a map with the gradient's tensor, for [`Components::Force`].
+fn transverse(map: &FieldMap, components: Components) -> Option<[Vec<f64>; 2]> {
+    let tensors = map.gradient_t_per_m_per_a.as_ref()?;
+    let along_z = |row: usize| -> Vec<f64> {
+        let of_row = tensors.chunks_exact(9).map(|tensor| tensor[3 * row + 2]);
+        of_row.collect()
+    };
+    (components == Components::Force).then(|| [along_z(0), along_z(1)])
 }
 
 fn each(map: &mut FieldMap) -> impl Iterator<Item = &mut Vec<f64>> {

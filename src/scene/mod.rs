@@ -532,6 +532,8 @@ fn force_n(moment_a_m2: [f64; 3], parts: Components, values: &[f64], row: usize)
     let [m_x, m_y, m_z] = moment_a_m2;
     match parts {
         Components::Gz => [0.0, 0.0, m_z * part(0)],
+        // Of an upright magnet.
+        Components::Force => [0, 1, 2].map(|axis| m_z * part(axis)),
         Components::Gradient | Components::All => {
             let [xx, xy, xz, yz, zz] = std::array::from_fn(part);
             [

@@ -9,6 +9,7 @@ pub use read::{keys, keys_of};
 use std::path::PathBuf;
 
 use crate::bodies::BodyOptions;
+use fluxform_base::force_direction::RequestedForce;
 use fluxform_base::point_weights::Weights;
 use fluxform_numerics::axis::Axis;
 
@@ -32,6 +33,8 @@ pub struct ShapeDocument {
     /// Grid of constraint points: of a document 61 x 61 over [-50, 50] mm unless it says
     /// otherwise, of a raw surface 61 x 61 over its own extent.
     pub grid: GridRequest,
+    /// The force that is requested over it.
+    pub force: RequestedForce,
     /// Whether the document or a flag gives that grid's samples.
     pub grid_is_given: bool,
     /// How the points count in the mean over the object; `None` where nothing says it.

@@ -4,7 +4,7 @@
 //! cargo bench --locked --bench replay_step -- [POSITIONS]
 //! ```
 //!
-//! Arrays of nine and of 64 air coils under a flat surface, positions of an exploring finger and
+//! The upward force alone, and the force vector. Arrays of nine and of 64 air coils under a flat surface, positions of an exploring finger and
 //! positions at random. C is measured where there is a compiler called `cc`. The least of the
 //! repeats is printed: on a machine with other work it is the better measure.
 
@@ -24,7 +24,9 @@ use fluxform::commands::lambda::LambdaOptions;
 use fluxform::commands::replay::Opened;
 use fluxform::commands::replay::synthesize::{Kind, Synthesis};
 use fluxform::design::{Design, Need};
-use fluxform::lambda::Allocator;
+use fluxform::force_direction::{ForceDirection, ForceOverride};
+use fluxform::lambda::sideways::SIDEWAYS_WEIGHT;
+use fluxform::lambda::{Allocator, VectorAllocator};
 use fluxform::progress::Silent;
 use fluxform::scene::sources::{DesignSource, ShapeSource};
 use fluxform::shape::document::ShapeDocument;
@@ -35,7 +37,13 @@ const REPEATS: usize = 20;
 
 /// A bundle of the flat surface over `side` x `side` coils, with the sum of the currents limited
 /// to `total_a`.
-fn bundle(folder: &Path, side: usize, pitch_mm: f64, total_a: f64) -> Result<Opened, Failure> {
+fn bundle(
+    folder: &Path,
+    side: usize,
+    pitch_mm: f64,
+    total_a: f64,
+    direction: ForceDirection,
+) -> Result<Opened, Failure> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(root.join("designs/seed_air.toml"))?
         .replace(
@@ -49,7 +57,7 @@ fn bundle(folder: &Path, side: usize, pitch_mm: f64, total_a: f64) -> Result<Ope
         )
         .replace(
             "name = \"seed_air\"",
-            &format!("name = \"air_{side}_{total_a}\""),
+            &format!("name = \"air_{side}_{total_a}_{}\"", direction.name()),
         );
     let path = root.join("designs/seed_air.toml");
     let (design, _) =
@@ -59,7 +67,13 @@ fn bundle(folder: &Path, side: usize, pitch_mm: f64, total_a: f64) -> Result<Ope
     let options = CalibrateOptions {
         out: folder.to_path_buf(),
         force: false,
-        lambda: LambdaOptions::default(),
+        lambda: LambdaOptions {
+            force: ForceOverride {
+                direction: Some(direction),
+                normal_force: None,
+            },
+            ..LambdaOptions::default()
+        },
         reach_m: DEFAULT_REACH_M,
         keep: false,
         page: false,
@@ -142,8 +156,12 @@ fn main() -> Result<(), Failure> {
     let program = c_program(folder.path());
     println!("| coils | positions | saturated | allocation ns | step ns | step in C ns |");
     println!("|---|---|---|---|---|---|");
-    for (side, pitch_mm, total_a) in [(3, 50.0, 18.0), (3, 50.0, 6.0), (8, 40.0, 128.0)] {
-        let opened = bundle(folder.path(), side, pitch_mm, total_a)?;
+    let arrays = [(3, 50.0, 18.0), (3, 50.0, 6.0), (8, 40.0, 128.0)];
+    let upward = ForceDirection::Vertical;
+    let vector = ForceDirection::VerticalOnly;
+    let all = arrays.map(|array| (array, upward)).into_iter();
+    for ((side, pitch_mm, total_a), direction) in all.chain(arrays.map(|array| (array, vector))) {
+        let opened = bundle(folder.path(), side, pitch_mm, total_a, direction)?;
         let finger = opened.synthesize(&Synthesis {
             kind: Kind::Explore,
             seed: 1,
@@ -166,11 +184,13 @@ fn main() -> Result<(), Failure> {
             let mut currents = vec![0.0; renderer.coils()];
             let mut saturated = 0;
             let mut rows = Vec::new();
+            let mut vectors = Vec::new();
             for position in positions {
                 let step = renderer.step(*position, &mut currents);
                 saturated += usize::from(step.answer == Answer::Saturated);
                 if step.answer != Answer::Outside {
                     rows.push((renderer.force_n_per_a().to_vec(), step.wanted_n));
+                    vectors.push(renderer.force_vectors_n_per_a().to_vec());
                 }
             }
             let step_ns = least(positions.len(), || {
@@ -185,8 +205,21 @@ fn main() -> Result<(), Failure> {
                 &runtime.current_max_a,
                 runtime.total_current_max_a,
             )?;
+            let mut of_vectors = VectorAllocator::new(
+                &runtime.resistance_ohm,
+                &runtime.current_min_a,
+                &runtime.current_max_a,
+                runtime.total_current_max_a,
+                SIDEWAYS_WEIGHT,
+            )?;
             let allocation_ns = least(rows.len().max(1), || {
-                for (per_ampere, wanted_n) in &rows {
+                for ((per_ampere, wanted_n), vectors) in rows.iter().zip(&vectors) {
+                    if !vectors.is_empty() {
+                        let wanted_n = [0.0, 0.0, *wanted_n];
+                        let found = of_vectors.allocate(vectors, wanted_n, &mut currents);
+                        std::hint::black_box(found);
+                        continue;
+                    }
                     let found = allocator.allocate(per_ampere, *wanted_n, &mut currents);
                     std::hint::black_box(found);
                 }
@@ -199,8 +232,9 @@ fn main() -> Result<(), Failure> {
                 None => "no cc".to_owned(),
             };
             println!(
-                "| {}, sum at most {total_a} A | {name} | {:.0} % | {allocation_ns:.0} | {step_ns:.0} | {c} |",
+                "| {}, sum at most {total_a} A, {} | {name} | {:.0} % | {allocation_ns:.0} | {step_ns:.0} | {c} |",
                 side * side,
+                direction.name(),
                 100.0 * saturated as f64 / positions.len() as f64
             );
         }

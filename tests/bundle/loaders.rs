@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use fluxform::bundle::load::Bundle;
 use fluxform::bundle::npz::MapArrays;
 use fluxform::bundle::replay::Answer;
-use fluxform::commands::replay::renderer::Renderer;
+use fluxform::commands::replay::renderer::{Renderer, Step};
 
 use fluxform_testing::bundle::*;
 use fluxform_testing::loaders::c_loader;
@@ -92,29 +92,39 @@ sys.path.insert(0, sys.argv[1])
 from load_bundle import Bundle
 points = np.loadtxt(sys.stdin, ndmin=2)
 bundle = Bundle(sys.argv[2])
-found = zip(bundle.force_per_ampere(points), bundle.passive_force(points), bundle.height(points), *bundle.currents(points))
-for row, pull, height, currents, force, answer in found:
+found = zip(points, bundle.force_per_ampere(points), bundle.passive_force(points), bundle.height(points), *bundle.currents(points))
+for point, row, pull, height, currents, force, answer in found:
     code = 'ok saturated outside'.split().index(answer)
     height = 0 if np.isnan(height) or code == 2 else height
-    print(*map(repr, map(float, [*row, pull, height, code, force, *currents])))
+    if 'requested_direction' not in bundle.map:
+        print(*map(repr, map(float, [*row, pull, height, code, force, *currents])))
+        continue
+    wanted = (code != 2) * bundle.requested_force([point])[0]
+    vectors = bundle.force_vectors_per_ampere([point])[0].ravel()
+    print(*map(repr, map(float, [*row, pull, height, code, force[2], *currents, *wanted, *force[:2], *vectors])))
 ";
 
 /// Where in a line forces per ampere and pull, height, answer, force, and currents begin.
 const PARTS: [usize; 6] = [0, COILS + 1, COILS + 2, COILS + 3, COILS + 4, 2 * COILS + 4];
+/// The same of a force vector: requested, sideways given, and the vectors per ampere.
+const VECTOR_PARTS: [usize; 4] = [2 * COILS + 4, 2 * COILS + 7, 2 * COILS + 9, 5 * COILS + 9];
 const COILS: usize = 4;
 const FORCE: usize = 3;
+const SIDEWAYS_FORCE: usize = 6;
 
 fn compare(loader: &str, found: &[Vec<f64>], want: &[Vec<f64>]) {
     assert_eq!(found.len(), want.len(), "{loader}");
-    let mut worst = [0.0f64; 5];
+    let mut worst = [0.0f64; 8];
     for (found, want) in found.iter().zip(want) {
         assert_eq!(found.len(), want.len(), "{loader}");
-        for (part, ends) in PARTS.windows(2).enumerate() {
+        let vector = VECTOR_PARTS.windows(2).filter(|ends| ends[1] <= want.len());
+        for (part, ends) in PARTS.windows(2).chain(vector).enumerate() {
             // A force that cancels the pull is compared with the pull.
-            let least = if part == FORCE {
-                want[COILS].abs()
-            } else {
-                0.0
+            let least = match part {
+                FORCE => want[COILS].abs(),
+                // Currents that cancel the sideways force leave rounding of their terms.
+                SIDEWAYS_FORCE => sideways_terms(want),
+                _ => 0.0,
             };
             let (found, want) = (&found[ends[0]..ends[1]], &want[ends[0]..ends[1]]);
             let scale = want.iter().fold(least, |m, v| m.max(v.abs()));
@@ -132,6 +142,14 @@ fn compare(loader: &str, found: &[Vec<f64>], want: &[Vec<f64>]) {
          currents, relative to the largest at the point: {}",
         worst.map(|w| format!("{w:.1e}")).join(" ")
     );
+}
+
+/// The sizes of the terms that a line's sideways force is a sum of.
+fn sideways_terms(line: &[f64]) -> f64 {
+    let currents = &line[COILS + 4..2 * COILS + 4];
+    let vectors = line[VECTOR_PARTS[2]..].chunks_exact(3);
+    let terms = vectors.zip(currents);
+    terms.map(|(g, i)| g[0].hypot(g[1]) * i.abs()).sum()
 }
 
 /// Another reader of bundles.
@@ -172,12 +190,17 @@ fn forces_on_samples(other: Option<&Loader>) {
         ("upright with pull", false, true, [13, 17, 11]),
         ("tilted with pull", true, true, [13, 9, 11]),
         ("short axes", false, true, [2, 3, 1]),
+        ("upright vector", false, false, [13, 17, 11]),
+        ("tilted vector with pull", true, true, [13, 9, 11]),
     ] {
         let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("bundle");
         let mut sample = sample(tilted, samples);
         if pulled {
             sample = sample.with_pull();
+        }
+        if name.contains("vector") {
+            sample = sample.with_vectors();
         }
         sample.write(&target, false).unwrap();
         let bundle = Bundle::open(&target).unwrap();
@@ -200,10 +223,12 @@ fn forces_on_samples(other: Option<&Loader>) {
                     .iter()
                     .position(|answer| *answer == step.answer)
                     .unwrap();
-                assert!(renderer.certificate(&step, &currents) < 1e-12);
+                let met = if renderer.is_vector() { 1e-11 } else { 1e-12 };
+                assert!(renderer.certificate(&step, &currents) <= met);
                 answers[answer] += 1;
                 force.extend([step.height_m, answer as f64, step.force_n]);
                 force.extend(currents);
+                force.extend(vector_of(&bundle, &step, p));
                 force
             })
             .collect();
@@ -309,6 +334,20 @@ fn extreme_limits_give_the_same_currents_in_python() {
 
 fn extreme_limits_give_the_same_currents_in_c() {
     currents_at_extreme_limits(Some(&Loader::C));
+}
+
+/// The requested vector, the sideways force given and the vectors per ampere, as the library has them.
+fn vector_of(bundle: &Bundle, step: &Step, position: [f64; 3]) -> Vec<f64> {
+    let Some(sideways) = step.sideways else {
+        return Vec::new();
+    };
+    let mut vectors = vec![[f64::NAN; 3]; COILS];
+    bundle.force_vector_per_ampere(position, &mut vectors);
+    let [wanted_x, wanted_y] = sideways.wanted_n;
+    let mut all = vec![wanted_x, wanted_y, step.wanted_n];
+    all.extend(sideways.force_n);
+    all.extend(vectors.as_flattened());
+    all
 }
 
 /// The library's values at a position, in the order of the other loaders' lines.

@@ -169,6 +169,36 @@ const CASES: &[Case] = &[
         0,
     ),
     (
+        "a force along the normal, coupled cores and their pull",
+        [CORE, PAIR, "passive_force = true\n", SUPPLY],
+        &["slope.toml", "--force-direction", "normal"],
+        0,
+    ),
+    (
+        "an upright vector, its upward part given",
+        [AIR, PAIR, UPRIGHT, SUPPLY],
+        &[
+            "slope.toml",
+            "shapes/half_sphere.toml",
+            "--force-direction",
+            "normal",
+            "--normal-force",
+            "upward",
+        ],
+        0,
+    ),
+    (
+        "a vector on a tilted cylinder magnet above cores",
+        [
+            CORE,
+            PAIR,
+            "model = \"cylinder\"\ntilt_deg = [7.0, -3.0]\n",
+            SUPPLY,
+        ],
+        &["slope.toml", "--force-direction", "vertical-only"],
+        0,
+    ),
+    (
         "no pages",
         [CORE, PAIR, UPRIGHT, SUPPLY],
         &["slope.toml", "--no-report"],

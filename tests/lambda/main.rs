@@ -14,5 +14,6 @@ mod power;
 mod saturation;
 mod scale;
 mod vector_allocation;
+mod vector_feedback;
 mod vertices;
 mod worst;

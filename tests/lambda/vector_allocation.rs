@@ -187,7 +187,7 @@ fn pseudo_inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
 fn currents_are_those_of_the_exhaustive_search() {
     let mut random = Random::new(5);
     let (mut reached, mut out_of_reach, mut unproven) = (0, 0, 0);
-    for number in 0..1500 {
+    for number in 0..2000 {
         let problem = Problem::random(&mut random);
         let (currents, result) = problem.solve();
         let (missing, power) = problem.exhaustive();

@@ -5,3 +5,4 @@
 mod command;
 mod physics;
 mod support;
+mod vector;

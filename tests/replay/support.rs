@@ -8,6 +8,7 @@ use fluxform::commands::calibrate::{self, CalibrateOptions, DEFAULT_REACH_M};
 use fluxform::commands::lambda::LambdaOptions;
 use fluxform::commands::replay::Opened;
 use fluxform::design::{Design, Need};
+use fluxform::force_direction::{ForceDirection, ForceOverride};
 use fluxform::progress::Silent;
 use fluxform::scene::sources::{DesignSource, ShapeSource};
 use fluxform::shape::document::ShapeDocument;
@@ -22,6 +23,15 @@ pub struct Bundles {
 
 impl Bundles {
     fn new(design: &str, changes: &[(&str, &str)], shapes: &[&str]) -> Self {
+        Self::of_force(ForceDirection::Vertical, design, changes, shapes)
+    }
+
+    fn of_force(
+        direction: ForceDirection,
+        design: &str,
+        changes: &[(&str, &str)],
+        shapes: &[&str],
+    ) -> Self {
         let path = root().join(design);
         let shipped = std::fs::read_to_string(&path).expect("shipped design");
         let text = changes.iter().fold(shipped, |text, (from, to)| {
@@ -46,7 +56,13 @@ impl Bundles {
         let options = CalibrateOptions {
             out: folder.path().to_path_buf(),
             force: false,
-            lambda: LambdaOptions::default(),
+            lambda: LambdaOptions {
+                force: ForceOverride {
+                    direction: Some(direction),
+                    normal_force: None,
+                },
+                ..LambdaOptions::default()
+            },
             reach_m: DEFAULT_REACH_M,
             keep: false,
             page: false,
@@ -82,6 +98,15 @@ const COARSE: [(&str, &str); 3] = [
 pub fn in_air() -> &'static Bundles {
     static MADE: OnceLock<Bundles> = OnceLock::new();
     MADE.get_or_init(|| Bundles::new("designs/seed_air.toml", &COARSE, &["flat", "half_sphere"]))
+}
+
+/// The half-sphere over the array in air, its force along the normal.
+pub fn along_the_normal() -> &'static Bundles {
+    static MADE: OnceLock<Bundles> = OnceLock::new();
+    MADE.get_or_init(|| {
+        let (design, shapes) = ("designs/seed_air.toml", ["half_sphere"]);
+        Bundles::of_force(ForceDirection::Normal, design, &COARSE, &shapes)
+    })
 }
 
 /// Two coupled cored coils with the steel's own pull.

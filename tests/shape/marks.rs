@@ -438,6 +438,7 @@ fn a_grids_marks_agree_with_its_heights() {
         samples: 41,
     });
     let document = ShapeDocument {
+        force: Default::default(),
         name: "turned".into(),
         source: SurfaceSource::File {
             path: root().join("shapes/half_cylinder.stl"),

@@ -55,6 +55,7 @@ fn from_stl(name: &str, placement: Placement, grid: GridRequest) -> Discretized 
 
 fn exactly(primitive: Primitive, placement: Placement, grid: GridRequest) -> ShapeDocument {
     ShapeDocument {
+        force: Default::default(),
         name: "exact".into(),
         source: SurfaceSource::Primitive(primitive),
         bodies: BodyOptions::default(),

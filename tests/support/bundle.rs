@@ -5,12 +5,13 @@ use std::path::Path;
 
 use fluxform_base::accuracy::StageAccuracy;
 use fluxform_base::force_constant::{Criterion, ForceConstants};
+use fluxform_base::force_direction::{ForceDirection, NormalForce};
 use fluxform_bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION, UNITS};
 use fluxform_bundle::atomic::WriteError;
 use fluxform_bundle::lambda_file::{AtLambda, LambdaFile, PathStep};
 use fluxform_bundle::manifest::*;
-use fluxform_bundle::npz::{MapArrays, Runtime};
-use fluxform_bundle::rendering::{HeightGrid, Rendering};
+use fluxform_bundle::npz::{MapArrays, Runtime, SIDES};
+use fluxform_bundle::rendering::{HeightGrid, Rendering, Requested};
 use fluxform_bundle::table::{CurrentRow, PointRow};
 use fluxform_bundle::timing::StageSeconds;
 use fluxform_bundle::write::{BundleContent, write_bundle};
@@ -80,6 +81,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
         z_m: z.nodes().into(),
         coil: coil.clone().into(),
         gz_t_per_m_per_a: gz.into(),
+        sides_t_per_m_per_a: None,
         gradient_t_per_m_per_a: tilted.then(|| all.into()),
         field_t_per_a: None,
         passive_force_n: None,
@@ -117,6 +119,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
         static_current_a: currents_a.clone(),
         inductance_h: inductance_h.concat(),
         voltage_v: Some(36.0),
+        requested: None,
     });
     let accuracy = BTreeMap::from([(
         "map".to_owned(),
@@ -220,6 +223,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
             lambda_n_per_m: Some(5.9878),
             criterion: Criterion::Saturation,
         },
+        force: None,
         points: points_grid,
         map: MapSummary {
             x_m: x.into(),
@@ -231,6 +235,7 @@ pub fn sample(tilted: bool, samples: [usize; 3]) -> Sample {
                 1.3e-6,
                 "relative to the largest |g| at that height, sampled",
             ),
+            sides: None,
             passive_force: None,
             working_point: None,
         },
@@ -267,6 +272,52 @@ impl Sample {
             interpolation: Interpolation::tricubic(1.7e-4, "sampled"),
         });
         self.map.passive_force_n = Some(pull.into());
+        self
+    }
+
+    /// The sample of a bundle that requests a force vector, whose direction changes from point to point.
+    ///
+    /// # Panics
+    /// For a sample without rendering.
+    pub fn with_vectors(mut self) -> Self {
+        let map = &self.map;
+        let mut sides = [Vec::new(), Vec::new()];
+        for &coil in map.coil.iter() {
+            let axis_m = self.manifest.array.positions_m[coil as usize];
+            for z in map.z_m.iter() {
+                for y in map.y_m.iter() {
+                    for x in map.x_m.iter() {
+                        let tensor = gradient(axis_m, [*x, *y, *z]);
+                        sides[0].push(tensor[2]);
+                        sides[1].push(tensor[5]);
+                    }
+                }
+            }
+        }
+        self.map.sides_t_per_m_per_a = Some(sides.map(Into::into));
+        self.manifest.map.components = "force".to_owned();
+        self.manifest.map.sides = Some(SidesOfMap {
+            arrays: SIDES.map(str::to_owned),
+            largest_error: [1.7e-6, 1.9e-6],
+        });
+        let rendering = self.map.runtime.rendering.as_mut().unwrap();
+        let nodes = rendering.heights.height_m.len();
+        let direction = (0..nodes).flat_map(|node| {
+            let turn = node as f64;
+            [0.4 * turn.sin(), 0.3 * (0.7 * turn).cos(), 0.9]
+        });
+        rendering.requested = Some(Requested {
+            direction: direction.collect(),
+            sideways_weight: 0.1,
+        });
+        self.manifest.force = Some(ForceSummary {
+            direction: ForceDirection::Normal,
+            normal_force: Some(NormalForce::Magnitude),
+            sideways_weight: 0.1,
+            crease_points: 0,
+            rim_points: 0,
+            static_currents: "the upward force alone".to_owned(),
+        });
         self
     }
 

@@ -77,6 +77,7 @@ pub fn seed_grid() -> GridRequest {
 
 pub fn file(path: &Path, unit_m: f64, placement: Placement, grid: GridRequest) -> ShapeDocument {
     ShapeDocument {
+        force: Default::default(),
         name: "test".into(),
         source: SurfaceSource::File {
             path: path.into(),

@@ -59,6 +59,7 @@ pub fn made_with(request: &BenchRequest) -> Options {
         variants: _,
         feedback: _,
         picture: _,
+        force: _,
     } = lambda;
     let Settings {
         criterion,

@@ -13,7 +13,7 @@ use super::plan::{Cost, Done, Plan, plan};
 use super::run;
 use crate::bundle::lambda_file::{LambdaFile, WorkingPointForces};
 use crate::bundle::manifest::Manifest;
-use crate::cli::args::{ErrorFlags, SurfaceFlags, Tolerance, WeightsFlag, Writing};
+use crate::cli::args::{ErrorFlags, ForceFlags, SurfaceFlags, Tolerance, WeightsFlag, Writing};
 use crate::cli::budget::{allow, cost_origin, costs};
 use crate::cli::describe;
 use crate::cli::documents;
@@ -84,6 +84,8 @@ pub struct Calibrate {
     #[command(flatten)]
     criterion: CriterionFlags,
     #[command(flatten)]
+    requested: ForceFlags,
+    #[command(flatten)]
     error: ErrorFlags,
     #[command(flatten)]
     weights: WeightsFlag,
@@ -103,6 +105,7 @@ impl Calibrate {
     pub fn run(&self, printer: &Printer) -> Result<(), Failure> {
         let out = folder(&self.out)?;
         let lambda = LambdaOptions {
+            force: self.requested.into(),
             weights: self.weights.weights,
             error: self.error.target(),
             ..self.criterion.options(self.tolerance.tolerance)
@@ -137,10 +140,15 @@ impl Calibrate {
         if let Some(plan) = plan.as_ref().filter(|_| !printer.json()) {
             printer.summary(Stream::Output, plan, || explained(plan))?;
         }
+        let components = if options.requests_vector(&shapes) {
+            Components::Force
+        } else {
+            Components::Gz
+        };
         allow(
             costs(design, &shapes, self.tolerance.tolerance)
                 .into_iter()
-                .chain([of_map(design, Components::Gz)]),
+                .chain([of_map(design, components)]),
             cost_origin(&shapes),
             printer,
         )?;

@@ -26,6 +26,7 @@ use crate::bundle::rendering::{HeightGrid, Rendering};
 use crate::bundle::table::{CurrentRow, PointRow};
 use crate::bundle::timing::StageSeconds;
 use crate::bundle::write::{BundleContent, check_bundle_target, write_bundle};
+use crate::force_direction::RequestedForce;
 use crate::lambda::Settings;
 use crate::map::FieldMap;
 use crate::map::tabulate::Grid;
@@ -44,11 +45,13 @@ use crate::shape::points::ConstraintPoints;
 pub(crate) mod again;
 mod budget;
 pub(crate) mod command;
+mod directions;
 mod ignored_pull;
 mod needed_map;
 mod page;
 pub mod plan;
 mod recorded;
+mod requested_force;
 
 pub use crate::report::bundle_files::PAGE_FILE;
 pub(crate) use ignored_pull::IgnoredPull;
@@ -99,6 +102,14 @@ impl CalibrateOptions {
         }
     }
 
+    /// Whether any of `shapes` requests a force vector.
+    pub(crate) fn requests_vector(&self, shapes: &[ShapeSource]) -> bool {
+        let force = |shape: &ShapeSource| self.lambda.force.over(shape.document.force);
+        shapes
+            .iter()
+            .any(|shape| force(shape).direction.is_vector())
+    }
+
     /// The options that `verify` needs beside the inputs to compute the same bundle again. A new option does not
     /// compile before it is recorded or left out on purpose.
     pub(crate) fn made_with(&self, shape: &ShapeSource) -> MadeWith {
@@ -121,6 +132,7 @@ impl CalibrateOptions {
             variants: _,
             feedback: _,
             picture: _,
+            force,
         } = lambda;
         let Settings {
             criterion,
@@ -132,6 +144,8 @@ impl CalibrateOptions {
             jnd: Some(jnd_weight),
             at_n_per_m,
             tolerance: *tolerance,
+            force_direction: force.direction,
+            normal_force: force.normal_force,
             weights: *weights,
             error: error.map(|target| target.error),
             refine: error.is_some_and(|target| target.refine),
@@ -444,7 +458,8 @@ impl Calibration<'_> {
         let gridded = nodes.map(|nodes| scene.design.with_nodes(nodes));
         let design = gridded.as_ref().unwrap_or(scene.design);
         let grid = (design, grid_points, reach_m);
-        let mut needed = NeededMap::new(scene, &solved.map, field, grid, progress)?;
+        let vector = self.force().direction.is_vector();
+        let mut needed = NeededMap::new(scene, (&solved.map, vector), field, grid, progress)?;
         let passive = passive_map(scene, &needed.made.map, progress)?;
         progress.begin("passive force", 1);
         let ignored = IgnoredPull::new(scene, &lambda, &of_grid, field)?;
@@ -476,8 +491,8 @@ impl Calibration<'_> {
         let rows = point_rows(grid_points);
         let currents = current_rows(scene, &lambda);
         let mut map = arrays(
-            &needed.made.map,
-            self.runtime(&lambda, &manifest, &rows, &currents),
+            &needed.made,
+            self.runtime(&lambda, &manifest, grid_points, (&rows, &currents)),
         );
         map.passive_force_n = passive.as_ref().map(|p| Cow::Borrowed(&*p.force_z_n));
         let mut extra = vec![(DESIGN_FILE, self.source.text.as_bytes())];
@@ -490,7 +505,7 @@ impl Calibration<'_> {
             lambda: &lambda.file,
             extra: &extra,
         };
-        let pages = self.pages(&content, &lambda, progress)?;
+        let pages = self.pages(&content, &lambda, grid_points, progress)?;
         let pages = pages.iter().map(|(name, bytes)| (*name, &bytes[..]));
         let extra: Vec<(&str, &[u8])> = extra.iter().copied().chain(pages).collect();
         content.extra = &extra;
@@ -503,14 +518,19 @@ impl Calibration<'_> {
         &self,
         content: &BundleContent,
         lambda: &LambdaReport,
+        points: &ConstraintPoints,
         progress: &dyn Progress,
     ) -> Result<Vec<(&'static str, Vec<u8>)>, RunError> {
         let Some(picture) = &lambda.picture else {
             return Ok(Vec::new());
         };
+        let directions = self.directions(points, lambda, progress)?;
         progress.begin("report", 1);
         let tolerance = self.solved.map.tolerance;
-        let object = page::object(self.scene, content, picture, &lambda.warnings, tolerance);
+        let warnings = &lambda.warnings;
+        let object = page::object(
+            self.scene, content, picture, directions, warnings, tolerance,
+        );
         let others: Vec<&str> = content.extra.iter().map(|(name, _)| *name).collect();
         let files = bundle_files::files(&object, &others)
             .map_err(|error| WriteError::from_io("write", Path::new(PAGE_FILE), error))?;
@@ -518,13 +538,18 @@ impl Calibration<'_> {
         Ok(files)
     }
 
+    /// The force that is requested over the shape.
+    fn force(&self) -> RequestedForce {
+        (self.options.lambda.force).over(self.shape.document.force)
+    }
+
     /// The numbers that a runtime needs beside the map.
     fn runtime(
         &self,
         lambda: &LambdaReport,
         manifest: &Manifest,
-        rows: &[PointRow],
-        currents: &[CurrentRow],
+        points: &ConstraintPoints,
+        (rows, currents): (&[PointRow], &[CurrentRow]),
     ) -> Runtime {
         let circuit = &self.circuit.circuit;
         let rendering = HeightGrid::of_points(&manifest.points, rows).map(|heights| Rendering {
@@ -532,6 +557,7 @@ impl Calibration<'_> {
             static_current_a: currents.iter().map(|row| row.current_a).collect(),
             inductance_h: circuit.inductance_h.concat(),
             voltage_v: circuit.voltage_v,
+            requested: requested_force::on_grid(self.force(), points),
         });
         Runtime {
             rendering,
@@ -551,7 +577,7 @@ impl Calibration<'_> {
         let mut accuracy = file.accuracy.clone();
         accuracy.insert("map".to_owned(), needed.made.accuracy.clone());
         accuracy.insert("inductances".to_owned(), self.circuit.accuracy.clone());
-        let mut map = summary(&needed.made.map, needed.components, needed.made.between);
+        let mut map = summary(&needed.made, needed.components);
         if let Some(passive) = passive {
             accuracy.insert(PASSIVE_STAGE.to_owned(), passive.accuracy.clone());
             map.passive_force = Some(PassiveForce {
@@ -577,6 +603,7 @@ impl Calibration<'_> {
                 lambda_n_per_m: file.lambda_n_per_m,
                 criterion: file.criterion,
             },
+            force: requested_force::summary(self.force(), points),
             points: points_grid(points),
             map,
             left_out: needed.left_out.clone(),

@@ -4,8 +4,8 @@ use crate::RunError;
 use crate::bundle::manifest::LeftOut;
 use crate::commands::map::workspace_grid;
 use crate::design::Design;
+use crate::map::Components;
 use crate::map::tabulate::{Grid, PlacedCoil};
-use crate::map::{Components, FieldMap};
 use crate::progress::Progress;
 use crate::scene::cached_field::ShapeField;
 use crate::scene::maps::{MagnetMean, SceneMap};
@@ -21,25 +21,39 @@ pub(super) struct NeededMap {
 }
 
 impl NeededMap {
+    /// With all three components of the force where a `vector` is requested.
     pub(super) fn new(
         scene: &Scene,
-        solved: &Solved,
+        (solved, vector): (&Solved, bool),
         field: ShapeField,
         (design, points, reach_m): (&Design, &ConstraintPoints, f64),
         progress: &dyn Progress,
     ) -> Result<Self, RunError> {
         let mut left_out = Vec::new();
         let grid = needed_grid(design, points, reach_m, &mut left_out);
-        let components = if scene.tilted() {
-            Components::Gradient
-        } else {
+        let components = match (vector, scene.tilted()) {
+            (true, _) => Components::Force,
+            (false, true) => Components::Gradient,
+            (false, false) => Components::Gz,
+        };
+        if !scene.tilted() {
+            let (what, why) = if vector {
+                (
+                    "field and gradient but for its column along z",
+                    "the force on an upright magnet needs that column alone (eq. 4)",
+                )
+            } else {
+                (
+                    "field and transverse gradient",
+                    "an upright dipole's vertical force needs dB_z/dz alone (eq. 5)",
+                )
+            };
             left_out.push(LeftOut {
-                what: "field and transverse gradient".to_owned(),
-                why: "an upright dipole's vertical force needs dB_z/dz alone (eq. 5)".to_owned(),
+                what: what.to_owned(),
+                why: why.to_owned(),
                 error_cost: 0.0,
             });
-            Components::Gz
-        };
+        }
         let driven = needed_coils(scene);
         if driven.len() < scene.coils.len() {
             left_out.push(LeftOut {
@@ -50,13 +64,7 @@ impl NeededMap {
         }
         let felt = MagnetMean::by_magnet(scene, &grid.z_m, MAGNET_SHARE * solved.tolerance)?;
         let mut made = field.map(scene, solved, &driven, &grid, components, &felt, progress)?;
-        drop_weak_coils(
-            scene,
-            &mut made.map,
-            &driven,
-            solved.tolerance,
-            &mut left_out,
-        );
+        drop_weak_coils(scene, &mut made, &driven, solved.tolerance, &mut left_out);
         Ok(Self {
             made,
             components,
@@ -82,11 +90,12 @@ fn largest_current_a(scene: &Scene, coil: usize) -> f64 {
 /// that any coil can give.
 fn drop_weak_coils(
     scene: &Scene,
-    map: &mut FieldMap,
+    made: &mut SceneMap,
     coils: &[PlacedCoil],
     tolerance: f64,
     left_out: &mut Vec<LeftOut>,
 ) {
+    let map = &mut made.map;
     let nodes = map.x_m.len() * map.y_m.len() * map.z_m.len();
     let strength: Vec<f64> = coils
         .iter()
@@ -128,6 +137,9 @@ fn drop_weak_coils(
         *values = kept;
     };
     retain(&mut map.gz_t_per_m_per_a, 1);
+    for side in made.sides.iter_mut().flatten() {
+        retain(side, 1);
+    }
     if let Some(gradient) = &mut map.gradient_t_per_m_per_a {
         retain(gradient, 9);
     }

@@ -6,7 +6,7 @@ use super::recorded;
 use crate::bundle::write::BundleContent;
 use crate::coil::limits::{self, Evaluated, LimitCheck};
 use crate::plot::lambda::LambdaPlot;
-use crate::report::data::{CalibratedObject, CoilPlan};
+use crate::report::data::{CalibratedObject, CoilPlan, DirectionField};
 use crate::scene::Scene;
 use crate::units::STEEL_DENSITY_KG_PER_M3;
 
@@ -16,6 +16,7 @@ pub(super) fn object<'a>(
     scene: &Scene,
     content: &'a BundleContent<'a>,
     curves: &'a LambdaPlot,
+    directions: Option<DirectionField>,
     warnings: &'a [String],
     tolerance: f64,
 ) -> CalibratedObject<'a> {
@@ -26,6 +27,7 @@ pub(super) fn object<'a>(
         points: content.points,
         map: content.map,
         curves,
+        directions,
         section: CoilPlan {
             inner_radius_m: 0.5 * scene.coil.inner_diameter_m,
             outer_radius_m: 0.5 * scene.coil.outer_diameter_m,

@@ -138,11 +138,12 @@ pub fn plan(
         });
     }
     let coils = source.design.array.positions_m.len();
+    let vector = options.requests_vector(shapes);
     Ok(Plan {
         coils,
         cost_coils: coils.min(MIDDLE_COILS),
         tolerance: scene.tolerances.map.max(KERNEL_ERROR),
-        terms: terms(&scene, cached, tolerance, &places, progress)?,
+        terms: terms(&scene, vector, (cached, tolerance), &places, progress)?,
         shapes: planned,
     })
 }
@@ -170,8 +171,8 @@ fn telling(points: &ConstraintPoints) -> Vec<[f64; 3]> {
 
 fn terms(
     scene: &Scene,
-    cached: bool,
-    tolerance: Option<f64>,
+    vector: bool,
+    (cached, tolerance): (bool, Option<f64>),
     places: &[[f64; 3]],
     progress: &dyn Progress,
 ) -> Result<Vec<Term>, RunError> {
@@ -195,7 +196,14 @@ fn terms(
             },
             cost: (driven < coils).then_some(Cost::OfTheForce(0.0)),
         },
-        if scene.tilted() {
+        if vector {
+            Term {
+                what: "transverse gradient",
+                done: Done::Computed,
+                why: "a force vector is requested (eq. 4)".to_owned(),
+                cost: None,
+            }
+        } else if scene.tilted() {
             Term {
                 what: "transverse gradient",
                 done: Done::Computed,

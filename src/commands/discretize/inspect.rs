@@ -9,6 +9,7 @@ use super::{ParsedBytes, shape_error};
 use crate::RunError;
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, SCHEMA_VERSION};
 use crate::design::Design;
+use crate::force_direction::RequestedForce;
 use crate::numerics::axis::Axis;
 use crate::plot::plane::PlanePlot;
 use crate::progress::Progress;
@@ -98,6 +99,7 @@ impl Inspected {
                 bodies,
                 scale: [1.0; 3],
                 placement: Placement::default(),
+                force: RequestedForce::default(),
                 grid: GridRequest {
                     x: extent,
                     y: extent,

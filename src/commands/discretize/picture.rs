@@ -115,11 +115,13 @@ pub(super) fn picture(seen: &PictureData<'_>) -> PlanePlot {
                 together: Together::First,
             }),
             marks: Vec::new(),
+            arrows: Vec::new(),
         },
         Panel {
             title: "what each point is".to_owned(),
             cells: None,
             marks: marks(seen),
+            arrows: Vec::new(),
         },
     ];
     if seen.cells.iter().any(Option::is_some) {
@@ -137,6 +139,7 @@ pub(super) fn picture(seen: &PictureData<'_>) -> PlanePlot {
                 together: Together::Largest,
             }),
             marks: Vec::new(),
+            arrows: Vec::new(),
         });
     }
     let [mut x, mut y] = seen.grid.plan();
@@ -163,6 +166,7 @@ pub(super) fn picture(seen: &PictureData<'_>) -> PlanePlot {
             title: format!("the part over the array and its workspace / {unit}"),
             cells: None,
             marks,
+            arrows: Vec::new(),
         }];
         (x, y) = (over.widened(0, x), over.widened(1, y));
     }

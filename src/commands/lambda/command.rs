@@ -8,7 +8,9 @@ use super::LambdaReport;
 use super::feedback::FeedbackOptions;
 use super::text::summary;
 use super::{LambdaOptions, run};
-use crate::cli::args::{ErrorFlags, SamplingFlags, SurfaceFlags, Tolerance, WeightsFlag, Writing};
+use crate::cli::args::{
+    ErrorFlags, ForceFlags, SamplingFlags, SurfaceFlags, Tolerance, WeightsFlag, Writing,
+};
 use crate::cli::budget::{allow, cost_origin, costs};
 use crate::cli::documents;
 use crate::cli::failure::{Failure, Wish};
@@ -57,6 +59,8 @@ pub struct Lambda {
     wiring: WiringFlags,
     #[command(flatten)]
     feedback: FeedbackFlags,
+    #[command(flatten)]
+    requested: ForceFlags,
     /// Draw error and currents over lambda, the errors over the surface and force against wanted
     /// force (SVG); `-` for standard output
     #[arg(long, value_name = "FILE")]
@@ -163,6 +167,7 @@ impl Lambda {
                 shell_m: self.feedback.shell,
             }),
             picture: self.plot.is_some(),
+            force: self.requested.into(),
             ..self.criterion.options(self.tolerance.tolerance)
         };
         let (document, shapes) = documents::design_and_shapes(

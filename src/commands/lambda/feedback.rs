@@ -2,11 +2,16 @@
 
 use crate::RunError;
 use crate::accuracy::StageAccuracy;
-use crate::bundle::lambda_file::{FeedbackFile, FeedbackPlace, FeedbackShell, StaticRendering};
+use crate::bundle::lambda_file::{
+    FeedbackFile, FeedbackPlace, FeedbackShell, StaticRendering, VectorFeedbackFile,
+};
 use crate::lambda::feedback::{
     Decided, FeedbackError, NoLambda, Rendered, Span, dip_between, reachable, render,
 };
-use crate::lambda::{ForceProblem, OperatingPoint};
+use crate::lambda::vector_feedback::{
+    CurrentsOf, VectorProblem, reachable_vectors, render_vectors,
+};
+use crate::lambda::{ForceProblem, OperatingPoint, Rewired};
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::passive;
@@ -86,6 +91,7 @@ impl PosedProblem<'_> {
             at_chosen,
             at_largest: at_largest.transpose()?,
             shell,
+            vector: self.vector_feedback(chosen, progress)?,
         };
         Ok(WithFeedback {
             file,
@@ -232,6 +238,72 @@ impl Layers {
             heights.filter(|h| **h + lift_m < self.floor_m).count()
         };
         (0..self.count()).map(below).sum()
+    }
+}
+
+/// The three components of an array's forces as wired, each [point, coil].
+fn wired_axes(posed: &PosedProblem, vectors: &[[f64; 3]]) -> [Rewired; 3] {
+    [0, 1, 2].map(|axis| {
+        let along: Vec<f64> = vectors.iter().map(|force| force[axis]).collect();
+        posed.options.wiring.apply(&ForceProblem {
+            forces_n_per_a: &along,
+            ..posed.unwired
+        })
+    })
+}
+
+impl PosedProblem<'_> {
+    /// The requested force vector with position feedback; `None` where the upward force alone is requested.
+    ///
+    /// # Errors
+    /// Places that cannot be computed; interruption.
+    fn vector_feedback(
+        &self,
+        chosen: Option<&OperatingPoint>,
+        progress: &dyn Progress,
+    ) -> Result<Option<VectorFeedbackFile>, RunError> {
+        let force = self.force;
+        if !force.direction.is_vector() {
+            return Ok(None);
+        }
+        let positions = &self.points.positions_m;
+        let vectors = (self.scene).force_vectors_n_per_a(self.solved, positions, progress)?;
+        let [of_x, of_y, of_z] = wired_axes(self, &vectors);
+        let direction = self.points.directions(force);
+        let problem = VectorProblem {
+            upward: of_z.problem(&self.unwired),
+            sides_n_per_a: [&of_x, &of_y].map(|side| side.problem(&self.unwired).forces_n_per_a),
+            direction: &direction,
+        };
+        let mut span = Span::default();
+        let reach = reachable_vectors(&problem).map_err(render_error)?;
+        span.add(problem.upward.height_m, &reach);
+        let largest = span.largest();
+        let rendered = |lambda: f64, of: CurrentsOf| {
+            render_vectors(&problem, lambda, of).map_err(render_error)
+        };
+        let at_chosen = |of: fn(&OperatingPoint) -> CurrentsOf| {
+            let rendered = chosen.map(|chosen| rendered(chosen.lambda_n_per_m, of(chosen)));
+            rendered.transpose()
+        };
+        let at_largest = largest
+            .ok()
+            .map(|l| rendered(l.lambda_n_per_m, CurrentsOf::Vector));
+        let (lambda_n_per_m, reason) = lambda_or_reason(largest);
+        Ok(Some(VectorFeedbackFile {
+            direction: force.direction,
+            normal_force: force.along_normal(),
+            lambda_n_per_m,
+            reason,
+            decided_at: largest.ok().map(|largest| FeedbackPlace {
+                point: largest.point,
+                position_m: positions[largest.point],
+            }),
+            fixed: at_chosen(|chosen| CurrentsOf::Static(&chosen.currents_a))?,
+            upward: at_chosen(|_| CurrentsOf::Upward)?,
+            vector: at_chosen(|_| CurrentsOf::Vector)?,
+            at_largest: at_largest.transpose()?,
+        }))
     }
 }
 

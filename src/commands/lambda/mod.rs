@@ -34,6 +34,7 @@ use crate::bundle::artefact::Input;
 use crate::bundle::headline::{BudgetName, BudgetPart};
 use crate::bundle::lambda_file::{LambdaFile, SampledPoints};
 use crate::design::Design;
+use crate::force_direction::{ForceOverride, RequestedForce};
 use crate::lambda::worst::worst_point;
 use crate::lambda::{self, ForceProblem, Precision, Settings, Solution, Status, Wiring};
 use crate::plot::lambda::LambdaPlot;
@@ -73,6 +74,8 @@ pub struct LambdaOptions {
     pub feedback: Option<FeedbackOptions>,
     /// Whether the data of a picture are computed.
     pub picture: bool,
+    /// What takes the place of the requested force that the shape states.
+    pub force: ForceOverride,
 }
 
 /// The force constant of one object. Serialised it is the JSON result.
@@ -167,6 +170,10 @@ pub fn run(
     let document = search
         .as_ref()
         .map_or(document, |(_, chosen)| &chosen.document);
+    let options = &LambdaOptions {
+        force: options.force.over(document.force).into(),
+        ..options.clone()
+    };
     let points = discretize::run(document, inputs.clone(), progress)?;
     let of_grid = WantedPoints::of_grid(&points, options.weights_of(&points));
     let sampling = options
@@ -336,6 +343,8 @@ struct PosedProblem<'a> {
     unwired: ForceProblem<'a>,
     /// The same as wired.
     problem: ForceProblem<'a>,
+    /// The requested force.
+    force: RequestedForce,
 }
 
 /// The force constant for points that are known.
@@ -383,6 +392,7 @@ pub(crate) fn solve_at(
         points,
         options,
         unwired,
+        force: options.force.over(RequestedForce::default()),
         problem: rewired
             .as_ref()
             .map_or(unwired, |rewired| rewired.problem(&unwired)),

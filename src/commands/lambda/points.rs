@@ -6,6 +6,7 @@ use crate::accuracy::StageAccuracy;
 use crate::bundle::artefact::Input;
 use crate::commands::discretize::PointsReport;
 use crate::commands::discretize::scattered::ScatteredReport;
+use crate::force_direction::RequestedForce;
 use crate::lambda::limit::{self, limit_error};
 use crate::lambda::{ForceProblem, ProblemError, Settings};
 use crate::point_weights::Weights;
@@ -17,6 +18,10 @@ pub(crate) struct WantedPoints {
     pub(crate) positions_m: Vec<[f64; 3]>,
     /// z of each, m.
     pub(crate) height_m: Vec<f64>,
+    /// Unit normal of each.
+    normals: Vec<[f64; 3]>,
+    /// Normal of the other face, of each that lies on a crease; empty where creases are not known.
+    other_normals: Vec<Option<[f64; 3]>>,
     /// How they count in the mean.
     pub(crate) rule: Weights,
     /// Plan area each stands for, m^2.
@@ -56,6 +61,8 @@ impl WantedPoints {
         Self {
             positions_m: positions_m(&points.x_m, &points.y_m, &points.height_m),
             height_m: points.height_m.clone(),
+            normals: points.normal.clone(),
+            other_normals: points.marks.iter().map(|marks| marks.crease).collect(),
             rule,
             areas: points.area_m2.clone(),
             graded: false,
@@ -79,6 +86,8 @@ impl WantedPoints {
         Self {
             positions_m: positions_m(&points.x_m, &points.y_m, &points.height_m),
             height_m: points.height_m.clone(),
+            normals: points.normal.clone(),
+            other_normals: Vec::new(),
             rule: Weights::Area,
             areas: points.weight_m2.clone(),
             graded: patches,
@@ -88,6 +97,15 @@ impl WantedPoints {
             grid: None,
             warnings: summary.warnings.clone(),
         }
+    }
+
+    /// The requested force over lambda times the height, at each point.
+    pub(super) fn directions(&self, force: RequestedForce) -> Vec<[f64; 3]> {
+        let normals = self.normals.iter().enumerate();
+        let other = |row: usize| self.other_normals.get(row).copied().flatten();
+        normals
+            .map(|(row, normal)| force.vector(*normal, other(row)))
+            .collect()
     }
 
     /// Weights in the mean; `None`: all alike.

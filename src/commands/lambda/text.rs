@@ -3,7 +3,7 @@
 use super::LambdaReport;
 use crate::bundle::lambda_file::{
     AtLambda, FeedbackFile, FeedbackPlace, FeedbackShell, LambdaFile, LambdaVariant,
-    TolerancePoint, WorkingPointForces, WorstPointFile,
+    TolerancePoint, VectorFeedbackFile, WorkingPointForces, WorstPointFile,
 };
 use crate::cli::describe;
 use crate::cli::layout::{Sheet, headed_table};
@@ -11,6 +11,7 @@ use crate::cli::quantity::{count, force, mm, number, number_to, percent};
 use crate::commands::discretize::PointsReport;
 use crate::design::Design;
 use crate::lambda::feedback::Rendered;
+use crate::lambda::vector_feedback::VectorRendering;
 use crate::lambda::{Criterion, Precision, Wiring};
 
 /// The result for people.
@@ -124,9 +125,49 @@ fn feedback_lines(sheet: &mut Sheet, design: &Design, file: &FeedbackFile) {
         );
         sheet.line("active", &describe::per_coil(design, &unit, &shares, 1));
     }
+    if let Some(vector) = &file.vector {
+        vector_lines(sheet, vector, file.at_chosen.as_ref());
+    }
     if let Some(shell) = &file.shell {
         sheet.line("shell", &shell_of(shell));
     }
+}
+
+/// The requested vector with feedback, and what other currents make of it.
+fn vector_lines(sheet: &mut Sheet, file: &VectorFeedbackFile, at_chosen: Option<&Rendered>) {
+    let constant = largest(file.lambda_n_per_m, file.reason.as_deref(), file.decided_at);
+    let size = file.normal_force.map_or_else(String::new, |size| {
+        format!(", lambda times the height its {} part", size.name())
+    });
+    let size = size.replace("magnitude part", "magnitude");
+    let mut lines = vec![format!(
+        "{}{size}: lambda {constant}",
+        file.direction.name()
+    )];
+    let at = at_chosen.map_or_else(String::new, |at| {
+        format!(" at {} N/m", number(at.lambda_n_per_m))
+    });
+    let one = |name: &str, of: &VectorRendering| {
+        format!(
+            "{name}: off by a median of {} degrees, 95 % within {}; error {} of the request, sideways {}\n  \
+             given at {} of the points; {} W",
+            number_to(of.direction_median_deg, 3),
+            number_to(of.direction_95_deg, 3),
+            percent(of.error_share),
+            percent(of.sideways_share),
+            percent(of.reached),
+            number_to(of.mean_power_w, 4)
+        )
+    };
+    let of_all = [
+        ("static currents", &file.fixed),
+        ("feedback of the upward part", &file.upward),
+        ("feedback of the vector", &file.vector),
+    ];
+    for (name, of) in of_all {
+        lines.extend(of.iter().map(|of| one(&format!("{name}{at}"), of)));
+    }
+    sheet.line("vector", &lines.join("\n"));
 }
 
 fn largest(lambda: Option<f64>, reason: Option<&str>, place: Option<FeedbackPlace>) -> String {

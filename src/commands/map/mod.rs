@@ -21,14 +21,14 @@ use crate::accuracy::{StageAccuracy, missed};
 use crate::bundle::artefact::{FLUXFORM_VERSION, Input, Options, SCHEMA_VERSION, UNITS};
 use crate::bundle::json::displayed;
 use crate::bundle::manifest::{
-    AxisSummary, Interpolation, MapSidecar, MapSummary, WorkingPointMap,
+    AxisSummary, Interpolation, MapSidecar, MapSummary, SidesOfMap, WorkingPointMap,
 };
-use crate::bundle::npz::{MapArrays, Runtime, WORKING_POINT};
+use crate::bundle::npz::{MapArrays, Runtime, SIDES, WORKING_POINT};
 use crate::bundle::write::{Beside, BesideContent, MapFormats, check_map_files, write_map_and};
 use crate::design::Design;
 use crate::map::coupled_map::TableReport;
 use crate::map::tabulate::Grid;
-use crate::map::{Components, FieldMap, InterpolationError};
+use crate::map::{Components, FieldMap};
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::maps::{MagnetMean, SceneMap};
@@ -194,9 +194,8 @@ pub fn run(
         &beside,
     )?;
     let made = Made::new(&scene, request, progress)?;
-    let map = &made.map.map;
-    let mut summary = summary(map, request.components, made.map.between);
-    let mut arrays = arrays(map, runtime(&scene, None));
+    let mut summary = summary(&made.map, request.components);
+    let mut arrays = arrays(&made.map, runtime(&scene, None));
     if let Some(together) = &made.together {
         summary.working_point = Some(together.summary.clone());
         arrays.working_point_gz_t_per_m = Some(Cow::Borrowed(&together.gz_t_per_m));
@@ -389,11 +388,8 @@ pub(crate) fn workspace_grid(design: &Design) -> Grid {
 }
 
 /// The map's grid, coils and interpolation as artefacts state them.
-pub(crate) fn summary(
-    map: &FieldMap,
-    components: Components,
-    between: InterpolationError,
-) -> MapSummary {
+pub(crate) fn summary(made: &SceneMap, components: Components) -> MapSummary {
+    let (map, between) = (&made.map, made.between);
     let definition = format!(
         "of dB_z/dz, relative to the largest |dB_z/dz| at that height: 1.25 times the largest \
          difference from direct values at {} places in the middles of cells, faces and edges, in the four \
@@ -407,6 +403,10 @@ pub(crate) fn summary(
         coil: indices(map),
         components: components.name().to_owned(),
         interpolation: Interpolation::tricubic(between.largest, definition),
+        sides: made.sides_between.map(|errors| SidesOfMap {
+            arrays: SIDES.map(str::to_owned),
+            largest_error: errors.map(|error| error.largest),
+        }),
         passive_force: None,
         working_point: None,
     }
@@ -426,13 +426,16 @@ pub(crate) fn runtime(scene: &Scene, lambda_n_per_m: Option<f64>) -> Runtime {
 }
 
 /// The map as arrays of `map.npz`, borrowed.
-pub(crate) fn arrays(map: &FieldMap, runtime: Runtime) -> MapArrays<'_> {
+pub(crate) fn arrays(made: &SceneMap, runtime: Runtime) -> MapArrays<'_> {
+    let map = &made.map;
+    let sides = made.sides.as_ref();
     MapArrays {
         x_m: Cow::Borrowed(&map.x_m),
         y_m: Cow::Borrowed(&map.y_m),
         z_m: Cow::Borrowed(&map.z_m),
         coil: Cow::Owned(indices(map)),
         gz_t_per_m_per_a: Cow::Borrowed(&map.gz_t_per_m_per_a),
+        sides_t_per_m_per_a: sides.map(|sides| sides.each_ref().map(|side| Cow::Borrowed(&**side))),
         gradient_t_per_m_per_a: map.gradient_t_per_m_per_a.as_deref().map(Cow::Borrowed),
         field_t_per_a: map.field_t_per_a.as_deref().map(Cow::Borrowed),
         passive_force_n: None,

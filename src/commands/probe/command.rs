@@ -146,6 +146,7 @@ impl Probe {
             Components::All => 12,
             Components::Gradient => 9,
             Components::Gz => 1,
+            Components::Force => 3,
         };
         allow(
             std::iter::once(of_probe(design, points, parts))

@@ -410,6 +410,8 @@ impl ProbeTable {
         }
         let first = match self.components {
             Components::Gz => 8,
+            // The tensor is symmetric: the derivatives of B_z are the others along z.
+            Components::Force => 6,
             Components::Gradient | Components::All => 0,
         };
         columns.extend(&GRADIENT_COLUMNS[first..]);

@@ -236,6 +236,18 @@ impl Follower {
             } else {
                 step.force_n
             });
+            if let Some(sideways) = step.sideways {
+                rows.wanted_sideways_n.push(sideways.wanted_n);
+                rows.sideways_n.push(if drive.is_some() && inside {
+                    let vectors = self.renderer.force_vectors_n_per_a();
+                    [0, 1].map(|axis| {
+                        let terms = vectors.iter().zip(&flowing);
+                        terms.map(|(g, i)| g[axis] * i).sum()
+                    })
+                } else {
+                    sideways.force_n
+                });
+            }
             rows.static_force_n.push(force(&self.fixed_a));
             rows.answer.push(step.answer);
             rows.current_a.extend(&flowing);

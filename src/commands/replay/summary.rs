@@ -12,6 +12,7 @@ use crate::bundle::load::Bundle;
 use crate::bundle::replay::{Answer, ReplayRows};
 use crate::bundle::trajectory::Trajectory;
 use crate::coil::drive::Drive;
+use crate::force_direction::ForceDirection;
 
 /// Where a trajectory is from.
 #[derive(Debug, Clone, PartialEq)]
@@ -86,6 +87,24 @@ pub struct ForceSummary {
     /// With the bundle's fixed currents.
     #[serde(rename = "static")]
     pub fixed: ErrorSummary,
+    /// All three components with feedback; absent where the upward one alone is requested.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vector: Option<VectorErrors>,
+}
+
+/// Differences from the requested force vector, over the positions inside the map.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct VectorErrors {
+    /// Where the force points.
+    pub direction: ForceDirection,
+    /// Length of the difference, root mean square, N.
+    pub rms_error_n: f64,
+    /// The longest, N.
+    pub worst_error_n: f64,
+    /// Angle between the given force and the requested one where one is requested, median, degrees.
+    pub direction_median_deg: f64,
+    /// 95 % of the angles are no larger, degrees.
+    pub direction_95_deg: f64,
 }
 
 /// Differences from the wanted force, over the positions inside the map.
@@ -278,6 +297,8 @@ impl ReplaySummary {
                 wanted_max_n: rows.wanted_force_n.iter().copied().fold(0.0, size),
                 feedback: errors(rows, |row| rows.error_n(row)),
                 fixed: errors(rows, |row| rows.static_error_n(row)),
+                vector: (bundle.manifest.force.as_ref())
+                    .and_then(|force| vector_errors(rows, force.direction)),
             },
             currents: CurrentSummary {
                 max_a: (0..rows.coils).map(|i| coil(i).fold(0.0, size)).collect(),
@@ -299,6 +320,38 @@ impl ReplaySummary {
             files: Vec::new(),
         }
     }
+}
+
+/// `None` where the upward force alone is requested.
+fn vector_errors(rows: &ReplayRows, direction: ForceDirection) -> Option<VectorErrors> {
+    if rows.sideways_n.is_empty() {
+        return None;
+    }
+    let inside = (0..rows.len()).filter(|&row| rows.answer[row] != Answer::Outside);
+    let (mut square, mut worst, mut count) = (0.0, 0.0_f64, 0);
+    let mut angles_deg = Vec::new();
+    for row in inside {
+        let ([wx, wy], [fx, fy]) = (rows.wanted_sideways_n[row], rows.sideways_n[row]);
+        let error = (wx - fx).hypot(wy - fy).hypot(rows.error_n(row));
+        square += error * error;
+        worst = worst.max(error);
+        count += 1;
+        if wx.hypot(wy).hypot(rows.wanted_force_n[row]) > 0.0 {
+            angles_deg.push(rows.direction_error_deg(row));
+        }
+    }
+    angles_deg.sort_by(f64::total_cmp);
+    let quantile = |part: f64| {
+        let at = (part * angles_deg.len() as f64) as usize;
+        angles_deg.get(at).copied().unwrap_or(0.0)
+    };
+    Some(VectorErrors {
+        direction,
+        rms_error_n: (square / f64::from(count.max(1))).sqrt(),
+        worst_error_n: worst,
+        direction_median_deg: quantile(0.5),
+        direction_95_deg: quantile(0.95),
+    })
 }
 
 /// How long positions are held.

@@ -1,9 +1,10 @@
 //! The result of `replay` for people.
 
 use super::ReplayReport;
-use super::summary::{ErrorSummary, ReplaySummary};
+use super::summary::{ErrorSummary, ReplaySummary, VectorErrors};
 use crate::cli::layout::Sheet;
-use crate::cli::quantity::{count, error, force, number, percent, si};
+use crate::cli::quantity::{count, error, force, number, number_to, percent, si};
+use crate::force_direction::ForceDirection;
 
 /// Forces below this are rounding, N.
 const NOTHING_N: f64 = 1e-12;
@@ -23,12 +24,25 @@ pub(super) fn summary(report: &ReplayReport, written: Option<&str>) -> String {
     sheet.line(
         "wanted",
         &format!(
-            "{} N/m times the height, at most {}",
+            "{} N/m times the height, {}, at most {} upward",
             number(summary.lambda_n_per_m),
+            direction(summary.force.vector.as_ref()),
             force(summary.force.wanted_max_n)
         ),
     );
     sheet.line("feedback", &errors(&summary.force.feedback));
+    if let Some(vector) = &summary.force.vector {
+        sheet.line(
+            "direction",
+            &format!(
+                "with feedback off by a median of {} degrees, 95 % within {}; error of the vector rms {}, worst {}",
+                number_to(vector.direction_median_deg, 3),
+                number_to(vector.direction_95_deg, 3),
+                newton(vector.rms_error_n),
+                newton(vector.worst_error_n)
+            ),
+        );
+    }
     sheet.line(
         "fixed",
         &format!(
@@ -92,6 +106,15 @@ fn limits(sheet: &mut Sheet, summary: &ReplaySummary) {
                     .map_or_else(String::new, |stage| error(stage.estimate))
             ),
         );
+    }
+}
+
+/// Which force is requested.
+fn direction(vector: Option<&VectorErrors>) -> &'static str {
+    match vector.map_or(ForceDirection::Vertical, |vector| vector.direction) {
+        ForceDirection::Vertical => "upward (sideways not controlled)",
+        ForceDirection::VerticalOnly => "upward and none sideways",
+        ForceDirection::Normal => "along the surface's normal",
     }
 }
 

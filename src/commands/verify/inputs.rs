@@ -15,6 +15,7 @@ use crate::commands::calibrate::PAGE_FILE;
 use crate::commands::lambda::LambdaOptions;
 use crate::commands::lambda::error_target::ErrorTarget;
 use crate::design::{Design, Need, Steel as Described, source};
+use crate::force_direction::ForceOverride;
 use crate::lambda::Settings;
 use crate::scene::sources::ShapeSource;
 use crate::shape::bodies::BodyOptions;
@@ -159,6 +160,10 @@ pub(super) fn options(bundle: &Bundle) -> Result<CalibrateOptions, String> {
         Some(made) => {
             options.reach_m = made.reach_m;
             options.page = made.report;
+            options.lambda.force = ForceOverride {
+                direction: made.force_direction,
+                normal_force: made.normal_force,
+            };
         }
         // Older bundles do not name their options; what they hold states one of them.
         None => {

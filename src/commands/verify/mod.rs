@@ -220,7 +220,7 @@ impl Verifier {
         let route = Route::new(&scene, &all.bundle, &bounds)?;
         let nodes = nodes::on(&all.bundle, &route, &bounds)?;
         let between = nodes::between(&all.bundle, &route, &bounds)?;
-        all.add([nodes, between]);
+        all.add(nodes.into_iter().chain(between));
         progress.advance(1);
         progress.check()?;
         let weights = expected.as_ref().and_then(|e| e.weights.as_deref());
@@ -364,7 +364,8 @@ fn difference(a: &[f64], b: &[f64]) -> f64 {
 struct Bounds {
     forces: f64,
     map: f64,
-    between: f64,
+    /// Of the maps along x, y and z.
+    between: [f64; 3],
     pull: f64,
     pull_map: f64,
     pull_between: f64,
@@ -378,10 +379,11 @@ impl Bounds {
             stage.map_or(0.0, |stage| stage.estimate)
         };
         let pull = manifest.map.passive_force.as_ref();
+        let [x, y] = (manifest.map.sides.as_ref()).map_or([0.0; 2], |sides| sides.largest_error);
         Self {
             forces: stage("forces"),
             map: stage("map"),
-            between: manifest.map.interpolation.largest_error,
+            between: [x, y, manifest.map.interpolation.largest_error],
             pull: stage("passive_force"),
             pull_map: stage(PASSIVE_STAGE),
             pull_between: pull.map_or(0.0, |pull| pull.interpolation.largest_error),
@@ -395,7 +397,7 @@ impl Bounds {
             forces: claimed.forces.min(CLAIMED_MAX),
             map: claimed.map.min(CLAIMED_MAX),
             // Nodes that are right leave nothing to claim between them.
-            between: claimed.between.min(1.0),
+            between: claimed.between.map(|error| error.min(1.0)),
             pull: claimed.pull.min(CLAIMED_MAX),
             pull_map: claimed.pull_map.min(CLAIMED_MAX),
             pull_between: claimed.pull_between.min(1.0),

@@ -8,25 +8,43 @@ use crate::field::winding::KERNEL_ERROR;
 use crate::numerics::lagrange;
 use crate::scene::evaluation_sample::spread;
 
-/// Largest |dB_z/dz| at a height: on the axis or anywhere of the map's plane.
-fn largest_in_plane(bundle: &Bundle, level: usize) -> f64 {
+/// The components that a map holds: the name of each in checks, its place among what
+/// [`Route::gradients`] gives, and its values.
+type Held<'a> = ([&'static str; 2], usize, &'a [f64]);
+
+fn held(bundle: &Bundle) -> Vec<Held<'_>> {
+    let map = &bundle.map;
+    let names = [
+        ["map nodes of gx", "map between nodes of gx"],
+        ["map nodes of gy", "map between nodes of gy"],
+    ];
+    let sides = map.sides().into_iter().flatten();
+    let sides = names.into_iter().zip(sides).enumerate();
+    std::iter::once((
+        ["map nodes", "map between nodes"],
+        2,
+        &*map.gz_t_per_m_per_a,
+    ))
+    .chain(sides.map(|(axis, (names, values))| (names, axis, values)))
+    .collect()
+}
+
+/// The largest value at a height: on the axis or anywhere of the map's plane.
+fn largest_in_plane(bundle: &Bundle, values: &[f64], level: usize) -> f64 {
     let map = &bundle.map;
     let plane = map.x_m.len() * map.y_m.len();
     (0..map.coil.len())
         .flat_map(|coil| {
             let start = (coil * map.z_m.len() + level) * plane;
-            &map.gz_t_per_m_per_a[start..start + plane]
+            &values[start..start + plane]
         })
         .fold(0.0, |most: f64, g| most.max(g.abs()))
 }
 
 /// Sampled nodes.
-pub(super) fn on(bundle: &Bundle, route: &Route, bounds: &Bounds) -> Result<Check, RunError> {
+pub(super) fn on(bundle: &Bundle, route: &Route, bounds: &Bounds) -> Result<Vec<Check>, RunError> {
     let map = &bundle.map;
     let [coils, nz, ny, nx] = map.shape();
-    let sizes: Vec<f64> = (0..nz)
-        .map(|level| largest_in_plane(bundle, level))
-        .collect();
     let places = spread(coils * nz * ny * nx, route.samples());
     let wanted: Vec<(usize, [f64; 3])> = places
         .iter()
@@ -37,20 +55,31 @@ pub(super) fn on(bundle: &Bundle, route: &Route, bounds: &Bounds) -> Result<Chec
         })
         .collect();
     let exact = route.gradients(&wanted)?;
-    let worst = places
-        .iter()
-        .zip(&exact)
-        .map(|(index, exact)| {
-            let error = (map.gz_t_per_m_per_a[*index] - exact[2]).abs();
-            ratio(error, sizes[index / (nx * ny) % nz])
-        })
-        .fold(0.0, f64::max);
-    let how = format!("{} nodes by an independent route", places.len());
-    Ok(check("map nodes", worst, bounds.map.max(KERNEL_ERROR), how))
+    // Errors of nodes are relative to the whole gradient, of which dB_z/dz is the largest part.
+    let sizes: Vec<f64> = (0..nz)
+        .map(|level| largest_in_plane(bundle, &map.gz_t_per_m_per_a, level))
+        .collect();
+    let checks = held(bundle).into_iter().map(|([name, _], part, values)| {
+        let worst = places
+            .iter()
+            .zip(&exact)
+            .map(|(index, exact)| {
+                let error = (values[*index] - exact[part]).abs();
+                ratio(error, sizes[index / (nx * ny) % nz])
+            })
+            .fold(0.0, f64::max);
+        let how = format!("{} nodes by an independent route", places.len());
+        check(name, worst, bounds.map.max(KERNEL_ERROR), how)
+    });
+    Ok(checks.collect())
 }
 
 /// Sampled places between nodes, interpolated.
-pub(super) fn between(bundle: &Bundle, route: &Route, bounds: &Bounds) -> Result<Check, RunError> {
+pub(super) fn between(
+    bundle: &Bundle,
+    route: &Route,
+    bounds: &Bounds,
+) -> Result<Vec<Check>, RunError> {
     let map = &bundle.map;
     let [coils, nz, ny, nx] = map.shape();
     let cells = [nx, ny, nz].map(|n| n.saturating_sub(1).max(1));
@@ -82,26 +111,27 @@ pub(super) fn between(bundle: &Bundle, route: &Route, bounds: &Bounds) -> Result
         .map(|(_, place, point)| (map.coil[*place] as usize, *point))
         .collect();
     let exact = route.gradients(&wanted)?;
-    let worst = places
-        .iter()
-        .zip(&exact)
-        .map(|((k, place, point), exact)| {
-            let Some(cell) = lagrange::locate([&map.x_m, &map.y_m, &map.z_m], *point) else {
-                return f64::INFINITY;
-            };
-            let value = cell.value(&map.gz_t_per_m_per_a[place * nodes..(place + 1) * nodes]);
-            // The lower of the two planes around the point has the larger values.
-            ratio((value - exact[2]).abs(), largest_in_plane(bundle, *k))
-        })
-        .fold(0.0, f64::max);
-    let how = format!(
-        "{} places between nodes, interpolated as the loaders do",
-        places.len()
-    );
-    Ok(check(
-        "map between nodes",
-        worst,
-        bounds.between.max(KERNEL_ERROR),
-        how,
-    ))
+    let checks = held(bundle).into_iter().map(|([_, name], part, values)| {
+        let sizes: Vec<f64> = (0..nz)
+            .map(|level| largest_in_plane(bundle, values, level))
+            .collect();
+        let worst = places
+            .iter()
+            .zip(&exact)
+            .map(|((k, place, point), exact)| {
+                let Some(cell) = lagrange::locate([&map.x_m, &map.y_m, &map.z_m], *point) else {
+                    return f64::INFINITY;
+                };
+                let value = cell.value(&values[place * nodes..(place + 1) * nodes]);
+                // The lower of the two planes around the point has the larger values.
+                ratio((value - exact[part]).abs(), sizes[*k])
+            })
+            .fold(0.0, f64::max);
+        let how = format!(
+            "{} places between nodes, interpolated as the loaders do",
+            places.len()
+        );
+        check(name, worst, bounds.between[part].max(KERNEL_ERROR), how)
+    });
+    Ok(checks.collect())
 }

@@ -170,7 +170,7 @@ impl AxialTable {
                 out.copy_from_slice(&values[0]);
                 return Ok(());
             }
-            Components::Gradient => &GRADIENT,
+            Components::Force | Components::Gradient => &GRADIENT,
             Components::All => &[
                 Quantity::DbzDz,
                 Quantity::DbrDzOverR,
@@ -179,6 +179,8 @@ impl AxialTable {
             ],
         };
         let values = self.sample(&r_m, &z_m, wanted)?;
+        // Of the force those along z alone, the gradient's last.
+        let first = if parts == Components::Force { 2 } else { 0 };
         for (place, [x, y, _]) in points_m.iter().enumerate() {
             let (zz, slope, ratio) = (values[0][place], values[1][place], values[2][place]);
             // dB_r/dr = -B_r/r - dB_z/dz; along the direction of r the tensor is that, across B_r/r.
@@ -188,7 +190,11 @@ impl AxialTable {
             } else {
                 0.0
             };
-            let mut put = |component: usize, value: f64| out[component * count + place] = value;
+            let mut put = |component: usize, value: f64| {
+                if let Some(component) = component.checked_sub(first) {
+                    out[component * count + place] = value;
+                }
+            };
             put(0, ratio + turn * x * x);
             put(1, turn * x * y);
             put(2, slope * x);
@@ -422,7 +428,7 @@ impl AxialSource for AxialTable {
     ) -> Result<Gradients, OnEdge> {
         let quantities: &[Quantity] = match components {
             Components::Gz => &[Quantity::DbzDz],
-            Components::Gradient | Components::All => &GRADIENT,
+            Components::Force | Components::Gradient | Components::All => &GRADIENT,
         };
         let mut values = self.sample(r_m, z_m, quantities)?.into_iter();
         let mut next = || values.next().unwrap_or_default();

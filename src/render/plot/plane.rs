@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use kuva::backend::svg::SvgBackend;
-use kuva::plot::{ColorMap, Heatmap, LegendEntry, LegendShape, ScatterPlot};
+use kuva::plot::{ColorMap, Heatmap, LegendEntry, LegendShape, QuiverPlot, ScatterPlot};
 use kuva::render::figure::Figure;
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
@@ -22,6 +22,9 @@ const NOTHING: &str = "#ffffff";
 const MARKS: [&str; 6] = [
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#000000",
 ];
+
+/// The same for arrows, on viridis: dark under light.
+const ARROWS: [&str; 2] = ["#000000", "#ff5fa2"];
 
 /// How several cells become one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,6 +55,15 @@ pub struct Mark {
     pub points: Vec<(f64, f64)>,
 }
 
+/// Arrows of one kind.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Arrows {
+    /// The kind's name.
+    pub name: &'static str,
+    /// Tail and length along x and y of each, in the unit of the plan.
+    pub arrows: Vec<([f64; 2], [f64; 2])>,
+}
+
 /// One picture of the region.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
@@ -61,6 +73,8 @@ pub struct Panel {
     pub cells: Option<Cells>,
     /// Marks over them.
     pub marks: Vec<Mark>,
+    /// Arrows over both.
+    pub arrows: Vec<Arrows>,
 }
 
 /// Pictures of one region beside each other.
@@ -120,6 +134,12 @@ impl PlanePlot {
                     .with_size(1.5),
             ));
         }
+        for (kind, colour) in panel.arrows.iter().zip(ARROWS) {
+            let drawn = kind.arrows.iter().filter(|(_, [u, v])| u.hypot(*v) > 0.0);
+            let drawn = drawn.map(|([x, y], [u, v])| (*x, *y, *u, *v));
+            let arrows = QuiverPlot::new().with_arrows(drawn.collect::<Vec<_>>());
+            plots.push(Plot::Quiver(arrows.with_color(colour)));
+        }
         let mut layout = Layout::new(x, y)
             .with_title(panel.title.clone())
             .with_title_size(TITLE_PX)
@@ -140,6 +160,20 @@ impl PlanePlot {
                         label: format!("{} ({})", mark.name, mark.points.len()),
                         color: colour.to_owned(),
                         shape: LegendShape::Circle,
+                        dasharray: None,
+                    });
+                }
+            }
+        }
+        let mut kinds: Vec<&str> = Vec::new();
+        for panel in &self.panels {
+            for (kind, colour) in panel.arrows.iter().zip(ARROWS) {
+                if !kind.arrows.is_empty() && !kinds.contains(&kind.name) {
+                    kinds.push(kind.name);
+                    entries.push(LegendEntry {
+                        label: kind.name.to_owned(),
+                        color: colour.to_owned(),
+                        shape: LegendShape::Line,
                         dasharray: None,
                     });
                 }
@@ -214,6 +248,10 @@ mod tests {
                         together: Together::First,
                     }),
                     marks: Vec::new(),
+                    arrows: vec![Arrows {
+                        name: "push",
+                        arrows: vec![([0.7, 1.3], [9.0, -7.0])],
+                    }],
                 },
                 Panel {
                     title: "marks".to_owned(),
@@ -222,6 +260,7 @@ mod tests {
                         name: "rim",
                         points: vec![(0.7, 1.3)],
                     }],
+                    arrows: Vec::new(),
                 },
             ],
         }
@@ -230,7 +269,7 @@ mod tests {
     #[test]
     fn a_drawing_says_what_it_shows_and_is_the_same_twice() {
         let svg = drawing(9, 7).svg();
-        for text in ["heights / mm", "x / mm", "rim (1)"] {
+        for text in ["heights / mm", "x / mm", "rim (1)", "push"] {
             assert!(svg.contains(text), "{text}");
         }
         assert!(!svg.contains("NaN"));

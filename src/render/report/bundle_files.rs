@@ -6,6 +6,7 @@ use fluxform_bundle::table::{Column, write_columns};
 
 use super::bundle::page;
 use super::data::CalibratedObject;
+use super::directions;
 use super::field::{Plan, some, together};
 use crate::plot::lambda::LambdaPlot;
 use crate::plot::plane::{Cells, Panel, PlanePlot, Together};
@@ -36,6 +37,11 @@ pub fn files(
     let (svg, table) = field_plot(object)?;
     files.push(("plots/field.svg", svg.into_bytes()));
     files.push(("plots/field.csv", table));
+    if let Some(field) = &object.directions {
+        let drawing = directions::plot(object, field).svg();
+        files.push(("plots/direction.svg", drawing.into_bytes()));
+        files.push(("plots/direction.csv", directions::table(field)?));
+    }
     let names = ["map.npz", "points.csv", "currents.csv", "lambda.json"];
     let names = names.iter().chain(others).copied();
     let names: Vec<&str> = names.chain(files.iter().map(|(name, _)| *name)).collect();
@@ -97,6 +103,7 @@ fn field_plot(object: &CalibratedObject) -> io::Result<(String, Vec<u8>)> {
             together: Together::First,
         }),
         marks: Vec::new(),
+        arrows: Vec::new(),
     };
     let panels = planes.iter().zip(values.chunks_exact(plan.len()));
     let plot = PlanePlot {

@@ -26,6 +26,8 @@ pub struct CalibratedObject<'a> {
     pub map: &'a MapArrays<'a>,
     /// Error and currents over lambda, and the forces at the chosen one.
     pub curves: &'a LambdaPlot,
+    /// Where the forces point; `None` where the upward one alone is requested.
+    pub directions: Option<DirectionField>,
     /// A coil in plan.
     pub section: CoilPlan,
     /// The design's limits on one coil.
@@ -80,6 +82,32 @@ impl CalibratedObject<'_> {
             given_n: forces.static_n[worst],
         })
     }
+}
+
+/// Force vectors at points of a grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DirectionField {
+    /// The grid's ends along x, m.
+    pub x_m: [f64; 2],
+    /// The grid's ends along y, m.
+    pub y_m: [f64; 2],
+    /// Points along x.
+    pub columns: usize,
+    /// One a point, x fastest; `None` where there is no surface.
+    pub cells: Vec<Option<DirectionCell>>,
+}
+
+/// Force vectors at a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DirectionCell {
+    /// m.
+    pub position_m: [f64; 3],
+    /// N.
+    pub requested_n: [f64; 3],
+    /// With static currents, N.
+    pub static_n: [f64; 3],
+    /// With feedback of all three components, N.
+    pub feedback_n: [f64; 3],
 }
 
 /// A coil seen from above.

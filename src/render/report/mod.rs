@@ -7,6 +7,7 @@
 pub mod bundle;
 pub mod bundle_files;
 pub mod data;
+mod directions;
 mod error_budget;
 mod field;
 pub mod frame;

@@ -6,6 +6,7 @@ use super::unit::unit_names;
 use super::{AxisRequest, GridRequest, Placement, ShapeDocument, SurfaceSource};
 use crate::bodies::BodyOptions;
 use crate::format::SurfaceFormat;
+use fluxform_base::force_direction::RequestedForce;
 use fluxform_design::message_text::axis_fault;
 use fluxform_numerics::axis::Axis;
 
@@ -119,6 +120,7 @@ impl ShapeDocument {
             bodies: surface.bodies.clone(),
             scale: surface.scale,
             placement: surface.placement,
+            force: RequestedForce::default(),
             weights: None,
             grid_is_given: surface.samples_are_given,
         })

@@ -8,6 +8,7 @@ use super::{
 };
 use crate::bodies::BodyOptions;
 use crate::format::SurfaceFormat;
+use fluxform_base::force_direction::{ForceDirection, NormalForce, RequestedForce};
 use fluxform_base::point_weights::Weights;
 use fluxform_base::units::m_from_mm;
 use fluxform_design::diagnostics::{Faults, InvalidDocument};
@@ -80,6 +81,7 @@ fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
         seat: seat(root),
     };
     let bodies = bodies(root);
+    let force = force(root);
     let Points {
         grid,
         is_given,
@@ -92,6 +94,7 @@ fn document(root: &mut Section<'_>, path: &Path) -> Option<ShapeDocument> {
         scale: scale?,
         placement,
         grid: grid?,
+        force,
         weights,
         grid_is_given: is_given,
     })
@@ -139,6 +142,24 @@ fn seat(root: &mut Section<'_>) -> Seat {
         center,
         rest_on_m: rest_on.map(|length| m_from_mm(length.value)),
         fit,
+    }
+}
+
+/// The force that is requested over the surface.
+fn force(root: &mut Section<'_>) -> RequestedForce {
+    let directions = ForceDirection::ALL.iter().map(|d| (d.name(), *d));
+    let sizes = NormalForce::ALL.iter().map(|s| (s.name(), *s));
+    let directions: Vec<_> = directions.collect();
+    let sizes: Vec<_> = sizes.collect();
+    let direction = root.choice_or_first("force", &directions);
+    let normal_force = root.choice_or_first("normal_force", &sizes);
+    if root.has("normal_force") && direction != ForceDirection::Normal {
+        let message = "the force is not along the normal";
+        root.fault("normal_force", message, "add force = \"normal\"");
+    }
+    RequestedForce {
+        direction,
+        normal_force,
     }
 }
 
@@ -229,6 +250,14 @@ const MEANINGS: &[(&str, &str)] = &[
     ("high_mm", "of `wedge`: its height at the high side"),
     ("points.x_mm", "grid of constraint points along x"),
     ("points.y_mm", "grid of constraint points along y"),
+    (
+        "force",
+        "`vertical`: upward, sideways not controlled; `vertical-only`: no sideways force; `normal`: along the surface's normal; the last two with feedback",
+    ),
+    (
+        "normal_force",
+        "of `normal`: lambda times the height is the force's `magnitude`, or its `upward` part",
+    ),
     (
         "points.outside",
         "what becomes of grid points beside the surface: there is no point",

@@ -116,6 +116,7 @@ fn map() -> MapArrays<'static> {
         z_m: vec![0.03].into(),
         coil: vec![0, 1].into(),
         gz_t_per_m_per_a: vec![0.1, 0.2, 0.3, 0.4, 0.4, 0.3, 0.2, 0.1].into(),
+        sides_t_per_m_per_a: None,
         gradient_t_per_m_per_a: None,
         field_t_per_a: None,
         passive_force_n: None,
@@ -174,6 +175,7 @@ impl Parts {
             met: false,
         };
         CalibratedObject {
+            directions: None,
             lambda: &self.lambda,
             manifest: &self.manifest,
             points: &self.points,

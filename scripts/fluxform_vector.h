@@ -1,0 +1,368 @@
+/* Currents of least power for a force vector: a part of fluxform_currents.c, which alone includes it. The
+ * algorithm is that of src/lambda/vector_allocation.rs. */
+#ifndef FLUXFORM_VECTOR_H
+#define FLUXFORM_VECTOR_H
+
+#define EPS_FIRST 1e-7
+#define EPS_LEAST 1e-14
+#define EPS_FACTOR 1e-3
+#define EPS_SUM 1e-6
+#define CLIMB_STEPS 60
+#define SLOPE_LEFT 0.1
+#define MET 1e-11
+#define REFINEMENTS 3
+#define PULL 1e-9
+#define PIVOT 1e-13
+
+enum { AT_LOWER, AT_FREE, AT_UPPER };
+
+/* Rows of the dual: the force's components, then the sum. */
+typedef struct {
+    size_t n;
+    const double *lower, *upper;
+    double target[4], eps[4];
+    double *conductance; /* 1 / R over the largest */
+    double *rows;        /* weighted force per ampere over the largest, then 1: four a coil */
+    double *at;          /* one of the three above */
+    double *currents;
+    keyed *order;        /* two a coil */
+} vector_problem;
+
+/* Sums at a place of the dual. */
+typedef struct {
+    double slope[4], curvature[4][4];
+    int changed;
+} dual_place;
+
+static double dot(const double *a, const double *b, int rows)
+{
+    double sum = 0;
+    for (int k = 0; k < rows; k++)
+        sum += a[k] * b[k];
+    return sum;
+}
+
+/* Solves a symmetric positive definite system of n rows whose lower triangle is given; 0 where a pivot
+ * is at most `least` of its diagonal entry. */
+static int solve_cholesky(double lower[4][4], const double *right, int n, double least, double *x)
+{
+    double l[4][4], scale[4];
+    for (int a = 0; a < n; a++) {
+        scale[a] = sqrt(lower[a][a]);
+        if (!(scale[a] > 0 && isfinite(scale[a])))
+            return 0;
+    }
+    for (int a = 0; a < n; a++)
+        for (int b = 0; b <= a; b++) {
+            double value = lower[a][b] / (scale[a] * scale[b]) - dot(l[a], l[b], b);
+            if (a != b)
+                l[a][b] = value / l[b][b];
+            else if (value <= least)
+                return 0;
+            else
+                l[a][a] = sqrt(value);
+        }
+    for (int a = 0; a < 4; a++)
+        x[a] = 0;
+    for (int a = 0; a < n; a++)
+        x[a] = (right[a] / scale[a] - dot(l[a], x, a)) / l[a][a];
+    for (int a = n - 1; a >= 0; a--) {
+        double known = 0;
+        for (int k = a + 1; k < n; k++)
+            known += l[k][a] * x[k];
+        x[a] = (x[a] - known) / l[a][a];
+    }
+    for (int a = 0; a < n; a++)
+        x[a] /= scale[a];
+    return 1;
+}
+
+/* Currents, slope and curvature of the dual at y. */
+static dual_place place_at(vector_problem *p, const double *y, int rows, int all_free)
+{
+    dual_place place;
+    memset(&place, 0, sizeof place);
+    place.changed = all_free;
+    for (int k = 0; k < rows; k++) {
+        place.slope[k] = p->target[k] - p->eps[k] * y[k];
+        place.curvature[k][k] = p->eps[k];
+    }
+    for (size_t i = 0; i < p->n; i++) {
+        const double *h = p->rows + 4 * i;
+        double alone = p->conductance[i] * dot(h, y, rows), current = alone;
+        int at = AT_FREE;
+        if (!all_free && !(alone > p->lower[i] && alone < p->upper[i])) {
+            at = alone <= p->lower[i] ? AT_LOWER : AT_UPPER;
+            current = at == AT_LOWER ? p->lower[i] : p->upper[i];
+        }
+        place.changed |= at != (int)p->at[i];
+        p->at[i] = at;
+        p->currents[i] = current;
+        for (int k = 0; k < rows; k++)
+            place.slope[k] -= h[k] * current;
+        for (int k = 0; at == AT_FREE && k < rows; k++)
+            for (int l = 0; l <= k; l++)
+                place.curvature[k][l] += p->conductance[i] * h[k] * h[l];
+    }
+    return place;
+}
+
+/* Where the dual is highest along a step from y: its slope falls piecewise linearly. */
+static double top_along(vector_problem *p, const double *y, const double *step, int rows)
+{
+    double slope = 0, fall = 0, from = 0;
+    size_t count = 0;
+    for (int k = 0; k < rows; k++) {
+        slope += step[k] * (p->target[k] - p->eps[k] * y[k]);
+        fall += p->eps[k] * step[k] * step[k];
+    }
+    for (size_t i = 0; i < p->n; i++) {
+        const double *h = p->rows + 4 * i;
+        double c = p->conductance[i], alone = c * dot(h, y, rows), per_step = dot(h, step, rows);
+        double speed = c * per_step, leaves, meets;
+        slope -= per_step * clamp(alone, p->lower[i], p->upper[i]);
+        if (speed == 0)
+            continue;
+        /* It moves from where it leaves the near limit to where it meets the far one. */
+        leaves = ((speed > 0 ? p->lower[i] : p->upper[i]) - alone) / speed;
+        meets = ((speed > 0 ? p->upper[i] : p->lower[i]) - alone) / speed;
+        if (meets <= 0)
+            continue;
+        if (leaves <= 0)
+            fall += speed * per_step;
+        else {
+            p->order[count].key = leaves;
+            p->order[count++].coil = 2 * i;
+        }
+        p->order[count].key = meets;
+        p->order[count++].coil = 2 * i + 1;
+    }
+    sort_keys(p->order, count);
+    for (size_t k = 0; k < count; k++) {
+        size_t i = p->order[k].coil / 2;
+        double to = p->order[k].key, per_step = dot(p->rows + 4 * i, step, rows);
+        double bend = p->conductance[i] * per_step * per_step;
+        if (slope <= fall * (to - from))
+            break;
+        slope -= fall * (to - from);
+        fall += p->order[k].coil % 2 ? -bend : bend;
+        from = to;
+    }
+    return fall > 0 ? from + slope / fall : from;
+}
+
+/* Newton's steps to the top of the dual; leaves currents and limits of that place. */
+static void climb(vector_problem *p, double *y, int rows)
+{
+    dual_place place = place_at(p, y, rows, dot(y, y, rows) == 0);
+    for (int turn = 0; turn < CLIMB_STEPS; turn++) {
+        double step[4], next[4], uphill, length = 1;
+        dual_place there;
+        if (!solve_cholesky(place.curvature, place.slope, rows, 0, step))
+            break;
+        uphill = dot(step, place.slope, rows);
+        if (!(uphill > 0 && isfinite(uphill)))
+            break;
+        for (int k = 0; k < 4; k++)
+            next[k] = y[k] + step[k];
+        there = place_at(p, next, rows, 0);
+        if (fabs(dot(step, there.slope, rows)) <= SLOPE_LEFT * uphill) {
+            memcpy(y, next, sizeof next);
+            place = there;
+            if (!place.changed)
+                break;
+            continue;
+        }
+        length = top_along(p, y, step, rows);
+        for (int k = 0; k < 4; k++)
+            y[k] += length * step[k];
+        place = place_at(p, y, rows, 0);
+    }
+}
+
+/* Force that is missing; returns the size of the terms it is a sum of. */
+static double missing_force(const vector_problem *p, double *left)
+{
+    double size = sqrt(dot(p->target, p->target, 3));
+    memcpy(left, p->target, 4 * sizeof *left);
+    for (size_t i = 0; i < p->n; i++) {
+        const double *h = p->rows + 4 * i;
+        for (int k = 0; k < 4; k++)
+            left[k] -= h[k] * p->currents[i];
+        size += sqrt(dot(h, h, 3)) * fabs(p->currents[i]);
+    }
+    return size;
+}
+
+static double size_of(const double *y)
+{
+    return fabs(y[0]) + fabs(y[1]) + fabs(y[2]) + fabs(y[3]);
+}
+
+static double sum_of(const vector_problem *p)
+{
+    double sum = 0;
+    for (size_t i = 0; i < p->n; i++)
+        sum += p->currents[i];
+    return sum;
+}
+
+/* Solves the free currents for the wanted force without eps; whether that is optimal. */
+static int finish_exactly(vector_problem *p, const double *climbed, int rows)
+{
+    double system[4][4], damped[4][4], right[4], y[4], left[4], size, terms = 0;
+    memset(system, 0, sizeof system);
+    memcpy(right, p->target, sizeof right);
+    for (size_t i = 0; i < p->n; i++) {
+        const double *h = p->rows + 4 * i;
+        for (int k = 0; k < rows; k++)
+            if ((int)p->at[i] != AT_FREE)
+                right[k] -= h[k] * p->currents[i];
+            else
+                for (int l = 0; l < rows; l++)
+                    system[k][l] += p->conductance[i] * h[k] * h[l];
+    }
+    memcpy(damped, system, sizeof damped);
+    for (int k = 0; k < rows; k++)
+        damped[k][k] += p->eps[k];
+    memcpy(y, climbed, sizeof y);
+    for (int turn = 0; turn < REFINEMENTS; turn++) {
+        double rest[4], step[4];
+        for (int k = 0; k < 4; k++)
+            rest[k] = k < rows ? right[k] - dot(system[k], y, rows) : 0;
+        if (!solve_cholesky(damped, rest, rows, 0, step))
+            return 0;
+        for (int k = 0; k < 4; k++)
+            y[k] += step[k];
+    }
+    if (rows == 4 && y[3] > MET * size_of(y))
+        return 0;
+    for (size_t i = 0; i < p->n; i++) {
+        double c = p->conductance[i], alone = c * dot(p->rows + 4 * i, y, rows);
+        double range = p->upper[i] - p->lower[i], slack = MET * (c * size_of(y) > range ? c * size_of(y) : range);
+        int at = (int)p->at[i];
+        if ((at != AT_UPPER && alone < p->lower[i] - slack && at == AT_FREE) ||
+            (at == AT_LOWER && alone > p->lower[i] + slack) || (at == AT_FREE && alone > p->upper[i] + slack) ||
+            (at == AT_UPPER && alone < p->upper[i] - slack) || isnan(alone))
+            return 0;
+        if (at == AT_FREE)
+            p->currents[i] = clamp(alone, p->lower[i], p->upper[i]);
+    }
+    size = missing_force(p, left);
+    for (size_t i = 0; i < p->n; i++)
+        terms += fabs(p->currents[i]);
+    return sqrt(dot(left, left, 3)) <= MET * size && sum_of(p) <= p->target[3] + MET * terms;
+}
+
+/* Whether no currents within the limits come nearer: what is missing pulls every coil against the limit
+ * it is at, the sum's included. */
+static int is_nearest(const vector_problem *p, int rows)
+{
+    double left[4], size = missing_force(p, left), missing = sqrt(dot(left, left, 3));
+    double slack = PULL * missing + ROUNDING * size, threshold = 0;
+    if (missing <= MET * size)
+        return 0;
+    if (rows == 4) {
+        double price = -INFINITY;
+        for (size_t i = 0; i < p->n; i++)
+            if ((int)p->at[i] == AT_FREE && dot(p->rows + 4 * i, left, 3) > price)
+                price = dot(p->rows + 4 * i, left, 3);
+        if (price == -INFINITY || price < -slack)
+            return 0;
+        threshold = price;
+    } else if (sum_of(p) > p->target[3] * (1 + MET))
+        return 0;
+    for (size_t i = 0; i < p->n; i++) {
+        double pull = dot(p->rows + 4 * i, left, 3) - threshold;
+        int at = (int)p->at[i];
+        if (!(at == AT_LOWER ? pull <= slack : at == AT_UPPER ? pull >= -slack : fabs(pull) <= slack))
+            return 0;
+    }
+    return 1;
+}
+
+/* Solves the free currents, of which there are no more than rows, for the nearest force; whether it is. */
+static int finish_nearest(vector_problem *p, int rows)
+{
+    size_t free[4];
+    int count = 0, unknowns;
+    double left[4], base[4] = {0, 0, 0, 0}, columns[4][4], system[4][4], projected[4], solved[4], rest = 0, given = 0;
+    for (size_t i = 0; i < p->n; i++)
+        if ((int)p->at[i] == AT_FREE) {
+            if (count == 4)
+                return 0;
+            free[count++] = i;
+        }
+    for (int a = 0; a < count; a++)
+        p->currents[free[a]] = 0;
+    missing_force(p, left);
+    /* With a sum that binds, the last free coil takes what the others leave of it. */
+    unknowns = count;
+    if (rows == 4 && count > 0) {
+        unknowns = count - 1;
+        memcpy(base, p->rows + 4 * free[unknowns], sizeof base);
+        rest = left[3];
+    }
+    memset(solved, 0, sizeof solved);
+    for (int a = 0; a < unknowns; a++) {
+        projected[a] = 0;
+        for (int k = 0; k < 3; k++) {
+            columns[a][k] = p->rows[4 * free[a] + (size_t)k] - base[k];
+            projected[a] += columns[a][k] * (left[k] - base[k] * rest);
+        }
+        for (int b = 0; b <= a; b++)
+            system[a][b] = dot(columns[a], columns[b], 3);
+    }
+    if (unknowns > 0 && !solve_cholesky(system, projected, unknowns, PIVOT, solved))
+        return 0;
+    for (int a = 0; a < unknowns; a++) {
+        p->currents[free[a]] = solved[a];
+        given += solved[a];
+    }
+    if (unknowns < count)
+        p->currents[free[unknowns]] = left[3] - given;
+    for (int a = 0; a < count; a++) {
+        size_t i = free[a];
+        double slack = MET * (p->upper[i] - p->lower[i]);
+        if (!(p->currents[i] >= p->lower[i] - slack && p->currents[i] <= p->upper[i] + slack))
+            return 0;
+        p->currents[i] = clamp(p->currents[i], p->lower[i], p->upper[i]);
+    }
+    return is_nearest(p, rows);
+}
+
+static int reached(const vector_problem *p)
+{
+    double left[4], size = missing_force(p, left);
+    return sqrt(dot(left, left, 3)) <= MET * size ? FLUXFORM_OK : FLUXFORM_SATURATED;
+}
+
+static int solve_vector(vector_problem *p)
+{
+    double size = 0, stiffness = 0, y[4] = {0, 0, 0, 0};
+    for (size_t i = 0; i < p->n; i++) {
+        size += p->conductance[i] * dot(p->rows + 4 * i, p->rows + 4 * i, 3);
+        stiffness += p->conductance[i];
+    }
+    for (double share = EPS_FIRST;; share *= EPS_FACTOR) {
+        int rows = 3;
+        for (int k = 0; k < 3; k++)
+            p->eps[k] = share * size;
+        p->eps[3] = EPS_SUM * share * stiffness;
+        y[3] = 0;
+        climb(p, y, rows);
+        if (sum_of(p) > p->target[3])
+            climb(p, y, rows = 4);
+        if (finish_exactly(p, y, rows))
+            return FLUXFORM_OK;
+        if (finish_nearest(p, rows))
+            return reached(p);
+        if (share * EPS_FACTOR < EPS_LEAST) {
+            for (size_t i = 0; i < p->n; i++)
+                p->currents[i] = clamp(p->conductance[i] * dot(p->rows + 4 * i, y, rows), p->lower[i], p->upper[i]);
+            return reached(p);
+        }
+    }
+}
+
+#endif

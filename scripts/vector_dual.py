@@ -1,0 +1,207 @@
+"""Currents of least power for a force vector: a part of load_bundle.py, which imports it. numpy only."""
+
+import numpy as np
+
+
+class Dual:
+    """The dual of the least power for a force vector: the algorithm of src/lambda/vector_allocation.rs."""
+
+    EPS_FIRST, EPS_LEAST, EPS_FACTOR, EPS_SUM = 1e-7, 1e-14, 1e-3, 1e-6
+    STEPS, SLOPE_LEFT, REFINEMENTS = 60, 0.1, 3
+    MET, PULL, PIVOT, ROUNDING = 1e-11, 1e-9, 1e-13, 1e-14
+
+    def __init__(self, rows, target, conductance, lower, upper):
+        self.rows, self.target, self.conductance = rows, target, conductance
+        self.lower, self.upper = lower, upper
+        self.at = np.zeros(len(lower), dtype=int)
+        self.currents = np.zeros(len(lower))
+
+    def place(self, y, n, all_free):
+        """Currents, slope and curvature at y, and whether another coil is at a limit than before."""
+        alone = self.conductance * (self.rows[:, :n] @ y[:n])
+        at = np.where(alone <= self.lower, -1, np.where(alone >= self.upper, 1, 0))
+        if all_free:
+            at[:] = 0
+        self.currents = np.where(at < 0, self.lower, np.where(at > 0, self.upper, alone))
+        changed = all_free or bool(np.any(at != self.at))
+        self.at = at
+        free = self.rows[at == 0, :n]
+        slope = self.target[:n] - self.eps[:n] * y[:n] - self.rows[:, :n].T @ self.currents
+        curvature = np.diag(self.eps[:n]) + (free.T * self.conductance[at == 0]) @ free
+        return slope, curvature, changed
+
+    def top_along(self, y, step, n):
+        """Where the dual is highest along a step: its slope falls piecewise linearly."""
+        alone = self.conductance * (self.rows[:, :n] @ y[:n])
+        per_step = self.rows[:, :n] @ step
+        speed = self.conductance * per_step
+        slope = float(step @ (self.target[:n] - self.eps[:n] * y[:n]))
+        slope -= float(per_step @ np.clip(alone, self.lower, self.upper))
+        fall = float(self.eps[:n] @ step**2)
+        kinks = []
+        for i in np.flatnonzero(speed):
+            near, far = (self.lower[i], self.upper[i]) if speed[i] > 0 else (self.upper[i], self.lower[i])
+            leaves, meets = (near - alone[i]) / speed[i], (far - alone[i]) / speed[i]
+            if meets <= 0:
+                continue
+            bend = speed[i] * per_step[i]
+            if leaves <= 0:
+                fall += bend
+            else:
+                kinks.append((leaves, bend))
+            kinks.append((meets, -bend))
+        since = 0.0
+        for to, bend in sorted(kinks):
+            if slope <= fall * (to - since):
+                break
+            slope -= fall * (to - since)
+            fall += bend
+            since = to
+        return since + slope / fall if fall > 0 else since
+
+    def climb(self, y, n):
+        """Newton's steps to the top of the dual."""
+        slope, curvature, _ = self.place(y, n, not np.any(y[:n]))
+        for _ in range(self.STEPS):
+            step = _cholesky(curvature, slope, 0.0)
+            if step is None:
+                break
+            uphill = float(step @ slope)
+            if not 0 < uphill < np.inf:
+                break
+            there = y.copy()
+            there[:n] += step
+            found = self.place(there, n, False)
+            if abs(float(step @ found[0])) <= self.SLOPE_LEFT * uphill:
+                y[:] = there
+                slope, curvature, changed = found
+                if not changed:
+                    break
+                continue
+            y[:n] += self.top_along(y, step, n) * step
+            slope, curvature, _ = self.place(y, n, False)
+
+    def left(self):
+        """What is missing of force and sum, and the size of the force's terms."""
+        sizes = np.linalg.norm(self.rows[:, :3], axis=1) * np.abs(self.currents)
+        return self.target - self.rows.T @ self.currents, np.linalg.norm(self.target[:3]) + np.sum(sizes)
+
+    def reached(self):
+        left, size = self.left()
+        return bool(np.linalg.norm(left[:3]) <= self.MET * size)
+
+    def finish_exactly(self, climbed, n):
+        """Solves the free currents without eps; whether that is optimal."""
+        free = self.at == 0
+        system = (self.rows[free, :n].T * self.conductance[free]) @ self.rows[free, :n]
+        right = self.target[:n] - self.rows[~free, :n].T @ self.currents[~free]
+        y = climbed.copy()
+        for _ in range(self.REFINEMENTS):
+            step = _cholesky(system + np.diag(self.eps[:n]), right - system @ y[:n], 0.0)
+            if step is None:
+                return False
+            y[:n] += step
+        size = np.sum(np.abs(y))
+        if n == 4 and y[3] > self.MET * size:
+            return False
+        alone = self.conductance * (self.rows[:, :n] @ y[:n])
+        slack = self.MET * np.maximum(self.conductance * size, self.upper - self.lower)
+        low, high = alone >= self.lower - slack, alone <= self.upper + slack
+        optimal = np.where(free, low & high, np.where(
+            self.at < 0, alone <= self.lower + slack, alone >= self.upper - slack))
+        if not np.all(optimal):
+            return False
+        self.currents = np.where(free, np.clip(alone, self.lower, self.upper), self.currents)
+        terms = np.sum(np.abs(self.currents))
+        return self.reached() and bool(np.sum(self.currents) <= self.target[3] + self.MET * terms)
+
+    def finish_nearest(self, n):
+        """Solves the free currents, few as they are, for the nearest force; whether it is."""
+        free = np.flatnonzero(self.at == 0)
+        if len(free) > 4:
+            return False
+        self.currents[free] = 0.0
+        left, _ = self.left()
+        # With a sum that binds, the last free coil takes what the others leave of it.
+        last = free[-1:] if n == 4 else free[:0]
+        others = free[: len(free) - len(last)]
+        base = self.rows[last, :3].sum(axis=0)
+        rest = left[3] if len(last) else 0.0
+        columns = self.rows[others, :3] - base
+        solved = np.zeros(0)
+        if len(others):
+            solved = _cholesky(columns @ columns.T, columns @ (left[:3] - base * rest), self.PIVOT)
+            if solved is None:
+                return False
+        self.currents[others] = solved
+        self.currents[last] = left[3] - np.sum(solved) if len(last) else 0.0
+        slack = self.MET * (self.upper - self.lower)[free]
+        found = self.currents[free]
+        if not np.all((found >= self.lower[free] - slack) & (found <= self.upper[free] + slack)):
+            return False
+        self.currents[free] = np.clip(found, self.lower[free], self.upper[free])
+        return self.nearest(n)
+
+    def nearest(self, n):
+        """Whether what is missing pulls every coil against the limit it is at, the sum's included."""
+        left, size = self.left()
+        missing = np.linalg.norm(left[:3])
+        if missing <= self.MET * size:
+            return False
+        slack = self.PULL * missing + self.ROUNDING * size
+        pull = self.rows[:, :3] @ left[:3]
+        threshold = 0.0
+        if n == 4:
+            threshold = np.max(pull[self.at == 0], initial=-np.inf)
+            if threshold < -slack:
+                return False
+        elif np.sum(self.currents) > self.target[3] * (1 + self.MET):
+            return False
+        pull = pull - threshold
+        against = np.where(self.at == 0, np.abs(pull) <= slack, self.at * pull >= -slack)
+        return bool(np.all(against))
+
+    def solve(self):
+        """Whether the currents, which it leaves, give the force."""
+        size = np.sum(self.conductance * np.sum(self.rows[:, :3] ** 2, axis=1))
+        stiffness = np.sum(self.conductance)
+        y, share = np.zeros(4), self.EPS_FIRST
+        while True:
+            self.eps = share * np.array([size, size, size, self.EPS_SUM * stiffness])
+            n, y[3] = 3, 0.0
+            self.climb(y, n)
+            if np.sum(self.currents) > self.target[3]:
+                n = 4
+                self.climb(y, n)
+            if self.finish_exactly(y, n):
+                return True
+            if self.finish_nearest(n):
+                return self.reached()
+            if share * self.EPS_FACTOR < self.EPS_LEAST:
+                alone = self.conductance * (self.rows[:, :n] @ y[:n])
+                self.currents = np.clip(alone, self.lower, self.upper)
+                return self.reached()
+            share *= self.EPS_FACTOR
+
+
+def _cholesky(matrix, right, least):
+    """Solves a symmetric positive definite system; None where a pivot is at most `least` of its entry."""
+    scale = np.sqrt(np.diag(matrix))
+    if not np.all((scale > 0) & np.isfinite(scale)):
+        return None
+    scaled, factor = matrix / np.outer(scale, scale), np.zeros_like(matrix)
+    for a in range(len(scale)):
+        for b in range(a + 1):
+            value = scaled[a, b] - factor[a, :b] @ factor[b, :b]
+            if a != b:
+                factor[a, b] = value / factor[b, b]
+            elif not value > least:
+                return None
+            else:
+                factor[a, a] = np.sqrt(value)
+    x = right / scale
+    for a in range(len(x)):
+        x[a] = (x[a] - factor[a, :a] @ x[:a]) / factor[a, a]
+    for a in reversed(range(len(x))):
+        x[a] = (x[a] - factor[a + 1 :, a] @ x[a + 1 :]) / factor[a, a]
+    return x / scale

@@ -1,0 +1,435 @@
+//! A force vector rendered with position feedback: eq. 8 with three rows at every point, and the same
+//! requests under static currents and under eq. 8 of the upward force alone.
+//!
+//! A request is `lambda h_j d_j` with a direction `d_j`. The lambdas that a point can be given are an
+//! interval, because the forces within the limits are a convex body `B`. Its upper end is found from above:
+//! where `F = lambda h d` lies outside `B`, the nearest force `N` of `B` gives a plane that holds all of `B` on one
+//! side, and the ray meets it at
+//!
+//! ```text
+//! lambda' h = n . N / n . d,   n = w^2 (F - N),
+//! ```
+//!
+//! below lambda and not below the end. `B` has finitely many faces, so that ends; each turn is Newton's step on the
+//! distance, which is convex. The lower end, above zero only where a force without currents is too strong, is
+//! found likewise from below.
+
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::allocation::{Allocator, Reach};
+use super::certificate::best_within_limits;
+use super::feedback::{FeedbackError, Reachable};
+use super::problem::{ForceProblem, Settings};
+use super::sideways::SIDEWAYS_WEIGHT;
+use super::vector_allocation::VectorAllocator;
+
+/// Points handled together: fixed, so that sums do not depend on the number of threads.
+const CHUNK_POINTS: usize = 1024;
+/// Turns to an end of the lambdas, at most.
+const TURNS: usize = 100;
+/// Steps below this share are none.
+const STILL: f64 = 1e-12;
+
+/// Points whose requested force is a vector.
+#[derive(Debug, Clone, Copy)]
+pub struct VectorProblem<'a> {
+    /// The upward force, the heights and the limits.
+    pub upward: ForceProblem<'a>,
+    /// Forces per ampere along x and y, each [point, coil], N/A.
+    pub sides_n_per_a: [&'a [f64]; 2],
+    /// The requested force over lambda times the height, at every point.
+    pub direction: &'a [[f64; 3]],
+}
+
+/// Whose currents render the points.
+#[derive(Debug, Clone, Copy)]
+pub enum CurrentsOf<'a> {
+    /// The same at every point, A.
+    Static(&'a [f64]),
+    /// Of least power for the upward part of the request (eq. 8).
+    Upward,
+    /// Of least power for all three components.
+    Vector,
+}
+
+/// How well given currents render requested vectors; means by the points' weights.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct VectorRendering {
+    /// Length of the difference from the requested vector, root mean square, N.
+    pub rms_error_n: f64,
+    /// The longest, N.
+    pub worst_error_n: f64,
+    /// Root mean square of the difference over that of the requested vector.
+    pub error_share: f64,
+    /// The same of its horizontal part alone.
+    pub sideways_share: f64,
+    /// Angle between the given force and the requested one, median over the points above height 0, degrees.
+    pub direction_median_deg: f64,
+    /// 95 % of the angles are no larger, degrees.
+    pub direction_95_deg: f64,
+    /// Share of the points at which the currents give all that was requested of them.
+    pub reached: f64,
+    /// Mean power in the coils, W.
+    pub mean_power_w: f64,
+    /// Largest |current| of any coil, A.
+    pub largest_current_a: f64,
+}
+
+impl VectorProblem<'_> {
+    fn point(&self, point: usize) -> Rows<'_> {
+        let coils = self.upward.coils();
+        let of = |all| -> &[f64] {
+            let all: &[f64] = all;
+            &all[point * coils..(point + 1) * coils]
+        };
+        let [x, y] = self.sides_n_per_a;
+        Rows {
+            axes: [of(x), of(y), of(self.upward.forces_n_per_a)],
+            offset_n: self.upward.offset_n.map_or(0.0, |all| all[point]),
+            request: self.direction[point].map(|part| part * self.upward.height_m[point]),
+        }
+    }
+
+    /// # Errors
+    /// Where the problem is malformed.
+    fn allocator(&self, sideways_weight: f64) -> Result<VectorAllocator, FeedbackError> {
+        let problem = &self.upward;
+        problem.validate(&Settings::default())?;
+        Ok(VectorAllocator::new(
+            problem.resistance_ohm,
+            problem.lower_a,
+            problem.upper_a,
+            problem.total_max_a,
+            sideways_weight,
+        )?)
+    }
+}
+
+/// One point: forces per ampere, the force without currents, and the request over lambda.
+struct Rows<'a> {
+    axes: [&'a [f64]; 3],
+    offset_n: f64,
+    request: [f64; 3],
+}
+
+impl Rows<'_> {
+    fn fill(&self, rows: &mut [[f64; 3]]) {
+        for (coil, row) in rows.iter_mut().enumerate() {
+            *row = std::array::from_fn(|axis| self.axes[axis][coil]);
+        }
+    }
+
+    /// What currents must give at `lambda`, N.
+    fn of_currents(&self, lambda: f64) -> [f64; 3] {
+        let [x, y, z] = self.request.map(|part| lambda * part);
+        [x, y, z - self.offset_n]
+    }
+
+    fn given(&self, currents: &[f64]) -> [f64; 3] {
+        let sum = |axis: usize| -> f64 {
+            let terms = self.axes[axis].iter().zip(currents);
+            terms.map(|(force, current)| force * current).sum()
+        };
+        [sum(0), sum(1), sum(2) + self.offset_n]
+    }
+}
+
+/// The lambdas that every point can be given, times its height: the two ends as [`super::feedback::reachable`] has
+/// them of upward forces, so that [`super::feedback::Span`] serves both.
+///
+/// Error: ends to 1e-10, where a force counts as given within 1e-11 of its terms.
+///
+/// # Errors
+/// Where the problem is malformed.
+///
+/// # Panics
+/// When directions or sideways forces are fewer than the points.
+pub fn reachable_vectors(problem: &VectorProblem) -> Result<Reachable, FeedbackError> {
+    let allocator = problem.allocator(1.0)?;
+    let points: Vec<usize> = (0..problem.upward.height_m.len()).collect();
+    let ends: Vec<(f64, f64)> = points
+        .par_chunks(CHUNK_POINTS)
+        .flat_map_iter(|points| {
+            let mut search = Search::new(problem, allocator.clone());
+            let ends: Vec<_> = points.iter().map(|point| search.ends(*point)).collect();
+            ends
+        })
+        .collect();
+    let (least_n, most_n) = ends.into_iter().unzip();
+    Ok(Reachable { least_n, most_n })
+}
+
+struct Search<'a> {
+    problem: &'a VectorProblem<'a>,
+    allocator: VectorAllocator,
+    rows: Vec<[f64; 3]>,
+    currents: Vec<f64>,
+}
+
+/// The result of asking for a lambda at a point.
+enum Asked {
+    Given,
+    /// The lambda at which the ray meets the plane before the nearest force, if it does.
+    Crosses(Option<f64>),
+}
+
+impl<'a> Search<'a> {
+    fn new(problem: &'a VectorProblem<'a>, allocator: VectorAllocator) -> Self {
+        let coils = problem.upward.coils();
+        Self {
+            problem,
+            allocator,
+            rows: vec![[0.0; 3]; coils],
+            currents: vec![0.0; coils],
+        }
+    }
+
+    /// Both ends of the lambdas of a point, times its height.
+    fn ends(&mut self, point: usize) -> (f64, f64) {
+        fluxform_base::progress::poll();
+        let rows = self.problem.point(point);
+        rows.fill(&mut self.rows);
+        let height = self.problem.upward.height_m[point];
+        if height == 0.0 {
+            // Nothing is requested: that must be possible.
+            return match self.asked(&rows, 0.0) {
+                Asked::Given => (0.0, 0.0),
+                Asked::Crosses(_) => (1.0, 1.0),
+            };
+        }
+        let Some(most) = self.end(&rows, self.bound(&rows), |next, now| next < now) else {
+            return (0.0, -height);
+        };
+        let least = if most > 0.0 {
+            self.end(&rows, 0.0, |next, now| next > now)
+        } else {
+            Some(0.0)
+        };
+        (least.unwrap_or(most) * height, most * height)
+    }
+
+    /// No lambda beyond it can be given: the force along the request is largest there.
+    fn bound(&self, rows: &Rows) -> f64 {
+        let [x, y, z] = rows.request;
+        let along: Vec<f64> = (self.rows.iter())
+            .map(|row| x * row[0] + y * row[1] + z * row[2])
+            .collect();
+        let best = best_within_limits(&self.problem.upward, &along);
+        let most: f64 = along.iter().zip(&best).map(|(force, i)| force * i).sum();
+        (most + z * rows.offset_n) / (x * x + y * y + z * z)
+    }
+
+    /// The end of the lambdas that is met from `lambda` on; `None` where there is none on the `way`.
+    fn end(&mut self, rows: &Rows, from: f64, way: fn(f64, f64) -> bool) -> Option<f64> {
+        let mut lambda = from;
+        for _ in 0..TURNS {
+            let next = match self.asked(rows, lambda) {
+                Asked::Given => return Some(lambda),
+                Asked::Crosses(next) => next.filter(|next| way(*next, lambda))?,
+            };
+            let still = (next - lambda).abs() <= STILL * lambda.abs().max(next.abs());
+            lambda = next;
+            if still {
+                break;
+            }
+        }
+        Some(lambda)
+    }
+
+    fn asked(&mut self, rows: &Rows, lambda: f64) -> Asked {
+        let wanted = rows.of_currents(lambda);
+        let found = self
+            .allocator
+            .allocate(&self.rows, wanted, &mut self.currents);
+        if found.reach == Reach::Reached {
+            return Asked::Given;
+        }
+        let nearest = found.force_n;
+        let normal: [f64; 3] = std::array::from_fn(|k| wanted[k] - nearest[k]);
+        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let [x, y, z] = nearest;
+        let crossing = dot(normal, [x, y, z + rows.offset_n]) / dot(normal, rows.request);
+        Asked::Crosses(Some(crossing).filter(|crossing| crossing.is_finite()))
+    }
+}
+
+/// Renders every point at `lambda_n_per_m`.
+///
+/// # Errors
+/// Where the problem is malformed.
+///
+/// # Panics
+/// When directions, sideways forces or currents are fewer than the problem's.
+pub fn render_vectors(
+    problem: &VectorProblem,
+    lambda_n_per_m: f64,
+    currents_of: CurrentsOf,
+) -> Result<VectorRendering, FeedbackError> {
+    let vector = problem.allocator(SIDEWAYS_WEIGHT)?;
+    let limits = &problem.upward;
+    let upward = Allocator::new(
+        limits.resistance_ohm,
+        limits.lower_a,
+        limits.upper_a,
+        limits.total_max_a,
+    )?;
+    let points: Vec<usize> = (0..limits.height_m.len()).collect();
+    let parts: Vec<Sums> = points
+        .par_chunks(CHUNK_POINTS)
+        .map(|points| {
+            let mut given = GivenCurrents {
+                currents_of,
+                upward: upward.clone(),
+                vector: vector.clone(),
+                rows: vec![[0.0; 3]; limits.coils()],
+                currents: vec![0.0; limits.coils()],
+            };
+            let mut sums = Sums::default();
+            for &point in points {
+                fluxform_base::progress::poll();
+                sums.add(problem, &mut given, point, lambda_n_per_m);
+            }
+            sums
+        })
+        .collect();
+    let mut all = Sums::default();
+    for part in parts {
+        all.join(part);
+    }
+    Ok(all.rendering())
+}
+
+/// Chooses the currents of a point.
+struct GivenCurrents<'a> {
+    currents_of: CurrentsOf<'a>,
+    upward: Allocator,
+    vector: VectorAllocator,
+    rows: Vec<[f64; 3]>,
+    currents: Vec<f64>,
+}
+
+impl GivenCurrents<'_> {
+    fn at(&mut self, rows: &Rows, lambda: f64) -> Reach {
+        let wanted = rows.of_currents(lambda);
+        match self.currents_of {
+            CurrentsOf::Static(currents) => {
+                self.currents.copy_from_slice(currents);
+                Reach::Saturated
+            }
+            CurrentsOf::Upward => {
+                let found = self
+                    .upward
+                    .allocate(rows.axes[2], wanted[2], &mut self.currents);
+                found.reach
+            }
+            CurrentsOf::Vector => {
+                rows.fill(&mut self.rows);
+                let found = self.vector.allocate(&self.rows, wanted, &mut self.currents);
+                found.reach
+            }
+        }
+    }
+}
+
+/// Sums over points.
+#[derive(Default)]
+struct Sums {
+    weight: f64,
+    requested: f64,
+    error: f64,
+    sideways: f64,
+    worst: f64,
+    reached: f64,
+    power: f64,
+    largest: f64,
+    angles_deg: Vec<f64>,
+}
+
+impl Sums {
+    fn add(
+        &mut self,
+        problem: &VectorProblem,
+        given: &mut GivenCurrents,
+        point: usize,
+        lambda: f64,
+    ) {
+        let rows = problem.point(point);
+        let limits = &problem.upward;
+        let weight = (limits.weights).map_or(1.0, |all| all[point] / limits.heaviest());
+        let reach = given.at(&rows, lambda);
+        let force = rows.given(&given.currents);
+        let request = rows.request.map(|part| lambda * part);
+        let [x, y, z]: [f64; 3] = std::array::from_fn(|k| force[k] - request[k]);
+        let sideways = x * x + y * y;
+        self.weight += weight;
+        self.requested += weight * request.iter().map(|part| part * part).sum::<f64>();
+        self.error += weight * (sideways + z * z);
+        self.sideways += weight * sideways;
+        self.worst = self.worst.max((sideways + z * z).sqrt());
+        self.reached += if reach == Reach::Reached { weight } else { 0.0 };
+        for (current, ohm) in given.currents.iter().zip(limits.resistance_ohm) {
+            self.power += weight * ohm * current * current;
+            self.largest = self.largest.max(current.abs());
+        }
+        if request != [0.0; 3] {
+            self.angles_deg.push(angle_deg(request, force));
+        }
+    }
+
+    /// Points that come after these.
+    fn join(&mut self, next: Self) {
+        self.weight += next.weight;
+        self.requested += next.requested;
+        self.error += next.error;
+        self.sideways += next.sideways;
+        self.worst = self.worst.max(next.worst);
+        self.reached += next.reached;
+        self.power += next.power;
+        self.largest = self.largest.max(next.largest);
+        self.angles_deg.extend(next.angles_deg);
+    }
+
+    fn rendering(mut self) -> VectorRendering {
+        self.angles_deg.sort_by(f64::total_cmp);
+        let quantile = |part: f64| {
+            let at = (part * self.angles_deg.len() as f64) as usize;
+            self.angles_deg.get(at).copied().unwrap_or(0.0)
+        };
+        // Nothing requested: no share of it.
+        let share = |square: f64| {
+            if self.requested > 0.0 {
+                (square / self.requested).sqrt()
+            } else {
+                0.0
+            }
+        };
+        VectorRendering {
+            rms_error_n: (self.error / self.weight).sqrt(),
+            worst_error_n: self.worst,
+            error_share: share(self.error),
+            sideways_share: share(self.sideways),
+            direction_median_deg: quantile(0.5),
+            direction_95_deg: quantile(0.95),
+            reached: self.reached / self.weight,
+            mean_power_w: self.power / self.weight,
+            largest_current_a: self.largest,
+        }
+    }
+}
+
+/// Angle between a requested force and the `given` one, degrees; 0 where none is requested, 180 where none is
+/// given.
+#[must_use]
+pub fn angle_deg(requested: [f64; 3], given: [f64; 3]) -> f64 {
+    let [[a, b, c], [x, y, z]] = [requested, given];
+    if requested == [0.0; 3] {
+        return 0.0;
+    }
+    if given == [0.0; 3] {
+        return 180.0;
+    }
+    let across = (b * z - c * y).hypot((c * x - a * z).hypot(a * y - b * x));
+    across.atan2(a * x + b * y + c * z).to_degrees()
+}
