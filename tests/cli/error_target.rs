@@ -24,7 +24,7 @@ fn a_requested_error_is_held_against_a_finer_run() {
         ("wedge", "primitive = \"wedge\"\nlow_mm = 34.0\n"),
         (
             "dome",
-            "primitive = \"half-sphere\"\nradius_mm = 67.0\nbase_mm = 11.0\n",
+            "primitive = \"half-sphere\"\nradius_mm = 91.0\nbase_mm = 11.0\n",
         ),
         ("cap", "primitive = \"half-sphere\"\nradius_mm = 38.3\n"),
     ];

@@ -82,6 +82,31 @@ fn a_shape_file_and_a_flag_choose_the_weights_and_bundles_by_area_pass_verify() 
     }
 }
 
+/// A rim low over the coils weighs much, and no point lies on it: half the points said nothing of that.
+#[test]
+fn what_a_rim_leaves_between_points_and_silhouette_is_stated() {
+    let place = Place::new();
+    let at = |samples: usize| {
+        let text = format!(
+            "name = \"dome\"\nprimitive = \"half-sphere\"\nradius_mm = 67.0\nbase_mm = 11.0\n\
+             [points]\nx_mm = [-50.0, 50.0, {samples}]\ny_mm = [-50.0, 50.0, {samples}]\n"
+        );
+        let name = format!("dome_{samples}.toml");
+        place.write(&name, &text);
+        solved(&place, &name, &["--weights", "area"])
+    };
+    let limit = lambda(&at(321));
+    for samples in [31, 61, 121] {
+        let coarse = at(samples);
+        let off = (lambda(&coarse) / limit - 1.0).abs();
+        assert!(
+            stated(&coarse) >= off,
+            "{samples}: {} of {off}",
+            stated(&coarse)
+        );
+    }
+}
+
 /// Columns of a table.
 #[test]
 fn the_table_of_points_states_the_area_of_each() {

@@ -105,11 +105,11 @@ fn the_table_of_numbers_is_what_the_commands_print() {
         (&coil, "6.0753 ohm"),
         (&coil, "778.87 mN"),
         (&coil, "151.51 ms"),
-        (&coil, "99.112 ms, +/- 5.41 %"),
-        (&flat, "3.2544 N/m"),
+        (&coil, "99 +- 6 ms"),
+        (&flat, "3.254 +- 0.004 N/m"),
         (&air, "99.709 mN"),
         (&air, "11.935 ms"),
-        (&flat_air, "0.62098 N/m"),
+        (&flat_air, "0.6210 +- 0.0020 N/m"),
     ] {
         assert!(printed.contains(value), "no {value} in:\n{printed}");
         assert!(readme.contains(value), "no {value} in README.md");

@@ -202,10 +202,6 @@ fn the_limit_of_ever_more_points_lies_within_the_stated_error() {
     }
     ratios.sort_by(f64::total_cmp);
     let median = ratios[ratios.len() / 2];
-    println!(
-        "{} objects, claimed over true: median {median:.2}",
-        ratios.len()
-    );
     assert!(median <= 10.0, "{median}");
 }
 

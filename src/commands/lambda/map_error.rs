@@ -26,9 +26,10 @@ const JUMP_SLOPE: f64 = 1.0;
 ///
 /// A runtime interpolates heights between points, and requests lambda times that. The certificate
 /// bounds how far that is off; where the surface jumps it is off by as much as it jumps, whatever the
-/// grid. A place is a jump where the slope changes by more than 1 (45 degrees) from one side of a node
-/// to the other; those are left out, their share is stated, and the rest is estimated from the second
-/// differences: of a bend anywhere in a cell interpolation is off by half of them at most.
+/// grid. A node is at a jump where the slope changes by more than 1 (45 degrees) from one of its sides
+/// to the other: there heights beyond a quarter of the spacing off are left out, and the share of such
+/// nodes is stated. The rest is estimated from the second differences: of a bend anywhere in a cell
+/// interpolation is off by half of them at most.
 pub(crate) fn between_points(points: &PointsReport) -> (Option<BudgetPart>, Option<f64>) {
     let found = &points.discretized.points;
     let Some(lowest_m) = lowest_requested_m(&found.height_m) else {
@@ -62,8 +63,8 @@ pub(crate) fn between_points(points: &PointsReport) -> (Option<BudgetPart>, Opti
     }
 }
 
-/// The largest half of the second differences at any node but jumps, relative to its height, and the
-/// number of jumps.
+/// The largest half of the second differences at any node, at jumps a quarter of the spacing, relative
+/// to its height, and the number of jumps.
 fn second_differences(points: &ConstraintPoints, lowest_m: f64) -> (f64, usize) {
     let rows = points.row_of_grid_point();
     let columns = points.grid.x_m.samples;
@@ -88,12 +89,12 @@ fn second_differences(points: &ConstraintPoints, lowest_m: f64) -> (f64, usize) 
                 continue;
             };
             let bend_m = (height_m - 0.5 * (points.height_m[a] + points.height_m[b])).abs();
-            jump |= bend_m > 0.5 * JUMP_SLOPE * step_m;
-            off_m += 0.5 * bend_m;
+            let most_m = 0.5 * JUMP_SLOPE * step_m;
+            jump |= bend_m > most_m;
+            off_m += 0.5 * bend_m.min(most_m);
         }
-        if jump {
-            jumps += 1;
-        } else if height_m >= lowest_m {
+        jumps += usize::from(jump);
+        if height_m >= lowest_m {
             largest = largest.max(off_m / height_m);
         }
     }
