@@ -150,11 +150,11 @@ impl Kernel for AddMultiple<'_> {
         let (x_blocks, x_rest) = x.as_chunks::<BLOCK>();
         for (y, x) in y_blocks.iter_mut().zip(x_blocks) {
             for k in 0..BLOCK {
-                y[k] = y[k] + product::<FMA>(factor, x[k]);
+                y[k] += product::<FMA>(factor, x[k]);
             }
         }
         for (y, &x) in y_rest.iter_mut().zip(x_rest) {
-            *y = *y + product::<FMA>(factor, x);
+            *y += product::<FMA>(factor, x);
         }
     }
 }
