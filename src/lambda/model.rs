@@ -199,16 +199,23 @@ impl Factor {
     pub(crate) fn pivoted(model: &Model, variables: &[usize], share: f64) -> Self {
         let mut taken = Vec::new();
         let mut factor = Self::new(model, &taken);
+        // Every column times Q', of which all but the first rows lie outside the span.
+        let mut turned: Vec<(usize, Vec<Num>)> = variables
+            .iter()
+            .filter(|&&i| model.norm[i] > Num::ZERO)
+            .map(|&i| (i, model.column(i).to_vec()))
+            .collect();
         // Each turn takes one more of them.
         for _ in 0..variables.len() {
-            let outside = |i: usize| {
-                let rest = factor.solve(model, model.column(i), Num::ZERO).residual;
-                (Num::dot(&rest, &rest).sqrt() / model.norm[i]).to_f64()
+            fluxform_base::progress::poll();
+            let rank = factor.members.len();
+            let outside = |(i, column): &(usize, Vec<Num>)| {
+                let rest = &column[rank..];
+                (Num::dot(rest, rest).sqrt() / model.norm[*i]).to_f64()
             };
-            let best = variables
+            let best = turned
                 .iter()
-                .filter(|&&i| model.norm[i] > Num::ZERO && !factor.contains(i))
-                .map(|&i| (i, outside(i)))
+                .map(|column| (column.0, outside(column)))
                 .reduce(|a, b| if b.1 > a.1 { b } else { a });
             let grown = match best {
                 Some((i, part)) if part > share => {
@@ -221,7 +228,17 @@ impl Factor {
             let Some(grown) = grown else {
                 break;
             };
+            let same_pivot = grown.pivot == factor.pivot;
             factor = grown;
+            turned.retain(|(i, _)| !factor.contains(*i));
+            for (i, column) in &mut turned {
+                if same_pivot {
+                    factor.reflect_by(rank, column);
+                } else {
+                    column.copy_from_slice(model.column(*i));
+                    factor.reflect(column);
+                }
+            }
         }
         factor
     }

@@ -1,7 +1,8 @@
-//! Time and memory of the force constant's two forms over 1e2 to 1e7 points.
+//! Time and memory of the force constant's two forms over 1e2 to 1e7 points, and over 16 to 400 coils.
 //!
 //! ```text
 //! cargo bench --locked --bench time_lambda -- [MOST_POINTS] [THREADS]
+//! cargo bench --locked --bench time_lambda -- coils [MOST_COILS] [THREADS]
 //! ```
 //!
 //! Default: 1e6 points, one thread. Each row is its own process, so that its peak memory
@@ -37,6 +38,12 @@ const CASES: [(&str, usize, u32, u32); 6] = [
     ("flat", 5, 25, 50),
     ("dome", 5, 25, 50),
 ];
+
+/// Sides of the square arrays over which coils are counted: at a pitch of 50 mm under a plate over
+/// all of them, of that many points along a side.
+const SIDES: [usize; 7] = [4, 6, 8, 10, 12, 15, 20];
+const PITCH_MM: u32 = 50;
+const NODES: usize = 61;
 
 /// Height of the surface, m; the dome is a smooth one without any symmetry.
 fn height_m(surface: &str, x: f64, y: f64) -> f64 {
@@ -146,6 +153,8 @@ fn main() -> Result<(), Failure> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.parse()?);
         return pool.build()?.install(|| row(surface, side, sizes_m, nodes));
     }
+    let over_coils = arguments.first().is_some_and(|first| first == "coils");
+    let arguments = &arguments[usize::from(over_coils)..];
     let most: f64 = arguments.first().map_or(Ok(1e6), |text| text.parse())?;
     let threads = arguments.get(1).map_or("1", String::as_str);
     println!("{threads} thread(s)\n");
@@ -153,6 +162,28 @@ fn main() -> Result<(), Failure> {
         "| surface | coils | pitch mm | points | path s | MB | turns | worst-point s | MB | turns | whole | gap |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|---|");
+    let measured = |surface: &str, side: usize, sizes_mm: [u32; 2], nodes: usize| {
+        let status = Command::new(std::env::current_exe()?)
+            .arg(surface)
+            .args([side.to_string(), sizes_mm[0].to_string()])
+            .args([sizes_mm[1].to_string(), nodes.to_string()])
+            .arg(threads)
+            .status()?;
+        if status.success() {
+            return Ok(());
+        }
+        Err(Failure::from(format!("{surface} {side} {nodes}: {status}")))
+    };
+    if over_coils {
+        for side in SIDES
+            .into_iter()
+            .filter(|side| (side * side) as f64 <= most)
+        {
+            let half_mm = PITCH_MM * (side as u32 - 1) / 2;
+            measured("flat", side, [PITCH_MM, half_mm], NODES)?;
+        }
+        return Ok(());
+    }
     for (surface, side, pitch, half) in CASES {
         for nodes in [10, 32, 100, 316, 1000, 3162] {
             let (size, coils): (f64, _) = ((nodes * nodes) as f64, side * side);
@@ -160,14 +191,7 @@ fn main() -> Result<(), Failure> {
             if size > most * 1.01 || size * coils as f64 > 1e8 {
                 continue;
             }
-            let status = Command::new(std::env::current_exe()?)
-                .arg(surface)
-                .args([side.to_string(), pitch.to_string(), half.to_string()])
-                .args([&nodes.to_string(), threads])
-                .status()?;
-            if !status.success() {
-                return Err(format!("{surface} {side} {nodes}: {status}").into());
-            }
+            measured(surface, side, [pitch, half], nodes)?;
         }
     }
     Ok(())
