@@ -459,6 +459,7 @@ impl Kernel for Pass<'_> {
     fn run<const FMA: bool>(self) -> Vec<f64> {
         match self.parts {
             Components::Gz => self.run_parts::<FMA, 1>(),
+            Components::Force => self.run_parts::<FMA, 3>(),
             Components::Gradient => self.run_parts::<FMA, 5>(),
             Components::All => self.run_parts::<FMA, 8>(),
         }
@@ -542,6 +543,8 @@ fn dipole<const FMA: bool, const PARTS: usize>(
         parts[6] = strength * dy + even * ny;
         parts[7] = strength * dz + even * nz;
     }
-    out.copy_from_slice(&parts[..PARTS]);
+    // Those along z alone: the last of the gradient's.
+    let first = if PARTS == 3 { 2 } else { 0 };
+    out.copy_from_slice(&parts[first..first + PARTS]);
     out
 }
