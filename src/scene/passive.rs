@@ -19,9 +19,8 @@ pub const PASSIVE_TOLERANCE: f64 = 1e-3;
 
 /// The same where the pull is left out: how large it is matters to some digits only.
 pub const LEFT_OUT_TOLERANCE: f64 = 1e-2;
-/// Of it what tabulating the pull may add, where it is not among the largest that are reported:
-/// those are computed by themselves.
-const TABLE_SHARE: f64 = 1.0;
+/// Of it what tabulating the pull may add.
+const TABLE_SHARE: f64 = 0.1;
 /// Most cores whose coupling is worth its memory and time where the pull is left out: both grow as
 /// powers of their number.
 const MOST_COUPLED: usize = 36;
