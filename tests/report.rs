@@ -76,7 +76,7 @@ fn a_bundle_holds_its_page_and_verify_checks_it() {
         "Accuracy</h2>",
         "Limits</h2>",
         "duality gap",
-        "map interpolation",
+        "nodes of the map",
         "id=\"draw-turn\"",
         "id=\"draw-path\"",
         "id=\"draw-currents\"",

@@ -123,7 +123,7 @@ mod tests {
     #[test]
     fn faults_are_reported_with_their_line() {
         for (text, words) in [
-            ("", "finger.csv:1: column t_s is missing"),
+            ("", "finger.csv: the table is empty; expected a header line"),
             (
                 "t_s,x_m,y_m\n0,0,0\n",
                 "finger.csv:1: column z_m is missing",

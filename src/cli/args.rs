@@ -190,10 +190,10 @@ pub struct SurfaceFlags {
 #[derive(Debug, Clone, Copy, Args)]
 pub struct ForceFlags {
     /// Where the requested force points [default: the shape file's `force`, or vertical]
-    #[arg(long, value_name = "NAME", value_parser = values::force_direction())]
+    #[arg(long, hide_short_help = true, value_name = "NAME", value_parser = values::force_direction())]
     pub force_direction: Option<ForceDirection>,
     /// How large a force along the normal is [default: the shape file's `normal_force`, or magnitude]
-    #[arg(long, value_name = "NAME", value_parser = values::normal_force())]
+    #[arg(long, hide_short_help = true, value_name = "NAME", value_parser = values::normal_force())]
     pub normal_force: Option<NormalForce>,
 }
 

@@ -16,7 +16,7 @@ use super::solve::constant;
 
 /// Ways to choose every second point along two axes; of scattered points every fourth.
 const SUBSETS: usize = 4;
-/// Of the largest difference: of 3600 random objects it alone fell short of the error in 12, by a
+/// Of the largest difference: of 1800 random objects it alone fell short of the error in 12, by a
 /// factor of 1.7 at most, where the errors of different parts of a surface cancel in one rule and
 /// not in another.
 const MARGIN: f64 = 1.8;

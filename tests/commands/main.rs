@@ -195,18 +195,20 @@ fn two_shapes_of_one_name_are_refused() {
 }
 
 #[test]
-fn points_outside_the_workspace_are_reported() {
+fn an_object_outside_the_workspace_is_refused_with_the_translation_that_cures_it() {
     let text = seed_air().replace("z_mm = [10.0, 80.0, 29]", "z_mm = [10.0, 40.0, 13]");
     assert_ne!(text, seed_air());
     let out = tempfile::tempdir().expect("a temporary folder");
-    let report = calibrate_text(&text, &SHAPES[..1], out.path()).expect("calibrates");
-    let warnings = &report.bundles[0].lambda.warnings;
-    assert!(
-        warnings
-            .iter()
-            .any(|w| w.contains("wholly outside the design's workspace")),
-        "{warnings:?}"
-    );
+    let error = calibrate_text(&text, &SHAPES[..1], out.path()).expect_err("no bundle");
+    let message = error.to_string();
+    for part in [
+        "wholly outside the design's workspace",
+        "translate_mm = [0, 0, 40]",
+    ] {
+        assert!(message.contains(part), "{message}");
+    }
+    let cured = text.replace("z_mm = [10.0, 40.0, 13]", "z_mm = [10.0, 60.0, 21]");
+    let report = calibrate_text(&cured, &SHAPES[..1], out.path()).expect("calibrates");
     assert!(
         verify::run(&report.bundles[0].folder, &Silent)
             .expect("opens")

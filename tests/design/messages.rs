@@ -75,7 +75,7 @@ fn a_wrong_type_says_what_was_found() {
     says(&[
         (
             sound_but("length_mm = 100.0", "length_mm = \"100\""),
-            "d.toml:5:13: error: coil.length_mm: expected a number, found the text \"100\"",
+            "d.toml:5:13: error: coil.length_mm: expected a number, found the text \"100\" (write 100 without quotes and unit)",
         ),
         (
             sound_but("length_mm = 100.0", "length_mm = true"),

@@ -73,9 +73,9 @@ pub struct Calibrate {
     /// OUT/<design>/.fluxform-kept
     #[arg(long, hide_short_help = true)]
     no_cache: bool,
-    /// Report first what will be computed and what left out
+    /// Report the plan and its cost first
     ///
-    /// Why, and what leaving it out costs.
+    /// With the reason for every part that is left out, and the error that this costs.
     #[arg(long)]
     explain: bool,
     /// Leave out report.html and the folder plots

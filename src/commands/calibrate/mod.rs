@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::discretize::{self, PointsReport, point_rows, points_grid};
 use super::lambda::error_target::{ChosenGrid, ErrorTarget};
-use super::lambda::placement::{Outside, Placed};
+use super::lambda::placement::Placed;
 use super::lambda::{LambdaOptions, LambdaReport, WantedPoints, sideways, solve_at};
 use super::made_with::surface;
 use super::map::{arrays, runtime, summary};
@@ -479,15 +479,7 @@ impl Calibration<'_> {
             document: &self.shape.document,
             points: &of_grid,
         };
-        match placed.outside() {
-            Outside::None => lambda.misplaced = placed.unfelt(lambda.file.lambda_n_per_m),
-            Outside::Some(warning) => {
-                lambda.warnings.push(warning);
-                lambda.misplaced = placed.unfelt(lambda.file.lambda_n_per_m);
-            }
-            Outside::Most(message) => lambda.misplaced = Some(message),
-        }
-        lambda.warnings.extend(lambda.misplaced.clone());
+        placed.judge(&mut lambda);
         let rows = point_rows(grid_points);
         let currents = current_rows(scene, &lambda);
         let mut map = arrays(

@@ -109,6 +109,14 @@ pub struct LambdaReport {
 }
 
 impl LambdaOptions {
+    /// These options, the force being the document's where they request none.
+    fn over(&self, document: &ShapeDocument) -> Self {
+        Self {
+            force: self.force.over(document.force).into(),
+            ..self.clone()
+        }
+    }
+
     /// How the points of a grid count: as requested, else as the document says, else equally, or by
     /// area where an error is requested, since lambda of the object is meant then.
     pub(crate) fn weights_of(&self, points: &PointsReport) -> Weights {
@@ -170,10 +178,7 @@ pub fn run(
     let document = search
         .as_ref()
         .map_or(document, |(_, chosen)| &chosen.document);
-    let options = &LambdaOptions {
-        force: options.force.over(document.force).into(),
-        ..options.clone()
-    };
+    let options = &options.over(document);
     let points = discretize::run(document, inputs.clone(), progress)?;
     let of_grid = WantedPoints::of_grid(&points, options.weights_of(&points));
     let sampling = options
@@ -198,29 +203,30 @@ pub fn run(
     let solve_with = |points: &WantedPoints, options: &LambdaOptions| {
         solve_at(&scene, &solved, none, points, options, progress)
     };
-    let misplaced = |points: &WantedPoints, report: &LambdaReport| {
-        Placed {
-            design,
-            document,
-            points,
-        }
-        .unfelt(report.file.lambda_n_per_m)
-    };
-    let (Some(chosen), Some(sampled)) = (chosen, sampled) else {
-        let mut report = solve_with(&of_grid, options)?;
-        if let Some((target, chosen)) = &search {
-            report.requested(*target, chosen, None, scene.tolerances.forces);
-        }
+    let whole = |points: &WantedPoints| -> Result<LambdaReport, RunError> {
+        let mut report = solve_with(points, options)?;
         sideways::add(
             &mut report.file,
             &scene,
             &solved,
             none,
-            &of_grid,
+            points,
             &options.wiring,
             progress,
         )?;
-        report.misplaced = misplaced(&of_grid, &report);
+        let placed = Placed {
+            design,
+            document,
+            points,
+        };
+        report.misplaced = placed.unfelt(report.file.lambda_n_per_m);
+        Ok(report)
+    };
+    let (Some(chosen), Some(sampled)) = (chosen, sampled) else {
+        let mut report = whole(&of_grid)?;
+        if let Some((target, chosen)) = &search {
+            report.requested(*target, chosen, None, scene.tolerances.forces);
+        }
         return Ok((points, report));
     };
     // Feedback and picture are of the chosen points alone.
@@ -230,21 +236,11 @@ pub fn run(
         ..options.clone()
     };
     let grid = solve_with(&of_grid, &plain)?.file;
-    let mut report = solve_with(&chosen, options)?;
-    sideways::add(
-        &mut report.file,
-        &scene,
-        &solved,
-        none,
-        &chosen,
-        &options.wiring,
-        progress,
-    )?;
+    let mut report = whole(&chosen)?;
     if let Some(coarser) = coarser {
         let other = solve_with(&coarser, &plain)?.file;
         report.add_quadrature(&other);
     }
-    report.misplaced = misplaced(&chosen, &report);
     report.file.sampling = Some(against_grid(&sampled.summary, &report.file, &grid));
     Ok((points, report))
 }

@@ -1,6 +1,6 @@
 //! Whether an object lies where the array can render it, and what would bring it there.
 
-use super::WantedPoints;
+use super::{LambdaReport, WantedPoints};
 use crate::design::Design;
 use crate::numerics::axis::Axis;
 use crate::shape::document::{ShapeDocument, SurfaceSource, parse_unit, unit_name, unit_names};
@@ -21,8 +21,8 @@ pub(crate) struct Placed<'a> {
     pub(crate) points: &'a WantedPoints,
 }
 
-/// What is to be said of the points outside the workspace.
-pub(crate) enum Outside {
+/// Report on the points outside the workspace.
+enum Outside {
     /// Nothing: there are none.
     None,
     /// Some: a warning.
@@ -32,8 +32,21 @@ pub(crate) enum Outside {
 }
 
 impl Placed<'_> {
+    /// Warns of points outside the workspace, and states why the object cannot be rendered where it is.
+    pub(crate) fn judge(&self, report: &mut LambdaReport) {
+        report.misplaced = match self.outside() {
+            Outside::Most(message) => Some(message),
+            Outside::Some(warning) => {
+                report.warnings.push(warning);
+                self.unfelt(report.file.lambda_n_per_m)
+            }
+            Outside::None => self.unfelt(report.file.lambda_n_per_m),
+        };
+        report.warnings.extend(report.misplaced.clone());
+    }
+
     /// The points outside the design's workspace, where a runtime gives no force.
-    pub(crate) fn outside(&self) -> Outside {
+    fn outside(&self) -> Outside {
         let axes = self.axes();
         let inside =
             |point: &[f64; 3]| (0..3).all(|k| axes[k].from <= point[k] && point[k] <= axes[k].to);
