@@ -79,7 +79,7 @@ int fluxform_direction(const fluxform_bundle *b, double x, double y, double *hei
     return there;
 }
 
-/* ---- currents of least power (the algorithm is told in src/lambda/allocation.rs) -------------- */
+/* ---- currents of least power (the algorithm is described in src/lambda/allocation.rs) -------------- */
 
 /* A coil and where it is sorted to. */
 typedef struct {

@@ -96,12 +96,6 @@ impl NormalForce {
     pub fn name(self) -> &'static str {
         self.into()
     }
-
-    /// The size in words.
-    #[must_use]
-    pub fn meaning(self) -> &'static str {
-        self.get_documentation().unwrap_or_default()
-    }
 }
 
 /// The sideways part of a force whose upward part is given, over that part, at most: 72 degrees.

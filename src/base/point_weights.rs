@@ -42,12 +42,6 @@ impl Weights {
         self.into()
     }
 
-    /// What it does.
-    #[must_use]
-    pub fn meaning(self) -> &'static str {
-        self.get_documentation().unwrap_or_default()
-    }
-
     /// Whether points count alike, so that a file need not say it.
     #[must_use]
     pub fn is_equal(&self) -> bool {

@@ -197,11 +197,11 @@ fn check_coils(manifest: &Manifest, map: &MapArrays) -> Result<(), String> {
 }
 
 fn check_map(manifest: &Manifest, map: &MapArrays) -> Result<(), String> {
-    let told = &manifest.map;
+    let summary = &manifest.map;
     for (name, nodes, axis) in [
-        ("x_m", &map.x_m, told.x_m),
-        ("y_m", &map.y_m, told.y_m),
-        ("z_m", &map.z_m, told.z_m),
+        ("x_m", &map.x_m, summary.x_m),
+        ("y_m", &map.y_m, summary.y_m),
+        ("z_m", &map.z_m, summary.z_m),
     ] {
         let found = AxisSummary::of_nodes(nodes);
         let near = ON_GRID * found.from_m.abs().max(found.to_m.abs());
@@ -217,26 +217,26 @@ fn check_map(manifest: &Manifest, map: &MapArrays) -> Result<(), String> {
     same(
         "map.npz and the manifest agree on coil",
         &*map.coil,
-        told.coil.as_slice(),
+        summary.coil.as_slice(),
     )?;
     same(
         "map.npz has a passive_force_n where the manifest tells of it",
         map.passive_force_n.is_some(),
-        told.passive_force.is_some(),
+        summary.passive_force.is_some(),
     )?;
     same(
         "map.npz has gx and gy where the manifest states them",
         map.sides_t_per_m_per_a.is_some(),
-        told.sides.is_some(),
+        summary.sides.is_some(),
     )?;
-    if let Some(sides) = &told.sides {
+    if let Some(sides) = &summary.sides {
         same(
             "the arrays of the sideways force are known",
             sides.arrays.each_ref().map(String::as_str),
             SIDES,
         )?;
     }
-    if let Some(passive) = &told.passive_force {
+    if let Some(passive) = &summary.passive_force {
         same(
             "the passive force's array is known",
             passive.array.as_str(),
@@ -250,7 +250,7 @@ fn check_map(manifest: &Manifest, map: &MapArrays) -> Result<(), String> {
     }
     same(
         "the interpolation is known",
-        told.interpolation.name.as_str(),
+        summary.interpolation.name.as_str(),
         INTERPOLATION,
     )
 }

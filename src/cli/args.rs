@@ -87,7 +87,7 @@ pub struct Tolerance {
 pub struct WeightsFlag {
     /// How the points of a grid count in the mean over the object [default: as the shape file says,
     /// else equal]
-    #[arg(long, hide_short_help = true, value_name = "RULE", value_parser = values::weights())]
+    #[arg(long, hide_short_help = true, value_name = "RULE", value_parser = values::named::<Weights>())]
     pub weights: Option<Weights>,
 }
 
@@ -190,10 +190,10 @@ pub struct SurfaceFlags {
 #[derive(Debug, Clone, Copy, Args)]
 pub struct ForceFlags {
     /// Where the requested force points [default: the shape file's `force`, or vertical]
-    #[arg(long, hide_short_help = true, value_name = "NAME", value_parser = values::force_direction())]
+    #[arg(long, hide_short_help = true, value_name = "NAME", value_parser = values::named::<ForceDirection>())]
     pub force_direction: Option<ForceDirection>,
     /// How large a force along the normal is [default: the shape file's `normal_force`, or magnitude]
-    #[arg(long, hide_short_help = true, value_name = "NAME", value_parser = values::normal_force())]
+    #[arg(long, hide_short_help = true, value_name = "NAME", value_parser = values::named::<NormalForce>())]
     pub normal_force: Option<NormalForce>,
 }
 

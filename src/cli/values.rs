@@ -2,50 +2,27 @@
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use strum::{EnumMessage, VariantArray};
 
-use crate::force_direction::{ForceDirection, NormalForce};
-use crate::lambda::Criterion;
-use crate::map::Components;
-use crate::point_weights::Weights;
 use crate::scene::tolerances::ErrorTarget;
 use crate::shape::document::{Up, parse_unit, unit_names};
 use crate::units::m_from_mm;
 
-/// Any criterion by its name.
-pub fn criterion() -> impl TypedValueParser<Value = Criterion> {
-    let of = |criterion: &Criterion| PossibleValue::new(criterion.name()).help(criterion.meaning());
-    let names = PossibleValuesParser::new(Criterion::ALL.iter().map(of));
-    names.try_map(|name| name.parse::<Criterion>())
-}
-
-/// Any direction of the requested force by its name.
-pub fn force_direction() -> impl TypedValueParser<Value = ForceDirection> {
-    let of = |one: &ForceDirection| PossibleValue::new(one.name()).help(one.meaning());
-    let names = PossibleValuesParser::new(ForceDirection::ALL.iter().map(of));
-    names.try_map(|name| name.parse::<ForceDirection>())
-}
-
-/// Any size of a force along the normal by its name.
-pub fn normal_force() -> impl TypedValueParser<Value = NormalForce> {
-    let of = |one: &NormalForce| PossibleValue::new(one.name()).help(one.meaning());
-    let names = PossibleValuesParser::new(NormalForce::ALL.iter().map(of));
-    names.try_map(|name| name.parse::<NormalForce>())
-}
-
-/// How points count, by name.
-pub fn weights() -> impl TypedValueParser<Value = Weights> {
-    let of = |one: &Weights| PossibleValue::new(one.name()).help(one.meaning());
-    let names = PossibleValuesParser::new(Weights::ALL.iter().map(of));
-    names.try_map(|name| name.parse::<Weights>())
-}
-
-/// Any components of a map by their name.
-pub fn components() -> impl TypedValueParser<Value = Components> {
-    let of = |one: &Components| PossibleValue::new(one.name()).help(one.meaning());
-    let names = PossibleValuesParser::new(Components::ALL.iter().map(of));
-    names.try_map(|name| name.parse::<Components>())
+/// Any variant of `T` by its name; the help states what it means.
+pub fn named<T>() -> impl TypedValueParser<Value = T>
+where
+    T: VariantArray + EnumMessage + Into<&'static str> + FromStr + Copy + Send + Sync,
+    T::Err: std::error::Error + Send + Sync + 'static,
+{
+    let of = |one: &T| {
+        let name: &'static str = (*one).into();
+        PossibleValue::new(name).help(one.get_documentation().unwrap_or_default())
+    };
+    let names = PossibleValuesParser::new(T::VARIANTS.iter().map(of));
+    names.try_map(|name| name.parse::<T>())
 }
 
 /// Most threads that may be asked for.

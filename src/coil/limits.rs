@@ -395,8 +395,8 @@ pub fn by_key(key: &str) -> Option<&'static Limit> {
 /// bend under the wire's tension.
 pub const MANDREL_M: f64 = 0.003;
 
-/// Diameters of its wire that a mandrel has at least. Enamel is tested for cracks around a mandrel as
-/// thick as the wire (the flexibility test of IEC 60851-3); four times that keeps a margin.
+/// Diameters of its wire that a mandrel has at least: a rule of thumb, for enamel that is bent does not
+/// crack at once.
 pub const WIRES_A_MANDREL: f64 = 4.0;
 
 /// The smallest bore, m, of a coil that is to be wound of wire of this diameter over its insulation, m.

@@ -117,7 +117,9 @@ impl Solved {
             None => {
                 "a-priori quadrature bound; rounding sampled against 40-digit values".to_owned()
             }
-            Some(steel) => format!("{steel}; bound of its evaluation"),
+            Some(steel) => format!(
+                "{steel}; error of its evaluation bounded, over coupled cores estimated at close places"
+            ),
         }
     }
 

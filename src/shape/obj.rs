@@ -35,10 +35,10 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
     while let Some(line) = lines.next_line() {
         fluxform_base::progress::poll();
         let mut words = line.words();
-        let told = |what| ReadError::new(Place::Line(line.number), what);
+        let as_fault = |what| ReadError::new(Place::Line(line.number), what);
         match words.next() {
-            Some(b"v") => reader.vertex(words).map_err(told)?,
-            Some(b"f" | b"fo") => reader.face(words, line.number).map_err(told)?,
+            Some(b"v") => reader.vertex(words).map_err(as_fault)?,
+            Some(b"f" | b"fo") => reader.face(words, line.number).map_err(as_fault)?,
             Some(b"curv" | b"curv2" | b"surf") => reader.free_form += 1,
             _ => {}
         }

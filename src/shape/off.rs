@@ -73,22 +73,22 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
     let mut points = Vec::with_capacity(vertices);
     for _ in 0..vertices {
         let (number, words) = next().ok_or_else(ends)?;
-        let told = |what: String| ReadError::new(Place::Line(number), what);
+        let as_fault = |what: String| ReadError::new(Place::Line(number), what);
         let [x, y, z, ..] = words[..] else {
-            return Err(told(
+            return Err(as_fault(
                 "a vertex has three coordinates; here are fewer".into(),
             ));
         };
         let mut point = [0.0; 3];
         for (slot, word) in point.iter_mut().zip([x, y, z]) {
-            *slot = numbers.read(word).map_err(told)?;
+            *slot = numbers.read(word).map_err(as_fault)?;
         }
         points.push(point);
     }
     let mut all = Faces::default();
     for _ in 0..faces {
         let (number, mut words) = next().ok_or_else(ends)?;
-        let told = |what: String| ReadError::new(Place::Line(number), what);
+        let as_fault = |what: String| ReadError::new(Place::Line(number), what);
         let corners = whole(words[0]).filter(|corners| *corners <= MOST_CORNERS);
         // Some programs break a face over lines.
         while corners.is_some_and(|corners| words.len() <= corners) {
@@ -96,14 +96,14 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, ReadError> {
         }
         let indices = corners.and_then(|corners| words.get(1..=corners));
         let indices = indices.ok_or_else(|| {
-            told(format!(
+            as_fault(format!(
                 "expected a face's number of corners, at most {MOST_CORNERS}, and as many indices"
             ))
         })?;
         for word in indices {
             let index = whole(word).filter(|index| *index < vertices);
             let index = index.ok_or_else(|| {
-                told(format!(
+                as_fault(format!(
                     "a face has the index `{}`, but the file has {vertices} vertices (indices \
                      count from 0)",
                     shown(word)

@@ -79,25 +79,25 @@ impl Structure {
         loop {
             fluxform_base::progress::poll();
             let step = document.step()?;
-            let told = |what: String| document.fault(what);
+            let as_fault = |what: String| document.fault(what);
             match step {
                 Step::Start(e) => match e.name() {
                     "ProductStructure" => {
                         found.root = e.get_exact("root").and_then(|id| last_number(&id));
                     }
-                    "Reference3D" => found.references.push(id(&e).map_err(told)?),
+                    "Reference3D" => found.references.push(id(&e).map_err(as_fault)?),
                     "ReferenceRep" => {
                         let representation = representation(&e);
-                        let id = id(&e).map_err(told)?;
+                        let id = id(&e).map_err(as_fault)?;
                         found.representations.insert(id, representation);
                     }
                     "Instance3D" | "InstanceRep" => open = Instance::default(),
                     _ => {}
                 },
                 Step::End { name, text } => match name.as_str() {
-                    "IsAggregatedBy" => open.within = reference(&text, part).map_err(told)?,
-                    "IsInstanceOf" => open.of = reference(&text, part).map_err(told)?,
-                    "RelativeMatrix" => open.place = Some(transform(&text).map_err(told)?),
+                    "IsAggregatedBy" => open.within = reference(&text, part).map_err(as_fault)?,
+                    "IsInstanceOf" => open.of = reference(&text, part).map_err(as_fault)?,
+                    "RelativeMatrix" => open.place = Some(transform(&text).map_err(as_fault)?),
                     "Instance3D" | "InstanceRep" => {
                         found.instances.push(std::mem::take(&mut open));
                     }
@@ -234,22 +234,22 @@ fn representation_mesh(
     let mut document = Document::new(part, text);
     loop {
         let step = document.step()?;
-        let told = |what: String| document.fault(what);
+        let as_fault = |what: String| document.fault(what);
         match step {
             Step::Start(e) => match (e.name(), open.last_mut()) {
                 ("Rep" | "Root", _) => open.push(Rep::default()),
                 ("PolygonalLOD", _) => coarser += 1,
-                ("Face", Some(rep)) if coarser == 0 => face(&e, rep).map_err(told)?,
+                ("Face", Some(rep)) if coarser == 0 => face(&e, rep).map_err(as_fault)?,
                 _ => {}
             },
             Step::End { name, text } => match (name.as_str(), open.last_mut()) {
                 ("PolygonalLOD", _) => coarser = coarser.saturating_sub(1),
                 ("Positions", Some(rep)) if coarser == 0 => {
-                    rep.positions = Some(positions(&text, numbers).map_err(told)?);
+                    rep.positions = Some(positions(&text, numbers).map_err(as_fault)?);
                 }
                 ("Rep" | "Root", Some(_)) => {
                     if let Some(rep) = open.pop() {
-                        add(&rep, &mut triangles).map_err(told)?;
+                        add(&rep, &mut triangles).map_err(as_fault)?;
                     }
                 }
                 _ => {}

@@ -124,35 +124,35 @@ impl Model {
         let mut open: Option<Open> = None;
         loop {
             let step = document.step()?;
-            let told = |what: String| document.fault(what);
+            let as_fault = |what: String| document.fault(what);
             match step {
                 Step::Start(e) => match (e.name(), &mut open) {
-                    ("model", _) => self.begin(&e, is_root).map_err(told)?,
-                    ("object", None) => open = Some(object(&e).map_err(told)?),
+                    ("model", _) => self.begin(&e, is_root).map_err(as_fault)?,
+                    ("object", None) => open = Some(object(&e).map_err(as_fault)?),
                     ("vertex", Some(object)) => {
-                        let vertex = self.vertex(&e).map_err(told)?;
+                        let vertex = self.vertex(&e).map_err(as_fault)?;
                         object.vertices.push(vertex);
                     }
-                    ("triangle", Some(object)) => triangle(&e, object).map_err(told)?,
+                    ("triangle", Some(object)) => triangle(&e, object).map_err(as_fault)?,
                     ("component", Some(object)) => {
-                        let placed = placed(&e, name).map_err(told)?;
+                        let placed = placed(&e, name).map_err(as_fault)?;
                         object.components.push(placed);
                     }
                     ("item", None) if is_root => {
-                        self.items.push(placed(&e, name).map_err(told)?);
+                        self.items.push(placed(&e, name).map_err(as_fault)?);
                     }
                     ("beamlattice" | "volumetricstack" | "booleans", Some(_)) => {
                         let what = format!(
                             "an object is a `{}`, which is not read; export it as a mesh",
                             e.name()
                         );
-                        return Err(told(what));
+                        return Err(as_fault(what));
                     }
                     _ => {}
                 },
                 Step::End { name: ended, .. } if ended == "object" => {
                     if let Some(object) = open.take() {
-                        self.add(name, object).map_err(told)?;
+                        self.add(name, object).map_err(as_fault)?;
                     }
                 }
                 Step::End { .. } => {}

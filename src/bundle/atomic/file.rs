@@ -326,8 +326,8 @@ mod tests {
         let overwrite = Overwrite::new(force, folder.join(sidecar), &inputs());
         let mut set = FileSet::begin(folder, overwrite);
         let written = set.write(table, |out| out.write_all(text.as_bytes()))?;
-        let told = record(&inputs(), &[FileEntry::new(table, written)]);
-        set.write(sidecar, |out| out.write_all(told.as_bytes()))?;
+        let record_text = record(&inputs(), &[FileEntry::new(table, written)]);
+        set.write(sidecar, |out| out.write_all(record_text.as_bytes()))?;
         set.commit()
     }
 
@@ -397,10 +397,10 @@ mod tests {
                 set.outdate(name)?;
             }
         }
-        let told = serde_json::json!({ "schema_version": "1.4.0", "fluxform_version": "0.1.0",
+        let record_text = serde_json::json!({ "schema_version": "1.4.0", "fluxform_version": "0.1.0",
             "inputs": inputs(), "made_with": options, "files": files });
-        let told = crate::seal::to_record(&told).unwrap();
-        set.write("a.json", |out| out.write_all(&told))?;
+        let record_text = crate::seal::to_record(&record_text).unwrap();
+        set.write("a.json", |out| out.write_all(&record_text))?;
         set.commit()
     }
 
@@ -619,8 +619,8 @@ mod tests {
             let overwrite = Overwrite::new(false, folder.path().join("map.json"), &[input(text)]);
             let mut set = FileSet::begin(folder.path(), overwrite);
             let map = set.write("map.npz", |out| out.write_all(text.as_bytes()));
-            let told = record(&[input(text)], &[FileEntry::new("map.npz", map.unwrap())]);
-            set.write("map.json", |out| out.write_all(told.as_bytes()))
+            let record_text = record(&[input(text)], &[FileEntry::new("map.npz", map.unwrap())]);
+            set.write("map.json", |out| out.write_all(record_text.as_bytes()))
                 .unwrap();
             set
         };
@@ -682,8 +682,11 @@ mod tests {
             .unwrap();
         let again = folder.path().join("inner/../inner/a.yaml");
         let refused = set.write_at(&again, |out| out.write_all(b"sources"));
-        let told = refused.unwrap_err().to_string();
-        assert!(told.contains("another file of this command"), "{told}");
+        let record_text = refused.unwrap_err().to_string();
+        assert!(
+            record_text.contains("another file of this command"),
+            "{record_text}"
+        );
         set.write_at(&folder.path().join("a.yaml"), |out| {
             out.write_all(b"sources")
         })

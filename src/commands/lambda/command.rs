@@ -120,7 +120,7 @@ struct FeedbackFlags {
 pub struct CriterionFlags {
     /// Which force constant is chosen
     #[arg(long, value_name = "NAME", default_value = Criterion::default().name(),
-          value_parser = values::criterion())]
+          value_parser = values::named::<Criterion>())]
     criterion: Criterion,
     /// Just-noticeable difference: the error that saturation may add, relative to the rms force
     #[arg(long, hide_short_help = true, value_name = "PART", default_value_t = crate::units::FORCE_JND,

@@ -50,7 +50,7 @@ pub struct Map {
     #[arg(value_name = "DESIGN")]
     design: FileArgument,
     /// Contents of the map
-    #[arg(long, default_value = Components::default().name(), value_parser = values::components())]
+    #[arg(long, default_value = Components::default().name(), value_parser = values::named::<Components>())]
     components: Components,
     /// Currents at which cores with a B-H curve are mapped together too, A: one for all coils, or
     /// one a coil [default: the rated currents]

@@ -502,7 +502,7 @@ class Face:
                     self.deviation = max(self.deviation, off)
 
     def check_area(self):
-        """Facets cover the face, and nothing besides."""
+        """Facets cover the face, and nothing else."""
         for ijk in self.triangles:
             a, b, c = (self.points[k] for k in ijk)
             self.area += 0.5 * norm(cross(less(b, a), less(c, a)))
