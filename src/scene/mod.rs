@@ -447,11 +447,7 @@ impl<'a> Scene<'a> {
     pub fn array_geometry(&self) -> ArrayGeometry {
         ArrayGeometry {
             positions_m: self.design.array.positions_m.clone(),
-            coupling: match self.design.array.coupling {
-                Coupling::Full => "full",
-                Coupling::None => "none",
-            }
-            .to_owned(),
+            coupling: self.design.array.coupling.name().to_owned(),
             gain: self.design.array.gain.clone(),
         }
     }
@@ -472,16 +468,8 @@ impl<'a> Scene<'a> {
         let magnet = &self.design.magnet;
         MagnetSummary {
             moment_a_m2: self.moment_a_m2,
-            model: match magnet.model {
-                MagnetModel::Dipole => "dipole",
-                MagnetModel::Cylinder => "cylinder",
-            }
-            .to_owned(),
-            polarity: match magnet.polarity {
-                Polarity::Repel => "repel",
-                Polarity::Attract => "attract",
-            }
-            .to_owned(),
+            model: magnet.model.name().to_owned(),
+            polarity: magnet.polarity.name().to_owned(),
             diameter_m: magnet.diameter_m,
             length_m: magnet.length_m,
         }
