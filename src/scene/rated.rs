@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::Scene;
 use super::single::{CoreSummary, Single, TargetSummary};
 use crate::RunError;
-use crate::accuracy::{StageAccuracy, missed};
+use crate::accuracy::{StageAccuracy, missed, missed_in_core};
 use crate::coil::circuit::{Circuit, CoilSize};
 use crate::coil::limits::{self, Evaluated, LimitCheck};
 use crate::units::STEEL_DENSITY_KG_PER_M3;
@@ -96,6 +96,11 @@ impl Rated {
             mass_kg,
             core_field_t: single.core.as_ref().map(|core| core.peak_field_t),
         });
+        let mut accuracy_missed = missed(&single.accuracy, single.tolerance);
+        accuracy_missed.extend(missed_in_core(
+            &single.accuracy,
+            scene.tolerances.core_field,
+        ));
         Ok(Self {
             coil: CoilSummary {
                 size: CoilSize::from(&scene.coil),
@@ -115,7 +120,7 @@ impl Rated {
             relative_permeability: single.relative_permeability,
             core: single.core,
             limits,
-            accuracy_missed: missed(&single.accuracy, single.tolerance),
+            accuracy_missed,
             accuracy: single.accuracy,
             warnings: single.warnings,
         })
