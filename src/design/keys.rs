@@ -13,7 +13,7 @@ pub use super::key::{Accepts, Assumed, Key, Without, with_meanings};
 #[must_use]
 pub fn of_designs() -> Vec<Key> {
     const SECTIONS: &str = "[coil]\n[wire]\n[core]\n[array]\n[magnet]\n[supply]\n[limits]\n\
-                            [target]\n[workspace]\n";
+                            [uncertainty]\n[target]\n[workspace]\n";
     let keys = list_keys(SECTIONS, |root| {
         Draft::read(root, Need::EVALUATE);
     });
@@ -136,6 +136,22 @@ const MEANINGS: &[(&str, &str)] = &[
     ("limits.mass_max_kg", "mass of wire and core"),
     ("limits.wire_length_max_m", "length of the wire"),
     ("limits.core_field_max_t", "flux density in the core"),
+    (
+        "uncertainty.sensor_mm",
+        "how far the magnet may be from where it is measured, along each axis",
+    ),
+    (
+        "uncertainty.tilt_deg",
+        "how far the finger may tilt the magnet, in any direction",
+    ),
+    (
+        "uncertainty.heat_c",
+        "how much warmer the magnet may become",
+    ),
+    (
+        "uncertainty.driver_percent",
+        "by how much each driver's current may be off",
+    ),
     (
         "target.height_mm",
         "height of the magnet's centre above the winding, for `evaluate` and `optimize`",
