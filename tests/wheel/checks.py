@@ -108,7 +108,7 @@ def currents_of_the_loader():
         one = bundle.currents(positions[3])
         assert np.array_equal(one.currents_a, found.currents_a[3]) and one.answer == answer[3]
         heights = bundle.height(positions)
-        assert np.allclose(np.nan_to_num(heights), loader.height(positions), atol=1e-12)
+        assert np.allclose(heights, loader.height(positions), atol=1e-12, equal_nan=True)
 
 
 def documents_in_memory():

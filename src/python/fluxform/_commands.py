@@ -168,11 +168,9 @@ class Lambda(Result):
 
     def currents_at(self, lambda_n_per_m) -> np.ndarray:
         """Currents of the least error at any force constant, A, [..., coil]: linear between the
-        path's points, not a number beyond its end."""
+        path's points, and constant beyond the last, where every coil that helps is at a limit."""
         nodes, currents = self.path_lambda_n_per_m, self.path_currents_a
-        columns = [
-            np.interp(lambda_n_per_m, nodes, column, left=np.nan, right=np.nan) for column in currents.T
-        ]
+        columns = [np.interp(lambda_n_per_m, nodes, column, left=np.nan) for column in currents.T]
         return np.stack(columns, axis=-1)
 
 

@@ -40,7 +40,7 @@ class Error(Exception):
         """Causes, cures and an example of this kind of failure."""
         from ._commands import run
 
-        return run(explain=self.code).explanation
+        return run(explain=self.code).codes[0].explanation
 
     def __str__(self):
         return f"[{self.code}] {self.message}"
