@@ -57,6 +57,16 @@ impl Origin {
         self
     }
 
+    /// A short name for an entry that is shared by all who ask for this origin: eight hexadecimal digits.
+    #[must_use]
+    pub fn short_name(&self) -> String {
+        let digest = self.0.clone().finalize();
+        digest[..4]
+            .iter()
+            .map(|byte| format!("{byte:02x}"))
+            .collect()
+    }
+
     /// The digest of an entry of this origin in `folder`.
     fn digest(&self, folder: &Dir) -> [u8; DIGEST] {
         self.clone().and(&folder.identity()).0.finalize().into()
@@ -128,7 +138,8 @@ impl Store {
         if matches!(dir.status(name), Ok(Some(_))) && !is_entry(&dir, OsStr::new(name)) {
             return;
         }
-        let _ = atomic::put(&dir, name, true, |out| {
+        // Not forced to the disk: an entry that a power cut tears is noticed and computed again.
+        let _ = atomic::put(&dir, name, false, |out| {
             out.write_all(MAGIC)?;
             out.write_all(&origin.digest(&dir))?;
             out.write_all(&Sha256::digest(&bytes))?;

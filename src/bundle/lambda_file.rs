@@ -127,7 +127,7 @@ pub struct SampledPoints {
 }
 
 /// Rendering with position feedback: at every point the currents of least power that give the
-/// wanted force there. A pair in series counts as one coil.
+/// requested force there. A pair in series counts as one coil.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FeedbackFile {
     /// The largest that every point can be given, N/m; null where there is none above zero.
@@ -235,7 +235,7 @@ pub struct FeedbackShell {
 pub struct TolerancePoint {
     /// N/m; null where no force is wanted, where any is tolerated, or where none can be kept.
     pub lambda_n_per_m: Option<f64>,
-    /// The part of the wanted force that is not felt: `jnd`.
+    /// The part of the requested force that is not felt: `jnd`.
     pub share: f64,
     /// The force that is not felt at all, N.
     pub threshold_n: f64,
@@ -330,7 +330,7 @@ pub struct WorstPointFile {
     /// Where the first limit binds, N/m.
     pub lambda_linear_n_per_m: Option<f64>,
     /// The largest lambda at which limits add less than a just-noticeable difference of the
-    /// largest wanted force to t*, N/m.
+    /// largest requested force to t*, N/m.
     pub lambda_jnd_n_per_m: Option<f64>,
     /// t* over lambda times the largest height, as long as no limit binds.
     pub relative_floor: Option<f64>,

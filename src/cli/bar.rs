@@ -1,7 +1,7 @@
 //! The progress bar, and the seconds of every stage: the only clock of a job.
 #![allow(clippy::disallowed_methods)] // a bar needs a clock
 
-use std::sync::{Arc, Condvar, Mutex, MutexGuard};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -20,6 +20,27 @@ const REFRESH: Duration = Duration::from_millis(100);
 pub struct Bar {
     shared: Arc<Shared>,
     painter: Option<JoinHandle<()>>,
+}
+
+/// Shows another thread how far the running job is.
+#[derive(Debug, Clone, Default)]
+pub struct Watch(Arc<Mutex<Weak<Shared>>>);
+
+impl Watch {
+    /// Looks at the job of `bar` from now on.
+    pub fn follow(&self, bar: &Bar) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Arc::downgrade(&bar.shared);
+    }
+
+    /// The innermost stage, how many of its items are done, and how many there are.
+    #[must_use]
+    pub fn stage(&self) -> Option<(String, u64, u64)> {
+        let job = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let shared = job.upgrade()?;
+        let state = shared.lock();
+        let stage = state.stages.last()?;
+        Some((stage.name.clone(), stage.done, stage.total))
+    }
 }
 
 #[derive(Debug, Default)]
@@ -75,9 +96,7 @@ impl Drop for Bar {
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, State> {
         // Nothing under the lock leaves the state half changed.
-        self.state
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner)
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn paint(&self) {

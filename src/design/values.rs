@@ -1,5 +1,6 @@
 //! The typed values of a section: numbers, lists, axes, texts, choices.
 
+use fluxform_base::choice::Choice;
 use toml::Spanned;
 use toml::de::DeValue;
 
@@ -134,13 +135,13 @@ impl<'a> Section<'a> {
         self.list(key, || of_tuple(N, rule), || Without::Nothing);
         let found = self.found(key)?;
         let mut values = [f64::NAN; N];
-        let wanted = format!("a list of {N} numbers");
-        let items = self.items(key, found, &wanted);
+        let expected = format!("a list of {N} numbers");
+        let items = self.items(key, found, &expected);
         if items.len() == N {
             values.copy_from_slice(&self.checked_items(key, items, rule));
             self.warn_of_slip(key, &values, rule, found);
         } else if !items.is_empty() {
-            let message = format!("expected {wanted}, found {}", items.len());
+            let message = format!("expected {expected}, found {}", items.len());
             self.fault(key, message, "write them in square brackets, with commas");
         }
         Some(values)
@@ -318,36 +319,29 @@ impl<'a> Section<'a> {
         None
     }
 
-    /// One of `options` by name, the first where absent or at fault.
-    ///
-    /// # Panics
-    /// If there are no options.
-    pub fn choice_or_first<T: Copy>(
-        &mut self,
-        key: &'static str,
-        options: &[(&'static str, T)],
-    ) -> T {
-        let (first, value) = options[0];
-        let without = || Without::Value(format!("{first:?}"));
-        self.list(key, || Accepts::any(choices(options)), without);
+    /// A variant of `T` by name, the first where absent or at fault.
+    pub fn choice_or_first<T: Choice>(&mut self, key: &'static str) -> T {
+        let first = T::VARIANTS[0];
+        let name: &str = first.into();
+        self.list(
+            key,
+            || Accepts::any(choices::<T>()),
+            || Without::Value(format!("{name:?}")),
+        );
         if !self.has(key) {
-            self.assume(key, format!("{first:?}"));
+            self.assume(key, format!("{name:?}"));
         }
-        self.choice(key, options).unwrap_or(value)
+        self.choice(key).unwrap_or(first)
     }
 
-    /// One of `options` by name; `None` where absent or at fault.
-    pub fn choice<T: Copy>(
-        &mut self,
-        key: &'static str,
-        options: &[(&'static str, T)],
-    ) -> Option<T> {
-        self.list(key, || Accepts::any(choices(options)), || Without::Nothing);
+    /// A variant of `T` by name; `None` where absent or at fault.
+    pub fn choice<T: Choice>(&mut self, key: &'static str) -> Option<T> {
+        self.list(key, || Accepts::any(choices::<T>()), || Without::Nothing);
         let text = self.text(key)?;
-        if let Some((_, value)) = options.iter().find(|(name, _)| *name == text.value) {
-            return Some(*value);
+        if let Ok(value) = text.value.parse() {
+            return Some(value);
         }
-        let names: Vec<&str> = options.iter().map(|(name, _)| *name).collect();
+        let names: Vec<&str> = T::VARIANTS.iter().map(|&one| one.into()).collect();
         let listed: Vec<String> = names.iter().map(|name| format!("{name:?}")).collect();
         let message = format!(
             "expected {}, found {}",
@@ -377,12 +371,12 @@ impl<'a> Section<'a> {
         }
     }
 
-    fn items(&self, key: &str, found: ValueRef<'a>, wanted: &str) -> &'a [Spanned<DeValue<'a>>] {
+    fn items(&self, key: &str, found: ValueRef<'a>, expected: &str) -> &'a [Spanned<DeValue<'a>>] {
         match found.get_ref() {
             DeValue::Array(items) if items.is_empty() => {
                 self.fault(
                     key,
-                    format!("expected {wanted}, found an empty list"),
+                    format!("expected {expected}, found an empty list"),
                     "leave the key out for its default",
                 );
             }
@@ -394,7 +388,7 @@ impl<'a> Section<'a> {
                 );
             }
             DeValue::Array(items) => return items,
-            _ => self.add_wrong_type(&self.path_of(key), found, wanted),
+            _ => self.add_wrong_type(&self.path_of(key), found, expected),
         }
         &[]
     }
@@ -412,12 +406,12 @@ impl<'a> Section<'a> {
             other => float(other),
         };
         let Some(value) = value else {
-            let wanted = if rule.gauges {
+            let expected = if rule.gauges {
                 "a number or a gauge like \"AWG 22\""
             } else {
                 "a number"
             };
-            let message = format!("expected {wanted}, found {}", described(found.get_ref()));
+            let message = format!("expected {expected}, found {}", described(found.get_ref()));
             let fault = Fault::error(path, message).at(&found.span());
             self.sink
                 .add(match quoted_number(found.get_ref(), rule.unit) {
@@ -461,8 +455,8 @@ impl<'a> Section<'a> {
         }
     }
 
-    pub(super) fn add_wrong_type(&self, path: &str, found: ValueRef<'a>, wanted: &str) {
-        let message = format!("expected {wanted}, found {}", described(found.get_ref()));
+    pub(super) fn add_wrong_type(&self, path: &str, found: ValueRef<'a>, expected: &str) {
+        let message = format!("expected {expected}, found {}", described(found.get_ref()));
         self.sink.add(Fault::error(path, message).at(&found.span()));
     }
 }
@@ -481,11 +475,9 @@ fn of_tuple(count: usize, rule: &Rule) -> Accepts {
     of_rule(&format!("{count} numbers"), rule)
 }
 
-fn choices<T>(options: &[(&'static str, T)]) -> String {
-    let names: Vec<String> = options
-        .iter()
-        .map(|(name, _)| format!("`{name:?}`"))
-        .collect();
+fn choices<T: Choice>() -> String {
+    let names = T::VARIANTS.iter().map(|&one| -> &str { one.into() });
+    let names: Vec<String> = names.map(|name| format!("`{name:?}`")).collect();
     names.join(" or ")
 }
 

@@ -72,7 +72,7 @@ pub struct Calibrate {
     #[arg(long, value_name = "LENGTH", value_parser = values::length, allow_hyphen_values = true)]
     reach: Option<f64>,
     /// Compute the field of coils and steel again, and remove what earlier runs kept of it in
-    /// OUT/<design>/.fluxform-kept
+    /// OUT/<design>/.fluxform-cache
     #[arg(long, hide_short_help = true)]
     no_cache: bool,
     /// Report the plan and its cost first

@@ -216,7 +216,7 @@ pub fn run(
     let difference = StageAccuracy {
         estimate: error,
         relative_to: "1 just-noticeable difference".to_owned(),
-        method: "first order: the error of every coil's force at the places told".to_owned(),
+        method: "first order: the error of every coil's force at the places given".to_owned(),
     };
     let accuracy = BTreeMap::from([("forces", stage), ("difference", difference)]);
     Ok(CompareReport {
@@ -374,7 +374,9 @@ impl Rendered {
 fn unusual(status: Status) -> Option<&'static str> {
     match status {
         Status::Solved => None,
-        Status::NothingWanted => Some("every height is zero: no force is wanted, lambda is null"),
+        Status::NothingWanted => {
+            Some("every height is zero: no force is requested, lambda is null")
+        }
         Status::NothingRendered => {
             Some("no current within the limits pushes the magnet up at its points: lambda is null")
         }

@@ -191,7 +191,7 @@ fn largest(lambda: Option<f64>, reason: Option<&str>, place: Option<FeedbackPlac
                 place.point
             )
         }
-        _ => format!("none: {}", reason.unwrap_or("no force is wanted")),
+        _ => format!("none: {}", reason.unwrap_or("no force is requested")),
     }
 }
 
@@ -335,7 +335,7 @@ fn operating_point(sheet: &mut Sheet, points: &PointsReport, file: &LambdaFile) 
         sheet.line(
             "force",
             &format!(
-                "{} wanted at the mean height, {}",
+                "{} requested at the mean height, {}",
                 force(lambda * mean_m),
                 mm(mean_m)
             ),

@@ -80,7 +80,7 @@ pub struct TrajectorySummary {
 /// Forces along a trajectory.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ForceSummary {
-    /// The largest force wanted, N.
+    /// The largest force requested, N.
     pub wanted_max_n: f64,
     /// With position feedback.
     pub feedback: ErrorSummary,
@@ -107,12 +107,12 @@ pub struct VectorErrors {
     pub direction_95_deg: f64,
 }
 
-/// Differences from the wanted force, over the positions inside the map.
+/// Differences from the requested force, over the positions inside the map.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ErrorSummary {
     /// Root mean square, N.
     pub rms_error_n: f64,
-    /// The same over the wanted force's root mean square; null where none is wanted.
+    /// The same over the requested force's root mean square; null where none is wanted.
     pub relative_rms_error: Option<f64>,
     /// Largest size, N.
     pub worst_error_n: f64,

@@ -88,7 +88,7 @@ fn errors_table(object: &CalibratedObject) -> io::Result<Option<Vec<u8>>> {
         &[
             ("x_m", Column::Number(&x_m)),
             ("y_m", Column::Number(&y_m)),
-            ("wanted_n", Column::Number(&forces.wanted_n)),
+            ("wanted_n", Column::Number(&forces.requested_n)),
             ("given_n", Column::Number(&forces.static_n)),
         ],
     )?;
