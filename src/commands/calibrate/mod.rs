@@ -52,7 +52,7 @@ mod needed_map;
 mod page;
 pub mod plan;
 mod recorded;
-mod requested_force;
+pub(crate) mod requested_force;
 
 pub use crate::report::bundle_files::PAGE_FILE;
 pub(crate) use ignored_pull::IgnoredPull;
@@ -134,6 +134,8 @@ impl CalibrateOptions {
             feedback: _,
             picture: _,
             force,
+            // Of `lambda --feedback` alone.
+            direction_jnd_deg: _,
             uncertainty,
         } = lambda;
         let Settings {
