@@ -2,6 +2,7 @@
 
 use super::limits::{self, Limits};
 use super::reader::{Located, Section};
+use super::search::{self, SearchSpace};
 use super::sections::{self, ArrayDraft, CoilDraft, CoreDraft, MagnetDraft};
 use super::sections::{SupplyDraft, WireDraft, WorkspaceDraft};
 
@@ -82,6 +83,7 @@ pub(super) struct Draft {
     pub(super) limits: Limits,
     pub(super) target_height: Located<f64>,
     pub(super) workspace: WorkspaceDraft,
+    pub(super) search: SearchSpace,
 }
 
 impl Draft {
@@ -103,6 +105,7 @@ impl Draft {
             limits: limits::read(root.section("limits")),
             target_height: sections::target_height_mm(root.section("target")),
             workspace: sections::workspace(root.section("workspace")),
+            search: search::read(root.section("search")),
         }
     }
 }
