@@ -49,7 +49,11 @@ fn tool(script: &str) -> Option<Tool> {
 fn lasting(text: &str) -> Vec<&str> {
     text.lines()
         .map(str::trim_end)
-        .filter(|line| !line.starts_with("  step ") && !line.starts_with("  written to "))
+        .filter(|line| {
+            !["  step ", "  written to ", "  took "]
+                .iter()
+                .any(|own| line.starts_with(own))
+        })
         .collect()
 }
 

@@ -105,6 +105,13 @@ pub struct Bounded {
 }
 
 impl Bounded {
+    /// By how much the excess falls with a unit more of the limit.
+    #[must_use]
+    pub fn per_unit(&self) -> f64 {
+        let up = if self.at_least { -1.0 } else { 1.0 };
+        up / self.scale.unwrap_or(self.limit)
+    }
+
     /// By how much the limit is broken: above 0 where it is.
     #[must_use]
     pub fn excess(&self) -> f64 {

@@ -1,6 +1,8 @@
 //! What surrounds the best array: what limits are worth, what each variable bought, how far each may
 //! move, designs that are easier to make, and what the objective costs in mass, heat and time.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use fluxform_base::progress::Interrupted;
@@ -17,6 +19,8 @@ use crate::limits::LimitName;
 /// A limit of the best array.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LimitWorth {
+    /// Its key.
+    pub key: &'static str,
     /// The array's value, in the unit of its key.
     pub value: f64,
     /// The limit.
@@ -25,8 +29,9 @@ pub struct LimitWorth {
     pub met: bool,
     /// Whether more of it would give a larger objective.
     pub active: bool,
-    /// By how much the objective would grow for one per cent more of it, relative, by the surrogate.
-    pub gain_per_percent: f64,
+    /// By how much the objective would grow for one unit more of it, relative and to first order, by
+    /// the surrogate.
+    pub gain_per_unit: f64,
     /// Which, where it is one of the design's.
     #[serde(skip)]
     pub name: Option<LimitName>,
@@ -57,7 +62,7 @@ pub struct Neighbour {
     /// What it is.
     pub what: String,
     /// Its variables by key.
-    pub values: Vec<(String, f64)>,
+    pub values: BTreeMap<String, f64>,
     /// Its objective.
     pub objective: f64,
 }
@@ -72,14 +77,14 @@ pub struct FrontPoint {
     /// The objective.
     pub objective: f64,
     /// The variables by key.
-    pub values: Vec<(String, f64)>,
+    pub values: BTreeMap<String, f64>,
 }
 
 /// All of it.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Study {
-    /// Every limit, with what it is worth, by key.
-    pub limits: Vec<(String, LimitWorth)>,
+    /// Every limit, with what it is worth.
+    pub limits: Vec<LimitWorth>,
     /// Every variable.
     pub variables: Vec<VariableStudy>,
     /// Designs that are easier to make.
@@ -105,7 +110,7 @@ pub struct TradedDesign {
     pub met: bool,
     /// Whether it does but for that of each quantity.
     met_but: [bool; 3],
-    values: Vec<(String, f64)>,
+    values: BTreeMap<String, f64>,
 }
 
 /// What the objective may lose within a range.
@@ -192,7 +197,7 @@ impl View<'_, '_> {
         self.found.problem
     }
 
-    fn named(&self, x: &[f64]) -> Vec<(String, f64)> {
+    fn named(&self, x: &[f64]) -> BTreeMap<String, f64> {
         let made = self.problem().space.made(x);
         self.problem()
             .space
@@ -212,7 +217,7 @@ impl View<'_, '_> {
         )
     }
 
-    fn limits(&self) -> Vec<(String, LimitWorth)> {
+    fn limits(&self) -> Vec<LimitWorth> {
         let best = &self.found.best;
         let whole = self.problem().space.variables().iter().enumerate();
         let whole = whole.filter(|(_, variable)| variable.values != Values::Continuous);
@@ -225,19 +230,19 @@ impl View<'_, '_> {
         let multipliers = ended.map_or_else(Vec::new, |(_, ended)| ended.multipliers);
         let worth = |(index, bound): (usize, &Bounded)| {
             let multiplier = multipliers.get(index).copied().unwrap_or(0.0);
-            let worth = LimitWorth {
+            LimitWorth {
+                key: bound.key,
                 value: bound.value,
                 limit: bound.limit,
                 met: bound.excess() <= 0.0,
                 active: multiplier > ACTIVE,
-                gain_per_percent: if multiplier > ACTIVE {
-                    0.01 * multiplier
+                gain_per_unit: if multiplier > ACTIVE {
+                    multiplier * bound.per_unit()
                 } else {
                     0.0
                 },
                 name: bound.name,
-            };
-            (bound.key.to_owned(), worth)
+            }
         };
         best.bounds.iter().enumerate().map(worth).collect()
     }

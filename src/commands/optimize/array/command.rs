@@ -19,7 +19,7 @@ use crate::commands::sweep::axis;
 use crate::design::template::Template;
 use crate::design::{Design, Need};
 use crate::numerics::mixed_search::Settings;
-use crate::progress::Interrupted;
+use crate::progress::{Interrupted, Progress};
 
 /// An array for shapes instead of a coil.
 #[derive(Debug, Args)]
@@ -136,6 +136,7 @@ impl ArrayFlags {
         };
         let ended = optimize_array(&source, &shapes, inputs, &request, &physics, &bar);
         let journal = physics.journal();
+        let seconds = bar.take_seconds();
         drop(physics);
         drop(bar);
         self.write_journal(&journal, &overwrite)?;
@@ -153,7 +154,9 @@ impl ArrayFlags {
             }
         }
         let json = printer.with_warnings(&result);
-        printer.summary(place, &json, || text::summary(&result, shared.out))?;
+        printer.summary(place, &json, || {
+            text::summary(&result, shared.out, &seconds)
+        })?;
         match result.status {
             ArrayEnding::Done => Ok(()),
             ArrayEnding::Interrupted => Err(RunError::Interrupted(Interrupted).into()),

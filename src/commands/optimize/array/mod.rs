@@ -84,6 +84,8 @@ pub fn optimize_array(
         true => None,
     };
     progress.end();
+    // Nothing more is computed after the user's stop.
+    found.interrupted |= progress.interrupted();
     result(
         document,
         (shapes, inputs),

@@ -12,8 +12,10 @@ pub fn csv(result: &ArrayOptimization) -> String {
     let mut text = format!("quantity,value,gain,{}\n", keys.join(","));
     for point in points {
         let value = |key: &&str| {
-            let known = point.values.iter().find(|(name, _)| name == key);
-            known.map_or_else(String::new, |(_, value)| value.to_string())
+            point
+                .values
+                .get(*key)
+                .map_or_else(String::new, f64::to_string)
         };
         let values: Vec<String> = keys.iter().map(value).collect();
         text.push_str(&format!(

@@ -3,11 +3,15 @@
 use super::{ArrayEnding, ArrayOptimization};
 use crate::cli::layout::{Sheet, Side, table};
 use crate::cli::limits::limit_row;
-use crate::cli::quantity::{count, number, percent};
+use crate::cli::quantity::{count, number, percent, si};
 use crate::cli::values::FileArgument;
-use crate::coil::array_search::study::Study;
+use crate::coil::array_search::study::{LimitWorth, Study};
 
-pub fn summary(result: &ArrayOptimization, out: Option<&FileArgument>) -> String {
+pub fn summary(
+    result: &ArrayOptimization,
+    out: Option<&FileArgument>,
+    seconds: &[(String, f64)],
+) -> String {
     let mut sheet = Sheet::new(&format!("{}: the array that is felt best", result.design));
     let whole = if result.shapes.len() == 1 {
         ""
@@ -22,6 +26,8 @@ pub fn summary(result: &ArrayOptimization, out: Option<&FileArgument>) -> String
     if let Some(FileArgument::Path(path)) = out {
         sheet.line("written to", &path.display().to_string());
     }
+    let took: f64 = seconds.iter().map(|(_, seconds)| seconds).sum();
+    sheet.line("took", &si(took, "s"));
     if let Some(search) = result.levels.iter().find(|level| level.level == "search") {
         let error = format!(
             "while searching force constants were {} off at most, their ratios {}",
@@ -68,19 +74,32 @@ fn ended(result: &ArrayOptimization) -> String {
 }
 
 fn worth(sheet: &mut Sheet, study: &Study) {
-    let active = study.limits.iter().filter(|(_, limit)| limit.active);
-    let said: Vec<String> = active
-        .map(|(key, limit)| {
-            let label = crate::cli::limits::label(key);
-            format!(
-                "1 % more of {label} would give {}",
-                percent(limit.gain_per_percent)
-            )
-        })
+    let said: Vec<String> = study
+        .limits
+        .iter()
+        .filter(|limit| limit.active)
+        .map(one_more)
         .collect();
     if !said.is_empty() {
         sheet.line("worth", &said.join("\n"));
     }
+}
+
+/// What a step more of a limit would give.
+fn one_more(limit: &LimitWorth) -> String {
+    let (unit, per_si) = match limit.name {
+        Some(name) => name.limit().step,
+        None if limit.key.ends_with("_m") => ("mm", 1e3),
+        None => ("mm", 1.0),
+    };
+    let label = crate::cli::limits::label(limit.key);
+    let given = percent(limit.gain_per_unit.abs() / per_si);
+    let way = if limit.gain_per_unit < 0.0 {
+        "less"
+    } else {
+        "more"
+    };
+    format!("1 {unit} {way} of {label} would give {given}")
 }
 
 fn shapes(result: &ArrayOptimization) -> String {
