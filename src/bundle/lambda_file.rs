@@ -12,6 +12,7 @@ use fluxform_base::force_direction::{ForceDirection, NormalForce};
 use fluxform_base::point_weights::Weights;
 use fluxform_lambda::feedback::Rendered;
 pub use fluxform_lambda::sideways::Sideways;
+pub use fluxform_lambda::uncertainty::{CurrentsError, RobustSetting, Study, TradeOff};
 use fluxform_lambda::vector_feedback::VectorRendering;
 use fluxform_lambda::worst::ActivePoint;
 use fluxform_lambda::{Criterion, ForceConstants, GivenForce, Wiring};
@@ -94,6 +95,9 @@ pub struct LambdaFile {
     /// it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sideways: Option<Sideways>,
+    /// The felt error under the uncertainties given; absent without any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<Study>,
     /// What the result comes to; absent without a lambda and in files of programs without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub headline: Option<Headline>,

@@ -13,8 +13,8 @@ pub use super::key::{Accepts, Assumed, Key, Without, with_meanings};
 #[must_use]
 pub fn of_designs() -> Vec<Key> {
     const SECTIONS: &str = "[coil]\n[wire]\n[core]\n[array]\n[magnet]\n[supply]\n[limits]\n\
-                            [target]\n[workspace]\n[search.coil]\n[search.wire]\n[search.core]\n\
-                            [search.array]\n[search.magnet]\n[search.shapes]\n";
+                            [uncertainty]\n[target]\n[workspace]\n[search.coil]\n[search.wire]\n\
+                            [search.core]\n[search.array]\n[search.magnet]\n[search.shapes]\n";
     let keys = list_keys(SECTIONS, |root| {
         Draft::read(root, Need::EVALUATE);
     });
@@ -150,6 +150,7 @@ const MEANINGS: &[(&str, &str)] = &[
     ("limits.wire_length_max_m", "length of the wire"),
     ("limits.core_field_max_t", "flux density in the core"),
     (
+<<<<<<< HEAD
         "limits.footprint_max_mm",
         "larger side of the rectangle that holds all coils",
     ),
@@ -161,6 +162,22 @@ const MEANINGS: &[(&str, &str)] = &[
     (
         "limits.array_settling_max_ms",
         "five time constants of the slowest coil among its neighbours",
+=======
+        "uncertainty.sensor_mm",
+        "how far the magnet may be from where it is measured, along each axis",
+    ),
+    (
+        "uncertainty.tilt_deg",
+        "how far the finger may tilt the magnet, in any direction",
+    ),
+    (
+        "uncertainty.heat_c",
+        "how much warmer the magnet may become",
+    ),
+    (
+        "uncertainty.driver_percent",
+        "by how much each driver's current may be off",
+>>>>>>> vec
     ),
     (
         "target.height_mm",

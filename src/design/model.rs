@@ -6,6 +6,7 @@ use super::search::SearchSpace;
 use std::path::{Path, PathBuf};
 use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
 
+use fluxform_base::uncertainty::Uncertainty;
 use fluxform_numerics::axis::Axis;
 
 /// A validated design.
@@ -25,6 +26,8 @@ pub struct Design {
     pub magnet: Magnet,
     /// Current and voltage limits.
     pub supply: Supply,
+    /// What is not exactly known of the display in use.
+    pub uncertainty: Uncertainty,
     /// Limits that `evaluate` and `optimize` check.
     pub limits: Limits,
     /// Height of the magnet's centre above the winding's top face at the target, m.

@@ -87,6 +87,7 @@ impl Draft {
             magnet: magnet_m(&self.magnet),
             supply: supply_of(self.supply, coils),
             limits: self.limits,
+            uncertainty: self.uncertainty,
             target_height_m: m_from_mm(self.target_height.value),
             workspace: workspace_m(&self.workspace)?,
             search: self.search,

@@ -9,6 +9,7 @@ use super::model::{ArrayGrid, Coupling, Driver, MagnetModel, Polarity};
 use super::reader::{Located, Section};
 use super::rule::{BODY_MM, Bound, Rule, metres_below, slip};
 use super::values::OneOrMany;
+use fluxform_base::uncertainty::Uncertainty;
 use fluxform_base::units::{MU_0_T_M_PER_A, REFERENCE_TEMPERATURE_C, m_from_mm};
 use fluxform_numerics::axis::Axis;
 
@@ -362,6 +363,30 @@ pub fn supply(mut s: Section<'_>) -> SupplyDraft {
     }
     s.finish();
     draft
+}
+
+/// `[uncertainty]`.
+pub fn uncertainty(mut s: Section<'_>) -> Uncertainty {
+    let mut bound = |key, rule: Rule, most| {
+        let given = s.number(key, &rule.bound(Bound::Within(0.0, most)));
+        given.map_or(0.0, |bound| bound.value)
+    };
+    let uncertainty = Uncertainty {
+        sensor_m: m_from_mm(bound(
+            "sensor_mm",
+            OFFSET_MM,
+            1e3 * Uncertainty::MOST.sensor_m,
+        )),
+        tilt_deg: bound("tilt_deg", Rule::any("degrees"), Uncertainty::MOST.tilt_deg),
+        heat_c: bound("heat_c", Rule::any("C"), Uncertainty::MOST.heat_c),
+        driver: bound(
+            "driver_percent",
+            Rule::any("%"),
+            100.0 * Uncertainty::MOST.driver,
+        ) / 100.0,
+    };
+    s.finish();
+    uncertainty
 }
 
 /// Height of the magnet's centre, mm.

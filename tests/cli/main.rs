@@ -22,6 +22,7 @@ mod steel;
 mod streams;
 mod surfaces;
 mod sweep;
+mod uncertainty;
 mod verify;
 mod weights;
 
